@@ -1,0 +1,45 @@
+# Every developer command. CI calls the same ones.
+
+CARGO ?= cargo
+PYTHON ?= python3
+PEERS := benches/.venv/bin/python
+
+.PHONY: help demo test lint doc bench audit clean
+
+help: ## list these commands
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 10
+
+demo: ## encode and decode the built-in capture; results in cager-demo/
+	$(CARGO) run --release --locked --quiet --bin cager -- demo
+
+test: ## run every test
+	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
+		$(CARGO) nextest run --workspace --locked; \
+	else \
+		$(CARGO) test --workspace --locked --all-targets; \
+	fi
+	$(CARGO) test --workspace --locked --doc
+
+lint: ## formatting, clippy and documentation, all warnings denied
+	$(CARGO) fmt --all --check
+	$(CARGO) clippy --workspace --all-targets --locked -- -D warnings
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps --locked
+
+doc: ## build the API documentation
+	$(CARGO) doc --workspace --no-deps --locked
+
+bench: $(PEERS) ## measure the figures beside their peers: benches/results.json and the README's table
+	$(CARGO) build --release --locked --bin cager
+	$(PYTHON) benches/run.py
+
+$(PEERS): benches/peers/requirements.txt
+	$(PYTHON) -m venv benches/.venv
+	benches/.venv/bin/pip install --quiet --requirement benches/peers/requirements.txt
+	@touch $@
+
+audit: ## licences and advisories of all dependencies; needs cargo-deny and the network
+	$(CARGO) deny check
+
+clean: ## remove everything that was built
+	$(CARGO) clean
+	rm -rf benches/.venv cager-demo

@@ -1,0 +1,158 @@
+//! Times every step on a built-in capture and prints one JSON document; `benches/run.py` puts the peers beside it.
+//!
+//! `figures FOLDER` writes rest.obj, cage.obj and frames.npy there first, so that other programs measure the same data.
+//! `figures --growth POINTS CAGE_VERTICES` prepares once and prints times and sizes.
+
+use cager_core::cage::Cage;
+use cager_core::coordinates::{CoordinateSystem, MeanValue};
+use cager_core::inversion::{BATCH, Solver, SolverOptions};
+use cager_core::maxvol::{self, maxvol};
+use cager_core::mesh::{Model, Polygons};
+use cager_core::synthetic::{Capture, Options};
+use cager_formats::{FrameOptions, create_frames, write_model};
+use serde_json::{Value, json};
+use std::hint::black_box;
+use std::path::Path;
+use std::time::Instant;
+
+const POINTS: usize = 20_000;
+const FRAMES: usize = 499;
+const CAGE_VERTICES: usize = 330;
+const RUNS: usize = 9;
+
+fn main() -> anyhow::Result<()> {
+    // `cargo bench` adds --bench.
+    let args: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+    let value = match args.as_slice() {
+        [flag, points, vertices] if flag == "--growth" => growth(points.parse()?, vertices.parse()?)?,
+        [folder] => figures(Path::new(folder))?,
+        _ => anyhow::bail!("usage: figures FOLDER | figures --growth POINTS CAGE_VERTICES; `make bench` does it all"),
+    };
+    #[allow(clippy::print_stdout)]
+    {
+        println!("{value:#}");
+    }
+    Ok(())
+}
+
+/// Best and median seconds of several runs after one that is not counted.
+fn timed<T>(mut work: impl FnMut() -> T) -> Value {
+    black_box(work());
+    let mut seconds: Vec<f64> = (0..RUNS)
+        .map(|_| {
+            let clock = Instant::now();
+            black_box(work());
+            clock.elapsed().as_secs_f64()
+        })
+        .collect();
+    seconds.sort_by(f64::total_cmp);
+    json!({ "best": seconds[0], "median": seconds[RUNS / 2] })
+}
+
+fn per_frame(mut figure: Value, frames: usize) -> Value {
+    for key in ["best", "median"] {
+        let seconds = figure[key].as_f64().unwrap_or(f64::NAN);
+        figure[key] = json!(seconds / frames as f64);
+    }
+    figure
+}
+
+fn capture(points: usize, cage_vertices: usize) -> anyhow::Result<(Capture, Cage)> {
+    let capture = Capture::new(&Options { points, frames: FRAMES, cage_vertices });
+    let cage = Cage::new(capture.cage.clone())?;
+    Ok((capture, cage))
+}
+
+fn figures(folder: &Path) -> anyhow::Result<Value> {
+    let (capture, cage) = capture(POINTS, CAGE_VERTICES)?;
+    let points = &capture.rest.points;
+    let frames = write(&capture, &cage, folder)?;
+
+    let mvc = timed(|| MeanValue.coordinates(&cage, points));
+    let phi = MeanValue.coordinates(&cage, points).phi;
+    let handles = maxvol(phi.as_ref(), maxvol::TOLERANCE)?;
+    let maxvol_figure = timed(|| maxvol(phi.as_ref(), maxvol::TOLERANCE));
+    let m = phi.ncols();
+    let square = faer::Mat::from_fn(m, m, |i, j| phi[(handles.rows[i] as usize, j)]);
+    faer::set_global_parallelism(faer::Par::Seq);
+    let svd = timed(|| square.thin_svd());
+    let prepare = timed(|| Solver::prepare(&MeanValue, &cage, points, SolverOptions::default()));
+
+    let solver = Solver::prepare(&MeanValue, &cage, points, SolverOptions::default())?;
+    let batches: Vec<Vec<&[f32]>> = frames.chunks(BATCH).map(|b| b.iter().map(Vec::as_slice).collect()).collect();
+    let invert = timed(|| batches.iter().map(|b| solver.invert(b)).collect::<Vec<_>>());
+    let cages: Vec<Vec<Vec<f32>>> = batches.iter().map(|b| solver.invert(b)).collect();
+    let invert_measure = timed(|| {
+        for batch in &batches {
+            let cages = solver.invert(batch);
+            let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
+            black_box(solver.decoder().measure(&views, batch));
+        }
+    });
+    let mut out = vec![Vec::new(); BATCH];
+    let decode = timed(|| {
+        for batch in &cages {
+            let views: Vec<&[f32]> = batch.iter().map(Vec::as_slice).collect();
+            solver.decoder().decode(&views, &mut out[..views.len()]);
+        }
+    });
+    Ok(json!({
+        "points": points.len(),
+        "cage_vertices": cage.vertices().len(),
+        "cage_faces": cage.faces().len(),
+        "frames": frames.len(),
+        "threads": rayon::current_num_threads(),
+        "log_volume": handles.log_volume,
+        "swaps": handles.swaps,
+        "solver_bytes": solver.size_bytes(),
+        "seconds": {
+            "mvc": mvc,
+            "maxvol": maxvol_figure,
+            "svd": svd,
+            "prepare": prepare,
+            "invert_batched": per_frame(invert, frames.len()),
+            "invert_measure": per_frame(invert_measure, frames.len()),
+            "decode": per_frame(decode, frames.len()),
+        },
+    }))
+}
+
+/// Writes the capture for other programs; returns its frames as they read them.
+fn write(capture: &Capture, cage: &Cage, folder: &Path) -> anyhow::Result<Vec<Vec<f32>>> {
+    let mut faces = Polygons::new();
+    for triangle in &cage.mesh().triangles {
+        faces.push(triangle);
+    }
+    std::fs::create_dir_all(folder)?;
+    write_model(&folder.join("rest.obj"), &capture.rest)?;
+    write_model(&folder.join("cage.obj"), &Model { points: cage.vertices().to_vec(), faces })?;
+    let (n, count) = (capture.rest.points.len(), capture.frames());
+    let mut writer =
+        create_frames(folder.join("frames.npy"), n, count, &Polygons::new(), &FrameOptions::default())?;
+    let mut frame = Vec::new();
+    let mut frames = Vec::with_capacity(count);
+    for t in 0..count {
+        capture.frame(t, &mut frame);
+        frames.push(frame.iter().map(|&x| x as f32).collect::<Vec<f32>>());
+        writer.write_frame(&frames[t])?;
+    }
+    writer.finish()?;
+    Ok(frames)
+}
+
+fn growth(points: usize, cage_vertices: usize) -> anyhow::Result<Value> {
+    let (capture, cage) = capture(points, cage_vertices)?;
+    let clock = Instant::now();
+    let solver = Solver::prepare(&MeanValue, &cage, &capture.rest.points, SolverOptions::default())?;
+    let seconds = clock.elapsed().as_secs_f64();
+    let found = solver.preparation();
+    Ok(json!({
+        "points": capture.rest.points.len(),
+        "cage_vertices": cage.vertices().len(),
+        "seconds": seconds,
+        "coordinates_seconds": found.coordinates_seconds,
+        "maxvol_seconds": found.maxvol_seconds,
+        "svd_seconds": found.svd_seconds,
+        "solver_bytes": solver.size_bytes(),
+    }))
+}

@@ -1,0 +1,185 @@
+"""Measures this project beside its peers in one run: writes benches/results.json and the README's table.
+
+Standard library only. `make bench` builds everything and calls this.
+"""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+PEERS = os.path.join(ROOT, "benches", ".venv", "bin", "python")
+CAGER = os.path.join(ROOT, "target", "release", "cager")
+RESULTS = os.path.join(ROOT, "benches", "results.json")
+README = os.path.join(ROOT, "README.md")
+RUNS = 5
+
+
+def figures_program():
+    """The built benchmark, as cargo names it."""
+    command = ["cargo", "bench", "--locked", "--bench", "figures", "--no-run", "--message-format=json"]
+    for line in subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout.splitlines():
+        message = json.loads(line)
+        if message.get("executable") and message.get("target", {}).get("name") == "figures":
+            return message["executable"]
+    sys.exit("cargo built no benchmark named figures")
+
+
+def run_json(command):
+    return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout)
+
+
+def peak_bytes(command):
+    """Runs a command in a child of its own and returns its peak resident memory and its wall-clock seconds."""
+    read, write = os.pipe()
+    child = os.fork()
+    if child == 0:
+        begin = time.perf_counter()
+        done = subprocess.run(command, stdout=subprocess.DEVNULL)
+        peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024
+        os.write(write, json.dumps([done.returncode, peak, time.perf_counter() - begin]).encode())
+        os._exit(0)
+    os.close(write)
+    with os.fdopen(read) as pipe:
+        code, peak, seconds = json.loads(pipe.read())
+    os.waitpid(child, 0)
+    if code:
+        sys.exit(f"{' '.join(command)} failed")
+    return peak, seconds
+
+
+def wall(command):
+    """Best and median wall-clock seconds of a command."""
+    seconds = []
+    for _ in range(RUNS + 1):
+        begin = time.perf_counter()
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        seconds.append(time.perf_counter() - begin)
+    seconds = sorted(seconds[1:])
+    return {"best": seconds[0], "median": seconds[RUNS // 2]}
+
+
+def encode_command(folder, frames, output):
+    names = ["--rest", "rest.obj", "--cage", "cage.obj"]
+    names = [os.path.join(folder, n) if not n.startswith("--") else n for n in names]
+    return [CAGER, "encode", *names, "--frames", os.path.join(folder, frames), "-o", os.path.join(folder, output)]
+
+
+def measure():
+    program = figures_program()
+    with tempfile.TemporaryDirectory() as folder:
+        ours = run_json([program, folder])
+        arguments = [f"--{n}={os.path.join(folder, n + '.obj')}" for n in ("rest", "cage")]
+        arguments.append(f"--frames={os.path.join(folder, 'frames.npy')}")
+        peers = run_json([PEERS, os.path.join(ROOT, "benches", "peers", "peers.py"), *arguments, f"--runs={RUNS}"])
+
+        encode = encode_command(folder, "frames.npy", "capture.cager")
+        container = os.path.join(folder, "capture.cager")
+        ours["seconds"]["encode"] = wall(encode)
+        decode = [CAGER, "decode", container, "-o", os.path.join(folder, "decoded.npy")]
+        ours["seconds"]["decode_all"] = wall(decode)
+        ours["report"] = run_json([CAGER, "inspect", "--json", container])
+        for key in ("singular_values", "handle_indices", "sections"):
+            ours["report"].pop(key)
+        ours["report"]["error"].pop("per_frame")
+        few = os.path.join(folder, "few.npy")
+        truncate_npy(os.path.join(folder, "frames.npy"), few, 50)
+        memory = {
+            "encode_50_frames": peak_bytes(encode_command(folder, "few.npy", "few.cager"))[0],
+            "encode_499_frames": peak_bytes(encode)[0],
+        }
+    growth = []
+    for points, vertices in [(20_000, 330), (100_000, 330), (1_000_000, 330), (20_000, 1_000), (20_000, 2_000)]:
+        command = [program, "--growth", str(points), str(vertices)]
+        entry = run_json(command)
+        entry["peak_bytes"] = peak_bytes(command)[0]
+        growth.append(entry)
+    return {"ours": ours, "peers": peers, "memory": memory, "growth": growth}
+
+
+def truncate_npy(source, target, frames):
+    with open(source, "rb") as file:
+        head = file.read(10)
+        text = file.read(int.from_bytes(head[8:10], "little")).decode()
+        start = text.index("(") + 1
+        count, points = (int(x) for x in text[start:].split(",")[:2])
+        shorter = text.replace(f"({count}", f"({frames}", 1).rstrip("\n").ljust(len(text) - 1)[: len(text) - 1] + "\n"
+        with open(target, "wb") as out:
+            out.write(head + shorter.encode() + file.read(frames * points * 12))
+
+
+def seconds(value):
+    for unit, factor in (("s", 1), ("ms", 1e3), ("µs", 1e6)):
+        if value * factor >= 1 or unit == "µs":
+            return f"{value * factor:.3g} {unit}"
+    return ""
+
+
+def table(results):
+    ours, peers = results["ours"]["seconds"], results["peers"]["seconds"]
+    o, p = (lambda k: ours[k]["median"]), (lambda *k: nested(peers, k)["median"])
+    n, m = results["ours"]["points"], results["ours"]["cage_vertices"]
+    peer_sum = p("mvc") + p("maxvol_lapack") + p("svd")
+    rows = [
+        (f"mean value coordinates, {n:,} points, {m} vertices", o("mvc"), p("mvc"), "numpy, 2 threads", "0.08 s"),
+        ("maxvol to 1.01", o("maxvol"), p("maxvol_lapack"), "the algorithm on OpenBLAS", "0.10 s"),
+        (f"SVD {m} × {m}", o("svd"), p("svd"), "LAPACK", "12 ms"),
+        ("preparation in all", o("prepare"), peer_sum, "the three above", "0.20 s"),
+        ("inversion, per frame", o("invert_batched"), p("invert_batched"), "OpenBLAS, one product", "20 µs"),
+        ("inversion and error, per frame", o("invert_measure"), p("invert_measure", "batched"), "OpenBLAS, f64, batched", "0.3 ms"),
+        ("decoding, per frame", o("decode"), p("decode", "batched"), "OpenBLAS, f64, batched", "0.4 ms"),
+        (f"`cager encode`, {results['ours']['frames']} frames from .npy", o("encode"), p("pipeline"), "the steps above as a script", "1.0 s"),
+    ]
+    lines = ["| step | CageR | peer | ratio | target | peer is |", "|---|---|---|---|---|---|"]
+    for name, mine, theirs, who, target in rows:
+        lines.append(f"| {name} | {seconds(mine)} | {seconds(theirs)} | {theirs / mine:.1f} × | {target} | {who} |")
+    lines += ["", "| growth | preparation | peak memory | prepared solver |", "|---|---|---|---|"]
+    for g in results["growth"]:
+        lines.append(
+            f"| {g['points']:,} points, {g['cage_vertices']:,} vertices | {seconds(g['seconds'])} "
+            f"| {g['peak_bytes'] / 1e9:.2f} GB | {g['solver_bytes'] / 1e6:.0f} MB |"
+        )
+    memory, report = results["memory"], results["ours"]["report"]
+    lines += [
+        "",
+        f"Encoding 50 frames takes {memory['encode_50_frames'] / 1e6:.0f} MB of memory at its peak, {results['ours']['frames']} frames "
+        f"{memory['encode_499_frames'] / 1e6:.0f} MB. The capture of {report['bytes']['capture'] / 1e6:.1f} MB becomes "
+        f"{report['bytes']['output'] / 1e6:.2f} MB ({report['bytes']['ratio']:.0f} times smaller) at an L2 error of "
+        f"{100 * report['error']['l2_mean']:.3f} % of the diagonal.",
+        f"Medians on {results['ours']['threads']} threads; peers: numpy {results['peers']['versions']['numpy']}, "
+        f"scipy {results['peers']['versions']['scipy']}, OpenBLAS {results['peers']['versions']['blas']}, in the same run.",
+    ]
+    return "\n".join(lines)
+
+
+def nested(tree, keys):
+    for key in keys:
+        tree = tree[key]
+    return tree
+
+
+def put_into_readme(text):
+    begin, end = "<!-- figures: begin -->", "<!-- figures: end -->"
+    with open(README) as file:
+        readme = file.read()
+    head, rest = readme.split(begin)
+    _, tail = rest.split(end)
+    with open(README, "w") as file:
+        file.write(f"{head}{begin}\n{text}\n{end}{tail}")
+
+
+if __name__ == "__main__":
+    if "--table" in sys.argv:
+        with open(RESULTS) as file:
+            results = json.load(file)
+    else:
+        results = measure()
+        with open(RESULTS, "w") as file:
+            json.dump(results, file, indent=1)
+            file.write("\n")
+    put_into_readme(table(results))
+    print(table(results))

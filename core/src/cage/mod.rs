@@ -1,0 +1,72 @@
+//! A checked cage: closed, oriented outwards, with its edges.
+
+mod check;
+
+pub use check::CageError;
+
+use crate::mesh::{Point, TriMesh, diagonal};
+
+/// An edge of a cage, shared by exactly two faces.
+#[derive(Clone, Copy, Debug)]
+pub struct Edge {
+    /// Its ends, the smaller index first.
+    pub vertices: [u32; 2],
+}
+
+/// A face of a cage with its edges.
+#[derive(Clone, Copy, Debug)]
+pub struct Face {
+    /// Corners, counter-clockwise seen from outside.
+    pub vertices: [u32; 3],
+    /// `edges[i]` is the edge opposite corner i.
+    pub edges: [u32; 3],
+    /// +1 where the face runs along its edge from the smaller index to the larger, −1 where it runs back.
+    pub signs: [f64; 3],
+}
+
+/// A closed, outward-oriented triangle mesh around a model.
+#[derive(Clone, Debug)]
+pub struct Cage {
+    mesh: TriMesh,
+    edges: Vec<Edge>,
+    faces: Vec<Face>,
+    diagonal: f64,
+}
+
+impl Cage {
+    /// Checks a mesh and takes it as a cage.
+    ///
+    /// # Errors
+    /// What makes the mesh unusable: see [`CageError`].
+    pub fn new(mesh: TriMesh) -> Result<Self, CageError> {
+        let (edges, faces) = check::connect(&mesh)?;
+        check::check_orientation(&mesh, &faces, edges.len())?;
+        let diagonal = diagonal(&mesh.vertices);
+        Ok(Self { mesh, edges, faces, diagonal })
+    }
+
+    /// Vertices, v × 3.
+    pub fn vertices(&self) -> &[Point] {
+        &self.mesh.vertices
+    }
+
+    /// The mesh as it was given.
+    pub fn mesh(&self) -> &TriMesh {
+        &self.mesh
+    }
+
+    /// Edges, in the order their first face names them.
+    pub fn edges(&self) -> &[Edge] {
+        &self.edges
+    }
+
+    /// Faces with their edges, in the mesh's order.
+    pub fn faces(&self) -> &[Face] {
+        &self.faces
+    }
+
+    /// Diagonal of the bounding box.
+    pub fn diagonal(&self) -> f64 {
+        self.diagonal
+    }
+}

@@ -1,0 +1,255 @@
+//! Mean value coordinates of a closed triangle mesh (Ju, Schaefer and Warren 2005), in mean-vector form.
+//!
+//! Seen from a point `x`, a face covers a spherical triangle with corners `u_i`, the unit vectors from `x` to its vertices.
+//! Its mean vector is `m = ½ Σ θ_i n_i` over its three edges: `θ_i` the angle an edge is seen under and `n_i` the unit
+//! normal of the plane through `x` and the edge. The weights are the solution of `Σ w_i d_i u_i = m`. Each edge term enters
+//! two faces with opposite signs, so the mean vectors of a closed cage add up to zero whatever the rounding of the terms, and
+//! affine reproduction depends only on the three-by-three solves.
+
+use super::{CoordinateSystem, Coordinates, thin};
+use crate::cage::Cage;
+use crate::mesh::{self, Point};
+use crate::simd::{LANES, Lanes, angle, cross, dot, multiversion};
+use faer::{Mat, MatMut};
+use rayon::prelude::*;
+
+/// Mean value coordinates: one unknown per cage vertex, defined inside and outside the cage.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct MeanValue;
+
+/// Closer to a vertex than this fraction of the cage's diagonal, a point has the coordinates of the vertex.
+const VERTEX_TOLERANCE: f64 = 1e-13;
+/// An edge seen under an angle whose sine is below this, from between its ends, holds the point. The snap moves
+/// reproduction by at most a quarter of this times the edge's length.
+const EDGE_TOLERANCE: f64 = 1e-11;
+/// Faces with a determinant below this fraction of their widest edge need the cancellation-free weights.
+const THIN: f64 = 1e-5;
+/// Points one parallel task computes: a few lane groups.
+const TASK_POINTS: usize = 8 * LANES;
+
+impl CoordinateSystem for MeanValue {
+    fn name(&self) -> &'static str {
+        "mvc"
+    }
+
+    fn unknowns(&self, cage: &Cage) -> usize {
+        cage.vertices().len()
+    }
+
+    fn rest_unknowns(&self, cage: &Cage) -> Vec<Point> {
+        cage.vertices().to_vec()
+    }
+
+    fn coordinates(&self, cage: &Cage, points: &[Point]) -> Coordinates {
+        let mut phi = Mat::zeros(points.len(), self.unknowns(cage));
+        let outside = phi
+            .as_mut()
+            .par_row_chunks_mut(TASK_POINTS)
+            .enumerate()
+            .map_init(
+                || Scratch::new(cage),
+                |scratch, (task, rows)| task_coordinates(cage, points, task * TASK_POINTS, rows, scratch),
+            )
+            .reduce(Vec::new, |mut a, b| {
+                a.extend(b);
+                a
+            });
+        Coordinates { phi, outside }
+    }
+}
+
+/// Working memory of one task; every entry holds one lane group.
+struct Scratch {
+    /// Unit vectors from the points to each cage vertex.
+    directions: Vec<[Lanes; 3]>,
+    /// Reciprocal distances to each cage vertex.
+    nearness: Vec<Lanes>,
+    /// Per edge: half mean-vector term `½ θ n`, and the factor that turns it into `u_a × u_b`.
+    edges: Vec<[Lanes; 4]>,
+    weights: Vec<Lanes>,
+}
+
+impl Scratch {
+    fn new(cage: &Cage) -> Self {
+        let m = cage.vertices().len();
+        Self {
+            directions: vec![[Lanes::ZERO; 3]; m],
+            nearness: vec![Lanes::ZERO; m],
+            edges: vec![[Lanes::ZERO; 4]; cage.edges().len()],
+            weights: vec![Lanes::ZERO; m],
+        }
+    }
+}
+
+/// Fills `rows`, the coordinates of the points from `first` on, and returns those points that lie outside.
+fn task_coordinates(
+    cage: &Cage,
+    points: &[Point],
+    first: usize,
+    mut rows: MatMut<'_, f64>,
+    scratch: &mut Scratch,
+) -> Vec<u32> {
+    let mut outside = Vec::new();
+    let count = rows.nrows();
+    let mut start = 0;
+    while start < count {
+        let filled = LANES.min(count - start);
+        // A last, partly filled group repeats its last point.
+        let at = |l: usize| points[first + start + l.min(filled - 1)];
+        let mut x = [Lanes::ZERO; 3];
+        for l in 0..LANES {
+            for k in 0..3 {
+                x[k].0[l] = at(l)[k];
+            }
+        }
+        let (total, on) = group_weights(cage, x, scratch);
+        let scale = total.map(|t| 1.0 / t);
+        for (j, &weight) in scratch.weights.iter().enumerate() {
+            let values = (weight * scale).0;
+            for l in 0..filled {
+                rows[(start + l, j)] = values[l];
+            }
+        }
+        for l in 0..filled {
+            match on[l] {
+                On::Nothing if total.0[l] <= 0.0 => outside.push((first + start + l) as u32),
+                On::Nothing => {}
+                On::Vertex(vertex) => set_row(&mut rows, start + l, &[(vertex, 1.0)]),
+                On::Edge(edge) => {
+                    let [a, b] = cage.edges()[edge].vertices;
+                    let (da, db) =
+                        (distance(at(l), cage.vertices()[a as usize]), distance(at(l), cage.vertices()[b as usize]));
+                    set_row(&mut rows, start + l, &[(a as usize, db / (da + db)), (b as usize, da / (da + db))]);
+                }
+            }
+        }
+        start += filled;
+    }
+    outside
+}
+
+/// What of the cage a point lies on, where the weights have no finite limit.
+#[derive(Clone, Copy)]
+enum On {
+    Nothing,
+    Vertex(usize),
+    Edge(usize),
+}
+
+fn set_row(rows: &mut MatMut<'_, f64>, row: usize, entries: &[(usize, f64)]) {
+    for j in 0..rows.ncols() {
+        rows[(row, j)] = 0.0;
+    }
+    for &(j, value) in entries {
+        rows[(row, j)] = value;
+    }
+}
+
+fn distance(a: Point, b: Point) -> f64 {
+    mesh::norm([a[0] - b[0], a[1] - b[1], a[2] - b[2]])
+}
+
+multiversion! {
+    /// Unnormalised weights of one lane group, left in the scratch; returns their sums.
+    fn group_weights(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> (Lanes, [On; LANES]) = group_weights_generic;
+}
+
+#[inline(always)]
+fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> (Lanes, [On; LANES]) {
+    let mut on = [On::Nothing; LANES];
+    let near_vertex = VERTEX_TOLERANCE * cage.diagonal();
+    for (j, v) in cage.vertices().iter().enumerate() {
+        let r = [Lanes::splat(v[0]) - x[0], Lanes::splat(v[1]) - x[1], Lanes::splat(v[2]) - x[2]];
+        let d = dot(r, r).sqrt();
+        let inverse = d.map(|d| 1.0 / d);
+        scratch.nearness[j] = inverse;
+        scratch.directions[j] = [r[0] * inverse, r[1] * inverse, r[2] * inverse];
+        scratch.weights[j] = Lanes::ZERO;
+        if d.any(d, |d, _| d <= near_vertex) {
+            for l in 0..LANES {
+                if d.0[l] <= near_vertex {
+                    on[l] = On::Vertex(j);
+                }
+            }
+        }
+    }
+    for (k, edge) in cage.edges().iter().enumerate() {
+        let a = scratch.directions[edge.vertices[0] as usize];
+        let b = scratch.directions[edge.vertices[1] as usize];
+        let c = cross(a, b);
+        let s2 = dot(c, c);
+        let s = s2.sqrt();
+        let t = dot(a, b);
+        let theta = angle(s, t);
+        let inverse = (theta * s).map(|p| if p > 0.0 { 1.0 / p } else { 0.0 });
+        let degenerate = inverse.map(|i| if i > 0.0 { 0.0 } else { 1.0 });
+        let half = theta * theta * inverse * 0.5 + degenerate * 0.5;
+        let back = s2 * inverse * 2.0 + degenerate * 2.0;
+        scratch.edges[k] = [c[0] * half, c[1] * half, c[2] * half, back];
+        if s.any(t, |s, t| (s < EDGE_TOLERANCE) & (t < 0.0)) {
+            for l in 0..LANES {
+                if s.0[l] < EDGE_TOLERANCE && t.0[l] < 0.0 && matches!(on[l], On::Nothing) {
+                    on[l] = On::Edge(k);
+                }
+            }
+        }
+    }
+    for face in cage.faces() {
+        let term = |i: usize| {
+            let [x, y, z, back] = scratch.edges[face.edges[i] as usize];
+            let sign = face.signs[i];
+            ([x * sign, y * sign, z * sign], back)
+        };
+        let (g0, back0) = term(0);
+        let (g1, back1) = term(1);
+        let (g2, back2) = term(2);
+        let m = [g0[0] + g1[0] + g2[0], g0[1] + g1[1] + g2[1], g0[2] + g1[2] + g2[2]];
+        let [v0, v1, v2] = face.vertices.map(|v| v as usize);
+        let det = dot(scratch.directions[v0], g0) * back0;
+        let inverse = det.map(|d| 1.0 / d);
+        let mut w = [dot(m, g0) * back0 * inverse, dot(m, g1) * back1 * inverse, dot(m, g2) * back2 * inverse];
+        let width2 = dot(g0, g0) + dot(g1, g1);
+        if det.any(width2, |d, q| d * d <= THIN * THIN * q) {
+            mend_thin(scratch, [v0, v1, v2], det, width2, m, &mut w);
+        }
+        scratch.weights[v0] = scratch.weights[v0] + w[0];
+        scratch.weights[v1] = scratch.weights[v1] + w[1];
+        scratch.weights[v2] = scratch.weights[v2] + w[2];
+    }
+    let mut total = Lanes::ZERO;
+    for (weight, &nearness) in scratch.weights.iter_mut().zip(&scratch.nearness) {
+        *weight = *weight * nearness;
+        total = total + *weight;
+    }
+    (total, on)
+}
+
+/// Replaces the weights of those lanes whose point lies nearly in the plane of the face.
+#[cold]
+#[inline(never)]
+fn mend_thin(scratch: &Scratch, vertices: [usize; 3], det: Lanes, width2: Lanes, m: [Lanes; 3], w: &mut [Lanes; 3]) {
+    for l in 0..LANES {
+        let d = det.0[l];
+        if d * d > THIN * THIN * width2.0[l] {
+            continue;
+        }
+        let mean = [m[0].0[l], m[1].0[l], m[2].0[l]];
+        let seen = mesh::norm(mean);
+        let u = vertices.map(|v| scratch.directions[v].map(|c| c.0[l]));
+        let mended = if seen < 0.1 {
+            let distances = vertices.map(|v| 1.0 / scratch.nearness[v].0[l]);
+            thin::flat_weights(u, d).or_else(|| (seen < 1e-8).then(|| thin::sliver_weights(u, distances, d)))
+        } else if d == 0.0 {
+            // On the face itself: only the ratios of the weights count.
+            const HUGE: f64 = 1e200;
+            Some([0, 1, 2].map(|i| HUGE * mesh::dot(mean, mesh::cross(u[(i + 1) % 3], u[(i + 2) % 3]))))
+        } else {
+            None
+        };
+        if let Some(mended) = mended {
+            for i in 0..3 {
+                w[i].0[l] = mended[i];
+            }
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! The few dense factorisations the method needs, on top of faer.
+//!
+//! Everything here runs sequentially unless it says otherwise: singular vectors of a parallel run differ in their last bits.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::matmul::matmul;
+use faer::linalg::{cholesky, lu, svd};
+use faer::{Accum, Mat, MatMut, MatRef, Par};
+
+/// Pivoted rows of a tall matrix.
+pub(crate) struct PivotedRows {
+    /// Rows in pivot order, one per column.
+    pub(crate) rows: Vec<u32>,
+    /// Smallest pivot relative to the largest, both absolute; NaN where a column vanished.
+    pub(crate) smallest: f64,
+}
+
+/// LU with partial pivoting of an n × m matrix, n ≥ m, done in place; keeps which rows were picked. Uses the rayon pool: its
+/// result is the same bits for any number of threads.
+pub(crate) fn pivoted_rows<T: faer::traits::RealField + Copy + Into<f64>>(mut a: Mat<T>) -> PivotedRows {
+    let (n, m) = a.shape();
+    let mut forward = vec![0usize; n];
+    let mut backward = vec![0usize; n];
+    let par = Par::rayon(0);
+    let mut memory =
+        MemBuffer::new(lu::partial_pivoting::factor::lu_in_place_scratch::<usize, T>(n, m, par, Default::default()));
+    lu::partial_pivoting::factor::lu_in_place(
+        a.as_mut(),
+        &mut forward,
+        &mut backward,
+        par,
+        MemStack::new(&mut memory),
+        Default::default(),
+    );
+    let pivots: Vec<f64> = (0..m).map(|j| Into::<f64>::into(a[(j, j)]).abs()).collect();
+    let smallest = pivots.iter().fold(f64::INFINITY, |low, &p| if p < low { p } else { low });
+    let largest = pivots.iter().copied().fold(0.0, f64::max);
+    let smallest = if pivots.iter().any(|p| p.is_nan()) { f64::NAN } else { smallest / largest };
+    PivotedRows { rows: forward[..m].iter().map(|&r| r as u32).collect(), smallest }
+}
+
+/// Inverse of a square matrix, and the natural logarithm of its absolute determinant.
+pub(crate) fn inverse(a: MatRef<'_, f64>) -> (Mat<f64>, f64) {
+    let m = a.nrows();
+    let mut factors = a.to_owned();
+    let mut forward = vec![0usize; m];
+    let mut backward = vec![0usize; m];
+    let mut memory = MemBuffer::new(lu::partial_pivoting::factor::lu_in_place_scratch::<usize, f64>(
+        m,
+        m,
+        Par::Seq,
+        Default::default(),
+    ));
+    let (_, permutation) = lu::partial_pivoting::factor::lu_in_place(
+        factors.as_mut(),
+        &mut forward,
+        &mut backward,
+        Par::Seq,
+        MemStack::new(&mut memory),
+        Default::default(),
+    );
+    let log_volume = (0..m).map(|j| factors[(j, j)].abs().ln()).sum();
+    let mut result = Mat::zeros(m, m);
+    let mut memory = MemBuffer::new(lu::partial_pivoting::inverse::inverse_scratch::<usize, f64>(m, Par::Seq));
+    lu::partial_pivoting::inverse::inverse(
+        result.as_mut(),
+        factors.as_ref(),
+        factors.as_ref(),
+        permutation,
+        Par::Seq,
+        MemStack::new(&mut memory),
+    );
+    (result, log_volume)
+}
+
+/// `A = U Σ Vᵀ` of a K × m matrix: thin U, K × min(K, m); Σ descending; full V, m × m.
+pub(crate) struct Svd {
+    pub(crate) u: Mat<f64>,
+    pub(crate) sigma: Vec<f64>,
+    pub(crate) v: Mat<f64>,
+}
+
+/// Singular value decomposition; `None` where it does not converge, which only non-finite entries are known to cause.
+pub(crate) fn svd(a: MatRef<'_, f64>) -> Option<Svd> {
+    let (k, m) = a.shape();
+    let size = k.min(m);
+    let (mut u, mut v) = (Mat::zeros(k, size), Mat::zeros(m, m));
+    let mut s = faer::diag::Diag::zeros(size);
+    let want_v = if m > size { svd::ComputeSvdVectors::Full } else { svd::ComputeSvdVectors::Thin };
+    // faer takes both sets of vectors thin or both full.
+    if m > size {
+        let mut full_u = Mat::zeros(k, k);
+        let mut memory = MemBuffer::new(svd::svd_scratch::<f64>(k, m, want_v, want_v, Par::Seq, Default::default()));
+        svd::svd(
+            a,
+            s.as_mut(),
+            Some(full_u.as_mut()),
+            Some(v.as_mut()),
+            Par::Seq,
+            MemStack::new(&mut memory),
+            Default::default(),
+        )
+        .ok()?;
+        u = full_u;
+    } else {
+        let mut memory = MemBuffer::new(svd::svd_scratch::<f64>(k, m, want_v, want_v, Par::Seq, Default::default()));
+        svd::svd(
+            a,
+            s.as_mut(),
+            Some(u.as_mut()),
+            Some(v.as_mut()),
+            Par::Seq,
+            MemStack::new(&mut memory),
+            Default::default(),
+        )
+        .ok()?;
+    }
+    Some(Svd { u, sigma: s.column_vector().iter().copied().collect(), v })
+}
+
+/// Singular values and right singular vectors of a tall matrix, through its QR factorisation.
+pub(crate) fn right_singular(mut a: Mat<f64>) -> Option<Svd> {
+    use faer::linalg::qr::no_pivoting::factor;
+    let (n, m) = a.shape();
+    let block = factor::recommended_block_size::<f64>(n, m);
+    let mut reflectors = Mat::zeros(block, m);
+    let mut memory = MemBuffer::new(factor::qr_in_place_scratch::<f64>(n, m, block, Par::Seq, Default::default()));
+    factor::qr_in_place(a.as_mut(), reflectors.as_mut(), Par::Seq, MemStack::new(&mut memory), Default::default());
+    svd(Mat::from_fn(m, m, |i, j| if i <= j { a[(i, j)] } else { 0.0 }).as_ref())
+}
+
+/// Singular values alone, descending.
+pub(crate) fn singular_values(a: MatRef<'_, f64>) -> Option<Vec<f64>> {
+    let (k, m) = a.shape();
+    let mut s = faer::diag::Diag::zeros(k.min(m));
+    let none = svd::ComputeSvdVectors::No;
+    let mut memory = MemBuffer::new(svd::svd_scratch::<f64>(k, m, none, none, Par::Seq, Default::default()));
+    svd::svd(a, s.as_mut(), None, None, Par::Seq, MemStack::new(&mut memory), Default::default()).ok()?;
+    Some(s.column_vector().iter().copied().collect())
+}
+
+/// Lower Cholesky factor in place of a symmetric positive definite matrix, zeros above; `None` where it is not definite.
+pub(crate) fn cholesky(mut a: Mat<f64>) -> Option<Mat<f64>> {
+    let n = a.nrows();
+    let mut memory =
+        MemBuffer::new(cholesky::llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default()));
+    cholesky::llt::factor::cholesky_in_place(
+        a.as_mut(),
+        Default::default(),
+        Par::Seq,
+        MemStack::new(&mut memory),
+        Default::default(),
+    )
+    .ok()?;
+    for j in 1..n {
+        for i in 0..j {
+            a[(i, j)] = 0.0;
+        }
+    }
+    Some(a)
+}
+
+/// Solves `A X = B` for symmetric positive definite A. `None` where A is not definite.
+pub(crate) fn solve_definite(a: Mat<f64>, mut b: Mat<f64>) -> Option<Mat<f64>> {
+    let l = cholesky(a)?;
+    faer::linalg::triangular_solve::solve_lower_triangular_in_place(l.as_ref(), b.as_mut(), Par::Seq);
+    faer::linalg::triangular_solve::solve_upper_triangular_in_place(l.transpose(), b.as_mut(), Par::Seq);
+    Some(b)
+}
+
+/// `A · B`, sequentially.
+pub(crate) fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
+    let mut out = Mat::zeros(a.nrows(), b.ncols());
+    multiply(out.as_mut(), a, b);
+    out
+}
+
+/// `out = A · B`, sequentially.
+pub(crate) fn multiply<T: faer::traits::ComplexField>(out: MatMut<'_, T>, a: MatRef<'_, T>, b: MatRef<'_, T>) {
+    matmul(out, Accum::Replace, a, b, faer::traits::math_utils::one(), Par::Seq);
+}
+
+/// The given rows of a matrix, in the given order.
+pub(crate) fn rows_of(a: MatRef<'_, f64>, rows: &[u32]) -> Mat<f64> {
+    Mat::from_fn(rows.len(), a.ncols(), |i, j| a[(rows[i] as usize, j)])
+}

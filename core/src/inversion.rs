@@ -1,0 +1,361 @@
+//! The solver: prepared once for a rest pose and its cage, then one matrix product per batch of frames.
+
+use crate::cage::Cage;
+use crate::coordinates::CoordinateSystem;
+use crate::decode::Decoder;
+use crate::dense::{self, Svd};
+use crate::mesh::{Point, diagonal, distance_to_surface};
+use crate::regularize::{Regularizer, Spectrum, cage_laplacian, spectral_map};
+use crate::spectrum::{RowBasis, row_basis};
+use faer::reborrow::Reborrow;
+use faer::{Accum, Mat, MatRef, Par};
+use rayon::prelude::*;
+use std::time::Instant;
+
+/// Frames of one matrix product. Shorter batches are padded, so that a frame's bits never depend on its company.
+pub const BATCH: usize = 16;
+/// Rows of one block where a tall matrix is multiplied in blocks.
+const BLOCK_ROWS: usize = 1024;
+
+/// Which points the inversion reads.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Handles {
+    /// As many as unknowns, of maximum volume: stable, and a frame costs microseconds.
+    #[default]
+    MaxVol,
+    /// Every point: least squares, the lowest error.
+    All,
+}
+
+impl Handles {
+    /// The name on the command line, in reports and in containers.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::MaxVol => "maxvol",
+            Self::All => "all",
+        }
+    }
+}
+
+/// Choices for a solver.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolverOptions {
+    /// Points read.
+    pub handles: Handles,
+    /// Treatment of the unstable end of the spectrum.
+    pub regularizer: Regularizer,
+    /// Spectrum threshold s: how many of the last singular directions are regularised.
+    pub spectrum: usize,
+    /// Weight λ of the regularisation; α for Tikhonov.
+    pub lambda: f64,
+}
+
+impl Default for SolverOptions {
+    fn default() -> Self {
+        Self { handles: Handles::MaxVol, regularizer: Regularizer::Laplacian, spectrum: 20, lambda: 1.0 }
+    }
+}
+
+/// Why a solver cannot be prepared.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PrepareError {
+    /// NaN or infinity in the rest pose.
+    #[error("rest point {point} is not finite; export the rest pose again")]
+    NotFinite {
+        /// The point, counted from 0.
+        point: usize,
+    },
+    /// The system is underdetermined.
+    #[error(
+        "the rest pose has {points} points, fewer than the {unknowns} unknowns of the cage; use a coarser cage or a denser model"
+    )]
+    TooFewPoints {
+        /// Number of points n.
+        points: usize,
+        /// Number of unknowns m.
+        unknowns: usize,
+    },
+    /// All points coincide.
+    #[error("all rest points are at the same place, so errors have no scale; check the rest pose")]
+    NoExtent,
+    /// s > m.
+    #[error("the spectrum threshold {spectrum} exceeds the {unknowns} unknowns of the cage; give at most {unknowns}")]
+    SpectrumTooLarge {
+        /// The threshold s.
+        spectrum: usize,
+        /// Number of unknowns m.
+        unknowns: usize,
+    },
+    /// λ is negative or not finite.
+    #[error("the weight lambda is {lambda}; give a finite number of at least 0")]
+    BadLambda {
+        /// The weight λ.
+        lambda: f64,
+    },
+    /// A factorisation failed.
+    #[error("the {what} did not succeed; check that the rest pose lies near its cage, in the same unit")]
+    NoSolution {
+        /// Which factorisation.
+        what: &'static str,
+    },
+}
+
+/// What preparing found out.
+#[derive(Clone, Debug, Default)]
+pub struct Preparation {
+    /// Numerical rank of `Φ`, at most m.
+    pub rank: usize,
+    /// `max_i |Φ C_R − P_R|_i` over the rest diagonal.
+    pub affine_reproduction_error: f64,
+    /// Condition number of `Φ`, over its rank.
+    pub condition_full: f64,
+    /// Condition number of `Φ□`, over its rank.
+    pub condition_handles: f64,
+    /// Singular values of the inverted matrix, descending: `Φ□`, or `Φ` where every point is read.
+    pub singular_values: Vec<f64>,
+    /// Swaps of maxvol after its start.
+    pub swaps: usize,
+    /// `ln |det Φ□|`.
+    pub log_volume: f64,
+    /// Largest `|B_ij|` after the last swap.
+    pub max_entry: f64,
+    /// Points outside the cage, ascending.
+    pub outside: Vec<u32>,
+    /// Largest distance of those to the cage, over the rest diagonal.
+    pub outside_distance: f64,
+    /// Seconds for the coordinates.
+    pub coordinates_seconds: f64,
+    /// Seconds for maxvol.
+    pub maxvol_seconds: f64,
+    /// Seconds for singular values, regularisation and the operator.
+    pub svd_seconds: f64,
+}
+
+/// A prepared inversion: `C_t = R · H_t`.
+#[derive(Clone, Debug)]
+pub struct Solver {
+    handles: Vec<u32>,
+    reads_all: bool,
+    /// `Rᵀ`, K × m, column-major: one row per point read.
+    operator: Mat<f64>,
+    decoder: Decoder,
+    diagonal: f64,
+    preparation: Preparation,
+}
+
+impl Solver {
+    /// Computes coordinates, handles, spectrum and operator. Runs on the current rayon pool; its result does not depend on it.
+    ///
+    /// # Errors
+    /// See [`PrepareError`].
+    pub fn prepare(
+        system: &dyn CoordinateSystem,
+        cage: &Cage,
+        points: &[Point],
+        options: SolverOptions,
+    ) -> Result<Self, PrepareError> {
+        let m = system.unknowns(cage);
+        check(points, m, options)?;
+        let diagonal = diagonal(points);
+        let clock = Instant::now();
+        let coordinates = system.coordinates(cage, points);
+        let phi = coordinates.phi.as_ref();
+        let mut preparation = Preparation {
+            affine_reproduction_error: reproduction_error(phi, &system.rest_unknowns(cage), points) / diagonal,
+            outside_distance: coordinates
+                .outside
+                .par_iter()
+                .map(|&i| distance_to_surface(cage.vertices(), &cage.mesh().triangles, points[i as usize]))
+                .reduce(|| 0.0, f64::max)
+                / diagonal,
+            outside: coordinates.outside,
+            coordinates_seconds: clock.elapsed().as_secs_f64(),
+            ..Preparation::default()
+        };
+
+        let clock = Instant::now();
+        let basis = row_basis(phi).ok_or(PrepareError::NoSolution { what: "choice of handles" })?;
+        preparation.rank = basis.rank;
+        preparation.swaps = basis.handles.swaps;
+        preparation.log_volume = basis.handles.log_volume;
+        preparation.max_entry = basis.handles.max_entry;
+        preparation.maxvol_seconds = clock.elapsed().as_secs_f64();
+
+        let clock = Instant::now();
+        let delta = cage_laplacian(cage);
+        let operator = operator(phi, &basis, delta.as_ref(), options, &mut preparation)?;
+        let operator = keep_translations(operator, cage.vertices().len());
+        preparation.svd_seconds = clock.elapsed().as_secs_f64();
+
+        let clock = Instant::now();
+        let decoder = Decoder::new(phi, cage.vertices().len());
+        preparation.coordinates_seconds += clock.elapsed().as_secs_f64();
+        Ok(Self {
+            handles: basis.handles.rows,
+            reads_all: options.handles == Handles::All,
+            operator,
+            decoder,
+            diagonal,
+            preparation,
+        })
+    }
+
+    /// What preparing found out.
+    pub fn preparation(&self) -> &Preparation {
+        &self.preparation
+    }
+
+    /// Rows of maximum volume. With [`Handles::All`] they only condition the solve, and every point is read.
+    pub fn handles(&self) -> &[u32] {
+        &self.handles
+    }
+
+    /// Diagonal of the rest pose's bounding box: the unit of errors.
+    pub fn diagonal(&self) -> f64 {
+        self.diagonal
+    }
+
+    /// Cages back to positions.
+    pub fn decoder(&self) -> &Decoder {
+        &self.decoder
+    }
+
+    /// Bytes the prepared solver holds.
+    pub fn size_bytes(&self) -> usize {
+        let phi = self.decoder.coordinates();
+        4 * phi.nrows() * phi.ncols() + 8 * self.operator.nrows() * self.operator.ncols() + 4 * self.handles.len()
+    }
+
+    /// Cages, each m × 3 interleaved, of up to [`BATCH`] frames, each n × 3 interleaved.
+    ///
+    /// The bits of a cage depend on its frame alone, not on the other frames of the batch.
+    ///
+    /// # Panics
+    /// Where a frame's length does not fit, or more frames come than a batch holds.
+    pub fn invert<T: Copy + Into<f64>>(&self, frames: &[&[T]]) -> Vec<Vec<f32>> {
+        assert!(frames.len() <= BATCH, "at most {BATCH} frames in a batch");
+        assert!(frames.iter().all(|f| f.len() == 3 * self.decoder.points()), "every frame has every point");
+        let (columns, m) = self.operator.shape();
+        let mut cages = Mat::<f64>::zeros(m, 3 * BATCH);
+        let mut block = Mat::<f64>::zeros(BLOCK_ROWS.min(columns), 3 * BATCH);
+        let mut first = 0;
+        while first < columns {
+            let rows = BLOCK_ROWS.min(columns - first);
+            for (f, frame) in frames.iter().enumerate() {
+                for i in 0..rows {
+                    let point = if self.reads_all { first + i } else { self.handles[first + i] as usize };
+                    for k in 0..3 {
+                        block[(i, 3 * f + k)] = frame[3 * point + k].into();
+                    }
+                }
+            }
+            faer::linalg::matmul::matmul(
+                cages.as_mut(),
+                if first == 0 { Accum::Replace } else { Accum::Add },
+                self.operator.as_ref().subrows(first, rows).transpose(),
+                block.as_ref().subrows(0, rows),
+                1.0,
+                Par::Seq,
+            );
+            first += rows;
+        }
+        (0..frames.len())
+            .map(|f| (0..m).flat_map(|j| [0, 1, 2].map(|k| cages[(j, 3 * f + k)] as f32)).collect())
+            .collect()
+    }
+}
+
+fn check(points: &[Point], unknowns: usize, options: SolverOptions) -> Result<(), PrepareError> {
+    if let Some(point) = points.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
+        return Err(PrepareError::NotFinite { point });
+    }
+    if points.len() < unknowns {
+        return Err(PrepareError::TooFewPoints { points: points.len(), unknowns });
+    }
+    if !(diagonal(points) > 0.0) {
+        return Err(PrepareError::NoExtent);
+    }
+    if options.spectrum > unknowns {
+        return Err(PrepareError::SpectrumTooLarge { spectrum: options.spectrum, unknowns });
+    }
+    if !(options.lambda.is_finite() && options.lambda >= 0.0) {
+        return Err(PrepareError::BadLambda { lambda: options.lambda });
+    }
+    Ok(())
+}
+
+/// The whole inversion as one matrix, transposed: r × m for handles of maximum volume, n × m for all points.
+fn operator(
+    phi: MatRef<'_, f64>,
+    basis: &RowBasis,
+    delta: MatRef<'_, f64>,
+    options: SolverOptions,
+    preparation: &mut Preparation,
+) -> Result<Mat<f64>, PrepareError> {
+    let failed = |what| PrepareError::NoSolution { what };
+    let rank = basis.rank;
+    let (handles, full) = rayon::join(
+        || dense::svd(basis.square.as_ref()),
+        || {
+            let compressed = basis.compressed()?;
+            match options.handles {
+                Handles::MaxVol => Some((dense::singular_values(compressed.as_ref())?, None)),
+                Handles::All => dense::svd(compressed.as_ref()).map(|svd| (svd.sigma.clone(), Some(svd))),
+            }
+        },
+    );
+    let handles = handles.ok_or(failed("singular value decomposition of the handles"))?;
+    let (full_sigma, full) = full.ok_or(failed("singular value decomposition of the coordinates"))?;
+    preparation.condition_handles = handles.sigma[0] / handles.sigma[rank - 1];
+    preparation.condition_full = full_sigma[0] / full_sigma[rank - 1];
+    let Svd { u, sigma, v } = full.unwrap_or(handles);
+    let spectrum = Spectrum { sigma: &sigma[..rank], v: v.as_ref(), delta };
+    let map = spectral_map(&spectrum, options.regularizer, options.spectrum, options.lambda)
+        .ok_or(failed("regularised solve"))?;
+    preparation.singular_values = sigma;
+    let mut inverse = dense::product(u.as_ref(), dense::product(v.as_ref(), map.as_ref()).transpose());
+    if options.handles == Handles::MaxVol {
+        return Ok(inverse);
+    }
+    // Φ = B Φ□ and BᵀB = RᵀR: the left singular vectors of Φ are B R⁻¹ U.
+    let factor = basis.gram_factor().ok_or(failed("factorisation of the handles"))?;
+    faer::linalg::triangular_solve::solve_upper_triangular_in_place(factor.as_ref(), inverse.as_mut(), Par::Seq);
+    let to_points = dense::product(basis.to_basis.as_ref(), inverse.as_ref());
+    Ok(tall_product(phi, to_points.as_ref()))
+}
+
+/// Makes cages follow a translation of the frame exactly, also where regularisation by itself would not: the rows of R that
+/// give positions sum to one, those that give directions to zero. Takes and gives `Rᵀ`.
+fn keep_translations(mut operator: Mat<f64>, positions: usize) -> Mat<f64> {
+    let read = operator.nrows();
+    for j in 0..operator.ncols() {
+        let column = operator.col_mut(j);
+        let sum: f64 = column.rb().iter().sum();
+        let share = (if j < positions { 1.0 } else { 0.0 } - sum) / read as f64;
+        for x in column.iter_mut() {
+            *x += share;
+        }
+    }
+    operator
+}
+
+/// `Φ · X` in parallel row blocks whose bits do not depend on the threads.
+pub(crate) fn tall_product(phi: MatRef<'_, f64>, x: MatRef<'_, f64>) -> Mat<f64> {
+    let mut out = Mat::zeros(phi.nrows(), x.ncols());
+    out.as_mut().par_row_chunks_mut(BLOCK_ROWS).enumerate().for_each(|(block, rows)| {
+        let count = rows.nrows();
+        dense::multiply(rows, phi.subrows(block * BLOCK_ROWS, count), x);
+    });
+    out
+}
+
+/// `max_i |Φ C − P|_i`.
+fn reproduction_error(phi: MatRef<'_, f64>, unknowns: &[Point], points: &[Point]) -> f64 {
+    let c = Mat::from_fn(unknowns.len(), 3, |i, k| unknowns[i][k]);
+    let product = tall_product(phi, c.as_ref());
+    points
+        .iter()
+        .enumerate()
+        .map(|(i, p)| (0..3).map(|k| (product[(i, k)] - p[k]).powi(2)).sum::<f64>().sqrt())
+        .fold(0.0, |a, b| if b > a || b.is_nan() { b } else { a })
+}

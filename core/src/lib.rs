@@ -1,0 +1,16 @@
+//! The mathematics of CageR: plain data in, plain data out; no I/O, no async, no threads of its own making.
+
+pub mod cage;
+pub mod coordinates;
+pub mod decode;
+mod dense;
+pub mod inversion;
+pub mod maxvol;
+pub mod mesh;
+pub mod regularize;
+mod simd;
+mod spectrum;
+pub mod synthetic;
+
+/// Version of the coordinates' computation: containers name it, since their readers compute the coordinates anew.
+pub const SOLVER_VERSION: u32 = 1;

@@ -1,0 +1,286 @@
+//! Rows of maximum volume: the handles (Goreinov, Oseledets, Savostyanov, Tyrtyshnikov and Zamarashkin 2010).
+//!
+//! With `B = Φ Φ□⁻¹`, swapping row i of `Φ` in for handle j multiplies the volume of `Φ□` by `|B_ij|`. Swaps go on until no
+//! entry exceeds 1 + τ. Almost all rows of `B` stay far below one throughout, so the swaps run on the few rows that could
+//! ever matter; a pass over all of `Φ` with a fresh factorisation then confirms the result or widens the choice.
+
+use crate::dense;
+use crate::simd::multiversion;
+use faer::reborrow::{Reborrow, ReborrowMut};
+use faer::{Accum, Mat, MatRef, Par};
+use rayon::prelude::*;
+
+/// Default tolerance τ: swaps end when no entry of B exceeds 1.01.
+pub const TOLERANCE: f64 = 0.01;
+/// Rows whose largest entry of B exceeds this take part in the swaps.
+const CANDIDATE: f32 = 0.9;
+/// Rows of one block of `B`: 1024 × 350 in f64 just exceeds the second-level cache, and products run at full speed.
+const BLOCK_ROWS: usize = 768;
+/// The blocks' Gram matrices are added up in this many fixed groups, so that the sum does not depend on the threads.
+const GRAM_GROUPS: usize = 8;
+/// Every confirming pass either ends the search or has found rows to swap; the volume bounds their number far below this.
+const MAX_PASSES: usize = 64;
+
+/// The handles picked from a tall matrix.
+#[derive(Clone, Debug)]
+pub struct MaxVol {
+    /// Picked rows, one per column of the matrix.
+    pub rows: Vec<u32>,
+    /// Number of swaps after the start by pivoted LU.
+    pub swaps: usize,
+    /// `ln |det Φ□|` of the picked rows.
+    pub log_volume: f64,
+    /// The same for the rows the search started from.
+    pub start_log_volume: f64,
+    /// Largest `|B_ij|` over all rows, from a fresh factorisation after the last swap.
+    pub max_entry: f64,
+    /// `Bᵀ B`, m × m, symmetric.
+    pub(crate) gram: Mat<f64>,
+    /// `Φ□⁻¹`, m × m.
+    pub(crate) inverse: Mat<f64>,
+}
+
+/// The matrix has no m linearly independent rows to the working precision.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("the coordinate matrix has dependent columns (smallest pivot {smallest:.1e} of the largest)")]
+pub struct Dependent {
+    /// Smallest pivot of the LU factorisation, relative to the largest.
+    pub smallest: f64,
+}
+
+/// Picks m rows of the n × m matrix `phi`, n ≥ m, such that no single exchange enlarges their volume by more than 1 + τ.
+///
+/// Deterministic: ties go to the smallest row, then the smallest column, and the threads of the pool do not matter.
+///
+/// # Errors
+/// [`Dependent`] where the columns are numerically dependent.
+pub fn maxvol(phi: MatRef<'_, f64>, tolerance: f64) -> Result<MaxVol, Dependent> {
+    let m = phi.ncols();
+    let mut rows = start_rows(phi)?;
+    let mut swaps = 0;
+    let (mut inverse, mut log_volume) = dense::inverse(dense::rows_of(phi, &rows).as_ref());
+    let start_log_volume = log_volume;
+    let mut row_max = row_maxima(phi, inverse.as_ref());
+    for _ in 0..MAX_PASSES {
+        let candidates: Vec<u32> = (0..phi.nrows() as u32).filter(|&i| row_max[i as usize] > CANDIDATE).collect();
+        let done = swap_among(phi, &candidates, inverse.as_ref(), tolerance, &mut rows);
+        swaps += done;
+        (inverse, log_volume) = dense::inverse(dense::rows_of(phi, &rows).as_ref());
+        let (maxima, gram) = maxima_and_gram(phi, inverse.as_ref());
+        let max_entry = maxima.iter().copied().fold(0.0, f64::max);
+        if max_entry <= 1.0 + tolerance || done == 0 && max_entry <= 1.0 + 2.0 * tolerance {
+            return Ok(MaxVol { rows, swaps, log_volume, start_log_volume, max_entry, gram, inverse });
+        }
+        row_max = maxima.iter().map(|&x| x as f32).collect();
+    }
+    let (maxima, gram) = maxima_and_gram(phi, inverse.as_ref());
+    debug_assert_eq!(rows.len(), m);
+    let max_entry = maxima.iter().copied().fold(0.0, f64::max);
+    Ok(MaxVol { rows, swaps, log_volume, start_log_volume, max_entry, gram, inverse })
+}
+
+/// Rows that LU with partial pivoting picks. Single precision decides the pivots as well as double does, in half the time,
+/// as long as the columns are far from dependent.
+fn start_rows(phi: MatRef<'_, f64>) -> Result<Vec<u32>, Dependent> {
+    const SINGLE_IS_SAFE: f64 = 1e-4;
+    let single = dense::pivoted_rows(to_single(phi));
+    if single.smallest > SINGLE_IS_SAFE {
+        return Ok(single.rows);
+    }
+    let double = dense::pivoted_rows(phi.to_owned());
+    if double.smallest > phi.nrows() as f64 * f64::EPSILON {
+        return Ok(double.rows);
+    }
+    Err(Dependent { smallest: double.smallest })
+}
+
+fn to_single(phi: MatRef<'_, f64>) -> Mat<f32> {
+    let mut single = Mat::zeros(phi.nrows(), phi.ncols());
+    single.as_mut().par_col_chunks_mut(1).enumerate().for_each(|(j, mut column)| {
+        for (s, &x) in column.as_mut().col_mut(0).iter_mut().zip(phi.col(j).iter()) {
+            *s = x as f32;
+        }
+    });
+    single
+}
+
+/// Largest `|B_ij|` of every row, in single precision: good enough to choose candidates by.
+fn row_maxima(phi: MatRef<'_, f64>, inverse: MatRef<'_, f64>) -> Vec<f32> {
+    let (n, m) = phi.shape();
+    let inverse = Mat::<f32>::from_fn(m, m, |i, j| inverse[(i, j)] as f32);
+    let mut maxima = vec![0.0f32; n];
+    maxima.par_chunks_mut(BLOCK_ROWS).enumerate().for_each_init(
+        || (Mat::<f32>::zeros(BLOCK_ROWS, m), Mat::<f32>::zeros(BLOCK_ROWS, m)),
+        |(single, b), (block, maxima)| {
+            let rows = phi.subrows(block * BLOCK_ROWS, maxima.len());
+            let mut single = single.as_mut().subrows_mut(0, maxima.len());
+            for j in 0..m {
+                for (s, &x) in single.rb_mut().col_mut(j).iter_mut().zip(rows.col(j).iter()) {
+                    *s = x as f32;
+                }
+            }
+            let mut b = b.as_mut().subrows_mut(0, maxima.len());
+            dense::multiply(b.rb_mut(), single.rb(), inverse.as_ref());
+            for j in 0..m {
+                for (max, &x) in maxima.iter_mut().zip(b.rb().col(j).iter()) {
+                    *max = if x.abs() > *max { x.abs() } else { *max };
+                }
+            }
+        },
+    );
+    maxima
+}
+
+/// Largest `|B_ij|` of every row, and `Bᵀ B`, from a given `Φ□⁻¹`, without ever holding B.
+fn maxima_and_gram(phi: MatRef<'_, f64>, inverse: MatRef<'_, f64>) -> (Vec<f64>, Mat<f64>) {
+    let (n, m) = phi.shape();
+    let mut maxima = vec![0.0f64; n];
+    let blocks_per_group = n.div_ceil(BLOCK_ROWS).div_ceil(GRAM_GROUPS);
+    let grams: Vec<Mat<f64>> = maxima
+        .par_chunks_mut(blocks_per_group * BLOCK_ROWS)
+        .enumerate()
+        .map(|(group, maxima)| {
+            let mut gram = Mat::zeros(m, m);
+            let mut b = Mat::zeros(BLOCK_ROWS.min(maxima.len()), m);
+            for (k, maxima) in maxima.chunks_mut(BLOCK_ROWS).enumerate() {
+                let first = (group * blocks_per_group + k) * BLOCK_ROWS;
+                let mut b = b.as_mut().subrows_mut(0, maxima.len());
+                dense::multiply(b.rb_mut(), phi.subrows(first, maxima.len()), inverse);
+                for j in 0..m {
+                    for (max, &x) in maxima.iter_mut().zip(b.rb().col(j).iter()) {
+                        *max = if x.abs() > *max { x.abs() } else { *max };
+                    }
+                }
+                add_gram(&mut gram, b.rb());
+            }
+            gram
+        })
+        .collect();
+    let mut gram = Mat::zeros(m, m);
+    for part in &grams {
+        gram += part;
+    }
+    for j in 0..m {
+        for i in 0..j {
+            gram[(i, j)] = gram[(j, i)];
+        }
+    }
+    (maxima, gram)
+}
+
+/// Adds `bᵀ b` to the lower triangle.
+fn add_gram(gram: &mut Mat<f64>, b: MatRef<'_, f64>) {
+    use faer::linalg::matmul::triangular::{BlockStructure, matmul};
+    matmul(
+        gram.as_mut(),
+        BlockStructure::TriangularLower,
+        Accum::Add,
+        b.transpose(),
+        BlockStructure::Rectangular,
+        b,
+        BlockStructure::Rectangular,
+        1.0,
+        Par::Seq,
+    );
+}
+
+/// Rows of B that take part in the swaps, row-major. Single precision: the pass that follows is in double.
+struct Working {
+    width: usize,
+    entries: Vec<f32>,
+    row_max: Vec<f32>,
+}
+
+/// Swaps rows among the candidates until no entry of theirs exceeds 1 + τ; returns the number of swaps.
+fn swap_among(
+    phi: MatRef<'_, f64>,
+    candidates: &[u32],
+    inverse: MatRef<'_, f64>,
+    tolerance: f64,
+    rows: &mut [u32],
+) -> usize {
+    let width = phi.ncols();
+    let b = dense::product(dense::rows_of(phi, candidates).as_ref(), inverse);
+    let mut work = Working {
+        width,
+        entries: Vec::with_capacity(candidates.len() * width),
+        row_max: Vec::with_capacity(candidates.len()),
+    };
+    for i in 0..candidates.len() {
+        work.entries.extend(b.row(i).iter().map(|&x| x as f32));
+        work.row_max.push(b.row(i).iter().fold(0.0, |m: f32, &x| m.max((x as f32).abs())));
+    }
+    // Rounding of the updates must not end the swaps just above the tolerance.
+    let enough = (1.0 + 0.2 * tolerance) as f32;
+    // Each swap multiplies the volume by more than 1 + τ, and Hadamard's inequality bounds the volume.
+    let limit = 100 * width + 1000;
+    let mut swaps = 0;
+    while swaps < limit {
+        let mut best = (0, 0.0);
+        for (i, &max) in work.row_max.iter().enumerate() {
+            if max > best.1 {
+                best = (i, max);
+            }
+        }
+        if best.1 <= enough {
+            break;
+        }
+        let row = &work.entries[best.0 * width..][..width];
+        let Some(column) = row.iter().position(|x| x.abs() == best.1) else { break };
+        rows[column] = candidates[best.0];
+        work.exchange(best.0, column);
+        swaps += 1;
+    }
+    swaps
+}
+
+impl Working {
+    /// Rank-one update of B for a swap of row `i` in for handle `j` (paper Eq. 3).
+    fn exchange(&mut self, i: usize, j: usize) {
+        let width = self.width;
+        let pivot = self.entries[i * width + j];
+        let mut direction: Vec<f32> = self.entries[i * width..][..width].to_vec();
+        direction[j] -= 1.0;
+        for x in &mut direction {
+            *x /= pivot;
+        }
+        // Below this many entries another thread costs more than it saves.
+        const TASK_ENTRIES: usize = 100_000;
+        let rows_per_task = (TASK_ENTRIES / width).max(1);
+        self.entries
+            .par_chunks_mut(rows_per_task * width)
+            .zip(self.row_max.par_chunks_mut(rows_per_task))
+            .for_each(|(entries, row_max)| update_rows(entries, row_max, &direction, j));
+    }
+}
+
+multiversion! {
+    fn update_rows(entries: &mut [f32], row_max: &mut [f32], direction: &[f32], column: usize) = update_rows_generic;
+}
+
+#[inline(always)]
+fn update_rows_generic(entries: &mut [f32], row_max: &mut [f32], direction: &[f32], column: usize) {
+    const WIDE: usize = 16;
+    for (row, max) in entries.chunks_exact_mut(direction.len()).zip(row_max) {
+        let factor = row[column];
+        let mut lanes = [0.0f32; WIDE];
+        let mut chunks = row.chunks_exact_mut(WIDE);
+        let mut steps = direction.chunks_exact(WIDE);
+        for (chunk, step) in (&mut chunks).zip(&mut steps) {
+            for l in 0..WIDE {
+                chunk[l] -= factor * step[l];
+                let size = chunk[l].abs();
+                lanes[l] = if size > lanes[l] { size } else { lanes[l] };
+            }
+        }
+        let mut largest = 0.0;
+        for (x, step) in chunks.into_remainder().iter_mut().zip(steps.remainder()) {
+            *x -= factor * step;
+            largest = if x.abs() > largest { x.abs() } else { largest };
+        }
+        for size in lanes {
+            largest = if size > largest { size } else { largest };
+        }
+        *max = largest;
+    }
+}

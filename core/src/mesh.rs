@@ -1,0 +1,179 @@
+//! Meshes as plain data.
+
+/// A point or vector in space.
+pub type Point = [f64; 3];
+
+/// Polygonal faces of any arity over some list of points.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Polygons {
+    /// Number of corners of each face.
+    arities: Vec<u32>,
+    /// Corners of all faces, back to back.
+    indices: Vec<u32>,
+}
+
+impl Polygons {
+    /// No faces.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Appends one face.
+    pub fn push(&mut self, face: &[u32]) {
+        self.arities.push(face.len() as u32);
+        self.indices.extend_from_slice(face);
+    }
+
+    /// Number of faces.
+    pub fn len(&self) -> usize {
+        self.arities.len()
+    }
+
+    /// Whether there are no faces: a point cloud.
+    pub fn is_empty(&self) -> bool {
+        self.arities.is_empty()
+    }
+
+    /// Number of corners of each face.
+    pub fn arities(&self) -> &[u32] {
+        &self.arities
+    }
+
+    /// Corners of all faces, back to back.
+    pub fn indices(&self) -> &[u32] {
+        &self.indices
+    }
+
+    /// The faces, each as a slice of point indices.
+    pub fn iter(&self) -> impl Iterator<Item = &[u32]> {
+        let mut rest = self.indices.as_slice();
+        self.arities.iter().map(move |&arity| {
+            let (face, tail) = rest.split_at(arity as usize);
+            rest = tail;
+            face
+        })
+    }
+
+    /// The faces as a fan of triangles each.
+    pub fn triangulated(&self) -> Vec<[u32; 3]> {
+        let mut triangles = Vec::new();
+        for face in self.iter() {
+            for k in 2..face.len() {
+                triangles.push([face[0], face[k - 1], face[k]]);
+            }
+        }
+        triangles
+    }
+}
+
+/// A model: points, with faces where there are any. A point cloud is a model without faces.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Model {
+    /// Positions of the points.
+    pub points: Vec<Point>,
+    /// Polygonal faces, kept as they were read.
+    pub faces: Polygons,
+}
+
+/// A triangle mesh: the form a cage has.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TriMesh {
+    /// Positions of the vertices.
+    pub vertices: Vec<Point>,
+    /// Counter-clockwise triangles.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl TriMesh {
+    /// The same surface with every face turned around.
+    #[must_use]
+    pub fn flipped(mut self) -> Self {
+        for triangle in &mut self.triangles {
+            triangle.swap(1, 2);
+        }
+        self
+    }
+}
+
+impl From<&Model> for TriMesh {
+    /// Polygons become fans of triangles.
+    fn from(model: &Model) -> Self {
+        Self { vertices: model.points.clone(), triangles: model.faces.triangulated() }
+    }
+}
+
+/// Lower and upper corner of the bounding box; both zero for no points.
+pub fn bounds(points: &[Point]) -> (Point, Point) {
+    let Some(&first) = points.first() else { return ([0.0; 3], [0.0; 3]) };
+    points.iter().fold((first, first), |(mut low, mut high), p| {
+        for k in 0..3 {
+            low[k] = low[k].min(p[k]);
+            high[k] = high[k].max(p[k]);
+        }
+        (low, high)
+    })
+}
+
+/// Length of the bounding box's diagonal: the unit of every error in a report.
+pub fn diagonal(points: &[Point]) -> f64 {
+    let (low, high) = bounds(points);
+    (0..3).map(|k| (high[k] - low[k]).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Generalised winding number of a closed triangle mesh around `x`: 1 inside, 0 outside (Van Oosterom and Strackee 1983).
+pub fn winding_number(vertices: &[Point], triangles: &[[u32; 3]], x: Point) -> f64 {
+    let mut angle = 0.0;
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|v| {
+            let p = vertices[v as usize];
+            [p[0] - x[0], p[1] - x[1], p[2] - x[2]]
+        });
+        let (la, lb, lc) = (norm(a), norm(b), norm(c));
+        let volume = dot(a, cross(b, c));
+        angle += 2.0 * volume.atan2(la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
+    }
+    angle / (4.0 * std::f64::consts::PI)
+}
+
+/// Distance from `x` to the nearest point of a triangle mesh.
+pub fn distance_to_surface(vertices: &[Point], triangles: &[[u32; 3]], x: Point) -> f64 {
+    triangles
+        .iter()
+        .map(|t| distance2_to_triangle(t.map(|v| vertices[v as usize]), x))
+        .fold(f64::INFINITY, f64::min)
+        .sqrt()
+}
+
+fn distance2_to_triangle([a, b, c]: [Point; 3], x: Point) -> f64 {
+    let (u, v, w) = (sub(b, a), sub(c, a), sub(x, a));
+    let n = cross(u, v);
+    let n2 = dot(n, n);
+    let (beta, gamma) = (dot(cross(w, v), n), dot(cross(u, w), n));
+    if n2 > 0.0 && beta >= 0.0 && gamma >= 0.0 && beta + gamma <= n2 {
+        return dot(w, n).powi(2) / n2;
+    }
+    [(a, b), (b, c), (c, a)].into_iter().map(|(p, q)| distance2_to_segment(p, q, x)).fold(f64::INFINITY, f64::min)
+}
+
+fn distance2_to_segment(p: Point, q: Point, x: Point) -> f64 {
+    let (e, w) = (sub(q, p), sub(x, p));
+    let t = (dot(w, e) / dot(e, e).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    let r = [w[0] - t * e[0], w[1] - t * e[1], w[2] - t * e[2]];
+    dot(r, r)
+}
+
+fn sub(a: Point, b: Point) -> Point {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+pub(crate) fn dot(a: Point, b: Point) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(crate) fn cross(a: Point, b: Point) -> Point {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+pub(crate) fn norm(a: Point) -> f64 {
+    dot(a, a).sqrt()
+}

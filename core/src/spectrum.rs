@@ -1,0 +1,58 @@
+//! Rank and spectrum of the coordinate matrix, and a well-conditioned basis of its rows.
+
+use crate::dense::{self, Svd};
+use crate::maxvol::{self, MaxVol};
+use faer::{Mat, MatRef};
+
+/// `Φ = B Φ□`: handles of maximum volume, with what the inversion needs of B.
+pub(crate) struct RowBasis {
+    /// The handles and `Bᵀ B`.
+    pub(crate) handles: MaxVol,
+    /// `Φ□`, r × m.
+    pub(crate) square: Mat<f64>,
+    /// Numerical rank r of `Φ`.
+    pub(crate) rank: usize,
+    /// `B = Φ · to_basis`, m × r.
+    pub(crate) to_basis: Mat<f64>,
+}
+
+/// Picks the handles. Where columns of `Φ` are dependent, only as many as its rank.
+///
+/// `None` where a decomposition does not converge.
+pub(crate) fn row_basis(phi: MatRef<'_, f64>) -> Option<RowBasis> {
+    let m = phi.ncols();
+    if let Ok(handles) = maxvol::maxvol(phi, maxvol::TOLERANCE) {
+        let square = dense::rows_of(phi, &handles.rows);
+        let to_basis = handles.inverse.clone();
+        return Some(RowBasis { handles, square, rank: m, to_basis });
+    }
+    let Svd { sigma, v, .. } = dense::right_singular(phi.to_owned())?;
+    let tolerance = phi.nrows() as f64 * f64::EPSILON * sigma[0];
+    let mut rank = sigma.iter().filter(|&&s| s > tolerance).count();
+    loop {
+        // Directions the points do feel, of full rank; one fewer each time a borderline singular value still spoils it.
+        let alive = v.as_ref().subcols(0, rank);
+        let felt = crate::inversion::tall_product(phi, alive);
+        match maxvol::maxvol(felt.as_ref(), maxvol::TOLERANCE) {
+            Ok(handles) => {
+                let square = dense::rows_of(phi, &handles.rows);
+                let to_basis = dense::product(alive, handles.inverse.as_ref());
+                return Some(RowBasis { handles, square, rank, to_basis });
+            }
+            Err(_) if rank > 1 => rank -= 1,
+            Err(_) => return None,
+        }
+    }
+}
+
+impl RowBasis {
+    /// Upper triangular R with `BᵀB = RᵀR`, so that `R Φ□` has the singular values and right vectors of `Φ`.
+    pub(crate) fn gram_factor(&self) -> Option<Mat<f64>> {
+        Some(dense::cholesky(self.handles.gram.clone())?.transpose().to_owned())
+    }
+
+    /// `R Φ□`, r × m: small, but with the spectrum of all of `Φ`.
+    pub(crate) fn compressed(&self) -> Option<Mat<f64>> {
+        Some(dense::product(self.gram_factor()?.as_ref(), self.square.as_ref()))
+    }
+}

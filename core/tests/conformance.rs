@@ -1,0 +1,167 @@
+//! What every coordinate system must satisfy, on cages that are convex, coplanar, concave and detailed.
+//!
+//! The bar: affine reproduction within 1e-10 of the diagonal and rows that sum to one, for points inside, outside, on
+//! faces, edges and vertices and at 1e-12…1e-4 of them, for cages scaled by 1e-6…1e6.
+
+mod common;
+
+use cager_core::cage::Cage;
+use cager_core::coordinates::{CoordinateSystem, MeanValue};
+use cager_core::mesh::{Point, diagonal};
+use common::{Random, cages};
+
+#[test]
+fn mean_value_coordinates_conform() {
+    suite(&MeanValue);
+}
+
+fn suite(system: &dyn CoordinateSystem) {
+    for (name, cage) in cages() {
+        reproduces_affine_functions_everywhere(system, name, &cage);
+        does_not_depend_on_the_order_of_vertices_and_faces(system, name, &cage);
+        follows_rigid_motions(system, name, &cage);
+        is_barycentric_on_faces(system, name, &cage);
+        is_continuous_across_planes_of_far_faces(system, name, &cage);
+    }
+}
+
+/// Points with a distance to some part of the cage that goes down to zero, and points anywhere.
+fn probes(cage: &Cage, random: &mut Random) -> Vec<Point> {
+    let vertices = cage.vertices();
+    let size = cage.diagonal();
+    let mut points = Vec::new();
+    for _ in 0..300 {
+        points.push([0, 1, 2].map(|_| size * (random.uniform() - 0.5) * 1.5));
+    }
+    let faces = &cage.mesh().triangles;
+    for k in 0..400 {
+        let face = faces[(random.uniform() * faces.len() as f64) as usize % faces.len()].map(|v| vertices[v as usize]);
+        let mut weights = [random.uniform(), random.uniform(), random.uniform()];
+        for w in weights.iter_mut().take(k % 3) {
+            *w = 0.0;
+        }
+        let total: f64 = weights.iter().sum();
+        let on = [0, 1, 2].map(|c| (0..3).map(|i| weights[i] / total * face[i][c]).sum::<f64>());
+        points.push(on);
+        for exponent in [-12, -11, -10, -8, -6, -4] {
+            let direction = random.direction();
+            let distance = size * 10f64.powi(exponent);
+            points.push([0, 1, 2].map(|c| on[c] + distance * direction[c]));
+        }
+    }
+    points.extend_from_slice(vertices);
+    points
+}
+
+fn reproduces_affine_functions_everywhere(system: &dyn CoordinateSystem, name: &str, cage: &Cage) {
+    let mut random = Random::new(7);
+    let points = probes(cage, &mut random);
+    for exponent in [-6, -3, 0, 3, 6] {
+        let scale = 10f64.powi(exponent);
+        let scaled = common::mapped(cage, |p| p.map(|c| c * scale));
+        let points: Vec<Point> = points.iter().map(|p| p.map(|c| c * scale)).collect();
+        let phi = system.coordinates(&scaled, &points).phi;
+        let unknowns = system.rest_unknowns(&scaled);
+        let size = diagonal(&points);
+        for (i, p) in points.iter().enumerate() {
+            let row: Vec<f64> = (0..phi.ncols()).map(|j| phi[(i, j)]).collect();
+            assert!(row.iter().all(|x| x.is_finite()), "{name} × {scale:e}: point {i} has a NaN");
+            let sum: f64 = row[..cage.vertices().len()].iter().sum();
+            assert!((sum - 1.0).abs() < 1e-12, "{name} × {scale:e}: row {i} sums to {sum}");
+            let error = (0..3)
+                .map(|c| (row.iter().zip(&unknowns).map(|(w, v)| w * v[c]).sum::<f64>() - p[c]).abs())
+                .fold(0.0, f64::max);
+            assert!(error / size <= 1e-10, "{name} × {scale:e}: point {i} {p:?} is off by {:e}", error / size);
+        }
+    }
+}
+
+fn does_not_depend_on_the_order_of_vertices_and_faces(system: &dyn CoordinateSystem, name: &str, cage: &Cage) {
+    let mut random = Random::new(11);
+    let points = probes(cage, &mut random);
+    let (shuffled, order) = common::shuffled(cage, &mut random);
+    let a = system.coordinates(cage, &points);
+    let b = system.coordinates(&shuffled, &points);
+    // Points within rounding of an edge may be taken for points on it in one order and not in the other.
+    let vertices = cage.vertices();
+    for i in 0..points.len() {
+        for (new, &old) in order.iter().enumerate() {
+            let difference = (a.phi[(i, old)] - b.phi[(i, new)]).abs();
+            assert!(
+                difference < 1e-7,
+                "{name}: point {i} {:?} vertex {old} {:?} differs by {difference:e}",
+                points[i],
+                vertices[old]
+            );
+        }
+    }
+}
+
+fn follows_rigid_motions(system: &dyn CoordinateSystem, name: &str, cage: &Cage) {
+    let mut random = Random::new(13);
+    let points: Vec<Point> = (0..200).map(|_| [0, 1, 2].map(|_| cage.diagonal() * (random.uniform() - 0.5))).collect();
+    let motion = |p: Point| {
+        let (s, c) = 0.7f64.sin_cos();
+        let q = [c * p[0] - s * p[1], s * p[0] + c * p[1], p[2]];
+        let (s, c) = 1.1f64.sin_cos();
+        [q[0] + 3.0, c * q[1] - s * q[2] - 2.0, s * q[1] + c * q[2] + 1.0]
+    };
+    let moved: Vec<Point> = points.iter().map(|&p| motion(p)).collect();
+    let a = system.coordinates(cage, &points);
+    let b = system.coordinates(&common::mapped(cage, motion), &moved);
+    for i in 0..points.len() {
+        for j in 0..a.phi.ncols() {
+            let difference = (a.phi[(i, j)] - b.phi[(i, j)]).abs();
+            assert!(difference < 1e-8, "{name}: point {i} changes by {difference:e} under a rigid motion");
+        }
+    }
+    assert_eq!(a.outside, b.outside, "{name}: what is outside changes under a rigid motion");
+}
+
+fn is_barycentric_on_faces(system: &dyn CoordinateSystem, name: &str, cage: &Cage) {
+    for face in cage.faces() {
+        let corners = face.vertices.map(|v| cage.vertices()[v as usize]);
+        let weights = [0.2, 0.3, 0.5];
+        let p = [0, 1, 2].map(|c| (0..3).map(|i| weights[i] * corners[i][c]).sum::<f64>());
+        let phi = system.coordinates(cage, &[p]).phi;
+        for j in 0..cage.vertices().len() {
+            let expected = face.vertices.iter().position(|&v| v as usize == j).map_or(0.0, |i| weights[i]);
+            assert!(
+                (phi[(0, j)] - expected).abs() < 1e-9,
+                "{name}: {} at vertex {j} of face {:?}, not {expected}",
+                phi[(0, j)],
+                face.vertices
+            );
+        }
+    }
+}
+
+fn is_continuous_across_planes_of_far_faces(system: &dyn CoordinateSystem, name: &str, cage: &Cage) {
+    for face in cage.faces().iter().take(60) {
+        let [a, b, c] = face.vertices.map(|v| cage.vertices()[v as usize]);
+        let e = [0, 1, 2].map(|k| b[k] - a[k]);
+        let f = [0, 1, 2].map(|k| c[k] - a[k]);
+        let n = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
+        let length = n.iter().map(|x| x * x).sum::<f64>().sqrt();
+        for (s, t) in [(1.7, 0.4), (-0.6, 0.9), (0.3, -1.1), (2.3, 2.1), (-1.3, -0.2)] {
+            let on: Point = [0, 1, 2].map(|k| a[k] + s * e[k] + t * f[k]);
+            let near: Vec<Point> = std::iter::once(on)
+                .chain(
+                    [1e-16, -1e-14, 1e-12, 1e-10, 1e-9]
+                        .map(|h| [0, 1, 2].map(|k| on[k] + h * cage.diagonal() * n[k] / length)),
+                )
+                .collect();
+            let phi = system.coordinates(cage, &near).phi;
+            for i in 1..near.len() {
+                for j in 0..phi.ncols() {
+                    let jump = (phi[(i, j)] - phi[(0, j)]).abs();
+                    assert!(
+                        jump < 1e-6,
+                        "{name}: vertex {j} jumps by {jump:e} within 1e-9 of the plane of {:?} at {on:?}",
+                        face.vertices
+                    );
+                }
+            }
+        }
+    }
+}

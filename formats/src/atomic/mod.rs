@@ -1,0 +1,72 @@
+//! Files and folders that appear whole or not at all.
+
+mod dir;
+mod file;
+
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+
+pub use dir::AtomicDir;
+pub use file::AtomicFile;
+
+use crate::error::Error;
+
+/// Where an output really goes: through symbolic links, so that those stay, and with its folder.
+#[derive(Debug)]
+struct Place {
+    folder: PathBuf,
+    target: PathBuf,
+}
+
+impl Place {
+    fn new(path: &Path) -> Result<Self, Error> {
+        let target = match fs::canonicalize(path) {
+            Ok(target) => target,
+            Err(cause) if cause.kind() == io::ErrorKind::NotFound => path.to_owned(),
+            Err(cause) => return Err(Error::write(path, cause)),
+        };
+        if target.file_name().is_none() {
+            return Err(Error::target(path, "does not end in a name; name the output"));
+        }
+        let folder = match target.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
+            _ => PathBuf::from("."),
+        };
+        match fs::metadata(&folder) {
+            Ok(found) if found.is_dir() => Ok(Self { folder, target }),
+            Ok(_) => Err(Error::write(path, io::ErrorKind::NotADirectory.into())),
+            Err(cause) => Err(Error::write(path, cause)),
+        }
+    }
+
+    fn sync_folder(&self) -> io::Result<()> {
+        sync_folder(&self.folder)
+    }
+}
+
+/// Makes the names in a folder durable, where the system can.
+fn sync_folder(folder: &Path) -> io::Result<()> {
+    if cfg!(not(unix)) {
+        return Ok(());
+    }
+    match File::open(folder)?.sync_all() {
+        Err(cause) if matches!(cause.kind(), io::ErrorKind::InvalidInput | io::ErrorKind::Unsupported) => Ok(()),
+        result => result,
+    }
+}
+
+/// A temporary name that says whose leftover it is, should the process be killed.
+fn builder(prefix: &OsString) -> tempfile::Builder<'_, 'static> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(prefix).suffix(".tmp");
+    builder
+}
+
+/// The error of a temporary file under the name of the final one.
+fn hide_temporary(path: &Path, cause: &io::Error) -> Error {
+    // What comes from the system itself has no path in it.
+    let cause = cause.raw_os_error().map_or_else(|| cause.kind().into(), io::Error::from_raw_os_error);
+    Error::write(path, cause)
+}

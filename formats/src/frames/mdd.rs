@@ -1,0 +1,26 @@
+//! Motion Designer: frames, points, a time in seconds for each frame, then `f32`; all big-endian.
+
+use super::cache::Layout;
+use super::widen::Scalar;
+use crate::error::Fault;
+
+pub(super) fn layout(head: &[u8]) -> Result<Layout, Fault> {
+    let field = |k: usize| head.as_chunks().0.get(k).map(|bytes| i32::from_be_bytes(*bytes));
+    let (Some(frames), Some(points)) = (field(0), field(1)) else {
+        return Err(Fault::damaged("ends within its header; copy or export the file again"));
+    };
+    let (Ok(points), Ok(frames)) = (u64::try_from(points), u64::try_from(frames)) else {
+        return Err(Fault::damaged(format!(
+            "promises {frames} frames of {points} points, so this is not a .mdd file; export it again"
+        )));
+    };
+    Ok(Layout { points, frames, start: 8 + 4 * frames, scalar: Scalar::F32Big })
+}
+
+/// The first eight bytes; the times are for the caller to write.
+pub(super) fn header(points: i32, frames: i32) -> [u8; 8] {
+    let mut header = [0; 8];
+    header[..4].copy_from_slice(&frames.to_be_bytes());
+    header[4..].copy_from_slice(&points.to_be_bytes());
+    header
+}

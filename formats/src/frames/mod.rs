@@ -1,0 +1,78 @@
+//! The frames of captures, one after another, so that memory does not grow with their number.
+
+mod cache;
+mod mdd;
+mod npy;
+mod pc2;
+mod sequence;
+mod source;
+mod widen;
+mod write;
+
+use std::path::Path;
+
+use crate::error::{Error, Fault};
+use crate::mesh::{MeshFormat, extensions};
+
+pub use source::{open_frames, open_frames_bytes};
+pub use write::{FrameOptions, FrameWriter, create_frames};
+
+/// Positions of one capture, frame by frame, in order. Memory does not grow with the number of frames.
+pub trait FrameReader: Send {
+    /// Number of points of every frame.
+    fn points(&self) -> usize;
+
+    /// Number of frames, known before any is read.
+    fn frames(&self) -> usize;
+
+    /// Reads the next frame into `out`, which then holds 3 × points coordinates `x y z x y z …`; false at the end, with
+    /// `out` empty.
+    ///
+    /// # Errors
+    /// [`Error::NonFinite`], [`Error::PointCount`], and those of the format; the next call tries the same frame again.
+    fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error>;
+}
+
+/// A file format for the frames of a capture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum CacheFormat {
+    /// A NumPy array, frames × points × 3, or points × 3 for one frame; 32- or 64-bit floats.
+    Npy,
+    /// Point cache 2, as 3ds Max and Blender write it.
+    Pc2,
+    /// Motion Designer point cache of LightWave.
+    Mdd,
+}
+
+impl CacheFormat {
+    /// All formats.
+    pub const ALL: [Self; 3] = [Self::Npy, Self::Pc2, Self::Mdd];
+
+    /// The file name extension, without the dot.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Npy => "npy",
+            Self::Pc2 => "pc2",
+            Self::Mdd => "mdd",
+        }
+    }
+
+    fn guess(path: &Path) -> Option<Self> {
+        let found = path.extension()?;
+        Self::ALL.into_iter().find(|format| found.eq_ignore_ascii_case(format.extension()))
+    }
+}
+
+/// An extension that no format of frames has.
+fn unknown_extension(path: &Path, read: bool) -> Error {
+    let caches = ".npy .pc2 .mdd";
+    Fault::unsupported(if read {
+        format!(
+            "is not a capture that is read; give {caches}, or {} files in a folder",
+            extensions(&MeshFormat::ALL)
+        )
+    } else {
+        format!("is not a format of frames that is written; end the name in one of {caches}, or in / for a folder of .obj files")
+    })
+    .at(path)
+}

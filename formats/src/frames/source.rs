@@ -1,0 +1,133 @@
+//! From what was typed to a reader.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::{self, Cursor};
+use std::path::{Path, PathBuf};
+
+use super::cache::CacheReader;
+use super::sequence::SequenceReader;
+use super::{CacheFormat, FrameReader, unknown_extension};
+use crate::error::{Error, Fault};
+use crate::mesh::{MeshFormat, extensions};
+use crate::natural;
+
+/// Opens the frames of a capture whose rest pose has `expected_points` points.
+///
+/// `source` is a `.npy`, `.pc2` or `.mdd` file, one mesh file, a folder of mesh files or a glob pattern for such files.
+/// Folder and pattern give the files of one mesh format in natural order, `2.obj` before `10.obj`; other files, and in
+/// a folder hidden ones, are passed over.
+///
+/// # Errors
+/// [`Error::PointCount`] where a cache has another number of points, [`Error::Damaged`] where its size is not what its
+/// header promises, [`Error::Unsupported`] for formats that are not read, and mesh formats mixed in one folder,
+/// [`Error::Invalid`] where there is no frame, [`Error::Io`].
+pub fn open_frames(source: impl AsRef<Path>, expected_points: usize) -> Result<Box<dyn FrameReader>, Error> {
+    let path = source.as_ref();
+    match fs::metadata(path) {
+        Ok(found) if found.is_dir() => {
+            let (files, _) = sort(list(path)?);
+            open_sequence(path, files, expected_points)
+        }
+        Ok(found) if !found.is_file() => Err(Fault::unsupported("is not a regular file; copy it to one").at(path)),
+        Ok(found) => open_file(path, found.len(), expected_points),
+        Err(cause) => match path.to_str() {
+            Some(pattern) if pattern.contains(['*', '?', '[']) => open_pattern(path, pattern, expected_points),
+            _ => Err(Error::read(path, cause)),
+        },
+    }
+}
+
+/// Opens the frames in the bytes of a cache file; `name` is the path in error messages.
+///
+/// # Errors
+/// As [`open_frames`].
+pub fn open_frames_bytes<'a>(
+    format: CacheFormat,
+    name: &Path,
+    bytes: &'a [u8],
+    expected_points: usize,
+) -> Result<Box<dyn FrameReader + 'a>, Error> {
+    let reader = CacheReader::open(format, name, Cursor::new(bytes), bytes.len() as u64, expected_points)?;
+    Ok(Box::new(reader))
+}
+
+fn open_file(path: &Path, length: u64, expected_points: usize) -> Result<Box<dyn FrameReader>, Error> {
+    if let Some(format) = CacheFormat::guess(path) {
+        let file = File::open(path).map_err(|cause| Error::read(path, cause))?;
+        return Ok(Box::new(CacheReader::open(format, path, file, length, expected_points)?));
+    }
+    if MeshFormat::guess(path).is_some() {
+        return Ok(Box::new(SequenceReader::new(vec![path.to_owned()], expected_points)));
+    }
+    Err(unknown_extension(path, true))
+}
+
+fn open_pattern(path: &Path, pattern: &str, expected_points: usize) -> Result<Box<dyn FrameReader>, Error> {
+    let options = glob::MatchOptions { require_literal_leading_dot: true, ..Default::default() };
+    let matches = glob::glob_with(pattern, options)
+        .map_err(|cause| Fault::invalid(format!("is not a pattern ({}); correct it", cause.msg)).at(path))?;
+    let mut found = Vec::new();
+    for path in matches {
+        let path = path.map_err(|cause| {
+            let path = cause.path().to_owned();
+            Error::read(&path, cause.into())
+        })?;
+        if path.is_file() {
+            found.push(path);
+        }
+    }
+    let (files, caches) = sort(found);
+    match caches.as_slice() {
+        [cache] if files.is_empty() => open_frames(cache, expected_points),
+        [_, _, ..] if files.is_empty() => {
+            Err(Fault::invalid(format!("matches {} captures; name one of them", caches.len())).at(path))
+        }
+        _ => open_sequence(path, files, expected_points),
+    }
+}
+
+fn list(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    let read = || -> io::Result<Vec<PathBuf>> {
+        let mut files = Vec::new();
+        for entry in fs::read_dir(folder)? {
+            let path = entry?.path();
+            let hidden = path.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b"."));
+            if !hidden && path.is_file() {
+                files.push(path);
+            }
+        }
+        Ok(files)
+    };
+    read().map_err(|cause| Error::read(folder, cause))
+}
+
+/// Mesh files and cache files in natural order.
+fn sort(mut files: Vec<PathBuf>) -> (Vec<PathBuf>, Vec<PathBuf>) {
+    files.sort_by(|a, b| natural::compare(a.as_os_str().as_encoded_bytes(), b.as_os_str().as_encoded_bytes()));
+    files.retain(|path| MeshFormat::guess(path).is_some() || CacheFormat::guess(path).is_some());
+    files.into_iter().partition(|path| MeshFormat::guess(path).is_some())
+}
+
+fn open_sequence(source: &Path, files: Vec<PathBuf>, expected_points: usize) -> Result<Box<dyn FrameReader>, Error> {
+    let mut counts = BTreeMap::new();
+    for format in files.iter().filter_map(|path| MeshFormat::guess(path)) {
+        *counts.entry(format.extension()).or_insert(0_usize) += 1;
+    }
+    match counts.len() {
+        0 => Err(Fault::invalid(format!(
+            "holds no mesh files; give a folder or pattern of {} files",
+            extensions(&MeshFormat::ALL)
+        ))
+        .at(source)),
+        1 => Ok(Box::new(SequenceReader::new(files, expected_points))),
+        _ => {
+            let list: Vec<_> = counts.iter().map(|(extension, count)| format!("{count} .{extension}")).collect();
+            Err(Fault::unsupported(format!(
+                "mixes mesh formats ({}); keep one, or pick it with a pattern such as \"*.obj\"",
+                list.join(", ")
+            ))
+            .at(source))
+        }
+    }
+}

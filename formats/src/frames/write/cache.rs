@@ -1,0 +1,65 @@
+//! All frames in one file.
+
+use std::io::{self, Write};
+
+use super::super::{mdd, npy, pc2};
+use super::{Announced, CacheFormat, FrameOptions, FrameWriter};
+use crate::atomic::AtomicFile;
+use crate::error::{Error, Fault};
+
+pub(super) struct CacheWriter {
+    announced: Announced,
+    file: AtomicFile,
+    big_endian: bool,
+    bytes: Vec<u8>,
+}
+
+impl CacheWriter {
+    pub(super) fn create(announced: Announced, format: CacheFormat, options: &FrameOptions) -> Result<Self, Error> {
+        let Announced { points, frames, .. } = announced;
+        if format == CacheFormat::Npy {
+            return Self::begin(announced, false, |file| file.write_all(&npy::header(points, frames)));
+        }
+        let (Ok(points), Ok(frames)) = (i32::try_from(points), i32::try_from(frames)) else {
+            let what = format!("cannot count more than {} frames or points; write .npy instead", i32::MAX);
+            return Err(Fault::unsupported(what).at(&announced.path));
+        };
+        if format == CacheFormat::Pc2 {
+            return Self::begin(announced, false, |file| file.write_all(&pc2::header(points, frames)));
+        }
+        Self::begin(announced, true, |file| {
+            file.write_all(&mdd::header(points, frames))?;
+            (0..frames).try_for_each(|k| file.write_all(&((f64::from(k) / options.fps) as f32).to_be_bytes()))
+        })
+    }
+
+    fn begin(
+        announced: Announced,
+        big_endian: bool,
+        header: impl FnOnce(&mut AtomicFile) -> io::Result<()>,
+    ) -> Result<Self, Error> {
+        let mut file = AtomicFile::create(&announced.path)?;
+        header(&mut file).map_err(|cause| Error::write(&announced.path, cause))?;
+        Ok(Self { announced, file, big_endian, bytes: Vec::new() })
+    }
+}
+
+impl FrameWriter for CacheWriter {
+    fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error> {
+        self.announced.admit(positions)?;
+        self.bytes.clear();
+        if self.big_endian {
+            self.bytes.extend(positions.iter().flat_map(|x| x.to_be_bytes()));
+        } else {
+            self.bytes.extend(positions.iter().flat_map(|x| x.to_le_bytes()));
+        }
+        self.file.write_all(&self.bytes).map_err(|cause| Error::write(&self.announced.path, cause))?;
+        self.announced.written += 1;
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> Result<(), Error> {
+        self.announced.check_complete()?;
+        self.file.commit()
+    }
+}

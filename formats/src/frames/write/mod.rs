@@ -1,0 +1,133 @@
+//! Frames to files.
+
+mod cache;
+mod sequence;
+
+use std::path::{MAIN_SEPARATOR, Path, PathBuf};
+
+use cager_core::mesh::Polygons;
+
+use super::{CacheFormat, unknown_extension};
+use crate::error::{Error, Fault};
+use cache::CacheWriter;
+use sequence::SequenceWriter;
+
+/// The frames of an output, one after another; dropped before [`FrameWriter::finish`] they leave nothing.
+pub trait FrameWriter: Send {
+    /// Writes the next frame, 3 × points coordinates `x y z x y z …`.
+    ///
+    /// # Errors
+    /// [`Error::PointCount`] for another number of coordinates, [`Error::NonFinite`], [`Error::FrameCount`] for more
+    /// frames than announced, [`Error::Io`].
+    fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error>;
+
+    /// Makes the frames durable and gives the output its name.
+    ///
+    /// # Errors
+    /// [`Error::FrameCount`] for fewer frames than announced, [`Error::Target`], [`Error::Io`]; the output is then not
+    /// created.
+    fn finish(self: Box<Self>) -> Result<(), Error>;
+}
+
+/// What some formats store beside the positions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrameOptions {
+    /// Frames per second, for the times in `.mdd`: 24 by default.
+    pub fps: f64,
+}
+
+impl Default for FrameOptions {
+    fn default() -> Self {
+        Self { fps: 24.0 }
+    }
+}
+
+/// Begins an output of `frames` frames of `points` points each.
+///
+/// The extension of `path` says what: `.npy` (frames × points × 3, `<f4`), `.pc2` or `.mdd`. Without an extension, with
+/// a `/` at the end, or as an existing folder it becomes a folder of files `frame_0000.obj`, …, each with `faces`.
+///
+/// # Errors
+/// [`Error::Unsupported`] for other extensions and for more points or frames than a format can count,
+/// [`Error::Invalid`] for no points, no frames, faces without their points and a frame rate that is not positive,
+/// [`Error::Target`] and [`Error::Io`] where the output cannot be created.
+pub fn create_frames(
+    path: impl AsRef<Path>,
+    points: usize,
+    frames: usize,
+    faces: &Polygons,
+    options: &FrameOptions,
+) -> Result<Box<dyn FrameWriter>, Error> {
+    let path = path.as_ref();
+    let announced = Announced { path: path.to_owned(), points, frames, written: 0 };
+    announced.check(options).map_err(|fault| fault.at(path))?;
+    if is_folder(path) {
+        return Ok(Box::new(SequenceWriter::create(announced, faces)?));
+    }
+    match CacheFormat::guess(path) {
+        Some(format) => Ok(Box::new(CacheWriter::create(announced, format, options)?)),
+        None => Err(unknown_extension(path, false)),
+    }
+}
+
+fn is_folder(path: &Path) -> bool {
+    let text = path.as_os_str().as_encoded_bytes();
+    let separated = text.last().is_some_and(|&end| end == b'/' || char::from(end) == MAIN_SEPARATOR);
+    separated || path.extension().is_none() || path.is_dir()
+}
+
+/// What is to come, and how much of it has.
+struct Announced {
+    path: PathBuf,
+    points: usize,
+    frames: usize,
+    written: usize,
+}
+
+impl Announced {
+    fn check(&self, options: &FrameOptions) -> Result<(), Fault> {
+        if self.points == 0 || self.frames == 0 {
+            return Err(Fault::invalid(format!(
+                "cannot hold {} frames of {} points; give it at least one of each",
+                self.frames, self.points
+            )));
+        }
+        if self.points > u32::MAX as usize {
+            return Err(Fault::unsupported(format!(
+                "cannot hold {} points, more than {}; reduce the mesh",
+                self.points,
+                u32::MAX
+            )));
+        }
+        if !(options.fps > 0.0 && options.fps.is_finite()) {
+            return Err(Fault::invalid(format!(
+                "cannot have {} frames per second; give a positive number",
+                options.fps
+            )));
+        }
+        Ok(())
+    }
+
+    /// Checks the next frame.
+    fn admit(&self, positions: &[f32]) -> Result<(), Error> {
+        let (path, frame) = (|| self.path.clone(), self.written);
+        if self.written == self.frames {
+            return Err(Error::FrameCount { path: path(), announced: self.frames, written: self.written + 1 });
+        }
+        if positions.len() != 3 * self.points {
+            let found = (positions.len() / 3) as u64;
+            return Err(Error::PointCount { path: path(), frame: Some(frame), expected: self.points, found });
+        }
+        match positions.iter().position(|x| !x.is_finite()) {
+            Some(culprit) => Err(Error::NonFinite { path: path(), frame, point: culprit / 3 }),
+            None => Ok(()),
+        }
+    }
+
+    fn check_complete(&self) -> Result<(), Error> {
+        if self.written == self.frames {
+            return Ok(());
+        }
+        Err(Error::FrameCount { path: self.path.clone(), announced: self.frames, written: self.written })
+    }
+}

@@ -1,0 +1,16 @@
+//! Meshes and point caches to and from files and byte slices.
+//!
+//! Readers take bytes of any origin: they return an error for whatever they do not understand, never panic, and never
+//! allocate more than a small multiple of what the file holds. Writers make files that appear whole or not at all.
+
+pub mod atomic;
+mod error;
+pub mod frames;
+pub mod mesh;
+mod natural;
+mod text;
+
+pub use atomic::{AtomicDir, AtomicFile};
+pub use error::{Action, Error};
+pub use frames::{CacheFormat, FrameOptions, FrameReader, FrameWriter, create_frames, open_frames, open_frames_bytes};
+pub use mesh::{MeshFormat, read_model, read_model_bytes, write_model};

@@ -1,0 +1,62 @@
+//! The container: a header, a chunk of JSON and a chunk of binary data.
+
+use gltf::json::Root;
+
+use crate::error::Fault;
+
+pub(super) struct Chunks<'a> {
+    pub(super) json: &'a [u8],
+    pub(super) binary: &'a [u8],
+}
+
+pub(super) fn split(bytes: &[u8]) -> Result<Chunks<'_>, Fault> {
+    let (Some(b"glTF"), Some(version), Some(length)) = (bytes.get(..4), word(bytes, 4), word(bytes, 8)) else {
+        return Err(Fault::damaged("does not begin as a .glb file does; export the mesh again"));
+    };
+    if version != 2 {
+        return Err(Fault::unsupported(format!("is glTF {version}.0; export the mesh as glTF 2.0")));
+    }
+    let mut rest = bytes.get(12..length as usize).ok_or_else(|| truncated(length.into(), bytes.len()))?;
+    let (mut json, mut binary) = (None, None);
+    while !rest.is_empty() {
+        let (Some(length), Some(kind)) = (word(rest, 0), rest.get(4..8)) else {
+            return Err(truncated(8, rest.len()));
+        };
+        let chunk = rest[8..].get(..length as usize).ok_or_else(|| truncated(length.into(), rest.len() - 8))?;
+        match kind {
+            b"JSON" if json.is_none() => json = Some(chunk),
+            b"BIN\0" if binary.is_none() => binary = Some(chunk),
+            // The format asks readers to skip what they do not know.
+            _ => {}
+        }
+        rest = &rest[8 + chunk.len()..];
+    }
+    let json = json.ok_or_else(|| Fault::damaged("has no JSON chunk; export the mesh again"))?;
+    Ok(Chunks { json, binary: binary.unwrap_or_default() })
+}
+
+/// Parses the JSON; the indices in it are not checked.
+pub(super) fn document(json: &[u8]) -> Result<Root, Fault> {
+    // Three bytes of JSON make an object of some hundred, so that their number is bounded before any is made.
+    const MOST_OBJECTS: usize = 100_000;
+    if json.iter().filter(|&&b| b == b'{').count() > MOST_OBJECTS {
+        return Err(Fault::unsupported(format!(
+            "describes more than {MOST_OBJECTS} objects; export the mesh alone, without its scene"
+        )));
+    }
+    let root: Root = gltf::json::deserialize::from_slice(json)
+        .map_err(|cause| Fault::damaged(format!("has JSON that is not glTF 2.0 ({cause}); export the mesh again")))?;
+    let compressed = |name: &&String| name.contains("compression") || name.contains("quantization");
+    if let Some(name) = root.extensions_required.iter().find(compressed) {
+        return Err(Fault::unsupported(format!("needs the extension {name}; export the mesh without compression")));
+    }
+    Ok(root)
+}
+
+fn word(bytes: &[u8], offset: usize) -> Option<u32> {
+    bytes.get(offset..)?.first_chunk().map(|bytes| u32::from_le_bytes(*bytes))
+}
+
+fn truncated(promised: u64, found: usize) -> Fault {
+    Fault::damaged(format!("promises {promised} bytes where {found} are left; copy or export the file again"))
+}

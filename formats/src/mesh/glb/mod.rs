@@ -1,0 +1,175 @@
+//! Binary glTF 2.0: the triangles and points of its default scene.
+//!
+//! The `gltf` crate turns the JSON into a document; everything that the document refers to is looked up here with
+//! checks, because the crate's own accessors and validation panic on indices out of range.
+
+mod accessor;
+mod container;
+mod scene;
+
+use std::collections::HashMap;
+
+use cager_core::mesh::{Model, Point};
+use gltf::json::mesh::{Mode, Primitive, Semantic};
+use gltf::json::validation::Checked;
+use gltf::json::{Mesh, Root};
+
+use super::check_face;
+use crate::error::Fault;
+use accessor::Buffers;
+use scene::Placement;
+
+pub(super) fn read(bytes: &[u8]) -> Result<Model, Fault> {
+    let chunks = container::split(bytes)?;
+    let root = container::document(chunks.json)?;
+    let mut builder = Builder {
+        root: &root,
+        buffers: Buffers { root: &root, binary: chunks.binary },
+        model: Model::default(),
+        most: MOST_FREE + MOST_PER_BYTE * bytes.len(),
+    };
+    for placement in scene::placements(&root)? {
+        builder.place(&placement)?;
+    }
+    Ok(builder.model)
+}
+
+/// Points, corners and primitives that any file may have.
+const MOST_FREE: usize = 1 << 16;
+/// Those beyond, for each byte of the file: enough for seven copies of a mesh and more.
+const MOST_PER_BYTE: usize = 2;
+
+struct Builder<'a> {
+    root: &'a Root,
+    buffers: Buffers<'a>,
+    model: Model,
+    /// Nodes may repeat a mesh, and primitives an accessor, any number of times in a few bytes each.
+    most: usize,
+}
+
+impl Builder<'_> {
+    fn place(&mut self, placement: &Placement) -> Result<(), Fault> {
+        let mesh: &Mesh = self
+            .root
+            .meshes
+            .get(placement.mesh)
+            .ok_or_else(|| dangling(&format!("mesh {}", placement.mesh), self.root.meshes.len()))?;
+        // Primitives that differ by their material alone often share their points.
+        let mut placed = HashMap::new();
+        for (k, primitive) in mesh.primitives.iter().enumerate() {
+            // Counted even if empty: the work, not the memory alone, is bounded.
+            self.most = self.most.checked_sub(1).ok_or_else(too_large)?;
+            let place = format!("mesh {}, primitive {k}", placement.mesh);
+            self.primitive(primitive, placement, &place, &mut placed)?;
+        }
+        Ok(())
+    }
+
+    fn primitive(
+        &mut self,
+        primitive: &Primitive,
+        placement: &Placement,
+        place: &str,
+        placed: &mut HashMap<usize, (usize, usize)>,
+    ) -> Result<(), Fault> {
+        let Checked::Valid(mode) = primitive.mode else {
+            return Err(Fault::damaged(format!("{place}: the mode is unknown; export the mesh again")));
+        };
+        if matches!(mode, Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
+            return Ok(());
+        }
+        let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions)).ok_or_else(|| {
+            Fault::unsupported(format!("{place} has no POSITION; export the mesh without compression"))
+        })?;
+        let (base, count) = match placed.get(&positions.value()) {
+            Some(&known) => known,
+            None => {
+                let added = self.add_points(positions.value(), placement, place)?;
+                placed.insert(positions.value(), added);
+                added
+            }
+        };
+        if mode == Mode::Points {
+            return Ok(());
+        }
+        let corners = match primitive.indices {
+            Some(index) => self.buffers.indices(index.value(), self.room(), place)?,
+            None => {
+                self.check_room(count)?;
+                (0..count as u32).collect()
+            }
+        };
+        self.add_triangles(&corners, mode, base, count, placement.mirrored(), place)
+    }
+
+    fn add_points(&mut self, index: usize, placement: &Placement, place: &str) -> Result<(usize, usize), Fault> {
+        let points = self.buffers.positions(index, self.room(), place)?;
+        let base = self.model.points.len();
+        for (k, &point) in points.iter().enumerate() {
+            let point: Point = placement.apply(point);
+            if !point.iter().all(|x| x.is_finite()) {
+                return Err(Fault::invalid(format!(
+                    "{place}: vertex {k} has a coordinate that is NaN or infinite; repair or remove it"
+                )));
+            }
+            self.model.points.push(point);
+        }
+        Ok((base, points.len()))
+    }
+
+    fn add_triangles(
+        &mut self,
+        corners: &[u32],
+        mode: Mode,
+        base: usize,
+        count: usize,
+        mirrored: bool,
+        place: &str,
+    ) -> Result<(), Fault> {
+        let triangles = match mode {
+            Mode::Triangles => corners.len() / 3,
+            _ => corners.len().saturating_sub(2),
+        };
+        if mode == Mode::Triangles && !corners.len().is_multiple_of(3) {
+            return Err(Fault::damaged(format!(
+                "{place}: {} corners do not make whole triangles; export the mesh again",
+                corners.len()
+            )));
+        }
+        self.check_room(triangles.saturating_mul(3))?;
+        for k in 0..triangles {
+            let mut face = match mode {
+                Mode::Triangles => [corners[3 * k], corners[3 * k + 1], corners[3 * k + 2]],
+                Mode::TriangleFan => [corners[0], corners[k + 1], corners[k + 2]],
+                // Every other triangle of a strip is turned around.
+                _ => [corners[k], corners[k + 1 + k % 2], corners[k + 2 - k % 2]],
+            };
+            check_face(&face, count, || format!("{place}, triangle {k}"))?;
+            if mirrored {
+                face.swap(1, 2);
+            }
+            // `room` keeps all points within `u32`.
+            self.model.faces.push(&face.map(|index| index + base as u32));
+        }
+        Ok(())
+    }
+
+    /// How many points or corners may still be added.
+    fn room(&self) -> usize {
+        let used = self.model.points.len() + self.model.faces.indices().len();
+        self.most.min(u32::MAX as usize).saturating_sub(used)
+    }
+
+    fn check_room(&self, wanted: usize) -> Result<(), Fault> {
+        if wanted <= self.room() { Ok(()) } else { Err(too_large()) }
+    }
+}
+
+fn too_large() -> Fault {
+    Fault::unsupported("repeats its meshes too often; export one copy of each, or bake them into a single mesh")
+}
+
+/// A reference to something that is not there.
+fn dangling(what: &str, count: usize) -> Fault {
+    Fault::damaged(format!("refers to {what}, but has {count} of those; export the mesh again"))
+}

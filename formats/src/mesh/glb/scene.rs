@@ -1,0 +1,113 @@
+//! Where the meshes of a scene stand.
+
+use cager_core::mesh::Point;
+use gltf::json::{Index, Node, Root};
+
+use super::dangling;
+use crate::error::Fault;
+
+/// Columns of a 4 × 4 matrix without its last row, which is 0 0 0 1.
+type Affine = [[f64; 3]; 4];
+
+const IDENTITY: Affine = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]];
+
+/// A mesh at its place in the scene.
+pub(super) struct Placement {
+    pub(super) mesh: usize,
+    transform: Affine,
+}
+
+impl Placement {
+    pub(super) fn apply(&self, [x, y, z]: Point) -> Point {
+        if self.transform == IDENTITY {
+            return [x, y, z];
+        }
+        let [a, b, c, d] = &self.transform;
+        [0, 1, 2].map(|k| a[k] * x + b[k] * y + c[k] * z + d[k])
+    }
+
+    /// Whether triangles turn around, so that they must be turned back.
+    pub(super) fn mirrored(&self) -> bool {
+        let [a, b, c, _] = &self.transform;
+        let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
+        a[0] * cross[0] + a[1] * cross[1] + a[2] * cross[2] < 0.0
+    }
+}
+
+/// The meshes of the default scene in the order of their nodes, or all meshes as they are where no node has one.
+pub(super) fn placements(root: &Root) -> Result<Vec<Placement>, Fault> {
+    let mut placements = Vec::new();
+    for (node, transform) in root.nodes.iter().zip(transforms(root)?) {
+        if let (Some(mesh), Some(transform)) = (node.mesh, transform) {
+            // The joints of a skin, not its node, say where it is; at rest they leave it where it was modelled.
+            let transform = if node.skin.is_some() { IDENTITY } else { transform };
+            placements.push(Placement { mesh: mesh.value(), transform });
+        }
+    }
+    if root.nodes.iter().all(|node| node.mesh.is_none()) {
+        placements.extend((0..root.meshes.len()).map(|mesh| Placement { mesh, transform: IDENTITY }));
+    }
+    Ok(placements)
+}
+
+/// From each node's space to the world's; none for nodes outside the default scene.
+fn transforms(root: &Root) -> Result<Vec<Option<Affine>>, Fault> {
+    let mut transforms = vec![None; root.nodes.len()];
+    let mut open: Vec<_> = roots(root)?.into_iter().map(|node| (node, IDENTITY)).collect();
+    while let Some((index, parent)) = open.pop() {
+        let node = root.nodes.get(index).ok_or_else(|| dangling(&format!("node {index}"), root.nodes.len()))?;
+        if transforms[index].is_some() {
+            return Err(Fault::damaged(format!(
+                "node {index} is reached twice, but nodes make a tree; export the mesh again"
+            )));
+        }
+        let world = compose(&parent, &local(node));
+        transforms[index] = Some(world);
+        open.extend(children(node).map(|child| (child, world)));
+    }
+    Ok(transforms)
+}
+
+fn roots(root: &Root) -> Result<Vec<usize>, Fault> {
+    let scene = root.scene.map_or(0, |scene| scene.value());
+    match root.scenes.get(scene) {
+        Some(scene) => Ok(scene.nodes.iter().map(Index::value).collect()),
+        None if root.scene.is_some() => Err(dangling(&format!("scene {scene}"), root.scenes.len())),
+        None => {
+            let mut is_root = vec![true; root.nodes.len()];
+            for child in root.nodes.iter().flat_map(children) {
+                if let Some(is_root) = is_root.get_mut(child) {
+                    *is_root = false;
+                }
+            }
+            Ok((0..root.nodes.len()).filter(|&node| is_root[node]).collect())
+        }
+    }
+}
+
+fn children(node: &Node) -> impl Iterator<Item = usize> {
+    node.children.iter().flatten().map(Index::value)
+}
+
+fn local(node: &Node) -> Affine {
+    if let Some(m) = &node.matrix {
+        return [0, 4, 8, 12].map(|column| [0, 1, 2].map(|row| f64::from(m[column + row])));
+    }
+    let [x, y, z, w] = node.rotation.unwrap_or_default().0.map(f64::from);
+    let rotation = [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)],
+        [2.0 * (x * y - z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + x * w)],
+        [2.0 * (x * z + y * w), 2.0 * (y * z - x * w), 1.0 - 2.0 * (x * x + y * y)],
+    ];
+    let scale = node.scale.unwrap_or([1.0; 3]).map(f64::from);
+    let [a, b, c] = [0, 1, 2].map(|k| rotation[k].map(|x| x * scale[k]));
+    [a, b, c, node.translation.unwrap_or_default().map(f64::from)]
+}
+
+fn compose(outer: &Affine, inner: &Affine) -> Affine {
+    let [a, b, c, d] = outer;
+    let turn = |[x, y, z]: [f64; 3]| [0, 1, 2].map(|k| a[k] * x + b[k] * y + c[k] * z);
+    let [i, j, k, moved] = inner;
+    let moved = turn(*moved);
+    [turn(*i), turn(*j), turn(*k), [0, 1, 2].map(|k| moved[k] + d[k])]
+}

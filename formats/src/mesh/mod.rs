@@ -1,0 +1,162 @@
+//! Models from and to mesh files.
+
+mod glb;
+mod obj;
+mod off;
+mod ply;
+mod stl;
+mod write;
+
+use std::fs;
+use std::path::Path;
+
+use cager_core::mesh::Model;
+
+use crate::error::{Error, Fault};
+
+pub use write::write_model;
+pub(crate) use write::write_obj_faces;
+
+/// A mesh file format.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum MeshFormat {
+    /// Wavefront OBJ.
+    Obj,
+    /// Polygon File Format, also called Stanford: ASCII or binary.
+    Ply,
+    /// Object File Format, ASCII.
+    Off,
+    /// Stereolithography: ASCII or binary. Corners with the same position become one point.
+    Stl,
+    /// Binary glTF 2.0.
+    Glb,
+}
+
+impl MeshFormat {
+    /// All formats.
+    pub const ALL: [Self; 5] = [Self::Obj, Self::Ply, Self::Off, Self::Stl, Self::Glb];
+
+    /// The file name extension, without the dot.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Obj => "obj",
+            Self::Ply => "ply",
+            Self::Off => "off",
+            Self::Stl => "stl",
+            Self::Glb => "glb",
+        }
+    }
+
+    /// The format that the extension of `path` stands for, in upper or lower case.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] lists the extensions that are read.
+    pub fn from_path(path: &Path) -> Result<Self, Error> {
+        if let Some(format) = Self::guess(path) {
+            return Ok(format);
+        }
+        let found = match path.extension() {
+            Some(found) if found.eq_ignore_ascii_case("gltf") => {
+                "glTF in separate files is not read; export it as binary .glb".to_owned()
+            }
+            Some(found) => format!(
+                ".{} is not a mesh format that is read; convert it to one of {}",
+                found.display(),
+                extensions(&Self::ALL)
+            ),
+            None => format!("has no file name extension; give it one of {}", extensions(&Self::ALL)),
+        };
+        Err(Fault::unsupported(found).at(path))
+    }
+
+    pub(crate) fn guess(path: &Path) -> Option<Self> {
+        let found = path.extension()?;
+        Self::ALL.into_iter().find(|format| found.eq_ignore_ascii_case(format.extension()))
+    }
+}
+
+/// Extensions as a list for messages.
+pub(crate) fn extensions(formats: &[MeshFormat]) -> String {
+    let list: Vec<_> = formats.iter().map(|format| format!(".{}", format.extension())).collect();
+    list.join(" ")
+}
+
+/// Reads a model from a file, its points in the order of the file and its polygons as they are.
+///
+/// # Errors
+/// As [`read_model_bytes`], and [`Error::Io`] where the file cannot be read.
+pub fn read_model(path: &Path) -> Result<Model, Error> {
+    read_file(path, Contents::PointsAndFaces)
+}
+
+/// Reads a model from the bytes of a file; `name` is the path in error messages.
+///
+/// Coordinates are as exact as `f64` can hold them. A `.glb` gives the triangles and points of its default scene, each
+/// node's mesh at its place; a mesh with a skin is taken in its bind pose.
+///
+/// # Errors
+/// [`Error::Damaged`] where the bytes do not follow the format or end too early, [`Error::Unsupported`] for variants
+/// that are not read, [`Error::Invalid`] for a coordinate that is not finite, a face with fewer than three corners or
+/// with a vertex that does not exist, and a file without points.
+pub fn read_model_bytes(format: MeshFormat, name: &Path, bytes: &[u8]) -> Result<Model, Error> {
+    read_bytes(format, name, bytes, Contents::PointsAndFaces)
+}
+
+/// How much of a file is wanted: the frames of a capture need no faces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Contents {
+    PointsAndFaces,
+    Points,
+}
+
+pub(crate) fn read_file(path: &Path, contents: Contents) -> Result<Model, Error> {
+    let format = MeshFormat::from_path(path)?;
+    let bytes = fs::read(path).map_err(|cause| Error::read(path, cause))?;
+    read_bytes(format, path, &bytes, contents)
+}
+
+fn read_bytes(format: MeshFormat, name: &Path, bytes: &[u8], contents: Contents) -> Result<Model, Error> {
+    let model = if bytes.is_empty() {
+        Err(Fault::damaged("is empty; export the mesh or copy the file again"))
+    } else {
+        match format {
+            MeshFormat::Obj => obj::read(bytes, contents),
+            MeshFormat::Ply => ply::read(bytes, contents),
+            MeshFormat::Off => off::read(bytes, contents),
+            MeshFormat::Stl => stl::read(bytes),
+            MeshFormat::Glb => glb::read(bytes),
+        }
+    };
+    model
+        .and_then(|model| match model.points.len() {
+            0 => Err(Fault::invalid("has no points; export the mesh with its vertices")),
+            n if n > u32::MAX as usize => {
+                Err(Fault::unsupported(format!("has {n} points, more than 4294967295; reduce the mesh")))
+            }
+            _ => Ok(model),
+        })
+        .map_err(|fault| fault.at(name))
+}
+
+/// Checks the corners of one face, which `place` names in messages, against the number of points.
+fn check_face(corners: &[u32], points: usize, place: impl Fn() -> String) -> Result<(), Fault> {
+    if corners.len() < 3 {
+        return Err(too_few_corners(&place(), corners.len()));
+    }
+    match corners.iter().find(|&&index| index as usize >= points) {
+        Some(&index) => Err(no_such_vertex(&place(), index.into(), points)),
+        None => Ok(()),
+    }
+}
+
+fn too_few_corners(place: &str, corners: usize) -> Fault {
+    Fault::invalid(format!(
+        "{place}: the face has {corners} corners where at least 3 are needed; remove it or export the mesh again"
+    ))
+}
+
+fn no_such_vertex(place: &str, index: i64, points: usize) -> Fault {
+    Fault::invalid(format!(
+        "{place}: the face names vertex {index}, but there are {points} vertices; export the mesh again"
+    ))
+}

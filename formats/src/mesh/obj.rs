@@ -1,0 +1,85 @@
+//! Wavefront OBJ: `v` and `f` lines; everything else is skipped.
+
+use cager_core::mesh::Model;
+
+use super::{Contents, no_such_vertex, too_few_corners};
+use crate::error::Fault;
+use crate::text::{Lines, integer, point, quoted, words};
+
+pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Model, Fault> {
+    let model = scan(bytes, contents, None)?;
+    let points = model.points.len();
+    let named = model.faces.indices().iter().max();
+    if named.is_some_and(|&index| index as usize >= points) {
+        // Faces may come before their vertices, so that only now it is known how many there are to check against.
+        return scan(bytes, contents, Some(points));
+    }
+    Ok(model)
+}
+
+/// One pass over the file; with `points`, stops at the first face that names a later vertex.
+fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Model, Fault> {
+    let mut model = Model::default();
+    let mut face = Vec::new();
+    let mut lines = Lines::new(bytes);
+    while let Some(line) = lines.next() {
+        let number = lines.number();
+        let is_vertex = match line {
+            [b'v'] | [b'v', b' ' | b'\t', ..] => true,
+            [b'f'] | [b'f', b' ' | b'\t', ..] if contents == Contents::PointsAndFaces => false,
+            _ => continue,
+        };
+        let joined;
+        let line = if line.ends_with(b"\\") {
+            joined = join(line, &mut lines);
+            joined.as_slice()
+        } else {
+            line
+        };
+        let mut words = words(&line[1..]).take_while(|word| word[0] != b'#');
+        if is_vertex {
+            let point = point(&mut words, || format!("line {number}"))?;
+            model.points.push(point);
+        } else {
+            face.clear();
+            for word in words {
+                face.push(corner(word, model.points.len(), points, number)?);
+            }
+            if face.len() < 3 {
+                return Err(too_few_corners(&format!("line {number}"), face.len()));
+            }
+            model.faces.push(&face);
+        }
+    }
+    Ok(model)
+}
+
+/// A line and those that continue it after a backslash.
+fn join(line: &[u8], lines: &mut Lines<'_>) -> Vec<u8> {
+    let mut joined = line.to_vec();
+    while joined.last() == Some(&b'\\') {
+        joined.pop();
+        joined.push(b' ');
+        joined.extend_from_slice(lines.next().unwrap_or_default());
+    }
+    joined
+}
+
+/// The vertex of a corner written `v`, `v/vt`, `v//vn` or `v/vt/vn`, where negative numbers count back from the last
+/// vertex.
+fn corner(word: &[u8], before: usize, points: Option<usize>, line: usize) -> Result<u32, Fault> {
+    let digits = word.split(|&b| b == b'/').next().unwrap_or(word);
+    let Some(index) = integer::<i64>(digits) else {
+        return Err(Fault::damaged(format!(
+            "line {line}: {} is not a vertex number; export the mesh again",
+            quoted(word)
+        )));
+    };
+    let from_zero = if index < 0 { before as i64 + index } else { index - 1 };
+    let exists = from_zero >= 0 && points.is_none_or(|points| from_zero < points as i64);
+    if !exists {
+        return Err(no_such_vertex(&format!("line {line}"), index, points.unwrap_or(before)));
+    }
+    // No file has as many points, so that the check at the end finds this one.
+    Ok(u32::try_from(from_zero).unwrap_or(u32::MAX))
+}

@@ -1,0 +1,172 @@
+//! The header: which elements follow, and what each is made of.
+
+use crate::error::Fault;
+use crate::text::{Lines, integer, quoted, words};
+
+pub(super) struct Header<'a> {
+    pub(super) encoding: Encoding,
+    pub(super) elements: Vec<Element>,
+    /// What follows the header.
+    pub(super) body: Lines<'a>,
+}
+
+#[derive(Clone, Copy)]
+pub(super) enum Encoding {
+    Ascii,
+    LittleEndian,
+    BigEndian,
+}
+
+pub(super) struct Element {
+    pub(super) name: String,
+    pub(super) count: u64,
+    pub(super) properties: Vec<Property>,
+}
+
+pub(super) struct Property {
+    pub(super) name: String,
+    pub(super) kind: Kind,
+}
+
+#[derive(Clone, Copy)]
+pub(super) enum Kind {
+    Scalar(Scalar),
+    List { count: Scalar, item: Scalar },
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Scalar {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+impl Scalar {
+    fn parse(word: &[u8]) -> Option<Self> {
+        Some(match word {
+            b"char" | b"int8" => Self::I8,
+            b"uchar" | b"uint8" => Self::U8,
+            b"short" | b"int16" => Self::I16,
+            b"ushort" | b"uint16" => Self::U16,
+            b"int" | b"int32" => Self::I32,
+            b"uint" | b"uint32" => Self::U32,
+            b"float" | b"float32" => Self::F32,
+            b"double" | b"float64" => Self::F64,
+            _ => return None,
+        })
+    }
+
+    fn is_float(self) -> bool {
+        matches!(self, Self::F32 | Self::F64)
+    }
+}
+
+impl Header<'_> {
+    /// Number of vertices, which faces are checked against even where they come first.
+    pub(super) fn vertices(&self) -> Result<u64, Fault> {
+        let mut vertices = self.elements.iter().filter(|element| element.name == "vertex");
+        let count = vertices.next().map_or(0, |element| element.count);
+        if vertices.next().is_some() {
+            return Err(Fault::damaged("has two lists of vertices; export the mesh again"));
+        }
+        if count > u64::from(u32::MAX) {
+            return Err(Fault::damaged(format!(
+                "promises {count} vertices, more than 4294967295; export the mesh again"
+            )));
+        }
+        Ok(count)
+    }
+}
+
+impl Element {
+    /// Columns of x, y and z.
+    pub(super) fn coordinates(&self) -> Result<[usize; 3], Fault> {
+        let mut columns = [0; 3];
+        for (column, axis) in columns.iter_mut().zip(["x", "y", "z"]) {
+            let is_axis = |property: &Property| property.name == axis && matches!(property.kind, Kind::Scalar(_));
+            *column = self.properties.iter().position(is_axis).ok_or_else(|| {
+                Fault::unsupported(format!("has vertices without {axis}; export the mesh with x, y and z"))
+            })?;
+        }
+        Ok(columns)
+    }
+
+    /// Column of the list of vertices of each face.
+    pub(super) fn corners(&self) -> Result<usize, Fault> {
+        let is_corners = |property: &Property| {
+            matches!(property.name.as_str(), "vertex_indices" | "vertex_index")
+                && matches!(property.kind, Kind::List { .. })
+        };
+        self.properties
+            .iter()
+            .position(is_corners)
+            .ok_or_else(|| Fault::unsupported("has faces without vertex_indices; export the mesh with plain polygons"))
+    }
+}
+
+pub(super) fn parse(bytes: &[u8]) -> Result<Header<'_>, Fault> {
+    let mut lines = Lines::new(bytes);
+    if lines.next() != Some(b"ply") {
+        return Err(Fault::damaged("does not begin with `ply`, so this is not a PLY file; export the mesh again"));
+    }
+    let mut encoding = None;
+    let mut elements: Vec<Element> = Vec::new();
+    while let Some(line) = lines.next() {
+        let words: Vec<_> = words(line).take(6).collect();
+        match words.as_slice() {
+            [b"format", name, ..] => {
+                encoding = Some(match *name {
+                    b"ascii" => Encoding::Ascii,
+                    b"binary_little_endian" => Encoding::LittleEndian,
+                    b"binary_big_endian" => Encoding::BigEndian,
+                    _ => return Err(unreadable(&lines, line)),
+                });
+            }
+            [b"element", name, count] => elements.push(Element {
+                name: String::from_utf8_lossy(name).into_owned(),
+                count: integer(count).ok_or_else(|| unreadable(&lines, line))?,
+                properties: Vec::new(),
+            }),
+            [b"property", kind @ .., name] => {
+                let kind = parse_kind(kind).ok_or_else(|| unreadable(&lines, line))?;
+                let element = elements.last_mut().ok_or_else(|| unreadable(&lines, line))?;
+                element.properties.push(Property { name: String::from_utf8_lossy(name).into_owned(), kind });
+            }
+            [] | [b"comment" | b"obj_info", ..] => {}
+            [b"end_header"] => {
+                let encoding = encoding.ok_or_else(|| Fault::damaged("has no `format` line; export the mesh again"))?;
+                let has = |name| elements.iter().any(|element| element.name == name && element.count > 0);
+                if has("tristrips") && !has("face") {
+                    return Err(Fault::unsupported("has triangle strips; export the mesh with plain polygons"));
+                }
+                return Ok(Header { encoding, elements, body: lines });
+            }
+            _ => return Err(unreadable(&lines, line)),
+        }
+    }
+    Err(Fault::damaged("ends within its header; copy or export the file again"))
+}
+
+fn parse_kind(words: &[&[u8]]) -> Option<Kind> {
+    match words {
+        [b"list", count, item] => {
+            let count = Scalar::parse(count).filter(|count| !count.is_float())?;
+            Some(Kind::List { count, item: Scalar::parse(item)? })
+        }
+        [scalar] => Scalar::parse(scalar).map(Kind::Scalar),
+        _ => None,
+    }
+}
+
+fn unreadable(lines: &Lines<'_>, line: &[u8]) -> Fault {
+    Fault::damaged(format!(
+        "line {}: {} is not understood in a PLY header; export the mesh again",
+        lines.number(),
+        quoted(line)
+    ))
+}

@@ -1,0 +1,116 @@
+//! Polygon File Format: ASCII, binary little-endian and binary big-endian.
+
+mod header;
+mod values;
+
+use cager_core::mesh::Model;
+
+use super::{Contents, check_face, no_such_vertex};
+use crate::error::Fault;
+use header::{Element, Encoding, Header, Kind};
+use values::{Ascii, Binary, Values};
+
+pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Model, Fault> {
+    let header = header::parse(bytes)?;
+    match header.encoding {
+        Encoding::Ascii => read_elements(&header, contents, Ascii::new(header.body.clone())),
+        Encoding::LittleEndian => read_elements(&header, contents, Binary::<false>::new(header.body.rest())),
+        Encoding::BigEndian => read_elements(&header, contents, Binary::<true>::new(header.body.rest())),
+    }
+}
+
+fn read_elements<V: Values>(header: &Header<'_>, contents: Contents, mut values: V) -> Result<Model, Fault> {
+    let mut model = Model::default();
+    let points = header.vertices()?;
+    for element in &header.elements {
+        match element.name.as_str() {
+            "vertex" => read_points(element, &mut values, &mut model)?,
+            "face" if contents == Contents::PointsAndFaces => read_faces(element, points, &mut values, &mut model)?,
+            _ => skip(element, &mut values)?,
+        }
+    }
+    Ok(model)
+}
+
+fn read_points<V: Values>(element: &Element, values: &mut V, model: &mut Model) -> Result<(), Fault> {
+    let columns = element.coordinates()?;
+    // Three scalars take at least three bytes.
+    let most = (values.remaining() / 3) as u64;
+    model.points.reserve_exact(element.count.min(most) as usize);
+    for k in 0..element.count {
+        let mut point = [0.0; 3];
+        for (column, property) in element.properties.iter().enumerate() {
+            let value = match property.kind {
+                Kind::Scalar(scalar) => values.next(scalar),
+                Kind::List { count, item } => skip_list(values, count, item).map(|()| 0.0),
+            };
+            let value = value.map_err(|fault| fault.inside(element, k))?;
+            if let Some(axis) = columns.iter().position(|&c| c == column) {
+                point[axis] = value;
+            }
+        }
+        if !point.iter().all(|x| x.is_finite()) {
+            return Err(Fault::invalid(format!(
+                "vertex {k} has a coordinate that is NaN or infinite; repair or remove it"
+            )));
+        }
+        model.points.push(point);
+    }
+    Ok(())
+}
+
+fn read_faces<V: Values>(element: &Element, points: u64, values: &mut V, model: &mut Model) -> Result<(), Fault> {
+    if element.count == 0 {
+        return Ok(());
+    }
+    let corners = element.corners()?;
+    let mut face = Vec::new();
+    for k in 0..element.count {
+        for (column, property) in element.properties.iter().enumerate() {
+            match property.kind {
+                Kind::List { count, item } if column == corners => {
+                    face.clear();
+                    let length = values.length(count).map_err(|fault| fault.inside(element, k))?;
+                    for _ in 0..length {
+                        let index = values.next(item).map_err(|fault| fault.inside(element, k))?;
+                        if !(index >= 0.0 && index < points as f64 && index.fract() == 0.0) {
+                            return Err(no_such_vertex(&format!("face {k}"), index as i64, points as usize));
+                        }
+                        face.push(index as u32);
+                    }
+                }
+                kind => skip_value(values, kind).map_err(|fault| fault.inside(element, k))?,
+            }
+        }
+        check_face(&face, points as usize, || format!("face {k}"))?;
+        model.faces.push(&face);
+    }
+    Ok(())
+}
+
+fn skip<V: Values>(element: &Element, values: &mut V) -> Result<(), Fault> {
+    // Nothing is stored for an element without properties, whatever its count.
+    if element.properties.is_empty() {
+        return Ok(());
+    }
+    for k in 0..element.count {
+        for property in &element.properties {
+            skip_value(values, property.kind).map_err(|fault| fault.inside(element, k))?;
+        }
+    }
+    Ok(())
+}
+
+fn skip_value<V: Values>(values: &mut V, kind: Kind) -> Result<(), values::Failure> {
+    match kind {
+        Kind::Scalar(scalar) => values.next(scalar).map(drop),
+        Kind::List { count, item } => skip_list(values, count, item),
+    }
+}
+
+fn skip_list<V: Values>(values: &mut V, count: header::Scalar, item: header::Scalar) -> Result<(), values::Failure> {
+    for _ in 0..values.length(count)? {
+        values.next(item)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,128 @@
+//! Models to mesh files.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use cager_core::mesh::Model;
+
+use super::{MeshFormat, check_face, extensions};
+use crate::atomic::AtomicFile;
+use crate::error::{Error, Fault};
+
+/// Writes a model to a `.obj`, `.ply` or `.off` file, which appears whole or not at all.
+///
+/// Text holds every coordinate exactly, in its shortest form. `.ply` is binary little-endian, `float` where that holds
+/// all coordinates exactly and `double` otherwise.
+///
+/// # Errors
+/// [`Error::Unsupported`] for other formats, [`Error::Invalid`] for a model that could not be read back,
+/// [`Error::Target`] and [`Error::Io`] where the file cannot be created.
+pub fn write_model(path: &Path, model: &Model) -> Result<(), Error> {
+    let write: fn(&mut AtomicFile, &Model) -> io::Result<()> = match MeshFormat::guess(path) {
+        Some(MeshFormat::Obj) => write_obj,
+        Some(MeshFormat::Ply) => write_ply,
+        Some(MeshFormat::Off) => write_off,
+        _ => {
+            let written = extensions(&[MeshFormat::Obj, MeshFormat::Ply, MeshFormat::Off]);
+            let what = format!("is not of a mesh format that is written; end its name in one of {written}");
+            return Err(Fault::unsupported(what).at(path));
+        }
+    };
+    check(model).map_err(|fault| fault.at(path))?;
+    let mut file = AtomicFile::create(path)?;
+    write(&mut file, model).map_err(|cause| Error::write(path, cause))?;
+    file.commit()
+}
+
+fn check(model: &Model) -> Result<(), Fault> {
+    if model.points.is_empty() {
+        return Err(Fault::invalid("the model to write has no points; give it some"));
+    }
+    let finite = |point: &[f64; 3]| point.iter().all(|x| x.is_finite());
+    if let Some(k) = model.points.iter().position(|point| !finite(point)) {
+        return Err(Fault::invalid(format!(
+            "vertex {k} has a coordinate that is NaN or infinite; repair the model before writing it"
+        )));
+    }
+    for (k, face) in model.faces.iter().enumerate() {
+        check_face(face, model.points.len(), || format!("face {k}"))?;
+    }
+    Ok(())
+}
+
+fn write_obj(out: &mut AtomicFile, model: &Model) -> io::Result<()> {
+    for [x, y, z] in &model.points {
+        writeln!(out, "v {x:?} {y:?} {z:?}")?;
+    }
+    write_obj_faces(out, model.faces.iter())
+}
+
+/// The `f` lines of an OBJ file.
+pub(crate) fn write_obj_faces<'a>(out: &mut impl Write, faces: impl Iterator<Item = &'a [u32]>) -> io::Result<()> {
+    for face in faces {
+        out.write_all(b"f")?;
+        for &index in face {
+            write!(out, " {}", u64::from(index) + 1)?;
+        }
+        out.write_all(b"\n")?;
+    }
+    Ok(())
+}
+
+fn write_off(out: &mut AtomicFile, model: &Model) -> io::Result<()> {
+    writeln!(out, "OFF\n{} {} 0", model.points.len(), model.faces.len())?;
+    for [x, y, z] in &model.points {
+        writeln!(out, "{x:?} {y:?} {z:?}")?;
+    }
+    for face in model.faces.iter() {
+        write!(out, "{}", face.len())?;
+        for index in face {
+            write!(out, " {index}")?;
+        }
+        out.write_all(b"\n")?;
+    }
+    Ok(())
+}
+
+fn write_ply(out: &mut AtomicFile, model: &Model) -> io::Result<()> {
+    let coordinates = model.points.as_flattened();
+    let single = coordinates.iter().all(|&x| f64::from(x as f32).to_bits() == x.to_bits());
+    let scalar = if single { "float" } else { "double" };
+    write!(
+        out,
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\n\
+         property {scalar} x\nproperty {scalar} y\nproperty {scalar} z\n",
+        model.points.len()
+    )?;
+    let largest = model.faces.arities().iter().max().copied();
+    // Most readers expect `uchar` and `int`; the wider types are for what does not fit.
+    let small_faces = largest.is_none_or(|corners| corners <= 255);
+    if largest.is_some() {
+        write!(
+            out,
+            "element face {}\nproperty list {} {} vertex_indices\n",
+            model.faces.len(),
+            if small_faces { "uchar" } else { "uint" },
+            if i32::try_from(model.points.len()).is_ok() { "int" } else { "uint" },
+        )?;
+    }
+    out.write_all(b"end_header\n")?;
+    for &x in coordinates {
+        if single {
+            out.write_all(&(x as f32).to_le_bytes())?;
+        } else {
+            out.write_all(&x.to_le_bytes())?;
+        }
+    }
+    for face in model.faces.iter() {
+        if small_faces {
+            out.write_all(&[face.len() as u8])?;
+        } else {
+            out.write_all(&(face.len() as u32).to_le_bytes())?;
+        }
+        for index in face {
+            out.write_all(&index.to_le_bytes())?;
+        }
+    }
+    Ok(())
+}

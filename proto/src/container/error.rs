@@ -1,0 +1,54 @@
+//! What can go wrong with a container, sorted by what a caller can do.
+
+use std::io;
+
+/// Why a container cannot be read or written; the caller adds the file's name.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// Some other kind of file.
+    #[error("is no .cager file: it does not begin as one; name a file that cager encode wrote")]
+    NotAContainer,
+    /// A later layout.
+    #[error("has version {0} of the format, and this program reads version 1; use a newer cager")]
+    NewerVersion(u16),
+    /// A required section of a later program.
+    #[error("needs the feature {0:?}, which this program does not have; use a newer cager")]
+    UnknownSection(String),
+    /// Bytes were changed or are missing.
+    #[error("is damaged at byte {offset}: {what}; get the file again")]
+    Corrupt {
+        /// Where in the file.
+        offset: u64,
+        /// What does not fit.
+        what: String,
+    },
+    /// A frame beyond the last.
+    #[error("has frames 0 to {last}, so there is no frame {frame}", last = .frames.saturating_sub(1))]
+    NoSuchFrame {
+        /// The frame asked for.
+        frame: usize,
+        /// Number of frames.
+        frames: usize,
+    },
+    /// A cage that cannot be stored.
+    #[error("frame {frame} cannot be stored: {what}")]
+    BadFrame {
+        /// The frame, from 0.
+        frame: usize,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// Too large for the format.
+    #[error("cannot be stored: {0}")]
+    TooLarge(String),
+    /// The operating system refused.
+    #[error("{0}")]
+    Io(#[from] io::Error),
+}
+
+impl Error {
+    pub(crate) fn corrupt(offset: u64, what: impl Into<String>) -> Self {
+        Self::Corrupt { offset, what: what.into() }
+    }
+}

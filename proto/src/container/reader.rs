@@ -1,0 +1,424 @@
+//! Reading a container: checked before it is believed, any frame at once.
+
+use super::codec;
+use super::section::{self, FOOTER_BYTES, HEADER_BYTES, PRELUDE_BYTES, SectionHeader, u64_at};
+use super::{Error, Header, Summary, tag};
+use crate::wire;
+use cager_core::mesh::{Model, Point, Polygons, TriMesh};
+use std::io::{Read, Seek, SeekFrom};
+
+/// Bytes of one entry of the table of contents: an offset and the section's header but for its checksums.
+const ENTRY_BYTES: usize = 40;
+
+/// Errors of one frame over the rest diagonal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrameError {
+    /// `sqrt(mean |e|²)`.
+    pub l2: f32,
+    /// `max |e|`.
+    pub linf: f32,
+}
+
+/// One section, for listings.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SectionInfo {
+    /// Its tag.
+    pub tag: String,
+    /// Number of its codec.
+    pub codec: u8,
+    /// Bytes in the file, header included.
+    pub bytes: u64,
+    /// Bytes once decoded.
+    pub raw_bytes: u64,
+}
+
+#[derive(Clone, Copy)]
+struct Entry {
+    offset: u64,
+    header: SectionHeader,
+}
+
+/// Reads one container from anything that can be searched.
+pub struct ContainerReader<R: Read + Seek> {
+    input: R,
+    file_bytes: u64,
+    entries: Vec<Entry>,
+    /// Entries of the frame chunks, by first frame.
+    chunks: Vec<usize>,
+    frames: usize,
+    header: Header,
+    /// The chunk decoded last.
+    cached: Option<(usize, Vec<u8>)>,
+}
+
+impl<R: Read + Seek> ContainerReader<R> {
+    /// Checks both ends, the table of contents and the header. Sections are checked as they are read; [`Self::verify`] reads
+    /// them all.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn open(mut input: R) -> Result<Self, Error> {
+        let file_bytes = input.seek(SeekFrom::End(0))?;
+        let mut prelude = [0; PRELUDE_BYTES];
+        input.rewind()?;
+        if file_bytes < PRELUDE_BYTES as u64 {
+            let mut start = vec![0; file_bytes as usize];
+            input.read_exact(&mut start)?;
+            let ours = !start.is_empty() && super::MAGIC.starts_with(&start[..start.len().min(8)]);
+            return Err(if ours { Error::corrupt(file_bytes, "the file was cut") } else { Error::NotAContainer });
+        }
+        input.read_exact(&mut prelude)?;
+        section::check_prelude(&prelude)?;
+        if file_bytes < (PRELUDE_BYTES + HEADER_BYTES + FOOTER_BYTES) as u64 {
+            return Err(Error::corrupt(file_bytes, "the file was cut"));
+        }
+        let mut footer = [0; FOOTER_BYTES];
+        input.seek(SeekFrom::Start(file_bytes - FOOTER_BYTES as u64))?;
+        input.read_exact(&mut footer)?;
+        let contents = section::check_footer(&footer, file_bytes)?;
+        let mut reader = Self {
+            input,
+            file_bytes,
+            entries: Vec::new(),
+            chunks: Vec::new(),
+            frames: 0,
+            header: Header::default(),
+            cached: None,
+        };
+        reader.read_contents(contents)?;
+        reader.read_header()?;
+        reader.check_sizes()?;
+        Ok(reader)
+    }
+
+    /// What a decoder must know.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// Number of frames.
+    pub fn frames(&self) -> usize {
+        self.frames
+    }
+
+    /// The model in its rest pose.
+    ///
+    /// # Errors
+    /// Damage.
+    pub fn rest(&mut self) -> Result<Model, Error> {
+        let points = self.positions(tag::REST_POINTS)?;
+        let mut faces = Polygons::new();
+        if self.header.rest_faces > 0 {
+            let (offset, numbers) = self.indices(tag::REST_FACES)?;
+            let (arities, indices) = numbers.split_at(self.header.rest_faces as usize);
+            let mut rest = indices;
+            for &arity in arities {
+                let Some((face, tail)) = rest.split_at_checked(arity as usize) else {
+                    return Err(Error::corrupt(offset, "the faces of the model have more corners than there are"));
+                };
+                check_indices(face, points.len(), offset)?;
+                faces.push(face);
+                rest = tail;
+            }
+            if !rest.is_empty() {
+                return Err(Error::corrupt(offset, "the faces of the model have fewer corners than there are"));
+            }
+        }
+        Ok(Model { points, faces })
+    }
+
+    /// The cage around the rest pose.
+    ///
+    /// # Errors
+    /// Damage.
+    pub fn cage(&mut self) -> Result<TriMesh, Error> {
+        let vertices = self.positions(tag::CAGE_VERTICES)?;
+        let (offset, numbers) = self.indices(tag::CAGE_FACES)?;
+        check_indices(&numbers, vertices.len(), offset)?;
+        Ok(TriMesh { vertices, triangles: numbers.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect() })
+    }
+
+    /// The stored rows of one frame, rows × 3. Any order will do; neighbours are fastest one after another.
+    ///
+    /// # Errors
+    /// A frame that does not exist; damage.
+    pub fn read_frame(&mut self, frame: usize, out: &mut Vec<f32>) -> Result<(), Error> {
+        if frame >= self.frames {
+            return Err(Error::NoSuchFrame { frame, frames: self.frames });
+        }
+        let chunk = self.chunks.partition_point(|&k| self.entries[k].header.first as usize <= frame) - 1;
+        let entry = self.entries[self.chunks[chunk]];
+        if self.cached.as_ref().is_none_or(|(cached, _)| *cached != chunk) {
+            self.cached = None;
+            let raw = self.raw(entry)?;
+            self.cached = Some((chunk, raw));
+        }
+        let Some((_, raw)) = &self.cached else { return Err(Error::NoSuchFrame { frame, frames: self.frames }) };
+        let bytes = 12 * self.header.rows_per_frame as usize;
+        let start = (frame - entry.header.first as usize) * bytes;
+        out.clear();
+        out.extend(raw[start..start + bytes].chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])));
+        if out.iter().any(|x| !x.is_finite()) {
+            return Err(Error::corrupt(entry.offset, format!("the cage of frame {frame} is not finite")));
+        }
+        Ok(())
+    }
+
+    /// Errors of all frames.
+    ///
+    /// # Errors
+    /// Damage.
+    pub fn errors(&mut self) -> Result<Vec<FrameError>, Error> {
+        let entry = self.entry(tag::ERRORS)?;
+        let raw = self.raw(entry)?;
+        let value = |b: &[u8], k: usize| f32::from_le_bytes([b[k], b[k + 1], b[k + 2], b[k + 3]]);
+        Ok(raw.chunks_exact(8).map(|b| FrameError { l2: value(b, 0), linf: value(b, 4) }).collect())
+    }
+
+    /// What the encoder found out, where it said so.
+    ///
+    /// # Errors
+    /// Damage.
+    pub fn summary(&mut self) -> Result<Option<Summary>, Error> {
+        let Some(&entry) = self.entries.iter().find(|e| e.header.tag == tag::SUMMARY) else { return Ok(None) };
+        let raw = self.raw(entry)?;
+        serde_json::from_slice(&raw)
+            .map(Some)
+            .map_err(|e| Error::corrupt(entry.offset, format!("the summary cannot be read ({e})")))
+    }
+
+    /// The sections, in the order of the file.
+    pub fn sections(&self) -> Vec<SectionInfo> {
+        let info = |e: &Entry| SectionInfo {
+            tag: String::from_utf8_lossy(&e.header.tag).into_owned(),
+            codec: e.header.codec,
+            bytes: HEADER_BYTES as u64 + e.header.payload_bytes,
+            raw_bytes: e.header.raw_bytes,
+        };
+        self.entries.iter().map(info).collect()
+    }
+
+    /// Reads and checks everything, frames included; of sections that this program does not know, the checksum.
+    ///
+    /// # Errors
+    /// The first damage found.
+    pub fn verify(&mut self) -> Result<(), Error> {
+        self.rest()?;
+        self.cage()?;
+        self.errors()?;
+        self.summary()?;
+        let mut cage = Vec::new();
+        for frame in 0..self.frames {
+            self.read_frame(frame, &mut cage)?;
+        }
+        for k in 0..self.entries.len() {
+            let entry = self.entries[k];
+            if !tag::KNOWN.contains(&entry.header.tag) {
+                self.payload(entry)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn read_contents(&mut self, offset: u64) -> Result<(), Error> {
+        let end = self.file_bytes - FOOTER_BYTES as u64;
+        if offset < PRELUDE_BYTES as u64 || offset.checked_add(HEADER_BYTES as u64).is_none_or(|start| start > end) {
+            return Err(Error::corrupt(end, "the table of contents lies outside the file"));
+        }
+        let header = self.header_at(offset)?;
+        if header.tag != tag::CONTENTS
+            || header.codec != codec::RAW
+            || header.payload_bytes != end - offset - HEADER_BYTES as u64
+        {
+            return Err(Error::corrupt(offset, "there is no table of contents where the end says"));
+        }
+        let contents = self.raw(Entry { offset, header })?;
+        if contents.len() % ENTRY_BYTES != 0 {
+            return Err(Error::corrupt(offset, "the table of contents is cut"));
+        }
+        let mut next = PRELUDE_BYTES as u64;
+        for line in contents.chunks_exact(ENTRY_BYTES) {
+            let at = u64_at(line, 0);
+            let header = section_fields(&line[8..]);
+            // Sections follow each other without gaps, so that no byte of the file goes unchecked.
+            if at != next {
+                return Err(Error::corrupt(offset, "the table of contents leaves a gap"));
+            }
+            next = at
+                .checked_add(HEADER_BYTES as u64)
+                .and_then(|x| x.checked_add(header.payload_bytes))
+                .filter(|&x| x <= offset)
+                .ok_or_else(|| Error::corrupt(offset, "the table of contents lists a section beyond itself"))?;
+            if SectionHeader::is_required(header.tag) && !tag::KNOWN.contains(&header.tag) {
+                return Err(Error::UnknownSection(String::from_utf8_lossy(&header.tag).into_owned()));
+            }
+            if header.tag == tag::FRAMES {
+                let end = header.first.checked_add(header.count);
+                let (true, Some(end)) = (header.first as usize == self.frames && header.count > 0, end) else {
+                    return Err(Error::corrupt(offset, "the frames are not in order"));
+                };
+                self.frames = end as usize;
+                self.chunks.push(self.entries.len());
+            }
+            self.entries.push(Entry { offset: at, header });
+        }
+        if next == offset {
+            Ok(())
+        } else {
+            Err(Error::corrupt(offset, "the table of contents does not list all sections"))
+        }
+    }
+
+    fn read_header(&mut self) -> Result<(), Error> {
+        let entry = self.entry(tag::HEADER)?;
+        if entry.header.codec != codec::RAW {
+            return Err(Error::corrupt(entry.offset, "the header is compressed"));
+        }
+        let raw = self.raw(entry)?;
+        self.header =
+            wire::decode(&raw).map_err(|e| Error::corrupt(entry.offset, format!("the header cannot be read ({e})")))?;
+        let h = &self.header;
+        if h.rows_per_frame == 0 || h.points > u64::from(u32::MAX) || h.cage_vertices > u64::from(u32::MAX) {
+            return Err(Error::corrupt(entry.offset, "the header counts what cannot be"));
+        }
+        Ok(())
+    }
+
+    /// Every section must be there as often as it should, and have the size that the header's counts give it.
+    fn check_sizes(&self) -> Result<(), Error> {
+        for tag in [tag::REST_POINTS, tag::CAGE_VERTICES, tag::CAGE_FACES, tag::ERRORS] {
+            self.entry(tag)?;
+        }
+        let most_faces = usize::from(self.header.rest_faces > 0);
+        for (tag, least, most) in
+            [(tag::REST_FACES, most_faces, most_faces), (tag::SUMMARY, 0, 1), (tag::CONTENTS, 0, 0)]
+        {
+            let count = self.entries.iter().filter(|e| e.header.tag == tag).count();
+            if count < least || count > most {
+                let name = String::from_utf8_lossy(&tag);
+                return Err(Error::corrupt(0, format!("the section {name} is there {count} times")));
+            }
+        }
+        for entry in &self.entries {
+            let (h, s) = (&self.header, &entry.header);
+            let expected = match s.tag {
+                tag::REST_POINTS => h.points.checked_mul(3 * u64::from(s.width)),
+                tag::REST_FACES => h.rest_faces.checked_add(h.rest_corners).and_then(|n| n.checked_mul(4)),
+                tag::CAGE_VERTICES => h.cage_vertices.checked_mul(3 * u64::from(s.width)),
+                tag::CAGE_FACES => h.cage_faces.checked_mul(12),
+                tag::FRAMES => {
+                    u64::from(s.count).checked_mul(12).and_then(|n| n.checked_mul(u64::from(h.rows_per_frame)))
+                }
+                tag::ERRORS => Some(8 * self.frames as u64),
+                _ => Some(s.raw_bytes),
+            };
+            let width_fits = match s.tag {
+                tag::REST_POINTS | tag::CAGE_VERTICES => s.width == 4 || s.width == 8,
+                tag::REST_FACES | tag::CAGE_FACES | tag::FRAMES | tag::ERRORS => s.width == 4,
+                _ => s.width > 0,
+            };
+            if expected != Some(s.raw_bytes) || !width_fits {
+                return Err(Error::corrupt(entry.offset, "a section does not have the size that the header gives it"));
+            }
+        }
+        Ok(())
+    }
+
+    fn entry(&self, tag: [u8; 4]) -> Result<Entry, Error> {
+        let mut found = self.entries.iter().filter(|e| e.header.tag == tag);
+        match (found.next(), found.next()) {
+            (Some(&entry), None) => Ok(entry),
+            (None, _) => Err(Error::corrupt(0, format!("the section {} is missing", String::from_utf8_lossy(&tag)))),
+            (Some(_), Some(second)) => Err(Error::corrupt(
+                second.offset,
+                format!("the section {} is there twice", String::from_utf8_lossy(&tag)),
+            )),
+        }
+    }
+
+    fn header_at(&mut self, offset: u64) -> Result<SectionHeader, Error> {
+        let mut bytes = [0; HEADER_BYTES];
+        self.input.seek(SeekFrom::Start(offset))?;
+        self.input.read_exact(&mut bytes)?;
+        SectionHeader::from_bytes(&bytes, offset)
+    }
+
+    /// The decoded bytes of a section, checked against both its header and the table of contents.
+    fn raw(&mut self, entry: Entry) -> Result<Vec<u8>, Error> {
+        let header = entry.header;
+        if header.raw_bytes > SectionHeader::most_raw_bytes(header.tag, self.file_bytes) {
+            return Err(Error::corrupt(entry.offset, "a section declares more bytes than the file can hold"));
+        }
+        let payload = self.payload(entry)?;
+        let stride = if header.tag == tag::FRAMES { 3 * self.header.rows_per_frame as usize } else { 1 };
+        codec::decode(
+            header.codec,
+            payload,
+            header.raw_bytes as usize,
+            usize::from(header.width).max(1),
+            stride,
+            entry.offset,
+        )
+    }
+
+    /// The stored bytes of a section.
+    fn payload(&mut self, entry: Entry) -> Result<Vec<u8>, Error> {
+        let header = self.header_at(entry.offset)?;
+        let in_contents = SectionHeader { payload_crc: header.payload_crc, ..entry.header };
+        if header != in_contents {
+            return Err(Error::corrupt(entry.offset, "a section differs from the table of contents"));
+        }
+        let room = self.file_bytes.saturating_sub(entry.offset + HEADER_BYTES as u64);
+        if header.payload_bytes > room {
+            return Err(Error::corrupt(entry.offset, "a section declares more bytes than the file can hold"));
+        }
+        let mut payload = vec![0; header.payload_bytes as usize];
+        self.input.read_exact(&mut payload)?;
+        if crc32c::crc32c(&payload) != header.payload_crc {
+            return Err(Error::corrupt(entry.offset, "the checksum of a section does not match"));
+        }
+        Ok(payload)
+    }
+
+    fn positions(&mut self, tag: [u8; 4]) -> Result<Vec<Point>, Error> {
+        let entry = self.entry(tag)?;
+        let raw = self.raw(entry)?;
+        let points: Vec<Point> = if entry.header.width == 4 {
+            let value = |b: &[u8], k: usize| f64::from(f32::from_le_bytes([b[k], b[k + 1], b[k + 2], b[k + 3]]));
+            raw.chunks_exact(12).map(|b| [value(b, 0), value(b, 4), value(b, 8)]).collect()
+        } else {
+            raw.chunks_exact(24).map(|b| [0, 8, 16].map(|k| f64::from_bits(u64_at(b, k)))).collect()
+        };
+        match points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+            Some(k) => Err(Error::corrupt(entry.offset, format!("position {k} is not finite"))),
+            None => Ok(points),
+        }
+    }
+
+    fn indices(&mut self, tag: [u8; 4]) -> Result<(u64, Vec<u32>), Error> {
+        let entry = self.entry(tag)?;
+        let raw = self.raw(entry)?;
+        Ok((entry.offset, raw.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()))
+    }
+}
+
+/// The fields of a section header as the table of contents repeats them.
+fn section_fields(b: &[u8]) -> SectionHeader {
+    SectionHeader {
+        tag: [b[0], b[1], b[2], b[3]],
+        codec: b[4],
+        width: b[5],
+        first: section::u32_at(b, 8),
+        count: section::u32_at(b, 12),
+        payload_bytes: u64_at(b, 16),
+        raw_bytes: u64_at(b, 24),
+        payload_crc: 0,
+    }
+}
+
+fn check_indices(indices: &[u32], points: usize, offset: u64) -> Result<(), Error> {
+    match indices.iter().find(|&&i| i as usize >= points) {
+        Some(i) => Err(Error::corrupt(offset, format!("a face names point {i} of {points}"))),
+        None => Ok(()),
+    }
+}

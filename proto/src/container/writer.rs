@@ -1,0 +1,209 @@
+//! Writing a container, frame by frame.
+
+use super::codec::{self, DIFFERENCE, PLANES, RAW};
+use super::section::{self, SectionHeader};
+use super::{CHUNK_FRAMES, Error, Header, Summary, tag};
+use crate::wire;
+use cager_core::mesh::{Model, Point, TriMesh};
+use std::io::Write;
+
+/// Writes one container to anything that takes bytes. The same input gives the same bytes.
+///
+/// Memory does not grow with the frames but for 8 bytes each and 40 bytes per chunk of [`CHUNK_FRAMES`].
+pub struct ContainerWriter<W: Write> {
+    out: W,
+    offset: u64,
+    rows: usize,
+    /// Frames not yet written, their numbers as little-endian bytes back to back.
+    pending: Vec<u8>,
+    pending_frames: usize,
+    errors: Vec<u8>,
+    contents: Vec<u8>,
+}
+
+impl<W: Write> ContainerWriter<W> {
+    /// Writes everything that comes before the frames. The counts in `header` are taken from the meshes, not from it.
+    ///
+    /// # Errors
+    /// Where the output refuses, a mesh exceeds what the format can count, or readers would refuse the meshes.
+    pub fn new(out: W, header: &Header, rest: &Model, cage: &TriMesh) -> Result<Self, Error> {
+        let header = Header {
+            points: rest.points.len() as u64,
+            rest_faces: rest.faces.len() as u64,
+            rest_corners: rest.faces.indices().len() as u64,
+            cage_vertices: cage.vertices.len() as u64,
+            cage_faces: cage.triangles.len() as u64,
+            ..header.clone()
+        };
+        check(&header, rest, cage)?;
+        let mut writer = Self {
+            out,
+            offset: 0,
+            rows: header.rows_per_frame as usize,
+            pending: Vec::new(),
+            pending_frames: 0,
+            errors: Vec::new(),
+            contents: Vec::new(),
+        };
+        writer.put(&section::prelude())?;
+        let encoded = wire::encode(&header).map_err(|e| Error::TooLarge(e.to_string()))?;
+        writer.section(tag::HEADER, RAW, 1, 0, &encoded)?;
+        writer.positions(tag::REST_POINTS, &rest.points)?;
+        if !rest.faces.is_empty() {
+            let numbers: Vec<u8> =
+                rest.faces.arities().iter().chain(rest.faces.indices()).flat_map(|i| i.to_le_bytes()).collect();
+            writer.section(tag::REST_FACES, DIFFERENCE, 4, 1, &numbers)?;
+        }
+        writer.positions(tag::CAGE_VERTICES, &cage.vertices)?;
+        let corners: Vec<u8> = cage.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()).collect();
+        writer.section(tag::CAGE_FACES, DIFFERENCE, 4, 1, &corners)?;
+        Ok(writer)
+    }
+
+    /// Adds the cage of the next frame, rows × 3, and its errors over the rest diagonal.
+    ///
+    /// # Errors
+    /// A cage of another size or with a value that is not finite; an output that refuses.
+    pub fn write_frame(&mut self, cage: &[f32], l2: f32, linf: f32) -> Result<(), Error> {
+        let frame = self.errors.len() / 8;
+        if cage.len() != 3 * self.rows {
+            return Err(Error::BadFrame {
+                frame,
+                what: format!("it has {} numbers, not 3 × {}", cage.len(), self.rows),
+            });
+        }
+        if let Some(k) = cage.iter().position(|x| !x.is_finite()) {
+            return Err(Error::BadFrame { frame, what: format!("cage vertex {} is not finite", k / 3) });
+        }
+        if frame >= u32::MAX as usize {
+            return Err(Error::TooLarge("a file holds at most 4,294,967,295 frames".to_owned()));
+        }
+        self.pending.extend(cage.iter().flat_map(|x| x.to_le_bytes()));
+        self.pending_frames += 1;
+        self.errors.extend_from_slice(&l2.to_le_bytes());
+        self.errors.extend_from_slice(&linf.to_le_bytes());
+        if self.pending_frames == CHUNK_FRAMES { self.flush_chunk() } else { Ok(()) }
+    }
+
+    /// Adds a section that readers may skip; its tag begins with a small letter.
+    ///
+    /// # Errors
+    /// A tag that is not of that form or belongs to this format; an output that refuses.
+    pub fn add_optional(&mut self, tag: [u8; 4], bytes: &[u8]) -> Result<(), Error> {
+        if SectionHeader::is_required(tag) || !tag.iter().all(u8::is_ascii_graphic) || tag::KNOWN.contains(&tag) {
+            return Err(Error::TooLarge(format!(
+                "{:?} is no tag of an optional section",
+                String::from_utf8_lossy(&tag)
+            )));
+        }
+        self.section(tag, PLANES, 1, 0, bytes)
+    }
+
+    /// Writes what comes after the frames and gives back the output, which the caller flushes.
+    ///
+    /// # Errors
+    /// An output that refuses.
+    pub fn finish(mut self, summary: Option<&Summary>) -> Result<W, Error> {
+        self.flush_chunk()?;
+        let errors = std::mem::take(&mut self.errors);
+        self.section(tag::ERRORS, PLANES, 4, 0, &errors)?;
+        if let Some(summary) = summary {
+            let text = serde_json::to_vec(summary).map_err(|e| Error::TooLarge(e.to_string()))?;
+            self.section(tag::SUMMARY, PLANES, 1, 0, &text)?;
+        }
+        let contents_offset = self.offset;
+        let contents = std::mem::take(&mut self.contents);
+        self.section(tag::CONTENTS, RAW, 1, 0, &contents)?;
+        let file_bytes = self.offset + section::FOOTER_BYTES as u64;
+        self.put(&section::footer(contents_offset, file_bytes))?;
+        Ok(self.out)
+    }
+
+    fn flush_chunk(&mut self) -> Result<(), Error> {
+        if self.pending_frames == 0 {
+            return Ok(());
+        }
+        let raw = std::mem::take(&mut self.pending);
+        let count = std::mem::take(&mut self.pending_frames) as u32;
+        let first = (self.errors.len() / 8) as u32 - count;
+        self.chunk(tag::FRAMES, DIFFERENCE, 4, 3 * self.rows, &raw, (first, count))?;
+        self.pending = raw;
+        self.pending.clear();
+        Ok(())
+    }
+
+    /// Single precision where it loses nothing, as for models that came from such a file.
+    fn positions(&mut self, tag: [u8; 4], points: &[Point]) -> Result<(), Error> {
+        let single = points.iter().flatten().all(|&x| f64::from(x as f32).to_bits() == x.to_bits());
+        let (width, raw): (usize, Vec<u8>) = if single {
+            (4, points.iter().flatten().flat_map(|&x| (x as f32).to_le_bytes()).collect())
+        } else {
+            (8, points.iter().flatten().flat_map(|x| x.to_le_bytes()).collect())
+        };
+        self.section(tag, PLANES, width, 0, &raw)
+    }
+
+    fn section(&mut self, tag: [u8; 4], codec: u8, width: usize, stride: usize, raw: &[u8]) -> Result<(), Error> {
+        self.chunk(tag, codec, width, stride, raw, (0, 0))
+    }
+
+    fn chunk(
+        &mut self,
+        tag: [u8; 4],
+        codec: u8,
+        width: usize,
+        stride: usize,
+        raw: &[u8],
+        frames: (u32, u32),
+    ) -> Result<(), Error> {
+        let (codec, payload) = match codec::encode(codec, raw, width, stride)? {
+            // Readers refuse what expands too far, lest a small file takes all their memory.
+            (_, payload) if raw.len() as u64 > SectionHeader::most_raw_bytes(tag, payload.len() as u64) => {
+                (RAW, raw.to_vec())
+            }
+            encoded => encoded,
+        };
+        let header = SectionHeader {
+            tag,
+            codec,
+            width: width as u8,
+            first: frames.0,
+            count: frames.1,
+            payload_bytes: payload.len() as u64,
+            raw_bytes: raw.len() as u64,
+            payload_crc: crc32c::crc32c(&payload),
+        };
+        let header = header.to_bytes();
+        self.contents.extend_from_slice(&self.offset.to_le_bytes());
+        self.contents.extend_from_slice(&header[..32]);
+        self.put(&header)?;
+        self.put(&payload)
+    }
+
+    fn put(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        self.out.write_all(bytes)?;
+        self.offset += bytes.len() as u64;
+        Ok(())
+    }
+}
+
+/// Refuses what a reader would refuse, so that a file that was written can be read.
+fn check(header: &Header, rest: &Model, cage: &TriMesh) -> Result<(), Error> {
+    if header.rows_per_frame == 0 {
+        return Err(Error::TooLarge("a frame without rows".to_owned()));
+    }
+    let meshes: [(&str, &[Point], &[u32]); 2] =
+        [("model", &rest.points, rest.faces.indices()), ("cage", &cage.vertices, cage.triangles.as_flattened())];
+    for (name, points, indices) in meshes {
+        if points.len() > u32::MAX as usize {
+            return Err(Error::TooLarge(format!("the {name} has more than 4,294,967,295 points")));
+        }
+        if let Some(k) = points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+            return Err(Error::TooLarge(format!("point {k} of the {name} is not finite")));
+        }
+        if let Some(k) = indices.iter().find(|&&k| k as usize >= points.len()) {
+            return Err(Error::TooLarge(format!("a face of the {name} names point {k} of {}", points.len())));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,197 @@
+//! What can be typed: one definition gives parsing, help and shell completions.
+
+use cager_core::inversion::Handles;
+use cager_core::regularize::Regularizer;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// Turns animated mesh captures into light, editable, streamable cages.
+///
+/// A capture is the same mesh in every frame; a cage is a coarse closed mesh around its rest pose. `encode` recovers the
+/// cage of every frame and writes one small .cager file; `decode` turns it back into positions. Try `cager demo` first: it
+/// needs no files.
+#[derive(Debug, Parser)]
+#[command(name = "cager", version, max_term_width = 100, arg_required_else_help = true)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    Encode(Box<EncodeArgs>),
+    Decode(DecodeArgs),
+    Inspect(InspectArgs),
+    Demo(DemoArgs),
+    Completions(CompletionsArgs),
+}
+
+/// Recover the cage of every frame of a capture and write a .cager file.
+///
+/// Example: cager encode --rest rest.obj --cage cage.obj --frames 'walk/*.obj' -o walk.cager
+#[derive(Args, Debug)]
+pub(crate) struct EncodeArgs {
+    /// Model in its rest pose: .obj .ply .off .stl .glb; a point cloud will do.
+    #[arg(long, value_name = "REST")]
+    pub(crate) rest: PathBuf,
+
+    /// Closed cage around the rest pose, same formats; polygons are triangulated.
+    #[arg(long, value_name = "CAGE")]
+    pub(crate) cage: PathBuf,
+
+    /// Capture, points in the order of the rest pose: a folder or quoted glob of mesh files (2.obj comes before 10.obj), .npy
+    /// (frames × points × 3), .pc2 or .mdd.
+    #[arg(long, value_name = "FRAMES")]
+    pub(crate) frames: PathBuf,
+
+    /// File to write; it appears whole or not at all.
+    #[arg(short, long, value_name = "OUT.cager")]
+    pub(crate) output: PathBuf,
+
+    #[command(flatten)]
+    pub(crate) solver: SolverArgs,
+
+    /// Write sizes, errors per frame, spectrum and times as JSON.
+    #[arg(long, value_name = "REPORT.json")]
+    pub(crate) report: Option<PathBuf>,
+
+    /// Turn all faces of the cage around: for cages whose normals point inwards.
+    #[arg(long)]
+    pub(crate) flip_cage: bool,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct SolverArgs {
+    /// Cage coordinates that bind the points to the cage.
+    #[arg(long, value_enum, default_value_t = CoordinatesArg::Mvc)]
+    pub(crate) coordinates: CoordinatesArg,
+
+    /// Points the inversion reads.
+    #[arg(long, value_enum, default_value_t = HandlesArg::Maxvol)]
+    pub(crate) handles: HandlesArg,
+
+    /// Treatment of the unstable end of the spectrum.
+    #[arg(long, value_enum, default_value_t = RegularizerArg::Laplacian)]
+    pub(crate) regularizer: RegularizerArg,
+
+    /// Spectrum threshold: how many of the last singular directions are regularised.
+    #[arg(long, value_name = "S", default_value_t = 20)]
+    pub(crate) spectrum: usize,
+
+    /// Weight of the regularisation (the damping α for tikhonov).
+    #[arg(long, value_name = "L", default_value_t = 1.0, allow_negative_numbers = true)]
+    pub(crate) lambda: f64,
+}
+
+/// Turn a .cager file back into positions.
+///
+/// Example: cager decode walk.cager -o walk.pc2
+#[derive(Args, Debug)]
+pub(crate) struct DecodeArgs {
+    /// File to read.
+    #[arg(value_name = "IN.cager")]
+    pub(crate) input: PathBuf,
+
+    /// Where to write: .npy, .pc2, .mdd, or a folder that is to hold one .obj per frame.
+    #[arg(short, long, value_name = "OUT")]
+    pub(crate) output: PathBuf,
+}
+
+/// Show what a .cager file holds: sizes, spectrum, errors.
+#[derive(Args, Debug)]
+pub(crate) struct InspectArgs {
+    /// File to read.
+    #[arg(value_name = "IN.cager")]
+    pub(crate) input: PathBuf,
+
+    /// Print JSON with the keys of the encode report.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Encode and decode a built-in capture: needs no files and no network.
+#[derive(Args, Debug)]
+pub(crate) struct DemoArgs {
+    /// Folder for the results: rest.obj, cage.obj, capture.cager, decoded.npy, report.json and errors.svg.
+    #[arg(short, long, value_name = "DIR", default_value = "cager-demo")]
+    pub(crate) output: PathBuf,
+
+    /// Points of the capture, about.
+    #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(100..=4_000_000))]
+    pub(crate) points: u32,
+
+    /// Frames of the capture.
+    #[arg(long, value_name = "F", default_value_t = 120, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub(crate) frames: u32,
+
+    /// Vertices of the cage, about.
+    #[arg(long, value_name = "V", default_value_t = 330, value_parser = clap::value_parser!(u32).range(26..=5_000))]
+    pub(crate) cage_vertices: u32,
+}
+
+/// Print a completion script for a shell.
+///
+/// Example: cager completions bash > /etc/bash_completion.d/cager
+#[derive(Args, Debug)]
+pub(crate) struct CompletionsArgs {
+    /// The shell.
+    #[arg(value_enum)]
+    pub(crate) shell: clap_complete::Shell,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum CoordinatesArg {
+    /// Mean value coordinates: defined everywhere, fast.
+    Mvc,
+}
+
+impl CoordinatesArg {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Mvc => "mvc",
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum HandlesArg {
+    /// As many as the cage has vertices, of maximum volume: stable and fast.
+    Maxvol,
+    /// Every point: least squares, the lowest error.
+    All,
+}
+
+impl From<HandlesArg> for Handles {
+    fn from(arg: HandlesArg) -> Self {
+        match arg {
+            HandlesArg::Maxvol => Self::MaxVol,
+            HandlesArg::All => Self::All,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum RegularizerArg {
+    /// Smooth the last S singular directions by the cage's Laplacian.
+    Laplacian,
+    /// Follow the data alone.
+    None,
+    /// Drop the last S singular directions.
+    TruncatedSvd,
+    /// Damp every direction, with α = L.
+    Tikhonov,
+    /// Smooth the whole spectrum by the cage's Laplacian.
+    Global,
+}
+
+impl From<RegularizerArg> for Regularizer {
+    fn from(arg: RegularizerArg) -> Self {
+        match arg {
+            RegularizerArg::Laplacian => Self::Laplacian,
+            RegularizerArg::None => Self::None,
+            RegularizerArg::TruncatedSvd => Self::TruncatedSvd,
+            RegularizerArg::Tikhonov => Self::Tikhonov,
+            RegularizerArg::Global => Self::Global,
+        }
+    }
+}

@@ -1,0 +1,25 @@
+//! `cager decode`.
+
+use super::args::DecodeArgs;
+use super::{grouped, print, progress};
+use crate::decode;
+use anyhow::Result;
+use std::time::Instant;
+
+pub(super) fn run(args: &DecodeArgs) -> Result<()> {
+    let clock = Instant::now();
+    let container = decode::open(&args.input)?;
+    let (frames, points) = (container.frames(), container.header().points);
+    drop(container);
+    let bar = progress::frames("decoding", frames);
+    let result = decode::decode(&args.input, &args.output, &mut |done| bar.set_position(done as u64));
+    bar.finish_and_clear();
+    result?;
+    print(&format!(
+        "{}: {} frames of {} points in {:.3} s\n",
+        args.output.display(),
+        grouped(frames as u64),
+        grouped(points),
+        clock.elapsed().as_secs_f64()
+    ))
+}

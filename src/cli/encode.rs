@@ -1,0 +1,116 @@
+//! `cager encode`.
+
+use super::args::{EncodeArgs, SolverArgs};
+use super::{grouped, human_bytes, print, progress, warn};
+use crate::coordinates;
+use crate::encode::{self, Job};
+use crate::report::Report;
+use anyhow::{Context, Result, bail};
+use cager_core::cage::Cage;
+use cager_core::inversion::{PrepareError, SolverOptions};
+use cager_core::mesh::TriMesh;
+use cager_formats::{AtomicFile, open_frames, read_model};
+use std::io::Write;
+use std::path::Path;
+use std::time::Instant;
+
+pub(super) fn run(args: &EncodeArgs) -> Result<()> {
+    let clock = Instant::now();
+    let rest = read_model(&args.rest)?;
+    let cage = read_cage(&args.cage, args.flip_cage)?;
+    let mut frames = open_frames(&args.frames, rest.points.len())?;
+    let read_seconds = clock.elapsed().as_secs_f64();
+    let (system, options) = solver(&args.solver)?;
+
+    let bar = progress::frames("encoding", frames.frames());
+    let job = Job { rest: &rest, cage: &cage, frames: frames.as_mut(), output: &args.output, system, options };
+    let result = encode::encode(job, &mut |done| bar.set_position(done as u64));
+    bar.finish_and_clear();
+    let mut report = result.map_err(|error| name_files(error, args))?;
+    report.seconds.read += read_seconds;
+    report.seconds.total = clock.elapsed().as_secs_f64();
+    if let Some(path) = &args.report {
+        write_report(path, &report)?;
+    }
+    warn(&report.warnings);
+    print(&summary(&report, &args.output))
+}
+
+/// Errors of the mathematics know vertices and points; the user knows files.
+fn name_files(error: encode::EncodeError, args: &EncodeArgs) -> anyhow::Error {
+    match error {
+        encode::EncodeError::Prepare(inner) => {
+            let path = match inner {
+                PrepareError::NotFinite { .. } | PrepareError::TooFewPoints { .. } | PrepareError::NoExtent => {
+                    &args.rest
+                }
+                _ => &args.cage,
+            };
+            match inner {
+                PrepareError::BadLambda { .. } => anyhow::anyhow!("--lambda: {inner}"),
+                PrepareError::SpectrumTooLarge { .. } => anyhow::anyhow!("--spectrum: {inner}"),
+                _ => anyhow::anyhow!("{}: {inner}", path.display()),
+            }
+        }
+        other => other.into(),
+    }
+}
+
+pub(super) fn read_cage(path: &Path, flip: bool) -> Result<Cage> {
+    let model = read_model(path)?;
+    if model.faces.is_empty() {
+        bail!("{}: has no faces, and a cage is a closed mesh; export the cage with its faces", path.display());
+    }
+    let mesh = TriMesh::from(&model);
+    Cage::new(if flip { mesh.flipped() } else { mesh }).with_context(|| path.display().to_string())
+}
+
+pub(super) fn solver(
+    args: &SolverArgs,
+) -> Result<(&'static dyn cager_core::coordinates::CoordinateSystem, SolverOptions)> {
+    let name = args.coordinates.name();
+    let system = coordinates::by_name(name).with_context(|| format!("--coordinates: {name} is unknown"))?;
+    let options = SolverOptions {
+        handles: args.handles.into(),
+        regularizer: args.regularizer.into(),
+        spectrum: args.spectrum,
+        lambda: args.lambda,
+    };
+    Ok((system, options))
+}
+
+pub(super) fn write_report(path: &Path, report: &Report) -> Result<()> {
+    let mut file = AtomicFile::create(path)?;
+    serde_json::to_writer_pretty(&mut file, report).with_context(|| path.display().to_string())?;
+    file.write_all(b"\n").with_context(|| path.display().to_string())?;
+    Ok(file.commit()?)
+}
+
+fn summary(report: &Report, output: &Path) -> String {
+    format!(
+        "{}: {} frames of {} points as cages of {} vertices\n\
+         \x20 size    {} from {}: {:.1} times smaller, {:.2} bits per point and frame\n\
+         \x20 error   L2 {:.4} % mean, {:.4} % max; L∞ {:.3} % mean, {:.3} % max (of the rest diagonal); KG {:.3} %\n\
+         \x20 system  condition {:.1} (all points {:.1}), rank {} of {}, affine reproduction {:.1e}\n\
+         \x20 time    {:.3} s\n",
+        output.display(),
+        grouped(report.frames as u64),
+        grouped(report.points as u64),
+        grouped(report.cage_vertices as u64),
+        human_bytes(report.bytes.output),
+        human_bytes(report.bytes.capture),
+        report.bytes.ratio,
+        report.bytes.bits_per_vertex_per_frame,
+        100.0 * report.error.l2_mean,
+        100.0 * report.error.l2_max,
+        100.0 * report.error.linf_mean,
+        100.0 * report.error.linf_max,
+        report.error.kg_percent,
+        report.condition_number.handles,
+        report.condition_number.full,
+        report.rank,
+        report.unknowns,
+        report.affine_reproduction_error,
+        report.seconds.total,
+    )
+}

@@ -1,0 +1,16 @@
+//! Progress on terminals, silence in pipes.
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
+
+/// A bar over frames on stderr; hidden where stderr is not a terminal.
+pub(crate) fn frames(what: &'static str, total: usize) -> ProgressBar {
+    let target =
+        if std::io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+    let style = ProgressStyle::with_template("{msg:>9} {bar:40} {pos}/{len} frames, {per_sec}, {eta} left");
+    let bar = ProgressBar::with_draw_target(Some(total as u64), target).with_message(what);
+    match style {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
+    }
+}

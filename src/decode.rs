@@ -1,0 +1,116 @@
+//! Containers back to positions.
+
+use crate::coordinates;
+use cager_core::cage::{Cage, CageError};
+use cager_core::decode::Decoder;
+use cager_core::inversion::BATCH;
+use cager_core::mesh::Model;
+use cager_formats::{FrameOptions, create_frames};
+use cager_proto::container::{self, ContainerReader};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+/// Why decoding stopped; nothing was written.
+#[derive(Debug, thiserror::Error)]
+pub enum DecodeError {
+    /// The container cannot be read.
+    #[error("{}: {source}", .path.display())]
+    Container {
+        /// The container.
+        path: PathBuf,
+        /// What went wrong.
+        source: container::Error,
+    },
+    /// The container holds a cage that is none.
+    #[error("{}: {source}", .path.display())]
+    Cage {
+        /// The container.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: CageError,
+    },
+    /// The container needs what this program cannot do.
+    #[error("{}: {what}; use a newer cager", .path.display())]
+    Unsupported {
+        /// The container.
+        path: PathBuf,
+        /// What it needs.
+        what: String,
+    },
+    /// The positions cannot be written.
+    #[error(transparent)]
+    Formats(#[from] cager_formats::Error),
+}
+
+/// An opened container.
+pub type Container = ContainerReader<BufReader<File>>;
+
+/// Opens a container.
+///
+/// # Errors
+/// A file that cannot be read or is no container; the path is named.
+pub fn open(path: &Path) -> Result<Container, DecodeError> {
+    let fail = |source| DecodeError::Container { path: path.to_owned(), source };
+    let file = File::open(path).map_err(|e| fail(container::Error::from(e)))?;
+    if file.metadata().is_ok_and(|m| m.is_dir()) {
+        return Err(fail(container::Error::NotAContainer));
+    }
+    ContainerReader::open(BufReader::new(file)).map_err(fail)
+}
+
+/// The rest pose of a container and what turns its cages into positions.
+///
+/// # Errors
+/// Damage, or coordinates that this program does not compute.
+pub fn decoder(container: &mut Container, path: &Path) -> Result<(Model, Decoder), DecodeError> {
+    let fail = |source| DecodeError::Container { path: path.to_owned(), source };
+    let unsupported = |what| DecodeError::Unsupported { path: path.to_owned(), what };
+    let header = container.header().clone();
+    let Some(system) = coordinates::by_name(&header.coordinates) else {
+        return Err(unsupported(format!("its coordinates are {:?}", header.coordinates)));
+    };
+    if header.solver_version != cager_core::SOLVER_VERSION {
+        return Err(unsupported(format!("its coordinates are of version {}", header.solver_version)));
+    }
+    let rest = container.rest().map_err(fail)?;
+    let mesh = container.cage().map_err(fail)?;
+    let cage = Cage::new(mesh).map_err(|source| DecodeError::Cage { path: path.to_owned(), source })?;
+    if system.unknowns(&cage) != header.rows_per_frame as usize {
+        return Err(unsupported(format!("it stores {} rows per frame", header.rows_per_frame)));
+    }
+    let phi = system.coordinates(&cage, &rest.points).phi;
+    let decoder = Decoder::new(phi.as_ref(), cage.vertices().len());
+    Ok((rest, decoder))
+}
+
+/// Decodes all frames into `output`, which appears whole or not at all. `progress` is told the number of frames done.
+///
+/// # Errors
+/// See [`DecodeError`].
+pub fn decode(input: &Path, output: &Path, progress: &mut dyn FnMut(usize)) -> Result<(), DecodeError> {
+    let fail = |source| DecodeError::Container { path: input.to_owned(), source };
+    let mut container = open(input)?;
+    let frames = container.frames();
+    let options = container.header().frame_rate.map_or_else(FrameOptions::default, |fps| FrameOptions { fps });
+    let (rest, decoder) = decoder(&mut container, input)?;
+    let mut writer = create_frames(output, rest.points.len(), frames, &rest.faces, &options)?;
+    // Both keep their allocations from batch to batch.
+    let mut cages = vec![Vec::new(); BATCH];
+    let mut positions = vec![Vec::new(); BATCH];
+    let mut first = 0;
+    while first < frames {
+        let count = BATCH.min(frames - first);
+        for (k, cage) in cages[..count].iter_mut().enumerate() {
+            container.read_frame(first + k, cage).map_err(fail)?;
+        }
+        let views: Vec<&[f32]> = cages[..count].iter().map(Vec::as_slice).collect();
+        decoder.decode(&views, &mut positions[..count]);
+        for frame in &positions[..count] {
+            writer.write_frame(frame)?;
+        }
+        first += count;
+        progress(first);
+    }
+    Ok(writer.finish()?)
+}

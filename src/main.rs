@@ -1,0 +1,7 @@
+//! The one binary: `cager`.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    cager::cli::run()
+}

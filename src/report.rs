@@ -1,0 +1,130 @@
+//! `report.json`: what encoding found out, for programs and people.
+
+use serde::{Deserialize, Serialize};
+
+/// The report of one encoding. Lengths are fractions of the rest pose's bounding-box diagonal.
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
+pub struct Report {
+    /// Points of the model, n.
+    pub points: usize,
+    /// Triangles of the model; 0 for a point cloud.
+    pub triangles: usize,
+    /// Frames of the capture.
+    pub frames: usize,
+    /// Unknowns per frame, m.
+    pub unknowns: usize,
+    /// Vertices of the cage.
+    pub cage_vertices: usize,
+    /// Triangles of the cage.
+    pub cage_faces: usize,
+    /// Coordinate system.
+    pub coordinates: String,
+    /// Points the inversion read.
+    pub handles: String,
+    /// Treatment of the unstable end of the spectrum.
+    pub regularizer: String,
+    /// Spectrum threshold s.
+    pub spectrum: usize,
+    /// Weight λ.
+    pub lambda: f64,
+    /// `max_i |Φ C_R − P_R|_i`.
+    pub affine_reproduction_error: f64,
+    /// Condition numbers over the numerical rank.
+    pub condition_number: Condition,
+    /// Numerical rank of `Φ`.
+    pub rank: usize,
+    /// Singular values of the inverted matrix, descending.
+    pub singular_values: Vec<f64>,
+    /// How the handles were found.
+    pub maxvol: MaxVol,
+    /// Rows of maximum volume.
+    pub handle_indices: Vec<u32>,
+    /// Errors of what a decoder of the written file gets back.
+    pub error: Errors,
+    /// Sizes.
+    pub bytes: Bytes,
+    /// Times. Reading, inverting and measuring overlap, so `total` is less than the sum on several processors.
+    pub seconds: Seconds,
+    /// What a user should know but that did not stop the work.
+    pub warnings: Vec<String>,
+}
+
+/// Condition numbers.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
+pub struct Condition {
+    /// Of `Φ`.
+    pub full: f64,
+    /// Of the handles' rows `Φ□`.
+    pub handles: f64,
+}
+
+/// How the handles were found.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
+pub struct MaxVol {
+    /// Swaps after the start by pivoted LU.
+    pub swaps: usize,
+    /// `ln |det Φ□|`.
+    pub log_volume: f64,
+    /// Largest `|B_ij|` at the end.
+    pub max_entry: f64,
+}
+
+/// Errors of the decoded capture.
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
+pub struct Errors {
+    /// Mean over frames of the L2 error.
+    pub l2_mean: f64,
+    /// Largest L2 error of a frame.
+    pub l2_max: f64,
+    /// Mean over frames of the L∞ error.
+    pub linf_mean: f64,
+    /// Largest L∞ error of a frame.
+    pub linf_max: f64,
+    /// `100 · ‖A − Â‖_F / ‖A − E(A)‖_F` (Karni and Gotsman 2004).
+    pub kg_percent: f64,
+    /// Every frame.
+    pub per_frame: Vec<FrameError>,
+}
+
+/// Errors of one frame.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
+pub struct FrameError {
+    /// `sqrt(mean |e|²)`.
+    pub l2: f64,
+    /// `max |e|`.
+    pub linf: f64,
+}
+
+/// Sizes.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
+pub struct Bytes {
+    /// f32 positions of all frames and one connectivity.
+    pub capture: u64,
+    /// The written file.
+    pub output: u64,
+    /// `capture / output`.
+    pub ratio: f64,
+    /// Bits of the file per point and frame.
+    pub bits_per_vertex_per_frame: f64,
+}
+
+/// Times in seconds, each added up over the threads that worked on it.
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
+pub struct Seconds {
+    /// Reading rest pose, cage and frames.
+    pub read: f64,
+    /// Computing `Φ`.
+    pub coordinates: f64,
+    /// Choosing the handles.
+    pub maxvol: f64,
+    /// Spectrum, regularisation and operator.
+    pub svd: f64,
+    /// Inverting all frames.
+    pub invert: f64,
+    /// Decoding all frames again and measuring them.
+    pub measure: f64,
+    /// Compressing and writing.
+    pub write: f64,
+    /// Wall-clock time of it all.
+    pub total: f64,
+}
