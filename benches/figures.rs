@@ -127,8 +127,7 @@ fn write(capture: &Capture, cage: &Cage, folder: &Path) -> anyhow::Result<Vec<Ve
     write_model(&folder.join("rest.obj"), &capture.rest)?;
     write_model(&folder.join("cage.obj"), &Model { points: cage.vertices().to_vec(), faces })?;
     let (n, count) = (capture.rest.points.len(), capture.frames());
-    let mut writer =
-        create_frames(folder.join("frames.npy"), n, count, &Polygons::new(), &FrameOptions::default())?;
+    let mut writer = create_frames(folder.join("frames.npy"), n, count, &Polygons::new(), &FrameOptions::default())?;
     let mut frame = Vec::new();
     let mut frames = Vec::with_capacity(count);
     for t in 0..count {

@@ -5,7 +5,7 @@ use cager_core::cage::{Cage, CageError};
 use cager_core::decode::Decoder;
 use cager_core::inversion::BATCH;
 use cager_core::mesh::Model;
-use cager_formats::{FrameOptions, create_frames};
+use cager_formats::{Action, FrameOptions, create_frames};
 use cager_proto::container::{self, ContainerReader};
 use std::fs::File;
 use std::io::BufReader;
@@ -15,20 +15,20 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum DecodeError {
     /// The container cannot be read.
-    #[error("{}: {source}", .path.display())]
+    #[error("{}: {cause}", .path.display())]
     Container {
         /// The container.
         path: PathBuf,
-        /// What went wrong.
-        source: container::Error,
+        /// What went wrong; part of the message, so not a source as well.
+        cause: container::Error,
     },
     /// The container holds a cage that is none.
-    #[error("{}: {source}", .path.display())]
+    #[error("{}: {cause}", .path.display())]
     Cage {
         /// The container.
         path: PathBuf,
-        /// What is wrong with it.
-        source: CageError,
+        /// What is wrong with it; part of the message, so not a source as well.
+        cause: CageError,
     },
     /// The container needs what this program cannot do.
     #[error("{}: {what}; use a newer cager", .path.display())]
@@ -43,6 +43,16 @@ pub enum DecodeError {
     Formats(#[from] cager_formats::Error),
 }
 
+impl DecodeError {
+    pub(crate) fn container(path: &Path, cause: container::Error) -> Self {
+        let path = path.to_owned();
+        match cause {
+            container::Error::Io(cause) => cager_formats::Error::Io { path, action: Action::Read, cause }.into(),
+            cause => Self::Container { path, cause },
+        }
+    }
+}
+
 /// An opened container.
 pub type Container = ContainerReader<BufReader<File>>;
 
@@ -51,7 +61,7 @@ pub type Container = ContainerReader<BufReader<File>>;
 /// # Errors
 /// A file that cannot be read or is no container; the path is named.
 pub fn open(path: &Path) -> Result<Container, DecodeError> {
-    let fail = |source| DecodeError::Container { path: path.to_owned(), source };
+    let fail = |cause| DecodeError::container(path, cause);
     let file = File::open(path).map_err(|e| fail(container::Error::from(e)))?;
     if file.metadata().is_ok_and(|m| m.is_dir()) {
         return Err(fail(container::Error::NotAContainer));
@@ -64,7 +74,7 @@ pub fn open(path: &Path) -> Result<Container, DecodeError> {
 /// # Errors
 /// Damage, or coordinates that this program does not compute.
 pub fn decoder(container: &mut Container, path: &Path) -> Result<(Model, Decoder), DecodeError> {
-    let fail = |source| DecodeError::Container { path: path.to_owned(), source };
+    let fail = |cause| DecodeError::container(path, cause);
     let unsupported = |what| DecodeError::Unsupported { path: path.to_owned(), what };
     let header = container.header().clone();
     let Some(system) = coordinates::by_name(&header.coordinates) else {
@@ -75,7 +85,7 @@ pub fn decoder(container: &mut Container, path: &Path) -> Result<(Model, Decoder
     }
     let rest = container.rest().map_err(fail)?;
     let mesh = container.cage().map_err(fail)?;
-    let cage = Cage::new(mesh).map_err(|source| DecodeError::Cage { path: path.to_owned(), source })?;
+    let cage = Cage::new(mesh).map_err(|cause| DecodeError::Cage { path: path.to_owned(), cause })?;
     if system.unknowns(&cage) != header.rows_per_frame as usize {
         return Err(unsupported(format!("it stores {} rows per frame", header.rows_per_frame)));
     }
@@ -89,10 +99,13 @@ pub fn decoder(container: &mut Container, path: &Path) -> Result<(Model, Decoder
 /// # Errors
 /// See [`DecodeError`].
 pub fn decode(input: &Path, output: &Path, progress: &mut dyn FnMut(usize)) -> Result<(), DecodeError> {
-    let fail = |source| DecodeError::Container { path: input.to_owned(), source };
+    let fail = |cause| DecodeError::container(input, cause);
     let mut container = open(input)?;
     let frames = container.frames();
     let options = container.header().frame_rate.map_or_else(FrameOptions::default, |fps| FrameOptions { fps });
+    // Decoding needs neither, but a damaged file is refused wherever the damage is.
+    container.errors().map_err(fail)?;
+    container.summary().map_err(fail)?;
     let (rest, decoder) = decoder(&mut container, input)?;
     let mut writer = create_frames(output, rest.points.len(), frames, &rest.faces, &options)?;
     // Both keep their allocations from batch to batch.

@@ -5,7 +5,8 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{BATCH, Handles, PrepareError, Solver, SolverOptions};
 use cager_core::mesh::Model;
-use cager_formats::{AtomicFile, FrameReader};
+use cager_core::regularize::Regularizer;
+use cager_formats::{Action, AtomicFile, FrameReader};
 use cager_proto::container::{self, ContainerWriter, Header, Summary};
 use rayon::prelude::*;
 use std::io::BufWriter;
@@ -26,13 +27,27 @@ pub enum EncodeError {
     #[error(transparent)]
     Formats(#[from] cager_formats::Error),
     /// The container could not be written.
-    #[error("{}: {source}", .path.display())]
+    #[error("{}: {cause}", .path.display())]
     Container {
         /// The output.
         path: PathBuf,
-        /// What went wrong.
-        source: container::Error,
+        /// What went wrong; part of the message, so not a source as well.
+        cause: container::Error,
     },
+}
+
+impl EncodeError {
+    fn container(path: &Path, cause: container::Error) -> Self {
+        let path = path.to_owned();
+        match cause {
+            // What `AtomicFile` passes through `io::Write` has the path in it already.
+            container::Error::Io(io) => match io.downcast() {
+                Ok(named) => Self::Formats(named),
+                Err(io) => Self::Formats(cager_formats::Error::Io { path, action: Action::Write, cause: io }),
+            },
+            cause => Self::Container { path, cause },
+        }
+    }
 }
 
 /// Everything an encoding needs.
@@ -57,7 +72,7 @@ pub struct Job<'a> {
 /// See [`EncodeError`].
 pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Report, EncodeError> {
     let clock = Instant::now();
-    let fail = |source| EncodeError::Container { path: job.output.to_owned(), source };
+    let fail = |cause| EncodeError::container(job.output, cause);
     // Before the work, so that an unwritable place costs no waiting.
     let file = AtomicFile::create(job.output)?;
     let solver = Solver::prepare(job.system, job.cage, &job.rest.points, job.options)?;
@@ -71,7 +86,7 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Report, E
     std::thread::scope(|scope| -> Result<(), EncodeError> {
         let (full, batches) = sync_channel(rayon::current_num_threads());
         let (empty, recycled) = sync_channel(2 * rayon::current_num_threads() + 2);
-        let frames = &mut *job.frames;
+        let frames = job.frames;
         let reader = scope.spawn(move || read_batches(frames, frames_per_batch(points), &full, &recycled));
         let mut done = 0;
         while let Ok(first) = batches.recv() {
@@ -118,6 +133,20 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Report, E
     report.seconds.write += clock_write.elapsed().as_secs_f64();
     report.seconds.total = clock.elapsed().as_secs_f64();
     Ok(report)
+}
+
+/// How many singular directions are left to the data although they amplify it more than a millionfold, and the spectrum
+/// threshold that would smooth them all.
+fn weak_directions(sigma: &[f64], unknowns: usize, options: SolverOptions) -> Option<(usize, usize)> {
+    const WEAK: f64 = 1e-6;
+    let smoothed = match options.regularizer {
+        Regularizer::None => 0,
+        Regularizer::Laplacian | Regularizer::TruncatedSvd => options.spectrum,
+        Regularizer::Tikhonov | Regularizer::Global => unknowns,
+    };
+    let strong = sigma.iter().filter(|&&s| s >= WEAK * sigma[0]).count();
+    let left = sigma.len().min(unknowns - smoothed).saturating_sub(strong);
+    (left > 0).then_some((left, unknowns - strong))
 }
 
 type Batch = Vec<Vec<f64>>;
@@ -269,6 +298,11 @@ fn warnings(job: &Job<'_>, solver: &Solver) -> Vec<String> {
             "the points determine only {} of the {unknowns} unknowns of the cage; the others are placed by the cage's Laplacian, and {} handles are read",
             found.rank,
             if job.options.handles == Handles::All { job.rest.points.len() } else { found.rank }
+        ));
+    }
+    if let Some((left, advised)) = weak_directions(&found.singular_values[..found.rank], unknowns, job.options) {
+        warnings.push(format!(
+            "{left} directions of the cage hardly move any point and follow the rounding of the data; expect spikes, or smooth them with --spectrum {advised}"
         ));
     }
     if found.affine_reproduction_error > 1e-10 {

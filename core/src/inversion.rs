@@ -6,7 +6,7 @@ use crate::decode::Decoder;
 use crate::dense::{self, Svd};
 use crate::mesh::{Point, diagonal, distance_to_surface};
 use crate::regularize::{Regularizer, Spectrum, cage_laplacian, spectral_map};
-use crate::spectrum::{RowBasis, row_basis};
+use crate::spectrum::{RANK_TOLERANCE, RowBasis, deficient_basis, row_basis};
 use faer::reborrow::Reborrow;
 use faer::{Accum, Mat, MatRef, Par};
 use rayon::prelude::*;
@@ -78,6 +78,9 @@ pub enum PrepareError {
     /// All points coincide.
     #[error("all rest points are at the same place, so errors have no scale; check the rest pose")]
     NoExtent,
+    /// Squared lengths overflow.
+    #[error("the rest pose is too large to be measured; scale it down")]
+    TooLarge,
     /// s > m.
     #[error("the spectrum threshold {spectrum} exceeds the {unknowns} unknowns of the cage; give at most {unknowns}")]
     SpectrumTooLarge {
@@ -174,16 +177,24 @@ impl Solver {
         };
 
         let clock = Instant::now();
-        let basis = row_basis(phi).ok_or(PrepareError::NoSolution { what: "choice of handles" })?;
-        preparation.rank = basis.rank;
-        preparation.swaps = basis.handles.swaps;
-        preparation.log_volume = basis.handles.log_volume;
-        preparation.max_entry = basis.handles.max_entry;
+        let no_handles = PrepareError::NoSolution { what: "choice of handles" };
+        let mut basis = row_basis(phi).ok_or(no_handles.clone())?;
         preparation.maxvol_seconds = clock.elapsed().as_secs_f64();
 
         let clock = Instant::now();
-        let delta = cage_laplacian(cage);
-        let operator = operator(phi, &basis, delta.as_ref(), options, &mut preparation)?;
+        let mut spectra = Spectra::of(&basis, options.handles)?;
+        if basis.rank == m && spectra.full_sigma[m - 1] <= RANK_TOLERANCE * spectra.full_sigma[0] {
+            basis = deficient_basis(phi).ok_or(no_handles)?;
+            spectra = Spectra::of(&basis, options.handles)?;
+        }
+        let rank = basis.rank;
+        preparation.rank = rank;
+        preparation.swaps = basis.handles.swaps;
+        preparation.log_volume = basis.handles.log_volume;
+        preparation.max_entry = basis.handles.max_entry;
+        preparation.condition_handles = spectra.handles.sigma[0] / spectra.handles.sigma[rank - 1];
+        preparation.condition_full = spectra.full_sigma[0] / spectra.full_sigma[rank - 1];
+        let operator = operator(phi, &basis, spectra, cage_laplacian(cage).as_ref(), options, &mut preparation)?;
         let operator = keep_translations(operator, cage.vertices().len());
         preparation.svd_seconds = clock.elapsed().as_secs_f64();
 
@@ -272,8 +283,12 @@ fn check(points: &[Point], unknowns: usize, options: SolverOptions) -> Result<()
     if points.len() < unknowns {
         return Err(PrepareError::TooFewPoints { points: points.len(), unknowns });
     }
-    if !(diagonal(points) > 0.0) {
+    let diagonal = diagonal(points);
+    if diagonal == 0.0 {
         return Err(PrepareError::NoExtent);
+    }
+    if !diagonal.is_finite() {
+        return Err(PrepareError::TooLarge);
     }
     if options.spectrum > unknowns {
         return Err(PrepareError::SpectrumTooLarge { spectrum: options.spectrum, unknowns });
@@ -284,36 +299,63 @@ fn check(points: &[Point], unknowns: usize, options: SolverOptions) -> Result<()
     Ok(())
 }
 
+/// Decompositions of the handles and of all points.
+struct Spectra {
+    handles: Svd,
+    full_sigma: Vec<f64>,
+    /// Of `R Φ□`, where every point is read.
+    full: Option<Svd>,
+}
+
+impl Spectra {
+    fn of(basis: &RowBasis, read: Handles) -> Result<Self, PrepareError> {
+        let (handles, full) = rayon::join(
+            || dense::svd(basis.square.as_ref()),
+            || {
+                let compressed = basis.compressed()?;
+                match read {
+                    Handles::MaxVol => Some((dense::singular_values(compressed.as_ref())?, None)),
+                    Handles::All => dense::svd(compressed.as_ref()).map(|svd| (svd.sigma.clone(), Some(svd))),
+                }
+            },
+        );
+        let failed = |what| PrepareError::NoSolution { what };
+        let handles = handles.ok_or(failed("singular value decomposition of the handles"))?;
+        let (full_sigma, full) = full.ok_or(failed("singular value decomposition of the coordinates"))?;
+        Ok(Self { handles, full_sigma, full })
+    }
+}
+
 /// The whole inversion as one matrix, transposed: r × m for handles of maximum volume, n × m for all points.
 fn operator(
     phi: MatRef<'_, f64>,
     basis: &RowBasis,
+    spectra: Spectra,
     delta: MatRef<'_, f64>,
     options: SolverOptions,
     preparation: &mut Preparation,
 ) -> Result<Mat<f64>, PrepareError> {
     let failed = |what| PrepareError::NoSolution { what };
     let rank = basis.rank;
-    let (handles, full) = rayon::join(
-        || dense::svd(basis.square.as_ref()),
-        || {
-            let compressed = basis.compressed()?;
-            match options.handles {
-                Handles::MaxVol => Some((dense::singular_values(compressed.as_ref())?, None)),
-                Handles::All => dense::svd(compressed.as_ref()).map(|svd| (svd.sigma.clone(), Some(svd))),
-            }
-        },
-    );
-    let handles = handles.ok_or(failed("singular value decomposition of the handles"))?;
-    let (full_sigma, full) = full.ok_or(failed("singular value decomposition of the coordinates"))?;
-    preparation.condition_handles = handles.sigma[0] / handles.sigma[rank - 1];
-    preparation.condition_full = full_sigma[0] / full_sigma[rank - 1];
-    let Svd { u, sigma, v } = full.unwrap_or(handles);
+    // B carries the rounding of Φ□⁻¹, which least squares over all points feels beyond this condition.
+    const GRAM_IS_SAFE: f64 = 1e6;
+    let directly = options.handles == Handles::All && preparation.condition_full > GRAM_IS_SAFE;
+    let svd = match (directly, spectra.full) {
+        (true, _) => dense::svd(phi).ok_or(failed("singular value decomposition of the coordinates"))?,
+        (false, Some(full)) => full,
+        (false, None) => spectra.handles,
+    };
+    let Svd { u, sigma, v } = svd;
     let spectrum = Spectrum { sigma: &sigma[..rank], v: v.as_ref(), delta };
     let map = spectral_map(&spectrum, options.regularizer, options.spectrum, options.lambda)
         .ok_or(failed("regularised solve"))?;
     preparation.singular_values = sigma;
-    let mut inverse = dense::product(u.as_ref(), dense::product(v.as_ref(), map.as_ref()).transpose());
+    let to_cage = dense::product(v.as_ref(), map.as_ref());
+    let u = u.as_ref().subcols(0, rank);
+    if directly {
+        return Ok(tall_product(u, to_cage.transpose()));
+    }
+    let mut inverse = dense::product(u, to_cage.transpose());
     if options.handles == Handles::MaxVol {
         return Ok(inverse);
     }

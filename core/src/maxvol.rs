@@ -6,18 +6,21 @@
 
 use crate::dense;
 use crate::simd::multiversion;
+use crate::spectrum::RANK_TOLERANCE;
 use faer::reborrow::{Reborrow, ReborrowMut};
 use faer::{Accum, Mat, MatRef, Par};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Default tolerance τ: swaps end when no entry of B exceeds 1.01.
 pub const TOLERANCE: f64 = 0.01;
 /// Rows whose largest entry of B exceeds this take part in the swaps.
 const CANDIDATE: f32 = 0.9;
-/// Rows of one block of `B`: 1024 × 350 in f64 just exceeds the second-level cache, and products run at full speed.
-const BLOCK_ROWS: usize = 768;
-/// The blocks' Gram matrices are added up in this many fixed groups, so that the sum does not depend on the threads.
-const GRAM_GROUPS: usize = 8;
+/// Rows of one block of `B`: small enough to share the work evenly, large enough for products at full speed.
+const BLOCK_ROWS: usize = 256;
+/// The blocks' Gram matrices are added up in a number of groups that follows from the shape alone, so that the sum does not
+/// depend on the threads. They take this much memory together, unless four already take more.
+const GRAM_BYTES: usize = 16 << 20;
 /// Every confirming pass either ends the search or has found rows to swap; the volume bounds their number far below this.
 const MAX_PASSES: usize = 64;
 
@@ -55,7 +58,6 @@ pub struct Dependent {
 /// # Errors
 /// [`Dependent`] where the columns are numerically dependent.
 pub fn maxvol(phi: MatRef<'_, f64>, tolerance: f64) -> Result<MaxVol, Dependent> {
-    let m = phi.ncols();
     let mut rows = start_rows(phi)?;
     let mut swaps = 0;
     let (mut inverse, mut log_volume) = dense::inverse(dense::rows_of(phi, &rows).as_ref());
@@ -66,15 +68,15 @@ pub fn maxvol(phi: MatRef<'_, f64>, tolerance: f64) -> Result<MaxVol, Dependent>
         let done = swap_among(phi, &candidates, inverse.as_ref(), tolerance, &mut rows);
         swaps += done;
         (inverse, log_volume) = dense::inverse(dense::rows_of(phi, &rows).as_ref());
-        let (maxima, gram) = maxima_and_gram(phi, inverse.as_ref());
+        let (maxima, gram) = maxima_and_gram(phi, inverse.as_ref(), 1.0 + tolerance);
         let max_entry = maxima.iter().copied().fold(0.0, f64::max);
-        if max_entry <= 1.0 + tolerance || done == 0 && max_entry <= 1.0 + 2.0 * tolerance {
+        if max_entry <= 1.0 + tolerance {
             return Ok(MaxVol { rows, swaps, log_volume, start_log_volume, max_entry, gram, inverse });
         }
         row_max = maxima.iter().map(|&x| x as f32).collect();
     }
-    let (maxima, gram) = maxima_and_gram(phi, inverse.as_ref());
-    debug_assert_eq!(rows.len(), m);
+    // Reports say what was reached.
+    let (maxima, gram) = maxima_and_gram(phi, inverse.as_ref(), f64::INFINITY);
     let max_entry = maxima.iter().copied().fold(0.0, f64::max);
     Ok(MaxVol { rows, swaps, log_volume, start_log_volume, max_entry, gram, inverse })
 }
@@ -88,7 +90,7 @@ fn start_rows(phi: MatRef<'_, f64>) -> Result<Vec<u32>, Dependent> {
         return Ok(single.rows);
     }
     let double = dense::pivoted_rows(phi.to_owned());
-    if double.smallest > phi.nrows() as f64 * f64::EPSILON {
+    if double.smallest > RANK_TOLERANCE {
         return Ok(double.rows);
     }
     Err(Dependent { smallest: double.smallest })
@@ -131,11 +133,14 @@ fn row_maxima(phi: MatRef<'_, f64>, inverse: MatRef<'_, f64>) -> Vec<f32> {
     maxima
 }
 
-/// Largest `|B_ij|` of every row, and `Bᵀ B`, from a given `Φ□⁻¹`, without ever holding B.
-fn maxima_and_gram(phi: MatRef<'_, f64>, inverse: MatRef<'_, f64>) -> (Vec<f64>, Mat<f64>) {
+/// Largest `|B_ij|` of every row, and `Bᵀ B`, from a given `Φ□⁻¹`, without ever holding B. Once an entry exceeds `limit` the
+/// Gram matrix is of no use and is left unfinished.
+fn maxima_and_gram(phi: MatRef<'_, f64>, inverse: MatRef<'_, f64>, limit: f64) -> (Vec<f64>, Mat<f64>) {
     let (n, m) = phi.shape();
     let mut maxima = vec![0.0f64; n];
-    let blocks_per_group = n.div_ceil(BLOCK_ROWS).div_ceil(GRAM_GROUPS);
+    let groups = (GRAM_BYTES / (8 * m * m)).clamp(4, 16);
+    let blocks_per_group = n.div_ceil(BLOCK_ROWS).div_ceil(groups);
+    let exceeded = AtomicBool::new(false);
     let grams: Vec<Mat<f64>> = maxima
         .par_chunks_mut(blocks_per_group * BLOCK_ROWS)
         .enumerate()
@@ -151,7 +156,12 @@ fn maxima_and_gram(phi: MatRef<'_, f64>, inverse: MatRef<'_, f64>) -> (Vec<f64>,
                         *max = if x.abs() > *max { x.abs() } else { *max };
                     }
                 }
-                add_gram(&mut gram, b.rb());
+                if maxima.iter().any(|&x| x > limit) {
+                    exceeded.store(true, Ordering::Relaxed);
+                }
+                if !exceeded.load(Ordering::Relaxed) {
+                    add_gram(&mut gram, b.rb());
+                }
             }
             gram
         })

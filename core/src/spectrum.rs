@@ -4,6 +4,9 @@ use crate::dense::{self, Svd};
 use crate::maxvol::{self, MaxVol};
 use faer::{Mat, MatRef};
 
+/// Singular values below this fraction of the largest are taken for zero: coordinates are not accurate to more.
+pub(crate) const RANK_TOLERANCE: f64 = 1e-11;
+
 /// `Φ = B Φ□`: handles of maximum volume, with what the inversion needs of B.
 pub(crate) struct RowBasis {
     /// The handles and `Bᵀ B`.
@@ -26,9 +29,15 @@ pub(crate) fn row_basis(phi: MatRef<'_, f64>) -> Option<RowBasis> {
         let to_basis = handles.inverse.clone();
         return Some(RowBasis { handles, square, rank: m, to_basis });
     }
+    deficient_basis(phi)
+}
+
+/// Fewer handles than columns, for a `Φ` whose columns are dependent to the working precision.
+///
+/// `None` where a decomposition does not converge.
+pub(crate) fn deficient_basis(phi: MatRef<'_, f64>) -> Option<RowBasis> {
     let Svd { sigma, v, .. } = dense::right_singular(phi.to_owned())?;
-    let tolerance = phi.nrows() as f64 * f64::EPSILON * sigma[0];
-    let mut rank = sigma.iter().filter(|&&s| s > tolerance).count();
+    let mut rank = sigma.iter().filter(|&&s| s > RANK_TOLERANCE * sigma[0]).count();
     loop {
         // Directions the points do feel, of full rank; one fewer each time a borderline singular value still spoils it.
         let alive = v.as_ref().subcols(0, rank);

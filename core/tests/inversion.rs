@@ -150,7 +150,9 @@ fn l2(capture: &Capture, cage: &Cage, options: SolverOptions) -> f64 {
 #[test]
 fn least_squares_has_the_lowest_error_and_global_regularisation_the_highest() {
     let (capture, cage) = capture();
-    let with = |handles, regularizer, spectrum| l2(&capture, &cage, SolverOptions { handles, regularizer, spectrum, lambda: 1.0 });
+    let with = |handles, regularizer, spectrum| {
+        l2(&capture, &cage, SolverOptions { handles, regularizer, spectrum, lambda: 1.0 })
+    };
     let least = with(Handles::All, Regularizer::None, 0);
     let maxvol = with(Handles::MaxVol, Regularizer::None, 0);
     let sub = with(Handles::MaxVol, Regularizer::Laplacian, 20);
@@ -164,7 +166,8 @@ fn no_threshold_no_weight_and_no_regularizer_are_the_same() {
     let (capture, cage) = capture();
     let positions = frame(&capture, 3);
     let with = |regularizer, spectrum, lambda| {
-        prepare(&capture, &cage, SolverOptions { handles: Handles::MaxVol, regularizer, spectrum, lambda }).invert(&[&positions])
+        prepare(&capture, &cage, SolverOptions { handles: Handles::MaxVol, regularizer, spectrum, lambda })
+            .invert(&[&positions])
     };
     let plain = with(Regularizer::None, 20, 1.0);
     assert_eq!(with(Regularizer::Laplacian, 0, 1.0), plain);
@@ -255,4 +258,31 @@ fn a_model_of_few_places_repeated_many_times_is_solved_as_far_as_it_goes() {
     let found = solver.invert(&[&positions]);
     let error = solver.decoder().measure(&[&found[0]], &[&positions])[0];
     assert!(error.linf < 1e-5 * solver.diagonal(), "{}", error.linf / solver.diagonal());
+}
+
+#[test]
+fn a_model_far_too_small_for_its_cage_is_still_followed_by_every_method() {
+    let (capture, cage) = capture();
+    for scale in [1e-1, 1e-2, 1e-3] {
+        let centre = capture.rest.points[300];
+        let shrunk = |p: &Point| [0, 1, 2].map(|k| centre[k] + scale * (p[k] - centre[k]));
+        let points: Vec<Point> = capture.rest.points.iter().map(shrunk).collect();
+        let moved: Vec<f64> =
+            points.iter().flat_map(|p| [1.1 * p[0] + 0.2 * p[1], p[1] - 0.1 * p[0] + 3.0, p[2]]).collect();
+        for handles in [Handles::MaxVol, Handles::All] {
+            for spectrum in [0, 20] {
+                let options = SolverOptions { handles, spectrum, ..SolverOptions::default() };
+                let solver = Solver::prepare(&MeanValue, &cage, &points, options).unwrap();
+                let found = solver.invert(&[&moved]);
+                let error = solver.decoder().measure(&[&found[0]], &[&moved])[0];
+                let l2 = error.l2 / solver.diagonal();
+                eprintln!(
+                    "{scale:e} {handles:?} s {spectrum}: rank {} condition {:e} L2 {l2:e}",
+                    solver.preparation().rank,
+                    solver.preparation().condition_full
+                );
+                assert!(l2 < 1e-2, "{scale:e} {handles:?} s {spectrum}: rank {} L2 {l2:e}", solver.preparation().rank);
+            }
+        }
+    }
 }

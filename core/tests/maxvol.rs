@@ -23,7 +23,11 @@ fn no_single_exchange_enlarges_the_volume_by_more_than_the_tolerance() {
         let found = maxvol(a.as_ref(), TOLERANCE).unwrap();
         let square = Mat::from_fn(m, m, |i, j| a[(found.rows[i] as usize, j)]);
         let b = faer::prelude::Solve::solve(&square.transpose().partial_piv_lu(), a.transpose());
-        let largest = b.as_ref().col_iter().flat_map(|c| c.iter().copied().collect::<Vec<_>>()).fold(0.0f64, |x, y| x.max(y.abs()));
+        let largest = b
+            .as_ref()
+            .col_iter()
+            .flat_map(|c| c.iter().copied().collect::<Vec<_>>())
+            .fold(0.0f64, |x, y| x.max(y.abs()));
         assert!(largest <= 1.0 + TOLERANCE + 1e-9, "{n} × {m}: {largest}");
         assert!((largest - found.max_entry).abs() < 1e-9);
         assert!((log_volume(&a, &found.rows) - found.log_volume).abs() < 1e-8);

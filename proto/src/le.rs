@@ -9,19 +9,9 @@ pub(crate) fn extend_f32(out: &mut Vec<u8>, values: &[f32]) {
     }
 }
 
-/// `values` as bytes, four each.
-pub(crate) fn u32_bytes(values: &[u32]) -> Vec<u8> {
-    values.iter().flat_map(|value| value.to_le_bytes()).collect()
-}
-
 /// The `f32` values in `bytes`; a remainder of fewer than four bytes is left out.
 pub(crate) fn f32_values(bytes: &[u8]) -> impl ExactSizeIterator<Item = f32> {
     bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
-}
-
-/// The `f64` values in `bytes`; a remainder of fewer than eight bytes is left out.
-pub(crate) fn f64_values(bytes: &[u8]) -> impl ExactSizeIterator<Item = f64> {
-    bytes.chunks_exact(8).map(|b| f64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]))
 }
 
 /// The `u32` values in `bytes`; a remainder of fewer than four bytes is left out.

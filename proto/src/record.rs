@@ -204,12 +204,7 @@ pub fn decode_rows(header: &FrameHeader, bytes: &[u8], out: &mut Vec<f32>) -> Re
 ///
 /// # Errors
 /// Those of [`decode_header`] and [`decode_rows`], with [`RecordError::Incomplete`] counted from the start of the record.
-pub fn decode(
-    bytes: &[u8],
-    kind: Kind,
-    rows: u32,
-    out: &mut Vec<f32>,
-) -> Result<(FrameHeader, usize), RecordError> {
+pub fn decode(bytes: &[u8], kind: Kind, rows: u32, out: &mut Vec<f32>) -> Result<(FrameHeader, usize), RecordError> {
     out.clear();
     let header = decode_header(bytes, kind, rows)?;
     decode_rows(&header, &bytes[HEADER_BYTES..], out).map_err(|error| match error {

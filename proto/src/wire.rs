@@ -28,7 +28,9 @@ pub enum WireError {
         limit: usize,
     },
     /// The bytes go on after the value: they are of another type, or damaged.
-    #[error("the message is followed by {bytes} bytes that do not belong to it; check that both sides agree on its type")]
+    #[error(
+        "the message is followed by {bytes} bytes that do not belong to it; check that both sides agree on its type"
+    )]
     Trailing {
         /// Number of bytes left over.
         bytes: usize,
@@ -55,7 +57,8 @@ pub fn encode<T: Serialize + ?Sized, const LIMIT: usize>(value: &T) -> Result<Ve
     Ok(bytes)
 }
 
-/// Decodes a value from exactly `bytes`, allocating no more than a small multiple of `LIMIT`.
+/// Decodes a value from exactly `bytes`, allocating no more than a small multiple of `LIMIT`, and for a sequence up to the
+/// 1 MiB that serde reserves ahead.
 ///
 /// # Errors
 /// [`WireError::TooLarge`] if `bytes` or a length inside them passes the limit, [`WireError::Trailing`] if bytes are left

@@ -74,9 +74,10 @@ pub(crate) struct SolverArgs {
     #[arg(long, value_enum, default_value_t = RegularizerArg::Laplacian)]
     pub(crate) regularizer: RegularizerArg,
 
-    /// Spectrum threshold: how many of the last singular directions are regularised.
-    #[arg(long, value_name = "S", default_value_t = 20)]
-    pub(crate) spectrum: usize,
+    /// Spectrum threshold: how many of the last singular directions are regularised [default: 20, or all of a cage that has
+    /// fewer].
+    #[arg(long, value_name = "S")]
+    pub(crate) spectrum: Option<usize>,
 
     /// Weight of the regularisation (the damping α for tikhonov).
     #[arg(long, value_name = "L", default_value_t = 1.0, allow_negative_numbers = true)]
@@ -98,6 +99,8 @@ pub(crate) struct DecodeArgs {
 }
 
 /// Show what a .cager file holds: sizes, spectrum, errors.
+///
+/// Every checksum is compared on the way. Example: cager inspect walk.cager
 #[derive(Args, Debug)]
 pub(crate) struct InspectArgs {
     /// File to read.
@@ -110,6 +113,8 @@ pub(crate) struct InspectArgs {
 }
 
 /// Encode and decode a built-in capture: needs no files and no network.
+///
+/// Example: cager demo -o my-first-capture
 #[derive(Args, Debug)]
 pub(crate) struct DemoArgs {
     /// Folder for the results: rest.obj, cage.obj, capture.cager, decoded.npy, report.json and errors.svg.

@@ -57,7 +57,7 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
     let decode_seconds = clock.elapsed().as_secs_f64();
     compare(&capture, &decoded, &report)?;
 
-    write_report(&folder.join("report.json"), &report)?;
+    write_report(AtomicFile::create(folder.join("report.json"))?, &report)?;
     let (l2, linf): (Vec<f64>, Vec<f64>) = report.error.per_frame.iter().map(|e| (e.l2, e.linf)).unzip();
     let title = format!(
         "Built-in capture: {} points, cage of {} vertices",

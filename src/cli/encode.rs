@@ -20,7 +20,10 @@ pub(super) fn run(args: &EncodeArgs) -> Result<()> {
     let cage = read_cage(&args.cage, args.flip_cage)?;
     let mut frames = open_frames(&args.frames, rest.points.len())?;
     let read_seconds = clock.elapsed().as_secs_f64();
-    let (system, options) = solver(&args.solver)?;
+    let (system, options) = solver(&args.solver, &cage)?;
+    refuse_overwriting(args)?;
+    // Before the work, so that a report that cannot be written costs no waiting and leaves no half of the output.
+    let report_file = args.report.as_ref().map(AtomicFile::create).transpose()?;
 
     let bar = progress::frames("encoding", frames.frames());
     let job = Job { rest: &rest, cage: &cage, frames: frames.as_mut(), output: &args.output, system, options };
@@ -29,8 +32,8 @@ pub(super) fn run(args: &EncodeArgs) -> Result<()> {
     let mut report = result.map_err(|error| name_files(error, args))?;
     report.seconds.read += read_seconds;
     report.seconds.total = clock.elapsed().as_secs_f64();
-    if let Some(path) = &args.report {
-        write_report(path, &report)?;
+    if let Some(file) = report_file {
+        write_report(file, &report)?;
     }
     warn(&report.warnings);
     print(&summary(&report, &args.output))
@@ -41,9 +44,10 @@ fn name_files(error: encode::EncodeError, args: &EncodeArgs) -> anyhow::Error {
     match error {
         encode::EncodeError::Prepare(inner) => {
             let path = match inner {
-                PrepareError::NotFinite { .. } | PrepareError::TooFewPoints { .. } | PrepareError::NoExtent => {
-                    &args.rest
-                }
+                PrepareError::NotFinite { .. }
+                | PrepareError::TooFewPoints { .. }
+                | PrepareError::NoExtent
+                | PrepareError::TooLarge => &args.rest,
                 _ => &args.cage,
             };
             match inner {
@@ -67,23 +71,49 @@ pub(super) fn read_cage(path: &Path, flip: bool) -> Result<Cage> {
 
 pub(super) fn solver(
     args: &SolverArgs,
+    cage: &Cage,
 ) -> Result<(&'static dyn cager_core::coordinates::CoordinateSystem, SolverOptions)> {
     let name = args.coordinates.name();
     let system = coordinates::by_name(name).with_context(|| format!("--coordinates: {name} is unknown"))?;
+    let defaults = SolverOptions::default();
     let options = SolverOptions {
         handles: args.handles.into(),
         regularizer: args.regularizer.into(),
-        spectrum: args.spectrum,
+        spectrum: args.spectrum.unwrap_or_else(|| defaults.spectrum.min(system.unknowns(cage))),
         lambda: args.lambda,
     };
     Ok((system, options))
 }
 
-pub(super) fn write_report(path: &Path, report: &Report) -> Result<()> {
-    let mut file = AtomicFile::create(path)?;
-    serde_json::to_writer_pretty(&mut file, report).with_context(|| path.display().to_string())?;
-    file.write_all(b"\n").with_context(|| path.display().to_string())?;
+pub(super) fn write_report(mut file: AtomicFile, report: &Report) -> Result<()> {
+    let mut text = serde_json::to_vec_pretty(report)?;
+    text.push(b'\n');
+    file.write_all(&text)?;
     Ok(file.commit()?)
+}
+
+/// An output in place of an input, or of the other output, is a slip that would cost the user a file.
+fn refuse_overwriting(args: &EncodeArgs) -> Result<()> {
+    for output in [Some(&args.output), args.report.as_ref()].into_iter().flatten() {
+        let Ok(place) = output.canonicalize() else { continue };
+        for input in [&args.rest, &args.cage, &args.frames] {
+            if input.canonicalize().is_ok_and(|input| input == place) {
+                bail!(
+                    "{}: is an input of this encoding, so it cannot be an output; name another file",
+                    output.display()
+                );
+            }
+        }
+    }
+    let place = |path: &Path| {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        path.canonicalize().ok().or_else(|| Some(folder.canonicalize().ok()?.join(path.file_name()?)))
+    };
+    let report = args.report.as_deref().and_then(place);
+    if report.is_some() && report == place(&args.output) {
+        bail!("{}: cannot hold both the capture and the report; name two files", args.output.display());
+    }
+    Ok(())
 }
 
 fn summary(report: &Report, output: &Path) -> String {

@@ -11,7 +11,7 @@ use std::fmt::Write;
 
 pub(super) fn run(args: &InspectArgs) -> Result<()> {
     let mut container = decode::open(&args.input)?;
-    let fail = |source| DecodeError::Container { path: args.input.clone(), source };
+    let fail = |cause| DecodeError::container(&args.input, cause);
     container.verify().map_err(fail)?;
     let summary = container.summary().map_err(fail)?;
     let errors = container.errors().map_err(fail)?;

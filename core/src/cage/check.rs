@@ -193,8 +193,9 @@ fn is_flat([a, b, c]: [Point; 3]) -> bool {
     let (u, v, w) = (e(a, b), e(a, c), e(b, c));
     let longest2 = len2(u).max(len2(v)).max(len2(w));
     let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-    // `!(a > b)` so that a NaN from overflowing coordinates counts as flat.
-    !(len2(n).sqrt() > FLAT * longest2)
+    let height = len2(n).sqrt() / longest2;
+    // NaN, from coordinates that overflow, counts as flat.
+    height.is_nan() || height <= FLAT
 }
 
 fn check_edges(edges: &[Edge], users: &[Vec<(usize, bool)>]) -> Result<(), CageError> {

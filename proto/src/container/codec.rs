@@ -1,7 +1,7 @@
 //! Lossless codecs for arrays of numbers: byte planes and zstd, with a difference along the array before them.
 
 use super::Error;
-use super::section::u32_at;
+use crate::le::u32_at;
 use std::io::Read;
 
 /// The bytes as they are.

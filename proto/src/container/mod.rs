@@ -18,6 +18,8 @@ use serde::{Deserialize, Deserializer, Serialize};
 pub const MAGIC: [u8; 8] = *b"\x89CGR\r\n\x1a\n";
 /// Version of the layout.
 pub const VERSION: u16 = 1;
+/// Largest encoded [`Header`], in bytes.
+pub(crate) const HEADER_LIMIT: usize = 64 << 10;
 /// Frames of one chunk: what reading one frame decompresses.
 pub const CHUNK_FRAMES: usize = 16;
 

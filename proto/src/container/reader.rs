@@ -1,8 +1,9 @@
 //! Reading a container: checked before it is believed, any frame at once.
 
 use super::codec;
-use super::section::{self, FOOTER_BYTES, HEADER_BYTES, PRELUDE_BYTES, SectionHeader, u64_at};
-use super::{Error, Header, Summary, tag};
+use super::section::{self, FOOTER_BYTES, HEADER_BYTES, PRELUDE_BYTES, SectionHeader};
+use super::{Error, HEADER_LIMIT, Header, Summary, tag};
+use crate::le::{self, f32_at, u32_at, u64_at};
 use crate::wire;
 use cager_core::mesh::{Model, Point, Polygons, TriMesh};
 use std::io::{Read, Seek, SeekFrom};
@@ -157,7 +158,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         let bytes = 12 * self.header.rows_per_frame as usize;
         let start = (frame - entry.header.first as usize) * bytes;
         out.clear();
-        out.extend(raw[start..start + bytes].chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])));
+        out.extend(le::f32_values(&raw[start..start + bytes]));
         if out.iter().any(|x| !x.is_finite()) {
             return Err(Error::corrupt(entry.offset, format!("the cage of frame {frame} is not finite")));
         }
@@ -171,8 +172,7 @@ impl<R: Read + Seek> ContainerReader<R> {
     pub fn errors(&mut self) -> Result<Vec<FrameError>, Error> {
         let entry = self.entry(tag::ERRORS)?;
         let raw = self.raw(entry)?;
-        let value = |b: &[u8], k: usize| f32::from_le_bytes([b[k], b[k + 1], b[k + 2], b[k + 3]]);
-        Ok(raw.chunks_exact(8).map(|b| FrameError { l2: value(b, 0), linf: value(b, 4) }).collect())
+        Ok(raw.chunks_exact(8).map(|b| FrameError { l2: f32_at(b, 0), linf: f32_at(b, 4) }).collect())
     }
 
     /// What the encoder found out, where it said so.
@@ -275,8 +275,8 @@ impl<R: Read + Seek> ContainerReader<R> {
             return Err(Error::corrupt(entry.offset, "the header is compressed"));
         }
         let raw = self.raw(entry)?;
-        self.header =
-            wire::decode(&raw).map_err(|e| Error::corrupt(entry.offset, format!("the header cannot be read ({e})")))?;
+        self.header = wire::decode::<_, HEADER_LIMIT>(&raw)
+            .map_err(|e| Error::corrupt(entry.offset, format!("the header cannot be read ({e})")))?;
         let h = &self.header;
         if h.rows_per_frame == 0 || h.points > u64::from(u32::MAX) || h.cage_vertices > u64::from(u32::MAX) {
             return Err(Error::corrupt(entry.offset, "the header counts what cannot be"));
@@ -384,7 +384,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         let entry = self.entry(tag)?;
         let raw = self.raw(entry)?;
         let points: Vec<Point> = if entry.header.width == 4 {
-            let value = |b: &[u8], k: usize| f64::from(f32::from_le_bytes([b[k], b[k + 1], b[k + 2], b[k + 3]]));
+            let value = |b: &[u8], k: usize| f64::from(f32_at(b, k));
             raw.chunks_exact(12).map(|b| [value(b, 0), value(b, 4), value(b, 8)]).collect()
         } else {
             raw.chunks_exact(24).map(|b| [0, 8, 16].map(|k| f64::from_bits(u64_at(b, k)))).collect()
@@ -398,7 +398,7 @@ impl<R: Read + Seek> ContainerReader<R> {
     fn indices(&mut self, tag: [u8; 4]) -> Result<(u64, Vec<u32>), Error> {
         let entry = self.entry(tag)?;
         let raw = self.raw(entry)?;
-        Ok((entry.offset, raw.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()))
+        Ok((entry.offset, le::u32_values(&raw).collect()))
     }
 }
 
@@ -408,8 +408,8 @@ fn section_fields(b: &[u8]) -> SectionHeader {
         tag: [b[0], b[1], b[2], b[3]],
         codec: b[4],
         width: b[5],
-        first: section::u32_at(b, 8),
-        count: section::u32_at(b, 12),
+        first: u32_at(b, 8),
+        count: u32_at(b, 12),
         payload_bytes: u64_at(b, 16),
         raw_bytes: u64_at(b, 24),
         payload_crc: 0,

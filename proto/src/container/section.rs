@@ -1,7 +1,8 @@
 //! Section headers, the prelude and the footer: everything of fixed size.
 
-use super::{Error, MAGIC, VERSION, tag};
-use crate::wire;
+use crate::le::{u32_at, u64_at};
+
+use super::{Error, HEADER_LIMIT, MAGIC, VERSION, tag};
 
 pub(crate) const PRELUDE_BYTES: usize = 16;
 pub(crate) const HEADER_BYTES: usize = 40;
@@ -62,7 +63,7 @@ impl SectionHeader {
     /// memory below 64 MiB and 256 times the file.
     pub(crate) fn most_raw_bytes(tag: [u8; 4], file_bytes: u64) -> u64 {
         let (times, more) = match tag {
-            tag::HEADER => return wire::LIMIT as u64,
+            tag::HEADER => return HEADER_LIMIT as u64,
             // Two bytes of JSON may become an empty text of 24 bytes.
             tag::SUMMARY => (16, 4 << 20),
             _ => (48, 12 << 20),
@@ -120,12 +121,4 @@ pub(crate) fn check_footer(b: &[u8; FOOTER_BYTES], file_bytes: u64) -> Result<u6
         return Err(Error::corrupt(offset, "the end does not fit the file"));
     }
     Ok(u64_at(b, 0))
-}
-
-pub(crate) fn u32_at(b: &[u8], k: usize) -> u32 {
-    u32::from_le_bytes([b[k], b[k + 1], b[k + 2], b[k + 3]])
-}
-
-pub(crate) fn u64_at(b: &[u8], k: usize) -> u64 {
-    u64::from(u32_at(b, k)) | u64::from(u32_at(b, k + 4)) << 32
 }

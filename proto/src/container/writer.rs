@@ -2,7 +2,7 @@
 
 use super::codec::{self, DIFFERENCE, PLANES, RAW};
 use super::section::{self, SectionHeader};
-use super::{CHUNK_FRAMES, Error, Header, Summary, tag};
+use super::{CHUNK_FRAMES, Error, HEADER_LIMIT, Header, Summary, tag};
 use crate::wire;
 use cager_core::mesh::{Model, Point, TriMesh};
 use std::io::Write;
@@ -46,7 +46,7 @@ impl<W: Write> ContainerWriter<W> {
             contents: Vec::new(),
         };
         writer.put(&section::prelude())?;
-        let encoded = wire::encode(&header).map_err(|e| Error::TooLarge(e.to_string()))?;
+        let encoded = wire::encode::<_, HEADER_LIMIT>(&header).map_err(|e| Error::TooLarge(e.to_string()))?;
         writer.section(tag::HEADER, RAW, 1, 0, &encoded)?;
         writer.positions(tag::REST_POINTS, &rest.points)?;
         if !rest.faces.is_empty() {

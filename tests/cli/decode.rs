@@ -1,0 +1,81 @@
+//! `cager decode`.
+
+use crate::support::{Dir, measure, read_frames};
+use cager_formats::read_model;
+
+#[test]
+fn every_output_format_holds_the_same_positions() {
+    let (dir, small) = Dir::with_encoded();
+    let points = small.rest.points.len();
+    dir.cager("decode out.cager -o back.npy").succeeds();
+    let truth = read_frames(&dir.path("back.npy"), points);
+    assert_eq!(truth.len(), 20);
+    for output in ["back.pc2", "back.mdd", "poses", "slashed/"] {
+        dir.cager(&format!("decode out.cager -o {output}")).succeeds();
+        let found = read_frames(&dir.path(output), points);
+        // Text gives the shortest digits of an f32, which are that f32 again and no other.
+        let same = truth.iter().flatten().zip(found.iter().flatten()).all(|(&a, &b)| a as f32 == b as f32);
+        assert!(same && found.len() == 20, "{output}");
+    }
+    let errors = measure(&small.rest.points, &small.frames, &truth);
+    assert!(errors.l2.iter().all(|&l2| l2 < 0.02), "{:?}", errors.l2);
+}
+
+#[test]
+fn npy_is_what_numpy_loads() {
+    let (dir, small) = Dir::with_encoded();
+    dir.cager("decode out.cager -o back.npy").succeeds();
+    let bytes = dir.read("back.npy");
+    let header = String::from_utf8_lossy(&bytes[10..128]).into_owned();
+    assert!(bytes.starts_with(b"\x93NUMPY\x01\x00"));
+    assert!(header.contains("'<f4'") && header.contains("False"), "{header}");
+    assert!(header.contains(&format!("(20, {}, 3)", small.rest.points.len())), "{header}");
+    assert_eq!(bytes.len(), 128 + 20 * small.rest.points.len() * 12);
+}
+
+#[test]
+fn folder_has_one_mesh_per_frame_with_the_quads_of_the_model() {
+    let (dir, small) = Dir::with_encoded();
+    dir.cager("decode out.cager -o poses").succeeds();
+    let names = dir.names("poses");
+    assert_eq!(names.len(), 20);
+    assert_eq!((names[0].as_str(), names[19].as_str()), ("frame_0000.obj", "frame_0019.obj"));
+    assert!(small.rest.faces.arities().contains(&4));
+    for name in names {
+        let pose = read_model(&dir.path(&format!("poses/{name}"))).expect("a pose");
+        assert!(pose.faces == small.rest.faces, "{name} has other faces than the model");
+    }
+}
+
+#[test]
+fn decoding_is_identical_each_time_and_for_any_number_of_threads() {
+    let (dir, _) = Dir::with_encoded();
+    dir.cager("decode out.cager -o back.npy").succeeds();
+    let first = dir.read("back.npy");
+    for threads in ["1", "2", "5"] {
+        dir.cager("decode out.cager -o back.npy").env("RAYON_NUM_THREADS", threads).succeeds();
+        assert!(dir.read("back.npy") == first, "{threads} threads give other positions");
+    }
+}
+
+#[test]
+fn a_capture_needs_nothing_but_its_container() {
+    let (dir, _) = Dir::with_encoded();
+    let alone = Dir::new();
+    alone.write("moved.cager", dir.read("out.cager"));
+    alone.cager("decode moved.cager -o back.npy").succeeds();
+    dir.cager("decode out.cager -o back.npy").succeeds();
+    assert!(alone.read("back.npy") == dir.read("back.npy"));
+    assert_eq!(alone.names(""), ["back.npy", "moved.cager"]);
+}
+
+#[test]
+fn decoded_frames_encode_to_the_same_cages_again() {
+    let (dir, _) = Dir::with_encoded();
+    dir.cager("decode out.cager -o back.npy").succeeds();
+    dir.cager("encode --rest rest.obj --cage cage.obj --frames back.npy -o again.cager --report again.json").succeeds();
+    let worst = dir.json("again.json")["error"]["linf_max"].as_f64().expect("a number");
+    // Both times the last directions are smoothed, so the second time little is left to lose.
+    let first = dir.json("report.json")["error"]["linf_max"].as_f64().expect("a number");
+    assert!(worst < first, "{worst} the second time, {first} the first");
+}

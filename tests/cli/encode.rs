@@ -1,0 +1,369 @@
+//! `cager encode`.
+
+use crate::support::{
+    Dir, ENCODE, as_model, close, largest, mean, measure, npy_f64, quad_box, read_cages, read_frames,
+};
+use cager_core::mesh::{Model, Polygons, winding_number};
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+fn encode(dir: &Dir, options: &str) -> Value {
+    dir.cager(&format!("{ENCODE} --report report.json {options}")).succeeds();
+    dir.json("report.json")
+}
+
+fn number(value: &Value, pointer: &str) -> f64 {
+    value.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("{pointer} is no number"))
+}
+
+#[test]
+fn every_source_of_the_same_frames_gives_the_same_file() {
+    let (dir, small) = Dir::with_capture();
+    for frame in 0..small.frames.len() {
+        dir.model(&format!("poses/{frame}.obj"), &small.posed(frame));
+        dir.model(&format!("mixed/pose{frame}.ply"), &small.posed(frame));
+    }
+    dir.write("mixed/notes.txt", "not a frame");
+    dir.model("mixed/other1.obj", &small.rest);
+    dir.write("wide.npy", npy_f64(&small.frames));
+    dir.frames("frames.pc2", &small.frames);
+    dir.frames("frames.mdd", &small.frames);
+    let mut files = Vec::new();
+    for source in ["frames.npy", "wide.npy", "frames.pc2", "frames.mdd", "poses", "poses/*.obj", "mixed/pose*.ply"] {
+        dir.cager("encode --rest rest.obj --cage cage.obj -o out.cager --frames").arg(source).succeeds();
+        assert_eq!(read_cages(&dir.path("out.cager")).len(), 20, "{source}");
+        files.push((source, dir.read("out.cager")));
+    }
+    for (source, file) in &files {
+        assert!(*file == files[0].1, "{source} and {} give different files", files[0].0);
+    }
+}
+
+#[test]
+fn doubles_are_not_narrowed_before_the_inversion() {
+    let (dir, small) = Dir::with_capture();
+    // Far from the origin a single keeps only some digits of the motion.
+    let far = |x: &f64| x + 1000.0;
+    let moved = |points: &[[f64; 3]]| points.iter().map(|p| p.map(|x| far(&x))).collect::<Vec<_>>();
+    let frames: Vec<Vec<f64>> = small.frames.iter().map(|f| f.iter().map(far).collect()).collect();
+    dir.model("rest.obj", &Model { points: moved(&small.rest.points), faces: Polygons::new() });
+    let mut cage = small.cage;
+    cage.vertices = moved(&cage.vertices);
+    dir.model("cage.obj", &as_model(&cage));
+    dir.write("frames.npy", npy_f64(&frames));
+    let wide = encode(&dir, "--handles all");
+    assert!(number(&wide, "/affine_reproduction_error") < 1e-10);
+    let near = { encode(&Dir::with_capture().0, "--handles all") };
+    close("l2_mean far away", number(&wide, "/error/l2_mean"), number(&near, "/error/l2_mean"), 0.01);
+}
+
+#[test]
+fn report_has_exactly_the_keys_and_types_of_the_contract() {
+    let (dir, _) = Dir::with_encoded();
+    let mut found = BTreeMap::new();
+    shape("", &dir.json("report.json"), &mut found);
+    let integers = ["points", "triangles", "frames", "unknowns", "cage_vertices", "cage_faces", "spectrum", "rank"];
+    let texts = ["coordinates", "handles", "regularizer"];
+    let numbers = [
+        "lambda",
+        "affine_reproduction_error",
+        "condition_number.full",
+        "condition_number.handles",
+        "singular_values[]",
+        "maxvol.log_volume",
+        "maxvol.max_entry",
+        "error.l2_mean",
+        "error.l2_max",
+        "error.linf_mean",
+        "error.linf_max",
+        "error.kg_percent",
+        "error.per_frame[].l2",
+        "error.per_frame[].linf",
+        "bytes.ratio",
+        "bytes.bits_per_vertex_per_frame",
+        "seconds.read",
+        "seconds.coordinates",
+        "seconds.maxvol",
+        "seconds.svd",
+        "seconds.invert",
+        "seconds.measure",
+        "seconds.write",
+        "seconds.total",
+    ];
+    let mut expected = BTreeMap::new();
+    expected.extend(integers.map(|key| (key.to_owned(), "integer")));
+    expected.extend(texts.map(|key| (key.to_owned(), "text")));
+    expected.extend(numbers.map(|key| (key.to_owned(), "number")));
+    expected.extend(
+        ["maxvol.swaps", "handle_indices[]", "bytes.capture", "bytes.output"].map(|key| (key.to_owned(), "integer")),
+    );
+    expected.insert("warnings[]".to_owned(), "empty");
+    assert_eq!(found, expected);
+}
+
+/// The type at every path of a document; the items of a list are one path.
+fn shape(path: &str, value: &Value, out: &mut BTreeMap<String, &'static str>) {
+    let leaf = match value {
+        Value::Object(map) => {
+            let dot = if path.is_empty() { "" } else { "." };
+            map.iter().for_each(|(key, value)| shape(&format!("{path}{dot}{key}"), value, out));
+            return;
+        }
+        Value::Array(items) if !items.is_empty() => {
+            items.iter().for_each(|item| shape(&format!("{path}[]"), item, out));
+            return;
+        }
+        Value::Array(_) => {
+            out.insert(format!("{path}[]"), "empty");
+            return;
+        }
+        Value::Number(n) if n.is_u64() => "integer",
+        Value::Number(_) => "number",
+        Value::String(_) => "text",
+        Value::Null => "null",
+        Value::Bool(_) => "boolean",
+    };
+    let before = out.insert(path.to_owned(), leaf);
+    assert!(before.is_none_or(|before| before == leaf), "{path} is {before:?} and {leaf}");
+}
+
+#[test]
+fn report_counts_what_was_given_and_written() {
+    let (dir, small) = Dir::with_encoded();
+    let report = dir.json("report.json");
+    let count = |key: &str| report[key].as_u64().expect(key) as usize;
+    assert_eq!(count("points"), small.rest.points.len());
+    assert_eq!(count("triangles"), small.rest.faces.triangulated().len());
+    assert_eq!(count("frames"), 20);
+    assert_eq!(count("unknowns"), small.cage.vertices.len());
+    assert_eq!(count("cage_vertices"), small.cage.vertices.len());
+    assert_eq!(count("cage_faces"), small.cage.triangles.len());
+    assert_eq!(count("rank"), small.cage.vertices.len());
+    assert_eq!(count("spectrum"), 20);
+    for (key, value) in [("coordinates", "mvc"), ("handles", "maxvol"), ("regularizer", "laplacian")] {
+        assert_eq!(report[key], value);
+    }
+    assert_eq!(report["lambda"], 1.0);
+    let written = dir.read("out.cager").len();
+    let capture = 12 * small.rest.points.len() * 20 + 4 * small.rest.faces.indices().len();
+    assert_eq!(report["bytes"]["output"], written);
+    assert_eq!(report["bytes"]["capture"], capture);
+    close("ratio", number(&report, "/bytes/ratio"), capture as f64 / written as f64, 1e-12);
+    let bits = 8.0 * written as f64 / (20 * small.rest.points.len()) as f64;
+    close("bits", number(&report, "/bytes/bits_per_vertex_per_frame"), bits, 1e-12);
+    let mut handles: Vec<u64> =
+        report["handle_indices"].as_array().expect("handles").iter().filter_map(Value::as_u64).collect();
+    handles.sort_unstable();
+    handles.dedup();
+    assert_eq!(handles.len(), small.cage.vertices.len());
+    assert!(handles.iter().all(|&h| (h as usize) < small.rest.points.len()));
+    assert!(number(&report, "/affine_reproduction_error") <= 1e-10);
+    assert!(number(&report, "/maxvol/max_entry") <= 1.1);
+    let sigma: Vec<f64> =
+        report["singular_values"].as_array().expect("sigma").iter().filter_map(Value::as_f64).collect();
+    assert!(sigma.len() == small.cage.vertices.len() && sigma.is_sorted_by(|a, b| a >= b));
+    close("condition", number(&report, "/condition_number/handles"), sigma[0] / sigma[sigma.len() - 1], 1e-9);
+}
+
+#[test]
+fn report_errors_are_those_of_the_decoded_output() {
+    for options in ["", "--handles all --spectrum 0", "--regularizer global --lambda 0.01"] {
+        let (dir, small) = Dir::with_capture();
+        let report = encode(&dir, options);
+        dir.cager("decode out.cager -o decoded.npy").succeeds();
+        let decoded = read_frames(&dir.path("decoded.npy"), small.rest.points.len());
+        let found = measure(&small.rest.points, &small.frames, &decoded);
+        for (t, (l2, linf)) in found.l2.iter().zip(&found.linf).enumerate() {
+            close("l2", number(&report, &format!("/error/per_frame/{t}/l2")), *l2, 1e-6);
+            close("linf", number(&report, &format!("/error/per_frame/{t}/linf")), *linf, 1e-6);
+        }
+        close("l2_mean", number(&report, "/error/l2_mean"), mean(&found.l2), 1e-6);
+        close("l2_max", number(&report, "/error/l2_max"), largest(&found.l2), 1e-6);
+        close("linf_mean", number(&report, "/error/linf_mean"), mean(&found.linf), 1e-6);
+        close("linf_max", number(&report, "/error/linf_max"), largest(&found.linf), 1e-6);
+        close("kg_percent", number(&report, "/error/kg_percent"), found.kg_percent, 1e-6);
+    }
+}
+
+#[test]
+fn output_is_identical_each_time_and_for_any_number_of_threads() {
+    let (dir, _) = Dir::with_capture();
+    for options in ["", "--handles all"] {
+        dir.cager(&format!("{ENCODE} {options}")).succeeds();
+        let first = dir.read("out.cager");
+        dir.cager(&format!("{ENCODE} {options}")).succeeds();
+        assert!(dir.read("out.cager") == first, "a second run gives another file");
+        for threads in ["1", "2", "5"] {
+            dir.cager(&format!("{ENCODE} {options}")).env("RAYON_NUM_THREADS", threads).succeeds();
+            assert!(dir.read("out.cager") == first, "{threads} threads give another file");
+        }
+    }
+}
+
+#[test]
+fn no_progress_bar_appears_in_a_pipe() {
+    let (dir, _) = Dir::with_capture();
+    for line in [ENCODE, "decode out.cager -o back.npy", "demo --points 300 --frames 3 --cage-vertices 40"] {
+        let done = dir.cager(line).succeeds();
+        assert_eq!(done.stderr, "", "{line}");
+        assert!(!done.stdout.contains(['\r', '\x1b']), "{line}: {:?}", done.stdout);
+    }
+}
+
+#[test]
+fn only_the_outputs_are_left_in_the_folder() {
+    let (dir, _) = Dir::with_encoded();
+    assert_eq!(dir.names(""), ["cage.obj", "frames.npy", "out.cager", "report.json", "rest.obj"]);
+}
+
+#[test]
+fn points_outside_the_cage_are_counted_in_a_warning_on_stderr() {
+    let (dir, small) = Dir::with_capture();
+    let cage = small.shrunk_cage();
+    dir.model("cage.obj", &as_model(&cage));
+    let outside =
+        small.rest.points.iter().filter(|&&p| winding_number(&cage.vertices, &cage.triangles, p) < 0.5).count();
+    assert!(outside > 10);
+    let done = dir.cager(&format!("{ENCODE} --report report.json")).succeeds();
+    let said = format!("{outside} of {} points lie outside the cage", small.rest.points.len());
+    assert!(done.stderr.starts_with(&format!("warning: {said}")), "{}", done.stderr);
+    assert_eq!(done.stderr.lines().count(), 1);
+    assert!(!done.stdout.contains("outside"), "{}", done.stdout);
+    let warnings = dir.json("report.json")["warnings"].clone();
+    assert!(warnings[0].as_str().is_some_and(|w| w.starts_with(&said)), "{warnings}");
+}
+
+#[test]
+fn unknowns_that_the_points_leave_open_are_a_warning() {
+    let (dir, small) = Dir::with_capture();
+    // Only 40 places: the other points stand on top of these.
+    let n = small.rest.points.len();
+    let points: Vec<_> = (0..n).map(|i| small.rest.points[i % 40 * (n / 40)]).collect();
+    dir.model("rest.obj", &Model { points: points.clone(), faces: Polygons::new() });
+    dir.write("frames.npy", npy_f64(&[points.as_flattened().to_vec()]));
+    for handles in ["maxvol", "all"] {
+        let done = dir.cager(&format!("{ENCODE} --report report.json --spectrum 0 --handles {handles}")).succeeds();
+        let report = dir.json("report.json");
+        assert_eq!(report["rank"], 40);
+        let said = format!("warning: the points determine only 40 of the {} unknowns", small.cage.vertices.len());
+        assert!(done.stderr.starts_with(&said) && done.stderr.lines().count() == 1, "{}", done.stderr);
+        assert!(number(&report, "/error/linf_max") < 1e-5, "{handles}: {}", report["error"]);
+    }
+}
+
+#[test]
+fn point_cloud_is_a_rest_pose() {
+    let (dir, small) = Dir::with_capture();
+    let cloud = Model { points: small.rest.points.clone(), faces: Polygons::new() };
+    dir.model("cloud.ply", &cloud);
+    let line = "encode --rest cloud.ply --cage cage.obj --frames frames.npy -o cloud.cager --report report.json";
+    dir.cager(line).succeeds();
+    assert_eq!(dir.json("report.json")["triangles"], 0);
+    dir.cager(ENCODE).succeeds();
+    assert_eq!(read_cages(&dir.path("cloud.cager")), read_cages(&dir.path("out.cager")));
+    dir.cager("decode cloud.cager -o poses").succeeds();
+    let first = cager_formats::read_model(&dir.path("poses/frame_0000.obj")).expect("a pose");
+    assert!(first.faces.is_empty() && first.points.len() == small.rest.points.len());
+}
+
+#[test]
+fn every_mesh_format_serves_as_rest_pose_and_cage() {
+    let (dir, small) = Dir::with_capture();
+    dir.cager(ENCODE).succeeds();
+    for format in ["ply", "off"] {
+        dir.model(&format!("rest.{format}"), &small.rest);
+        dir.model(&format!("cage.{format}"), &as_model(&small.cage));
+        let line = format!("encode --rest rest.{format} --cage cage.{format} --frames frames.npy -o {format}.cager");
+        dir.cager(&line).succeeds();
+        assert!(dir.read(&format!("{format}.cager")) == dir.read("out.cager"), "{format}");
+    }
+}
+
+#[test]
+fn quads_of_the_cage_become_triangles_and_a_cage_smaller_than_the_default_spectrum_will_do() {
+    let (dir, small) = Dir::with_capture();
+    dir.model("cage.obj", &quad_box(&small.rest.points));
+    let report = encode(&dir, "");
+    assert_eq!(report["cage_vertices"], 8);
+    assert_eq!(report["cage_faces"], 12);
+    assert_eq!(report["spectrum"], 8);
+    assert!(number(&report, "/affine_reproduction_error") <= 1e-10);
+    assert_eq!(read_cages(&dir.path("out.cager"))[0].len(), 24);
+}
+
+#[test]
+fn reading_all_points_is_never_worse_than_reading_the_handles() {
+    let (dir, _) = Dir::with_capture();
+    for options in ["--spectrum 0", "--regularizer none"] {
+        let few = encode(&dir, options);
+        let all = encode(&dir, &format!("{options} --handles all"));
+        assert_eq!(all["handles"], "all");
+        for (t, (a, b)) in (0..).zip(frame_errors(&all).into_iter().zip(frame_errors(&few))) {
+            assert!(a <= b * (1.0 + 1e-9), "frame {t}: {a} with all points, {b} with handles");
+        }
+        assert!(number(&all, "/error/l2_mean") < number(&few, "/error/l2_mean"));
+    }
+}
+
+fn frame_errors(report: &Value) -> Vec<f64> {
+    let frames = report["error"]["per_frame"].as_array().expect("frames");
+    frames.iter().filter_map(|f| f["l2"].as_f64()).collect()
+}
+
+#[test]
+fn every_regularizer_runs_and_is_named_in_the_report() {
+    let (dir, _) = Dir::with_capture();
+    let plain = encode(&dir, "--regularizer none --handles all");
+    for name in ["laplacian", "none", "truncated-svd", "tikhonov", "global"] {
+        for handles in ["maxvol", "all"] {
+            let report = encode(&dir, &format!("--regularizer {name} --handles {handles} --spectrum 5 --lambda 0.01"));
+            assert_eq!(report["regularizer"], name);
+            assert_eq!(report["lambda"], 0.01);
+            assert_eq!(report["spectrum"], 5);
+            let (l2, best) = (number(&report, "/error/l2_mean"), number(&plain, "/error/l2_mean"));
+            assert!(l2 >= best * (1.0 - 1e-6) && l2 < 0.05, "{name}, {handles}: {l2} where least squares has {best}");
+        }
+    }
+}
+
+#[test]
+fn one_mesh_file_is_a_capture_of_one_frame() {
+    let (dir, _) = Dir::with_capture();
+    let line =
+        "encode --rest rest.obj --cage cage.obj --frames rest.obj --spectrum 0 -o out.cager --report report.json";
+    dir.cager(line).succeeds();
+    let report = dir.json("report.json");
+    assert_eq!(report["frames"], 1);
+    assert!(number(&report, "/error/linf_max") < 1e-6);
+}
+
+#[test]
+fn an_old_output_is_replaced_by_success_and_kept_byte_for_byte_by_failure() {
+    let (dir, mut small) = Dir::with_capture();
+    dir.write("out.cager", "the old capture");
+    dir.write("report.json", "the old report");
+    dir.write("good.npy", dir.read("frames.npy"));
+    small.frames[17][100] = f64::NAN;
+    dir.write("frames.npy", npy_f64(&small.frames));
+    let before = dir.contents();
+    let failed = dir.cager(&format!("{ENCODE} --report report.json")).run();
+    assert_eq!(failed.status, Some(1), "{}", failed.stderr);
+    assert!(dir.contents() == before, "a failed encoding changed {:?}", dir.names(""));
+    let line = "encode --rest rest.obj --cage cage.obj --frames good.npy -o out.cager --report report.json";
+    dir.cager(line).succeeds();
+    assert_ne!(dir.read("out.cager"), b"the old capture");
+    assert_eq!(dir.json("report.json")["frames"], 20);
+}
+
+#[test]
+fn names_with_spaces_and_accents_work() {
+    let (dir, small) = Dir::with_capture();
+    dir.model("Élan vital/rest pose.obj", &small.rest);
+    dir.cager("encode --cage cage.obj --frames frames.npy")
+        .arg("--rest")
+        .arg("Élan vital/rest pose.obj")
+        .arg("-o")
+        .arg("Élan vital/été 1.cager")
+        .succeeds();
+    assert_eq!(dir.names("Élan vital"), ["rest pose.obj", "été 1.cager"]);
+}

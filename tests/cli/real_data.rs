@@ -1,0 +1,287 @@
+//! The captures of `CAGER_DATA` (default `../shared/data`), which are not part of the project.
+
+use crate::support::{Dir, close, npy_f64, read_cages};
+use cager::encode::{Job, encode};
+use cager::report::Report;
+use cager_core::cage::Cage;
+use cager_core::coordinates::{CoordinateSystem, MeanValue};
+use cager_core::inversion::{Handles, SolverOptions};
+use cager_core::mesh::{Model, Point, TriMesh, diagonal, winding_number};
+use cager_formats::{open_frames, read_model};
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The folder of captures; without one, says so.
+fn data() -> Option<PathBuf> {
+    let root = std::env::var_os("CAGER_DATA")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
+    if !root.join("reference.json").is_file() {
+        eprintln!("skipped: no real captures at {}", root.display());
+        return None;
+    }
+    Some(root)
+}
+
+fn reference(root: &Path) -> serde_json::Map<String, Value> {
+    let text = fs::read(root.join("reference.json")).expect("reference.json");
+    match serde_json::from_slice(&text) {
+        Ok(Value::Object(map)) => map,
+        other => panic!("reference.json is {other:?}"),
+    }
+}
+
+fn cage_of(path: &Path) -> Cage {
+    Cage::new(TriMesh::from(&read_model(path).expect("a cage"))).expect("a good cage")
+}
+
+fn run(folder: &Path, rest: &Model, cage: &Cage, options: SolverOptions) -> Report {
+    let dir = Dir::new();
+    let mut frames = open_frames(folder.join("frames.npy"), rest.points.len()).expect("frames");
+    let output = dir.path("out.cager");
+    let job = Job { rest, cage, frames: frames.as_mut(), output: &output, system: &MeanValue, options };
+    encode(job, &mut |_| {}).expect("an encoding")
+}
+
+/// Every cage of one capture against the independent reference.
+fn reproduces_the_reference(capture: &str) {
+    let Some(root) = data() else { return };
+    let folder = root.join(capture);
+    let rest = read_model(&folder.join("rest.obj")).expect("a rest pose");
+    let mut cages = 0;
+    for (name, expected) in reference(&root).iter().filter(|(name, _)| name.starts_with(&format!("{capture}/"))) {
+        cages += 1;
+        let cage = cage_of(&root.join(format!("{name}.obj")));
+        let m = cage.vertices().len();
+        let options = |handles, spectrum| SolverOptions { handles, spectrum, ..SolverOptions::default() };
+        let all = run(&folder, &rest, &cage, options(Handles::All, 0));
+        assert_eq!((all.points, all.frames), (rest.points.len(), expected["frames"].as_u64().unwrap_or(0) as usize));
+        let e = &all.error;
+        let mut worst: f64 = 0.0;
+        for (key, found) in [
+            ("l2_mean", e.l2_mean),
+            ("l2_max", e.l2_max),
+            ("linf_mean", e.linf_mean),
+            ("linf_max", e.linf_max),
+            ("kg_percent", e.kg_percent),
+        ] {
+            let wanted = expected["least_squares"][key].as_f64().expect(key);
+            worst = worst.max(close(&format!("{name}: {key}"), found, wanted, 1e-4));
+        }
+        assert!(all.affine_reproduction_error <= 1e-10, "{name}: {:e}", all.affine_reproduction_error);
+        let wanted = expected["cond_phi"].as_f64().expect("cond_phi");
+        let full_rank = all.rank == m;
+        if full_rank {
+            close(&format!("{name}: condition of Φ"), all.condition_number.full, wanted, 1e-3);
+        }
+        let mut l2 = Vec::new();
+        for spectrum in [0, 20, 50] {
+            let report = run(&folder, &rest, &cage, options(Handles::MaxVol, spectrum));
+            let wanted = expected[format!("maxvol_s{spectrum}")]["l2_mean"].as_f64().expect("l2_mean");
+            let apart = close(&format!("{name}: maxvol, spectrum {spectrum}"), report.error.l2_mean, wanted, 0.1);
+            l2.push(format!("s{spectrum} {apart:.1e}"));
+            assert_eq!(report.rank, all.rank, "{name}");
+            assert_eq!(report.handle_indices.len(), report.rank, "{name}");
+            assert!(report.error.l2_mean >= all.error.l2_mean * (1.0 - 1e-6), "{name}: better than least squares");
+            assert!(report.maxvol.max_entry <= 1.1, "{name}: {}", report.maxvol.max_entry);
+            let condition = report.condition_number;
+            assert!(condition.handles >= 1.0 && condition.handles <= 1.5 * wanted_handles(expected), "{name}");
+        }
+        eprintln!(
+            "{name}: least squares {worst:.1e}, {}, affine {:.1e}, rank {} of {m}, condition {:.1} / {wanted:.1}, {:?}",
+            l2.join(" "),
+            all.affine_reproduction_error,
+            all.rank,
+            all.condition_number.full,
+            all.warnings
+        );
+    }
+    assert!(cages > 0, "{capture} has no cage in reference.json");
+}
+
+fn wanted_handles(expected: &Value) -> f64 {
+    expected["cond_handles"].as_f64().expect("cond_handles")
+}
+
+#[test]
+fn horse_gallop_has_the_errors_of_the_reference() {
+    reproduces_the_reference("horse-gallop");
+}
+
+#[test]
+fn samba_has_the_errors_of_the_reference() {
+    reproduces_the_reference("samba");
+}
+
+#[test]
+fn chicken_crossing_has_the_errors_of_the_reference() {
+    reproduces_the_reference("chickenCrossing");
+}
+
+#[test]
+fn makehuman_walk_has_the_errors_of_the_reference() {
+    reproduces_the_reference("makehuman-cmu-walk");
+}
+
+#[test]
+fn supercages_arm_has_the_errors_of_the_reference() {
+    reproduces_the_reference("supercages-arm");
+}
+
+#[test]
+fn the_tests_cover_every_capture_of_the_reference() {
+    let Some(root) = data() else { return };
+    let known = ["horse-gallop", "samba", "chickenCrossing", "makehuman-cmu-walk", "supercages-arm"];
+    for name in reference(&root).keys() {
+        assert!(known.iter().any(|capture| name.starts_with(&format!("{capture}/"))), "{name} is not tested");
+    }
+}
+
+#[test]
+fn a_real_capture_through_the_program_has_the_errors_of_the_reference() {
+    let Some(root) = data() else { return };
+    let folder = root.join("supercages-arm");
+    let dir = Dir::new();
+    let line = "encode --handles all --spectrum 0 -o out.cager --report report.json";
+    encode_files(&dir, line, &folder.join("rest.obj"), &folder.join("cage.obj"), &folder.join("frames.npy"));
+    let (report, expected) = (dir.json("report.json"), &reference(&root)["supercages-arm/cage"]["least_squares"]);
+    for key in ["l2_mean", "l2_max", "linf_mean", "linf_max", "kg_percent"] {
+        close(key, report["error"][key].as_f64().expect(key), expected[key].as_f64().expect(key), 1e-4);
+    }
+    dir.cager("decode out.cager -o back.npy").succeeds();
+    dir.cager("inspect out.cager").succeeds();
+}
+
+/// Runs the program on files that lie elsewhere; gives what it wrote to stderr.
+fn encode_files(dir: &Dir, line: &str, rest: &Path, cage: &Path, frames: &Path) -> String {
+    dir.cager(line).arg("--rest").arg(rest).arg("--cage").arg(cage).arg("--frames").arg(frames).succeeds().stderr
+}
+
+/// `Φ · C` in double precision.
+fn posed(cage: &Cage, rest: &[Point], moved: &[Point]) -> Vec<f64> {
+    let phi = MeanValue.coordinates(cage, rest).phi;
+    (0..rest.len())
+        .flat_map(|i| [0, 1, 2].map(|k| (0..moved.len()).map(|j| phi[(i, j)] * moved[j][k]).sum::<f64>()))
+        .collect()
+}
+
+#[test]
+fn armadillo_posed_with_ten_cages_gives_the_ten_cages_back() {
+    let Some(root) = data() else { return };
+    let folder = root.join("deformed/armadillo");
+    let rest = read_model(&folder.join("armadilloman.obj")).expect("a model");
+    let cage = cage_of(&folder.join("bounding_mesh.obj"));
+    let moved: Vec<Vec<Point>> = (1..=10)
+        .map(|k| read_model(&folder.join(format!("deformed_bounding_mesh{k}.obj"))).expect("a cage").points)
+        .collect();
+    let frames: Vec<Vec<f64>> = moved.iter().map(|cage_k| posed(&cage, &rest.points, cage_k)).collect();
+    let dir = Dir::new();
+    dir.write("frames.npy", npy_f64(&frames));
+    let line = "encode --spectrum 0 -o out.cager --report report.json";
+    let (rest_file, cage_file) = (folder.join("armadilloman.obj"), folder.join("bounding_mesh.obj"));
+    encode_files(&dir, line, &rest_file, &cage_file, &dir.path("frames.npy"));
+    let size = diagonal(&rest.points);
+    let mut worst: f64 = 0.0;
+    for (k, (found, expected)) in read_cages(&dir.path("out.cager")).iter().zip(&moved).enumerate() {
+        for (v, (a, b)) in found.as_chunks::<3>().0.iter().zip(expected).enumerate() {
+            let apart = (0..3).map(|i| (f64::from(a[i]) - b[i]).powi(2)).sum::<f64>().sqrt() / size;
+            assert!(apart <= 1e-6, "cage {}, vertex {v}: {apart:e} of the diagonal apart", k + 1);
+            worst = worst.max(apart);
+        }
+    }
+    assert_eq!(dir.json("report.json")["frames"], 10);
+    eprintln!("armadillo: worst vertex {worst:.1e} of the diagonal");
+}
+
+/// Encodes rest pose and `cage_deformed.obj`'s pose of a pair; gives the report and stderr.
+fn encode_pair(folder: &Path, cage_file: &str) -> (Value, String) {
+    let rest = read_model(&folder.join("mesh.obj")).expect("a model");
+    let mut frames = vec![rest.points.as_flattened().to_vec()];
+    if let Ok(moved) = read_model(&folder.join("cage_deformed.obj")) {
+        frames.push(posed(&cage_of(&folder.join("cage.obj")), &rest.points, &moved.points));
+    }
+    let dir = Dir::new();
+    dir.write("frames.npy", npy_f64(&frames));
+    let line = "encode --spectrum 0 -o out.cager --report report.json";
+    let said = encode_files(&dir, line, &folder.join("mesh.obj"), &folder.join(cage_file), &dir.path("frames.npy"));
+    dir.cager("decode out.cager -o back.npy").succeeds();
+    (dir.json("report.json"), said)
+}
+
+fn outside(folder: &Path, cage_file: &str) -> usize {
+    let rest = read_model(&folder.join("mesh.obj")).expect("a model");
+    let cage = TriMesh::from(&read_model(&folder.join(cage_file)).expect("a cage"));
+    rest.points.iter().filter(|&&p| winding_number(&cage.vertices, &cage.triangles, p) < 0.5).count()
+}
+
+#[test]
+fn every_pair_encodes_and_points_outside_are_counted() {
+    let Some(root) = data() else { return };
+    let mut pairs: Vec<PathBuf> =
+        fs::read_dir(root.join("pairs")).expect("pairs").map(|entry| entry.expect("a pair").path()).collect();
+    pairs.sort();
+    assert!(!pairs.is_empty());
+    for pair in pairs {
+        for cage in ["cage.obj", "cage_poly.obj"].into_iter().filter(|cage| pair.join(cage).is_file()) {
+            let (report, said) = encode_pair(&pair, cage);
+            let count = outside(&pair, cage);
+            let name = format!("{}/{cage}", pair.file_name().unwrap_or_default().display());
+            eprintln!("{name}: {count} outside, rank {} of {}, {said}", report["rank"], report["unknowns"]);
+            let warned = said.contains(&format!("{count} of {} points lie outside", report["points"]));
+            assert_eq!(warned, count > 0, "{name}: {count} points are outside, but it says {said:?}");
+            assert!(report["affine_reproduction_error"].as_f64().is_some_and(|e| e <= 1e-10), "{name}");
+            if name.starts_with("qmvc") && cage == "cage.obj" {
+                assert!(count > 0 && report["frames"] == 2, "{name}");
+                assert!(report["error"]["linf_max"].as_f64().is_some_and(|e| e < 1e-6), "{name}: {}", report["error"]);
+            }
+        }
+    }
+}
+
+#[test]
+fn open_elephant_cage_is_refused_with_its_boundary_edges() {
+    let Some(root) = data() else { return };
+    let folder = root.join("invalid/pgc_elephant");
+    let dir = Dir::new();
+    let done = dir
+        .cager("encode -o out.cager --report report.json --rest")
+        .arg(folder.join("mesh.obj"))
+        .arg("--cage")
+        .arg(folder.join("cage.obj"))
+        .arg("--frames")
+        .arg(folder.join("mesh.obj"))
+        .run();
+    assert_eq!(done.status, Some(1), "{done:?}");
+    assert!(done.stderr.contains("cage.obj: the cage is open: "), "{}", done.stderr);
+    let listed = done.stderr.split_once('(').map_or("", |(_, rest)| rest);
+    assert!(listed.starts_with(|c: char| c.is_ascii_digit()) && listed.contains('–'), "{}", done.stderr);
+    assert!(dir.names("").is_empty());
+    eprintln!("{}", done.stderr);
+}
+
+#[test]
+fn cages_that_leave_most_of_the_model_outside_get_an_error_or_a_warning_that_counts() {
+    let Some(root) = data() else { return };
+    for name in ["deepcage_tpose", "nested_gargo"] {
+        let folder = root.join("invalid").join(name);
+        let dir = Dir::new();
+        let done = dir
+            .cager("encode -o out.cager --report report.json --rest")
+            .arg(folder.join("mesh.obj"))
+            .arg("--cage")
+            .arg(folder.join("cage.obj"))
+            .arg("--frames")
+            .arg(folder.join("mesh.obj"))
+            .run();
+        eprintln!("{name}: {done:?}");
+        if done.status == Some(0) {
+            let count = outside(&folder, "cage.obj");
+            assert!(done.stderr.contains(&format!("warning: {count} of ")), "{count} outside: {}", done.stderr);
+        } else {
+            assert_eq!(done.status, Some(1));
+            assert!(done.stderr.starts_with("cager: ") && done.stderr.contains("cage.obj"), "{}", done.stderr);
+            assert_eq!(done.stderr.lines().count(), 1);
+            assert!(dir.names("").is_empty());
+        }
+    }
+}

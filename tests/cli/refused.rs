@@ -1,0 +1,541 @@
+//! Bad input: one sentence that names the file and the place, exit status 1, and nothing left behind.
+
+use crate::support::{Dir, ENCODE, Small, as_model, npy, npy_f64};
+use cager_core::mesh::{Model, Polygons, TriMesh};
+
+/// Runs a command that must be refused with one line that has all these words, and must leave the folder as it was.
+#[track_caller]
+fn refused(dir: &Dir, line: &str, words: &[&str]) {
+    let before = dir.contents();
+    let done = dir.cager(line).run();
+    assert_eq!(done.status, Some(1), "{line}: {}{}", done.stdout, done.stderr);
+    assert_sentence(line, &done.stderr, words);
+    assert_eq!(done.stdout, "", "{line}");
+    assert!(dir.contents() == before, "{line}: the folder was changed; it has {:?}", dir.names(""));
+}
+
+#[track_caller]
+fn assert_sentence(line: &str, stderr: &str, words: &[&str]) {
+    assert!(stderr.starts_with("cager: "), "{line}: {stderr}");
+    assert!(stderr.ends_with('\n') && stderr.lines().count() == 1, "{line}: more than one line: {stderr}");
+    for word in words {
+        assert!(stderr.contains(word), "{line}: {word:?} is missing in {stderr}");
+    }
+    // A cause printed by two layers is a stutter.
+    let message = stderr.trim_end().trim_start_matches("cager: ");
+    let half: String = message.chars().skip(message.chars().count() / 2).collect();
+    assert!(half.len() < 12 || message.matches(half.trim_start_matches([':', ' '])).count() == 1, "twice: {message}");
+    if let Some(file) = words.first().filter(|word| word.contains('.') && !word.starts_with('-')) {
+        assert_eq!(message.matches(file).count(), 1, "{file} is named more than once: {message}");
+    }
+}
+
+/// Writes a changed cage and expects its refusal.
+#[track_caller]
+fn refused_cage(change: impl FnOnce(&mut TriMesh) -> Vec<String>) {
+    let (dir, mut small) = Dir::with_capture();
+    let words = change(&mut small.cage);
+    dir.model("cage.obj", &as_model(&small.cage));
+    let words: Vec<&str> = std::iter::once("cage.obj").chain(words.iter().map(String::as_str)).collect();
+    refused(&dir, &format!("{ENCODE} --report report.json"), &words);
+}
+
+fn edge(a: u32, b: u32) -> String {
+    format!("{}–{}", a.min(b), a.max(b))
+}
+
+#[test]
+fn open_cage_is_refused_with_its_boundary_edges() {
+    refused_cage(|cage| {
+        let [a, b, c] = cage.triangles.remove(7);
+        vec!["open".into(), "3 edges".into(), edge(a, b), edge(b, c), edge(c, a)]
+    });
+}
+
+#[test]
+fn inward_cage_is_refused_with_the_offer_to_flip_it_which_works() {
+    let (dir, small) = Dir::with_capture();
+    dir.cager(ENCODE).succeeds();
+    let good = dir.read("out.cager");
+    std::fs::remove_file(dir.path("out.cager")).expect("removed");
+    dir.model("cage.obj", &as_model(&small.cage.clone().flipped()));
+    refused(&dir, ENCODE, &["cage.obj", "inwards", "--flip-cage"]);
+    dir.cager(&format!("{ENCODE} --flip-cage")).succeeds();
+    assert!(dir.read("out.cager") == good, "a cage flipped back is another cage");
+    dir.model("cage.obj", &as_model(&small.cage));
+    std::fs::remove_file(dir.path("out.cager")).expect("removed");
+    refused(&dir, &format!("{ENCODE} --flip-cage"), &["cage.obj", "inwards"]);
+}
+
+#[test]
+fn inconsistently_oriented_cage_is_refused_with_the_faces_and_their_edge() {
+    refused_cage(|cage| {
+        cage.triangles[5].swap(1, 2);
+        vec!["face".into(), " 5 ".into(), "edge".into(), "same direction".into()]
+    });
+}
+
+#[test]
+fn one_inward_part_of_a_cage_is_refused_with_a_vertex_of_it() {
+    refused_cage(|cage| {
+        let n = cage.vertices.len() as u32;
+        let far: Vec<_> = cage.vertices.iter().map(|v| [v[0] + 10.0, v[1], v[2]]).collect();
+        let inward: Vec<_> = cage.triangles.iter().map(|t| [t[0] + n, t[2] + n, t[1] + n]).collect();
+        cage.vertices.extend(far);
+        cage.triangles.extend(inward);
+        vec!["vertex".into(), "inwards".into()]
+    });
+}
+
+#[test]
+fn non_manifold_edge_is_refused_with_its_faces() {
+    refused_cage(|cage| {
+        let [a, b, _] = cage.triangles[3];
+        let tip = cage.vertices.len() as u32;
+        cage.vertices.push([9.0, 9.0, 9.0]);
+        cage.triangles.push([a, b, tip]);
+        vec![edge(a, b), "3 faces".into(), cage.triangles.len().saturating_sub(1).to_string()]
+    });
+}
+
+#[test]
+fn duplicate_faces_are_refused_with_both() {
+    refused_cage(|cage| {
+        cage.triangles.push(cage.triangles[4]);
+        vec![format!("faces 4 and {}", cage.triangles.len() - 1)]
+    });
+}
+
+#[test]
+fn degenerate_triangle_is_refused_with_its_face_and_vertices() {
+    refused_cage(|cage| {
+        let [a, _, c] = cage.triangles[9];
+        cage.vertices[c as usize] = cage.vertices[a as usize];
+        let first = cage.triangles.iter().position(|t| t.contains(&a) && t.contains(&c)).expect("a face");
+        vec![format!("face {first} "), "no area".into(), a.to_string(), c.to_string()]
+    });
+    refused_cage(|cage| {
+        let [a, b, _] = cage.triangles[9];
+        cage.triangles[9] = [a, b, b];
+        vec!["face 9".into(), "no area".into()]
+    });
+}
+
+#[test]
+fn loose_vertex_and_too_small_cages_are_refused() {
+    refused_cage(|cage| {
+        cage.vertices.push([0.0; 3]);
+        vec![format!("vertex {}", cage.vertices.len() - 1)]
+    });
+    refused_cage(|cage| {
+        cage.triangles.truncate(1);
+        vec!["1 faces".into(), "at least 4".into()]
+    });
+}
+
+#[test]
+fn cage_without_faces_is_refused() {
+    let (dir, small) = Dir::with_capture();
+    dir.model("cage.ply", &Model { points: small.cage.vertices, faces: Polygons::new() });
+    refused(&dir, "encode --rest rest.obj --cage cage.ply --frames frames.npy -o out.cager", &["cage.ply", "no faces"]);
+}
+
+#[test]
+fn fewer_points_than_unknowns_are_refused_with_both_numbers() {
+    let (dir, small) = Dir::with_capture();
+    dir.model("rest.obj", &Model { points: small.rest.points[..50].to_vec(), faces: Polygons::new() });
+    let frames: Vec<Vec<f64>> = small.frames.iter().map(|f| f[..150].to_vec()).collect();
+    dir.frames("few.npy", &frames);
+    let m = format!("{} unknowns", small.cage.vertices.len());
+    refused(
+        &dir,
+        "encode --rest rest.obj --cage cage.obj --frames few.npy -o out.cager",
+        &["rest.obj", "50 points", &m],
+    );
+}
+
+#[test]
+fn points_in_one_place_or_too_far_apart_are_refused() {
+    let (dir, small) = Dir::with_capture();
+    let mut far = small.rest.clone();
+    far.points[7] = [1e200, 0.0, 0.0];
+    dir.model("rest.obj", &far);
+    refused(&dir, ENCODE, &["rest.obj", "too large"]);
+    dir.model("rest.obj", &Model { points: vec![[0.0, 0.0, 1.0]; small.rest.points.len()], faces: Polygons::new() });
+    refused(&dir, ENCODE, &["rest.obj", "same place"]);
+}
+
+/// The text of a mesh with one coordinate replaced; gives the number of the line too.
+fn spoilt_obj(model: &Model, vertex: usize, word: &str) -> (String, usize) {
+    let mut text = String::from("# exported by hand\n");
+    for (i, [x, y, z]) in model.points.iter().enumerate() {
+        if i == vertex {
+            text += &format!("v {x} {word} {z}\n");
+        } else {
+            text += &format!("v {x} {y} {z}\n");
+        }
+    }
+    for face in model.faces.iter() {
+        text += "f";
+        for v in face {
+            text += &format!(" {}", v + 1);
+        }
+        text += "\n";
+    }
+    (text, vertex + 2)
+}
+
+#[test]
+fn rest_pose_or_cage_that_is_not_finite_is_refused_with_the_line() {
+    let (dir, small) = Dir::with_capture();
+    for word in ["nan", "NaN", "inf", "-inf", "1e999"] {
+        let (text, line) = spoilt_obj(&small.rest, 123, word);
+        dir.write("rest.obj", text);
+        refused(&dir, ENCODE, &["rest.obj", &format!("line {line}")]);
+    }
+    dir.model("rest.obj", &small.rest);
+    for word in ["nan", "-inf", "x"] {
+        let (text, line) = spoilt_obj(&as_model(&small.cage), 31, word);
+        dir.write("cage.obj", text);
+        refused(&dir, ENCODE, &["cage.obj", &format!("line {line}")]);
+    }
+}
+
+#[test]
+fn binary_mesh_that_is_not_finite_is_refused_with_the_vertex() {
+    let (dir, small) = Dir::with_capture();
+    for (bad, vertex) in [(f32::NAN, 77), (f32::NEG_INFINITY, 0)] {
+        let n = small.rest.points.len();
+        let mut ply = format!(
+            "ply\nformat binary_little_endian 1.0\nelement vertex {n}\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
+        )
+        .into_bytes();
+        for (i, p) in small.rest.points.iter().enumerate() {
+            for (k, &x) in p.iter().enumerate() {
+                let x = if i == vertex && k == 2 { bad } else { x as f32 };
+                ply.extend(x.to_le_bytes());
+            }
+        }
+        dir.write("rest.ply", ply);
+        refused(
+            &dir,
+            "encode --rest rest.ply --cage cage.obj --frames frames.npy -o out.cager",
+            &["rest.ply", &format!("vertex {vertex}")],
+        );
+    }
+}
+
+#[test]
+fn frame_that_is_not_finite_is_refused_with_the_frame_and_the_point() {
+    for (bad, frame, point) in [(f64::NAN, 0, 5), (f64::INFINITY, 13, 0), (f64::NEG_INFINITY, 19, 599)] {
+        let (dir, mut small) = Dir::with_capture();
+        let point = point.min(small.rest.points.len() - 1);
+        small.frames[frame][3 * point + 1] = bad;
+        dir.write("frames.npy", npy_f64(&small.frames));
+        refused(&dir, ENCODE, &["frames.npy", &format!("frame {frame}:"), &format!("point {point} ")]);
+    }
+}
+
+#[test]
+fn frame_too_large_for_a_container_is_refused_with_the_frame() {
+    let (dir, mut small) = Dir::with_capture();
+    small.frames[6].fill(1e200);
+    dir.write("frames.npy", npy_f64(&small.frames));
+    refused(&dir, ENCODE, &["frame 6"]);
+}
+
+#[test]
+fn wrong_frame_in_a_folder_is_refused_with_its_file_and_frame() {
+    let (dir, small) = Dir::with_capture();
+    for frame in 0..12 {
+        dir.model(&format!("poses/{frame}.obj"), &small.posed(frame));
+    }
+    let line = "encode --rest rest.obj --cage cage.obj --frames poses -o out.cager";
+    let mut short = small.posed(10);
+    short.points.pop();
+    short.faces = Polygons::new();
+    dir.model("poses/10.obj", &short);
+    let n = small.rest.points.len();
+    refused(&dir, line, &["poses/10.obj", "frame 10 ", &format!("{} points", n - 1), &n.to_string()]);
+    let (text, number) = spoilt_obj(&small.posed(10), 40, "nan");
+    dir.write("poses/10.obj", text);
+    refused(&dir, line, &["poses/10.obj", "frame 10:", &format!("line {number}")]);
+    dir.write("poses/10.obj", "");
+    refused(&dir, line, &["poses/10.obj", "frame 10:", "empty"]);
+}
+
+#[test]
+fn capture_of_another_mesh_is_refused_with_both_numbers() {
+    let (dir, small) = Dir::with_capture();
+    let n = small.rest.points.len();
+    let frames: Vec<Vec<f64>> = small.frames.iter().map(|f| f[3..].to_vec()).collect();
+    for name in ["other.npy", "other.pc2", "other.mdd"] {
+        dir.frames(name, &frames);
+        refused(
+            &dir,
+            &format!("encode --rest rest.obj --cage cage.obj --frames {name} -o out.cager"),
+            &[name, &(n - 1).to_string(), &format!("{n} are expected")],
+        );
+    }
+}
+
+#[test]
+fn frames_that_are_not_there_are_refused() {
+    let (dir, small) = Dir::with_capture();
+    dir.write("notes/readme.txt", "no frames");
+    std::fs::create_dir(dir.path("empty")).expect("a folder");
+    dir.model("mixed/1.obj", &small.rest);
+    dir.model("mixed/2.ply", &small.rest);
+    dir.write("walk.fbx", "a format that is not read");
+    for (frames, word) in [
+        ("empty", "no mesh files"),
+        ("notes", "no mesh files"),
+        ("walk*.obj", "no mesh files"),
+        ("nowhere/*.obj", "no mesh files"),
+        ("nowhere", "check the path"),
+        ("nowhere.npy", "check the path"),
+        ("mixed", "mixes"),
+        ("walk.fbx", ".npy .pc2 .mdd"),
+        ("[.obj", "pattern"),
+    ] {
+        refused(
+            &dir,
+            &format!("encode --rest rest.obj --cage cage.obj --frames {frames} -o out.cager"),
+            &[frames, word],
+        );
+    }
+}
+
+#[test]
+fn missing_and_unreadable_meshes_are_refused() {
+    let (dir, _) = Dir::with_capture();
+    dir.write("rest.fbx", "a format that is not read");
+    dir.write("bare", "no extension");
+    dir.write("empty.obj", "");
+    dir.write("text.obj", "Dear reader,\nthis is a letter.\n");
+    std::fs::create_dir(dir.path("folder.obj")).expect("a folder");
+    for (rest, word) in [
+        ("nowhere.obj", "check the path"),
+        ("rest.obj/x.obj", "check the path"),
+        ("rest.fbx", ".obj .ply .off .stl .glb"),
+        ("bare", "extension"),
+        ("empty.obj", "empty"),
+        ("text.obj", "no points"),
+        ("folder.obj", "name a file"),
+    ] {
+        let rest_line = format!("encode --rest {rest} --cage cage.obj --frames frames.npy -o out.cager");
+        refused(&dir, &rest_line, &[rest, word]);
+        let cage_line = format!("encode --rest rest.obj --cage {rest} --frames frames.npy -o out.cager");
+        refused(&dir, &cage_line, &[rest, word]);
+    }
+}
+
+#[test]
+fn truncated_point_cache_is_refused_wherever_it_was_cut() {
+    let (dir, small) = Dir::with_capture();
+    for kind in ["npy", "pc2", "mdd"] {
+        dir.frames(&format!("whole.{kind}"), &small.frames);
+        let whole = dir.read(&format!("whole.{kind}"));
+        let name = format!("cut.{kind}");
+        let line = format!("encode --rest rest.obj --cage cage.obj --frames {name} -o out.cager");
+        for length in [0, 1, 4, 7, 11, 20, 31, whole.len() / 2, whole.len() - 1] {
+            dir.write(&name, &whole[..length]);
+            refused(&dir, &line, &[&name]);
+        }
+        dir.write(&name, [whole.as_slice(), b"excess"].concat());
+        refused(&dir, &line, &[&name, "6 bytes are in excess"]);
+        dir.write(&name, &whole[..whole.len() - 12 * small.rest.points.len() - 1]);
+        refused(&dir, &line, &[&name, "20 frames", "18 whole frames"]);
+    }
+}
+
+#[test]
+fn arrays_of_other_types_orders_and_shapes_are_refused() {
+    let (dir, small) = Dir::with_capture();
+    let (frames, n) = (small.frames.len(), small.rest.points.len());
+    let shape = format!("({frames}, {n}, 3)");
+    let data = vec![0; 8 * 3 * n * frames];
+    for (kind, fortran, shape, word) in [
+        ("<i4", false, shape.as_str(), "<i4"),
+        ("<f2", false, &shape, "<f2"),
+        ("<c8", false, &shape, "<c8"),
+        ("<f4", true, &shape, "Fortran order"),
+        ("<f4", false, &format!("({frames}, 3, {n})"), "shape"),
+        ("<f4", false, &format!("({})", 3 * frames * n), "shape"),
+        ("<f4", false, "(0, 5, 3)", "5"),
+        ("<f4", false, &format!("(99999999999999999999, {n}, 3)"), "header"),
+    ] {
+        dir.write("frames.npy", npy(kind, fortran, shape, &data));
+        refused(&dir, ENCODE, &["frames.npy", word]);
+    }
+}
+
+#[test]
+fn bad_solver_options_are_refused_by_the_options_name() {
+    let (dir, small) = Dir::with_capture();
+    for lambda in ["nan", "NaN", "-1", "-0.5", "inf"] {
+        refused(&dir, &format!("{ENCODE} --lambda {lambda}"), &["--lambda", "at least 0"]);
+    }
+    let m = small.cage.vertices.len();
+    refused(&dir, &format!("{ENCODE} --spectrum {}", m + 1), &["--spectrum", &format!("at most {m}")]);
+    dir.cager(&format!("{ENCODE} --spectrum {m}")).succeeds();
+}
+
+#[test]
+fn output_that_cannot_be_written_is_refused_before_the_work() {
+    let (dir, _) = Dir::with_encoded();
+    let line = "encode --rest rest.obj --cage cage.obj --frames frames.npy";
+    std::fs::create_dir(dir.path("folder")).expect("a folder");
+    let mut places = vec!["rest.obj/out.cager", "nowhere/out.cager", "folder", "folder/.."];
+    if cfg!(target_os = "linux") {
+        places.extend(["/proc/out.cager", "/dev/full"]);
+    }
+    for place in places {
+        refused(&dir, &format!("{line} -o {place}"), &[place]);
+        // The report's place is looked at before anything is written, so that there is no .cager without its report.
+        refused(&dir, &format!("{line} -o new.cager --report {place}"), &[place]);
+    }
+    for place in ["rest.obj/back.npy", "nowhere/back.pc2", "nowhere/poses", "back.abc", "rest.obj/"] {
+        refused(&dir, &format!("decode out.cager -o {place}"), &[place]);
+    }
+    dir.write("full/keep.txt", "mine");
+    refused(&dir, "decode out.cager -o full", &["full", "not empty"]);
+    std::fs::create_dir(dir.path("folder.npy")).expect("a folder");
+    dir.write("folder.npy/keep.txt", "mine");
+    refused(&dir, "decode out.cager -o folder.npy", &["folder.npy"]);
+}
+
+#[test]
+fn output_in_place_of_an_input_is_refused() {
+    let (dir, _) = Dir::with_capture();
+    let line = "encode --rest rest.obj --cage cage.obj --frames frames.npy";
+    for input in ["rest.obj", "./cage.obj", "frames.npy"] {
+        refused(&dir, &format!("{line} -o {input}"), &[input, "input"]);
+        refused(&dir, &format!("{line} -o out.cager --report {input}"), &[input, "input"]);
+    }
+    refused(&dir, &format!("{line} -o both --report both"), &["both", "two files"]);
+    dir.write("both", "an old file");
+    refused(&dir, &format!("{line} -o both --report ./both"), &["both", "two files"]);
+}
+
+/// Files may have no more than 8 blocks here, 4 or 8 KiB, as on a disk that is full.
+#[cfg(unix)]
+#[test]
+fn full_disk_is_refused_and_leaves_nothing() {
+    let (dir, _) = Dir::with_encoded();
+    let line = "encode --rest rest.obj --cage cage.obj --frames frames.npy -o new.cager --report new.json";
+    assert!(dir.read("out.cager").len() > 16 << 10, "the output fits on the full disk, so that this tests nothing");
+    for (line, file) in [
+        (line, "new.cager"),
+        ("decode out.cager -o back.npy", "back.npy"),
+        ("decode out.cager -o back.mdd", "back.mdd"),
+        ("decode out.cager -o poses", "poses/frame_0000.obj"),
+    ] {
+        let before = dir.contents();
+        let limited = format!("ulimit -f 8; trap '' XFSZ; exec {} {line}", env!("CARGO_BIN_EXE_cager"));
+        let done = dir.command("sh", ["-c", &limited]).run();
+        assert_eq!(done.status, Some(1), "{line}: {done:?}");
+        assert_sentence(line, &done.stderr, &[file, "cannot be written", "free some space"]);
+        assert!(dir.contents() == before, "{line} left {:?}", dir.names(""));
+        // The same without the limit, so that it was the limit.
+        dir.cager(line).succeeds();
+    }
+}
+
+#[test]
+fn files_that_are_no_containers_are_refused() {
+    let (dir, _) = Dir::with_encoded();
+    dir.write(
+        "text.cager",
+        "Dear reader,\nthis is a letter, and not a short one: it goes on for more than a header.\n",
+    );
+    dir.write("short.cager", "hi");
+    dir.write("empty.cager", "");
+    dir.write("zeros.cager", [0; 4096]);
+    dir.write("newer.cager", {
+        let mut bytes = dir.read("out.cager");
+        bytes[8] = 200;
+        bytes
+    });
+    std::fs::create_dir(dir.path("folder.cager")).expect("a folder");
+    for file in ["text.cager", "short.cager", "empty.cager", "zeros.cager", "folder.cager", "rest.obj"] {
+        for line in [format!("inspect {file}"), format!("inspect --json {file}"), format!("decode {file} -o back.npy")]
+        {
+            refused(&dir, &line, &[file, "is no .cager file"]);
+        }
+    }
+    for line in ["inspect newer.cager", "decode newer.cager -o back.npy"] {
+        refused(&dir, line, &["newer.cager"]);
+    }
+    for line in ["inspect gone.cager", "decode gone.cager -o back.npy", "decode rest.obj/x.cager -o back.npy"] {
+        refused(&dir, line, &["cager", "cannot be read", "check the path"]);
+    }
+}
+
+#[test]
+fn container_cut_anywhere_is_refused() {
+    let (dir, _) = Dir::with_encoded();
+    let whole = dir.read("out.cager");
+    let ends = [0, 1, 7, 8, 9, 15, 16, 17, 40, 63, 64, 65].into_iter();
+    let last = (1..=8).map(|k| whole.len() - k * k);
+    for length in ends.chain(last).chain((1..32).map(|k| k * whole.len() / 32)) {
+        damaged(&dir, &whole[..length], &format!("cut after {length} bytes"));
+    }
+    damaged(&dir, &[whole.as_slice(), b"\0"].concat(), "a byte in excess");
+    damaged(&dir, &[whole.as_slice(), whole.as_slice()].concat(), "twice over");
+}
+
+#[test]
+fn container_corrupted_anywhere_is_refused() {
+    let (dir, _) = Dir::with_encoded();
+    let whole = dir.read("out.cager");
+    let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    for round in 0..200 {
+        // Half of the rounds hit the two ends, where the structure is.
+        let place = match round % 4 {
+            0 => random.below(whole.len().min(400)),
+            1 => whole.len() - 1 - random.below(whole.len().min(900)),
+            _ => random.below(whole.len()),
+        };
+        let change = 1 + random.below(255) as u8;
+        let mut bytes = whole.clone();
+        bytes[place] ^= change;
+        damaged(&dir, &bytes, &format!("byte {place} of {} changed by {change}", whole.len()));
+    }
+}
+
+/// Neither command believes these bytes.
+#[track_caller]
+fn damaged(dir: &Dir, bytes: &[u8], what: &str) {
+    dir.write("bad.cager", bytes);
+    for line in ["decode bad.cager -o back.npy", "inspect bad.cager"] {
+        let done = dir.cager(line).run();
+        assert_eq!(done.status, Some(1), "{what}: {line}: {done:?}");
+        assert_sentence(line, &done.stderr, &["bad.cager"]);
+        assert_eq!(done.stdout, "", "{what}: {line}");
+        assert!(!dir.path("back.npy").exists(), "{what}: {line} left an output");
+    }
+    let names = dir.names("");
+    assert_eq!(names, ["bad.cager", "cage.obj", "frames.npy", "out.cager", "report.json", "rest.obj"], "{what}");
+}
+
+/// xorshift64: the same places in every run.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, end: usize) -> usize {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 % end as u64) as usize
+    }
+}
+
+#[test]
+fn small_capture_by_itself_is_good() {
+    // What all the others spoil in one place.
+    let small = Small::new();
+    assert!(small.frames.iter().flatten().all(|x| x.is_finite()));
+    let (dir, _) = Dir::with_capture();
+    assert_eq!(dir.cager(ENCODE).succeeds().stderr, "");
+}
