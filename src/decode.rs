@@ -3,7 +3,7 @@
 use crate::coordinates;
 use cager_core::cage::{Cage, CageError};
 use cager_core::decode::Decoder;
-use cager_core::inversion::BATCH;
+use cager_core::inversion::{BATCH, coordinates_fit};
 use cager_core::mesh::Model;
 use cager_formats::{Action, FrameOptions, create_frames};
 use cager_proto::container::{self, ContainerReader};
@@ -37,6 +37,14 @@ pub enum DecodeError {
         path: PathBuf,
         /// What it needs.
         what: String,
+    },
+    /// The coordinates do not fit into memory.
+    #[error("{}: its coordinates need {gigabytes:.0} GB of memory; decode it on a larger machine", .path.display())]
+    Memory {
+        /// The container.
+        path: PathBuf,
+        /// What decoding needs.
+        gigabytes: f64,
     },
     /// The positions cannot be written.
     #[error(transparent)]
@@ -84,10 +92,17 @@ pub fn decoder(container: &mut Container, path: &Path) -> Result<(Model, Decoder
         return Err(unsupported(format!("its coordinates are of version {}", header.solver_version)));
     }
     let rest = container.rest().map_err(fail)?;
+    if let Some(face) = rest.faces.arities().iter().position(|&corners| corners < 3) {
+        return Err(fail(container::Error::Corrupt { offset: 0, what: format!("face {face} of the model is none") }));
+    }
     let mesh = container.cage().map_err(fail)?;
     let cage = Cage::new(mesh).map_err(|cause| DecodeError::Cage { path: path.to_owned(), cause })?;
     if system.unknowns(&cage) != header.rows_per_frame as usize {
         return Err(unsupported(format!("it stores {} rows per frame", header.rows_per_frame)));
+    }
+    if !coordinates_fit(rest.points.len(), system.unknowns(&cage), 2) {
+        let gigabytes = 12e-9 * rest.points.len() as f64 * system.unknowns(&cage) as f64;
+        return Err(DecodeError::Memory { path: path.to_owned(), gigabytes });
     }
     let phi = system.coordinates(&cage, &rest.points).phi;
     let decoder = Decoder::new(phi.as_ref(), cage.vertices().len());

@@ -3,9 +3,9 @@
 use crate::report::{Bytes, Condition, Errors, FrameError, MaxVol, Report, Seconds};
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{BATCH, Handles, PrepareError, Solver, SolverOptions};
+use cager_core::inversion::{BATCH, PrepareError, Solver, SolverOptions};
 use cager_core::mesh::Model;
-use cager_core::regularize::Regularizer;
+use cager_core::regularize::{Regularizer, WEAK};
 use cager_formats::{Action, AtomicFile, FrameReader};
 use cager_proto::container::{self, ContainerWriter, Header, Summary};
 use rayon::prelude::*;
@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Instant;
 
-/// Frames are read ahead in batches of at most this many bytes each, so that large models do not fill the memory.
-const BATCH_BYTES: usize = 128 << 20;
+/// Frames on their way take at most this much memory, unless one frame per batch already takes more.
+const FRAMES_BYTES: usize = 640 << 20;
 
 /// Why encoding stopped; nothing was written.
 #[derive(Debug, thiserror::Error)]
@@ -82,6 +82,7 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Report, E
         .map_err(fail)?;
 
     let mut totals = Totals::default();
+    let mut farthest = (0, 0.0);
     let points = job.frames.points();
     std::thread::scope(|scope| -> Result<(), EncodeError> {
         let (full, batches) = sync_channel(rayon::current_num_threads());
@@ -107,6 +108,10 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Report, E
                 report.seconds.invert += batch.invert_seconds;
                 report.seconds.measure += batch.measure_seconds;
                 for (cage, error) in batch.cages.iter().zip(&batch.errors) {
+                    let extent = cage.iter().fold(0.0f32, |far, x| far.max(x.abs()));
+                    if f64::from(extent) > farthest.1 {
+                        farthest = (done, f64::from(extent));
+                    }
                     let error = totals.add(error, &mut report.error.per_frame, solver.diagonal());
                     writer.write_frame(cage, error.l2 as f32, error.linf as f32).map_err(fail)?;
                     done += 1;
@@ -120,6 +125,7 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Report, E
         Ok(())
     })?;
 
+    report.warnings.extend(far_away(farthest.0, farthest.1 / solver.diagonal()));
     let clock_write = Instant::now();
     report.frames = report.error.per_frame.len();
     totals.finish(&mut report);
@@ -135,24 +141,11 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Report, E
     Ok(report)
 }
 
-/// How many singular directions are left to the data although they amplify it more than a millionfold, and the spectrum
-/// threshold that would smooth them all.
-fn weak_directions(sigma: &[f64], unknowns: usize, options: SolverOptions) -> Option<(usize, usize)> {
-    const WEAK: f64 = 1e-6;
-    let smoothed = match options.regularizer {
-        Regularizer::None => 0,
-        Regularizer::Laplacian | Regularizer::TruncatedSvd => options.spectrum,
-        Regularizer::Tikhonov | Regularizer::Global => unknowns,
-    };
-    let strong = sigma.iter().filter(|&&s| s >= WEAK * sigma[0]).count();
-    let left = sigma.len().min(unknowns - smoothed).saturating_sub(strong);
-    (left > 0).then_some((left, unknowns - strong))
-}
-
 type Batch = Vec<Vec<f64>>;
 
 fn frames_per_batch(points: usize) -> usize {
-    (BATCH_BYTES / (24 * points)).clamp(1, BATCH)
+    let batches = 2 * rayon::current_num_threads() + 1;
+    (FRAMES_BYTES / batches / (24 * points)).clamp(1, BATCH)
 }
 
 /// Reads all frames; returns the seconds that took, not counting the time it waited for the solver.
@@ -293,25 +286,41 @@ fn warnings(job: &Job<'_>, solver: &Solver) -> Vec<String> {
             100.0 * found.outside_distance
         ));
     }
-    if found.rank < unknowns {
+    let strong = found.singular_values.iter().filter(|&&s| s >= WEAK * found.singular_values[0]).count();
+    let weak = unknowns - strong;
+    if weak > 0 {
+        let consequence = match job.options.regularizer {
+            Regularizer::Laplacian | Regularizer::Global if job.options.lambda > 0.0 => {
+                "the cage's Laplacian takes care".to_owned()
+            }
+            Regularizer::Tikhonov => "all are damped".to_owned(),
+            Regularizer::TruncatedSvd if job.options.spectrum >= weak => "all are dropped".to_owned(),
+            _ => format!(
+                "they follow the rounding of the data, so expect spikes, or use --regularizer laplacian --spectrum {weak}"
+            ),
+        };
         warnings.push(format!(
-            "the points determine only {} of the {unknowns} unknowns of the cage; the others are placed by the cage's Laplacian, and {} handles are read",
-            found.rank,
-            if job.options.handles == Handles::All { job.rest.points.len() } else { found.rank }
-        ));
-    }
-    if let Some((left, advised)) = weak_directions(&found.singular_values[..found.rank], unknowns, job.options) {
-        warnings.push(format!(
-            "{left} directions of the cage hardly move any point and follow the rounding of the data; expect spikes, or smooth them with --spectrum {advised}"
+            "the points determine only {strong} of the {unknowns} unknowns of the cage; of the {weak} others, {consequence}"
         ));
     }
     if found.affine_reproduction_error > 1e-10 {
         warnings.push(format!(
-            "the coordinates reproduce the rest pose to {:.1e} of its diagonal only; move the cage closer to the model",
+            "the coordinates reproduce the rest pose to {:.1e} of its diagonal only, as happens far outside a cage or in one much thinner than wide; check that both files belong together",
             found.affine_reproduction_error
         ));
     }
     warnings
+}
+
+/// Cages are stored as positions in single precision; far from the origin little of it is left for the shape.
+fn far_away(frame: usize, diagonals: f64) -> Option<String> {
+    const LOST: f64 = 100.0;
+    (diagonals > LOST).then(|| {
+        format!(
+            "the cage of frame {frame} lies {diagonals:.0} diagonals from the origin, where single precision resolves {:.1e} of the diagonal; move the capture closer to the origin",
+            diagonals * f64::from(f32::EPSILON) / 2.0
+        )
+    })
 }
 
 fn header(job: &Job<'_>, solver: &Solver) -> Header {

@@ -14,6 +14,10 @@ use std::time::Instant;
 
 /// Frames of one matrix product. Shorter batches are padded, so that a frame's bits never depend on its company.
 pub const BATCH: usize = 16;
+/// Beyond this affine reproduction error, over the diagonal, coordinates are of no use.
+const NOT_REPRODUCED: f64 = 1e-6;
+/// Points outside by less than this fraction of the diagonal lie on the cage.
+const ON_THE_CAGE: f64 = 1e-9;
 /// Rows of one block where a tall matrix is multiplied in blocks.
 const BLOCK_ROWS: usize = 1024;
 
@@ -81,6 +85,28 @@ pub enum PrepareError {
     /// Squared lengths overflow.
     #[error("the rest pose is too large to be measured; scale it down")]
     TooLarge,
+    /// The coordinates do not fit into memory.
+    #[error(
+        "{points} points times {unknowns} unknowns need {gigabytes:.0} GB of memory; use a coarser cage or a lighter model"
+    )]
+    OutOfMemory {
+        /// Number of points n.
+        points: usize,
+        /// Number of unknowns m.
+        unknowns: usize,
+        /// Memory that preparing needs.
+        gigabytes: f64,
+    },
+    /// A point so far from the cage that its coordinates are rounding.
+    #[error(
+        "rest point {point} is not reproduced by the cage (off by {error:.1e} of its diagonal), as happens far outside it; move the cage around the model or delete the point"
+    )]
+    NotReproduced {
+        /// The point, counted from 0.
+        point: usize,
+        /// Distance of `Φ C_R` from it over the smaller of the diagonals of model and cage.
+        error: f64,
+    },
     /// s > m.
     #[error("the spectrum threshold {spectrum} exceeds the {unknowns} unknowns of the cage; give at most {unknowns}")]
     SpectrumTooLarge {
@@ -161,17 +187,24 @@ impl Solver {
         check(points, m, options)?;
         let diagonal = diagonal(points);
         let clock = Instant::now();
+        if !coordinates_fit(points.len(), m, 2) {
+            let gigabytes = 20e-9 * points.len() as f64 * m as f64;
+            return Err(PrepareError::OutOfMemory { points: points.len(), unknowns: m, gigabytes });
+        }
         let coordinates = system.coordinates(cage, points);
         let phi = coordinates.phi.as_ref();
+        let (point, error) = reproduction_error(phi, &system.rest_unknowns(cage), cage, points);
+        let reproduction = error / diagonal;
+        // A stray point enlarges the model's own diagonal, not the cage's.
+        let relative = error / diagonal.min(cage.diagonal());
+        if relative.is_nan() || relative > NOT_REPRODUCED {
+            return Err(PrepareError::NotReproduced { point, error: relative });
+        }
+        let (outside, outside_distance) = outside(cage, points, &coordinates.outside, diagonal);
         let mut preparation = Preparation {
-            affine_reproduction_error: reproduction_error(phi, &system.rest_unknowns(cage), points) / diagonal,
-            outside_distance: coordinates
-                .outside
-                .par_iter()
-                .map(|&i| distance_to_surface(cage.vertices(), &cage.mesh().triangles, points[i as usize]))
-                .reduce(|| 0.0, f64::max)
-                / diagonal,
-            outside: coordinates.outside,
+            affine_reproduction_error: reproduction,
+            outside_distance,
+            outside,
             coordinates_seconds: clock.elapsed().as_secs_f64(),
             ..Preparation::default()
         };
@@ -391,13 +424,29 @@ pub(crate) fn tall_product(phi: MatRef<'_, f64>, x: MatRef<'_, f64>) -> Mat<f64>
     out
 }
 
-/// `max_i |Φ C − P|_i`.
-fn reproduction_error(phi: MatRef<'_, f64>, unknowns: &[Point], points: &[Point]) -> f64 {
-    let c = Mat::from_fn(unknowns.len(), 3, |i, k| unknowns[i][k]);
+/// Whether the system grants memory for `copies` double-precision matrices n × m.
+pub fn coordinates_fit(points: usize, unknowns: usize, copies: usize) -> bool {
+    let Some(entries) = points.checked_mul(unknowns).and_then(|n| n.checked_mul(copies)) else { return false };
+    Vec::<f64>::new().try_reserve_exact(entries).is_ok()
+}
+
+/// Of the points found outside, those that do not lie on the cage, and the largest distance over the diagonal.
+fn outside(cage: &Cage, points: &[Point], found: &[u32], diagonal: f64) -> (Vec<u32>, f64) {
+    let distance = |i: u32| distance_to_surface(cage.vertices(), &cage.mesh().triangles, points[i as usize]) / diagonal;
+    let measured: Vec<(u32, f64)> =
+        found.par_iter().map(|&i| (i, distance(i))).filter(|&(_, distance)| distance > ON_THE_CAGE).collect();
+    let farthest = measured.iter().map(|&(_, distance)| distance).fold(0.0, f64::max);
+    (measured.into_iter().map(|(i, _)| i).collect(), farthest)
+}
+
+/// The point of the largest `|Φ C − P|`, and that distance. Measured about the cage's first vertex: far from the origin the
+/// sum itself would round.
+fn reproduction_error(phi: MatRef<'_, f64>, unknowns: &[Point], cage: &Cage, points: &[Point]) -> (usize, f64) {
+    let o = cage.vertices()[0];
+    let positions = cage.vertices().len();
+    let c = Mat::from_fn(unknowns.len(), 3, |i, k| unknowns[i][k] - if i < positions { o[k] } else { 0.0 });
     let product = tall_product(phi, c.as_ref());
-    points
-        .iter()
-        .enumerate()
-        .map(|(i, p)| (0..3).map(|k| (product[(i, k)] - p[k]).powi(2)).sum::<f64>().sqrt())
-        .fold(0.0, |a, b| if b > a || b.is_nan() { b } else { a })
+    let error =
+        |(i, p): (usize, &Point)| (i, (0..3).map(|k| (product[(i, k)] - (p[k] - o[k])).powi(2)).sum::<f64>().sqrt());
+    points.iter().enumerate().map(error).fold((0, 0.0), |a, b| if b.1 > a.1 || b.1.is_nan() { b } else { a })
 }

@@ -54,6 +54,12 @@ impl Polygons {
         })
     }
 
+    /// For every triangle of [`Self::triangulated`], the face it came from.
+    pub fn polygon_of_triangle(&self) -> Vec<u32> {
+        let faces = self.arities.iter().enumerate();
+        faces.flat_map(|(face, &arity)| std::iter::repeat_n(face as u32, (arity as usize).saturating_sub(2))).collect()
+    }
+
     /// The faces as a fan of triangles each.
     pub fn triangulated(&self) -> Vec<[u32; 3]> {
         let mut triangles = Vec::new();

@@ -76,12 +76,12 @@ lanewise!(Mul, mul, *);
 lanewise!(Div, div, /);
 
 #[inline(always)]
-pub(crate) fn dot(a: [Lanes; 3], b: [Lanes; 3]) -> Lanes {
+pub(crate) fn dot(a: &[Lanes; 3], b: &[Lanes; 3]) -> Lanes {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[inline(always)]
-pub(crate) fn cross(a: [Lanes; 3], b: [Lanes; 3]) -> [Lanes; 3] {
+pub(crate) fn cross(a: &[Lanes; 3], b: &[Lanes; 3]) -> [Lanes; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 

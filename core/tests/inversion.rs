@@ -176,7 +176,7 @@ fn no_threshold_no_weight_and_no_regularizer_are_the_same() {
     assert_ne!(with(Regularizer::Laplacian, 20, 1.0), plain);
 }
 
-/// Coordinates of a cage whose last vertices no point feels.
+/// Mean value coordinates with the weights of the last vertices passed on to four others that span them.
 struct Deaf(usize);
 
 impl CoordinateSystem for Deaf {
@@ -191,11 +191,18 @@ impl CoordinateSystem for Deaf {
     }
     fn coordinates(&self, cage: &Cage, points: &[Point]) -> Coordinates {
         let mut coordinates = MeanValue.coordinates(cage, points);
-        let m = cage.vertices().len();
-        for i in 0..points.len() {
-            let kept: f64 = (0..m - self.0).map(|j| coordinates.phi[(i, j)]).sum();
-            for j in 0..m {
-                coordinates.phi[(i, j)] = if j < m - self.0 { coordinates.phi[(i, j)] / kept } else { 0.0 };
+        let v = cage.vertices();
+        let m = v.len();
+        let heirs = [0, m / 4, m / 2, 3 * m / 4];
+        let row = |k: usize, p: Point| if k < 3 { p[k] } else { 1.0 };
+        let span = faer::Mat::from_fn(4, 4, |k, i| row(k, v[heirs[i]])).partial_piv_lu();
+        for dead in m - self.0..m {
+            let shares = faer::prelude::Solve::solve(&span, faer::Mat::from_fn(4, 1, |k, _| row(k, v[dead])));
+            for i in 0..points.len() {
+                let weight = std::mem::take(&mut coordinates.phi[(i, dead)]);
+                for (k, &heir) in heirs.iter().enumerate() {
+                    coordinates.phi[(i, heir)] += weight * shares[(k, 0)];
+                }
             }
         }
         coordinates

@@ -74,8 +74,8 @@ pub(crate) struct SolverArgs {
     #[arg(long, value_enum, default_value_t = RegularizerArg::Laplacian)]
     pub(crate) regularizer: RegularizerArg,
 
-    /// Spectrum threshold: how many of the last singular directions are regularised [default: 20, or all of a cage that has
-    /// fewer].
+    /// Spectrum threshold: how many of the last singular directions are regularised [default: 20, or a quarter of a cage
+    /// with fewer than 40].
     #[arg(long, value_name = "S")]
     pub(crate) spectrum: Option<usize>,
 

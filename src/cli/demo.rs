@@ -1,7 +1,7 @@
 //! `cager demo`: the main job on a built-in capture.
 
 use super::args::DemoArgs;
-use super::encode::write_report;
+use super::encode::{default_spectrum, write_report};
 use super::{grouped, human_bytes, print, progress};
 use crate::coordinates;
 use crate::decode;
@@ -41,10 +41,7 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
         frames: &mut frames,
         output: &output,
         system,
-        options: SolverOptions {
-            spectrum: SolverOptions::default().spectrum.min(cage.vertices().len()),
-            ..SolverOptions::default()
-        },
+        options: SolverOptions { spectrum: default_spectrum(cage.vertices().len()), ..SolverOptions::default() },
     };
     let report = encode::encode(job, &mut |done| bar.set_position(done as u64))?;
     bar.finish_and_clear();

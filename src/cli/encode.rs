@@ -9,7 +9,7 @@ use anyhow::{Context, Result, bail};
 use cager_core::cage::Cage;
 use cager_core::inversion::{PrepareError, SolverOptions};
 use cager_core::mesh::TriMesh;
-use cager_formats::{AtomicFile, open_frames, read_model};
+use cager_formats::{AtomicFile, CacheFormat, MeshFormat, open_frames, read_model};
 use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
@@ -47,7 +47,9 @@ fn name_files(error: encode::EncodeError, args: &EncodeArgs) -> anyhow::Error {
                 PrepareError::NotFinite { .. }
                 | PrepareError::TooFewPoints { .. }
                 | PrepareError::NoExtent
-                | PrepareError::TooLarge => &args.rest,
+                | PrepareError::TooLarge
+                | PrepareError::NotReproduced { .. }
+                | PrepareError::OutOfMemory { .. } => &args.rest,
                 _ => &args.cage,
             };
             match inner {
@@ -66,7 +68,10 @@ pub(super) fn read_cage(path: &Path, flip: bool) -> Result<Cage> {
         bail!("{}: has no faces, and a cage is a closed mesh; export the cage with its faces", path.display());
     }
     let mesh = TriMesh::from(&model);
-    Cage::new(if flip { mesh.flipped() } else { mesh }).with_context(|| path.display().to_string())
+    let cage = Cage::new(if flip { mesh.flipped() } else { mesh });
+    let polygon_of = model.faces.polygon_of_triangle();
+    cage.map_err(|error| error.renumbered(|triangle| polygon_of[triangle] as usize))
+        .with_context(|| path.display().to_string())
 }
 
 pub(super) fn solver(
@@ -75,11 +80,10 @@ pub(super) fn solver(
 ) -> Result<(&'static dyn cager_core::coordinates::CoordinateSystem, SolverOptions)> {
     let name = args.coordinates.name();
     let system = coordinates::by_name(name).with_context(|| format!("--coordinates: {name} is unknown"))?;
-    let defaults = SolverOptions::default();
     let options = SolverOptions {
         handles: args.handles.into(),
         regularizer: args.regularizer.into(),
-        spectrum: args.spectrum.unwrap_or_else(|| defaults.spectrum.min(system.unknowns(cage))),
+        spectrum: args.spectrum.unwrap_or_else(|| default_spectrum(system.unknowns(cage))),
         lambda: args.lambda,
     };
     Ok((system, options))
@@ -90,6 +94,12 @@ pub(super) fn write_report(mut file: AtomicFile, report: &Report) -> Result<()> 
     text.push(b'\n');
     file.write_all(&text)?;
     Ok(file.commit()?)
+}
+
+/// The paper's 20; less for a cage of which it would smooth the greater part.
+pub(super) fn default_spectrum(unknowns: usize) -> usize {
+    let usual = SolverOptions::default().spectrum;
+    if unknowns >= 2 * usual { usual } else { unknowns / 4 }
 }
 
 /// An output in place of an input, or of the other output, is a slip that would cost the user a file.
@@ -103,6 +113,10 @@ fn refuse_overwriting(args: &EncodeArgs) -> Result<()> {
                     output.display()
                 );
             }
+        }
+        // It may be a frame of the folder or pattern; no container or report has such a name.
+        if output.exists() && (MeshFormat::from_path(output).is_ok() || CacheFormat::from_path(output).is_some()) {
+            bail!("{}: is a mesh or a capture, so it is not replaced; name another file", output.display());
         }
     }
     let place = |path: &Path| {

@@ -1,7 +1,7 @@
 //! `cager inspect`.
 
 use super::args::InspectArgs;
-use super::{grouped, human_bytes, print, warn};
+use super::{grouped, human_bytes, plain, print, warn};
 use crate::decode::{self, Container, DecodeError};
 use anyhow::Result;
 use cager_proto::container::Summary;
@@ -109,11 +109,15 @@ fn as_text(name: &str, container: &Container, summary: Option<&Summary>, bytes: 
     writeln!(
         out,
         "  solver    coordinates {}, handles {}, regularizer {}, spectrum {}, lambda {}",
-        h.coordinates, h.handles, h.regularizer, h.spectrum, h.lambda
+        plain(&h.coordinates),
+        plain(&h.handles),
+        plain(&h.regularizer),
+        h.spectrum,
+        h.lambda
     )?;
     if let Some(s) = summary {
         let e = &s.error;
-        writeln!(out, "  written   by {}", s.generator)?;
+        writeln!(out, "  written   by {}", plain(&s.generator))?;
         writeln!(
             out,
             "  size      {:.1} times smaller than {}",

@@ -48,8 +48,13 @@ fn print(text: &str) -> anyhow::Result<()> {
 
 fn warn(warnings: &[String]) {
     for warning in warnings {
-        let _ = writeln!(std::io::stderr(), "warning: {warning}");
+        let _ = writeln!(std::io::stderr(), "warning: {}", plain(warning));
     }
+}
+
+/// Text of a file's own, without what would move a terminal's cursor or change its colours.
+fn plain(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
 }
 
 /// `1234567` as `1,234,567`.

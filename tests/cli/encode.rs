@@ -1,7 +1,7 @@
 //! `cager encode`.
 
 use crate::support::{
-    Dir, ENCODE, as_model, close, largest, mean, measure, npy_f64, quad_box, read_cages, read_frames,
+    Dir, ENCODE, as_model, close, largest, mean, measure, npy_f64, polygons, quad_box, read_cages, read_frames,
 };
 use cager_core::mesh::{Model, Polygons, winding_number};
 use serde_json::Value;
@@ -286,7 +286,7 @@ fn quads_of_the_cage_become_triangles_and_a_cage_smaller_than_the_default_spectr
     let report = encode(&dir, "");
     assert_eq!(report["cage_vertices"], 8);
     assert_eq!(report["cage_faces"], 12);
-    assert_eq!(report["spectrum"], 8);
+    assert_eq!(report["spectrum"], 2);
     assert!(number(&report, "/affine_reproduction_error") <= 1e-10);
     assert_eq!(read_cages(&dir.path("out.cager"))[0].len(), 24);
 }
@@ -366,4 +366,38 @@ fn names_with_spaces_and_accents_work() {
         .arg("Élan vital/été 1.cager")
         .succeeds();
     assert_eq!(dir.names("Élan vital"), ["rest pose.obj", "été 1.cager"]);
+}
+
+#[test]
+fn half_a_model_in_the_cage_of_the_whole_is_encoded_well_with_the_default_options() {
+    let (dir, small) = Dir::with_capture();
+    let (low, high) = cager_core::mesh::bounds(&small.rest.points);
+    let upper: Vec<usize> =
+        (0..small.rest.points.len()).filter(|&i| small.rest.points[i][2] > 0.5 * (low[2] + high[2])).collect();
+    let rest = Model { points: upper.iter().map(|&i| small.rest.points[i]).collect(), faces: polygons([]) };
+    let frames: Vec<Vec<f64>> =
+        small.frames.iter().map(|f| upper.iter().flat_map(|&i| f[3 * i..3 * i + 3].to_vec()).collect()).collect();
+    dir.model("rest.ply", &rest);
+    dir.frames("frames.npy", &frames);
+    let line = "encode --rest rest.ply --cage cage.obj --frames frames.npy -o out.cager --report report.json";
+    for options in ["", " --handles all", " --spectrum 0"] {
+        dir.cager(&format!("{line}{options}")).succeeds();
+        let report = dir.json("report.json");
+        let error = number(&report, "/error/l2_mean");
+        assert!(error < 0.05, "{options}: {error}");
+    }
+}
+
+#[test]
+fn a_capture_far_from_the_origin_is_encoded_with_a_warning_that_names_a_frame() {
+    let (dir, small) = Dir::with_capture();
+    let far: Vec<Vec<f64>> = small.frames.iter().map(|f| f.iter().map(|x| x + 1e5).collect()).collect();
+    dir.write("frames.npy", npy_f64(&far));
+    let done = dir.cager(ENCODE).run();
+    assert_eq!(done.status, Some(0), "{}", done.stderr);
+    assert!(
+        done.stderr.contains("the cage of frame ") && done.stderr.contains("closer to the origin"),
+        "{}",
+        done.stderr
+    );
 }

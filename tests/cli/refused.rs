@@ -1,6 +1,6 @@
 //! Bad input: one sentence that names the file and the place, exit status 1, and nothing left behind.
 
-use crate::support::{Dir, ENCODE, Small, as_model, npy, npy_f64};
+use crate::support::{Dir, ENCODE, Small, as_model, npy, npy_f64, polygons, quad_box};
 use cager_core::mesh::{Model, Polygons, TriMesh};
 
 /// Runs a command that must be refused with one line that has all these words, and must leave the folder as it was.
@@ -538,4 +538,34 @@ fn small_capture_by_itself_is_good() {
     assert!(small.frames.iter().flatten().all(|x| x.is_finite()));
     let (dir, _) = Dir::with_capture();
     assert_eq!(dir.cager(ENCODE).succeeds().stderr, "");
+}
+
+#[test]
+fn a_frame_of_the_captures_own_folder_is_not_replaced_by_the_output() {
+    let (dir, small) = Dir::with_capture();
+    for t in 0..3 {
+        dir.model(&format!("walk/{t}.obj"), &small.posed(t));
+    }
+    for frames in ["walk", "walk/*.obj"] {
+        let line = format!("encode --rest rest.obj --cage cage.obj --frames {frames} -o walk/1.obj");
+        refused(&dir, &line, &["1.obj", "name another file"]);
+    }
+}
+
+#[test]
+fn faces_of_a_polygon_cage_are_counted_as_in_its_file() {
+    let (dir, small) = Dir::with_capture();
+    let mut cage = quad_box(&small.rest.points);
+    let quads: Vec<Vec<u32>> = cage.faces.iter().map(<[u32]>::to_vec).collect();
+    cage.faces = polygons(quads.iter().cloned().chain([quads[5].clone()]));
+    dir.model("cage.obj", &cage);
+    refused(&dir, ENCODE, &["cage.obj", "faces 5 and 6 "]);
+}
+
+#[test]
+fn a_point_far_from_the_cage_is_refused_by_number() {
+    let (dir, mut small) = Dir::with_capture();
+    small.rest.points[17] = [1e9, 0.0, 0.0];
+    dir.model("rest.obj", &small.rest);
+    refused(&dir, ENCODE, &["rest.obj", "point 17 "]);
 }

@@ -101,6 +101,19 @@ pub enum CageError {
 }
 
 impl CageError {
+    /// The same error with faces counted as in the file, before polygons were split into triangles.
+    #[must_use]
+    pub fn renumbered(mut self, face_of: impl Fn(usize) -> usize) -> Self {
+        match &mut self {
+            Self::NoSuchVertex { face, .. } | Self::Degenerate { face, .. } => *face = face_of(*face),
+            Self::DuplicateFaces { first, second, .. } => (*first, *second) = (face_of(*first), face_of(*second)),
+            Self::NonManifold { faces, .. } => faces.iter_mut().for_each(|face| *face = face_of(*face)),
+            Self::Inconsistent { faces, .. } => *faces = faces.map(face_of),
+            _ => {}
+        }
+        self
+    }
+
     /// Whether turning every face around would mend it.
     pub fn is_inward(&self) -> bool {
         matches!(self, Self::Inward { .. })

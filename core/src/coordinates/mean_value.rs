@@ -160,10 +160,13 @@ fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> (
     let near_vertex = VERTEX_TOLERANCE * cage.diagonal();
     for (j, v) in cage.vertices().iter().enumerate() {
         let r = [Lanes::splat(v[0]) - x[0], Lanes::splat(v[1]) - x[1], Lanes::splat(v[2]) - x[2]];
-        let d = dot(r, r).sqrt();
+        let d = dot(&r, &r).sqrt();
         let inverse = d.map(|d| 1.0 / d);
         scratch.nearness[j] = inverse;
-        scratch.directions[j] = [r[0] * inverse, r[1] * inverse, r[2] * inverse];
+        let direction = &mut scratch.directions[j];
+        direction[0] = r[0] * inverse;
+        direction[1] = r[1] * inverse;
+        direction[2] = r[2] * inverse;
         scratch.weights[j] = Lanes::ZERO;
         if d.any(d, |d, _| d <= near_vertex) {
             for l in 0..LANES {
@@ -174,10 +177,10 @@ fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> (
         }
     }
     for (k, edge) in cage.edges().iter().enumerate() {
-        let a = scratch.directions[edge.vertices[0] as usize];
-        let b = scratch.directions[edge.vertices[1] as usize];
+        let a = &scratch.directions[edge.vertices[0] as usize];
+        let b = &scratch.directions[edge.vertices[1] as usize];
         let c = cross(a, b);
-        let s2 = dot(c, c);
+        let s2 = dot(&c, &c);
         let s = s2.sqrt();
         let t = dot(a, b);
         let theta = angle(s, t);
@@ -185,7 +188,12 @@ fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> (
         let degenerate = inverse.map(|i| if i > 0.0 { 0.0 } else { 1.0 });
         let half = theta * theta * inverse * 0.5 + degenerate * 0.5;
         let back = s2 * inverse * 2.0 + degenerate * 2.0;
-        scratch.edges[k] = [c[0] * half, c[1] * half, c[2] * half, back];
+        // One by one: an array would be built on the stack and copied.
+        let term = &mut scratch.edges[k];
+        term[0] = c[0] * half;
+        term[1] = c[1] * half;
+        term[2] = c[2] * half;
+        term[3] = back;
         if s.any(t, |s, t| (s < EDGE_TOLERANCE) & (t < 0.0)) {
             for l in 0..LANES {
                 if s.0[l] < EDGE_TOLERANCE && t.0[l] < 0.0 && matches!(on[l], On::Nothing) {
@@ -195,22 +203,20 @@ fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> (
         }
     }
     for face in cage.faces() {
-        let term = |i: usize| {
-            let [x, y, z, back] = scratch.edges[face.edges[i] as usize];
-            let sign = face.signs[i];
-            ([x * sign, y * sign, z * sign], back)
-        };
-        let (g0, back0) = term(0);
-        let (g1, back1) = term(1);
-        let (g2, back2) = term(2);
+        let [e0, e1, e2] = face.edges.map(|e| &scratch.edges[e as usize]);
+        let [s0, s1, s2] = face.signs;
+        let g0 = [e0[0] * s0, e0[1] * s0, e0[2] * s0];
+        let g1 = [e1[0] * s1, e1[1] * s1, e1[2] * s1];
+        let g2 = [e2[0] * s2, e2[1] * s2, e2[2] * s2];
+        let (back0, back1, back2) = (e0[3], e1[3], e2[3]);
         let m = [g0[0] + g1[0] + g2[0], g0[1] + g1[1] + g2[1], g0[2] + g1[2] + g2[2]];
         let [v0, v1, v2] = face.vertices.map(|v| v as usize);
-        let det = dot(scratch.directions[v0], g0) * back0;
+        let det = dot(&scratch.directions[v0], &g0) * back0;
         let inverse = det.map(|d| 1.0 / d);
-        let mut w = [dot(m, g0) * back0 * inverse, dot(m, g1) * back1 * inverse, dot(m, g2) * back2 * inverse];
-        let width2 = dot(g0, g0) + dot(g1, g1);
+        let mut w = [dot(&m, &g0) * back0 * inverse, dot(&m, &g1) * back1 * inverse, dot(&m, &g2) * back2 * inverse];
+        let width2 = dot(&g0, &g0) + dot(&g1, &g1);
         if det.any(width2, |d, q| d * d <= THIN * THIN * q) {
-            mend_thin(scratch, [v0, v1, v2], det, width2, m, &mut w);
+            mend_thin(scratch, [v0, v1, v2], det, width2, &m, &mut w);
         }
         scratch.weights[v0] = scratch.weights[v0] + w[0];
         scratch.weights[v1] = scratch.weights[v1] + w[1];
@@ -227,7 +233,7 @@ fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> (
 /// Replaces the weights of those lanes whose point lies nearly in the plane of the face.
 #[cold]
 #[inline(never)]
-fn mend_thin(scratch: &Scratch, vertices: [usize; 3], det: Lanes, width2: Lanes, m: [Lanes; 3], w: &mut [Lanes; 3]) {
+fn mend_thin(scratch: &Scratch, vertices: [usize; 3], det: Lanes, width2: Lanes, m: &[Lanes; 3], w: &mut [Lanes; 3]) {
     for l in 0..LANES {
         let d = det.0[l];
         if d * d > THIN * THIN * width2.0[l] {

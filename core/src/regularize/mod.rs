@@ -53,9 +53,13 @@ pub(crate) struct Spectrum<'a> {
     pub(crate) delta: MatRef<'a, f64>,
 }
 
-/// `T`, m × r. Directions the data says nothing about are always placed by Δ, but for the two baselines that have no term.
+/// Directions with a singular value below this fraction of the largest amplify single-precision cages beyond use.
+pub const WEAK: f64 = 1e-6;
+
+/// `T`, m × r. Directions the data says nothing about are always placed by Δ, but for the two baselines that have no term;
+/// with the Laplacian, those it says next to nothing about as well.
 ///
-/// `None` where the regularised system is singular: Δ leaves a direction free that the data leaves free too.
+/// `None` where a factorisation fails.
 pub(crate) fn spectral_map(
     spectrum: &Spectrum<'_>,
     regularizer: Regularizer,
@@ -70,7 +74,10 @@ pub(crate) fn spectral_map(
         Regularizer::TruncatedSvd => Some(diagonal(&|k, sigma| if k < m - s { 1.0 / sigma } else { 0.0 })),
         Regularizer::Tikhonov => Some(diagonal(&|_, sigma| sigma / (sigma * sigma + lambda * lambda))),
         Regularizer::Global => sub_spectral(spectrum, m, lambda),
-        Regularizer::Laplacian if lambda > 0.0 => sub_spectral(spectrum, s.max(dead), lambda),
+        Regularizer::Laplacian if lambda > 0.0 => {
+            let strong = spectrum.sigma.iter().filter(|&&x| x >= WEAK * spectrum.sigma[0]).count();
+            sub_spectral(spectrum, s.max(m - strong), lambda)
+        }
         Regularizer::Laplacian | Regularizer::None => sub_spectral(spectrum, dead, 1.0),
     }
 }
@@ -104,7 +111,17 @@ fn sub_spectral(spectrum: &Spectrum<'_>, s: usize, lambda: f64) -> Option<Mat<f6
             right[(i, low + i)] = sigma;
         }
     }
-    let high = dense::solve_definite(system, right)?;
+    let high = match dense::solve_definite(system.clone(), right.clone()) {
+        Some(high) => high,
+        // Δ leaves the place of a whole shell free, and no point feels that shell: hold it near the centre.
+        None => {
+            let size = (0..s).map(|i| system[(i, i)]).fold(0.0, f64::max);
+            for i in 0..s {
+                system[(i, i)] += if size > 0.0 { 1e-9 * size } else { 1.0 };
+            }
+            dense::solve_definite(system, right)?
+        }
+    };
     for j in 0..r {
         for i in 0..s {
             map[(low + i, j)] = high[(i, j)];

@@ -57,7 +57,8 @@ impl CacheFormat {
         }
     }
 
-    fn guess(path: &Path) -> Option<Self> {
+    /// The format that the path's extension names, if any.
+    pub fn from_path(path: &Path) -> Option<Self> {
         let found = path.extension()?;
         Self::ALL.into_iter().find(|format| found.eq_ignore_ascii_case(format.extension()))
     }

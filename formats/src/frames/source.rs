@@ -53,7 +53,7 @@ pub fn open_frames_bytes<'a>(
 }
 
 fn open_file(path: &Path, length: u64, expected_points: usize) -> Result<Box<dyn FrameReader>, Error> {
-    if let Some(format) = CacheFormat::guess(path) {
+    if let Some(format) = CacheFormat::from_path(path) {
         let file = File::open(path).map_err(|cause| Error::read(path, cause))?;
         return Ok(Box::new(CacheReader::open(format, path, file, length, expected_points)?));
     }
@@ -105,7 +105,7 @@ fn list(folder: &Path) -> Result<Vec<PathBuf>, Error> {
 /// Mesh files and cache files in natural order.
 fn sort(mut files: Vec<PathBuf>) -> (Vec<PathBuf>, Vec<PathBuf>) {
     files.sort_by(|a, b| natural::compare(a.as_os_str().as_encoded_bytes(), b.as_os_str().as_encoded_bytes()));
-    files.retain(|path| MeshFormat::guess(path).is_some() || CacheFormat::guess(path).is_some());
+    files.retain(|path| MeshFormat::guess(path).is_some() || CacheFormat::from_path(path).is_some());
     files.into_iter().partition(|path| MeshFormat::guess(path).is_some())
 }
 

@@ -278,6 +278,9 @@ impl<R: Read + Seek> ContainerReader<R> {
         self.header = wire::decode::<_, HEADER_LIMIT>(&raw)
             .map_err(|e| Error::corrupt(entry.offset, format!("the header cannot be read ({e})")))?;
         let h = &self.header;
+        if h.frame_rate.is_some_and(|fps| !(fps.is_finite() && fps > 0.0)) {
+            return Err(Error::corrupt(entry.offset, "the frame rate is no rate"));
+        }
         if h.rows_per_frame == 0 || h.points > u64::from(u32::MAX) || h.cage_vertices > u64::from(u32::MAX) {
             return Err(Error::corrupt(entry.offset, "the header counts what cannot be"));
         }

@@ -64,7 +64,7 @@ pub fn create_frames(
     if is_folder(path) {
         return Ok(Box::new(SequenceWriter::create(announced, faces)?));
     }
-    match CacheFormat::guess(path) {
+    match CacheFormat::from_path(path) {
         Some(format) => Ok(Box::new(CacheWriter::create(announced, format, options)?)),
         None => Err(unknown_extension(path, false)),
     }
