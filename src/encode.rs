@@ -332,6 +332,7 @@ fn header(job: &Job<'_>, solver: &Solver) -> Header {
         spectrum: job.options.spectrum as u32,
         lambda: job.options.lambda,
         rows_per_frame: solver.decoder().unknowns() as u32,
+        frame_rate: job.frames.frame_rate(),
         ..Header::default()
     }
 }

@@ -79,3 +79,18 @@ fn decoded_frames_encode_to_the_same_cages_again() {
     let first = dir.json("report.json")["error"]["linf_max"].as_f64().expect("a number");
     assert!(worst < first, "{worst} the second time, {first} the first");
 }
+
+#[test]
+fn frame_rate_of_an_mdd_survives() {
+    let (dir, small) = Dir::with_encoded();
+    let mut mdd: Vec<u8> = Vec::new();
+    mdd.extend((small.frames.len() as i32).to_be_bytes());
+    mdd.extend((small.rest.points.len() as i32).to_be_bytes());
+    mdd.extend((0..small.frames.len()).flat_map(|t| (t as f32 / 60.0).to_be_bytes()));
+    mdd.extend(small.frames.iter().flatten().flat_map(|&x| (x as f32).to_be_bytes()));
+    dir.write("walk.mdd", &mdd);
+    dir.cager("encode --rest rest.obj --cage cage.obj --frames walk.mdd -o walk.cager").succeeds();
+    dir.cager("decode walk.cager -o back.mdd").succeeds();
+    let times = 8..8 + 4 * small.frames.len();
+    assert_eq!(dir.read("back.mdd")[times.clone()], mdd[times]);
+}

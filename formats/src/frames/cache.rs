@@ -8,13 +8,15 @@ use super::{CacheFormat, FrameReader, mdd, npy, pc2};
 use crate::error::{Error, Fault};
 
 /// What a header promises.
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Debug, PartialEq)]
 pub(super) struct Layout {
     pub(super) points: u64,
     pub(super) frames: u64,
     /// Offset of the first coordinate in bytes.
     pub(super) start: u64,
     pub(super) scalar: Scalar,
+    /// Frames per second, where the header tells.
+    pub(super) frame_rate: Option<f64>,
 }
 
 /// No header that is read here is longer.
@@ -28,6 +30,7 @@ pub(super) struct CacheReader<R> {
     source: R,
     start: u64,
     scalar: Scalar,
+    frame_rate: Option<f64>,
     points: usize,
     frames: usize,
     next: usize,
@@ -62,6 +65,7 @@ impl<R: Read + Seek> CacheReader<R> {
             source,
             start: layout.start,
             scalar: layout.scalar,
+            frame_rate: layout.frame_rate,
             points: expected_points,
             // No more than the bytes of the file, which fit.
             frames: layout.frames as usize,
@@ -73,7 +77,7 @@ impl<R: Read + Seek> CacheReader<R> {
 
 impl Layout {
     fn check_size(&self, length: u64) -> Result<(), Fault> {
-        let Self { points, frames, start, scalar } = *self;
+        let Self { points, frames, start, scalar, .. } = *self;
         if points == 0 {
             return Err(Fault::invalid("has no points; export the capture with its points"));
         }
@@ -105,6 +109,10 @@ impl<R: Read + Seek + Send> FrameReader for CacheReader<R> {
 
     fn frames(&self) -> usize {
         self.frames
+    }
+
+    fn frame_rate(&self) -> Option<f64> {
+        self.frame_rate
     }
 
     fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error> {

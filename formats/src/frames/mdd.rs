@@ -14,7 +14,18 @@ pub(super) fn layout(head: &[u8]) -> Result<Layout, Fault> {
             "promises {frames} frames of {points} points, so this is not a .mdd file; export it again"
         )));
     };
-    Ok(Layout { points, frames, start: 8 + 4 * frames, scalar: Scalar::F32Big })
+    let time = |k: usize| head.as_chunks().0.get(2 + k).map(|bytes| f64::from(f32::from_be_bytes(*bytes)));
+    let frame_rate = match (time(0), time(1)) {
+        (Some(first), Some(second)) if frames > 1 => rate(second - first),
+        _ => None,
+    };
+    Ok(Layout { points, frames, start: 8 + 4 * frames, scalar: Scalar::F32Big, frame_rate })
+}
+
+/// Times are single precision: thousandths of a frame per second are all they tell.
+fn rate(step: f64) -> Option<f64> {
+    let rate = (1000.0 / step).round() / 1000.0;
+    (rate.is_finite() && rate > 0.0).then_some(rate)
 }
 
 /// The first eight bytes; the times are for the caller to write.

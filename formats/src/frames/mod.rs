@@ -25,6 +25,11 @@ pub trait FrameReader: Send {
     /// Number of frames, known before any is read.
     fn frames(&self) -> usize;
 
+    /// Frames per second, where the source tells.
+    fn frame_rate(&self) -> Option<f64> {
+        None
+    }
+
     /// Reads the next frame into `out`, which then holds 3 × points coordinates `x y z x y z …`; false at the end, with
     /// `out` empty.
     ///

@@ -77,7 +77,7 @@ impl Array<'_> {
                 "is in Fortran order; convert it with numpy.save(path, numpy.ascontiguousarray(numpy.load(path)))",
             ));
         }
-        Ok(Layout { points, frames, start, scalar })
+        Ok(Layout { points, frames, start, scalar, frame_rate: None })
     }
 }
 

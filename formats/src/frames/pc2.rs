@@ -22,7 +22,7 @@ pub(super) fn layout(head: &[u8]) -> Result<Layout, Fault> {
     let (Ok(points), Ok(frames)) = (u64::try_from(points), u64::try_from(frames)) else {
         return Err(Fault::damaged(format!("promises {frames} frames of {points} points; export it again")));
     };
-    Ok(Layout { points, frames, start: HEADER as u64, scalar: Scalar::F32Little })
+    Ok(Layout { points, frames, start: HEADER as u64, scalar: Scalar::F32Little, frame_rate: None })
 }
 
 /// A header for frames 0, 1, 2, …
