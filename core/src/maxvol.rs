@@ -210,16 +210,7 @@ fn swap_among(
     rows: &mut [u32],
 ) -> usize {
     let width = phi.ncols();
-    let b = dense::product(dense::rows_of(phi, candidates).as_ref(), inverse);
-    let mut work = Working {
-        width,
-        entries: Vec::with_capacity(candidates.len() * width),
-        row_max: Vec::with_capacity(candidates.len()),
-    };
-    for i in 0..candidates.len() {
-        work.entries.extend(b.row(i).iter().map(|&x| x as f32));
-        work.row_max.push(b.row(i).iter().fold(0.0, |m: f32, &x| m.max((x as f32).abs())));
-    }
+    let mut work = Working::gather(phi, candidates, inverse);
     // Rounding of the updates must not end the swaps just above the tolerance.
     let enough = (1.0 + 0.2 * tolerance) as f32;
     // Each swap multiplies the volume by more than 1 + τ, and Hadamard's inequality bounds the volume.
@@ -245,6 +236,25 @@ fn swap_among(
 }
 
 impl Working {
+    fn gather(phi: MatRef<'_, f64>, candidates: &[u32], inverse: MatRef<'_, f64>) -> Self {
+        let width = phi.ncols();
+        let mut entries = vec![0.0f32; candidates.len() * width];
+        let mut row_max = vec![0.0f32; candidates.len()];
+        let blocks = entries.par_chunks_mut(BLOCK_ROWS * width).zip(row_max.par_chunks_mut(BLOCK_ROWS));
+        blocks.zip(candidates.par_chunks(BLOCK_ROWS)).for_each(|((entries, row_max), candidates)| {
+            // Transposed, so that a row of B is contiguous.
+            let rows = dense::rows_of(phi, candidates);
+            let b = dense::product(inverse.transpose(), rows.transpose());
+            for (i, (row, max)) in entries.chunks_exact_mut(width).zip(row_max).enumerate() {
+                for (entry, &x) in row.iter_mut().zip(b.col(i).iter()) {
+                    *entry = x as f32;
+                    *max = if entry.abs() > *max { entry.abs() } else { *max };
+                }
+            }
+        });
+        Self { width, entries, row_max }
+    }
+
     /// Rank-one update of B for a swap of row `i` in for handle `j` (paper Eq. 3).
     fn exchange(&mut self, i: usize, j: usize) {
         let width = self.width;
