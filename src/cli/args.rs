@@ -93,7 +93,7 @@ pub(crate) struct DecodeArgs {
     #[arg(value_name = "IN.cager")]
     pub(crate) input: PathBuf,
 
-    /// Where to write: .npy, .pc2, .mdd, or a folder that is to hold one .obj per frame.
+    /// Where to write: .npy, .pc2, .mdd, or a folder that is to hold one .obj per frame ('FOLDER/*.ply' for .ply).
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
 }

@@ -10,7 +10,7 @@ fn every_output_format_holds_the_same_positions() {
     dir.cager("decode out.cager -o back.npy").succeeds();
     let truth = read_frames(&dir.path("back.npy"), points);
     assert_eq!(truth.len(), 20);
-    for output in ["back.pc2", "back.mdd", "poses", "slashed/"] {
+    for output in ["back.pc2", "back.mdd", "poses", "slashed/", "binary/*.ply"] {
         dir.cager(&format!("decode out.cager -o {output}")).succeeds();
         let found = read_frames(&dir.path(output), points);
         // Text gives the shortest digits of an f32, which are that f32 again and no other.

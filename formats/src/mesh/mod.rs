@@ -15,7 +15,7 @@ use cager_core::mesh::Model;
 use crate::error::{Error, Fault};
 
 pub use write::write_model;
-pub(crate) use write::write_obj_faces;
+pub(crate) use write::{write_obj_faces, write_ply};
 
 /// A mesh file format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -84,7 +84,8 @@ fn write_off(out: &mut AtomicFile, model: &Model) -> io::Result<()> {
     Ok(())
 }
 
-fn write_ply(out: &mut AtomicFile, model: &Model) -> io::Result<()> {
+/// A binary little-endian PLY file.
+pub(crate) fn write_ply(out: &mut impl Write, model: &Model) -> io::Result<()> {
     let coordinates = model.points.as_flattened();
     let single = coordinates.iter().all(|&x| f64::from(x as f32).to_bits() == x.to_bits());
     let scalar = if single { "float" } else { "double" };

@@ -45,7 +45,8 @@ impl Default for FrameOptions {
 /// Begins an output of `frames` frames of `points` points each.
 ///
 /// The extension of `path` says what: `.npy` (frames × points × 3, `<f4`), `.pc2` or `.mdd`. Without an extension, with
-/// a `/` at the end, or as an existing folder it becomes a folder of files `frame_0000.obj`, …, each with `faces`.
+/// a `/` at the end, or as an existing folder it becomes a folder of files `frame_0000.obj`, …, each with `faces`;
+/// `FOLDER/*.ply` makes them `.ply` files.
 ///
 /// # Errors
 /// [`Error::Unsupported`] for other extensions and for more points or frames than a format can count,
@@ -58,11 +59,14 @@ pub fn create_frames(
     faces: &Polygons,
     options: &FrameOptions,
 ) -> Result<Box<dyn FrameWriter>, Error> {
-    let path = path.as_ref();
+    let given = path.as_ref();
+    let pattern = given.file_name().and_then(|name| name.to_str()).filter(|name| matches!(*name, "*.ply" | "*.obj"));
+    let folder = given.parent().filter(|_| pattern.is_some());
+    let path = folder.unwrap_or(given);
     let announced = Announced { path: path.to_owned(), points, frames, written: 0 };
     announced.check(options).map_err(|fault| fault.at(path))?;
-    if is_folder(path) {
-        return Ok(Box::new(SequenceWriter::create(announced, faces)?));
+    if folder.is_some() || is_folder(path) {
+        return Ok(Box::new(SequenceWriter::create(announced, faces, pattern == Some("*.ply"))?));
     }
     match CacheFormat::from_path(path) {
         Some(format) => Ok(Box::new(CacheWriter::create(announced, format, options)?)),

@@ -1,25 +1,32 @@
-//! Each frame in an OBJ file of its own.
+//! Each frame in a mesh file of its own.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 
-use cager_core::mesh::Polygons;
+use cager_core::mesh::{Model, Polygons};
 
 use super::{Announced, FrameWriter};
 use crate::atomic::AtomicDir;
 use crate::error::{Error, Fault};
-use crate::mesh::write_obj_faces;
+use crate::mesh::{write_obj_faces, write_ply};
 
 pub(super) struct SequenceWriter {
     announced: Announced,
     folder: AtomicDir,
-    /// The `f` lines, which are the same in all files.
-    faces: Vec<u8>,
+    format: Format,
     digits: usize,
 }
 
+/// What the files are, with what is the same in all of them.
+enum Format {
+    /// The `f` lines.
+    Obj(Vec<u8>),
+    /// The model; its points change.
+    Ply(Model),
+}
+
 impl SequenceWriter {
-    pub(super) fn create(announced: Announced, faces: &Polygons) -> Result<Self, Error> {
+    pub(super) fn create(announced: Announced, faces: &Polygons, ply: bool) -> Result<Self, Error> {
         if let Some(&index) = faces.indices().iter().find(|&&index| index as usize >= announced.points) {
             return Err(Fault::invalid(format!(
                 "the faces to write name vertex {index}, but there are {} points; give the faces of this mesh",
@@ -28,18 +35,33 @@ impl SequenceWriter {
             .at(&announced.path));
         }
         let folder = AtomicDir::create(&announced.path)?;
-        let mut text = Vec::new();
-        write_obj_faces(&mut text, faces.iter()).map_err(|cause| Error::write(&announced.path, cause))?;
+        let format = if ply {
+            Format::Ply(Model { points: Vec::new(), faces: faces.clone() })
+        } else {
+            let mut text = Vec::new();
+            write_obj_faces(&mut text, faces.iter()).map_err(|cause| Error::write(&announced.path, cause))?;
+            Format::Obj(text)
+        };
         let digits = (announced.frames - 1).to_string().len().max(4);
-        Ok(Self { announced, folder, faces: text, digits })
+        Ok(Self { announced, folder, format, digits })
     }
 
-    fn write_obj(&self, name: &str, positions: &[f32]) -> io::Result<()> {
+    fn write_file(&mut self, name: &str, positions: &[f32]) -> io::Result<()> {
         let mut file = BufWriter::with_capacity(1 << 16, File::create(self.folder.folder().join(name))?);
-        for [x, y, z] in positions.as_chunks().0 {
-            writeln!(file, "v {x:?} {y:?} {z:?}")?;
+        let points = positions.as_chunks().0;
+        match &mut self.format {
+            Format::Obj(faces) => {
+                for [x, y, z] in points {
+                    writeln!(file, "v {x:?} {y:?} {z:?}")?;
+                }
+                file.write_all(faces)?;
+            }
+            Format::Ply(model) => {
+                model.points.clear();
+                model.points.extend(points.iter().map(|p| p.map(f64::from)));
+                write_ply(&mut file, model)?;
+            }
         }
-        file.write_all(&self.faces)?;
         file.flush()
     }
 }
@@ -47,8 +69,9 @@ impl SequenceWriter {
 impl FrameWriter for SequenceWriter {
     fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error> {
         self.announced.admit(positions)?;
-        let name = format!("frame_{:0digits$}.obj", self.announced.written, digits = self.digits);
-        self.write_obj(&name, positions).map_err(|cause| Error::write(&self.announced.path.join(&name), cause))?;
+        let extension = if matches!(self.format, Format::Ply(_)) { "ply" } else { "obj" };
+        let name = format!("frame_{:0digits$}.{extension}", self.announced.written, digits = self.digits);
+        self.write_file(&name, positions).map_err(|cause| Error::write(&self.announced.path.join(&name), cause))?;
         self.announced.written += 1;
         Ok(())
     }
