@@ -13,12 +13,12 @@ demo: ## encode and decode the built-in capture; results in cager-demo/
 	$(CARGO) run --release --locked --quiet --bin cager -- demo
 
 test: ## run every test
+	@$(CARGO) test --workspace --locked --doc --quiet
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
 		$(CARGO) nextest run --workspace --locked; \
 	else \
 		$(CARGO) test --workspace --locked --all-targets; \
 	fi
-	$(CARGO) test --workspace --locked --doc
 
 lint: ## formatting, clippy and documentation, all warnings denied
 	$(CARGO) fmt --all --check
