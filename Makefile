@@ -17,7 +17,7 @@ test: ## run every test
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
 		$(CARGO) nextest run --workspace --locked; \
 	else \
-		$(CARGO) test --workspace --locked --all-targets; \
+		$(CARGO) test --workspace --locked --lib --bins --tests; \
 	fi
 
 lint: ## formatting, clippy and documentation, all warnings denied
