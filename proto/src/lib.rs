@@ -1,13 +1,15 @@
 //! Everything of CageR that is stored or crosses a wire.
 //!
 //! * [`container`]: the `.cager` file: a rest pose, its cage and one solved cage per frame, with random access.
+//! * [`messages`]: the JSON bodies of the service.
 //! * [`record`]: the frame record, `application/vnd.cager.frames`: one frame with its number and its error.
 //! * [`wire`]: small structured values to and from bytes; the one module that knows bincode.
 //!
-//! All three are little-endian with fixed-width integers. `README.md` of this crate has the frame record byte by byte,
+//! The binary ones are little-endian with fixed-width integers. `README.md` of this crate has the frame record byte by byte,
 //! `docs/FORMAT.md` of the repository the container.
 
 pub mod container;
 mod le;
+pub mod messages;
 pub mod record;
 pub mod wire;

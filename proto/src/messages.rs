@@ -1,0 +1,248 @@
+//! The JSON bodies of the service, shared by server and client.
+//!
+//! Lengths are fractions of the rest pose's bounding-box diagonal, times are seconds.
+
+use serde::{Deserialize, Serialize};
+
+/// What a session is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(rename_all = "lowercase")]
+pub enum SessionState {
+    /// Coordinates, handles and operator are being computed.
+    Preparing,
+    /// Frames are accepted.
+    Ready,
+    /// All frames are there and the container is written; nothing changes any more.
+    Completed,
+    /// The session cannot be used; `problem` says why.
+    Failed,
+}
+
+/// Choices for a session, the JSON part `options` of its creation. What is left out has its default.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(default, deny_unknown_fields)]
+pub struct SessionOptions {
+    /// A name for people, at most 200 characters.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Coordinate system: `mvc`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coordinates: Option<String>,
+    /// Points the inversion reads: `maxvol` or `all`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub handles: Option<String>,
+    /// Treatment of the unstable end of the spectrum: `laplacian`, `none`, `truncated-svd`, `tikhonov` or `global`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub regularizer: Option<String>,
+    /// Spectrum threshold: how many of the last singular directions are regularised.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spectrum: Option<u32>,
+    /// Weight of the regularisation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lambda: Option<f64>,
+    /// Bound on every vertex's error. Not available yet: a session that asks for it is refused.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_error: Option<f64>,
+    /// Vertices of an automatic cage. Not available yet: a session that asks for it is refused.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cage_vertices: Option<u32>,
+    /// Turn a cage inside out whose faces all point inwards.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub flip_cage: bool,
+    /// Frames per second, written into the container.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frame_rate: Option<f64>,
+}
+
+/// A session. Numbers that preparing finds are null until it is done.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct Session {
+    /// Identifier, part of every address below it.
+    pub id: String,
+    /// Name given at creation.
+    pub name: Option<String>,
+    /// What it is doing.
+    pub state: SessionState,
+    /// Creation time, seconds since 1970.
+    pub created: f64,
+    /// Points of the model, n.
+    pub points: Option<u32>,
+    /// Unknowns per frame, m: rows of a cage record.
+    pub unknowns: Option<u32>,
+    /// Number of handles: rows of a frame with `rows=handles`.
+    pub handle_count: Option<u32>,
+    /// Vertices of the cage.
+    pub cage_vertices: Option<u32>,
+    /// Triangles of the cage.
+    pub cage_faces: Option<u32>,
+    /// Coordinate system.
+    pub coordinates: String,
+    /// Points the inversion reads.
+    pub handles: String,
+    /// Treatment of the unstable end of the spectrum.
+    pub regularizer: String,
+    /// Spectrum threshold; null until it is known where none was given.
+    pub spectrum: Option<u32>,
+    /// Weight of the regularisation.
+    pub lambda: f64,
+    /// Condition numbers over the numerical rank.
+    pub condition_number: Option<ConditionNumber>,
+    /// Numerical rank of the coordinates.
+    pub rank: Option<u32>,
+    /// Largest distance of `Φ C_R` from the rest pose.
+    pub affine_reproduction_error: Option<f64>,
+    /// How far the frames are.
+    pub frames: FrameCounts,
+    /// Whether the prepared solver was there already.
+    pub cache: Option<CacheUse>,
+    /// Times of the preparation.
+    pub seconds: PreparationSeconds,
+    /// What a user should know but that did not stop the work.
+    pub warnings: Vec<String>,
+    /// Why the session failed.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub problem: Option<Problem>,
+}
+
+/// Condition numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct ConditionNumber {
+    /// Of `Φ`.
+    pub full: f64,
+    /// Of the handles' rows.
+    pub handles: f64,
+}
+
+/// Where the solver of a session came from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(rename_all = "lowercase")]
+pub enum CacheUse {
+    /// An earlier session of the same tenant had prepared it.
+    Hit,
+    /// It was prepared for this session.
+    Miss,
+}
+
+/// Progress of a session's frames.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct FrameCounts {
+    /// Frames that arrived whole, solved or waiting.
+    pub received: u64,
+    /// Frames that are solved and on disk.
+    pub solved: u64,
+    /// Ranges `[a, b)` that are not solved, below the highest frame, or below the number declared at completion.
+    pub missing: Vec<[u32; 2]>,
+}
+
+/// Times of a preparation; all zero where the solver was there already.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(default)]
+pub struct PreparationSeconds {
+    /// Waiting for a free place.
+    pub queued: f64,
+    /// Reading rest pose and cage.
+    pub read: f64,
+    /// Computing `Φ`.
+    pub coordinates: f64,
+    /// Choosing the handles.
+    pub maxvol: f64,
+    /// Spectrum, regularisation and operator.
+    pub svd: f64,
+    /// From creation to readiness.
+    pub total: f64,
+}
+
+/// A page of sessions, oldest first.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct SessionList {
+    /// The sessions.
+    pub sessions: Vec<Session>,
+    /// Give it as `after` to get the next page; null on the last.
+    pub next: Option<String>,
+}
+
+/// A solved frame: one line of the answer to posted frames.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct FrameResult {
+    /// Number of the frame, from 0.
+    pub frame: u32,
+    /// `sqrt(mean |e|²)`; null where only the handle rows were sent.
+    pub l2: Option<f32>,
+    /// `max |e|`; null where only the handle rows were sent.
+    pub linf: Option<f32>,
+}
+
+/// Errors of all solved frames, ascending.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct FrameErrors {
+    /// The frames.
+    pub frames: Vec<FrameResult>,
+}
+
+/// Says that no more frames are coming.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct Complete {
+    /// Number of frames of the capture.
+    pub frames: u32,
+}
+
+/// Progress, the data of a server-sent event.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct Progress {
+    /// What the session is doing.
+    pub state: SessionState,
+    /// Frames that arrived whole.
+    pub received: u64,
+    /// Frames that are solved and on disk.
+    pub solved: u64,
+}
+
+/// An error as problem details (RFC 9457), `application/problem+json`.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct Problem {
+    /// Stable name of the kind of error: `urn:cager:problem:` and a word.
+    #[serde(rename = "type")]
+    pub kind: String,
+    /// What went wrong, the same for every error of the kind.
+    pub title: String,
+    /// HTTP status.
+    pub status: u16,
+    /// What went wrong here and what to do.
+    pub detail: String,
+    /// Identifier of the request, also in the server's log.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub request_id: Option<String>,
+    /// The frame concerned.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub frame: Option<u32>,
+    /// Ranges `[a, b)` of frames that are missing.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub missing: Option<Vec<[u32; 2]>>,
+    /// The limit that was passed, in bytes or in number.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub limit: Option<u64>,
+}
+
+impl Problem {
+    /// What every problem type begins with.
+    pub const TYPE_PREFIX: &'static str = "urn:cager:problem:";
+
+    /// The last word of the type.
+    pub fn word(&self) -> &str {
+        self.kind.strip_prefix(Self::TYPE_PREFIX).unwrap_or(&self.kind)
+    }
+}
