@@ -1,7 +1,7 @@
 //! Positions from cages, and how far they are from a capture: `P = Φ·C` in single precision.
 
 use crate::dense;
-use crate::inversion::BATCH;
+use crate::inversion::product_columns;
 use crate::mesh::Point;
 use crate::simd::multiversion;
 use faer::{Mat, MatRef};
@@ -13,8 +13,9 @@ const BLOCK_ROWS: usize = 1024;
 /// Turns cages into positions of the model's points.
 #[derive(Clone, Debug)]
 pub struct Decoder {
-    /// `Φ`, n × m, column-major.
+    /// `Φ`, n × m, column-major; zero rows follow up to a whole tile.
     phi: Mat<f32>,
+    points: usize,
     /// Unknowns that are positions and follow a translation; the others are directions.
     positions: usize,
 }
@@ -35,18 +36,19 @@ pub struct FrameError {
 impl Decoder {
     /// Takes coordinates n × m whose first `positions` unknowns are positions.
     pub fn new(phi: MatRef<'_, f64>, positions: usize) -> Self {
-        let mut single = Mat::zeros(phi.nrows(), phi.ncols());
+        let points = phi.nrows();
+        let mut single = Mat::zeros(points.next_multiple_of(dense::WHOLE_ROWS), phi.ncols());
         single.as_mut().par_col_chunks_mut(1).enumerate().for_each(|(j, mut column)| {
             for (s, &x) in column.as_mut().col_mut(0).iter_mut().zip(phi.col(j).iter()) {
                 *s = x as f32;
             }
         });
-        Self { phi: single, positions }
+        Self { phi: single, points, positions }
     }
 
     /// Number of points n.
     pub fn points(&self) -> usize {
-        self.phi.nrows()
+        self.points
     }
 
     /// Number of unknowns m.
@@ -56,10 +58,10 @@ impl Decoder {
 
     /// `Φ` in single precision, n × m, column-major.
     pub fn coordinates(&self) -> MatRef<'_, f32> {
-        self.phi.as_ref()
+        self.phi.as_ref().subrows(0, self.points)
     }
 
-    /// Positions of up to [`BATCH`] frames, each n × 3 interleaved, from their cages, each m × 3 interleaved.
+    /// Positions of up to [`BATCH`](crate::inversion::BATCH) frames, each n × 3 interleaved, from their cages, each m × 3 interleaved.
     ///
     /// The bits of a frame depend on its cage alone, not on the other frames of the batch.
     ///
@@ -81,7 +83,7 @@ impl Decoder {
             }
         }
         parts.par_iter_mut().enumerate().for_each_init(
-            || Mat::zeros(BLOCK_ROWS, 3 * BATCH),
+            || Mat::zeros(BLOCK_ROWS, columns.ncols()),
             |product, (block, parts)| {
                 let product = self.block_product(block, columns.as_ref(), product);
                 for (f, part) in parts.iter_mut().enumerate() {
@@ -96,7 +98,7 @@ impl Decoder {
         );
     }
 
-    /// Errors of up to [`BATCH`] frames: what [`Self::decode`] gives for these cages against the capture's own positions.
+    /// Errors of up to [`BATCH`](crate::inversion::BATCH) frames: what [`Self::decode`] gives for these cages against the capture's own positions.
     ///
     /// # Panics
     /// Where the lengths do not fit.
@@ -108,7 +110,7 @@ impl Decoder {
         let blocks: Vec<Vec<Sums>> = (0..n.div_ceil(BLOCK_ROWS))
             .into_par_iter()
             .map_init(
-                || Mat::zeros(BLOCK_ROWS, 3 * BATCH),
+                || Mat::zeros(BLOCK_ROWS, columns.ncols()),
                 |product, block| {
                     let product = self.block_product(block, columns.as_ref(), product);
                     (0..frames.len())
@@ -123,12 +125,11 @@ impl Decoder {
         (0..frames.len()).map(|f| Sums::total(blocks.iter().map(|b| &b[f])).into_error(n)).collect()
     }
 
-    /// Cages side by side, m × 3·BATCH, each about its own centre, which keeps the digits of a capture that travels.
+    /// Cages side by side, m × 3 for each and padding, each about its own centre, which keeps the digits of a capture that travels.
     fn columns(&self, cages: &[&[f32]]) -> (Mat<f32>, Vec<Point>) {
         let m = self.unknowns();
-        assert!(cages.len() <= BATCH, "at most {BATCH} frames in a batch");
         assert!(cages.iter().all(|c| c.len() == 3 * m), "every cage has every unknown");
-        let mut columns = Mat::zeros(m, 3 * BATCH);
+        let mut columns = Mat::zeros(m, product_columns(cages.len()));
         let mut centres = Vec::with_capacity(cages.len());
         for (f, cage) in cages.iter().enumerate() {
             let mut centre = [0.0; 3];
@@ -151,8 +152,9 @@ impl Decoder {
 
     fn block_product<'a>(&self, block: usize, columns: MatRef<'_, f32>, product: &'a mut Mat<f32>) -> MatRef<'a, f32> {
         let first = block * BLOCK_ROWS;
-        let rows = BLOCK_ROWS.min(self.points() - first);
-        dense::multiply(product.as_mut().subrows_mut(0, rows), self.phi.as_ref().subrows(first, rows), columns);
+        let rows = BLOCK_ROWS.min(self.points - first);
+        let whole = rows.next_multiple_of(dense::WHOLE_ROWS);
+        dense::multiply(product.as_mut().subrows_mut(0, whole), self.phi.as_ref().subrows(first, whole), columns);
         product.as_ref().subrows(0, rows)
     }
 }

@@ -184,3 +184,49 @@ pub(crate) fn multiply<T: faer::traits::ComplexField>(out: MatMut<'_, T>, a: Mat
 pub(crate) fn rows_of(a: MatRef<'_, f64>, rows: &[u32]) -> Mat<f64> {
     Mat::from_fn(rows.len(), a.ncols(), |i, j| a[(rows[i] as usize, j)])
 }
+
+/// Rows of a product whose bits must not depend on its width are a multiple of this: kernels sum in another order at the
+/// edges of small matrices.
+pub(crate) const WHOLE_ROWS: usize = 16;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn noise(rows: usize, columns: usize) -> Mat<f64> {
+        let mut state = 0x9e37_79b9_7f4a_7c15u64;
+        Mat::from_fn(rows, columns, |_, _| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) as f64 / (1u64 << 30) as f64 - 1.0
+        })
+    }
+
+    #[test]
+    fn products_have_the_same_bits_at_every_width_of_a_batch() {
+        use crate::inversion::{BATCH, product_columns};
+        for unknowns in [4, 7, 37, 130, 332, 700, 1500] {
+            for rows in [1, 2, 3, 5, 9, 21, 64].map(|tiles| tiles * WHOLE_ROWS) {
+                let (a, b) = (noise(rows, unknowns), noise(unknowns, 3 * BATCH));
+                let single = |m: &Mat<f64>| Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] as f32);
+                let (a32, b32, at) = (single(&a), single(&b), a.transpose().to_owned());
+                let whole = product(at.transpose(), b.as_ref());
+                let mut whole32 = Mat::zeros(rows, 3 * BATCH);
+                multiply(whole32.as_mut(), a32.as_ref(), b32.as_ref());
+                for frames in 1..BATCH {
+                    let width = product_columns(frames);
+                    let part = product(at.transpose(), b.as_ref().subcols(0, width));
+                    let mut part32 = Mat::zeros(rows, width);
+                    multiply(part32.as_mut(), a32.as_ref(), b32.as_ref().subcols(0, width));
+                    for (i, j) in (0..rows).flat_map(|i| (0..width).map(move |j| (i, j))) {
+                        assert_eq!(part[(i, j)].to_bits(), whole[(i, j)].to_bits(), "{rows} × {unknowns} × {width}");
+                        assert_eq!(
+                            part32[(i, j)].to_bits(),
+                            whole32[(i, j)].to_bits(),
+                            "{rows} × {unknowns} × {width}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}

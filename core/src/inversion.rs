@@ -12,7 +12,7 @@ use faer::{Accum, Mat, MatRef, Par};
 use rayon::prelude::*;
 use std::time::Instant;
 
-/// Frames of one matrix product. Shorter batches are padded, so that a frame's bits never depend on its company.
+/// Most frames of one matrix product.
 pub const BATCH: usize = 16;
 /// Beyond this affine reproduction error, over the diagonal, coordinates are of no use.
 const NOT_REPRODUCED: f64 = 1e-6;
@@ -165,7 +165,7 @@ pub struct Preparation {
 pub struct Solver {
     handles: Vec<u32>,
     reads_all: bool,
-    /// `Rᵀ`, K × m, column-major: one row per point read.
+    /// `Rᵀ`, K × m, column-major: one row per point read; zero columns follow up to a whole tile.
     operator: Mat<f64>,
     decoder: Decoder,
     diagonal: f64,
@@ -228,7 +228,7 @@ impl Solver {
         preparation.condition_handles = spectra.handles.sigma[0] / spectra.handles.sigma[rank - 1];
         preparation.condition_full = spectra.full_sigma[0] / spectra.full_sigma[rank - 1];
         let operator = operator(phi, &basis, spectra, cage_laplacian(cage).as_ref(), options, &mut preparation)?;
-        let operator = keep_translations(operator, cage.vertices().len());
+        let operator = with_whole_tiles(keep_translations(operator, cage.vertices().len()));
         preparation.svd_seconds = clock.elapsed().as_secs_f64();
 
         let clock = Instant::now();
@@ -270,6 +270,11 @@ impl Solver {
         4 * phi.nrows() * phi.ncols() + 8 * self.operator.nrows() * self.operator.ncols() + 4 * self.handles.len()
     }
 
+    /// Whether a frame's handle rows are all that [`Self::invert`] reads of it.
+    pub fn reads_handles_only(&self) -> bool {
+        !self.reads_all
+    }
+
     /// Cages, each m × 3 interleaved, of up to [`BATCH`] frames, each n × 3 interleaved.
     ///
     /// The bits of a cage depend on its frame alone, not on the other frames of the batch.
@@ -277,17 +282,32 @@ impl Solver {
     /// # Panics
     /// Where a frame's length does not fit, or more frames come than a batch holds.
     pub fn invert<T: Copy + Into<f64>>(&self, frames: &[&[T]]) -> Vec<Vec<f32>> {
-        assert!(frames.len() <= BATCH, "at most {BATCH} frames in a batch");
         assert!(frames.iter().all(|f| f.len() == 3 * self.decoder.points()), "every frame has every point");
-        let (columns, m) = self.operator.shape();
-        let mut cages = Mat::<f64>::zeros(m, 3 * BATCH);
-        let mut block = Mat::<f64>::zeros(BLOCK_ROWS.min(columns), 3 * BATCH);
+        self.solve(frames, |row| if self.reads_all { row } else { self.handles[row] as usize })
+    }
+
+    /// As [`Self::invert`] of frames of which only the rows of [`Self::handles`] are there, K × 3 interleaved: the same bits.
+    ///
+    /// # Panics
+    /// As [`Self::invert`], and where the solver reads every point.
+    pub fn invert_handles<T: Copy + Into<f64>>(&self, frames: &[&[T]]) -> Vec<Vec<f32>> {
+        assert!(self.reads_handles_only(), "handles are not enough for least squares over all points");
+        assert!(frames.iter().all(|f| f.len() == 3 * self.handles.len()), "every frame has every handle");
+        self.solve(frames, |row| row)
+    }
+
+    fn solve<T: Copy + Into<f64>>(&self, frames: &[&[T]], point_of_row: impl Fn(usize) -> usize) -> Vec<Vec<f32>> {
+        let (columns, padded) = self.operator.shape();
+        let m = self.decoder.unknowns();
+        let width = product_columns(frames.len());
+        let mut cages = Mat::<f64>::zeros(padded, width);
+        let mut block = Mat::<f64>::zeros(BLOCK_ROWS.min(columns), width);
         let mut first = 0;
         while first < columns {
             let rows = BLOCK_ROWS.min(columns - first);
             for (f, frame) in frames.iter().enumerate() {
                 for i in 0..rows {
-                    let point = if self.reads_all { first + i } else { self.handles[first + i] as usize };
+                    let point = point_of_row(first + i);
                     for k in 0..3 {
                         block[(i, 3 * f + k)] = frame[3 * point + k].into();
                     }
@@ -307,6 +327,18 @@ impl Solver {
             .map(|f| (0..m).flat_map(|j| [0, 1, 2].map(|k| cages[(j, 3 * f + k)] as f32)).collect())
             .collect()
     }
+}
+
+/// Columns of the product of a batch of frames.
+///
+/// Few frames cost less in a narrow product. Widths are whole tiles of the kernels, which sum over the unknowns in the same
+/// order in each: a test holds them to it.
+///
+/// # Panics
+/// Where more frames come than a batch holds.
+pub(crate) fn product_columns(frames: usize) -> usize {
+    assert!(frames <= BATCH, "at most {BATCH} frames in a batch");
+    3 * [BATCH / 4, BATCH / 2].into_iter().find(|&width| frames <= width).unwrap_or(BATCH)
 }
 
 fn check(points: &[Point], unknowns: usize, options: SolverOptions) -> Result<(), PrepareError> {
@@ -411,6 +443,12 @@ fn keep_translations(mut operator: Mat<f64>, positions: usize) -> Mat<f64> {
             *x += share;
         }
     }
+    operator
+}
+
+/// Zero columns up to a whole tile, see [`product_columns`].
+fn with_whole_tiles(mut operator: Mat<f64>) -> Mat<f64> {
+    operator.resize_with(operator.nrows(), operator.ncols().next_multiple_of(dense::WHOLE_ROWS), |_, _| 0.0);
     operator
 }
 

@@ -122,6 +122,21 @@ fn a_frame_has_the_same_bits_alone_in_any_place_of_a_batch_and_with_any_threads(
 }
 
 #[test]
+fn the_handle_rows_of_a_frame_give_the_same_cage_as_the_whole_frame() {
+    let (capture, cage) = capture();
+    let solver = prepare(&capture, &cage, SolverOptions::default());
+    assert!(solver.reads_handles_only());
+    let whole: Vec<Vec<f64>> = (0..5).map(|t| frame(&capture, t)).collect();
+    let rows = |f: &Vec<f64>| -> Vec<f64> {
+        solver.handles().iter().flat_map(|&i| f[3 * i as usize..][..3].to_vec()).collect()
+    };
+    let parts: Vec<Vec<f64>> = whole.iter().map(rows).collect();
+    let from_whole = solver.invert(&whole.iter().map(Vec::as_slice).collect::<Vec<_>>());
+    let from_rows = solver.invert_handles(&parts.iter().map(Vec::as_slice).collect::<Vec<_>>());
+    assert_eq!(from_whole, from_rows);
+}
+
+#[test]
 fn every_method_follows_a_translation_exactly() {
     let (capture, cage) = capture();
     for regularizer in Regularizer::ALL {
