@@ -1,5 +1,6 @@
 //! The `cager` program: the command line over the crates that do the work.
 
+pub mod capture;
 pub mod cli;
 mod coordinates;
 pub mod decode;

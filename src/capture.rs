@@ -1,0 +1,245 @@
+//! From solved frames to a container and its report: what `encode` and the service share, so that both write the same bytes.
+
+use crate::report::{Bytes, Condition, Errors, FrameError, MaxVol, Report, Seconds};
+use cager_core::cage::Cage;
+use cager_core::coordinates::CoordinateSystem;
+use cager_core::inversion::{Solver, SolverOptions};
+use cager_core::mesh::Model;
+use cager_core::regularize::{Regularizer, WEAK};
+use cager_proto::container::{self, ContainerWriter, Header, Summary};
+use std::io::Write;
+
+/// What an encoding is made with, besides its frames.
+#[derive(Clone, Copy)]
+pub struct Encoding<'a> {
+    /// Model in its rest pose.
+    pub rest: &'a Model,
+    /// Checked cage around it.
+    pub cage: &'a Cage,
+    /// Coordinate system.
+    pub system: &'a dyn CoordinateSystem,
+    /// Solver options.
+    pub options: SolverOptions,
+    /// Solver prepared with all of these.
+    pub solver: &'a Solver,
+    /// Frames per second, where known.
+    pub frame_rate: Option<f64>,
+}
+
+/// Errors of a frame as they are stored, with the sums that the error of the whole capture needs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StoredError {
+    /// `sqrt(mean |e|²)` over the rest diagonal; NaN if not measured.
+    pub l2: f32,
+    /// `max |e|` over the rest diagonal; NaN if not measured.
+    pub linf: f32,
+    /// `Σ |e|²` in the capture's unit.
+    pub squared: f64,
+    /// `Σ |p − p̄|²` of the frame about its own centroid.
+    pub spread: f64,
+}
+
+impl StoredError {
+    /// Of a frame whose other points than the handles are not known.
+    pub const NOT_MEASURED: Self = Self { l2: f32::NAN, linf: f32::NAN, squared: f64::NAN, spread: f64::NAN };
+
+    /// Of a measured frame.
+    pub fn new(error: &cager_core::decode::FrameError, diagonal: f64) -> Self {
+        let stored = |x: f64| (x / diagonal) as f32;
+        Self { l2: stored(error.l2), linf: stored(error.linf), squared: error.squared, spread: error.spread }
+    }
+}
+
+/// Writes the container of a capture, frame by frame.
+pub struct CaptureWriter<W: Write> {
+    writer: ContainerWriter<W>,
+    report: Report,
+    squared: f64,
+    spread: f64,
+    diagonal: f64,
+    /// Frame whose cage lies farthest from the origin, and how far.
+    farthest: (usize, f64),
+}
+
+impl<W: Write> CaptureWriter<W> {
+    /// Writes what comes before the frames.
+    ///
+    /// # Errors
+    /// An output that refuses; sizes beyond the format.
+    pub fn new(out: W, encoding: &Encoding<'_>) -> Result<Self, container::Error> {
+        let writer = ContainerWriter::new(out, &header(encoding), encoding.rest, encoding.cage.mesh())?;
+        let report = begin_report(encoding);
+        let diagonal = encoding.solver.diagonal();
+        Ok(Self { writer, report, squared: 0.0, spread: 0.0, diagonal, farthest: (0, 0.0) })
+    }
+
+    /// Adds the next frame: its cage, m × 3, and its error.
+    ///
+    /// # Errors
+    /// An output that refuses.
+    pub fn write_frame(&mut self, cage: &[f32], error: &StoredError) -> Result<(), container::Error> {
+        let extent = f64::from(cage.iter().fold(0.0f32, |far, x| far.max(x.abs())));
+        if extent > self.farthest.1 {
+            self.farthest = (self.report.frames, extent);
+        }
+        self.squared += error.squared;
+        self.spread += error.spread;
+        self.report.error.per_frame.push(FrameError { l2: f64::from(error.l2), linf: f64::from(error.linf) });
+        self.report.frames += 1;
+        self.writer.write_frame(cage, error.l2, error.linf)
+    }
+
+    /// Writes what comes after the frames. The sizes and times of the report are left to the caller.
+    ///
+    /// # Errors
+    /// An output that refuses.
+    pub fn finish(mut self) -> Result<(W, Report), container::Error> {
+        self.report.warnings.extend(far_away(self.farthest.0, self.farthest.1 / self.diagonal));
+        let frames = &self.report.error.per_frame;
+        let mean = |f: fn(&FrameError) -> f64| frames.iter().map(f).sum::<f64>() / frames.len().max(1) as f64;
+        let max =
+            |f: fn(&FrameError) -> f64| frames.iter().map(f).fold(0.0, |a, b| if b > a || b.is_nan() { b } else { a });
+        let kg_percent = if self.spread == 0.0 { 0.0 } else { 100.0 * (self.squared / self.spread).sqrt() };
+        let (l2_mean, l2_max, linf_mean, linf_max) = (mean(|e| e.l2), max(|e| e.l2), mean(|e| e.linf), max(|e| e.linf));
+        let error = &mut self.report.error;
+        (error.l2_mean, error.l2_max, error.linf_mean, error.linf_max) = (l2_mean, l2_max, linf_mean, linf_max);
+        error.kg_percent = kg_percent;
+        self.report.bytes.capture =
+            self.report.bytes.capture * 4 + 12 * (self.report.points as u64) * (self.report.frames as u64);
+        let summary = summary(&self.report);
+        Ok((self.writer.finish(Some(&summary))?, self.report))
+    }
+}
+
+fn begin_report(encoding: &Encoding<'_>) -> Report {
+    let solver = encoding.solver;
+    let found = solver.preparation();
+    Report {
+        points: encoding.rest.points.len(),
+        triangles: encoding.rest.faces.arities().iter().map(|&a| (a as usize).saturating_sub(2)).sum(),
+        frames: 0,
+        unknowns: solver.decoder().unknowns(),
+        cage_vertices: encoding.cage.vertices().len(),
+        cage_faces: encoding.cage.faces().len(),
+        coordinates: encoding.system.name().to_owned(),
+        handles: encoding.options.handles.name().to_owned(),
+        regularizer: encoding.options.regularizer.name().to_owned(),
+        spectrum: encoding.options.spectrum,
+        lambda: encoding.options.lambda,
+        affine_reproduction_error: found.affine_reproduction_error,
+        condition_number: Condition { full: found.condition_full, handles: found.condition_handles },
+        rank: found.rank,
+        singular_values: found.singular_values.clone(),
+        maxvol: MaxVol { swaps: found.swaps, log_volume: found.log_volume, max_entry: found.max_entry },
+        handle_indices: solver.handles().to_vec(),
+        error: Errors {
+            l2_mean: 0.0,
+            l2_max: 0.0,
+            linf_mean: 0.0,
+            linf_max: 0.0,
+            kg_percent: 0.0,
+            per_frame: Vec::new(),
+        },
+        bytes: Bytes {
+            capture: encoding.rest.faces.indices().len() as u64,
+            output: 0,
+            ratio: 0.0,
+            bits_per_vertex_per_frame: 0.0,
+        },
+        seconds: Seconds::default(),
+        warnings: preparation_warnings(encoding.options, solver),
+    }
+}
+
+/// What a user should know after the preparation.
+pub fn preparation_warnings(options: SolverOptions, solver: &Solver) -> Vec<String> {
+    let found = solver.preparation();
+    let unknowns = solver.decoder().unknowns();
+    let mut warnings = Vec::new();
+    if !found.outside.is_empty() {
+        warnings.push(format!(
+            "{} of {} points lie outside the cage, by up to {:.2} % of the rest diagonal; mean value coordinates are defined there too, but an enlarged cage usually gives lower errors",
+            found.outside.len(),
+            solver.decoder().points(),
+            100.0 * found.outside_distance
+        ));
+    }
+    let strong = found.singular_values.iter().filter(|&&s| s >= WEAK * found.singular_values[0]).count();
+    let weak = unknowns - strong;
+    if weak > 0 {
+        let consequence = match options.regularizer {
+            Regularizer::Laplacian | Regularizer::Global if options.lambda > 0.0 => {
+                "the cage's Laplacian takes care".to_owned()
+            }
+            Regularizer::Tikhonov => "all are damped".to_owned(),
+            Regularizer::TruncatedSvd if options.spectrum >= weak => "all are dropped".to_owned(),
+            _ => format!(
+                "they follow the rounding of the data, so expect spikes, or use --regularizer laplacian --spectrum {weak}"
+            ),
+        };
+        warnings.push(format!(
+            "the points determine only {strong} of the {unknowns} unknowns of the cage; of the {weak} others, {consequence}"
+        ));
+    }
+    if found.affine_reproduction_error > 1e-10 {
+        warnings.push(format!(
+            "the coordinates reproduce the rest pose to {:.1e} of its diagonal only, as happens far outside a cage or in one much thinner than wide; check that both files belong together",
+            found.affine_reproduction_error
+        ));
+    }
+    warnings
+}
+
+/// Cages are stored as positions in single precision; far from the origin little of it is left for the shape.
+fn far_away(frame: usize, diagonals: f64) -> Option<String> {
+    const LOST: f64 = 100.0;
+    (diagonals > LOST).then(|| {
+        format!(
+            "the cage of frame {frame} lies {diagonals:.0} diagonals from the origin, where single precision resolves {:.1e} of the diagonal; move the capture closer to the origin",
+            diagonals * f64::from(f32::EPSILON) / 2.0
+        )
+    })
+}
+
+fn header(encoding: &Encoding<'_>) -> Header {
+    Header {
+        solver_version: cager_core::SOLVER_VERSION,
+        coordinates: encoding.system.name().to_owned(),
+        handles: encoding.options.handles.name().to_owned(),
+        regularizer: encoding.options.regularizer.name().to_owned(),
+        spectrum: encoding.options.spectrum as u32,
+        lambda: encoding.options.lambda,
+        rows_per_frame: encoding.solver.decoder().unknowns() as u32,
+        frame_rate: encoding.frame_rate,
+        ..Header::default()
+    }
+}
+
+fn summary(report: &Report) -> Summary {
+    Summary {
+        generator: concat!("cager ", env!("CARGO_PKG_VERSION")).to_owned(),
+        triangles: report.triangles as u64,
+        affine_reproduction_error: report.affine_reproduction_error,
+        condition_number: container::ConditionNumber {
+            full: report.condition_number.full,
+            handles: report.condition_number.handles,
+        },
+        rank: report.rank as u64,
+        singular_values: report.singular_values.clone(),
+        maxvol: container::MaxVolSummary {
+            swaps: report.maxvol.swaps as u64,
+            log_volume: report.maxvol.log_volume,
+            max_entry: report.maxvol.max_entry,
+        },
+        handle_indices: report.handle_indices.clone(),
+        error: container::ErrorSummary {
+            l2_mean: report.error.l2_mean,
+            l2_max: report.error.l2_max,
+            linf_mean: report.error.linf_mean,
+            linf_max: report.error.linf_max,
+            kg_percent: report.error.kg_percent,
+        },
+        capture_bytes: report.bytes.capture,
+        warnings: report.warnings.clone(),
+    }
+}
