@@ -5,5 +5,6 @@ pub mod cli;
 mod coordinates;
 pub mod decode;
 pub mod encode;
+pub mod engine;
 mod plot;
 pub mod report;
