@@ -1,0 +1,152 @@
+//! Writing solved frames: what waits for a session is written together and synced once, then its uploads hear of it.
+
+use super::Session;
+use super::frames::Digests;
+use crate::capture::StoredError;
+use crate::problem::{self, ApiError};
+use crate::store::{FrameLog, LogRecord, StoreError};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// A solved frame that is not on disk yet.
+pub(crate) struct Solved {
+    pub(crate) frame: u32,
+    pub(crate) digests: Digests,
+    pub(crate) error: StoredError,
+    pub(crate) cage: Vec<f32>,
+}
+
+/// What waits to be written, and whether a thread is at it.
+#[derive(Default)]
+pub(crate) struct Waiting {
+    solved: Vec<Solved>,
+    busy: bool,
+}
+
+impl Waiting {
+    /// Whether something is being written or will be.
+    pub(crate) fn is_busy(&self) -> bool {
+        self.busy
+    }
+}
+
+/// Threads that write and sync.
+#[derive(Clone)]
+pub(crate) struct Committer {
+    sessions: Sender<Arc<Session>>,
+}
+
+impl Committer {
+    /// Starts `threads` of them. They end when the last clone is dropped.
+    pub(crate) fn start(threads: usize) -> std::io::Result<Self> {
+        let (sessions, queue) = channel();
+        let queue = Arc::new(Mutex::new(queue));
+        for k in 0..threads {
+            let queue = Arc::clone(&queue);
+            std::thread::Builder::new().name(format!("commit-{k}")).spawn(move || run(&queue))?;
+        }
+        Ok(Self { sessions })
+    }
+}
+
+fn run(queue: &Mutex<Receiver<Arc<Session>>>) {
+    loop {
+        let next = queue.lock().unwrap_or_else(PoisonError::into_inner).recv();
+        let Ok(session) = next else { return };
+        let solved = std::mem::take(&mut super::lock(&session.waiting).solved);
+        session.write(&solved);
+        let mut waiting = super::lock(&session.waiting);
+        waiting.busy = !waiting.solved.is_empty();
+        if waiting.busy {
+            drop(waiting);
+            session.enqueue();
+        }
+    }
+}
+
+impl Session {
+    /// Takes over solved frames, to be written soon.
+    pub(crate) fn commit(self: &Arc<Self>, solved: Vec<Solved>) {
+        if solved.is_empty() {
+            return;
+        }
+        let mut waiting = super::lock(&self.waiting);
+        waiting.solved.extend(solved);
+        if !waiting.busy {
+            waiting.busy = true;
+            drop(waiting);
+            self.enqueue();
+        }
+    }
+
+    fn enqueue(self: &Arc<Self>) {
+        // The threads live as long as any session.
+        let _ = self.committer.sessions.send(Arc::clone(self));
+    }
+
+    /// Writes frames, syncs them and tells their uploads.
+    fn write(&self, solved: &[Solved]) {
+        let records: Vec<LogRecord<'_>> = solved
+            .iter()
+            .map(|s| LogRecord {
+                frame: s.frame,
+                l2: s.error.l2,
+                linf: s.error.linf,
+                squared: s.error.squared,
+                spread: s.error.spread,
+                handle_digest: s.digests.handles,
+                full_digest: s.digests.full,
+                cage: &s.cage,
+            })
+            .collect();
+        let mut log = super::lock(&self.log);
+        let outcome = self.open_log(&mut log).and_then(|log| log.append(&records));
+        if outcome.is_err() {
+            // Whether it can go on is found out by opening it again.
+            *log = None;
+        }
+        drop(log);
+        match outcome {
+            Ok(entries) => {
+                let measured = solved.iter().filter(|s| s.digests.full.is_some()).count();
+                metrics::counter!("cager_frames_total", "tenant" => self.meta.tenant.clone(), "rows" => "all")
+                    .increment(measured as u64);
+                metrics::counter!("cager_frames_total", "tenant" => self.meta.tenant.clone(), "rows" => "handles")
+                    .increment((solved.len() - measured) as u64);
+                for entry in entries {
+                    let uploads = self.frames().solved(entry);
+                    uploads.iter().for_each(|upload| upload.answer(entry.frame));
+                }
+            }
+            Err(error) => {
+                tracing::error!(session = %self.meta.id, %error, "frames could not be written");
+                let error = storage_error(&error);
+                for s in solved {
+                    let uploads = self.frames().gave_up(s.frame);
+                    uploads.iter().for_each(|upload| upload.fail(error.clone().frame(s.frame)));
+                }
+            }
+        }
+        self.touch();
+    }
+
+    /// The log, opened if it is not. What it holds that is not known yet becomes known.
+    fn open_log<'a>(&self, log: &'a mut Option<FrameLog>) -> Result<&'a mut FrameLog, StoreError> {
+        if log.is_none() {
+            *log = Some(self.load_log()?);
+        }
+        Ok(log.as_mut().expect("it was just opened"))
+    }
+}
+
+/// What a client hears when the store refuses.
+pub(crate) fn storage_error(error: &StoreError) -> ApiError {
+    match error {
+        StoreError::Full { .. } => ApiError::new(
+            problem::STORAGE_FULL,
+            "the service's disk is full; nothing that was answered is lost, so try again when the operator has made room",
+        )
+        .retry_after(60),
+        other => ApiError::internal(other),
+    }
+}

@@ -1,0 +1,121 @@
+//! Completing a session: its container is written once and never changes.
+
+use super::create::blocking;
+use super::prepare::{self, Choices};
+use super::prepared::Prepared;
+use super::{Phase, Session};
+use crate::capture::{CaptureWriter, Encoding, StoredError};
+use crate::problem::{self, ApiError};
+use crate::service::Service;
+use crate::store::{Completion, LogEntry, StoreError};
+use cager_proto::container;
+use std::io::{self, BufWriter, Write};
+use std::sync::Arc;
+
+/// Frames read from the log at a time.
+const READ_FRAMES: usize = 64;
+
+impl Service {
+    /// Says that a session has `frames` frames, and writes its container. Once begun, it goes on where the client gives up.
+    pub(crate) async fn complete(self: &Arc<Self>, session: &Arc<Session>, frames: u32) -> Result<(), ApiError> {
+        let (service, session) = (Arc::clone(self), Arc::clone(session));
+        let work = tokio::spawn(async move {
+            let _one = session.completing.lock().await;
+            service.complete_alone(&session, frames).await
+        });
+        work.await.map_err(|error| ApiError::internal(&error))?
+    }
+
+    async fn complete_alone(self: &Arc<Self>, session: &Arc<Session>, frames: u32) -> Result<(), ApiError> {
+        match session.status().phase {
+            Phase::Completed(completion) if completion.frames == frames => return Ok(()),
+            Phase::Completed(completion) => {
+                let detail = format!("the session was completed with {} frames, not {frames}", completion.frames);
+                return Err(ApiError::new(problem::SESSION_COMPLETED, detail));
+            }
+            Phase::Failed(problem) => {
+                return Err(ApiError::new(problem::SESSION_FAILED, problem.detail));
+            }
+            Phase::Preparing => {
+                let detail = "the session is still being prepared and has no frames";
+                return Err(ApiError::new(problem::NOT_READY, detail).retry_after(1));
+            }
+            Phase::Ready => {}
+        }
+        if frames == 0 {
+            return Err(ApiError::new(problem::INVALID_OPTIONS, "frames: a capture has at least one frame"));
+        }
+        let entries: Vec<LogEntry> = {
+            let known = session.frames();
+            let missing = known.missing(Some(frames));
+            if !missing.is_empty() {
+                let count: u64 = missing.iter().map(|[a, b]| u64::from(b - a)).sum();
+                let detail = format!("{count} of {frames} frames are missing; post them, then complete the session");
+                return Err(ApiError::new(problem::FRAMES_MISSING, detail).missing(missing));
+            }
+            if let Some(highest) = known.highest().filter(|&highest| highest >= frames) {
+                let detail = format!("frame {highest} was posted, so the capture has more than {frames} frames");
+                return Err(ApiError::new(problem::FRAME_CONFLICT, detail).frame(highest));
+            }
+            known.entries().copied().collect()
+        };
+        let prepared = self.solver(session).await?;
+        let writing = Arc::clone(session);
+        let completion = blocking(move || write(&writing, &prepared, &entries, frames)).await??;
+        session.set_phase(Phase::Completed(completion));
+        Ok(())
+    }
+}
+
+fn write(
+    session: &Session,
+    prepared: &Prepared,
+    entries: &[LogEntry],
+    frames: u32,
+) -> Result<Completion, ApiError> {
+    let stored = |error: StoreError| super::commit::storage_error(&error);
+    let choices = Choices::of(&session.meta.options)?;
+    let content = session.store.content(&session.meta.key).map_err(stored)?;
+    let content = content.ok_or_else(|| ApiError::internal(&"the rest pose of a session is gone"))?;
+    let geometry = prepare::read(&content, &choices)?;
+    let encoding = Encoding {
+        rest: &geometry.rest,
+        cage: &geometry.cage,
+        system: choices.system,
+        options: prepared.options,
+        solver: &prepared.solver,
+        frame_rate: session.meta.options.frame_rate,
+    };
+    let mut write = |out: &mut dyn Write| write_frames(session, &encoding, entries, out);
+    let written = session.store.write_container(&session.meta.id, &mut write).map_err(stored)?;
+    let completion = Completion { frames, container_bytes: written.bytes, container_digest: written.digest };
+    session.store.complete(&session.meta.id, &completion).map_err(stored)?;
+    Ok(completion)
+}
+
+fn write_frames(
+    session: &Session,
+    encoding: &Encoding<'_>,
+    entries: &[LogEntry],
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let plain = |error: container::Error| match error {
+        container::Error::Io(error) => error,
+        other => io::Error::other(other.to_string()),
+    };
+    let mut writer = CaptureWriter::new(BufWriter::with_capacity(1 << 20, out), encoding).map_err(plain)?;
+    let row_bytes = 12 * encoding.solver.decoder().unknowns();
+    let (mut bytes, mut cage) = (Vec::new(), Vec::new());
+    for entries in entries.chunks(READ_FRAMES) {
+        bytes.clear();
+        session.read_cages(entries, &mut bytes)?;
+        for (entry, bytes) in entries.iter().zip(bytes.chunks_exact(row_bytes)) {
+            cage.clear();
+            cage.extend(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])));
+            let error =
+                StoredError { l2: entry.l2, linf: entry.linf, squared: entry.squared, spread: entry.spread };
+            writer.write_frame(&cage, &error).map_err(plain)?;
+        }
+    }
+    writer.finish().map_err(plain)?.0.flush()
+}

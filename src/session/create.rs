@@ -1,0 +1,256 @@
+//! Making, preparing and deleting sessions.
+
+use super::facts::{Facts, Outcome};
+use super::prepare::Choices;
+use super::prepared::{Got, Prepared};
+use super::registry::Repetition;
+use super::upload::{self, FrameJob};
+use super::{LiveLane, Phase, Session, Status};
+use crate::auth::Tenant;
+use crate::problem::{self, ApiError};
+use crate::service::Service;
+use crate::store::{Content, ContentKey, Idempotency, SessionMeta};
+use cager_proto::messages::{CacheUse, PreparationSeconds, SessionOptions};
+use std::sync::Arc;
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+/// A request to make a session.
+pub(crate) struct NewSession {
+    pub(crate) content: Content,
+    pub(crate) options: SessionOptions,
+    pub(crate) idempotency_key: Option<String>,
+}
+
+impl Service {
+    /// Makes a session and begins to prepare it. What comes back is on disk.
+    pub(crate) async fn create(self: &Arc<Self>, tenant: &Tenant, new: NewSession) -> Result<Arc<Session>, ApiError> {
+        let NewSession { content, options, idempotency_key } = new;
+        let choices = Choices::of(&options)?;
+        let (key, content) = {
+            let (tenant, options) = (tenant.name.clone(), options.clone());
+            blocking(move || (content_key(&tenant, &content, &options), content)).await?
+        };
+        let fingerprint = fingerprint(&key, &options);
+        let Some(idempotency_key) = idempotency_key else {
+            return self.create_new(tenant, key, content, options, choices, None).await;
+        };
+        match self.registry.begin(&tenant.name, &idempotency_key, &fingerprint)? {
+            Repetition::Done(session) => Ok(session),
+            Repetition::First => {
+                // Frees the key also where the client goes away in the middle.
+                let _free = GiveUp { service: self, tenant: &tenant.name, key: &idempotency_key };
+                let idempotency = Idempotency { key: idempotency_key.clone(), fingerprint };
+                self.create_new(tenant, key, content, options, choices, Some(idempotency)).await
+            }
+        }
+    }
+
+    async fn create_new(
+        self: &Arc<Self>,
+        tenant: &Tenant,
+        key: ContentKey,
+        content: Content,
+        options: SessionOptions,
+        choices: Choices,
+        idempotency: Option<Idempotency>,
+    ) -> Result<Arc<Session>, ApiError> {
+        self.check_quota(tenant, (content.rest.len() + content.cage.len()) as u64)?;
+        let at_hand = self.solvers.at_hand(&key);
+        let most = self.config.max_preparing + self.config.max_prepare_queue;
+        if at_hand.is_none() && self.solvers.in_flight() >= most {
+            self.rejected("prepare_queue");
+            let detail = format!("{most} sessions are being prepared or wait for it; try again later");
+            return Err(ApiError::new(problem::BUSY, detail).limit(most as u64).retry_after(5));
+        }
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let meta = SessionMeta {
+            id: uuid::Uuid::now_v7().simple().to_string(),
+            tenant: tenant.name.clone(),
+            created_ms: now.as_millis() as u64,
+            key,
+            options,
+            idempotency,
+        };
+        let status = match &at_hand {
+            Some(prepared) => {
+                let facts = Facts::new(prepared, CacheUse::Hit, PreparationSeconds::default());
+                Status { phase: Phase::Ready, facts: Some(facts) }
+            }
+            None => Status { phase: Phase::Preparing, facts: None },
+        };
+        let session = Arc::new(Session::new(meta, self.store.clone(), self.committer.clone(), status, true));
+        {
+            let _content = self.registry.content_lock(&key).await;
+            let (store, meta) = (self.store.clone(), session.meta.clone());
+            blocking(move || store.put_content(&key, &content).and_then(|()| store.create_session(&meta)))
+                .await?
+                .map_err(|error| super::commit::storage_error(&error))?;
+            self.registry.insert(Arc::clone(&session));
+        }
+        metrics::counter!("cager_sessions_created_total", "tenant" => tenant.name.clone()).increment(1);
+        match session.facts() {
+            // It would be found prepared after a restart as well; this only says it sooner.
+            Some(facts) => drop(self.keep_outcome(&session, Outcome::Ready(Box::new(facts)))),
+            None => drop(tokio::spawn(Arc::clone(self).prepare(Arc::clone(&session), choices))),
+        }
+        Ok(session)
+    }
+
+    /// Goes on with a session found on disk.
+    pub(crate) fn resume(self: &Arc<Self>, meta: SessionMeta) {
+        let id = meta.id.clone();
+        let outcome: Option<Outcome> = self.store.note(&id, OUTCOME).unwrap_or_else(|error| {
+            tracing::warn!(session = %id, %error, "what preparing found is unreadable, so it is done again");
+            None
+        });
+        let completion = self.store.completion(&id).unwrap_or_else(|error| {
+            tracing::warn!(session = %id, %error, "the mark of completion is unreadable, so the session has to be completed again");
+            None
+        });
+        let status = match (outcome, completion) {
+            (Some(Outcome::Ready(facts)), Some(completion)) => {
+                Status { phase: Phase::Completed(completion), facts: Some(*facts) }
+            }
+            (Some(Outcome::Ready(facts)), None) => Status { phase: Phase::Ready, facts: Some(*facts) },
+            (Some(Outcome::Failed(problem)), _) => Status { phase: Phase::Failed(problem), facts: None },
+            (None, _) => Status { phase: Phase::Preparing, facts: None },
+        };
+        let preparing = matches!(status.phase, Phase::Preparing);
+        let choices = Choices::of(&meta.options);
+        let session = Arc::new(Session::new(meta, self.store.clone(), self.committer.clone(), status, false));
+        self.registry.insert(Arc::clone(&session));
+        if preparing {
+            match choices {
+                Ok(choices) => drop(tokio::spawn(Arc::clone(self).prepare(session, choices))),
+                Err(error) => session.set_phase(Phase::Failed(error.problem)),
+            }
+        }
+    }
+
+    async fn prepare(self: Arc<Self>, session: Arc<Session>, choices: Choices) {
+        let clock = Instant::now();
+        let got = tokio::select! {
+            got = self.solvers.get(session.meta.key, choices) => got,
+            () = session.deleted().cancelled() => return,
+        };
+        match got {
+            Ok(Got { prepared, cache, mut seconds }) => {
+                seconds.total = clock.elapsed().as_secs_f64();
+                let facts = Facts::new(&prepared, cache, seconds);
+                self.keep_outcome(&session, Outcome::Ready(Box::new(facts.clone()))).await;
+                let completion = self.store.completion(&session.meta.id).ok().flatten();
+                let phase = completion.map_or(Phase::Ready, Phase::Completed);
+                session.set_status(Status { phase, facts: Some(facts) });
+            }
+            Err(error) => {
+                tracing::info!(session = %session.meta.id, detail = %error.problem.detail, "the session cannot be prepared");
+                // What may succeed another time is tried again after a restart.
+                if error.status().is_client_error() {
+                    self.keep_outcome(&session, Outcome::Failed(error.problem.clone())).await;
+                }
+                session.set_phase(Phase::Failed(error.problem));
+            }
+        }
+    }
+
+    fn keep_outcome(&self, session: &Session, outcome: Outcome) -> impl Future<Output = ()> + use<> {
+        let (store, id) = (self.store.clone(), session.meta.id.clone());
+        let done = tokio::task::spawn_blocking(move || {
+            if let Err(error) = store.put_note(&id, OUTCOME, &outcome) {
+                tracing::warn!(session = %id, %error, "what preparing found could not be kept; it is found again after a restart");
+            }
+        });
+        async move { drop(done.await) }
+    }
+
+    /// The solver of a session that is ready.
+    pub(crate) async fn solver(self: &Arc<Self>, session: &Session) -> Result<Arc<Prepared>, ApiError> {
+        let choices = Choices::of(&session.meta.options)?;
+        Ok(self.solvers.get(session.meta.key, choices).await?.prepared)
+    }
+
+    /// The lane that takes a session's frames to the engine.
+    pub(crate) fn lane(&self, session: &Arc<Session>, prepared: Arc<Prepared>, tenant: &Tenant) -> Arc<LiveLane> {
+        session.live_lane(|| {
+            let decoder = prepared.solver.decoder();
+            let cost = decoder.points() as f64 * decoder.unknowns() as f64;
+            let (weak, solver) = (Arc::downgrade(session), Arc::clone(&prepared));
+            let run = move |jobs: Vec<FrameJob>| {
+                if let Some(session) = weak.upgrade() {
+                    upload::solve(&session, &solver, jobs);
+                }
+            };
+            LiveLane::new(self.engine.lane(&tenant.name, tenant.priority.weight(), cost, run), prepared)
+        })
+    }
+
+    /// Deletes a session; what runs for it stops.
+    pub(crate) async fn delete(&self, session: &Arc<Session>) -> Result<(), ApiError> {
+        let (store, id, key) = (self.store.clone(), session.meta.id.clone(), session.meta.key);
+        let _content = self.registry.content_lock(&key).await;
+        let removed = id.clone();
+        blocking({
+            let store = store.clone();
+            move || store.delete_session(&removed)
+        })
+        .await?
+        .map_err(|error| super::commit::storage_error(&error))?;
+        self.registry.remove(&id);
+        session.mark_deleted();
+        if !self.registry.uses_content(&key) {
+            let gone = blocking(move || store.remove_content(&key)).await?;
+            if let Err(error) = gone {
+                tracing::warn!(session = %id, %error, "the content of a deleted session still takes space");
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Name of the note that holds the [`Outcome`].
+const OUTCOME: &str = "outcome";
+
+struct GiveUp<'a> {
+    service: &'a Service,
+    tenant: &'a str,
+    key: &'a str,
+}
+
+impl Drop for GiveUp<'_> {
+    fn drop(&mut self) {
+        self.service.registry.give_up(self.tenant, self.key);
+    }
+}
+
+/// Digest of all that a solver depends on. The tenant is part of it: what one tenant uploaded is never a hit for another.
+fn content_key(tenant: &str, content: &Content, options: &SessionOptions) -> ContentKey {
+    let mut hasher = blake3::Hasher::new();
+    let extension = |name: &str| name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
+    let solving = SessionOptions { name: None, frame_rate: None, ..options.clone() };
+    let solving = serde_json::to_vec(&solving).unwrap_or_default();
+    for part in [
+        format!("cager solver {}", cager_core::SOLVER_VERSION).as_bytes(),
+        tenant.as_bytes(),
+        extension(&content.rest_name).as_bytes(),
+        &content.rest,
+        extension(&content.cage_name).as_bytes(),
+        &content.cage,
+        &solving,
+    ] {
+        hasher.update(&(part.len() as u64).to_le_bytes());
+        hasher.update(part);
+    }
+    ContentKey(*hasher.finalize().as_bytes())
+}
+
+fn fingerprint(key: &ContentKey, options: &SessionOptions) -> String {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(&key.0);
+    hasher.update(&serde_json::to_vec(options).unwrap_or_default());
+    hasher.finalize().to_hex().to_string()
+}
+
+/// Runs what blocks away from the async threads.
+pub(crate) async fn blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, ApiError> {
+    tokio::task::spawn_blocking(work).await.map_err(|error| ApiError::internal(&error))
+}

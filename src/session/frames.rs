@@ -1,0 +1,206 @@
+//! Which frames of a session are there: solved and on disk, or being solved.
+
+use super::upload::Upload;
+use crate::store::LogEntry;
+use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
+
+/// What a frame's bytes were, to recognise it when it is posted again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Digests {
+    /// Of its handle rows.
+    pub(crate) handles: [u8; 16],
+    /// Of all its rows, where all were sent.
+    pub(crate) full: Option<[u8; 16]>,
+}
+
+impl Digests {
+    /// Whether both can be the same frame.
+    pub(crate) fn agree(&self, other: &Self) -> bool {
+        self.handles == other.handles
+            && match (self.full, other.full) {
+                (Some(a), Some(b)) => a == b,
+                _ => true,
+            }
+    }
+}
+
+/// A frame that is being solved or written, and who wants to know.
+struct Pending {
+    digests: Digests,
+    waiting: Vec<Arc<Upload>>,
+}
+
+/// What to do with a frame that arrived.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Claim {
+    /// Solve it.
+    Solve,
+    /// It is there already, the same.
+    Known,
+    /// The same is being solved; the upload hears of it.
+    Waiting,
+    /// It was there before, but different.
+    Conflict,
+}
+
+/// The frames of one session.
+#[derive(Default)]
+pub(crate) struct Frames {
+    solved: BTreeMap<u32, LogEntry>,
+    pending: HashMap<u32, Pending>,
+}
+
+impl Frames {
+    pub(crate) fn new(entries: Vec<LogEntry>) -> Self {
+        // Of a frame that is there twice, the first counts.
+        let mut solved = BTreeMap::new();
+        for entry in entries {
+            solved.entry(entry.frame).or_insert(entry);
+        }
+        Self { solved, pending: HashMap::new() }
+    }
+
+    /// Decides about a frame that arrived.
+    pub(crate) fn claim(&mut self, frame: u32, digests: Digests, upload: &Arc<Upload>) -> Claim {
+        if let Some(entry) = self.solved.get(&frame) {
+            let known = Digests { handles: entry.handle_digest, full: entry.full_digest };
+            return if known.agree(&digests) { Claim::Known } else { Claim::Conflict };
+        }
+        if let Some(pending) = self.pending.get_mut(&frame) {
+            if !pending.digests.agree(&digests) {
+                return Claim::Conflict;
+            }
+            pending.waiting.push(Arc::clone(upload));
+            return Claim::Waiting;
+        }
+        self.pending.insert(frame, Pending { digests, waiting: vec![Arc::clone(upload)] });
+        Claim::Solve
+    }
+
+    /// Enters a frame that is on disk; returns the uploads that wait for it.
+    pub(crate) fn solved(&mut self, entry: LogEntry) -> Vec<Arc<Upload>> {
+        self.solved.entry(entry.frame).or_insert(entry);
+        self.pending.remove(&entry.frame).map_or_else(Vec::new, |pending| pending.waiting)
+    }
+
+    /// Gives up a frame that could not be solved or written; returns the uploads that wait for it.
+    pub(crate) fn gave_up(&mut self, frame: u32) -> Vec<Arc<Upload>> {
+        self.pending.remove(&frame).map_or_else(Vec::new, |pending| pending.waiting)
+    }
+
+    /// The entry of a solved frame.
+    pub(crate) fn entry(&self, frame: u32) -> Option<&LogEntry> {
+        self.solved.get(&frame)
+    }
+
+    /// All solved frames, ascending.
+    pub(crate) fn entries(&self) -> impl ExactSizeIterator<Item = &LogEntry> {
+        self.solved.values()
+    }
+
+    /// Up to `most` entries of consecutive frames from `first` on.
+    pub(crate) fn run(&self, first: u32, most: usize) -> Vec<LogEntry> {
+        self.solved
+            .range(first..)
+            .zip(u64::from(first)..)
+            .take(most)
+            .take_while(|((frame, _), expected)| u64::from(**frame) == *expected)
+            .map(|((_, entry), _)| *entry)
+            .collect()
+    }
+
+    /// Number of consecutive solved frames from `first` on.
+    pub(crate) fn run_length(&self, first: u32) -> u64 {
+        self.solved
+            .range(first..)
+            .zip(u64::from(first)..)
+            .take_while(|((frame, _), expected)| u64::from(**frame) == *expected)
+            .count() as u64
+    }
+
+    /// Number of solved frames.
+    pub(crate) fn solved_count(&self) -> u64 {
+        self.solved.len() as u64
+    }
+
+    /// Number of frames that are solved or being solved.
+    pub(crate) fn received_count(&self) -> u64 {
+        self.solved_count() + self.pending.len() as u64
+    }
+
+    /// The highest solved frame.
+    pub(crate) fn highest(&self) -> Option<u32> {
+        self.solved.last_key_value().map(|(frame, _)| *frame)
+    }
+
+    /// Ranges `[a, b)` below `end` that are not solved; below the highest solved frame where no end is known.
+    pub(crate) fn missing(&self, end: Option<u32>) -> Vec<[u32; 2]> {
+        let end = end.or(self.highest()).unwrap_or(0);
+        let mut missing = Vec::new();
+        let mut next = 0;
+        for &frame in self.solved.keys().take_while(|&&frame| frame < end) {
+            if frame > next {
+                missing.push([next, frame]);
+            }
+            next = frame + 1;
+        }
+        if next < end {
+            missing.push([next, end]);
+        }
+        missing
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entry(frame: u32) -> LogEntry {
+        LogEntry {
+            frame,
+            offset: u64::from(frame),
+            l2: 0.0,
+            linf: 0.0,
+            squared: 0.0,
+            spread: 0.0,
+            handle_digest: [1; 16],
+            full_digest: Some([2; 16]),
+        }
+    }
+
+    #[test]
+    fn missing_ranges_lie_between_the_frames_that_are_there() {
+        let frames = Frames::new([3, 4, 7].map(entry).to_vec());
+        assert_eq!(frames.missing(None), [[0, 3], [5, 7]]);
+        assert_eq!(frames.missing(Some(10)), [[0, 3], [5, 7], [8, 10]]);
+        assert_eq!(frames.missing(Some(4)), [[0, 3]]);
+        assert_eq!(Frames::default().missing(Some(2)), [[0, 2]]);
+        assert!(Frames::default().missing(None).is_empty());
+    }
+
+    #[test]
+    fn a_run_ends_at_the_first_gap() {
+        let frames = Frames::new([3, 4, 5, 7].map(entry).to_vec());
+        assert_eq!(frames.run(3, 10).len(), 3);
+        assert_eq!(frames.run(4, 1).len(), 1);
+        assert_eq!(frames.run_length(4), 2);
+        assert!(frames.run(0, 10).is_empty());
+        assert_eq!(Frames::new(vec![entry(u32::MAX)]).run_length(u32::MAX), 1);
+    }
+
+    #[test]
+    fn a_frame_posted_again_is_known_by_its_bytes() {
+        let upload = Arc::new(Upload::default());
+        let mut frames = Frames::new(vec![entry(3)]);
+        let same = Digests { handles: [1; 16], full: Some([2; 16]) };
+        assert_eq!(frames.claim(3, same, &upload), Claim::Known);
+        assert_eq!(frames.claim(3, Digests { full: None, ..same }, &upload), Claim::Known);
+        assert_eq!(frames.claim(3, Digests { full: Some([3; 16]), ..same }, &upload), Claim::Conflict);
+        assert_eq!(frames.claim(4, same, &upload), Claim::Solve);
+        assert_eq!(frames.claim(4, same, &upload), Claim::Waiting);
+        assert_eq!(frames.claim(4, Digests { handles: [9; 16], ..same }, &upload), Claim::Conflict);
+        assert_eq!(frames.solved(entry(4)).len(), 2);
+        assert_eq!(frames.claim(4, same, &upload), Claim::Known);
+    }
+}

@@ -1,0 +1,340 @@
+//! What a session is: a rest pose with its cage, being prepared, ready for frames, completed or failed. Nothing about HTTP.
+
+pub(crate) mod commit;
+pub(crate) mod complete;
+pub(crate) mod create;
+pub(crate) mod facts;
+pub(crate) mod frames;
+pub(crate) mod prepare;
+pub(crate) mod prepared;
+pub(crate) mod registry;
+pub(crate) mod retention;
+pub(crate) mod upload;
+
+use crate::engine::Lane;
+use crate::problem::{self, ApiError};
+use crate::store::{Completion, FrameLog, LogEntry, LogReader, SessionMeta, Store, StoreError};
+use cager_proto::messages::{FrameCounts, Problem, Progress, Session as View, SessionState};
+use commit::{Committer, Waiting};
+use facts::Facts;
+use frames::Frames;
+use prepared::Prepared;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use tokio::sync::watch;
+use tokio_util::sync::CancellationToken;
+use upload::FrameJob;
+
+/// A session as long as the service runs.
+pub(crate) struct Session {
+    pub(crate) meta: SessionMeta,
+    store: Store,
+    committer: Committer,
+    status: Mutex<Status>,
+    frames: Mutex<Frames>,
+    /// Whether what the log holds is in `frames`.
+    loaded: AtomicBool,
+    queued: Arc<AtomicU64>,
+    waiting: Mutex<Waiting>,
+    log: Mutex<Option<FrameLog>>,
+    reader: Mutex<Option<LogReader>>,
+    lane: Mutex<Weak<LiveLane>>,
+    /// Held while the container is written, so that it is written once.
+    pub(crate) completing: tokio::sync::Mutex<()>,
+    version: watch::Sender<u64>,
+    deleted: CancellationToken,
+}
+
+/// What is known of a session, and where it stands.
+#[derive(Clone, Debug)]
+pub(crate) struct Status {
+    pub(crate) phase: Phase,
+    pub(crate) facts: Option<Facts>,
+}
+
+/// Where a session stands.
+#[derive(Clone, Debug)]
+pub(crate) enum Phase {
+    Preparing,
+    Ready,
+    Completed(Completion),
+    Failed(Box<Problem>),
+}
+
+/// A session's lane to the engine with the solver its frames need. It lives as long as an upload runs, so that the solver of a
+/// session nobody uses can leave the memory.
+pub(crate) struct LiveLane {
+    pub(crate) lane: Lane<FrameJob>,
+    pub(crate) prepared: Arc<Prepared>,
+    uploads: AtomicU64,
+}
+
+impl LiveLane {
+    pub(crate) fn new(lane: Lane<FrameJob>, prepared: Arc<Prepared>) -> Self {
+        Self { lane, prepared, uploads: AtomicU64::new(0) }
+    }
+
+    /// Counts the uploads whose bodies still arrive.
+    pub(crate) fn upload_begins(&self) {
+        if self.uploads.fetch_add(1, Ordering::Relaxed) == 0 {
+            self.lane.expect_more(true);
+        }
+    }
+
+    pub(crate) fn upload_ends(&self) {
+        if self.uploads.fetch_sub(1, Ordering::Relaxed) == 1 {
+            self.lane.expect_more(false);
+        }
+    }
+}
+
+impl Session {
+    pub(crate) fn new(meta: SessionMeta, store: Store, committer: Committer, status: Status, is_new: bool) -> Self {
+        Self {
+            meta,
+            store,
+            committer,
+            status: Mutex::new(status),
+            frames: Mutex::default(),
+            loaded: AtomicBool::new(is_new),
+            queued: Arc::default(),
+            waiting: Mutex::default(),
+            log: Mutex::default(),
+            reader: Mutex::default(),
+            lane: Mutex::default(),
+            completing: tokio::sync::Mutex::new(()),
+            version: watch::Sender::new(0),
+            deleted: CancellationToken::new(),
+        }
+    }
+
+    pub(crate) fn status(&self) -> Status {
+        lock(&self.status).clone()
+    }
+
+    pub(crate) fn facts(&self) -> Option<Facts> {
+        lock(&self.status).facts.clone()
+    }
+
+    pub(crate) fn set_status(&self, status: Status) {
+        *lock(&self.status) = status;
+        self.touch();
+    }
+
+    pub(crate) fn set_phase(&self, phase: Phase) {
+        lock(&self.status).phase = phase;
+        self.touch();
+    }
+
+    pub(crate) fn frames(&self) -> MutexGuard<'_, Frames> {
+        lock(&self.frames)
+    }
+
+    /// Tells everyone who follows that something changed.
+    pub(crate) fn touch(&self) {
+        self.version.send_modify(|version| *version += 1);
+    }
+
+    /// Changes with everything that happens to the session.
+    pub(crate) fn changes(&self) -> watch::Receiver<u64> {
+        self.version.subscribe()
+    }
+
+    /// Becomes true when the session is deleted.
+    pub(crate) fn deleted(&self) -> &CancellationToken {
+        &self.deleted
+    }
+
+    pub(crate) fn is_deleted(&self) -> bool {
+        self.deleted.is_cancelled()
+    }
+
+    /// Reads what the log holds, if that did not happen yet. Blocks.
+    ///
+    /// # Errors
+    /// A damaged log, after which the session is failed and out of the way; what the system says.
+    pub(crate) fn load(&self) -> Result<(), ApiError> {
+        if self.loaded.load(Ordering::Acquire) {
+            return Ok(());
+        }
+        if self.facts().is_none() {
+            // Without an outcome there was no frame yet.
+            return Ok(());
+        }
+        let mut log = lock(&self.log);
+        if log.is_none() && !self.loaded.load(Ordering::Acquire) {
+            match self.load_log() {
+                Ok(opened) => *log = Some(opened),
+                Err(StoreError::Damaged { path, what }) => return Err(self.quarantine(&path, &what)),
+                Err(error) => return Err(commit::storage_error(&error)),
+            }
+        }
+        Ok(())
+    }
+
+    /// As [`Self::load`], off the async threads.
+    pub(crate) async fn ensure_loaded(self: &Arc<Self>) -> Result<(), ApiError> {
+        if self.loaded.load(Ordering::Acquire) {
+            return Ok(());
+        }
+        let session = Arc::clone(self);
+        tokio::task::spawn_blocking(move || session.load()).await.map_err(|e| ApiError::internal(&e))?
+    }
+
+    /// Opens the log; what it holds that is not known yet becomes known. The caller holds the place it goes to.
+    fn load_log(&self) -> Result<FrameLog, StoreError> {
+        let rows = self.facts().map_or(0, |facts| facts.unknowns);
+        let (log, entries) = self.store.open_log(&self.meta.id, rows)?;
+        *lock(&self.reader) = Some(log.reader());
+        if !self.loaded.load(Ordering::Acquire) {
+            let mut frames = self.frames();
+            for entry in Frames::new(entries).entries() {
+                frames.solved(*entry);
+            }
+            self.loaded.store(true, Ordering::Release);
+        } else {
+            // Written although the answer was an error: true all the same.
+            let mut frames = self.frames();
+            let late: Vec<LogEntry> = entries.into_iter().filter(|e| frames.entry(e.frame).is_none()).collect();
+            for entry in late {
+                frames.solved(entry).iter().for_each(|upload| upload.answer(entry.frame));
+            }
+        }
+        Ok(log)
+    }
+
+    /// Puts a damaged session aside, so that others are not disturbed.
+    fn quarantine(&self, path: &std::path::Path, what: &str) -> ApiError {
+        tracing::error!(session = %self.meta.id, path = %path.display(), what, "the frame log is damaged; the session is put in quarantine");
+        metrics::counter!("cager_quarantined_total").increment(1);
+        if let Err(error) = self.store.quarantine_session(&self.meta.id, what) {
+            tracing::error!(session = %self.meta.id, %error, "it could not be moved");
+        }
+        let error = ApiError::new(
+            problem::SESSION_FAILED,
+            "stored frames of this session are damaged; the operator finds it in quarantine, and the capture has to be uploaded to a new session",
+        );
+        self.set_phase(Phase::Failed(error.problem.clone()));
+        error
+    }
+
+    /// Reads the cages of these frames, m × 12 bytes each, one after another. Blocks.
+    ///
+    /// # Errors
+    /// What the store says.
+    pub(crate) fn read_cages(&self, entries: &[LogEntry], out: &mut Vec<u8>) -> Result<(), StoreError> {
+        let mut reader = lock(&self.reader).clone();
+        if reader.is_none() {
+            let mut log = lock(&self.log);
+            if log.is_none() {
+                *log = Some(self.load_log()?);
+            }
+            reader = lock(&self.reader).clone();
+        }
+        match reader {
+            Some(reader) => reader.read_cages(entries, out),
+            None => Ok(()),
+        }
+    }
+
+    /// The lane of running uploads, if there is one.
+    pub(crate) fn live_lane(&self, make: impl FnOnce() -> LiveLane) -> Arc<LiveLane> {
+        let mut lane = lock(&self.lane);
+        lane.upgrade().unwrap_or_else(|| {
+            let live = Arc::new(make());
+            *lane = Arc::downgrade(&live);
+            live
+        })
+    }
+
+    /// Closes files of a session that nobody uses.
+    pub(crate) fn rest_if_idle(&self) {
+        let idle = lock(&self.lane).strong_count() == 0 && !lock(&self.waiting).is_busy();
+        if idle && let Ok(mut log) = self.log.try_lock() {
+            *lock(&self.reader) = None;
+            *log = None;
+        }
+    }
+
+    /// Ends everything that runs for the session.
+    pub(crate) fn mark_deleted(&self) {
+        self.deleted.cancel();
+        self.touch();
+    }
+
+    /// The number of frames declared at completion.
+    pub(crate) fn declared(&self) -> Option<u32> {
+        match &lock(&self.status).phase {
+            Phase::Completed(completion) => Some(completion.frames),
+            _ => None,
+        }
+    }
+
+    /// Where it stands, for server-sent events.
+    pub(crate) fn progress(&self) -> Progress {
+        let state = state_of(&lock(&self.status).phase);
+        let frames = self.frames();
+        Progress {
+            state,
+            received: frames.received_count() + self.queued.load(Ordering::Relaxed),
+            solved: frames.solved_count(),
+        }
+    }
+
+    /// The session as clients see it.
+    pub(crate) fn view(&self) -> View {
+        let status = self.status();
+        let (options, facts) = (&self.meta.options, status.facts.as_ref());
+        let frames = {
+            let frames = self.frames();
+            FrameCounts {
+                received: frames.received_count() + self.queued.load(Ordering::Relaxed),
+                solved: frames.solved_count(),
+                missing: frames.missing(self.declared()),
+            }
+        };
+        let or = |given: &Option<String>, default: &str| given.clone().unwrap_or_else(|| default.to_owned());
+        let problem = match &status.phase {
+            Phase::Failed(problem) => Some((**problem).clone()),
+            _ => None,
+        };
+        View {
+            id: self.meta.id.clone(),
+            name: options.name.clone(),
+            state: state_of(&status.phase),
+            created: self.meta.created_ms as f64 / 1e3,
+            points: facts.map(|f| f.points),
+            unknowns: facts.map(|f| f.unknowns),
+            handle_count: facts.map(|f| f.handle_count),
+            cage_vertices: facts.map(|f| f.cage_vertices),
+            cage_faces: facts.map(|f| f.cage_faces),
+            coordinates: or(&options.coordinates, "mvc"),
+            handles: or(&options.handles, "maxvol"),
+            regularizer: or(&options.regularizer, "laplacian"),
+            spectrum: facts.map(|f| f.spectrum).or(options.spectrum),
+            lambda: options.lambda.unwrap_or(1.0),
+            condition_number: facts.map(|f| f.condition_number),
+            rank: facts.map(|f| f.rank),
+            affine_reproduction_error: facts.map(|f| f.affine_reproduction_error),
+            frames,
+            cache: facts.map(|f| f.cache),
+            seconds: facts.map_or_else(Default::default, |f| f.seconds),
+            warnings: facts.map_or_else(Vec::new, |f| f.warnings.clone()),
+            problem,
+        }
+    }
+}
+
+fn state_of(phase: &Phase) -> SessionState {
+    match phase {
+        Phase::Preparing => SessionState::Preparing,
+        Phase::Ready => SessionState::Ready,
+        Phase::Completed(_) => SessionState::Completed,
+        Phase::Failed(_) => SessionState::Failed,
+    }
+}
+
+/// Nothing is left half-done where a thread panics with one of these locks.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

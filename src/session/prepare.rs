@@ -1,0 +1,154 @@
+//! From uploaded bytes to a solver: reading, checking, preparing. Blocks.
+
+use super::prepared::Prepared;
+use crate::capture::preparation_warnings;
+use crate::coordinates;
+use crate::problem::{self, ApiError};
+use crate::store::Content;
+use cager_core::cage::Cage;
+use cager_core::coordinates::CoordinateSystem;
+use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions};
+use cager_core::mesh::{Model, TriMesh};
+use cager_core::regularize::Regularizer;
+use cager_formats::{MeshFormat, read_model_bytes};
+use cager_proto::messages::SessionOptions;
+use std::path::Path;
+
+/// Options that were checked, all but the spectrum's bound, which the cage gives.
+#[derive(Clone, Copy)]
+pub(crate) struct Choices {
+    pub(crate) system: &'static dyn CoordinateSystem,
+    pub(crate) handles: Handles,
+    pub(crate) regularizer: Regularizer,
+    pub(crate) spectrum: Option<u32>,
+    pub(crate) lambda: f64,
+    pub(crate) flip_cage: bool,
+}
+
+const NAME_CHARACTERS: usize = 200;
+
+impl Choices {
+    /// Checks what can be checked without the cage.
+    ///
+    /// # Errors
+    /// An option that is unknown, out of range or not available.
+    pub(crate) fn of(options: &SessionOptions) -> Result<Self, ApiError> {
+        let refuse = |detail: String| Err(ApiError::new(problem::INVALID_OPTIONS, detail));
+        if options.name.as_ref().is_some_and(|name| name.chars().count() > NAME_CHARACTERS) {
+            return refuse(format!("name: is longer than {NAME_CHARACTERS} characters; shorten it"));
+        }
+        if options.max_error.is_some() {
+            return refuse("max_error: is not available yet; leave it out".to_owned());
+        }
+        if options.cage_vertices.is_some() {
+            return refuse("cage_vertices: automatic cages are not available yet; send a cage".to_owned());
+        }
+        if options.frame_rate.is_some_and(|rate| !(rate.is_finite() && rate > 0.0)) {
+            return refuse("frame_rate: give a positive number of frames per second".to_owned());
+        }
+        let name = options.coordinates.as_deref().unwrap_or("mvc");
+        let Some(system) = coordinates::by_name(name) else {
+            return refuse(format!("coordinates: {name:?} is not available; give mvc"));
+        };
+        let handles = match options.handles.as_deref().unwrap_or(Handles::default().name()) {
+            "maxvol" => Handles::MaxVol,
+            "all" => Handles::All,
+            other => return refuse(format!("handles: {other:?} is not available; give maxvol or all")),
+        };
+        let wanted = options.regularizer.as_deref().unwrap_or(Regularizer::default().name());
+        let Some(&regularizer) = Regularizer::ALL.iter().find(|r| r.name() == wanted) else {
+            let names: Vec<&str> = Regularizer::ALL.iter().map(|r| r.name()).collect();
+            return refuse(format!("regularizer: {wanted:?} is not available; give one of {}", names.join(", ")));
+        };
+        let lambda = options.lambda.unwrap_or(SolverOptions::default().lambda);
+        if !(lambda.is_finite() && lambda >= 0.0) {
+            return refuse(format!("lambda: is {lambda}; give a finite number of at least 0"));
+        }
+        Ok(Self { system, handles, regularizer, spectrum: options.spectrum, lambda, flip_cage: options.flip_cage })
+    }
+
+    /// The solver's options for a cage of so many unknowns.
+    pub(crate) fn solver_options(&self, unknowns: usize) -> SolverOptions {
+        SolverOptions {
+            handles: self.handles,
+            regularizer: self.regularizer,
+            spectrum: self.spectrum.map_or_else(|| crate::coordinates::default_spectrum(unknowns), |s| s as usize),
+            lambda: self.lambda,
+        }
+    }
+}
+
+/// Rest pose and cage of a session.
+pub(crate) struct Geometry {
+    pub(crate) rest: Model,
+    pub(crate) cage: Cage,
+}
+
+/// Reads and checks rest pose and cage.
+///
+/// # Errors
+/// Bytes that cannot be read; a cage that cannot be used.
+pub(crate) fn read(content: &Content, choices: &Choices) -> Result<Geometry, ApiError> {
+    let rest = read_part("rest", &content.rest_name, &content.rest)?;
+    Ok(Geometry { rest, cage: read_cage(content, choices)? })
+}
+
+/// Reads and checks the cage.
+///
+/// # Errors
+/// As [`read`].
+pub(crate) fn read_cage(content: &Content, choices: &Choices) -> Result<Cage, ApiError> {
+    let model = read_part("cage", &content.cage_name, &content.cage)?;
+    if model.faces.is_empty() {
+        return Err(geometry(format!(
+            "{}: has no faces, and a cage is a closed mesh; export the cage with its faces",
+            content.cage_name
+        )));
+    }
+    let mesh = TriMesh::from(&model);
+    let polygon_of = model.faces.polygon_of_triangle();
+    Cage::new(if choices.flip_cage { mesh.flipped() } else { mesh }).map_err(|error| {
+        let error = error.renumbered(|triangle| polygon_of[triangle] as usize);
+        geometry(format!("{}: {error}", content.cage_name))
+    })
+}
+
+/// Prepares the solver.
+///
+/// # Errors
+/// Geometry or options that do not go together.
+pub(crate) fn prepare(geometry: &Geometry, choices: &Choices) -> Result<Prepared, ApiError> {
+    let options = choices.solver_options(choices.system.unknowns(&geometry.cage));
+    let solver = Solver::prepare(choices.system, &geometry.cage, &geometry.rest.points, options).map_err(|error| {
+        match error {
+            PrepareError::SpectrumTooLarge { .. } => {
+                ApiError::new(problem::INVALID_OPTIONS, format!("spectrum: {error}"))
+            }
+            PrepareError::BadLambda { .. } => ApiError::new(problem::INVALID_OPTIONS, format!("lambda: {error}")),
+            _ => self::geometry(error.to_string()),
+        }
+    })?;
+    Ok(with_solver(solver, &geometry.cage, options))
+}
+
+/// A solver with what goes with it.
+pub(crate) fn with_solver(solver: Solver, cage: &Cage, options: SolverOptions) -> Prepared {
+    let warnings = preparation_warnings(options, &solver);
+    Prepared {
+        solver,
+        options,
+        cage_vertices: cage.vertices().len() as u32,
+        cage_faces: cage.faces().len() as u32,
+        warnings,
+    }
+}
+
+fn read_part(part: &str, name: &str, bytes: &[u8]) -> Result<Model, ApiError> {
+    let path = Path::new(name);
+    let format = MeshFormat::from_path(path).map_err(|error| geometry(format!("{part}: {error}")))?;
+    read_model_bytes(format, path, bytes).map_err(|error| geometry(format!("{part}: {error}")))
+}
+
+fn geometry(detail: String) -> ApiError {
+    ApiError::new(problem::INVALID_GEOMETRY, detail)
+}

@@ -1,0 +1,134 @@
+//! Which sessions there are, whose they are, and which requests made them.
+
+use super::Session;
+use crate::problem::{self, ApiError};
+use crate::store::ContentKey;
+use std::collections::{BTreeMap, HashMap};
+use std::sync::{Arc, Mutex};
+
+/// All sessions. Ids are in order of creation.
+#[derive(Default)]
+pub(crate) struct Registry {
+    inner: Mutex<Inner>,
+    /// Held while a content is stored or removed, by its first byte: a removal must not meet a creation.
+    contents: [tokio::sync::Mutex<()>; 16],
+}
+
+#[derive(Default)]
+struct Inner {
+    sessions: BTreeMap<String, Arc<Session>>,
+    requests: HashMap<(String, String), Request>,
+}
+
+/// A request with an idempotency key.
+struct Request {
+    fingerprint: String,
+    /// The session it made; `None` while it is being made.
+    session: Option<String>,
+}
+
+/// What a repeated request meets.
+pub(crate) enum Repetition {
+    /// It is the first of its kind; the guard frees its key if it fails.
+    First,
+    /// It was done before; here is what it made.
+    Done(Arc<Session>),
+}
+
+impl Registry {
+    pub(crate) fn insert(&self, session: Arc<Session>) {
+        let mut inner = super::lock(&self.inner);
+        let meta = &session.meta;
+        if let Some(idempotency) = &meta.idempotency {
+            let request = Request { fingerprint: idempotency.fingerprint.clone(), session: Some(meta.id.clone()) };
+            inner.requests.insert((meta.tenant.clone(), idempotency.key.clone()), request);
+        }
+        inner.sessions.insert(meta.id.clone(), session);
+    }
+
+    pub(crate) fn remove(&self, id: &str) {
+        let mut inner = super::lock(&self.inner);
+        if let Some(session) = inner.sessions.remove(id)
+            && let Some(idempotency) = &session.meta.idempotency
+        {
+            inner.requests.remove(&(session.meta.tenant.clone(), idempotency.key.clone()));
+        }
+    }
+
+    /// A tenant's session; another tenant's is not there.
+    ///
+    /// # Errors
+    /// 404 where there is none.
+    pub(crate) fn find(&self, tenant: &str, id: &str) -> Result<Arc<Session>, ApiError> {
+        let inner = super::lock(&self.inner);
+        inner.sessions.get(id).filter(|session| session.meta.tenant == tenant).cloned().ok_or_else(|| {
+            ApiError::new(problem::NOT_FOUND, "there is no session with this id; list them at /v1/sessions")
+        })
+    }
+
+    /// Up to `most` of a tenant's sessions that follow `after`, oldest first.
+    pub(crate) fn page(&self, tenant: &str, after: Option<&str>, most: usize) -> Vec<Arc<Session>> {
+        use std::ops::Bound::{Excluded, Unbounded};
+        let inner = super::lock(&self.inner);
+        let from = after.map_or(Unbounded, Excluded);
+        let later = inner.sessions.range::<str, _>((from, Unbounded)).map(|(_, session)| session);
+        later.filter(|session| session.meta.tenant == tenant).take(most).cloned().collect()
+    }
+
+    pub(crate) fn all(&self) -> Vec<Arc<Session>> {
+        super::lock(&self.inner).sessions.values().cloned().collect()
+    }
+
+    pub(crate) fn of_tenant(&self, tenant: &str) -> Vec<Arc<Session>> {
+        let inner = super::lock(&self.inner);
+        inner.sessions.values().filter(|session| session.meta.tenant == tenant).cloned().collect()
+    }
+
+    pub(crate) fn uses_content(&self, key: &ContentKey) -> bool {
+        super::lock(&self.inner).sessions.values().any(|session| session.meta.key == *key)
+    }
+
+    /// Held while a content is stored or removed.
+    pub(crate) async fn content_lock(&self, key: &ContentKey) -> tokio::sync::MutexGuard<'_, ()> {
+        self.contents[usize::from(key.0[0]) % self.contents.len()].lock().await
+    }
+
+    /// Announces a request with an idempotency key.
+    ///
+    /// # Errors
+    /// The key belongs to another request, or to one that is still being worked on.
+    pub(crate) fn begin(&self, tenant: &str, key: &str, fingerprint: &str) -> Result<Repetition, ApiError> {
+        let mut inner = super::lock(&self.inner);
+        let place = (tenant.to_owned(), key.to_owned());
+        match inner.requests.get(&place) {
+            None => {
+                let request = Request { fingerprint: fingerprint.to_owned(), session: None };
+                inner.requests.insert(place, request);
+                Ok(Repetition::First)
+            }
+            Some(request) if request.fingerprint != fingerprint => Err(ApiError::new(
+                problem::KEY_REUSED,
+                "this Idempotency-Key came with another rest pose, cage or options before; use a new key for a new session",
+            )),
+            Some(Request { session: Some(id), .. }) => {
+                inner.sessions.get(id).cloned().map(Repetition::Done).ok_or_else(|| {
+                    ApiError::new(problem::NOT_FOUND, "the session that this request made was deleted; use a new key")
+                })
+            }
+            Some(Request { session: None, .. }) => Err(ApiError::new(
+                problem::KEY_IN_USE,
+                "the same request is being worked on right now; ask again in a moment",
+            )
+            .retry_after(1)),
+        }
+    }
+
+    /// Frees the key of a request that made nothing.
+    pub(crate) fn give_up(&self, tenant: &str, key: &str) {
+        let mut inner = super::lock(&self.inner);
+        let place = (tenant.to_owned(), key.to_owned());
+        if inner.requests.get(&place).is_some_and(|request| request.session.is_none()) {
+            inner.requests.remove(&place);
+        }
+    }
+}

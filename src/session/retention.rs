@@ -1,0 +1,84 @@
+//! How much a tenant may keep and for how long.
+
+use super::Session;
+use crate::auth::Tenant;
+use crate::problem::{self, ApiError};
+use crate::service::Service;
+use std::sync::Arc;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use tokio_util::sync::CancellationToken;
+
+const SWEEP_EVERY: Duration = Duration::from_secs(20);
+
+impl Service {
+    /// Bytes that a tenant's sessions take on disk.
+    pub(crate) fn used_bytes(&self, tenant: &str) -> u64 {
+        self.registry.of_tenant(tenant).iter().map(|session| self.session_bytes(session)).sum()
+    }
+
+    fn session_bytes(&self, session: &Session) -> u64 {
+        self.store.session_bytes(&session.meta.id) + self.store.content_bytes(&session.meta.key)
+    }
+
+    /// Whether a tenant may make one more session of so many bytes.
+    ///
+    /// # Errors
+    /// A quota that is used up.
+    pub(crate) fn check_quota(&self, tenant: &Tenant, bytes: u64) -> Result<(), ApiError> {
+        let limits = &tenant.limits;
+        let sessions = self.registry.of_tenant(&tenant.name);
+        if sessions.len() as u64 >= limits.max_sessions {
+            self.rejected("tenant_sessions");
+            let detail = format!("you have {} sessions; delete one that is not needed any more", sessions.len());
+            return Err(ApiError::new(problem::TOO_MANY_SESSIONS, detail).limit(limits.max_sessions));
+        }
+        drop(sessions);
+        self.check_bytes(tenant, bytes)
+    }
+
+    /// Whether a tenant may store so many bytes more.
+    ///
+    /// # Errors
+    /// A quota that is used up.
+    pub(crate) fn check_bytes(&self, tenant: &Tenant, bytes: u64) -> Result<(), ApiError> {
+        let used = self.used_bytes(&tenant.name);
+        if used.saturating_add(bytes) <= tenant.limits.max_bytes {
+            return Ok(());
+        }
+        self.rejected("tenant_bytes");
+        let detail = format!(
+            "your sessions take {used} of {} bytes, and this needs {bytes} more; delete sessions that are not needed any more",
+            tenant.limits.max_bytes
+        );
+        Err(ApiError::new(problem::QUOTA_EXCEEDED, detail).limit(tenant.limits.max_bytes))
+    }
+
+    /// Deletes what is too old and closes what nobody uses, until the service stops.
+    pub(crate) async fn sweep(self: Arc<Self>, stop: CancellationToken) {
+        loop {
+            tokio::select! {
+                () = stop.cancelled() => return,
+                () = tokio::time::sleep(SWEEP_EVERY) => {}
+            }
+            self.sweep_once().await;
+        }
+    }
+
+    /// One round of [`Self::sweep`].
+    pub(crate) async fn sweep_once(&self) {
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_millis() as u64;
+        for session in self.registry.all() {
+            let limits = self.access.tenant(&session.meta.tenant).limits;
+            let age_ms = now.saturating_sub(session.meta.created_ms);
+            if limits.max_age_s > 0 && age_ms / 1000 >= limits.max_age_s {
+                tracing::info!(session = %session.meta.id, "deleted, because its time is over");
+                metrics::counter!("cager_sessions_expired_total").increment(1);
+                if let Err(error) = self.delete(&session).await {
+                    tracing::warn!(session = %session.meta.id, detail = %error.problem.detail, "could not be deleted");
+                }
+            } else {
+                session.rest_if_idle();
+            }
+        }
+    }
+}
