@@ -40,7 +40,7 @@ fn run(folder: &Path, rest: &Model, cage: &Cage, options: SolverOptions) -> Repo
     let mut frames = open_frames(folder.join("frames.npy"), rest.points.len()).expect("frames");
     let output = dir.path("out.cager");
     let job = Job { rest, cage, frames: frames.as_mut(), output: &output, system: &MeanValue, options };
-    encode(job, &mut |_| {}).expect("an encoding")
+    encode(job, &mut |_| {}).expect("an encoding").report
 }
 
 /// Every cage of one capture against the independent reference.
