@@ -6,7 +6,7 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{BATCH, PrepareError, Solver, SolverOptions};
 use cager_core::mesh::Model;
-use cager_formats::{Action, AtomicFile, FrameReader};
+use cager_formats::{Action, AtomicFile, CompleteFile, FrameReader};
 use cager_proto::container;
 use rayon::prelude::*;
 use std::io::BufWriter;
@@ -66,11 +66,21 @@ pub struct Job<'a> {
     pub options: SolverOptions,
 }
 
-/// Encodes a capture into one container, which appears whole or not at all. `progress` is told the number of frames done.
+/// What an encoding gives.
+#[derive(Debug)]
+pub struct Encoded {
+    /// What was found out.
+    pub report: Report,
+    /// The container, complete but for its name, so that a report can take its name together with it: see
+    /// [`cager_formats::commit_together`].
+    pub container: CompleteFile,
+}
+
+/// Encodes a capture into one container. `progress` is told the number of frames done.
 ///
 /// # Errors
 /// See [`EncodeError`].
-pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Report, EncodeError> {
+pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Encoded, EncodeError> {
     let clock = Instant::now();
     let fail = |cause| EncodeError::container(job.output, cause);
     // Before the work, so that an unwritable place costs no waiting.
@@ -132,13 +142,13 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Report, E
     let clock_write = Instant::now();
     let (buffered, mut report) = writer.finish().map_err(fail)?;
     let file = buffered.into_inner().map_err(|e| fail(container::Error::from(e.into_error())))?;
-    file.commit()?;
-    report.bytes.output = std::fs::metadata(job.output).map_or(0, |m| m.len());
+    let container = file.complete()?;
+    report.bytes.output = container.length();
     report.bytes.ratio = report.bytes.capture as f64 / report.bytes.output as f64;
     report.bytes.bits_per_vertex_per_frame = 8.0 * report.bytes.output as f64 / (report.points * report.frames) as f64;
     seconds.write += clock_write.elapsed().as_secs_f64();
     report.seconds = Seconds { total: clock.elapsed().as_secs_f64(), ..seconds };
-    Ok(report)
+    Ok(Encoded { report, container })
 }
 
 type Batch = Vec<Vec<f64>>;

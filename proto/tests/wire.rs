@@ -1,5 +1,7 @@
 //! The layout of encoded structures: fixed bytes, which another crate reads too.
 
+mod support;
+
 use cager_proto::container::Header;
 use cager_proto::wire::{self, WireError};
 use serde::Serialize;
@@ -36,19 +38,13 @@ const GOLDEN: &str = "
 
 fn header() -> Header {
     Header {
-        solver_version: 1,
-        coordinates: "mvc".to_owned(),
-        handles: "maxvol".to_owned(),
-        regularizer: "laplacian".to_owned(),
-        spectrum: 20,
-        lambda: 1.0,
         points: 66,
         rest_faces: 64,
         rest_corners: 258,
         cage_vertices: 12,
         cage_faces: 20,
-        rows_per_frame: 12,
         frame_rate: Some(30.0),
+        ..support::header(12)
     }
 }
 

@@ -1,7 +1,7 @@
 //! `cager decode`.
 
 use super::args::DecodeArgs;
-use super::{grouped, print, progress};
+use super::{grouped, interrupt, print, progress};
 use crate::decode;
 use anyhow::Result;
 use std::time::Instant;
@@ -11,6 +11,7 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     let container = decode::open(&args.input)?;
     let (frames, points) = (container.frames(), container.header().points);
     drop(container);
+    interrupt::leaves_nothing()?;
     let bar = progress::frames("decoding", frames);
     let result = decode::decode(&args.input, &args.output, &mut |done| bar.set_position(done as u64));
     bar.finish_and_clear();

@@ -2,10 +2,10 @@
 
 use super::args::DemoArgs;
 use super::encode::{default_spectrum, write_report};
-use super::{grouped, human_bytes, print, progress};
+use super::{grouped, human_bytes, interrupt, print, progress};
 use crate::coordinates;
 use crate::decode;
-use crate::encode::{self, Job};
+use crate::encode::{self, Encoded, Job};
 use crate::plot::error_plot;
 use crate::report::Report;
 use anyhow::{Context, Result, bail, ensure};
@@ -13,7 +13,7 @@ use cager_core::cage::Cage;
 use cager_core::inversion::SolverOptions;
 use cager_core::mesh::{Model, Polygons, diagonal};
 use cager_core::synthetic::{Capture, Options};
-use cager_formats::{AtomicFile, FrameReader, open_frames, write_model};
+use cager_formats::{AtomicFile, FrameReader, commit_together, open_frames, write_model};
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
@@ -28,6 +28,7 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
     let cage = Cage::new(capture.cage.clone()).context("the built-in cage")?;
     let Some(system) = coordinates::by_name("mvc") else { bail!("mean value coordinates are missing") };
     let folder = &args.output;
+    interrupt::leaves_nothing()?;
     std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     write_model(&folder.join("rest.obj"), &capture.rest)?;
     write_model(&folder.join("cage.obj"), &as_model(&cage))?;
@@ -43,8 +44,10 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
         system,
         options: SolverOptions { spectrum: default_spectrum(cage.vertices().len()), ..SolverOptions::default() },
     };
-    let report = encode::encode(job, &mut |done| bar.set_position(done as u64))?;
+    let Encoded { report, container } = encode::encode(job, &mut |done| bar.set_position(done as u64))?;
     bar.finish_and_clear();
+    let report_file = write_report(AtomicFile::create(folder.join("report.json"))?, &report)?;
+    commit_together(vec![report_file, container])?;
 
     let decoded = folder.join("decoded.npy");
     let clock = Instant::now();
@@ -54,7 +57,6 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
     let decode_seconds = clock.elapsed().as_secs_f64();
     compare(&capture, &decoded, &report)?;
 
-    write_report(AtomicFile::create(folder.join("report.json"))?, &report)?;
     let (l2, linf): (Vec<f64>, Vec<f64>) = report.error.per_frame.iter().map(|e| (e.l2, e.linf)).unzip();
     let title = format!(
         "Built-in capture: {} points, cage of {} vertices",

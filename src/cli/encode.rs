@@ -1,15 +1,15 @@
 //! `cager encode`.
 
 use super::args::{EncodeArgs, SolverArgs};
-use super::{grouped, human_bytes, print, progress, warn};
+use super::{grouped, human_bytes, interrupt, print, progress, warn};
 use crate::coordinates;
-use crate::encode::{self, Job};
+use crate::encode::{self, Encoded, Job};
 use crate::report::Report;
 use anyhow::{Context, Result, bail};
 use cager_core::cage::Cage;
 use cager_core::inversion::{PrepareError, SolverOptions};
 use cager_core::mesh::TriMesh;
-use cager_formats::{AtomicFile, CacheFormat, MeshFormat, open_frames, read_model};
+use cager_formats::{AtomicFile, CacheFormat, CompleteFile, MeshFormat, commit_together, open_frames, read_model};
 use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
@@ -22,19 +22,20 @@ pub(super) fn run(args: &EncodeArgs) -> Result<()> {
     let read_seconds = clock.elapsed().as_secs_f64();
     let (system, options) = solver(&args.solver, &cage)?;
     refuse_overwriting(args)?;
-    // Before the work, so that a report that cannot be written costs no waiting and leaves no half of the output.
+    interrupt::leaves_nothing()?;
+    // Before the work, so that a report that cannot be written costs no waiting.
     let report_file = args.report.as_ref().map(AtomicFile::create).transpose()?;
 
     let bar = progress::frames("encoding", frames.frames());
     let job = Job { rest: &rest, cage: &cage, frames: frames.as_mut(), output: &args.output, system, options };
     let result = encode::encode(job, &mut |done| bar.set_position(done as u64));
     bar.finish_and_clear();
-    let mut report = result.map_err(|error| name_files(error, args))?;
+    let Encoded { mut report, container } = result.map_err(|error| name_files(error, args))?;
     report.seconds.read += read_seconds;
     report.seconds.total = clock.elapsed().as_secs_f64();
-    if let Some(file) = report_file {
-        write_report(file, &report)?;
-    }
+    // A full disk shows here, before either file has its name.
+    let report_file = report_file.map(|file| write_report(file, &report)).transpose()?;
+    commit_together(report_file.into_iter().chain([container]).collect())?;
     warn(&report.warnings);
     print(&summary(&report, &args.output))
 }
@@ -89,11 +90,11 @@ pub(super) fn solver(
     Ok((system, options))
 }
 
-pub(super) fn write_report(mut file: AtomicFile, report: &Report) -> Result<()> {
+pub(super) fn write_report(mut file: AtomicFile, report: &Report) -> Result<CompleteFile> {
     let mut text = serde_json::to_vec_pretty(report)?;
     text.push(b'\n');
     file.write_all(&text)?;
-    Ok(file.commit()?)
+    Ok(file.complete()?)
 }
 
 /// The paper's 20; less for a cage of which it would smooth the greater part.

@@ -5,6 +5,7 @@ mod decode;
 mod demo;
 mod encode;
 mod inspect;
+mod interrupt;
 mod progress;
 
 use args::{Cli, Command};

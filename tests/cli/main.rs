@@ -3,7 +3,11 @@
 mod decode;
 mod demo;
 mod encode;
+#[cfg(unix)]
+mod full_disk;
 mod inspect;
+#[cfg(target_os = "linux")]
+mod interrupted;
 mod real_data;
 mod refused;
 mod support;

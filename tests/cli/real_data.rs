@@ -1,6 +1,6 @@
 //! The captures of `CAGER_DATA` (default `../shared/data`), which are not part of the project.
 
-use crate::support::{Dir, close, npy_f64, read_cages};
+use crate::support::{Dir, Output, TestCommand, close, npy_f64, read_cages};
 use cager::encode::{Job, encode};
 use cager::report::Report;
 use cager_core::cage::Cage;
@@ -40,7 +40,7 @@ fn run(folder: &Path, rest: &Model, cage: &Cage, options: SolverOptions) -> Repo
     let mut frames = open_frames(folder.join("frames.npy"), rest.points.len()).expect("frames");
     let output = dir.path("out.cager");
     let job = Job { rest, cage, frames: frames.as_mut(), output: &output, system: &MeanValue, options };
-    encode(job, &mut |_| {}).expect("an encoding")
+    encode(job, &mut |_| {}).expect("an encoding").report
 }
 
 /// Every cage of one capture against the independent reference.
@@ -154,7 +154,17 @@ fn a_real_capture_through_the_program_has_the_errors_of_the_reference() {
 
 /// Runs the program on files that lie elsewhere; gives what it wrote to stderr.
 fn encode_files(dir: &Dir, line: &str, rest: &Path, cage: &Path, frames: &Path) -> String {
-    dir.cager(line).arg("--rest").arg(rest).arg("--cage").arg(cage).arg("--frames").arg(frames).succeeds().stderr
+    on_files(dir, line, rest, cage, frames).succeeds().stderr
+}
+
+fn on_files(dir: &Dir, line: &str, rest: &Path, cage: &Path, frames: &Path) -> TestCommand {
+    dir.cager(line).arg("--rest").arg(rest).arg("--cage").arg(cage).arg("--frames").arg(frames)
+}
+
+/// Encodes a pair with its rest pose as the only frame, which may fail.
+fn encode_rest_pose(dir: &Dir, folder: &Path) -> Output {
+    let (mesh, cage) = (folder.join("mesh.obj"), folder.join("cage.obj"));
+    on_files(dir, "encode -o out.cager --report report.json", &mesh, &cage, &mesh).run()
 }
 
 /// `Φ · C` in double precision.
@@ -241,16 +251,8 @@ fn every_pair_encodes_and_points_outside_are_counted() {
 #[test]
 fn open_elephant_cage_is_refused_with_its_boundary_edges() {
     let Some(root) = data() else { return };
-    let folder = root.join("invalid/pgc_elephant");
     let dir = Dir::new();
-    let done = dir
-        .cager("encode -o out.cager --report report.json --rest")
-        .arg(folder.join("mesh.obj"))
-        .arg("--cage")
-        .arg(folder.join("cage.obj"))
-        .arg("--frames")
-        .arg(folder.join("mesh.obj"))
-        .run();
+    let done = encode_rest_pose(&dir, &root.join("invalid/pgc_elephant"));
     assert_eq!(done.status, Some(1), "{done:?}");
     assert!(done.stderr.contains("cage.obj: the cage is open: "), "{}", done.stderr);
     let listed = done.stderr.split_once('(').map_or("", |(_, rest)| rest);
@@ -265,14 +267,7 @@ fn cages_that_leave_most_of_the_model_outside_get_an_error_or_a_warning_that_cou
     for name in ["deepcage_tpose", "nested_gargo"] {
         let folder = root.join("invalid").join(name);
         let dir = Dir::new();
-        let done = dir
-            .cager("encode -o out.cager --report report.json --rest")
-            .arg(folder.join("mesh.obj"))
-            .arg("--cage")
-            .arg(folder.join("cage.obj"))
-            .arg("--frames")
-            .arg(folder.join("mesh.obj"))
-            .run();
+        let done = encode_rest_pose(&dir, &folder);
         eprintln!("{name}: {done:?}");
         if done.status == Some(0) {
             let count = outside(&folder, "cage.obj");

@@ -138,6 +138,12 @@ impl TestCommand {
         self
     }
 
+    /// Starts it and lets it work; what it says is lost.
+    #[cfg(target_os = "linux")]
+    pub(crate) fn spawn(mut self) -> std::process::Child {
+        self.0.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program runs")
+    }
+
     pub(crate) fn run(mut self) -> Output {
         let done = self.0.output().expect("the program runs");
         Output {

@@ -4,18 +4,20 @@ use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use tempfile::TempDir;
-
-use super::{Place, builder, hide_temporary, sync_folder};
+use super::temporary::{self, Temporary};
+use super::{Place, hide_temporary, sync_folder};
 use crate::error::Error;
 
 /// A folder that takes its name once all its files are complete; dropped before [`AtomicDir::commit`] it leaves
 /// nothing.
+///
+/// A folder cannot be without a name, so a process that is killed leaves it under a temporary one, beginning with
+/// `.cager-`; on a signal that can be caught, [`remove_temporaries`](super::remove_temporaries) removes it.
 #[derive(Debug)]
 pub struct AtomicDir {
     path: PathBuf,
     place: Place,
-    folder: TempDir,
+    folder: Temporary,
 }
 
 impl AtomicDir {
@@ -28,16 +30,8 @@ impl AtomicDir {
         let path = path.as_ref();
         let place = Place::new(path)?;
         check_free(path, &place.target)?;
-        let prefix = ".cager-".into();
-        let mut builder = builder(&prefix);
-        #[cfg(unix)]
-        {
-            use std::fs::Permissions;
-            use std::os::unix::fs::PermissionsExt;
-            // As for any new folder, the system takes the umask away from these.
-            builder.permissions(Permissions::from_mode(0o777));
-        }
-        let folder = builder.tempdir_in(&place.folder).map_err(|cause| hide_temporary(path, &cause))?;
+        let begun = temporary::lock().begin(&place.folder, |path| fs::create_dir(path));
+        let ((), folder) = begun.map_err(|cause| hide_temporary(path, &cause))?;
         Ok(Self { path: path.to_owned(), place, folder })
     }
 
@@ -51,6 +45,16 @@ impl AtomicDir {
         self.folder.path()
     }
 
+    /// Begins a file in the folder; interruption is no error here, unlike for a file begun by its path.
+    ///
+    /// # Errors
+    /// Those of [`File::create`].
+    pub fn create_file(&self, name: &str) -> io::Result<File> {
+        // Not between the removal of the folder and the end of the process.
+        let _live = temporary::lock();
+        File::create(self.folder().join(name))
+    }
+
     /// Makes the files durable and gives the folder its name.
     ///
     /// # Errors
@@ -61,10 +65,7 @@ impl AtomicDir {
         self.put_in_place().map_err(|cause| match cause.kind() {
             io::ErrorKind::DirectoryNotEmpty | io::ErrorKind::AlreadyExists => occupied(&self.path),
             _ => hide_temporary(&self.path, &cause),
-        })?;
-        // What was the temporary folder is the output now.
-        let _ = self.folder.keep();
-        Ok(())
+        })
     }
 
     fn put_in_place(&self) -> io::Result<()> {
@@ -72,10 +73,13 @@ impl AtomicDir {
             File::open(entry?.path())?.sync_all()?;
         }
         sync_folder(self.folder())?;
-        if cfg!(not(unix)) && self.place.target.exists() {
-            fs::remove_dir(&self.place.target)?;
+        {
+            let mut live = temporary::lock();
+            if cfg!(not(unix)) && self.place.target.exists() {
+                fs::remove_dir(&self.place.target)?;
+            }
+            live.rename(&self.folder, &self.place.target)?;
         }
-        fs::rename(self.folder(), &self.place.target)?;
         self.place.sync_folder()
     }
 }

@@ -4,20 +4,25 @@ use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use tempfile::NamedTempFile;
-
-use super::{Place, builder, hide_temporary};
+use super::complete::{CompleteFile, commit_together};
+use super::temporary::{self, Temporary};
+use super::{Place, anonymous, hide_temporary};
 use crate::error::Error;
 
 /// A file that takes its name once it is complete; dropped before [`AtomicFile::commit`] it leaves nothing, and what
 /// stood under the name stays.
+///
+/// Until then it has no name where the system can do that (`O_TMPFILE` on Linux), so that not even a killed process
+/// leaves anything, and a temporary one elsewhere, which [`remove_temporaries`](super::remove_temporaries) knows.
 ///
 /// Writing is buffered. The errors of [`Write`] and [`Seek`] carry an [`Error`] that names the file.
 #[derive(Debug)]
 pub struct AtomicFile {
     path: PathBuf,
     place: Place,
-    file: BufWriter<NamedTempFile>,
+    // Before its name, so that it is closed first: not every system removes open files.
+    file: BufWriter<File>,
+    temporary: Option<Temporary>,
 }
 
 impl AtomicFile {
@@ -27,7 +32,10 @@ impl AtomicFile {
     /// [`Error::Target`] where `path` is a folder or a device, [`Error::Io`] where the folder is missing or closed to
     /// writing.
     pub fn create(path: impl AsRef<Path>) -> Result<Self, Error> {
-        let path = path.as_ref();
+        Self::create_as(path.as_ref(), anonymous::create)
+    }
+
+    pub(super) fn create_as(path: &Path, unnamed: impl FnOnce(&Path) -> Option<File>) -> Result<Self, Error> {
         let place = Place::new(path)?;
         if place.target.is_dir() {
             return Err(Error::target(path, "is a folder; name a file in it"));
@@ -35,17 +43,15 @@ impl AtomicFile {
         if place.target.exists() && !place.target.is_file() {
             return Err(Error::target(path, "is not a regular file; name one"));
         }
-        let prefix = ".cager-".into();
-        let mut builder = builder(&prefix);
-        #[cfg(unix)]
-        {
-            use std::fs::Permissions;
-            use std::os::unix::fs::PermissionsExt;
-            // As for any new file, the system takes the umask away from these.
-            builder.permissions(Permissions::from_mode(0o666));
-        }
-        let file = builder.tempfile_in(&place.folder).map_err(|cause| hide_temporary(path, &cause))?;
-        Ok(Self { path: path.to_owned(), place, file: BufWriter::with_capacity(1 << 16, file) })
+        let (file, temporary) = match unnamed(&place.folder) {
+            Some(file) => (file, None),
+            None => {
+                let begun = temporary::lock().begin(&place.folder, |path| File::create_new(path));
+                let (file, temporary) = begun.map_err(|cause| hide_temporary(path, &cause))?;
+                (file, Some(temporary))
+            }
+        };
+        Ok(Self { path: path.to_owned(), place, file: BufWriter::with_capacity(1 << 16, file), temporary })
     }
 
     /// The path as it was given to [`AtomicFile::create`].
@@ -53,20 +59,28 @@ impl AtomicFile {
         &self.path
     }
 
+    /// Makes the contents durable; all that is left to do is to give the file its name.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; the file is then not created.
+    pub fn complete(self) -> Result<CompleteFile, Error> {
+        let Self { path, place, file, temporary } = self;
+        let finish = || {
+            let file = file.into_inner().map_err(io::IntoInnerError::into_error)?;
+            file.sync_all()?;
+            let length = file.metadata()?.len();
+            Ok((file, length))
+        };
+        let (file, length) = finish().map_err(|cause: io::Error| hide_temporary(&path, &cause))?;
+        Ok(CompleteFile { path, place, file, temporary, replaced: None, length })
+    }
+
     /// Makes the contents durable and gives the file its name, in place of a file that had it.
     ///
     /// # Errors
-    /// [`Error::Io`]; the file is then not
-    /// created, unless it is its name alone that could not be made durable.
+    /// [`Error::Io`]; the file is then not created, unless it is its name alone that could not be made durable.
     pub fn commit(self) -> Result<(), Error> {
-        let Self { path, place, file } = self;
-        let put_in_place = || {
-            let file = file.into_inner().map_err(io::IntoInnerError::into_error)?;
-            file.as_file().sync_all()?;
-            let _: File = file.persist(&place.target).map_err(|failed| failed.error)?;
-            place.sync_folder()
-        };
-        put_in_place().map_err(|cause| hide_temporary(&path, &cause))
+        commit_together(vec![self.complete()?])
     }
 
     fn name<T>(&self, result: io::Result<T>) -> io::Result<T> {

@@ -1,15 +1,19 @@
 //! Files and folders that appear whole or not at all.
 
+mod anonymous;
+mod complete;
 mod dir;
 mod file;
+mod temporary;
 
-use std::ffi::OsString;
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
+pub use complete::{CompleteFile, commit_together};
 pub use dir::AtomicDir;
 pub use file::AtomicFile;
+pub use temporary::remove_temporaries;
 
 use crate::error::Error;
 
@@ -55,13 +59,6 @@ fn sync_folder(folder: &Path) -> io::Result<()> {
         Err(cause) if matches!(cause.kind(), io::ErrorKind::InvalidInput | io::ErrorKind::Unsupported) => Ok(()),
         result => result,
     }
-}
-
-/// A temporary name that says whose leftover it is, should the process be killed.
-fn builder(prefix: &OsString) -> tempfile::Builder<'_, 'static> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(prefix).suffix(".tmp");
-    builder
 }
 
 /// The error of a temporary file under the name of the final one.

@@ -1,6 +1,5 @@
 //! Each frame in a mesh file of its own.
 
-use std::fs::File;
 use std::io::{self, BufWriter, Write};
 
 use cager_core::mesh::{Model, Polygons};
@@ -47,7 +46,7 @@ impl SequenceWriter {
     }
 
     fn write_file(&mut self, name: &str, positions: &[f32]) -> io::Result<()> {
-        let mut file = BufWriter::with_capacity(1 << 16, File::create(self.folder.folder().join(name))?);
+        let mut file = BufWriter::with_capacity(1 << 16, self.folder.create_file(name)?);
         let points = positions.as_chunks().0;
         match &mut self.format {
             Format::Obj(faces) => {

@@ -1,0 +1,197 @@
+//! Complete files that take their names, all or none.
+
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::temporary::{self, Live, Temporary};
+use super::{Place, anonymous, hide_temporary};
+use crate::error::Error;
+
+/// A file whose contents are durable but which does not have its name yet; dropped it leaves nothing.
+#[derive(Debug)]
+#[must_use = "it has no name before `commit_together`"]
+pub struct CompleteFile {
+    pub(super) path: PathBuf,
+    pub(super) place: Place,
+    pub(super) file: File,
+    pub(super) temporary: Option<Temporary>,
+    /// What had the name before, for as long as it may have to come back.
+    pub(super) replaced: Option<Temporary>,
+    pub(super) length: u64,
+}
+
+impl CompleteFile {
+    /// The path as it was given to [`AtomicFile::create`](super::AtomicFile::create).
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Bytes in the file.
+    pub fn length(&self) -> u64 {
+        self.length
+    }
+
+    /// Gives the file its name and says how to take that back. `keep` saves what had the name before.
+    fn put_in_place(&mut self, live: &mut Live, keep: bool) -> io::Result<Undo> {
+        let target = &self.place.target;
+        if self.temporary.is_none() {
+            match anonymous::link(&self.file, target) {
+                Err(cause) if cause.kind() == io::ErrorKind::AlreadyExists => {
+                    // Only renaming replaces a file in one step, and only what has a name can be renamed.
+                    let ((), name) = live.begin(&self.place.folder, |path| anonymous::link(&self.file, path))?;
+                    self.temporary = Some(name);
+                }
+                linked => return linked.map(|()| Undo::Remove),
+            }
+        }
+        let Some(temporary) = &self.temporary else { return Ok(Undo::Nothing) };
+        let replaces = target.exists();
+        if replaces && keep {
+            let kept = live.begin(&self.place.folder, |path| fs::hard_link(target, path));
+            self.replaced = kept.ok().map(|((), name)| name);
+        }
+        live.rename(temporary, target)?;
+        Ok(match self.replaced {
+            Some(_) => Undo::Restore,
+            None if replaces => Undo::Nothing,
+            None => Undo::Remove,
+        })
+    }
+
+    fn take_back(&self, live: &mut Live, how: Undo) -> io::Result<()> {
+        match (how, &self.replaced) {
+            (Undo::Remove, _) => fs::remove_file(&self.place.target),
+            (Undo::Restore, Some(old)) => live.rename(old, &self.place.target),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// How to take a name back.
+#[derive(Clone, Copy)]
+enum Undo {
+    Remove,
+    Restore,
+    /// Where a file cannot have two names, what was replaced is gone.
+    Nothing,
+}
+
+/// Gives complete files their names, in place of files that had them, as one step: where one of them cannot have its
+/// name, none has, and those that stood there before stay.
+///
+/// A process killed in between may leave a part of them; that takes microseconds, since all else was done before. What
+/// was replaced can be restored only where the system lets a file have two names.
+///
+/// # Errors
+/// [`Error::Io`]; the files are then not created, unless it is a name alone that could not be made durable.
+pub fn commit_together(mut files: Vec<CompleteFile>) -> Result<(), Error> {
+    name_all(&mut files)?;
+    for file in &mut files {
+        // Before what takes time, in which a killed process would leave it.
+        file.replaced = None;
+    }
+    for file in &files {
+        file.place.sync_folder().map_err(|cause| hide_temporary(&file.path, &cause))?;
+    }
+    Ok(())
+}
+
+/// The temporaries stay in the files, since dropping one takes the lock that is held here.
+fn name_all(files: &mut [CompleteFile]) -> Result<(), Error> {
+    let mut live = temporary::lock();
+    let mut done = Vec::new();
+    for k in 0..files.len() {
+        let another_may_fail = k + 1 < files.len();
+        match files[k].put_in_place(&mut live, another_may_fail) {
+            Ok(undo) => done.push(undo),
+            Err(cause) => {
+                for (file, undo) in files.iter().zip(done) {
+                    // The first error is the one to tell.
+                    let _ = file.take_back(&mut live, undo);
+                }
+                return Err(hide_temporary(&files[k].path, &cause));
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::atomic::AtomicFile;
+    use std::collections::BTreeMap;
+    use std::io::Write;
+    use tempfile::tempdir;
+
+    /// A complete file, under a temporary name or, where the system has that, without any.
+    fn begin(path: &Path, named: bool) -> CompleteFile {
+        let unnamed = |folder: &Path| if named { None } else { anonymous::create(folder) };
+        let mut file = AtomicFile::create_as(path, unnamed).unwrap();
+        file.write_all(b"new").unwrap();
+        file.complete().unwrap()
+    }
+
+    /// Names in a folder, hidden ones too, with the contents of files.
+    fn contents(folder: &Path) -> BTreeMap<String, String> {
+        let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap());
+        entries
+            .map(|e| (e.file_name().into_string().unwrap(), fs::read_to_string(e.path()).unwrap_or_default()))
+            .collect()
+    }
+
+    fn expected(files: &[(&str, &str)]) -> BTreeMap<String, String> {
+        files.iter().map(|&(name, text)| (name.to_owned(), text.to_owned())).collect()
+    }
+
+    #[test]
+    fn files_take_their_names_together_over_old_ones_and_beside_them() {
+        for (named, old) in [(false, false), (false, true), (true, false), (true, true)] {
+            let folder = tempdir().unwrap();
+            let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+            if old {
+                fs::write(&a, "old").unwrap();
+                fs::write(&b, "old").unwrap();
+            }
+            let before = contents(folder.path());
+            let files = vec![begin(&a, named), begin(&b, named)];
+            assert_eq!((files[0].path(), files[0].length()), (a.as_path(), 3));
+            if !named && anonymous::create(folder.path()).is_some() {
+                assert_eq!(contents(folder.path()), before, "an unnamed file has a name");
+            }
+            commit_together(files).unwrap();
+            assert_eq!(contents(folder.path()), expected(&[("a", "new"), ("b", "new")]), "{named} {old}");
+        }
+    }
+
+    #[test]
+    fn where_one_file_cannot_have_its_name_all_is_as_before() {
+        for (named, old) in [(false, false), (false, true), (true, false), (true, true)] {
+            let folder = tempdir().unwrap();
+            let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+            if old {
+                fs::write(&a, "old").unwrap();
+            }
+            let files = vec![begin(&a, named), begin(&b, named)];
+            // Someone takes the second name for what no file replaces.
+            fs::create_dir(&b).unwrap();
+            let error = commit_together(files).unwrap_err().to_string();
+            assert!(error.starts_with(&format!("{}: cannot be written (", b.display())), "{error}");
+            assert!(!error.contains(".cager-"), "{error}");
+            let before: &[_] = if old { &[("a", "old"), ("b", "")] } else { &[("b", "")] };
+            assert_eq!(contents(folder.path()), expected(before), "{named} {old}");
+        }
+    }
+
+    #[test]
+    fn a_file_dropped_with_or_without_a_name_leaves_nothing() {
+        for named in [false, true] {
+            let folder = tempdir().unwrap();
+            let file = begin(&folder.path().join("a"), named);
+            assert!(contents(folder.path()).len() <= 1);
+            drop(file);
+            assert!(contents(folder.path()).is_empty());
+        }
+    }
+}
