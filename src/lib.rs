@@ -6,3 +6,4 @@ pub mod decode;
 pub mod encode;
 mod plot;
 pub mod report;
+pub mod store;

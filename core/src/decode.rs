@@ -44,6 +44,16 @@ impl Decoder {
         Self { phi: single, positions }
     }
 
+    /// Takes coordinates n × m that are in single precision already.
+    pub(crate) fn from_single(phi: Mat<f32>, positions: usize) -> Self {
+        Self { phi, positions }
+    }
+
+    /// Unknowns that are positions and follow a translation; they come first.
+    pub fn positions(&self) -> usize {
+        self.positions
+    }
+
     /// Number of points n.
     pub fn points(&self) -> usize {
         self.phi.nrows()

@@ -12,6 +12,10 @@ use faer::{Accum, Mat, MatRef, Par};
 use rayon::prelude::*;
 use std::time::Instant;
 
+mod parts;
+
+pub use parts::SolverParts;
+
 /// Frames of one matrix product. Shorter batches are padded, so that a frame's bits never depend on its company.
 pub const BATCH: usize = 16;
 /// Beyond this affine reproduction error, over the diagonal, coordinates are of no use.
