@@ -8,3 +8,4 @@ pub mod encode;
 pub mod engine;
 mod plot;
 pub mod report;
+pub mod store;

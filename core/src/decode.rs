@@ -46,6 +46,18 @@ impl Decoder {
         Self { phi: single, points, positions }
     }
 
+    /// Takes coordinates n × m that are in single precision already.
+    pub(crate) fn from_single(mut phi: Mat<f32>, positions: usize) -> Self {
+        let points = phi.nrows();
+        phi.resize_with(points.next_multiple_of(dense::WHOLE_ROWS), phi.ncols(), |_, _| 0.0);
+        Self { phi, points, positions }
+    }
+
+    /// Unknowns that are positions and follow a translation; they come first.
+    pub fn positions(&self) -> usize {
+        self.positions
+    }
+
     /// Number of points n.
     pub fn points(&self) -> usize {
         self.points

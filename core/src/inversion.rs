@@ -12,6 +12,10 @@ use faer::{Accum, Mat, MatRef, Par};
 use rayon::prelude::*;
 use std::time::Instant;
 
+mod parts;
+
+pub use parts::SolverParts;
+
 /// Most frames of one matrix product.
 pub const BATCH: usize = 16;
 /// Beyond this affine reproduction error, over the diagonal, coordinates are of no use.
@@ -270,11 +274,6 @@ impl Solver {
         4 * phi.nrows() * phi.ncols() + 8 * self.operator.nrows() * self.operator.ncols() + 4 * self.handles.len()
     }
 
-    /// Whether a frame's handle rows are all that [`Self::invert`] reads of it.
-    pub fn reads_handles_only(&self) -> bool {
-        !self.reads_all
-    }
-
     /// Cages, each m × 3 interleaved, of up to [`BATCH`] frames, each n × 3 interleaved.
     ///
     /// The bits of a cage depend on its frame alone, not on the other frames of the batch.
@@ -291,7 +290,7 @@ impl Solver {
     /// # Panics
     /// As [`Self::invert`], and where the solver reads every point.
     pub fn invert_handles<T: Copy + Into<f64>>(&self, frames: &[&[T]]) -> Vec<Vec<f32>> {
-        assert!(self.reads_handles_only(), "handles are not enough for least squares over all points");
+        assert!(!self.reads_all, "handles are not enough for least squares over all points");
         assert!(frames.iter().all(|f| f.len() == 3 * self.handles.len()), "every frame has every handle");
         self.solve(frames, |row| row)
     }

@@ -41,7 +41,7 @@ impl Facts {
             points: solver.decoder().points() as u32,
             unknowns: solver.decoder().unknowns() as u32,
             handle_count: solver.handles().len() as u32,
-            reads_handles_only: solver.reads_handles_only(),
+            reads_handles_only: !solver.reads_all(),
             cage_vertices: prepared.cage_vertices,
             cage_faces: prepared.cage_faces,
             spectrum: prepared.options.spectrum as u32,

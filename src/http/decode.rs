@@ -1,0 +1,203 @@
+//! `POST /v1/sessions/{id}/decode`: cages in, positions out.
+
+use super::extract::{Found, content_type};
+use super::frames::{body_error, deleted, prepared, stopping};
+use super::openapi;
+use crate::engine::Lane;
+use crate::problem::{self, ApiError};
+use crate::service::{Service, StreamPlace};
+use crate::session::Session;
+use axum::body::Body;
+use axum::extract::State;
+use axum::response::{IntoResponse, Response};
+use bytes::Bytes;
+use http::{HeaderMap, header};
+use http_body_util::BodyExt;
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::sync::{Arc, Mutex};
+use tokio::sync::{oneshot, watch};
+
+/// Positions of a cage: m × 3 little-endian f32 in, n × 3 out, for as many cages as the body has. Cages may be edited.
+#[utoipa::path(
+    post, path = "/v1/sessions/{id}/decode", tag = "results", params(openapi::Id),
+    request_body(content = Vec<u8>, content_type = "application/octet-stream", description = "m × 3 numbers per cage"),
+    responses((status = 200, description = "n × 3 numbers per cage", content_type = "application/octet-stream", body = Vec<u8>)),
+)]
+pub(crate) async fn post(
+    State(service): State<Arc<Service>>,
+    Found { session, tenant }: Found,
+    headers: HeaderMap,
+    body: Body,
+) -> Result<Response, ApiError> {
+    if content_type(&headers).as_deref() != Some("application/octet-stream") {
+        return Err(ApiError::new(problem::MEDIA_TYPE, "send cages as application/octet-stream"));
+    }
+    let place = service.stream(&tenant)?;
+    let facts = prepared(&service, &session).await?;
+    let solver = service.solver(&session).await?;
+    let cost = f64::from(facts.points) * f64::from(facts.unknowns);
+    let lane = service.engine.lane(&tenant.name, tenant.priority.weight(), cost, move |jobs: Vec<Job>| {
+        let (cages, replies): (Vec<_>, Vec<_>) = jobs.into_iter().map(|job| (job.cage, job.reply)).unzip();
+        let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
+        let mut positions = vec![Vec::new(); cages.len()];
+        solver.solver.decoder().decode(&views, &mut positions);
+        for (positions, reply) in positions.into_iter().zip(replies) {
+            let bytes: Vec<u8> = positions.iter().flat_map(|x| x.to_le_bytes()).collect();
+            // The client may be gone.
+            let _ = reply.send(bytes.into());
+        }
+    });
+    let spool = Arc::new(Spool::new().map_err(|error| ApiError::internal(&error))?);
+    let arrived = spool.arrived.subscribe();
+    let limit = service.config.max_rest_bytes;
+    tokio::spawn(spool_body(Arc::clone(&spool), body, limit, service, Arc::clone(&session)));
+    let mut decoding =
+        Decoding { spool, arrived, lane, session, frame_bytes: 12 * u64::from(facts.unknowns), next: 0, _place: place };
+    // The first is waited for, so that its error still has a status.
+    let first = decoding.next().await?;
+    let rest = futures_util::stream::unfold(decoding, |mut decoding| async {
+        match decoding.next().await {
+            Ok(None) => None,
+            Ok(Some(bytes)) => Some((Ok(bytes), decoding)),
+            Err(error) => Some((Err(io::Error::other(error.problem.detail)), decoding)),
+        }
+    });
+    let first = futures_util::stream::iter(first.map(Ok));
+    let stream = futures_util::StreamExt::chain(first, rest);
+    Ok(([(header::CONTENT_TYPE, "application/octet-stream")], Body::from_stream(stream)).into_response())
+}
+
+struct Job {
+    cage: Vec<f32>,
+    reply: oneshot::Sender<Bytes>,
+}
+
+/// The body as it arrives, on disk: a client that reads nothing before it has written all must not be held back.
+struct Spool {
+    file: Mutex<File>,
+    arrived: watch::Sender<Arrived>,
+}
+
+#[derive(Clone, Default)]
+struct Arrived {
+    bytes: u64,
+    end: Option<Result<(), ApiError>>,
+}
+
+impl Spool {
+    fn new() -> io::Result<Self> {
+        Ok(Self { file: Mutex::new(tempfile::tempfile()?), arrived: watch::Sender::default() })
+    }
+
+    fn append(&self, at: u64, bytes: &[u8]) -> io::Result<()> {
+        let mut file = crate::session::lock(&self.file);
+        file.seek(SeekFrom::Start(at))?;
+        file.write_all(bytes)
+    }
+
+    fn read(&self, at: u64, length: usize) -> io::Result<Vec<u8>> {
+        let mut file = crate::session::lock(&self.file);
+        file.seek(SeekFrom::Start(at))?;
+        let mut bytes = vec![0; length];
+        file.read_exact(&mut bytes)?;
+        Ok(bytes)
+    }
+}
+
+async fn spool_body(spool: Arc<Spool>, mut body: Body, limit: u64, service: Arc<Service>, session: Arc<Session>) {
+    let mut bytes = 0u64;
+    let end = loop {
+        let next = tokio::select! {
+            next = body.frame() => next,
+            () = session.deleted().cancelled() => break Err(deleted()),
+            () = service.stopping().cancelled() => break Err(stopping()),
+            () = spool.arrived.closed() => return,
+        };
+        let chunk = match next {
+            None => break Ok(()),
+            Some(Ok(frame)) => frame.into_data().unwrap_or_default(),
+            Some(Err(error)) => break Err(body_error(&error)),
+        };
+        if bytes + chunk.len() as u64 > limit {
+            let detail = format!("the cages take more than {limit} bytes; decode fewer at a time");
+            break Err(ApiError::new(problem::TOO_LARGE, detail).limit(limit));
+        }
+        let (writing, length) = (Arc::clone(&spool), chunk.len() as u64);
+        match tokio::task::spawn_blocking(move || writing.append(bytes, &chunk)).await {
+            Ok(Ok(())) => bytes += length,
+            Ok(Err(error)) => break Err(ApiError::internal(&error)),
+            Err(error) => break Err(ApiError::internal(&error)),
+        }
+        spool.arrived.send_modify(|arrived| arrived.bytes = bytes);
+    };
+    spool.arrived.send_modify(|arrived| arrived.end = Some(end));
+}
+
+/// The half that answers.
+struct Decoding {
+    spool: Arc<Spool>,
+    arrived: watch::Receiver<Arrived>,
+    lane: Lane<Job>,
+    session: Arc<Session>,
+    frame_bytes: u64,
+    next: u64,
+    _place: StreamPlace,
+}
+
+impl Decoding {
+    /// Positions of the next cages.
+    async fn next(&mut self) -> Result<Option<Bytes>, ApiError> {
+        const AT_A_TIME: u64 = 4;
+        let at = self.next * self.frame_bytes;
+        let count = loop {
+            let arrived = self.arrived.borrow_and_update().clone();
+            let whole = (arrived.bytes - at) / self.frame_bytes;
+            if whole > 0 {
+                break whole.min(AT_A_TIME);
+            }
+            match arrived.end {
+                Some(Err(error)) => return Err(error),
+                Some(Ok(())) if arrived.bytes == at => return Ok(None),
+                Some(Ok(())) => {
+                    let detail = format!(
+                        "the body ends within cage {}, after {} of {} bytes; send whole cages",
+                        self.next,
+                        arrived.bytes - at,
+                        self.frame_bytes
+                    );
+                    return Err(ApiError::new(problem::BAD_REQUEST, detail));
+                }
+                None => {}
+            }
+            if self.arrived.changed().await.is_err() {
+                return Err(ApiError::internal(&"a spool ended early"));
+            }
+        };
+        let (spool, length) = (Arc::clone(&self.spool), (count * self.frame_bytes) as usize);
+        let bytes = crate::session::create::blocking(move || spool.read(at, length))
+            .await?
+            .map_err(|error| ApiError::internal(&error))?;
+        let mut replies = Vec::new();
+        for cage in bytes.chunks_exact(self.frame_bytes as usize) {
+            let cage: Vec<f32> = cage.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+            if let Some(k) = cage.iter().position(|x| !x.is_finite()) {
+                let detail = format!("cage {}: vertex {} is not finite", self.next, k / 3);
+                return Err(ApiError::new(problem::INVALID_FRAME, detail));
+            }
+            let (reply, positions) = oneshot::channel();
+            self.lane.push(Job { cage, reply });
+            replies.push(positions);
+            self.next += 1;
+        }
+        let mut out = Vec::new();
+        for reply in replies {
+            let positions = tokio::select! {
+                positions = reply => positions.map_err(|_| ApiError::internal(&"a batch of cages was lost"))?,
+                () = self.session.deleted().cancelled() => return Err(deleted()),
+            };
+            out.extend_from_slice(&positions);
+        }
+        Ok(Some(out.into()))
+    }
+}

@@ -1,0 +1,152 @@
+//! What handlers take from a request: the tenant, the tenant's session, checked queries and bodies.
+
+use crate::auth::Tenant;
+use crate::problem::{self, ApiError};
+use crate::service::Service;
+use crate::session::Session;
+use axum::extract::rejection::{JsonRejection, QueryRejection};
+use axum::extract::{FromRequestParts, Path, State};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+use http::request::Parts;
+use http::{HeaderMap, header};
+use std::convert::Infallible;
+use std::sync::Arc;
+
+/// Who asks. Rejects with 401 where the middleware did not run or found no valid token.
+#[derive(Clone)]
+pub(crate) struct Caller(pub(crate) Arc<Tenant>);
+
+/// Finds out who asks, before anything else of the request is looked at.
+pub(crate) async fn authenticate(
+    State(service): State<Arc<Service>>,
+    mut request: axum::extract::Request,
+    next: Next,
+) -> Response {
+    match service.access.authenticate(request.headers()) {
+        Ok(tenant) => {
+            request.extensions_mut().insert(Caller(tenant));
+            next.run(request).await
+        }
+        Err(denied) => {
+            service.rejected("unauthorized");
+            ApiError::new(problem::UNAUTHORIZED, denied.to_string()).into_response()
+        }
+    }
+}
+
+impl<S: Sync> FromRequestParts<S> for Caller {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, ApiError> {
+        let caller = parts.extensions.get::<Self>().cloned();
+        caller.ok_or_else(|| ApiError::new(problem::UNAUTHORIZED, "send Authorization: Bearer and your token"))
+    }
+}
+
+/// The caller's session of this address. Rejects with 404 where there is none, or it is another tenant's.
+pub(crate) struct Found {
+    pub(crate) tenant: Arc<Tenant>,
+    pub(crate) session: Arc<Session>,
+}
+
+impl FromRequestParts<Arc<Service>> for Found {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, service: &Arc<Service>) -> Result<Self, ApiError> {
+        let Caller(tenant) = Caller::from_request_parts(parts, service).await?;
+        let Path(id) = Path::<String>::from_request_parts(parts, service)
+            .await
+            .map_err(|_| ApiError::new(problem::NOT_FOUND, "the id of a session is missing"))?;
+        let session = service.registry.find(&tenant.name, &id)?;
+        session.ensure_loaded().await?;
+        Ok(Self { tenant, session })
+    }
+}
+
+/// A query string. Rejects with 400 where it does not fit.
+pub(crate) struct Query<T>(pub(crate) T);
+
+impl<S: Sync + Send, T: serde::de::DeserializeOwned> FromRequestParts<S> for Query<T> {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+        match <axum::extract::Query<T> as FromRequestParts<S>>::from_request_parts(parts, state).await {
+            Ok(axum::extract::Query(query)) => Ok(Self(query)),
+            Err(QueryRejection::FailedToDeserializeQueryString(error)) => {
+                Err(ApiError::new(problem::BAD_REQUEST, format!("query: {}", error.body_text())))
+            }
+            Err(other) => Err(ApiError::new(problem::BAD_REQUEST, format!("query: {other}"))),
+        }
+    }
+}
+
+/// A JSON body. Rejects with 400, 413, 415 or 422.
+pub(crate) struct Body<T>(pub(crate) T);
+
+impl<S: Sync + Send, T: serde::de::DeserializeOwned> axum::extract::FromRequest<S> for Body<T> {
+    type Rejection = ApiError;
+
+    async fn from_request(request: axum::extract::Request, state: &S) -> Result<Self, ApiError> {
+        match <axum::Json<T> as axum::extract::FromRequest<S>>::from_request(request, state).await {
+            Ok(axum::Json(body)) => Ok(Self(body)),
+            Err(JsonRejection::MissingJsonContentType(_)) => {
+                Err(ApiError::new(problem::MEDIA_TYPE, "send the body as application/json"))
+            }
+            Err(JsonRejection::JsonDataError(error)) => {
+                Err(ApiError::new(problem::INVALID_OPTIONS, format!("body: {}", error.body_text())))
+            }
+            Err(error) if error.status() == http::StatusCode::PAYLOAD_TOO_LARGE => {
+                Err(ApiError::new(problem::TOO_LARGE, "the body is larger than a JSON body may be"))
+            }
+            Err(error) => Err(ApiError::new(problem::BAD_REQUEST, format!("body: {}", error.body_text()))),
+        }
+    }
+}
+
+/// What the client would like to get.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Accept {
+    /// Nothing in particular.
+    Anything,
+    Json,
+    /// Frame records.
+    Records,
+    /// Newline-delimited JSON.
+    Ndjson,
+    Binary,
+    /// Something that no route has.
+    Other,
+}
+
+impl Accept {
+    /// The first known type of the header.
+    pub(crate) fn of(headers: &HeaderMap) -> Self {
+        let Some(accept) = headers.get(header::ACCEPT).and_then(|value| value.to_str().ok()) else {
+            return Self::Anything;
+        };
+        let known = |part: &str| match part.split(';').next().unwrap_or_default().trim().to_ascii_lowercase().as_str() {
+            "*/*" | "application/*" | "" => Some(Self::Anything),
+            "application/json" => Some(Self::Json),
+            cager_proto::record::MEDIA_TYPE => Some(Self::Records),
+            "application/x-ndjson" | "application/ndjson" | "application/jsonl" => Some(Self::Ndjson),
+            "application/octet-stream" => Some(Self::Binary),
+            _ => None,
+        };
+        accept.split(',').find_map(known).unwrap_or(Self::Other)
+    }
+}
+
+impl<S: Sync> FromRequestParts<S> for Accept {
+    type Rejection = Infallible;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Infallible> {
+        Ok(Self::of(&parts.headers))
+    }
+}
+
+/// The media type of a body without its parameters, in small letters.
+pub(crate) fn content_type(headers: &HeaderMap) -> Option<String> {
+    let value = headers.get(header::CONTENT_TYPE)?.to_str().ok()?;
+    Some(value.split(';').next().unwrap_or_default().trim().to_ascii_lowercase())
+}

@@ -1,0 +1,230 @@
+//! From the bytes of a body to frames, however they are cut.
+
+use crate::problem::{self, ApiError};
+use crate::session::facts::Facts;
+use crate::session::upload::Rows;
+use cager_proto::record::{self, FrameHeader, Kind, RecordError};
+
+/// A whole frame.
+#[derive(Debug, PartialEq)]
+pub(crate) struct FrameIn {
+    pub(crate) frame: u32,
+    pub(crate) rows: Rows,
+    /// Little-endian f32, three for each row.
+    pub(crate) bytes: Vec<u8>,
+}
+
+/// How frames follow each other in a body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Layout {
+    /// Back to back, numbered from here.
+    Raw { first: u32, rows: Rows },
+    /// As frame records, with their own numbers.
+    Records,
+}
+
+/// Puts frames together.
+pub(crate) struct FrameReader {
+    layout: Layout,
+    points: u32,
+    handles: u32,
+    /// Number of the next raw frame; beyond u32 there is none.
+    next: u64,
+    head: Vec<u8>,
+    record: Option<FrameHeader>,
+    bytes: Vec<u8>,
+    begun: bool,
+}
+
+impl FrameReader {
+    pub(crate) fn new(layout: Layout, facts: &Facts) -> Self {
+        let next = match layout {
+            Layout::Raw { first, .. } => u64::from(first),
+            Layout::Records => 0,
+        };
+        Self {
+            layout,
+            points: facts.points,
+            handles: facts.handle_count,
+            next,
+            head: Vec::new(),
+            record: None,
+            bytes: Vec::new(),
+            begun: false,
+        }
+    }
+
+    /// Bytes of the largest frame that can come next: what the caller makes room for before it gives more.
+    pub(crate) fn frame_bytes(&self) -> usize {
+        let rows = match self.layout {
+            Layout::Raw { rows: Rows::Handles, .. } => self.handles,
+            _ => self.points.max(self.handles),
+        };
+        12 * rows as usize
+    }
+
+    /// Whether nothing of the next frame is there, so that no room is taken for it yet.
+    pub(crate) fn is_between_frames(&self) -> bool {
+        !self.begun
+    }
+
+    /// Takes bytes from the front of `input`; a frame when one is whole, and nothing when it needs more input.
+    ///
+    /// # Errors
+    /// A record that is damaged or does not belong here.
+    pub(crate) fn push(&mut self, input: &mut &[u8]) -> Result<Option<FrameIn>, ApiError> {
+        if input.is_empty() {
+            return Ok(None);
+        }
+        self.begun = true;
+        let (frame, rows, needed) = match self.layout {
+            Layout::Raw { rows, .. } => {
+                let frame = u32::try_from(self.next).map_err(|_| {
+                    ApiError::new(problem::INVALID_FRAME, "the frame numbers pass 4294967295, the highest there is")
+                })?;
+                (frame, rows, self.frame_bytes())
+            }
+            Layout::Records => {
+                let Some(header) = self.header(input)? else { return Ok(None) };
+                let rows = if header.kind == Kind::HandleRows { Rows::Handles } else { Rows::All };
+                (header.frame, rows, header.row_bytes() as usize)
+            }
+        };
+        if self.bytes.capacity() < needed {
+            self.bytes.reserve_exact(needed - self.bytes.len());
+        }
+        let take = input.len().min(needed - self.bytes.len());
+        self.bytes.extend_from_slice(&input[..take]);
+        *input = &input[take..];
+        if self.bytes.len() < needed {
+            return Ok(None);
+        }
+        let bytes = std::mem::take(&mut self.bytes);
+        if let Some(header) = self.record.take()
+            && crc32c::crc32c(&bytes) != header.crc
+        {
+            return Err(refused(RecordError::Checksum { frame }).frame(frame));
+        }
+        self.head.clear();
+        self.begun = false;
+        self.next += 1;
+        Ok(Some(FrameIn { frame, rows, bytes }))
+    }
+
+    /// Whether the body may end here.
+    ///
+    /// # Errors
+    /// It ends within a frame.
+    pub(crate) fn finish(&self) -> Result<(), ApiError> {
+        if !self.begun {
+            return Ok(());
+        }
+        let (which, have, needed) = match (self.layout, self.record) {
+            (Layout::Raw { .. }, _) => (format!("frame {}", self.next), self.bytes.len(), self.frame_bytes()),
+            (Layout::Records, Some(header)) => {
+                (format!("frame {}", header.frame), self.bytes.len(), header.row_bytes() as usize)
+            }
+            (Layout::Records, None) => ("the header of a frame record".to_owned(), self.head.len(), record::HEADER_BYTES),
+        };
+        Err(ApiError::new(
+            problem::BAD_REQUEST,
+            format!("the body ends within {which}, after {have} of {needed} bytes; send whole frames"),
+        ))
+    }
+
+    /// The header of the record at hand, as soon as it is whole.
+    fn header(&mut self, input: &mut &[u8]) -> Result<Option<FrameHeader>, ApiError> {
+        if self.record.is_none() {
+            let take = input.len().min(record::HEADER_BYTES - self.head.len());
+            self.head.extend_from_slice(&input[..take]);
+            *input = &input[take..];
+            let header = match record::decode_header(&self.head, Kind::Positions, self.points) {
+                Err(RecordError::Kind { .. }) => record::decode_header(&self.head, Kind::HandleRows, self.handles),
+                other => other,
+            };
+            match header {
+                Ok(header) => self.record = Some(header),
+                Err(RecordError::Incomplete { .. }) => return Ok(None),
+                Err(error) => return Err(refused(error)),
+            }
+        }
+        Ok(self.record)
+    }
+}
+
+fn refused(error: RecordError) -> ApiError {
+    ApiError::new(problem::INVALID_FRAME, error.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cager_proto::messages::{CacheUse, ConditionNumber, PreparationSeconds};
+
+    fn facts() -> Facts {
+        Facts {
+            points: 5,
+            unknowns: 4,
+            handle_count: 4,
+            reads_handles_only: true,
+            cage_vertices: 4,
+            cage_faces: 4,
+            spectrum: 0,
+            condition_number: ConditionNumber { full: 1.0, handles: 1.0 },
+            rank: 4,
+            affine_reproduction_error: 0.0,
+            cache: CacheUse::Miss,
+            seconds: PreparationSeconds::default(),
+            warnings: Vec::new(),
+        }
+    }
+
+    fn read(layout: Layout, body: &[u8], chunk: usize) -> Result<Vec<FrameIn>, ApiError> {
+        let mut reader = FrameReader::new(layout, &facts());
+        let mut frames = Vec::new();
+        for mut piece in body.chunks(chunk) {
+            while !piece.is_empty() {
+                frames.extend(reader.push(&mut piece)?);
+            }
+        }
+        reader.finish().map(|()| frames)
+    }
+
+    #[test]
+    fn frames_are_the_same_however_the_body_is_cut() {
+        let body: Vec<u8> = (0..180u8).collect();
+        let layout = Layout::Raw { first: 7, rows: Rows::All };
+        let whole = read(layout, &body, 1000).unwrap();
+        assert_eq!(whole.iter().map(|f| f.frame).collect::<Vec<_>>(), [7, 8, 9]);
+        assert_eq!(whole.iter().flat_map(|f| f.bytes.clone()).collect::<Vec<_>>(), body);
+        for chunk in 1..100 {
+            assert_eq!(read(layout, &body, chunk).unwrap(), whole, "chunks of {chunk}");
+        }
+        let handles = read(Layout::Raw { first: 0, rows: Rows::Handles }, &body[..96], 5).unwrap();
+        assert_eq!((handles.len(), handles[0].bytes.len()), (2, 48));
+    }
+
+    #[test]
+    fn records_are_the_same_however_the_body_is_cut() {
+        let mut body = Vec::new();
+        record::encode(Kind::Positions, 3, f32::NAN, f32::NAN, &[1.0; 15], &mut body).unwrap();
+        record::encode(Kind::HandleRows, 9, f32::NAN, f32::NAN, &[2.0; 12], &mut body).unwrap();
+        for chunk in 1..body.len() + 1 {
+            let frames = read(Layout::Records, &body, chunk).unwrap();
+            assert_eq!(frames.iter().map(|f| (f.frame, f.rows)).collect::<Vec<_>>(), [(3, Rows::All), (9, Rows::Handles)]);
+        }
+        for cut in 1..88 {
+            assert!(read(Layout::Records, &body[..cut], 1000).is_err(), "cut at {cut}");
+        }
+        body[40] ^= 1;
+        assert!(read(Layout::Records, &body, 7).unwrap_err().problem.detail.contains("damaged"));
+    }
+
+    #[test]
+    fn a_body_that_ends_within_a_frame_says_where() {
+        let error = read(Layout::Raw { first: 4, rows: Rows::All }, &[0; 70], 64).unwrap_err();
+        assert!(error.problem.detail.contains("frame 5, after 10 of 60 bytes"), "{}", error.problem.detail);
+        let error = read(Layout::Raw { first: u32::MAX, rows: Rows::All }, &[0; 120], 64).unwrap_err();
+        assert!(error.problem.detail.contains("4294967295"));
+    }
+}

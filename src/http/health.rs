@@ -1,0 +1,51 @@
+//! `/healthz`, `/readyz` and `/metrics`: answered outside all limits.
+
+use crate::problem::ApiError;
+use crate::service::Service;
+use crate::telemetry;
+use axum::Json;
+use axum::extract::State;
+use axum::response::{IntoResponse, Response};
+use http::header;
+use serde::Serialize;
+use std::sync::Arc;
+
+/// That the service lives.
+#[derive(Serialize, utoipa::ToSchema)]
+pub(crate) struct Health {
+    /// `ok`.
+    status: &'static str,
+    /// Version of the program.
+    version: &'static str,
+    /// Seconds since it started.
+    uptime_s: f64,
+}
+
+fn health(service: &Service) -> Json<Health> {
+    let uptime_s = service.started.elapsed().as_secs_f64();
+    Json(Health { status: "ok", version: env!("CARGO_PKG_VERSION"), uptime_s })
+}
+
+/// Liveness: the process answers.
+#[utoipa::path(get, path = "/healthz", tag = "operation", security(()), responses((status = 200, body = Health)))]
+pub(crate) async fn live(State(service): State<Arc<Service>>) -> Json<Health> {
+    health(&service)
+}
+
+/// Readiness: sessions are resumed and the disk takes writes.
+#[utoipa::path(get, path = "/readyz", tag = "operation", security(()), responses((status = 200, body = Health)))]
+pub(crate) async fn ready(State(service): State<Arc<Service>>) -> Result<Json<Health>, ApiError> {
+    service.ready().await?;
+    Ok(health(&service))
+}
+
+/// Metrics in Prometheus' text format.
+#[utoipa::path(
+    get, path = "/metrics", tag = "operation", security(()),
+    responses((status = 200, description = "Metrics", content_type = "text/plain", body = String)),
+)]
+pub(crate) async fn metrics(State(service): State<Arc<Service>>) -> Response {
+    telemetry::metrics::observe(&service);
+    let text = telemetry::metrics::recorder().render();
+    ([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], text).into_response()
+}

@@ -1,0 +1,22 @@
+//! HTTP: routes, what they take and give, and the listener.
+
+mod cages;
+mod container;
+mod coordinates;
+mod decode;
+mod errors;
+mod events;
+mod extract;
+mod frames;
+mod frames_in;
+mod health;
+pub mod listen;
+mod multipart;
+pub mod openapi;
+mod ranged;
+mod respond;
+mod router;
+mod sessions;
+mod viewer;
+
+pub use router::{router, spare};

@@ -1,0 +1,125 @@
+//! The multipart body that makes a session.
+
+use super::frames::body_error;
+use crate::problem::{self, ApiError};
+use crate::service::Service;
+use crate::store::Content;
+use axum::extract::Multipart;
+use axum::extract::multipart::{Field, MultipartError};
+use cager_proto::messages::SessionOptions;
+use tokio::sync::OwnedSemaphorePermit;
+
+const OPTIONS_BYTES: usize = 64 << 10;
+const NAME_CHARACTERS: usize = 200;
+/// Memory is asked for in pieces of this many bytes.
+const PIECE: usize = 4 << 20;
+
+/// What the parts hold, and the room they take until it is dropped.
+pub(crate) struct Parts {
+    pub(crate) content: Content,
+    pub(crate) options: SessionOptions,
+    pub(crate) room: Vec<OwnedSemaphorePermit>,
+}
+
+struct File {
+    name: String,
+    bytes: Vec<u8>,
+}
+
+/// Reads all parts.
+///
+/// # Errors
+/// Parts that are missing, twice there, unknown or too large; no room.
+pub(crate) async fn read(service: &Service, mut body: Multipart) -> Result<Parts, ApiError> {
+    let (mut rest, mut cage, mut options) = (None, None, None);
+    let mut room = Vec::new();
+    let mut left = service.config.max_rest_bytes;
+    while let Some(field) = body.next_field().await.map_err(|e| broken(&e))? {
+        let part = field.name().unwrap_or_default().to_owned();
+        let twice = || bad(format!("part {part:?} is there twice; send it once"));
+        match part.as_str() {
+            "rest" | "cage" => {
+                let place = if part == "rest" { &mut rest } else { &mut cage };
+                if place.is_some() {
+                    return Err(twice());
+                }
+                *place = Some(read_file(service, &part, field, &mut left, &mut room).await?);
+            }
+            "options" => {
+                if options.is_some() {
+                    return Err(twice());
+                }
+                options = Some(read_options(field).await?);
+            }
+            _ => return Err(bad(format!("part {part:?} is unknown; send rest, cage and options"))),
+        }
+    }
+    let rest = rest.ok_or_else(|| bad("part rest is missing; send the rest pose as a file".to_owned()))?;
+    let cage = cage.ok_or_else(|| {
+        let detail = "part cage is missing: automatic cages are not available yet, so send a cage as a file";
+        ApiError::new(problem::INVALID_OPTIONS, detail)
+    })?;
+    let content = Content { rest_name: rest.name, rest: rest.bytes, cage_name: cage.name, cage: cage.bytes };
+    Ok(Parts { content, options: options.unwrap_or_default(), room })
+}
+
+async fn read_file(
+    service: &Service,
+    part: &str,
+    mut field: Field<'_>,
+    left: &mut u64,
+    room: &mut Vec<OwnedSemaphorePermit>,
+) -> Result<File, ApiError> {
+    let name = field.file_name().unwrap_or_default();
+    // Some clients send a path; only the name and its extension matter.
+    let name: String = name.rsplit(['/', '\\']).next().unwrap_or_default().chars().filter(|c| !c.is_control()).collect();
+    if !name.contains('.') || name.chars().count() > NAME_CHARACTERS {
+        let detail = format!("part {part:?} needs a file name whose extension says the format, such as rest.obj");
+        return Err(bad(detail));
+    }
+    let mut bytes = Vec::new();
+    let mut granted = 0;
+    while let Some(chunk) = field.chunk().await.map_err(|e| broken(&e))? {
+        *left = left.checked_sub(chunk.len() as u64).ok_or_else(|| {
+            service.rejected("body_too_large");
+            let limit = service.config.max_rest_bytes;
+            let detail = format!("rest pose and cage are larger than {limit} bytes together; send a lighter model");
+            ApiError::new(problem::TOO_LARGE, detail).limit(limit)
+        })?;
+        while bytes.len() + chunk.len() > granted {
+            room.push(service.upload_memory.try_take(PIECE as u64).ok_or_else(|| {
+                service.rejected("upload_memory");
+                let detail = "too many models are being uploaded at the moment; try again later";
+                ApiError::new(problem::BUSY, detail).retry_after(5)
+            })?);
+            granted += PIECE;
+        }
+        bytes.extend_from_slice(&chunk);
+    }
+    Ok(File { name, bytes })
+}
+
+async fn read_options(mut field: Field<'_>) -> Result<SessionOptions, ApiError> {
+    let mut bytes = Vec::new();
+    while let Some(chunk) = field.chunk().await.map_err(|e| broken(&e))? {
+        bytes.extend_from_slice(&chunk);
+        if bytes.len() > OPTIONS_BYTES {
+            let detail = format!("part \"options\" is larger than {OPTIONS_BYTES} bytes");
+            return Err(ApiError::new(problem::TOO_LARGE, detail).limit(OPTIONS_BYTES as u64));
+        }
+    }
+    serde_json::from_slice(&bytes)
+        .map_err(|error| ApiError::new(problem::INVALID_OPTIONS, format!("part \"options\": {error}")))
+}
+
+fn bad(detail: String) -> ApiError {
+    ApiError::new(problem::BAD_REQUEST, detail)
+}
+
+fn broken(error: &MultipartError) -> ApiError {
+    let general = body_error(error);
+    if general.problem.word() == problem::REQUEST_TIMEOUT.word {
+        return general;
+    }
+    bad(format!("the multipart body cannot be read: {}", error.body_text()))
+}

@@ -1,0 +1,148 @@
+//! Immutable bytes with `ETag`, `Range` and conditions (RFC 9110, §13 and §14).
+
+use crate::problem::{self, ApiError};
+use axum::body::Body;
+use axum::response::{IntoResponse, Response};
+use bytes::Bytes;
+use http::{HeaderMap, HeaderValue, StatusCode, header};
+use std::io;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Bytes read and sent at a time.
+const PIECE: u64 = 512 << 10;
+
+/// Bytes that never change.
+pub(crate) struct Immutable {
+    pub(crate) length: u64,
+    /// Without the quotes.
+    pub(crate) etag: String,
+    pub(crate) media_type: &'static str,
+    /// Whether shared caches may keep it: not where tokens guard it.
+    pub(crate) public: bool,
+    /// Reads a range; blocks.
+    pub(crate) read: Arc<dyn Fn(Range<u64>) -> io::Result<Bytes> + Send + Sync>,
+}
+
+impl Immutable {
+    /// The response to a request with these headers.
+    ///
+    /// # Errors
+    /// 416 for a range that lies outside.
+    pub(crate) fn respond(self, headers: &HeaderMap) -> Result<Response, ApiError> {
+        let etag = format!("\"{}\"", self.etag);
+        let scope = if self.public { "public" } else { "private" };
+        let mut response = match self.select(headers, &etag)? {
+            Selection::NotModified => StatusCode::NOT_MODIFIED.into_response(),
+            Selection::All => {
+                let length = self.length;
+                let mut response = self.body(0..length).into_response();
+                response.headers_mut().insert(header::CONTENT_LENGTH, HeaderValue::from(length));
+                response
+            }
+            Selection::Part(range) => {
+                let (first, last) = (range.start, range.end - 1);
+                let content_range = format!("bytes {first}-{last}/{}", self.length);
+                let length = range.end - range.start;
+                let mut response = (StatusCode::PARTIAL_CONTENT, self.body(range)).into_response();
+                response.headers_mut().insert(header::CONTENT_LENGTH, HeaderValue::from(length));
+                insert(&mut response, header::CONTENT_RANGE, &content_range);
+                response
+            }
+        };
+        insert(&mut response, header::ETAG, &etag);
+        insert(&mut response, header::CACHE_CONTROL, &format!("{scope}, max-age=31536000, immutable"));
+        insert(&mut response, header::ACCEPT_RANGES, "bytes");
+        insert(&mut response, header::VARY, "accept, authorization");
+        if response.status() != StatusCode::NOT_MODIFIED {
+            response.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static(self.media_type));
+        }
+        Ok(response)
+    }
+
+    fn select(&self, headers: &HeaderMap, etag: &str) -> Result<Selection, ApiError> {
+        let text = |name| headers.get(name).and_then(|value: &HeaderValue| value.to_str().ok());
+        if let Some(known) = text(header::IF_NONE_MATCH) {
+            let same = |tag: &str| tag == "*" || tag.trim_start_matches("W/") == etag;
+            if known.split(',').any(|tag| same(tag.trim())) {
+                return Ok(Selection::NotModified);
+            }
+        }
+        if text(header::IF_RANGE).is_some_and(|tag| tag != etag) {
+            return Ok(Selection::All);
+        }
+        match text(header::RANGE).and_then(|range| parse_range(range, self.length)) {
+            None => Ok(Selection::All),
+            Some(Some(range)) => Ok(Selection::Part(range)),
+            Some(None) => {
+                let detail = format!("there are {} bytes; ask for a range within them", self.length);
+                Err(ApiError::new(problem::RANGE, detail).limit(self.length))
+            }
+        }
+    }
+
+    fn body(&self, range: Range<u64>) -> Body {
+        let read = Arc::clone(&self.read);
+        Body::from_stream(futures_util::stream::unfold(range, move |left| {
+            let read = Arc::clone(&read);
+            async move {
+                if left.is_empty() {
+                    return None;
+                }
+                let piece = left.start..left.end.min(left.start + PIECE);
+                let next = piece.end..left.end;
+                let bytes = tokio::task::spawn_blocking(move || read(piece)).await;
+                Some((bytes.map_err(io::Error::other).and_then(|bytes| bytes), next))
+            }
+        }))
+    }
+}
+
+enum Selection {
+    All,
+    Part(Range<u64>),
+    NotModified,
+}
+
+/// The one range of a header: `None` where it is to be ignored, `Some(None)` where it lies outside.
+fn parse_range(text: &str, length: u64) -> Option<Option<Range<u64>>> {
+    let (first, last) = text.trim().strip_prefix("bytes=")?.split_once('-')?;
+    let (first, last) = (first.trim(), last.trim());
+    if first.is_empty() {
+        let count: u64 = last.parse().ok()?;
+        return Some((count > 0 && length > 0).then(|| length.saturating_sub(count)..length));
+    }
+    let first: u64 = first.parse().ok()?;
+    let last: u64 = if last.is_empty() { u64::MAX } else { last.parse().ok()? };
+    if last < first {
+        return None;
+    }
+    Some((first < length).then(|| first..last.saturating_add(1).min(length)))
+}
+
+fn insert(response: &mut Response, name: header::HeaderName, value: &str) {
+    if let Ok(value) = HeaderValue::from_str(value) {
+        response.headers_mut().insert(name, value);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_read_as_the_standard_says() {
+        assert_eq!(parse_range("bytes=0-4", 10), Some(Some(0..5)));
+        assert_eq!(parse_range("bytes=5-", 10), Some(Some(5..10)));
+        assert_eq!(parse_range("bytes=-3", 10), Some(Some(7..10)));
+        assert_eq!(parse_range("bytes=-30", 10), Some(Some(0..10)));
+        assert_eq!(parse_range("bytes=2-99", 10), Some(Some(2..10)));
+        assert_eq!(parse_range("bytes=10-", 10), Some(None));
+        assert_eq!(parse_range("bytes=-0", 10), Some(None));
+        assert_eq!(parse_range("bytes=0-", 0), Some(None));
+        assert_eq!(parse_range("bytes=4-2", 10), None);
+        assert_eq!(parse_range("bytes=0-1,3-4", 10), None);
+        assert_eq!(parse_range("items=0-1", 10), None);
+        assert_eq!(parse_range(&format!("bytes=1-{}", u64::MAX), 10), Some(Some(1..10)));
+    }
+}

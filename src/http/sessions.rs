@@ -1,0 +1,121 @@
+//! `/v1/sessions`: making, listing, looking at, completing and deleting sessions.
+
+use super::extract::{Body, Caller, Found, Query, content_type};
+use super::respond::JsonResult;
+use super::{multipart, openapi};
+use crate::problem::{self, ApiError};
+use crate::service::Service;
+use crate::session::create::NewSession;
+use axum::Json;
+use axum::extract::{FromRequest, Multipart, Request, State};
+use axum::response::{IntoResponse, Response};
+use cager_proto::messages::{Complete, Session, SessionList};
+use http::{StatusCode, header};
+use serde::Deserialize;
+use std::sync::Arc;
+
+const PAGE: usize = 100;
+const KEY_CHARACTERS: usize = 255;
+
+/// Makes a session: parts `rest` and `cage` are files whose names carry their format, part `options` is JSON. It is prepared in
+/// the background; frames may be posted at once and wait for it.
+#[utoipa::path(
+    post, path = "/v1/sessions", tag = "sessions",
+    params(("Idempotency-Key" = Option<String>, Header, description = "A repetition with the same key and content gives the same session")),
+    request_body(content = openapi::NewSessionForm, content_type = "multipart/form-data"),
+    responses((status = 201, description = "The session, or the one that an earlier request with the same key made", body = Session,
+        headers(("Location" = String, description = "Address of the session")))),
+)]
+pub(crate) async fn create(
+    State(service): State<Arc<Service>>,
+    Caller(tenant): Caller,
+    request: Request,
+) -> Result<Response, ApiError> {
+    let headers = request.headers();
+    if content_type(headers).as_deref() != Some("multipart/form-data") {
+        let detail = "send multipart/form-data with the parts rest, cage and options";
+        return Err(ApiError::new(problem::MEDIA_TYPE, detail));
+    }
+    let limit = service.config.max_rest_bytes;
+    let declared = http_body::Body::size_hint(request.body()).lower();
+    // The envelope of the parts is small.
+    if declared > limit.saturating_add(1 << 20) {
+        service.rejected("body_too_large");
+        let detail = format!("the body has {declared} bytes, but rest pose and cage may have {limit} together");
+        return Err(ApiError::new(problem::TOO_LARGE, detail).limit(limit));
+    }
+    let idempotency_key = match headers.get("idempotency-key").map(|value| value.to_str()) {
+        None => None,
+        Some(Ok(key)) if (1..=KEY_CHARACTERS).contains(&key.len()) => Some(key.to_owned()),
+        Some(_) => {
+            let detail = format!("Idempotency-Key: give 1 to {KEY_CHARACTERS} visible ASCII characters");
+            return Err(ApiError::new(problem::BAD_REQUEST, detail));
+        }
+    };
+    let body = Multipart::from_request(request, &()).await.map_err(|error| {
+        ApiError::new(problem::BAD_REQUEST, format!("the multipart body cannot be read: {}", error.body_text()))
+    })?;
+    let parts = multipart::read(&service, body).await?;
+    let new = NewSession { content: parts.content, options: parts.options, idempotency_key };
+    let session = service.create(&tenant, new).await?;
+    drop(parts.room);
+    let location = format!("/v1/sessions/{}", session.meta.id);
+    Ok((StatusCode::CREATED, [(header::LOCATION, location)], Json(session.view())).into_response())
+}
+
+/// Where a page begins.
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(crate) struct PageQuery {
+    /// The `next` of the page before.
+    after: Option<String>,
+}
+
+/// Lists the tenant's sessions, oldest first, a hundred at a time.
+#[utoipa::path(get, path = "/v1/sessions", tag = "sessions", params(PageQuery), responses((status = 200, body = SessionList)))]
+pub(crate) async fn list(
+    State(service): State<Arc<Service>>,
+    Caller(tenant): Caller,
+    Query(query): Query<PageQuery>,
+) -> JsonResult<SessionList> {
+    let mut page = service.registry.page(&tenant.name, query.after.as_deref(), PAGE + 1);
+    let more = page.len() > PAGE;
+    page.truncate(PAGE);
+    for session in &page {
+        // One that cannot be read is listed as failed.
+        let _ = session.ensure_loaded().await;
+    }
+    let next = page.last().filter(|_| more).map(|session| session.meta.id.clone());
+    Ok(Json(SessionList { sessions: page.iter().map(|session| session.view()).collect(), next }))
+}
+
+/// A session.
+#[utoipa::path(get, path = "/v1/sessions/{id}", tag = "sessions", params(openapi::Id), responses((status = 200, body = Session)))]
+pub(crate) async fn get(Found { session, .. }: Found) -> Json<Session> {
+    Json(session.view())
+}
+
+/// Deletes a session with all that belongs to it; what runs for it stops.
+#[utoipa::path(delete, path = "/v1/sessions/{id}", tag = "sessions", params(openapi::Id), responses((status = 204, description = "It is gone")))]
+pub(crate) async fn delete(
+    State(service): State<Arc<Service>>,
+    Found { session, .. }: Found,
+) -> Result<StatusCode, ApiError> {
+    service.delete(&session).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// Says that no more frames are coming, and writes the container. Repeating it changes nothing.
+#[utoipa::path(
+    post, path = "/v1/sessions/{id}/complete", tag = "sessions", params(openapi::Id), request_body = Complete,
+    responses((status = 200, description = "The completed session", body = Session)),
+)]
+pub(crate) async fn complete(
+    State(service): State<Arc<Service>>,
+    Found { session, .. }: Found,
+    Body(Complete { frames }): Body<Complete>,
+) -> JsonResult<Session> {
+    service.complete(&session, frames).await?;
+    Ok(Json(session.view()))
+}

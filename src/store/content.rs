@@ -1,0 +1,148 @@
+//! Uploaded rest poses and cages, by their digest: kept for containers, and for preparing anew.
+
+use super::{ContentKey, Store, StoreError, meta};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// A rest pose and a cage as they were uploaded.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Content {
+    /// File name of the rest pose, for its ending.
+    pub rest_name: String,
+    /// The file.
+    pub rest: Vec<u8>,
+    /// File name of the cage.
+    pub cage_name: String,
+    /// The file.
+    pub cage: Vec<u8>,
+}
+
+#[derive(Debug, Deserialize, Serialize)]
+struct Description {
+    rest: Part,
+    cage: Part,
+}
+
+#[derive(Debug, Deserialize, Serialize)]
+struct Part {
+    name: String,
+    bytes: u64,
+    blake3: String,
+}
+
+impl Part {
+    fn of(name: &str, content: &[u8]) -> Self {
+        Self { name: name.into(), bytes: content.len() as u64, blake3: blake3::hash(content).to_hex().to_string() }
+    }
+}
+
+const DESCRIPTION: &str = "content.json";
+
+impl Store {
+    /// Keeps content, durably on Ok. Create-only: where the key is there already nothing changes, unless it is damaged: then it
+    /// is replaced.
+    ///
+    /// # Errors
+    /// [`StoreError::Full`], or what the system says.
+    pub fn put_content(&self, key: &ContentKey, content: &Content) -> Result<(), StoreError> {
+        let files = self.files();
+        let place = files.contents().join(key.to_string());
+        let description = Description {
+            rest: Part::of(&content.rest_name, &content.rest),
+            cage: Part::of(&content.cage_name, &content.cage),
+        };
+        if self.content_is_there(key, &place)? {
+            return Ok(());
+        }
+        let bytes = meta::wrap(&place.join(DESCRIPTION), "content", &description)?;
+        let aside = files.temporary("content");
+        let make = || {
+            files.disk.create_dir(&aside).map_err(|e| StoreError::of(&aside, "create", e))?;
+            files.write_new(&aside.join("rest"), &content.rest)?;
+            files.write_new(&aside.join("cage"), &content.cage)?;
+            files.write_new(&aside.join(DESCRIPTION), &bytes)?;
+            files.sync_dir(&aside)?;
+            let _one_at_a_time = self.publishing();
+            if files.exists(&place)? {
+                files.discard(&aside);
+                return Ok(());
+            }
+            files.publish(&aside, &place)
+        };
+        make().inspect_err(|_| files.discard(&aside))
+    }
+
+    /// Content by its key; None where there is none. Damaged content is quarantined, so that the next upload replaces it.
+    ///
+    /// # Errors
+    /// [`StoreError::Damaged`], or what the system says.
+    pub fn content(&self, key: &ContentKey) -> Result<Option<Content>, StoreError> {
+        let place = self.files().contents().join(key.to_string());
+        let found = self.read_content(&place);
+        self.set_aside_if_damaged(&place, found)
+    }
+
+    /// Forgets content; fine where there is none. A prepared solver of the key stays.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn remove_content(&self, key: &ContentKey) -> Result<(), StoreError> {
+        let _one_at_a_time = self.publishing();
+        self.files().throw_away(&self.files().contents().join(key.to_string()))
+    }
+
+    /// A quick look: metadata and lengths, not every byte. Makes sure that what is there is durable.
+    fn content_is_there(&self, key: &ContentKey, place: &Path) -> Result<bool, StoreError> {
+        if !self.files().exists(place)? {
+            return Ok(false);
+        }
+        let looked = self.describe(place).and_then(|description| {
+            let Some(description) = description else { return Ok(()) };
+            let entries = self.files().list(place)?;
+            for (name, part) in [("rest", &description.rest), ("cage", &description.cage)] {
+                if !entries.iter().any(|entry| entry.name == name && entry.bytes == part.bytes) {
+                    return Err(StoreError::damaged(&place.join(name), "it is missing or of another length"));
+                }
+            }
+            Ok(())
+        });
+        match self.set_aside_if_damaged(place, looked) {
+            Ok(()) => {
+                self.files().sync_dir(&self.files().contents())?;
+                Ok(true)
+            }
+            Err(StoreError::Damaged { .. }) => {
+                tracing::warn!(%key, "damaged content is replaced by a new upload");
+                Ok(false)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    fn describe(&self, place: &Path) -> Result<Option<Description>, StoreError> {
+        let path = place.join(DESCRIPTION);
+        match meta::read(self.files(), &path, "content")? {
+            None if self.files().exists(place)? => Err(StoreError::damaged(&path, "it is missing")),
+            found => Ok(found),
+        }
+    }
+
+    fn read_content(&self, place: &Path) -> Result<Option<Content>, StoreError> {
+        let Some(Description { rest, cage }) = self.describe(place)? else { return Ok(None) };
+        let read = |name: &str, part: &Part| {
+            let path = place.join(name);
+            let bytes = self.files().read(&path, part.bytes)?;
+            let bytes = bytes.ok_or_else(|| StoreError::damaged(&path, "it is missing"))?;
+            if bytes.len() as u64 != part.bytes || blake3::hash(&bytes).to_hex().as_str() != part.blake3 {
+                return Err(StoreError::damaged(&path, "its content does not match its checksum"));
+            }
+            Ok(bytes)
+        };
+        Ok(Some(Content {
+            rest: read("rest", &rest)?,
+            cage: read("cage", &cage)?,
+            rest_name: rest.name,
+            cage_name: cage.name,
+        }))
+    }
+}

@@ -1,0 +1,79 @@
+//! What can go wrong with the store, by what the caller can do about it.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why something could not be stored or read back.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// No space: later, or elsewhere, the same call can succeed. Nothing was changed.
+    #[error("there is no space left to write {}; free some, or raise the quota, and try again", path.display())]
+    Full {
+        /// What was being written.
+        path: PathBuf,
+    },
+    /// Data that was stored is not what was stored.
+    #[error("{} is damaged: {what}; restore it from a backup, or delete it", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        what: String,
+    },
+    /// Another process uses the folder.
+    #[error("the data folder {} is in use by another process; stop it, or give another folder", path.display())]
+    Locked {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A name that no session can have. Nothing was looked up.
+    #[error("{id:?} is not the id of a session: ids are 1 to 64 of the characters 0-9, a-z and -")]
+    BadId {
+        /// The name, cut after 80 characters.
+        id: String,
+    },
+    /// The system refused.
+    #[error("could not {action} {}: {cause}; check the disk and the folder's permissions", path.display())]
+    Io {
+        /// What was concerned.
+        path: PathBuf,
+        /// What was being done, a verb.
+        action: &'static str,
+        /// The system's answer.
+        cause: io::Error,
+    },
+}
+
+impl StoreError {
+    /// Sorts an error of the system.
+    pub(crate) fn of(path: &Path, action: &'static str, cause: io::Error) -> Self {
+        use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+        // A store error may have travelled through a writer.
+        if cause.get_ref().is_some_and(|inner| inner.is::<Self>()) {
+            if let Some(inner) = cause.into_inner().and_then(|inner| inner.downcast::<Self>().ok()) {
+                return *inner;
+            }
+            return Self::Io { path: path.to_owned(), action, cause: io::ErrorKind::Other.into() };
+        }
+        match cause.kind() {
+            StorageFull | QuotaExceeded | FileTooLarge => Self::Full { path: path.to_owned() },
+            _ => Self::Io { path: path.to_owned(), action, cause },
+        }
+    }
+
+    pub(crate) fn damaged(path: &Path, what: impl Into<String>) -> Self {
+        Self::Damaged { path: path.to_owned(), what: what.into() }
+    }
+
+    /// Whether the file or folder was not there.
+    pub fn is_not_found(&self) -> bool {
+        matches!(self, Self::Io { cause, .. } if cause.kind() == io::ErrorKind::NotFound)
+    }
+}
+
+/// So that a store error can leave the closure that writes a container.
+impl From<StoreError> for io::Error {
+    fn from(error: StoreError) -> Self {
+        Self::other(error)
+    }
+}

@@ -1,0 +1,393 @@
+//! A disk that fails on demand, for tests: errors of single operations, short writes, syncs that lose what they should keep,
+//! processes that stop anywhere, and power cuts.
+
+use super::disk::{Disk, DiskFile, Entry, LocalDisk};
+use shadow::Shadow;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+mod shadow;
+
+/// Kinds of operations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Op {
+    /// A new file.
+    Create,
+    /// Opening a file.
+    Open,
+    /// Writing to a file.
+    Write,
+    /// Reading from a file, or asking for its length.
+    Read,
+    /// Cutting a file.
+    Truncate,
+    /// Syncing a file.
+    Sync,
+    /// A new folder.
+    CreateDir,
+    /// Renaming a file or folder.
+    Rename,
+    /// Removing a file or an empty folder.
+    Remove,
+    /// Listing a folder.
+    List,
+    /// Syncing a folder.
+    SyncDir,
+    /// Noting a use.
+    Touch,
+}
+
+/// What happens to an operation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// It fails with this `errno` and does nothing; a sync loses all that it should have kept.
+    Error(i32),
+    /// As an error; a sync also ruins the blocks it tried to write, with older bytes in them.
+    Ruin(i32),
+    /// A write takes half of its bytes and succeeds. Other operations are as ever.
+    Short,
+    /// The process ends here: a write takes half of its bytes, nothing else happens, and all later operations fail until
+    /// [`FaultyDisk::restart`].
+    Stop,
+}
+
+/// What becomes of unsynced data.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Loss {
+    /// All stays, as when only the process ends. A later power cut can still take it.
+    Nothing,
+    /// All is gone.
+    Everything,
+    /// Sectors of files stay or go by chance, and a first part of the changes to folders stays. The same seed gives the same.
+    Torn(u64),
+}
+
+#[derive(Debug)]
+struct Armed {
+    op: Option<Op>,
+    /// Counted from 1.
+    nth: u64,
+    last: u64,
+    fault: Fault,
+}
+
+#[derive(Debug)]
+struct State {
+    shadow: Shadow,
+    counts: BTreeMap<Op, u64>,
+    total: u64,
+    trace: Vec<(Op, PathBuf)>,
+    armed: Vec<Armed>,
+    stopped: bool,
+    /// Files opened before a restart are dead.
+    generation: u64,
+    free_bytes: Option<u64>,
+}
+
+/// A disk over the system's own, with faults in it. Everything under its root is also kept in memory.
+#[derive(Clone, Debug)]
+pub struct FaultyDisk {
+    state: Arc<Mutex<State>>,
+}
+
+enum Verdict {
+    Whole,
+    Half,
+    HalfAndStop,
+    Error(io::Error),
+    Ruin(io::Error),
+}
+
+impl FaultyDisk {
+    /// A disk for the folder `root`, which has to be there; what is in it counts as durable.
+    ///
+    /// # Errors
+    /// The system's.
+    pub fn new(root: &Path) -> io::Result<Self> {
+        let state = State {
+            shadow: Shadow::new(root)?,
+            counts: BTreeMap::new(),
+            total: 0,
+            trace: Vec::new(),
+            armed: Vec::new(),
+            stopped: false,
+            generation: 0,
+            free_bytes: None,
+        };
+        Ok(Self { state: Arc::new(Mutex::new(state)) })
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Makes the `nth` operation of a kind fail, of all where none is given; counted from 1 and from now on.
+    pub fn fail(&self, op: Option<Op>, nth: u64, fault: Fault) {
+        self.arm(op, nth, 1, fault);
+    }
+
+    /// Makes the `nth` operation and all later ones fail.
+    pub fn fail_from(&self, op: Option<Op>, nth: u64, fault: Fault) {
+        self.arm(op, nth, u64::MAX, fault);
+    }
+
+    fn arm(&self, op: Option<Op>, nth: u64, count: u64, fault: Fault) {
+        let mut state = self.state();
+        let before = op.map_or(state.total, |op| state.counts.get(&op).copied().unwrap_or(0));
+        state.armed.push(Armed { op, nth: before + nth, last: (before + nth - 1).saturating_add(count), fault });
+    }
+
+    /// No more faults, but for a stop that has happened.
+    pub fn disarm(&self) {
+        self.state().armed.clear();
+    }
+
+    /// Stops here: all operations fail until [`Self::restart`].
+    pub fn stop(&self) {
+        self.state().stopped = true;
+    }
+
+    /// Whether it stopped and was not restarted.
+    pub fn is_stopped(&self) -> bool {
+        self.state().stopped
+    }
+
+    /// Operations so far.
+    pub fn operations(&self) -> u64 {
+        self.state().total
+    }
+
+    /// The operations so far, for the message of a test.
+    pub fn trace(&self) -> Vec<(Op, PathBuf)> {
+        self.state().trace.clone()
+    }
+
+    /// Bytes that the disk says are free; None for what the system says.
+    pub fn set_free_bytes(&self, bytes: Option<u64>) {
+        self.state().free_bytes = bytes;
+    }
+
+    /// Starts again after a stop, without faults; the folder then has what the disk would hold. Files opened before are dead.
+    ///
+    /// # Errors
+    /// The system's.
+    pub fn restart(&self, loss: Loss) -> io::Result<()> {
+        let mut state = self.state();
+        state.armed.clear();
+        state.stopped = false;
+        state.generation += 1;
+        match loss {
+            Loss::Nothing => Ok(()),
+            Loss::Everything => state.shadow.restore(None),
+            Loss::Torn(seed) => state.shadow.restore(Some(seed)),
+        }
+    }
+
+    fn run<T>(&self, op: Op, path: &Path, act: impl FnOnce(&mut Shadow) -> io::Result<T>) -> io::Result<T> {
+        let mut state = self.state();
+        match state.admit(op, path) {
+            Verdict::Whole | Verdict::Half => act(&mut state.shadow),
+            Verdict::HalfAndStop => Err(stopped()),
+            Verdict::Error(error) | Verdict::Ruin(error) => Err(error),
+        }
+    }
+
+    fn file(&self, path: &Path, inner: Arc<dyn DiskFile>, node: Option<usize>) -> Arc<dyn DiskFile> {
+        let generation = self.state().generation;
+        Arc::new(FaultyFile { disk: self.clone(), path: path.to_owned(), inner, node, generation })
+    }
+}
+
+fn stopped() -> io::Error {
+    io::Error::other("the process has ended")
+}
+
+impl State {
+    fn admit(&mut self, op: Op, path: &Path) -> Verdict {
+        if self.stopped {
+            return Verdict::Error(stopped());
+        }
+        self.total += 1;
+        self.trace.push((op, path.to_owned()));
+        let count = self.counts.entry(op).or_default();
+        *count += 1;
+        let (count, total) = (*count, self.total);
+        let hit = self.armed.iter().find(|armed| match armed.op {
+            None => (armed.nth..=armed.last).contains(&total),
+            Some(kind) => kind == op && (armed.nth..=armed.last).contains(&count),
+        });
+        match hit.map(|armed| armed.fault) {
+            None => Verdict::Whole,
+            Some(Fault::Short) => Verdict::Half,
+            Some(Fault::Error(errno)) => Verdict::Error(io::Error::from_raw_os_error(errno)),
+            Some(Fault::Ruin(errno)) => Verdict::Ruin(io::Error::from_raw_os_error(errno)),
+            Some(Fault::Stop) => {
+                self.stopped = true;
+                Verdict::HalfAndStop
+            }
+        }
+    }
+}
+
+impl Disk for FaultyDisk {
+    fn create_new(&self, path: &Path) -> io::Result<Arc<dyn DiskFile>> {
+        let (inner, node) = self.run(Op::Create, path, |shadow| {
+            let inner = LocalDisk.create_new(path)?;
+            Ok((inner, shadow.create(path, false)))
+        })?;
+        Ok(self.file(path, inner, node))
+    }
+
+    fn open(&self, path: &Path) -> io::Result<Arc<dyn DiskFile>> {
+        let (inner, node) = self.run(Op::Open, path, |shadow| Ok((LocalDisk.open(path)?, shadow.find(path))))?;
+        Ok(self.file(path, inner, node))
+    }
+
+    fn open_for_writing(&self, path: &Path) -> io::Result<Arc<dyn DiskFile>> {
+        let open = |shadow: &mut Shadow| Ok((LocalDisk.open_for_writing(path)?, shadow.find(path)));
+        let (inner, node) = self.run(Op::Open, path, open)?;
+        Ok(self.file(path, inner, node))
+    }
+
+    fn create_dir(&self, path: &Path) -> io::Result<()> {
+        self.run(Op::CreateDir, path, |shadow| {
+            LocalDisk.create_dir(path)?;
+            shadow.create(path, true);
+            Ok(())
+        })
+    }
+
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        self.run(Op::Rename, to, |shadow| {
+            LocalDisk.rename(from, to)?;
+            shadow.rename(from, to);
+            Ok(())
+        })
+    }
+
+    fn remove_file(&self, path: &Path) -> io::Result<()> {
+        self.run(Op::Remove, path, |shadow| {
+            LocalDisk.remove_file(path)?;
+            shadow.remove(path);
+            Ok(())
+        })
+    }
+
+    fn remove_dir(&self, path: &Path) -> io::Result<()> {
+        self.run(Op::Remove, path, |shadow| {
+            LocalDisk.remove_dir(path)?;
+            shadow.remove(path);
+            Ok(())
+        })
+    }
+
+    fn list(&self, path: &Path) -> io::Result<Vec<Entry>> {
+        self.run(Op::List, path, |_| LocalDisk.list(path))
+    }
+
+    fn sync_dir(&self, path: &Path) -> io::Result<()> {
+        self.run(Op::SyncDir, path, |shadow| {
+            LocalDisk.list(path)?;
+            shadow.sync_dir(path);
+            Ok(())
+        })
+    }
+
+    fn touch(&self, path: &Path) -> io::Result<()> {
+        self.run(Op::Touch, path, |_| LocalDisk.touch(path))
+    }
+
+    fn lock(&self, path: &Path) -> io::Result<Option<File>> {
+        LocalDisk.lock(path)
+    }
+
+    fn free_bytes(&self, path: &Path) -> io::Result<u64> {
+        let told = self.state().free_bytes;
+        told.map_or_else(|| LocalDisk.free_bytes(path), Ok)
+    }
+}
+
+#[derive(Debug)]
+struct FaultyFile {
+    disk: FaultyDisk,
+    path: PathBuf,
+    inner: Arc<dyn DiskFile>,
+    node: Option<usize>,
+    generation: u64,
+}
+
+impl FaultyFile {
+    fn admit(&self, op: Op) -> (MutexGuard<'_, State>, Verdict) {
+        let mut state = self.disk.state();
+        let verdict = if state.generation == self.generation {
+            state.admit(op, &self.path)
+        } else {
+            Verdict::Error(io::Error::other("the file was opened before the restart"))
+        };
+        (state, verdict)
+    }
+
+    fn run<T>(&self, op: Op, act: impl FnOnce(&mut Shadow) -> io::Result<T>) -> io::Result<T> {
+        let (mut state, verdict) = self.admit(op);
+        match verdict {
+            Verdict::Whole | Verdict::Half => act(&mut state.shadow),
+            Verdict::HalfAndStop => Err(stopped()),
+            Verdict::Error(error) | Verdict::Ruin(error) => Err(error),
+        }
+    }
+}
+
+impl DiskFile for FaultyFile {
+    fn write_at(&self, bytes: &[u8], offset: u64) -> io::Result<usize> {
+        let (mut state, verdict) = self.admit(Op::Write);
+        let half = &bytes[..bytes.len().div_ceil(2)];
+        let (some, result) = match verdict {
+            Verdict::Whole => (bytes, Ok(bytes.len())),
+            Verdict::Half => (half, Ok(half.len())),
+            Verdict::HalfAndStop => (half, Err(stopped())),
+            Verdict::Error(error) | Verdict::Ruin(error) => return Err(error),
+        };
+        self.inner.write_all_at(some, offset)?;
+        state.shadow.write(self.node, offset, some);
+        result
+    }
+
+    fn read_at(&self, bytes: &mut [u8], offset: u64) -> io::Result<usize> {
+        self.run(Op::Read, |_| self.inner.read_at(bytes, offset))
+    }
+
+    /// Never reaches the real disk: what is durable is what the shadow says.
+    fn sync_data(&self) -> io::Result<()> {
+        let (mut state, verdict) = self.admit(Op::Sync);
+        match verdict {
+            Verdict::Whole | Verdict::Half => {
+                state.shadow.sync(self.node);
+                Ok(())
+            }
+            Verdict::HalfAndStop => Err(stopped()),
+            Verdict::Error(error) => {
+                state.shadow.lose(self.node, false);
+                Err(error)
+            }
+            Verdict::Ruin(error) => {
+                state.shadow.lose(self.node, true);
+                Err(error)
+            }
+        }
+    }
+
+    fn set_len(&self, bytes: u64) -> io::Result<()> {
+        self.run(Op::Truncate, |shadow| {
+            self.inner.set_len(bytes)?;
+            shadow.set_len(self.node, bytes);
+            Ok(())
+        })
+    }
+
+    fn len(&self) -> io::Result<u64> {
+        self.run(Op::Read, |_| self.inner.len())
+    }
+}

@@ -1,0 +1,210 @@
+//! Whole files and folders: written aside, synced, renamed into place; moved aside, then removed.
+
+use super::disk::{Disk, DiskFile};
+use super::{Quarantined, StoreError};
+use std::ffi::OsString;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+/// The folder of a store, and the file layer it lies on.
+#[derive(Debug)]
+pub(crate) struct Files {
+    pub(crate) disk: Arc<dyn Disk>,
+    pub(crate) root: PathBuf,
+    /// Differs between runs, so that leftovers of an earlier one are never in the way.
+    run: u128,
+    next: AtomicU64,
+}
+
+impl Files {
+    pub(crate) fn new(root: &Path, disk: Arc<dyn Disk>) -> Self {
+        let run = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos());
+        Self { disk, root: root.to_owned(), run, next: AtomicU64::new(0) }
+    }
+
+    pub(crate) fn sessions(&self) -> PathBuf {
+        self.root.join("sessions")
+    }
+
+    pub(crate) fn session(&self, id: &str) -> PathBuf {
+        self.sessions().join(id)
+    }
+
+    pub(crate) fn contents(&self) -> PathBuf {
+        self.root.join("contents")
+    }
+
+    pub(crate) fn prepared(&self) -> PathBuf {
+        self.root.join("prepared")
+    }
+
+    pub(crate) fn trash(&self) -> PathBuf {
+        self.root.join("trash")
+    }
+
+    pub(crate) fn quarantine(&self) -> PathBuf {
+        self.root.join("quarantine")
+    }
+
+    pub(crate) fn tmp(&self) -> PathBuf {
+        self.root.join("tmp")
+    }
+
+    fn unique(&self, name: &str) -> String {
+        format!("{name}.{:x}-{}", self.run, self.next.fetch_add(1, Ordering::Relaxed))
+    }
+
+    /// A path in `tmp/` that nothing else has.
+    pub(crate) fn temporary(&self, name: &str) -> PathBuf {
+        self.tmp().join(self.unique(name))
+    }
+
+    /// Makes `path` with `bytes`, durable but for its entry in the folder.
+    pub(crate) fn write_new(&self, path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
+        let file = self.create(path)?;
+        file.write_all_at(bytes, 0).map_err(|e| StoreError::of(path, "write", e))?;
+        self.sync_file(&*file, path)
+    }
+
+    pub(crate) fn create(&self, path: &Path) -> Result<Arc<dyn DiskFile>, StoreError> {
+        self.disk.create_new(path).map_err(|e| StoreError::of(path, "create", e))
+    }
+
+    pub(crate) fn sync_file(&self, file: &dyn DiskFile, path: &Path) -> Result<(), StoreError> {
+        timed(|| file.sync_data()).map_err(|e| StoreError::of(path, "sync", e))
+    }
+
+    pub(crate) fn sync_dir(&self, path: &Path) -> Result<(), StoreError> {
+        timed(|| self.disk.sync_dir(path)).map_err(|e| StoreError::of(path, "sync", e))
+    }
+
+    /// Writes `bytes` to `path`, which has the old or the new content at every moment; durable on Ok.
+    pub(crate) fn replace(&self, path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
+        let temporary = self.temporary("file");
+        self.write_new(&temporary, bytes)
+            .and_then(|()| self.publish(&temporary, path))
+            .inspect_err(|_| self.discard(&temporary))
+    }
+
+    /// Moves a synced file or folder to its place, durably.
+    pub(crate) fn publish(&self, from: &Path, to: &Path) -> Result<(), StoreError> {
+        self.disk.rename(from, to).map_err(|e| StoreError::of(to, "put in place", e))?;
+        self.sync_dir(parent(to))
+    }
+
+    /// Removes a temporary, best effort: what stays is removed when the store is opened again.
+    pub(crate) fn discard(&self, path: &Path) {
+        if let Err(error) = self.remove_tree(path)
+            && !error.is_not_found()
+        {
+            tracing::debug!(%error, "a temporary stays until the next start");
+        }
+    }
+
+    /// Whether there is a file or folder of that name.
+    pub(crate) fn exists(&self, path: &Path) -> Result<bool, StoreError> {
+        match self.disk.open(path) {
+            Ok(_) => Ok(true),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
+            Err(error) => Err(StoreError::of(path, "open", error)),
+        }
+    }
+
+    /// Moves a file or folder to `trash/`, durably, then removes it. It is gone on Ok, even where the removal has to be
+    /// finished at the next start. Fine where there is nothing.
+    pub(crate) fn throw_away(&self, path: &Path) -> Result<(), StoreError> {
+        let trash = self.trash();
+        let name = path.file_name().map_or_else(|| "unnamed".into(), |name| name.to_string_lossy());
+        let away = trash.join(self.unique(&name));
+        let moved = match self.disk.rename(path, &away) {
+            Ok(()) => true,
+            // An earlier call may have moved it and failed to sync: that is made up for here.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => false,
+            Err(error) => return Err(StoreError::of(path, "delete", error)),
+        };
+        self.sync_dir(&trash)?;
+        self.sync_dir(parent(path))?;
+        if moved && let Err(error) = self.remove_tree(&away) {
+            tracing::warn!(%error, "the space of something deleted is freed at the next start only");
+        }
+        Ok(())
+    }
+
+    /// Moves a damaged file or folder to `quarantine/`, with a note beside it.
+    pub(crate) fn set_aside(&self, path: &Path, why: &str) -> Result<Quarantined, StoreError> {
+        let folder = self.quarantine();
+        let name: OsString = path.file_name().map_or_else(|| "unnamed".into(), OsString::from);
+        let mut target = folder.join(&name);
+        if self.exists(&target)? {
+            target = folder.join(self.unique(&name.to_string_lossy()));
+        }
+        self.disk.rename(path, &target).map_err(|e| StoreError::of(path, "quarantine", e))?;
+        self.sync_dir(&folder)?;
+        self.sync_dir(parent(path))?;
+        let mut note = target.clone().into_os_string();
+        note.push(".why.txt");
+        if let Err(error) = self.write_new(Path::new(&note), format!("{why}\n").as_bytes()) {
+            tracing::debug!(%error, "no note beside something quarantined");
+        }
+        Ok(Quarantined { name: name.to_string_lossy().into_owned(), path: target, why: why.to_owned() })
+    }
+
+    /// Removes a file, or a folder with all in it.
+    pub(crate) fn remove_tree(&self, path: &Path) -> Result<(), StoreError> {
+        match self.disk.remove_file(path) {
+            Ok(()) => return Ok(()),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+            // EISDIR, or EPERM as POSIX has it: seen below whether it is a folder.
+            Err(_) => {}
+        }
+        self.clear(path)?;
+        self.disk.remove_dir(path).map_err(|e| StoreError::of(path, "remove", e))
+    }
+
+    /// Removes all in a folder.
+    pub(crate) fn clear(&self, folder: &Path) -> Result<(), StoreError> {
+        for entry in self.list(folder)? {
+            self.remove_tree(&folder.join(entry.name))?;
+        }
+        Ok(())
+    }
+
+    pub(crate) fn list(&self, folder: &Path) -> Result<Vec<super::disk::Entry>, StoreError> {
+        self.disk.list(folder).map_err(|e| StoreError::of(folder, "list", e))
+    }
+
+    /// A whole file; None where there is none. More than `limit` bytes are damage, found before any memory is taken.
+    pub(crate) fn read(&self, path: &Path, limit: u64) -> Result<Option<Vec<u8>>, StoreError> {
+        let file = match self.disk.open(path) {
+            Ok(file) => file,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(StoreError::of(path, "open", error)),
+        };
+        let bytes = file.len().map_err(|e| StoreError::of(path, "read", e))?;
+        if bytes > limit {
+            return Err(StoreError::damaged(path, format!("it has {bytes} bytes where {limit} are the most")));
+        }
+        let mut content = vec![0; bytes as usize];
+        file.read_exact_at(&mut content, 0).map_err(|e| StoreError::of(path, "read", e))?;
+        Ok(Some(content))
+    }
+}
+
+/// The folder something is in.
+pub(crate) fn parent(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if parent != Path::new("") => parent,
+        _ => Path::new("."),
+    }
+}
+
+/// Runs a sync and records how long it took.
+pub(crate) fn timed(sync: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
+    let clock = Instant::now();
+    let result = sync();
+    metrics::histogram!("cager_fsync_seconds").record(clock.elapsed().as_secs_f64());
+    result
+}

@@ -1,0 +1,122 @@
+//! What a log holds after whatever ended the last process.
+
+use super::format::{BLOCK_BYTES, DATA_START, Layout};
+use super::{LogEntry, StoreError};
+use crate::store::disk::DiskFile;
+use crate::store::files::{Files, parent};
+use std::collections::HashSet;
+use std::path::Path;
+
+/// Read at once, in bytes.
+const READ_BYTES: u64 = 1 << 20;
+
+pub(super) struct Recovered {
+    pub(super) entries: Vec<LogEntry>,
+    /// Length of the log; all of it is durable.
+    pub(super) durable: u64,
+    /// Its bytes since the last multiple of [`BLOCK_BYTES`].
+    pub(super) tail: Vec<u8>,
+    pub(super) marks: u64,
+}
+
+pub(super) fn recover(
+    files: &Files,
+    file: &dyn DiskFile,
+    path: &Path,
+    layout: &Layout,
+) -> Result<Recovered, StoreError> {
+    let failed = |error| StoreError::of(path, "read", error);
+    let length = file.len().map_err(failed)?;
+    if length < DATA_START {
+        return Err(StoreError::damaged(path, format!("{length} bytes are too few for its first block")));
+    }
+    let mut block = vec![0; DATA_START as usize];
+    file.read_exact_at(&mut block, 0).map_err(failed)?;
+    layout.check_first_block(&block).map_err(|what| StoreError::damaged(path, what))?;
+    let (marked, mut marks) = layout.marked(&block);
+
+    let Scan { mut entries, end, claimed } = scan(file, length, layout).map_err(failed)?;
+    let claimed = claimed.max(marked).max(DATA_START);
+    if claimed > end {
+        let what = if length < claimed && end + layout.stride() > length {
+            format!("{length} bytes are left of {claimed} that were acknowledged")
+        } else {
+            format!("the record at byte {end} was acknowledged and does not match its checksum")
+        };
+        return Err(StoreError::damaged(path, what));
+    }
+    if end < length {
+        tracing::info!(path = %path.display(), bytes = length - end, "the torn end of a frame log is cut off");
+        file.set_len(end).map_err(|e| StoreError::of(path, "cut the torn end of", e))?;
+    }
+    let tail = read_range(file, end - end % BLOCK_BYTES, end).map_err(failed)?;
+    if end == DATA_START {
+        // Its entry in the folder may not be durable, and the first group counts on it.
+        files.sync_dir(parent(path))?;
+    }
+    if claimed < end {
+        // Nobody may have synced these records, or a sync of them may have failed and will not fail again; written once more,
+        // they can be synced. So can the first block.
+        let failed = |error| StoreError::of(path, "write", error);
+        file.write_all_at(&block, 0).map_err(failed)?;
+        let mut at = claimed - claimed % BLOCK_BYTES;
+        while at < end {
+            let piece = read_range(file, at, end.min(at + READ_BYTES)).map_err(failed)?;
+            file.write_all_at(&piece, at).map_err(failed)?;
+            at += piece.len() as u64;
+        }
+        files.sync_file(file, path)?;
+        files.sync_dir(parent(path))?;
+        marks += 1;
+        if let Err(error) = layout.write_mark(file, marks, end) {
+            tracing::debug!(%error, path = %path.display(), "a frame log's length was not marked");
+        }
+    }
+    let mut seen = HashSet::with_capacity(entries.len());
+    entries.retain(|entry| seen.insert(entry.frame));
+    Ok(Recovered { entries, durable: end, tail, marks })
+}
+
+struct Scan {
+    /// Records up to the first that is not intact.
+    entries: Vec<LogEntry>,
+    /// Where that one begins, or the file's last whole record ends.
+    end: u64,
+    /// The largest durable length that an intact record claims, also of those after `end`.
+    claimed: u64,
+}
+
+fn scan(file: &dyn DiskFile, length: u64, layout: &Layout) -> std::io::Result<Scan> {
+    let stride = layout.stride();
+    let together = (READ_BYTES / stride).max(1);
+    let mut piece = Vec::new();
+    let mut found = Scan { entries: Vec::new(), end: DATA_START, claimed: 0 };
+    let mut intact = true;
+    let mut at = DATA_START;
+    while at + stride <= length {
+        let count = together.min((length - at) / stride);
+        piece.resize((count * stride) as usize, 0);
+        file.read_exact_at(&mut piece, at)?;
+        for record in piece.chunks_exact(stride as usize) {
+            let read = layout.read_record(record, at);
+            at += stride;
+            match read {
+                Some((entry, claim)) => {
+                    found.claimed = found.claimed.max(claim);
+                    if intact {
+                        found.entries.push(entry);
+                        found.end = at;
+                    }
+                }
+                None => intact = false,
+            }
+        }
+    }
+    Ok(found)
+}
+
+fn read_range(file: &dyn DiskFile, from: u64, to: u64) -> std::io::Result<Vec<u8>> {
+    let mut bytes = vec![0; (to - from) as usize];
+    file.read_exact_at(&mut bytes, from)?;
+    Ok(bytes)
+}

@@ -1,0 +1,174 @@
+//! Shared content and prepared solvers.
+
+use super::tests::{Given, KEY, SOLVER, content, prepare};
+use super::{ContentKey, Store};
+use cager_core::inversion::{BATCH, Handles, Solver};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Bits of everything a solver is used for.
+fn bits(solver: &Solver) -> Vec<u64> {
+    let n = solver.decoder().points();
+    let frames: Vec<Vec<f64>> =
+        (0..BATCH).map(|f| (0..3 * n).map(|i| ((i * 7 + f * 13) % 101) as f64 * 0.01).collect()).collect();
+    let frames: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
+    let cages = solver.invert(&frames);
+    let cages: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
+    let errors = solver.decoder().measure(&cages, &frames);
+    let errors = errors.iter().flat_map(|e| [e.l2, e.linf, e.squared, e.spread]).map(f64::to_bits);
+    cages.iter().flat_map(|cage| cage.iter()).map(|x| u64::from(x.to_bits())).chain(errors).collect()
+}
+
+#[test]
+fn a_solver_comes_back_the_same_to_the_bit() {
+    let given = Given::new();
+    let store = given.open().store;
+    for (i, handles) in [Handles::MaxVol, Handles::All].into_iter().enumerate() {
+        let key = ContentKey([i as u8; 32]);
+        let solver = prepare(handles);
+        assert!(store.prepared(&key).unwrap().is_none());
+        store.put_prepared(&key, &solver).unwrap();
+        let found = store.prepared(&key).unwrap().unwrap();
+        assert_eq!(bits(&found), bits(&solver));
+        assert_eq!(found.handles(), solver.handles());
+        assert_eq!(found.diagonal().to_bits(), solver.diagonal().to_bits());
+        assert_eq!(format!("{:?}", found.preparation()), format!("{:?}", solver.preparation()));
+        assert_eq!(found.size_bytes(), solver.size_bytes());
+    }
+}
+
+#[test]
+fn a_damaged_solver_is_set_aside_and_made_anew() {
+    let given = Given::new();
+    let store = given.open().store;
+    store.put_prepared(&KEY, &SOLVER).unwrap();
+    let path = given.root().join(format!("prepared/{KEY}.solver"));
+    let file = std::fs::read(&path).unwrap();
+    let gone = |bytes: &[u8], what: &str| {
+        std::fs::write(&path, bytes).unwrap();
+        assert!(store.prepared(&KEY).unwrap().is_none(), "{what}");
+        assert!(!path.exists(), "{what}");
+    };
+    // Every byte of the header and some of the rest.
+    for at in (0..220).chain((220..file.len()).step_by(1009)).chain(file.len() - 8..file.len()) {
+        let mut changed = file.clone();
+        changed[at] ^= 1 << (at % 8);
+        gone(&changed, &format!("byte {at} changed"));
+        gone(&file[..at], &format!("cut to {at} bytes"));
+        std::fs::remove_dir_all(given.root().join("quarantine")).unwrap();
+        std::fs::create_dir(given.root().join("quarantine")).unwrap();
+    }
+    // Lengths that lie, with a checksum that does not.
+    for field in 0..6 {
+        for value in [0, 1, 2, 1 << 32, 1 << 63, u64::MAX] {
+            let mut changed = file.clone();
+            changed[40 + 8 * field..][..8].copy_from_slice(&value.to_le_bytes());
+            let crc = crc32c::crc32c(&changed[..192]).to_le_bytes();
+            changed[192..196].copy_from_slice(&crc);
+            if changed != file {
+                gone(&changed, &format!("length {field} is {value}"));
+            }
+        }
+    }
+    store.put_prepared(&KEY, &SOLVER).unwrap();
+    assert!(store.prepared(&KEY).unwrap().is_some());
+    let other = ContentKey([1; 32]);
+    std::fs::copy(&path, given.root().join(format!("prepared/{other}.solver"))).unwrap();
+    assert!(store.prepared(&other).unwrap().is_none(), "a solver of other content");
+}
+
+#[test]
+fn many_may_put_at_once() {
+    let given = Given::new();
+    let store = given.open().store;
+    std::thread::scope(|scope| {
+        for _ in 0..8 {
+            scope.spawn(|| {
+                store.put_prepared(&KEY, &SOLVER).unwrap();
+                store.put_content(&KEY, &content()).unwrap();
+                assert_eq!(bits(&store.prepared(&KEY).unwrap().unwrap()), bits(&SOLVER));
+                assert_eq!(store.content(&KEY).unwrap(), Some(content()));
+            });
+        }
+    });
+    for (folder, count) in [("tmp", 0), ("prepared", 1), ("contents", 1), ("quarantine", 0)] {
+        assert_eq!(std::fs::read_dir(given.root().join(folder)).unwrap().count(), count, "{folder}");
+    }
+}
+
+#[test]
+fn the_least_recently_used_go_first() {
+    let given = Given::new();
+    let store = given.open().store;
+    let keys = [1, 2, 3].map(|i| ContentKey([i; 32]));
+    for key in &keys {
+        store.put_prepared(key, &SOLVER).unwrap();
+    }
+    let one = std::fs::metadata(given.root().join(format!("prepared/{}.solver", keys[0]))).unwrap().len();
+    assert_eq!(store.trim_prepared(3 * one).unwrap(), 0);
+    store.prepared(&keys[0]).unwrap().unwrap();
+    assert_eq!(store.trim_prepared(3 * one - 1).unwrap(), one);
+    let left = keys.map(|key| store.prepared(&key).unwrap().is_some());
+    assert_eq!(left, [true, false, true]);
+    assert_eq!(store.trim_prepared(0).unwrap(), 2 * one);
+    assert_eq!(store.trim_prepared(0).unwrap(), 0);
+}
+
+#[test]
+fn damaged_content_is_reported_once_and_replaced() {
+    let given = Given::new();
+    let store = given.open().store;
+    assert_eq!(store.content(&KEY).unwrap(), None);
+    let place = given.root().join(format!("contents/{KEY}"));
+    for name in ["content.json", "rest", "cage"] {
+        store.put_content(&KEY, &content()).unwrap();
+        let mut bytes = std::fs::read(place.join(name)).unwrap();
+        bytes[30] ^= 4;
+        std::fs::write(place.join(name), bytes).unwrap();
+        assert!(store.content(&KEY).unwrap_err().to_string().contains(name));
+        assert_eq!(store.content(&KEY).unwrap(), None);
+        // A missing part is seen at the next upload at the latest.
+        store.put_content(&KEY, &content()).unwrap();
+        std::fs::remove_file(place.join(name)).unwrap();
+        store.put_content(&KEY, &content()).unwrap();
+        assert_eq!(store.content(&KEY).unwrap(), Some(content()));
+    }
+    store.remove_content(&KEY).unwrap();
+    store.remove_content(&KEY).unwrap();
+    assert_eq!(store.content(&KEY).unwrap(), None);
+}
+
+#[test]
+fn keys_are_hexadecimal() {
+    let text = KEY.to_string();
+    assert_eq!(text, "a7".repeat(32));
+    assert_eq!(text.parse(), Ok(KEY));
+    assert_eq!(serde_json::to_string(&KEY).unwrap(), format!("{text:?}"));
+    assert_eq!(serde_json::from_str::<ContentKey>(&format!("{text:?}")).unwrap(), KEY);
+    for wrong in ["", "a7", &"A7".repeat(32), &"g0".repeat(32), &"é".repeat(32)] {
+        assert!(wrong.parse::<ContentKey>().is_err(), "{wrong}");
+    }
+}
+
+/// Run by hand in release: `cargo test --release -p cager store -- --ignored --nocapture`.
+#[test]
+#[ignore = "takes a figure"]
+fn loading_takes_milliseconds() {
+    use cager_core::cage::Cage;
+    use cager_core::coordinates::MeanValue;
+    use cager_core::inversion::SolverOptions;
+    use cager_core::synthetic::{Capture, Options};
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path(), Arc::new(super::LocalDisk)).unwrap().store;
+    let capture = Capture::new(&Options::default());
+    let cage = Cage::new(capture.cage.clone()).unwrap();
+    let solver = Solver::prepare(&MeanValue, &cage, &capture.rest.points, SolverOptions::default()).unwrap();
+    let clock = Instant::now();
+    store.put_prepared(&KEY, &solver).unwrap();
+    println!("put {} MB: {:?}", solver.size_bytes() / 1_000_000, clock.elapsed());
+    for _ in 0..5 {
+        let clock = Instant::now();
+        store.prepared(&KEY).unwrap().unwrap();
+        println!("load: {:?}", clock.elapsed());
+    }
+}
