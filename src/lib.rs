@@ -1,11 +1,18 @@
-//! The `cager` program: the command line over the crates that do the work.
+//! The `cager` program: the command line and the service over the crates that do the work.
 
+pub mod auth;
 pub mod capture;
 pub mod cli;
+pub mod config;
 mod coordinates;
 pub mod decode;
 pub mod encode;
 pub mod engine;
+pub mod http;
 mod plot;
+pub mod problem;
 pub mod report;
+pub mod service;
+mod session;
 pub mod store;
+pub mod telemetry;

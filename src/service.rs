@@ -132,7 +132,7 @@ impl Service {
         tokio::spawn(Arc::clone(&service).sweep(stop.clone()));
         tokio::spawn(Arc::clone(&service).check_logs(stop.clone()));
         let watching = Arc::clone(&service);
-        tokio::spawn(async move { watching.access.watch(stop).await });
+        tokio::spawn(async move { watching.access.clone().watch(stop).await });
         Ok(service)
     }
 
@@ -185,7 +185,9 @@ impl Service {
         if mine >= tenant.limits.max_streams {
             self.rejected("tenant_streams");
             let detail = format!("you have {mine} streams open, as many as you may; wait for one to end");
-            return Err(ApiError::new(problem::TOO_MANY_STREAMS, detail).limit(tenant.limits.max_streams).retry_after(2));
+            return Err(ApiError::new(problem::TOO_MANY_STREAMS, detail)
+                .limit(tenant.limits.max_streams)
+                .retry_after(2));
         }
         let waiting = self.engine.waiting();
         let full = waiting >= self.config.max_queue_frames;

@@ -1,5 +1,6 @@
 //! What can be typed: one definition gives parsing, help and shell completions.
 
+use crate::config::ServeFlags;
 use cager_core::inversion::Handles;
 use cager_core::regularize::Regularizer;
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -22,6 +23,7 @@ pub(crate) enum Command {
     Encode(Box<EncodeArgs>),
     Decode(DecodeArgs),
     Inspect(InspectArgs),
+    Serve(Box<ServeFlags>),
     Demo(DemoArgs),
     Completions(CompletionsArgs),
 }

@@ -1,9 +1,10 @@
 //! `cager demo`: the main job on a built-in capture.
 
 use super::args::DemoArgs;
-use super::encode::{default_spectrum, write_report};
+use super::encode::write_report;
 use super::{grouped, human_bytes, interrupt, print, progress};
 use crate::coordinates;
+use crate::coordinates::default_spectrum;
 use crate::decode;
 use crate::encode::{self, Encoded, Job};
 use crate::plot::error_plot;

@@ -84,7 +84,7 @@ pub(super) fn solver(
     let options = SolverOptions {
         handles: args.handles.into(),
         regularizer: args.regularizer.into(),
-        spectrum: args.spectrum.unwrap_or_else(|| default_spectrum(system.unknowns(cage))),
+        spectrum: args.spectrum.unwrap_or_else(|| coordinates::default_spectrum(system.unknowns(cage))),
         lambda: args.lambda,
     };
     Ok((system, options))
@@ -95,12 +95,6 @@ pub(super) fn write_report(mut file: AtomicFile, report: &Report) -> Result<Comp
     text.push(b'\n');
     file.write_all(&text)?;
     Ok(file.complete()?)
-}
-
-/// The paper's 20; less for a cage of which it would smooth the greater part.
-pub(super) fn default_spectrum(unknowns: usize) -> usize {
-    let usual = SolverOptions::default().spectrum;
-    if unknowns >= 2 * usual { usual } else { unknowns / 4 }
 }
 
 /// An output in place of an input, or of the other output, is a slip that would cost the user a file.

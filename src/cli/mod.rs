@@ -7,6 +7,7 @@ mod encode;
 mod inspect;
 mod interrupt;
 mod progress;
+pub(crate) mod serve;
 
 use args::{Cli, Command};
 use clap::{CommandFactory, Parser};
@@ -20,6 +21,7 @@ pub fn run() -> ExitCode {
         Command::Decode(args) => decode::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Demo(args) => demo::run(&args),
+        Command::Serve(args) => serve::run(&args),
         Command::Completions(args) => {
             let mut script = Vec::new();
             clap_complete::generate(args.shell, &mut Cli::command(), "cager", &mut script);

@@ -89,7 +89,8 @@ pub(crate) async fn post(
     let place = service.stream(&tenant)?;
     let facts = prepared(&service, &session).await?;
     if rows == Rows::Handles && !facts.reads_handles_only {
-        let detail = "this session reads every point (handles is all), so handle rows are not enough; post whole frames";
+        let detail =
+            "this session reads every point (handles is all), so handle rows are not enough; post whole frames";
         return Err(ApiError::new(problem::INVALID_FRAME, detail));
     }
     let arriving = http_body::Body::size_hint(&body).exact().unwrap_or(0);
@@ -159,12 +160,8 @@ pub(crate) fn stopping() -> ApiError {
 
 /// What a broken body means.
 pub(crate) fn body_error(error: &(dyn std::error::Error + 'static)) -> ApiError {
-    let mut cause = Some(error);
-    while let Some(error) = cause {
-        if error.downcast_ref::<io::Error>().is_some_and(|e| e.kind() == io::ErrorKind::TimedOut) {
-            return ApiError::new(problem::REQUEST_TIMEOUT, "the body stopped arriving; send the rest again");
-        }
-        cause = error.source();
+    if super::listen::is_body_timeout(error) {
+        return ApiError::new(problem::REQUEST_TIMEOUT, "the body stopped arriving; send the rest again");
     }
     ApiError::new(problem::BAD_REQUEST, format!("the body broke off ({error}); send the rest again"))
 }
@@ -221,8 +218,7 @@ impl Reading {
                 if let Some(frame) = frames.push(&mut input)?
                     && let Some(permits) = permits.take()
                 {
-                    let job =
-                        FrameJob::new(&self.session, &self.upload, frame.frame, frame.rows, frame.bytes, permits);
+                    let job = FrameJob::new(&self.session, &self.upload, frame.frame, frame.rows, frame.bytes, permits);
                     self.live.lane.push(job);
                 }
             }

@@ -124,7 +124,9 @@ impl FrameReader {
             (Layout::Records, Some(header)) => {
                 (format!("frame {}", header.frame), self.bytes.len(), header.row_bytes() as usize)
             }
-            (Layout::Records, None) => ("the header of a frame record".to_owned(), self.head.len(), record::HEADER_BYTES),
+            (Layout::Records, None) => {
+                ("the header of a frame record".to_owned(), self.head.len(), record::HEADER_BYTES)
+            }
         };
         Err(ApiError::new(
             problem::BAD_REQUEST,
@@ -211,7 +213,10 @@ mod tests {
         record::encode(Kind::HandleRows, 9, f32::NAN, f32::NAN, &[2.0; 12], &mut body).unwrap();
         for chunk in 1..body.len() + 1 {
             let frames = read(Layout::Records, &body, chunk).unwrap();
-            assert_eq!(frames.iter().map(|f| (f.frame, f.rows)).collect::<Vec<_>>(), [(3, Rows::All), (9, Rows::Handles)]);
+            assert_eq!(
+                frames.iter().map(|f| (f.frame, f.rows)).collect::<Vec<_>>(),
+                [(3, Rows::All), (9, Rows::Handles)]
+            );
         }
         for cut in 1..88 {
             assert!(read(Layout::Records, &body[..cut], 1000).is_err(), "cut at {cut}");

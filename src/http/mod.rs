@@ -19,4 +19,4 @@ mod router;
 mod sessions;
 mod viewer;
 
-pub use router::{router, spare};
+pub use router::{document, router, spare};

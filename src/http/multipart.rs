@@ -72,7 +72,8 @@ async fn read_file(
 ) -> Result<File, ApiError> {
     let name = field.file_name().unwrap_or_default();
     // Some clients send a path; only the name and its extension matter.
-    let name: String = name.rsplit(['/', '\\']).next().unwrap_or_default().chars().filter(|c| !c.is_control()).collect();
+    let name: String =
+        name.rsplit(['/', '\\']).next().unwrap_or_default().chars().filter(|c| !c.is_control()).collect();
     if !name.contains('.') || name.chars().count() > NAME_CHARACTERS {
         let detail = format!("part {part:?} needs a file name whose extension says the format, such as rest.obj");
         return Err(bad(detail));

@@ -67,12 +67,7 @@ impl Service {
     }
 }
 
-fn write(
-    session: &Session,
-    prepared: &Prepared,
-    entries: &[LogEntry],
-    frames: u32,
-) -> Result<Completion, ApiError> {
+fn write(session: &Session, prepared: &Prepared, entries: &[LogEntry], frames: u32) -> Result<Completion, ApiError> {
     let stored = |error: StoreError| super::commit::storage_error(&error);
     let choices = Choices::of(&session.meta.options)?;
     let content = session.store.content(&session.meta.key).map_err(stored)?;
@@ -112,8 +107,7 @@ fn write_frames(
         for (entry, bytes) in entries.iter().zip(bytes.chunks_exact(row_bytes)) {
             cage.clear();
             cage.extend(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])));
-            let error =
-                StoredError { l2: entry.l2, linf: entry.linf, squared: entry.squared, spread: entry.spread };
+            let error = StoredError { l2: entry.l2, linf: entry.linf, squared: entry.squared, spread: entry.spread };
             writer.write_frame(&cage, &error).map_err(plain)?;
         }
     }

@@ -172,15 +172,17 @@ impl Service {
     /// The lane that takes a session's frames to the engine.
     pub(crate) fn lane(&self, session: &Arc<Session>, prepared: Arc<Prepared>, tenant: &Tenant) -> Arc<LiveLane> {
         session.live_lane(|| {
-            let decoder = prepared.solver.decoder();
-            let cost = decoder.points() as f64 * decoder.unknowns() as f64;
-            let (weak, solver) = (Arc::downgrade(session), Arc::clone(&prepared));
+            let cost = {
+                let decoder = prepared.solver.decoder();
+                decoder.points() as f64 * decoder.unknowns() as f64
+            };
+            let (weak, solver) = (Arc::downgrade(session), prepared);
             let run = move |jobs: Vec<FrameJob>| {
                 if let Some(session) = weak.upgrade() {
                     upload::solve(&session, &solver, jobs);
                 }
             };
-            LiveLane::new(self.engine.lane(&tenant.name, tenant.priority.weight(), cost, run), prepared)
+            LiveLane::new(self.engine.lane(&tenant.name, tenant.priority.weight(), cost, run))
         })
     }
 

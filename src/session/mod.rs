@@ -18,7 +18,6 @@ use cager_proto::messages::{FrameCounts, Problem, Progress, Session as View, Ses
 use commit::{Committer, Waiting};
 use facts::Facts;
 use frames::Frames;
-use prepared::Prepared;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use tokio::sync::watch;
@@ -65,13 +64,12 @@ pub(crate) enum Phase {
 /// session nobody uses can leave the memory.
 pub(crate) struct LiveLane {
     pub(crate) lane: Lane<FrameJob>,
-    pub(crate) prepared: Arc<Prepared>,
     uploads: AtomicU64,
 }
 
 impl LiveLane {
-    pub(crate) fn new(lane: Lane<FrameJob>, prepared: Arc<Prepared>) -> Self {
-        Self { lane, prepared, uploads: AtomicU64::new(0) }
+    pub(crate) fn new(lane: Lane<FrameJob>) -> Self {
+        Self { lane, uploads: AtomicU64::new(0) }
     }
 
     /// Counts the uploads whose bodies still arrive.

@@ -72,7 +72,7 @@ impl Choices {
         SolverOptions {
             handles: self.handles,
             regularizer: self.regularizer,
-            spectrum: self.spectrum.map_or_else(|| crate::coordinates::default_spectrum(unknowns), |s| s as usize),
+            spectrum: self.spectrum.map_or_else(|| coordinates::default_spectrum(unknowns), |s| s as usize),
             lambda: self.lambda,
         }
     }
@@ -119,15 +119,16 @@ pub(crate) fn read_cage(content: &Content, choices: &Choices) -> Result<Cage, Ap
 /// Geometry or options that do not go together.
 pub(crate) fn prepare(geometry: &Geometry, choices: &Choices) -> Result<Prepared, ApiError> {
     let options = choices.solver_options(choices.system.unknowns(&geometry.cage));
-    let solver = Solver::prepare(choices.system, &geometry.cage, &geometry.rest.points, options).map_err(|error| {
-        match error {
-            PrepareError::SpectrumTooLarge { .. } => {
-                ApiError::new(problem::INVALID_OPTIONS, format!("spectrum: {error}"))
-            }
-            PrepareError::BadLambda { .. } => ApiError::new(problem::INVALID_OPTIONS, format!("lambda: {error}")),
-            _ => self::geometry(error.to_string()),
-        }
-    })?;
+    let solver =
+        Solver::prepare(choices.system, &geometry.cage, &geometry.rest.points, options).map_err(
+            |error| match error {
+                PrepareError::SpectrumTooLarge { .. } => {
+                    ApiError::new(problem::INVALID_OPTIONS, format!("spectrum: {error}"))
+                }
+                PrepareError::BadLambda { .. } => ApiError::new(problem::INVALID_OPTIONS, format!("lambda: {error}")),
+                _ => self::geometry(error.to_string()),
+            },
+        )?;
     Ok(with_solver(solver, &geometry.cage, options))
 }
 

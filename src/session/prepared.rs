@@ -97,11 +97,6 @@ impl Solvers {
         super::lock(&self.inner).flights.len()
     }
 
-    /// The threads that prepare, for other work of that kind.
-    pub(crate) fn pool(&self) -> &rayon::ThreadPool {
-        &self.pool
-    }
-
     /// The solver of a content: from memory, from disk, or prepared now. Goes on where the caller gives up.
     pub(crate) async fn get(self: &Arc<Self>, key: ContentKey, choices: Choices) -> Result<Got, ApiError> {
         if let Some(prepared) = self.at_hand(&key) {
@@ -151,9 +146,10 @@ impl Solvers {
     fn load_or_prepare(&self, key: ContentKey, choices: Choices, queued: f64) -> Result<Got, ApiError> {
         let clock = Instant::now();
         let stored = |error| super::commit::storage_error(&error);
-        let content = self.store.content(&key).map_err(stored)?.ok_or_else(|| {
-            ApiError::new(problem::SESSION_DELETED, "the session was deleted before it was prepared")
-        })?;
+        let content =
+            self.store.content(&key).map_err(stored)?.ok_or_else(|| {
+                ApiError::new(problem::SESSION_DELETED, "the session was deleted before it was prepared")
+            })?;
         match self.store.prepared(&key) {
             Ok(Some(solver)) => {
                 let cage = prepare::read_cage(&content, &choices)?;

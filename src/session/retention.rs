@@ -16,6 +16,17 @@ impl Service {
         self.registry.of_tenant(tenant).iter().map(|session| self.session_bytes(session)).sum()
     }
 
+    /// Sessions and bytes of every tenant that has any.
+    pub(crate) fn usage(&self) -> Vec<(String, usize, u64)> {
+        let mut usage = std::collections::BTreeMap::<String, (usize, u64)>::new();
+        for session in self.registry.all() {
+            let entry = usage.entry(session.meta.tenant.clone()).or_default();
+            entry.0 += 1;
+            entry.1 += self.session_bytes(&session);
+        }
+        usage.into_iter().map(|(tenant, (sessions, bytes))| (tenant, sessions, bytes)).collect()
+    }
+
     fn session_bytes(&self, session: &Session) -> u64 {
         self.store.session_bytes(&session.meta.id) + self.store.content_bytes(&session.meta.key)
     }

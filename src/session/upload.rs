@@ -195,10 +195,8 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
         }
         if let Some(row) = first_not_finite(&job.bytes) {
             let what = if job.rows == Rows::All { "point" } else { "handle" };
-            let (frame, detail) = (
-                job.frame,
-                format!("frame {}: {what} {row} is not finite; export this frame again", job.frame),
-            );
+            let (frame, detail) =
+                (job.frame, format!("frame {}: {what} {row} is not finite; export this frame again", job.frame));
             job.fail(ApiError::new(problem::INVALID_FRAME, detail).frame(frame));
             continue;
         }
@@ -256,7 +254,8 @@ fn solve_alike(session: &Arc<Session>, prepared: &Prepared, rows: Rows, jobs: Ve
         let frame = job.frame;
         let fits = cage.iter().all(|x| x.is_finite()) && (rows == Rows::Handles || error.linf.is_finite());
         if !fits {
-            let detail = format!("frame {frame}: its numbers are too large for single precision; scale the capture down");
+            let detail =
+                format!("frame {frame}: its numbers are too large for single precision; scale the capture down");
             for upload in session.frames().gave_up(frame) {
                 upload.fail(ApiError::new(problem::INVALID_FRAME, detail.clone()).frame(frame));
             }

@@ -92,6 +92,12 @@ impl Store {
     }
 
     /// A quick look: metadata and lengths, not every byte. Makes sure that what is there is durable.
+    /// Bytes of a content's files; 0 where there is none.
+    pub fn content_bytes(&self, key: &ContentKey) -> u64 {
+        let folder = self.files().contents().join(key.to_string());
+        self.files().disk.list(&folder).map_or(0, |all| all.iter().map(|e| e.bytes).sum())
+    }
+
     fn content_is_there(&self, key: &ContentKey, place: &Path) -> Result<bool, StoreError> {
         if !self.files().exists(place)? {
             return Ok(false);

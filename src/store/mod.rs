@@ -2,7 +2,7 @@
 //! use their own threads.
 //!
 //! ```text
-//! sessions/<id>/   session.json  frames.log  capture.cager  complete.json
+//! sessions/<id>/   session.json  frames.log  capture.cager  complete.json  outcome.json
 //! contents/<key>/  content.json  rest  cage
 //! prepared/<key>.solver
 //! tmp/             being written; emptied at start       trash/       being removed; emptied at start

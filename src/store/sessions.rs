@@ -5,6 +5,7 @@ use super::files::Files;
 use super::names::check_id;
 use super::{ContentKey, Quarantined, Store, StoreError, is_session_id, meta};
 use cager_proto::messages::SessionOptions;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::io::{self, Write};
 use std::path::PathBuf;
@@ -166,6 +167,26 @@ impl Store {
             }
         }
         Ok(found)
+    }
+
+    /// Keeps a note of what was found out about the session, replacing an earlier one of that name: whole or not at all, durable
+    /// on Ok. `name` is one of the program's own.
+    ///
+    /// # Errors
+    /// [`StoreError::BadId`], [`StoreError::Full`].
+    pub fn put_note<T: Serialize>(&self, id: &str, name: &'static str, note: &T) -> Result<(), StoreError> {
+        check_id(id)?;
+        let path = self.files().session(id).join(name).with_extension("json");
+        self.files().replace(&path, &meta::wrap(&path, name, note)?)
+    }
+
+    /// A note of the session; None where there is none.
+    ///
+    /// # Errors
+    /// [`StoreError::Damaged`], [`StoreError::BadId`].
+    pub fn note<T: DeserializeOwned>(&self, id: &str, name: &'static str) -> Result<Option<T>, StoreError> {
+        check_id(id)?;
+        meta::read(self.files(), &self.files().session(id).join(name).with_extension("json"), name)
     }
 
     /// Where the session's container lies, or would. A name that is no id gives a path where nothing is.

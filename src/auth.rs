@@ -1,0 +1,234 @@
+//! Who may use the service: access tokens, tenants and their limits.
+//!
+//! A tokens file holds the SHA-256 of each token, never the token:
+//!
+//! ```toml
+//! # T=$(openssl rand -hex 32); printf %s "$T" | sha256sum
+//! [[token]]
+//! name = "farm"            # what the log calls it
+//! tenant = "studio-a"      # whose sessions it sees; several tokens may share a tenant
+//! sha256 = "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"
+//! priority = "normal"      # or high, low
+//! max_sessions = 100       # this and max_bytes, max_age_s, max_streams: where they differ from the service's settings
+//! ```
+//!
+//! Clients send `Authorization: Bearer TOKEN`.
+
+mod file;
+#[cfg(test)]
+mod tests;
+
+pub use file::AccessError;
+
+use file::{Entries, Stamp};
+use http::HeaderMap;
+use http::header::AUTHORIZATION;
+use serde::Deserialize;
+use sha2::{Digest, Sha256};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
+use std::time::Duration;
+use tokio_util::sync::CancellationToken;
+
+/// Shortest token that is accepted, in bytes: shorter ones could be guessed.
+pub const MIN_TOKEN_BYTES: usize = 16;
+/// Longest token that is looked at, in bytes.
+const MAX_TOKEN_BYTES: usize = 1024;
+/// Name of the tenant of a service without tokens.
+pub const LOCAL: &str = "local";
+/// How often the tokens file is looked at.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
+
+/// The share of the solving threads where several tenants wait.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Priority {
+    /// A quarter of a normal share.
+    Low,
+    /// One share.
+    #[default]
+    Normal,
+    /// Four shares.
+    High,
+}
+
+impl Priority {
+    /// Share of the solving threads against other tenants that wait.
+    pub fn weight(self) -> f64 {
+        match self {
+            Self::Low => 0.25,
+            Self::Normal => 1.0,
+            Self::High => 4.0,
+        }
+    }
+}
+
+/// What a tenant may use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TenantLimits {
+    /// Sessions at a time.
+    pub max_sessions: u64,
+    /// Bytes of all its sessions on disk.
+    pub max_bytes: u64,
+    /// Age in seconds at which sessions are deleted; 0 for never.
+    pub max_age_s: u64,
+    /// Streams at work.
+    pub max_streams: u64,
+}
+
+impl TenantLimits {
+    /// The larger of each.
+    fn most_generous(self, other: Self) -> Self {
+        let for_ever = self.max_age_s == 0 || other.max_age_s == 0;
+        Self {
+            max_sessions: self.max_sessions.max(other.max_sessions),
+            max_bytes: self.max_bytes.max(other.max_bytes),
+            max_age_s: if for_ever { 0 } else { self.max_age_s.max(other.max_age_s) },
+            max_streams: self.max_streams.max(other.max_streams),
+        }
+    }
+}
+
+/// Whose request it is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Tenant {
+    /// Name, fit for a file name.
+    pub name: String,
+    /// The share of the solving threads where several tenants wait.
+    pub priority: Priority,
+    /// What it may use.
+    pub limits: TenantLimits,
+}
+
+/// Why a request is refused; to be answered with 401 and `WWW-Authenticate: Bearer`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Denied {
+    /// There is no `Authorization` header.
+    #[error("this service needs a token: send the header Authorization: Bearer TOKEN")]
+    Missing,
+    /// The header is not what it should be, or there are several.
+    #[error("the Authorization header must be Bearer and a token, once")]
+    Malformed,
+    /// The token is unknown or was revoked.
+    #[error("the token is not valid (any more); ask the service's operator for another")]
+    Unknown,
+}
+
+/// Tells tenants by their tokens. Clones share their state.
+#[derive(Clone)]
+pub struct Access(Arc<Inner>);
+
+struct Inner {
+    /// Without one, everybody is `local`.
+    path: Option<PathBuf>,
+    defaults: TenantLimits,
+    local: Arc<Tenant>,
+    entries: RwLock<Arc<Entries>>,
+    seen: Mutex<Option<Stamp>>,
+}
+
+impl Access {
+    /// Reads the tokens file; without one, everyone is tenant `local` with the default limits.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or has an entry that is wrong, with its line.
+    pub fn open(path: Option<&Path>, defaults: TenantLimits) -> Result<Self, AccessError> {
+        // Looked at first: a change while reading is then noticed later.
+        let seen = path.and_then(Stamp::of);
+        let entries = path.map(|path| Entries::read(path, defaults)).transpose()?.unwrap_or_default();
+        Ok(Self(Arc::new(Inner {
+            path: path.map(Path::to_owned),
+            defaults,
+            local: Arc::new(Tenant { name: LOCAL.to_owned(), priority: Priority::Normal, limits: defaults }),
+            entries: RwLock::new(Arc::new(entries)),
+            seen: Mutex::new(seen),
+        })))
+    }
+
+    /// Whether tokens are asked for.
+    pub fn is_guarded(&self) -> bool {
+        self.0.path.is_some()
+    }
+
+    /// Finds out whose request it is.
+    ///
+    /// # Errors
+    /// No token, a header that is not understood, or a token that nobody has.
+    pub fn authenticate(&self, headers: &HeaderMap) -> Result<Arc<Tenant>, Denied> {
+        if self.0.path.is_none() {
+            return Ok(Arc::clone(&self.0.local));
+        }
+        let mut values = headers.get_all(AUTHORIZATION).iter();
+        let value = values.next().ok_or(Denied::Missing)?;
+        if values.next().is_some() {
+            return Err(Denied::Malformed);
+        }
+        let (scheme, token) = value.to_str().ok().and_then(|text| text.split_once(' ')).ok_or(Denied::Malformed)?;
+        let token = token.trim_matches(' ');
+        if !scheme.eq_ignore_ascii_case("bearer") || token.is_empty() {
+            return Err(Denied::Malformed);
+        }
+        if !(MIN_TOKEN_BYTES..=MAX_TOKEN_BYTES).contains(&token.len()) {
+            return Err(Denied::Unknown);
+        }
+        self.entries().find(&Sha256::digest(token).into()).ok_or(Denied::Unknown)
+    }
+
+    /// A tenant by name, for sessions that were there before a restart: the most generous of its tokens, or the defaults.
+    pub fn tenant(&self, name: &str) -> Arc<Tenant> {
+        let of_tokens = self.entries().tenants().filter(|tenant| tenant.name == name).fold(None, |best, tenant| {
+            let best: &Tenant = best.as_ref().unwrap_or(tenant);
+            Some(Tenant {
+                name: name.to_owned(),
+                priority: best.priority.max(tenant.priority),
+                limits: best.limits.most_generous(tenant.limits),
+            })
+        });
+        let default = || Tenant { name: name.to_owned(), priority: Priority::Normal, limits: self.0.defaults };
+        Arc::new(of_tokens.unwrap_or_else(default))
+    }
+
+    /// Reads the file again whenever it changes, until `stop`. A removed entry stops working within a second; a file that
+    /// cannot be used is logged, and the entries before stay.
+    pub async fn watch(self, stop: CancellationToken) {
+        let Some(path) = self.0.path.clone() else { return };
+        while stop.run_until_cancelled(tokio::time::sleep(LOOK_EVERY)).await.is_some() {
+            let this = self.clone();
+            let reloaded = tokio::task::spawn_blocking(move || this.reload_if_changed()).await;
+            match reloaded {
+                Ok(Ok(None)) => {}
+                Ok(Ok(Some(count))) => tracing::info!(file = %path.display(), tokens = count, "tokens reloaded"),
+                Ok(Err(error)) => tracing::error!(%error, "tokens not reloaded; the old ones stay valid"),
+                Err(error) => tracing::error!(%error, "tokens not reloaded; the old ones stay valid"),
+            }
+        }
+    }
+
+    /// Reads the file if it is another than before. Gives the number of tokens if it was.
+    fn reload_if_changed(&self) -> Result<Option<usize>, AccessError> {
+        let Some(path) = &self.0.path else { return Ok(None) };
+        let stamp = Stamp::of(path);
+        {
+            let mut seen = self.0.seen.lock().unwrap_or_else(PoisonError::into_inner);
+            if *seen == stamp {
+                return Ok(None);
+            }
+            // Also for a broken file, so that it is complained about once.
+            *seen = stamp;
+        }
+        let entries = Entries::read(path, self.0.defaults)?;
+        let count = entries.tenants().count();
+        *self.0.entries.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(entries);
+        Ok(Some(count))
+    }
+
+    fn entries(&self) -> Arc<Entries> {
+        Arc::clone(&self.0.entries.read().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl std::fmt::Debug for Access {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Access").field("path", &self.0.path).field("entries", &self.entries()).finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,89 @@
+//! `cager serve`.
+
+use super::print;
+use crate::config::{ServeConfig, ServeFlags};
+use crate::http::listen::{serve, tls_config};
+use crate::http::{router, spare};
+use crate::service::Service;
+use crate::store::LocalDisk;
+use crate::telemetry;
+use anyhow::{Context, Result};
+use std::io::Write;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::net::TcpListener;
+use tokio_util::sync::CancellationToken;
+
+pub(super) fn run(flags: &ServeFlags) -> Result<()> {
+    let config = ServeConfig::load(flags.config.as_deref(), std::env::vars(), flags)?;
+    if flags.check_config {
+        return print(&config.check_config());
+    }
+    telemetry::init_logging(config.log, &config.log_filter)?;
+    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().thread_name("serve").build()?;
+    let outcome = runtime.block_on(async {
+        let stop = CancellationToken::new();
+        tokio::spawn(stop_on_signals(stop.clone()));
+        run_until(config, stop, |address| {
+            // For scripts that asked for any free port.
+            let _ = writeln!(std::io::stdout(), "listening on {address}");
+        })
+        .await
+    });
+    // Blocking work that is left is not waited for: what was answered is on disk.
+    runtime.shutdown_timeout(Duration::from_secs(2));
+    outcome
+}
+
+/// Serves until `stop`; tells `listening` the address when connections are accepted.
+///
+/// # Errors
+/// A port, a folder or a file that cannot be used.
+pub(crate) async fn run_until(
+    config: ServeConfig,
+    stop: CancellationToken,
+    listening: impl FnOnce(SocketAddr),
+) -> Result<()> {
+    telemetry::metrics::recorder();
+    let tls = config.tls().map(|tls| tls_config(&tls)).transpose()?;
+    let scheme = if tls.is_some() { "https" } else { "http" };
+    let listener = TcpListener::bind(config.listen)
+        .await
+        .with_context(|| format!("{}: cannot be listened on; is it in use? give another --listen", config.listen))?;
+    let limits = config.limits();
+    let service = Service::start(config, Arc::new(LocalDisk), stop.clone())?;
+    let address = listener.local_addr()?;
+    tracing::info!(%address, scheme, "listening");
+    listening(address);
+    serve(listener, router(Arc::clone(&service)), spare(service), limits, tls, stop).await?;
+    tracing::info!("stopped");
+    Ok(())
+}
+
+/// Begins to stop at the first signal; the second one ends the process at once.
+async fn stop_on_signals(stop: CancellationToken) {
+    if signal().await.is_ok() {
+        tracing::info!("stopping; a second signal ends it at once");
+        stop.cancel();
+        if signal().await.is_ok() {
+            std::process::exit(130);
+        }
+    }
+}
+
+#[cfg(unix)]
+async fn signal() -> std::io::Result<()> {
+    use tokio::signal::unix::{SignalKind, signal};
+    let (mut interrupt, mut terminate) = (signal(SignalKind::interrupt())?, signal(SignalKind::terminate())?);
+    tokio::select! {
+        _ = interrupt.recv() => {}
+        _ = terminate.recv() => {}
+    }
+    Ok(())
+}
+
+#[cfg(not(unix))]
+async fn signal() -> std::io::Result<()> {
+    tokio::signal::ctrl_c().await
+}

@@ -1,0 +1,206 @@
+//! The service's settings: defaults, then a file, then the environment, then flags, each overriding the one before.
+
+mod flags;
+mod settings;
+mod show;
+#[cfg(test)]
+mod tests;
+
+pub use flags::ServeFlags;
+pub(crate) use settings::line_of;
+pub use settings::{ConfigError, Origin};
+
+use crate::auth::TenantLimits;
+use crate::http::listen::{Limits, Tls};
+use crate::telemetry::LogFormat;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+const KIB: u64 = 1 << 10;
+const MIB: u64 = 1 << 20;
+const GIB: u64 = 1 << 30;
+
+/// Settings of the service. Names are those of the file's keys; in the environment they are in capitals after `CAGER_`.
+/// Sizes in a file or the environment may be numbers or texts such as `"512 MiB"`.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ServeConfig {
+    /// Address and port to listen on. Other than loopback addresses need tokens.
+    pub listen: SocketAddr,
+    /// Folder of sessions and prepared solvers; made if it is not there.
+    pub data: PathBuf,
+    /// File of access tokens; without one everyone on this machine is tenant `local`.
+    pub tokens: Option<PathBuf>,
+    /// PEM file of the certificate, for TLS.
+    pub tls_certificate: Option<PathBuf>,
+    /// PEM file of the certificate's private key.
+    pub tls_key: Option<PathBuf>,
+    /// Form of log lines: `human` or `json`.
+    pub log: LogFormat,
+    /// Which log lines appear: a level, or levels by module such as `info,cager::http=debug`.
+    pub log_filter: String,
+    /// Threads that solve; 0 for one per processor.
+    pub workers: usize,
+    /// Bytes of prepared solvers kept in memory.
+    pub cache_bytes: u64,
+    /// Bytes of prepared solvers kept on disk.
+    pub prepared_disk_bytes: u64,
+    /// Bytes of frames held in memory between arrival and disk, all streams together.
+    pub frame_bytes: u64,
+    /// Bytes of rest poses and cages held in memory while sessions are created, all together.
+    pub upload_bytes: u64,
+    /// Bytes of one rest pose or cage.
+    pub max_rest_bytes: u64,
+    /// Connections that are served; a few more get health and otherwise 503.
+    pub max_connections: usize,
+    /// Requests at work.
+    pub max_requests: usize,
+    /// Frame, cage, event and decode streams at work.
+    pub max_streams: usize,
+    /// Sessions prepared at the same time.
+    pub max_preparing: usize,
+    /// Sessions waiting to be prepared.
+    pub max_prepare_queue: usize,
+    /// Frames waiting to be solved.
+    pub max_queue_frames: usize,
+    /// Seconds for a request's header to arrive.
+    pub header_timeout_s: u64,
+    /// Seconds that a request body may pause.
+    pub body_timeout_s: u64,
+    /// Seconds that a connection without requests stays open.
+    pub idle_timeout_s: u64,
+    /// Seconds in which a response's reader may take nothing.
+    pub write_timeout_s: u64,
+    /// Seconds for a request that is not a stream.
+    pub request_timeout_s: u64,
+    /// Seconds for open requests after a stop signal.
+    pub drain_timeout_s: u64,
+    /// Bytes of a request's header.
+    pub max_header_bytes: usize,
+    /// Sessions of a tenant, where its token says nothing else.
+    pub tenant_max_sessions: u64,
+    /// Bytes of a tenant's sessions on disk, where its token says nothing else.
+    pub tenant_max_bytes: u64,
+    /// Seconds after which a tenant's sessions are deleted, where its token says nothing else; 0 for never.
+    pub tenant_max_age_s: u64,
+    /// Streams of a tenant at work, where its token says nothing else.
+    pub tenant_max_streams: u64,
+    /// Where each setting that is not a default came from.
+    #[serde(skip)]
+    pub origins: BTreeMap<String, Origin>,
+}
+
+impl Default for ServeConfig {
+    fn default() -> Self {
+        Self {
+            listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
+            data: PathBuf::from("cager-data"),
+            tokens: None,
+            tls_certificate: None,
+            tls_key: None,
+            log: LogFormat::Human,
+            log_filter: "info".to_owned(),
+            workers: 0,
+            cache_bytes: 2 * GIB,
+            prepared_disk_bytes: 20 * GIB,
+            frame_bytes: 256 * MIB,
+            upload_bytes: GIB,
+            max_rest_bytes: 512 * MIB,
+            max_connections: 1024,
+            max_requests: 512,
+            max_streams: 256,
+            max_preparing: 2,
+            max_prepare_queue: 64,
+            max_queue_frames: 4096,
+            header_timeout_s: 10,
+            body_timeout_s: 30,
+            idle_timeout_s: 75,
+            write_timeout_s: 300,
+            request_timeout_s: 60,
+            drain_timeout_s: 20,
+            max_header_bytes: 32 << 10,
+            tenant_max_sessions: 1000,
+            tenant_max_bytes: 100 * GIB,
+            tenant_max_age_s: 0,
+            tenant_max_streams: 64,
+            origins: BTreeMap::new(),
+        }
+    }
+}
+
+impl ServeConfig {
+    /// Puts the settings together. `env` may be the whole environment; `file` overrides the flag `--config` and `CAGER_CONFIG`
+    /// where it is given. Relative paths in the file are relative to the file.
+    ///
+    /// # Errors
+    /// A file that cannot be read, unknown keys, values that are not possible, and combinations that are unsafe.
+    pub fn load(
+        file: Option<&Path>,
+        env: impl Iterator<Item = (String, String)>,
+        flags: &ServeFlags,
+    ) -> Result<Self, ConfigError> {
+        let mut layers = settings::Layers::default();
+        let env: Vec<_> = env.filter(|(name, _)| name.starts_with(settings::ENVIRONMENT)).collect();
+        let from_env = env.iter().find(|(name, _)| name == "CAGER_CONFIG").map(|(_, path)| Path::new(path));
+        if let Some(file) = file.or(flags.config.as_deref()).or(from_env) {
+            layers.add_file(file)?;
+        }
+        layers.add_environment(&env)?;
+        flags.add_to(&mut layers)?;
+        let config = layers.build()?;
+        config.check()?;
+        Ok(config)
+    }
+
+    /// Refuses combinations that cannot work or are not safe.
+    fn check(&self) -> Result<(), ConfigError> {
+        if self.tokens.is_none() && !self.listen.ip().is_loopback() {
+            return Err(ConfigError::Open { listen: self.listen });
+        }
+        match (&self.tls_certificate, &self.tls_key) {
+            (Some(_), None) => Err(ConfigError::HalfTls { given: "tls_certificate", missing: "tls_key" }),
+            (None, Some(_)) => Err(ConfigError::HalfTls { given: "tls_key", missing: "tls_certificate" }),
+            _ => Ok(()),
+        }
+    }
+
+    /// The listener's limits.
+    pub fn limits(&self) -> Limits {
+        Limits {
+            header_timeout: Duration::from_secs(self.header_timeout_s),
+            body_timeout: Duration::from_secs(self.body_timeout_s),
+            idle_timeout: Duration::from_secs(self.idle_timeout_s),
+            write_timeout: Duration::from_secs(self.write_timeout_s),
+            drain_timeout: Duration::from_secs(self.drain_timeout_s),
+            max_connections: self.max_connections,
+            max_header_bytes: self.max_header_bytes,
+            ..Limits::default()
+        }
+    }
+
+    /// Certificate and key, if TLS is wanted.
+    pub fn tls(&self) -> Option<Tls> {
+        Some(Tls { certificate: self.tls_certificate.clone()?, key: self.tls_key.clone()? })
+    }
+
+    /// Limits of tenants whose tokens say nothing else.
+    pub fn tenant_limits(&self) -> TenantLimits {
+        TenantLimits {
+            max_sessions: self.tenant_max_sessions,
+            max_bytes: self.tenant_max_bytes,
+            max_age_s: self.tenant_max_age_s,
+            max_streams: self.tenant_max_streams,
+        }
+    }
+
+    /// Threads that solve: the setting, or one per processor.
+    pub fn worker_threads(&self) -> usize {
+        match self.workers {
+            0 => std::thread::available_parallelism().map_or(1, usize::from),
+            workers => workers,
+        }
+    }
+}

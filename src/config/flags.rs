@@ -1,0 +1,85 @@
+//! Settings from the command line.
+
+use super::settings::{ConfigError, Layers, Origin};
+use crate::telemetry::LogFormat;
+use std::path::PathBuf;
+use toml::Value;
+
+/// Flags of `cager serve`.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct ServeFlags {
+    /// Address and port to listen on [default: 127.0.0.1:8080].
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    pub listen: Option<String>,
+
+    /// Folder of sessions and prepared solvers [default: cager-data].
+    #[arg(long, value_name = "DIR")]
+    pub data: Option<PathBuf>,
+
+    /// File of settings, TOML.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+
+    /// File of access tokens, TOML; needed on other than loopback addresses.
+    #[arg(long, value_name = "FILE")]
+    pub tokens: Option<PathBuf>,
+
+    /// Certificate for TLS, PEM.
+    #[arg(long, value_name = "FILE")]
+    pub tls_certificate: Option<PathBuf>,
+
+    /// Private key of the certificate, PEM.
+    #[arg(long, value_name = "FILE")]
+    pub tls_key: Option<PathBuf>,
+
+    /// Form of log lines [default: human].
+    #[arg(long, value_enum, value_name = "FORM")]
+    pub log: Option<LogFormat>,
+
+    /// Which log lines appear: error, warn, info, debug, or by module [default: info].
+    #[arg(long, value_name = "FILTER")]
+    pub log_filter: Option<String>,
+
+    /// Threads that solve; 0 for one per processor [default: 0].
+    #[arg(long, value_name = "N")]
+    pub workers: Option<usize>,
+
+    /// Any other setting, for example --set max_streams=64; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+
+    /// Print all settings and where they come from, and stop.
+    #[arg(long)]
+    pub check_config: bool,
+}
+
+impl ServeFlags {
+    /// Lays the flags that were given on top. Named flags override `--set`.
+    pub(super) fn add_to(&self, layers: &mut Layers) -> Result<(), ConfigError> {
+        for text in &self.set {
+            let Some((key, value)) = text.split_once('=') else {
+                return Err(ConfigError::Set { text: text.clone() });
+            };
+            let key = key.trim().replace('-', "_");
+            layers.add(&key, &Value::String(value.trim().to_owned()), Origin::Flag(format!("--set {key}")))?;
+        }
+        let path = |path: &Option<PathBuf>| path.as_ref().map(|path| path.to_string_lossy().into_owned());
+        let named = [
+            ("listen", self.listen.clone()),
+            ("data", path(&self.data)),
+            ("tokens", path(&self.tokens)),
+            ("tls_certificate", path(&self.tls_certificate)),
+            ("tls_key", path(&self.tls_key)),
+            ("log", self.log.map(|log| log.name().to_owned())),
+            ("log_filter", self.log_filter.clone()),
+            ("workers", self.workers.map(|workers| workers.to_string())),
+        ];
+        for (key, value) in named {
+            if let Some(value) = value {
+                let flag = Origin::Flag(format!("--{}", key.replace('_', "-")));
+                layers.add(key, &Value::String(value), flag)?;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,183 @@
+//! Bodies that keep the connection's state and clocks up to date.
+
+use super::state::{InFlight, State};
+use bytes::Bytes;
+use http_body::{Body, Frame, SizeHint};
+use hyper::body::Incoming;
+use std::error::Error;
+use std::fmt;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::task::{Context, Poll, ready};
+use std::time::Duration;
+use tokio::time::{Instant, Sleep, sleep};
+
+/// Largest piece of a response handed to HTTP/2 at once, so that what it holds back for a slow reader stays small.
+const PIECE_BYTES: usize = 64 << 10;
+
+/// The client stopped sending in the middle of a request body. It is the source of the body's error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BodyTimeout {
+    /// How long was waited.
+    pub after: Duration,
+}
+
+impl fmt::Display for BodyTimeout {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "the request body stopped coming for {} s; send it again", self.after.as_secs_f64())
+    }
+}
+
+impl Error for BodyTimeout {}
+
+/// Whether an error while reading a request body is, at its root, a [`BodyTimeout`] (to be answered with 408).
+pub fn is_body_timeout(error: &(dyn Error + 'static)) -> bool {
+    std::iter::successors(Some(error), |&error| error.source()).any(<dyn Error>::is::<BodyTimeout>)
+}
+
+/// A request body that fails when the client pauses too long.
+pub(super) struct Upload {
+    inner: Incoming,
+    state: Arc<State>,
+    in_flight: Option<Arc<InFlight>>,
+    timeout: Duration,
+    /// Runs while somebody waits.
+    clock: Option<Pin<Box<Sleep>>>,
+    waiting: bool,
+    /// Set when the body is dropped before its end.
+    unfinished: Arc<AtomicBool>,
+}
+
+impl Upload {
+    pub(super) fn new(inner: Incoming, state: Arc<State>, in_flight: Arc<InFlight>, timeout: Duration) -> Self {
+        // A request without a body is done receiving.
+        let in_flight = (!inner.is_end_stream()).then_some(in_flight);
+        Self { inner, state, in_flight, timeout, clock: None, waiting: false, unfinished: Arc::default() }
+    }
+
+    /// Becomes true when the body is dropped before its end.
+    pub(super) fn unfinished(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.unfinished)
+    }
+
+    /// Polls the clock, which starts with the first wait after some progress.
+    fn poll_clock(&mut self, cx: &mut Context<'_>) -> Poll<()> {
+        let timeout = self.timeout;
+        let clock = self.clock.get_or_insert_with(|| Box::pin(sleep(timeout)));
+        if !self.waiting {
+            self.waiting = true;
+            clock.as_mut().reset(Instant::now() + timeout);
+        }
+        clock.as_mut().poll(cx)
+    }
+}
+
+impl Body for Upload {
+    type Data = Bytes;
+    type Error = Box<dyn Error + Send + Sync>;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Self::Data>, Self::Error>>> {
+        let this = &mut *self;
+        let Poll::Ready(frame) = Pin::new(&mut this.inner).poll_frame(cx) else {
+            ready!(this.poll_clock(cx));
+            metrics::counter!("cager_body_timeouts_total").increment(1);
+            this.waiting = false;
+            return Poll::Ready(Some(Err(BodyTimeout { after: this.timeout }.into())));
+        };
+        this.waiting = false;
+        this.state.body_came();
+        if frame.is_none() || this.inner.is_end_stream() {
+            this.in_flight = None;
+        }
+        Poll::Ready(frame.map(|frame| frame.map_err(Into::into)))
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.inner.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.inner.size_hint()
+    }
+}
+
+impl Drop for Upload {
+    fn drop(&mut self) {
+        if self.in_flight.is_some() {
+            self.unfinished.store(true, Ordering::Release);
+        }
+    }
+}
+
+/// A response body that says whether the client reads it.
+pub(super) struct Reply {
+    inner: axum::body::Body,
+    state: Arc<State>,
+    _in_flight: Arc<InFlight>,
+    /// Rest of a large piece, for HTTP/2.
+    rest: Bytes,
+    split: bool,
+    unread: bool,
+}
+
+impl Reply {
+    pub(super) fn new(inner: axum::body::Body, state: Arc<State>, in_flight: Arc<InFlight>, split: bool) -> Self {
+        Self { inner, state, _in_flight: in_flight, rest: Bytes::new(), split, unread: false }
+    }
+
+    fn set_unread(&mut self, unread: bool) {
+        if self.unread != unread {
+            self.unread = unread;
+            self.state.response_unread(unread);
+        }
+    }
+}
+
+impl Body for Reply {
+    type Data = Bytes;
+    type Error = axum::Error;
+
+    fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        let this = &mut *self;
+        this.set_unread(false);
+        let mut data = std::mem::take(&mut this.rest);
+        if data.is_empty() {
+            match ready!(Pin::new(&mut this.inner).poll_frame(cx)) {
+                Some(Ok(frame)) => match frame.into_data() {
+                    Ok(bytes) => data = bytes,
+                    Err(frame) => return Poll::Ready(Some(Ok(frame))),
+                },
+                end => return Poll::Ready(end),
+            }
+        }
+        if this.split && data.len() > PIECE_BYTES {
+            this.rest = data.split_off(PIECE_BYTES);
+        }
+        this.set_unread(true);
+        Poll::Ready(Some(Ok(Frame::data(data))))
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.rest.is_empty() && self.inner.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        let (inner, rest) = (self.inner.size_hint(), self.rest.len() as u64);
+        let mut hint = SizeHint::new();
+        hint.set_lower(inner.lower() + rest);
+        if let Some(upper) = inner.upper() {
+            hint.set_upper(upper + rest);
+        }
+        hint
+    }
+}
+
+impl Drop for Reply {
+    fn drop(&mut self) {
+        self.set_unread(false);
+    }
+}

@@ -1,0 +1,118 @@
+//! From the protocol to the router: refuses what is ambiguous or too large, and wraps the bodies.
+
+use super::Limits;
+use super::body::{Reply, Upload};
+use super::head::Head;
+use super::state::State;
+use axum::Router;
+use axum::body::Body;
+use axum::extract::ConnectInfo;
+use cager_proto::messages::Problem;
+use http::header::{CONNECTION, CONTENT_TYPE, HeaderValue, TRANSFER_ENCODING};
+use http::{Request, Response, StatusCode, Version};
+use hyper::body::Incoming;
+use std::convert::Infallible;
+use std::net::SocketAddr;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use tokio::sync::Notify;
+use tower::Service as _;
+
+/// The requests of one connection.
+#[derive(Clone)]
+pub(super) struct Requests {
+    pub(super) app: Router,
+    pub(super) peer: SocketAddr,
+    pub(super) limits: Arc<Limits>,
+    pub(super) state: Arc<State>,
+    /// Told when a request has begun, where a connection gets only one.
+    pub(super) only_one: Option<Arc<Notify>>,
+}
+
+impl hyper::service::Service<Request<Incoming>> for Requests {
+    type Response = Response<Reply>;
+    type Error = Infallible;
+    type Future = Pin<Box<dyn Future<Output = Result<Self::Response, Infallible>> + Send>>;
+
+    fn call(&self, request: Request<Incoming>) -> Self::Future {
+        let (head, in_flight) = self.state.begin();
+        if let Some(only_one) = &self.only_one {
+            only_one.notify_one();
+        }
+        let this = self.clone();
+        Box::pin(async move {
+            let http2 = request.version() == Version::HTTP_2;
+            let (response, close) = match refusal(&request, head, &this.limits) {
+                Some(problem) => (problem, true),
+                None => {
+                    let upload = |body| {
+                        Upload::new(body, Arc::clone(&this.state), Arc::clone(&in_flight), this.limits.body_timeout)
+                    };
+                    let mut request = request.map(upload);
+                    let unfinished = request.body().unfinished();
+                    request.extensions_mut().insert(ConnectInfo(this.peer));
+                    let Ok(response) = this.app.clone().call(request.map(Body::new)).await;
+                    // What is left of the body would be taken for the next request.
+                    (response, unfinished.load(Ordering::Acquire))
+                }
+            };
+            let mut response = response.map(|body| Reply::new(body, this.state, in_flight, http2));
+            if close && !http2 {
+                response.headers_mut().insert(CONNECTION, HeaderValue::from_static("close"));
+            }
+            Ok(response)
+        })
+    }
+}
+
+/// The answer to a request that must not reach the router.
+fn refusal(request: &Request<Incoming>, head: Option<Head>, limits: &Limits) -> Option<Response<Body>> {
+    let lengths = match head {
+        Some(head) => head.ambiguous,
+        // The header came along with the request before it, so that nobody has looked at it.
+        None => request.version() != Version::HTTP_2 && request.headers().contains_key(TRANSFER_ENCODING),
+    };
+    if lengths {
+        let detail = "Send either Content-Length or Transfer-Encoding, and a chunked request only after the response to the \
+                      one before.";
+        return Some(problem(
+            StatusCode::BAD_REQUEST,
+            "bad-request",
+            "The request's length is ambiguous",
+            detail,
+            None,
+        ));
+    }
+    let bytes = head.map_or(0, |head| head.bytes);
+    if bytes > limits.max_header_bytes {
+        let detail = format!("The header has {bytes} bytes; at most {} are allowed.", limits.max_header_bytes);
+        return Some(too_large(&detail, limits.max_header_bytes));
+    }
+    let count = request.headers().len();
+    if count > limits.max_headers {
+        let detail = format!("The header has {count} lines; at most {} are allowed.", limits.max_headers);
+        return Some(too_large(&detail, limits.max_headers));
+    }
+    None
+}
+
+fn too_large(detail: &str, limit: usize) -> Response<Body> {
+    let status = StatusCode::REQUEST_HEADER_FIELDS_TOO_LARGE;
+    problem(status, "header-too-large", "The header is too large", detail, Some(limit as u64))
+}
+
+fn problem(status: StatusCode, word: &str, title: &str, detail: &str, limit: Option<u64>) -> Response<Body> {
+    let problem = Problem {
+        kind: format!("{}{word}", Problem::TYPE_PREFIX),
+        title: title.to_owned(),
+        status: status.as_u16(),
+        detail: detail.to_owned(),
+        limit,
+        ..Problem::default()
+    };
+    let mut response = Response::new(Body::from(serde_json::to_vec(&problem).unwrap_or_default()));
+    *response.status_mut() = status;
+    response.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));
+    response
+}

@@ -1,0 +1,164 @@
+//! Every route, in one flat list.
+
+use super::respond::PROBLEM_JSON;
+use super::{
+    cages, container, coordinates, decode, errors, events, extract, frames, health, openapi, sessions, viewer,
+};
+use crate::problem::{self, ApiError, Kind};
+use crate::service::Service;
+use crate::telemetry::{RequestId, request_id};
+use axum::error_handling::HandleErrorLayer;
+use axum::extract::{DefaultBodyLimit, MatchedPath, Request};
+use axum::middleware::{Next, from_fn, from_fn_with_state};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use axum::{BoxError, Router};
+use bytes::Bytes;
+use http::{StatusCode, header};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use tower::limit::GlobalConcurrencyLimitLayer;
+use tower::load_shed::LoadShedLayer;
+use tower::timeout::TimeoutLayer;
+use tower::{ServiceBuilder, timeout};
+use tower_http::catch_panic::CatchPanicLayer;
+use utoipa::OpenApi;
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+/// Routes that answer quickly.
+fn quick() -> OpenApiRouter<Arc<Service>> {
+    OpenApiRouter::new()
+        .routes(routes!(sessions::list))
+        .routes(routes!(sessions::get, sessions::delete))
+        .routes(routes!(coordinates::handles))
+        .routes(routes!(coordinates::get))
+        .routes(routes!(errors::get))
+        .routes(routes!(events::get))
+        .routes(routes!(cages::get))
+        .routes(routes!(container::get))
+}
+
+/// Routes that take as long as their bodies or their work.
+fn lasting() -> OpenApiRouter<Arc<Service>> {
+    OpenApiRouter::new().routes(routes!(sessions::create)).routes(routes!(sessions::complete)).merge(streaming())
+}
+
+fn streaming() -> OpenApiRouter<Arc<Service>> {
+    OpenApiRouter::new().routes(routes!(frames::post)).routes(routes!(decode::post))
+}
+
+/// Routes for operators and browsers, outside all limits.
+fn open() -> OpenApiRouter<Arc<Service>> {
+    OpenApiRouter::new().routes(routes!(health::live)).routes(routes!(health::ready)).routes(routes!(health::metrics))
+}
+
+/// The OpenAPI document of all routes.
+pub fn document() -> utoipa::openapi::OpenApi {
+    let mut all =
+        OpenApiRouter::with_openapi(openapi::Document::openapi()).merge(quick()).merge(lasting()).merge(open());
+    openapi::with_problems(all.to_openapi())
+}
+
+/// The service's routes.
+pub fn router(service: Arc<Service>) -> Router {
+    let request_timeout = Duration::from_secs(service.config.request_timeout_s);
+    let in_time = ServiceBuilder::new()
+        .layer(HandleErrorLayer::new(async |error: BoxError| refused(&error)))
+        .layer(TimeoutLayer::new(request_timeout));
+    let in_bounds = ServiceBuilder::new()
+        .layer(HandleErrorLayer::new(async |error: BoxError| refused(&error)))
+        .layer(LoadShedLayer::new())
+        .layer(GlobalConcurrencyLimitLayer::new(service.config.max_requests));
+    let guarded = Router::from(quick())
+        .layer(in_time)
+        .merge(Router::from(lasting()).layer(DefaultBodyLimit::disable()))
+        .layer(in_bounds)
+        .route_layer(from_fn_with_state(Arc::clone(&service), extract::authenticate));
+    let document = Bytes::from(document().to_json().unwrap_or_default());
+    Router::from(open())
+        .merge(guarded)
+        .route("/", get(viewer::page))
+        .route("/openapi.json", get(move || std::future::ready(json(&document))))
+        .fallback(|| async { ApiError::new(problem::NOT_FOUND, "the routes are listed in /openapi.json") })
+        .with_state(service)
+        .layer(CatchPanicLayer::custom(|panic: Box<dyn std::any::Any + Send>| {
+            let text = panic.downcast_ref::<&str>().map(|s| (*s).to_owned());
+            let text = text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default();
+            ApiError::internal(&format!("a request panicked: {text}")).into_response()
+        }))
+        .layer(from_fn(finish))
+        .layer(from_fn(request_id))
+}
+
+fn json(document: &Bytes) -> Response {
+    ([(header::CONTENT_TYPE, "application/json")], document.clone()).into_response()
+}
+
+/// The routes for connections beyond the limit: health, and "come back later" for everything else.
+pub fn spare(service: Arc<Service>) -> Router {
+    Router::from(open())
+        .fallback(|| async {
+            metrics::counter!("cager_rejections_total", "reason" => "connections").increment(1);
+            ApiError::new(problem::BUSY, "too many connections are open; try again in a moment").retry_after(2)
+        })
+        .with_state(service)
+        .layer(from_fn(finish))
+        .layer(from_fn(request_id))
+}
+
+/// What a layer refused.
+fn refused(error: &BoxError) -> ApiError {
+    if error.is::<timeout::error::Elapsed>() {
+        metrics::counter!("cager_rejections_total", "reason" => "timeout").increment(1);
+        return ApiError::new(problem::BUSY, "the request took too long; try again later").retry_after(5);
+    }
+    metrics::counter!("cager_rejections_total", "reason" => "requests").increment(1);
+    ApiError::new(problem::BUSY, "too many requests are being worked on; try again in a moment").retry_after(1)
+}
+
+/// Makes every error a problem with the request's id, and counts the request.
+async fn finish(request: Request, next: Next) -> Response {
+    let clock = Instant::now();
+    let id = request.extensions().get::<RequestId>().cloned();
+    let route = request.extensions().get::<MatchedPath>().map(|path| path.as_str().to_owned());
+    let mut response = next.run(request).await;
+    let status = response.status();
+    let route = response.extensions().get::<MatchedPath>().map(|p| p.as_str().to_owned()).or(route);
+    metrics::counter!("cager_requests_total", "status" => status.as_u16().to_string()).increment(1);
+    metrics::histogram!("cager_request_seconds", "route" => route.unwrap_or_else(|| "other".to_owned()))
+        .record(clock.elapsed().as_secs_f64());
+    if status.is_client_error() || status.is_server_error() {
+        let mut error = match response.extensions_mut().remove::<ApiError>() {
+            Some(error) => error,
+            None if is_problem(&response) => return response,
+            None => ApiError::new(kind_of(status), status.canonical_reason().unwrap_or("error").to_owned()),
+        };
+        error.problem.request_id = id.map(|id| id.0.to_string());
+        let allow = response.headers_mut().remove(header::ALLOW);
+        let mut problem = error.into_response();
+        problem.extensions_mut().remove::<ApiError>();
+        if let Some(allow) = allow {
+            problem.headers_mut().insert(header::ALLOW, allow);
+        }
+        return problem;
+    }
+    response
+}
+
+fn is_problem(response: &Response) -> bool {
+    response.headers().get(header::CONTENT_TYPE).is_some_and(|value| value == PROBLEM_JSON)
+}
+
+/// The kind of an error that did not come from a handler.
+fn kind_of(status: StatusCode) -> Kind {
+    match status {
+        StatusCode::METHOD_NOT_ALLOWED => problem::METHOD_NOT_ALLOWED,
+        StatusCode::NOT_FOUND => problem::NOT_FOUND,
+        StatusCode::PAYLOAD_TOO_LARGE => problem::TOO_LARGE,
+        StatusCode::UNSUPPORTED_MEDIA_TYPE => problem::MEDIA_TYPE,
+        StatusCode::REQUEST_TIMEOUT => problem::REQUEST_TIMEOUT,
+        status if status.is_client_error() => problem::BAD_REQUEST,
+        _ => problem::INTERNAL,
+    }
+}

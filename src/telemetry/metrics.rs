@@ -1,0 +1,75 @@
+//! Metrics for operators, in Prometheus' format. `docs/OPERATIONS.md` lists them.
+
+use crate::service::Service;
+use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
+use std::sync::OnceLock;
+
+/// Buckets of times that are short on an idle machine, in seconds.
+const SHORT: &[f64] = &[1e-4, 2.5e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0];
+/// Buckets of preparations, in seconds.
+const LONG: &[f64] = &[0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0, 300.0];
+
+/// The process's recorder, installed with the first call.
+pub fn recorder() -> &'static PrometheusHandle {
+    static HANDLE: OnceLock<PrometheusHandle> = OnceLock::new();
+    HANDLE.get_or_init(|| {
+        let builder = PrometheusBuilder::new();
+        let named = |name: &str| Matcher::Full(name.to_owned());
+        let builder = builder
+            .set_buckets(SHORT)
+            .and_then(|b| b.set_buckets_for_metric(named("cager_prepare_seconds"), LONG))
+            .expect("the buckets are not empty");
+        let recorder = builder.build_recorder();
+        let handle = recorder.handle();
+        // Another recorder of the process keeps its place; this one then stays empty.
+        if metrics::set_global_recorder(recorder).is_err() {
+            tracing::warn!("another metrics recorder is installed");
+        }
+        describe();
+        handle
+    })
+}
+
+/// Sets the gauges that are looked up rather than counted.
+pub(crate) fn observe(service: &Service) {
+    metrics::gauge!("cager_queue_frames").set(service.engine.waiting() as f64);
+    metrics::gauge!("cager_streams").set(service.open_streams() as f64);
+    metrics::gauge!("cager_preparing").set(service.solvers.in_flight() as f64);
+    metrics::gauge!("cager_memory_bytes", "use" => "frames").set(service.frame_memory.used() as f64);
+    metrics::gauge!("cager_memory_bytes", "use" => "uploads").set(service.upload_memory.used() as f64);
+    metrics::gauge!("cager_disk_free_bytes").set(service.store.free_bytes() as f64);
+    metrics::gauge!("cager_uptime_seconds").set(service.started.elapsed().as_secs_f64());
+    for (tenant, sessions, bytes) in service.usage() {
+        metrics::gauge!("cager_sessions", "tenant" => tenant.clone()).set(sessions as f64);
+        metrics::gauge!("cager_stored_bytes", "tenant" => tenant).set(bytes as f64);
+    }
+    recorder().run_upkeep();
+}
+
+fn describe() {
+    use metrics::{Unit, describe_counter, describe_gauge, describe_histogram};
+    describe_counter!("cager_frames_total", "Frames solved and on disk, by tenant and rows sent");
+    describe_counter!("cager_received_bytes_total", Unit::Bytes, "Bytes of frames received, by tenant");
+    describe_counter!("cager_log_bytes_total", Unit::Bytes, "Bytes written to frame logs");
+    describe_counter!("cager_sessions_created_total", "Sessions made, by tenant");
+    describe_counter!("cager_sessions_expired_total", "Sessions deleted because of their age");
+    describe_counter!("cager_quarantined_total", "Damaged things put aside");
+    describe_counter!("cager_rejections_total", "Requests turned away, by reason");
+    describe_counter!("cager_requests_total", "Requests, by status class");
+    describe_counter!("cager_cache_total", "Solvers asked for: memory, disk, joined (being prepared already) or miss");
+    describe_counter!("cager_cache_evictions_total", "Solvers that left the memory");
+    describe_gauge!("cager_cache_bytes", Unit::Bytes, "Memory of caches");
+    describe_gauge!("cager_queue_frames", "Frames and cages waiting to be solved or decoded");
+    describe_gauge!("cager_streams", "Uploads, followers and decodings that run");
+    describe_gauge!("cager_preparing", "Sessions being prepared or waiting for it");
+    describe_gauge!("cager_memory_bytes", Unit::Bytes, "Memory taken by what is on its way");
+    describe_gauge!("cager_disk_free_bytes", Unit::Bytes, "Free space of the data folder's file system");
+    describe_gauge!("cager_uptime_seconds", Unit::Seconds, "Time since the service started");
+    describe_gauge!("cager_sessions", "Sessions, by tenant");
+    describe_gauge!("cager_stored_bytes", Unit::Bytes, "Disk space of sessions, by tenant");
+    describe_histogram!("cager_queue_seconds", Unit::Seconds, "Wait of a batch's oldest frame");
+    describe_histogram!("cager_solve_seconds", Unit::Seconds, "Inverting and measuring a batch of up to 16 frames");
+    describe_histogram!("cager_prepare_seconds", Unit::Seconds, "Preparing a solver");
+    describe_histogram!("cager_fsync_seconds", Unit::Seconds, "Syncing to disk");
+    describe_histogram!("cager_request_seconds", Unit::Seconds, "From a request to its response's header, by route");
+}

@@ -1,0 +1,56 @@
+//! Stopping the service.
+
+use super::*;
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn without_connections_and_with_idle_ones_stopping_is_quick() {
+    assert!(start(limits()).await.stop().await < ms(300));
+
+    let long = Limits { idle_timeout: HANG, header_timeout: HANG, drain_timeout: HANG, ..limits() };
+    let server = start(long).await;
+    let silent = server.connect().await;
+    let mut idle = server.connect().await;
+    assert!(ask(&mut idle, "GET / HTTP/1.1\r\nHost: x\r\n\r\n").await.ends_with("here"));
+    let mut half = server.connect().await;
+    half.write_all(b"GET / HT").await.unwrap();
+    let mut http2 = server.connect().await;
+    http2.write_all(HTTP2).await.unwrap();
+    tokio::time::sleep(ms(100)).await;
+    let took = server.stop().await;
+    // A closed socket is held for two seconds at most for its client to close it as well.
+    assert!(took < ms(4000), "{took:?}");
+    drop((silent, half));
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_request_at_work_is_finished_and_nothing_new_is_accepted() {
+    let server = start(Limits { drain_timeout: HANG, ..limits() }).await;
+    let address = server.address;
+    let mut stream = server.connect().await;
+    stream.write_all(b"GET /slow HTTP/1.1\r\nHost: x\r\n\r\n").await.unwrap();
+    tokio::time::sleep(ms(100)).await;
+    let stopping = tokio::spawn(server.stop());
+    tokio::time::sleep(ms(100)).await;
+    assert!(TcpStream::connect(address).await.is_err(), "the port is still open");
+    let (bytes, _) = read_to_close(&mut stream).await;
+    let text = String::from_utf8_lossy(&bytes);
+    assert!(text.starts_with("HTTP/1.1 200 ") && text.contains("connection: close"), "{text}");
+    drop(stream);
+    assert!(stopping.await.unwrap() < ms(4000));
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_stream_without_end_is_cut_at_the_end_of_the_drain_time() {
+    let server = start(limits()).await;
+    let mut http1 = server.connect().await;
+    http1.write_all(b"GET /ticking HTTP/1.1\r\nHost: x\r\n\r\n").await.unwrap();
+    let client = reqwest::Client::builder().http2_prior_knowledge().build().unwrap();
+    let mut http2 = client.get(format!("http://{}/ticking", server.address)).send().await.unwrap();
+    assert_eq!(http2.chunk().await.unwrap().unwrap(), "tick\n");
+    let stopping = tokio::spawn(server.stop());
+    let (bytes, _) = read_to_close(&mut http1).await;
+    assert!(bytes.windows(4).filter(|bytes| bytes == b"tick").count() > 10, "streams may go on for the drain time");
+    let rest = async { while let Ok(Some(_)) = http2.chunk().await {} };
+    timeout(HANG, rest).await.expect("the stream goes on");
+    assert_took(stopping.await.unwrap(), limits().drain_timeout);
+}

@@ -1,0 +1,171 @@
+//! The listener, met by clients that misbehave. Raw sockets, since well-made clients cannot be made to.
+
+mod closing;
+mod early;
+mod heads;
+mod slow;
+mod tls;
+
+use axum::Router;
+use axum::body::{Body, Bytes};
+use axum::extract::ConnectInfo;
+use axum::response::IntoResponse;
+use axum::routing::{get, post};
+use cager::http::listen::{Limits, is_body_timeout, serve};
+use futures_util::StreamExt as _;
+use http::{StatusCode, header};
+use std::convert::Infallible;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use tokio::io::{AsyncRead, AsyncReadExt as _, AsyncWrite, AsyncWriteExt as _};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::task::JoinHandle;
+use tokio::time::timeout;
+use tokio_util::sync::CancellationToken;
+
+/// Longer than any limit under test; what takes this long hangs.
+const HANG: Duration = Duration::from_secs(15);
+/// Preface and empty settings of HTTP/2.
+const HTTP2: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\x00\x00\x00\x04\x00\x00\x00\x00\x00";
+
+fn ms(ms: u64) -> Duration {
+    Duration::from_millis(ms)
+}
+
+/// Limits short enough for tests, none of them equal.
+fn limits() -> Limits {
+    Limits {
+        header_timeout: ms(400),
+        body_timeout: ms(500),
+        idle_timeout: ms(700),
+        write_timeout: ms(900),
+        drain_timeout: ms(1200),
+        max_connections: 64,
+        spare_connections: 4,
+        ..Limits::default()
+    }
+}
+
+/// A running listener; stops when dropped.
+struct Server {
+    address: SocketAddr,
+    stop: CancellationToken,
+    running: JoinHandle<std::io::Result<()>>,
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.stop.cancel();
+    }
+}
+
+fn app() -> Router {
+    let endless = || futures_util::stream::repeat_with(|| Ok::<_, Infallible>(Bytes::from(vec![7; 64 << 10])));
+    let ticking = || {
+        let ticks = futures_util::stream::unfold((), |()| async {
+            tokio::time::sleep(ms(50)).await;
+            Some((Ok::<_, Infallible>(Bytes::from_static(b"tick\n")), ()))
+        });
+        Body::from_stream(ticks)
+    };
+    Router::new()
+        .route("/", get(async || "here"))
+        .route("/peer", get(async |ConnectInfo(peer): ConnectInfo<SocketAddr>| peer.to_string()))
+        .route("/endless", get(async move || Body::from_stream(endless())))
+        .route("/ticking", get(async move || ticking()))
+        .route("/slow", get(async || tokio::time::sleep(ms(2000)).await))
+        .route("/count", post(count))
+        .route("/lazy", post(lazy))
+        .route("/refuse", post(async || (StatusCode::PAYLOAD_TOO_LARGE, "too large")))
+}
+
+/// Reads the whole body and says how long it was.
+async fn count(body: Body) -> axum::response::Response {
+    let mut stream = body.into_data_stream();
+    let mut total = 0;
+    while let Some(piece) = stream.next().await {
+        match piece {
+            Ok(piece) => total += piece.len(),
+            Err(error) if is_body_timeout(&error) => return StatusCode::REQUEST_TIMEOUT.into_response(),
+            Err(_) => return StatusCode::BAD_REQUEST.into_response(),
+        }
+    }
+    total.to_string().into_response()
+}
+
+/// Lets the body wait for longer than the body timeout before it reads.
+async fn lazy(body: Body) -> axum::response::Response {
+    tokio::time::sleep(ms(1000)).await;
+    count(body).await
+}
+
+async fn start(limits: Limits) -> Server {
+    start_with(limits, None).await
+}
+
+async fn start_with(limits: Limits, tls: Option<Arc<rustls::ServerConfig>>) -> Server {
+    let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let address = listener.local_addr().unwrap();
+    let stop = CancellationToken::new();
+    let spare = Router::new()
+        .route("/healthz", get(async || "ok"))
+        .fallback(async || (StatusCode::SERVICE_UNAVAILABLE, [(header::RETRY_AFTER, "1")], "busy"));
+    let running = tokio::spawn(serve(listener, app(), spare, limits, tls, stop.clone()));
+    Server { address, stop, running }
+}
+
+impl Server {
+    async fn connect(&self) -> TcpStream {
+        TcpStream::connect(self.address).await.unwrap()
+    }
+
+    /// Stops it; gives the time until it had stopped.
+    async fn stop(mut self) -> Duration {
+        let began = Instant::now();
+        self.stop.cancel();
+        timeout(HANG, &mut self.running).await.expect("the server hangs").unwrap().unwrap();
+        began.elapsed()
+    }
+}
+
+/// Reads until the other side closes; gives what came and the time it took.
+async fn read_to_close(stream: &mut TcpStream) -> (Vec<u8>, Duration) {
+    let began = Instant::now();
+    let mut bytes = Vec::new();
+    // A reset is a way of closing, too.
+    let _ = timeout(HANG, stream.read_to_end(&mut bytes)).await.expect("the connection stays open");
+    (bytes, began.elapsed())
+}
+
+/// Sends text and reads one response with a Content-Length.
+async fn ask(stream: &mut (impl AsyncRead + AsyncWrite + Unpin), text: &str) -> String {
+    stream.write_all(text.as_bytes()).await.unwrap();
+    read_response(stream).await
+}
+
+async fn read_response(stream: &mut (impl AsyncRead + Unpin)) -> String {
+    let mut bytes = Vec::new();
+    let whole = async {
+        loop {
+            let text = String::from_utf8_lossy(&bytes).to_lowercase();
+            if let Some((head, body)) = text.split_once("\r\n\r\n") {
+                let length = head.lines().find_map(|line| line.strip_prefix("content-length: "));
+                if body.len() >= length.map_or(0, |length| length.parse().unwrap()) {
+                    return;
+                }
+            }
+            if stream.read_buf(&mut bytes).await.unwrap() == 0 {
+                return;
+            }
+        }
+    };
+    timeout(HANG, whole).await.expect("no response");
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+#[track_caller]
+fn assert_took(took: Duration, limit: Duration) {
+    // Clocks are looked at now and then, and tests share two processors.
+    assert!(took + ms(60) >= limit && took < limit + ms(1500), "closed after {took:?}; the limit is {limit:?}");
+}

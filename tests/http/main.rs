@@ -1,0 +1,3 @@
+//! The service over HTTP, as its clients meet it.
+
+mod listen;
