@@ -136,7 +136,9 @@ fn a_life_without_faults_is_durable() {
 #[test]
 fn any_operation_may_fail() {
     for nth in 1..=operations() {
-        for fault in [Fault::Error(ENOSPC), Fault::Ruin(EIO), Fault::Short] {
+        for (fault, at_once) in
+            [Fault::Error(ENOSPC), Fault::Ruin(EIO), Fault::Short].into_iter().flat_map(|f| [(f, false), (f, true)])
+        {
             let given = Given::new();
             given.disk.fail(None, nth, fault);
             let mut told = Told::default();
@@ -148,8 +150,14 @@ fn any_operation_may_fail() {
                 assert!(!matches!(error, StoreError::Damaged { .. }), "{what}: {error}");
             }
             assert!(fault != Fault::Short || told.errors.is_empty(), "{what}: a short write is no error");
-            look(&given, &told, &what);
-            given.disk.restart(if nth % 2 == 0 { Loss::Everything } else { Loss::Torn(nth) }).unwrap();
+            // With the power failing at once, and after a look.
+            if !at_once {
+                look(&given, &told, &what);
+            }
+            given
+                .disk
+                .restart(if at_once || nth.is_multiple_of(2) { Loss::Everything } else { Loss::Torn(nth) })
+                .unwrap();
             look(&given, &told, &what);
         }
     }

@@ -29,7 +29,9 @@ pub(crate) struct Given {
 
 impl Given {
     pub(crate) fn new() -> Self {
-        let folder = tempfile::tempdir().unwrap();
+        // The disk is made up, so memory does, where the system offers it as a folder.
+        let memory = tempfile::tempdir_in("/dev/shm");
+        let folder = memory.or_else(|_| tempfile::tempdir()).unwrap();
         let disk = FaultyDisk::new(folder.path()).unwrap();
         Self { folder, disk }
     }

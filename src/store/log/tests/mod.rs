@@ -167,6 +167,43 @@ fn opening_marks_what_it_found() {
 }
 
 #[test]
+fn a_new_mark_goes_over_the_older_one() {
+    let fixture = fixture();
+    for frame in 20..24 {
+        let (mut log, _) = fixture.store.open_log("a", ROWS).unwrap();
+        append(&mut log, &[frame]).unwrap();
+        let file = std::fs::read(&fixture.path).unwrap();
+        let mut marks = [512, 1024].map(|at| u64::from_le_bytes(std::array::from_fn(|i| file[at + i])));
+        marks.sort_unstable();
+        let length = file.len() as u64;
+        assert_eq!(marks, [length - STRIDE, length]);
+    }
+}
+
+#[test]
+fn a_log_made_by_a_process_that_ended_keeps_what_the_next_one_appends() {
+    for nth in 1.. {
+        let given = Given::new();
+        let store = given.open().store;
+        store.create_session(&meta("a")).unwrap();
+        given.disk.fail(None, nth, Fault::Stop);
+        let done = store.open_log("a", ROWS).is_ok();
+        drop(store);
+        given.disk.restart(Loss::Nothing).unwrap();
+        let store = given.open().store;
+        append(&mut store.open_log("a", ROWS).unwrap().0, &[7]).unwrap();
+        drop(store);
+        given.disk.restart(Loss::Everything).unwrap();
+        let (log, entries) = given.open().store.open_log("a", ROWS).unwrap();
+        assert_eq!(frames(&log, &entries), [7], "ended at operation {nth}");
+        if done {
+            assert!(nth > 5, "there were operations to end at");
+            break;
+        }
+    }
+}
+
+#[test]
 fn a_log_of_other_cages_or_of_another_session_is_refused() {
     let fixture = fixture();
     assert!(matches!(fixture.store.open_log("a", ROWS + 1), Err(StoreError::Damaged { .. })));
