@@ -49,12 +49,10 @@ impl StoreError {
     pub(crate) fn of(path: &Path, action: &'static str, cause: io::Error) -> Self {
         use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
         // A store error may have travelled through a writer.
-        if cause.get_ref().is_some_and(|inner| inner.is::<Self>()) {
-            if let Some(inner) = cause.into_inner().and_then(|inner| inner.downcast::<Self>().ok()) {
-                return *inner;
-            }
-            return Self::Io { path: path.to_owned(), action, cause: io::ErrorKind::Other.into() };
-        }
+        let cause = match cause.downcast::<Self>() {
+            Ok(inner) => return inner,
+            Err(cause) => cause,
+        };
         match cause.kind() {
             StorageFull | QuotaExceeded | FileTooLarge => Self::Full { path: path.to_owned() },
             _ => Self::Io { path: path.to_owned(), action, cause },

@@ -183,7 +183,7 @@ impl Files {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
             Err(error) => return Err(StoreError::of(path, "open", error)),
         };
-        let bytes = file.len().map_err(|e| StoreError::of(path, "read", e))?;
+        let bytes = file.length().map_err(|e| StoreError::of(path, "read", e))?;
         if bytes > limit {
             return Err(StoreError::damaged(path, format!("it has {bytes} bytes where {limit} are the most")));
         }

@@ -34,8 +34,6 @@ mod sessions;
 mod solver_file;
 
 #[cfg(test)]
-mod prepared_tests;
-#[cfg(test)]
 mod tests;
 
 pub use content::Content;

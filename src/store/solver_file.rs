@@ -101,7 +101,7 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
 
 /// Reads a solver. Nothing is allocated before the lengths are known to be the file's.
 pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Found> {
-    let bytes = file.len()?;
+    let bytes = file.length()?;
     let damage = |what: &str| Ok(Found::Damage(what.into()));
     if bytes < HEADER_BYTES as u64 + 4 {
         return damage("it is too short");

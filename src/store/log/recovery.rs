@@ -26,7 +26,7 @@ pub(super) fn recover(
     layout: &Layout,
 ) -> Result<Recovered, StoreError> {
     let failed = |error| StoreError::of(path, "read", error);
-    let length = file.len().map_err(failed)?;
+    let length = file.length().map_err(failed)?;
     if length < DATA_START {
         return Err(StoreError::damaged(path, format!("{length} bytes are too few for its first block")));
     }

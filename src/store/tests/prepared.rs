@@ -1,7 +1,7 @@
 //! Shared content and prepared solvers.
 
-use super::tests::{Given, KEY, SOLVER, content, prepare};
-use super::{ContentKey, Store};
+use super::{Given, KEY, SOLVER, content, prepare};
+use crate::store::{ContentKey, LocalDisk, Store};
 use cager_core::inversion::{BATCH, Handles, Solver};
 use std::sync::Arc;
 use std::time::Instant;
@@ -153,13 +153,14 @@ fn keys_are_hexadecimal() {
 /// Run by hand in release: `cargo test --release -p cager store -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes a figure"]
+#[expect(clippy::print_stdout, reason = "it is run for what it prints")]
 fn loading_takes_milliseconds() {
     use cager_core::cage::Cage;
     use cager_core::coordinates::MeanValue;
     use cager_core::inversion::SolverOptions;
     use cager_core::synthetic::{Capture, Options};
     let folder = tempfile::tempdir().unwrap();
-    let store = Store::open(folder.path(), Arc::new(super::LocalDisk)).unwrap().store;
+    let store = Store::open(folder.path(), Arc::new(LocalDisk)).unwrap().store;
     let capture = Capture::new(&Options::default());
     let cage = Cage::new(capture.cage.clone()).unwrap();
     let solver = Solver::prepare(&MeanValue, &cage, &capture.rest.points, SolverOptions::default()).unwrap();

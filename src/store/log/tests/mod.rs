@@ -3,17 +3,15 @@
 use super::format::DATA_START;
 use super::{FrameLog, LogEntry, LogRecord};
 use crate::store::faults::{Fault, Loss, Op};
-use crate::store::tests::{Given, meta};
+use crate::store::tests::{EIO, ENOSPC, Given, ROWS, meta};
 use crate::store::{Store, StoreError};
-use proptest::prelude::*;
-use std::collections::BTreeMap;
+use std::fs::OpenOptions;
+use std::io::Write;
 use std::path::PathBuf;
-use std::sync::Arc;
 
-const ROWS: u32 = 5;
+mod sequences;
+
 const STRIDE: u64 = 72 + 12 * ROWS as u64 + 4;
-const EIO: i32 = 5;
-const ENOSPC: i32 = 28;
 
 pub(crate) fn cage(frame: u32) -> Vec<f32> {
     (0..3 * ROWS).map(|i| frame as f32 * 100.0 + i as f32 + 0.25).collect()
@@ -21,7 +19,7 @@ pub(crate) fn cage(frame: u32) -> Vec<f32> {
 
 fn record(frame: u32, cage: &[f32]) -> LogRecord<'_> {
     let f = f64::from(frame);
-    let measured = frame % 2 == 0;
+    let measured = frame.is_multiple_of(2);
     LogRecord {
         frame,
         l2: if measured { frame as f32 + 0.5 } else { f32::NAN },
@@ -88,7 +86,9 @@ fn fixture() -> Fixture {
 impl Fixture {
     /// What opening gives for these bytes.
     fn open(&self, bytes: &[u8]) -> Result<Vec<u32>, StoreError> {
-        std::fs::write(&self.path, bytes).unwrap();
+        // Emptying the file first would make the system write it out each time.
+        let mut file = OpenOptions::new().write(true).open(&self.path).unwrap();
+        file.write_all(bytes).and_then(|()| file.set_len(bytes.len() as u64)).unwrap();
         let opened = self.store.open_log("a", ROWS);
         if matches!(opened, Err(StoreError::Damaged { .. })) {
             assert_eq!(std::fs::read(&self.path).unwrap(), bytes, "damage is left as it is");
@@ -164,6 +164,43 @@ fn opening_marks_what_it_found() {
     assert_eq!(fixture.open(&fixture.unmarked()).unwrap(), ALL);
     let marked = std::fs::read(&fixture.path).unwrap();
     assert!(fixture.damaged(&marked[..marked.len() - 1]), "what was shown once is never cut");
+}
+
+#[test]
+fn a_new_mark_goes_over_the_older_one() {
+    let fixture = fixture();
+    for frame in 20..24 {
+        let (mut log, _) = fixture.store.open_log("a", ROWS).unwrap();
+        append(&mut log, &[frame]).unwrap();
+        let file = std::fs::read(&fixture.path).unwrap();
+        let mut marks = [512, 1024].map(|at| u64::from_le_bytes(std::array::from_fn(|i| file[at + i])));
+        marks.sort_unstable();
+        let length = file.len() as u64;
+        assert_eq!(marks, [length - STRIDE, length]);
+    }
+}
+
+#[test]
+fn a_log_made_by_a_process_that_ended_keeps_what_the_next_one_appends() {
+    for nth in 1.. {
+        let given = Given::new();
+        let store = given.open().store;
+        store.create_session(&meta("a")).unwrap();
+        given.disk.fail(None, nth, Fault::Stop);
+        let done = store.open_log("a", ROWS).is_ok();
+        drop(store);
+        given.disk.restart(Loss::Nothing).unwrap();
+        let store = given.open().store;
+        append(&mut store.open_log("a", ROWS).unwrap().0, &[7]).unwrap();
+        drop(store);
+        given.disk.restart(Loss::Everything).unwrap();
+        let (log, entries) = given.open().store.open_log("a", ROWS).unwrap();
+        assert_eq!(frames(&log, &entries), [7], "ended at operation {nth}");
+        if done {
+            assert!(nth > 5, "there were operations to end at");
+            break;
+        }
+    }
 }
 
 #[test]
@@ -294,89 +331,4 @@ fn what_shares_a_block_with_a_failed_sync_survives_it() {
     disk.restart(Loss::Everything).unwrap();
     let (log, entries) = fixture.given.open().store.open_log("a", ROWS).unwrap();
     assert_eq!(frames(&log, &entries), [4, 5, 0, 1, 2, 9, 20]);
-}
-
-#[derive(Clone, Debug)]
-enum Step {
-    Append(u32),
-    Reopen,
-    Kill,
-    Cut(Loss),
-    Arm(Op, u64, Fault),
-}
-
-fn steps() -> impl Strategy<Value = Vec<Step>> {
-    let op = prop::sample::select(vec![Op::Write, Op::Sync, Op::Truncate, Op::Read, Op::Rename, Op::SyncDir]);
-    let fault = prop::sample::select(vec![Fault::Error(EIO), Fault::Error(ENOSPC), Fault::Short, Fault::Stop]);
-    let loss = prop_oneof![Just(Loss::Everything), any::<u64>().prop_map(Loss::Torn)];
-    let step = prop_oneof![
-        6 => (1u32..5).prop_map(Step::Append),
-        1 => Just(Step::Reopen),
-        1 => Just(Step::Kill),
-        2 => loss.prop_map(Step::Cut),
-        4 => (op, 1u64..4, fault).prop_map(|(op, nth, fault)| Step::Arm(op, nth, fault)),
-    ];
-    prop::collection::vec(step, 1..40)
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
-    #[test]
-    fn whatever_happens_acknowledged_frames_stay(steps in steps()) {
-        let given = Given::new();
-        let disk = &given.disk;
-        let mut store = given.open().store;
-        store.create_session(&meta("a")).unwrap();
-        let mut log: Option<FrameLog> = None;
-        let mut acknowledged = BTreeMap::new();
-        let mut next = 0;
-        for step in steps.into_iter().chain([Step::Cut(Loss::Everything), Step::Reopen]) {
-            let restart = match step {
-                Step::Append(count) => {
-                    let new: Vec<u32> = (next..next + count).collect();
-                    next += count;
-                    if let Some(Ok(entries)) = log.as_mut().map(|log| append(log, &new)) {
-                        acknowledged.extend(entries.into_iter().map(|entry| (entry.frame, entry.offset)));
-                    }
-                    None
-                }
-                Step::Arm(op, nth, fault) => {
-                    disk.fail(Some(op), nth, fault);
-                    None
-                }
-                Step::Reopen => {
-                    log = None;
-                    match store.open_log("a", ROWS) {
-                        Ok((opened, entries)) => {
-                            // Reading them to compare may meet an armed fault.
-                            disk.disarm();
-                            let found: BTreeMap<u32, u64> = entries.iter().map(|e| (e.frame, e.offset)).collect();
-                            for (frame, offset) in &acknowledged {
-                                prop_assert_eq!(found.get(frame), Some(offset), "frame {} is lost", frame);
-                            }
-                            if !disk.is_stopped() {
-                                frames(&opened, &entries);
-                            }
-                            // What is shown counts.
-                            acknowledged = found;
-                            log = Some(opened);
-                        }
-                        Err(error) => prop_assert!(!matches!(error, StoreError::Damaged { .. }), "{}", error),
-                    }
-                    None
-                }
-                Step::Kill => Some(Loss::Nothing),
-                Step::Cut(loss) => Some(loss),
-            };
-            if let Some(loss) = restart {
-                log = None;
-                drop(store);
-                disk.restart(loss).unwrap();
-                let opened = Store::open(given.root(), Arc::new(disk.clone())).unwrap();
-                prop_assert_eq!(opened.sessions.len(), 1);
-                prop_assert!(opened.quarantined.is_empty());
-                store = opened.store;
-            }
-        }
-    }
 }

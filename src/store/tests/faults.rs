@@ -1,70 +1,11 @@
-//! The whole store, with every operation of the disk failing in turn.
+//! A life of the store, with every operation of the disk failing in turn.
 
-use super::faults::{Fault, FaultyDisk, Loss};
-use super::log::tests::{append, frames};
-use super::{
-    Completion, Content, ContentKey, FrameLog, Idempotency, LocalDisk, Opened, SessionMeta, Store, StoreError,
-};
-use cager_core::cage::Cage;
-use cager_core::coordinates::MeanValue;
-use cager_core::inversion::{Handles, Solver, SolverOptions};
-use cager_core::synthetic::{Capture, Options};
-use cager_proto::messages::SessionOptions;
+use super::{EIO, ENOSPC, Given, KEY, ROWS, SOLVER, completion, content, meta, write_frames};
+use crate::store::faults::{Fault, Loss};
+use crate::store::log::tests::{append, frames};
+use crate::store::{FrameLog, Opened, Store, StoreError};
 use std::io;
-use std::path::Path;
-use std::sync::{Arc, LazyLock};
-use tempfile::TempDir;
-
-const EIO: i32 = 5;
-const ENOSPC: i32 = 28;
-
-/// An empty folder on a disk that can fail.
-pub(crate) struct Given {
-    folder: TempDir,
-    pub(crate) disk: FaultyDisk,
-}
-
-impl Given {
-    pub(crate) fn new() -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let disk = FaultyDisk::new(folder.path()).unwrap();
-        Self { folder, disk }
-    }
-
-    pub(crate) fn root(&self) -> &Path {
-        self.folder.path()
-    }
-
-    pub(crate) fn open(&self) -> Opened {
-        Store::open(self.root(), Arc::new(self.disk.clone())).unwrap()
-    }
-}
-
-pub(crate) fn meta(id: &str) -> SessionMeta {
-    SessionMeta {
-        id: id.into(),
-        tenant: "someone".into(),
-        created_ms: 1_700_000_000_000,
-        key: KEY,
-        options: SessionOptions { lambda: Some(0.1 + 0.2), name: Some("Ärmel".into()), ..SessionOptions::default() },
-        idempotency: Some(Idempotency { key: "k".into(), fingerprint: "f".into() }),
-    }
-}
-
-pub(crate) const KEY: ContentKey = ContentKey([0xa7; 32]);
-
-pub(crate) fn content() -> Content {
-    Content { rest_name: "rest.obj".into(), rest: vec![1; 5000], cage_name: "cage.ply".into(), cage: vec![2; 70] }
-}
-
-pub(crate) fn prepare(handles: Handles) -> Solver {
-    let capture = Capture::new(&Options { points: 400, frames: 2, cage_vertices: 40 });
-    let cage = Cage::new(capture.cage.clone()).unwrap();
-    Solver::prepare(&MeanValue, &cage, &capture.rest.points, SolverOptions { handles, ..SolverOptions::default() })
-        .unwrap()
-}
-
-pub(crate) static SOLVER: LazyLock<Solver> = LazyLock::new(|| prepare(Handles::MaxVol));
+use std::sync::Arc;
 
 /// What somebody was told.
 #[derive(Default)]
@@ -79,22 +20,7 @@ struct Told {
     errors: Vec<StoreError>,
 }
 
-const ROWS: u32 = 5;
 const GROUPS: [&[u32]; 3] = [&[4, 5], &[0], &[1, 2, 9]];
-
-fn write_frames(out: &mut dyn io::Write) -> io::Result<()> {
-    (0..1000u32).try_for_each(|i| out.write_all(&i.to_le_bytes()))
-}
-
-fn completion() -> Completion {
-    let mut bytes = Vec::new();
-    write_frames(&mut bytes).unwrap();
-    Completion {
-        frames: 6,
-        container_bytes: bytes.len() as u64,
-        container_digest: blake3::hash(&bytes).to_hex().to_string(),
-    }
-}
 
 /// A life of the store. Every step is tried again once, as a client would.
 fn live(given: &Given, told: &mut Told) -> Result<(), ()> {
@@ -210,7 +136,9 @@ fn a_life_without_faults_is_durable() {
 #[test]
 fn any_operation_may_fail() {
     for nth in 1..=operations() {
-        for fault in [Fault::Error(ENOSPC), Fault::Ruin(EIO), Fault::Short] {
+        for (fault, at_once) in
+            [Fault::Error(ENOSPC), Fault::Ruin(EIO), Fault::Short].into_iter().flat_map(|f| [(f, false), (f, true)])
+        {
             let given = Given::new();
             given.disk.fail(None, nth, fault);
             let mut told = Told::default();
@@ -222,8 +150,14 @@ fn any_operation_may_fail() {
                 assert!(!matches!(error, StoreError::Damaged { .. }), "{what}: {error}");
             }
             assert!(fault != Fault::Short || told.errors.is_empty(), "{what}: a short write is no error");
-            look(&given, &told, &what);
-            given.disk.restart(if nth % 2 == 0 { Loss::Everything } else { Loss::Torn(nth) }).unwrap();
+            // With the power failing at once, and after a look.
+            if !at_once {
+                look(&given, &told, &what);
+            }
+            given
+                .disk
+                .restart(if at_once || nth.is_multiple_of(2) { Loss::Everything } else { Loss::Torn(nth) })
+                .unwrap();
             look(&given, &told, &what);
         }
     }
@@ -302,139 +236,4 @@ fn a_deletion_may_be_interrupted_anywhere() {
             assert!(std::fs::read_dir(given.root().join("trash")).unwrap().next().is_none());
         }
     }
-}
-
-#[test]
-fn a_damaged_session_is_set_aside_and_blocks_nobody() {
-    let given = Given::new();
-    let store = given.open().store;
-    for id in ["a", "b", "c", "d", "e"] {
-        store.create_session(&meta(id)).unwrap();
-    }
-    drop(store);
-    let sessions = given.root().join("sessions");
-    let mut bytes = std::fs::read(sessions.join("b/session.json")).unwrap();
-    bytes[200] ^= 1;
-    std::fs::write(sessions.join("b/session.json"), bytes).unwrap();
-    std::fs::remove_file(sessions.join("c/session.json")).unwrap();
-    std::fs::copy(sessions.join("a/session.json"), sessions.join("d/session.json")).unwrap();
-    std::fs::create_dir(sessions.join("Not an id")).unwrap();
-    for _ in 0..2 {
-        // A name that is taken in quarantine is no obstacle.
-        std::fs::write(sessions.join("stray"), "x").unwrap();
-        let Opened { sessions, quarantined, .. } = Store::open(given.root(), Arc::new(LocalDisk)).unwrap();
-        assert_eq!(sessions, [meta("a"), meta("e")]);
-        for found in &quarantined {
-            assert!(found.path.starts_with(given.root().join("quarantine")) && found.path.exists(), "{found:?}");
-            assert!(found.why.contains(&found.name), "{found:?}");
-        }
-        let names: Vec<&str> = quarantined.iter().map(|found| found.name.as_str()).collect();
-        assert!(names == ["Not an id", "b", "c", "d", "stray"] || names == ["stray"], "{names:?}");
-    }
-    let Opened { store, .. } = Store::open(given.root(), Arc::new(LocalDisk)).unwrap();
-    store.quarantine_session("e", "its log is damaged").unwrap();
-    let note = std::fs::read_to_string(given.root().join("quarantine/e.why.txt")).unwrap();
-    assert_eq!(note, "its log is damaged\n");
-}
-
-#[test]
-fn a_session_that_cannot_be_read_now_is_left_where_it_is() {
-    let given = Given::new();
-    given.open().store.create_session(&meta("a")).unwrap();
-    given.disk.fail(Some(super::faults::Op::Read), 2, Fault::Error(EIO));
-    let opened = given.open();
-    assert_eq!((opened.sessions.len(), opened.quarantined.len()), (0, 1));
-    drop(opened);
-    assert_eq!(given.open().sessions, [meta("a")]);
-}
-
-#[test]
-fn one_process_at_a_time() {
-    let given = Given::new();
-    let opened = given.open();
-    let refused = Store::open(given.root(), Arc::new(LocalDisk));
-    assert!(matches!(refused, Err(StoreError::Locked { .. })), "{refused:?}");
-    let log = opened.store.create_session(&meta("a")).and_then(|()| opened.store.open_log("a", ROWS)).unwrap();
-    drop(opened);
-    assert!(matches!(Store::open(given.root(), Arc::new(LocalDisk)), Err(StoreError::Locked { .. })), "a log is open");
-    drop(log);
-    given.open();
-}
-
-#[test]
-fn names_from_outside_touch_no_path() {
-    let given = Given::new();
-    let store = given.open().store;
-    for id in ["", ".", "..", "a/b", "../x", "A", "a.b", "a\0", &"a".repeat(65), "ä"] {
-        let refused = [
-            store.create_session(&SessionMeta { id: id.into(), ..meta("a") }),
-            store.delete_session(id),
-            store.quarantine_session(id, "?"),
-            store.open_log(id, ROWS).map(|_| ()),
-            store.write_container(id, &mut |_| Ok(())).map(|_| ()),
-            store.complete(id, &completion()),
-            store.completion(id).map(|_| ()),
-        ];
-        assert!(refused.iter().all(|r| matches!(r, Err(StoreError::BadId { .. }))), "{id:?}: {refused:?}");
-        assert!(store.container_path(id).starts_with(given.root().join("sessions/.no-session")));
-        assert_eq!(store.session_bytes(id), 0);
-    }
-    store.create_session(&meta(&"a-0".repeat(21))).unwrap();
-}
-
-#[test]
-fn an_id_is_taken_once() {
-    let given = Given::new();
-    let store = given.open().store;
-    store.create_session(&meta("a")).unwrap();
-    let again = store.create_session(&SessionMeta { tenant: "another".into(), ..meta("a") });
-    assert!(matches!(again, Err(StoreError::Io { cause, .. }) if cause.kind() == io::ErrorKind::AlreadyExists));
-    drop(store);
-    assert_eq!(given.open().sessions, [meta("a")]);
-}
-
-#[test]
-fn a_container_is_replaced_whole_or_not_at_all() {
-    let given = Given::new();
-    let store = given.open().store;
-    store.create_session(&meta("a")).unwrap();
-    let big: Vec<u8> = (0..1_000_000u32).map(|i| (i % 251) as u8).collect();
-    let container = store
-        .write_container("a", &mut |out| {
-            out.write_all(&big[..10])?;
-            out.write_all(&big[10..900_000])?;
-            out.write_all(&big[900_000..])
-        })
-        .unwrap();
-    assert_eq!(std::fs::read(store.container_path("a")).unwrap(), big);
-    assert_eq!(container.digest, blake3::hash(&big).to_hex().as_str());
-    assert!(store.session_bytes("a") > container.bytes);
-    let damage = || StoreError::Damaged { path: "x".into(), what: "y".into() };
-    let failed = store.write_container("a", &mut |out| {
-        out.write_all(b"half")?;
-        Err(damage().into())
-    });
-    assert!(matches!(failed, Err(StoreError::Damaged { .. })), "an error of the store comes out as it was: {failed:?}");
-    assert_eq!(std::fs::read(store.container_path("a")).unwrap(), big);
-    given.disk.fail(Some(super::faults::Op::Write), 2, Fault::Error(ENOSPC));
-    let failed = store.write_container("a", &mut |out| {
-        let _ = out.write_all(&big);
-        let _ = out.flush();
-        out.write_all(&big)?;
-        Ok(())
-    });
-    assert!(failed.is_err() || std::fs::read(store.container_path("a")).unwrap().len() == 2 * big.len());
-}
-
-#[test]
-fn a_full_disk_is_not_ready() {
-    let given = Given::new();
-    let store = given.open().store;
-    store.probe().unwrap();
-    assert!(store.free_bytes() > 0);
-    given.disk.set_free_bytes(Some(5));
-    assert_eq!(store.free_bytes(), 5);
-    given.disk.fail(Some(super::faults::Op::Write), 1, Fault::Error(ENOSPC));
-    assert!(matches!(store.probe(), Err(StoreError::Full { .. })));
-    store.probe().unwrap();
 }

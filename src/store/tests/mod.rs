@@ -1,0 +1,86 @@
+//! What the store's tests share.
+
+use super::faults::FaultyDisk;
+use super::{Completion, Content, ContentKey, Idempotency, Opened, SessionMeta, Store};
+use cager_core::cage::Cage;
+use cager_core::coordinates::MeanValue;
+use cager_core::inversion::{Handles, Solver, SolverOptions};
+use cager_core::synthetic::{Capture, Options};
+use cager_proto::messages::SessionOptions;
+use std::io;
+use std::path::Path;
+use std::sync::{Arc, LazyLock};
+use tempfile::TempDir;
+
+mod faults;
+mod prepared;
+mod sessions;
+
+pub(crate) const EIO: i32 = 5;
+pub(crate) const ENOSPC: i32 = 28;
+/// Of every cage here.
+pub(crate) const ROWS: u32 = 5;
+
+/// An empty folder on a disk that can fail.
+pub(crate) struct Given {
+    folder: TempDir,
+    pub(crate) disk: FaultyDisk,
+}
+
+impl Given {
+    pub(crate) fn new() -> Self {
+        // The disk is made up, so memory does, where the system offers it as a folder.
+        let memory = tempfile::tempdir_in("/dev/shm");
+        let folder = memory.or_else(|_| tempfile::tempdir()).unwrap();
+        let disk = FaultyDisk::new(folder.path()).unwrap();
+        Self { folder, disk }
+    }
+
+    pub(crate) fn root(&self) -> &Path {
+        self.folder.path()
+    }
+
+    pub(crate) fn open(&self) -> Opened {
+        Store::open(self.root(), Arc::new(self.disk.clone())).unwrap()
+    }
+}
+
+pub(crate) fn meta(id: &str) -> SessionMeta {
+    SessionMeta {
+        id: id.into(),
+        tenant: "someone".into(),
+        created_ms: 1_700_000_000_000,
+        key: KEY,
+        options: SessionOptions { lambda: Some(0.1 + 0.2), name: Some("Ärmel".into()), ..SessionOptions::default() },
+        idempotency: Some(Idempotency { key: "k".into(), fingerprint: "f".into() }),
+    }
+}
+
+pub(crate) const KEY: ContentKey = ContentKey([0xa7; 32]);
+
+pub(crate) fn content() -> Content {
+    Content { rest_name: "rest.obj".into(), rest: vec![1; 5000], cage_name: "cage.ply".into(), cage: vec![2; 70] }
+}
+
+pub(crate) fn prepare(handles: Handles) -> Solver {
+    let capture = Capture::new(&Options { points: 400, frames: 2, cage_vertices: 40 });
+    let cage = Cage::new(capture.cage.clone()).unwrap();
+    Solver::prepare(&MeanValue, &cage, &capture.rest.points, SolverOptions { handles, ..SolverOptions::default() })
+        .unwrap()
+}
+
+pub(crate) static SOLVER: LazyLock<Solver> = LazyLock::new(|| prepare(Handles::MaxVol));
+
+pub(crate) fn write_frames(out: &mut dyn io::Write) -> io::Result<()> {
+    (0..1000u32).try_for_each(|i| out.write_all(&i.to_le_bytes()))
+}
+
+pub(crate) fn completion() -> Completion {
+    let mut bytes = Vec::new();
+    write_frames(&mut bytes).unwrap();
+    Completion {
+        frames: 6,
+        container_bytes: bytes.len() as u64,
+        container_digest: blake3::hash(&bytes).to_hex().to_string(),
+    }
+}
