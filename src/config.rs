@@ -1,14 +1,16 @@
 //! The service's settings: defaults, then a file, then the environment, then flags, each overriding the one before.
 
+mod error;
 mod flags;
+mod layers;
 mod settings;
 mod show;
 #[cfg(test)]
 mod tests;
 
+pub use error::{ConfigError, Origin};
 pub use flags::ServeFlags;
-pub(crate) use settings::line_of;
-pub use settings::{ConfigError, Origin};
+pub(crate) use layers::line_of;
 
 use crate::auth::TenantLimits;
 use crate::http::listen::{Limits, Tls};
@@ -142,8 +144,8 @@ impl ServeConfig {
         env: impl Iterator<Item = (String, String)>,
         flags: &ServeFlags,
     ) -> Result<Self, ConfigError> {
-        let mut layers = settings::Layers::default();
-        let env: Vec<_> = env.filter(|(name, _)| name.starts_with(settings::ENVIRONMENT)).collect();
+        let mut layers = layers::Layers::default();
+        let env: Vec<_> = env.filter(|(name, _)| name.starts_with(layers::ENVIRONMENT)).collect();
         let from_env = env.iter().find(|(name, _)| name == "CAGER_CONFIG").map(|(_, path)| Path::new(path));
         if let Some(file) = file.or(flags.config.as_deref()).or(from_env) {
             layers.add_file(file)?;

@@ -1,6 +1,7 @@
 //! Settings from the command line.
 
-use super::settings::{ConfigError, Layers, Origin};
+use super::layers::Layers;
+use super::{ConfigError, Origin};
 use crate::telemetry::LogFormat;
 use std::path::PathBuf;
 use toml::Value;

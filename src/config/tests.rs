@@ -1,1 +1,137 @@
+use super::*;
+use clap::Parser as _;
+use std::fs;
 
+#[derive(clap::Parser)]
+struct Line {
+    #[command(flatten)]
+    flags: ServeFlags,
+}
+
+fn flags(line: &str) -> ServeFlags {
+    Line::parse_from(std::iter::once("serve").chain(line.split_whitespace())).flags
+}
+
+fn load(file: &str, env: &[(&str, &str)], line: &str) -> Result<ServeConfig, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cager.toml");
+    fs::write(&path, file).unwrap();
+    let env = env.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned()));
+    let loaded = ServeConfig::load(Some(&path), env, &flags(line)).map_err(|error| error.to_string());
+    let named = |text: String| text.replace(&*folder.path().to_string_lossy(), "DIR");
+    loaded.map_err(named)
+}
+
+#[test]
+fn the_table_of_settings_and_the_struct_agree() {
+    let all = ServeConfig {
+        tokens: Some("a".into()),
+        tls_certificate: Some("b".into()),
+        tls_key: Some("c".into()),
+        ..ServeConfig::default()
+    };
+    let mut of_struct: Vec<_> = toml::Table::try_from(&all).unwrap().keys().cloned().collect();
+    let mut of_table: Vec<_> = settings::names().map(str::to_owned).collect();
+    of_struct.sort();
+    of_table.sort();
+    assert_eq!(of_struct, of_table);
+    // Every default is possible.
+    for (name, value) in &toml::Table::try_from(&all).unwrap() {
+        settings::read(name, value).unwrap().unwrap();
+    }
+}
+
+#[test]
+fn later_layers_override_earlier_ones() {
+    let file = "max_streams = 1\nmax_requests = 1\nmax_preparing = 1\nworkers = 1\ncache_bytes = \"3 GiB\"\nupload_bytes = 1048576";
+    let env = [("CAGER_MAX_REQUESTS", "2"), ("CAGER_MAX_PREPARING", "2"), ("CAGER_WORKERS", "2"), ("HOME", "/x")];
+    let config =
+        load(file, &env, "--set max-preparing=3 --set workers=3 --workers 4 --set frame_bytes=1MB2").unwrap_err();
+    assert!(config.contains("--set frame_bytes: frame_bytes = \"1MB2\": write a size from 1 MiB"), "{config}");
+    let config = load(file, &env, "--set max-preparing=3 --set workers=3 --workers 4").unwrap();
+    assert_eq!((config.max_streams, config.max_requests, config.max_preparing, config.workers), (1, 2, 3, 4));
+    assert_eq!((config.cache_bytes, config.upload_bytes, config.frame_bytes), (3 << 30, 1 << 20, 256 << 20));
+    assert_eq!(config.origins["workers"], Origin::Flag("--workers".to_owned()));
+    assert_eq!(config.origins["max_requests"], Origin::Environment("CAGER_MAX_REQUESTS".to_owned()));
+    assert!(!config.origins.contains_key("frame_bytes"));
+}
+
+#[test]
+fn mistakes_name_their_place_and_what_to_do() {
+    for (file, env, line, wanted) in [
+        (
+            "max_stream = 1",
+            &[][..],
+            "",
+            "file DIR/cager.toml: unknown setting max_stream, did you mean max_streams?; --check-config",
+        ),
+        ("[tenant]\nx = 1", &[], "", "file DIR/cager.toml: unknown setting tenant; --check-config"),
+        ("listen = \"0.0.0.0\"", &[], "", "listen = \"0.0.0.0\": write ADDRESS:PORT"),
+        ("workers = -1", &[], "", "workers = -1: write a whole number from 0 to 4096"),
+        ("workers = 1.5", &[], "", "workers = 1.5: write a whole number"),
+        ("cache_bytes = \"1 GX\"", &[], "", "cache_bytes = \"1 GX\": write a size from 0 B to 1024 TiB"),
+        ("body_timeout_s = 0", &[], "", "body_timeout_s = 0: write a whole number from 1 to 86400"),
+        ("tokens = 3", &[], "", "tokens = 3: write the path"),
+        ("log = \"xml\"", &[], "", "log = \"xml\": write \"human\" or \"json\""),
+        ("log_filter = \"cager=loud\"", &[], "", "write a level such as info"),
+        ("workers = 1\nworkers = 2", &[], "", "DIR/cager.toml: line 2: "),
+        ("", &[("CAGER_MAX_STREAM", "1")], "", "environment CAGER_MAX_STREAM: unknown setting max_stream"),
+        ("", &[("CAGER_WORKERS", "many")], "", "environment CAGER_WORKERS: workers = \"many\": write"),
+        ("", &[], "--set workers", "--set workers: write --set KEY=VALUE"),
+        ("", &[], "--set wrokers=1", "flag --set wrokers: unknown setting wrokers, did you mean workers?"),
+        ("", &[], "--tls-key k.pem", "tls_key is set but tls_certificate is not"),
+    ] {
+        let error = load(file, env, line).unwrap_err();
+        assert!(error.contains(wanted), "{file:?} {env:?} {line:?}\n  {error}\n  {wanted}");
+    }
+    let error = ServeConfig::load(Some(Path::new("no/such.toml")), std::iter::empty(), &flags("")).unwrap_err();
+    assert!(error.to_string().starts_with("no/such.toml: cannot be read: "), "{error}");
+}
+
+#[test]
+fn others_may_use_the_prefix_in_the_environment() {
+    // What Kubernetes sets for a service of this name, and what the client commands read.
+    let env = [("CAGER_SERVICE_HOST", "10.0.0.1"), ("CAGER_PORT", "tcp://10.0.0.1:80"), ("CAGER_TOKEN", "secret")];
+    let config = load("", &env, "").unwrap();
+    assert_eq!(config, ServeConfig::default());
+}
+
+#[test]
+fn paths_in_a_file_are_relative_to_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cager.toml");
+    fs::write(&path, "data = \"store\"\ntokens = \"/etc/tokens.toml\"").unwrap();
+    let env = [("CAGER_CONFIG".to_owned(), path.to_str().unwrap().to_owned())];
+    let config = ServeConfig::load(None, env.into_iter(), &flags("")).unwrap();
+    assert_eq!(config.data, folder.path().join("store"));
+    assert_eq!(config.tokens.as_deref(), Some(Path::new("/etc/tokens.toml")));
+    let config = ServeConfig::load(Some(&path), std::iter::empty(), &flags("--data here")).unwrap();
+    assert_eq!(config.data, Path::new("here"));
+}
+
+#[test]
+fn without_tokens_only_this_machine_is_let_in() {
+    for address in ["127.0.0.1:0", "[::1]:80", "127.9.9.9:1", "localhost:8080"] {
+        load("", &[], &format!("--listen {address}")).unwrap();
+    }
+    for address in ["0.0.0.0:80", "[::]:80", "192.168.0.1:80", "[::ffff:127.0.0.1]:80"] {
+        let error = load("", &[("CAGER_LISTEN", address)], "").unwrap_err();
+        assert!(error.contains("openssl rand -hex 32") && error.contains("--tokens"), "{error}");
+        load("", &[], &format!("--listen {address} --tokens t.toml")).unwrap();
+    }
+}
+
+#[test]
+fn the_shown_settings_can_be_read_again_and_name_their_origins() {
+    let given = load("max_rest_bytes = 1500\nlog = \"json\"", &[("CAGER_WORKERS", "2")], "--data a\"b").unwrap();
+    let text = given.check_config();
+    let line = |start: &str| text.lines().find(|line| line.starts_with(start)).unwrap_or_default();
+    assert!(line("workers = 2 ").ends_with("# environment CAGER_WORKERS"), "{text}");
+    assert!(line("max_rest_bytes = \"1500 B\" ").contains("# file "), "{text}");
+    assert!(line("cache_bytes = \"2 GiB\" ").ends_with("# default"), "{text}");
+    assert!(line("# tokens is not set").ends_with("# default"), "{text}");
+    let mut again = load(&text, &[], "--data a\"b").unwrap();
+    again.origins = given.origins.clone();
+    assert_eq!(again, given);
+    assert_eq!(settings::names().count(), text.lines().count());
+}

@@ -129,3 +129,120 @@ impl Drop for Logged {
         self.log.ended = self.ended;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use axum::Router;
+    use axum::routing::{get, post};
+    use std::io::Write;
+    use std::sync::Mutex;
+    use tower::ServiceExt as _;
+    use tracing_subscriber::EnvFilter;
+    use tracing_subscriber::fmt::MakeWriter;
+
+    /// Log lines, kept.
+    #[derive(Clone, Default)]
+    struct Lines(Arc<Mutex<Vec<u8>>>);
+
+    impl Write for Lines {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            self.0.lock().unwrap().write(bytes)
+        }
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    impl MakeWriter<'_> for Lines {
+        type Writer = Self;
+        fn make_writer(&self) -> Self {
+            self.clone()
+        }
+    }
+
+    fn app() -> Router {
+        Router::new()
+            .route("/id", get(async |request: Request| request.extensions().get::<RequestId>().unwrap().to_string()))
+            .route("/echo", post(async |body: String| body))
+            .route("/fail", get(async || StatusCode::SERVICE_UNAVAILABLE))
+            .route("/healthz", get(async || "ok"))
+            .route("/never", get(std::future::pending::<()>))
+            .layer(axum::middleware::from_fn(request_id))
+    }
+
+    /// Sends a request; gives its identifier, its body and what was logged.
+    async fn send(request: Request, filter: &str) -> (String, String, String) {
+        let lines = Lines::default();
+        let subscriber = tracing_subscriber::fmt()
+            .with_env_filter(EnvFilter::new(filter))
+            .with_writer(lines.clone())
+            .json()
+            .flatten_event(true)
+            .with_span_list(false);
+        let _guard = tracing::subscriber::set_default(subscriber.finish());
+        let response = app().oneshot(request).await.unwrap();
+        let id = response.headers()[HEADER].to_str().unwrap().to_owned();
+        let body = axum::body::to_bytes(response.into_body(), 1 << 20).await.unwrap();
+        let text = String::from_utf8(lines.0.lock().unwrap().clone()).unwrap();
+        (id, String::from_utf8(body.to_vec()).unwrap(), text)
+    }
+
+    fn request(method: &str, path: &str) -> http::request::Builder {
+        Request::builder().method(method).uri(path)
+    }
+
+    #[tokio::test]
+    async fn identifiers_are_kept_if_they_can_stand_in_a_log() {
+        for id in ["a", "A-1_b.c", &"x".repeat(64)] {
+            let asked = request("GET", "/id").header("X-Request-Id", id).body(Body::empty()).unwrap();
+            let (answered, body, _) = send(asked, "info").await;
+            assert_eq!((answered.as_str(), body.as_str()), (id, id));
+        }
+        for id in ["", "a b", "a\tb", "é", &"x".repeat(65), "{\"a\":1}"] {
+            let asked = request("GET", "/id").header("X-Request-Id", id).body(Body::empty()).unwrap();
+            let (answered, body, _) = send(asked, "info").await;
+            assert!(answered != id && answered.len() == 32 && answered == body, "{id:?}: {answered}");
+        }
+    }
+
+    #[tokio::test]
+    async fn neither_tokens_nor_queries_nor_bodies_are_logged() {
+        let asked = request("POST", "/echo?token=in-the-query")
+            .header("Authorization", "Bearer in-the-header")
+            .header("Cookie", "in-the-cookie")
+            .header("X-Request-Id", "seen")
+            .body(Body::from("in-the-body"))
+            .unwrap();
+        let (_, body, log) = send(asked, "trace").await;
+        assert_eq!(body, "in-the-body");
+        assert!(!log.contains("in-the-") && !log.contains("Bearer"), "{log}");
+        assert!(log.contains("\"request_id\":\"seen\"") && log.contains("\"path\":\"/echo\""), "{log}");
+        assert!(log.contains("\"method\":\"POST\"") && log.contains("\"status\":200"), "{log}");
+        assert!(log.contains("\"latency_ms\":") && log.contains("\"whole\":true"), "{log}");
+    }
+
+    #[tokio::test]
+    async fn levels_follow_what_matters() {
+        let of = async |path: &str, filter: &str| {
+            let (_, _, log) = send(request("GET", path).body(Body::empty()).unwrap(), filter).await;
+            log
+        };
+        assert!(of("/fail", "warn").await.contains("\"level\":\"WARN\""));
+        assert!(of("/id", "warn").await.is_empty());
+        assert!(of("/id", "info").await.contains("\"level\":\"INFO\""));
+        assert!(of("/healthz", "info").await.is_empty());
+        assert!(of("/healthz", "debug").await.contains("\"level\":\"DEBUG\""));
+    }
+
+    #[tokio::test]
+    async fn a_client_that_has_gone_is_logged() {
+        let lines = Lines::default();
+        let subscriber = tracing_subscriber::fmt().with_writer(lines.clone()).finish();
+        let _guard = tracing::subscriber::set_default(subscriber);
+        let asked = app().oneshot(request("GET", "/never").body(Body::empty()).unwrap());
+        assert!(tokio::time::timeout(Duration::from_millis(50), asked).await.is_err());
+        let text = String::from_utf8(lines.0.lock().unwrap().clone()).unwrap();
+        assert!(text.contains("client gone before the response"), "{text}");
+    }
+}

@@ -51,8 +51,12 @@ pub(super) struct Upload {
 
 impl Upload {
     pub(super) fn new(inner: Incoming, state: Arc<State>, in_flight: Arc<InFlight>, timeout: Duration) -> Self {
-        // A request without a body is done receiving.
-        let in_flight = (!inner.is_end_stream()).then_some(in_flight);
+        // A request without a body is complete.
+        let empty = inner.is_end_stream();
+        if empty {
+            state.body_ended();
+        }
+        let in_flight = (!empty).then_some(in_flight);
         Self { inner, state, in_flight, timeout, clock: None, waiting: false, unfinished: Arc::default() }
     }
 
@@ -91,6 +95,7 @@ impl Body for Upload {
         this.waiting = false;
         this.state.body_came();
         if frame.is_none() || this.inner.is_end_stream() {
+            this.state.body_ended();
             this.in_flight = None;
         }
         Poll::Ready(frame.map(|frame| frame.map_err(Into::into)))

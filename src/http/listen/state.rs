@@ -69,7 +69,7 @@ struct Facts {
     blocked_since: Option<Instant>,
     /// Last time that a response got on, or a body came.
     progress: Instant,
-    /// Bytes may come that nobody reads: closing at once would destroy the response on its way.
+    /// More bytes of a request may come that nobody reads: closing at once would destroy the response on its way.
     may_linger: bool,
 }
 
@@ -173,6 +173,11 @@ impl State {
     /// A piece of a request body came.
     pub(super) fn body_came(&self) {
         self.facts().progress = Instant::now();
+    }
+
+    /// A request is there to its end, so that nothing unread is left of it.
+    pub(super) fn body_ended(&self) {
+        self.facts().may_linger = false;
     }
 
     /// A response is asked for its next piece (`false`) or has just given one (`true`).

@@ -77,6 +77,13 @@ fn app() -> Router {
         .route("/slow", get(async || tokio::time::sleep(ms(2000)).await))
         .route("/count", post(count))
         .route("/lazy", post(lazy))
+        .route(
+            "/duplex",
+            post(async move |body: Body| {
+                tokio::spawn(count(body));
+                Body::from_stream(endless())
+            }),
+        )
         .route("/refuse", post(async || (StatusCode::PAYLOAD_TOO_LARGE, "too large")))
 }
 

@@ -101,6 +101,23 @@ async fn a_client_that_does_not_read_is_closed() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_client_that_uploads_without_reading_is_not_closed_before_it_stops() {
+    let server = start(limits()).await;
+    let mut stream = server.connect().await;
+    stream.write_all(b"POST /duplex HTTP/1.1\r\nHost: x\r\nContent-Length: 1000\r\n\r\n").await.unwrap();
+    let began = Instant::now();
+    while began.elapsed() < 3 * limits().write_timeout {
+        stream.write_all(b"x").await.expect("the connection should be kept while the upload goes on");
+        tokio::time::sleep(ms(100)).await;
+    }
+    let stopped = Instant::now();
+    // Once the buffers are read, a reset or the end is all that is left.
+    tokio::time::sleep(limits().write_timeout + ms(300)).await;
+    let _ = timeout(HANG, stream.read_to_end(&mut Vec::new())).await.expect("the connection stays open");
+    assert_took(stopped.elapsed(), limits().write_timeout);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn http_2_silent_and_idle_connections_are_closed() {
     let server = start(limits()).await;
     let mut half = server.connect().await;
