@@ -1,11 +1,11 @@
-//! Eight-wide arithmetic over points, compiled once per instruction set and chosen at run time.
+//! Eight-wide arithmetic, over points or over entries of a column, compiled once per instruction set and chosen at run time.
 //!
 //! Nothing here uses fused multiply-add: the same source then gives the same bits on every machine, with or without AVX.
 
-/// Points that one lane group holds.
+/// Points or entries that one lane group holds.
 pub(crate) const LANES: usize = 8;
 
-/// One value for each point of a lane group.
+/// One value for each point or entry of a lane group.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(crate) struct Lanes(pub(crate) [f64; LANES]);
@@ -49,6 +49,26 @@ impl Lanes {
             found |= f(self.0[l], other.0[l]);
         }
         found
+    }
+}
+
+/// Lane groups as the numbers they hold.
+#[inline(always)]
+pub(crate) fn flat(lanes: &[Lanes]) -> &[f64] {
+    // SAFETY: a lane group is an array of eight numbers, without padding, and aligned for more than one of them.
+    #[allow(unsafe_code)]
+    unsafe {
+        std::slice::from_raw_parts(lanes.as_ptr().cast(), lanes.len() * LANES)
+    }
+}
+
+/// As [`flat`], to be written to.
+#[inline(always)]
+pub(crate) fn flat_mut(lanes: &mut [Lanes]) -> &mut [f64] {
+    // SAFETY: as above; every bit pattern is a number.
+    #[allow(unsafe_code)]
+    unsafe {
+        std::slice::from_raw_parts_mut(lanes.as_mut_ptr().cast(), lanes.len() * LANES)
     }
 }
 
