@@ -6,6 +6,7 @@ use crate::decode::Decoder;
 use crate::dense;
 use crate::mesh::{Point, diagonal, distance_to_surface};
 use crate::regularize::{Regularizer, Spectrum, cage_laplacian, spectral_map};
+use crate::simd::zeros;
 use crate::spectrum::{RANK_TOLERANCE, RowBasis, deficient_basis, row_basis};
 use crate::svd::{self, Svd};
 use faer::reborrow::Reborrow;
@@ -417,7 +418,7 @@ fn keep_translations(mut operator: Mat<f64>, positions: usize) -> Mat<f64> {
 
 /// `Φ · X` in parallel row blocks whose bits do not depend on the threads.
 pub(crate) fn tall_product(phi: MatRef<'_, f64>, x: MatRef<'_, f64>) -> Mat<f64> {
-    let mut out = Mat::zeros(phi.nrows(), x.ncols());
+    let mut out = zeros(phi.nrows(), x.ncols());
     out.as_mut().par_row_chunks_mut(BLOCK_ROWS).enumerate().for_each(|(block, rows)| {
         let count = rows.nrows();
         dense::multiply(rows, phi.subrows(block * BLOCK_ROWS, count), x);

@@ -5,7 +5,7 @@
 //! ever matter; a pass over all of `Φ` with a fresh factorisation then confirms the result or widens the choice.
 
 use crate::dense;
-use crate::simd::multiversion;
+use crate::simd::{self, multiversion};
 use crate::spectrum::RANK_TOLERANCE;
 use faer::reborrow::{Reborrow, ReborrowMut};
 use faer::{Accum, Mat, MatRef, Par};
@@ -97,7 +97,7 @@ fn start_rows(phi: MatRef<'_, f64>) -> Result<Vec<u32>, Dependent> {
 }
 
 fn to_single(phi: MatRef<'_, f64>) -> Mat<f32> {
-    let mut single = Mat::zeros(phi.nrows(), phi.ncols());
+    let mut single = simd::zeros(phi.nrows(), phi.ncols());
     single.as_mut().par_col_chunks_mut(1).enumerate().for_each(|(j, mut column)| {
         for (s, &x) in column.as_mut().col_mut(0).iter_mut().zip(phi.col(j).iter()) {
             *s = x as f32;
