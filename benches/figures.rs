@@ -8,6 +8,7 @@ use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::{BATCH, Solver, SolverOptions};
 use cager_core::maxvol::{self, maxvol};
 use cager_core::mesh::{Model, Polygons};
+use cager_core::svd::svd;
 use cager_core::synthetic::{Capture, Options};
 use cager_formats::{FrameOptions, create_frames, write_model};
 use serde_json::{Value, json};
@@ -74,8 +75,7 @@ fn figures(folder: &Path) -> anyhow::Result<Value> {
     let maxvol_figure = timed(|| maxvol(phi.as_ref(), maxvol::TOLERANCE));
     let m = phi.ncols();
     let square = faer::Mat::from_fn(m, m, |i, j| phi[(handles.rows[i] as usize, j)]);
-    faer::set_global_parallelism(faer::Par::Seq);
-    let svd = timed(|| square.thin_svd());
+    let svd = timed(|| svd(square.as_ref()));
     let prepare = timed(|| Solver::prepare(&MeanValue, &cage, points, SolverOptions::default()));
 
     let solver = Solver::prepare(&MeanValue, &cage, points, SolverOptions::default())?;

@@ -3,7 +3,7 @@
 use crate::dense;
 use crate::inversion::product_columns;
 use crate::mesh::Point;
-use crate::simd::multiversion;
+use crate::simd::{self, multiversion};
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
@@ -37,7 +37,7 @@ impl Decoder {
     /// Takes coordinates n × m whose first `positions` unknowns are positions.
     pub fn new(phi: MatRef<'_, f64>, positions: usize) -> Self {
         let points = phi.nrows();
-        let mut single = Mat::zeros(points.next_multiple_of(dense::WHOLE_ROWS), phi.ncols());
+        let mut single = simd::zeros(points.next_multiple_of(dense::WHOLE_ROWS), phi.ncols());
         single.as_mut().par_col_chunks_mut(1).enumerate().for_each(|(j, mut column)| {
             for (s, &x) in column.as_mut().col_mut(0).iter_mut().zip(phi.col(j).iter()) {
                 *s = x as f32;

@@ -2,9 +2,10 @@
 //!
 //! Everything here runs sequentially unless it says otherwise: singular vectors of a parallel run differ in their last bits.
 
+use crate::svd::{Svd, svd};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::matmul::matmul;
-use faer::linalg::{cholesky, lu, svd};
+use faer::linalg::{cholesky, lu};
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
 /// Pivoted rows of a tall matrix.
@@ -73,51 +74,6 @@ pub(crate) fn inverse(a: MatRef<'_, f64>) -> (Mat<f64>, f64) {
     (result, log_volume)
 }
 
-/// `A = U Σ Vᵀ` of a K × m matrix: thin U, K × min(K, m); Σ descending; full V, m × m.
-pub(crate) struct Svd {
-    pub(crate) u: Mat<f64>,
-    pub(crate) sigma: Vec<f64>,
-    pub(crate) v: Mat<f64>,
-}
-
-/// Singular value decomposition; `None` where it does not converge, which only non-finite entries are known to cause.
-pub(crate) fn svd(a: MatRef<'_, f64>) -> Option<Svd> {
-    let (k, m) = a.shape();
-    let size = k.min(m);
-    let (mut u, mut v) = (Mat::zeros(k, size), Mat::zeros(m, m));
-    let mut s = faer::diag::Diag::zeros(size);
-    let want_v = if m > size { svd::ComputeSvdVectors::Full } else { svd::ComputeSvdVectors::Thin };
-    // faer takes both sets of vectors thin or both full.
-    if m > size {
-        let mut full_u = Mat::zeros(k, k);
-        let mut memory = MemBuffer::new(svd::svd_scratch::<f64>(k, m, want_v, want_v, Par::Seq, Default::default()));
-        svd::svd(
-            a,
-            s.as_mut(),
-            Some(full_u.as_mut()),
-            Some(v.as_mut()),
-            Par::Seq,
-            MemStack::new(&mut memory),
-            Default::default(),
-        )
-        .ok()?;
-        u = full_u;
-    } else {
-        let mut memory = MemBuffer::new(svd::svd_scratch::<f64>(k, m, want_v, want_v, Par::Seq, Default::default()));
-        svd::svd(
-            a,
-            s.as_mut(),
-            Some(u.as_mut()),
-            Some(v.as_mut()),
-            Par::Seq,
-            MemStack::new(&mut memory),
-            Default::default(),
-        )
-        .ok()?;
-    }
-    Some(Svd { u, sigma: s.column_vector().iter().copied().collect(), v })
-}
-
 /// Singular values and right singular vectors of a tall matrix, through its QR factorisation.
 pub(crate) fn right_singular(mut a: Mat<f64>) -> Option<Svd> {
     use faer::linalg::qr::no_pivoting::factor;
@@ -127,16 +83,6 @@ pub(crate) fn right_singular(mut a: Mat<f64>) -> Option<Svd> {
     let mut memory = MemBuffer::new(factor::qr_in_place_scratch::<f64>(n, m, block, Par::Seq, Default::default()));
     factor::qr_in_place(a.as_mut(), reflectors.as_mut(), Par::Seq, MemStack::new(&mut memory), Default::default());
     svd(Mat::from_fn(m, m, |i, j| if i <= j { a[(i, j)] } else { 0.0 }).as_ref())
-}
-
-/// Singular values alone, descending.
-pub(crate) fn singular_values(a: MatRef<'_, f64>) -> Option<Vec<f64>> {
-    let (k, m) = a.shape();
-    let mut s = faer::diag::Diag::zeros(k.min(m));
-    let none = svd::ComputeSvdVectors::No;
-    let mut memory = MemBuffer::new(svd::svd_scratch::<f64>(k, m, none, none, Par::Seq, Default::default()));
-    svd::svd(a, s.as_mut(), None, None, Par::Seq, MemStack::new(&mut memory), Default::default()).ok()?;
-    Some(s.column_vector().iter().copied().collect())
 }
 
 /// Lower Cholesky factor in place of a symmetric positive definite matrix, zeros above; `None` where it is not definite.

@@ -3,10 +3,12 @@
 use crate::cage::Cage;
 use crate::coordinates::CoordinateSystem;
 use crate::decode::Decoder;
-use crate::dense::{self, Svd};
+use crate::dense;
 use crate::mesh::{Point, diagonal, distance_to_surface};
 use crate::regularize::{Regularizer, Spectrum, cage_laplacian, spectral_map};
+use crate::simd::zeros;
 use crate::spectrum::{RANK_TOLERANCE, RowBasis, deficient_basis, row_basis};
+use crate::svd::{self, Svd};
 use faer::reborrow::Reborrow;
 use faer::{Accum, Mat, MatRef, Par};
 use rayon::prelude::*;
@@ -374,12 +376,12 @@ struct Spectra {
 impl Spectra {
     fn of(basis: &RowBasis, read: Handles) -> Result<Self, PrepareError> {
         let (handles, full) = rayon::join(
-            || dense::svd(basis.square.as_ref()),
+            || svd::svd(basis.square.as_ref()),
             || {
                 let compressed = basis.compressed()?;
                 match read {
-                    Handles::MaxVol => Some((dense::singular_values(compressed.as_ref())?, None)),
-                    Handles::All => dense::svd(compressed.as_ref()).map(|svd| (svd.sigma.clone(), Some(svd))),
+                    Handles::MaxVol => Some((svd::singular_values(compressed.as_ref())?, None)),
+                    Handles::All => svd::svd(compressed.as_ref()).map(|svd| (svd.sigma.clone(), Some(svd))),
                 }
             },
         );
@@ -404,12 +406,12 @@ fn operator(
     // B carries the rounding of Φ□⁻¹, which least squares over all points feels beyond this condition.
     const GRAM_IS_SAFE: f64 = 1e6;
     let directly = options.handles == Handles::All && preparation.condition_full > GRAM_IS_SAFE;
-    let svd = match (directly, spectra.full) {
-        (true, _) => dense::svd(phi).ok_or(failed("singular value decomposition of the coordinates"))?,
+    let decomposition = match (directly, spectra.full) {
+        (true, _) => svd::svd(phi).ok_or(failed("singular value decomposition of the coordinates"))?,
         (false, Some(full)) => full,
         (false, None) => spectra.handles,
     };
-    let Svd { u, sigma, v } = svd;
+    let Svd { u, sigma, v } = decomposition;
     let spectrum = Spectrum { sigma: &sigma[..rank], v: v.as_ref(), delta };
     let map = spectral_map(&spectrum, options.regularizer, options.spectrum, options.lambda)
         .ok_or(failed("regularised solve"))?;
@@ -453,7 +455,7 @@ fn with_whole_tiles(mut operator: Mat<f64>) -> Mat<f64> {
 
 /// `Φ · X` in parallel row blocks whose bits do not depend on the threads.
 pub(crate) fn tall_product(phi: MatRef<'_, f64>, x: MatRef<'_, f64>) -> Mat<f64> {
-    let mut out = Mat::zeros(phi.nrows(), x.ncols());
+    let mut out = zeros(phi.nrows(), x.ncols());
     out.as_mut().par_row_chunks_mut(BLOCK_ROWS).enumerate().for_each(|(block, rows)| {
         let count = rows.nrows();
         dense::multiply(rows, phi.subrows(block * BLOCK_ROWS, count), x);

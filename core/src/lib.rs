@@ -10,7 +10,8 @@ pub mod mesh;
 pub mod regularize;
 mod simd;
 mod spectrum;
+pub mod svd;
 pub mod synthetic;
 
-/// Version of the coordinates' computation: containers name it, since their readers compute the coordinates anew.
-pub const SOLVER_VERSION: u32 = 1;
+/// Version of the computation of coordinates and cages: containers name it, since their readers compute the coordinates anew.
+pub const SOLVER_VERSION: u32 = 2;

@@ -2,10 +2,11 @@
 //!
 //! With `B = Φ Φ□⁻¹`, swapping row i of `Φ` in for handle j multiplies the volume of `Φ□` by `|B_ij|`. Swaps go on until no
 //! entry exceeds 1 + τ. Almost all rows of `B` stay far below one throughout, so the swaps run on the few rows that could
-//! ever matter; a pass over all of `Φ` with a fresh factorisation then confirms the result or widens the choice.
+//! ever matter; a pass over all of `Φ` with a fresh factorisation then confirms the result or widens the choice. While more
+//! swaps are to be expected that pass is in single precision; the one that confirms is in double.
 
 use crate::dense;
-use crate::simd::multiversion;
+use crate::simd::{self, multiversion};
 use crate::spectrum::RANK_TOLERANCE;
 use faer::reborrow::{Reborrow, ReborrowMut};
 use faer::{Accum, Mat, MatRef, Par};
@@ -21,6 +22,8 @@ const BLOCK_ROWS: usize = 256;
 /// The blocks' Gram matrices are added up in a number of groups that follows from the shape alone, so that the sum does not
 /// depend on the threads. They take this much memory together, unless four already take more.
 const GRAM_BYTES: usize = 16 << 20;
+/// From this many columns on, the first round of swaps is hardly ever the last.
+const SEVERAL_ROUNDS: usize = 512;
 /// Every confirming pass either ends the search or has found rows to swap; the volume bounds their number far below this.
 const MAX_PASSES: usize = 64;
 
@@ -63,11 +66,18 @@ pub fn maxvol(phi: MatRef<'_, f64>, tolerance: f64) -> Result<MaxVol, Dependent>
     let (mut inverse, mut log_volume) = dense::inverse(dense::rows_of(phi, &rows).as_ref());
     let start_log_volume = log_volume;
     let mut row_max = row_maxima(phi, inverse.as_ref());
-    for _ in 0..MAX_PASSES {
+    for pass in 0..MAX_PASSES {
         let candidates: Vec<u32> = (0..phi.nrows() as u32).filter(|&i| row_max[i as usize] > CANDIDATE).collect();
         let done = swap_among(phi, &candidates, inverse.as_ref(), tolerance, &mut rows);
         swaps += done;
         (inverse, log_volume) = dense::inverse(dense::rows_of(phi, &rows).as_ref());
+        // A pass that is about to find more rows to swap need not be exact.
+        if done > 0 && (pass > 0 || phi.ncols() >= SEVERAL_ROUNDS) {
+            row_max = row_maxima(phi, inverse.as_ref());
+            if row_max.iter().any(|&x| x > (1.0 + tolerance) as f32) {
+                continue;
+            }
+        }
         let (maxima, gram) = maxima_and_gram(phi, inverse.as_ref(), 1.0 + tolerance);
         let max_entry = maxima.iter().copied().fold(0.0, f64::max);
         if max_entry <= 1.0 + tolerance {
@@ -97,7 +107,7 @@ fn start_rows(phi: MatRef<'_, f64>) -> Result<Vec<u32>, Dependent> {
 }
 
 fn to_single(phi: MatRef<'_, f64>) -> Mat<f32> {
-    let mut single = Mat::zeros(phi.nrows(), phi.ncols());
+    let mut single = simd::zeros(phi.nrows(), phi.ncols());
     single.as_mut().par_col_chunks_mut(1).enumerate().for_each(|(j, mut column)| {
         for (s, &x) in column.as_mut().col_mut(0).iter_mut().zip(phi.col(j).iter()) {
             *s = x as f32;

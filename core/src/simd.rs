@@ -1,11 +1,15 @@
-//! Eight-wide arithmetic over points, compiled once per instruction set and chosen at run time.
+//! Eight-wide arithmetic, over points or over entries of a column, compiled once per instruction set and chosen at run time.
 //!
 //! Nothing here uses fused multiply-add: the same source then gives the same bits on every machine, with or without AVX.
 
-/// Points that one lane group holds.
+use faer::Mat;
+use rayon::prelude::*;
+use std::mem::MaybeUninit;
+
+/// Points or entries that one lane group holds.
 pub(crate) const LANES: usize = 8;
 
-/// One value for each point of a lane group.
+/// One value for each point or entry of a lane group.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(crate) struct Lanes(pub(crate) [f64; LANES]);
@@ -50,6 +54,45 @@ impl Lanes {
         }
         found
     }
+}
+
+/// Lane groups as the numbers they hold.
+#[inline(always)]
+pub(crate) fn flat(lanes: &[Lanes]) -> &[f64] {
+    // SAFETY: a lane group is an array of eight numbers, without padding, and aligned for more than one of them.
+    #[allow(unsafe_code)]
+    unsafe {
+        std::slice::from_raw_parts(lanes.as_ptr().cast(), lanes.len() * LANES)
+    }
+}
+
+/// As [`flat`], to be written to.
+#[inline(always)]
+pub(crate) fn flat_mut(lanes: &mut [Lanes]) -> &mut [f64] {
+    // SAFETY: as above; every bit pattern is a number.
+    #[allow(unsafe_code)]
+    unsafe {
+        std::slice::from_raw_parts_mut(lanes.as_mut_ptr().cast(), lanes.len() * LANES)
+    }
+}
+
+/// Zeros, n × m, whose memory the threads of the current rayon pool touch first, each a share: the system hands out new memory
+/// page by page, which takes one thread longer than most steps of a preparation.
+pub(crate) fn zeros<T: Copy + Default + Send>(n: usize, m: usize) -> Mat<T> {
+    const TASK_BYTES: usize = 1 << 18;
+    let mut matrix = Mat::<T>::with_capacity(n, m);
+    let stride = matrix.col_stride().unsigned_abs();
+    let length = if n == 0 { 0 } else { stride * m };
+    // SAFETY: a matrix of this capacity owns m columns of `stride` ≥ n entries each, one after the other.
+    #[allow(unsafe_code)]
+    let entries = unsafe { std::slice::from_raw_parts_mut(matrix.as_ptr_mut().cast::<MaybeUninit<T>>(), length) };
+    entries.par_chunks_mut(TASK_BYTES / size_of::<T>()).for_each(|part| part.fill(MaybeUninit::new(T::default())));
+    // SAFETY: within the capacity, and every entry was written just now.
+    #[allow(unsafe_code)]
+    unsafe {
+        matrix.set_dims(n, m);
+    }
+    matrix
 }
 
 macro_rules! lanewise {

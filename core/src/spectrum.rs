@@ -1,7 +1,8 @@
 //! Rank and spectrum of the coordinate matrix, and a well-conditioned basis of its rows.
 
-use crate::dense::{self, Svd};
+use crate::dense;
 use crate::maxvol::{self, MaxVol};
+use crate::svd::Svd;
 use faer::{Mat, MatRef};
 
 /// Singular values below this fraction of the largest are taken for zero: coordinates are not accurate to more.

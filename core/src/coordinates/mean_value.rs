@@ -9,8 +9,8 @@
 use super::{CoordinateSystem, Coordinates, thin};
 use crate::cage::Cage;
 use crate::mesh::{self, Point};
-use crate::simd::{LANES, Lanes, angle, cross, dot, multiversion};
-use faer::{Mat, MatMut};
+use crate::simd::{LANES, Lanes, angle, cross, dot, multiversion, zeros};
+use faer::MatMut;
 use rayon::prelude::*;
 
 /// Mean value coordinates: one unknown per cage vertex, defined inside and outside the cage.
@@ -41,7 +41,7 @@ impl CoordinateSystem for MeanValue {
     }
 
     fn coordinates(&self, cage: &Cage, points: &[Point]) -> Coordinates {
-        let mut phi = Mat::zeros(points.len(), self.unknowns(cage));
+        let mut phi = zeros(points.len(), self.unknowns(cage));
         let outside = phi
             .as_mut()
             .par_row_chunks_mut(TASK_POINTS)
@@ -169,11 +169,7 @@ fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> (
         direction[2] = r[2] * inverse;
         scratch.weights[j] = Lanes::ZERO;
         if d.any(d, |d, _| d <= near_vertex) {
-            for l in 0..LANES {
-                if d.0[l] <= near_vertex {
-                    on[l] = On::Vertex(j);
-                }
-            }
+            note_vertex(&mut on, j, &d, near_vertex);
         }
     }
     for (k, edge) in cage.edges().iter().enumerate() {
@@ -195,11 +191,7 @@ fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> (
         term[2] = c[2] * half;
         term[3] = back;
         if s.any(t, |s, t| (s < EDGE_TOLERANCE) & (t < 0.0)) {
-            for l in 0..LANES {
-                if s.0[l] < EDGE_TOLERANCE && t.0[l] < 0.0 && matches!(on[l], On::Nothing) {
-                    on[l] = On::Edge(k);
-                }
-            }
+            note_edge(&mut on, k, &s, &t);
         }
     }
     for face in cage.faces() {
@@ -228,6 +220,28 @@ fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> (
         total = total + *weight;
     }
     (total, on)
+}
+
+// Kept out of the loops: the compiler would otherwise split the lanes as these few entries ask for, and the roots with them.
+
+#[cold]
+#[inline(never)]
+fn note_vertex(on: &mut [On; LANES], vertex: usize, distances: &Lanes, near: f64) {
+    for l in 0..LANES {
+        if distances.0[l] <= near {
+            on[l] = On::Vertex(vertex);
+        }
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn note_edge(on: &mut [On; LANES], edge: usize, sines: &Lanes, cosines: &Lanes) {
+    for l in 0..LANES {
+        if sines.0[l] < EDGE_TOLERANCE && cosines.0[l] < 0.0 && matches!(on[l], On::Nothing) {
+            on[l] = On::Edge(edge);
+        }
+    }
 }
 
 /// Replaces the weights of those lanes whose point lies nearly in the plane of the face.
