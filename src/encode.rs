@@ -305,7 +305,7 @@ fn warnings(job: &Job<'_>, solver: &Solver) -> Vec<String> {
     }
     if found.affine_reproduction_error > 1e-10 {
         warnings.push(format!(
-            "the coordinates reproduce the rest pose to {:.1e} of its diagonal only, as happens far outside a cage or in one much thinner than wide; check that both files belong together",
+            "the coordinates reproduce the rest pose to {:.1e} of its diagonal only, as happens far outside a cage, above all a very thin one; check that both files belong together",
             found.affine_reproduction_error
         ));
     }

@@ -11,6 +11,7 @@ pub mod regularize;
 mod simd;
 mod spectrum;
 pub mod synthetic;
+mod wide;
 
 /// Version of the coordinates' computation: containers name it, since their readers compute the coordinates anew.
-pub const SOLVER_VERSION: u32 = 1;
+pub const SOLVER_VERSION: u32 = 2;
