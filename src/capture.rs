@@ -183,7 +183,7 @@ pub fn preparation_warnings(options: SolverOptions, solver: &Solver) -> Vec<Stri
     }
     if found.affine_reproduction_error > 1e-10 {
         warnings.push(format!(
-            "the coordinates reproduce the rest pose to {:.1e} of its diagonal only, as happens far outside a cage or in one much thinner than wide; check that both files belong together",
+            "the coordinates reproduce the rest pose to {:.1e} of its diagonal only, as happens far outside a cage, above all a very thin one; check that both files belong together",
             found.affine_reproduction_error
         ));
     }

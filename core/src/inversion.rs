@@ -4,7 +4,7 @@ use crate::cage::Cage;
 use crate::coordinates::CoordinateSystem;
 use crate::decode::Decoder;
 use crate::dense;
-use crate::mesh::{Point, diagonal, distance_to_surface};
+use crate::mesh::{Point, diagonal, distance_to_surface, norm};
 use crate::regularize::{Regularizer, Spectrum, cage_laplacian, spectral_map};
 use crate::simd::zeros;
 use crate::spectrum::{RANK_TOLERANCE, RowBasis, deficient_basis, row_basis};
@@ -22,6 +22,8 @@ pub use parts::SolverParts;
 pub const BATCH: usize = 16;
 /// Beyond this affine reproduction error, over the diagonal, coordinates are of no use.
 const NOT_REPRODUCED: f64 = 1e-6;
+/// Farther from the cage, in its diagonals, one point outweighs all others by the inverse of [`WEAK`](crate::regularize::WEAK).
+const FAR: f64 = 1e5;
 /// Points outside by less than this fraction of the diagonal lie on the cage.
 const ON_THE_CAGE: f64 = 1e-9;
 /// Rows of one block where a tall matrix is multiplied in blocks.
@@ -103,7 +105,17 @@ pub enum PrepareError {
         /// Memory that preparing needs.
         gigabytes: f64,
     },
-    /// A point so far from the cage that its coordinates are rounding.
+    /// A point so far from the cage that its coordinates outweigh those of all others.
+    #[error(
+        "rest point {point} lies {distance:.1e} diagonals of the cage away from it; move the cage around the model or delete the point"
+    )]
+    TooFar {
+        /// The point, counted from 0.
+        point: usize,
+        /// Distance from the first vertex of the cage over the diagonal of the cage.
+        distance: f64,
+    },
+    /// A point whose coordinates are rounding.
     #[error(
         "rest point {point} is not reproduced by the cage (off by {error:.1e} of its diagonal), as happens far outside it; move the cage around the model or delete the point"
     )]
@@ -197,6 +209,7 @@ impl Solver {
             let gigabytes = 20e-9 * points.len() as f64 * m as f64;
             return Err(PrepareError::OutOfMemory { points: points.len(), unknowns: m, gigabytes });
         }
+        refuse_far_points(cage, points)?;
         let coordinates = system.coordinates(cage, points);
         let phi = coordinates.phi.as_ref();
         let (point, error) = reproduction_error(phi, &system.rest_unknowns(cage), cage, points);
@@ -340,6 +353,17 @@ impl Solver {
 pub(crate) fn product_columns(frames: usize) -> usize {
     assert!(frames <= BATCH, "at most {BATCH} frames in a batch");
     3 * [BATCH / 4, BATCH / 2].into_iter().find(|&width| frames <= width).unwrap_or(BATCH)
+}
+
+fn refuse_far_points(cage: &Cage, points: &[Point]) -> Result<(), PrepareError> {
+    let [a, b, c] = cage.vertices()[0];
+    for (point, p) in points.iter().enumerate() {
+        let distance = norm([p[0] - a, p[1] - b, p[2] - c]) / cage.diagonal();
+        if distance > FAR {
+            return Err(PrepareError::TooFar { point, distance });
+        }
+    }
+    Ok(())
 }
 
 fn check(points: &[Point], unknowns: usize, options: SolverOptions) -> Result<(), PrepareError> {

@@ -12,6 +12,7 @@ mod simd;
 mod spectrum;
 pub mod svd;
 pub mod synthetic;
+mod wide;
 
 /// Version of the computation of coordinates and cages: containers name it, since their readers compute the coordinates anew.
 pub const SOLVER_VERSION: u32 = 2;

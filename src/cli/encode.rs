@@ -50,6 +50,7 @@ fn name_files(error: encode::EncodeError, args: &EncodeArgs) -> anyhow::Error {
                 | PrepareError::NoExtent
                 | PrepareError::TooLarge
                 | PrepareError::NotReproduced { .. }
+                | PrepareError::TooFar { .. }
                 | PrepareError::OutOfMemory { .. } => &args.rest,
                 _ => &args.cage,
             };

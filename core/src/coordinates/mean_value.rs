@@ -4,10 +4,12 @@
 //! Its mean vector is `m = ½ Σ θ_i n_i` over its three edges: `θ_i` the angle an edge is seen under and `n_i` the unit
 //! normal of the plane through `x` and the edge. The weights are the solution of `Σ w_i d_i u_i = m`. Each edge term enters
 //! two faces with opposite signs, so the mean vectors of a closed cage add up to zero whatever the rounding of the terms, and
-//! affine reproduction depends only on the three-by-three solves.
+//! affine reproduction depends only on the three-by-three solves. What rounding leaves too little of is computed again in
+//! 192 bits.
 
-use super::{CoordinateSystem, Coordinates, thin};
-use crate::cage::Cage;
+use super::doubt::{Mended, TOLERANCE, is_kept, is_unreliable, mend_thin};
+use super::{CoordinateSystem, Coordinates, careful};
+use crate::cage::{Cage, Edge};
 use crate::mesh::{self, Point};
 use crate::simd::{LANES, Lanes, angle, cross, dot, multiversion, zeros};
 use faer::MatMut;
@@ -17,13 +19,10 @@ use rayon::prelude::*;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MeanValue;
 
-/// Closer to a vertex than this fraction of the cage's diagonal, a point has the coordinates of the vertex.
+/// Closer to a vertex than this fraction of the cage's diagonal, a point is looked at closely.
 const VERTEX_TOLERANCE: f64 = 1e-13;
-/// An edge seen under an angle whose sine is below this, from between its ends, holds the point. The snap moves
-/// reproduction by at most a quarter of this times the edge's length.
+/// So is one that sees an edge under an angle whose sine is below this, from between its ends.
 const EDGE_TOLERANCE: f64 = 1e-11;
-/// Faces with a determinant below this fraction of their widest edge need the cancellation-free weights.
-const THIN: f64 = 1e-5;
 /// Points one parallel task computes: a few lane groups.
 const TASK_POINTS: usize = 8 * LANES;
 
@@ -59,14 +58,15 @@ impl CoordinateSystem for MeanValue {
 }
 
 /// Working memory of one task; every entry holds one lane group.
-struct Scratch {
+pub(super) struct Scratch {
     /// Unit vectors from the points to each cage vertex.
-    directions: Vec<[Lanes; 3]>,
+    pub(super) directions: Vec<[Lanes; 3]>,
     /// Reciprocal distances to each cage vertex.
-    nearness: Vec<Lanes>,
+    pub(super) nearness: Vec<Lanes>,
     /// Per edge: half mean-vector term `½ θ n`, and the factor that turns it into `u_a × u_b`.
-    edges: Vec<[Lanes; 4]>,
-    weights: Vec<Lanes>,
+    pub(super) edges: Vec<[Lanes; 4]>,
+    pub(super) weights: Vec<Lanes>,
+    pub(super) mended: Mended,
 }
 
 impl Scratch {
@@ -77,6 +77,7 @@ impl Scratch {
             nearness: vec![Lanes::ZERO; m],
             edges: vec![[Lanes::ZERO; 4]; cage.edges().len()],
             weights: vec![Lanes::ZERO; m],
+            mended: Mended::default(),
         }
     }
 }
@@ -89,7 +90,7 @@ fn task_coordinates(
     mut rows: MatMut<'_, f64>,
     scratch: &mut Scratch,
 ) -> Vec<u32> {
-    let mut outside = Vec::new();
+    let mut outsiders = Vec::new();
     let count = rows.nrows();
     let mut start = 0;
     while start < count {
@@ -102,7 +103,7 @@ fn task_coordinates(
                 x[k].0[l] = at(l)[k];
             }
         }
-        let (total, on) = group_weights(cage, x, scratch);
+        let Sums { total, on, suspect } = group_weights(cage, x, scratch);
         let scale = total.map(|t| 1.0 / t);
         for (j, &weight) in scratch.weights.iter().enumerate() {
             let values = (weight * scale).0;
@@ -111,29 +112,51 @@ fn task_coordinates(
             }
         }
         for l in 0..filled {
-            match on[l] {
-                On::Nothing if total.0[l] <= 0.0 => outside.push((first + start + l) as u32),
-                On::Nothing => {}
-                On::Vertex(vertex) => set_row(&mut rows, start + l, &[(vertex, 1.0)]),
-                On::Edge(edge) => {
-                    let [a, b] = cage.edges()[edge].vertices;
-                    let (da, db) =
-                        (distance(at(l), cage.vertices()[a as usize]), distance(at(l), cage.vertices()[b as usize]));
-                    set_row(&mut rows, start + l, &[(a as usize, db / (da + db)), (b as usize, da / (da + db))]);
+            let careful = match on[l] {
+                On::Nothing => suspect[l] && is_unreliable(cage, scratch, l, total.0[l]),
+                On::Vertex(vertex) if at(l) == cage.vertices()[vertex] => {
+                    set_row(&mut rows, start + l, &[(vertex, 1.0)]);
+                    continue;
                 }
+                On::Edge([a, b]) if careful::is_on_edge(cage.vertices()[a], cage.vertices()[b], at(l)) => {
+                    let [to_a, to_b] = [a, b].map(|v| distance(at(l), cage.vertices()[v]));
+                    set_row(&mut rows, start + l, &[(a, to_b / (to_a + to_b)), (b, to_a / (to_a + to_b))]);
+                    continue;
+                }
+                On::Vertex(_) | On::Edge(_) => true,
+            };
+            let outside = if careful && at(l).iter().all(|c| c.is_finite()) {
+                let row = careful::row(cage, at(l));
+                for (j, &value) in row.values.iter().enumerate() {
+                    rows[(start + l, j)] = value;
+                }
+                row.outside
+            } else {
+                total.0[l] <= 0.0
+            };
+            if outside {
+                outsiders.push((first + start + l) as u32);
             }
         }
         start += filled;
     }
-    outside
+    outsiders
 }
 
-/// What of the cage a point lies on, where the weights have no finite limit.
+/// What of the cage a point may lie on, where the weights have no finite limit.
 #[derive(Clone, Copy)]
 enum On {
     Nothing,
     Vertex(usize),
-    Edge(usize),
+    Edge([usize; 2]),
+}
+
+/// What the weights of one lane group add up to.
+struct Sums {
+    total: Lanes,
+    on: [On; LANES],
+    /// Rows whose entries may be off by more than [`TOLERANCE`].
+    suspect: [bool; LANES],
 }
 
 fn set_row(rows: &mut MatMut<'_, f64>, row: usize, entries: &[(usize, f64)]) {
@@ -151,12 +174,13 @@ fn distance(a: Point, b: Point) -> f64 {
 
 multiversion! {
     /// Unnormalised weights of one lane group, left in the scratch; returns their sums.
-    fn group_weights(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> (Lanes, [On; LANES]) = group_weights_generic;
+    fn group_weights(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> Sums = group_weights_generic;
 }
 
 #[inline(always)]
-fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> (Lanes, [On; LANES]) {
+fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> Sums {
     let mut on = [On::Nothing; LANES];
+    scratch.mended = Mended::default();
     let near_vertex = VERTEX_TOLERANCE * cage.diagonal();
     for (j, v) in cage.vertices().iter().enumerate() {
         let r = [Lanes::splat(v[0]) - x[0], Lanes::splat(v[1]) - x[1], Lanes::splat(v[2]) - x[2]];
@@ -191,9 +215,11 @@ fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> (
         term[2] = c[2] * half;
         term[3] = back;
         if s.any(t, |s, t| (s < EDGE_TOLERANCE) & (t < 0.0)) {
-            note_edge(&mut on, k, &s, &t);
+            note_edge(&mut on, edge, &s, &t);
         }
     }
+    // The largest square of what a face loses, over the distances.
+    let mut worst = Lanes::ZERO;
     for face in cage.faces() {
         let [e0, e1, e2] = face.edges.map(|e| &scratch.edges[e as usize]);
         let [s0, s1, s2] = face.signs;
@@ -206,20 +232,35 @@ fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> (
         let det = dot(&scratch.directions[v0], &g0) * back0;
         let inverse = det.map(|d| 1.0 / d);
         let mut w = [dot(&m, &g0) * back0 * inverse, dot(&m, &g1) * back1 * inverse, dot(&m, &g2) * back2 * inverse];
+        let inverse2 = inverse * inverse;
         let width2 = dot(&g0, &g0) + dot(&g1, &g1);
-        if det.any(width2, |d, q| d * d <= THIN * THIN * q) {
-            mend_thin(scratch, [v0, v1, v2], det, width2, &m, &mut w);
+        let thinness = width2 * inverse2;
+        // What rounding does to the sine of the face's height, it does to all three weights.
+        let mut loss = thinness + dot(&w, &w) * inverse2;
+        if thinness.any(thinness, |q, _| !is_kept(q)) {
+            mend_thin(cage, scratch, face, x, thinness, &m, &mut loss, &mut w);
         }
+        worst = worst.zip(loss, |a, b| if a < b { b } else { a });
         scratch.weights[v0] = scratch.weights[v0] + w[0];
         scratch.weights[v1] = scratch.weights[v1] + w[1];
         scratch.weights[v2] = scratch.weights[v2] + w[2];
     }
     let mut total = Lanes::ZERO;
+    let mut nearest = Lanes::ZERO;
+    let mut largest = Lanes::ZERO;
     for (weight, &nearness) in scratch.weights.iter_mut().zip(&scratch.nearness) {
         *weight = *weight * nearness;
         total = total + *weight;
+        nearest = nearest.zip(nearness, |a, b| if a < b { b } else { a });
+        largest = largest.zip(*weight, |a, b| if a < b.abs() { b.abs() } else { a });
     }
-    (total, on)
+    let mut suspect = [false; LANES];
+    for l in 0..LANES {
+        let error = f64::EPSILON * (worst.0[l].sqrt() * nearest.0[l] + largest.0[l]);
+        let relative = error / total.0[l].abs();
+        suspect[l] = relative.is_nan() || relative > TOLERANCE;
+    }
+    Sums { total, on, suspect }
 }
 
 // Kept out of the loops: the compiler would otherwise split the lanes as these few entries ask for, and the roots with them.
@@ -236,40 +277,10 @@ fn note_vertex(on: &mut [On; LANES], vertex: usize, distances: &Lanes, near: f64
 
 #[cold]
 #[inline(never)]
-fn note_edge(on: &mut [On; LANES], edge: usize, sines: &Lanes, cosines: &Lanes) {
+fn note_edge(on: &mut [On; LANES], edge: &Edge, sines: &Lanes, cosines: &Lanes) {
     for l in 0..LANES {
         if sines.0[l] < EDGE_TOLERANCE && cosines.0[l] < 0.0 && matches!(on[l], On::Nothing) {
-            on[l] = On::Edge(edge);
-        }
-    }
-}
-
-/// Replaces the weights of those lanes whose point lies nearly in the plane of the face.
-#[cold]
-#[inline(never)]
-fn mend_thin(scratch: &Scratch, vertices: [usize; 3], det: Lanes, width2: Lanes, m: &[Lanes; 3], w: &mut [Lanes; 3]) {
-    for l in 0..LANES {
-        let d = det.0[l];
-        if d * d > THIN * THIN * width2.0[l] {
-            continue;
-        }
-        let mean = [m[0].0[l], m[1].0[l], m[2].0[l]];
-        let seen = mesh::norm(mean);
-        let u = vertices.map(|v| scratch.directions[v].map(|c| c.0[l]));
-        let mended = if seen < 0.1 {
-            let distances = vertices.map(|v| 1.0 / scratch.nearness[v].0[l]);
-            thin::flat_weights(u, d).or_else(|| (seen < 1e-8).then(|| thin::sliver_weights(u, distances, d)))
-        } else if d == 0.0 {
-            // On the face itself: only the ratios of the weights count.
-            const HUGE: f64 = 1e200;
-            Some([0, 1, 2].map(|i| HUGE * mesh::dot(mean, mesh::cross(u[(i + 1) % 3], u[(i + 2) % 3]))))
-        } else {
-            None
-        };
-        if let Some(mended) = mended {
-            for i in 0..3 {
-                w[i].0[l] = mended[i];
-            }
+            on[l] = On::Edge(edge.vertices.map(|v| v as usize));
         }
     }
 }

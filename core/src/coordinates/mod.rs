@@ -1,7 +1,8 @@
 //! Cage coordinates: every point as a fixed combination of the cage's unknowns, `P = Φ·C`.
 
+mod careful;
+mod doubt;
 mod mean_value;
-mod thin;
 
 pub use mean_value::MeanValue;
 

@@ -1,6 +1,8 @@
 //! Cages and random numbers for the tests of this crate.
 #![allow(dead_code)]
 
+pub(crate) mod golden;
+
 use cager_core::cage::Cage;
 use cager_core::mesh::{Point, TriMesh};
 use cager_core::synthetic::{Capture, Options};
@@ -43,6 +45,17 @@ pub(crate) fn cages() -> Vec<(&'static str, Cage)> {
         ("octahedron", cage(&octahedron())),
         ("needle", cage(&stretched(&octahedron(), [30.0, 0.3, 1.0]))),
         ("detailed", cage(&detailed)),
+    ]
+}
+
+/// Cages a thousand and more times wider than thick, where opposite faces nearly cancel.
+pub(crate) fn thin_cages() -> Vec<(&'static str, Cage)> {
+    let square = || prism(&[[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]], &[[0, 1, 2], [0, 2, 3]]);
+    vec![
+        ("plate", cage(&stretched(&square(), [1.0, 1.0, 1e-3]))),
+        ("rod", cage(&stretched(&square(), [1.0, 1e-4, 1e-4]))),
+        ("flat L-shaped prism", cage(&stretched(&l_shape(), [1.0, 1.0, 1e-4]))),
+        ("blade", cage(&stretched(&octahedron(), [1.0, 1e-2, 1e-4]))),
     ]
 }
 
