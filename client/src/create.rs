@@ -87,7 +87,12 @@ fn part(file: &MeshFile, sent: &Arc<AtomicU64>) -> Part {
         sent.fetch_add(chunk.len() as u64, Ordering::Relaxed);
         async move { (!chunk.is_empty()).then_some((Ok::<_, Infallible>(chunk), rest)) }
     });
-    Part::stream_with_length(Body::wrap_stream(chunks), length).file_name(file.name.clone())
+    Part::stream_with_length(Body::wrap_stream(chunks), length).file_name(plain_name(&file.name))
+}
+
+/// The service wants the extension; other letters are written in so many ways in a form that some servers lose them.
+fn plain_name(name: &str) -> String {
+    name.chars().map(|c| if c.is_ascii_alphanumeric() || matches!(c, '.' | '-' | '_') { c } else { '_' }).collect()
 }
 
 fn random_key() -> String {
