@@ -11,6 +11,7 @@ pub mod engine;
 pub mod http;
 mod plot;
 pub mod problem;
+pub mod remote;
 pub mod report;
 pub mod service;
 mod session;

@@ -46,6 +46,17 @@ impl Decoder {
         Self { phi: single, points, positions }
     }
 
+    /// Takes coordinates in single precision, n × `unknowns`, row-major, as they travel to who decodes elsewhere; the first
+    /// `positions` unknowns are positions. Decodes to the same bits as the decoder that they came from.
+    ///
+    /// # Panics
+    /// Where the values are not whole rows.
+    pub fn from_rows(values: &[f32], unknowns: usize, positions: usize) -> Self {
+        assert!(values.len().is_multiple_of(unknowns), "whole rows of {unknowns} coordinates");
+        let rows = MatRef::from_row_major_slice(values, values.len() / unknowns, unknowns);
+        Self::from_single(rows.to_owned(), positions)
+    }
+
     /// Takes coordinates n × m that are in single precision already.
     pub(crate) fn from_single(mut phi: Mat<f32>, positions: usize) -> Self {
         let points = phi.nrows();

@@ -4,6 +4,7 @@ mod common;
 
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Coordinates, MeanValue};
+use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, Handles, PrepareError, Solver, SolverOptions};
 use cager_core::mesh::Point;
 use cager_core::regularize::Regularizer;
@@ -77,6 +78,22 @@ fn the_measured_error_is_that_of_the_decoded_positions() {
         let linf = squares.iter().copied().fold(0.0, f64::max).sqrt();
         assert!((errors[t].l2 / l2 - 1.0).abs() < 1e-12 && (errors[t].linf / linf - 1.0).abs() < 1e-12);
     }
+}
+
+#[test]
+fn coordinates_that_have_travelled_decode_to_the_same_bits() {
+    let (capture, cage) = capture();
+    let solver = prepare(&capture, &cage, SolverOptions::default());
+    let frame = frame(&capture, 3);
+    let cages = solver.invert(&[&frame]);
+    let phi = solver.decoder().coordinates();
+    let rows: Vec<f32> = (0..phi.nrows()).flat_map(|i| (0..phi.ncols()).map(move |j| phi[(i, j)])).collect();
+    let elsewhere = Decoder::from_rows(&rows, phi.ncols(), cage.vertices().len());
+    assert_eq!((elsewhere.points(), elsewhere.unknowns()), (phi.nrows(), phi.ncols()));
+    let (mut here, mut there) = (vec![Vec::new()], vec![Vec::new()]);
+    solver.decoder().decode(&[&cages[0]], &mut here);
+    elsewhere.decode(&[&cages[0]], &mut there);
+    assert_eq!(here, there);
 }
 
 #[test]

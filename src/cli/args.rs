@@ -60,6 +60,14 @@ pub(crate) struct EncodeArgs {
     /// Turn all faces of the cage around: for cages whose normals point inwards.
     #[arg(long)]
     pub(crate) flip_cage: bool,
+
+    /// Have a service compute: its address, such as http://127.0.0.1:8080.
+    #[arg(long, value_name = "URL")]
+    pub(crate) server: Option<String>,
+
+    /// Token to show to the service [default: the environment's CAGER_TOKEN, which other users of this machine do not see].
+    #[arg(long, value_name = "T", requires = "server", hide_default_value = true)]
+    pub(crate) token: Option<String>,
 }
 
 #[derive(Args, Debug)]

@@ -1,14 +1,17 @@
 //! `cager encode`.
 
 use super::args::{EncodeArgs, SolverArgs};
-use super::{grouped, human_bytes, interrupt, print, progress, warn};
+use super::{grouped, human_bytes, interrupt, plain, print, progress, warn};
 use crate::coordinates;
 use crate::encode::{self, Encoded, Job};
+use crate::remote::{EncodedRemotely, FileFrames, RemoteJob, encode_remotely};
 use crate::report::Report;
 use anyhow::{Context, Result, bail};
+use cager_client::FrameSource;
+use cager_client::messages::SessionOptions;
 use cager_core::cage::Cage;
 use cager_core::inversion::{PrepareError, SolverOptions};
-use cager_core::mesh::TriMesh;
+use cager_core::mesh::{Model, TriMesh};
 use cager_formats::{AtomicFile, CacheFormat, CompleteFile, MeshFormat, commit_together, open_frames, read_model};
 use std::io::Write;
 use std::path::Path;
@@ -18,20 +21,72 @@ pub(super) fn run(args: &EncodeArgs) -> Result<()> {
     let clock = Instant::now();
     let rest = read_model(&args.rest)?;
     let cage = read_cage(&args.cage, args.flip_cage)?;
+    match &args.server {
+        None => here(args, &rest, &cage, clock),
+        Some(address) => elsewhere(args, address, &rest, &cage, clock),
+    }
+}
+
+fn here(args: &EncodeArgs, rest: &Model, cage: &Cage, clock: Instant) -> Result<()> {
     let mut frames = open_frames(&args.frames, rest.points.len())?;
     let read_seconds = clock.elapsed().as_secs_f64();
-    let (system, options) = solver(&args.solver, &cage)?;
-    refuse_overwriting(args)?;
-    interrupt::leaves_nothing()?;
-    // Before the work, so that a report that cannot be written costs no waiting.
-    let report_file = args.report.as_ref().map(AtomicFile::create).transpose()?;
+    let (system, options) = solver(&args.solver, cage)?;
+    let report_file = begin(args)?;
 
     let bar = progress::frames("encoding", frames.frames());
-    let job = Job { rest: &rest, cage: &cage, frames: frames.as_mut(), output: &args.output, system, options };
+    let job = Job { rest, cage, frames: frames.as_mut(), output: &args.output, system, options };
     let result = encode::encode(job, &mut |done| bar.set_position(done as u64));
     bar.finish_and_clear();
-    let Encoded { mut report, container } = result.map_err(|error| name_files(error, args))?;
-    report.seconds.read += read_seconds;
+    let mut encoded = result.map_err(|error| name_files(error, args))?;
+    encoded.report.seconds.read += read_seconds;
+    finish(args, encoded, report_file, clock)
+}
+
+/// The files are read here as well, so that what is wrong with them is told before anything is sent, in words that name them.
+fn elsewhere(args: &EncodeArgs, address: &str, rest: &Model, cage: &Cage, clock: Instant) -> Result<()> {
+    let frames = FileFrames::open(&args.frames, rest.points.len())?;
+    let read_seconds = clock.elapsed().as_secs_f64();
+    let (system, options) = solver(&args.solver, cage)?;
+    let report_file = begin(args)?;
+
+    let token = args.token.clone().or_else(|| std::env::var("CAGER_TOKEN").ok());
+    let options = SessionOptions {
+        name: args.output.file_stem().map(|name| name.to_string_lossy().chars().take(200).collect()),
+        coordinates: Some(system.name().to_owned()),
+        handles: Some(options.handles.name().to_owned()),
+        regularizer: Some(options.regularizer.name().to_owned()),
+        spectrum: Some(options.spectrum as u32),
+        lambda: Some(options.lambda),
+        flip_cage: args.flip_cage,
+        ..SessionOptions::default()
+    };
+    let bar = progress::frames("encoding", frames.frames().unwrap_or(0) as usize);
+    let job = RemoteJob {
+        address,
+        token: token.as_deref(),
+        rest: &args.rest,
+        cage: &args.cage,
+        frames,
+        output: &args.output,
+        options,
+    };
+    let result = encode_remotely(job, &mut |done| bar.set_position(done as u64));
+    bar.finish_and_clear();
+    let EncodedRemotely { mut encoded, session } = result?;
+    encoded.report.seconds.read += read_seconds;
+    finish(args, encoded, report_file, clock)?;
+    print(&format!("  service {}, session {}\n", plain(address), plain(&session)))
+}
+
+/// What comes before the work, so that outputs that cannot be written cost no waiting.
+fn begin(args: &EncodeArgs) -> Result<Option<AtomicFile>> {
+    refuse_overwriting(args)?;
+    interrupt::leaves_nothing()?;
+    Ok(args.report.as_ref().map(AtomicFile::create).transpose()?)
+}
+
+fn finish(args: &EncodeArgs, encoded: Encoded, report_file: Option<AtomicFile>, clock: Instant) -> Result<()> {
+    let Encoded { mut report, container } = encoded;
     report.seconds.total = clock.elapsed().as_secs_f64();
     // A full disk shows here, before either file has its name.
     let report_file = report_file.map(|file| write_report(file, &report)).transpose()?;

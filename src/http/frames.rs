@@ -100,7 +100,7 @@ pub(crate) async fn post(
     let solver = service.solver(&session).await?;
     let live = service.lane(&session, solver, &tenant);
     let upload = Arc::new(Upload::default());
-    let answering = Answering { upload: Arc::clone(&upload), _place: place };
+    let answering = Answering { upload: Arc::clone(&upload), _live: Arc::clone(&live), _place: place };
     let reading = Reading { service, session: Arc::clone(&session), live, upload: Arc::clone(&upload) };
     let frames = FrameReader::new(layout, &facts);
     tokio::spawn(async move {
@@ -231,6 +231,8 @@ impl Reading {
 /// The half of an upload that answers. Dropped when the client is gone.
 struct Answering {
     upload: Arc<Upload>,
+    /// Frames wait in the lane after the whole body has arrived, and a lane that is dropped forgets them.
+    _live: Arc<LiveLane>,
     _place: StreamPlace,
 }
 

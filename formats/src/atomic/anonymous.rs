@@ -18,7 +18,7 @@ mod linux {
     /// A file in the file system of `folder`, with the permissions of any new file; none where the system has no such
     /// files, or where they could not be named later.
     pub(in super::super) fn create(folder: &Path) -> Option<File> {
-        let flags = OFlags::TMPFILE | OFlags::WRONLY | OFlags::CLOEXEC;
+        let flags = OFlags::TMPFILE | OFlags::RDWR | OFlags::CLOEXEC;
         let file = File::from(rustix::fs::open(folder, flags, Mode::from_raw_mode(0o666)).ok()?);
         // Its name is to be linked to what /proc shows, which some sandboxes lack: better found out before the work.
         let (own, shown) = (file.metadata().ok()?, fs::metadata(shown(&file)).ok()?);

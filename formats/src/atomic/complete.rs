@@ -1,7 +1,7 @@
 //! Complete files that take their names, all or none.
 
 use std::fs::{self, File};
-use std::io;
+use std::io::{self, Seek};
 use std::path::{Path, PathBuf};
 
 use super::temporary::{self, Live, Temporary};
@@ -30,6 +30,16 @@ impl CompleteFile {
     /// Bytes in the file.
     pub fn length(&self) -> u64 {
         self.length
+    }
+
+    /// The contents from their start, for whoever checks them before they take their name. One reader at a time: all share
+    /// one position.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn reader(&self) -> Result<File, Error> {
+        let reader = self.file.try_clone().and_then(|mut file| file.rewind().map(|()| file));
+        reader.map_err(|cause| hide_temporary(&self.path, &cause))
     }
 
     /// Gives the file its name and says how to take that back. `keep` saves what had the name before.

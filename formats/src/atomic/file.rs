@@ -46,7 +46,8 @@ impl AtomicFile {
         let (file, temporary) = match unnamed(&place.folder) {
             Some(file) => (file, None),
             None => {
-                let begun = temporary::lock().begin(&place.folder, |path| File::create_new(path));
+                let begun = temporary::lock()
+                    .begin(&place.folder, |path| File::options().read(true).write(true).create_new(true).open(path));
                 let (file, temporary) = begun.map_err(|cause| hide_temporary(path, &cause))?;
                 (file, Some(temporary))
             }

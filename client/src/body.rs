@@ -1,0 +1,76 @@
+//! Reading answers that may be too long, too short or never end.
+
+use crate::client::Client;
+use crate::error::Failure;
+use bytes::Bytes;
+use reqwest::Response;
+use serde::de::DeserializeOwned;
+
+/// Longest JSON body: the errors of half a million frames are shorter.
+const JSON_BYTES: u64 = 64 << 20;
+
+/// Room made for a body on the word of its sender alone.
+const TRUSTED_BYTES: u64 = 1 << 20;
+
+/// What came of waiting for the next part of a body.
+pub(crate) enum Heard {
+    /// The part.
+    Piece(Bytes),
+    /// The body is over.
+    End,
+    /// Nothing within the idle time-out.
+    Silence,
+}
+
+/// Waits for the next part of a body that may be silent for long.
+pub(crate) async fn listen(client: &Client, response: &mut Response) -> Result<Heard, Failure> {
+    match tokio::time::timeout(client.options().idle_timeout, response.chunk()).await {
+        Ok(Ok(Some(piece))) => Ok(Heard::Piece(piece)),
+        Ok(Ok(None)) => Ok(Heard::End),
+        Ok(Err(error)) => Err(client.network(&error)),
+        Err(_) => Ok(Heard::Silence),
+    }
+}
+
+/// The next part of a body; `None` at its end.
+pub(crate) async fn next(client: &Client, response: &mut Response) -> Result<Option<Bytes>, Failure> {
+    match listen(client, response).await? {
+        Heard::Piece(piece) => Ok(Some(piece)),
+        Heard::End => Ok(None),
+        Heard::Silence => Err(client.stalled()),
+    }
+}
+
+/// A whole body of at most `limit` bytes.
+pub(crate) async fn whole(client: &Client, mut response: Response, limit: u64) -> Result<Vec<u8>, Failure> {
+    let too_long = || Failure::protocol(format!("its body has more than {limit} bytes"));
+    let announced = response.content_length().unwrap_or(0);
+    if announced > limit {
+        return Err(too_long());
+    }
+    let mut body = Vec::with_capacity(announced.min(TRUSTED_BYTES) as usize);
+    while let Some(chunk) = next(client, &mut response).await? {
+        if body.len() as u64 + chunk.len() as u64 > limit {
+            return Err(too_long());
+        }
+        body.extend_from_slice(&chunk);
+    }
+    Ok(body)
+}
+
+/// A JSON body.
+pub(crate) async fn json<T: DeserializeOwned>(client: &Client, response: Response) -> Result<T, Failure> {
+    let body = whole(client, response, JSON_BYTES).await?;
+    serde_json::from_slice(&body)
+        .map_err(|error| Failure::protocol(format!("its JSON is not what was asked for: {error}")))
+}
+
+/// Little-endian bytes as numbers of four bytes each.
+pub(crate) fn numbers<T>(bytes: &[u8], read: fn([u8; 4]) -> T) -> Result<Vec<T>, Failure> {
+    let (numbers, rest) = bytes.as_chunks::<4>();
+    if rest.is_empty() {
+        Ok(numbers.iter().map(|&b| read(b)).collect())
+    } else {
+        Err(Failure::protocol(format!("its {} bytes are not numbers of four", bytes.len())))
+    }
+}

@@ -1,0 +1,119 @@
+//! Progress of a session as it happens.
+
+use crate::backoff::Backoff;
+use crate::body::{Heard, listen};
+use crate::client::Client;
+use crate::error::{ClientError, Failure};
+use crate::sse::SseParser;
+use cager_proto::messages::{Progress, SessionState};
+use futures_util::stream::BoxStream;
+use futures_util::{StreamExt, stream};
+use reqwest::header::ACCEPT;
+use reqwest::{Method, Response, StatusCode};
+use std::collections::VecDeque;
+use std::time::Duration;
+
+/// Pause before the next connection where the stream does not ask for another one.
+const RECONNECT: Duration = Duration::from_secs(1);
+
+/// Longest pause that a stream may ask for.
+const LONGEST_RECONNECT: Duration = Duration::from_secs(60);
+
+impl Client {
+    /// Progress of a session as it happens, until it is complete or has failed; that is the last item. A broken connection is
+    /// taken up again after the last event.
+    ///
+    /// An error, such as [`ClientError::Refused`] for a session that was deleted, ends the stream.
+    pub fn events(&self, id: &str) -> BoxStream<'static, Result<Progress, ClientError>> {
+        let events = Events {
+            client: self.clone(),
+            id: id.to_owned(),
+            backoff: self.backoff(),
+            connection: None,
+            last_id: None,
+            pause: RECONNECT,
+            waiting: VecDeque::new(),
+            done: false,
+        };
+        stream::try_unfold(events, async |mut events| Ok(events.next().await?.map(|progress| (progress, events))))
+            .boxed()
+    }
+}
+
+struct Events {
+    client: Client,
+    id: String,
+    backoff: Backoff,
+    connection: Option<(Response, SseParser)>,
+    last_id: Option<String>,
+    pause: Duration,
+    waiting: VecDeque<Progress>,
+    done: bool,
+}
+
+impl Events {
+    async fn next(&mut self) -> Result<Option<Progress>, ClientError> {
+        loop {
+            if let Some(progress) = self.waiting.pop_front() {
+                self.backoff.progress();
+                self.done = matches!(progress.state, SessionState::Completed | SessionState::Failed);
+                return Ok(Some(progress));
+            }
+            if self.done {
+                return Ok(None);
+            }
+            if let Err(failure) = self.receive().await {
+                self.connection = None;
+                self.backoff.wait_after(failure).await?;
+            }
+        }
+    }
+
+    /// Waits for the next events, over a new connection where there is none.
+    async fn receive(&mut self) -> Result<(), Failure> {
+        let (response, parser) = match &mut self.connection {
+            Some(connection) => connection,
+            None => {
+                let Some(response) = self.connect().await? else {
+                    self.done = true;
+                    return Ok(());
+                };
+                self.connection.insert((response, SseParser::default()))
+            }
+        };
+        let Heard::Piece(piece) = listen(&self.client, response).await? else {
+            // Servers and proxies end long answers, and there may be nothing to tell for long; that is no failure, but no
+            // reason to hurry either.
+            self.connection = None;
+            tokio::time::sleep(self.pause).await;
+            return Ok(());
+        };
+        let events = parser.push(&piece).map_err(|_| Failure::protocol("an event has no end"))?;
+        if let Some(id) = parser.last_id() {
+            self.last_id = Some(id.to_owned());
+        }
+        self.pause = parser.retry().map_or(self.pause, |asked| asked.min(LONGEST_RECONNECT));
+        for event in events {
+            match serde_json::from_str(&event.data) {
+                Ok(progress) => self.waiting.push_back(progress),
+                Err(error) if matches!(event.event.as_str(), "" | "message" | "progress") => {
+                    return Err(Failure::protocol(format!("an event is no progress: {error}")));
+                }
+                // Other types of events may come in later versions.
+                Err(_) => {}
+            }
+        }
+        Ok(())
+    }
+
+    async fn connect(&mut self) -> Result<Option<Response>, Failure> {
+        let mut request = self.client.request(Method::GET, &["v1", "sessions", &self.id, "events"], &[]).await?;
+        request = request.header(ACCEPT, "text/event-stream");
+        if let Some(id) = &self.last_id {
+            request = request.header("Last-Event-ID", id);
+        }
+        let response = self.client.send(request).await?;
+        // The way to say that there will be no more events.
+        Ok((response.status() != StatusCode::NO_CONTENT).then_some(response))
+    }
+}

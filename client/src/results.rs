@@ -1,0 +1,116 @@
+//! What preparing and solving found, in one piece each.
+
+use crate::body::{numbers, whole};
+use crate::client::Client;
+use crate::error::{ClientError, Failure};
+use crate::sessions::known;
+use cager_proto::messages::{FrameErrors, FrameResult};
+use reqwest::header::{ACCEPT, HeaderMap};
+use reqwest::{Method, Response};
+
+/// Bytes of all indices that can be: four for each of a session's points.
+const MOST_HANDLE_BYTES: u64 = 4 * u32::MAX as u64;
+
+/// The coordinates `Φ` of a session.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coordinates {
+    /// Points of the model, n.
+    pub rows: usize,
+    /// Unknowns per frame, m.
+    pub columns: usize,
+    /// n × m values, row-major.
+    pub values: Vec<f32>,
+}
+
+impl Client {
+    /// Errors of all solved frames as fractions of the rest diagonal, ascending by frame.
+    ///
+    /// # Errors
+    /// Those of the connection.
+    pub async fn errors(&self, id: &str) -> Result<Vec<FrameResult>, ClientError> {
+        let errors: FrameErrors = self.fetch(Method::GET, &["v1", "sessions", id, "errors"], &[]).await?;
+        Ok(errors.frames)
+    }
+
+    /// Indices of the points that the inversion reads, in the order of the rows of a frame with
+    /// [`Rows::Handles`](crate::Rows::Handles).
+    ///
+    /// # Errors
+    /// [`ClientError::Refused`] where the session has none yet, and those of the connection.
+    pub async fn handles(&self, id: &str) -> Result<Vec<u32>, ClientError> {
+        self.retrying(|| async {
+            let response = self.octets(&["v1", "sessions", id, "handles"]).await?;
+            numbers(&whole(self, response, MOST_HANDLE_BYTES).await?, u32::from_le_bytes)
+        })
+        .await
+    }
+
+    /// The coordinates that turn cages into positions: `P = Φ·C`.
+    ///
+    /// # Errors
+    /// [`ClientError::Refused`] where the session has none yet, and those of the connection.
+    pub async fn coordinates(&self, id: &str) -> Result<Coordinates, ClientError> {
+        let session = self.session(id).await?;
+        self.retrying(|| async {
+            let rows = known(id, "points", session.points)?;
+            let columns = known(id, "unknowns", session.unknowns)?;
+            let response = self.octets(&["v1", "sessions", id, "coordinates"]).await?;
+            for (name, expected) in [("cager-rows", rows), ("cager-columns", columns)] {
+                let found = number(response.headers(), name)?;
+                if found != expected {
+                    return Err(Failure::protocol(format!("{name} is {found}, but the session says {expected}")));
+                }
+            }
+            let bytes = 4 * u64::from(rows) * u64::from(columns);
+            let body = whole(self, response, bytes).await?;
+            if body.len() as u64 != bytes {
+                return Err(Failure::protocol(format!("{} bytes are not {rows} × {columns} coordinates", body.len())));
+            }
+            let values = numbers(&body, f32::from_le_bytes)?;
+            Ok(Coordinates { rows: rows as usize, columns: columns as usize, values })
+        })
+        .await
+    }
+
+    /// A resource as bytes.
+    async fn octets(&self, segments: &[&str]) -> Result<Response, Failure> {
+        let request = self.request(Method::GET, segments, &[]).await?;
+        self.send(request.header(ACCEPT, "application/octet-stream")).await
+    }
+
+    /// Positions of the model from cages, edited or not, by the service: `cages` holds whole frames of m × 3 values one after
+    /// another, the result as many of n × 3. For many frames, call it for some at a time, or see
+    /// [`LocalDecoder`](crate::LocalDecoder).
+    ///
+    /// # Errors
+    /// [`ClientError::Mismatch`] where `cages` does not hold whole frames, and those of the connection.
+    pub async fn decode(&self, id: &str, cages: &[f32]) -> Result<Vec<f32>, ClientError> {
+        let session = self.session(id).await?;
+        let body: bytes::Bytes = cages.iter().flat_map(|x| x.to_le_bytes()).collect();
+        self.retrying(|| async {
+            let frame = 3 * known(id, "unknowns", session.unknowns)? as usize;
+            let points = known(id, "points", session.points)?;
+            if frame == 0 || !cages.len().is_multiple_of(frame) {
+                let what = format!("{} values are no whole cages of {frame} each; give whole frames", cages.len());
+                return Err(ClientError::Mismatch(what).into());
+            }
+            let request = self.request(Method::POST, &["v1", "sessions", id, "decode"], &[]).await?;
+            let request = request
+                .header("content-type", "application/octet-stream")
+                .header(ACCEPT, "application/octet-stream")
+                .body(body.clone());
+            let expected = 12 * u64::from(points) * (cages.len() / frame) as u64;
+            let positions = whole(self, self.send(request).await?, expected).await?;
+            if positions.len() as u64 != expected {
+                return Err(self.broken(format!("{} of {expected} bytes came", positions.len())));
+            }
+            numbers(&positions, f32::from_le_bytes)
+        })
+        .await
+    }
+}
+
+fn number(headers: &HeaderMap, name: &str) -> Result<u32, Failure> {
+    let value = headers.get(name).and_then(|value| value.to_str().ok()?.parse().ok());
+    value.ok_or_else(|| Failure::protocol(format!("the header {name} is missing or no number")))
+}

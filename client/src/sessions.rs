@@ -1,0 +1,115 @@
+//! Looking at sessions, waiting for them, finishing and deleting them.
+
+use crate::body::json;
+use crate::client::Client;
+use crate::error::{ClientError, Failure};
+use cager_proto::messages::{Complete, Problem, Session, SessionList, SessionState};
+use reqwest::Method;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Pauses between two looks at a session that prepares.
+const FIRST_PAUSE: Duration = Duration::from_millis(50);
+const LONGEST_PAUSE: Duration = Duration::from_secs(2);
+
+impl Client {
+    /// A session as it is now.
+    ///
+    /// # Errors
+    /// [`ClientError::Refused`] with status 404 where there is none of that id, and those of the connection.
+    pub async fn session(&self, id: &str) -> Result<Session, ClientError> {
+        self.fetch(Method::GET, &["v1", "sessions", id], &[]).await
+    }
+
+    /// All sessions, oldest first, page after page.
+    ///
+    /// # Errors
+    /// Those of the connection.
+    pub async fn sessions(&self) -> Result<Vec<Session>, ClientError> {
+        let mut all = Vec::new();
+        let mut query = Vec::new();
+        loop {
+            let page: SessionList = self.fetch(Method::GET, &["v1", "sessions"], &query).await?;
+            let grew = !page.sessions.is_empty();
+            all.extend(page.sessions);
+            match page.next {
+                None => return Ok(all),
+                // An empty page that names a next one would go on for ever.
+                Some(_) if !grew => return Err(ClientError::Protocol("its list of sessions has no end".to_owned())),
+                Some(next) => query = vec![("after", next)],
+            }
+        }
+    }
+
+    /// Deletes a session with all its results, and stops work for it.
+    ///
+    /// # Errors
+    /// [`ClientError::Refused`] with status 404 where there is none of that id, and those of the connection.
+    pub async fn delete(&self, id: &str) -> Result<(), ClientError> {
+        let asked = AtomicBool::new(false);
+        self.retrying(|| async {
+            let request = self.request(Method::DELETE, &["v1", "sessions", id], &[]).await?;
+            let again = asked.swap(true, Ordering::Relaxed);
+            match self.send(request).await {
+                // An earlier attempt deleted it, and its answer was lost.
+                Err(failure) if again && failure.status() == Some(404) => Ok(()),
+                answer => answer.map(drop),
+            }
+        })
+        .await
+    }
+
+    /// Waits until a session takes frames, or is complete.
+    ///
+    /// # Errors
+    /// [`ClientError::Failed`] with the reason where preparing failed, [`ClientError::NotReady`] after `limit`, and those of
+    /// the connection.
+    pub async fn wait_ready(&self, id: &str, limit: Duration) -> Result<Session, ClientError> {
+        let clock = Instant::now();
+        let mut pause = FIRST_PAUSE;
+        loop {
+            let session = self.session(id).await?;
+            match session.state {
+                SessionState::Ready | SessionState::Completed => return Ok(session),
+                SessionState::Failed => return Err(ClientError::Failed(Box::new(reason(session)))),
+                SessionState::Preparing => {}
+            }
+            let waited = clock.elapsed();
+            if waited >= limit {
+                return Err(ClientError::NotReady { id: id.to_owned(), waited });
+            }
+            tokio::time::sleep(pause.min(limit - waited)).await;
+            pause = (pause * 2).min(LONGEST_PAUSE);
+        }
+    }
+
+    /// Says that no more than `frames` frames are coming. The session is then complete and its container written.
+    ///
+    /// # Errors
+    /// [`ClientError::Refused`] with status 409 and the missing ranges where frames are missing, and those of the
+    /// connection.
+    pub async fn complete(&self, id: &str, frames: u32) -> Result<Session, ClientError> {
+        self.retrying(|| async {
+            let request = self.request(Method::POST, &["v1", "sessions", id, "complete"], &[]).await?;
+            json(self, self.send(request.json(&Complete { frames })).await?).await
+        })
+        .await
+    }
+}
+
+/// Why a session failed.
+pub(crate) fn reason(session: Session) -> Problem {
+    session.problem.unwrap_or_else(|| Problem {
+        kind: "about:blank".to_owned(),
+        title: "Session failed".to_owned(),
+        detail: "the service does not say why; look at its log".to_owned(),
+        ..Problem::default()
+    })
+}
+
+/// A number of a session that is known once it is ready.
+pub(crate) fn known(id: &str, what: &str, number: Option<u32>) -> Result<u32, Failure> {
+    number.ok_or_else(|| {
+        ClientError::Mismatch(format!("session {id} does not know its {what} yet; wait until it is ready")).into()
+    })
+}

@@ -1,0 +1,174 @@
+//! Uploading frames: as fast as the connection takes them, and on after whatever broke it.
+
+mod answer;
+mod feed;
+mod pass;
+mod set;
+
+use crate::client::Client;
+use crate::error::{ClientError, Failure};
+use crate::sessions::{known, reason};
+use crate::source::FrameSource;
+use cager_proto::messages::{FrameResult, Session, SessionState};
+use feed::{Feed, check_handles};
+use set::FrameSet;
+use std::time::Duration;
+
+/// Which rows of a frame are sent.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Rows {
+    /// All points: the service measures the error of every frame.
+    #[default]
+    All,
+    /// Those that the inversion reads: little to send, the same cages, but no errors.
+    Handles,
+}
+
+/// How frames are uploaded.
+pub struct UploadOptions<'a> {
+    /// Which rows of a frame are sent.
+    pub rows: Rows,
+    /// Told every frame's result once, as it comes; on a session that had some already, theirs first.
+    pub on_frame: Option<&'a mut (dyn FnMut(FrameResult) + Send)>,
+    /// Longest wait for a session that still prepares.
+    pub ready_limit: Duration,
+}
+
+impl Default for UploadOptions<'_> {
+    fn default() -> Self {
+        Self { rows: Rows::All, on_frame: None, ready_limit: Duration::from_secs(600) }
+    }
+}
+
+/// A finished upload.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Uploaded {
+    /// Frames of the capture; the service has all of them, solved and on disk.
+    pub frames: u32,
+    /// Bytes of frames given to connections, more than once where one broke.
+    pub sent_bytes: u64,
+    /// Requests after the first one.
+    pub retries: u32,
+}
+
+impl Client {
+    /// Uploads the frames that a session does not have yet, and returns when all of them are solved. Results come back while
+    /// frames are sent; memory does not grow with their number. After a broken connection, a restart of the service or its
+    /// request for patience, it goes on with what is missing.
+    ///
+    /// `source` is read on a thread of its own, for which it is handed over.
+    ///
+    /// # Errors
+    /// [`ClientError::Mismatch`] where the frames do not fit the session, [`ClientError::Source`] where they cannot be read,
+    /// [`ClientError::Refused`] where the service does not want them, and those of [`Client::wait_ready`] and the connection.
+    /// Frames that have their result stay solved; another upload goes on from there.
+    pub async fn upload<S: FrameSource + 'static>(
+        &self,
+        session: &Session,
+        source: S,
+        options: UploadOptions<'_>,
+    ) -> Result<Uploaded, ClientError> {
+        let session = self.wait_ready(&session.id, options.ready_limit).await?;
+        let points = known(&session.id, "points", session.points).map_err(plain)?;
+        if source.points() != points as usize {
+            let found = source.points();
+            return Err(ClientError::Mismatch(format!(
+                "the frames have {found} points, but the session's model has {points}; use a capture of the same mesh"
+            )));
+        }
+        let handles = match options.rows {
+            Rows::All => None,
+            Rows::Handles => Some(self.handles(&session.id).await?),
+        };
+        check_handles(handles.as_deref().unwrap_or_default(), points)?;
+        let mut upload = Upload {
+            client: self.clone(),
+            id: session.id.clone(),
+            by_handles: handles.is_some(),
+            total: source.frames(),
+            done: FrameSet::default(),
+            reported: FrameSet::default(),
+            on_frame: options.on_frame,
+            sent_bytes: 0,
+        };
+        upload.learn(&session).await?;
+        upload.run(&Feed::start(source, handles)?).await
+    }
+}
+
+/// An upload under way.
+struct Upload<'a> {
+    client: Client,
+    id: String,
+    by_handles: bool,
+    /// Frames of the capture, where known.
+    total: Option<u32>,
+    /// Frames that the service has solved.
+    done: FrameSet,
+    /// Frames whose result the caller knows.
+    reported: FrameSet,
+    on_frame: Option<&'a mut (dyn FnMut(FrameResult) + Send)>,
+    sent_bytes: u64,
+}
+
+impl Upload<'_> {
+    async fn run(mut self, feed: &Feed) -> Result<Uploaded, ClientError> {
+        let mut backoff = self.client.backoff();
+        let mut cautious = false;
+        while !self.is_complete() {
+            let before = self.done.len();
+            let ranges = self.done.missing(self.total);
+            let Err(failure) = self.pass(feed, ranges, cautious).await else { continue };
+            if self.done.len() > before {
+                backoff.progress();
+            }
+            cautious = matches!(&failure, Failure::Transient { error: ClientError::Broken { .. }, .. });
+            backoff.wait_after(failure).await?;
+            let session = self.client.session(&self.id).await?;
+            self.learn(&session).await?;
+            if self.done.len() > before {
+                backoff.progress();
+            }
+        }
+        let frames = self.total.unwrap_or_else(|| self.done.end());
+        Ok(Uploaded { frames, sent_bytes: self.sent_bytes, retries: backoff.total() })
+    }
+
+    /// Takes over what the service has, and reports the results that went astray.
+    async fn learn(&mut self, session: &Session) -> Result<(), ClientError> {
+        if session.state == SessionState::Failed {
+            return Err(ClientError::Failed(Box::new(reason(session.clone()))));
+        }
+        self.done = FrameSet::solved(&session.frames)
+            .ok_or_else(|| ClientError::Protocol("the counts of its frames contradict each other".to_owned()))?;
+        if session.state == SessionState::Completed {
+            self.total = self.total.or(Some(self.done.end()));
+        }
+        if self.on_frame.is_some() && self.done.len() > self.reported.len() {
+            for result in self.client.errors(&self.id).await? {
+                self.report(result);
+            }
+        }
+        Ok(())
+    }
+
+    fn report(&mut self, result: FrameResult) {
+        let FrameResult { frame, .. } = result;
+        if self.reported.insert(frame, frame.saturating_add(1))
+            && let Some(on_frame) = &mut self.on_frame
+        {
+            on_frame(result);
+        }
+    }
+
+    fn is_complete(&self) -> bool {
+        self.total.is_some_and(|total| self.done.missing(Some(total)).is_empty())
+    }
+}
+
+/// A failure that no other attempt mends.
+fn plain(failure: Failure) -> ClientError {
+    match failure {
+        Failure::Transient { error, .. } | Failure::Final(error) => error,
+    }
+}

@@ -1,0 +1,152 @@
+//! Encoding by a service: the same files in and the same container out as [`crate::encode`], but another machine computes.
+
+mod frames;
+mod report;
+
+pub use frames::FileFrames;
+
+use crate::encode::Encoded;
+use cager_client::messages::{FrameResult, SessionOptions};
+use cager_client::{Client, ClientError, ClientOptions, MeshFile, NewSession, UploadOptions};
+use cager_formats::{Action, AtomicFile};
+use cager_proto::container;
+use report::{Times, report};
+use std::io::{self, BufReader};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Longest wait for a session to be prepared.
+const READY_WITHIN: Duration = Duration::from_secs(3600);
+
+/// Longest wait for a service to clean up after a failure; it does so by itself in time.
+const CLEAN_UP_WITHIN: Duration = Duration::from_secs(5);
+
+/// Why encoding by a service stopped; nothing was written.
+#[derive(Debug, thiserror::Error)]
+pub enum RemoteError {
+    /// The service refused, or cannot be reached.
+    #[error(transparent)]
+    Client(#[from] ClientError),
+    /// A file cannot be read or written.
+    #[error(transparent)]
+    Formats(#[from] cager_formats::Error),
+    /// What the service sent is no container.
+    #[error(
+        "the container from the service cannot be read ({0}); encode again, and look at the service's log if that gives the same"
+    )]
+    Container(container::Error),
+    /// The system gives no means to connect.
+    #[error("the network cannot be used ({0}); free some memory or files and try again")]
+    Runtime(io::Error),
+}
+
+/// Everything an encoding by a service needs.
+pub struct RemoteJob<'a> {
+    /// Address of the service.
+    pub address: &'a str,
+    /// Token to show there.
+    pub token: Option<&'a str>,
+    /// File with the model in its rest pose.
+    pub rest: &'a Path,
+    /// File with the cage around it.
+    pub cage: &'a Path,
+    /// The capture.
+    pub frames: FileFrames,
+    /// File to write.
+    pub output: &'a Path,
+    /// Choices for the session.
+    pub options: SessionOptions,
+}
+
+/// A capture that a service has encoded.
+#[derive(Debug)]
+pub struct EncodedRemotely {
+    /// Report and container, as of an encoding on this machine. Of its times `invert` is that of uploading and solving, which
+    /// overlap, and `write` that of completing and downloading.
+    pub encoded: Encoded,
+    /// The session, which stays on the service.
+    pub session: String,
+}
+
+/// Has a service encode a capture. `progress` is told the number of frames done.
+///
+/// # Errors
+/// See [`RemoteError`]; the session is then deleted, where the service can still be reached.
+pub fn encode_remotely(
+    job: RemoteJob<'_>,
+    progress: &mut (dyn FnMut(usize) + Send),
+) -> Result<EncodedRemotely, RemoteError> {
+    // One thread moves bytes; frames are read on another.
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(RemoteError::Runtime)?;
+    runtime.block_on(encode(job, progress))
+}
+
+async fn encode(job: RemoteJob<'_>, progress: &mut (dyn FnMut(usize) + Send)) -> Result<EncodedRemotely, RemoteError> {
+    let clock = Instant::now();
+    let mut client = Client::new(job.address)?;
+    if let Some(token) = job.token {
+        client = client.with_token(token);
+    }
+    // Before the work, so that an unwritable place costs no waiting.
+    let file = AtomicFile::create(job.output)?;
+    let mut new = NewSession::new(mesh_file(job.rest)?, mesh_file(job.cage)?);
+    new.options = SessionOptions { frame_rate: job.frames.frame_rate(), ..job.options };
+    let session = client.create(&new).await?.id;
+    match run(&client, &session, job.frames, file, clock, progress).await {
+        Ok(encoded) => Ok(EncodedRemotely { encoded, session }),
+        Err(error) => {
+            let hasty = client.with_options(ClientOptions { retries: 0, ..ClientOptions::default() });
+            let _ = tokio::time::timeout(CLEAN_UP_WITHIN, hasty.delete(&session)).await;
+            Err(error)
+        }
+    }
+}
+
+async fn run(
+    client: &Client,
+    session: &str,
+    frames: FileFrames,
+    mut file: AtomicFile,
+    clock: Instant,
+    progress: &mut (dyn FnMut(usize) + Send),
+) -> Result<Encoded, RemoteError> {
+    let ready = client.wait_ready(session, READY_WITHIN).await?;
+    let clock_upload = Instant::now();
+    let mut done = 0;
+    let mut on_frame = |_: FrameResult| {
+        done += 1;
+        progress(done);
+    };
+    let options = UploadOptions { on_frame: Some(&mut on_frame), ..UploadOptions::default() };
+    let uploaded = client.upload(&ready, frames, options).await?;
+    let upload = clock_upload.elapsed();
+
+    let clock_write = Instant::now();
+    client.complete(session, uploaded.frames).await?;
+    client.download(session, &mut file).await.map_err(name_output)?;
+    let container = file.complete()?;
+    // Nothing that is no container takes the name of one.
+    let report = report(BufReader::new(container.reader()?)).map_err(RemoteError::Container)?;
+    let times = Times { preparation: ready.seconds, upload, write: clock_write.elapsed(), total: clock.elapsed() };
+    Ok(Encoded { report: report.finish(container.length(), &times), container })
+}
+
+/// What `AtomicFile` passes through `io::Write` has the path in it already.
+fn name_output(error: ClientError) -> RemoteError {
+    match error {
+        ClientError::Output(cause) => match cause.downcast() {
+            Ok(named) => RemoteError::Formats(named),
+            Err(cause) => ClientError::Output(cause).into(),
+        },
+        error => error.into(),
+    }
+}
+
+fn mesh_file(path: &Path) -> Result<MeshFile, cager_formats::Error> {
+    let bytes = std::fs::read(path).map_err(|cause| cager_formats::Error::Io {
+        path: PathBuf::from(path),
+        action: Action::Read,
+        cause,
+    })?;
+    Ok(MeshFile::new(path.file_name().unwrap_or_default().to_string_lossy(), bytes))
+}
