@@ -2,7 +2,7 @@
 
 use crate::server::{Server, capture, ready};
 use crate::support::{ENCODE, read_cages, read_frames};
-use cager_client::messages::{FrameResult, Session, SessionState};
+use cager_client::messages::{FrameResult, Problem, Session, SessionState};
 use cager_client::{
     CageFrame, Client, ClientError, ClientOptions, FnFrames, LocalDecoder, MemoryFrames, Rows, UploadOptions,
 };
@@ -105,7 +105,7 @@ async fn gaps_are_filled_and_other_content_is_refused() {
         assert!(request.send().await.expect("an answer").status().is_success());
     }
     let error = client.complete(&session.id, 20).await.expect_err("frames are missing");
-    assert_eq!(error.problem().map(|p| p.word()), Some("frames-missing"));
+    assert_eq!(error.problem().map(Problem::word), Some("frames-missing"));
     assert_eq!(upload(&client, &session, points, &values).await, (0..20).collect::<Vec<_>>());
 
     let longer = [values.clone(), vec![0.0; 3 * points - 1], vec![f32::INFINITY]].concat();
@@ -113,6 +113,28 @@ async fn gaps_are_filled_and_other_content_is_refused() {
     let problem = error.expect_err("not finite").problem().cloned().expect("a problem");
     assert_eq!((problem.word(), problem.frame), ("invalid-frame", Some(20)));
     client.complete(&session.id, 20).await.expect("complete");
+}
+
+#[tokio::test]
+async fn a_bad_frame_in_a_long_upload_is_named_whatever_the_protocol() {
+    let (dir, points, values) = capture();
+    let server = Server::start(&dir);
+    for http2 in [true, false] {
+        let client = server.client().with_options(ClientOptions { http2, ..ClientOptions::default() });
+        let session = ready(&client, &dir).await;
+        let values = values.clone();
+        // Far more than the connection's buffers hold comes after it.
+        let frames = FnFrames::new(points, Some(5000), move |number, out| {
+            out.extend_from_slice(&values[(number as usize % 20) * 3 * points..][..3 * points]);
+            if number == 1234 {
+                out[77] = f32::NAN;
+            }
+            Ok(true)
+        });
+        let error = client.upload(&session, frames, UploadOptions::default()).await.expect_err("a bad frame");
+        let problem = error.problem().unwrap_or_else(|| panic!("http2 {http2}: {error}"));
+        assert_eq!((problem.word(), problem.frame), ("invalid-frame", Some(1234)), "http2 {http2}");
+    }
 }
 
 #[tokio::test]
@@ -132,7 +154,7 @@ async fn a_bad_pair_fails_with_the_reason() {
         refused => refused,
     };
     let error = outcome.expect_err("an open cage");
-    assert_eq!(error.problem().map(|p| p.word()), Some("invalid-geometry"), "{error}");
+    assert_eq!(error.problem().map(Problem::word), Some("invalid-geometry"), "{error}");
 }
 
 #[tokio::test]
