@@ -72,6 +72,23 @@ fn a_guarded_service_wants_a_token_from_the_command_line_or_the_environment() {
     dir.cager(&encode).env("CAGER_TOKEN", TOKEN).succeeds();
 }
 
+#[test]
+fn a_service_behind_tls_is_used_if_its_certificate_is_trusted() {
+    let (dir, ..) = capture();
+    let made = rcgen::generate_simple_self_signed(["localhost".to_owned()]).expect("a certificate");
+    dir.write("certificate.pem", made.cert.pem());
+    dir.write("key.pem", made.signing_key.serialize_pem());
+    restrict(&dir, "key.pem");
+    let files = ["--tls-certificate", "certificate.pem", "--tls-key", "key.pem"];
+    let server = Server::start_at(&dir, "127.0.0.1:0", &files);
+    let place = server.place.replace("127.0.0.1", "localhost");
+    let encode = format!("{ENCODE} --server https://{place}");
+    dir.cager(&encode).env("SSL_CERT_FILE", "certificate.pem").succeeds();
+    let said = dir.cager(&encode).run();
+    assert_eq!(said.status, Some(1));
+    assert!(said.stderr.contains("certificate"), "{}", said.stderr);
+}
+
 #[cfg(unix)]
 fn restrict(dir: &Dir, name: &str) {
     use std::os::unix::fs::PermissionsExt;
