@@ -30,6 +30,11 @@ const IN_FLIGHT: usize = 64;
 const QUOTA_EVERY: u64 = 64;
 /// Answers sent at a time.
 const ANSWERS: usize = 64;
+/// How long the answer's header waits for the first record: some clients give up on a server that says nothing.
+const HEAD_WITHIN: Duration = Duration::from_secs(5);
+/// How much of a refused body is thrown away, and for how long.
+const DRAINED_BYTES: usize = 64 << 20;
+const DRAINED_WITHIN: Duration = Duration::from_secs(5);
 /// How long an upload waits for its session to be prepared.
 const PREPARED_WITHIN: Duration = Duration::from_secs(50);
 
@@ -108,13 +113,20 @@ pub(crate) async fn post(
     let frames = FrameReader::new(layout, &facts);
     tokio::spawn(async move {
         reading.live.upload_begins();
-        let outcome = reading.read(body, frames).await;
+        let mut body = body;
+        let outcome = reading.read(&mut body, frames).await;
         reading.live.upload_ends();
+        let refused = outcome.is_err() || reading.upload.has_failed();
         reading.upload.close(outcome.err());
+        if refused && !reading.upload.is_abandoned() {
+            drain(body).await;
+        }
     });
-    let first = match upload.next(ANSWERS).await {
-        Step::Failed(error) => return Err(error),
-        step => step,
+    // An error before the first record still has a status of its own.
+    let first = match tokio::time::timeout(HEAD_WITHIN, upload.next(ANSWERS)).await {
+        Ok(Step::Failed(error)) => return Err(error),
+        Ok(step) => Some(step),
+        Err(_) => None,
     };
     let media_type = if records_out { record::MEDIA_TYPE } else { "application/x-ndjson" };
     let stream = answers(answering, session, first, records_out);
@@ -165,6 +177,21 @@ pub(crate) fn stopping() -> ApiError {
     ApiError::new(problem::STOPPING, detail).retry_after(5)
 }
 
+/// Throws a refused body away for a while: many clients look at the answer only when they have written all.
+async fn drain(mut body: Body) {
+    let take = async {
+        let mut left = DRAINED_BYTES;
+        while let Some(Ok(frame)) = body.frame().await {
+            left = left.saturating_sub(frame.data_ref().map_or(0, Bytes::len));
+            if left == 0 {
+                return;
+            }
+        }
+    };
+    // Whether it comes to an end does not matter.
+    let _ = tokio::time::timeout(DRAINED_WITHIN, take).await;
+}
+
 /// What a broken body means.
 pub(crate) fn body_error(error: &(dyn std::error::Error + 'static)) -> ApiError {
     if super::listen::is_body_timeout(error) {
@@ -183,7 +210,7 @@ struct Reading {
 }
 
 impl Reading {
-    async fn read(&self, mut body: Body, mut frames: FrameReader) -> Result<(), ApiError> {
+    async fn read(&self, body: &mut Body, mut frames: FrameReader) -> Result<(), ApiError> {
         let places = Arc::new(Semaphore::new(IN_FLIGHT));
         let mut permits = None;
         let mut received = 0u64;
@@ -258,10 +285,10 @@ impl Drop for Answering {
 fn answers(
     answering: Answering,
     session: Arc<Session>,
-    first: Step,
+    first: Option<Step>,
     records: bool,
 ) -> impl futures_util::Stream<Item = io::Result<Bytes>> {
-    futures_util::stream::unfold((Some(first), answering), move |(step, answering)| {
+    futures_util::stream::unfold((first, answering), move |(step, answering)| {
         let session = Arc::clone(&session);
         async move {
             let step = match step {
