@@ -11,8 +11,8 @@ use tokio::sync::OwnedSemaphorePermit;
 
 const OPTIONS_BYTES: usize = 64 << 10;
 const NAME_CHARACTERS: usize = 200;
-/// Memory is asked for in pieces of this many bytes.
-const PIECE: usize = 4 << 20;
+/// Memory is asked for in pieces of this many bytes: small ones, so that hundreds of small models have room at the same time.
+const PIECE: usize = 64 << 10;
 
 /// What the parts hold, and the room they take until it is dropped.
 pub(crate) struct Parts {

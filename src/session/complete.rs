@@ -47,24 +47,42 @@ impl Service {
             return Err(ApiError::new(problem::INVALID_OPTIONS, "frames: a capture has at least one frame"));
         }
         let entries: Vec<LogEntry> = {
-            let known = session.frames();
+            let mut known = session.frames();
             let missing = known.missing(Some(frames));
             if !missing.is_empty() {
                 let count: u64 = missing.iter().map(|[a, b]| u64::from(b - a)).sum();
                 let detail = format!("{count} of {frames} frames are missing; post them, then complete the session");
                 return Err(ApiError::new(problem::FRAMES_MISSING, detail).missing(missing));
             }
-            if let Some(highest) = known.highest().filter(|&highest| highest >= frames) {
+            if let Some(highest) = known.highest_received().filter(|&highest| highest >= frames) {
                 let detail = format!("frame {highest} was posted, so the capture has more than {frames} frames");
                 return Err(ApiError::new(problem::FRAME_CONFLICT, detail).frame(highest));
             }
+            // From here to the end of writing, a new frame would be in the log but not in the container.
+            known.seal(true);
             known.entries().copied().collect()
         };
+        match self.write_capture(session, entries, frames).await {
+            Ok(completion) => {
+                session.set_phase(Phase::Completed(completion));
+                Ok(())
+            }
+            Err(error) => {
+                session.frames().seal(false);
+                Err(error)
+            }
+        }
+    }
+
+    async fn write_capture(
+        self: &Arc<Self>,
+        session: &Arc<Session>,
+        entries: Vec<LogEntry>,
+        frames: u32,
+    ) -> Result<Completion, ApiError> {
         let prepared = self.solver(session).await?;
         let writing = Arc::clone(session);
-        let completion = blocking(move || write(&writing, &prepared, &entries, frames)).await??;
-        session.set_phase(Phase::Completed(completion));
-        Ok(())
+        blocking(move || write(&writing, &prepared, &entries, frames)).await?
     }
 }
 

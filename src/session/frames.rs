@@ -42,6 +42,8 @@ pub(crate) enum Claim {
     Waiting,
     /// It was there before, but different.
     Conflict,
+    /// It is new, but no new frames are taken any more.
+    Late,
 }
 
 /// The frames of one session.
@@ -49,6 +51,7 @@ pub(crate) enum Claim {
 pub(crate) struct Frames {
     solved: BTreeMap<u32, LogEntry>,
     pending: HashMap<u32, Pending>,
+    sealed: bool,
 }
 
 impl Frames {
@@ -58,7 +61,7 @@ impl Frames {
         for entry in entries {
             solved.entry(entry.frame).or_insert(entry);
         }
-        Self { solved, pending: HashMap::new() }
+        Self { solved, ..Self::default() }
     }
 
     /// Decides about a frame that arrived.
@@ -74,8 +77,16 @@ impl Frames {
             pending.waiting.push(Arc::clone(upload));
             return Claim::Waiting;
         }
+        if self.sealed {
+            return Claim::Late;
+        }
         self.pending.insert(frame, Pending { digests, waiting: vec![Arc::clone(upload)] });
         Claim::Solve
+    }
+
+    /// Takes no new frames while the session is being completed, and after that; or takes them again where that failed.
+    pub(crate) fn seal(&mut self, sealed: bool) {
+        self.sealed = sealed;
     }
 
     /// Enters a frame that is on disk; returns the uploads that wait for it.
@@ -132,6 +143,11 @@ impl Frames {
     /// The highest solved frame.
     pub(crate) fn highest(&self) -> Option<u32> {
         self.solved.last_key_value().map(|(frame, _)| *frame)
+    }
+
+    /// The highest frame that is solved or being solved.
+    pub(crate) fn highest_received(&self) -> Option<u32> {
+        self.pending.keys().copied().max().max(self.highest())
     }
 
     /// Ranges `[a, b)` below `end` that are not solved; below the highest solved frame where no end is known.
@@ -200,7 +216,11 @@ mod tests {
         assert_eq!(frames.claim(4, same, &upload), Claim::Solve);
         assert_eq!(frames.claim(4, same, &upload), Claim::Waiting);
         assert_eq!(frames.claim(4, Digests { handles: [9; 16], ..same }, &upload), Claim::Conflict);
-        assert_eq!(frames.solved(entry(4)).len(), 2);
+        assert_eq!(frames.highest_received(), Some(4));
+        frames.seal(true);
+        assert_eq!(frames.claim(5, same, &upload), Claim::Late);
+        assert_eq!(frames.claim(4, same, &upload), Claim::Waiting);
+        assert_eq!(frames.solved(entry(4)).len(), 3);
         assert_eq!(frames.claim(4, same, &upload), Claim::Known);
     }
 }

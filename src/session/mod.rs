@@ -90,12 +90,14 @@ impl LiveLane {
 
 impl Session {
     pub(crate) fn new(meta: SessionMeta, store: Store, committer: Committer, status: Status, is_new: bool) -> Self {
+        let mut frames = Frames::default();
+        frames.seal(matches!(status.phase, Phase::Completed(_)));
         Self {
             meta,
             store,
             committer,
             status: Mutex::new(status),
-            frames: Mutex::default(),
+            frames: Mutex::new(frames),
             loaded: AtomicBool::new(is_new),
             queued: Arc::default(),
             bytes: AtomicU64::new(0),
@@ -118,6 +120,7 @@ impl Session {
     }
 
     pub(crate) fn set_status(&self, status: Status) {
+        self.frames().seal(matches!(status.phase, Phase::Completed(_)));
         *lock(&self.status) = status;
         self.touch();
     }

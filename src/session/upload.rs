@@ -203,14 +203,6 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
             job.fail(ApiError::new(problem::INVALID_FRAME, detail).frame(frame));
             continue;
         }
-        if let Some(frames) = session.declared()
-            && session.frames().entry(job.frame).is_none()
-        {
-            let frame = job.frame;
-            let detail = format!("the session was completed with {frames} frames, so frame {frame} comes too late");
-            job.fail(ApiError::new(problem::SESSION_COMPLETED, detail).frame(frame));
-            continue;
-        }
         let digests = digests(prepared, &job);
         match session.frames().claim(job.frame, digests, &job.upload) {
             Claim::Solve if job.rows == Rows::All => whole.push((job, digests)),
@@ -227,6 +219,16 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
                     "frame {frame} was posted before with other content; what was posted first stays, so delete the session to start over"
                 );
                 job.fail(ApiError::new(problem::FRAME_CONFLICT, detail).frame(frame));
+            }
+            Claim::Late => {
+                let frame = job.frame;
+                let detail = match session.declared() {
+                    Some(frames) => {
+                        format!("the session was completed with {frames} frames, so frame {frame} comes too late")
+                    }
+                    None => format!("the session is being completed, so frame {frame} comes too late"),
+                };
+                job.fail(ApiError::new(problem::SESSION_COMPLETED, detail).frame(frame));
             }
         }
     }
