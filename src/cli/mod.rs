@@ -4,6 +4,7 @@ mod args;
 mod decode;
 mod demo;
 mod encode;
+mod health;
 mod inspect;
 mod interrupt;
 mod progress;
@@ -22,6 +23,7 @@ pub fn run() -> ExitCode {
         Command::Inspect(args) => inspect::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Serve(args) => serve::run(&args),
+        Command::Health(args) => health::run(&args),
         Command::Completions(args) => {
             let mut script = Vec::new();
             clap_complete::generate(args.shell, &mut Cli::command(), "cager", &mut script);
