@@ -143,7 +143,7 @@ pub(crate) struct HealthArgs {
     pub(crate) timeout_s: u64,
 }
 
-/// Encode and decode a built-in capture: needs no files and no network.
+/// Encode and decode a built-in capture through a service of its own: needs no files and no network.
 ///
 /// Example: cager demo -o my-first-capture
 #[derive(Args, Debug)]

@@ -7,6 +7,7 @@ mod encode;
 mod health;
 mod inspect;
 mod interrupt;
+mod own_service;
 mod progress;
 pub(crate) mod serve;
 
