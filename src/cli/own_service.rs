@@ -45,9 +45,13 @@ impl OwnService {
             runtime.shutdown_timeout(Duration::from_secs(2));
             outcome
         };
-        let running = std::thread::Builder::new().name("service".to_owned()).spawn(serve).context("the service")?;
+        let begun = data.undisturbed(|| {
+            let running = std::thread::Builder::new().name("service".to_owned()).spawn(serve);
+            running.map(|running| (running, listening.recv()))
+        });
+        let (running, listening) = begun.context("the service")?;
         let mut service = Self { address: String::new(), stop, running: Some(running), _data: data };
-        match listening.recv() {
+        match listening {
             Ok(address) => service.address = format!("http://{address}"),
             // It ended before it listened; how tells why.
             Err(_) => return Err(service.end().err().unwrap_or_else(|| anyhow!("the service did not start"))),

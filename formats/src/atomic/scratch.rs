@@ -22,6 +22,13 @@ impl ScratchDir {
         begun.map(|((), made)| Self(made)).map_err(|cause| Error::write(folder, cause))
     }
 
+    /// Runs what may make the folder anew where it is missing: [`remove_temporaries`](super::remove_temporaries) waits for
+    /// it, so it should be short. It must not begin, name or drop an output.
+    pub fn undisturbed<T>(&self, work: impl FnOnce() -> T) -> T {
+        let _live = temporary::lock();
+        work()
+    }
+
     /// Where it is.
     pub fn path(&self) -> &Path {
         self.0.path()
