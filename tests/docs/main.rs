@@ -1,0 +1,8 @@
+//! Documents and deployment files against the program: what they say is run or looked up.
+
+mod clients;
+mod support;
+
+// Run by `clients`, in a process of its own.
+#[path = "../../client/examples/encode.rs"]
+mod encode_example;
