@@ -4,6 +4,8 @@ mod clients;
 mod deploy;
 mod operations;
 mod support;
+#[cfg(target_os = "linux")]
+mod walled;
 
 // Run by `clients`, in a process of its own.
 #[path = "../../client/examples/encode.rs"]
