@@ -11,6 +11,8 @@ import sys
 import tempfile
 import time
 
+import service
+
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 PEERS = os.path.join(ROOT, "benches", ".venv", "bin", "python")
 CAGER = os.path.join(ROOT, "target", "release", "cager")
@@ -93,6 +95,7 @@ def measure():
         for key in ("singular_values", "handle_indices", "sections"):
             ours["report"].pop(key)
         ours["report"]["error"].pop("per_frame")
+        ours["service"] = service.measure(CAGER, folder, encode, wall, RUNS)
         few = os.path.join(folder, "few.npy")
         truncate_npy(os.path.join(folder, "frames.npy"), few, 50)
         memory = {
@@ -152,6 +155,17 @@ def table(results):
             f"| {g['points']:,} points, {g['cage_vertices']:,} vertices | {seconds(g['seconds'])} "
             f"| {g['peak_bytes'] / 1e9:.2f} GB | {g['solver_bytes'] / 1e6:.0f} MB |"
         )
+    s = {key: value["median"] for key, value in results["ours"]["service"].items()}
+    share = 100 * s["encode_local"] / s["encode_fresh"]
+    lines += [
+        "",
+        "| through the service, on loopback | CageR | target |",
+        "|---|---|---|",
+        f"| `cager encode --server` of the same capture, nothing prepared | {seconds(s['encode_fresh'])}, {share:.0f} % of the rate without the service ({seconds(s['encode_local'])}) | 60 % |",
+        f"| the same where the solver is cached | {seconds(s['encode_prepared'])} | – |",
+        f"| first cage after the first frame's last byte, idle service | {seconds(s['first_cage'])} | 5 ms |",
+        f"| a second session on the same rest pose and cage, ready | {seconds(s['second_session'])} | 5 ms |",
+    ]
     memory, report = results["memory"], results["ours"]["report"]
     lines += [
         "",

@@ -64,6 +64,8 @@ pub struct ServeConfig {
     pub max_streams: usize,
     /// Sessions prepared at the same time.
     pub max_preparing: usize,
+    /// Memory that preparing one session may take, in bytes; larger ones are refused.
+    pub max_prepare_bytes: u64,
     /// Sessions waiting to be prepared.
     pub max_prepare_queue: usize,
     /// Frames waiting to be solved.
@@ -115,6 +117,7 @@ impl Default for ServeConfig {
             max_requests: 512,
             max_streams: 256,
             max_preparing: 2,
+            max_prepare_bytes: 8 * GIB,
             max_prepare_queue: 64,
             max_queue_frames: 4096,
             header_timeout_s: 10,

@@ -99,14 +99,7 @@ impl Service {
             metrics::counter!("cager_quarantined_total").increment(1);
         }
         let engine = Engine::new(config.workers).map_err(StartError::Threads)?;
-        let solvers = Solvers::new(
-            opened.store.clone(),
-            config.cache_bytes,
-            config.prepared_disk_bytes,
-            config.max_preparing,
-            config.workers,
-        )
-        .map_err(StartError::Threads)?;
+        let solvers = Solvers::new(opened.store.clone(), &config).map_err(StartError::Threads)?;
         let service = Arc::new(Self {
             access,
             store: opened.store,

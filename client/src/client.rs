@@ -226,6 +226,9 @@ impl Client {
     }
 
     fn build(&self, only_http1: bool, only_http2: bool) -> Result<reqwest::Client, Failure> {
+        // Fails where the program has chosen its own, which is as good.
+        #[cfg(feature = "tls")]
+        let _ = rustls::crypto::ring::default_provider().install_default();
         let options = self.options();
         let mut builder = reqwest::Client::builder()
             .user_agent(concat!("cager-client/", env!("CARGO_PKG_VERSION")))

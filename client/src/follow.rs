@@ -26,10 +26,11 @@ impl Client {
         self.cage_stream(id, first, Until::Completed)
     }
 
-    /// Cages of up to `count` frames from `first` on, as many as are solved.
+    /// The cages of `count` frames from `first` on.
     ///
     /// # Errors
-    /// [`ClientError::Refused`] where the service has none of them, and those of the connection.
+    /// [`ClientError::Refused`] with status 409 and the missing ranges where not all of them are solved, and those of the
+    /// connection.
     pub async fn cages(&self, id: &str, first: u32, count: u32) -> Result<Vec<CageFrame>, ClientError> {
         let end = first.saturating_add(count);
         if first == end {

@@ -6,6 +6,8 @@ use cager_client::messages::{FrameResult, SessionState};
 use cager_client::{Client, ClientError, FnFrames, MemoryFrames, Rows, UploadOptions, Uploaded};
 use proptest::prelude::*;
 use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 use support::client;
 use support::service::{Fault, HANDLES, POINTS, Service, capture, frame, frame_bytes, session};
@@ -192,6 +194,23 @@ async fn frames_of_unknown_number_are_sent_to_their_end() {
     let uploaded = client(&address).upload(&session(SessionState::Ready), source, UploadOptions::default()).await;
     assert_eq!(uploaded.expect("an upload").frames, 30);
     assert_whole(&service, 30);
+}
+
+#[tokio::test]
+async fn frames_of_a_slow_source_have_their_results_before_the_next_is_read() {
+    let (_, address) = Service::start([]).await;
+    let seen = Arc::new(AtomicU32::new(0));
+    let results = Arc::clone(&seen);
+    let source = FnFrames::new(POINTS as usize, Some(5), move |number, out| {
+        out.extend(frame(number));
+        std::thread::sleep(Duration::from_millis(50));
+        // The one before may still be on its way.
+        assert!(results.load(Ordering::Relaxed) + 1 >= number, "{number} frames were kept back");
+        Ok(true)
+    });
+    let mut on_frame = |_: FrameResult| _ = seen.fetch_add(1, Ordering::Relaxed);
+    let options = UploadOptions { on_frame: Some(&mut on_frame), ..UploadOptions::default() };
+    client(&address).upload(&session(SessionState::Ready), source, options).await.expect("an upload");
 }
 
 #[tokio::test]

@@ -49,7 +49,7 @@ fn elsewhere(args: &EncodeArgs, address: &str, rest: &Model, cage: &Cage, clock:
     let (system, options) = solver(&args.solver, cage)?;
     let report_file = begin(args)?;
 
-    let token = args.token.clone().or_else(|| std::env::var("CAGER_TOKEN").ok());
+    let token = args.token.clone().or_else(|| std::env::var("CAGER_TOKEN").ok()).filter(|token| !token.is_empty());
     let options = SessionOptions {
         name: args.output.file_stem().map(|name| name.to_string_lossy().chars().take(200).collect()),
         coordinates: Some(system.name().to_owned()),

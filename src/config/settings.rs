@@ -36,6 +36,7 @@ const SETTINGS: &[(&str, Kind)] = &[
     ("max_requests", Kind::Number { least: 1, most: 1_000_000 }),
     ("max_streams", Kind::Number { least: 1, most: 1_000_000 }),
     ("max_preparing", Kind::Number { least: 1, most: 4096 }),
+    ("max_prepare_bytes", Kind::Bytes { least: MIB, most: 1 << 50 }),
     ("max_prepare_queue", Kind::Number { least: 0, most: 1_000_000 }),
     ("max_queue_frames", Kind::Number { least: 16, most: 1 << 30 }),
     ("header_timeout_s", Kind::Number { least: 1, most: DAY }),

@@ -3,6 +3,7 @@
 use super::extract::{Accept, Found, Query, content_type};
 use super::frames_in::{FrameReader, Layout};
 use super::openapi;
+use crate::auth::Tenant;
 use crate::problem::{self, ApiError};
 use crate::service::{Service, StreamPlace};
 use crate::session::facts::Facts;
@@ -25,6 +26,8 @@ use tokio::sync::Semaphore;
 
 /// Frames of one upload that wait or are solved at a time: enough that the pool never waits for it.
 const IN_FLIGHT: usize = 64;
+/// Frames after which the tenant's quota is looked at again: a body need not say how long it is.
+const QUOTA_EVERY: u64 = 64;
 /// Answers sent at a time.
 const ANSWERS: usize = 64;
 /// How long an upload waits for its session to be prepared.
@@ -101,7 +104,7 @@ pub(crate) async fn post(
     let live = service.lane(&session, solver, &tenant);
     let upload = Arc::new(Upload::default());
     let answering = Answering { upload: Arc::clone(&upload), _live: Arc::clone(&live), _place: place };
-    let reading = Reading { service, session: Arc::clone(&session), live, upload: Arc::clone(&upload) };
+    let reading = Reading { service, tenant, session: Arc::clone(&session), live, upload: Arc::clone(&upload) };
     let frames = FrameReader::new(layout, &facts);
     tokio::spawn(async move {
         reading.live.upload_begins();
@@ -123,7 +126,7 @@ pub(crate) fn not_acceptable(available: &str) -> ApiError {
 }
 
 /// The facts of a session that is ready; waits for one that is being prepared.
-pub(crate) async fn prepared(service: &Service, session: &Session) -> Result<Facts, ApiError> {
+pub(crate) async fn prepared(service: &Service, session: &Arc<Session>) -> Result<Facts, ApiError> {
     let mut changes = session.changes();
     let deadline = tokio::time::Instant::now() + PREPARED_WITHIN;
     loop {
@@ -134,7 +137,11 @@ pub(crate) async fn prepared(service: &Service, session: &Session) -> Result<Fac
                 let detail = format!("the session failed: {}", problem.detail);
                 return Err(ApiError::new(problem::SESSION_FAILED, detail));
             }
-            (_, Some(facts)) => return Ok(facts),
+            (_, Some(facts)) => {
+                // A session resumed without its facts could not read its log before.
+                session.ensure_loaded().await?;
+                return Ok(facts);
+            }
             _ => {}
         }
         tokio::select! {
@@ -169,6 +176,7 @@ pub(crate) fn body_error(error: &(dyn std::error::Error + 'static)) -> ApiError 
 /// The half of an upload that reads its body.
 struct Reading {
     service: Arc<Service>,
+    tenant: Arc<Tenant>,
     session: Arc<Session>,
     live: Arc<LiveLane>,
     upload: Arc<Upload>,
@@ -179,6 +187,7 @@ impl Reading {
         let places = Arc::new(Semaphore::new(IN_FLIGHT));
         let mut permits = None;
         let mut received = 0u64;
+        let mut submitted = 0u64;
         let counter = metrics::counter!("cager_received_bytes_total", "tenant" => self.session.meta.tenant.clone());
         let stopped = async {
             tokio::select! {
@@ -220,6 +229,10 @@ impl Reading {
                 {
                     let job = FrameJob::new(&self.session, &self.upload, frame.frame, frame.rows, frame.bytes, permits);
                     self.live.lane.push(job);
+                    submitted += 1;
+                    if submitted.is_multiple_of(QUOTA_EVERY) {
+                        self.service.check_bytes(&self.tenant, 0)?;
+                    }
                 }
             }
         }

@@ -5,8 +5,12 @@ use super::frames::Digests;
 use crate::capture::StoredError;
 use crate::problem::{self, ApiError};
 use crate::store::{FrameLog, LogRecord, StoreError};
+use std::sync::atomic::Ordering::Relaxed;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
+
+/// What the log adds to a cage, about.
+const RECORD_BYTES: usize = 96;
 
 /// A solved frame that is not on disk yet.
 pub(crate) struct Solved {
@@ -108,6 +112,8 @@ impl Session {
         drop(log);
         match outcome {
             Ok(entries) => {
+                let cages: usize = solved.iter().map(|s| RECORD_BYTES + 4 * s.cage.len()).sum();
+                self.bytes.fetch_add(cages as u64, Relaxed);
                 let measured = solved.iter().filter(|s| s.digests.full.is_some()).count();
                 metrics::counter!("cager_frames_total", "tenant" => self.meta.tenant.clone(), "rows" => "all")
                     .increment(measured as u64);

@@ -11,6 +11,7 @@ use crate::store::{Completion, LogEntry, StoreError};
 use cager_proto::container;
 use std::io::{self, BufWriter, Write};
 use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
 
 /// Frames read from the log at a time.
 const READ_FRAMES: usize = 64;
@@ -85,6 +86,7 @@ fn write(session: &Session, prepared: &Prepared, entries: &[LogEntry], frames: u
     let written = session.store.write_container(&session.meta.id, &mut write).map_err(stored)?;
     let completion = Completion { frames, container_bytes: written.bytes, container_digest: written.digest };
     session.store.complete(&session.meta.id, &completion).map_err(stored)?;
+    session.bytes.fetch_add(completion.container_bytes, Relaxed);
     Ok(completion)
 }
 

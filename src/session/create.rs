@@ -12,6 +12,7 @@ use crate::service::Service;
 use crate::store::{Content, ContentKey, Idempotency, SessionMeta};
 use cager_proto::messages::{CacheUse, PreparationSeconds, SessionOptions};
 use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 /// A request to make a session.
@@ -79,6 +80,7 @@ impl Service {
             None => Status { phase: Phase::Preparing, facts: None },
         };
         let session = Arc::new(Session::new(meta, self.store.clone(), self.committer.clone(), status, true));
+        session.bytes.store((content.rest.len() + content.cage.len()) as u64, Relaxed);
         {
             let _content = self.registry.content_lock(&key).await;
             let (store, meta) = (self.store.clone(), session.meta.clone());
@@ -118,6 +120,8 @@ impl Service {
         let preparing = matches!(status.phase, Phase::Preparing);
         let choices = Choices::of(&meta.options);
         let session = Arc::new(Session::new(meta, self.store.clone(), self.committer.clone(), status, false));
+        let bytes = self.store.session_bytes(&session.meta.id) + self.store.content_bytes(&session.meta.key);
+        session.bytes.store(bytes, Relaxed);
         self.registry.insert(Arc::clone(&session));
         if preparing {
             match choices {
@@ -129,9 +133,17 @@ impl Service {
 
     async fn prepare(self: Arc<Self>, session: Arc<Session>, choices: Choices) {
         let clock = Instant::now();
-        let got = tokio::select! {
-            got = self.solvers.get(session.meta.key, choices) => got,
-            () = session.deleted().cancelled() => return,
+        let mut again = true;
+        let got = loop {
+            let got = tokio::select! {
+                got = self.solvers.get(session.meta.key, choices) => got,
+                () = session.deleted().cancelled() => return,
+            };
+            // It may have come along with the preparation of a session that was deleted meanwhile, content and all.
+            match got {
+                Err(error) if again && error.problem.word() == problem::SESSION_DELETED.word => again = false,
+                got => break got,
+            }
         };
         match got {
             Ok(Got { prepared, cache, mut seconds }) => {

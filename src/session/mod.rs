@@ -34,6 +34,8 @@ pub(crate) struct Session {
     /// Whether what the log holds is in `frames`.
     loaded: AtomicBool,
     queued: Arc<AtomicU64>,
+    /// Bytes of its files and of its content.
+    pub(crate) bytes: AtomicU64,
     waiting: Mutex<Waiting>,
     log: Mutex<Option<FrameLog>>,
     reader: Mutex<Option<LogReader>>,
@@ -96,6 +98,7 @@ impl Session {
             frames: Mutex::default(),
             loaded: AtomicBool::new(is_new),
             queued: Arc::default(),
+            bytes: AtomicU64::new(0),
             waiting: Mutex::default(),
             log: Mutex::default(),
             reader: Mutex::default(),

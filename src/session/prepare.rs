@@ -117,8 +117,18 @@ pub(crate) fn read_cage(content: &Content, choices: &Choices) -> Result<Cage, Ap
 ///
 /// # Errors
 /// Geometry or options that do not go together.
-pub(crate) fn prepare(geometry: &Geometry, choices: &Choices) -> Result<Prepared, ApiError> {
-    let options = choices.solver_options(choices.system.unknowns(&geometry.cage));
+pub(crate) fn prepare(geometry: &Geometry, choices: &Choices, most_bytes: u64) -> Result<Prepared, ApiError> {
+    let unknowns = choices.system.unknowns(&geometry.cage);
+    let options = choices.solver_options(unknowns);
+    // Two matrices of n × m in double precision and one in single, at their peak.
+    let needed = 20 * geometry.rest.points.len() as u64 * unknowns as u64;
+    if needed > most_bytes {
+        let detail = format!(
+            "{} points times {unknowns} unknowns need {needed} bytes to be prepared, and this service allows {most_bytes}; use a coarser cage or a lighter model",
+            geometry.rest.points.len()
+        );
+        return Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(most_bytes));
+    }
     let solver =
         Solver::prepare(choices.system, &geometry.cage, &geometry.rest.points, options).map_err(
             |error| match error {

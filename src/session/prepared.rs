@@ -1,6 +1,7 @@
 //! Prepared solvers by content: in memory up to a budget, on disk beyond, each prepared once however many ask.
 
 use super::prepare::{self, Choices};
+use crate::config::ServeConfig;
 use crate::problem::{self, ApiError};
 use crate::store::{ContentKey, Store};
 use cager_core::inversion::{Solver, SolverOptions};
@@ -35,6 +36,8 @@ pub(crate) struct Solvers {
     store: Store,
     budget_bytes: u64,
     disk_budget_bytes: u64,
+    /// Memory that one preparation may take.
+    most_bytes: u64,
     /// Solvers being prepared at a time.
     places: Semaphore,
     pool: Arc<rayon::ThreadPool>,
@@ -55,28 +58,23 @@ struct Kept {
 }
 
 impl Solvers {
-    /// Starts the threads that prepare: 0 means one per processor.
+    /// Starts the threads that prepare.
     ///
     /// # Errors
     /// The system's, where threads cannot be started.
-    pub(crate) fn new(
-        store: Store,
-        budget_bytes: u64,
-        disk_budget_bytes: u64,
-        at_a_time: usize,
-        threads: usize,
-    ) -> std::io::Result<Self> {
+    pub(crate) fn new(store: Store, config: &ServeConfig) -> std::io::Result<Self> {
         let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
+            .num_threads(config.workers)
             .thread_name(|k| format!("prepare-{k}"))
             .build()
             .map_err(std::io::Error::other)?;
         Ok(Self {
             inner: Mutex::default(),
             store,
-            budget_bytes,
-            disk_budget_bytes,
-            places: Semaphore::new(at_a_time.max(1)),
+            budget_bytes: config.cache_bytes,
+            disk_budget_bytes: config.prepared_disk_bytes,
+            most_bytes: config.max_prepare_bytes,
+            places: Semaphore::new(config.max_preparing.max(1)),
             pool: Arc::new(pool),
         })
     }
@@ -171,7 +169,7 @@ impl Solvers {
         metrics::counter!("cager_cache_total", "result" => "miss").increment(1);
         let geometry = prepare::read(&content, &choices)?;
         let read = clock.elapsed().as_secs_f64();
-        let prepared = self.pool.install(|| prepare::prepare(&geometry, &choices))?;
+        let prepared = self.pool.install(|| prepare::prepare(&geometry, &choices, self.most_bytes))?;
         let found = prepared.solver.preparation();
         let seconds = PreparationSeconds {
             queued,

@@ -1,10 +1,10 @@
 //! How much a tenant may keep and for how long.
 
-use super::Session;
 use crate::auth::Tenant;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use tokio_util::sync::CancellationToken;
 
@@ -13,7 +13,7 @@ const SWEEP_EVERY: Duration = Duration::from_secs(20);
 impl Service {
     /// Bytes that a tenant's sessions take on disk.
     pub(crate) fn used_bytes(&self, tenant: &str) -> u64 {
-        self.registry.of_tenant(tenant).iter().map(|session| self.session_bytes(session)).sum()
+        self.registry.of_tenant(tenant).iter().map(|session| session.bytes.load(Relaxed)).sum()
     }
 
     /// Sessions and bytes of every tenant that has any.
@@ -22,13 +22,9 @@ impl Service {
         for session in self.registry.all() {
             let entry = usage.entry(session.meta.tenant.clone()).or_default();
             entry.0 += 1;
-            entry.1 += self.session_bytes(&session);
+            entry.1 += session.bytes.load(Relaxed);
         }
         usage.into_iter().map(|(tenant, (sessions, bytes))| (tenant, sessions, bytes)).collect()
-    }
-
-    fn session_bytes(&self, session: &Session) -> u64 {
-        self.store.session_bytes(&session.meta.id) + self.store.content_bytes(&session.meta.key)
     }
 
     /// Whether a tenant may make one more session of so many bytes.

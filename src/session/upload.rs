@@ -176,6 +176,9 @@ impl Drop for FrameJob {
     }
 }
 
+/// Numbers that a thread keeps room for: frames of models beyond that are rare.
+const KEPT_NUMBERS: usize = 4 << 20;
+
 thread_local! {
     /// Frames as numbers: big, so kept. Taken out while in use, as a thread may start a batch while it waits within another.
     static NUMBERS: RefCell<Vec<Vec<f32>>> = const { RefCell::new(Vec::new()) };
@@ -198,6 +201,14 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
             let (frame, detail) =
                 (job.frame, format!("frame {}: {what} {row} is not finite; export this frame again", job.frame));
             job.fail(ApiError::new(problem::INVALID_FRAME, detail).frame(frame));
+            continue;
+        }
+        if let Some(frames) = session.declared()
+            && session.frames().entry(job.frame).is_none()
+        {
+            let frame = job.frame;
+            let detail = format!("the session was completed with {frames} frames, so frame {frame} comes too late");
+            job.fail(ApiError::new(problem::SESSION_COMPLETED, detail).frame(frame));
             continue;
         }
         let digests = digests(prepared, &job);
@@ -247,7 +258,9 @@ fn solve_alike(session: &Arc<Session>, prepared: &Prepared, rows: Rows, jobs: Ve
         }
         Rows::Handles => (solver.invert_handles(&views), vec![StoredError::NOT_MEASURED; jobs.len()]),
     };
-    NUMBERS.set(numbers);
+    if numbers.iter().map(Vec::capacity).sum::<usize>() <= KEPT_NUMBERS {
+        NUMBERS.set(numbers);
+    }
     guard.frames.clear();
     let mut solved = Vec::with_capacity(jobs.len());
     for (((job, digests), cage), error) in jobs.into_iter().zip(cages).zip(errors) {

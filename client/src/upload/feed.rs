@@ -7,6 +7,7 @@ use bytes::Bytes;
 use cager_proto::record::{self, Kind};
 use std::io;
 use std::sync::mpsc;
+use std::time::{Duration, Instant};
 use tokio::sync::{mpsc as async_mpsc, oneshot};
 
 /// Frames are gathered to pieces of this size: few hand-overs, and still little memory.
@@ -14,6 +15,10 @@ const PIECE_BYTES: usize = 512 << 10;
 
 /// Pieces that wait for the connection; reading goes on meanwhile.
 const WAITING_PIECES: usize = 3;
+
+/// A connection that has nothing to send gets what there is this often: the frames of a source that is slower than the
+/// connection are not kept back.
+const KEPT_BACK: Duration = Duration::from_millis(5);
 
 /// The bytes of a request's body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,7 +63,8 @@ impl Feed {
         let run = move || {
             let mut reader = Reader { position: None, frame: Vec::new(), rows: Vec::new(), handles };
             for Job { ranges, layout, first_alone, pieces, outcome } in queue {
-                let mut body = BodyWriter { pieces, piece: Vec::new(), layout, alone: first_alone };
+                let mut body =
+                    BodyWriter { pieces, piece: Vec::new(), layout, alone: first_alone, flushed: Instant::now() };
                 let end = reader.read(&mut source, &ranges, &mut body);
                 // Before `body` goes, so that whoever sees the body's end finds the outcome.
                 if let Some(end) = end {
@@ -175,6 +181,7 @@ struct BodyWriter {
     piece: Vec<u8>,
     layout: Layout,
     alone: bool,
+    flushed: Instant,
 }
 
 impl BodyWriter {
@@ -185,7 +192,8 @@ impl BodyWriter {
             // The rows were counted: they cannot be of another shape.
             Layout::Records => drop(record::encode(kind, frame, f32::NAN, f32::NAN, rows, &mut self.piece)),
         }
-        if std::mem::take(&mut self.alone) || self.piece.len() >= PIECE_BYTES { self.flush() } else { Some(()) }
+        let idle = self.pieces.capacity() == self.pieces.max_capacity() && self.flushed.elapsed() >= KEPT_BACK;
+        if std::mem::take(&mut self.alone) || idle || self.piece.len() >= PIECE_BYTES { self.flush() } else { Some(()) }
     }
 
     fn flush(&mut self) -> Option<()> {
@@ -195,6 +203,7 @@ impl BodyWriter {
             let piece = rest.split_to(rest.len().min(2 * PIECE_BYTES));
             self.pieces.blocking_send(piece).ok()?;
         }
+        self.flushed = Instant::now();
         Some(())
     }
 }

@@ -134,13 +134,17 @@ impl Service {
         let records = exchange.header("content-type") == Some(record::MEDIA_TYPE);
         exchange.begin(200, &[("content-type", "application/x-ndjson")]).await;
         if matches!(fault, Fault::Garbage) {
-            return exchange.chunk(b"{\"oops\"\n").await;
+            exchange.chunk(b"{\"oops\"\n").await;
+            // Closed with bytes unread, the connection would lose the line.
+            exchange.whole_body().await;
+            return exchange.end().await;
         }
         if matches!(fault, Fault::Endless) {
             for _ in 0..40 {
                 exchange.chunk(&[b'x'; 1 << 16]).await;
             }
-            return;
+            exchange.whole_body().await;
+            return exchange.end().await;
         }
         let (mut waiting, mut done) = (Vec::new(), 0);
         while let Some(piece) = exchange.body_piece().await {
@@ -155,8 +159,7 @@ impl Service {
                     (next, bytes.to_vec(), 12 * rows)
                 };
                 match fault {
-                    Fault::Cut(after) if done == after => return,
-                    Fault::LoseResults(after) if done == after => return,
+                    Fault::Cut(after) | Fault::LoseResults(after) if done == after => return,
                     Fault::End(after) if done == after => return exchange.end().await,
                     Fault::HalfLine(after) if done == after => {
                         exchange.chunk(b"{\"frame\":").await;

@@ -1,0 +1,101 @@
+//! `cager encode --server`.
+
+use crate::server::{Server, capture};
+use crate::support::{Dir, ENCODE};
+use serde_json::Value;
+
+/// A token and its SHA-256.
+const TOKEN: &str = "open-sesame-open-sesame-open-sesame";
+const HASH: &str = "2482b372f3c76c863606bc41264596d81f6a2bd5cfd3d5c389f1436040912d4f";
+
+#[test]
+fn a_service_gives_the_bytes_and_the_report_that_this_machine_gives() {
+    let (dir, ..) = capture();
+    let server = Server::start(&dir);
+    for options in ["", " --handles all", " --regularizer tikhonov --lambda 0.01", " --spectrum 3"] {
+        dir.cager(&format!("{ENCODE} --report here.json{options}")).succeeds();
+        let here = dir.read("out.cager");
+        let said =
+            dir.cager(&format!("{ENCODE} --report there.json{options} --server {}", server.address())).succeeds();
+        assert!(dir.read("out.cager") == here, "{options}: other bytes");
+        let [mut here, mut there] = ["here.json", "there.json"].map(|name| dir.json(name));
+        for report in [&mut here, &mut there] {
+            assert!(report["seconds"]["total"].as_f64() > Some(0.0));
+            report["seconds"] = Value::Null;
+        }
+        assert_eq!(here, there, "{options}");
+        assert!(said.stdout.contains("20 frames of") && said.stdout.contains(&server.address()), "{}", said.stdout);
+    }
+}
+
+#[test]
+fn a_frame_that_cannot_be_read_is_named_and_nothing_is_left_anywhere() {
+    let (dir, ..) = capture();
+    let server = Server::start(&dir);
+    let mut frames = dir.read("frames.npy");
+    let frame_bytes = (frames.len() - 128) / 20;
+    let at = 128 + 7 * frame_bytes + 12 * 5;
+    frames[at..at + 4].copy_from_slice(&f32::NAN.to_le_bytes());
+    dir.write("frames.npy", frames);
+    let said = dir.cager(&format!("{ENCODE} --server {}", server.address())).run();
+    assert_eq!(said.status, Some(1));
+    assert!(said.stderr.contains("frames.npy: frame 7: point 5 has a coordinate that is NaN"), "{}", said.stderr);
+    assert!(!dir.path("out.cager").exists());
+    assert_eq!(sessions(&server), 0);
+}
+
+#[test]
+fn an_address_without_a_service_is_told_at_once() {
+    let (dir, ..) = capture();
+    let free = std::net::TcpListener::bind("127.0.0.1:0").and_then(|l| l.local_addr()).expect("a port");
+    let said = dir.cager(&format!("{ENCODE} --server http://{free}")).run();
+    assert_eq!(said.status, Some(1));
+    assert!(said.stderr.contains(&format!("http://{free} cannot be reached")), "{}", said.stderr);
+    let said = dir.cager(&format!("{ENCODE} --server localhost:8080")).run();
+    assert!(said.stderr.contains("not the address of a service"), "{}", said.stderr);
+    assert!(!dir.path("out.cager").exists());
+}
+
+#[test]
+fn a_guarded_service_wants_a_token_from_the_command_line_or_the_environment() {
+    let (dir, ..) = capture();
+    dir.write("tokens.toml", format!("[[token]]\nname = \"me\"\ntenant = \"us\"\nsha256 = \"{HASH}\"\n"));
+    restrict(&dir, "tokens.toml");
+    let server = Server::start_at(&dir, "127.0.0.1:0", &["--tokens", "tokens.toml"]);
+    let encode = format!("{ENCODE} --server {}", server.address());
+    let said = dir.cager(&encode).env("CAGER_TOKEN", "").run();
+    assert_eq!(said.status, Some(1));
+    assert!(said.stderr.contains("needs a token"), "{}", said.stderr);
+    let said = dir.cager(&format!("{encode} --token wrong")).run();
+    assert!(said.status == Some(1) && !said.stderr.contains("wrong"), "{}", said.stderr);
+    dir.cager(&format!("{encode} --token {TOKEN}")).succeeds();
+    dir.cager(&encode).env("CAGER_TOKEN", TOKEN).succeeds();
+}
+
+#[test]
+fn a_service_behind_tls_is_used_if_its_certificate_is_trusted() {
+    let (dir, ..) = capture();
+    let made = rcgen::generate_simple_self_signed(["localhost".to_owned()]).expect("a certificate");
+    dir.write("certificate.pem", made.cert.pem());
+    dir.write("key.pem", made.signing_key.serialize_pem());
+    restrict(&dir, "key.pem");
+    let files = ["--tls-certificate", "certificate.pem", "--tls-key", "key.pem"];
+    let server = Server::start_at(&dir, "127.0.0.1:0", &files);
+    let place = server.place.replace("127.0.0.1", "localhost");
+    let encode = format!("{ENCODE} --server https://{place}");
+    dir.cager(&encode).env("SSL_CERT_FILE", "certificate.pem").succeeds();
+    let said = dir.cager(&encode).run();
+    assert_eq!(said.status, Some(1));
+    assert!(said.stderr.contains("certificate"), "{}", said.stderr);
+}
+
+#[cfg(unix)]
+fn restrict(dir: &Dir, name: &str) {
+    use std::os::unix::fs::PermissionsExt;
+    std::fs::set_permissions(dir.path(name), std::fs::Permissions::from_mode(0o600)).expect(name);
+}
+
+#[tokio::main(flavor = "current_thread")]
+async fn sessions(server: &Server) -> usize {
+    server.client().sessions().await.expect("sessions").len()
+}
