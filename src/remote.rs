@@ -7,7 +7,7 @@ pub use frames::FileFrames;
 
 use crate::encode::Encoded;
 use cager_client::messages::{FrameResult, SessionOptions};
-use cager_client::{Client, ClientError, ClientOptions, MeshFile, NewSession, UploadOptions};
+use cager_client::{Client, ClientError, ClientOptions, FrameSource, MeshFile, NewSession, UploadOptions};
 use cager_formats::{Action, AtomicFile};
 use cager_proto::container;
 use report::{Times, report};
@@ -41,7 +41,7 @@ pub enum RemoteError {
 }
 
 /// Everything an encoding by a service needs.
-pub struct RemoteJob<'a> {
+pub struct RemoteJob<'a, F> {
     /// Address of the service.
     pub address: &'a str,
     /// Token to show there.
@@ -51,7 +51,7 @@ pub struct RemoteJob<'a> {
     /// File with the cage around it.
     pub cage: &'a Path,
     /// The capture.
-    pub frames: FileFrames,
+    pub frames: F,
     /// File to write.
     pub output: &'a Path,
     /// Choices for the session.
@@ -66,14 +66,29 @@ pub struct EncodedRemotely {
     pub encoded: Encoded,
     /// The session, which stays on the service.
     pub session: String,
+    /// How long its steps took.
+    pub steps: Steps,
+}
+
+/// How long the steps of an encoding by a service took, as its client saw them.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Steps {
+    /// Sending rest pose and cage, and waiting until the session is ready.
+    pub prepare: Duration,
+    /// Sending the frames and receiving what was solved, which overlap.
+    pub upload: Duration,
+    /// Having the container written.
+    pub complete: Duration,
+    /// Fetching the container.
+    pub download: Duration,
 }
 
 /// Has a service encode a capture. `progress` is told the number of frames done.
 ///
 /// # Errors
 /// See [`RemoteError`]; the session is then deleted, where the service can still be reached.
-pub fn encode_remotely(
-    job: RemoteJob<'_>,
+pub fn encode_remotely<F: FrameSource + 'static>(
+    job: RemoteJob<'_, F>,
     progress: &mut (dyn FnMut(usize) + Send),
 ) -> Result<EncodedRemotely, RemoteError> {
     // One thread moves bytes; frames are read on another.
@@ -81,7 +96,10 @@ pub fn encode_remotely(
     runtime.block_on(encode(job, progress))
 }
 
-async fn encode(job: RemoteJob<'_>, progress: &mut (dyn FnMut(usize) + Send)) -> Result<EncodedRemotely, RemoteError> {
+async fn encode<F: FrameSource + 'static>(
+    job: RemoteJob<'_, F>,
+    progress: &mut (dyn FnMut(usize) + Send),
+) -> Result<EncodedRemotely, RemoteError> {
     let clock = Instant::now();
     let mut client = Client::new(job.address)?;
     if let Some(token) = job.token {
@@ -90,10 +108,10 @@ async fn encode(job: RemoteJob<'_>, progress: &mut (dyn FnMut(usize) + Send)) ->
     // Before the work, so that an unwritable place costs no waiting.
     let file = AtomicFile::create(job.output)?;
     let mut new = NewSession::new(mesh_file(job.rest)?, mesh_file(job.cage)?);
-    new.options = SessionOptions { frame_rate: job.frames.frame_rate(), ..job.options };
+    new.options = job.options;
     let session = client.create(&new).await?.id;
     match run(&client, &session, job.frames, file, clock, progress).await {
-        Ok(encoded) => Ok(EncodedRemotely { encoded, session }),
+        Ok((encoded, steps)) => Ok(EncodedRemotely { encoded, session, steps }),
         Err(error) => {
             let hasty = client.with_options(ClientOptions { retries: 0, ..ClientOptions::default() });
             let _ = tokio::time::timeout(CLEAN_UP_WITHIN, hasty.delete(&session)).await;
@@ -105,12 +123,13 @@ async fn encode(job: RemoteJob<'_>, progress: &mut (dyn FnMut(usize) + Send)) ->
 async fn run(
     client: &Client,
     session: &str,
-    frames: FileFrames,
+    frames: impl FrameSource + 'static,
     mut file: AtomicFile,
     clock: Instant,
     progress: &mut (dyn FnMut(usize) + Send),
-) -> Result<Encoded, RemoteError> {
+) -> Result<(Encoded, Steps), RemoteError> {
     let ready = client.wait_ready(session, READY_WITHIN).await?;
+    let mut steps = Steps { prepare: clock.elapsed(), ..Steps::default() };
     let clock_upload = Instant::now();
     let mut done = 0;
     let mut on_frame = |_: FrameResult| {
@@ -119,16 +138,19 @@ async fn run(
     };
     let options = UploadOptions { on_frame: Some(&mut on_frame), ..UploadOptions::default() };
     let uploaded = client.upload(&ready, frames, options).await?;
-    let upload = clock_upload.elapsed();
+    steps.upload = clock_upload.elapsed();
 
-    let clock_write = Instant::now();
+    let clock_complete = Instant::now();
     client.complete(session, uploaded.frames).await?;
+    steps.complete = clock_complete.elapsed();
+    let clock_download = Instant::now();
     client.download(session, &mut file).await.map_err(name_output)?;
     let container = file.complete()?;
     // Nothing that is no container takes the name of one.
     let report = report(BufReader::new(container.reader()?)).map_err(RemoteError::Container)?;
-    let times = Times { preparation: ready.seconds, upload, write: clock_write.elapsed(), total: clock.elapsed() };
-    Ok(Encoded { report: report.finish(container.length(), &times), container })
+    steps.download = clock_download.elapsed();
+    let times = Times { preparation: ready.seconds, steps, total: clock.elapsed() };
+    Ok((Encoded { report: report.finish(container.length(), &times), container }, steps))
 }
 
 /// What `AtomicFile` passes through `io::Write` has the path in it already.

@@ -1,11 +1,14 @@
 //! Encodes one capture: create a session, upload its frames, complete it, download the container.
 
 use cager_client::{Client, FnFrames, MeshFile, NewSession, UploadOptions};
-use std::{fs, time::Duration};
+use std::{env, fs, time::Duration};
 
 #[tokio::main]
-async fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let client = Client::new("http://127.0.0.1:8080")?;
+pub(crate) async fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut client = Client::new(env::var("CAGER_SERVER").as_deref().unwrap_or("http://127.0.0.1:8080"))?;
+    if let Ok(token) = env::var("CAGER_TOKEN") {
+        client = client.with_token(&token);
+    }
     let (rest, cage) = (fs::read("rest.obj")?, fs::read("cage.obj")?);
     let session =
         client.create(&NewSession::new(MeshFile::new("rest.obj", rest), MeshFile::new("cage.obj", cage))).await?;

@@ -2,6 +2,7 @@
 
 use crate::error::ClientError;
 use reqwest::Url;
+use std::net::IpAddr;
 
 /// Where a service answers: scheme, host, port and perhaps a prefix.
 #[derive(Clone, Debug)]
@@ -30,6 +31,13 @@ impl Address {
 
     pub(crate) fn is_https(&self) -> bool {
         self.base.scheme() == "https"
+    }
+
+    /// Whether it is on this very machine.
+    pub(crate) fn is_loopback(&self) -> bool {
+        let host = self.base.host_str().unwrap_or_default();
+        let literal = host.trim_start_matches('[').trim_end_matches(']').parse::<IpAddr>();
+        host == "localhost" || literal.is_ok_and(|address| address.is_loopback())
     }
 
     /// The address of a resource. `id`, where there is one, was given by a caller or by the service.
@@ -87,6 +95,20 @@ mod tests {
         assert_eq!(join("http://h", &["v1", "sessions", "a/../b?c#d"]), "http://h/v1/sessions/a%2F..%2Fb%3Fc%23d");
         for id in ["", ".", ".."] {
             assert!(join("http://h", &["v1", "sessions", id]).contains("not the id"), "{id:?}");
+        }
+    }
+
+    #[test]
+    fn this_machine_is_known_by_its_names() {
+        for (base, here) in [
+            ("http://127.0.0.1:1", true),
+            ("http://127.8.9.1", true),
+            ("http://[::1]:1", true),
+            ("http://LOCALHOST", true),
+            ("http://10.0.0.1", false),
+            ("http://localhost.example.org", false),
+        ] {
+            assert_eq!(Address::parse(base).expect("an address").is_loopback(), here, "{base}");
         }
     }
 

@@ -240,6 +240,10 @@ impl Client {
             .http2_keep_alive_timeout(Duration::from_secs(20))
             // A redirect would turn an upload into a GET, or carry the token elsewhere; its target is reported instead.
             .redirect(reqwest::redirect::Policy::none());
+        if self.shared.address.is_loopback() {
+            // A proxy's loopback is another machine's.
+            builder = builder.no_proxy();
+        }
         if only_http1 {
             builder = builder.http1_only();
         }

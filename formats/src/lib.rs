@@ -10,7 +10,7 @@ pub mod mesh;
 mod natural;
 mod text;
 
-pub use atomic::{AtomicDir, AtomicFile, CompleteFile, commit_together, remove_temporaries};
+pub use atomic::{AtomicDir, AtomicFile, CompleteFile, ScratchDir, commit_together, remove_temporaries};
 pub use error::{Action, Error};
 pub use frames::{CacheFormat, FrameOptions, FrameReader, FrameWriter, create_frames, open_frames, open_frames_bytes};
 pub use mesh::{MeshFormat, read_model, read_model_bytes, write_model};

@@ -4,6 +4,7 @@ use crate::config::ServeFlags;
 use cager_core::inversion::Handles;
 use cager_core::regularize::Regularizer;
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::net::SocketAddr;
 use std::path::PathBuf;
 
 /// Turns animated mesh captures into light, editable, streamable cages.
@@ -24,6 +25,7 @@ pub(crate) enum Command {
     Decode(DecodeArgs),
     Inspect(InspectArgs),
     Serve(Box<ServeFlags>),
+    Health(HealthArgs),
     Demo(DemoArgs),
     Completions(CompletionsArgs),
 }
@@ -122,7 +124,26 @@ pub(crate) struct InspectArgs {
     pub(crate) json: bool,
 }
 
-/// Encode and decode a built-in capture: needs no files and no network.
+/// Ask a service on this machine whether it is ready: exit status 0, or 1 with the reason.
+///
+/// For containers and scripts that have no curl. A service with TLS is only asked whether it takes connections. Example: cager
+/// health --address 127.0.0.1:8080
+#[derive(Args, Debug)]
+pub(crate) struct HealthArgs {
+    /// Address and port [default: the environment's CAGER_LISTEN, or 127.0.0.1:8080; the loopback address for 0.0.0.0 and [::]].
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    pub(crate) address: Option<SocketAddr>,
+
+    /// Ask only whether it lives, not whether it is ready.
+    #[arg(long)]
+    pub(crate) live: bool,
+
+    /// Longest time to wait, in seconds.
+    #[arg(long, value_name = "S", default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=3600))]
+    pub(crate) timeout_s: u64,
+}
+
+/// Encode and decode a built-in capture through a service of its own: needs no files and no network.
 ///
 /// Example: cager demo -o my-first-capture
 #[derive(Args, Debug)]

@@ -1,52 +1,58 @@
-//! `cager demo`: the main job on a built-in capture.
+//! `cager demo`: the main job on a built-in capture, through a service.
 
 use super::args::DemoArgs;
 use super::encode::write_report;
+use super::own_service::OwnService;
 use super::{grouped, human_bytes, interrupt, print, progress};
-use crate::coordinates;
-use crate::coordinates::default_spectrum;
 use crate::decode;
-use crate::encode::{self, Encoded, Job};
+use crate::encode::Encoded;
 use crate::plot::error_plot;
+use crate::remote::{EncodedRemotely, RemoteJob, Steps, encode_remotely};
 use crate::report::Report;
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
+use cager_client::FnFrames;
+use cager_client::messages::SessionOptions;
 use cager_core::cage::Cage;
-use cager_core::inversion::SolverOptions;
 use cager_core::mesh::{Model, Polygons, diagonal};
 use cager_core::synthetic::{Capture, Options};
-use cager_formats::{AtomicFile, FrameReader, commit_together, open_frames, write_model};
+use cager_formats::{AtomicFile, commit_together, open_frames, write_model};
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
-use std::time::Instant;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 pub(super) fn run(args: &DemoArgs) -> Result<()> {
-    let capture = Capture::new(&Options {
+    let capture = Arc::new(Capture::new(&Options {
         points: args.points as usize,
         frames: args.frames as usize,
         cage_vertices: args.cage_vertices as usize,
-    });
+    }));
     let cage = Cage::new(capture.cage.clone()).context("the built-in cage")?;
-    let Some(system) = coordinates::by_name("mvc") else { bail!("mean value coordinates are missing") };
     let folder = &args.output;
     interrupt::leaves_nothing()?;
     std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-    write_model(&folder.join("rest.obj"), &capture.rest)?;
-    write_model(&folder.join("cage.obj"), &as_model(&cage))?;
+    let (rest_file, cage_file) = (folder.join("rest.obj"), folder.join("cage.obj"));
+    write_model(&rest_file, &capture.rest)?;
+    write_model(&cage_file, &as_model(&cage))?;
 
+    // There rather than in the system's folder for temporaries, which may be small, or memory.
+    let service = OwnService::start(folder)?;
     let output = folder.join("capture.cager");
-    let bar = progress::frames("encoding", capture.frames());
-    let mut frames = Generated { capture: &capture, next: 0 };
-    let job = Job {
-        rest: &capture.rest,
-        cage: &cage,
-        frames: &mut frames,
+    let job = RemoteJob {
+        address: service.address(),
+        token: None,
+        rest: &rest_file,
+        cage: &cage_file,
+        frames: generated(&capture),
         output: &output,
-        system,
-        options: SolverOptions { spectrum: default_spectrum(cage.vertices().len()), ..SolverOptions::default() },
+        options: SessionOptions { name: Some("demo".to_owned()), ..SessionOptions::default() },
     };
-    let Encoded { report, container } = encode::encode(job, &mut |done| bar.set_position(done as u64))?;
+    let bar = progress::frames("encoding", capture.frames());
+    let result = encode_remotely(job, &mut |done| bar.set_position(done as u64));
     bar.finish_and_clear();
+    let EncodedRemotely { encoded: Encoded { report, container }, steps, .. } = result?;
+    service.stop()?;
     let report_file = write_report(AtomicFile::create(folder.join("report.json"))?, &report)?;
     commit_together(vec![report_file, container])?;
 
@@ -67,7 +73,7 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
     let mut plot = AtomicFile::create(folder.join("errors.svg"))?;
     plot.write_all(error_plot(&title, &l2, &linf).as_bytes())?;
     plot.commit()?;
-    print(&table(&report, decode_seconds, folder)?)
+    print(&table(&report, &steps, decode_seconds, folder)?)
 }
 
 fn as_model(cage: &Cage) -> Model {
@@ -78,30 +84,15 @@ fn as_model(cage: &Cage) -> Model {
     Model { points: cage.vertices().to_vec(), faces }
 }
 
-/// The built-in capture as a source of frames.
-struct Generated<'a> {
-    capture: &'a Capture,
-    next: usize,
-}
-
-impl FrameReader for Generated<'_> {
-    fn points(&self) -> usize {
-        self.capture.rest.points.len()
-    }
-
-    fn frames(&self) -> usize {
-        self.capture.frames()
-    }
-
-    fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, cager_formats::Error> {
-        out.clear();
-        if self.next == self.capture.frames() {
-            return Ok(false);
-        }
-        self.capture.frame(self.next, out);
-        self.next += 1;
+/// The frames of the built-in capture, made as they are sent.
+fn generated(capture: &Arc<Capture>) -> impl cager_client::FrameSource + 'static {
+    let capture = Arc::clone(capture);
+    let mut wide = Vec::new();
+    FnFrames::new(capture.rest.points.len(), u32::try_from(capture.frames()).ok(), move |frame, out: &mut Vec<f32>| {
+        capture.frame(frame as usize, &mut wide);
+        out.extend(wide.iter().map(|&x| x as f32));
         Ok(true)
-    }
+    })
 }
 
 /// Measures the decoded file anew, to show that the report says what a user gets.
@@ -112,6 +103,8 @@ fn compare(capture: &Capture, decoded: &Path, report: &Report) -> Result<()> {
     let (mut truth, mut found) = (Vec::new(), Vec::new());
     for (t, said) in report.error.per_frame.iter().enumerate() {
         capture.frame(t, &mut truth);
+        // As they were sent.
+        truth.iter_mut().for_each(|x| *x = f64::from(*x as f32));
         ensure!(reader.read_next(&mut found)?, "{}: frame {t} is missing", decoded.display());
         let squares = truth
             .chunks_exact(3)
@@ -129,9 +122,9 @@ fn compare(capture: &Capture, decoded: &Path, report: &Report) -> Result<()> {
     Ok(())
 }
 
-fn table(report: &Report, decode_seconds: f64, folder: &Path) -> Result<String> {
+fn table(report: &Report, steps: &Steps, decode_seconds: f64, folder: &Path) -> Result<String> {
     let s = &report.seconds;
-    let frames = report.frames as f64;
+    let seconds = |s: f64| format!("{s:.3} s");
     let mut out = String::new();
     let mut row = |name: &str, value: String, note: &str| writeln!(out, "  {name:<24}{value:>14}   {note}");
     row("points × frames", format!("{} × {}", grouped(report.points as u64), report.frames), "")?;
@@ -155,13 +148,22 @@ fn table(report: &Report, decode_seconds: f64, folder: &Path) -> Result<String> 
         format!("{:.1}", report.condition_number.handles),
         &format!("{:.1} over all points", report.condition_number.full),
     )?;
-    row("coordinates", format!("{:.3} s", s.coordinates), "")?;
-    row("maxvol", format!("{:.3} s", s.maxvol), &format!("{} swaps", report.maxvol.swaps))?;
-    row("spectrum and operator", format!("{:.3} s", s.svd), "")?;
-    row("inversion", format!("{:.3} s", s.invert), &format!("{:.1} µs per frame", 1e6 * s.invert / frames))?;
-    row("error measurement", format!("{:.3} s", s.measure), &format!("{:.3} ms per frame", 1e3 * s.measure / frames))?;
-    row("encoding in all", format!("{:.3} s", s.total), "generating the frames included")?;
-    row("decoding in all", format!("{decode_seconds:.3} s"), "coordinates and writing decoded.npy included")?;
+    row("coordinates", seconds(s.coordinates), "")?;
+    row("maxvol", seconds(s.maxvol), &format!("{} swaps", report.maxvol.swaps))?;
+    row("spectrum and operator", seconds(s.svd), "")?;
+    let step = |step: Duration| seconds(step.as_secs_f64());
+    let per_frame = 1e3 * steps.upload.as_secs_f64() / report.frames as f64;
+    row("service: prepare", step(steps.prepare), "the three above, and sending rest pose and cage")?;
+    row(
+        "service: upload, solve",
+        step(steps.upload),
+        &format!("{per_frame:.3} ms per frame, made, sent, solved, measured, on disk"),
+    )?;
+    row("service: complete", step(steps.complete), "writing the container")?;
+    row("service: download", step(steps.download), "fetching and checking it")?;
+    row("encoding in all", seconds(s.total), "")?;
+    row("decoding in all", seconds(decode_seconds), "coordinates and writing decoded.npy included")?;
+    writeln!(out, "All went through a real service over HTTP: started for it on this machine, and stopped again.")?;
     writeln!(out, "Decoded again and measured anew: the errors are those of the report.")?;
     writeln!(out, "Look at {}: the errors of every frame.", folder.join("errors.svg").display())?;
     Ok(out)

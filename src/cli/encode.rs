@@ -58,6 +58,7 @@ fn elsewhere(args: &EncodeArgs, address: &str, rest: &Model, cage: &Cage, clock:
         spectrum: Some(options.spectrum as u32),
         lambda: Some(options.lambda),
         flip_cage: args.flip_cage,
+        frame_rate: frames.frame_rate(),
         ..SessionOptions::default()
     };
     let bar = progress::frames("encoding", frames.frames().unwrap_or(0) as usize);
@@ -72,7 +73,7 @@ fn elsewhere(args: &EncodeArgs, address: &str, rest: &Model, cage: &Cage, clock:
     };
     let result = encode_remotely(job, &mut |done| bar.set_position(done as u64));
     bar.finish_and_clear();
-    let EncodedRemotely { mut encoded, session } = result?;
+    let EncodedRemotely { mut encoded, session, .. } = result?;
     encoded.report.seconds.read += read_seconds;
     finish(args, encoded, report_file, clock)?;
     print(&format!("  service {}, session {}\n", plain(address), plain(&session)))

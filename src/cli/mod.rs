@@ -4,8 +4,10 @@ mod args;
 mod decode;
 mod demo;
 mod encode;
+mod health;
 mod inspect;
 mod interrupt;
+mod own_service;
 mod progress;
 pub(crate) mod serve;
 
@@ -22,6 +24,7 @@ pub fn run() -> ExitCode {
         Command::Inspect(args) => inspect::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Serve(args) => serve::run(&args),
+        Command::Health(args) => health::run(&args),
         Command::Completions(args) => {
             let mut script = Vec::new();
             clap_complete::generate(args.shell, &mut Cli::command(), "cager", &mut script);

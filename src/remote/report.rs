@@ -1,5 +1,6 @@
 //! The report of a capture that was encoded elsewhere, from its container.
 
+use super::Steps;
 use crate::report::{Bytes, Condition, Errors, FrameError, MaxVol, Report, Seconds};
 use cager_client::messages::PreparationSeconds;
 use cager_proto::container::{ContainerReader, Error};
@@ -9,8 +10,7 @@ use std::time::Duration;
 /// What took how long.
 pub(super) struct Times {
     pub(super) preparation: PreparationSeconds,
-    pub(super) upload: Duration,
-    pub(super) write: Duration,
+    pub(super) steps: Steps,
     pub(super) total: Duration,
 }
 
@@ -73,9 +73,9 @@ impl Unfinished {
             coordinates: times.preparation.coordinates,
             maxvol: times.preparation.maxvol,
             svd: times.preparation.svd,
-            invert: times.upload.as_secs_f64(),
+            invert: times.steps.upload.as_secs_f64(),
             measure: 0.0,
-            write: times.write.as_secs_f64(),
+            write: (times.steps.complete + times.steps.download).as_secs_f64(),
             total: times.total.as_secs_f64(),
         };
         report

@@ -56,6 +56,15 @@ fn describe() {
     describe_counter!("cager_quarantined_total", "Damaged things put aside");
     describe_counter!("cager_rejections_total", "Requests turned away, by reason");
     describe_counter!("cager_requests_total", "Requests, by status class");
+    describe_counter!("cager_connections_total", "Connections accepted");
+    describe_counter!("cager_connections_closed_total", "Connections that ended, by how");
+    describe_counter!(
+        "cager_connections_rejected_total",
+        "Connections beyond the limit: spare (answered once) or full"
+    );
+    describe_counter!("cager_accept_errors_total", "Errors of accepting connections");
+    describe_counter!("cager_body_timeouts_total", "Request bodies that stopped arriving");
+    describe_gauge!("cager_connections", "Open connections");
     describe_counter!("cager_cache_total", "Solvers asked for: memory, disk, joined (being prepared already) or miss");
     describe_counter!("cager_cache_evictions_total", "Solvers that left the memory");
     describe_gauge!("cager_cache_bytes", Unit::Bytes, "Memory of caches");

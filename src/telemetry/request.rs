@@ -64,7 +64,9 @@ pub async fn request_id(mut request: Request, next: Next) -> Response {
         response.headers_mut().insert(HEADER, header);
     }
     log.answered = Some((response.status(), log.began.elapsed()));
-    response.map(|inner| Body::new(Logged { ended: inner.is_end_stream(), inner, log }))
+    let declared =
+        response.headers().get(http::header::CONTENT_LENGTH).and_then(|value| value.to_str().ok()?.parse().ok());
+    response.map(|inner| Body::new(Logged { ended: inner.is_end_stream(), inner, declared, given: 0, log }))
 }
 
 /// Writes the request's line when it is dropped: at the end of the response, or when the client has gone.
@@ -101,6 +103,9 @@ impl Drop for Log {
 struct Logged {
     inner: Body,
     ended: bool,
+    /// Its length, after which nobody asks for the end.
+    declared: Option<u64>,
+    given: u64,
     log: Log,
 }
 
@@ -111,7 +116,10 @@ impl HttpBody for Logged {
     fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
         let this = &mut *self;
         let frame = ready!(Pin::new(&mut this.inner).poll_frame(cx));
-        this.ended = frame.is_none() || this.inner.is_end_stream();
+        if let Some(Ok(Some(data))) = frame.as_ref().map(|frame| frame.as_ref().map(Frame::data_ref)) {
+            this.given += data.len() as u64;
+        }
+        this.ended = frame.is_none() || this.inner.is_end_stream() || this.declared == Some(this.given);
         Poll::Ready(frame)
     }
 

@@ -17,7 +17,8 @@ fn demo_in_an_empty_folder_writes_what_it_says() {
     let report = dir.json("cager-demo/report.json");
     let svg = String::from_utf8(dir.read("cager-demo/errors.svg")).expect("UTF-8");
     assert!(svg.trim_start().starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
-    for word in ["L2", "L∞", "ratio", "20", "errors.svg"] {
+    for word in ["L2", "L∞", "ratio", "20", "errors.svg", "real service", "prepare", "upload", "complete", "download"]
+    {
         assert!(done.stdout.contains(word), "{word} is missing in {}", done.stdout);
     }
     assert_eq!(report["frames"], 20);
@@ -50,6 +51,20 @@ fn demo_goes_where_it_is_told_and_can_run_there_again() {
     dir.cager(line).succeeds();
     assert!(dir.read("some/where/capture.cager") == first);
     assert_eq!(dir.names(""), ["some"]);
+}
+
+#[test]
+fn demo_needs_neither_a_proxy_nor_the_usual_port() {
+    let dir = Dir::new();
+    // Holds the port where `cager serve` listens, unless somebody else does.
+    let _taken = std::net::TcpListener::bind("127.0.0.1:8080");
+    let mut demo = dir.cager("demo --points 300 --frames 3 --cage-vertices 40");
+    for name in ["http_proxy", "HTTP_PROXY", "all_proxy", "ALL_PROXY"] {
+        demo = demo.env(name, "http://127.0.0.1:1");
+    }
+    // Settings of a service that is meant to run here are not the demo's.
+    demo.env("CAGER_LISTEN", "127.0.0.1:8080").env("CAGER_DATA", "/nowhere").succeeds();
+    assert_eq!(dir.names(""), ["cager-demo"]);
 }
 
 #[test]

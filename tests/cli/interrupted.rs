@@ -131,6 +131,27 @@ fn a_decoding_told_to_end_leaves_no_folder_and_no_file() {
 }
 
 #[test]
+fn a_demo_told_to_end_takes_its_service_along() {
+    let line = "demo --points 2000 --frames 100000 --cage-vertices 200";
+    for signal in ASKED {
+        let dir = Dir::new();
+        // While it starts, while it prepares, and while frames arrive.
+        for begun in ["", "sessions", "sessions/*/frames.log"] {
+            let child = begin(&dir, line, |_| service_has(&dir, begun));
+            send(&child, signal);
+            assert_eq!(death(child), Some(signal.as_raw()), "{begun}");
+            assert_eq!(dir.names("cager-demo"), ["cage.obj", "rest.obj"], "{signal:?} at {begun:?}");
+        }
+    }
+}
+
+/// Whether the demo's service has something in its data folder. `*` stands for any name.
+fn service_has(dir: &Dir, what: &str) -> bool {
+    let pattern = dir.path("cager-demo/.cager-*.tmp").join(what);
+    glob::glob(&pattern.display().to_string()).expect("a pattern").next().is_some()
+}
+
+#[test]
 fn a_killed_process_leaves_no_file_where_files_need_no_name() {
     use rustix::fs::{Mode, OFlags};
     let (_inputs, dir, line) = long_encode();

@@ -4,6 +4,7 @@ mod anonymous;
 mod complete;
 mod dir;
 mod file;
+mod scratch;
 mod temporary;
 
 use std::fs::{self, File};
@@ -13,6 +14,7 @@ use std::path::{Path, PathBuf};
 pub use complete::{CompleteFile, commit_together};
 pub use dir::AtomicDir;
 pub use file::AtomicFile;
+pub use scratch::ScratchDir;
 pub use temporary::remove_temporaries;
 
 use crate::error::Error;

@@ -74,5 +74,21 @@ impl Drop for Temporary {
 }
 
 fn remove(path: &Path) -> io::Result<()> {
-    if fs::symlink_metadata(path)?.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) }
+    if fs::symlink_metadata(path)?.is_dir() { remove_dir(path) } else { fs::remove_file(path) }
+}
+
+/// Removes a folder that other threads may still write into: under another name they do not find it any more.
+fn remove_dir(path: &Path) -> io::Result<()> {
+    let gone = path.with_extension("gone.tmp");
+    loop {
+        match fs::rename(path, &gone) {
+            Ok(()) => fs::remove_dir_all(&gone)?,
+            // Systems that do not rename folders with open files in them.
+            Err(_) => return fs::remove_dir_all(path),
+        }
+        // Someone was just about to make what was missing.
+        if !path.exists() {
+            return Ok(());
+        }
+    }
 }
