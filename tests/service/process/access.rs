@@ -1,0 +1,143 @@
+//! Who may use the service, and what one tenant can learn of another.
+
+use crate::support::{Capture, TestApp, folder, service, write_tokens};
+use cager_proto::messages::{CacheUse, SessionList};
+use std::io::Read as _;
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+const ANNA: &str = "anna-has-a-long-secret";
+const BERT: &str = "bert-has-a-long-secret";
+
+fn guarded() -> TestApp {
+    TestApp::guarded(&[("anna", ANNA, ""), ("bert", BERT, "")])
+}
+
+#[tokio::test]
+async fn lists_hold_a_tenants_own_sessions_only() {
+    let app = guarded();
+    let (anna, bert) = (app.caller(Some(ANNA)), app.caller(Some(BERT)));
+    let capture = Capture::tiny();
+    let annas = [anna.create(capture).await.id, anna.create(capture).await.id];
+    let berts = [bert.create(capture).await.id];
+    let list = async |api: &crate::support::Api, query: &str| {
+        let list: SessionList = api.get(&format!("/v1/sessions{query}")).await.is(200);
+        list.sessions.into_iter().map(|session| session.id).collect::<Vec<_>>()
+    };
+    assert_eq!(list(&anna, "").await, annas);
+    assert_eq!(list(&bert, "").await, berts);
+    assert_eq!(list(&bert, &format!("?after={}", annas[0])).await, berts, "a stranger's id is a place like any other");
+}
+
+#[tokio::test]
+async fn what_one_tenant_prepared_is_no_hit_for_another() {
+    let app = guarded();
+    let (anna, bert) = (app.caller(Some(ANNA)), app.caller(Some(BERT)));
+    let capture = Capture::small();
+    assert_eq!(anna.ready(capture).await.cache, Some(CacheUse::Miss));
+    assert_eq!(anna.ready(capture).await.cache, Some(CacheUse::Hit));
+    let session = bert.ready(capture).await;
+    assert_eq!(session.cache, Some(CacheUse::Miss), "that would tell what others have");
+    assert!(session.seconds.coordinates > 0.0, "nor does its time tell");
+    // Both get the same numbers.
+    let anna_s = anna.ready(capture).await;
+    let (a, b) =
+        (anna.upload(&anna_s.id, 0, capture.raw(0..3)).await, bert.upload(&session.id, 0, capture.raw(0..3)).await);
+    assert_eq!(a, b);
+}
+
+#[tokio::test]
+async fn an_idempotency_key_is_a_tenants_own() {
+    let app = guarded();
+    let form = || crate::support::form(Capture::tiny(), &serde_json::json!({}));
+    let anna: cager_proto::messages::Session = app.caller(Some(ANNA)).create_with(form(), Some("k")).await.is(201);
+    let bert: cager_proto::messages::Session = app.caller(Some(BERT)).create_with(form(), Some("k")).await.is(201);
+    assert_ne!(anna.id, bert.id);
+}
+
+#[tokio::test]
+async fn a_revoked_token_stops_working_and_a_new_one_begins() {
+    let app = guarded();
+    let (anna, bert) = (app.caller(Some(ANNA)), app.caller(Some(BERT)));
+    bert.get("/v1/sessions").await.expect(200);
+    write_tokens(&app.tokens_file(), &[("anna", ANNA, ""), ("carl", "carl-has-a-long-secret", "")]);
+    let clock = Instant::now();
+    while bert.get("/v1/sessions").await.status == 200 {
+        assert!(clock.elapsed() < Duration::from_secs(5), "the token still works");
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+    println!("revoked after {:?}", clock.elapsed());
+    bert.get("/v1/sessions").await.problem(401, "unauthorized");
+    anna.get("/v1/sessions").await.expect(200);
+    app.caller(Some("carl-has-a-long-secret")).get("/v1/sessions").await.expect(200);
+    // A file that cannot be read locks nobody out.
+    std::fs::write(app.tokens_file(), "[[token]\n").expect("a file");
+    tokio::time::sleep(Duration::from_millis(1500)).await;
+    anna.get("/v1/sessions").await.expect(200);
+    assert!(app.log().contains("not reloaded"));
+}
+
+#[tokio::test]
+async fn secrets_are_not_in_the_log() {
+    let app = guarded();
+    let anna = app.caller(Some(ANNA));
+    let capture = Capture::tiny();
+    let form = crate::support::form(capture, &serde_json::json!({"name": "Unreleased Film"}));
+    let session: cager_proto::messages::Session = anna.create_with(form, Some("key-of-anna")).await.is(201);
+    anna.prepared(&session.id).await;
+    anna.upload(&session.id, 0, capture.raw(0..2)).await;
+    anna.get(&format!("/v1/sessions?after={}&token=in-the-query", session.id)).await.expect(400);
+    anna.get(&format!("/v1/sessions?after={ANNA}")).await.expect(200);
+    app.caller(Some("mistyped-but-nearly-right")).get("/v1/sessions").await.expect(401);
+    let failed = anna.get("/v1/sessions/unknown").await.problem(404, "not-found");
+    let log = app.log();
+    assert!(log.contains(&failed.request_id.expect("an id")), "the log is the one that is looked at");
+    let hash: String = <sha2::Sha256 as sha2::Digest>::digest(ANNA).iter().map(|byte| format!("{byte:02x}")).collect();
+    for secret in [ANNA, BERT, &hash, "mistyped-but", "in-the-query", "Unreleased", "key-of-anna", "Bearer"] {
+        assert!(!log.contains(secret), "{secret:?} is in the log");
+    }
+}
+
+/// Runs a service that must not start; gives what it says.
+fn refused(args: &[&str]) -> String {
+    let place = folder();
+    let mut process = service()
+        .args(args)
+        .arg("--data")
+        .arg(place.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("it runs");
+    let clock = Instant::now();
+    let status = loop {
+        if let Some(status) = process.try_wait().expect("its status") {
+            break status;
+        }
+        if clock.elapsed() > Duration::from_secs(10) {
+            process.kill().expect("it is there");
+            panic!("it serves");
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    };
+    assert!(!status.success());
+    let mut said = String::new();
+    process.stderr.take().expect("stderr").read_to_string(&mut said).expect("UTF-8");
+    said
+}
+
+#[test]
+fn an_open_service_listens_on_this_machine_only() {
+    for address in ["0.0.0.0:0", "[::]:0"] {
+        let said = refused(&["--listen", address]);
+        assert!(said.contains("tokens") && said.contains(address), "{said}");
+    }
+}
+
+#[test]
+fn a_port_in_use_is_named() {
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = taken.local_addr().expect("an address").to_string();
+    let said = refused(&["--listen", &address]);
+    assert!(said.contains(&address), "{said}");
+}

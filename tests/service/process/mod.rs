@@ -1,0 +1,6 @@
+mod access;
+mod limits;
+mod overload;
+mod problems;
+mod restart;
+mod stop;

@@ -1,0 +1,135 @@
+//! Small captures, as bytes.
+
+use cager_core::mesh::{Model, Polygons, TriMesh};
+use cager_core::synthetic::{self, Options};
+use cager_formats::{FrameOptions, create_frames, write_model};
+use cager_proto::record::{self, Kind};
+use std::ops::Range;
+use std::process::{Command, Stdio};
+use std::sync::OnceLock;
+
+/// A capture whose frames are exact in single precision.
+pub(crate) struct Capture {
+    pub(crate) rest: Mesh,
+    pub(crate) cage: Mesh,
+    pub(crate) frames: Vec<Vec<f32>>,
+}
+
+/// A mesh as a file and as numbers.
+#[derive(Clone)]
+pub(crate) struct Mesh {
+    pub(crate) obj: Vec<u8>,
+    pub(crate) model: Model,
+}
+
+impl Mesh {
+    pub(crate) fn new(model: Model) -> Self {
+        let folder = super::folder();
+        let path = folder.path().join("mesh.obj");
+        write_model(&path, &model).expect("a mesh");
+        Self { obj: std::fs::read(path).expect("a mesh"), model }
+    }
+
+    pub(crate) fn of(mesh: &TriMesh) -> Self {
+        let mut faces = Polygons::new();
+        mesh.triangles.iter().for_each(|triangle| faces.push(triangle));
+        Self::new(Model { points: mesh.vertices.clone(), faces })
+    }
+}
+
+impl Capture {
+    /// What most tests send: 1,500 points, 60 vertices of the cage, 40 frames.
+    pub(crate) fn small() -> &'static Self {
+        static SMALL: OnceLock<Capture> = OnceLock::new();
+        SMALL.get_or_init(|| Self::new(1500, 60, 40))
+    }
+
+    /// Where many sessions or frames matter: 200 points, 32 vertices of the cage, 20 frames.
+    pub(crate) fn tiny() -> &'static Self {
+        static TINY: OnceLock<Capture> = OnceLock::new();
+        TINY.get_or_init(|| Self::new(200, 32, 20))
+    }
+
+    pub(crate) fn new(points: usize, cage_vertices: usize, frames: usize) -> Self {
+        let capture = synthetic::Capture::new(&Options { points, frames, cage_vertices });
+        let mut wide = Vec::new();
+        let frame = |t| {
+            capture.frame(t, &mut wide);
+            wide.iter().map(|&x| x as f32).collect()
+        };
+        let frames = (0..frames).map(frame).collect();
+        Self { rest: Mesh::new(capture.rest), cage: Mesh::of(&capture.cage), frames }
+    }
+
+    pub(crate) fn points(&self) -> usize {
+        self.rest.model.points.len()
+    }
+
+    pub(crate) fn count(&self) -> u32 {
+        self.frames.len() as u32
+    }
+
+    /// A frame as it is posted.
+    pub(crate) fn frame(&self, frame: u32) -> Vec<u8> {
+        self.frames[frame as usize].iter().flat_map(|x| x.to_le_bytes()).collect()
+    }
+
+    /// Frames back to back.
+    pub(crate) fn raw(&self, frames: Range<u32>) -> Vec<u8> {
+        frames.flat_map(|frame| self.frame(frame)).collect()
+    }
+
+    /// Handle rows of frames back to back.
+    pub(crate) fn handle_rows(&self, frames: Range<u32>, handles: &[u32]) -> Vec<u8> {
+        frames.flat_map(|frame| self.rows_of(frame, handles)).flat_map(f32::to_le_bytes).collect()
+    }
+
+    fn rows_of(&self, frame: u32, handles: &[u32]) -> Vec<f32> {
+        let row = |&handle: &u32| self.frames[frame as usize][3 * handle as usize..][..3].to_vec();
+        handles.iter().flat_map(row).collect()
+    }
+
+    /// Frame records.
+    pub(crate) fn records(&self, frames: impl IntoIterator<Item = u32>) -> Vec<u8> {
+        let mut out = Vec::new();
+        for frame in frames {
+            let rows = &self.frames[frame as usize];
+            record::encode(Kind::Positions, frame, f32::NAN, f32::NAN, rows, &mut out).expect("a record");
+        }
+        out
+    }
+
+    /// Frame records of handle rows.
+    pub(crate) fn handle_records(&self, frames: impl IntoIterator<Item = u32>, handles: &[u32]) -> Vec<u8> {
+        let mut out = Vec::new();
+        for frame in frames {
+            let rows = self.rows_of(frame, handles);
+            record::encode(Kind::HandleRows, frame, f32::NAN, f32::NAN, &rows, &mut out).expect("a record");
+        }
+        out
+    }
+
+    /// The container that `cager encode` makes of the first frames, without a service.
+    pub(crate) fn encoded(&self, frames: u32) -> Vec<u8> {
+        let folder = super::folder();
+        let path = |name: &str| folder.path().join(name);
+        std::fs::write(path("rest.obj"), &self.rest.obj).expect("a rest pose");
+        std::fs::write(path("cage.obj"), &self.cage.obj).expect("a cage");
+        let count = frames as usize;
+        let options = FrameOptions::default();
+        let mut writer =
+            create_frames(path("frames.npy"), self.points(), count, &Polygons::new(), &options).expect("frames");
+        for frame in &self.frames[..count] {
+            writer.write_frame(frame).expect("a frame");
+        }
+        writer.finish().expect("frames");
+        let done = Command::new(env!("CARGO_BIN_EXE_cager"))
+            .args("encode --rest rest.obj --cage cage.obj --frames frames.npy -o out.cager".split(' '))
+            .current_dir(folder.path())
+            .stdin(Stdio::null())
+            .output()
+            .expect("the program runs");
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        std::fs::read(path("out.cager")).expect("a container")
+    }
+}

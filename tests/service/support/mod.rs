@@ -1,0 +1,211 @@
+//! A real service in a process of its own, and clients that talk to it.
+
+mod api;
+mod capture;
+mod raw;
+
+pub(crate) use api::{Api, OCTETS, RECORDS, Reply, cages_of, file, form, form_of, lines, piece, records, text};
+pub(crate) use capture::{Capture, Mesh};
+pub(crate) use raw::{Raw, chunked};
+
+use sha2::{Digest as _, Sha256};
+use std::fmt::Write as _;
+use std::io::{BufRead as _, BufReader};
+use std::net::SocketAddr;
+use std::ops::Deref;
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// Longer than anything here takes; what takes this long hangs.
+pub(crate) const HANG: Duration = Duration::from_secs(30);
+
+/// A running service. Requests through it go over HTTP/1.1, with the token of its first tenant where it has one.
+pub(crate) struct TestApp {
+    process: Child,
+    _stdout: BufReader<ChildStdout>,
+    pub(crate) address: SocketAddr,
+    place: Arc<TempDir>,
+    flags: Vec<String>,
+    api: Api,
+}
+
+impl Deref for TestApp {
+    type Target = Api;
+
+    fn deref(&self) -> &Api {
+        &self.api
+    }
+}
+
+impl TestApp {
+    /// Starts a service with default settings.
+    pub(crate) fn start() -> Self {
+        Self::with(&[])
+    }
+
+    /// Starts a service with these settings, each `KEY=VALUE`.
+    pub(crate) fn with(settings: &[&str]) -> Self {
+        let flags = settings.iter().flat_map(|setting| ["--set".to_owned(), (*setting).to_owned()]).collect();
+        Self::launch(Arc::new(folder()), flags, None)
+    }
+
+    /// Starts a service with a tokens file. Each entry is a tenant, its token and further keys of the file.
+    pub(crate) fn guarded(tokens: &[(&str, &str, &str)]) -> Self {
+        let place = folder();
+        let file = place.path().join("tokens.toml");
+        write_tokens(&file, tokens);
+        let flags = vec!["--tokens".to_owned(), file.display().to_string()];
+        Self::launch(Arc::new(place), flags, tokens.first().map(|(_, token, _)| (*token).to_owned()))
+    }
+
+    fn launch(place: Arc<TempDir>, flags: Vec<String>, token: Option<String>) -> Self {
+        let log = std::fs::OpenOptions::new().create(true).append(true).open(place.path().join("log"));
+        let mut process = service()
+            .args(["--listen", "127.0.0.1:0", "--data"])
+            .arg(place.path().join("data"))
+            .args(&flags)
+            .stdout(Stdio::piped())
+            .stderr(log.expect("a log"))
+            .spawn()
+            .expect("the service starts");
+        let mut stdout = BufReader::new(process.stdout.take().expect("its output"));
+        let mut line = String::new();
+        stdout.read_line(&mut line).expect("its first line");
+        let Some(address) = line.trim().strip_prefix("listening on ") else {
+            let _ = process.kill();
+            panic!("{line:?}; {}", std::fs::read_to_string(place.path().join("log")).unwrap_or_default());
+        };
+        let address: SocketAddr = address.parse().expect("an address");
+        let api = Api::new(address, token, false);
+        Self { process, _stdout: stdout, address, place, flags, api }
+    }
+
+    /// The same over HTTP/2.
+    pub(crate) fn http2(&self) -> Api {
+        Api::new(self.address, self.api.token.clone(), true)
+    }
+
+    /// Connections of its own with another token, or none.
+    pub(crate) fn caller(&self, token: Option<&str>) -> Api {
+        Api::new(self.address, token.map(str::to_owned), false)
+    }
+
+    /// Connections of its own.
+    pub(crate) fn stranger(&self) -> Api {
+        Api::new(self.address, self.api.token.clone(), false)
+    }
+
+    /// The client that users program with.
+    pub(crate) fn client(&self) -> cager_client::Client {
+        cager_client::Client::new(&format!("http://{}", self.address)).expect("an address")
+    }
+
+    pub(crate) fn tokens_file(&self) -> PathBuf {
+        self.place.path().join("tokens.toml")
+    }
+
+    /// What the service has logged.
+    pub(crate) fn log(&self) -> String {
+        std::fs::read_to_string(self.place.path().join("log")).expect("a log")
+    }
+
+    /// A value of `/metrics`; 0 where it is not there yet.
+    pub(crate) async fn metric(&self, name: &str) -> f64 {
+        let text = self.get("/metrics").await.text();
+        let line = text.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
+        line.map_or(0.0, |value| value.trim().parse().expect("a number"))
+    }
+
+    /// Memory that the process holds, in MiB.
+    #[cfg(target_os = "linux")]
+    pub(crate) fn resident_mib(&self) -> u64 {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.process.id())).expect("its status");
+        let kib = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).expect("its memory");
+        kib.trim().trim_end_matches(" kB").parse::<u64>().expect("a number") / 1024
+    }
+
+    /// Asks the service to stop.
+    pub(crate) fn terminate(&self) {
+        let pid = rustix::process::Pid::from_child(&self.process);
+        rustix::process::kill_process(pid, rustix::process::Signal::TERM).expect("it is there");
+    }
+
+    /// Ends the service without a word.
+    pub(crate) fn kill(&mut self) {
+        self.process.kill().expect("it is there");
+        self.process.wait().expect("its end");
+    }
+
+    /// Waits until the process is gone; gives the time that took.
+    pub(crate) async fn ended(&mut self) -> (ExitStatus, Duration) {
+        let clock = Instant::now();
+        loop {
+            if let Some(status) = self.process.try_wait().expect("its status") {
+                return (status, clock.elapsed());
+            }
+            assert!(clock.elapsed() < HANG, "the service does not end");
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+    }
+
+    /// Starts the service again, on the same folder with the same settings.
+    pub(crate) fn again(&self) -> Self {
+        Self::launch(Arc::clone(&self.place), self.flags.clone(), self.api.token.clone())
+    }
+}
+
+impl Drop for TestApp {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+        if std::thread::panicking() {
+            eprintln!("the service's log:\n{}", self.log());
+        }
+    }
+}
+
+/// `cager serve` without settings from the environment of the tests.
+pub(crate) fn service() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_cager"));
+    for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("CAGER_")) {
+        command.env_remove(name);
+    }
+    command.arg("serve").stdin(Stdio::null());
+    command
+}
+
+pub(crate) fn folder() -> TempDir {
+    tempfile::tempdir().expect("a temporary folder")
+}
+
+/// Writes a tokens file; see [`TestApp::guarded`].
+pub(crate) fn write_tokens(file: &Path, tokens: &[(&str, &str, &str)]) {
+    let mut text = String::new();
+    for (k, (tenant, token, more)) in tokens.iter().enumerate() {
+        let hash: String = Sha256::digest(token).iter().map(|byte| format!("{byte:02x}")).collect();
+        writeln!(text, "[[token]]\nname = \"key-{k}\"\ntenant = \"{tenant}\"\nsha256 = \"{hash}\"\n{more}")
+            .expect("a text");
+    }
+    std::fs::write(file, text).expect("a tokens file");
+}
+
+/// Waits until something is there.
+pub(crate) async fn eventually<T, F: Future<Output = Option<T>>>(what: &str, mut look: impl FnMut() -> F) -> T {
+    let clock = Instant::now();
+    loop {
+        if let Some(found) = look().await {
+            return found;
+        }
+        assert!(clock.elapsed() < HANG, "{what}: not within {HANG:?}");
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+}
+
+/// Waits for something that must not hang.
+pub(crate) async fn within<T>(what: &str, limit: Duration, work: impl Future<Output = T>) -> T {
+    let outcome = tokio::time::timeout(limit, work).await;
+    outcome.unwrap_or_else(|_| panic!("{what}: not within {limit:?}"))
+}

@@ -1,0 +1,131 @@
+//! Rest poses and cages that cannot be used: what is said about them.
+
+use crate::support::{Capture, Mesh, TestApp, file, form, form_of, text};
+use cager_core::mesh::{Model, Polygons};
+use cager_proto::messages::{Problem, Session};
+use reqwest::multipart::Form;
+use serde_json::json;
+
+fn faces(all: impl IntoIterator<Item = Vec<u32>>) -> Polygons {
+    let mut faces = Polygons::new();
+    all.into_iter().for_each(|face| faces.push(&face));
+    faces
+}
+
+/// The small capture's cage with other faces.
+fn cage_with(change: impl Fn(Vec<Vec<u32>>) -> Vec<Vec<u32>>) -> Mesh {
+    let model = &Capture::small().cage.model;
+    let all = model.faces.iter().map(<[u32]>::to_vec).collect();
+    Mesh::new(Model { points: model.points.clone(), faces: faces(change(all)) })
+}
+
+fn inward() -> Mesh {
+    cage_with(|all| all.into_iter().map(|face| face.into_iter().rev().collect()).collect())
+}
+
+#[track_caller]
+fn says(problem: &Problem, words: &[&str]) {
+    assert_eq!((problem.status, problem.word()), (422, "invalid-geometry"), "{}", problem.detail);
+    for word in words {
+        assert!(problem.detail.contains(word), "{word:?} is not in: {}", problem.detail);
+    }
+}
+
+#[tokio::test]
+async fn a_file_that_cannot_be_read_is_named_with_its_line() {
+    let app = TestApp::start();
+    let capture = Capture::small();
+    let cage = || file("cage.obj", &capture.cage.obj);
+    let bad = Form::new().part("rest", file("rest.obj", b"v 0 0 0\nv 1 x 0\n")).part("cage", cage());
+    says(&app.refusal(bad).await, &["rest", "line 2"]);
+    let bad = Form::new().part("rest", file("rest.xyz", b"1 2 3")).part("cage", cage());
+    says(&app.refusal(bad).await, &["rest.xyz"]);
+    let bad = Form::new().part("rest", file("rest.stl", b"solid nothing")).part("cage", cage());
+    says(&app.refusal(bad).await, &["rest"]);
+    let bad = Form::new().part("rest", file("rest.obj", b"v 0 0 nan\n")).part("cage", cage());
+    says(&app.refusal(bad).await, &["rest"]);
+}
+
+#[tokio::test]
+async fn a_cage_that_is_open_is_refused_with_the_edge() {
+    let app = TestApp::start();
+    let capture = Capture::small();
+    let open = cage_with(|mut all| {
+        all.pop();
+        all
+    });
+    let problem = app.refusal(form_of(&capture.rest, &open, &json!({}))).await;
+    says(&problem, &["cage.obj", "edge"]);
+    let points = Mesh::new(Model { points: capture.cage.model.points.clone(), faces: Polygons::new() });
+    says(&app.refusal(form_of(&capture.rest, &points, &json!({}))).await, &["cage.obj", "faces"]);
+}
+
+#[tokio::test]
+async fn an_inward_cage_is_refused_and_flip_cage_turns_it() {
+    let app = TestApp::start();
+    let capture = Capture::small();
+    says(&app.refusal(form_of(&capture.rest, &inward(), &json!({}))).await, &["cage.obj", "inward"]);
+    let form = form_of(&capture.rest, &inward(), &json!({"flip_cage": true}));
+    let session: Session = app.create_with(form, None).await.is(201);
+    app.prepared(&session.id).await;
+    let flipped = app.upload(&session.id, 0, capture.raw(0..3)).await;
+    let usual = app.ready(capture).await;
+    let usual = app.upload(&usual.id, 0, capture.raw(0..3)).await;
+    for (a, b) in flipped.iter().zip(&usual) {
+        // Its triangles begin at other corners, so that the last bits may differ.
+        let (a, b) = (a.l2.expect("measured"), b.l2.expect("measured"));
+        assert!((a - b).abs() < 1e-3 * b, "{a} and {b}");
+    }
+}
+
+#[tokio::test]
+async fn a_session_that_failed_says_so_wherever_it_is_used() {
+    let app = TestApp::start();
+    let capture = Capture::small();
+    let parts = form_of(&capture.rest, &inward(), &json!({}));
+    let reply = app.create_with(parts, None).await;
+    if reply.status == 422 {
+        return;
+    }
+    let session: Session = reply.is(201);
+    app.settled(&session.id).await;
+    let at = |what: &str| format!("/v1/sessions/{}/{what}", session.id);
+    let post = app.post(&at("frames?first=0"), crate::support::OCTETS, capture.frame(0)).await;
+    assert!(post.problem(409, "session-failed").detail.contains("inward"));
+    for what in ["handles", "coordinates", "cages?first=0", "cages?first=0&follow=true"] {
+        app.get(&at(what)).await.problem(409, "session-failed");
+    }
+    app.complete(&session.id, 1).await.problem(409, "session-failed");
+    app.post(&at("decode"), crate::support::OCTETS, vec![0; 12]).await.problem(409, "session-failed");
+    let events = app.get(&at("events")).await.expect(200).text();
+    assert!(events.contains("\"failed\""), "{events}");
+    app.delete(&format!("/v1/sessions/{}", session.id)).await.expect(204);
+}
+
+#[tokio::test]
+async fn polygons_of_the_cage_and_points_without_faces_are_fine() {
+    let app = TestApp::start();
+    let capture = Capture::small();
+    let cloud = Mesh::new(Model { points: capture.rest.model.points.clone(), faces: Polygons::new() });
+    let form = form_of(&cloud, &capture.cage, &json!({}));
+    let session: Session = app.create_with(form, None).await.is(201);
+    app.prepared(&session.id).await;
+    let cloud = app.upload(&session.id, 0, capture.raw(0..2)).await;
+    let model = app.ready(capture).await;
+    assert_eq!(app.upload(&model.id, 0, capture.raw(0..2)).await, cloud, "faces of the model change no number");
+}
+
+#[tokio::test]
+async fn options_may_be_left_out() {
+    let app = TestApp::start();
+    let capture = Capture::tiny();
+    let parts = || {
+        Form::new()
+            .part("rest", file("a path/rest.OBJ", &capture.rest.obj))
+            .part("cage", file("c.obj", &capture.cage.obj))
+    };
+    for form in [parts(), parts().part("options", text(&json!({}))), form(capture, &json!({"handles": "maxvol"}))] {
+        let session: Session = app.create_with(form, None).await.is(201);
+        app.prepared(&session.id).await;
+    }
+}

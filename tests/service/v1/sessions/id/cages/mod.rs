@@ -1,0 +1,3 @@
+mod follow;
+mod forms;
+mod ranges;

@@ -1,0 +1,5 @@
+mod any_order;
+mod duplex;
+mod refused;
+mod repeats;
+mod vanished;

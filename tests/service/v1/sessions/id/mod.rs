@@ -1,0 +1,9 @@
+mod cages;
+mod capture_cager;
+mod complete;
+mod coordinates;
+mod decode;
+mod delete;
+mod events;
+mod frames;
+mod handles;

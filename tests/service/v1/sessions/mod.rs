@@ -1,0 +1,6 @@
+mod concurrent;
+mod create;
+mod geometry;
+mod id;
+mod idempotency;
+mod list;
