@@ -2,7 +2,8 @@
 
 use crate::service::Service;
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
-use std::sync::OnceLock;
+use std::collections::BTreeMap;
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// Buckets of times that are short on an idle machine, in seconds.
 const SHORT: &[f64] = &[1e-4, 2.5e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0];
@@ -39,9 +40,14 @@ pub(crate) fn observe(service: &Service) {
     metrics::gauge!("cager_memory_bytes", "use" => "uploads").set(service.upload_memory.used() as f64);
     metrics::gauge!("cager_disk_free_bytes").set(service.store.free_bytes() as f64);
     metrics::gauge!("cager_uptime_seconds").set(service.started.elapsed().as_secs_f64());
-    for (tenant, sessions, bytes) in service.usage() {
-        metrics::gauge!("cager_sessions", "tenant" => tenant.clone()).set(sessions as f64);
-        metrics::gauge!("cager_stored_bytes", "tenant" => tenant).set(bytes as f64);
+    // A tenant whose last session is gone has none, rather than as many as before.
+    static SEEN: Mutex<BTreeMap<String, (usize, u64)>> = Mutex::new(BTreeMap::new());
+    let mut seen = SEEN.lock().unwrap_or_else(PoisonError::into_inner);
+    seen.values_mut().for_each(|usage| *usage = (0, 0));
+    seen.extend(service.usage().into_iter().map(|(tenant, sessions, bytes)| (tenant, (sessions, bytes))));
+    for (tenant, (sessions, bytes)) in &*seen {
+        metrics::gauge!("cager_sessions", "tenant" => tenant.clone()).set(*sessions as f64);
+        metrics::gauge!("cager_stored_bytes", "tenant" => tenant.clone()).set(*bytes as f64);
     }
     recorder().run_upkeep();
 }
