@@ -6,7 +6,7 @@ use std::{env, fs, time::Duration};
 #[tokio::main]
 pub(crate) async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut client = Client::new(env::var("CAGER_SERVER").as_deref().unwrap_or("http://127.0.0.1:8080"))?;
-    if let Ok(token) = env::var("CAGER_TOKEN") {
+    if let Some(token) = env::var("CAGER_TOKEN").ok().filter(|token| !token.is_empty()) {
         client = client.with_token(&token);
     }
     let (rest, cage) = (fs::read("rest.obj")?, fs::read("cage.obj")?);

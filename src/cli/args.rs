@@ -126,8 +126,8 @@ pub(crate) struct InspectArgs {
 
 /// Ask a service on this machine whether it is ready: exit status 0, or 1 with the reason.
 ///
-/// For containers and scripts that have no curl. A service with TLS is only asked whether it takes connections. Example: cager
-/// health --address 127.0.0.1:8080
+/// For containers and scripts that have no curl. Of a service with TLS it sees only that it lives.
+/// Example: cager health --address 127.0.0.1:8080
 #[derive(Args, Debug)]
 pub(crate) struct HealthArgs {
     /// Address and port [default: the environment's CAGER_LISTEN, or 127.0.0.1:8080; the loopback address for 0.0.0.0 and [::]].

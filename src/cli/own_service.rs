@@ -31,6 +31,7 @@ impl OwnService {
             cache_bytes: u64::MAX,
             prepared_disk_bytes: u64::MAX,
             max_rest_bytes: 1 << 34,
+            max_prepare_bytes: u64::MAX,
             drain_timeout_s: 1,
             ..ServeConfig::default()
         };
