@@ -226,7 +226,7 @@ fn errors_name_the_file_the_place_and_what_to_do() {
         ("a.ply", ply.replace("3 1 2 3 0.5", "3 1 2 4 0.5"), "a.ply: face 3: the face names vertex 4, but there are 4"),
         ("a.ply", ply.replace("3 1 2 3 0.5", "3 1 2 -1 0.5"), "a.ply: face 3: the face names vertex -1"),
         ("a.ply", ply.replace("3 1 2 3 0.5", "2 1 2 0.5"), "a.ply: face 3: the face has 2 corners"),
-        ("a.ply", ply.replace("3 1 2 3 0.5", ""), "a.ply: ends after 3 of 4 items of `face`; "),
+        ("a.ply", ply.replace("3 1 2 3 0.5", ""), "a.ply: ends after 3 of 4 items of \"face\"; "),
         ("a.ply", ply.replace("0 1.5 0 255", "0 nan 0 255"), "a.ply: vertex 2 has a coordinate that is NaN"),
         ("a.ply", ply.replace("double z", "double w"), "a.ply: has vertices without z; "),
         ("a.ply", ply.replace("vertex_index", "corners"), "a.ply: has faces without vertex_indices; "),
@@ -239,6 +239,15 @@ fn errors_name_the_file_the_place_and_what_to_do() {
         let error = message(read(name, &text));
         assert!(error.starts_with(wanted), "{error}\nfor {text}");
     }
+}
+
+#[test]
+fn a_long_name_in_a_file_is_not_repeated_in_full() {
+    let name = "\u{1b}[2J".to_owned() + &"x".repeat(10_000);
+    let text = format!("ply\nformat ascii 1.0\nelement {name} 2\nproperty int a\nend_header\n1\n");
+    let error = message(read("a.ply", text));
+    assert!(error.starts_with(r#"a.ply: ends after 1 of 2 items of "\u{1b}[2Jxxx"#), "{error}");
+    assert!(error.len() < 200 && !error.contains('\u{1b}'), "{error}");
 }
 
 #[test]

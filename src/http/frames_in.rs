@@ -58,7 +58,8 @@ impl FrameReader {
     pub(crate) fn frame_bytes(&self) -> usize {
         let rows = match self.layout {
             Layout::Raw { rows: Rows::Handles, .. } => self.handles,
-            _ => self.points.max(self.handles),
+            Layout::Raw { rows: Rows::All, .. } => self.points,
+            Layout::Records => self.points.max(self.handles),
         };
         12 * rows as usize
     }
@@ -204,6 +205,15 @@ mod tests {
         }
         let handles = read(Layout::Raw { first: 0, rows: Rows::Handles }, &body[..96], 5).unwrap();
         assert_eq!((handles.len(), handles[0].bytes.len()), (2, 48));
+    }
+
+    #[test]
+    fn whole_frames_have_a_row_for_each_point_whatever_the_handles() {
+        let facts = Facts { points: 1, handle_count: 3, ..facts() };
+        let mut reader = FrameReader::new(Layout::Raw { first: 0, rows: Rows::All }, &facts);
+        let frame = reader.push(&mut &[0; 12][..]).unwrap().expect("a whole frame");
+        assert_eq!(frame.bytes.len(), 12);
+        reader.finish().unwrap();
     }
 
     #[test]

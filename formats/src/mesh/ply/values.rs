@@ -27,9 +27,10 @@ pub(super) enum Failure {
 
 impl Failure {
     pub(super) fn inside(self, element: &Element, k: u64) -> Fault {
-        let Element { name, count, .. } = element;
+        // The name comes from the file: any bytes, any number of them.
+        let (name, count) = (quoted(element.name.as_bytes()), element.count);
         Fault::damaged(match self {
-            Self::End => format!("ends after {k} of {count} items of `{name}`; copy or export the file again"),
+            Self::End => format!("ends after {k} of {count} items of {name}; copy or export the file again"),
             Self::Length(length) => format!("{name} {k}: a list cannot have {length} items; export the mesh again"),
             Self::Word { line, shown } => format!("line {line}: {shown} is not a number; export the mesh again"),
         })
