@@ -1,6 +1,7 @@
 //! Completing a session: its container is written once and never changes.
 
 use super::create::blocking;
+use super::frames::Unsealed;
 use super::prepare::{self, Choices};
 use super::prepared::Prepared;
 use super::{Phase, Session};
@@ -46,24 +47,45 @@ impl Service {
             return Err(ApiError::new(problem::INVALID_OPTIONS, "frames: a capture has at least one frame"));
         }
         let entries: Vec<LogEntry> = {
-            let known = session.frames();
-            let missing = known.missing(Some(frames));
-            if !missing.is_empty() {
-                let count: u64 = missing.iter().map(|[a, b]| u64::from(b - a)).sum();
-                let detail = format!("{count} of {frames} frames are missing; post them, then complete the session");
-                return Err(ApiError::new(problem::FRAMES_MISSING, detail).missing(missing));
-            }
-            if let Some(highest) = known.highest().filter(|&highest| highest >= frames) {
-                let detail = format!("frame {highest} was posted, so the capture has more than {frames} frames");
-                return Err(ApiError::new(problem::FRAME_CONFLICT, detail).frame(highest));
+            let mut known = session.frames();
+            // From here on no frame is answered that the container would lack.
+            match known.seal_at(frames) {
+                Ok(()) => {}
+                Err(Unsealed::Missing(missing)) => {
+                    let count: u64 = missing.iter().map(|[a, b]| u64::from(b - a)).sum();
+                    let detail =
+                        format!("{count} of {frames} frames are missing; post them, then complete the session");
+                    return Err(ApiError::new(problem::FRAMES_MISSING, detail).missing(missing));
+                }
+                Err(Unsealed::Beyond(frame)) => {
+                    let detail = format!("frame {frame} was posted, so the capture has more than {frames} frames");
+                    return Err(ApiError::new(problem::FRAME_CONFLICT, detail).frame(frame));
+                }
             }
             known.entries().copied().collect()
         };
+        let mut sealed = Sealed { session, kept: false };
         let prepared = self.solver(session).await?;
         let writing = Arc::clone(session);
-        let completion = blocking(move || write(&writing, &prepared, &entries, frames)).await??;
+        let written = blocking(move || write(&writing, &prepared, &entries, frames)).await?;
+        let completion = written.map_err(|error| if session.is_deleted() { super::gone() } else { error })?;
         session.set_phase(Phase::Completed(completion));
+        sealed.kept = true;
         Ok(())
+    }
+}
+
+/// Lets a session take frames again where its completion fails.
+struct Sealed<'a> {
+    session: &'a Session,
+    kept: bool,
+}
+
+impl Drop for Sealed<'_> {
+    fn drop(&mut self) {
+        if !self.kept {
+            self.session.frames().unseal();
+        }
     }
 }
 

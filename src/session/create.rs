@@ -132,6 +132,9 @@ impl Service {
         let preparing = matches!(status.phase, Phase::Preparing);
         let choices = Choices::of(&meta.options);
         let session = Arc::new(Session::new(meta, self.store.clone(), self.committer.clone(), status, false));
+        if session.declared().is_some() {
+            session.frames().seal();
+        }
         self.registry.insert(Arc::clone(&session));
         if preparing {
             match choices {
@@ -161,6 +164,15 @@ impl Service {
                 self.keep_outcome(&session, Outcome::Ready(Box::new(facts.clone()))).await;
                 let completion = self.store.completion(&session.meta.id).ok().flatten();
                 let phase = completion.map_or(Phase::Ready, Phase::Completed);
+                // A process may have ended with frames in the log and no outcome on disk. Who hears that the session is ready
+                // finds them all.
+                session.set_status(Status { phase: Phase::Preparing, facts: Some(facts.clone()) });
+                if session.ensure_loaded().await.is_err() && matches!(session.status().phase, Phase::Failed(_)) {
+                    return;
+                }
+                if matches!(phase, Phase::Completed(_)) {
+                    session.frames().seal();
+                }
                 session.set_status(Status { phase, facts: Some(facts) });
             }
             Err(error) => {

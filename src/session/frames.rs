@@ -42,6 +42,8 @@ pub(crate) enum Claim {
     Waiting,
     /// It was there before, but different.
     Conflict,
+    /// It is new, and the session takes no new ones.
+    Sealed,
 }
 
 /// The frames of one session.
@@ -49,16 +51,28 @@ pub(crate) enum Claim {
 pub(crate) struct Frames {
     solved: BTreeMap<u32, LogEntry>,
     pending: HashMap<u32, Pending>,
+    /// Whether no frames are coming any more.
+    sealed: bool,
+}
+
+/// Why a session cannot be sealed.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Unsealed {
+    /// These ranges are missing.
+    Missing(Vec<[u32; 2]>),
+    /// This frame lies beyond the end.
+    Beyond(u32),
 }
 
 impl Frames {
+    #[cfg(test)]
     pub(crate) fn new(entries: Vec<LogEntry>) -> Self {
         // Of a frame that is there twice, the first counts.
         let mut solved = BTreeMap::new();
         for entry in entries {
             solved.entry(entry.frame).or_insert(entry);
         }
-        Self { solved, pending: HashMap::new() }
+        Self { solved, ..Self::default() }
     }
 
     /// Decides about a frame that arrived.
@@ -74,8 +88,40 @@ impl Frames {
             pending.waiting.push(Arc::clone(upload));
             return Claim::Waiting;
         }
+        if self.sealed {
+            return Claim::Sealed;
+        }
         self.pending.insert(frame, Pending { digests, waiting: vec![Arc::clone(upload)] });
         Claim::Solve
+    }
+
+    /// Takes no new frames from here on, if all of `frames` are there and none beyond, nor on its way.
+    ///
+    /// # Errors
+    /// Why that cannot be yet; nothing changed.
+    pub(crate) fn seal_at(&mut self, frames: u32) -> Result<(), Unsealed> {
+        let missing = self.missing(Some(frames));
+        if !missing.is_empty() {
+            return Err(Unsealed::Missing(missing));
+        }
+        let on_its_way = self.pending.keys().copied().max();
+        match self.highest().max(on_its_way).filter(|&highest| highest >= frames) {
+            Some(highest) => Err(Unsealed::Beyond(highest)),
+            None => {
+                self.sealed = true;
+                Ok(())
+            }
+        }
+    }
+
+    /// Takes no new frames from here on.
+    pub(crate) fn seal(&mut self) {
+        self.sealed = true;
+    }
+
+    /// Takes new frames again.
+    pub(crate) fn unseal(&mut self) {
+        self.sealed = false;
     }
 
     /// Enters a frame that is on disk; returns the uploads that wait for it.
@@ -202,5 +248,25 @@ mod tests {
         assert_eq!(frames.claim(4, Digests { handles: [9; 16], ..same }, &upload), Claim::Conflict);
         assert_eq!(frames.solved(entry(4)).len(), 2);
         assert_eq!(frames.claim(4, same, &upload), Claim::Known);
+    }
+
+    #[test]
+    fn a_sealed_session_takes_what_it_knows_and_nothing_new() {
+        let upload = Arc::new(Upload::default());
+        let same = Digests { handles: [1; 16], full: Some([2; 16]) };
+        let mut frames = Frames::new([0, 2].map(entry).to_vec());
+        assert_eq!(frames.seal_at(3), Err(Unsealed::Missing(vec![[1, 2]])));
+        assert_eq!(frames.claim(1, same, &upload), Claim::Solve);
+        assert_eq!(frames.seal_at(3), Err(Unsealed::Missing(vec![[1, 2]])), "it is not on disk yet");
+        frames.solved(entry(1));
+        assert_eq!(frames.seal_at(2), Err(Unsealed::Beyond(2)));
+        assert_eq!(frames.claim(3, same, &upload), Claim::Solve);
+        assert_eq!(frames.seal_at(3), Err(Unsealed::Beyond(3)), "its record will be sent");
+        frames.gave_up(3);
+        assert_eq!(frames.seal_at(3), Ok(()));
+        assert_eq!(frames.claim(3, same, &upload), Claim::Sealed);
+        assert_eq!(frames.claim(2, same, &upload), Claim::Known);
+        frames.unseal();
+        assert_eq!(frames.claim(3, same, &upload), Claim::Solve);
     }
 }
