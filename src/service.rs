@@ -158,9 +158,14 @@ impl Service {
             return Err(ApiError::new(problem::BUSY, "sessions are being resumed").retry_after(1));
         }
         let store = self.store.clone();
-        crate::session::create::blocking(move || store.probe())
-            .await?
-            .map_err(|error| crate::session::commit::storage_error(&error))
+        crate::session::create::blocking(move || store.probe()).await?.map_err(|error| match error {
+            full @ StoreError::Full { .. } => crate::session::commit::storage_error(&full),
+            other => {
+                tracing::error!(error = %other, "not ready");
+                ApiError::new(problem::STORAGE_FAILED, "the data folder takes no writes; the log has the reason")
+                    .retry_after(60)
+            }
+        })
     }
 
     /// Counts a request that was turned away.

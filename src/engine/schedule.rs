@@ -29,6 +29,8 @@ pub(super) struct Schedule<W> {
     slots: usize,
     running: usize,
     waiting: usize,
+    /// Highest virtual time of all that were served.
+    time: f64,
     stopped: bool,
 }
 
@@ -62,6 +64,7 @@ impl<W: Clone> Schedule<W> {
             slots,
             running: 0,
             waiting: 0,
+            time: 0.0,
             stopped: false,
         }
     }
@@ -112,11 +115,11 @@ impl<W: Clone> Schedule<W> {
         }
         lane.waiting += 1;
         self.waiting += 1;
-        // Time spent without work earns no claim.
-        let behind = self.tenants.values().filter(|t| t.waiting > 0).map(|t| t.pass).fold(f64::INFINITY, f64::min);
+        // Time spent without work earns no claim on those who wait, nor, where nobody does at the moment, on those who worked.
+        let behind = self.tenants.values().filter(|t| t.waiting > 0).map(|t| t.pass).reduce(f64::min);
         if let Some(tenant) = self.tenants.get_mut(&lane.tenant) {
-            if tenant.waiting == 0 && behind.is_finite() {
-                tenant.pass = tenant.pass.max(behind);
+            if tenant.waiting == 0 {
+                tenant.pass = tenant.pass.max(behind.unwrap_or(self.time));
             }
             tenant.waiting += 1;
         }
@@ -180,6 +183,7 @@ impl<W: Clone> Schedule<W> {
         tenant.waiting -= count;
         tenant.turn += 1;
         tenant.pass += lane.cost * count as f64 / tenant.weight;
+        self.time = self.time.max(tenant.pass);
         lane.served = tenant.turn;
         Next::Batch { lane: id, count, work: lane.work.clone() }
     }
@@ -268,6 +272,21 @@ mod tests {
         (0..1600).for_each(|_| schedule.pushed(late, now));
         let served = serve(&mut schedule, now, 20);
         assert_eq!(served.iter().filter(|&&w| w == "busy").count(), 10);
+    }
+
+    #[test]
+    fn a_tenant_that_was_served_alone_does_not_pay_for_it_later() {
+        let now = Instant::now();
+        let mut schedule = Schedule::new(1);
+        let (old, new) = (schedule.add("old", 1.0, 1.0, "old"), schedule.add("new", 1.0, 1.0, "new"));
+        (0..1600).for_each(|_| schedule.pushed(old, now));
+        serve(&mut schedule, now, 100);
+        // For a moment nobody waits.
+        (0..1600).for_each(|_| schedule.pushed(new, now));
+        (0..1600).for_each(|_| schedule.pushed(old, now));
+        let served = serve(&mut schedule, now, 20);
+        let count = served.iter().filter(|&&w| w == "old").count();
+        assert!((9..=11).contains(&count), "{served:?}");
     }
 
     #[test]

@@ -1,12 +1,12 @@
 //! `POST /v1/sessions/{id}/decode`: cages in, positions out.
 
 use super::extract::{Found, content_type};
-use super::frames::{body_error, deleted, prepared, stopping};
+use super::frames::{body_error, prepared, stopping};
 use super::openapi;
 use crate::engine::Lane;
 use crate::problem::{self, ApiError};
 use crate::service::{Service, StreamPlace};
-use crate::session::Session;
+use crate::session::{Session, gone};
 use axum::body::Body;
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};
@@ -110,7 +110,7 @@ async fn spool_body(spool: Arc<Spool>, mut body: Body, limit: u64, service: Arc<
     let end = loop {
         let next = tokio::select! {
             next = body.frame() => next,
-            () = session.deleted().cancelled() => break Err(deleted()),
+            () = session.deleted().cancelled() => break Err(gone()),
             () = service.stopping().cancelled() => break Err(stopping()),
             () = spool.arrived.closed() => return,
         };
@@ -194,7 +194,7 @@ impl Decoding {
         for reply in replies {
             let positions = tokio::select! {
                 positions = reply => positions.map_err(|_| ApiError::internal(&"a batch of cages was lost"))?,
-                () = self.session.deleted().cancelled() => return Err(deleted()),
+                () = self.session.deleted().cancelled() => return Err(gone()),
             };
             out.extend_from_slice(&positions);
         }

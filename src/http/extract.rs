@@ -81,6 +81,9 @@ impl<S: Sync + Send, T: serde::de::DeserializeOwned> FromRequestParts<S> for Que
     }
 }
 
+/// Most bytes of a JSON body: what the router's extractors take by default.
+const JSON_BYTES: u64 = 2 << 20;
+
 /// A JSON body. Rejects with 400, 413, 415 or 422.
 pub(crate) struct Body<T>(pub(crate) T);
 
@@ -88,6 +91,11 @@ impl<S: Sync + Send, T: serde::de::DeserializeOwned> axum::extract::FromRequest<
     type Rejection = ApiError;
 
     async fn from_request(request: axum::extract::Request, state: &S) -> Result<Self, ApiError> {
+        let declared = http_body::Body::size_hint(request.body()).lower();
+        if declared > JSON_BYTES {
+            let detail = format!("the body has {declared} bytes, and a JSON body may have {JSON_BYTES}");
+            return Err(ApiError::new(problem::TOO_LARGE, detail).limit(JSON_BYTES));
+        }
         match <axum::Json<T> as axum::extract::FromRequest<S>>::from_request(request, state).await {
             Ok(axum::Json(body)) => Ok(Self(body)),
             Err(JsonRejection::MissingJsonContentType(_)) => {

@@ -7,8 +7,8 @@ use crate::auth::Tenant;
 use crate::problem::{self, ApiError};
 use crate::service::{Service, StreamPlace};
 use crate::session::facts::Facts;
-use crate::session::upload::{FrameJob, Rows, Step, Upload};
-use crate::session::{LiveLane, Phase, Session};
+use crate::session::upload::{FrameJob, Permits, Rows, Step, Upload};
+use crate::session::{LiveLane, Phase, Session, gone};
 use crate::store::LogEntry;
 use axum::body::Body;
 use axum::extract::State;
@@ -28,6 +28,8 @@ use tokio::sync::Semaphore;
 const IN_FLIGHT: usize = 64;
 /// Frames after which the tenant's quota is looked at again: a body need not say how long it is.
 const QUOTA_EVERY: u64 = 64;
+/// Frames of one upload that are not on disk yet: enough that a slow sync holds nothing up, and a bound where the disk hangs.
+const NOT_WRITTEN: usize = 512;
 /// Answers sent at a time.
 const ANSWERS: usize = 64;
 /// How long the answer's header waits for the first record: some clients give up on a server that says nothing.
@@ -104,7 +106,7 @@ pub(crate) async fn post(
     let arriving = http_body::Body::size_hint(&body).exact().unwrap_or(0);
     let frame_bytes = 12 * u64::from(if rows == Rows::Handles { facts.handle_count } else { facts.points }.max(1));
     let record_bytes = 128 + 12 * u64::from(facts.unknowns);
-    service.check_bytes(&tenant, arriving / frame_bytes * record_bytes)?;
+    service.check_bytes(&tenant, (arriving / frame_bytes).saturating_mul(record_bytes))?;
     let solver = service.solver(&session).await?;
     let live = service.lane(&session, solver, &tenant);
     let upload = Arc::new(Upload::default());
@@ -116,7 +118,7 @@ pub(crate) async fn post(
         let mut body = body;
         let outcome = reading.read(&mut body, frames).await;
         reading.live.upload_ends();
-        let refused = outcome.is_err() || reading.upload.has_failed();
+        let refused = outcome.is_err() || reading.upload.is_pointless();
         reading.upload.close(outcome.err());
         if refused && !reading.upload.is_abandoned() {
             drain(body).await;
@@ -149,16 +151,16 @@ pub(crate) async fn prepared(service: &Service, session: &Arc<Session>) -> Resul
                 let detail = format!("the session failed: {}", problem.detail);
                 return Err(ApiError::new(problem::SESSION_FAILED, detail));
             }
+            (Phase::Preparing, _) | (_, None) => {}
             (_, Some(facts)) => {
-                // A session resumed without its facts could not read its log before.
+                // It may have become ready since the request came.
                 session.ensure_loaded().await?;
                 return Ok(facts);
             }
-            _ => {}
         }
         tokio::select! {
             _ = changes.changed() => {}
-            () = session.deleted().cancelled() => return Err(deleted()),
+            () = session.deleted().cancelled() => return Err(gone()),
             () = service.stopping().cancelled() => return Err(stopping()),
             () = tokio::time::sleep_until(deadline) => {
                 let detail = "the session is still being prepared; wait until its state is ready";
@@ -166,10 +168,6 @@ pub(crate) async fn prepared(service: &Service, session: &Arc<Session>) -> Resul
             }
         }
     }
-}
-
-pub(crate) fn deleted() -> ApiError {
-    ApiError::new(problem::SESSION_DELETED, "the session was deleted")
 }
 
 pub(crate) fn stopping() -> ApiError {
@@ -212,13 +210,14 @@ struct Reading {
 impl Reading {
     async fn read(&self, body: &mut Body, mut frames: FrameReader) -> Result<(), ApiError> {
         let places = Arc::new(Semaphore::new(IN_FLIGHT));
+        let unwritten = Arc::new(Semaphore::new(NOT_WRITTEN));
         let mut permits = None;
         let mut received = 0u64;
         let mut submitted = 0u64;
         let counter = metrics::counter!("cager_received_bytes_total", "tenant" => self.session.meta.tenant.clone());
         let stopped = async {
             tokio::select! {
-                () = self.session.deleted().cancelled() => deleted(),
+                () = self.session.deleted().cancelled() => gone(),
                 () = self.service.stopping().cancelled() => stopping(),
             }
         };
@@ -227,6 +226,8 @@ impl Reading {
             let next = tokio::select! {
                 biased;
                 error = &mut stopped => return Err(error),
+                // A client that waits for an answer before it sends on must hear of an error all the same.
+                () = self.upload.pointless() => return Ok(()),
                 next = body.frame() => next,
             };
             let chunk = match next {
@@ -238,16 +239,20 @@ impl Reading {
             counter.increment(chunk.len() as u64);
             let mut input = &chunk[..];
             while !input.is_empty() {
-                if self.upload.has_failed() || self.upload.is_abandoned() {
+                if self.upload.is_pointless() {
                     return Ok(());
                 }
                 if frames.is_between_frames() && permits.is_none() {
                     let room = async {
-                        let place = Arc::clone(&places).acquire_owned().await.expect("it is never closed");
-                        [place, self.service.frame_memory.take(frames.frame_bytes() as u64).await]
+                        let open = "it is never closed";
+                        let unwritten = Arc::clone(&unwritten).acquire_owned().await.expect(open);
+                        let place = Arc::clone(&places).acquire_owned().await.expect(open);
+                        let memory = self.service.frame_memory.take(frames.frame_bytes() as u64).await;
+                        Permits { _solving: [place, memory], writing: unwritten }
                     };
                     permits = Some(tokio::select! {
                         error = &mut stopped => return Err(error),
+                        () = self.upload.pointless() => return Ok(()),
                         permits = room => permits,
                     });
                 }

@@ -4,35 +4,97 @@ use super::frames::body_error;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::Content;
-use axum::extract::Multipart;
+use axum::body::Body;
 use axum::extract::multipart::{Field, MultipartError};
+use axum::extract::{FromRequest, Multipart, Request};
 use cager_proto::messages::SessionOptions;
+use futures_util::StreamExt as _;
+use std::sync::{Arc, Mutex};
 use tokio::sync::OwnedSemaphorePermit;
 
+/// Bytes of a body beside rest pose and cage.
+pub(crate) const ENVELOPE_BYTES: u64 = 1 << 20;
 const OPTIONS_BYTES: usize = 64 << 10;
 const NAME_CHARACTERS: usize = 200;
 /// Memory is asked for in pieces of this many bytes: small ones, so that hundreds of small models have room at the same time.
-const PIECE: usize = 64 << 10;
+const PIECE: u64 = 64 << 10;
 
 /// What the parts hold, and the room they take until it is dropped.
 pub(crate) struct Parts {
     pub(crate) content: Content,
     pub(crate) options: SessionOptions,
-    pub(crate) room: Vec<OwnedSemaphorePermit>,
+    pub(crate) room: Room,
 }
+
+/// Room for models.
+pub(crate) type Room = Vec<OwnedSemaphorePermit>;
 
 struct File {
     name: String,
     bytes: Vec<u8>,
 }
 
+/// A body whose bytes are counted as they come, before anyone looks for parts in them: until one is found, all that came is kept.
+struct Metered {
+    room: Room,
+    received: u64,
+    granted: u64,
+    /// Why no more was taken.
+    refused: Option<ApiError>,
+}
+
+impl Metered {
+    fn take(&mut self, service: &Service, bytes: usize) -> Result<(), ApiError> {
+        self.received += bytes as u64;
+        let limit = service.config.max_rest_bytes;
+        if self.received > limit.saturating_add(ENVELOPE_BYTES) {
+            service.rejected("body_too_large");
+            let detail = format!("rest pose and cage have more than {limit} bytes together, the most that is taken");
+            return Err(ApiError::new(problem::TOO_LARGE, detail).limit(limit));
+        }
+        while self.granted < self.received {
+            self.room.push(service.upload_memory.try_take(PIECE).ok_or_else(|| {
+                service.rejected("upload_memory");
+                let detail = "too many models are being uploaded at the moment; try again later";
+                ApiError::new(problem::BUSY, detail).retry_after(5)
+            })?);
+            self.granted += PIECE;
+        }
+        Ok(())
+    }
+}
+
 /// Reads all parts.
 ///
 /// # Errors
 /// Parts that are missing, twice there, unknown or too large; no room.
-pub(crate) async fn read(service: &Service, mut body: Multipart) -> Result<Parts, ApiError> {
+pub(crate) async fn read(service: &Arc<Service>, request: Request) -> Result<Parts, ApiError> {
+    let metered = Arc::new(Mutex::new(Metered { room: Room::new(), received: 0, granted: 0, refused: None }));
+    let (counting, counted) = (Arc::clone(service), Arc::clone(&metered));
+    let request = request.map(|body| {
+        Body::from_stream(body.into_data_stream().map(move |piece| {
+            let piece = piece?;
+            let mut metered = crate::session::lock(&counted);
+            metered.take(&counting, piece.len()).map(|()| piece).map_err(|error| {
+                metered.refused = Some(error);
+                axum::Error::new("it was refused")
+            })
+        }))
+    });
+    let body = Multipart::from_request(request, &())
+        .await
+        .map_err(|error| bad(format!("the multipart body cannot be read: {}", error.body_text())))?;
+    let parts = read_parts(service, body).await;
+    let mut metered = crate::session::lock(&metered);
+    match (parts, metered.refused.take()) {
+        (_, Some(refused)) => Err(refused),
+        (Ok(parts), None) => Ok(Parts { room: std::mem::take(&mut metered.room), ..parts }),
+        (Err(error), None) => Err(error),
+    }
+}
+
+async fn read_parts(service: &Service, mut body: Multipart) -> Result<Parts, ApiError> {
     let (mut rest, mut cage, mut options) = (None, None, None);
-    let mut room = Vec::new();
     let mut left = service.config.max_rest_bytes;
     while let Some(field) = body.next_field().await.map_err(|e| broken(&e))? {
         let part = field.name().unwrap_or_default().to_owned();
@@ -43,7 +105,7 @@ pub(crate) async fn read(service: &Service, mut body: Multipart) -> Result<Parts
                 if place.is_some() {
                     return Err(twice());
                 }
-                *place = Some(read_file(service, &part, field, &mut left, &mut room).await?);
+                *place = Some(read_file(service, &part, field, &mut left).await?);
             }
             "options" => {
                 if options.is_some() {
@@ -60,16 +122,10 @@ pub(crate) async fn read(service: &Service, mut body: Multipart) -> Result<Parts
         ApiError::new(problem::INVALID_OPTIONS, detail)
     })?;
     let content = Content { rest_name: rest.name, rest: rest.bytes, cage_name: cage.name, cage: cage.bytes };
-    Ok(Parts { content, options: options.unwrap_or_default(), room })
+    Ok(Parts { content, options: options.unwrap_or_default(), room: Room::new() })
 }
 
-async fn read_file(
-    service: &Service,
-    part: &str,
-    mut field: Field<'_>,
-    left: &mut u64,
-    room: &mut Vec<OwnedSemaphorePermit>,
-) -> Result<File, ApiError> {
+async fn read_file(service: &Service, part: &str, mut field: Field<'_>, left: &mut u64) -> Result<File, ApiError> {
     let name = field.file_name().unwrap_or_default();
     // Some clients send a path; only the name and its extension matter.
     let name: String =
@@ -79,7 +135,6 @@ async fn read_file(
         return Err(bad(detail));
     }
     let mut bytes = Vec::new();
-    let mut granted = 0;
     while let Some(chunk) = field.chunk().await.map_err(|e| broken(&e))? {
         *left = left.checked_sub(chunk.len() as u64).ok_or_else(|| {
             service.rejected("body_too_large");
@@ -87,14 +142,6 @@ async fn read_file(
             let detail = format!("rest pose and cage are larger than {limit} bytes together; send a lighter model");
             ApiError::new(problem::TOO_LARGE, detail).limit(limit)
         })?;
-        while bytes.len() + chunk.len() > granted {
-            room.push(service.upload_memory.try_take(PIECE as u64).ok_or_else(|| {
-                service.rejected("upload_memory");
-                let detail = "too many models are being uploaded at the moment; try again later";
-                ApiError::new(problem::BUSY, detail).retry_after(5)
-            })?);
-            granted += PIECE;
-        }
         bytes.extend_from_slice(&chunk);
     }
     Ok(File { name, bytes })

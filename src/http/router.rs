@@ -39,13 +39,15 @@ fn quick() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(container::get))
 }
 
-/// Routes that take as long as their bodies or their work.
-fn lasting() -> OpenApiRouter<Arc<Service>> {
-    OpenApiRouter::new().routes(routes!(sessions::create)).routes(routes!(sessions::complete)).merge(streaming())
+/// Routes that take as long as their work.
+fn completing() -> OpenApiRouter<Arc<Service>> {
+    OpenApiRouter::new().routes(routes!(sessions::complete))
 }
 
+/// Routes that take as long as their bodies, which they read piece by piece.
+
 fn streaming() -> OpenApiRouter<Arc<Service>> {
-    OpenApiRouter::new().routes(routes!(frames::post)).routes(routes!(decode::post))
+    OpenApiRouter::new().routes(routes!(sessions::create)).routes(routes!(frames::post)).routes(routes!(decode::post))
 }
 
 /// Routes for operators and browsers, outside all limits.
@@ -55,8 +57,11 @@ fn open() -> OpenApiRouter<Arc<Service>> {
 
 /// The OpenAPI document of all routes.
 pub fn document() -> utoipa::openapi::OpenApi {
-    let mut all =
-        OpenApiRouter::with_openapi(openapi::Document::openapi()).merge(quick()).merge(lasting()).merge(open());
+    let mut all = OpenApiRouter::with_openapi(openapi::Document::openapi())
+        .merge(quick())
+        .merge(completing())
+        .merge(streaming())
+        .merge(open());
     openapi::with_problems(all.to_openapi())
 }
 
@@ -72,7 +77,8 @@ pub fn router(service: Arc<Service>) -> Router {
         .layer(GlobalConcurrencyLimitLayer::new(service.config.max_requests));
     let guarded = Router::from(quick())
         .layer(in_time)
-        .merge(Router::from(lasting()).layer(DefaultBodyLimit::disable()))
+        .merge(Router::from(completing()))
+        .merge(Router::from(streaming()).layer(DefaultBodyLimit::disable()))
         .layer(in_bounds)
         .route_layer(from_fn_with_state(Arc::clone(&service), extract::authenticate));
     let document = Bytes::from(document().to_json().unwrap_or_default());

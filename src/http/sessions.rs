@@ -7,7 +7,7 @@ use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::create::NewSession;
 use axum::Json;
-use axum::extract::{FromRequest, Multipart, Request, State};
+use axum::extract::{Request, State};
 use axum::response::{IntoResponse, Response};
 use cager_proto::messages::{Complete, Session, SessionList};
 use http::{StatusCode, header};
@@ -38,8 +38,7 @@ pub(crate) async fn create(
     }
     let limit = service.config.max_rest_bytes;
     let declared = http_body::Body::size_hint(request.body()).lower();
-    // The envelope of the parts is small.
-    if declared > limit.saturating_add(1 << 20) {
+    if declared > limit.saturating_add(multipart::ENVELOPE_BYTES) {
         service.rejected("body_too_large");
         let detail = format!("the body has {declared} bytes, but rest pose and cage may have {limit} together");
         return Err(ApiError::new(problem::TOO_LARGE, detail).limit(limit));
@@ -52,13 +51,9 @@ pub(crate) async fn create(
             return Err(ApiError::new(problem::BAD_REQUEST, detail));
         }
     };
-    let body = Multipart::from_request(request, &()).await.map_err(|error| {
-        ApiError::new(problem::BAD_REQUEST, format!("the multipart body cannot be read: {}", error.body_text()))
-    })?;
-    let parts = multipart::read(&service, body).await?;
-    let new = NewSession { content: parts.content, options: parts.options, idempotency_key };
+    let parts = multipart::read(&service, request).await?;
+    let new = NewSession { content: parts.content, options: parts.options, idempotency_key, room: parts.room };
     let session = service.create(&tenant, new).await?;
-    drop(parts.room);
     let location = format!("/v1/sessions/{}", session.meta.id);
     Ok((StatusCode::CREATED, [(header::LOCATION, location)], Json(session.view())).into_response())
 }

@@ -5,9 +5,11 @@ use super::frames::Digests;
 use crate::capture::StoredError;
 use crate::problem::{self, ApiError};
 use crate::store::{FrameLog, LogRecord, StoreError};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
+use tokio::sync::OwnedSemaphorePermit;
 
 /// What the log adds to a cage, about.
 const RECORD_BYTES: usize = 96;
@@ -18,6 +20,8 @@ pub(crate) struct Solved {
     pub(crate) digests: Digests,
     pub(crate) error: StoredError,
     pub(crate) cage: Vec<f32>,
+    /// Its place among the upload's frames that are not on disk.
+    pub(crate) _permit: Option<OwnedSemaphorePermit>,
 }
 
 /// What waits to be written, and whether a thread is at it.
@@ -58,7 +62,9 @@ fn run(queue: &Mutex<Receiver<Arc<Session>>>) {
         let next = queue.lock().unwrap_or_else(PoisonError::into_inner).recv();
         let Ok(session) = next else { return };
         let solved = std::mem::take(&mut super::lock(&session.waiting).solved);
-        session.write(&solved);
+        if catch_unwind(AssertUnwindSafe(|| session.write(&solved))).is_err() {
+            session.give_up(&solved, &ApiError::internal(&"writing frames panicked"));
+        }
         let mut waiting = super::lock(&session.waiting);
         waiting.busy = !waiting.solved.is_empty();
         if waiting.busy {
@@ -125,15 +131,24 @@ impl Session {
                 }
             }
             Err(error) => {
-                tracing::error!(session = %self.meta.id, %error, "frames could not be written");
-                let error = storage_error(&error);
-                for s in solved {
-                    let uploads = self.frames().gave_up(s.frame);
-                    uploads.iter().for_each(|upload| upload.fail(error.clone().frame(s.frame)));
-                }
+                let error = if self.is_deleted() {
+                    super::gone()
+                } else {
+                    tracing::error!(session = %self.meta.id, %error, "frames could not be written");
+                    storage_error(&error)
+                };
+                self.give_up(solved, &error);
             }
         }
         self.touch();
+    }
+
+    /// Tells the uploads of frames that are not written why.
+    fn give_up(&self, solved: &[Solved], error: &ApiError) {
+        for s in solved {
+            let uploads = self.frames().gave_up(s.frame);
+            uploads.iter().for_each(|upload| upload.fail(error.clone().frame(s.frame)));
+        }
     }
 
     /// The log, opened if it is not. What it holds that is not known yet becomes known.

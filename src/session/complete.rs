@@ -1,6 +1,7 @@
 //! Completing a session: its container is written once and never changes.
 
 use super::create::blocking;
+use super::frames::Unsealed;
 use super::prepare::{self, Choices};
 use super::prepared::Prepared;
 use super::{Phase, Session};
@@ -48,41 +49,44 @@ impl Service {
         }
         let entries: Vec<LogEntry> = {
             let mut known = session.frames();
-            let missing = known.missing(Some(frames));
-            if !missing.is_empty() {
-                let count: u64 = missing.iter().map(|[a, b]| u64::from(b - a)).sum();
-                let detail = format!("{count} of {frames} frames are missing; post them, then complete the session");
-                return Err(ApiError::new(problem::FRAMES_MISSING, detail).missing(missing));
+            // From here on no frame is answered that the container would lack.
+            match known.seal_at(frames) {
+                Ok(()) => {}
+                Err(Unsealed::Missing(missing)) => {
+                    let count: u64 = missing.iter().map(|[a, b]| u64::from(b - a)).sum();
+                    let detail =
+                        format!("{count} of {frames} frames are missing; post them, then complete the session");
+                    return Err(ApiError::new(problem::FRAMES_MISSING, detail).missing(missing));
+                }
+                Err(Unsealed::Beyond(frame)) => {
+                    let detail = format!("frame {frame} was posted, so the capture has more than {frames} frames");
+                    return Err(ApiError::new(problem::FRAME_CONFLICT, detail).frame(frame));
+                }
             }
-            if let Some(highest) = known.highest_received().filter(|&highest| highest >= frames) {
-                let detail = format!("frame {highest} was posted, so the capture has more than {frames} frames");
-                return Err(ApiError::new(problem::FRAME_CONFLICT, detail).frame(highest));
-            }
-            // From here to the end of writing, a new frame would be in the log but not in the container.
-            known.seal(true);
             known.entries().copied().collect()
         };
-        match self.write_capture(session, entries, frames).await {
-            Ok(completion) => {
-                session.set_phase(Phase::Completed(completion));
-                Ok(())
-            }
-            Err(error) => {
-                session.frames().seal(false);
-                Err(error)
-            }
-        }
-    }
-
-    async fn write_capture(
-        self: &Arc<Self>,
-        session: &Arc<Session>,
-        entries: Vec<LogEntry>,
-        frames: u32,
-    ) -> Result<Completion, ApiError> {
+        let mut sealed = Sealed { session, kept: false };
         let prepared = self.solver(session).await?;
         let writing = Arc::clone(session);
-        blocking(move || write(&writing, &prepared, &entries, frames)).await?
+        let written = blocking(move || write(&writing, &prepared, &entries, frames)).await?;
+        let completion = written.map_err(|error| if session.is_deleted() { super::gone() } else { error })?;
+        session.set_phase(Phase::Completed(completion));
+        sealed.kept = true;
+        Ok(())
+    }
+}
+
+/// Lets a session take frames again where its completion fails.
+struct Sealed<'a> {
+    session: &'a Session,
+    kept: bool,
+}
+
+impl Drop for Sealed<'_> {
+    fn drop(&mut self) {
+        if !self.kept {
+            self.session.frames().unseal();
+        }
     }
 }
 

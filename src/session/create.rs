@@ -14,18 +14,32 @@ use cager_proto::messages::{CacheUse, PreparationSeconds, SessionOptions};
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
+use tokio::sync::OwnedSemaphorePermit;
 
 /// A request to make a session.
 pub(crate) struct NewSession {
     pub(crate) content: Content,
     pub(crate) options: SessionOptions,
     pub(crate) idempotency_key: Option<String>,
+    /// The room that the content takes.
+    pub(crate) room: Vec<OwnedSemaphorePermit>,
 }
 
 impl Service {
-    /// Makes a session and begins to prepare it. What comes back is on disk.
-    pub(crate) async fn create(self: &Arc<Self>, tenant: &Tenant, new: NewSession) -> Result<Arc<Session>, ApiError> {
-        let NewSession { content, options, idempotency_key } = new;
+    /// Makes a session and begins to prepare it. What comes back is on disk. Once begun, it goes on where the client gives up:
+    /// a session that is on disk and not known would come up at the next start only, beside the one that the client made instead.
+    pub(crate) async fn create(
+        self: &Arc<Self>,
+        tenant: &Arc<Tenant>,
+        new: NewSession,
+    ) -> Result<Arc<Session>, ApiError> {
+        let (service, tenant) = (Arc::clone(self), Arc::clone(tenant));
+        let work = tokio::spawn(async move { service.create_for(&tenant, new).await });
+        work.await.map_err(|error| ApiError::internal(&error))?
+    }
+
+    async fn create_for(self: &Arc<Self>, tenant: &Tenant, new: NewSession) -> Result<Arc<Session>, ApiError> {
+        let NewSession { content, options, idempotency_key, room: _room } = new;
         let choices = Choices::of(&options)?;
         let (key, content) = {
             let (tenant, options) = (tenant.name.clone(), options.clone());
@@ -38,7 +52,7 @@ impl Service {
         match self.registry.begin(&tenant.name, &idempotency_key, &fingerprint)? {
             Repetition::Done(session) => Ok(session),
             Repetition::First => {
-                // Frees the key also where the client goes away in the middle.
+                // Frees the key also after a panic.
                 let _free = GiveUp { service: self, tenant: &tenant.name, key: &idempotency_key };
                 let idempotency = Idempotency { key: idempotency_key.clone(), fingerprint };
                 self.create_new(tenant, key, content, options, choices, Some(idempotency)).await
@@ -152,6 +166,15 @@ impl Service {
                 self.keep_outcome(&session, Outcome::Ready(Box::new(facts.clone()))).await;
                 let completion = self.store.completion(&session.meta.id).ok().flatten();
                 let phase = completion.map_or(Phase::Ready, Phase::Completed);
+                // A process may have ended with frames in the log and no outcome on disk. Who hears that the session is ready
+                // finds them all.
+                session.set_status(Status { phase: Phase::Preparing, facts: Some(facts.clone()) });
+                if session.ensure_loaded().await.is_err() && matches!(session.status().phase, Phase::Failed(_)) {
+                    return;
+                }
+                if matches!(phase, Phase::Completed(_)) {
+                    session.frames().seal();
+                }
                 session.set_status(Status { phase, facts: Some(facts) });
             }
             Err(error) => {
@@ -198,8 +221,15 @@ impl Service {
         })
     }
 
-    /// Deletes a session; what runs for it stops.
-    pub(crate) async fn delete(&self, session: &Arc<Session>) -> Result<(), ApiError> {
+    /// Deletes a session; what runs for it stops. Once begun, it goes on where the client gives up: a session that is gone from
+    /// the disk must not stay known, and take frames that a restart would forget.
+    pub(crate) async fn delete(self: &Arc<Self>, session: &Arc<Session>) -> Result<(), ApiError> {
+        let (service, session) = (Arc::clone(self), Arc::clone(session));
+        let work = tokio::spawn(async move { service.delete_alone(&session).await });
+        work.await.map_err(|error| ApiError::internal(&error))?
+    }
+
+    async fn delete_alone(&self, session: &Arc<Session>) -> Result<(), ApiError> {
         let (store, id, key) = (self.store.clone(), session.meta.id.clone(), session.meta.key);
         let _content = self.registry.content_lock(&key).await;
         let removed = id.clone();

@@ -42,8 +42,8 @@ pub(crate) enum Claim {
     Waiting,
     /// It was there before, but different.
     Conflict,
-    /// It is new, but no new frames are taken any more.
-    Late,
+    /// It is new, and the session takes no new ones.
+    Sealed,
 }
 
 /// The frames of one session.
@@ -51,10 +51,21 @@ pub(crate) enum Claim {
 pub(crate) struct Frames {
     solved: BTreeMap<u32, LogEntry>,
     pending: HashMap<u32, Pending>,
+    /// Whether no frames are coming any more.
     sealed: bool,
 }
 
+/// Why a session cannot be sealed.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Unsealed {
+    /// These ranges are missing.
+    Missing(Vec<[u32; 2]>),
+    /// This frame lies beyond the end.
+    Beyond(u32),
+}
+
 impl Frames {
+    #[cfg(test)]
     pub(crate) fn new(entries: Vec<LogEntry>) -> Self {
         // Of a frame that is there twice, the first counts.
         let mut solved = BTreeMap::new();
@@ -78,15 +89,39 @@ impl Frames {
             return Claim::Waiting;
         }
         if self.sealed {
-            return Claim::Late;
+            return Claim::Sealed;
         }
         self.pending.insert(frame, Pending { digests, waiting: vec![Arc::clone(upload)] });
         Claim::Solve
     }
 
-    /// Takes no new frames while the session is being completed, and after that; or takes them again where that failed.
-    pub(crate) fn seal(&mut self, sealed: bool) {
-        self.sealed = sealed;
+    /// Takes no new frames from here on, if all of `frames` are there and none beyond, nor on its way.
+    ///
+    /// # Errors
+    /// Why that cannot be yet; nothing changed.
+    pub(crate) fn seal_at(&mut self, frames: u32) -> Result<(), Unsealed> {
+        let missing = self.missing(Some(frames));
+        if !missing.is_empty() {
+            return Err(Unsealed::Missing(missing));
+        }
+        let on_its_way = self.pending.keys().copied().max();
+        match self.highest().max(on_its_way).filter(|&highest| highest >= frames) {
+            Some(highest) => Err(Unsealed::Beyond(highest)),
+            None => {
+                self.sealed = true;
+                Ok(())
+            }
+        }
+    }
+
+    /// Takes no new frames from here on.
+    pub(crate) fn seal(&mut self) {
+        self.sealed = true;
+    }
+
+    /// Takes new frames again.
+    pub(crate) fn unseal(&mut self) {
+        self.sealed = false;
     }
 
     /// Enters a frame that is on disk; returns the uploads that wait for it.
@@ -143,11 +178,6 @@ impl Frames {
     /// The highest solved frame.
     pub(crate) fn highest(&self) -> Option<u32> {
         self.solved.last_key_value().map(|(frame, _)| *frame)
-    }
-
-    /// The highest frame that is solved or being solved.
-    pub(crate) fn highest_received(&self) -> Option<u32> {
-        self.pending.keys().copied().max().max(self.highest())
     }
 
     /// Ranges `[a, b)` below `end` that are not solved; below the highest solved frame where no end is known.
@@ -216,11 +246,27 @@ mod tests {
         assert_eq!(frames.claim(4, same, &upload), Claim::Solve);
         assert_eq!(frames.claim(4, same, &upload), Claim::Waiting);
         assert_eq!(frames.claim(4, Digests { handles: [9; 16], ..same }, &upload), Claim::Conflict);
-        assert_eq!(frames.highest_received(), Some(4));
-        frames.seal(true);
-        assert_eq!(frames.claim(5, same, &upload), Claim::Late);
-        assert_eq!(frames.claim(4, same, &upload), Claim::Waiting);
-        assert_eq!(frames.solved(entry(4)).len(), 3);
+        assert_eq!(frames.solved(entry(4)).len(), 2);
         assert_eq!(frames.claim(4, same, &upload), Claim::Known);
+    }
+
+    #[test]
+    fn a_sealed_session_takes_what_it_knows_and_nothing_new() {
+        let upload = Arc::new(Upload::default());
+        let same = Digests { handles: [1; 16], full: Some([2; 16]) };
+        let mut frames = Frames::new([0, 2].map(entry).to_vec());
+        assert_eq!(frames.seal_at(3), Err(Unsealed::Missing(vec![[1, 2]])));
+        assert_eq!(frames.claim(1, same, &upload), Claim::Solve);
+        assert_eq!(frames.seal_at(3), Err(Unsealed::Missing(vec![[1, 2]])), "it is not on disk yet");
+        frames.solved(entry(1));
+        assert_eq!(frames.seal_at(2), Err(Unsealed::Beyond(2)));
+        assert_eq!(frames.claim(3, same, &upload), Claim::Solve);
+        assert_eq!(frames.seal_at(3), Err(Unsealed::Beyond(3)), "its record will be sent");
+        frames.gave_up(3);
+        assert_eq!(frames.seal_at(3), Ok(()));
+        assert_eq!(frames.claim(3, same, &upload), Claim::Sealed);
+        assert_eq!(frames.claim(2, same, &upload), Claim::Known);
+        frames.unseal();
+        assert_eq!(frames.claim(3, same, &upload), Claim::Solve);
     }
 }

@@ -91,7 +91,9 @@ impl LiveLane {
 impl Session {
     pub(crate) fn new(meta: SessionMeta, store: Store, committer: Committer, status: Status, is_new: bool) -> Self {
         let mut frames = Frames::default();
-        frames.seal(matches!(status.phase, Phase::Completed(_)));
+        if matches!(status.phase, Phase::Completed(_)) {
+            frames.seal();
+        }
         Self {
             meta,
             store,
@@ -120,7 +122,9 @@ impl Session {
     }
 
     pub(crate) fn set_status(&self, status: Status) {
-        self.frames().seal(matches!(status.phase, Phase::Completed(_)));
+        if matches!(status.phase, Phase::Completed(_)) {
+            self.frames().seal();
+        }
         *lock(&self.status) = status;
         self.touch();
     }
@@ -161,9 +165,12 @@ impl Session {
         if self.loaded.load(Ordering::Acquire) {
             return Ok(());
         }
-        if self.facts().is_none() {
-            // Without an outcome there was no frame yet.
-            return Ok(());
+        match self.status() {
+            // Loaded before anyone hears that it is ready.
+            Status { facts: None, .. } => return Ok(()),
+            // In quarantine, where it has said why; what there is to know is that it failed.
+            Status { phase: Phase::Failed(_), .. } => return Ok(()),
+            _ => {}
         }
         let mut log = lock(&self.log);
         if log.is_none() && !self.loaded.load(Ordering::Acquire) {
@@ -190,20 +197,14 @@ impl Session {
         let rows = self.facts().map_or(0, |facts| facts.unknowns);
         let (log, entries) = self.store.open_log(&self.meta.id, rows)?;
         *lock(&self.reader) = Some(log.reader());
-        if !self.loaded.load(Ordering::Acquire) {
-            let mut frames = self.frames();
-            for entry in Frames::new(entries).entries() {
-                frames.solved(*entry);
-            }
-            self.loaded.store(true, Ordering::Release);
-        } else {
-            // Written although the answer was an error: true all the same.
-            let mut frames = self.frames();
-            let late: Vec<LogEntry> = entries.into_iter().filter(|e| frames.entry(e.frame).is_none()).collect();
-            for entry in late {
-                frames.solved(entry).iter().for_each(|upload| upload.answer(entry.frame));
-            }
+        // Of a session that was loaded before, those that were written although the answer was an error: true all the same.
+        let mut frames = self.frames();
+        let new: Vec<LogEntry> = entries.into_iter().filter(|e| frames.entry(e.frame).is_none()).collect();
+        for entry in new {
+            frames.solved(entry).iter().for_each(|upload| upload.answer(entry.frame));
         }
+        self.loaded.store(true, Ordering::Release);
+        drop(frames);
         Ok(log)
     }
 
@@ -327,6 +328,11 @@ impl Session {
             problem,
         }
     }
+}
+
+/// What ends all that runs for a session that was deleted.
+pub(crate) fn gone() -> ApiError {
+    ApiError::new(problem::SESSION_DELETED, "the session was deleted")
 }
 
 fn state_of(phase: &Phase) -> SessionState {

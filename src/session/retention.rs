@@ -72,7 +72,7 @@ impl Service {
     }
 
     /// One round of [`Self::sweep`].
-    pub(crate) async fn sweep_once(&self) {
+    pub(crate) async fn sweep_once(self: &Arc<Self>) {
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_millis() as u64;
         for session in self.registry.all() {
             let limits = self.access.tenant(&session.meta.tenant).limits;

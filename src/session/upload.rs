@@ -8,10 +8,11 @@ use crate::capture::StoredError;
 use crate::problem::{self, ApiError};
 use std::cell::RefCell;
 use std::collections::VecDeque;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 use tokio::sync::{Notify, OwnedSemaphorePermit};
+use tokio_util::sync::CancellationToken;
 
 /// What an upload has submitted and heard back. Answers that nobody has read yet are frame numbers; what they say waits in
 /// the log.
@@ -19,7 +20,10 @@ use tokio::sync::{Notify, OwnedSemaphorePermit};
 pub(crate) struct Upload {
     state: Mutex<State>,
     changed: Notify,
-    gone: AtomicBool,
+    /// The client is gone.
+    gone: CancellationToken,
+    /// Something failed, or the client is gone.
+    pointless: CancellationToken,
 }
 
 #[derive(Default)]
@@ -63,6 +67,7 @@ impl Upload {
             s.finished += 1;
             s.error.get_or_insert(error);
         });
+        self.pointless.cancel();
     }
 
     /// No more frames will be submitted, because the body ended or for this reason.
@@ -75,18 +80,24 @@ impl Upload {
         });
     }
 
-    /// Whether something failed, so that reading more makes no sense.
-    pub(crate) fn has_failed(&self) -> bool {
-        super::lock(&self.state).error.is_some()
+    /// Whether something failed or the client went away, so that reading more makes no sense.
+    pub(crate) fn is_pointless(&self) -> bool {
+        self.pointless.is_cancelled()
+    }
+
+    /// As [`Self::is_pointless`], as soon as it is so.
+    pub(crate) async fn pointless(&self) {
+        self.pointless.cancelled().await;
     }
 
     /// The client went away: what waits is not worth solving.
     pub(crate) fn abandon(&self) {
-        self.gone.store(true, Ordering::Relaxed);
+        self.gone.cancel();
+        self.pointless.cancel();
     }
 
     pub(crate) fn is_abandoned(&self) -> bool {
-        self.gone.load(Ordering::Relaxed)
+        self.gone.is_cancelled()
     }
 
     /// The next answers, at most `most`. For one caller at a time.
@@ -126,7 +137,15 @@ pub(crate) struct FrameJob {
     queued: Arc<AtomicU64>,
     arrived: Instant,
     settled: bool,
-    _permits: [OwnedSemaphorePermit; 2],
+    permits: Option<Permits>,
+}
+
+/// What a frame takes of what there is for all.
+pub(crate) struct Permits {
+    /// A place and memory, until it is solved.
+    pub(crate) _solving: [OwnedSemaphorePermit; 2],
+    /// A place until it is on disk.
+    pub(crate) writing: OwnedSemaphorePermit,
 }
 
 impl FrameJob {
@@ -136,7 +155,7 @@ impl FrameJob {
         frame: u32,
         rows: Rows,
         bytes: Vec<u8>,
-        permits: [OwnedSemaphorePermit; 2],
+        permits: Permits,
     ) -> Self {
         session.queued.fetch_add(1, Ordering::Relaxed);
         upload.with(|s| s.submitted += 1);
@@ -148,7 +167,7 @@ impl FrameJob {
             queued: Arc::clone(&session.queued),
             arrived: Instant::now(),
             settled: false,
-            _permits: permits,
+            permits: Some(permits),
         }
     }
 
@@ -213,6 +232,12 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
                 job.settle();
                 upload.answer(frame);
             }
+            Claim::Sealed => {
+                let frame = job.frame;
+                let detail =
+                    format!("frame {frame} comes after the session was completed; make a new session for more");
+                job.fail(ApiError::new(problem::SESSION_COMPLETED, detail).frame(frame));
+            }
             Claim::Conflict => {
                 let frame = job.frame;
                 let detail = format!(
@@ -220,29 +245,28 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
                 );
                 job.fail(ApiError::new(problem::FRAME_CONFLICT, detail).frame(frame));
             }
-            Claim::Late => {
-                let frame = job.frame;
-                let detail = match session.declared() {
-                    Some(frames) => {
-                        format!("the session was completed with {frames} frames, so frame {frame} comes too late")
-                    }
-                    None => format!("the session is being completed, so frame {frame} comes too late"),
-                };
-                job.fail(ApiError::new(problem::SESSION_COMPLETED, detail).frame(frame));
-            }
         }
     }
-    for (rows, jobs) in [(Rows::All, whole), (Rows::Handles, handles)] {
+    // A panic must not leave these frames claimed for ever.
+    let batches = [(Rows::All, whole), (Rows::Handles, handles)].map(|(rows, jobs)| {
+        let guard = GiveUp { session, frames: jobs.iter().map(|(job, _)| job.frame).collect() };
+        (rows, jobs, guard)
+    });
+    for (rows, jobs, guard) in batches {
         if !jobs.is_empty() {
-            solve_alike(session, prepared, rows, jobs);
+            solve_alike(session, prepared, rows, jobs, guard);
         }
     }
     metrics::histogram!("cager_solve_seconds").record(clock.elapsed().as_secs_f64());
 }
 
-fn solve_alike(session: &Arc<Session>, prepared: &Prepared, rows: Rows, jobs: Vec<(FrameJob, Digests)>) {
-    // A panic must not leave these frames claimed for ever.
-    let mut guard = GiveUp { session, frames: jobs.iter().map(|(job, _)| job.frame).collect() };
+fn solve_alike(
+    session: &Arc<Session>,
+    prepared: &Prepared,
+    rows: Rows,
+    jobs: Vec<(FrameJob, Digests)>,
+    mut guard: GiveUp<'_>,
+) {
     let mut numbers = NUMBERS.take();
     numbers.resize_with(numbers.len().max(jobs.len()), Vec::new);
     for ((job, _), numbers) in jobs.iter().zip(&mut numbers) {
@@ -265,7 +289,7 @@ fn solve_alike(session: &Arc<Session>, prepared: &Prepared, rows: Rows, jobs: Ve
     }
     guard.frames.clear();
     let mut solved = Vec::with_capacity(jobs.len());
-    for (((job, digests), cage), error) in jobs.into_iter().zip(cages).zip(errors) {
+    for (((mut job, digests), cage), error) in jobs.into_iter().zip(cages).zip(errors) {
         let frame = job.frame;
         let fits = cage.iter().all(|x| x.is_finite()) && (rows == Rows::Handles || error.linf.is_finite());
         if !fits {
@@ -275,7 +299,8 @@ fn solve_alike(session: &Arc<Session>, prepared: &Prepared, rows: Rows, jobs: Ve
                 upload.fail(ApiError::new(problem::INVALID_FRAME, detail.clone()).frame(frame));
             }
         } else {
-            solved.push(Solved { frame, digests, error, cage });
+            let permit = job.permits.take().map(|permits| permits.writing);
+            solved.push(Solved { frame, digests, error, cage, _permit: permit });
         }
         job.settle();
     }
