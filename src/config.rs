@@ -165,6 +165,10 @@ impl ServeConfig {
         if self.tokens.is_none() && !self.listen.ip().is_loopback() {
             return Err(ConfigError::Open { listen: self.listen });
         }
+        let (upload_bytes, max_rest_bytes) = (self.upload_bytes, self.max_rest_bytes);
+        if upload_bytes < max_rest_bytes {
+            return Err(ConfigError::UploadRoom { upload_bytes, max_rest_bytes });
+        }
         match (&self.tls_certificate, &self.tls_key) {
             (Some(_), None) => Err(ConfigError::HalfTls { given: "tls_certificate", missing: "tls_key" }),
             (None, Some(_)) => Err(ConfigError::HalfTls { given: "tls_key", missing: "tls_certificate" }),

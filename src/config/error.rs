@@ -85,6 +85,16 @@ pub enum ConfigError {
         /// The address.
         listen: SocketAddr,
     },
+    /// A model of the largest size would never find room.
+    #[error(
+        "upload_bytes is {upload_bytes}, less than max_rest_bytes, which is {max_rest_bytes}; raise the one or lower the other"
+    )]
+    UploadRoom {
+        /// Memory for uploads of models.
+        upload_bytes: u64,
+        /// Largest model.
+        max_rest_bytes: u64,
+    },
     /// One half of what TLS needs.
     #[error("{given} is set but {missing} is not; TLS needs both")]
     HalfTls {

@@ -83,6 +83,7 @@ impl Service {
             tenant: tenant.name.clone(),
             created_ms: now.as_millis() as u64,
             key,
+            solver_version: cager_core::SOLVER_VERSION,
             options,
             idempotency,
         };
@@ -123,10 +124,16 @@ impl Service {
             tracing::warn!(session = %id, %error, "the mark of completion is unreadable, so the session has to be completed again");
             None
         });
+        let old = (meta.solver_version != cager_core::SOLVER_VERSION).then(|| {
+            let detail = "the service was upgraded to another version of the computation while this session was open; upload the capture to a new one";
+            ApiError::new(problem::SESSION_FAILED, detail).problem
+        });
         let status = match (outcome, completion) {
             (Some(Outcome::Ready(facts)), Some(completion)) => {
                 Status { phase: Phase::Completed(completion), facts: Some(*facts) }
             }
+            // Frames of two versions must not meet in one capture.
+            (_, None) if let Some(problem) = old => Status { phase: Phase::Failed(problem), facts: None },
             (Some(Outcome::Ready(facts)), None) => Status { phase: Phase::Ready, facts: Some(*facts) },
             (Some(Outcome::Failed(problem)), _) => Status { phase: Phase::Failed(problem), facts: None },
             (None, _) => Status { phase: Phase::Preparing, facts: None },

@@ -23,6 +23,8 @@ pub struct SessionMeta {
     pub created_ms: u64,
     /// Rest pose, cage and options.
     pub key: ContentKey,
+    /// Version of the computation that its frames are solved with.
+    pub solver_version: u32,
     /// Choices, as they were given.
     pub options: SessionOptions,
     /// The request that made it, so that a repetition finds it.

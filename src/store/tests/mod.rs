@@ -52,6 +52,7 @@ pub(crate) fn meta(id: &str) -> SessionMeta {
         created_ms: 1_700_000_000_000,
         key: KEY,
         options: SessionOptions { lambda: Some(0.1 + 0.2), name: Some("Ärmel".into()), ..SessionOptions::default() },
+        solver_version: cager_core::SOLVER_VERSION,
         idempotency: Some(Idempotency { key: "k".into(), fingerprint: "f".into() }),
     }
 }
