@@ -57,6 +57,11 @@ impl Committer {
     }
 }
 
+/// What frames take in the log, about.
+fn stored_bytes(solved: &[Solved]) -> u64 {
+    solved.iter().map(|s| (RECORD_BYTES + 4 * s.cage.len()) as u64).sum()
+}
+
 fn run(queue: &Mutex<Receiver<Arc<Session>>>) {
     loop {
         let next = queue.lock().unwrap_or_else(PoisonError::into_inner).recv();
@@ -80,6 +85,8 @@ impl Session {
         if solved.is_empty() {
             return;
         }
+        // Counted before they are written, so that a quota holds however slow the disk is.
+        self.bytes.fetch_add(stored_bytes(&solved), Relaxed);
         let mut waiting = super::lock(&self.waiting);
         waiting.solved.extend(solved);
         if !waiting.busy {
@@ -118,8 +125,6 @@ impl Session {
         drop(log);
         match outcome {
             Ok(entries) => {
-                let cages: usize = solved.iter().map(|s| RECORD_BYTES + 4 * s.cage.len()).sum();
-                self.bytes.fetch_add(cages as u64, Relaxed);
                 let measured = solved.iter().filter(|s| s.digests.full.is_some()).count();
                 metrics::counter!("cager_frames_total", "tenant" => self.meta.tenant.clone(), "rows" => "all")
                     .increment(measured as u64);
@@ -131,6 +136,7 @@ impl Session {
                 }
             }
             Err(error) => {
+                self.bytes.fetch_sub(stored_bytes(solved), Relaxed);
                 let error = if self.is_deleted() {
                     super::gone()
                 } else {

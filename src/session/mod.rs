@@ -34,7 +34,7 @@ pub(crate) struct Session {
     /// Whether what the log holds is in `frames`.
     loaded: AtomicBool,
     queued: Arc<AtomicU64>,
-    /// Bytes of its files and of its content.
+    /// Bytes of its files, of its content, and of frames about to be written.
     pub(crate) bytes: AtomicU64,
     waiting: Mutex<Waiting>,
     log: Mutex<Option<FrameLog>>,

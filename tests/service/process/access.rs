@@ -66,7 +66,7 @@ async fn a_revoked_token_stops_working_and_a_new_one_begins() {
         assert!(clock.elapsed() < Duration::from_secs(5), "the token still works");
         tokio::time::sleep(Duration::from_millis(50)).await;
     }
-    println!("revoked after {:?}", clock.elapsed());
+    eprintln!("revoked after {:?}", clock.elapsed());
     bert.get("/v1/sessions").await.problem(401, "unauthorized");
     anna.get("/v1/sessions").await.expect(200);
     app.caller(Some("carl-has-a-long-secret")).get("/v1/sessions").await.expect(200);

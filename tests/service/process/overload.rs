@@ -33,7 +33,7 @@ async fn ten_times_too_much_is_turned_away_and_health_answers_all_the_while() {
     let session = app.ready(capture).await;
     app.upload(&session.id, 0, capture.raw(0..40)).await;
     let expected = app.cages(&session.id).await;
-    let body = bytes::Bytes::from(capture.raw(0..40).repeat(2));
+    let body = bytes::Bytes::from(capture.raw(0..40).repeat(4));
     let sessions = join_all((0..10).map(|_| app.ready(capture))).await;
     let before = app.resident_mib();
     let over = AtomicBool::new(false);
@@ -41,7 +41,7 @@ async fn ten_times_too_much_is_turned_away_and_health_answers_all_the_while() {
         let one = async |k: usize| {
             let id = &sessions[k % sessions.len()].id;
             // Each its own frames, so that all of them have to be solved.
-            let path = format!("/v1/sessions/{id}/frames?first={}", 80 * k);
+            let path = format!("/v1/sessions/{id}/frames?first={}", 160 * k);
             for _ in 0..TRIES {
                 let reply = app.stranger().post(&path, OCTETS, body.clone()).await;
                 match reply.status {
@@ -65,7 +65,7 @@ async fn ten_times_too_much_is_turned_away_and_health_answers_all_the_while() {
     let grown = app.resident_mib().saturating_sub(before);
     let at = |share: f64| pulse[((pulse.len() - 1) as f64 * share) as usize];
     let count = taken.iter().filter(|taken| **taken).count();
-    println!(
+    eprintln!(
         "{count} of {} uploads taken; {} pulses: median {:?}, p99 {:?}, longest {:?}; memory grew by {grown} MiB",
         taken.len(),
         pulse.len(),
@@ -75,14 +75,15 @@ async fn ten_times_too_much_is_turned_away_and_health_answers_all_the_while() {
     );
     assert!(count >= STREAMS, "{count} taken");
     assert!(app.metric("cager_rejections_total{reason=\"streams\"}").await >= 20.0, "that was no overload");
-    assert!(pulse.len() >= 20, "the load lasted too short to tell");
-    // 50 ms is the aim; this machine may be busy with other things.
-    assert!(at(0.99) < Duration::from_millis(500), "health took {:?}", at(0.99));
+    assert!(pulse.len() >= 10, "the load lasted too short to tell");
+    // 50 ms is the aim also for the slowest; the machine may be busy with other things, and sends the load besides.
+    assert!(at(0.5) < Duration::from_millis(100), "health took {:?} in half of the cases", at(0.5));
+    assert!(at(0.99) < Duration::from_secs(1), "health took {:?}", at(0.99));
     assert!(grown < 200, "memory grew by {grown} MiB");
     // What was taken is right.
     for (k, _) in taken.iter().enumerate().filter(|(_, taken)| **taken).take(12) {
         let id = &sessions[k % sessions.len()].id;
-        let cages = app.get(&format!("/v1/sessions/{id}/cages?first={}&count=40", 80 * k)).await.expect(200).body;
+        let cages = app.get(&format!("/v1/sessions/{id}/cages?first={}&count=40", 160 * k)).await.expect(200).body;
         assert!(cages == expected, "upload {k}");
     }
 }

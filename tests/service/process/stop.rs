@@ -42,7 +42,7 @@ async fn open_streams_are_told_at_once_and_the_process_ends() {
     let told = clock.elapsed();
     drop((upload, silent, follower, events));
     let (status, _) = app.ended().await;
-    println!("all told after {told:?}, ended after {:?}", clock.elapsed());
+    eprintln!("all told after {told:?}, ended after {:?}", clock.elapsed());
     assert!(status.success(), "{status}");
     assert!(clock.elapsed() < Duration::from_secs(8), "it waited for the whole drain time");
     assert!(app.log().contains("stopped"));

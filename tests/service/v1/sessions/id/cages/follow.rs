@@ -128,7 +128,7 @@ async fn followers_that_stop_reading_cost_no_memory_and_disturb_nobody() {
     let ((), bytes) = tokio::join!(upload, read);
     assert_eq!(bytes, FRAMES as usize * 12 * session.unknowns.expect("known") as usize);
     let grown = app.resident_mib().saturating_sub(before);
-    println!("{STALLED} stalled followers of {} MiB each: {grown} MiB", bytes >> 20);
+    eprintln!("{STALLED} stalled followers of {} MiB each: {grown} MiB", bytes >> 20);
     assert!(grown < 100, "memory grew by {grown} MiB");
     // One of them wakes up, and nothing is lost.
     let mut late = stalled.pop().expect("one");
