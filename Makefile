@@ -3,13 +3,14 @@
 CARGO ?= cargo
 PYTHON ?= python3
 PEERS := benches/.venv/bin/python
+SCHEMATHESIS := target/schemathesis/bin/python
 
 LINT := target/lint-deploy
 
-.PHONY: help demo test lint lint-deploy doc bench audit clean
+.PHONY: help demo test lint lint-deploy doc bench openapi schemathesis fuzz audit clean
 
 help: ## list these commands
-	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 13
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
 
 demo: ## encode and decode the built-in capture; results in cager-demo/
 	$(CARGO) run --release --locked --quiet --bin cager -- demo
@@ -51,6 +52,21 @@ $(PEERS): benches/peers/requirements.txt
 	$(PYTHON) -m venv benches/.venv
 	benches/.venv/bin/pip install --quiet --requirement benches/peers/requirements.txt
 	@touch $@
+
+openapi: ## write docs/openapi.json anew from the routes
+	CAGER_UPDATE_OPENAPI=1 $(CARGO) test --locked --quiet --test http openapi
+
+schemathesis: $(SCHEMATHESIS) ## hold a running service against its OpenAPI document; SCHEMATHESIS_ARGS for more
+	$(CARGO) build --locked --bin cager
+	$(SCHEMATHESIS) tests/schemathesis/run.py target/debug/cager $(SCHEMATHESIS_ARGS)
+
+$(SCHEMATHESIS): tests/schemathesis/requirements.txt
+	$(PYTHON) -m venv target/schemathesis
+	target/schemathesis/bin/pip install --quiet --requirement tests/schemathesis/requirements.txt
+	@touch $@
+
+fuzz: ## run each fuzz target for FUZZ_SECONDS (600), FUZZ_JOBS at a time; needs a C++ compiler
+	fuzz/run.sh $(FUZZ_TARGETS)
 
 audit: ## licences and advisories of all dependencies; needs cargo-deny and the network
 	$(CARGO) deny check

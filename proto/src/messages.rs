@@ -26,21 +26,26 @@ pub enum SessionState {
 pub struct SessionOptions {
     /// A name for people, at most 200 characters.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schema(max_length = 200))]
     pub name: Option<String>,
     /// Coordinate system: `mvc`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schema(pattern = "^mvc$"))]
     pub coordinates: Option<String>,
     /// Points the inversion reads: `maxvol` or `all`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schema(pattern = "^(maxvol|all)$"))]
     pub handles: Option<String>,
     /// Treatment of the unstable end of the spectrum: `laplacian`, `none`, `truncated-svd`, `tikhonov` or `global`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schema(pattern = "^(laplacian|none|truncated-svd|tikhonov|global)$"))]
     pub regularizer: Option<String>,
     /// Spectrum threshold: how many of the last singular directions are regularised.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spectrum: Option<u32>,
     /// Weight of the regularisation.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schema(minimum = 0))]
     pub lambda: Option<f64>,
     /// Bound on every vertex's error. Not available yet: a session that asks for it is refused.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -53,6 +58,7 @@ pub struct SessionOptions {
     pub flip_cage: bool,
     /// Frames per second, written into the container.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schema(exclusive_minimum = 0))]
     pub frame_rate: Option<f64>,
 }
 
@@ -194,7 +200,8 @@ pub struct FrameErrors {
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Complete {
-    /// Number of frames of the capture.
+    /// Number of frames of the capture, at least 1.
+    #[cfg_attr(feature = "schema", schema(minimum = 1))]
     pub frames: u32,
 }
 

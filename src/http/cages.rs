@@ -70,7 +70,7 @@ impl Form {
 /// Solved cages: m × 3 little-endian f32 each, or frame records. With `follow` the stream stays open until the session is completed.
 /// Cages of a completed session never change: they have an `ETag` and take `Range`.
 #[utoipa::path(
-    get, path = "/v1/sessions/{id}/cages", tag = "results", params(openapi::Id, CagesQuery),
+    get, path = "/v1/sessions/{id}/cages", operation_id = "get_cages", tag = "results", params(openapi::Id, CagesQuery, openapi::Conditions),
     responses(
         (status = 200, description = "The cages", content(
             (Vec<u8> = "application/octet-stream"), (Vec<u8> = "application/vnd.cager.frames"),

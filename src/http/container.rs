@@ -18,7 +18,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// The container of a completed session.
 #[utoipa::path(
-    get, path = "/v1/sessions/{id}/capture.cager", tag = "results", params(openapi::Id),
+    get, path = "/v1/sessions/{id}/capture.cager", operation_id = "get_container", tag = "results", params(openapi::Id, openapi::Conditions),
     responses(
         (status = 200, description = "The container", content_type = "application/vnd.cager", body = Vec<u8>),
         (status = 206, description = "The range asked for", content_type = "application/vnd.cager", body = Vec<u8>),

@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 /// The handles: rows of the rest pose, as u32 little-endian, or as a JSON list.
 #[utoipa::path(
-    get, path = "/v1/sessions/{id}/handles", tag = "results", params(openapi::Id),
+    get, path = "/v1/sessions/{id}/handles", operation_id = "get_handles", tag = "results", params(openapi::Id),
     responses((status = 200, description = "The handles", content(
         (Vec<u8> = "application/octet-stream"), (Vec<u32> = "application/json"),
     ))),
@@ -41,7 +41,7 @@ pub(crate) async fn handles(
 
 /// `Φ` as f32 little-endian, row-major, `Cager-Rows` × `Cager-Columns`. It never changes.
 #[utoipa::path(
-    get, path = "/v1/sessions/{id}/coordinates", tag = "results", params(openapi::Id),
+    get, path = "/v1/sessions/{id}/coordinates", operation_id = "get_coordinates", tag = "results", params(openapi::Id, openapi::Conditions),
     responses(
         (status = 200, description = "Φ", content_type = "application/octet-stream", body = Vec<u8>,
             headers(("Cager-Rows" = u32, description = "Points n"), ("Cager-Columns" = u32, description = "Unknowns m"))),

@@ -20,7 +20,7 @@ use tokio::sync::{oneshot, watch};
 
 /// Positions of a cage: m × 3 little-endian f32 in, n × 3 out, for as many cages as the body has. Cages may be edited.
 #[utoipa::path(
-    post, path = "/v1/sessions/{id}/decode", tag = "results", params(openapi::Id),
+    post, path = "/v1/sessions/{id}/decode", operation_id = "decode_cages", tag = "results", params(openapi::Id),
     request_body(content = Vec<u8>, content_type = "application/octet-stream", description = "m × 3 numbers per cage"),
     responses((status = 200, description = "n × 3 numbers per cage", content_type = "application/octet-stream", body = Vec<u8>)),
 )]

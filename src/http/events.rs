@@ -19,12 +19,24 @@ const AT_MOST_EVERY: Duration = Duration::from_millis(100);
 /// Without changes, a comment keeps proxies from closing the connection.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 
+/// A server-sent event.
+#[derive(utoipa::ToSchema)]
+#[allow(dead_code, reason = "it only describes")]
+pub(crate) struct Event {
+    /// `progress`, or `deleted` as the last.
+    event: Option<String>,
+    /// What it tells, for `Last-Event-ID`.
+    id: Option<String>,
+    /// JSON: `{"state": …, "received": …, "solved": …}` with the state and the frames of the session; `{}` where it was deleted.
+    data: Option<String>,
+}
+
 /// Progress of the session: an event `progress` with each change, until it is completed, failed or deleted. An event's id says what it tells, so
 /// that `Last-Event-ID` keeps a client that comes back from hearing the same again.
 #[utoipa::path(
-    get, path = "/v1/sessions/{id}/events", tag = "sessions",
+    get, path = "/v1/sessions/{id}/events", operation_id = "get_events", tag = "sessions",
     params(openapi::Id, ("Last-Event-ID" = Option<String>, Header, description = "The last event heard")),
-    responses((status = 200, description = "Events whose data is a Progress", content_type = "text/event-stream", body = Progress)),
+    responses((status = 200, description = "Events whose data is JSON", content_type = "text/event-stream", body = Event)),
 )]
 pub(crate) async fn get(
     State(service): State<Arc<Service>>,

@@ -63,7 +63,7 @@ pub(crate) enum RowsQuery {
 /// for each frame as soon as it is solved and on disk, in the order of solving. An error after the first record ends NDJSON with a line
 /// of problem details, and cuts a stream of frame records off.
 #[utoipa::path(
-    post, path = "/v1/sessions/{id}/frames", tag = "frames", params(openapi::Id, UploadQuery),
+    post, path = "/v1/sessions/{id}/frames", operation_id = "post_frames", tag = "frames", params(openapi::Id, UploadQuery),
     request_body(content(
         (Vec<u8> = "application/octet-stream"), (Vec<u8> = "application/vnd.cager.frames"),
     ), description = "n × 3 numbers per frame, or one row per handle"),

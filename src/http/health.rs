@@ -27,13 +27,13 @@ fn health(service: &Service) -> Json<Health> {
 }
 
 /// Liveness: the process answers.
-#[utoipa::path(get, path = "/healthz", tag = "operation", security(()), responses((status = 200, body = Health)))]
+#[utoipa::path(get, path = "/healthz", operation_id = "get_health", tag = "operation", security(()), responses((status = 200, description = "It is", body = Health)))]
 pub(crate) async fn live(State(service): State<Arc<Service>>) -> Json<Health> {
     health(&service)
 }
 
 /// Readiness: sessions are resumed and the disk takes writes.
-#[utoipa::path(get, path = "/readyz", tag = "operation", security(()), responses((status = 200, body = Health)))]
+#[utoipa::path(get, path = "/readyz", operation_id = "get_readiness", tag = "operation", security(()), responses((status = 200, description = "It is", body = Health)))]
 pub(crate) async fn ready(State(service): State<Arc<Service>>) -> Result<Json<Health>, ApiError> {
     service.ready().await?;
     Ok(health(&service))
@@ -41,7 +41,7 @@ pub(crate) async fn ready(State(service): State<Arc<Service>>) -> Result<Json<He
 
 /// Metrics in Prometheus' text format.
 #[utoipa::path(
-    get, path = "/metrics", tag = "operation", security(()),
+    get, path = "/metrics", operation_id = "get_metrics", tag = "operation", security(()),
     responses((status = 200, description = "Metrics", content_type = "text/plain", body = String)),
 )]
 pub(crate) async fn metrics(State(service): State<Arc<Service>>) -> Response {

@@ -9,6 +9,8 @@ mod events;
 mod extract;
 mod frames;
 mod frames_in;
+#[doc(hidden)]
+pub mod fuzzing;
 mod health;
 pub mod listen;
 mod multipart;

@@ -1,12 +1,23 @@
 //! The OpenAPI document, made from the routes.
 
+use super::events::Event;
+use super::frames::RowsQuery;
 use super::respond::PROBLEM_JSON;
 use crate::problem;
-use cager_proto::messages::{FrameErrors, FrameResult, Problem, Progress, Session, SessionList, SessionOptions};
+use axum::response::IntoResponse;
+use bytes::Bytes;
+use cager_proto::messages::{FrameErrors, FrameResult, Problem, Session, SessionList, SessionOptions};
+use http::header;
+use serde_json::Value;
 use std::collections::BTreeMap;
-use utoipa::openapi::path::Operation;
+use std::sync::LazyLock;
+use utoipa::openapi::encoding::EncodingBuilder;
+use utoipa::openapi::path::{Operation, ParameterBuilder, ParameterIn};
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityScheme};
-use utoipa::openapi::{ContentBuilder, HeaderBuilder, ObjectBuilder, Ref, RefOr, ResponseBuilder, Type};
+use utoipa::openapi::{
+    Content, ContentBuilder, HeaderBuilder, KnownFormat, ObjectBuilder, PathItem, Ref, RefOr, Response,
+    ResponseBuilder, Schema, SchemaFormat, Type,
+};
 use utoipa::{IntoParams, Modify, OpenApi, ToSchema};
 
 /// The path parameter of a session.
@@ -29,7 +40,8 @@ pub(crate) struct NewSessionForm {
     #[schema(value_type = String, format = Binary)]
     cage: Vec<u8>,
     /// Choices.
-    options: Option<SessionOptions>,
+    #[schema(required = false)]
+    options: SessionOptions,
 }
 
 /// The document without its paths.
@@ -40,7 +52,7 @@ pub(crate) struct NewSessionForm {
         description = "Turns animated mesh captures into cages: make a session from a rest pose and its cage, post frames, follow or download the cages.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0"),
     ),
-    components(schemas(FrameErrors, FrameResult, Problem, Progress, Session, SessionList, SessionOptions)),
+    components(schemas(Event, FrameErrors, FrameResult, Problem, RowsQuery, Session, SessionList, SessionOptions)),
     security(("token" = [])),
     tags(
         (name = "sessions", description = "Sessions and their progress"),
@@ -64,36 +76,194 @@ impl Modify for Token {
     }
 }
 
-/// Adds what every route can answer.
-pub(crate) fn with_problems(mut document: utoipa::openapi::OpenApi) -> utoipa::openapi::OpenApi {
+/// This document.
+#[utoipa::path(
+    get, path = "/openapi.json", operation_id = "get_openapi", tag = "operation", security(()),
+    responses((status = 200, description = "OpenAPI 3.1", content_type = "application/json", body = Object)),
+)]
+pub(crate) async fn get() -> impl IntoResponse {
+    static DOCUMENT: LazyLock<Bytes> = LazyLock::new(|| Bytes::from(super::document().to_json().unwrap_or_default()));
+    ([(header::CONTENT_TYPE, "application/json")], DOCUMENT.clone())
+}
+
+/// Conditions of bytes that never change.
+#[derive(IntoParams)]
+#[into_params(parameter_in = Header)]
+#[allow(dead_code, reason = "it only describes")]
+pub(crate) struct Conditions {
+    /// One range of bytes, for example `bytes=0-1023`; what is no single range is ignored.
+    #[param(rename = "Range")]
+    range: Option<String>,
+    /// The range holds only for this `ETag`; otherwise everything comes.
+    #[param(rename = "If-Range")]
+    if_range: Option<String>,
+    /// `ETag`s that the client has: 304 where one of them is right.
+    #[param(rename = "If-None-Match")]
+    if_none_match: Option<String>,
+}
+
+/// The document of these routes, with what every route takes and answers.
+pub(crate) fn finished(mut document: utoipa::openapi::OpenApi) -> utoipa::openapi::OpenApi {
     let mut statuses: BTreeMap<u16, Vec<&str>> = BTreeMap::new();
     for kind in problem::ALL {
         statuses.entry(kind.status.as_u16()).or_default().push(kind.word);
     }
     for (path, item) in &mut document.paths.paths {
         let guarded = path.starts_with("/v1/");
-        let operations: [&mut Option<Operation>; 4] = [&mut item.get, &mut item.post, &mut item.put, &mut item.delete];
-        for operation in operations.into_iter().flatten() {
+        for (method, operation) in operations(item) {
             for (status, words) in &statuses {
-                if guarded || matches!(status, 405 | 500 | 503 | 507) {
-                    let response = problem_response(*status, words);
+                if can_answer(*status, guarded, method, path, operation) {
+                    let response = problem_response(words);
                     operation.responses.responses.entry(status.to_string()).or_insert(RefOr::T(response));
                 }
             }
+            describe_bytes(operation);
+            describe_headers(operation);
         }
     }
-    document
+    with_ranges(document)
 }
 
-fn problem_response(status: u16, words: &[&str]) -> utoipa::openapi::Response {
-    let kinds: Vec<String> = words.iter().map(|word| format!("`{word}`")).collect();
-    let mut response = ResponseBuilder::new()
-        .description(format!("Problem: {}", kinds.join(", ")))
-        .content(PROBLEM_JSON, ContentBuilder::new().schema(Some(Ref::from_schema_name("Problem"))).build());
-    if matches!(status, 409 | 429 | 503 | 507) {
-        let seconds = ObjectBuilder::new().schema_type(Type::Integer).build();
-        let header = HeaderBuilder::new().description(Some("Seconds after which trying again makes sense"));
-        response = response.header("Retry-After", header.schema(Some(seconds)).build());
+/// Integers with the range that they have: `int32` ends at half of what a u32 holds.
+fn with_ranges(document: utoipa::openapi::OpenApi) -> utoipa::openapi::OpenApi {
+    fn mend(value: &mut Value) {
+        if value["format"] == "int32" && value["minimum"].as_u64().is_some() {
+            value["format"] = "int64".into();
+            value["maximum"] = u32::MAX.into();
+        }
+        match value {
+            Value::Object(fields) => fields.values_mut().for_each(mend),
+            Value::Array(items) => items.iter_mut().for_each(mend),
+            _ => {}
+        }
     }
-    response.build()
+    let mended = serde_json::to_value(&document).and_then(|mut value| {
+        mend(&mut value);
+        serde_json::from_value(value)
+    });
+    mended.unwrap_or(document)
+}
+
+fn operations(item: &mut PathItem) -> impl Iterator<Item = (&'static str, &mut Operation)> {
+    let all = [("get", &mut item.get), ("post", &mut item.post), ("put", &mut item.put), ("delete", &mut item.delete)];
+    all.into_iter().filter_map(|(method, operation)| operation.as_mut().map(|operation| (method, operation)))
+}
+
+/// Whether a route can answer with a problem of this status.
+fn can_answer(status: u16, guarded: bool, method: &str, path: &str, operation: &Operation) -> bool {
+    let takes_body = operation.request_body.is_some();
+    let in_session = path.contains("{id}");
+    let forms = operation.responses.responses.values().filter_map(|response| match response {
+        RefOr::T(response) => Some(response.content.len()),
+        RefOr::Ref(_) => None,
+    });
+    let negotiates = forms.max().unwrap_or(0) > 1;
+    match status {
+        // Whatever the route: a request that is broken or stalls, too many connections, a fault of the service.
+        400 | 405 | 408 | 500 | 503 => true,
+        507 => path == "/readyz" || takes_body,
+        _ if !guarded => false,
+        401 => true,
+        404 => in_session,
+        406 => negotiates,
+        409 => in_session || takes_body,
+        410 => in_session,
+        413 | 415 | 422 => takes_body,
+        416 => takes(operation, "Range"),
+        429 => takes_body || method == "get" && in_session,
+        _ => false,
+    }
+}
+
+fn takes(operation: &Operation, parameter: &str) -> bool {
+    let parameters = operation.parameters.iter().flatten();
+    parameters.into_iter().any(|known| matches!(known, RefOr::T(known) if known.name == parameter))
+}
+
+/// Bodies of bytes are described as such, not as lists of numbers.
+fn describe_bytes(operation: &mut Operation) {
+    for response in operation.responses.responses.values_mut() {
+        if let RefOr::T(response) = response {
+            response.content.iter_mut().for_each(|(media_type, content)| describe_content(media_type, content));
+        }
+    }
+    if let Some(RefOr::T(body)) = &mut operation.request_body {
+        body.content.iter_mut().for_each(|(media_type, content)| describe_content(media_type, content));
+    }
+}
+
+fn describe_content(media_type: &str, content: &mut RefOr<Content>) {
+    let is_bytes = media_type == "application/octet-stream" || media_type.starts_with("application/vnd.cager");
+    let RefOr::T(content) = content else { return };
+    if is_bytes {
+        let format = SchemaFormat::KnownFormat(KnownFormat::Binary);
+        content.schema = Some(ObjectBuilder::new().schema_type(Type::String).format(Some(format)).build().into());
+    }
+    if media_type == "multipart/form-data" {
+        for part in ["rest", "cage"] {
+            let example = format!("form-data; name=\"{part}\"; filename=\"{part}.obj\"");
+            let name = HeaderBuilder::new()
+                .description(Some("With a file name, whose extension says the format"))
+                .schema(Some(text()))
+                .example(Some(example.into()));
+            let part_headers = EncodingBuilder::new().header("Content-Disposition", name.build());
+            content.encoding.insert(part.to_owned(), part_headers.build());
+        }
+        let options = EncodingBuilder::new().content_type(Some("application/json".to_owned()));
+        content.encoding.insert("options".to_owned(), options.build());
+    }
+}
+
+/// The header that every request may have, and those that responses have.
+fn describe_headers(operation: &mut Operation) {
+    let id = ParameterBuilder::new()
+        .name("x-request-id")
+        .parameter_in(ParameterIn::Header)
+        .description(Some(
+            "An identifier for the log, 1 to 64 letters, digits, or . _ -; another is made where it is none",
+        ))
+        .schema(Some(text()));
+    operation.parameters.get_or_insert_default().push(RefOr::T(id.build()));
+    let has_range = takes(operation, "Range");
+    for (status, response) in &mut operation.responses.responses {
+        let RefOr::T(response) = response else { continue };
+        let mut add = |name: &str, schema: RefOr<Schema>, description: &str| {
+            let header = HeaderBuilder::new().description(Some(description)).schema(Some(schema)).build();
+            response.headers.entry(name.to_owned()).or_insert(RefOr::T(header));
+        };
+        add("x-request-id", text(), "Identifier of the request, also in the service's log");
+        match status.as_str() {
+            "401" => add("WWW-Authenticate", text(), "`Bearer`"),
+            "405" => add("Allow", text(), "Methods that the address takes"),
+            "409" | "429" | "503" | "507" => {
+                add("Retry-After", whole_number(), "Seconds after which trying again makes sense");
+            }
+            "200" | "206" | "304" if has_range => {
+                add("ETag", text(), "Names these bytes, which never change; of a session that is completed");
+                add("Accept-Ranges", text(), "`bytes`, where `Range` is taken");
+                add("Cache-Control", text(), "How long they may be kept");
+                add("Vary", text(), "Headers of the request that they depend on");
+                if status == "206" {
+                    add("Content-Range", text(), "The range that came, and the length of everything");
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+fn text() -> RefOr<Schema> {
+    ObjectBuilder::new().schema_type(Type::String).build().into()
+}
+
+fn whole_number() -> RefOr<Schema> {
+    ObjectBuilder::new().schema_type(Type::Integer).minimum(Some(0)).build().into()
+}
+
+fn problem_response(words: &[&str]) -> Response {
+    let kinds: Vec<String> = words.iter().map(|word| format!("`{word}`")).collect();
+    ResponseBuilder::new()
+        .description(format!("Problem: {}", kinds.join(", ")))
+        .content(PROBLEM_JSON, ContentBuilder::new().schema(Some(Ref::from_schema_name("Problem"))).build())
+        .build()
 }

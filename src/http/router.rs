@@ -11,9 +11,7 @@ use axum::error_handling::HandleErrorLayer;
 use axum::extract::{DefaultBodyLimit, MatchedPath, Request};
 use axum::middleware::{Next, from_fn, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
-use axum::routing::get;
 use axum::{BoxError, Router};
-use bytes::Bytes;
 use http::{StatusCode, header};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -54,14 +52,15 @@ fn open() -> OpenApiRouter<Arc<Service>> {
     OpenApiRouter::new().routes(routes!(health::live)).routes(routes!(health::ready)).routes(routes!(health::metrics))
 }
 
+/// What describes the service, to people and programs.
+fn described() -> OpenApiRouter<Arc<Service>> {
+    OpenApiRouter::new().routes(routes!(viewer::page)).routes(routes!(openapi::get))
+}
+
 /// The OpenAPI document of all routes.
 pub fn document() -> utoipa::openapi::OpenApi {
-    let mut all = OpenApiRouter::with_openapi(openapi::Document::openapi())
-        .merge(quick())
-        .merge(completing())
-        .merge(streaming())
-        .merge(open());
-    openapi::with_problems(all.to_openapi())
+    let routes = quick().merge(completing()).merge(streaming()).merge(open()).merge(described());
+    openapi::finished(OpenApiRouter::with_openapi(openapi::Document::openapi()).merge(routes).to_openapi())
 }
 
 /// The service's routes.
@@ -80,11 +79,9 @@ pub fn router(service: Arc<Service>) -> Router {
         .merge(Router::from(streaming()).layer(DefaultBodyLimit::disable()))
         .layer(in_bounds)
         .route_layer(from_fn_with_state(Arc::clone(&service), extract::authenticate));
-    let document = Bytes::from(document().to_json().unwrap_or_default());
     Router::from(open())
         .merge(guarded)
-        .route("/", get(viewer::page))
-        .route("/openapi.json", get(move || std::future::ready(json(&document))))
+        .merge(Router::from(described()))
         .fallback(|| async { ApiError::new(problem::NOT_FOUND, "the routes are listed in /openapi.json") })
         .with_state(service)
         .layer(CatchPanicLayer::custom(|panic: Box<dyn std::any::Any + Send>| {
@@ -94,10 +91,6 @@ pub fn router(service: Arc<Service>) -> Router {
         }))
         .layer(from_fn(finish))
         .layer(from_fn(request_id))
-}
-
-fn json(document: &Bytes) -> Response {
-    ([(header::CONTENT_TYPE, "application/json")], document.clone()).into_response()
 }
 
 /// The routes for connections beyond the limit: health, and "come back later" for everything else.

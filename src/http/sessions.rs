@@ -20,7 +20,7 @@ const KEY_CHARACTERS: usize = 255;
 /// Makes a session: parts `rest` and `cage` are files whose names carry their format, part `options` is JSON. It is prepared in
 /// the background; frames may be posted at once and wait for it.
 #[utoipa::path(
-    post, path = "/v1/sessions", tag = "sessions",
+    post, path = "/v1/sessions", operation_id = "create_session", tag = "sessions",
     params(("Idempotency-Key" = Option<String>, Header, description = "A repetition with the same key and content gives the same session")),
     request_body(content = openapi::NewSessionForm, content_type = "multipart/form-data"),
     responses((status = 201, description = "The session, or the one that an earlier request with the same key made", body = Session,
@@ -68,7 +68,7 @@ pub(crate) struct PageQuery {
 }
 
 /// Lists the tenant's sessions, oldest first, a hundred at a time.
-#[utoipa::path(get, path = "/v1/sessions", tag = "sessions", params(PageQuery), responses((status = 200, body = SessionList)))]
+#[utoipa::path(get, path = "/v1/sessions", operation_id = "list_sessions", tag = "sessions", params(PageQuery), responses((status = 200, description = "A page of sessions", body = SessionList)))]
 pub(crate) async fn list(
     State(service): State<Arc<Service>>,
     Caller(tenant): Caller,
@@ -86,13 +86,13 @@ pub(crate) async fn list(
 }
 
 /// A session.
-#[utoipa::path(get, path = "/v1/sessions/{id}", tag = "sessions", params(openapi::Id), responses((status = 200, body = Session)))]
+#[utoipa::path(get, path = "/v1/sessions/{id}", operation_id = "get_session", tag = "sessions", params(openapi::Id), responses((status = 200, description = "The session", body = Session)))]
 pub(crate) async fn get(Found { session, .. }: Found) -> Json<Session> {
     Json(session.view())
 }
 
 /// Deletes a session with all that belongs to it; what runs for it stops.
-#[utoipa::path(delete, path = "/v1/sessions/{id}", tag = "sessions", params(openapi::Id), responses((status = 204, description = "It is gone")))]
+#[utoipa::path(delete, path = "/v1/sessions/{id}", operation_id = "delete_session", tag = "sessions", params(openapi::Id), responses((status = 204, description = "It is gone")))]
 pub(crate) async fn delete(
     State(service): State<Arc<Service>>,
     Found { session, .. }: Found,
@@ -103,7 +103,7 @@ pub(crate) async fn delete(
 
 /// Says that no more frames are coming, and writes the container. Repeating it changes nothing.
 #[utoipa::path(
-    post, path = "/v1/sessions/{id}/complete", tag = "sessions", params(openapi::Id), request_body = Complete,
+    post, path = "/v1/sessions/{id}/complete", operation_id = "complete_session", tag = "sessions", params(openapi::Id), request_body = Complete,
     responses((status = 200, description = "The completed session", body = Session)),
 )]
 pub(crate) async fn complete(

@@ -1,3 +1,4 @@
 //! The service over HTTP, as its clients meet it.
 
 mod listen;
+mod openapi;

@@ -1,0 +1,51 @@
+//! All targets.
+
+mod bodies;
+mod container;
+mod frames;
+mod meshes;
+mod settings;
+mod store;
+
+use crate::Target;
+
+/// Everything that reads bytes from outside.
+pub const TARGETS: &[Target] = &[
+    meshes::OBJ,
+    meshes::PLY,
+    meshes::OFF,
+    meshes::STL,
+    meshes::GLB,
+    frames::NPY,
+    frames::PC2,
+    frames::MDD,
+    container::CONTAINER,
+    bodies::RECORD,
+    bodies::FRAMES,
+    bodies::NEW_SESSION,
+    bodies::RANGE,
+    settings::TOKENS,
+    settings::CONFIG,
+    store::LOG,
+    store::SOLVER,
+    store::SMALL_FILES,
+];
+
+/// Takes a byte off the front.
+fn byte(bytes: &mut &[u8]) -> u8 {
+    let Some((first, rest)) = bytes.split_first() else { return 0 };
+    *bytes = rest;
+    *first
+}
+
+/// Puts a checksum of some bytes behind them, where there is room.
+fn mend(bytes: &mut [u8], from: usize, to: usize, at: usize) {
+    if from <= to && to <= bytes.len() && at.checked_add(4).is_some_and(|end| end <= bytes.len()) {
+        let crc = crc32c::crc32c(&bytes[from..to]);
+        bytes[at..at + 4].copy_from_slice(&crc.to_le_bytes());
+    }
+}
+
+fn u64_at(bytes: &[u8], at: usize) -> Option<u64> {
+    Some(u64::from_le_bytes(bytes.get(at..at.checked_add(8)?)?.try_into().ok()?))
+}

@@ -1,0 +1,109 @@
+//! Doors for the fuzz targets to what reads requests. They panic where a promise is broken.
+
+use super::frames_in::{FrameReader, Layout};
+use super::multipart;
+use super::ranged::Immutable;
+use crate::problem::ApiError;
+use crate::service::Service;
+use crate::session::facts::Facts;
+use crate::session::prepare::Choices;
+use crate::session::upload::Rows;
+use axum::body::Body;
+use axum::extract::{FromRequest, Multipart, Request};
+use axum::response::Response;
+use bytes::Bytes;
+use cager_proto::messages::{CacheUse, ConditionNumber, PreparationSeconds};
+use http::{HeaderMap, HeaderValue, header};
+use std::io;
+use std::sync::Arc;
+
+/// How frames come in.
+#[derive(Clone, Copy, Debug)]
+pub struct Frames {
+    /// Number of the first raw frame; None where they are records.
+    pub first: Option<u32>,
+    /// Whether raw frames have handle rows only.
+    pub handle_rows: bool,
+    /// Points of the session.
+    pub points: u32,
+    /// Handles of the session.
+    pub handles: u32,
+}
+
+impl Frames {
+    /// Number, rows and bytes of every frame of a body that comes in pieces.
+    ///
+    /// # Errors
+    /// What the client would hear.
+    pub fn read<'a>(self, pieces: impl Iterator<Item = &'a [u8]>) -> (Vec<(u32, bool, Vec<u8>)>, Result<(), ApiError>) {
+        let rows = if self.handle_rows { Rows::Handles } else { Rows::All };
+        let layout = self.first.map_or(Layout::Records, |first| Layout::Raw { first, rows });
+        let mut reader = FrameReader::new(layout, &facts(self.points, self.handles));
+        let mut frames = Vec::new();
+        for mut piece in pieces {
+            while !piece.is_empty() {
+                let before = piece.len();
+                match reader.push(&mut piece) {
+                    Ok(Some(frame)) => frames.push((frame.frame, frame.rows == Rows::Handles, frame.bytes)),
+                    Ok(None) => assert!(piece.len() < before, "nothing was taken of {before} bytes"),
+                    Err(error) => return (frames, Err(error)),
+                }
+            }
+        }
+        let end = reader.finish();
+        (frames, end)
+    }
+}
+
+fn facts(points: u32, handle_count: u32) -> Facts {
+    Facts {
+        points,
+        unknowns: handle_count,
+        handle_count,
+        reads_handles_only: true,
+        cage_vertices: handle_count,
+        cage_faces: handle_count,
+        spectrum: 0,
+        condition_number: ConditionNumber { full: 1.0, handles: 1.0 },
+        rank: handle_count,
+        affine_reproduction_error: 0.0,
+        cache: CacheUse::Miss,
+        seconds: PreparationSeconds::default(),
+        warnings: Vec::new(),
+    }
+}
+
+/// Reads the multipart body that makes a session, and checks its options; gives the bytes of rest pose and cage.
+///
+/// # Errors
+/// What the client would hear.
+pub async fn new_session(
+    service: &Service,
+    content_type: HeaderValue,
+    pieces: Vec<Bytes>,
+) -> Result<(usize, usize), ApiError> {
+    let body = Body::from_stream(futures_util::stream::iter(pieces.into_iter().map(Ok::<_, io::Error>)));
+    let mut request = Request::new(body);
+    request.headers_mut().insert(header::CONTENT_TYPE, content_type);
+    let body = Multipart::from_request(request, &())
+        .await
+        .map_err(|error| ApiError::new(crate::problem::BAD_REQUEST, error.body_text()))?;
+    let parts = multipart::read(service, body).await?;
+    Choices::of(&parts.options)?;
+    Ok((parts.content.rest.len(), parts.content.cage.len()))
+}
+
+/// The response to a request for bytes that never change.
+///
+/// # Errors
+/// What the client would hear.
+pub fn immutable(content: Bytes, etag: &str, headers: &HeaderMap) -> Result<Response, ApiError> {
+    let bytes = Immutable {
+        length: content.len() as u64,
+        etag: etag.to_owned(),
+        media_type: "application/octet-stream",
+        public: false,
+        read: Arc::new(move |range| Ok(content.slice(range.start as usize..range.end as usize))),
+    };
+    bytes.respond(headers)
+}
