@@ -4,7 +4,7 @@ CARGO ?= cargo
 PYTHON ?= python3
 PEERS := benches/.venv/bin/python
 
-.PHONY: help demo test lint doc bench audit clean
+.PHONY: help demo test soak lint doc bench audit clean
 
 help: ## list these commands
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 10
@@ -19,6 +19,10 @@ test: ## run every test
 	else \
 		$(CARGO) test --workspace --locked --lib --bins --tests; \
 	fi
+
+soak: ## kill the service a hundred times under load; KILLS and SEED change how often and when
+	CAGER_SOAK_KILLS=$(or $(KILLS),100) $(if $(SEED),CAGER_SOAK_SEED=$(SEED)) \
+		$(CARGO) test --release --locked --test reliability -- --exact --nocapture soak::a_service_that_is_killed_keeps_what_it_said
 
 lint: ## formatting, clippy and documentation, all warnings denied
 	$(CARGO) fmt --all --check
