@@ -7,7 +7,7 @@ SCHEMATHESIS := target/schemathesis/bin/python
 
 LINT := target/lint-deploy
 
-.PHONY: help demo test lint lint-deploy doc bench openapi schemathesis fuzz audit clean
+.PHONY: help demo test soak lint lint-deploy doc bench openapi schemathesis fuzz audit clean
 
 help: ## list these commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
@@ -22,6 +22,10 @@ test: ## run every test
 	else \
 		$(CARGO) test --workspace --locked --lib --bins --tests; \
 	fi
+
+soak: ## kill the service a hundred times under load; KILLS and SEED change how often and when
+	CAGER_SOAK_KILLS=$(or $(KILLS),100) $(if $(SEED),CAGER_SOAK_SEED=$(SEED)) \
+		$(CARGO) test --release --locked --test reliability -- --exact --nocapture soak::a_service_that_is_killed_keeps_what_it_said
 
 lint: ## formatting, clippy and documentation, all warnings denied
 	$(CARGO) fmt --all --check

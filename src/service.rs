@@ -18,6 +18,9 @@ use tokio_util::sync::CancellationToken;
 /// Threads that write frame logs. Most of their time they wait for the disk.
 const COMMIT_THREADS: usize = 4;
 
+/// How long a look at the disk counts.
+const PROBED_FOR: std::time::Duration = std::time::Duration::from_secs(1);
+
 /// Everything the routes work with.
 pub struct Service {
     pub(crate) config: ServeConfig,
@@ -36,6 +39,8 @@ pub struct Service {
     stop: CancellationToken,
     resumed: AtomicBool,
     pub(crate) started: Instant,
+    /// When the disk took a write, to see whether it does.
+    probed: tokio::sync::Mutex<Option<Instant>>,
 }
 
 /// Why the service does not start.
@@ -114,6 +119,7 @@ impl Service {
             stop: stop.clone(),
             resumed: AtomicBool::new(false),
             started: Instant::now(),
+            probed: tokio::sync::Mutex::default(),
             config,
         });
         let count = opened.sessions.len();
@@ -157,8 +163,15 @@ impl Service {
         if !self.resumed.load(Ordering::Acquire) {
             return Err(ApiError::new(problem::BUSY, "sessions are being resumed").retry_after(1));
         }
+        // One look at the disk answers all who ask within a second.
+        let mut probed = self.probed.lock().await;
+        if probed.is_some_and(|then| then.elapsed() < PROBED_FOR) {
+            return Ok(());
+        }
         let store = self.store.clone();
-        crate::session::create::blocking(move || store.probe()).await?.map_err(|error| match error {
+        let probe = crate::session::create::blocking(move || store.probe()).await?;
+        *probed = probe.is_ok().then(Instant::now);
+        probe.map_err(|error| match error {
             full @ StoreError::Full { .. } => crate::session::commit::storage_error(&full),
             other => {
                 tracing::error!(error = %other, "not ready");

@@ -102,10 +102,10 @@ impl<W: Clone> Schedule<W> {
         if let Some(tenant) = self.tenants.get_mut(&lane.tenant) {
             tenant.waiting -= lane.waiting;
             tenant.lanes.retain(|&other| other != id);
-            if tenant.lanes.is_empty() {
-                self.tenants.remove(&lane.tenant);
-            }
         }
+        // Who is ahead of all others stays known, lest it begin anew with every short upload.
+        let time = self.time;
+        self.tenants.retain(|_, tenant| !tenant.lanes.is_empty() || tenant.pass > time);
     }
 
     pub(super) fn pushed(&mut self, id: u64, now: Instant) {

@@ -15,6 +15,7 @@ use http::{HeaderMap, header};
 use http_body_util::BodyExt;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::Path;
 use std::sync::{Arc, Mutex};
 use tokio::sync::{oneshot, watch};
 
@@ -48,7 +49,7 @@ pub(crate) async fn post(
             let _ = reply.send(bytes.into());
         }
     });
-    let spool = Arc::new(Spool::new().map_err(|error| ApiError::internal(&error))?);
+    let spool = Arc::new(Spool::new(&service.config.data).map_err(|error| spool_error(&error))?);
     let arrived = spool.arrived.subscribe();
     let limit = service.config.max_rest_bytes;
     tokio::spawn(spool_body(Arc::clone(&spool), body, limit, service, Arc::clone(&session)));
@@ -86,8 +87,9 @@ struct Arrived {
 }
 
 impl Spool {
-    fn new() -> io::Result<Self> {
-        Ok(Self { file: Mutex::new(tempfile::tempfile()?), arrived: watch::Sender::default() })
+    /// In the data folder: the only place where the service may write.
+    fn new(data: &Path) -> io::Result<Self> {
+        Ok(Self { file: Mutex::new(tempfile::tempfile_in(data.join("tmp"))?), arrived: watch::Sender::default() })
     }
 
     fn append(&self, at: u64, bytes: &[u8]) -> io::Result<()> {
@@ -126,12 +128,21 @@ async fn spool_body(spool: Arc<Spool>, mut body: Body, limit: u64, service: Arc<
         let (writing, length) = (Arc::clone(&spool), chunk.len() as u64);
         match tokio::task::spawn_blocking(move || writing.append(bytes, &chunk)).await {
             Ok(Ok(())) => bytes += length,
-            Ok(Err(error)) => break Err(ApiError::internal(&error)),
+            Ok(Err(error)) => break Err(spool_error(&error)),
             Err(error) => break Err(ApiError::internal(&error)),
         }
         spool.arrived.send_modify(|arrived| arrived.bytes = bytes);
     };
     spool.arrived.send_modify(|arrived| arrived.end = Some(end));
+}
+
+fn spool_error(error: &io::Error) -> ApiError {
+    match error.kind() {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+            ApiError::new(problem::STORAGE_FULL, "the service's disk is full; try again later").retry_after(60)
+        }
+        _ => ApiError::internal(error),
+    }
 }
 
 /// The half that answers.

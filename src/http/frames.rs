@@ -23,6 +23,7 @@ use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::Semaphore;
+use tokio::time::{Instant, sleep_until};
 
 /// Frames of one upload that wait or are solved at a time: enough that the pool never waits for it.
 const IN_FLIGHT: usize = 64;
@@ -37,6 +38,11 @@ const HEAD_WITHIN: Duration = Duration::from_secs(5);
 /// How much of a refused body is thrown away, and for how long.
 const DRAINED_BYTES: usize = 64 << 20;
 const DRAINED_WITHIN: Duration = Duration::from_secs(5);
+/// How long a frame waits for memory.
+const ROOM_WITHIN: Duration = Duration::from_secs(30);
+/// A frame keeps its memory from its first byte on, so that it has to come faster than this, after the pause that any body may
+/// make.
+pub(crate) const SLOWEST_BYTES_PER_SECOND: u64 = 16 << 10;
 /// How long an upload waits for its session to be prepared.
 const PREPARED_WITHIN: Duration = Duration::from_secs(50);
 
@@ -142,7 +148,7 @@ pub(crate) fn not_acceptable(available: &str) -> ApiError {
 /// The facts of a session that is ready; waits for one that is being prepared.
 pub(crate) async fn prepared(service: &Service, session: &Arc<Session>) -> Result<Facts, ApiError> {
     let mut changes = session.changes();
-    let deadline = tokio::time::Instant::now() + PREPARED_WITHIN;
+    let deadline = Instant::now() + PREPARED_WITHIN;
     loop {
         changes.mark_unchanged();
         let status = session.status();
@@ -162,7 +168,7 @@ pub(crate) async fn prepared(service: &Service, session: &Arc<Session>) -> Resul
             _ = changes.changed() => {}
             () = session.deleted().cancelled() => return Err(gone()),
             () = service.stopping().cancelled() => return Err(stopping()),
-            () = tokio::time::sleep_until(deadline) => {
+            () = sleep_until(deadline) => {
                 let detail = "the session is still being prepared; wait until its state is ready";
                 return Err(ApiError::new(problem::NOT_READY, detail).retry_after(2));
             }
@@ -188,6 +194,10 @@ async fn drain(mut body: Body) {
     };
     // Whether it comes to an end does not matter.
     let _ = tokio::time::timeout(DRAINED_WITHIN, take).await;
+}
+
+pub(crate) fn too_slow() -> ApiError {
+    ApiError::new(problem::REQUEST_TIMEOUT, "the body comes too slowly; send the rest again over a faster connection")
 }
 
 /// What a broken body means.
@@ -222,6 +232,8 @@ impl Reading {
             }
         };
         tokio::pin!(stopped);
+        let patience = Duration::from_secs(self.service.config.body_timeout_s);
+        let mut late = Instant::now();
         loop {
             let next = tokio::select! {
                 biased;
@@ -229,6 +241,7 @@ impl Reading {
                 // A client that waits for an answer before it sends on must hear of an error all the same.
                 () = self.upload.pointless() => return Ok(()),
                 next = body.frame() => next,
+                () = sleep_until(late), if permits.is_some() => return Err(too_slow()),
             };
             let chunk = match next {
                 None => break,
@@ -254,7 +267,11 @@ impl Reading {
                         error = &mut stopped => return Err(error),
                         () = self.upload.pointless() => return Ok(()),
                         permits = room => permits,
+                        () = tokio::time::sleep(ROOM_WITHIN) => return Err(self.no_room()),
                     });
+                    late = Instant::now()
+                        + patience
+                        + Duration::from_secs(frames.frame_bytes() as u64 / SLOWEST_BYTES_PER_SECOND);
                 }
                 if let Some(frame) = frames.push(&mut input)?
                     && let Some(permits) = permits.take()
@@ -270,6 +287,12 @@ impl Reading {
         }
         tracing::debug!(session = %self.session.meta.id, received, "upload read");
         frames.finish()
+    }
+
+    fn no_room(&self) -> ApiError {
+        self.service.rejected("frame_memory");
+        let detail = "the memory for frames is taken by others; send the rest in a moment";
+        ApiError::new(problem::BUSY, detail).retry_after(5)
     }
 }
 

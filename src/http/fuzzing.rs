@@ -9,7 +9,7 @@ use crate::session::facts::Facts;
 use crate::session::prepare::Choices;
 use crate::session::upload::Rows;
 use axum::body::Body;
-use axum::extract::{FromRequest, Multipart, Request};
+use axum::extract::Request;
 use axum::response::Response;
 use bytes::Bytes;
 use cager_proto::messages::{CacheUse, ConditionNumber, PreparationSeconds};
@@ -78,17 +78,14 @@ fn facts(points: u32, handle_count: u32) -> Facts {
 /// # Errors
 /// What the client would hear.
 pub async fn new_session(
-    service: &Service,
+    service: &Arc<Service>,
     content_type: HeaderValue,
     pieces: Vec<Bytes>,
 ) -> Result<(usize, usize), ApiError> {
     let body = Body::from_stream(futures_util::stream::iter(pieces.into_iter().map(Ok::<_, io::Error>)));
     let mut request = Request::new(body);
     request.headers_mut().insert(header::CONTENT_TYPE, content_type);
-    let body = Multipart::from_request(request, &())
-        .await
-        .map_err(|error| ApiError::new(crate::problem::BAD_REQUEST, error.body_text()))?;
-    let parts = multipart::read(service, body).await?;
+    let parts = multipart::read(service, request).await?;
     Choices::of(&parts.options)?;
     Ok((parts.content.rest.len(), parts.content.cage.len()))
 }

@@ -76,8 +76,9 @@ pub fn router(service: Arc<Service>) -> Router {
     let guarded = Router::from(quick())
         .layer(in_time)
         .merge(Router::from(completing()))
-        .merge(Router::from(streaming()).layer(DefaultBodyLimit::disable()))
         .layer(in_bounds)
+        // Bounded by memory and by the tenant's streams instead: a slow body must not hold a place that all tenants share.
+        .merge(Router::from(streaming()).layer(DefaultBodyLimit::disable()))
         .route_layer(from_fn_with_state(Arc::clone(&service), extract::authenticate));
     Router::from(open())
         .merge(guarded)

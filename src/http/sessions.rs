@@ -1,6 +1,7 @@
 //! `/v1/sessions`: making, listing, looking at, completing and deleting sessions.
 
 use super::extract::{Body, Caller, Found, Query, content_type};
+use super::frames::{SLOWEST_BYTES_PER_SECOND, too_slow};
 use super::respond::JsonResult;
 use super::{multipart, openapi};
 use crate::problem::{self, ApiError};
@@ -13,6 +14,8 @@ use cager_proto::messages::{Complete, Session, SessionList};
 use http::{StatusCode, header};
 use serde::Deserialize;
 use std::sync::Arc;
+use std::time::Duration;
+use tokio::time::timeout;
 
 const PAGE: usize = 100;
 const KEY_CHARACTERS: usize = 255;
@@ -51,7 +54,9 @@ pub(crate) async fn create(
             return Err(ApiError::new(problem::BAD_REQUEST, detail));
         }
     };
-    let parts = multipart::read(&service, request).await?;
+    let most = if declared > 0 { declared } else { limit };
+    let patience = Duration::from_secs(service.config.body_timeout_s + most / SLOWEST_BYTES_PER_SECOND);
+    let parts = timeout(patience, multipart::read(&service, request)).await.map_err(|_| too_slow())??;
     let new = NewSession { content: parts.content, options: parts.options, idempotency_key, room: parts.room };
     let session = service.create(&tenant, new).await?;
     let location = format!("/v1/sessions/{}", session.meta.id);

@@ -9,7 +9,7 @@ use super::{LiveLane, Phase, Session, Status};
 use crate::auth::Tenant;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{Content, ContentKey, Idempotency, SessionMeta};
+use crate::store::{Completion, Content, ContentKey, Idempotency, SessionMeta};
 use cager_proto::messages::{CacheUse, PreparationSeconds, SessionOptions};
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -128,6 +128,16 @@ impl Service {
             let detail = "the service was upgraded to another version of the computation while this session was open; upload the capture to a new one";
             ApiError::new(problem::SESSION_FAILED, detail).problem
         });
+        // A capture that is not all there is written again from the log, to the same bytes, when it is completed again.
+        let whole = |c: &Completion| {
+            let there = std::fs::metadata(self.store.container_path(&id)).map_or(0, |m| m.len());
+            if there != c.container_bytes {
+                tracing::error!(session = %id, there, expected = c.container_bytes, "the container is not whole; complete the session again");
+            }
+            there == c.container_bytes
+        };
+        let completion = completion.filter(whole);
+        let has_log = matches!(outcome, Some(Outcome::Ready(_)));
         let status = match (outcome, completion) {
             (Some(Outcome::Ready(facts)), Some(completion)) => {
                 Status { phase: Phase::Completed(completion), facts: Some(*facts) }
@@ -143,6 +153,7 @@ impl Service {
         let session = Arc::new(Session::new(meta, self.store.clone(), self.committer.clone(), status, false));
         let bytes = self.store.session_bytes(&session.meta.id) + self.store.content_bytes(&session.meta.key);
         session.bytes.store(bytes, Relaxed);
+        session.has_log.store(has_log, Relaxed);
         self.registry.insert(Arc::clone(&session));
         if preparing {
             match choices {
@@ -170,12 +181,12 @@ impl Service {
             Ok(Got { prepared, cache, mut seconds }) => {
                 seconds.total = clock.elapsed().as_secs_f64();
                 let facts = Facts::new(&prepared, cache, seconds);
+                session.set_status(Status { phase: Phase::Preparing, facts: Some(facts.clone()) });
                 self.keep_outcome(&session, Outcome::Ready(Box::new(facts.clone()))).await;
                 let completion = self.store.completion(&session.meta.id).ok().flatten();
                 let phase = completion.map_or(Phase::Ready, Phase::Completed);
                 // A process may have ended with frames in the log and no outcome on disk. Who hears that the session is ready
                 // finds them all.
-                session.set_status(Status { phase: Phase::Preparing, facts: Some(facts.clone()) });
                 if session.ensure_loaded().await.is_err() && matches!(session.status().phase, Phase::Failed(_)) {
                     return;
                 }
@@ -195,10 +206,12 @@ impl Service {
         }
     }
 
-    fn keep_outcome(&self, session: &Session, outcome: Outcome) -> impl Future<Output = ()> + use<> {
-        let (store, id) = (self.store.clone(), session.meta.id.clone());
+    fn keep_outcome(&self, session: &Arc<Session>, outcome: Outcome) -> impl Future<Output = ()> + use<> {
+        let (store, id, session) = (self.store.clone(), session.meta.id.clone(), Arc::clone(session));
         let done = tokio::task::spawn_blocking(move || {
-            if let Err(error) = store.put_note(&id, OUTCOME, &outcome) {
+            // A ready session has a log; one without is damaged.
+            let log = if matches!(outcome, Outcome::Ready(_)) { session.make_log() } else { Ok(()) };
+            if let Err(error) = log.and_then(|()| store.put_note(&id, OUTCOME, &outcome)) {
                 tracing::warn!(session = %id, %error, "what preparing found could not be kept; it is found again after a restart");
             }
         });

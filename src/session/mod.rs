@@ -31,6 +31,8 @@ pub(crate) struct Session {
     committer: Committer,
     status: Mutex<Status>,
     frames: Mutex<Frames>,
+    /// Whether there is a log on disk. It is made before the session is known to be ready, so that one that is gone is missed.
+    pub(crate) has_log: AtomicBool,
     /// Whether what the log holds is in `frames`.
     loaded: AtomicBool,
     queued: Arc<AtomicU64>,
@@ -100,6 +102,7 @@ impl Session {
             committer,
             status: Mutex::new(status),
             frames: Mutex::new(frames),
+            has_log: AtomicBool::new(false),
             loaded: AtomicBool::new(is_new),
             queued: Arc::default(),
             bytes: AtomicU64::new(0),
@@ -183,6 +186,18 @@ impl Session {
         Ok(())
     }
 
+    /// Makes the log of a session that has none yet. Blocks.
+    ///
+    /// # Errors
+    /// What the store says.
+    pub(crate) fn make_log(&self) -> Result<(), StoreError> {
+        let mut log = lock(&self.log);
+        if log.is_none() && !self.is_deleted() {
+            *log = Some(self.load_log()?);
+        }
+        Ok(())
+    }
+
     /// As [`Self::load`], off the async threads.
     pub(crate) async fn ensure_loaded(self: &Arc<Self>) -> Result<(), ApiError> {
         if self.loaded.load(Ordering::Acquire) {
@@ -195,7 +210,18 @@ impl Session {
     /// Opens the log; what it holds that is not known yet becomes known. The caller holds the place it goes to.
     fn load_log(&self) -> Result<FrameLog, StoreError> {
         let rows = self.facts().map_or(0, |facts| facts.unknowns);
+        if self.has_log.load(Ordering::Acquire) && !self.store.has_log(&self.meta.id)? {
+            let path = self.store.log_path(&self.meta.id);
+            return Err(StoreError::Damaged { path, what: "the frame log is gone".to_owned() });
+        }
         let (log, entries) = self.store.open_log(&self.meta.id, rows)?;
+        self.has_log.store(true, Ordering::Release);
+        if let Some(frames) = self.declared()
+            && entries.len() < frames as usize
+        {
+            let what = format!("{} of {frames} frames are there", entries.len());
+            return Err(StoreError::Damaged { path: self.store.log_path(&self.meta.id), what });
+        }
         *lock(&self.reader) = Some(log.reader());
         // Of a session that was loaded before, those that were written although the answer was an error: true all the same.
         let mut frames = self.frames();

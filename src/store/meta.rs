@@ -31,7 +31,22 @@ pub(crate) fn wrap<T: Serialize>(path: &Path, kind: &str, value: &T) -> Result<V
 /// What the file says; None where there is none.
 pub(crate) fn read<T: DeserializeOwned>(files: &Files, path: &Path, kind: &str) -> Result<Option<T>, StoreError> {
     let Some(file) = files.read(path, LIMIT)? else { return Ok(None) };
+    if let Some(format) = newer_format(&file) {
+        let cause =
+            std::io::Error::other(format!("it has format {format}, and this version reads 1: use the newer one"));
+        return Err(StoreError::of(path, "read", cause));
+    }
     unwrap(&file, kind).map(Some).map_err(|what| StoreError::damaged(path, what))
+}
+
+/// The format of a file that a newer version wrote: no damage, so that it is left where it is.
+fn newer_format(file: &[u8]) -> Option<u32> {
+    #[derive(serde::Deserialize)]
+    struct Wrapper {
+        format: u32,
+    }
+    let found: Wrapper = serde_json::from_slice(file).ok()?;
+    (found.format > 1).then_some(found.format)
 }
 
 fn unwrap<T: DeserializeOwned>(file: &[u8], kind: &str) -> Result<T, String> {

@@ -24,6 +24,7 @@ pub struct SessionMeta {
     /// Rest pose, cage and options.
     pub key: ContentKey,
     /// Version of the computation that its frames are solved with.
+    #[serde(default)]
     pub solver_version: u32,
     /// Choices, as they were given.
     pub options: SessionOptions,

@@ -92,6 +92,20 @@ pub struct FrameLog {
 const KEPT_BUFFER_BYTES: usize = 4 << 20;
 
 impl Store {
+    /// Where the session's log lies, or would. A name that is no id gives a path where nothing is.
+    pub fn log_path(&self, id: &str) -> PathBuf {
+        self.container_path(id).with_file_name("frames.log")
+    }
+
+    /// Whether the session has a log.
+    ///
+    /// # Errors
+    /// [`StoreError::BadId`], or what the system says.
+    pub fn has_log(&self, id: &str) -> Result<bool, StoreError> {
+        check_id(id)?;
+        self.files().exists(&self.log_path(id))
+    }
+
     /// Opens a session's log, made where it is missing, for cages of `rows` rows; gives the frames in it, in the log's order,
     /// each once. Every record is checked, a torn end is cut off, and all that is given is durable.
     ///

@@ -1,0 +1,17 @@
+//! What holds when things go wrong: processes killed, disks that refuse, clients that misbehave, more work than there is room for.
+
+#![cfg(target_os = "linux")]
+
+mod capture;
+mod client_gone;
+mod disk;
+mod gate;
+mod inside;
+mod limits;
+mod overload;
+mod power;
+mod process;
+mod races;
+mod soak;
+mod stalled;
+mod wire;
