@@ -30,12 +30,15 @@ pub struct Frames {
     pub handles: u32,
 }
 
+/// Number, whether all rows are there, and bytes.
+pub type ReadFrame = (u32, bool, Vec<u8>);
+
 impl Frames {
     /// Number, rows and bytes of every frame of a body that comes in pieces.
     ///
     /// # Errors
     /// What the client would hear.
-    pub fn read<'a>(self, pieces: impl Iterator<Item = &'a [u8]>) -> (Vec<(u32, bool, Vec<u8>)>, Result<(), ApiError>) {
+    pub fn read<'a>(self, pieces: impl Iterator<Item = &'a [u8]>) -> (Vec<ReadFrame>, Result<(), ApiError>) {
         let rows = if self.handle_rows { Rows::Handles } else { Rows::All };
         let layout = self.first.map_or(Layout::Records, |first| Layout::Raw { first, rows });
         let mut reader = FrameReader::new(layout, &facts(self.points, self.handles));

@@ -168,7 +168,15 @@ pub(super) const SMALL_FILES: Target = Target {
         let store = open(&disk);
         let options = SessionOptions { lambda: Some(0.3), name: Some("n".into()), ..SessionOptions::default() };
         let idempotency = Some(cager::store::Idempotency { key: "k".into(), fingerprint: "f".into() });
-        let meta = SessionMeta { id: ID.into(), tenant: "t".into(), created_ms: 1, key: KEY, options, idempotency };
+        let meta = SessionMeta {
+            id: ID.into(),
+            tenant: "t".into(),
+            created_ms: 1,
+            key: KEY,
+            solver_version: 1,
+            options,
+            idempotency,
+        };
         store.create_session(&meta).expect("a session");
         let completion = cager::store::Completion { frames: 6, container_bytes: 7, container_digest: "00".into() };
         store.complete(ID, &completion).expect("a completion");
