@@ -43,7 +43,7 @@ fn the_table_of_settings_and_the_struct_agree() {
 
 #[test]
 fn later_layers_override_earlier_ones() {
-    let file = "max_streams = 1\nmax_requests = 1\nmax_preparing = 1\nworkers = 1\ncache_bytes = \"3 GiB\"\nupload_bytes = 1048576";
+    let file = "max_streams = 1\nmax_requests = 1\nmax_preparing = 1\nworkers = 1\ncache_bytes = \"3 GiB\"\nupload_bytes = 1048576\nmax_rest_bytes = 1048576";
     let env = [("CAGER_MAX_REQUESTS", "2"), ("CAGER_MAX_PREPARING", "2"), ("CAGER_WORKERS", "2"), ("HOME", "/x")];
     let config =
         load(file, &env, "--set max-preparing=3 --set workers=3 --workers 4 --set frame_bytes=1MB2").unwrap_err();

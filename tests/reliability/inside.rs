@@ -6,7 +6,8 @@ use crate::process::{HANG, client};
 use cager::config::ServeConfig;
 use cager::http::listen::serve;
 use cager::http::{router, spare};
-use cager::service::Service;
+use cager::service::{Service, StartError};
+use cager::store::StoreError;
 use cager::store::Disk;
 use cager::store::faults::{FaultyDisk, Loss};
 use cager_client::messages::{FrameResult, Problem, Session};
@@ -88,7 +89,7 @@ impl Inside {
     }
 
     pub(crate) async fn status(&self, path: &str) -> u16 {
-        reqwest::get(self.url(path)).await.expect("an answer").status().as_u16()
+        http().build().expect("a client").get(self.url(path)).send().await.expect("an answer").status().as_u16()
     }
 
     /// A client that tells every refusal.
@@ -157,7 +158,16 @@ impl Inside {
 async fn start(config: ServeConfig, disk: Arc<dyn Disk>) -> Running {
     let stop = CancellationToken::new();
     let limits = config.limits();
-    let service = Service::start(config, disk, stop.clone()).expect("a service");
+    // What the service before does in the background may still hold the folder for a moment.
+    let clock = Instant::now();
+    let service = loop {
+        match Service::start(config.clone(), Arc::clone(&disk), stop.clone()) {
+            Err(StartError::Store(StoreError::Locked { .. })) if clock.elapsed() < HANG => {
+                sleep(Duration::from_millis(5)).await;
+            }
+            service => break service.expect("a service"),
+        }
+    };
     let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
     let address = listener.local_addr().expect("an address");
     let (app, spare) = (router(Arc::clone(&service)), spare(Arc::clone(&service)));
@@ -170,9 +180,16 @@ pub(crate) fn errors(result: &FrameResult) -> Errors {
     Errors { l2: bits(result.l2), linf: bits(result.linf) }
 }
 
+/// A client to be made, in a process that knows how to encrypt: reqwest asks for it even where nothing is encrypted.
+pub(crate) fn http() -> reqwest::ClientBuilder {
+    // Another test of the process may have been first.
+    let _ = rustls::crypto::ring::default_provider().install_default();
+    reqwest::Client::builder()
+}
+
 /// Posts raw frames and takes the answer apart.
 pub(crate) async fn post(url: String, body: Vec<u8>) -> Posted {
-    let request = reqwest::Client::new().post(url).header("content-type", "application/octet-stream").body(body);
+    let request = http().build().expect("a client").post(url).header("content-type", "application/octet-stream").body(body);
     let answer = timeout(HANG, request.send()).await.expect("an answer in time").expect("an answer");
     let status = answer.status().as_u16();
     // An answer that is cut off counts as far as it came.

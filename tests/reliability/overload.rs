@@ -64,7 +64,7 @@ async fn too_much_work_is_refused_quickly_and_disturbs_nobody() {
     let stop = Arc::new(AtomicBool::new(false));
     let url = server.url(&format!("/v1/sessions/{}/frames", busy.id));
     let body = bytes::Bytes::from(reference.many(0..24).repeat(12));
-    let http = reqwest::Client::builder().http1_only().build().expect("a client");
+    let http = crate::inside::http().http1_only().build().expect("a client");
     let load: Vec<_> = (0..WANTED)
         .map(|k| {
             let (url, body, http, stop) = (url.clone(), body.clone(), http.clone(), Arc::clone(&stop));

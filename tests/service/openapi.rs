@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 const ANNA: &str = "anna-has-a-long-secret";
 const BERT: &str = "bert-has-a-long-secret";
 /// For operators; without captures in them.
-const OPEN: [&str; 3] = ["/healthz", "/readyz", "/metrics"];
+const OPEN: [&str; 5] = ["/", "/healthz", "/readyz", "/metrics", "/openapi.json"];
 
 async fn guarded() -> TestApp {
     TestApp::guarded(&[("anna", ANNA, ""), ("bert", BERT, "")])

@@ -44,7 +44,7 @@ async fn a_stream_without_end_is_cut_at_the_end_of_the_drain_time() {
     let server = start(limits()).await;
     let mut http1 = server.connect().await;
     http1.write_all(b"GET /ticking HTTP/1.1\r\nHost: x\r\n\r\n").await.unwrap();
-    let client = reqwest::Client::builder().http2_prior_knowledge().build().unwrap();
+    let client = crate::client().http2_prior_knowledge().build().unwrap();
     let mut http2 = client.get(format!("http://{}/ticking", server.address)).send().await.unwrap();
     assert_eq!(http2.chunk().await.unwrap().unwrap(), "tick\n");
     let stopping = tokio::spawn(server.stop());

@@ -29,7 +29,7 @@ async fn ordinary_clients_see_the_refusal() {
     let server = start(limits()).await;
     let mut seen = 0;
     for _ in 0..10 {
-        let client = reqwest::Client::builder().http1_only().build().unwrap();
+        let client = crate::client().http1_only().build().unwrap();
         let request = client.post(format!("http://{}/refuse", server.address)).body(vec![0; BODY_BYTES]);
         let answer = timeout(HANG, request.send()).await.expect("no answer");
         seen += usize::from(answer.is_ok_and(|answer| answer.status() == StatusCode::PAYLOAD_TOO_LARGE));

@@ -14,7 +14,7 @@ async fn too_many_header_lines_are_refused() {
     let answer = ask(&mut server.connect().await, &text).await;
     assert!(answer.starts_with("HTTP/1.1 431 "), "{answer}");
 
-    let client = reqwest::Client::builder().http2_prior_knowledge().build().unwrap();
+    let client = crate::client().http2_prior_knowledge().build().unwrap();
     let mut request = client.get(format!("http://{}/", server.address));
     for i in 0..200 {
         request = request.header(format!("x-{i}"), "y");
@@ -104,7 +104,7 @@ async fn connections_beyond_the_limit_get_one_answer_and_then_none() {
     assert!(ask(&mut health, "GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n").await.ends_with("ok"));
     assert!(read_to_close(&mut health).await.0.is_empty(), "a spare connection is closed after its answer");
     drop(health);
-    let client = reqwest::Client::builder().http2_prior_knowledge().build().unwrap();
+    let client = crate::client().http2_prior_knowledge().build().unwrap();
     let busy = client.get(format!("http://{}/", server.address)).send().await.unwrap();
     assert_eq!((busy.status().as_u16(), &busy.headers()["retry-after"]), (503, &"1".parse().unwrap()));
     drop((busy, client));

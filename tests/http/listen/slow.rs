@@ -129,7 +129,7 @@ async fn http_2_silent_and_idle_connections_are_closed() {
     idle.write_all(HTTP2).await.unwrap();
     assert_took(read_to_close(&mut idle).await.1, limits().idle_timeout);
 
-    let client = reqwest::Client::builder().http2_prior_knowledge().build().unwrap();
+    let client = crate::client().http2_prior_knowledge().build().unwrap();
     let url = format!("http://{}/peer", server.address);
     let peer = async || client.get(&url).send().await.unwrap().text().await.unwrap();
     let first = peer().await;
@@ -141,7 +141,7 @@ async fn http_2_silent_and_idle_connections_are_closed() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn http_2_readers_that_stall_and_bodies_that_stop_are_ended() {
     let server = start(limits()).await;
-    let client = reqwest::Client::builder().http2_prior_knowledge().build().unwrap();
+    let client = crate::client().http2_prior_knowledge().build().unwrap();
     let mut response = client.get(format!("http://{}/endless", server.address)).send().await.unwrap();
     tokio::time::sleep(limits().write_timeout + ms(1000)).await;
     let read = async { while let Ok(Some(_)) = response.chunk().await {} };
