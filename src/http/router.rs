@@ -45,7 +45,6 @@ fn completing() -> OpenApiRouter<Arc<Service>> {
 }
 
 /// Routes that take as long as their bodies, which they read piece by piece.
-
 fn streaming() -> OpenApiRouter<Arc<Service>> {
     OpenApiRouter::new().routes(routes!(sessions::create)).routes(routes!(frames::post)).routes(routes!(decode::post))
 }

@@ -125,12 +125,8 @@ impl Session {
                 }
             }
             Err(error) => {
-                let error = if self.is_deleted() {
-                    super::gone()
-                } else {
-                    tracing::error!(session = %self.meta.id, %error, "frames could not be written");
-                    storage_error(&error)
-                };
+                tracing::warn!(session = %self.meta.id, %error, "frames could not be written");
+                let error = self.storage_error(&error);
                 self.give_up(solved, &error);
             }
         }
