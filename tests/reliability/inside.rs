@@ -6,9 +6,9 @@ use crate::process::{HANG, client};
 use cager::config::ServeConfig;
 use cager::http::listen::serve;
 use cager::http::{router, spare};
-use cager::service::Service;
-use cager::store::Disk;
+use cager::service::{Service, StartError};
 use cager::store::faults::{FaultyDisk, Loss};
+use cager::store::{Disk, StoreError};
 use cager_client::messages::{FrameResult, Problem, Session};
 use cager_client::{Client, ClientOptions};
 use std::collections::BTreeMap;
@@ -157,7 +157,16 @@ impl Inside {
 async fn start(config: ServeConfig, disk: Arc<dyn Disk>) -> Running {
     let stop = CancellationToken::new();
     let limits = config.limits();
-    let service = Service::start(config, disk, stop.clone()).expect("a service");
+    let clock = Instant::now();
+    let service = loop {
+        match Service::start(config.clone(), Arc::clone(&disk), stop.clone()) {
+            // Threads of the one before let go of the folder a moment later.
+            Err(StartError::Store(StoreError::Locked { .. })) if clock.elapsed() < HANG => {
+                sleep(Duration::from_millis(2)).await;
+            }
+            started => break started.expect("a service"),
+        }
+    };
     let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
     let address = listener.local_addr().expect("an address");
     let (app, spare) = (router(Arc::clone(&service)), spare(Arc::clone(&service)));
