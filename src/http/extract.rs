@@ -59,7 +59,11 @@ impl FromRequestParts<Arc<Service>> for Found {
             .await
             .map_err(|_| ApiError::new(problem::NOT_FOUND, "the id of a session is missing"))?;
         let session = service.registry.find(&tenant.name, &id)?;
-        session.ensure_loaded().await?;
+        match session.ensure_loaded().await {
+            // What can be known of it is that it failed, and why.
+            Err(_) if session.has_failed() => {}
+            loaded => loaded?,
+        }
         Ok(Self { tenant, session })
     }
 }

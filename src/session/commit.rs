@@ -137,12 +137,8 @@ impl Session {
             }
             Err(error) => {
                 self.bytes.fetch_sub(stored_bytes(solved), Relaxed);
-                let error = if self.is_deleted() {
-                    super::gone()
-                } else {
-                    tracing::error!(session = %self.meta.id, %error, "frames could not be written");
-                    storage_error(&error)
-                };
+                tracing::warn!(session = %self.meta.id, %error, "frames could not be written");
+                let error = self.storage_error(&error);
                 self.give_up(solved, &error);
             }
         }

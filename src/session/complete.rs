@@ -68,8 +68,7 @@ impl Service {
         let mut sealed = Sealed { session, kept: false };
         let prepared = self.solver(session).await?;
         let writing = Arc::clone(session);
-        let written = blocking(move || write(&writing, &prepared, &entries, frames)).await?;
-        let completion = written.map_err(|error| if session.is_deleted() { super::gone() } else { error })?;
+        let completion = blocking(move || write(&writing, &prepared, &entries, frames)).await??;
         session.set_phase(Phase::Completed(completion));
         sealed.kept = true;
         Ok(())
@@ -91,10 +90,13 @@ impl Drop for Sealed<'_> {
 }
 
 fn write(session: &Session, prepared: &Prepared, entries: &[LogEntry], frames: u32) -> Result<Completion, ApiError> {
-    let stored = |error: StoreError| super::commit::storage_error(&error);
+    let stored = |error: StoreError| session.storage_error(&error);
     let choices = Choices::of(&session.meta.options)?;
     let content = session.store.content(&session.meta.key).map_err(stored)?;
-    let content = content.ok_or_else(|| ApiError::internal(&"the rest pose of a session is gone"))?;
+    let content = content.ok_or_else(|| match session.is_deleted() {
+        true => super::gone(),
+        false => ApiError::internal(&"the rest pose of a session is gone"),
+    })?;
     let geometry = prepare::read(&content, &choices)?;
     let encoding = Encoding {
         rest: &geometry.rest,

@@ -187,7 +187,7 @@ impl Service {
                 let phase = completion.map_or(Phase::Ready, Phase::Completed);
                 // A process may have ended with frames in the log and no outcome on disk. Who hears that the session is ready
                 // finds them all.
-                if session.ensure_loaded().await.is_err() && matches!(session.status().phase, Phase::Failed(_)) {
+                if session.ensure_loaded().await.is_err() && session.has_failed() {
                     return;
                 }
                 if matches!(phase, Phase::Completed(_)) {
@@ -253,12 +253,15 @@ impl Service {
         let (store, id, key) = (self.store.clone(), session.meta.id.clone(), session.meta.key);
         let _content = self.registry.content_lock(&key).await;
         let removed = id.clone();
-        blocking({
+        session.set_deleting(true);
+        let deleted = blocking({
             let store = store.clone();
             move || store.delete_session(&removed)
-        })
-        .await?
-        .map_err(|error| super::commit::storage_error(&error))?;
+        });
+        deleted
+            .await?
+            .map_err(|error| super::commit::storage_error(&error))
+            .inspect_err(|_| session.set_deleting(false))?;
         self.registry.remove(&id);
         session.mark_deleted();
         if !self.registry.uses_content(&key) {

@@ -45,6 +45,8 @@ pub(crate) struct Session {
     /// Held while the container is written, so that it is written once.
     pub(crate) completing: tokio::sync::Mutex<()>,
     version: watch::Sender<u64>,
+    /// Its files may be on their way to the trash.
+    deleting: AtomicBool,
     deleted: CancellationToken,
 }
 
@@ -112,6 +114,7 @@ impl Session {
             lane: Mutex::default(),
             completing: tokio::sync::Mutex::new(()),
             version: watch::Sender::new(0),
+            deleting: AtomicBool::new(false),
             deleted: CancellationToken::new(),
         }
     }
@@ -130,6 +133,10 @@ impl Session {
         }
         *lock(&self.status) = status;
         self.touch();
+    }
+
+    pub(crate) fn has_failed(&self) -> bool {
+        matches!(lock(&self.status).phase, Phase::Failed(_))
     }
 
     pub(crate) fn set_phase(&self, phase: Phase) {
@@ -160,6 +167,16 @@ impl Session {
         self.deleted.is_cancelled()
     }
 
+    /// Says whether its files are being deleted, so that nobody takes their absence for a fault.
+    pub(crate) fn set_deleting(&self, deleting: bool) {
+        self.deleting.store(deleting, Ordering::SeqCst);
+    }
+
+    /// What a client hears when the store refuses.
+    pub(crate) fn storage_error(&self, error: &StoreError) -> ApiError {
+        if self.deleting.load(Ordering::SeqCst) || self.is_deleted() { gone() } else { commit::storage_error(error) }
+    }
+
     /// Reads what the log holds, if that did not happen yet. Blocks.
     ///
     /// # Errors
@@ -180,7 +197,7 @@ impl Session {
             match self.load_log() {
                 Ok(opened) => *log = Some(opened),
                 Err(StoreError::Damaged { path, what }) => return Err(self.quarantine(&path, &what)),
-                Err(error) => return Err(commit::storage_error(&error)),
+                Err(error) => return Err(self.storage_error(&error)),
             }
         }
         Ok(())
@@ -276,6 +293,20 @@ impl Session {
             *lane = Arc::downgrade(&live);
             live
         })
+    }
+
+    /// Writes what the disk may have lost of the log again, if it takes it now. Blocks.
+    pub(crate) fn mend(&self) {
+        if self.has_failed() || !self.store.log_is_doubtful(&self.meta.id) {
+            return;
+        }
+        let mut log = lock(&self.log);
+        if log.is_none() {
+            match self.load_log() {
+                Ok(opened) => *log = Some(opened),
+                Err(error) => tracing::warn!(session = %self.meta.id, %error, "the frame log cannot be made safe yet"),
+            }
+        }
     }
 
     /// Closes files of a session that nobody uses.

@@ -1,5 +1,6 @@
 //! How much a tenant may keep and for how long.
 
+use super::create::blocking;
 use crate::auth::Tenant;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
@@ -84,6 +85,8 @@ impl Service {
                     tracing::warn!(session = %session.meta.id, detail = %error.problem.detail, "could not be deleted");
                 }
             } else {
+                let mending = Arc::clone(&session);
+                let _ = blocking(move || mending.mend()).await;
                 session.rest_if_idle();
             }
         }

@@ -54,10 +54,18 @@ struct Inner {
     files: Files,
     /// Held by every open frame log too, so that no other process comes in while one is written.
     lock: Arc<File>,
-    /// Sessions whose log is open: a second writer would overwrite the first.
-    open_logs: Arc<Mutex<HashSet<String>>>,
+    /// What is known of logs beside what is in them.
+    logs: Arc<Mutex<Logs>>,
     /// Taken around "is it there? then put it there" of shared content.
     publishing: Mutex<()>,
+}
+
+#[derive(Debug, Default)]
+struct Logs {
+    /// Sessions whose log is open: a second writer would overwrite the first.
+    open: HashSet<String>,
+    /// Sessions whose log the disk may hold damaged, although the system still shows it as it should be.
+    doubtful: HashSet<String>,
 }
 
 /// A store and what was found in it.
@@ -111,7 +119,7 @@ impl Store {
             }
         }
         let (sessions, quarantined) = sessions::find(&files)?;
-        let inner = Inner { files, lock: Arc::new(lock), open_logs: Arc::default(), publishing: Mutex::new(()) };
+        let inner = Inner { files, lock: Arc::new(lock), logs: Arc::default(), publishing: Mutex::new(()) };
         Ok(Opened { store: Self { inner: Arc::new(inner) }, sessions, quarantined })
     }
 

@@ -7,9 +7,8 @@ use cager::config::ServeConfig;
 use cager::http::listen::serve;
 use cager::http::{router, spare};
 use cager::service::{Service, StartError};
-use cager::store::StoreError;
-use cager::store::Disk;
 use cager::store::faults::{FaultyDisk, Loss};
+use cager::store::{Disk, StoreError};
 use cager_client::messages::{FrameResult, Problem, Session};
 use cager_client::{Client, ClientOptions};
 use std::collections::BTreeMap;
@@ -158,14 +157,14 @@ impl Inside {
 async fn start(config: ServeConfig, disk: Arc<dyn Disk>) -> Running {
     let stop = CancellationToken::new();
     let limits = config.limits();
-    // What the service before does in the background may still hold the folder for a moment.
     let clock = Instant::now();
     let service = loop {
         match Service::start(config.clone(), Arc::clone(&disk), stop.clone()) {
+            // Threads of the one before let go of the folder a moment later.
             Err(StartError::Store(StoreError::Locked { .. })) if clock.elapsed() < HANG => {
-                sleep(Duration::from_millis(5)).await;
+                sleep(Duration::from_millis(2)).await;
             }
-            service => break service.expect("a service"),
+            started => break started.expect("a service"),
         }
     };
     let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
@@ -189,7 +188,8 @@ pub(crate) fn http() -> reqwest::ClientBuilder {
 
 /// Posts raw frames and takes the answer apart.
 pub(crate) async fn post(url: String, body: Vec<u8>) -> Posted {
-    let request = http().build().expect("a client").post(url).header("content-type", "application/octet-stream").body(body);
+    let request =
+        http().build().expect("a client").post(url).header("content-type", "application/octet-stream").body(body);
     let answer = timeout(HANG, request.send()).await.expect("an answer in time").expect("an answer");
     let status = answer.status().as_u16();
     // An answer that is cut off counts as far as it came.

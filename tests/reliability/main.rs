@@ -1,6 +1,7 @@
 //! What holds when things go wrong: processes killed, disks that refuse, clients that misbehave, more work than there is room for.
 
 #![cfg(target_os = "linux")]
+#![allow(clippy::print_stdout, reason = "figures and seeds, shown where somebody asks for them")]
 
 mod capture;
 mod client_gone;

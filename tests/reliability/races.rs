@@ -186,7 +186,7 @@ async fn a_session_with_a_damaged_log_is_failed_and_disturbs_no_other() {
         assert_eq!((refused.status, refused.word()), (409, "session-failed"), "{refused:?}");
         assert_eq!(inside.client().sessions().await.expect("a list").len(), 2);
     }
-    assert!(inside.names("quarantine").iter().any(|name| *name == bad.id));
+    assert!(inside.names("quarantine").contains(&bad.id));
     inside.check(&SMALL, &good.id, &posted.frames).await;
     inside.client().delete(&bad.id).await.expect("a deletion");
     inside.finish(&SMALL, &good).await;

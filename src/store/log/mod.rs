@@ -9,11 +9,10 @@
 //! the log is opened again. Opening makes all that it finds durable and marks it.
 
 use super::names::check_id;
-use super::{Store, StoreError};
+use super::{Logs, Store, StoreError};
 use crate::store::disk::DiskFile;
 use crate::store::files::timed;
 use format::{BLOCK_BYTES, Layout};
-use std::collections::HashSet;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -85,7 +84,7 @@ pub struct FrameLog {
     /// After an error that could not be undone.
     refuses: bool,
     buffer: Vec<u8>,
-    _only: OnlyWriter,
+    only: OnlyWriter,
 }
 
 /// Larger buffers are given back after an append.
@@ -116,14 +115,16 @@ impl Store {
         check_id(id)?;
         let files = self.files();
         let path = files.session(id).join("frames.log");
-        let only = OnlyWriter::new(self, id, &path)?;
+        let mut only = OnlyWriter::new(self, id, &path)?;
         let layout = Layout::new(id, rows);
         if !files.exists(&path)? {
             // The first block appears whole, so a log without one is damaged.
             files.replace(&path, &layout.first_block())?;
         }
         let file = files.disk.open_for_writing(&path).map_err(|e| StoreError::of(&path, "open", e))?;
-        let recovered = recovery::recover(files, &*file, &path, &layout)?;
+        let recovered = recovery::recover(files, &*file, &path, &layout, only.doubtful);
+        only.doubtful = recovered.is_err();
+        let recovered = recovered?;
         let log = FrameLog {
             file,
             path,
@@ -133,9 +134,16 @@ impl Store {
             marks: recovered.marks,
             refuses: false,
             buffer: Vec::new(),
-            _only: only,
+            only,
         };
         Ok((log, recovered.entries))
+    }
+}
+
+impl Store {
+    /// Whether the disk may hold less of a session's log than the system shows, until the log is opened again with success.
+    pub fn log_is_doubtful(&self, id: &str) -> bool {
+        self.inner.logs.lock().unwrap_or_else(PoisonError::into_inner).doubtful.contains(id)
     }
 }
 
@@ -190,6 +198,7 @@ impl FrameLog {
         result.map_err(|error| {
             if let Err(error) = self.cut_back(sync_failed) {
                 self.refuses = true;
+                self.only.doubtful = sync_failed;
                 tracing::error!(%error, path = %self.path.display(), "a frame log takes no more frames until it is opened anew");
             }
             StoreError::of(&self.path, "append to", error)
@@ -241,22 +250,33 @@ impl LogRecord<'_> {
 #[derive(Debug)]
 struct OnlyWriter {
     id: String,
-    open: Arc<Mutex<HashSet<String>>>,
+    logs: Arc<Mutex<Logs>>,
+    /// Whether the disk may hold something else than the system shows: a sync failed, and what it may have ruined was not
+    /// written again. Outlives this.
+    doubtful: bool,
     _lock: Arc<File>,
 }
 
 impl OnlyWriter {
     fn new(store: &Store, id: &str, path: &Path) -> Result<Self, StoreError> {
-        let open = store.inner.open_logs.clone();
-        if !open.lock().unwrap_or_else(PoisonError::into_inner).insert(id.to_owned()) {
-            return Err(StoreError::of(path, "open", io::ErrorKind::ResourceBusy.into()));
-        }
-        Ok(Self { id: id.to_owned(), open, _lock: store.inner.lock.clone() })
+        let logs = store.inner.logs.clone();
+        let doubtful = {
+            let mut known = logs.lock().unwrap_or_else(PoisonError::into_inner);
+            if !known.open.insert(id.to_owned()) {
+                return Err(StoreError::of(path, "open", io::ErrorKind::ResourceBusy.into()));
+            }
+            known.doubtful.remove(id)
+        };
+        Ok(Self { id: id.to_owned(), logs, doubtful, _lock: store.inner.lock.clone() })
     }
 }
 
 impl Drop for OnlyWriter {
     fn drop(&mut self) {
-        self.open.lock().unwrap_or_else(PoisonError::into_inner).remove(&self.id);
+        let mut known = self.logs.lock().unwrap_or_else(PoisonError::into_inner);
+        known.open.remove(&self.id);
+        if self.doubtful {
+            known.doubtful.insert(std::mem::take(&mut self.id));
+        }
     }
 }

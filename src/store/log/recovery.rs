@@ -24,6 +24,7 @@ pub(super) fn recover(
     file: &dyn DiskFile,
     path: &Path,
     layout: &Layout,
+    doubtful: bool,
 ) -> Result<Recovered, StoreError> {
     let failed = |error| StoreError::of(path, "read", error);
     let length = file.length().map_err(failed)?;
@@ -54,9 +55,9 @@ pub(super) fn recover(
         // Its entry in the folder may not be durable, and the first group counts on it.
         files.sync_dir(parent(path))?;
     }
-    if claimed < end {
+    if claimed < end || doubtful {
         // Nobody may have synced these records, or a sync of them may have failed and will not fail again; written once more,
-        // they can be synced. So can the first block.
+        // they can be synced. So can the first block. A sync that failed may also have ruined what shares a block with them.
         let failed = |error| StoreError::of(path, "write", error);
         file.write_all_at(&block, 0).map_err(failed)?;
         let mut at = claimed - claimed % BLOCK_BYTES;

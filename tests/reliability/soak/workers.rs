@@ -39,6 +39,10 @@ impl Worker {
     /// Session after session, the last one to its end.
     pub(super) async fn run(mut self) {
         let client = client(self.address);
+        // A client that was never answered takes a refused connection for a wrong address.
+        while client.sessions().await.is_err() {
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
         for number in 0.. {
             let name = format!("{:?}-{number}", self.style);
             if let Err(what) = self.session(&client, &name).await {

@@ -332,3 +332,24 @@ fn what_shares_a_block_with_a_failed_sync_survives_it() {
     let (log, entries) = fixture.given.open().store.open_log("a", ROWS).unwrap();
     assert_eq!(frames(&log, &entries), [4, 5, 0, 1, 2, 9, 20]);
 }
+
+#[test]
+fn what_a_sync_ruined_while_the_disk_refused_is_written_again_when_it_takes_it() {
+    let fixture = fixture();
+    let disk = &fixture.given.disk;
+    let (mut log, _) = fixture.store.open_log("a", ROWS).unwrap();
+    append(&mut log, &[20]).unwrap();
+    disk.fail_from(Some(Op::Sync), 1, Fault::Ruin(EIO));
+    assert!(append(&mut log, &[21]).is_err());
+    drop(log);
+    assert!(fixture.store.log_is_doubtful("a"));
+    assert!(fixture.store.open_log("a", ROWS).is_err(), "what is given would not be durable");
+    assert!(fixture.store.log_is_doubtful("a"));
+    disk.disarm();
+    drop(fixture.store.open_log("a", ROWS).unwrap());
+    assert!(!fixture.store.log_is_doubtful("a"));
+    drop(fixture.store);
+    disk.restart(Loss::Everything).unwrap();
+    let (log, entries) = fixture.given.open().store.open_log("a", ROWS).unwrap();
+    assert_eq!(frames(&log, &entries), [4, 5, 0, 1, 2, 9, 20]);
+}
