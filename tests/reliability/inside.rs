@@ -68,8 +68,20 @@ impl Inside {
         self.running.as_ref().expect("it runs")
     }
 
+    /// As [`Self::restart`]; as soon as it has started, the gate is closed.
+    pub(crate) async fn restart_slowly(&mut self, loss: Loss) {
+        self.stop(loss).await;
+        self.start().await;
+        self.gate.close();
+    }
+
     /// The process ends, or the power does, and the service starts again.
     pub(crate) async fn restart(&mut self, loss: Loss) {
+        self.stop(loss).await;
+        self.start().await;
+    }
+
+    async fn stop(&mut self, loss: Loss) {
         self.disk.stop();
         let Running { service, stop, served, .. } = self.running.take().expect("it runs");
         stop.cancel();
@@ -80,7 +92,6 @@ impl Inside {
             sleep(Duration::from_millis(2)).await;
         }
         self.disk.restart(loss).expect("the disk");
-        self.start().await;
     }
 
     pub(crate) fn url(&self, path: &str) -> String {
