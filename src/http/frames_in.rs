@@ -104,7 +104,7 @@ impl FrameReader {
         if let Some(header) = self.record.take()
             && crc32c::crc32c(&bytes) != header.crc
         {
-            return Err(refused(RecordError::Checksum { frame }).frame(frame));
+            return Err(refused(&RecordError::Checksum { frame }).frame(frame));
         }
         self.head.clear();
         self.begun = false;
@@ -148,14 +148,14 @@ impl FrameReader {
             match header {
                 Ok(header) => self.record = Some(header),
                 Err(RecordError::Incomplete { .. }) => return Ok(None),
-                Err(error) => return Err(refused(error)),
+                Err(error) => return Err(refused(&error)),
             }
         }
         Ok(self.record)
     }
 }
 
-fn refused(error: RecordError) -> ApiError {
+fn refused(error: &RecordError) -> ApiError {
     ApiError::new(problem::INVALID_FRAME, error.to_string())
 }
 
