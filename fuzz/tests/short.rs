@@ -54,22 +54,22 @@ macro_rules! short {
 
 // About a second each.
 short! {
-    obj "obj" 20_000;
-    ply "ply" 20_000;
-    off "off" 20_000;
-    stl "stl" 20_000;
-    glb "glb" 5_000;
-    npy "npy" 40_000;
-    pc2 "pc2" 40_000;
-    mdd "mdd" 40_000;
-    container "container" 5_000;
-    record "record" 60_000;
-    frames "frames" 40_000;
-    new_session "new-session" 4_000;
-    range "range" 20_000;
-    tokens "tokens" 5_000;
-    config "config" 5_000;
-    log "log" 5_000;
-    solver "solver" 5_000;
-    small_files "small-files" 5_000;
+    obj "obj" 120_000;
+    ply "ply" 120_000;
+    off "off" 120_000;
+    stl "stl" 120_000;
+    glb "glb" 30_000;
+    npy "npy" 240_000;
+    pc2 "pc2" 240_000;
+    mdd "mdd" 240_000;
+    container "container" 30_000;
+    record "record" 360_000;
+    frames "frames" 240_000;
+    new_session "new-session" 24_000;
+    range "range" 120_000;
+    tokens "tokens" 30_000;
+    config "config" 30_000;
+    log "log" 30_000;
+    solver "solver" 30_000;
+    small_files "small-files" 30_000;
 }

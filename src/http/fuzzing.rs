@@ -17,6 +17,9 @@ use http::{HeaderMap, HeaderValue, header};
 use std::io;
 use std::sync::Arc;
 
+/// Number of a frame, whether it has handle rows only, and its bytes.
+pub type Frame = (u32, bool, Vec<u8>);
+
 /// How frames come in.
 #[derive(Clone, Copy, Debug)]
 pub struct Frames {
@@ -30,15 +33,9 @@ pub struct Frames {
     pub handles: u32,
 }
 
-/// Number, whether all rows are there, and bytes.
-pub type ReadFrame = (u32, bool, Vec<u8>);
-
 impl Frames {
-    /// Number, rows and bytes of every frame of a body that comes in pieces.
-    ///
-    /// # Errors
-    /// What the client would hear.
-    pub fn read<'a>(self, pieces: impl Iterator<Item = &'a [u8]>) -> (Vec<ReadFrame>, Result<(), ApiError>) {
+    /// Every frame of a body that comes in pieces, and what the client would hear of its end.
+    pub fn read<'a>(self, pieces: impl Iterator<Item = &'a [u8]>) -> (Vec<Frame>, Result<(), ApiError>) {
         let rows = if self.handle_rows { Rows::Handles } else { Rows::All };
         let layout = self.first.map_or(Layout::Records, |first| Layout::Raw { first, rows });
         let mut reader = FrameReader::new(layout, &facts(self.points, self.handles));

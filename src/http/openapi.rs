@@ -8,7 +8,7 @@ use axum::response::IntoResponse;
 use bytes::Bytes;
 use cager_proto::messages::{FrameErrors, FrameResult, Problem, Session, SessionList, SessionOptions};
 use http::header;
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 use utoipa::openapi::encoding::EncodingBuilder;
@@ -82,7 +82,7 @@ impl Modify for Token {
     responses((status = 200, description = "OpenAPI 3.1", content_type = "application/json", body = Object)),
 )]
 pub(crate) async fn get() -> impl IntoResponse {
-    static DOCUMENT: LazyLock<Bytes> = LazyLock::new(|| Bytes::from(super::document().to_json().unwrap_or_default()));
+    static DOCUMENT: LazyLock<Bytes> = LazyLock::new(|| Bytes::from(super::document().to_string()));
     ([(header::CONTENT_TYPE, "application/json")], DOCUMENT.clone())
 }
 
@@ -103,7 +103,7 @@ pub(crate) struct Conditions {
 }
 
 /// The document of these routes, with what every route takes and answers.
-pub(crate) fn finished(mut document: utoipa::openapi::OpenApi) -> utoipa::openapi::OpenApi {
+pub(crate) fn finished(mut document: utoipa::openapi::OpenApi) -> Value {
     let mut statuses: BTreeMap<u16, Vec<&str>> = BTreeMap::new();
     for kind in problem::ALL {
         statuses.entry(kind.status.as_u16()).or_default().push(kind.word);
@@ -121,27 +121,28 @@ pub(crate) fn finished(mut document: utoipa::openapi::OpenApi) -> utoipa::openap
             describe_headers(operation);
         }
     }
-    with_ranges(document)
+    let mut document = serde_json::to_value(&document).unwrap_or_default();
+    mend_ranges(&mut document);
+    let schemas = &mut document["components"]["schemas"];
+    schemas["NewSessionForm"]["additionalProperties"] = false.into();
+    for refused in ["max_error", "cage_vertices"] {
+        let property = &mut schemas["SessionOptions"]["properties"][refused];
+        *property = json!({ "type": "null", "description": property["description"] });
+    }
+    document
 }
 
 /// Integers with the range that they have: `int32` ends at half of what a u32 holds.
-fn with_ranges(document: utoipa::openapi::OpenApi) -> utoipa::openapi::OpenApi {
-    fn mend(value: &mut Value) {
-        if value["format"] == "int32" && value["minimum"].as_u64().is_some() {
-            value["format"] = "int64".into();
-            value["maximum"] = u32::MAX.into();
-        }
-        match value {
-            Value::Object(fields) => fields.values_mut().for_each(mend),
-            Value::Array(items) => items.iter_mut().for_each(mend),
-            _ => {}
-        }
+fn mend_ranges(value: &mut Value) {
+    if value["format"] == "int32" && value["minimum"].as_u64().is_some() {
+        value["format"] = "int64".into();
+        value["maximum"] = u32::MAX.into();
     }
-    let mended = serde_json::to_value(&document).and_then(|mut value| {
-        mend(&mut value);
-        serde_json::from_value(value)
-    });
-    mended.unwrap_or(document)
+    match value {
+        Value::Object(fields) => fields.values_mut().for_each(mend_ranges),
+        Value::Array(items) => items.iter_mut().for_each(mend_ranges),
+        _ => {}
+    }
 }
 
 fn operations(item: &mut PathItem) -> impl Iterator<Item = (&'static str, &mut Operation)> {

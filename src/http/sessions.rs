@@ -24,7 +24,7 @@ const KEY_CHARACTERS: usize = 255;
 /// the background; frames may be posted at once and wait for it.
 #[utoipa::path(
     post, path = "/v1/sessions", operation_id = "create_session", tag = "sessions",
-    params(("Idempotency-Key" = Option<String>, Header, description = "A repetition with the same key and content gives the same session")),
+    params(("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[ -~]+$", description = "A repetition with the same key and content gives the same session")),
     request_body(content = openapi::NewSessionForm, content_type = "multipart/form-data"),
     responses((status = 201, description = "The session, or the one that an earlier request with the same key made", body = Session,
         headers(("Location" = String, description = "Address of the session")))),

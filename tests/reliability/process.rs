@@ -35,6 +35,8 @@ impl Setup {
     }
 
     pub(crate) async fn start(&self) -> Server {
+        // The tests' client asks for it even where nothing is encrypted; another test of the process may have been first.
+        let _ = rustls::crypto::ring::default_provider().install_default();
         let clock = Instant::now();
         let mut command = Command::new(env!("CARGO_BIN_EXE_cager"));
         command.args(["serve", "--log-filter", "error", "--listen", &self.listen.to_string(), "--data"]);

@@ -4,7 +4,9 @@ use crate::Target;
 use cager::auth::{Access, TenantLimits};
 use cager::config::{ServeConfig, ServeFlags};
 use std::cell::RefCell;
+use std::fs::File;
 use std::io::{Seek, Write};
+use std::os::fd::AsRawFd;
 use std::path::{Path, PathBuf};
 
 const FIXED: usize = 4 << 20;
@@ -79,20 +81,18 @@ pub(super) const CONFIG: Target = Target {
 };
 
 thread_local! {
-    static SCRATCH: RefCell<Option<(PathBuf, std::fs::File)>> = const { RefCell::new(None) };
+    static SCRATCH: RefCell<Option<(PathBuf, File)>> = const { RefCell::new(None) };
 }
 
-/// The bytes as a file, in memory where the system offers it as a folder.
+/// A file without a name, so that nothing stays; in memory where the system offers it as a folder.
+fn scratch() -> (PathBuf, File) {
+    let file = tempfile::tempfile_in("/dev/shm").or_else(|_| tempfile::tempfile()).expect("a scratch file");
+    (PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd())), file)
+}
+
 fn with_file<T>(bytes: &[u8], f: impl FnOnce(&Path) -> T) -> T {
-    SCRATCH.with_borrow_mut(|scratch| {
-        let (path, file) = scratch.get_or_insert_with(|| {
-            let memory = Path::new("/dev/shm");
-            let folder = if memory.is_dir() { memory.to_owned() } else { std::env::temp_dir() };
-            let name = format!("cager-fuzz-{}-{:?}.toml", std::process::id(), std::thread::current().id());
-            let path = folder.join(name);
-            let file = std::fs::File::create(&path).expect("a scratch file");
-            (path, file)
-        });
+    SCRATCH.with_borrow_mut(|kept| {
+        let (path, file) = kept.get_or_insert_with(scratch);
         let written = file.set_len(0).and_then(|()| file.rewind()).and_then(|()| file.write_all(bytes));
         written.expect("a scratch file");
         f(path)
