@@ -1,7 +1,7 @@
 //! The engine: a bounded pool of solving threads, away from the threads that serve connections.
 //!
 //! Work arrives in lanes, one per session. What waits in a lane is taken together, up to [`BATCH`] frames, as one matrix
-//! product. Who comes next is [`schedule`]'s choice; what a batch does is the lane's.
+//! product. Who comes next is the choice of `schedule`; what a batch does is the lane's.
 
 mod schedule;
 
