@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Pauses between two looks at a session that prepares.
-const FIRST_PAUSE: Duration = Duration::from_millis(50);
+const FIRST_PAUSE: Duration = Duration::from_millis(20);
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 
 impl Client {
@@ -79,7 +79,7 @@ impl Client {
                 return Err(ClientError::NotReady { id: id.to_owned(), waited });
             }
             tokio::time::sleep(pause.min(limit - waited)).await;
-            pause = (pause * 2).min(LONGEST_PAUSE);
+            pause = pause.mul_f64(1.25).min(LONGEST_PAUSE);
         }
     }
 

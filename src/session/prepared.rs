@@ -136,7 +136,13 @@ impl Solvers {
             }
             super::lock(&solvers.inner).flights.remove(&key);
             // Nobody may be listening any more.
+            let fresh =
+                result.as_ref().ok().filter(|got| got.cache == CacheUse::Miss).map(|got| Arc::clone(&got.prepared));
             let _ = landed.send(Some(result));
+            // Nobody has to wait for it: without it the same solver is prepared again.
+            if let Some(prepared) = fresh {
+                drop(tokio::task::spawn_blocking(move || solvers.store(&key, &prepared)));
+            }
         });
         (flight, true)
     }
@@ -180,12 +186,15 @@ impl Solvers {
             total: queued + clock.elapsed().as_secs_f64(),
         };
         metrics::histogram!("cager_prepare_seconds").record(clock.elapsed().as_secs_f64());
-        // A cache that cannot be written costs time only.
-        let kept = self.store.put_prepared(&key, &prepared.solver);
+        Ok(Got { prepared: Arc::new(prepared), cache: CacheUse::Miss, seconds })
+    }
+
+    /// Stores a solver for after a restart. Blocks. One that cannot be written costs time only.
+    fn store(&self, key: &ContentKey, prepared: &Prepared) {
+        let kept = self.store.put_prepared(key, &prepared.solver);
         if let Err(error) = kept.and_then(|()| self.store.trim_prepared(self.disk_budget_bytes).map(|_| ())) {
             tracing::warn!(%error, "a solver could not be stored");
         }
-        Ok(Got { prepared: Arc::new(prepared), cache: CacheUse::Miss, seconds })
     }
 
     fn keep(&self, key: ContentKey, prepared: &Arc<Prepared>) {
