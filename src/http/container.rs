@@ -51,7 +51,7 @@ pub(crate) async fn get(
         public: !service.access.is_guarded(),
         read: Arc::new(read),
     };
-    let mut response = container.respond(&headers)?;
+    let mut response = container.respond(&headers);
     let name = HeaderValue::from_static("attachment; filename=\"capture.cager\"");
     response.headers_mut().insert(CONTENT_DISPOSITION, name);
     Ok(response)

@@ -76,7 +76,7 @@ pub(crate) async fn get(
         public: !service.access.is_guarded(),
         read: Arc::new(read),
     };
-    let mut response = coordinates.respond(&headers)?;
+    let mut response = coordinates.respond(&headers);
     response.headers_mut().insert("cager-rows", HeaderValue::from(facts.points));
     response.headers_mut().insert("cager-columns", HeaderValue::from(facts.unknowns));
     Ok(response)

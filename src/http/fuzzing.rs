@@ -102,5 +102,6 @@ pub fn immutable(content: Bytes, etag: &str, headers: &HeaderMap) -> Result<Resp
         public: false,
         read: Arc::new(move |range| Ok(content.slice(range.start as usize..range.end as usize))),
     };
-    bytes.respond(headers)
+    let mut response = bytes.respond(headers);
+    response.extensions_mut().remove::<ApiError>().map_or(Ok(response), Err)
 }

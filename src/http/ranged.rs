@@ -25,14 +25,19 @@ pub(crate) struct Immutable {
 }
 
 impl Immutable {
-    /// The response to a request with these headers.
-    ///
-    /// # Errors
-    /// 416 for a range that lies outside.
-    pub(crate) fn respond(self, headers: &HeaderMap) -> Result<Response, ApiError> {
+    /// The response to a request with these headers; 416 for a range that lies outside.
+    pub(crate) fn respond(self, headers: &HeaderMap) -> Response {
         let etag = format!("\"{}\"", self.etag);
         let scope = if self.public { "public" } else { "private" };
-        let mut response = match self.select(headers, &etag)? {
+        let selection = match self.select(headers, &etag) {
+            Ok(selection) => selection,
+            Err(error) => {
+                let mut response = error.into_response();
+                insert(&mut response, header::CONTENT_RANGE, &format!("bytes */{}", self.length));
+                return response;
+            }
+        };
+        let mut response = match selection {
             Selection::NotModified => StatusCode::NOT_MODIFIED.into_response(),
             Selection::All => {
                 let length = self.length;
@@ -57,7 +62,7 @@ impl Immutable {
         if response.status() != StatusCode::NOT_MODIFIED {
             response.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static(self.media_type));
         }
-        Ok(response)
+        response
     }
 
     fn select(&self, headers: &HeaderMap, etag: &str) -> Result<Selection, ApiError> {

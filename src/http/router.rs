@@ -134,11 +134,13 @@ async fn finish(request: Request, next: Next) -> Response {
             None => ApiError::new(kind_of(status), status.canonical_reason().unwrap_or("error").to_owned()),
         };
         error.problem.request_id = id.map(|id| id.0.to_string());
-        let allow = response.headers_mut().remove(header::ALLOW);
+        let kept = [header::ALLOW, header::CONTENT_RANGE].map(|name| (response.headers_mut().remove(&name), name));
         let mut problem = error.into_response();
         problem.extensions_mut().remove::<ApiError>();
-        if let Some(allow) = allow {
-            problem.headers_mut().insert(header::ALLOW, allow);
+        for (value, name) in kept {
+            if let Some(value) = value {
+                problem.headers_mut().insert(name, value);
+            }
         }
         return problem;
     }

@@ -4,6 +4,7 @@ use super::Session;
 use crate::problem::{self, ApiError};
 use crate::store::ContentKey;
 use std::collections::{BTreeMap, HashMap};
+use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex};
 
 /// All sessions. Ids are in order of creation.
@@ -79,9 +80,11 @@ impl Registry {
         super::lock(&self.inner).sessions.values().cloned().collect()
     }
 
-    pub(crate) fn of_tenant(&self, tenant: &str) -> Vec<Arc<Session>> {
+    /// Number of a tenant's sessions, and the bytes they take.
+    pub(crate) fn usage_of(&self, tenant: &str) -> (u64, u64) {
         let inner = super::lock(&self.inner);
-        inner.sessions.values().filter(|session| session.meta.tenant == tenant).cloned().collect()
+        let mine = inner.sessions.values().filter(|session| session.meta.tenant == tenant);
+        mine.fold((0, 0), |(count, bytes), session| (count + 1, bytes + session.bytes.load(Relaxed)))
     }
 
     pub(crate) fn uses_content(&self, key: &ContentKey) -> bool {

@@ -12,11 +12,6 @@ use tokio_util::sync::CancellationToken;
 const SWEEP_EVERY: Duration = Duration::from_secs(20);
 
 impl Service {
-    /// Bytes that a tenant's sessions take on disk.
-    pub(crate) fn used_bytes(&self, tenant: &str) -> u64 {
-        self.registry.of_tenant(tenant).iter().map(|session| session.bytes.load(Relaxed)).sum()
-    }
-
     /// Sessions and bytes of every tenant that has any.
     pub(crate) fn usage(&self) -> Vec<(String, usize, u64)> {
         let mut usage = std::collections::BTreeMap::<String, (usize, u64)>::new();
@@ -34,13 +29,12 @@ impl Service {
     /// A quota that is used up.
     pub(crate) fn check_quota(&self, tenant: &Tenant, bytes: u64) -> Result<(), ApiError> {
         let limits = &tenant.limits;
-        let sessions = self.registry.of_tenant(&tenant.name);
-        if sessions.len() as u64 >= limits.max_sessions {
+        let (sessions, _) = self.registry.usage_of(&tenant.name);
+        if sessions >= limits.max_sessions {
             self.rejected("tenant_sessions");
-            let detail = format!("you have {} sessions; delete one that is not needed any more", sessions.len());
+            let detail = format!("you have {sessions} sessions; delete one that is not needed any more");
             return Err(ApiError::new(problem::TOO_MANY_SESSIONS, detail).limit(limits.max_sessions));
         }
-        drop(sessions);
         self.check_bytes(tenant, bytes)
     }
 
@@ -49,7 +43,7 @@ impl Service {
     /// # Errors
     /// A quota that is used up.
     pub(crate) fn check_bytes(&self, tenant: &Tenant, bytes: u64) -> Result<(), ApiError> {
-        let used = self.used_bytes(&tenant.name);
+        let (_, used) = self.registry.usage_of(&tenant.name);
         if used.saturating_add(bytes) <= tenant.limits.max_bytes {
             return Ok(());
         }

@@ -45,7 +45,9 @@ async fn any_part_can_be_asked_for() {
             assert!(ask(range).await.expect(200).body == whole.body, "{path} {range}");
         }
         for range in [format!("bytes={length}-"), "bytes=-0".to_owned()] {
-            assert_eq!(ask(&range).await.problem(416, "range").limit, Some(length as u64));
+            let refused = ask(&range).await;
+            assert_eq!(refused.problem(416, "range").limit, Some(length as u64));
+            assert_eq!(refused.header("content-range"), format!("bytes */{length}"), "{path} {range}");
         }
         let head = app.send(app.request(Method::HEAD, &path).header("accept", accept)).await.expect(200);
         assert_eq!(head.header("content-length"), length.to_string());
