@@ -70,7 +70,7 @@ fn figures(folder: &Path) -> anyhow::Result<Value> {
     let frames = write(&capture, &cage, folder)?;
 
     let mvc = timed(|| MeanValue.coordinates(&cage, points));
-    let phi = MeanValue.coordinates(&cage, points).phi;
+    let phi = MeanValue.coordinates(&cage, points)?.phi;
     let handles = maxvol(phi.as_ref(), maxvol::TOLERANCE)?;
     let maxvol_figure = timed(|| maxvol(phi.as_ref(), maxvol::TOLERANCE));
     let m = phi.ncols();

@@ -2,6 +2,7 @@
 
 use crate::coordinates;
 use cager_core::cage::{Cage, CageError};
+use cager_core::coordinates::CoordinatesError;
 use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, coordinates_fit};
 use cager_core::mesh::Model;
@@ -37,6 +38,14 @@ pub enum DecodeError {
         path: PathBuf,
         /// What it needs.
         what: String,
+    },
+    /// The coordinates of the file's model do not exist.
+    #[error("{}: {cause}", .path.display())]
+    Coordinates {
+        /// The input.
+        path: PathBuf,
+        /// Why; part of the message, so not a source as well.
+        cause: CoordinatesError,
     },
     /// The coordinates do not fit into memory.
     #[error("{}: its coordinates need {gigabytes:.0} GB of memory; decode it on a larger machine", .path.display())]
@@ -104,7 +113,8 @@ pub fn decoder(container: &mut Container, path: &Path) -> Result<(Model, Decoder
         let gigabytes = 12e-9 * rest.points.len() as f64 * system.unknowns(&cage) as f64;
         return Err(DecodeError::Memory { path: path.to_owned(), gigabytes });
     }
-    let phi = system.coordinates(&cage, &rest.points).phi;
+    let coordinates = system.coordinates(&cage, &rest.points);
+    let phi = coordinates.map_err(|cause| DecodeError::Coordinates { path: path.to_owned(), cause })?.phi;
     let decoder = Decoder::new(phi.as_ref(), cage.vertices().len());
     Ok((rest, decoder))
 }

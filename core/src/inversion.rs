@@ -133,7 +133,7 @@ impl Solver {
             return Err(PrepareError::OutOfMemory { points: points.len(), unknowns: m, gigabytes });
         }
         refuse_far_points(cage, points)?;
-        let coordinates = system.coordinates(cage, points);
+        let coordinates = system.coordinates(cage, points)?;
         let phi = coordinates.phi.as_ref();
         let (point, error) = reproduction_error(phi, &system.rest_unknowns(cage), cage, points);
         let reproduction = error / diagonal;

@@ -8,7 +8,7 @@
 //! 192 bits.
 
 use super::doubt::{Mended, TOLERANCE, is_kept, is_unreliable, mend_thin};
-use super::{CoordinateSystem, Coordinates, careful};
+use super::{CoordinateSystem, Coordinates, CoordinatesError, careful};
 use crate::cage::{Cage, Edge};
 use crate::mesh::{self, Point};
 use crate::simd::{LANES, Lanes, angle, cross, dot, multiversion, zeros};
@@ -39,7 +39,7 @@ impl CoordinateSystem for MeanValue {
         cage.vertices().to_vec()
     }
 
-    fn coordinates(&self, cage: &Cage, points: &[Point]) -> Coordinates {
+    fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError> {
         let mut phi = zeros(points.len(), self.unknowns(cage));
         let outside = phi
             .as_mut()
@@ -53,7 +53,7 @@ impl CoordinateSystem for MeanValue {
                 a.extend(b);
                 a
             });
-        Coordinates { phi, outside }
+        Ok(Coordinates { phi, outside })
     }
 }
 

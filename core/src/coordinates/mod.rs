@@ -2,8 +2,10 @@
 
 mod careful;
 mod doubt;
+mod error;
 mod mean_value;
 
+pub use error::CoordinatesError;
 pub use mean_value::MeanValue;
 
 use crate::cage::Cage;
@@ -31,5 +33,8 @@ pub trait CoordinateSystem: Sync {
     fn rest_unknowns(&self, cage: &Cage) -> Vec<Point>;
 
     /// `Φ` for these points. Rows sum to one; runs on the current rayon pool; the result does not depend on it.
-    fn coordinates(&self, cage: &Cage, points: &[Point]) -> Coordinates;
+    ///
+    /// # Errors
+    /// A cage or points for which the system is not defined.
+    fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError>;
 }

@@ -1,5 +1,6 @@
 //! Why a solver cannot be prepared, and what to do about it.
 
+use crate::coordinates::CoordinatesError;
 /// Why a solver cannot be prepared.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PrepareError {
@@ -71,6 +72,9 @@ pub enum PrepareError {
         /// The weight λ.
         lambda: f64,
     },
+    /// The coordinates do not exist.
+    #[error(transparent)]
+    Coordinates(#[from] CoordinatesError),
     /// A factorisation failed.
     #[error("the {what} did not succeed; check that the rest pose lies near its cage, in the same unit")]
     NoSolution {

@@ -1,0 +1,39 @@
+/// Why a system has no coordinates for a model and its cage.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CoordinatesError {
+    /// Points outside the cage, where the system is not defined.
+    #[error("{} outside the cage ({}), by up to {:.2} % of its diagonal, where {system} coordinates do not exist; enlarge the cage or use mean value coordinates (mvc)", counted(.points), listed(.points), 100.0 * .distance)]
+    Outside {
+        /// The system's name.
+        system: &'static str,
+        /// The points, counted from 0, ascending.
+        points: Vec<u32>,
+        /// Largest distance to the cage over the cage's diagonal.
+        distance: f64,
+    },
+    /// A factorisation failed, or refining ended without reaching the accuracy.
+    #[error("{system} coordinates could not be computed for this cage: {reason}; use mean value coordinates (mvc)")]
+    NotComputed {
+        /// The system's name.
+        system: &'static str,
+        /// What happened.
+        reason: String,
+    },
+}
+
+fn counted(points: &[u32]) -> String {
+    match points.len() {
+        1 => "1 point lies".to_owned(),
+        count => format!("{count} points lie"),
+    }
+}
+
+/// The first of them.
+fn listed(points: &[u32]) -> String {
+    const SHOWN: usize = 8;
+    let mut text = points.iter().take(SHOWN).map(u32::to_string).collect::<Vec<_>>().join(", ");
+    if points.len() > SHOWN {
+        text += ", …";
+    }
+    text
+}
