@@ -3,9 +3,12 @@
 mod careful;
 mod doubt;
 mod error;
+mod green;
+pub(crate) mod layer;
 mod mean_value;
 
 pub use error::CoordinatesError;
+pub use green::Green;
 pub use mean_value::MeanValue;
 
 use crate::cage::Cage;
