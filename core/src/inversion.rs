@@ -14,9 +14,11 @@ use faer::{Accum, Mat, MatRef, Par};
 use rayon::prelude::*;
 use std::time::Instant;
 
+mod analysis;
 mod error;
 mod parts;
 
+pub use analysis::Analysis;
 pub use error::PrepareError;
 pub use parts::SolverParts;
 
@@ -303,6 +305,10 @@ fn check(points: &[Point], unknowns: usize, options: SolverOptions) -> Result<()
     if !diagonal.is_finite() {
         return Err(PrepareError::TooLarge);
     }
+    check_options(unknowns, options)
+}
+
+fn check_options(unknowns: usize, options: SolverOptions) -> Result<(), PrepareError> {
     if options.spectrum > unknowns {
         return Err(PrepareError::SpectrumTooLarge { spectrum: options.spectrum, unknowns });
     }
@@ -313,6 +319,7 @@ fn check(points: &[Point], unknowns: usize, options: SolverOptions) -> Result<()
 }
 
 /// Decompositions of the handles and of all points.
+#[derive(Clone)]
 struct Spectra {
     handles: Svd,
     full_sigma: Vec<f64>,
