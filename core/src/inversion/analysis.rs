@@ -1,9 +1,10 @@
 //! What solvers with any options share: coordinates, handles and decompositions, computed once.
 
-use super::{
-    Handles, Preparation, PrepareError, Solver, SolverOptions, Spectra, check, coordinates_fit, keep_translations,
-    operator, outside, refuse_far_points, reproduction_error, with_whole_tiles,
+use super::operator::{Spectra, keep_translations, operator, with_whole_tiles};
+use super::prepare::{
+    NOT_REPRODUCED, check, check_options, coordinates_fit, outside, refuse_far_points, reproduction_error,
 };
+use super::{Handles, Preparation, PrepareError, Solver, SolverOptions};
 use crate::cage::Cage;
 use crate::coordinates::CoordinateSystem;
 use crate::decode::Decoder;
@@ -48,7 +49,7 @@ impl Analysis {
         let phi = coordinates.phi;
         let (point, error) = reproduction_error(phi.as_ref(), &system.rest_unknowns(cage), cage, points);
         let relative = error / diagonal.min(cage.diagonal());
-        if relative.is_nan() || relative > super::NOT_REPRODUCED {
+        if relative.is_nan() || relative > NOT_REPRODUCED {
             return Err(PrepareError::NotReproduced { point, error: relative });
         }
         let (outside, outside_distance) = outside(cage, points, &coordinates.outside, diagonal);
@@ -91,7 +92,7 @@ impl Analysis {
     /// # Errors
     /// As [`Solver::prepare`].
     pub fn solver(&self, options: SolverOptions) -> Result<Solver, PrepareError> {
-        super::check_options(self.phi.ncols(), options)?;
+        check_options(self.phi.ncols(), options)?;
         let clock = Instant::now();
         let mut preparation = self.preparation.clone();
         let operator = operator(
@@ -113,7 +114,7 @@ impl Analysis {
     /// # Errors
     /// As [`Solver::prepare`]; [`PrepareError::NoSolution`] where the rows determine nothing.
     pub fn solver_reading(&self, rows: &[u32], options: SolverOptions) -> Result<Solver, PrepareError> {
-        super::check_options(self.phi.ncols(), options)?;
+        check_options(self.phi.ncols(), options)?;
         let failed = |what| PrepareError::NoSolution { what };
         let square = dense::rows_of(self.phi.as_ref(), rows);
         let Svd { u, sigma, v } =
