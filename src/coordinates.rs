@@ -1,12 +1,11 @@
 //! Coordinate systems by name, and what is chosen where nothing is said.
 
-use cager_core::coordinates::{CoordinateSystem, MeanValue};
+use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::inversion::SolverOptions;
 
 /// The coordinate system with this name on the command line, in reports and in containers.
 pub(crate) fn by_name(name: &str) -> Option<&'static dyn CoordinateSystem> {
-    static MEAN_VALUE: MeanValue = MeanValue;
-    let all: [&'static dyn CoordinateSystem; 1] = [&MEAN_VALUE];
+    let all: [&'static dyn CoordinateSystem; 3] = [&MeanValue, &Green::Consistent, &Green::Free];
     all.into_iter().find(|system| system.name() == name)
 }
 
