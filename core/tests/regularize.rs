@@ -167,7 +167,7 @@ fn the_chosen_threshold_is_the_largest_within_the_bound() {
         [Handles::MaxVol, Handles::Rectangular { count: None }, Handles::Spread { count: None }, Handles::All]
     {
         for regularizer in [Regularizer::Laplacian, Regularizer::Differential, Regularizer::TruncatedSvd] {
-            let options = SolverOptions { handles, regularizer, lambda: 0.01, ..SolverOptions::default() };
+            let options = SolverOptions { handles, regularizer, lambda: 0.001, ..SolverOptions::default() };
             let term = regularizer.term().unwrap();
             let reading = analysis.reading(handles).unwrap();
             let measured = |spectrum| {
@@ -194,10 +194,10 @@ fn the_chosen_threshold_is_the_largest_within_the_bound() {
             );
         }
     }
-    let options = SolverOptions { lambda: 0.01, ..SolverOptions::default() };
+    let options = SolverOptions::default();
     let reading = analysis.reading(options.handles).unwrap();
     let at = |bound| reading.choose_threshold(options, &CageLaplacian, &samples, bound).unwrap().spectrum;
-    assert!(at(0.0) <= at(0.02) && at(0.02) < at(0.2));
+    assert!(at(0.0) <= at(0.2) && at(0.2) < at(2.0), "{} {} {}", at(0.0), at(0.2), at(2.0));
     assert_eq!(at(1e9), m);
 }
 
