@@ -48,7 +48,8 @@ impl Choices {
         }
         let name = options.coordinates.as_deref().unwrap_or("mvc");
         let Some(system) = coordinates::by_name(name) else {
-            return refuse(format!("coordinates: {name:?} is not available; give mvc"));
+            let names = coordinates::ALL.map(|system| system.name()).join(", ");
+            return refuse(format!("coordinates: {name:?} is not available; give one of {names}"));
         };
         let wanted = options.handles.as_deref().unwrap_or(Handles::default().name());
         if !Handles::NAMES.contains(&wanted) {
@@ -177,10 +178,13 @@ pub(crate) fn prepare(geometry: &Geometry, choices: &Choices, most_bytes: u64) -
         }
         _ => 0,
     };
-    let needed = (20 * points as u64 * unknowns as u64).saturating_add(handles);
+    let columns = choices.system.columns(&geometry.cage) as u64;
+    // What an iteration takes beside them: their Gram matrix, and in single precision.
+    let iterated = if columns > unknowns as u64 { 12 * columns * columns } else { 0 };
+    let needed = (20 * points as u64 * columns).saturating_add(handles).saturating_add(iterated);
     if needed > most_bytes {
         let detail = format!(
-            "{points} points times {unknowns} unknowns need {needed} bytes to be prepared, and this service allows {most_bytes}; use a coarser cage or a lighter model"
+            "{points} points times {columns} values of the cage need {needed} bytes to be prepared, and this service allows {most_bytes}; use a coarser cage or a lighter model"
         );
         return Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(most_bytes));
     }

@@ -29,11 +29,11 @@ use super::{BLOCK_ROWS, product_columns};
 /// Most Gauss–Newton steps of a frame.
 const STEPS: usize = 8;
 /// Most conjugate gradients of a step.
-const GRADIENTS: usize = 10;
+const GRADIENTS: usize = 8;
 /// Fraction of the first preconditioned squared residual at which gradients have converged.
 const GRADIENT_TOLERANCE: f64 = 1e-4;
 /// A step that lowers E by less than this fraction is the last.
-const TOLERANCE: f64 = 1e-3;
+const TOLERANCE: f64 = 5e-3;
 /// Steps are halved so often before they are left out.
 const HALVINGS: usize = 4;
 /// Below this fraction of the squared positions, E is rounding.
@@ -70,10 +70,10 @@ pub enum Outcome {
 pub(crate) struct Consistent {
     /// `G`, T × T for T = v + f; zero columns follow up to a whole tile, as in all of these.
     gram: Mat<f64>,
-    /// The same in single precision, transposed in memory, for the conjugate gradients.
-    gram_single: Mat<f32>,
-    /// `((v/K) Φ_vᵀΦ_v + λ ΔᵀΔ)⁻¹`, v × v.
-    preconditioner: Mat<f64>,
+    /// `G`, and among vertices `λ ΔᵀΔ` beside it, for the conjugate gradients; zero rows follow up to a whole tile.
+    curvature: Mat<f32>,
+    /// The inverse of its part among vertices, v × v; zero rows follow as well.
+    preconditioner: Mat<f32>,
     /// Rows read of Φ, K × T; none where every point is read.
     rows: Option<Mat<f64>>,
     /// Neighbours of each vertex.
@@ -115,10 +115,10 @@ impl Consistent {
                 }
             }
         }
-        let preconditioner = dense::solve_definite(system, Mat::identity(v, v))?;
-        let single = Mat::from_fn(total.next_multiple_of(dense::WHOLE_ROWS), total, |i, j| {
-            if i < total { gram[(i, j)] as f32 } else { 0.0 }
-        });
+        let preconditioner = dense::solve_definite(system.clone(), Mat::identity(v, v))?;
+        let curvature = |i, j| if i < v && j < v { system[(i, j)] } else { gram[(i, j)] };
+        let curvature = single(total, &curvature);
+        let preconditioner = single(v, &|i, j| preconditioner[(i, j)]);
         let whole = |mut a: Mat<f64>| {
             let columns = a.ncols().next_multiple_of(dense::WHOLE_ROWS);
             a.resize_with(a.nrows(), columns, |_, _| 0.0);
@@ -126,8 +126,8 @@ impl Consistent {
         };
         Some(Self {
             gram: whole(gram),
-            gram_single: single,
-            preconditioner: whole(preconditioner),
+            curvature,
+            preconditioner,
             rows: rows.map(|rows| whole(sums::rows_of(decoder, rows))),
             neighbours,
             weight,
@@ -147,8 +147,9 @@ impl Consistent {
 
     pub(crate) fn size_bytes(&self) -> usize {
         let doubles = |a: &Mat<f64>| 8 * a.nrows() * a.ncols();
-        let single = 4 * self.gram_single.nrows() * self.gram_single.ncols();
-        doubles(&self.gram) + single + doubles(&self.preconditioner) + self.rows.as_ref().map_or(0, doubles)
+        let singles = |a: &Mat<f32>| 4 * a.nrows() * a.ncols();
+        let rows = self.rows.as_ref().map_or(0, doubles);
+        doubles(&self.gram) + singles(&self.curvature) + singles(&self.preconditioner) + rows
     }
 
     /// Improves the cages of a batch in place. `point` gives row i of those read of frame f; `diagonal` is the unit of what is
@@ -242,7 +243,7 @@ impl Consistent {
         for gradient in 0..GRADIENTS {
             let residuals: Vec<Vec<Point>> =
                 searches.iter().map(|s| s.as_ref().map_or(Vec::new(), |s| s.residual())).collect();
-            let better = self.preconditioned(&residuals);
+            let better = state::products(self.preconditioner.as_ref(), &residuals, |x| x as f32, f64::from);
             for (search, better) in searches.iter_mut().zip(better) {
                 if let Some(search) = search {
                     search.turn(&better, gradient == 0, GRADIENT_TOLERANCE);
@@ -253,11 +254,10 @@ impl Consistent {
             }
             let moved: Vec<Vec<Point>> =
                 searches.iter().map(|s| s.as_ref().map_or(Vec::new(), |s| s.moved_values(tied))).collect();
-            let products = self.times_gram_single(&moved);
+            let products = state::products(self.curvature.as_ref(), &moved, |x| x as f32, f64::from);
             for (search, products) in searches.iter_mut().zip(products) {
                 if let Some(search) = search {
-                    let shape = self.shape_gradient(search.direction());
-                    search.advance(tied, &products, &shape);
+                    search.advance(tied, &products);
                 }
             }
         }
@@ -316,14 +316,6 @@ impl Consistent {
         state::products(self.gram.transpose(), values, |x| x, |x| x)
     }
 
-    fn times_gram_single(&self, values: &[Vec<Point>]) -> Vec<Vec<Point>> {
-        state::products(self.gram_single.as_ref(), values, |x| x as f32, f64::from)
-    }
-
-    fn preconditioned(&self, residuals: &[Vec<Point>]) -> Vec<Vec<Point>> {
-        state::products(self.preconditioner.transpose(), residuals, |x| x, |x| x)
-    }
-
     /// `Δ x`.
     fn bent(&self, x: &[Point]) -> Vec<Point> {
         let of_vertex = |(i, near): (usize, &Vec<u32>)| {
@@ -354,6 +346,11 @@ impl Consistent {
     fn pull_back(&self, frame: &Moving) -> Vec<Point> {
         self.shape_gradient(&frame.moved_by(&frame.cage))
     }
+}
+
+/// Square, in single precision, with zero rows up to a whole tile.
+fn single(n: usize, entry: &dyn Fn(usize, usize) -> f64) -> Mat<f32> {
+    Mat::from_fn(n.next_multiple_of(dense::WHOLE_ROWS), n, |i, j| if i < n { entry(i, j) as f32 } else { 0.0 })
 }
 
 /// Neighbours of each vertex of a closed mesh: along every edge, one of its two faces runs away from the vertex.

@@ -102,10 +102,6 @@ impl Search {
         self.residual.clone()
     }
 
-    pub(super) fn direction(&self) -> &[Point] {
-        &self.direction
-    }
-
     pub(super) fn is_done(&self) -> bool {
         self.done
     }
@@ -146,15 +142,12 @@ impl Search {
         d.iter().copied().chain(tied.faces().iter().zip(&self.derivatives).map(of_face)).collect()
     }
 
-    /// Goes along the direction, by `G J d` and `λΔᵀΔ d`.
-    pub(super) fn advance(&mut self, tied: &TiedNormals, products: &[Point], shape: &[Point]) {
+    /// Goes along the direction d, by the curvature times `J d`.
+    pub(super) fn advance(&mut self, tied: &TiedNormals, products: &[Point]) {
         if self.done {
             return;
         }
-        let mut image = gathered(tied, &self.derivatives, products);
-        for (i, s) in image.iter_mut().zip(shape) {
-            *i = [0, 1, 2].map(|k| i[k] + s[k]);
-        }
+        let image = gathered(tied, &self.derivatives, products);
         let curvature: f64 = self.direction.iter().zip(&image).map(|(&d, &i)| dot(d, i)).sum();
         let length = self.size / curvature;
         if !(length.is_finite() && length > 0.0) {
