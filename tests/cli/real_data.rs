@@ -13,7 +13,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The folder of captures; without one, says so.
-fn data() -> Option<PathBuf> {
+pub(crate) fn data() -> Option<PathBuf> {
     let root = std::env::var_os("CAGER_DATA")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
     if !root.join("reference.json").is_file() {
@@ -31,24 +31,26 @@ fn reference(root: &Path) -> serde_json::Map<String, Value> {
     }
 }
 
-fn cage_of(path: &Path) -> Cage {
+pub(crate) fn cage_of(path: &Path) -> Cage {
     Cage::new(TriMesh::from(&read_model(path).expect("a cage"))).expect("a good cage")
 }
 
 fn run(folder: &Path, rest: &Model, cage: &Cage, options: SolverOptions) -> Report {
-    let dir = Dir::new();
+    run_with(&Dir::new(), &MeanValue, folder, rest, cage, options)
+}
+
+/// Encodes a capture into `out.cager`.
+pub(crate) fn run_with(
+    dir: &Dir,
+    system: &dyn CoordinateSystem,
+    folder: &Path,
+    rest: &Model,
+    cage: &Cage,
+    options: SolverOptions,
+) -> Report {
     let mut frames = open_frames(folder.join("frames.npy"), rest.points.len()).expect("frames");
     let output = dir.path("out.cager");
-    let job = Job {
-        rest,
-        cage,
-        frames: frames.as_mut(),
-        output: &output,
-        system: &MeanValue,
-        options,
-        term: None,
-        choose: None,
-    };
+    let job = Job { rest, cage, frames: frames.as_mut(), output: &output, system, options, term: None, choose: None };
     encode(job, &mut |_| {}).expect("an encoding").report
 }
 
