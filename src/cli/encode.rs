@@ -1,6 +1,7 @@
 //! `cager encode`.
 
 use super::args::{EncodeArgs, SolverArgs};
+use super::outputs::refuse_overwriting;
 use super::{grouped, human_bytes, interrupt, plain, print, progress, warn};
 use crate::coordinates;
 use crate::encode::{self, Encoded, Job};
@@ -12,7 +13,7 @@ use cager_client::messages::SessionOptions;
 use cager_core::cage::Cage;
 use cager_core::inversion::{PrepareError, SolverOptions};
 use cager_core::mesh::{Model, TriMesh};
-use cager_formats::{AtomicFile, CacheFormat, CompleteFile, MeshFormat, commit_together, open_frames, read_model};
+use cager_formats::{AtomicFile, CompleteFile, commit_together, open_frames, read_model};
 use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
@@ -81,7 +82,7 @@ fn elsewhere(args: &EncodeArgs, address: &str, rest: &Model, cage: &Cage, clock:
 
 /// What comes before the work, so that outputs that cannot be written cost no waiting.
 fn begin(args: &EncodeArgs) -> Result<Option<AtomicFile>> {
-    refuse_overwriting(args)?;
+    refuse_overwriting(&args.output, args.report.as_deref(), [&args.rest, &args.cage, &args.frames])?;
     interrupt::leaves_nothing()?;
     Ok(args.report.as_ref().map(AtomicFile::create).transpose()?)
 }
@@ -99,24 +100,27 @@ fn finish(args: &EncodeArgs, encoded: Encoded, report_file: Option<AtomicFile>, 
 /// Errors of the mathematics know vertices and points; the user knows files.
 fn name_files(error: encode::EncodeError, args: &EncodeArgs) -> anyhow::Error {
     match error {
-        encode::EncodeError::Prepare(inner) => {
-            let path = match inner {
-                PrepareError::NotFinite { .. }
-                | PrepareError::TooFewPoints { .. }
-                | PrepareError::NoExtent
-                | PrepareError::TooLarge
-                | PrepareError::NotReproduced { .. }
-                | PrepareError::TooFar { .. }
-                | PrepareError::OutOfMemory { .. } => &args.rest,
-                _ => &args.cage,
-            };
-            match inner {
-                PrepareError::BadLambda { .. } => anyhow::anyhow!("--lambda: {inner}"),
-                PrepareError::SpectrumTooLarge { .. } => anyhow::anyhow!("--spectrum: {inner}"),
-                _ => anyhow::anyhow!("{}: {inner}", path.display()),
-            }
-        }
+        encode::EncodeError::Prepare(inner) => name_file(inner, &args.rest, &args.cage),
         other => other.into(),
+    }
+}
+
+/// Names the file or the option that is to blame.
+pub(super) fn name_file(error: PrepareError, rest: &Path, cage: &Path) -> anyhow::Error {
+    let path = match error {
+        PrepareError::NotFinite { .. }
+        | PrepareError::TooFewPoints { .. }
+        | PrepareError::NoExtent
+        | PrepareError::TooLarge
+        | PrepareError::NotReproduced { .. }
+        | PrepareError::TooFar { .. }
+        | PrepareError::OutOfMemory { .. } => rest,
+        _ => cage,
+    };
+    match error {
+        PrepareError::BadLambda { .. } => anyhow::anyhow!("--lambda: {error}"),
+        PrepareError::SpectrumTooLarge { .. } => anyhow::anyhow!("--spectrum: {error}"),
+        _ => anyhow::anyhow!("{}: {error}", path.display()),
     }
 }
 
@@ -152,34 +156,6 @@ pub(super) fn write_report(mut file: AtomicFile, report: &Report) -> Result<Comp
     text.push(b'\n');
     file.write_all(&text)?;
     Ok(file.complete()?)
-}
-
-/// An output in place of an input, or of the other output, is a slip that would cost the user a file.
-fn refuse_overwriting(args: &EncodeArgs) -> Result<()> {
-    for output in [Some(&args.output), args.report.as_ref()].into_iter().flatten() {
-        let Ok(place) = output.canonicalize() else { continue };
-        for input in [&args.rest, &args.cage, &args.frames] {
-            if input.canonicalize().is_ok_and(|input| input == place) {
-                bail!(
-                    "{}: is an input of this encoding, so it cannot be an output; name another file",
-                    output.display()
-                );
-            }
-        }
-        // It may be a frame of the folder or pattern; no container or report has such a name.
-        if output.exists() && (MeshFormat::from_path(output).is_ok() || CacheFormat::from_path(output).is_some()) {
-            bail!("{}: is a mesh or a capture, so it is not replaced; name another file", output.display());
-        }
-    }
-    let place = |path: &Path| {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        path.canonicalize().ok().or_else(|| Some(folder.canonicalize().ok()?.join(path.file_name()?)))
-    };
-    let report = args.report.as_deref().and_then(place);
-    if report.is_some() && report == place(&args.output) {
-        bail!("{}: cannot hold both the capture and the report; name two files", args.output.display());
-    }
-    Ok(())
 }
 
 fn summary(report: &Report, output: &Path) -> String {

@@ -88,7 +88,9 @@ pub(crate) struct Chart {
 impl Chart {
     /// The `svg` element.
     pub(crate) fn svg(&self) -> String {
-        let all = |f: fn(&(f64, f64)) -> f64| -> Vec<f64> { self.series.iter().flat_map(|s| s.points.iter().map(f)).collect() };
+        let all = |f: fn(&(f64, f64)) -> f64| -> Vec<f64> {
+            self.series.iter().flat_map(|s| s.points.iter().map(f)).collect()
+        };
         let (x, y) = (Scale::covering(self.x.cover, &all(|p| p.0)), Scale::covering(self.y.cover, &all(|p| p.1)));
         let top_of_legend = if self.title.is_empty() { NO_TITLE } else { TITLE };
         let (legend, rows) = self.legend(top_of_legend);
@@ -96,7 +98,11 @@ impl Chart {
         let place = Place { x, y, top };
         let height = top + PANEL + 42.0;
         let mut svg = String::new();
-        let _ = writeln!(svg, r#"<svg class="chart" viewBox="0 0 {WIDTH} {height}" role="img" aria-label="{}">"#, escaped(&self.title));
+        let _ = writeln!(
+            svg,
+            r#"<svg class="chart" viewBox="0 0 {WIDTH} {height}" role="img" aria-label="{}">"#,
+            escaped(&self.title)
+        );
         if !self.title.is_empty() {
             let _ = writeln!(svg, r#"<text class="t" x="{LEFT}" y="15">{}</text>"#, escaped(&self.title));
         }
@@ -126,7 +132,12 @@ impl Chart {
                 Mark::Dots => dot(&mut svg, x + 11.0, y - 4.0, 3.2),
                 Mark::Diamonds => diamond(&mut svg, x + 11.0, y - 4.0),
             }
-            let _ = writeln!(svg, r#"<text class="l" x="{:.1}" y="{y:.1}">{}</text></g>"#, x + 28.0, escaped(&series.label));
+            let _ = writeln!(
+                svg,
+                r#"<text class="l" x="{:.1}" y="{y:.1}">{}</text></g>"#,
+                x + 28.0,
+                escaped(&series.label)
+            );
             x += width;
         }
         let any = self.series.iter().any(|s| !s.label.is_empty());
@@ -138,17 +149,41 @@ impl Chart {
         let whole = |tick: &f64| tick.fract() == 0.0;
         for tick in place.y.ticks().into_iter().filter(|t| !self.y.whole || whole(t)) {
             let y = place.y_of(tick);
-            let _ = writeln!(svg, r#"<path class="g" d="M{LEFT} {y:.1}H{RIGHT}"/><text class="a" x="{:.1}" y="{:.1}" text-anchor="end">{}</text>"#, LEFT - 7.0, y + 4.0, short(tick));
+            let _ = writeln!(
+                svg,
+                r#"<path class="g" d="M{LEFT} {y:.1}H{RIGHT}"/><text class="a" x="{:.1}" y="{:.1}" text-anchor="end">{}</text>"#,
+                LEFT - 7.0,
+                y + 4.0,
+                short(tick)
+            );
         }
         for tick in place.x.ticks().into_iter().filter(|t| !self.x.whole || whole(t)) {
             let x = place.x_of(tick);
-            let _ = writeln!(svg, r#"<path class="g" d="M{x:.1} {:.1}V{bottom:.1}"/><text class="a" x="{x:.1}" y="{:.1}" text-anchor="middle">{}</text>"#, place.top, bottom + 16.0, short(tick));
+            let _ = writeln!(
+                svg,
+                r#"<path class="g" d="M{x:.1} {:.1}V{bottom:.1}"/><text class="a" x="{x:.1}" y="{:.1}" text-anchor="middle">{}</text>"#,
+                place.top,
+                bottom + 16.0,
+                short(tick)
+            );
         }
         let _ = writeln!(svg, r#"<path class="b" d="M{LEFT} {bottom:.1}H{RIGHT}"/>"#);
         let log = |scale: &Scale| if scale.logarithmic { " (log)" } else { "" };
-        let _ = writeln!(svg, r#"<text class="n" x="{:.1}" y="{:.1}" text-anchor="middle">{}{}</text>"#, (LEFT + RIGHT) / 2.0, bottom + 35.0, escaped(&self.x.label), log(&place.x));
+        let _ = writeln!(
+            svg,
+            r#"<text class="n" x="{:.1}" y="{:.1}" text-anchor="middle">{}{}</text>"#,
+            (LEFT + RIGHT) / 2.0,
+            bottom + 35.0,
+            escaped(&self.x.label),
+            log(&place.x)
+        );
         let middle = place.top + PANEL / 2.0;
-        let _ = writeln!(svg, r#"<text class="n" transform="translate(13 {middle:.1}) rotate(-90)" text-anchor="middle">{}{}</text>"#, escaped(&self.y.label), log(&place.y));
+        let _ = writeln!(
+            svg,
+            r#"<text class="n" transform="translate(13 {middle:.1}) rotate(-90)" text-anchor="middle">{}{}</text>"#,
+            escaped(&self.y.label),
+            log(&place.y)
+        );
     }
 }
 
@@ -233,12 +268,18 @@ mod tests {
     use super::*;
 
     fn chart(points: Vec<(f64, f64)>, cover: Cover) -> Chart {
-        let series = |label: &str, mark| Series { label: label.to_owned(), class: "k-all", mark, points: points.clone() };
+        let series =
+            |label: &str, mark| Series { label: label.to_owned(), class: "k-all", mark, points: points.clone() };
         Chart {
             title: "a<b".to_owned(),
             x: Axis::counting("frame"),
             y: Axis::new("error, %", cover),
-            series: vec![series("one", Mark::Line), series("two", Mark::Dashes), series("", Mark::Dots), series("four", Mark::Diamonds)],
+            series: vec![
+                series("one", Mark::Line),
+                series("two", Mark::Dashes),
+                series("", Mark::Dots),
+                series("four", Mark::Diamonds),
+            ],
         }
     }
 
@@ -289,7 +330,8 @@ mod tests {
 
     #[test]
     fn logarithmic_axes_have_round_ticks() {
-        let ticks = |values: &[f64]| Scale::covering(Cover::Factors, values).ticks().into_iter().map(short).collect::<Vec<_>>();
+        let ticks =
+            |values: &[f64]| Scale::covering(Cover::Factors, values).ticks().into_iter().map(short).collect::<Vec<_>>();
         assert_eq!(ticks(&[1.5, 30.0]), ["1", "2", "5", "10", "20"]);
         assert_eq!(ticks(&[1e-6, 1.0]).len(), 5);
         let around = Scale::covering(Cover::Around, &[-399.0, -350.0]);

@@ -1,0 +1,26 @@
+//! Handles drawn at random against those of maximum volume (the paper's Fig. 3).
+
+use crate::compare::noise::Random;
+use crate::compare::track::Totals;
+use serde::Serialize;
+
+/// Draws.
+pub(crate) const DRAWS: u64 = 10;
+
+/// One choice of as many points as unknowns, inverted by the data alone.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Draw {
+    /// How the points were chosen.
+    pub(crate) choice: String,
+    /// Numerical rank of their rows.
+    pub(crate) rank: usize,
+    /// Condition number of their rows.
+    pub(crate) condition: f64,
+    /// Errors; spikes as well.
+    pub(crate) totals: Totals,
+}
+
+/// Rows of each draw, `count` of `points`.
+pub(crate) fn draws(count: usize, points: usize) -> Vec<(String, Vec<u32>)> {
+    (1..=DRAWS).map(|seed| (format!("random {seed}"), Random::new(seed).choose(count, points))).collect()
+}
