@@ -145,3 +145,86 @@ fn frames_of(reader: &mut dyn FrameReader, wanted: &[usize]) -> Result<Vec<Frame
 fn as_points<T: Copy + Into<f64>>(coordinates: &[T]) -> Vec<Point> {
     coordinates.as_chunks::<3>().0.iter().map(|p| p.map(Into::into)).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cager_core::coordinates::{Coordinates, CoordinatesError, MeanValue};
+    use cager_core::synthetic::{Capture, Options};
+
+    /// A system that no cage is good enough for.
+    struct Never;
+
+    impl CoordinateSystem for Never {
+        fn name(&self) -> &'static str {
+            "never"
+        }
+
+        fn unknowns(&self, cage: &Cage) -> usize {
+            cage.vertices().len()
+        }
+
+        fn rest_unknowns(&self, cage: &Cage) -> Vec<Point> {
+            cage.vertices().to_vec()
+        }
+
+        fn coordinates(&self, _: &Cage, _: &[Point]) -> Result<Coordinates, CoordinatesError> {
+            Err(CoordinatesError::Outside { system: "never", points: vec![3, 17], distance: 0.02 })
+        }
+    }
+
+    /// Frames that are made as they are read.
+    struct Made(Capture, usize);
+
+    impl FrameReader for Made {
+        fn points(&self) -> usize {
+            self.0.rest.points.len()
+        }
+
+        fn frames(&self) -> usize {
+            self.0.frames()
+        }
+
+        fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, cager_formats::Error> {
+            out.clear();
+            if self.1 == self.0.frames() {
+                return Ok(false);
+            }
+            self.0.frame(self.1, out);
+            self.1 += 1;
+            Ok(true)
+        }
+    }
+
+    fn run(systems: &[&'static dyn CoordinateSystem]) -> Result<(Figures, Vec<Pictures>), CompareError> {
+        let capture = Capture::new(&Options { points: 400, frames: 5, cage_vertices: 40 });
+        let cage = Cage::new(capture.cage.clone()).expect("a cage");
+        let open = || Ok(Box::new(Made(capture.clone(), 0)) as Box<dyn FrameReader>);
+        let job = Job {
+            rest: &capture.rest,
+            cage: &cage,
+            open: &open,
+            systems,
+            frames_at_most: 120,
+            up: None,
+            names: ["rest", "cage", "frames"].map(str::to_owned),
+        };
+        compare(&job, &mut Progress { tell: &mut |_, _, _| {} })
+    }
+
+    #[test]
+    fn a_system_that_cannot_be_computed_has_a_section_that_says_why() {
+        let (figures, pictures) = run(&[&Never, &MeanValue]).expect("a comparison");
+        assert_eq!(figures.computed().map(|(name, _)| name).collect::<Vec<_>>(), ["mvc"]);
+        let html = page(&figures, &pictures);
+        let section = html.split("<h2 id=\"refused\">").nth(1).and_then(|rest| rest.split("<h2").next());
+        assert!(section.is_some_and(|s| s.contains("never") && s.contains("2 points lie outside the cage (3, 17)")));
+        let alone = page(&run(&[&MeanValue]).expect("a comparison").0, &pictures);
+        assert!(!alone.contains("id=\"refused\""));
+    }
+
+    #[test]
+    fn nothing_to_compare_is_an_error() {
+        assert!(matches!(run(&[&Never]), Err(CompareError::Prepare(PrepareError::Coordinates(_)))));
+    }
+}

@@ -225,7 +225,9 @@ impl<'a> Painter<'a> {
         let Some(frame) = self.frame(self.shown) else { return Ok((Vec::new(), 1.0)) };
         let mut solvers = Vec::new();
         if let Some((name, rows)) = &studied.middling {
-            solvers.push((format!("{name}, data alone"), studied.analysis.solver_reading(rows, data_alone())?));
+            let usual = studied.figures.method(|m| m.is_cager() && m.curve).map(|m| m.method.options());
+            let solver = studied.analysis.solver_reading(rows, usual.unwrap_or_else(data_alone))?;
+            solvers.push((format!("{name}, sub-spectral"), solver));
         }
         for found in studied.figures.methods.iter().filter(|found| shows_model(&found.method)) {
             solvers.push((found.method.name(), studied.analysis.solver(found.method.options())?));

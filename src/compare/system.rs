@@ -39,7 +39,7 @@ pub(super) struct Studied {
 enum Subject {
     Method(Method),
     Noise(Method),
-    Draw(String, Vec<u32>),
+    Draw(String, Vec<u32>, SolverOptions),
 }
 
 /// Studies a system on the sample.
@@ -66,7 +66,12 @@ pub(super) fn study(
     subjects.extend(noise_methods(unknowns, usual, damping).into_iter().map(Subject::Noise));
     let start = analysis.handles().start.clone();
     let drawn = draws(unknowns, job.rest.points.len()).into_iter().chain([("pivoted LU".to_owned(), start)]);
-    subjects.extend(drawn.map(|(choice, rows)| Subject::Draw(choice, rows)));
+    let regularised = SolverOptions { spectrum: usual, ..SolverOptions::default() };
+    for (choice, rows) in drawn {
+        for options in [data_alone(), regularised] {
+            subjects.push(Subject::Draw(choice.clone(), rows.clone(), options));
+        }
+    }
 
     let mut found = Found::default();
     let mut motion = Motion::new(sample);
@@ -130,7 +135,7 @@ fn noise_methods(unknowns: usize, usual: usize, damping: f64) -> Vec<Method> {
 fn solver(analysis: &Analysis, subject: &Subject) -> Result<Solver, PrepareError> {
     match subject {
         Subject::Method(method) | Subject::Noise(method) => analysis.solver(method.options()),
-        Subject::Draw(_, rows) => analysis.solver_reading(rows, data_alone()),
+        Subject::Draw(_, rows, options) => analysis.solver_reading(rows, *options),
     }
 }
 
@@ -199,11 +204,15 @@ impl Found {
                 let (clean_l2_mean, clean_linf_max) = (clean.l2_mean, clean.linf_max);
                 self.noise.push(NoiseFigures { method, totals, per_frame: track.found, clean_l2_mean, clean_linf_max });
             }
-            Subject::Draw(choice, rows) => {
-                let found = track.solver.preparation();
-                self.draws.push(Draw { choice, rank: found.rank, condition: found.condition_handles, totals });
-                self.rows.push(rows);
-            }
+            Subject::Draw(choice, rows, _) => match self.draws.last_mut().filter(|draw| draw.choice == choice) {
+                Some(draw) => draw.totals = totals,
+                None => {
+                    let found = track.solver.preparation();
+                    let (rank, condition) = (found.rank, found.condition_handles);
+                    self.draws.push(Draw { choice, rank, condition, data_alone: totals, totals });
+                    self.rows.push(rows);
+                }
+            },
         }
     }
 

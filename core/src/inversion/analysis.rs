@@ -98,7 +98,7 @@ impl Analysis {
         let operator = operator(
             self.phi.as_ref(),
             &self.basis,
-            self.spectra.clone(),
+            self.spectra.reading(options.handles),
             self.delta.as_ref(),
             options,
             &mut preparation,

@@ -11,7 +11,6 @@ use faer::{Mat, MatRef, Par};
 use rayon::prelude::*;
 
 /// Decompositions of the handles and of all points.
-#[derive(Clone)]
 pub(super) struct Spectra {
     pub(super) handles: Svd,
     pub(super) full_sigma: Vec<f64>,
@@ -35,6 +34,14 @@ impl Spectra {
         let handles = handles.ok_or(failed("singular value decomposition of the handles"))?;
         let (full_sigma, full) = full.ok_or(failed("singular value decomposition of the coordinates"))?;
         Ok(Self { handles, full_sigma, full })
+    }
+}
+
+impl Spectra {
+    /// What inverting needs of them when it reads these points.
+    pub(super) fn reading(&self, read: Handles) -> Self {
+        let full = if read == Handles::All { self.full.clone() } else { None };
+        Self { handles: self.handles.clone(), full_sigma: self.full_sigma.clone(), full }
     }
 }
 

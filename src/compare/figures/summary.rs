@@ -158,7 +158,7 @@ fn swaps(figures: &SystemFigures) -> Option<Claim> {
 }
 
 fn random(figures: &SystemFigures) -> Option<Claim> {
-    let maxvol = figures.method(|m| m.handles == Handles::MaxVol && m.regularizer == Regularizer::None)?;
+    let maxvol = usual(figures)?;
     let drawn = figures.random.iter().filter(|draw| draw.choice.starts_with("random"));
     let mut l2: Vec<f64> = drawn.map(|draw| draw.totals.l2_mean).collect();
     l2.sort_by(f64::total_cmp);

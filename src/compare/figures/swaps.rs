@@ -2,7 +2,7 @@
 
 use crate::compare::noise::Random;
 use cager_core::inversion::Analysis;
-use cager_core::maxvol::{MaxVol, TOLERANCE, maxvol_from};
+use cager_core::maxvol::{MaxVol, TOLERANCE, maxvol, maxvol_from};
 use faer::Mat;
 use serde::Serialize;
 
@@ -10,15 +10,15 @@ use serde::Serialize;
 const CONDITIONS: usize = 40;
 /// From more points than this, the search with a random start takes evenly spaced ones.
 const MOST_POINTS: usize = 30_000;
-/// Random starts to try before one is regular.
-const ATTEMPTS: u64 = 20;
+/// Points drawn for a random start, as multiples of the unknowns: among fewer there may be no independent ones.
+const DRAWN: [usize; 4] = [2, 4, 8, 16];
 
 /// Both searches.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Swaps {
     /// From the rows that LU with partial pivoting picks, as every encoding does it.
     pub(crate) from_lu: SwapTrace,
-    /// From rows drawn at random, as in the paper; null where no regular ones were found.
+    /// From rows that LU picks among a few points drawn at random; null where no independent ones were found.
     pub(crate) from_random: Option<SwapTrace>,
 }
 
@@ -56,9 +56,14 @@ fn from_random(analysis: &Analysis) -> Option<SwapTrace> {
     if rows.len() < m {
         return None;
     }
-    let some = Mat::from_fn(rows.len(), m, |i, j| phi[(rows[i] as usize, j)]);
-    let start = |seed| Random::new(seed).choose(m, rows.len());
-    let found = (0..ATTEMPTS).find_map(|seed| maxvol_from(some.as_ref(), start(seed), TOLERANCE).ok())?;
+    let rows_of = |rows: &[u32]| Mat::from_fn(rows.len(), m, |i, j| phi[(rows[i] as usize, j)]);
+    let some = rows_of(&rows);
+    let found = DRAWN.iter().find_map(|times| {
+        let drawn = Random::new(0).choose((times * m).min(rows.len()), rows.len());
+        let of_rows: Vec<u32> = drawn.iter().map(|&i| rows[i as usize]).collect();
+        let start = maxvol(rows_of(&of_rows).as_ref(), TOLERANCE).ok()?.start;
+        maxvol_from(some.as_ref(), start.iter().map(|&i| drawn[i as usize]).collect(), TOLERANCE).ok()
+    })?;
     Some(SwapTrace::of(&found, analysis, &rows))
 }
 

@@ -17,7 +17,7 @@ pub(super) fn swaps(html: &mut Html, systems: &[Shown<'_>]) {
     for (name, found, pictures) in systems {
         let traces = [
             ("pivoted LU", "k-cager", Some(&found.swaps.from_lu)),
-            ("random rows", "k-all", found.swaps.from_random.as_ref()),
+            ("LU of a few drawn points", "k-all", found.swaps.from_random.as_ref()),
         ];
         let chart = |title: &str, label: &str, cover: Cover, points: fn(&SwapTrace) -> Vec<(f64, f64)>| Chart {
             title: format!("{name}: {title}"),
@@ -58,7 +58,7 @@ pub(super) fn swaps(html: &mut Html, systems: &[Shown<'_>]) {
     html.plots(
         &charts,
         "Volume and condition number of the handles' matrix Φ□ after every swap.",
-        "The search starts from the rows that LU with partial pivoting picks, which is close to the end, or, as in the paper, from rows drawn at random. Each swap multiplies the volume by the entry of B that called for it; it ends where no entry exceeds 1.01. Volume should only rise; the condition number need not fall at each swap, but does in the long run.",
+        "The search starts from the rows that LU with partial pivoting picks, which is close to the end, or from those that LU picks among a few points drawn at random, which is farther away, as the paper's start is. Each swap multiplies the volume by the entry of B that called for it; it ends where no entry exceeds 1.01. Volume should only rise; the condition number need not fall at each swap, but does in the long run.",
         "Paper: Fig. 4.",
     );
     html.table(&table);
@@ -95,6 +95,7 @@ pub(super) fn random(html: &mut Html, systems: &[Shown<'_>]) {
                 percent(draw.totals.l2_mean, 4),
                 percent(draw.totals.linf_max, 2),
                 percent(draw.totals.spike_mean, 4),
+                large(draw.data_alone.l2_mean),
             ]);
         }
         let mut series = vec![
@@ -102,11 +103,14 @@ pub(super) fn random(html: &mut Html, systems: &[Shown<'_>]) {
             Series { label: "start of maxvol (LU)".to_owned(), class: "k-maxvol", mark: Mark::Dots, points: start },
         ];
         let plain = |handles: Handles| found.method(|m| m.handles == handles && m.regularizer == Regularizer::None);
+        let usual = |handles: Handles| {
+            found.method(|m| m.handles == handles && m.regularizer == Regularizer::Laplacian && m.curve)
+        };
         for (handles, label, class, cond) in [
             (Handles::MaxVol, "maxvol", "k-cager", found.spectra.condition_handles),
             (Handles::All, "all points", "k-all", found.spectra.condition_full),
         ] {
-            let Some(m) = plain(handles) else { continue };
+            let (Some(m), Some(alone)) = (usual(handles), plain(handles)) else { continue };
             let points = vec![(cond, 100.0 * m.totals.l2_mean)];
             series.push(Series { label: label.to_owned(), class, mark: Mark::Diamonds, points });
             table.row(vec![
@@ -117,6 +121,7 @@ pub(super) fn random(html: &mut Html, systems: &[Shown<'_>]) {
                 percent(m.totals.l2_mean, 4),
                 percent(m.totals.linf_max, 2),
                 percent(m.totals.spike_mean, 4),
+                large(alone.totals.l2_mean),
             ]);
         }
         charts.push(Chart {
@@ -128,9 +133,18 @@ pub(super) fn random(html: &mut Html, systems: &[Shown<'_>]) {
     }
     html.plots(
         &charts,
-        "Ten draws of as many points as unknowns, the rows maxvol starts from, maxvol, and all points, each inverted by the data alone.",
-        "One dot for each choice of handles: to the right the less stable, upwards the less accurate ones. What a draw looks like is the first picture under “Errors of the reconstructed model”.",
+        "Ten draws of as many points as unknowns, the rows maxvol starts from, maxvol, and all points, each with sub-spectral regularisation at the usual threshold.",
+        "One dot for each choice of handles: to the right the less stable, upwards the less accurate ones. Points drawn at random often lie so close together that their rows are dependent; without regularisation they reconstruct nothing at all (last column). What a draw looks like is the first picture under “Errors of the reconstructed model”.",
         "Paper: Fig. 3.",
     );
     html.table(&table);
+}
+
+/// An error in percent that may be of any size.
+fn large(fraction: f64) -> String {
+    if fraction < 1.0 { percent(fraction, 4) } else { number_of(100.0 * fraction) }
+}
+
+fn number_of(value: f64) -> String {
+    if value.is_finite() { format!("{value:.1e}") } else { "–".to_owned() }
 }

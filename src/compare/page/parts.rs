@@ -109,7 +109,7 @@ impl Html {
 pub(super) struct Table {
     headers: Vec<String>,
     words: usize,
-    paragraphs: bool,
+    paragraphs: &'static [usize],
     rows: Vec<(&'static str, Vec<String>)>,
 }
 
@@ -117,12 +117,12 @@ impl Table {
     /// With these headers, of which the first `words` are of columns of words. Headers and cells are markup.
     pub(super) fn new(headers: &[&str], words: usize) -> Self {
         let headers = headers.iter().map(|&header| header.to_owned()).collect();
-        Self { headers, words, paragraphs: false, rows: Vec::new() }
+        Self { headers, words, paragraphs: &[], rows: Vec::new() }
     }
 
-    /// Whose columns of words may run over several lines.
-    pub(super) fn of_paragraphs(mut self) -> Self {
-        self.paragraphs = true;
+    /// Whose cells in these columns may run over several lines.
+    pub(super) fn with_paragraphs(mut self, columns: &'static [usize]) -> Self {
+        self.paragraphs = columns;
         self
     }
 
@@ -137,7 +137,7 @@ impl Table {
     }
 
     fn class(&self, column: usize) -> &'static str {
-        match (column < self.words, self.paragraphs) {
+        match (column < self.words, self.paragraphs.contains(&column)) {
             (true, true) => r#" class="w p""#,
             (true, false) => r#" class="w""#,
             _ => "",

@@ -55,7 +55,7 @@ pub(super) fn head(figures: &Figures) -> String {
 fn card(title: &str, choice: &Choice, why: &str, figures: &Figures) -> String {
     let capture = &figures.capture;
     let command = format!(
-        "cager encode --rest {} --cage {} --frames {} {} -o out.cager",
+        "cager encode --rest {} \\\n  --cage {} \\\n  --frames {} \\\n  {} \\\n  -o out.cager",
         quoted(&capture.rest),
         quoted(&capture.cage),
         quoted(&capture.source),
@@ -84,7 +84,7 @@ fn quoted(word: &str) -> String {
 /// The paper's claims on this capture.
 pub(super) fn claims(html: &mut Html, figures: &Figures) {
     html.section("claims", "What the paper says, and what this capture says");
-    let mut table = Table::new(&["", "system", "claim", "where", "measured here"], 5).of_paragraphs();
+    let mut table = Table::new(&["", "system", "claim", "where", "measured here"], 5).with_paragraphs(&[2, 4]);
     for claim in &figures.claims {
         let (class, word) = match claim.verdict {
             Verdict::Holds => ("holds", "holds"),
