@@ -13,16 +13,21 @@ use cager_core::mesh::{Point, TriMesh};
 use cager_formats::FrameReader;
 use rayon::prelude::*;
 
-/// Pixels of a picture, about.
+/// Pixels of a picture, about, and of that of the handles.
 const PIXELS: f64 = 420.0 * 420.0;
+const HANDLES_PIXELS: f64 = 4.0 * PIXELS;
+/// A reconstruction farther off than this, over the diagonal, has a view of its own.
+const LOST: f64 = 0.5;
+/// A singular vector on fewer unknowns than this is marked where it lives.
+const FEW: f64 = 12.0;
 /// Width over height that pictures keep to.
 const ASPECT: [f64; 2] = [0.6, 1.7];
 /// Frames of the row that shows the capture.
-const ROW: usize = 5;
+const ROW: usize = 4;
 /// Colours of the model, of cages, of their edges and of handles.
 const MODEL: [f32; 3] = [0.80, 0.81, 0.83];
 const CAGE: [f32; 3] = [0.16, 0.42, 0.70];
-const EDGES: [f32; 3] = [0.36, 0.38, 0.42];
+const EDGES: [f32; 3] = [0.46, 0.48, 0.52];
 const HANDLES: [f32; 3] = [0.16, 0.62, 0.36];
 
 /// A picture with what stands below it.
@@ -124,27 +129,28 @@ impl<'a> Painter<'a> {
     }
 
     /// A camera on these points, and the size of its pictures.
-    fn camera(&self, points: &[Point]) -> (Camera, usize, usize) {
+    fn camera(&self, points: &[Point], pixels: f64) -> (Camera, usize, usize) {
         let rest = &self.looks.mesh.vertices;
         let square = Camera::fitting(points, rest, self.up, 1.0);
         let seen: Vec<Point> = points.iter().map(|p| square.project(*p, [1000, 1000])).collect();
         let (low, high) = cager_core::mesh::bounds(&seen);
         let aspect = (high[0] - low[0]) / (high[1] - low[1]);
         let aspect = if aspect.is_finite() { aspect.clamp(ASPECT[0], ASPECT[1]) } else { 1.0 };
-        let (width, height) = ((PIXELS * aspect).sqrt() as usize, (PIXELS / aspect).sqrt() as usize);
+        let (width, height) = ((pixels * aspect).sqrt() as usize, (pixels / aspect).sqrt() as usize);
         (Camera::fitting(points, rest, self.up, width as f64 / height as f64), width, height)
     }
 
     fn handles(&self, studied: &Studied) -> Picture {
         let (mesh, cage) = (self.looks.mesh, self.looks.cage);
         let both: Vec<Point> = mesh.vertices.iter().chain(cage.vertices()).copied().collect();
-        let (camera, width, height) = self.camera(&both);
+        let (camera, width, height) = self.camera(&both, HANDLES_PIXELS);
         let mut scene = Scene::new(camera, width, height);
         scene.surface(model(&mesh.vertices, mesh), Shade::Plain(MODEL), true);
         scene.lines(cage.vertices(), &self.edges, CAGE);
-        let handles: Vec<Point> =
-            studied.analysis.handles().rows.iter().map(|&row| mesh.vertices[row as usize]).collect();
-        scene.dots(&handles, HANDLES, 2.6);
+        let handles = &studied.analysis.handles().rows;
+        for &row in handles {
+            scene.dot(mesh.vertices[row as usize], HANDLES, 4.5, false);
+        }
         Picture {
             title: "handles".to_owned(),
             note: format!("{} points of maximum volume", handles.len()),
@@ -167,7 +173,7 @@ impl<'a> Painter<'a> {
             .par_iter()
             .map(|(number, cage, points)| {
                 let both: Vec<Point> = points.iter().chain(cage).copied().collect();
-                let (camera, width, height) = self.camera(&both);
+                let (camera, width, height) = self.camera(&both, PIXELS);
                 let mut scene = Scene::new(camera, width, height);
                 scene.surface(model(points, mesh), Shade::Plain(MODEL), true);
                 scene.lines(cage, &self.edges, CAGE);
@@ -202,7 +208,7 @@ impl<'a> Painter<'a> {
         // Spikes may leave the picture; the cages of the paper's own method do not.
         let calm = shots.last().map_or(&[][..], |shot| &shot.1);
         let fitted: Vec<Point> = model_points.iter().chain(calm).copied().collect();
-        let (camera, width, height) = self.camera(&fitted);
+        let (camera, width, height) = self.camera(&fitted, PIXELS);
         let faces: Vec<[u32; 3]> = self.looks.cage.mesh().triangles.clone();
         let pictures = shots
             .par_iter()
@@ -245,15 +251,16 @@ impl<'a> Painter<'a> {
             .collect();
         // What the random draw does would leave the others without colour.
         let ramp = Ramp::over(shots.iter().skip(usize::from(shots.len() > 1)).flat_map(|shot| &shot.2));
-        let (camera, width, height) = self.camera(&as_points(&frame.points));
+        let (camera, width, height) = self.camera(&as_points(&frame.points), PIXELS);
         let pictures = shots
             .par_iter()
             .map(|(title, points, errors)| {
                 let colours: Vec<[f32; 3]> = errors.iter().map(|x| ramp.colour(*x)).collect();
-                let mut scene = Scene::new(camera, width, height);
+                let linf = errors.iter().copied().fold(0.0, f64::max);
+                let view = if linf > LOST { self.camera(&most(points), PIXELS) } else { (camera, width, height) };
+                let mut scene = Scene::new(view.0, view.1, view.2);
                 scene.surface(model(points, self.looks.mesh), Shade::PerPoint(&colours), true);
                 let l2 = (errors.iter().map(|x| x * x).sum::<f64>() / errors.len() as f64).sqrt();
-                let linf = errors.iter().copied().fold(0.0, f64::max);
                 let note = format!("L2 {:.3} %, L∞ {:.2} %", 100.0 * l2, 100.0 * linf);
                 Picture { title: title.clone(), note, png: scene.png() }
             })
@@ -263,7 +270,7 @@ impl<'a> Painter<'a> {
 
     fn vectors(&self, studied: &Studied) -> Vec<Picture> {
         let cage = self.looks.cage;
-        let (camera, width, height) = self.camera(cage.vertices());
+        let (camera, width, height) = self.camera(cage.vertices(), PIXELS);
         let (v, sigma) = (studied.analysis.handle_vectors(), studied.analysis.handle_spectrum());
         let painted = &studied.figures.vectors.painted;
         painted
@@ -271,8 +278,7 @@ impl<'a> Painter<'a> {
             .map(|&k| {
                 let values: Vec<f64> = (0..cage.vertices().len()).map(|j| v[(j, k)]).collect();
                 let top = values.iter().copied().fold(0.0, |a: f64, x| a.max(x.abs()));
-                let colours: Vec<[f32; 3]> =
-                    values.iter().map(|x| diverging(if top > 0.0 { x / top } else { 0.0 })).collect();
+                let colours: Vec<[f32; 3]> = values.iter().map(|x| diverging(signed_root(*x, top))).collect();
                 let mut scene = Scene::new(camera, width, height);
                 scene.surface(
                     Mesh { points: cage.vertices(), triangles: &cage.mesh().triangles },
@@ -280,6 +286,12 @@ impl<'a> Painter<'a> {
                     false,
                 );
                 scene.lines(cage.vertices(), &self.edges, EDGES);
+                if studied.figures.vectors.spread[k] < FEW {
+                    for (j, vertex) in cage.vertices().iter().enumerate().filter(|(j, _)| values[*j].abs() > 0.25 * top)
+                    {
+                        scene.dot(*vertex, colours[j], 6.0, true);
+                    }
+                }
                 let note = match sigma.get(k) {
                     Some(sigma) => {
                         format!("singular value {sigma:.3}, on {:.0} unknowns", studied.figures.vectors.spread[k])
@@ -301,6 +313,21 @@ fn most_spiky(figures: &SystemFigures) -> usize {
             .max_by(|&a, &b| values[a].total_cmp(&values[b]).then(b.cmp(&a)))
     };
     largest(&full.per_frame.spike_max).or_else(|| largest(&full.per_frame.linf)).unwrap_or(0)
+}
+
+/// Without the outermost fiftieth in every direction.
+fn most(points: &[Point]) -> Vec<Point> {
+    let ends = [0, 1, 2].map(|k| {
+        let mut sorted: Vec<f64> = points.iter().map(|p| p[k]).collect();
+        sorted.sort_by(f64::total_cmp);
+        [sorted[sorted.len() / 50], sorted[sorted.len() - 1 - sorted.len() / 50]]
+    });
+    points.iter().filter(|p| (0..3).all(|k| (ends[k][0]..=ends[k][1]).contains(&p[k]))).copied().collect()
+}
+
+/// The value over `top` with the small ones raised, so that they are seen.
+fn signed_root(value: f64, top: f64) -> f64 {
+    if top > 0.0 { (value.abs() / top).sqrt().copysign(value) } else { 0.0 }
 }
 
 fn shows_cage(method: &Method, figures: &SystemFigures) -> bool {

@@ -208,7 +208,8 @@ impl Found {
                 Some(draw) => draw.totals = totals,
                 None => {
                     let found = track.solver.preparation();
-                    let (rank, condition) = (found.rank, found.condition_handles);
+                    // Of what is dependent, rounding decides; infinity has no place in a plot.
+                    let (rank, condition) = (found.rank, found.condition_handles.min(1.0 / f64::EPSILON));
                     self.draws.push(Draw { choice, rank, condition, data_alone: totals, totals });
                     self.rows.push(rows);
                 }

@@ -17,12 +17,13 @@ pub(super) fn section(html: &mut Html, figures: &Figures, systems: &[Shown<'_>])
         html.plots(
             &[
                 by_threshold(name, found, "mean spike", "mean second difference, %", |m| m.totals.spike_mean),
+                by_threshold(name, found, "largest spike", "largest second difference, %", |m| m.totals.spike_max),
                 by_threshold(name, found, "edges", "mean change of edges, % of their mean", |m| m.totals.edges_mean),
                 trade(name, found, figures.capture.motion_mean),
                 over_time(name, found, &figures.capture.measured),
             ],
             "How calm the cages are, and what it costs.",
-            "Upper row: over the spectrum threshold s, with all points read and with maxvol handles; the lines of global regularisation have no threshold. Lower left: every method by its error and its restlessness, both better towards the lower left corner; the model's own mean is the line. Lower right: the largest spike of every frame.",
+            "The first three over the spectrum threshold s, for every choice of points read; global regularisation has no threshold and is a level line. Then every method by its error and its restlessness, both better towards the lower left corner, with the model's own mean as a line; and the largest spike of every frame. Axes need not begin at zero.",
             "Paper: Figs. 8, 12, 13, 19 and 20.",
         );
         html.table(&table(found, figures));
@@ -65,7 +66,7 @@ fn by_threshold(
     Chart {
         title: format!("{name}: {title}"),
         x: Axis::counting("spectrum threshold s"),
-        y: Axis::new(label, Cover::FromZero),
+        y: Axis::new(label, Cover::Around),
         series,
     }
 }
@@ -88,8 +89,8 @@ fn trade(name: &str, found: &SystemFigures, motion: f64) -> Chart {
     series.push(Series { label: "the model itself".to_owned(), class: "k-random", mark: Mark::Dashes, points });
     Chart {
         title: format!("{name}: error and restlessness"),
-        x: Axis::new("mean L2, %", Cover::Factors),
-        y: Axis::new("mean second difference, %", Cover::Factors),
+        x: Axis::new("mean L2, %", Cover::Around),
+        y: Axis::new("mean second difference, %", Cover::Around),
         series,
     }
 }

@@ -1,7 +1,7 @@
 //! Singular values.
 
 use super::Shown;
-use super::parts::{Html, Table, condition};
+use super::parts::{Html, Table, condition, number};
 use crate::plot::{Axis, Chart, Cover, Mark, Series};
 
 /// Spectra of all systems.
@@ -41,10 +41,10 @@ pub(super) fn section(html: &mut Html, systems: &[Shown<'_>]) {
         charts.push(chart(format!("{name}: last fifth"), found.unknowns * 4 / 5, Cover::FromZero));
         for (label, class, values, cond) in spectra {
             let at = |part: f64| values.get(((values.len() - 1) as f64 * part) as usize).map_or(f64::NAN, |s| *s);
-            let cells = [0.0, 0.25, 0.5, 0.75, 1.0].map(|part| format!("{:.3e}", at(part)));
+            let cells = [0.0, 0.25, 0.5, 0.75, 1.0].map(|part| value(at(part)));
             let mut row = vec![(*name).to_owned(), super::parts::coloured(class, label), condition(cond)];
             row.extend(cells);
-            row.push(format!("{:.3e}", at(1.0) / at(0.0)));
+            row.push(value(at(1.0) / at(0.0)));
             table.row(row);
         }
     }
@@ -55,4 +55,9 @@ pub(super) fn section(html: &mut Html, systems: &[Shown<'_>]) {
         "Paper: Figs. 6 and 9.",
     );
     html.table(&table);
+}
+
+/// Four significant digits, or a power of ten where the number is small.
+fn value(x: f64) -> String {
+    if x < 1e-3 { format!("{x:.3e}") } else { number(x, 4) }
 }

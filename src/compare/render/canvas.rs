@@ -45,24 +45,27 @@ impl Canvas {
         }
         let Some([left, right]) = span([a[0], b[0], c[0]], self.width) else { return };
         let Some([top, bottom]) = span([a[1], b[1], c[1]], self.height) else { return };
+        // Depth and colour are linear over the triangle: their values at the first corner's place, and their slopes.
+        let slopes = |f: [f64; 3]| {
+            let (p, q) = (f[1] - f[0], f[2] - f[0]);
+            [(p * (c[1] - a[1]) - q * (b[1] - a[1])) / area, (q * (b[0] - a[0]) - p * (c[0] - a[0])) / area]
+        };
+        let channel = |k: usize| corners.map(|corner| f64::from(corner.colour[k]));
+        let values = [[a[2], b[2], c[2]], channel(0), channel(1), channel(2)];
+        let slopes = values.map(slopes);
         for y in top..=bottom {
-            for x in left..=right {
-                let (px, py) = (x as f64 + 0.5, y as f64 + 0.5);
-                let share = |p: Point, q: Point| ((q[0] - p[0]) * (py - p[1]) - (q[1] - p[1]) * (px - p[0])) / area;
-                let (u, v, w) = (share(b, c), share(c, a), share(a, b));
-                if u < 0.0 || v < 0.0 || w < 0.0 {
-                    continue;
-                }
-                let depth = (u * a[2] + v * b[2] + w * c[2]) as f32;
+            let py = y as f64 + 0.5;
+            let Some([first, last]) = row([a, b, c], py, area, [left, right]) else { continue };
+            let start = [0, 1, 2, 3]
+                .map(|k| values[k][0] + slopes[k][0] * (first as f64 + 0.5 - a[0]) + slopes[k][1] * (py - a[1]));
+            for x in first..=last {
+                let along = (x - first) as f64;
+                let depth = (start[0] + along * slopes[0][0]) as f32;
                 let at = y * self.width + x;
                 if depth > self.depths[at] {
                     self.depths[at] = depth;
-                    let mix = |k: usize| {
-                        u as f32 * corners[0].colour[k]
-                            + v as f32 * corners[1].colour[k]
-                            + w as f32 * corners[2].colour[k]
-                    };
-                    self.colours[at] = [mix(0), mix(1), mix(2), 1.0];
+                    let mix = |k: usize| ((start[k] + along * slopes[k][0]) as f32).clamp(0.0, 1.0);
+                    self.colours[at] = [mix(1), mix(2), mix(3), 1.0];
                 }
             }
         }
@@ -150,6 +153,30 @@ impl Canvas {
         }
         Png::new(width, height, &pixels)
     }
+}
+
+/// The samples of one row whose centres lie within a triangle, between two columns.
+///
+/// A centre on an edge belongs to the triangle to its right or below alone, so that neighbours never both draw it.
+fn row([a, b, c]: [Point; 3], y: f64, area: f64, [left, right]: [usize; 2]) -> Option<[usize; 2]> {
+    let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+    for (p, q) in [(a, b), (b, c), (c, a)] {
+        // Inside where rate · x + offset is not negative.
+        let sign = if area > 0.0 { 1.0 } else { -1.0 };
+        let rate = -sign * (q[1] - p[1]);
+        let offset = sign * ((q[0] - p[0]) * (y - p[1]) + (q[1] - p[1]) * p[0]);
+        if rate > 0.0 {
+            low = low.max(-offset / rate);
+        } else if rate < 0.0 {
+            high = high.min(-offset / rate);
+        } else if offset < 0.0 {
+            return None;
+        }
+    }
+    let first = (low - 0.5).ceil().max(left as f64);
+    let last = (high - 0.5).ceil() - 1.0;
+    let last = last.min(right as f64);
+    (first <= last).then_some([first as usize, last as usize])
 }
 
 /// The samples that lie between the least and the largest of the values, if any do.

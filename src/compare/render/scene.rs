@@ -11,7 +11,7 @@ const LIGHT: Point = [-0.38, 0.52, 0.765];
 /// Brightness of what the light does not reach.
 const SHADE: f64 = 0.52;
 /// Width of lines and radius of a point cloud's points, in pixels.
-const LINE: f64 = 1.1;
+const LINE: f64 = 0.9;
 const POINT: f64 = 1.6;
 /// Opacity of lines behind a surface.
 const BEHIND: f32 = 0.13;
@@ -88,11 +88,11 @@ impl Scene {
         }
     }
 
-    /// Adds discs of this radius in pixels, before the surface they lie on.
-    pub(crate) fn dots(&mut self, points: &[Point], colour: Rgb, radius: f64) {
-        for place in self.places(points) {
-            self.canvas.disc(place, colour, radius * SAMPLES as f64, 2.0 * radius * SAMPLES as f64);
-        }
+    /// Adds a disc of this radius in pixels, before the surface it lies on; where `through`, before all others too.
+    pub(crate) fn dot(&mut self, point: Point, colour: Rgb, radius: f64, through: bool) {
+        let radius = radius * SAMPLES as f64;
+        let place = self.camera.project(point, self.canvas.size());
+        self.canvas.disc(place, colour, radius, if through { 1e6 } else { 2.0 * radius });
     }
 
     /// The picture.
