@@ -54,6 +54,13 @@ impl Method {
             (Handles::MaxVol, Regularizer::Global) => "k-maxvol-global",
             (Handles::MaxVol, Regularizer::TruncatedSvd) => "k-truncated",
             (Handles::MaxVol, Regularizer::Tikhonov) => "k-tikhonov",
+            (Handles::MaxVol, Regularizer::Differential) => "k-differential",
+            (Handles::MaxVol, Regularizer::Temporal) => "k-temporal",
+            (Handles::Spread { .. }, Regularizer::None) => "k-spread-data",
+            (Handles::Spread { .. }, _) => "k-spread",
+            (Handles::Rectangular { .. }, Regularizer::None) => "k-rectangular-data",
+            (Handles::Rectangular { .. }, _) => "k-rectangular",
+            (Handles::MaxVol, Regularizer::Matrix) => "k-other",
         }
     }
 
@@ -63,12 +70,14 @@ impl Method {
             Handles::All => "all points",
             other => other.name(),
         };
+        let s = self.spectrum;
         match self.regularizer {
             Regularizer::None => format!("{read}, data alone"),
-            Regularizer::Laplacian => format!("{read}, sub-spectral s = {}", self.spectrum),
-            Regularizer::TruncatedSvd => format!("{read}, truncated s = {}", self.spectrum),
+            Regularizer::Laplacian => format!("{read}, sub-spectral s = {s}"),
+            Regularizer::TruncatedSvd => format!("{read}, truncated s = {s}"),
             Regularizer::Tikhonov => format!("{read}, Tikhonov α = {:.2}", self.lambda),
             Regularizer::Global => format!("{read}, global λ = {}", self.lambda),
+            other => format!("{read}, {} s = {s}", other.name()),
         }
     }
 
@@ -80,13 +89,13 @@ impl Method {
 
     /// Whether its line is dashed, as a second mark beside its colour.
     pub(crate) fn is_dashed(&self) -> bool {
-        !matches!(self.regularizer, Regularizer::None | Regularizer::Laplacian)
+        !(self.regularizer == Regularizer::None || self.regularizer.is_sub_spectral())
     }
 
     /// The options of `cager encode` that choose it.
     pub(crate) fn flags(&self) -> String {
         let mut flags = format!("--handles {} --regularizer {}", self.handles.name(), self.regularizer.name());
-        if matches!(self.regularizer, Regularizer::Laplacian | Regularizer::TruncatedSvd) {
+        if self.regularizer.has_threshold() {
             flags += &format!(" --spectrum {}", self.spectrum);
         }
         if !matches!(self.regularizer, Regularizer::None | Regularizer::TruncatedSvd) {
@@ -116,12 +125,13 @@ impl Method {
     }
 }
 
-/// The methods to compare on a cage with these unknowns, the most important ones first; `usual` is the usual threshold, and
-/// `damping` the singular value there, from which Tikhonov's α is.
-pub(crate) fn methods(unknowns: usize, usual: usize, damping: f64) -> Vec<Method> {
+/// The methods to compare on a cage with these unknowns; `usual` is the usual threshold, `damping` the singular value there, from
+/// which Tikhonov's α is. Where every frame is measured, `in_order`, those that depend on the previous frame as well.
+pub(crate) fn methods(unknowns: usize, usual: usize, damping: f64, in_order: bool) -> Vec<Method> {
     let mut thresholds: Vec<usize> = THRESHOLDS.into_iter().chain([usual]).filter(|&s| s <= unknowns).collect();
     thresholds.sort_unstable();
     thresholds.dedup();
+    let curve = |method: Method| Method { curve: true, ..method };
     let mut all = Vec::new();
     for handles in [Handles::All, Handles::MaxVol] {
         for &s in &thresholds {
@@ -129,9 +139,17 @@ pub(crate) fn methods(unknowns: usize, usual: usize, damping: f64) -> Vec<Method
             let method = Method::new(handles, regularizer, s);
             all.push(Method { curve: s == 0 || s == usual, ..method });
         }
-        all.push(Method { curve: true, ..Method::new(handles, Regularizer::Global, 0) });
+        all.push(curve(Method::new(handles, Regularizer::Global, 0)));
     }
-    all.push(Method { curve: true, ..Method::new(Handles::MaxVol, Regularizer::TruncatedSvd, usual) });
+    for handles in [Handles::Rectangular { count: None }, Handles::Spread { count: None }] {
+        all.push(Method::new(handles, Regularizer::None, 0));
+        all.push(curve(Method::new(handles, Regularizer::Laplacian, usual)));
+    }
+    all.push(Method::new(Handles::MaxVol, Regularizer::Differential, usual));
+    if in_order {
+        all.push(Method::new(Handles::MaxVol, Regularizer::Temporal, usual));
+    }
+    all.push(curve(Method::new(Handles::MaxVol, Regularizer::TruncatedSvd, usual)));
     all.push(Method { lambda: damping, ..Method::new(Handles::MaxVol, Regularizer::Tikhonov, 0) });
     all
 }

@@ -38,6 +38,11 @@ impl Sample {
         &self.measured
     }
 
+    /// Whether every frame is measured.
+    pub(crate) fn is_whole(&self) -> bool {
+        self.measured.len() == self.frames
+    }
+
     /// Position of a frame among the measured ones.
     pub(crate) fn position(&self, frame: usize) -> Option<usize> {
         self.measured.binary_search(&frame).ok()

@@ -8,7 +8,7 @@ use super::track::{Motion, Shape, Track};
 use super::{CompareError, Job, Progress};
 use crate::coordinates::default_spectrum;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{Analysis, BATCH, Handles, PrepareError, Solver, SolverOptions};
+use cager_core::inversion::{Analysis, BATCH, Handles, PrepareError, Reading, Solver, SolverOptions};
 use cager_core::regularize::Regularizer;
 use rayon::prelude::*;
 
@@ -62,7 +62,8 @@ pub(super) fn study(
     let usual = default_spectrum(unknowns);
     let damping = spectra.handles[spectra.handles.len().saturating_sub(usual + 1)];
 
-    let mut subjects: Vec<Subject> = methods(unknowns, usual, damping).into_iter().map(Subject::Method).collect();
+    let mut subjects: Vec<Subject> =
+        methods(unknowns, usual, damping, sample.is_whole()).into_iter().map(Subject::Method).collect();
     subjects.extend(noise_methods(unknowns, usual, damping).into_iter().map(Subject::Noise));
     let start = analysis.handles().start.clone();
     let drawn = draws(unknowns, job.rest.points.len()).into_iter().chain([("pivoted LU".to_owned(), start)]);
@@ -73,6 +74,7 @@ pub(super) fn study(
         }
     }
 
+    let mut workshop = Workshop { analysis: &analysis, readings: Vec::new(), drawn: None };
     let mut found = Found::default();
     let mut motion = Motion::new(sample);
     let mut subjects = subjects.into_iter().peekable();
@@ -83,7 +85,7 @@ pub(super) fn study(
         while bytes < OPERATOR_BYTES
             && let Some(subject) = subjects.next()
         {
-            let solver = match solver(&analysis, &subject) {
+            let solver = match workshop.solver(&subject) {
                 Ok(solver) => solver,
                 // Rows drawn at random may determine nothing.
                 Err(_) if matches!(subject, Subject::Draw(..)) => continue,
@@ -123,19 +125,46 @@ pub(super) fn study(
     Ok(Outcome::Studied(Box::new(Studied { figures, analysis, motion: motion.totals(), middling })))
 }
 
-/// The methods that noise is tried on: the extremes and what the paper proposes.
+/// The methods that noise is tried on: plain least squares, and what reads fewer points.
 fn noise_methods(unknowns: usize, usual: usize, damping: f64) -> Vec<Method> {
     let wanted = |m: &Method| {
-        m.curve
-            && (m.is_full_least_squares() || m.handles != Handles::All && m.regularizer != Regularizer::TruncatedSvd)
+        let plain = m.regularizer == Regularizer::None && matches!(m.handles, Handles::All | Handles::MaxVol);
+        let proposed = m.regularizer == Regularizer::Laplacian && m.handles != Handles::All;
+        m.curve && (plain || proposed || m.regularizer == Regularizer::Global)
     };
-    methods(unknowns, usual, damping).into_iter().filter(wanted).collect()
+    methods(unknowns, usual, damping, false).into_iter().filter(wanted).collect()
 }
 
-fn solver(analysis: &Analysis, subject: &Subject) -> Result<Solver, PrepareError> {
-    match subject {
-        Subject::Method(method) | Subject::Noise(method) => analysis.solver(method.options()),
-        Subject::Draw(_, rows, options) => analysis.solver_reading(rows, *options),
+/// Solvers of an analysis, each choice of handles decomposed once.
+struct Workshop<'a> {
+    analysis: &'a Analysis,
+    readings: Vec<(Handles, Reading<'a>)>,
+    /// The last rows drawn.
+    drawn: Option<(Vec<u32>, Reading<'a>)>,
+}
+
+impl<'a> Workshop<'a> {
+    fn solver(&mut self, subject: &Subject) -> Result<Solver, PrepareError> {
+        match subject {
+            Subject::Method(method) | Subject::Noise(method) => {
+                if self.readings.iter().all(|(handles, _)| *handles != method.handles) {
+                    self.readings.push((method.handles, self.analysis.reading(method.handles)?));
+                }
+                let of_handles = |(handles, _): &&(Handles, Reading<'a>)| *handles == method.handles;
+                match self.readings.iter().find(of_handles) {
+                    Some((_, reading)) => reading.solver(method.options()),
+                    None => self.analysis.solver(method.options()),
+                }
+            }
+            Subject::Draw(_, rows, options) => {
+                let known = self.drawn.take().filter(|(of, _)| of == rows);
+                let drawn = match known {
+                    Some(drawn) => drawn,
+                    None => (rows.clone(), self.analysis.reading_of(rows)?),
+                };
+                self.drawn.insert(drawn).1.solver(*options)
+            }
+        }
     }
 }
 

@@ -151,7 +151,7 @@ impl Track {
         let frames: Vec<&[f64]> = batch.iter().map(|frame| frame.points.as_slice()).collect();
         let seconds = (0..REPEATS).map(|_| {
             let clock = Instant::now();
-            std::hint::black_box(self.solver.invert(&frames));
+            std::hint::black_box(self.solver.invert_after(None, &frames));
             clock.elapsed().as_secs_f64()
         });
         self.frame_seconds = seconds.fold(f64::INFINITY, f64::min) / frames.len() as f64;
@@ -160,7 +160,8 @@ impl Track {
     /// Inverts and measures the frames that follow; `clean` are the same without noise.
     pub(crate) fn take(&mut self, frames: &[Frame], clean: &[Frame], sample: &Sample, shape: &Shape) {
         let views: Vec<&[f64]> = frames.iter().map(|frame| frame.points.as_slice()).collect();
-        let cages = self.solver.invert(&views);
+        let previous = self.before.back().map(|(_, cage)| cage.as_slice());
+        let cages = self.solver.invert_after(previous, &views);
         let measured: Vec<usize> = (0..frames.len()).filter(|&i| frames[i].measured).collect();
         let errors = |of: &[Frame]| {
             let cages: Vec<&[f32]> = measured.iter().map(|&i| cages[i].as_slice()).collect();

@@ -178,7 +178,9 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Found> {
         maxvol_seconds,
         svd_seconds,
     };
-    let parts = SolverParts { handles, reads_all: reads_all == 1, operator, phi, positions, diagonal, preparation };
+    let pull = cager_core::inversion::Pull::None;
+    let parts =
+        SolverParts { handles, reads_all: reads_all == 1, operator, pull, phi, positions, diagonal, preparation };
     match Solver::from_parts(parts) {
         Some(solver) => Ok(Found::Solver(Box::new(solver))),
         None => damage("its parts do not fit together"),

@@ -1,33 +1,38 @@
-//! What solvers with any options share: coordinates, handles and decompositions, computed once.
+//! A rest pose and its cage, analysed: coordinates, handles of maximum volume and decompositions, which solvers with any
+//! options share.
 
-use super::operator::{Spectra, keep_translations, operator, with_whole_tiles};
+use super::operator::{Decomposed, Spectra};
 use super::prepare::{
-    NOT_REPRODUCED, check, check_options, coordinates_fit, outside, refuse_far_points, reproduction_error,
+    check, check_options, coordinates_fit, outside, refuse_far_points, refuse_unreproduced, reproduction_error,
 };
-use super::{Handles, Preparation, PrepareError, Solver, SolverOptions};
+use super::reading::Reading;
+use super::{Preparation, PrepareError, Solver, SolverOptions};
 use crate::cage::Cage;
 use crate::coordinates::CoordinateSystem;
 use crate::decode::Decoder;
 use crate::dense;
+use crate::handles::Handles;
 use crate::maxvol::MaxVol;
 use crate::mesh::{Point, diagonal};
-use crate::regularize::{Spectrum, cage_laplacian, spectral_map};
 use crate::spectrum::{RANK_TOLERANCE, RowBasis, deficient_basis, row_basis};
-use crate::svd::{self, Svd};
+use crate::svd;
 use faer::{Mat, MatRef};
 use std::time::Instant;
 
 /// A rest pose and its cage, analysed: solvers with any options follow at the cost of their operator alone.
 ///
-/// For comparisons. It holds `Φ` in double precision as well; whoever wants one solver calls [`Solver::prepare`].
+/// It holds `Φ` in double precision as well; whoever wants one solver calls [`Solver::prepare`].
 pub struct Analysis {
-    phi: Mat<f64>,
-    delta: Mat<f64>,
+    pub(super) phi: Mat<f64>,
+    pub(super) cage: Cage,
+    pub(super) points: Vec<Point>,
+    /// Unknowns of the rest pose, m × 3.
+    pub(super) rest: Vec<Point>,
     basis: RowBasis,
     spectra: Spectra,
-    decoder: Decoder,
-    diagonal: f64,
-    preparation: Preparation,
+    pub(super) decoder: Decoder,
+    pub(super) diagonal: f64,
+    pub(super) preparation: Preparation,
 }
 
 impl Analysis {
@@ -36,23 +41,47 @@ impl Analysis {
     /// # Errors
     /// As [`Solver::prepare`].
     pub fn new(system: &dyn CoordinateSystem, cage: &Cage, points: &[Point]) -> Result<Self, PrepareError> {
+        Self::with_copies(system, cage, points, true, 3)
+    }
+
+    /// As [`Self::new`], with what solvers of these options need and no more.
+    ///
+    /// # Errors
+    /// As [`Solver::prepare`].
+    pub fn for_options(
+        system: &dyn CoordinateSystem,
+        cage: &Cage,
+        points: &[Point],
+        options: SolverOptions,
+    ) -> Result<Self, PrepareError> {
+        let whole_frames = matches!(options.handles, Handles::All | Handles::Spread { .. });
+        check(points, system.unknowns(cage), options)?;
+        Self::with_copies(system, cage, points, whole_frames, 2)
+    }
+
+    fn with_copies(
+        system: &dyn CoordinateSystem,
+        cage: &Cage,
+        points: &[Point],
+        whole_frames: bool,
+        copies: usize,
+    ) -> Result<Self, PrepareError> {
         let m = system.unknowns(cage);
         check(points, m, SolverOptions { spectrum: 0, ..SolverOptions::default() })?;
         let diagonal = diagonal(points);
         let clock = Instant::now();
-        if !coordinates_fit(points.len(), m, 3) {
-            let gigabytes = 28e-9 * points.len() as f64 * m as f64;
+        if !coordinates_fit(points.len(), m, copies) {
+            let gigabytes = (4 + 8 * copies) as f64 * 1e-9 * points.len() as f64 * m as f64;
             return Err(PrepareError::OutOfMemory { points: points.len(), unknowns: m, gigabytes });
         }
         refuse_far_points(cage, points)?;
         let coordinates = system.coordinates(cage, points)?;
         let phi = coordinates.phi;
-        let (point, error) = reproduction_error(phi.as_ref(), &system.rest_unknowns(cage), cage, points);
-        let relative = error / diagonal.min(cage.diagonal());
-        if relative.is_nan() || relative > NOT_REPRODUCED {
-            return Err(PrepareError::NotReproduced { point, error: relative });
-        }
+        let rest = system.rest_unknowns(cage);
+        let (point, error) = reproduction_error(phi.as_ref(), &rest, cage, points);
+        refuse_unreproduced(point, error, cage, diagonal)?;
         let (outside, outside_distance) = outside(cage, points, &coordinates.outside, diagonal);
+        let decoder = Decoder::new(phi.as_ref(), cage.vertices().len());
         let coordinates_seconds = clock.elapsed().as_secs_f64();
 
         let clock = Instant::now();
@@ -61,10 +90,10 @@ impl Analysis {
         let maxvol_seconds = clock.elapsed().as_secs_f64();
 
         let clock = Instant::now();
-        let mut spectra = Spectra::of(&basis, Handles::All)?;
+        let mut spectra = Spectra::of(&basis, whole_frames)?;
         if basis.rank == m && spectra.full_sigma[m - 1] <= RANK_TOLERANCE * spectra.full_sigma[0] {
             basis = deficient_basis(phi.as_ref()).ok_or(no_handles)?;
-            spectra = Spectra::of(&basis, Handles::All)?;
+            spectra = Spectra::of(&basis, whole_frames)?;
         }
         let rank = basis.rank;
         let preparation = Preparation {
@@ -82,9 +111,30 @@ impl Analysis {
             maxvol_seconds,
             svd_seconds: clock.elapsed().as_secs_f64(),
         };
-        let delta = cage_laplacian(cage);
-        let decoder = Decoder::new(phi.as_ref(), cage.vertices().len());
-        Ok(Self { phi, delta, basis, spectra, decoder, diagonal, preparation })
+        let (cage, points) = (cage.clone(), points.to_vec());
+        Ok(Self { phi, cage, points, rest, basis, spectra, decoder, diagonal, preparation })
+    }
+
+    /// A choice of handles, decomposed: solvers with any regularisation follow.
+    ///
+    /// # Errors
+    /// As [`Solver::prepare`].
+    pub fn reading(&self, handles: Handles) -> Result<Reading<'_>, PrepareError> {
+        let clock = Instant::now();
+        let options = SolverOptions { handles, spectrum: 0, ..SolverOptions::default() };
+        check_options(self.phi.nrows(), self.phi.ncols(), options)?;
+        let decomposed = Decomposed::new(self.phi.as_ref(), &self.points, &self.basis, &self.spectra, handles)?;
+        Ok(Reading { analysis: self, decomposed, seconds: clock.elapsed().as_secs_f64() })
+    }
+
+    /// As [`Self::reading`], of the given rows, as many as unknowns or more.
+    ///
+    /// # Errors
+    /// [`PrepareError::NoSolution`] where the rows determine nothing.
+    pub fn reading_of(&self, rows: &[u32]) -> Result<Reading<'_>, PrepareError> {
+        let clock = Instant::now();
+        let decomposed = Decomposed::of_given_rows(self.phi.as_ref(), rows.to_vec(), self.phi.ncols())?;
+        Ok(Reading { analysis: self, decomposed, seconds: clock.elapsed().as_secs_f64() })
     }
 
     /// The solver with these options.
@@ -92,20 +142,7 @@ impl Analysis {
     /// # Errors
     /// As [`Solver::prepare`].
     pub fn solver(&self, options: SolverOptions) -> Result<Solver, PrepareError> {
-        check_options(self.phi.ncols(), options)?;
-        let clock = Instant::now();
-        let mut preparation = self.preparation.clone();
-        let operator = operator(
-            self.phi.as_ref(),
-            &self.basis,
-            self.spectra.reading(options.handles),
-            self.delta.as_ref(),
-            options,
-            &mut preparation,
-        )?;
-        preparation.svd_seconds += clock.elapsed().as_secs_f64();
-        let handles = self.basis.handles.rows.clone();
-        Ok(self.solver_of(operator, handles, options.handles == Handles::All, preparation))
+        self.reading(options.handles)?.solver(options)
     }
 
     /// A solver that reads the given rows instead of those of maximum volume, as many as unknowns or more; the handles among the
@@ -114,32 +151,7 @@ impl Analysis {
     /// # Errors
     /// As [`Solver::prepare`]; [`PrepareError::NoSolution`] where the rows determine nothing.
     pub fn solver_reading(&self, rows: &[u32], options: SolverOptions) -> Result<Solver, PrepareError> {
-        check_options(self.phi.ncols(), options)?;
-        let failed = |what| PrepareError::NoSolution { what };
-        let square = dense::rows_of(self.phi.as_ref(), rows);
-        let Svd { u, sigma, v } =
-            svd::svd(square.as_ref()).ok_or(failed("singular value decomposition of the rows"))?;
-        let rank = sigma.iter().filter(|&&x| x > RANK_TOLERANCE * sigma[0]).count();
-        if rank == 0 {
-            return Err(failed("choice of rows"));
-        }
-        let spectrum = Spectrum { sigma: &sigma[..rank], v: v.as_ref(), delta: self.delta.as_ref() };
-        let map = spectral_map(&spectrum, options.regularizer, options.spectrum, options.lambda)
-            .ok_or(failed("regularised solve"))?;
-        let to_cage = dense::product(v.as_ref(), map.as_ref());
-        let operator = dense::product(u.as_ref().subcols(0, rank), to_cage.transpose());
-        let preparation = Preparation {
-            rank,
-            condition_handles: sigma[0] / sigma[sigma.len().min(v.ncols()) - 1],
-            singular_values: sigma,
-            ..self.preparation.clone()
-        };
-        Ok(self.solver_of(operator, rows.to_vec(), false, preparation))
-    }
-
-    fn solver_of(&self, operator: Mat<f64>, handles: Vec<u32>, reads_all: bool, preparation: Preparation) -> Solver {
-        let operator = with_whole_tiles(keep_translations(operator, self.decoder.positions()));
-        Solver { handles, reads_all, operator, decoder: self.decoder.clone(), diagonal: self.diagonal, preparation }
+        self.reading_of(rows)?.solver(options)
     }
 
     /// What preparing found out; the singular values are empty, see [`Self::handle_spectrum`] and [`Self::full_spectrum`].

@@ -1,19 +1,16 @@
 //! Preparing: coordinates, handles, spectrum and operator.
 
-use super::operator::{Spectra, keep_translations, operator, tall_product, with_whole_tiles};
-use super::{Handles, PrepareError, Solver, SolverOptions};
+use super::operator::tall_product;
+use super::{Analysis, Handles, PrepareError, Solver, SolverOptions};
 use crate::cage::Cage;
 use crate::coordinates::CoordinateSystem;
-use crate::decode::Decoder;
 use crate::mesh::{Point, diagonal, distance_to_surface, norm};
-use crate::regularize::cage_laplacian;
-use crate::spectrum::{RANK_TOLERANCE, deficient_basis, row_basis};
+use crate::regularize::{Term, TermError};
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
-use std::time::Instant;
 
 /// Beyond this affine reproduction error, over the diagonal, coordinates are of no use.
-pub(super) const NOT_REPRODUCED: f64 = 1e-6;
+const NOT_REPRODUCED: f64 = 1e-6;
 /// Farther from the cage, in its diagonals, one point outweighs all others by the inverse of [`WEAK`](crate::regularize::WEAK).
 const FAR: f64 = 1e5;
 /// Points outside by less than this fraction of the diagonal lie on the cage.
@@ -61,66 +58,26 @@ impl Solver {
         points: &[Point],
         options: SolverOptions,
     ) -> Result<Self, PrepareError> {
-        let m = system.unknowns(cage);
-        check(points, m, options)?;
-        let diagonal = diagonal(points);
-        let clock = Instant::now();
-        if !coordinates_fit(points.len(), m, 2) {
-            let gigabytes = 20e-9 * points.len() as f64 * m as f64;
-            return Err(PrepareError::OutOfMemory { points: points.len(), unknowns: m, gigabytes });
-        }
-        refuse_far_points(cage, points)?;
-        let coordinates = system.coordinates(cage, points)?;
-        let phi = coordinates.phi.as_ref();
-        let (point, error) = reproduction_error(phi, &system.rest_unknowns(cage), cage, points);
-        let reproduction = error / diagonal;
-        // A stray point enlarges the model's own diagonal, not the cage's.
-        let relative = error / diagonal.min(cage.diagonal());
-        if relative.is_nan() || relative > NOT_REPRODUCED {
-            return Err(PrepareError::NotReproduced { point, error: relative });
-        }
-        let (outside, outside_distance) = outside(cage, points, &coordinates.outside, diagonal);
-        let mut preparation = Preparation {
-            affine_reproduction_error: reproduction,
-            outside_distance,
-            outside,
-            coordinates_seconds: clock.elapsed().as_secs_f64(),
-            ..Preparation::default()
-        };
+        let term = options.regularizer.term().ok_or(TermError::Missing)?;
+        Self::prepare_with(system, cage, points, options, term)
+    }
 
-        let clock = Instant::now();
-        let no_handles = PrepareError::NoSolution { what: "choice of handles" };
-        let mut basis = row_basis(phi).ok_or(no_handles.clone())?;
-        preparation.maxvol_seconds = clock.elapsed().as_secs_f64();
-
-        let clock = Instant::now();
-        let mut spectra = Spectra::of(&basis, options.handles)?;
-        if basis.rank == m && spectra.full_sigma[m - 1] <= RANK_TOLERANCE * spectra.full_sigma[0] {
-            basis = deficient_basis(phi).ok_or(no_handles)?;
-            spectra = Spectra::of(&basis, options.handles)?;
-        }
-        let rank = basis.rank;
-        preparation.rank = rank;
-        preparation.swaps = basis.handles.swaps;
-        preparation.log_volume = basis.handles.log_volume;
-        preparation.max_entry = basis.handles.max_entry;
-        preparation.condition_handles = spectra.handles.sigma[0] / spectra.handles.sigma[rank - 1];
-        preparation.condition_full = spectra.full_sigma[0] / spectra.full_sigma[rank - 1];
-        let operator = operator(phi, &basis, spectra, cage_laplacian(cage).as_ref(), options, &mut preparation)?;
-        let operator = with_whole_tiles(keep_translations(operator, cage.vertices().len()));
-        preparation.svd_seconds = clock.elapsed().as_secs_f64();
-
-        let clock = Instant::now();
-        let decoder = Decoder::new(phi, cage.vertices().len());
-        preparation.coordinates_seconds += clock.elapsed().as_secs_f64();
-        Ok(Self {
-            handles: basis.handles.rows,
-            reads_all: options.handles == Handles::All,
-            operator,
-            decoder,
-            diagonal,
-            preparation,
-        })
+    /// As [`Self::prepare`], with a term of the caller's own, for
+    /// [`Regularizer::Matrix`](crate::regularize::Regularizer::Matrix).
+    ///
+    /// # Errors
+    /// See [`PrepareError`].
+    pub fn prepare_with(
+        system: &dyn CoordinateSystem,
+        cage: &Cage,
+        points: &[Point],
+        options: SolverOptions,
+        term: &dyn Term,
+    ) -> Result<Self, PrepareError> {
+        // Known before anything is computed.
+        term.delta(cage, system.unknowns(cage))?;
+        let analysis = Analysis::for_options(system, cage, points, options)?;
+        analysis.reading(options.handles)?.solver_with(options, term)
     }
 }
 
@@ -131,6 +88,15 @@ pub(super) fn refuse_far_points(cage: &Cage, points: &[Point]) -> Result<(), Pre
         if distance > FAR {
             return Err(PrepareError::TooFar { point, distance });
         }
+    }
+    Ok(())
+}
+
+/// Refuses a point whose coordinates are rounding. A stray point enlarges the model's own diagonal, not the cage's.
+pub(super) fn refuse_unreproduced(point: usize, error: f64, cage: &Cage, diagonal: f64) -> Result<(), PrepareError> {
+    let relative = error / diagonal.min(cage.diagonal());
+    if relative.is_nan() || relative > NOT_REPRODUCED {
+        return Err(PrepareError::NotReproduced { point, error: relative });
     }
     Ok(())
 }
@@ -149,15 +115,28 @@ pub(super) fn check(points: &[Point], unknowns: usize, options: SolverOptions) -
     if !diagonal.is_finite() {
         return Err(PrepareError::TooLarge);
     }
-    check_options(unknowns, options)
+    check_options(points.len(), unknowns, options)
 }
 
-pub(super) fn check_options(unknowns: usize, options: SolverOptions) -> Result<(), PrepareError> {
-    if options.spectrum > unknowns {
+/// Checks options for so many points and unknowns.
+///
+/// # Errors
+/// The options among [`PrepareError`].
+pub fn check_options(points: usize, unknowns: usize, options: SolverOptions) -> Result<(), PrepareError> {
+    if options.regularizer.has_threshold() && options.spectrum > unknowns {
         return Err(PrepareError::SpectrumTooLarge { spectrum: options.spectrum, unknowns });
     }
     if !(options.lambda.is_finite() && options.lambda >= 0.0) {
         return Err(PrepareError::BadLambda { lambda: options.lambda });
+    }
+    let count = options.handles.count(points, unknowns);
+    if !(unknowns..=points).contains(&count) {
+        return Err(PrepareError::HandleCount { count, unknowns, points });
+    }
+    // Their covariance, its factor, and what is solved with it.
+    if matches!(options.handles, Handles::Spread { .. }) && !coordinates_fit(count, 2 * count + 2 * unknowns, 1) {
+        let gigabytes = 8e-9 * count as f64 * (2 * count + 2 * unknowns) as f64;
+        return Err(PrepareError::HandlesOutOfMemory { count, gigabytes });
     }
     Ok(())
 }
