@@ -96,7 +96,7 @@ mod tests {
         let length = u32::from_be_bytes([bytes[33], bytes[34], bytes[35], bytes[36]]) as usize;
         let rows = miniz_oxide::inflate::decompress_to_vec_zlib(&bytes[41..41 + length]).expect("compressed rows");
         let mut above = vec![0u8; 28];
-        let mut found = Vec::new();
+        let mut found: Vec<[u8; 4]> = Vec::new();
         for row in rows.chunks(29) {
             assert_eq!(row[0], 2);
             above = row[1..].iter().zip(&above).map(|(x, up)| x.wrapping_add(*up)).collect();
