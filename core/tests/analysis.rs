@@ -115,4 +115,10 @@ fn swaps_lead_from_the_start_to_the_handles_and_their_volume() {
         assert!(found.max_entry <= 1.0 + TOLERANCE);
     }
     assert!(maxvol_from(a.as_ref(), vec![7; 25], TOLERANCE).is_err());
+    // All but dependent: the second row is the first but for 1e-7.
+    let mut near = a.clone();
+    for j in 0..25 {
+        near[(1, j)] = near[(0, j)] + if j == 3 { 1e-7 } else { 0.0 };
+    }
+    assert!(maxvol_from(near.as_ref(), (0..25).collect(), TOLERANCE).is_err());
 }

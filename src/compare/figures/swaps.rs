@@ -8,10 +8,10 @@ use serde::Serialize;
 
 /// Condition numbers are computed after at most this many swaps, evenly spaced.
 const CONDITIONS: usize = 40;
-/// From more points than this, the search with a random start takes evenly spaced ones.
-const MOST_POINTS: usize = 30_000;
-/// Points drawn for a random start, as multiples of the unknowns: among fewer there may be no independent ones.
-const DRAWN: [usize; 4] = [2, 4, 8, 16];
+/// From more coordinates than this, the search with a random start takes evenly spaced points: it needs many swaps.
+const MOST_ENTRIES: usize = 6_000_000;
+/// Points drawn for a random start, as multiples of the unknowns: among few there may be no independent ones.
+const DRAWN: [usize; 6] = [2, 3, 4, 6, 8, 16];
 
 /// Both searches.
 #[derive(Clone, Debug, Serialize)]
@@ -51,7 +51,7 @@ fn from_random(analysis: &Analysis) -> Option<SwapTrace> {
     if analysis.preparation().rank < m {
         return None;
     }
-    let step = n.div_ceil(MOST_POINTS);
+    let step = n.div_ceil((MOST_ENTRIES / m).max(4 * m));
     let rows: Vec<u32> = (0..n as u32).step_by(step).collect();
     if rows.len() < m {
         return None;

@@ -24,11 +24,7 @@ impl Png {
         let blank = vec![[0u8; 4]; width];
         let mut above = blank.as_slice();
         for row in pixels.chunks_exact(width) {
-            // Filter "up": pictures on one colour are mostly what is above.
-            rows.push(2);
-            for (pixel, up) in row.iter().zip(above) {
-                rows.extend((0..4).map(|k| pixel[k].wrapping_sub(up[k])));
-            }
+            rows.extend(filtered(row, above));
             above = row;
         }
         let mut header = Vec::new();
@@ -57,6 +53,38 @@ impl Png {
             }
         }
         url
+    }
+}
+
+/// A row less what is expected of it, by whichever of the standard's filters leaves the least; the filter's number first.
+fn filtered(row: &[[u8; 4]], above: &[[u8; 4]]) -> Vec<u8> {
+    let mut best = (u64::MAX, Vec::new());
+    for filter in 0..=4u8 {
+        let mut bytes = vec![filter];
+        for (x, pixel) in row.iter().enumerate() {
+            let [left, corner] = if x > 0 { [row[x - 1], above[x - 1]] } else { [[0; 4]; 2] };
+            bytes.extend((0..4).map(|k| pixel[k].wrapping_sub(expected(filter, left[k], above[x][k], corner[k]))));
+        }
+        // The usual measure: what is near zero compresses.
+        let size = bytes[1..].iter().map(|&b| u64::from((b as i8).unsigned_abs())).sum();
+        if size < best.0 {
+            best = (size, bytes);
+        }
+    }
+    best.1
+}
+
+/// What a filter of the standard expects of a byte, from those to its left, above it and to the left of that.
+fn expected(filter: u8, left: u8, up: u8, corner: u8) -> u8 {
+    match filter {
+        0 => 0,
+        1 => left,
+        2 => up,
+        3 => ((u16::from(left) + u16::from(up)) / 2) as u8,
+        _ => {
+            let near = |x: u8| (i16::from(left) + i16::from(up) - i16::from(corner) - i16::from(x)).abs();
+            [left, up, corner].into_iter().min_by_key(|&x| near(x)).unwrap_or(0)
+        }
     }
 }
 
@@ -95,14 +123,15 @@ mod tests {
         assert_eq!(&bytes[16..29], [0, 0, 0, 7, 0, 0, 0, 5, 8, 6, 0, 0, 0]);
         let length = u32::from_be_bytes([bytes[33], bytes[34], bytes[35], bytes[36]]) as usize;
         let rows = miniz_oxide::inflate::decompress_to_vec_zlib(&bytes[41..41 + length]).expect("compressed rows");
-        let mut above = vec![0u8; 28];
-        let mut found: Vec<[u8; 4]> = Vec::new();
+        let mut found = vec![0u8; 28];
         for row in rows.chunks(29) {
-            assert_eq!(row[0], 2);
-            above = row[1..].iter().zip(&above).map(|(x, up)| x.wrapping_add(*up)).collect();
-            found.extend(above.as_chunks::<4>().0);
+            for (x, byte) in row[1..].iter().enumerate() {
+                let start = found.len() - 28;
+                let [left, corner] = if x >= 4 { [found[start + 24], found[start - 4]] } else { [0; 2] };
+                found.push(byte.wrapping_add(expected(row[0], left, found[start], corner)));
+            }
         }
-        assert_eq!(found, pixels);
+        assert_eq!(found[28..].as_chunks::<4>().0, pixels);
     }
 
     #[test]
