@@ -17,6 +17,8 @@ use tokio_util::sync::CancellationToken;
 
 /// Threads that write frame logs. Most of their time they wait for the disk.
 const COMMIT_THREADS: usize = 4;
+/// Threads that read new sessions' files at a time.
+const READING: usize = 2;
 
 /// How long a look at the disk counts.
 const PROBED_FOR: std::time::Duration = std::time::Duration::from_secs(1);
@@ -29,7 +31,9 @@ pub struct Service {
     pub(crate) engine: Engine,
     pub(crate) solvers: Arc<Solvers>,
     pub(crate) committer: Committer,
-    pub(crate) registry: Registry,
+    pub(crate) registry: Arc<Registry>,
+    /// Rest poses and cages of new sessions being read at a time: parsing keeps a processor busy.
+    pub(crate) reading: Semaphore,
     /// Memory for frames on their way, in KiB.
     pub(crate) frame_memory: Memory,
     /// Memory for rest poses and cages on their way, in KiB.
@@ -111,7 +115,8 @@ impl Service {
             engine,
             solvers: Arc::new(solvers),
             committer: Committer::start(COMMIT_THREADS).map_err(StartError::Threads)?,
-            registry: Registry::default(),
+            registry: Arc::default(),
+            reading: Semaphore::new(READING),
             frame_memory: Memory::new(config.frame_bytes),
             upload_memory: Memory::new(config.upload_bytes),
             streams: Arc::new(Semaphore::new(config.max_streams)),

@@ -186,6 +186,20 @@ impl Solver {
         })
     }
 
+    /// What [`Self::prepare`] would refuse before it computes anything.
+    ///
+    /// # Errors
+    /// See [`PrepareError`].
+    pub fn check(
+        system: &dyn CoordinateSystem,
+        cage: &Cage,
+        points: &[Point],
+        options: SolverOptions,
+    ) -> Result<(), PrepareError> {
+        check(points, system.unknowns(cage), options)?;
+        refuse_far_points(cage, points)
+    }
+
     /// What preparing found out.
     pub fn preparation(&self) -> &Preparation {
         &self.preparation

@@ -4,6 +4,7 @@
 //! product. Who comes next is the choice of `schedule`; what a batch does is the lane's.
 
 mod schedule;
+pub(crate) mod threads;
 
 use cager_core::inversion::BATCH;
 use schedule::{Next, Schedule};
@@ -46,11 +47,7 @@ impl Engine {
     /// # Errors
     /// The system's, where threads cannot be started.
     pub fn new(workers: usize) -> std::io::Result<Self> {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(workers)
-            .thread_name(|k| format!("solve-{k}"))
-            .build()
-            .map_err(std::io::Error::other)?;
+        let pool = threads::pool("solve", workers)?;
         let slots = pool.current_num_threads();
         let shared = Arc::new(Shared { state: Mutex::new(Schedule::new(slots)), changed: Condvar::new(), pool });
         let dispatching = Arc::clone(&shared);

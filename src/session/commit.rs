@@ -1,7 +1,7 @@
 //! Writing solved frames: what waits for a session is written together and synced once, then its uploads hear of it.
 
-use super::Session;
 use super::frames::Digests;
+use super::{Phase, Session};
 use crate::capture::StoredError;
 use crate::problem::{self, ApiError};
 use crate::store::{FrameLog, LogRecord, StoreError};
@@ -117,6 +117,13 @@ impl Session {
             })
             .collect();
         let mut log = super::lock(&self.log);
+        if let Phase::Failed(problem) = self.status().phase {
+            // Its files are in quarantine.
+            drop(log);
+            self.bytes.fetch_sub(stored_bytes(solved), Relaxed);
+            self.give_up(solved, &ApiError::new(problem::SESSION_FAILED, problem.detail));
+            return;
+        }
         let outcome = self.open_log(&mut log).and_then(|log| log.append(&records));
         if outcome.is_err() {
             // Whether it can go on is found out by opening it again.
@@ -138,7 +145,7 @@ impl Session {
             Err(error) => {
                 self.bytes.fetch_sub(stored_bytes(solved), Relaxed);
                 tracing::warn!(session = %self.meta.id, %error, "frames could not be written");
-                let error = self.storage_error(&error);
+                let error = self.damaged_or(error);
                 self.give_up(solved, &error);
             }
         }

@@ -68,7 +68,12 @@ impl Service {
         let mut sealed = Sealed { session, kept: false };
         let prepared = self.solver(session).await?;
         let writing = Arc::clone(session);
-        let completion = blocking(move || write(&writing, &prepared, &entries, frames)).await??;
+        let written = blocking(move || write(&writing, &prepared, &entries, frames)).await?;
+        let completion = written.map_err(|error| match session.status().phase {
+            // What was to be written proved damaged.
+            Phase::Failed(problem) => ApiError::new(problem::SESSION_FAILED, problem.detail),
+            _ => error,
+        })?;
         session.set_phase(Phase::Completed(completion));
         sealed.kept = true;
         Ok(())

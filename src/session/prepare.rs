@@ -113,6 +113,17 @@ pub(crate) fn read_cage(content: &Content, choices: &Choices) -> Result<Cage, Ap
     })
 }
 
+/// Checks what is wrong of rest pose, cage and options together without computing much.
+///
+/// # Errors
+/// Geometry or options that do not go together.
+pub(crate) fn check(geometry: &Geometry, choices: &Choices, most_bytes: u64) -> Result<(), ApiError> {
+    let unknowns = choices.system.unknowns(&geometry.cage);
+    check_memory(geometry, unknowns, most_bytes)?;
+    let options = choices.solver_options(unknowns);
+    Solver::check(choices.system, &geometry.cage, &geometry.rest.points, options).map_err(|error| refusal(&error))
+}
+
 /// Prepares the solver.
 ///
 /// # Errors
@@ -120,25 +131,9 @@ pub(crate) fn read_cage(content: &Content, choices: &Choices) -> Result<Cage, Ap
 pub(crate) fn prepare(geometry: &Geometry, choices: &Choices, most_bytes: u64) -> Result<Prepared, ApiError> {
     let unknowns = choices.system.unknowns(&geometry.cage);
     let options = choices.solver_options(unknowns);
-    // Two matrices of n × m in double precision and one in single, at their peak.
-    let needed = 20 * geometry.rest.points.len() as u64 * unknowns as u64;
-    if needed > most_bytes {
-        let detail = format!(
-            "{} points times {unknowns} unknowns need {needed} bytes to be prepared, and this service allows {most_bytes}; use a coarser cage or a lighter model",
-            geometry.rest.points.len()
-        );
-        return Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(most_bytes));
-    }
-    let solver =
-        Solver::prepare(choices.system, &geometry.cage, &geometry.rest.points, options).map_err(
-            |error| match error {
-                PrepareError::SpectrumTooLarge { .. } => {
-                    ApiError::new(problem::INVALID_OPTIONS, format!("spectrum: {error}"))
-                }
-                PrepareError::BadLambda { .. } => ApiError::new(problem::INVALID_OPTIONS, format!("lambda: {error}")),
-                _ => self::geometry(error.to_string()),
-            },
-        )?;
+    check_memory(geometry, unknowns, most_bytes)?;
+    let solver = Solver::prepare(choices.system, &geometry.cage, &geometry.rest.points, options)
+        .map_err(|error| refusal(&error))?;
     Ok(with_solver(solver, &geometry.cage, options))
 }
 
@@ -154,10 +149,31 @@ pub(crate) fn with_solver(solver: Solver, cage: &Cage, options: SolverOptions) -
     }
 }
 
+fn check_memory(geometry: &Geometry, unknowns: usize, most_bytes: u64) -> Result<(), ApiError> {
+    // Two matrices of n × m in double precision and one in single, at their peak.
+    let needed = 20 * geometry.rest.points.len() as u64 * unknowns as u64;
+    if needed > most_bytes {
+        let detail = format!(
+            "{} points times {unknowns} unknowns need {needed} bytes to be prepared, and this service allows {most_bytes}; use a coarser cage or a lighter model",
+            geometry.rest.points.len()
+        );
+        return Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(most_bytes));
+    }
+    Ok(())
+}
+
 fn read_part(part: &str, name: &str, bytes: &[u8]) -> Result<Model, ApiError> {
     let path = Path::new(name);
     let format = MeshFormat::from_path(path).map_err(|error| geometry(format!("{part}: {error}")))?;
     read_model_bytes(format, path, bytes).map_err(|error| geometry(format!("{part}: {error}")))
+}
+
+fn refusal(error: &PrepareError) -> ApiError {
+    match error {
+        PrepareError::SpectrumTooLarge { .. } => ApiError::new(problem::INVALID_OPTIONS, format!("spectrum: {error}")),
+        PrepareError::BadLambda { .. } => ApiError::new(problem::INVALID_OPTIONS, format!("lambda: {error}")),
+        _ => geometry(error.to_string()),
+    }
 }
 
 fn geometry(detail: String) -> ApiError {
