@@ -49,7 +49,7 @@ impl Solver {
         fits.then(|| Self {
             handles,
             reads_all,
-            operator: super::with_whole_tiles(operator),
+            operator: super::operator::with_whole_tiles(operator),
             decoder: Decoder::from_single(phi, positions),
             diagonal,
             preparation,
