@@ -196,13 +196,16 @@ pub struct FrameErrors {
 }
 
 /// Says that no more frames are coming.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Complete {
     /// Number of frames of the capture, at least 1.
     #[cfg_attr(feature = "schema", schema(minimum = 1))]
     pub frames: u32,
+    /// Leave out frames with this number and above, which were posted by mistake. Without it, such frames are an error.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub discard_beyond: bool,
 }
 
 /// Progress, the data of a server-sent event.

@@ -230,8 +230,12 @@ impl Session {
             let path = self.store.log_path(&self.meta.id);
             return Err(StoreError::Damaged { path, what: "the frame log is gone".to_owned() });
         }
-        let (log, entries) = self.store.open_log(&self.meta.id, rows)?;
+        let (log, mut entries) = self.store.open_log(&self.meta.id, rows)?;
         self.has_log.store(true, Ordering::Release);
+        if let Some(frames) = self.declared() {
+            // Those beyond were discarded at completion.
+            entries.retain(|entry| entry.frame < frames);
+        }
         if let Some(frames) = self.declared()
             && entries.len() < frames as usize
         {
