@@ -131,6 +131,7 @@ impl Service {
         for meta in opened.sessions {
             service.resume(meta);
         }
+        service.forget_orphans();
         service.resumed.store(true, Ordering::Release);
         tracing::info!(sessions = count, quarantined = opened.quarantined.len(), "sessions resumed");
         tokio::spawn(Arc::clone(&service).sweep(stop.clone()));
@@ -138,6 +139,24 @@ impl Service {
         let watching = Arc::clone(&service);
         tokio::spawn(async move { watching.access.clone().watch(stop).await });
         Ok(service)
+    }
+
+    /// Removes rest poses and cages of no session: a crash between storing them and storing their session leaves them. Not where
+    /// something is in quarantine, which may be of use with its rest pose only.
+    fn forget_orphans(&self) {
+        let forget = || -> Result<(), StoreError> {
+            if self.store.has_quarantined()? {
+                return Ok(());
+            }
+            for key in self.store.contents()?.iter().filter(|key| !self.registry.uses_content(key)) {
+                self.store.remove_content(key)?;
+                tracing::info!(%key, "a rest pose and cage of no session are removed");
+            }
+            Ok(())
+        };
+        if let Err(error) = forget() {
+            tracing::warn!(%error, "rest poses and cages of no session may take space");
+        }
     }
 
     /// Reads the logs of all resumed sessions in the background, so that damage is found before somebody waits for it.

@@ -134,7 +134,8 @@ pub(crate) struct FrameJob {
     rows: Rows,
     /// Little-endian f32, three for each row.
     bytes: Vec<u8>,
-    queued: Arc<AtomicU64>,
+    /// Where it counts as long as nobody has claimed its frame.
+    queued: Option<Arc<AtomicU64>>,
     arrived: Instant,
     settled: bool,
     permits: Option<Permits>,
@@ -164,7 +165,7 @@ impl FrameJob {
             frame,
             rows,
             bytes,
-            queued: Arc::clone(&session.queued),
+            queued: Some(Arc::clone(&session.queued)),
             arrived: Instant::now(),
             settled: false,
             permits: Some(permits),
@@ -183,9 +184,17 @@ impl FrameJob {
     }
 }
 
+impl FrameJob {
+    fn leave_queue(&mut self) {
+        if let Some(queued) = self.queued.take() {
+            queued.fetch_sub(1, Ordering::Relaxed);
+        }
+    }
+}
+
 impl Drop for FrameJob {
     fn drop(&mut self) {
-        self.queued.fetch_sub(1, Ordering::Relaxed);
+        self.leave_queue();
         if !self.settled {
             self.upload.fail(ApiError::new(
                 problem::SESSION_DELETED,
@@ -211,7 +220,7 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
     let clock = Instant::now();
     let mut whole = Vec::new();
     let mut handles = Vec::new();
-    for job in jobs {
+    for mut job in jobs {
         if job.upload.is_abandoned() || session.is_deleted() {
             continue;
         }
@@ -223,7 +232,13 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
             continue;
         }
         let digests = digests(prepared, &job);
-        match session.frames().claim(job.frame, digests, &job.upload) {
+        let claim = {
+            let mut frames = session.frames();
+            // At once, so that no frame counts twice.
+            job.leave_queue();
+            frames.claim(job.frame, digests, &job.upload)
+        };
+        match claim {
             Claim::Solve if job.rows == Rows::All => whole.push((job, digests)),
             Claim::Solve => handles.push((job, digests)),
             Claim::Waiting => job.settle(),
