@@ -125,6 +125,7 @@ fn begin_report(encoding: &Encoding<'_>) -> Report {
         handles: encoding.options.handles.name().to_owned(),
         regularizer: encoding.options.regularizer.name().to_owned(),
         spectrum: encoding.options.spectrum,
+        spectrum_choice: None,
         lambda: encoding.options.lambda,
         affine_reproduction_error: found.affine_reproduction_error,
         condition_number: Condition { full: found.condition_full, handles: found.condition_handles },
@@ -171,6 +172,7 @@ pub fn preparation_warnings(options: SolverOptions, solver: &Solver) -> Vec<Stri
             Regularizer::Laplacian | Regularizer::Global if options.lambda > 0.0 => {
                 "the cage's Laplacian takes care".to_owned()
             }
+            other if other.is_sub_spectral() && options.lambda > 0.0 => "the regularisation takes care".to_owned(),
             Regularizer::Tikhonov => "all are damped".to_owned(),
             Regularizer::TruncatedSvd if options.spectrum >= weak => "all are dropped".to_owned(),
             _ => format!(

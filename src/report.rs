@@ -25,6 +25,9 @@ pub struct Report {
     pub regularizer: String,
     /// Spectrum threshold s.
     pub spectrum: usize,
+    /// Why this threshold, where it was chosen by measuring.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spectrum_choice: Option<SpectrumChoice>,
     /// Weight λ.
     pub lambda: f64,
     /// `max_i |Φ C_R − P_R|_i`.
@@ -35,9 +38,9 @@ pub struct Report {
     pub rank: usize,
     /// Singular values of the inverted matrix, descending.
     pub singular_values: Vec<f64>,
-    /// How the handles were found.
+    /// How the handles of maximum volume were found.
     pub maxvol: MaxVol,
-    /// Rows of maximum volume.
+    /// Rows read, in their order: those of maximum volume first. Where every point is read, only those.
     pub handle_indices: Vec<u32>,
     /// Errors of what a decoder of the written file gets back.
     pub error: Errors,
@@ -54,8 +57,39 @@ pub struct Report {
 pub struct Condition {
     /// Of `Φ`.
     pub full: f64,
-    /// Of the handles' rows `Φ□`.
+    /// Of the handles' rows.
     pub handles: f64,
+}
+
+/// How a spectrum threshold was chosen: the largest whose mean L2 error on some frames of the capture stays within a bound of that at
+/// threshold 0.
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
+pub struct SpectrumChoice {
+    /// Bound of the extra error, as a fraction.
+    pub bound: f64,
+    /// Extra error at the chosen threshold, as a fraction.
+    pub extra: f64,
+    /// Frames measured, evenly spaced.
+    pub frames: usize,
+    /// Thresholds tried, ascending.
+    pub tried: Vec<TriedSpectrum>,
+}
+
+/// A threshold that was tried.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
+pub struct TriedSpectrum {
+    /// The threshold s.
+    pub spectrum: usize,
+    /// Mean L2 error of the frames measured.
+    pub l2_mean: f64,
+}
+
+impl SpectrumChoice {
+    /// What choosing within a bound found.
+    pub fn new(found: &cager_core::inversion::Threshold, bound: f64) -> Self {
+        let tried = found.tried.iter().map(|&(spectrum, l2_mean)| TriedSpectrum { spectrum, l2_mean }).collect();
+        Self { bound, extra: found.extra(), frames: found.frames, tried }
+    }
 }
 
 /// How the handles were found.

@@ -6,6 +6,7 @@ use crate::mesh::Point;
 use crate::simd::{self, multiversion};
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Rows of Φ that one task multiplies: their product with a batch of cages stays in the second-level cache.
 const BLOCK_ROWS: usize = 1024;
@@ -13,8 +14,8 @@ const BLOCK_ROWS: usize = 1024;
 /// Turns cages into positions of the model's points.
 #[derive(Clone, Debug)]
 pub struct Decoder {
-    /// `Φ`, n × m, column-major; zero rows follow up to a whole tile.
-    phi: Mat<f32>,
+    /// `Φ`, n × m, column-major; zero rows follow up to a whole tile. Shared by the solvers of one analysis.
+    phi: Arc<Mat<f32>>,
     points: usize,
     /// Unknowns that are positions and follow a translation; the others are directions.
     positions: usize,
@@ -43,7 +44,7 @@ impl Decoder {
                 *s = x as f32;
             }
         });
-        Self { phi: single, points, positions }
+        Self { phi: Arc::new(single), points, positions }
     }
 
     /// Takes coordinates in single precision, n × `unknowns`, row-major, as they travel to who decodes elsewhere; the first
@@ -61,7 +62,7 @@ impl Decoder {
     pub(crate) fn from_single(mut phi: Mat<f32>, positions: usize) -> Self {
         let points = phi.nrows();
         phi.resize_with(points.next_multiple_of(dense::WHOLE_ROWS), phi.ncols(), |_, _| 0.0);
-        Self { phi, points, positions }
+        Self { phi: Arc::new(phi), points, positions }
     }
 
     /// Unknowns that are positions and follow a translation; they come first.
@@ -79,9 +80,13 @@ impl Decoder {
         self.phi.ncols()
     }
 
+    fn padded(&self) -> MatRef<'_, f32> {
+        (*self.phi).as_ref()
+    }
+
     /// `Φ` in single precision, n × m, column-major.
     pub fn coordinates(&self) -> MatRef<'_, f32> {
-        self.phi.as_ref().subrows(0, self.points)
+        self.padded().subrows(0, self.points)
     }
 
     /// Positions of up to [`BATCH`](crate::inversion::BATCH) frames, each n × 3 interleaved, from their cages, each m × 3 interleaved.
@@ -177,7 +182,7 @@ impl Decoder {
         let first = block * BLOCK_ROWS;
         let rows = BLOCK_ROWS.min(self.points - first);
         let whole = rows.next_multiple_of(dense::WHOLE_ROWS);
-        dense::multiply(product.as_mut().subrows_mut(0, whole), self.phi.as_ref().subrows(first, whole), columns);
+        dense::multiply(product.as_mut().subrows_mut(0, whole), self.padded().subrows(first, whole), columns);
         product.as_ref().subrows(0, rows)
     }
 }

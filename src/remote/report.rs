@@ -36,6 +36,7 @@ pub(super) fn report(container: impl Read + Seek) -> Result<Unfinished, Error> {
         handles: header.handles.clone(),
         regularizer: header.regularizer.clone(),
         spectrum: header.spectrum as usize,
+        spectrum_choice: None,
         lambda: header.lambda,
         affine_reproduction_error: summary.affine_reproduction_error,
         condition_number: Condition { full: summary.condition_number.full, handles: summary.condition_number.handles },

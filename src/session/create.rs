@@ -69,7 +69,7 @@ impl Service {
         choices: Choices,
         idempotency: Option<Idempotency>,
     ) -> Result<Arc<Session>, ApiError> {
-        let room = self.reserve(tenant, (content.rest.len() + content.cage.len()) as u64)?;
+        let room = self.reserve(tenant, content.size_bytes())?;
         let at_hand = self.solvers.at_hand(&key);
         let most = self.config.max_preparing + self.config.max_prepare_queue;
         if at_hand.is_none() && self.solvers.in_flight_of(&tenant.name) >= most {
@@ -99,7 +99,7 @@ impl Service {
             None => Status { phase: Phase::Preparing, facts: None },
         };
         let session = Arc::new(Session::new(meta, self.store.clone(), self.committer.clone(), status, true));
-        session.bytes.store((content.rest.len() + content.cage.len()) as u64, Relaxed);
+        session.bytes.store(content.size_bytes(), Relaxed);
         {
             let _content = self.registry.content_lock(&key).await;
             let (store, meta) = (self.store.clone(), session.meta.clone());
@@ -335,7 +335,10 @@ fn content_key(tenant: &str, content: &Content, options: &SessionOptions) -> Con
         extension(&content.cage_name).as_bytes(),
         &content.cage,
         &solving,
-    ] {
+    ]
+    .into_iter()
+    .chain(content.matrix.as_ref().map(|matrix| matrix.bytes.as_slice()))
+    {
         hasher.update(&(part.len() as u64).to_le_bytes());
         hasher.update(part);
     }

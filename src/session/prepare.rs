@@ -9,8 +9,8 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions};
 use cager_core::mesh::{Model, TriMesh};
-use cager_core::regularize::Regularizer;
-use cager_formats::{MeshFormat, read_model_bytes};
+use cager_core::regularize::{Regularizer, SparseMatrix, Term, TermError};
+use cager_formats::{MeshFormat, read_matrix_bytes, read_model_bytes};
 use cager_proto::messages::SessionOptions;
 use std::path::Path;
 
@@ -50,14 +50,23 @@ impl Choices {
         let Some(system) = coordinates::by_name(name) else {
             return refuse(format!("coordinates: {name:?} is not available; give mvc"));
         };
-        let handles = match options.handles.as_deref().unwrap_or(Handles::default().name()) {
-            "maxvol" => Handles::MaxVol,
-            "all" => Handles::All,
-            other => return refuse(format!("handles: {other:?} is not available; give maxvol or all")),
+        let wanted = options.handles.as_deref().unwrap_or(Handles::default().name());
+        if !Handles::NAMES.contains(&wanted) {
+            let names = Handles::NAMES.join(", ");
+            return refuse(format!("handles: {wanted:?} is not available; give one of {names}"));
+        }
+        let Some(handles) = Handles::by_name(wanted, options.handle_count.map(|count| count as usize)) else {
+            return refuse(format!("handle_count: {wanted} reads a number of points of its own; leave it out"));
         };
         let wanted = options.regularizer.as_deref().unwrap_or(Regularizer::default().name());
-        let Some(&regularizer) = Regularizer::ALL.iter().find(|r| r.name() == wanted) else {
-            let names: Vec<&str> = Regularizer::ALL.iter().map(|r| r.name()).collect();
+        if wanted == Regularizer::Temporal.name() {
+            return refuse(
+                "regularizer: temporal makes every frame depend on the one before, and a service takes frames in any order; encode with the command line, without --server".to_owned(),
+            );
+        }
+        let Some(regularizer) = Regularizer::by_name(wanted) else {
+            let names = Regularizer::ALL.iter().filter(|&&r| r != Regularizer::Temporal).map(|r| r.name());
+            let names: Vec<&str> = names.collect();
             return refuse(format!("regularizer: {wanted:?} is not available; give one of {}", names.join(", ")));
         };
         let lambda = options.lambda.unwrap_or(SolverOptions::default().lambda);
@@ -82,6 +91,20 @@ impl Choices {
 pub(crate) struct Geometry {
     pub(crate) rest: Model,
     pub(crate) cage: Cage,
+    /// The matrix of the regularizer of that name.
+    pub(crate) matrix: Option<SparseMatrix>,
+}
+
+fn read_matrix(content: &Content, choices: &Choices) -> Result<Option<SparseMatrix>, ApiError> {
+    let refuse = |detail: String| Err(ApiError::new(problem::INVALID_OPTIONS, format!("regularizer_matrix: {detail}")));
+    match (&content.matrix, choices.regularizer) {
+        (Some(file), Regularizer::Matrix) => {
+            read_matrix_bytes(Path::new(&file.name), &file.bytes).map(Some).or_else(|error| refuse(error.to_string()))
+        }
+        (None, Regularizer::Matrix) => refuse("the regularizer matrix needs it; send it as a file".to_owned()),
+        (Some(_), other) => refuse(format!("{} uses no matrix; choose the regularizer matrix", other.name())),
+        (None, _) => Ok(None),
+    }
 }
 
 /// Reads and checks rest pose and cage.
@@ -90,7 +113,7 @@ pub(crate) struct Geometry {
 /// Bytes that cannot be read; a cage that cannot be used.
 pub(crate) fn read(content: &Content, choices: &Choices) -> Result<Geometry, ApiError> {
     let rest = read_part("rest", &content.rest_name, &content.rest)?;
-    Ok(Geometry { rest, cage: read_cage(content, choices)? })
+    Ok(Geometry { rest, cage: read_cage(content, choices)?, matrix: read_matrix(content, choices)? })
 }
 
 /// Reads and checks the cage.
@@ -119,9 +142,12 @@ pub(crate) fn read_cage(content: &Content, choices: &Choices) -> Result<Cage, Ap
 /// Geometry or options that do not go together.
 pub(crate) fn check(geometry: &Geometry, choices: &Choices, most_bytes: u64) -> Result<(), ApiError> {
     let unknowns = choices.system.unknowns(&geometry.cage);
-    check_memory(geometry, unknowns, most_bytes)?;
     let options = choices.solver_options(unknowns);
-    Solver::check(choices.system, &geometry.cage, &geometry.rest.points, options).map_err(|error| refusal(&error))
+    check_memory(geometry, unknowns, options, most_bytes)?;
+    Solver::check(choices.system, &geometry.cage, &geometry.rest.points, options).map_err(refused)?;
+    let Some(matrix) = &geometry.matrix else { return Ok(()) };
+    matrix.delta(&geometry.cage, unknowns).map_err(|error| refused(error.into()))?;
+    Ok(())
 }
 
 /// Prepares the solver.
@@ -131,10 +157,24 @@ pub(crate) fn check(geometry: &Geometry, choices: &Choices, most_bytes: u64) -> 
 pub(crate) fn prepare(geometry: &Geometry, choices: &Choices, most_bytes: u64) -> Result<Prepared, ApiError> {
     let unknowns = choices.system.unknowns(&geometry.cage);
     let options = choices.solver_options(unknowns);
-    check_memory(geometry, unknowns, most_bytes)?;
-    let solver = Solver::prepare(choices.system, &geometry.cage, &geometry.rest.points, options)
-        .map_err(|error| refusal(&error))?;
+    check_memory(geometry, unknowns, options, most_bytes)?;
+    let own = || geometry.matrix.as_ref().map(|matrix| matrix as &dyn Term).ok_or(TermError::Missing);
+    let term = options.regularizer.term().map_or_else(own, |term| Ok(term)).map_err(|error| refused(error.into()))?;
+    let solver =
+        Solver::prepare_with(choices.system, &geometry.cage, &geometry.rest.points, options, term).map_err(refused)?;
     Ok(with_solver(solver, &geometry.cage, options))
+}
+
+/// What a client hears of an error: which option it is about, or that it is the geometry.
+fn refused(error: PrepareError) -> ApiError {
+    let option = match error {
+        PrepareError::SpectrumTooLarge { .. } => "spectrum",
+        PrepareError::BadLambda { .. } => "lambda",
+        PrepareError::HandleCount { .. } | PrepareError::HandlesOutOfMemory { .. } => "handle_count",
+        PrepareError::Term(_) => "regularizer_matrix",
+        _ => return geometry(error.to_string()),
+    };
+    ApiError::new(problem::INVALID_OPTIONS, format!("{option}: {error}"))
 }
 
 /// A solver with what goes with it.
@@ -149,13 +189,21 @@ pub(crate) fn with_solver(solver: Solver, cage: &Cage, options: SolverOptions) -
     }
 }
 
-fn check_memory(geometry: &Geometry, unknowns: usize, most_bytes: u64) -> Result<(), ApiError> {
+fn check_memory(geometry: &Geometry, unknowns: usize, options: SolverOptions, most_bytes: u64) -> Result<(), ApiError> {
+    let points = geometry.rest.points.len();
+    let handles = match options.handles {
+        // The covariance of the handles, its factor, and what is solved with it.
+        Handles::Spread { .. } => {
+            let count = options.handles.count(points, unknowns) as u64;
+            count.saturating_mul(16 * (count + unknowns as u64))
+        }
+        _ => 0,
+    };
     // Two matrices of n × m in double precision and one in single, at their peak.
-    let needed = 20 * geometry.rest.points.len() as u64 * unknowns as u64;
+    let needed = (20 * points as u64 * unknowns as u64).saturating_add(handles);
     if needed > most_bytes {
         let detail = format!(
-            "{} points times {unknowns} unknowns need {needed} bytes to be prepared, and this service allows {most_bytes}; use a coarser cage or a lighter model",
-            geometry.rest.points.len()
+            "{points} points times {unknowns} unknowns need {needed} bytes to be prepared, and this service allows {most_bytes}; use a coarser cage or a lighter model"
         );
         return Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(most_bytes));
     }
@@ -166,14 +214,6 @@ fn read_part(part: &str, name: &str, bytes: &[u8]) -> Result<Model, ApiError> {
     let path = Path::new(name);
     let format = MeshFormat::from_path(path).map_err(|error| geometry(format!("{part}: {error}")))?;
     read_model_bytes(format, path, bytes).map_err(|error| geometry(format!("{part}: {error}")))
-}
-
-fn refusal(error: &PrepareError) -> ApiError {
-    match error {
-        PrepareError::SpectrumTooLarge { .. } => ApiError::new(problem::INVALID_OPTIONS, format!("spectrum: {error}")),
-        PrepareError::BadLambda { .. } => ApiError::new(problem::INVALID_OPTIONS, format!("lambda: {error}")),
-        _ => geometry(error.to_string()),
-    }
 }
 
 fn geometry(detail: String) -> ApiError {

@@ -3,16 +3,21 @@
 
 use super::ContentKey;
 use super::disk::DiskFile;
-use cager_core::inversion::{Preparation, Solver, SolverParts};
+use cager_core::inversion::{Preparation, Pull, Solver, SolverParts};
 use faer::Mat;
 use std::io;
 
-const MAGIC: [u8; 8] = *b"CGRSOLV\x01";
-const COUNTS: usize = 9;
+const MAGIC: [u8; 8] = *b"CGRSOLV\x02";
+const COUNTS: usize = 10;
 const NUMBERS: usize = 10;
 /// Magic, key, counts, numbers, checksum.
 const HEADER_BYTES: usize = 8 + 32 + 8 * COUNTS + 8 * NUMBERS + 4;
 const PIECE_BYTES: usize = 1 << 18;
+
+/// What is added to `R · H`, the last of the counts.
+const NO_PULL: u64 = 0;
+const CONSTANT: u64 = 1;
+const PREVIOUS: u64 = 2;
 
 /// What a file turned out to be.
 pub(super) enum Found {
@@ -22,16 +27,22 @@ pub(super) enum Found {
 
 /// Length of the file that has these counts, where one can have it.
 fn file_bytes(counts: &[u64; COUNTS]) -> Option<u64> {
-    let [points, unknowns, handles, reads_all, values, outside, ..] = *counts;
+    let [points, unknowns, handles, reads_all, values, outside, _, _, _, pull] = *counts;
     // A matrix's columns are padded in memory: only tall ones take about what their file does.
-    if unknowns > points || reads_all > 1 {
+    if unknowns > points || reads_all > 1 || handles > points {
         return None;
     }
+    let pull = match pull {
+        NO_PULL => 0,
+        CONSTANT => unknowns.checked_mul(24)?,
+        PREVIOUS => unknowns.checked_mul(unknowns.checked_mul(8)?.checked_add(12)?)?,
+        _ => return None,
+    };
     let read = if reads_all == 1 { points } else { handles };
     let phi = points.checked_mul(unknowns)?.checked_mul(4)?;
     let operator = read.checked_mul(unknowns)?.checked_mul(8)?;
     let small = handles.checked_add(outside)?.checked_mul(4)?.checked_add(values.checked_mul(8)?)?;
-    (HEADER_BYTES as u64 + 4).checked_add(phi)?.checked_add(operator)?.checked_add(small)
+    (HEADER_BYTES as u64 + 4).checked_add(phi)?.checked_add(operator)?.checked_add(small)?.checked_add(pull)
 }
 
 pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> io::Result<()> {
@@ -66,6 +77,11 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
         decoder.positions(),
         *rank,
         *swaps,
+        match solver.pull() {
+            Pull::None => NO_PULL,
+            Pull::Constant(_) => CONSTANT,
+            Pull::Previous { .. } => PREVIOUS,
+        } as usize,
     ];
     header.extend(counts.iter().flat_map(|&count| (count as u64).to_le_bytes()));
     let numbers: [f64; NUMBERS] = [
@@ -89,6 +105,17 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
     out.put(singular_values.iter().map(|x| x.to_le_bytes()))?;
     for j in 0..operator.ncols() {
         out.put(operator.col(j).iter().map(|x| x.to_le_bytes()))?;
+    }
+    let mut put_matrix = |matrix: &Mat<f64>| {
+        (0..matrix.ncols()).try_for_each(|j| out.put(matrix.col(j).iter().map(|x| x.to_le_bytes())))
+    };
+    match solver.pull() {
+        Pull::None => {}
+        Pull::Constant(offset) => put_matrix(offset)?,
+        Pull::Previous { operator, first } => {
+            put_matrix(operator)?;
+            out.put(first.iter().map(|x| x.to_le_bytes()))?;
+        }
     }
     for j in 0..phi.ncols() {
         out.put(phi.col(j).iter().map(|x| x.to_le_bytes()))?;
@@ -125,7 +152,7 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Found> {
     if file_bytes(&counts) != Some(bytes) {
         return damage("its length is not what its header says");
     }
-    let [points, unknowns, handle_count, reads_all, values, outside_count, positions, rank, swaps] =
+    let [points, unknowns, handle_count, reads_all, values, outside_count, positions, rank, swaps, _] =
         counts.map(|count| count as usize);
 
     let mut source = In { file, piece: Vec::new(), at: 0, offset: HEADER_BYTES as u64, end: bytes, crc: 0 };
@@ -136,10 +163,17 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Found> {
     source.fill(&mut outside, u32::from_le_bytes)?;
     let mut singular_values = vec![0.0; values];
     source.fill(&mut singular_values, f64::from_le_bytes)?;
-    let mut operator = Mat::<f64>::zeros(if reads_all == 1 { points } else { handle_count }, unknowns);
-    for j in 0..unknowns {
-        source.fill(operator.col_as_slice_mut(j), f64::from_le_bytes)?;
-    }
+    let operator = source.matrix(if reads_all == 1 { points } else { handle_count }, unknowns)?;
+    let pull = match counts[COUNTS - 1] {
+        CONSTANT => Pull::Constant(source.matrix(unknowns, 3)?),
+        PREVIOUS => {
+            let operator = source.matrix(unknowns, unknowns)?;
+            let mut first = vec![0.0; 3 * unknowns];
+            source.fill(&mut first, f32::from_le_bytes)?;
+            Pull::Previous { operator, first }
+        }
+        _ => Pull::None,
+    };
     let mut phi = Mat::<f32>::zeros(points, unknowns);
     for j in 0..unknowns {
         source.fill(phi.col_as_slice_mut(j), f32::from_le_bytes)?;
@@ -178,7 +212,8 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Found> {
         maxvol_seconds,
         svd_seconds,
     };
-    let parts = SolverParts { handles, reads_all: reads_all == 1, operator, phi, positions, diagonal, preparation };
+    let parts =
+        SolverParts { handles, reads_all: reads_all == 1, operator, pull, phi, positions, diagonal, preparation };
     match Solver::from_parts(parts) {
         Some(solver) => Ok(Found::Solver(Box::new(solver))),
         None => damage("its parts do not fit together"),
@@ -224,6 +259,12 @@ struct In<'a> {
 }
 
 impl In<'_> {
+    fn matrix(&mut self, rows: usize, columns: usize) -> io::Result<Mat<f64>> {
+        let mut matrix = Mat::<f64>::zeros(rows, columns);
+        (0..columns).try_for_each(|j| self.fill(matrix.col_as_slice_mut(j), f64::from_le_bytes))?;
+        Ok(matrix)
+    }
+
     fn fill<T, const N: usize>(&mut self, mut values: &mut [T], value: fn([u8; N]) -> T) -> io::Result<()> {
         while !values.is_empty() {
             if self.piece.len() - self.at < N {

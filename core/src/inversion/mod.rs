@@ -1,17 +1,27 @@
 //! The solver: prepared once for a rest pose and its cage, then one matrix product per batch of frames.
 
+mod analysis;
 mod error;
 mod operator;
 mod options;
 mod parts;
 mod prepare;
+mod pull;
+mod reading;
 mod solve;
+mod threshold;
+mod translations;
 
+pub use crate::handles::Handles;
+pub use analysis::Analysis;
 pub use error::PrepareError;
-pub use options::{Handles, SolverOptions};
+pub use options::SolverOptions;
 pub use parts::SolverParts;
-pub use prepare::{Preparation, coordinates_fit};
+pub use prepare::{Preparation, check_options, coordinates_fit};
+pub use pull::Pull;
+pub use reading::Reading;
 pub use solve::{BATCH, Solver};
+pub use threshold::{Sample, Threshold};
 
 pub(crate) use operator::tall_product;
 pub(crate) use solve::product_columns;

@@ -1,26 +1,7 @@
 //! Choices for a solver.
 
+use crate::handles::Handles;
 use crate::regularize::Regularizer;
-
-/// Which points the inversion reads.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Handles {
-    /// As many as unknowns, of maximum volume: stable, and a frame costs microseconds.
-    #[default]
-    MaxVol,
-    /// Every point: least squares, the lowest error.
-    All,
-}
-
-impl Handles {
-    /// The name on the command line, in reports and in containers.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::MaxVol => "maxvol",
-            Self::All => "all",
-        }
-    }
-}
 
 /// Choices for a solver.
 #[derive(Clone, Copy, Debug, PartialEq)]

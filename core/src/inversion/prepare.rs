@@ -1,16 +1,13 @@
 //! Preparing: coordinates, handles, spectrum and operator.
 
-use super::operator::{Spectra, keep_translations, operator, tall_product, with_whole_tiles};
-use super::{Handles, PrepareError, Solver, SolverOptions};
+use super::operator::tall_product;
+use super::{Analysis, Handles, PrepareError, Solver, SolverOptions};
 use crate::cage::Cage;
 use crate::coordinates::CoordinateSystem;
-use crate::decode::Decoder;
 use crate::mesh::{Point, diagonal, distance_to_surface, norm};
-use crate::regularize::cage_laplacian;
-use crate::spectrum::{RANK_TOLERANCE, deficient_basis, row_basis};
+use crate::regularize::{Term, TermError};
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
-use std::time::Instant;
 
 /// Beyond this affine reproduction error, over the diagonal, coordinates are of no use.
 const NOT_REPRODUCED: f64 = 1e-6;
@@ -75,70 +72,30 @@ impl Solver {
         points: &[Point],
         options: SolverOptions,
     ) -> Result<Self, PrepareError> {
-        let m = system.unknowns(cage);
-        check(points, m, options)?;
-        let diagonal = diagonal(points);
-        let clock = Instant::now();
-        if !coordinates_fit(points.len(), m, 2) {
-            let gigabytes = 20e-9 * points.len() as f64 * m as f64;
-            return Err(PrepareError::OutOfMemory { points: points.len(), unknowns: m, gigabytes });
-        }
-        refuse_far_points(cage, points)?;
-        let coordinates = system.coordinates(cage, points)?;
-        let phi = coordinates.phi.as_ref();
-        let (point, error) = reproduction_error(phi, &system.rest_unknowns(cage), cage, points);
-        let reproduction = error / diagonal;
-        // A stray point enlarges the model's own diagonal, not the cage's.
-        let relative = error / diagonal.min(cage.diagonal());
-        if relative.is_nan() || relative > NOT_REPRODUCED {
-            return Err(PrepareError::NotReproduced { point, error: relative });
-        }
-        let (outside, outside_distance) = outside(cage, points, &coordinates.outside, diagonal);
-        let mut preparation = Preparation {
-            affine_reproduction_error: reproduction,
-            outside_distance,
-            outside,
-            coordinates_seconds: clock.elapsed().as_secs_f64(),
-            ..Preparation::default()
-        };
+        let term = options.regularizer.term().ok_or(TermError::Missing)?;
+        Self::prepare_with(system, cage, points, options, term)
+    }
 
-        let clock = Instant::now();
-        let no_handles = PrepareError::NoSolution { what: "choice of handles" };
-        let mut basis = row_basis(phi).ok_or(no_handles.clone())?;
-        preparation.maxvol_seconds = clock.elapsed().as_secs_f64();
-
-        let clock = Instant::now();
-        let mut spectra = Spectra::of(&basis, options.handles)?;
-        if basis.rank == m && spectra.full_sigma[m - 1] <= RANK_TOLERANCE * spectra.full_sigma[0] {
-            basis = deficient_basis(phi).ok_or(no_handles)?;
-            spectra = Spectra::of(&basis, options.handles)?;
-        }
-        let rank = basis.rank;
-        preparation.rank = rank;
-        preparation.swaps = basis.handles.swaps;
-        preparation.log_volume = basis.handles.log_volume;
-        preparation.max_entry = basis.handles.max_entry;
-        preparation.condition_handles = spectra.handles.sigma[0] / spectra.handles.sigma[rank - 1];
-        preparation.condition_full = spectra.full_sigma[0] / spectra.full_sigma[rank - 1];
-        let operator = operator(phi, &basis, spectra, cage_laplacian(cage).as_ref(), options, &mut preparation)?;
-        let operator = with_whole_tiles(keep_translations(operator, cage.vertices().len()));
-        preparation.svd_seconds = clock.elapsed().as_secs_f64();
-
-        let clock = Instant::now();
-        let decoder = Decoder::new(phi, cage.vertices().len());
-        preparation.coordinates_seconds += clock.elapsed().as_secs_f64();
-        Ok(Self {
-            handles: basis.handles.rows,
-            reads_all: options.handles == Handles::All,
-            operator,
-            decoder,
-            diagonal,
-            preparation,
-        })
+    /// As [`Self::prepare`], with a term of the caller's own, for
+    /// [`Regularizer::Matrix`](crate::regularize::Regularizer::Matrix).
+    ///
+    /// # Errors
+    /// See [`PrepareError`].
+    pub fn prepare_with(
+        system: &dyn CoordinateSystem,
+        cage: &Cage,
+        points: &[Point],
+        options: SolverOptions,
+        term: &dyn Term,
+    ) -> Result<Self, PrepareError> {
+        // Known before anything is computed.
+        term.delta(cage, system.unknowns(cage))?;
+        let analysis = Analysis::for_options(system, cage, points, options)?;
+        analysis.reading(options.handles)?.solver_with(options, term)
     }
 }
 
-fn refuse_far_points(cage: &Cage, points: &[Point]) -> Result<(), PrepareError> {
+pub(super) fn refuse_far_points(cage: &Cage, points: &[Point]) -> Result<(), PrepareError> {
     let [a, b, c] = cage.vertices()[0];
     for (point, p) in points.iter().enumerate() {
         let distance = norm([p[0] - a, p[1] - b, p[2] - c]) / cage.diagonal();
@@ -149,7 +106,16 @@ fn refuse_far_points(cage: &Cage, points: &[Point]) -> Result<(), PrepareError> 
     Ok(())
 }
 
-fn check(points: &[Point], unknowns: usize, options: SolverOptions) -> Result<(), PrepareError> {
+/// Refuses a point whose coordinates are rounding. A stray point enlarges the model's own diagonal, not the cage's.
+pub(super) fn refuse_unreproduced(point: usize, error: f64, cage: &Cage, diagonal: f64) -> Result<(), PrepareError> {
+    let relative = error / diagonal.min(cage.diagonal());
+    if relative.is_nan() || relative > NOT_REPRODUCED {
+        return Err(PrepareError::NotReproduced { point, error: relative });
+    }
+    Ok(())
+}
+
+pub(super) fn check(points: &[Point], unknowns: usize, options: SolverOptions) -> Result<(), PrepareError> {
     if let Some(point) = points.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
         return Err(PrepareError::NotFinite { point });
     }
@@ -163,11 +129,28 @@ fn check(points: &[Point], unknowns: usize, options: SolverOptions) -> Result<()
     if !diagonal.is_finite() {
         return Err(PrepareError::TooLarge);
     }
-    if options.spectrum > unknowns {
+    check_options(points.len(), unknowns, options)
+}
+
+/// Checks options for so many points and unknowns.
+///
+/// # Errors
+/// The options among [`PrepareError`].
+pub fn check_options(points: usize, unknowns: usize, options: SolverOptions) -> Result<(), PrepareError> {
+    if options.regularizer.has_threshold() && options.spectrum > unknowns {
         return Err(PrepareError::SpectrumTooLarge { spectrum: options.spectrum, unknowns });
     }
     if !(options.lambda.is_finite() && options.lambda >= 0.0) {
         return Err(PrepareError::BadLambda { lambda: options.lambda });
+    }
+    let count = options.handles.count(points, unknowns);
+    if !(unknowns..=points).contains(&count) {
+        return Err(PrepareError::HandleCount { count, unknowns, points });
+    }
+    // Their covariance, its factor, and what is solved with it.
+    if matches!(options.handles, Handles::Spread { .. }) && !coordinates_fit(count, 2 * count + 2 * unknowns, 1) {
+        let gigabytes = 8e-9 * count as f64 * (2 * count + 2 * unknowns) as f64;
+        return Err(PrepareError::HandlesOutOfMemory { count, gigabytes });
     }
     Ok(())
 }
@@ -179,7 +162,7 @@ pub fn coordinates_fit(points: usize, unknowns: usize, copies: usize) -> bool {
 }
 
 /// Of the points found outside, those that do not lie on the cage, and the largest distance over the diagonal.
-fn outside(cage: &Cage, points: &[Point], found: &[u32], diagonal: f64) -> (Vec<u32>, f64) {
+pub(super) fn outside(cage: &Cage, points: &[Point], found: &[u32], diagonal: f64) -> (Vec<u32>, f64) {
     let distance = |i: u32| distance_to_surface(cage.vertices(), &cage.mesh().triangles, points[i as usize]) / diagonal;
     let measured: Vec<(u32, f64)> =
         found.par_iter().map(|&i| (i, distance(i))).filter(|&(_, distance)| distance > ON_THE_CAGE).collect();
@@ -189,7 +172,12 @@ fn outside(cage: &Cage, points: &[Point], found: &[u32], diagonal: f64) -> (Vec<
 
 /// The point of the largest `|Φ C − P|`, and that distance. Measured about the cage's first vertex: far from the origin the
 /// sum itself would round.
-fn reproduction_error(phi: MatRef<'_, f64>, unknowns: &[Point], cage: &Cage, points: &[Point]) -> (usize, f64) {
+pub(super) fn reproduction_error(
+    phi: MatRef<'_, f64>,
+    unknowns: &[Point],
+    cage: &Cage,
+    points: &[Point],
+) -> (usize, f64) {
     let o = cage.vertices()[0];
     let positions = cage.vertices().len();
     let c = Mat::from_fn(unknowns.len(), 3, |i, k| unknowns[i][k] - if i < positions { o[k] } else { 0.0 });

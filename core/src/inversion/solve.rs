@@ -1,19 +1,20 @@
 //! Cages from frames: one matrix product for a batch.
 
-use super::{BLOCK_ROWS, Preparation};
+use super::{BLOCK_ROWS, Preparation, Pull};
 use crate::decode::Decoder;
 use faer::{Accum, Mat, Par};
 
 /// Most frames of one matrix product.
 pub const BATCH: usize = 16;
 
-/// A prepared inversion: `C_t = R · H_t`.
+/// A prepared inversion: `C_t = R · H_t`, and for some terms a constant or a part of the previous cage beside it.
 #[derive(Clone, Debug)]
 pub struct Solver {
     pub(super) handles: Vec<u32>,
     pub(super) reads_all: bool,
     /// `Rᵀ`, K × m, column-major: one row per point read; zero columns follow up to a whole tile.
     pub(super) operator: Mat<f64>,
+    pub(super) pull: Pull,
     pub(super) decoder: Decoder,
     pub(super) diagonal: f64,
     pub(super) preparation: Preparation,
@@ -25,7 +26,8 @@ impl Solver {
         &self.preparation
     }
 
-    /// Rows of maximum volume. With [`Handles::All`] they only condition the solve, and every point is read.
+    /// The rows read, K, in their order: those of maximum volume first. With [`Handles::All`](crate::handles::Handles::All) there are
+    /// no others here: they only condition the solve, and every point is read.
     pub fn handles(&self) -> &[u32] {
         &self.handles
     }
@@ -43,7 +45,14 @@ impl Solver {
     /// Bytes the prepared solver holds.
     pub fn size_bytes(&self) -> usize {
         let phi = self.decoder.coordinates();
-        4 * phi.nrows() * phi.ncols() + 8 * self.operator.nrows() * self.operator.ncols() + 4 * self.handles.len()
+        let operator = 8 * self.operator.nrows() * self.operator.ncols() + self.pull.size_bytes();
+        4 * phi.nrows() * phi.ncols() + operator + 4 * self.handles.len()
+    }
+
+    /// Whether every cage depends on the previous frame's, so that frames have to be inverted in order, by
+    /// [`Self::invert_after`].
+    pub fn follows_previous(&self) -> bool {
+        self.pull.is_previous()
     }
 
     /// Cages, each m × 3 interleaved, of up to [`BATCH`] frames, each n × 3 interleaved.
@@ -51,10 +60,20 @@ impl Solver {
     /// The bits of a cage depend on its frame alone, not on the other frames of the batch.
     ///
     /// # Panics
-    /// Where a frame's length does not fit, or more frames come than a batch holds.
+    /// Where a frame's length does not fit, more frames come than a batch holds, or the solver follows the previous frame.
     pub fn invert<T: Copy + Into<f64>>(&self, frames: &[&[T]]) -> Vec<Vec<f32>> {
+        assert!(!self.follows_previous(), "every cage depends on the one before");
+        self.invert_after(None, frames)
+    }
+
+    /// As [`Self::invert`], for any solver: where it follows the previous frame, these are consecutive frames, the first after the
+    /// one whose cage is `previous`, or the first of all. Other solvers do not look at it.
+    ///
+    /// # Panics
+    /// Where lengths do not fit, or more frames come than a batch holds.
+    pub fn invert_after<T: Copy + Into<f64>>(&self, previous: Option<&[f32]>, frames: &[&[T]]) -> Vec<Vec<f32>> {
         assert!(frames.iter().all(|f| f.len() == 3 * self.decoder.points()), "every frame has every point");
-        self.solve(frames, |row| if self.reads_all { row } else { self.handles[row] as usize })
+        self.solve(previous, frames, |row| if self.reads_all { row } else { self.handles[row] as usize })
     }
 
     /// As [`Self::invert`] of frames of which only the rows of [`Self::handles`] are there, K × 3 interleaved: the same bits.
@@ -62,12 +81,31 @@ impl Solver {
     /// # Panics
     /// As [`Self::invert`], and where the solver reads every point.
     pub fn invert_handles<T: Copy + Into<f64>>(&self, frames: &[&[T]]) -> Vec<Vec<f32>> {
-        assert!(!self.reads_all, "handles are not enough for least squares over all points");
-        assert!(frames.iter().all(|f| f.len() == 3 * self.handles.len()), "every frame has every handle");
-        self.solve(frames, |row| row)
+        assert!(!self.follows_previous(), "every cage depends on the one before");
+        self.invert_handles_after(None, frames)
     }
 
-    fn solve<T: Copy + Into<f64>>(&self, frames: &[&[T]], point_of_row: impl Fn(usize) -> usize) -> Vec<Vec<f32>> {
+    /// As [`Self::invert_after`] and [`Self::invert_handles`].
+    ///
+    /// # Panics
+    /// As both.
+    pub fn invert_handles_after<T: Copy + Into<f64>>(
+        &self,
+        previous: Option<&[f32]>,
+        frames: &[&[T]],
+    ) -> Vec<Vec<f32>> {
+        assert!(!self.reads_all, "handles are not enough for least squares over all points");
+        assert!(frames.iter().all(|f| f.len() == 3 * self.handles.len()), "every frame has every handle");
+        self.solve(previous, frames, |row| row)
+    }
+
+    fn solve<T: Copy + Into<f64>>(
+        &self,
+        previous: Option<&[f32]>,
+        frames: &[&[T]],
+        point_of_row: impl Fn(usize) -> usize,
+    ) -> Vec<Vec<f32>> {
+        assert!(previous.is_none_or(|cage| cage.len() == 3 * self.decoder.unknowns()), "a cage has every unknown");
         let (columns, padded) = self.operator.shape();
         let m = self.decoder.unknowns();
         let width = product_columns(frames.len());
@@ -94,9 +132,13 @@ impl Solver {
             );
             first += rows;
         }
-        (0..frames.len())
-            .map(|f| (0..m).flat_map(|j| [0, 1, 2].map(|k| cages[(j, 3 * f + k)] as f32)).collect())
-            .collect()
+        let mut solved: Vec<Vec<f32>> = Vec::with_capacity(frames.len());
+        for f in 0..frames.len() {
+            let mut cage: Vec<[f64; 3]> = (0..m).map(|j| [0, 1, 2].map(|k| cages[(j, 3 * f + k)])).collect();
+            self.pull.add(&mut cage, solved.last().map(Vec::as_slice).or(previous), self.decoder.positions());
+            solved.push(cage.as_flattened().iter().map(|&x| x as f32).collect());
+        }
+        solved
     }
 }
 
