@@ -3,11 +3,14 @@
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::SolverOptions;
 
+/// Every coordinate system, the usual one first.
+pub(crate) fn all() -> &'static [&'static dyn CoordinateSystem] {
+    &[&MeanValue]
+}
+
 /// The coordinate system with this name on the command line, in reports and in containers.
 pub(crate) fn by_name(name: &str) -> Option<&'static dyn CoordinateSystem> {
-    static MEAN_VALUE: MeanValue = MeanValue;
-    let all: [&'static dyn CoordinateSystem; 1] = [&MEAN_VALUE];
-    all.into_iter().find(|system| system.name() == name)
+    all().iter().copied().find(|system| system.name() == name)
 }
 
 /// The spectrum threshold where none is given: the paper's 20; less for a cage of which it would smooth the greater part.
