@@ -1,7 +1,7 @@
 //! `cager compare`.
 
 use super::args::{CompareArgs, CoordinatesArg, UpArg};
-use super::encode::{name_file, read_cage};
+use super::encode::{blame, read_cage};
 use super::outputs::refuse_overwriting;
 use super::{human_bytes, interrupt, plain, print, progress};
 use crate::compare::{CompareError, Figures, Job, Progress, Up, compare, page};
@@ -45,7 +45,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     let result = compare(&job, &mut Progress { tell: &mut tell });
     bar.finish_and_clear();
     let (figures, pictures) = result.map_err(|error| match error {
-        CompareError::Prepare(error) => name_file(error, &args.rest, &args.cage),
+        CompareError::Prepare(error) => blame(error, &args.rest, &args.cage),
         CompareError::Formats(error) => error.into(),
     })?;
 

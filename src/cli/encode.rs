@@ -16,7 +16,7 @@ use cager_core::mesh::{Model, TriMesh};
 use cager_core::regularize::{Regularizer, SparseMatrix, Term};
 use cager_formats::{AtomicFile, CompleteFile, commit_together, open_frames, read_matrix, read_model};
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 
 pub(super) fn run(args: &EncodeArgs) -> Result<()> {
@@ -37,8 +37,7 @@ fn here(args: &EncodeArgs, rest: &Model, cage: &Cage, clock: Instant) -> Result<
     let choose = match (args.solver.spectrum, spectrum_bound(&args.solver)?) {
         (Some(SpectrumArg::Auto), bound) => {
             // What is wrong with the options is told before anything is read.
-            check_options(rest.points.len(), system.unknowns(cage), options)
-                .map_err(|e| name_file_or_option(e, args))?;
+            check_options(rest.points.len(), system.unknowns(cage), options).map_err(|e| name_file(e, args))?;
             let mut again = open_frames(&args.frames, rest.points.len())?;
             let samples = sample_frames(again.as_mut(), options.regularizer == Regularizer::Temporal)?;
             Some(ChooseSpectrum { samples, bound })
@@ -115,9 +114,8 @@ fn elsewhere(args: &EncodeArgs, address: &str, rest: &Model, cage: &Cage, clock:
 
 /// What comes before the work, so that outputs that cannot be written cost no waiting.
 fn begin(args: &EncodeArgs) -> Result<Option<AtomicFile>> {
-    let inputs: Vec<&PathBuf> =
-        [&args.rest, &args.cage, &args.frames].into_iter().chain(&args.solver.regularizer_matrix).collect();
-    refuse_overwriting(&args.output, args.report.as_deref(), &inputs)?;
+    let inputs = [&args.rest, &args.cage, &args.frames].into_iter().chain(&args.solver.regularizer_matrix);
+    refuse_overwriting(&args.output, args.report.as_deref(), inputs)?;
     interrupt::leaves_nothing()?;
     Ok(args.report.as_ref().map(AtomicFile::create).transpose()?)
 }
@@ -135,27 +133,26 @@ fn finish(args: &EncodeArgs, encoded: Encoded, report_file: Option<AtomicFile>, 
 /// Errors of the mathematics know vertices and points; the user knows files.
 fn name_files(error: encode::EncodeError, args: &EncodeArgs) -> anyhow::Error {
     match error {
-        encode::EncodeError::Prepare(inner) => name_file_or_option(inner, args),
+        encode::EncodeError::Prepare(inner) => name_file(inner, args),
         other => other.into(),
     }
 }
 
-fn name_file_or_option(error: PrepareError, args: &EncodeArgs) -> anyhow::Error {
-    match error {
-        PrepareError::HandleCount { .. } | PrepareError::HandlesOutOfMemory { .. } => {
-            anyhow::anyhow!("--handle-count: {error}")
-        }
-        PrepareError::Term(_) => {
-            let path = args.solver.regularizer_matrix.as_ref().unwrap_or(&args.cage);
-            anyhow::anyhow!("{}: {error}", path.display())
-        }
-        error => name_file(error, &args.rest, &args.cage),
+fn name_file(error: PrepareError, args: &EncodeArgs) -> anyhow::Error {
+    match (&error, &args.solver.regularizer_matrix) {
+        (PrepareError::Term(_), Some(matrix)) => anyhow::anyhow!("{}: {error}", matrix.display()),
+        _ => blame(error, &args.rest, &args.cage),
     }
 }
 
 /// Names the file or the option that is to blame.
-pub(super) fn name_file(error: PrepareError, rest: &Path, cage: &Path) -> anyhow::Error {
+pub(super) fn blame(error: PrepareError, rest: &Path, cage: &Path) -> anyhow::Error {
     let path = match error {
+        PrepareError::BadLambda { .. } => return anyhow::anyhow!("--lambda: {error}"),
+        PrepareError::SpectrumTooLarge { .. } => return anyhow::anyhow!("--spectrum: {error}"),
+        PrepareError::HandleCount { .. } | PrepareError::HandlesOutOfMemory { .. } => {
+            return anyhow::anyhow!("--handle-count: {error}");
+        }
         PrepareError::NotFinite { .. }
         | PrepareError::TooFewPoints { .. }
         | PrepareError::NoExtent
@@ -165,11 +162,7 @@ pub(super) fn name_file(error: PrepareError, rest: &Path, cage: &Path) -> anyhow
         | PrepareError::OutOfMemory { .. } => rest,
         _ => cage,
     };
-    match error {
-        PrepareError::BadLambda { .. } => anyhow::anyhow!("--lambda: {error}"),
-        PrepareError::SpectrumTooLarge { .. } => anyhow::anyhow!("--spectrum: {error}"),
-        _ => anyhow::anyhow!("{}: {error}", path.display()),
-    }
+    anyhow::anyhow!("{}: {error}", path.display())
 }
 
 pub(super) fn read_cage(path: &Path, flip: bool) -> Result<Cage> {

@@ -5,10 +5,15 @@ use cager_formats::{CacheFormat, MeshFormat};
 use std::path::{Path, PathBuf};
 
 /// An output in place of an input, or of the other output, is a slip that would cost the user a file.
-pub(super) fn refuse_overwriting(output: &Path, report: Option<&Path>, inputs: &[&PathBuf]) -> Result<()> {
+pub(super) fn refuse_overwriting<'a>(
+    output: &Path,
+    report: Option<&Path>,
+    inputs: impl IntoIterator<Item = &'a PathBuf>,
+) -> Result<()> {
+    let inputs: Vec<&PathBuf> = inputs.into_iter().collect();
     for output in [Some(output), report].into_iter().flatten() {
         let Ok(place) = output.canonicalize() else { continue };
-        for input in inputs {
+        for input in &inputs {
             if input.canonicalize().is_ok_and(|input| input == place) {
                 bail!(
                     "{}: is an input of this encoding, so it cannot be an output; name another file",

@@ -257,9 +257,13 @@ impl<'a> Painter<'a> {
             .map(|(title, points, errors)| {
                 let colours: Vec<[f32; 3]> = errors.iter().map(|x| ramp.colour(*x)).collect();
                 let linf = errors.iter().copied().fold(0.0, f64::max);
-                let view = if linf > LOST { self.camera(&most(points), PIXELS) } else { (camera, width, height) };
+                // Of a lost one, the triangles would hide each other.
+                let (view, mesh) = match linf > LOST {
+                    true => (self.camera(&most(points), PIXELS), Mesh { points, triangles: &[] }),
+                    false => ((camera, width, height), model(points, self.looks.mesh)),
+                };
                 let mut scene = Scene::new(view.0, view.1, view.2);
-                scene.surface(model(points, self.looks.mesh), Shade::PerPoint(&colours), true);
+                scene.surface(mesh, Shade::PerPoint(&colours), true);
                 let l2 = (errors.iter().map(|x| x * x).sum::<f64>() / errors.len() as f64).sqrt();
                 let note = format!("L2 {:.3} %, L∞ {:.2} %", 100.0 * l2, 100.0 * linf);
                 Picture { title: title.clone(), note, png: scene.png() }

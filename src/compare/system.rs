@@ -17,6 +17,9 @@ const OPERATOR_BYTES: usize = 640 << 20;
 /// The same for a batch of frames.
 const BATCH_BYTES: usize = 256 << 20;
 
+/// Rows whose singular values are below this fraction of the largest are dependent to the working precision.
+const DEPENDENT: f64 = 1e-11;
+
 /// What became of a system.
 pub(super) enum Outcome {
     /// Everything was measured.
@@ -236,9 +239,11 @@ impl Found {
             Subject::Draw(choice, rows, _) => match self.draws.last_mut().filter(|draw| draw.choice == choice) {
                 Some(draw) => draw.totals = totals,
                 None => {
-                    let found = track.solver.preparation();
+                    let sigma = &track.solver.preparation().singular_values;
+                    let (first, last) = (sigma.first().copied().unwrap_or(0.0), sigma.last().copied().unwrap_or(0.0));
                     // Of what is dependent, rounding decides; infinity has no place in a plot.
-                    let (rank, condition) = (found.rank, found.condition_handles.min(1.0 / f64::EPSILON));
+                    let condition = (first / last).min(1.0 / f64::EPSILON);
+                    let rank = sigma.iter().filter(|&&x| x > DEPENDENT * first).count();
                     self.draws.push(Draw { choice, rank, condition, data_alone: totals, totals });
                     self.rows.push(rows);
                 }

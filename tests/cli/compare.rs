@@ -1,7 +1,7 @@
 //! `cager compare`.
 
 use crate::refused::assert_sentence;
-use crate::support::{Dir, Small, close};
+use crate::support::{Dir, Small, close, npy_f64};
 use cager_core::mesh::{Model, Polygons};
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -261,7 +261,7 @@ fn bad_inputs_are_refused_in_the_words_of_encode_and_leave_nothing() {
     dir.model("open.obj", &crate::support::as_model(&open));
     let mut spoilt = small.frames.clone();
     spoilt[7][5] = f64::NAN;
-    dir.frames("spoilt.npy", &spoilt);
+    dir.write("spoilt.npy", npy_f64(&spoilt));
     let few = Small { frames: small.frames.iter().map(|f| f[..30].to_vec()).collect(), ..Small::new() };
     dir.frames("few.npy", &few.frames);
     let before = dir.contents();

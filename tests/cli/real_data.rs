@@ -289,6 +289,73 @@ fn outside(folder: &Path, cage_file: &str) -> usize {
     rest.points.iter().filter(|&&p| winding_number(&cage.vertices, &cage.triangles, p) < 0.5).count()
 }
 
+/// What `cager compare` finds out about mean value coordinates.
+fn compared(root: &Path, capture: &str, cage: &str) -> Value {
+    let (dir, folder) = (Dir::new(), root.join(capture));
+    dir.cager("compare --coordinates mvc -o report.html --json figures.json --rest")
+        .arg(folder.join("rest.obj"))
+        .arg("--cage")
+        .arg(folder.join(cage))
+        .arg("--frames")
+        .arg(folder.join("frames.npy"))
+        .succeeds();
+    dir.json("figures.json")["systems"][0]["figures"].clone()
+}
+
+/// A total of a method.
+fn total(figures: &Value, handles: &str, regularizer: &str, spectrum: u64, key: &str) -> f64 {
+    let methods = figures["methods"].as_array().expect("methods");
+    let found = methods
+        .iter()
+        .find(|m| m["handles"] == handles && m["regularizer"] == regularizer && m["spectrum"] == spectrum);
+    found.and_then(|m| m["totals"][key].as_f64()).unwrap_or_else(|| panic!("{handles} {regularizer} {spectrum} {key}"))
+}
+
+fn holds_the_papers_claims(capture: &str, cage: &str) {
+    let Some(root) = data() else { return };
+    let found = compared(&root, capture, cage);
+    let spectra = &found["spectra"];
+    let condition = |key: &str| spectra[key].as_f64().expect("a condition number");
+    eprintln!("{capture}: condition {} of {}", condition("condition_handles"), condition("condition_full"));
+    assert!(condition("condition_handles") < condition("condition_full"), "§4.3");
+
+    let of = |handles, regularizer, s, key| total(&found, handles, regularizer, s, key);
+    let (plain, sub) = (of("maxvol", "none", 0, "spike_mean"), of("maxvol", "laplacian", 20, "spike_mean"));
+    let l2 = [("none", 0), ("laplacian", 20), ("global", 0)].map(|(r, s)| of("maxvol", r, s, "l2_mean"));
+    eprintln!("{capture}: mean spike {plain:.3e} to {sub:.3e}; mean L2 {l2:?}");
+    assert!(sub < plain, "§5.2: sub-spectral regularisation lowers spikes");
+    assert!(l2[1] - l2[0] < l2[2] - l2[0], "§5.2: at less cost than global regularisation");
+    assert!(of("maxvol", "none", 0, "spike_mean") < of("all", "none", 0, "spike_mean"), "§4.3: and so does maxvol");
+
+    let noisy = found["noise"].as_array().expect("noise");
+    let noisy =
+        noisy.iter().find(|n| n["handles"] == "maxvol" && n["regularizer"] == "laplacian").expect("the usual one");
+    let rise = noisy["totals"]["linf_max"].as_f64().expect("L∞") - of("maxvol", "laplacian", 20, "linf_max");
+    eprintln!("{capture}: noise of 0.3e-2 raises the largest L∞ by {rise:.2e}");
+    // The paper has 1.2 times the noise.
+    assert!(rise.abs() <= 2.0 * 0.3e-2, "§6.2: by about its own size");
+}
+
+#[test]
+fn the_papers_claims_hold_on_the_horse() {
+    holds_the_papers_claims("horse-gallop", "cage350.obj");
+}
+
+#[test]
+fn the_papers_claims_hold_on_samba() {
+    holds_the_papers_claims("samba", "cage350.obj");
+}
+
+#[test]
+fn the_papers_claims_hold_on_the_walk() {
+    holds_the_papers_claims("makehuman-cmu-walk", "cage350.obj");
+}
+
+#[test]
+fn the_papers_claims_hold_on_the_arm() {
+    holds_the_papers_claims("supercages-arm", "cage350.obj");
+}
+
 #[test]
 fn every_pair_encodes_and_points_outside_are_counted() {
     let Some(root) = data() else { return };

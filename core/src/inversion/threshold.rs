@@ -91,17 +91,13 @@ impl Reading<'_> {
         while fits < m && exceeds > m {
             let s = next.min(m);
             tried.push((s, error(s)?));
-            if tried.last().is_some_and(|&(_, l2)| l2 <= most) {
-                fits = s
-            } else {
-                exceeds = s
-            }
+            (fits, exceeds) = if tried.last().is_some_and(|&(_, l2)| l2 <= most) { (s, exceeds) } else { (fits, s) };
             next += (next / 2).max(1);
         }
         while exceeds - fits > 1 && exceeds <= m {
             let s = fits.midpoint(exceeds);
             tried.push((s, error(s)?));
-            if tried.last().is_some_and(|&(_, l2)| l2 <= most) { fits = s } else { exceeds = s }
+            (fits, exceeds) = if tried.last().is_some_and(|&(_, l2)| l2 <= most) { (s, exceeds) } else { (fits, s) };
         }
         tried.sort_by_key(|&(s, _)| s);
         Ok(Threshold { spectrum: fits, frames: samples.len(), tried })

@@ -68,6 +68,8 @@ fn sub_spectral(spectrum: &Spectrum<'_>, s: usize, lambda: f64) -> Option<Spectr
     let bent = dense::product(spectrum.delta, spectrum.v);
     let (bent_low, bent_high) = (bent.as_ref().subcols(0, low), bent.as_ref().subcols(low, s));
     let mut system = dense::product(bent_high.transpose(), bent_high);
+    // What rounding leaves of a direction that Δ does not know.
+    let nothing = lambda * (1e-14 * spectrum.delta.norm_l2()).powi(2);
     let coupling = dense::product(bent_high.transpose(), bent_low);
     // The right-hand sides of the data, and after them those of the reference.
     let pulled = if spectrum.reference == Reference::Origin { 0 } else { m };
@@ -91,7 +93,7 @@ fn sub_spectral(spectrum: &Spectrum<'_>, s: usize, lambda: f64) -> Option<Spectr
             right[(i, r + j)] = lambda * pull[(i, j)];
         }
     }
-    let high = match dense::solve_definite(system.clone(), right.clone()) {
+    let high = match dense::solve_determined(system.clone(), right.clone(), 1e-13, nothing) {
         Some(high) => high,
         // Δ leaves the place of a whole shell free, and no point feels that shell: hold it near the centre.
         None => {

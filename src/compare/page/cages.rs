@@ -18,7 +18,7 @@ pub(super) fn section(html: &mut Html, figures: &Figures, systems: &[Shown<'_>])
             &[
                 by_threshold(name, found, "mean spike", "mean second difference, %", |m| m.totals.spike_mean),
                 by_threshold(name, found, "largest spike", "largest second difference, %", |m| m.totals.spike_max),
-                by_threshold(name, found, "edges", "mean change of edges, % of their mean", |m| m.totals.edges_mean),
+                by_threshold(name, found, "edges", "mean change of edges, %", |m| m.totals.edges_mean),
                 trade(name, found, figures.capture.motion_mean),
                 over_time(name, found, &figures.capture.measured),
             ],

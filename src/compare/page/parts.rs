@@ -7,6 +7,9 @@ use std::fmt::Write;
 /// Pixels of pictures are this many times those of the page, for screens with small pixels.
 const DENSITY: usize = 2;
 
+/// Least width of a picture's caption, in pixels of the page.
+const TILE: usize = 168;
+
 /// A page in the making.
 #[derive(Default)]
 pub(super) struct Html {
@@ -51,7 +54,8 @@ impl Html {
             let (width, height) = (picture.png.width / DENSITY, picture.png.height / DENSITY);
             let _ = writeln!(
                 self.text,
-                r#"<div class="tile"><img width="{width}" height="{height}" alt="{title}" src="{}"/><b>{title}</b><span>{}</span></div>"#,
+                r#"<div class="tile" style="width:{}px"><img width="{width}" height="{height}" alt="{title}" src="{}"/><b>{title}</b><span>{}</span></div>"#,
+                width.max(TILE),
                 picture.png.data_url(),
                 escaped(&picture.note),
                 title = escaped(&picture.title),

@@ -9,7 +9,7 @@ pub(super) fn head(figures: &Figures) -> String {
     let capture = &figures.capture;
     let sampled = match capture.measured.len() {
         all if all == capture.frames => format!("{} frames", grouped(all)),
-        some => format!("{} frames, {some} of them measured, evenly spaced", grouped(capture.frames)),
+        some => format!("{} frames ({some} of them, evenly spaced, are measured)", grouped(capture.frames)),
     };
     let model = match capture.triangles {
         0 => format!("a cloud of {} points", grouped(capture.points)),
@@ -67,7 +67,7 @@ fn card(title: &str, choice: &Choice, why: &str, figures: &Figures) -> String {
         escaped(&choice.system),
         escaped(&choice.method),
         escaped(why),
-        escaped(&command)
+        command.lines().map(escaped).collect::<Vec<_>>().join("\n")
     )
 }
 

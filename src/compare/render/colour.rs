@@ -66,7 +66,7 @@ fn between(stops: &[Rgb], position: f64) -> Rgb {
     let at = if position.is_nan() { 0.0 } else { position.clamp(0.0, 1.0) * last as f64 };
     let k = (at.floor() as usize).min(last - 1);
     let t = (at - k as f64) as f32;
-    [0, 1, 2].map(|i| stops[k][i] + t * (stops[k + 1][i] - stops[k][i]))
+    [0, 1, 2].map(|i| (1.0 - t) * stops[k][i] + t * stops[k + 1][i])
 }
 
 #[cfg(test)]
