@@ -22,7 +22,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     open()?;
     let systems = systems(&args.coordinates)?;
     // Before the work, so that outputs that cannot be written cost no waiting.
-    refuse_overwriting(&args.output, args.json.as_deref(), &[&args.rest, &args.cage, &args.frames])?;
+    refuse_overwriting(&args.output, args.json.as_deref(), [&args.rest, &args.cage, &args.frames])?;
     interrupt::leaves_nothing()?;
     let mut report = AtomicFile::create(&args.output)?;
     let json = args.json.as_ref().map(AtomicFile::create).transpose()?;
