@@ -14,6 +14,7 @@ pub(crate) mod upload;
 use crate::engine::Lane;
 use crate::problem::{self, ApiError};
 use crate::store::{Completion, FrameLog, LogEntry, LogReader, SessionMeta, Store, StoreError};
+use cager_core::regularize::Regularizer;
 use cager_proto::messages::{FrameCounts, Problem, Progress, Session as View, SessionState};
 use commit::{Committer, Waiting};
 use facts::Facts;
@@ -39,6 +40,8 @@ pub(crate) struct Session {
     /// Bytes of its files, of its content, and of frames about to be written.
     pub(crate) bytes: AtomicU64,
     waiting: Mutex<Waiting>,
+    /// The last solved frame with its cage, where the next depends on it.
+    last_solved: Mutex<Option<(u32, Vec<f32>)>>,
     log: Mutex<Option<FrameLog>>,
     reader: Mutex<Option<LogReader>>,
     lane: Mutex<Weak<LiveLane>>,
@@ -109,6 +112,7 @@ impl Session {
             queued: Arc::default(),
             bytes: AtomicU64::new(0),
             waiting: Mutex::default(),
+            last_solved: Mutex::default(),
             log: Mutex::default(),
             reader: Mutex::default(),
             lane: Mutex::default(),
@@ -283,6 +287,11 @@ impl Session {
             Some(reader) => reader.read_cages(entries, out),
             None => Ok(()),
         }
+    }
+
+    /// Whether every frame depends on the one before, so that they have to come in order.
+    pub(crate) fn follows_previous(&self) -> bool {
+        self.meta.options.regularizer.as_deref() == Some(Regularizer::Temporal.name())
     }
 
     /// The lane of running uploads, if there is one.
