@@ -69,6 +69,19 @@ impl Engine {
         Lane { engine: Arc::downgrade(&self.shared), id, work }
     }
 
+    /// As [`Self::lane`], whose batches run one after another, in order of arrival.
+    pub fn lane_in_order<J: Send + 'static>(
+        &self,
+        tenant: &str,
+        weight: f64,
+        cost: f64,
+        run: impl Fn(Vec<J>) + Send + Sync + 'static,
+    ) -> Lane<J> {
+        let lane = self.lane(tenant, weight, cost, run);
+        lock(&self.shared.state).keep_order(lane.id);
+        lane
+    }
+
     /// Jobs that wait in all lanes.
     pub fn waiting(&self) -> usize {
         lock(&self.shared.state).waiting()

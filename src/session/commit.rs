@@ -103,6 +103,10 @@ impl Session {
 
     /// Writes frames, syncs them and tells their uploads.
     fn write(&self, solved: &[Solved]) {
+        let solved = self.written_after_their_predecessors(solved);
+        if solved.is_empty() {
+            return;
+        }
         let records: Vec<LogRecord<'_>> = solved
             .iter()
             .map(|s| LogRecord {
@@ -150,6 +154,24 @@ impl Session {
             }
         }
         self.touch();
+    }
+
+    /// Where frames depend on those before them, gives up the ones whose predecessor could not be written: what is on disk must
+    /// come from what is on disk.
+    fn written_after_their_predecessors<'a>(&self, solved: &'a [Solved]) -> &'a [Solved] {
+        if !self.follows_previous() {
+            return solved;
+        }
+        let there = |frame: u32, before: &[Solved]| {
+            before.iter().any(|s| s.frame == frame) || self.frames().entry(frame).is_some()
+        };
+        let orphan = (0..solved.len()).find(|&k| solved[k].frame > 0 && !there(solved[k].frame - 1, &solved[..k]));
+        let (written, orphans) = solved.split_at(orphan.unwrap_or(solved.len()));
+        if let Some(first) = orphans.first() {
+            self.bytes.fetch_sub(stored_bytes(orphans), Relaxed);
+            self.give_up(orphans, &super::upload::predecessor_missing(first.frame));
+        }
+        written
     }
 
     /// Tells the uploads of frames that are not written why.

@@ -259,13 +259,18 @@ impl Service {
                 let decoder = prepared.solver.decoder();
                 decoder.points() as f64 * decoder.unknowns() as f64
             };
+            let in_order = prepared.solver.follows_previous();
             let (weak, solver) = (Arc::downgrade(session), prepared);
             let run = move |jobs: Vec<FrameJob>| {
                 if let Some(session) = weak.upgrade() {
                     upload::solve(&session, &solver, jobs);
                 }
             };
-            LiveLane::new(self.engine.lane(&tenant.name, tenant.priority.weight(), cost, run))
+            let (name, weight) = (&tenant.name, tenant.priority.weight());
+            LiveLane::new(match in_order {
+                true => self.engine.lane_in_order(name, weight, cost, run),
+                false => self.engine.lane(name, weight, cost, run),
+            })
         })
     }
 

@@ -15,6 +15,7 @@ pub(crate) mod upload;
 use crate::engine::Lane;
 use crate::problem::{self, ApiError};
 use crate::store::{Completion, FrameLog, LogEntry, LogReader, SessionMeta, Store, StoreError};
+use cager_core::regularize::Regularizer;
 use cager_proto::messages::{FrameCounts, Problem, Progress, Session as View, SessionState};
 use commit::{Committer, Waiting};
 use facts::Facts;
@@ -40,6 +41,8 @@ pub(crate) struct Session {
     /// Bytes of its files, of its content, and of frames about to be written.
     pub(crate) bytes: AtomicU64,
     waiting: Mutex<Waiting>,
+    /// The last solved frame with its cage, where the next depends on it.
+    last_solved: Mutex<Option<(u32, Vec<f32>)>>,
     log: Mutex<Option<FrameLog>>,
     reader: Mutex<Option<LogReader>>,
     lane: Mutex<Weak<LiveLane>>,
@@ -110,6 +113,7 @@ impl Session {
             queued: Arc::default(),
             bytes: AtomicU64::new(0),
             waiting: Mutex::default(),
+            last_solved: Mutex::default(),
             log: Mutex::default(),
             reader: Mutex::default(),
             lane: Mutex::default(),
@@ -308,6 +312,11 @@ impl Session {
             }
             error => self.storage_error(&error),
         }
+    }
+
+    /// Whether every frame depends on the one before, so that they have to come in order.
+    pub(crate) fn follows_previous(&self) -> bool {
+        self.meta.options.regularizer.as_deref() == Some(Regularizer::Temporal.name())
     }
 
     /// The lane of running uploads, if there is one.

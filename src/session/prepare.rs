@@ -59,14 +59,8 @@ impl Choices {
             return refuse(format!("handle_count: {wanted} reads a number of points of its own; leave it out"));
         };
         let wanted = options.regularizer.as_deref().unwrap_or(Regularizer::default().name());
-        if wanted == Regularizer::Temporal.name() {
-            return refuse(
-                "regularizer: temporal makes every frame depend on the one before, and a service takes frames in any order; encode with the command line, without --server".to_owned(),
-            );
-        }
         let Some(regularizer) = Regularizer::by_name(wanted) else {
-            let names = Regularizer::ALL.iter().filter(|&&r| r != Regularizer::Temporal).map(|r| r.name());
-            let names: Vec<&str> = names.collect();
+            let names: Vec<&str> = Regularizer::ALL.iter().map(|r| r.name()).collect();
             return refuse(format!("regularizer: {wanted:?} is not available; give one of {}", names.join(", ")));
         };
         let lambda = options.lambda.unwrap_or(SolverOptions::default().lambda);
