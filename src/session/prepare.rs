@@ -48,7 +48,8 @@ impl Choices {
         }
         let name = options.coordinates.as_deref().unwrap_or("mvc");
         let Some(system) = coordinates::by_name(name) else {
-            return refuse(format!("coordinates: {name:?} is not available; give mvc"));
+            let names = coordinates::ALL.map(|system| system.name()).join(", ");
+            return refuse(format!("coordinates: {name:?} is not available; give one of {names}"));
         };
         let wanted = options.handles.as_deref().unwrap_or(Handles::default().name());
         if !Handles::NAMES.contains(&wanted) {
@@ -137,7 +138,7 @@ pub(crate) fn read_cage(content: &Content, choices: &Choices) -> Result<Cage, Ap
 pub(crate) fn check(geometry: &Geometry, choices: &Choices, most_bytes: u64) -> Result<(), ApiError> {
     let unknowns = choices.system.unknowns(&geometry.cage);
     let options = choices.solver_options(unknowns);
-    check_memory(geometry, unknowns, options, most_bytes)?;
+    check_memory(geometry, choices, options, most_bytes)?;
     Solver::check(choices.system, &geometry.cage, &geometry.rest.points, options).map_err(refused)?;
     let Some(matrix) = &geometry.matrix else { return Ok(()) };
     matrix.delta(&geometry.cage, unknowns).map_err(|error| refused(error.into()))?;
@@ -151,7 +152,7 @@ pub(crate) fn check(geometry: &Geometry, choices: &Choices, most_bytes: u64) -> 
 pub(crate) fn prepare(geometry: &Geometry, choices: &Choices, most_bytes: u64) -> Result<Prepared, ApiError> {
     let unknowns = choices.system.unknowns(&geometry.cage);
     let options = choices.solver_options(unknowns);
-    check_memory(geometry, unknowns, options, most_bytes)?;
+    check_memory(geometry, choices, options, most_bytes)?;
     let own = || geometry.matrix.as_ref().map(|matrix| matrix as &dyn Term).ok_or(TermError::Missing);
     let term = options.regularizer.term().map_or_else(own, |term| Ok(term)).map_err(|error| refused(error.into()))?;
     let solver =
@@ -183,8 +184,14 @@ pub(crate) fn with_solver(solver: Solver, cage: &Cage, options: SolverOptions) -
     }
 }
 
-fn check_memory(geometry: &Geometry, unknowns: usize, options: SolverOptions, most_bytes: u64) -> Result<(), ApiError> {
+fn check_memory(
+    geometry: &Geometry,
+    choices: &Choices,
+    options: SolverOptions,
+    most_bytes: u64,
+) -> Result<(), ApiError> {
     let points = geometry.rest.points.len();
+    let unknowns = choices.system.unknowns(&geometry.cage);
     let handles = match options.handles {
         // The covariance of the handles, its factor, and what is solved with it.
         Handles::Spread { .. } => {
@@ -193,11 +200,14 @@ fn check_memory(geometry: &Geometry, unknowns: usize, options: SolverOptions, mo
         }
         _ => 0,
     };
-    // Two matrices of n × m in double precision and one in single, at their peak.
-    let needed = (20 * points as u64 * unknowns as u64).saturating_add(handles);
+    let columns = choices.system.columns(&geometry.cage) as u64;
+    // What an iteration takes beside them: their Gram matrix, and in single precision.
+    let iterated = if columns > unknowns as u64 { 12 * columns * columns } else { 0 };
+    // Two matrices of all points and columns in double precision and one in single, at their peak.
+    let needed = (20 * points as u64 * columns).saturating_add(handles).saturating_add(iterated);
     if needed > most_bytes {
         let detail = format!(
-            "{points} points times {unknowns} unknowns need {needed} bytes to be prepared, and this service allows {most_bytes}; use a coarser cage or a lighter model"
+            "{points} points times {columns} values of the cage need {needed} bytes to be prepared, and this service allows {most_bytes}; use a coarser cage or a lighter model"
         );
         return Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(most_bytes));
     }

@@ -325,7 +325,7 @@ fn predecessor(session: &Session, frame: u32) -> Result<Option<Vec<f32>>, ApiErr
     }
     let Some(entry) = session.frames().entry(before).copied() else { return Err(predecessor_missing(frame)) };
     let mut bytes = Vec::new();
-    session.read_cages(&[entry], &mut bytes).map_err(|error| super::commit::storage_error(&error))?;
+    session.read_cages(&[entry], &mut bytes)?;
     Ok(Some(bytes.as_chunks().0.iter().map(|&b| f32::from_le_bytes(b)).collect()))
 }
 
