@@ -38,6 +38,10 @@ lint-deploy: $(LINT)/bin/python ## Dockerfile, manifests, alerts and dashboard a
 	$(LINT)/bin/check-jsonschema --builtin-schema vendor.compose-spec deploy/compose.yaml
 	$(LINT)/bin/kubernetes-validate --strict $(filter-out %/kustomization.yaml %/servicemonitor.yaml,$(wildcard deploy/kubernetes/*.yaml))
 	$(LINT)/bin/python deploy/check_queries.py
+	@if command -v kubectl >/dev/null; then \
+		kubectl kustomize deploy/kubernetes >$(LINT)/together.yaml && \
+		$(LINT)/bin/kubernetes-validate --strict $(LINT)/together.yaml; \
+	else echo "kubectl is not here, so the kustomization is not built"; fi
 
 $(LINT)/bin/python: Makefile
 	$(PYTHON) -m venv $(LINT)

@@ -1,10 +1,10 @@
 //! The main job: frames in, one cage per frame out, measured as a decoder will see it.
 
 use crate::capture::{CaptureWriter, Encoding, StoredError};
-use crate::report::{Report, Seconds, SpectrumChoice};
+use crate::report::{Consistency, Report, Seconds, SpectrumChoice};
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{Analysis, BATCH, PrepareError, Sample, Solver, SolverOptions};
+use cager_core::inversion::{Analysis, BATCH, Convergence, PrepareError, Sample, Solver, SolverOptions};
 use cager_core::mesh::Model;
 use cager_core::regularize::{Term, TermError};
 use cager_formats::{Action, AtomicFile, CompleteFile, FrameReader};
@@ -152,6 +152,7 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Encoded, 
         ..Seconds::default()
     };
     let points = job.frames.points();
+    let mut convergence = Vec::new();
     std::thread::scope(|scope| -> Result<(), EncodeError> {
         let (full, batches) = sync_channel(rayon::current_num_threads());
         let (empty, recycled) = sync_channel(2 * rayon::current_num_threads() + 2);
@@ -186,6 +187,7 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Encoded, 
             for batch in solved {
                 seconds.invert += batch.invert_seconds;
                 seconds.measure += batch.measure_seconds;
+                convergence.extend(batch.convergence);
                 for (cage, error) in batch.cages.iter().zip(&batch.errors) {
                     writer.write_frame(cage, &StoredError::new(error, solver.diagonal())).map_err(fail)?;
                     done += 1;
@@ -202,6 +204,7 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Encoded, 
     let clock_write = Instant::now();
     let (buffered, mut report) = writer.finish().map_err(fail)?;
     report.spectrum_choice = choice;
+    report.consistency = Consistency::new(&convergence);
     let file = buffered.into_inner().map_err(|e| fail(container::Error::from(e.into_error())))?;
     let container = file.complete()?;
     report.bytes.output = container.length();
@@ -268,6 +271,8 @@ fn read_batches(
 struct SolvedBatch {
     cages: Vec<Vec<f32>>,
     errors: Vec<cager_core::decode::FrameError>,
+    /// Empty where nothing was iterated.
+    convergence: Vec<Convergence>,
     invert_seconds: f64,
     measure_seconds: f64,
 }
@@ -276,10 +281,12 @@ struct SolvedBatch {
 fn solve(solver: &Solver, batch: &Batch, previous: Option<&[f32]>) -> SolvedBatch {
     let frames: Vec<&[f64]> = batch.iter().map(Vec::as_slice).collect();
     let clock = Instant::now();
-    let cages = solver.invert_after(previous, &frames);
+    let inverted = solver.invert_reporting(previous, &frames);
     let invert_seconds = clock.elapsed().as_secs_f64();
+    let convergence = inverted.iter().filter_map(|inverted| inverted.convergence).collect();
+    let cages: Vec<Vec<f32>> = inverted.into_iter().map(|inverted| inverted.cage).collect();
     let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
     let errors = solver.decoder().measure(&views, &frames);
     let measure_seconds = clock.elapsed().as_secs_f64() - invert_seconds;
-    SolvedBatch { cages, errors, invert_seconds, measure_seconds }
+    SolvedBatch { cages, errors, convergence, invert_seconds, measure_seconds }
 }

@@ -1,5 +1,6 @@
 //! `report.json`: what encoding found out, for programs and people.
 
+use cager_core::inversion::{Convergence, Outcome};
 use serde::{Deserialize, Serialize};
 
 /// The report of one encoding. Lengths are fractions of the rest pose's bounding-box diagonal.
@@ -30,6 +31,9 @@ pub struct Report {
     pub spectrum_choice: Option<SpectrumChoice>,
     /// Weight λ.
     pub lambda: f64,
+    /// How the iteration went, for coordinates whose inversion is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub consistency: Option<Consistency>,
     /// `max_i |Φ C_R − P_R|_i`.
     pub affine_reproduction_error: f64,
     /// Condition numbers over the numerical rank.
@@ -89,6 +93,46 @@ impl SpectrumChoice {
     pub fn new(found: &cager_core::inversion::Threshold, bound: f64) -> Self {
         let tried = found.tried.iter().map(|&(spectrum, l2_mean)| TriedSpectrum { spectrum, l2_mean }).collect();
         Self { bound, extra: found.extra(), frames: found.frames, tried }
+    }
+}
+
+/// How the inversion of coordinates went whose normals follow from the vertices: it starts from a linear one and improves its
+/// cages.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
+pub struct Consistency {
+    /// Mean over frames of the Gauss–Newton steps taken.
+    pub steps_mean: f64,
+    /// Most steps of a frame.
+    pub steps_max: usize,
+    /// Mean over frames of the L2 error of the points read, as the linear inversion leaves it.
+    pub start_l2_mean: f64,
+    /// Mean over frames of the L2 error of the points read.
+    pub l2_mean: f64,
+    /// Frames whose last step changed next to nothing.
+    pub converged: usize,
+    /// Frames that took as many steps as are allowed, each of them an improvement.
+    pub stopped: usize,
+    /// Frames that no step improved: their cages are those of the linear inversion.
+    pub kept_start: usize,
+}
+
+impl Consistency {
+    /// Of all frames; `None` where there was no iteration.
+    pub fn new(frames: &[Convergence]) -> Option<Self> {
+        if frames.is_empty() {
+            return None;
+        }
+        let mean = |f: fn(&Convergence) -> f64| frames.iter().map(f).sum::<f64>() / frames.len() as f64;
+        let count = |outcome| frames.iter().filter(|frame| frame.outcome == outcome).count();
+        Some(Self {
+            steps_mean: mean(|frame| frame.steps as f64),
+            steps_max: frames.iter().map(|frame| frame.steps).max().unwrap_or(0),
+            start_l2_mean: mean(|frame| frame.start),
+            l2_mean: mean(|frame| frame.residual),
+            converged: count(Outcome::Converged),
+            stopped: count(Outcome::StepLimit),
+            kept_start: count(Outcome::KeptStart),
+        })
     }
 }
 

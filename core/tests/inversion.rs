@@ -226,10 +226,10 @@ impl CoordinateSystem for Deaf {
     fn name(&self) -> &'static str {
         "deaf"
     }
-    fn unknowns(&self, cage: &Cage) -> usize {
+    fn columns(&self, cage: &Cage) -> usize {
         cage.vertices().len()
     }
-    fn rest_unknowns(&self, cage: &Cage) -> Vec<Point> {
+    fn rest_values(&self, cage: &Cage) -> Vec<Point> {
         cage.vertices().to_vec()
     }
     fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError> {

@@ -238,12 +238,18 @@ pub(crate) struct CompletionsArgs {
 pub(crate) enum CoordinatesArg {
     /// Mean value coordinates: defined everywhere, fast.
     Mvc,
+    /// Green coordinates: the model keeps its angles better; normals of the cage follow from its vertices, found by iterating.
+    Green,
+    /// Green coordinates whose normals are unknowns of their own: the lowest errors, by cages with spikes.
+    GreenFree,
 }
 
 impl CoordinatesArg {
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Mvc => "mvc",
+            Self::Green => "green",
+            Self::GreenFree => "green-free",
         }
     }
 }

@@ -66,7 +66,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
 /// The systems asked for, each once; all where none is.
 fn systems(names: &[CoordinatesArg]) -> Result<Vec<&'static dyn CoordinateSystem>> {
     if names.is_empty() {
-        return Ok(coordinates::all().to_vec());
+        return Ok(coordinates::ALL.to_vec());
     }
     let mut systems: Vec<&'static dyn CoordinateSystem> = Vec::new();
     for name in names.iter().map(|name| name.name()) {

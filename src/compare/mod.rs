@@ -160,11 +160,11 @@ mod tests {
             "never"
         }
 
-        fn unknowns(&self, cage: &Cage) -> usize {
+        fn columns(&self, cage: &Cage) -> usize {
             cage.vertices().len()
         }
 
-        fn rest_unknowns(&self, cage: &Cage) -> Vec<Point> {
+        fn rest_values(&self, cage: &Cage) -> Vec<Point> {
             cage.vertices().to_vec()
         }
 

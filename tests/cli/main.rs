@@ -10,6 +10,7 @@ mod inspect;
 #[cfg(target_os = "linux")]
 mod interrupted;
 mod real_data;
+mod real_methods;
 mod refused;
 mod support;
 mod usage;

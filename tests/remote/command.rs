@@ -23,6 +23,7 @@ fn a_service_gives_the_bytes_and_the_report_that_this_machine_gives() {
         " --handles spread",
         " --handles rectangular --handle-count 100",
         " --regularizer differential --spectrum all",
+        " --regularizer temporal",
         " --regularizer matrix --regularizer-matrix d.mtx",
     ] {
         dir.cager(&format!("{ENCODE} --report here.json{options}")).succeeds();

@@ -8,7 +8,7 @@ use super::prepare::{
 use super::reading::Reading;
 use super::{Preparation, PrepareError, Solver, SolverOptions};
 use crate::cage::Cage;
-use crate::coordinates::CoordinateSystem;
+use crate::coordinates::{CoordinateSystem, MeanValue};
 use crate::decode::Decoder;
 use crate::dense;
 use crate::handles::Handles;
@@ -22,6 +22,9 @@ use std::time::Instant;
 /// A rest pose and its cage, analysed: solvers with any options follow at the cost of their operator alone.
 ///
 /// It holds `Φ` in double precision as well; whoever wants one solver calls [`Solver::prepare`].
+///
+/// Of a system whose normals follow from the vertices, it analyses where its inversion starts from: mean value coordinates of the
+/// same cage and points. Only the decoder and the errors of reproduction are the system's own.
 pub struct Analysis {
     pub(super) phi: Mat<f64>,
     pub(super) cage: Cage,
@@ -70,18 +73,25 @@ impl Analysis {
         check(points, m, SolverOptions { spectrum: 0, ..SolverOptions::default() })?;
         let diagonal = diagonal(points);
         let clock = Instant::now();
-        if !coordinates_fit(points.len(), m, copies) {
-            let gigabytes = (4 + 8 * copies) as f64 * 1e-9 * points.len() as f64 * m as f64;
+        let columns = system.columns(cage);
+        if !coordinates_fit(points.len(), columns, copies) {
+            let gigabytes = (4 + 8 * copies) as f64 * 1e-9 * points.len() as f64 * columns as f64;
             return Err(PrepareError::OutOfMemory { points: points.len(), unknowns: m, gigabytes });
         }
         refuse_far_points(cage, points)?;
         let coordinates = system.coordinates(cage, points)?;
-        let phi = coordinates.phi;
-        let rest = system.rest_unknowns(cage);
+        let mut phi = coordinates.phi;
+        let mut rest = system.rest_values(cage);
         let (point, error) = reproduction_error(phi.as_ref(), &rest, cage, points);
         refuse_unreproduced(point, error, cage, diagonal)?;
         let (outside, outside_distance) = outside(cage, points, &coordinates.outside, diagonal);
-        let decoder = Decoder::new(phi.as_ref(), cage.vertices().len());
+        let tied = system.tied_normals(cage);
+        let decoder = Decoder::new(phi.as_ref(), cage.vertices().len()).with_tied_normals(tied);
+        if decoder.tied_normals().is_some() {
+            drop(phi);
+            phi = MeanValue.coordinates(cage, points)?.phi;
+            rest.truncate(m);
+        }
         let coordinates_seconds = clock.elapsed().as_secs_f64();
 
         let clock = Instant::now();

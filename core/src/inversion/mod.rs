@@ -1,6 +1,8 @@
-//! The solver: prepared once for a rest pose and its cage, then one matrix product per batch of frames.
+//! The solver: prepared once for a rest pose and its cage, then one matrix product per batch of frames; where normals follow from
+//! vertices, that is the start of an iteration.
 
 mod analysis;
+mod consistent;
 mod error;
 mod operator;
 mod options;
@@ -14,13 +16,14 @@ mod translations;
 
 pub use crate::handles::Handles;
 pub use analysis::Analysis;
+pub use consistent::{Convergence, Outcome};
 pub use error::PrepareError;
 pub use options::SolverOptions;
-pub use parts::SolverParts;
+pub use parts::{SolverParts, TiedParts};
 pub use prepare::{Preparation, check_options, coordinates_fit};
 pub use pull::Pull;
 pub use reading::Reading;
-pub use solve::{BATCH, Solver};
+pub use solve::{BATCH, Inverted, Solver};
 pub use threshold::{Sample, Threshold};
 
 pub(crate) use operator::tall_product;

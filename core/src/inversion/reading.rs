@@ -1,5 +1,6 @@
 //! From a choice of handles to solvers: a regularised map, and what pulls cages towards others.
 
+use super::consistent::Consistent;
 use super::operator::{Decomposed, failed, with_whole_tiles};
 use super::prepare::check_options;
 use super::pull::Pull;
@@ -9,6 +10,7 @@ use crate::dense;
 use crate::mesh::Point;
 use crate::regularize::{Reference, Regularizer, SpectralMap, Spectrum, Term, TermError, spectral_map};
 use faer::Mat;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// A choice of handles of an [`Analysis`], decomposed: solvers with any regularisation follow at little cost.
@@ -49,6 +51,15 @@ impl Reading<'_> {
         let operator = self.decomposed.operator(analysis.phi.as_ref(), map.data.as_ref());
         let operator = with_whole_tiles(keep_translations(operator, positions));
         let pull = self.pull(&map, bent.reference);
+        let decoder = analysis.decoder.clone();
+        let consistent = match decoder.tied_normals() {
+            None => None,
+            Some(_) => {
+                let rows = (!self.decomposed.reads_all).then_some(self.decomposed.handles.as_slice());
+                let prepared = Consistent::new(&decoder, rows, shape_weight(options));
+                Some(Arc::new(prepared.ok_or(failed("preparation of the consistent inversion"))?))
+            }
+        };
         let mut preparation = analysis.preparation.clone();
         preparation.condition_handles = self.decomposed.condition;
         preparation.singular_values = self.decomposed.sigma.clone();
@@ -58,7 +69,8 @@ impl Reading<'_> {
             reads_all: self.decomposed.reads_all,
             operator,
             pull,
-            decoder: analysis.decoder.clone(),
+            consistent,
+            decoder,
             diagonal: analysis.diagonal,
             preparation,
         })
@@ -99,6 +111,13 @@ impl Reading<'_> {
         let first = rest.iter().flatten().map(|&x| x as f32).collect();
         Pull::Previous { operator, first }
     }
+}
+
+/// How much the shape of the linear start counts beside the points: as much as a term, where there is one.
+fn shape_weight(options: SolverOptions) -> f64 {
+    const WITHOUT_TERM: f64 = 1e-3;
+    let has_term = options.regularizer.is_sub_spectral() || options.regularizer == Regularizer::Global;
+    if has_term { options.lambda } else { WITHOUT_TERM }
 }
 
 /// Unknowns with the first vertex as origin, m × 3: the pull does not see the difference, and digits are kept.

@@ -1,8 +1,11 @@
-//! Cages from frames: one matrix product for a batch.
+//! Cages from frames: one matrix product for a batch, and for some systems what follows it.
 
-use super::{BLOCK_ROWS, Preparation, Pull};
+use super::consistent::Consistent;
+use super::{BLOCK_ROWS, Convergence, Preparation, Pull};
 use crate::decode::Decoder;
+use crate::mesh::Point;
 use faer::{Accum, Mat, Par};
+use std::sync::Arc;
 
 /// Most frames of one matrix product.
 pub const BATCH: usize = 16;
@@ -15,9 +18,20 @@ pub struct Solver {
     /// `Rᵀ`, K × m, column-major: one row per point read; zero columns follow up to a whole tile.
     pub(super) operator: Mat<f64>,
     pub(super) pull: Pull,
+    /// What improves cages where their normals follow from their vertices.
+    pub(super) consistent: Option<Arc<Consistent>>,
     pub(super) decoder: Decoder,
     pub(super) diagonal: f64,
     pub(super) preparation: Preparation,
+}
+
+/// The cage of a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inverted {
+    /// m × 3 interleaved.
+    pub cage: Vec<f32>,
+    /// How finding it went, where that took more than a matrix product.
+    pub convergence: Option<Convergence>,
 }
 
 impl Solver {
@@ -46,7 +60,8 @@ impl Solver {
     pub fn size_bytes(&self) -> usize {
         let phi = self.decoder.coordinates();
         let operator = 8 * self.operator.nrows() * self.operator.ncols() + self.pull.size_bytes();
-        4 * phi.nrows() * phi.ncols() + operator + 4 * self.handles.len()
+        let consistent = self.consistent.as_ref().map_or(0, |consistent| consistent.size_bytes());
+        4 * phi.nrows() * phi.ncols() + operator + consistent + 4 * self.handles.len()
     }
 
     /// Whether every cage depends on the previous frame's, so that frames have to be inverted in order, by
@@ -72,6 +87,14 @@ impl Solver {
     /// # Panics
     /// Where lengths do not fit, or more frames come than a batch holds.
     pub fn invert_after<T: Copy + Into<f64>>(&self, previous: Option<&[f32]>, frames: &[&[T]]) -> Vec<Vec<f32>> {
+        self.invert_reporting(previous, frames).into_iter().map(|inverted| inverted.cage).collect()
+    }
+
+    /// As [`Self::invert_after`], with how the inversion of each frame went.
+    ///
+    /// # Panics
+    /// As [`Self::invert_after`].
+    pub fn invert_reporting<T: Copy + Into<f64>>(&self, previous: Option<&[f32]>, frames: &[&[T]]) -> Vec<Inverted> {
         assert!(frames.iter().all(|f| f.len() == 3 * self.decoder.points()), "every frame has every point");
         self.solve(previous, frames, |row| if self.reads_all { row } else { self.handles[row] as usize })
     }
@@ -96,7 +119,7 @@ impl Solver {
     ) -> Vec<Vec<f32>> {
         assert!(!self.reads_all, "handles are not enough for least squares over all points");
         assert!(frames.iter().all(|f| f.len() == 3 * self.handles.len()), "every frame has every handle");
-        self.solve(previous, frames, |row| row)
+        self.solve(previous, frames, |row| row).into_iter().map(|inverted| inverted.cage).collect()
     }
 
     fn solve<T: Copy + Into<f64>>(
@@ -104,8 +127,37 @@ impl Solver {
         previous: Option<&[f32]>,
         frames: &[&[T]],
         point_of_row: impl Fn(usize) -> usize,
-    ) -> Vec<Vec<f32>> {
+    ) -> Vec<Inverted> {
         assert!(previous.is_none_or(|cage| cage.len() == 3 * self.decoder.unknowns()), "a cage has every unknown");
+        let mut cages = self.linear(frames, &point_of_row);
+        let position = |frame: usize, row: usize| {
+            let point = point_of_row(row);
+            [0, 1, 2].map(|k| frames[frame][3 * point + k].into())
+        };
+        if let (Some(consistent), false) = (&self.consistent, self.follows_previous()) {
+            for cage in &mut cages {
+                self.pull.add(cage, None, self.decoder.positions());
+            }
+            let found = consistent.refine(&self.decoder, &mut cages, position, self.diagonal);
+            let inverted = |(cage, found): (&Vec<Point>, _)| Inverted { cage: single(cage), convergence: Some(found) };
+            return cages.iter().zip(found).map(inverted).collect();
+        }
+        let mut solved: Vec<Inverted> = Vec::with_capacity(frames.len());
+        for (f, mut cage) in cages.into_iter().enumerate() {
+            let before = solved.last().map(|inverted| inverted.cage.as_slice()).or(previous);
+            self.pull.add(&mut cage, before, self.decoder.positions());
+            let mut cage = [cage];
+            let refine = |consistent: &Arc<Consistent>| {
+                consistent.refine(&self.decoder, &mut cage, |_, row| position(f, row), self.diagonal).pop()
+            };
+            let convergence = self.consistent.as_ref().and_then(refine);
+            solved.push(Inverted { cage: single(&cage[0]), convergence });
+        }
+        solved
+    }
+
+    /// `R · H`.
+    fn linear<T: Copy + Into<f64>>(&self, frames: &[&[T]], point_of_row: impl Fn(usize) -> usize) -> Vec<Vec<Point>> {
         let (columns, padded) = self.operator.shape();
         let m = self.decoder.unknowns();
         let width = product_columns(frames.len());
@@ -132,14 +184,12 @@ impl Solver {
             );
             first += rows;
         }
-        let mut solved: Vec<Vec<f32>> = Vec::with_capacity(frames.len());
-        for f in 0..frames.len() {
-            let mut cage: Vec<[f64; 3]> = (0..m).map(|j| [0, 1, 2].map(|k| cages[(j, 3 * f + k)])).collect();
-            self.pull.add(&mut cage, solved.last().map(Vec::as_slice).or(previous), self.decoder.positions());
-            solved.push(cage.as_flattened().iter().map(|&x| x as f32).collect());
-        }
-        solved
+        (0..frames.len()).map(|f| (0..m).map(|j| [0, 1, 2].map(|k| cages[(j, 3 * f + k)])).collect()).collect()
     }
+}
+
+fn single(cage: &[Point]) -> Vec<f32> {
+    cage.as_flattened().iter().map(|&x| x as f32).collect()
 }
 
 /// Columns of the product of a batch of frames.

@@ -2,7 +2,6 @@
 
 use super::{Reference, Term, TermError};
 use crate::cage::Cage;
-use crate::mesh::norm;
 use faer::Mat;
 
 /// Smooth cages: each vertex should be the mean of its neighbours, and where a cage's normals are unknown, each of them the
@@ -20,8 +19,8 @@ impl Term for CageLaplacian {
     }
 }
 
-/// `Δ = I − D⁻¹A`: of the graph of vertices, v × v; where there are unknown normals, a second block of the graph of faces, times
-/// the mean length of an edge, since vertices have a length and normals have none.
+/// `Δ = I − D⁻¹A`: of the graph of vertices, v × v; where there are unknown normals, a second block of the graph of faces.
+/// Normals have a length, as vertices do.
 pub(super) fn cage_laplacian(cage: &Cage, unknowns: usize) -> Mat<f64> {
     let v = cage.vertices().len();
     let mut degree = vec![0.0; v];
@@ -40,24 +39,17 @@ pub(super) fn cage_laplacian(cage: &Cage, unknowns: usize) -> Mat<f64> {
         delta[(b, a)] = -1.0 / degree[b];
     }
     if unknowns == v + cage.faces().len() {
-        let length = mean_edge_length(cage);
         let mut faces_of = vec![Vec::with_capacity(2); cage.edges().len()];
         for (f, face) in cage.faces().iter().enumerate() {
-            delta[(v + f, v + f)] = length;
+            delta[(v + f, v + f)] = 1.0;
             face.edges.iter().for_each(|&edge| faces_of[edge as usize].push(v + f));
         }
         for pair in faces_of {
             if let [f, g] = pair[..] {
-                delta[(f, g)] -= length / 3.0;
-                delta[(g, f)] -= length / 3.0;
+                delta[(f, g)] -= 1.0 / 3.0;
+                delta[(g, f)] -= 1.0 / 3.0;
             }
         }
     }
     delta
-}
-
-fn mean_edge_length(cage: &Cage) -> f64 {
-    let p = cage.vertices();
-    let length = |[a, b]: [u32; 2]| norm([0, 1, 2].map(|k| p[a as usize][k] - p[b as usize][k]));
-    cage.edges().iter().map(|edge| length(edge.vertices)).sum::<f64>() / cage.edges().len() as f64
 }

@@ -1,0 +1,166 @@
+//! Green coordinates of a closed triangle mesh (Lipman, Levin and Cohen-Or 2008): vertices and face normals.
+//!
+//! `x = Σ φ_v v + Σ ψ_f n_f` by Green's third identity, with the closed forms of `layer.rs`. The double layer jumps at the
+//! cage: its row sums to one inside, to zero outside and to something between on the cage itself. What is missing to one is made up
+//! with the point's affine coordinates in the nearest face: `x = Σ α_i v_i + β n` over the corners and the normal of that face. Inside that
+//! is nothing; on a face, an edge or a vertex it gives the limit from inside; outside it is the analytic continuation
+//! through that face (Lipman et al. 2008, §5). So coordinates are continuous inside, on the cage and through each face, they reproduce
+//! points everywhere, and jump outside where another face becomes the nearest, by about the distance to the cage times the
+//! bend of the deformation.
+//!
+//! Normals have a length: the root of the mean area of the faces. So `Φ` has no unit, and a cage's rows have one.
+
+use super::layer::{self, Frame, Layers, Scratch};
+use super::{CoordinateSystem, Coordinates, CoordinatesError, TiedNormals};
+use crate::cage::Cage;
+use crate::mesh::{self, Point};
+use crate::simd::{LANES, Lanes, zeros};
+use faer::MatMut;
+use rayon::prelude::*;
+
+/// Green coordinates: cage vertices and face normals, defined inside and outside the cage.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Green {
+    /// Normals follow from the vertices, see [`TiedNormals`]: the vertices are the unknowns, and the inversion is not linear.
+    #[default]
+    Consistent,
+    /// Normals are unknowns of their own, as in the paper of this method, which finds it the least stable case.
+    Free,
+}
+
+/// Rows that sum to one within this are left alone.
+const WHOLE: f64 = 1e-13;
+/// Faces whose distances differ by less than this fraction, as they do at a common edge, are equally near.
+const EQUALLY_NEAR: f64 = 1e-9;
+/// So are faces within this fraction of the cage's size.
+const AT_THE_CAGE: f64 = 1e-13;
+
+impl CoordinateSystem for Green {
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Consistent => "green",
+            Self::Free => "green-free",
+        }
+    }
+
+    fn columns(&self, cage: &Cage) -> usize {
+        cage.vertices().len() + cage.faces().len()
+    }
+
+    fn rest_values(&self, cage: &Cage) -> Vec<Point> {
+        let layers = Layers::new(cage);
+        let length = normal_length(&layers) / layers.scale();
+        let normals = layers.faces().iter().map(|f| f.normal().map(|c| c * length));
+        cage.vertices().iter().copied().chain(normals).collect()
+    }
+
+    fn unknowns(&self, cage: &Cage) -> usize {
+        match self {
+            Self::Consistent => cage.vertices().len(),
+            Self::Free => self.columns(cage),
+        }
+    }
+
+    fn tied_normals(&self, cage: &Cage) -> Option<TiedNormals> {
+        (*self == Self::Consistent).then(|| {
+            let layers = Layers::new(cage);
+            TiedNormals::new(cage, normal_length(&layers) / layers.scale())
+        })
+    }
+
+    fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError> {
+        let layers = Layers::new(cage);
+        let length = normal_length(&layers);
+        let mut phi = zeros(points.len(), self.columns(cage));
+        let outside = phi
+            .as_mut()
+            .par_row_chunks_mut(layer::TASK_POINTS)
+            .enumerate()
+            .map_init(
+                || layers.scratch(),
+                |scratch, (task, rows)| rows_of(&layers, length, points, task * layer::TASK_POINTS, rows, scratch),
+            )
+            .reduce(Vec::new, |mut a, b| {
+                a.extend(b);
+                a
+            });
+        Ok(Coordinates { phi, outside })
+    }
+}
+
+/// Length of the normals, in the unit of the layers.
+fn normal_length(layers: &Layers) -> f64 {
+    layers.mean_area().sqrt()
+}
+
+/// Fills `rows`, the coordinates of the points from `first` on, and returns those points that lie outside.
+fn rows_of(
+    layers: &Layers,
+    length: f64,
+    points: &[Point],
+    first: usize,
+    mut rows: MatMut<'_, f64>,
+    scratch: &mut Scratch,
+) -> Vec<u32> {
+    let mut outsiders = Vec::new();
+    let (count, vertices) = (rows.nrows(), layers.vertices().len());
+    for start in (0..count).step_by(LANES) {
+        let x = layers.group(points, first + start);
+        layer::group_potentials(layers, &x, scratch);
+        let (mut phi, mut psi) = rows.as_mut().split_at_col_mut(vertices);
+        layer::write_group(phi.as_mut(), start, &scratch.double, layer::INVERSE_4PI);
+        layer::write_group(psi.as_mut(), start, &scratch.single, layer::INVERSE_4PI / length);
+        let total = scratch.double.iter().fold(Lanes::ZERO, |sum, &w| sum + w) * layer::INVERSE_4PI;
+        for l in 0..LANES.min(count - start) {
+            let missing = 1.0 - total.0[l];
+            if missing.abs() <= WHOLE {
+                continue;
+            }
+            for (f, share) in nearest_faces(layers, x.map(|c| c.0[l]), missing) {
+                let face = &layers.faces()[f];
+                let (weights, height) = face.completion(from_corner(layers, face, x.map(|c| c.0[l])));
+                for (v, weight) in face.vertices.into_iter().zip(weights) {
+                    phi[(start + l, v as usize)] += missing * share * weight;
+                }
+                psi[(start + l, f)] += missing * share * height / length;
+            }
+            if total.0[l] < 0.5 {
+                outsiders.push((first + start + l) as u32);
+            }
+        }
+    }
+    outsiders
+}
+
+/// The point seen from a face's first corner.
+fn from_corner(layers: &Layers, face: &Frame, x: Point) -> Point {
+    let corner = layers.vertices()[face.vertices[0] as usize];
+    [0, 1, 2].map(|k| x[k] - corner[k])
+}
+
+/// The faces nearest to the point, those that share the nearest edge or vertex, and the share of each. Shares fall with the angle
+/// between a face's normal and the way to the point, so that they change smoothly from one face over an edge to the next.
+fn nearest_faces(layers: &Layers, x: Point, missing: f64) -> Vec<(usize, f64)> {
+    let distance2 = |face: &Frame| mesh::distance2_to_triangle(face.vertices.map(|v| layers.vertices()[v as usize]), x);
+    let distances: Vec<f64> = layers.faces().iter().map(distance2).collect();
+    let least = distances.iter().copied().fold(f64::INFINITY, f64::min);
+    let bound = least * (1.0 + EQUALLY_NEAR) + AT_THE_CAGE * AT_THE_CAGE;
+    let distance = least.sqrt();
+    let share = |face: &Frame| {
+        if distance <= AT_THE_CAGE {
+            return 1.0;
+        }
+        let height = mesh::dot(from_corner(layers, face, x), face.normal()) * missing.signum();
+        1.0 / ((1.0 - height / distance).max(0.0) + EQUALLY_NEAR)
+    };
+    let mut found: Vec<(usize, f64)> = layers
+        .faces()
+        .iter()
+        .enumerate()
+        .filter(|&(f, _)| distances[f] <= bound)
+        .map(|(f, face)| (f, share(face)))
+        .collect();
+    let total: f64 = found.iter().map(|&(_, share)| share).sum();
+    found.iter_mut().for_each(|(_, share)| *share /= total);
+    found
+}

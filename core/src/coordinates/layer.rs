@@ -1,0 +1,339 @@
+//! Potentials of a triangle mesh's layers, in closed form: what Green coordinates and boundary elements are made of.
+//!
+//! For a point `x`, with `r = y − x`: the double layer of the hat function of a vertex, `φ_v = ∫ hat_v (r·n) / 4π|r|³`, and
+//! the single layer of a face, `ψ_f = ∫_f 1 / 4π|r|`. A harmonic function `u` inside a closed mesh is
+//! `u(x) = Σ φ_v u_v + Σ ψ_f ∂u/∂n` as far as it is linear on faces and its normal derivative constant (Green's third identity;
+//! Lipman, Levin and Cohen-Or 2008, Eq. 3).
+//!
+//! Both follow from the solid angle `Ω` of each face and from `L = ∫ 1/|r|` along each edge. An edge's `L` enters its two faces
+//! with opposite signs and `Ω` enters `φ` and `ψ` with opposite signs, so that linear functions are reproduced to rounding
+//! wherever the point lies, even where `Ω` and `L` themselves are lost: at edges, `L` is cut off where it would be infinite,
+//! since its factors vanish there. Weights within a face are formed from coordinates along and across its longest edge,
+//! whose rounding cancels even in faces a million times longer than wide.
+
+use crate::cage::{Cage, Face};
+use crate::mesh::{self, Point};
+use crate::simd::{LANES, Lanes, angle, dot, ln_ratio, multiversion, zeros};
+use faer::{Mat, MatMut};
+use rayon::prelude::*;
+
+/// Closer to the plane of a face than this fraction of its longest edge, a point lies in it.
+const IN_PLANE: f64 = 1e-13;
+/// Largest ratio whose logarithm is taken, at edges: the range of `L`.
+const LARGEST: f64 = 1.329_227_995_784_916e36;
+/// Points one parallel task computes: a few lane groups.
+pub(super) const TASK_POINTS: usize = 8 * LANES;
+
+/// A closed triangle mesh, prepared for the potentials of its layers.
+#[derive(Clone, Debug)]
+pub(crate) struct Layers {
+    /// Scaled to a size near one by a power of two, so that nothing overflows and scale does not change a bit.
+    vertices: Vec<Point>,
+    scale: f64,
+    /// Ends and length.
+    edges: Vec<([u32; 2], f64)>,
+    faces: Vec<Frame>,
+}
+
+/// A face in its own coordinates: its longest edge runs from the first corner, at the origin, to the second, at `(length, 0)`;
+/// the third is at `(foot · length, height)`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frame {
+    /// Corners, counter-clockwise.
+    pub(super) vertices: [u32; 3],
+    /// `edges[i]` is the edge opposite corner i.
+    edges: [u32; 3],
+    /// Unit vectors along the longest edge, across it, and outwards.
+    axes: [Point; 3],
+    length: f64,
+    height: f64,
+    foot: f64,
+    /// Heights over the edges opposite the first two corners.
+    heights: [f64; 2],
+    /// Outward unit normals, in the plane, of the edges opposite the first two corners.
+    normals: [[f64; 2]; 2],
+}
+
+impl Frame {
+    fn new(vertices: &[Point], face: &Face) -> Self {
+        let between = |a: u32, b: u32| {
+            let (a, b) = (vertices[a as usize], vertices[b as usize]);
+            [b[0] - a[0], b[1] - a[1], b[2] - a[2]]
+        };
+        let side = |i: usize| between(face.vertices[(i + 1) % 3], face.vertices[(i + 2) % 3]);
+        let lengths = [0, 1, 2].map(|i| mesh::norm(side(i)));
+        let top = (0..3).fold(0, |a, b| if lengths[b] > lengths[a] { b } else { a });
+        let (first, second) = ((top + 1) % 3, (top + 2) % 3);
+        let [v0, v1, v2] = [first, second, top].map(|i| face.vertices[i]);
+        // The sides that meet opposite the longest edge are the shortest two: their product rounds least.
+        let product = mesh::cross(between(v2, v0), between(v2, v1));
+        let double_area = mesh::norm(product);
+        let length = lengths[top];
+        let along = between(v0, v1).map(|c| c / length);
+        let normal = product.map(|c| c / double_area);
+        let axes = [along, mesh::cross(normal, along), normal];
+        let height = double_area / length;
+        let reach = mesh::dot(between(v0, v2), along);
+        Self {
+            vertices: [v0, v1, v2],
+            edges: [first, second, top].map(|i| face.edges[i]),
+            axes,
+            length,
+            height,
+            foot: reach / length,
+            heights: [double_area / lengths[first], double_area / lengths[second]],
+            normals: [
+                [height / lengths[first], (length - reach) / lengths[first]],
+                [-height / lengths[second], reach / lengths[second]],
+            ],
+        }
+    }
+
+    /// Outward unit normal.
+    pub(super) fn normal(&self) -> Point {
+        self.axes[2]
+    }
+
+    /// `x` as a sum of the face's corners, in the order of [`Self::vertices`], and of its unit normal, in the unit of
+    /// [`Layers`]. `x − v₀` is given, in that unit.
+    pub(super) fn completion(&self, x: Point) -> ([f64; 3], f64) {
+        let [p, q, h] = self.axes.map(|axis| mesh::dot(axis, x));
+        let across = q / self.height;
+        let second = p / self.length - self.foot * across;
+        ([1.0 - second - across, second, across], h)
+    }
+}
+
+/// Potentials at the points of one lane group, all times 4π; every entry holds one group.
+pub(super) struct Scratch {
+    /// Vectors to the vertices and their lengths.
+    corners: Vec<[Lanes; 4]>,
+    /// `L`, and the product of the vectors to the ends.
+    edges: Vec<[Lanes; 2]>,
+    /// `4π φ`, of each vertex.
+    pub(super) double: Vec<Lanes>,
+    /// `4π ψ`, of each face, in the unit of [`Layers`].
+    pub(super) single: Vec<Lanes>,
+}
+
+impl Layers {
+    /// Prepares a mesh.
+    pub(crate) fn new(cage: &Cage) -> Self {
+        let scale = 2f64.powi(-(cage.diagonal().log2() as i32).clamp(-1000, 1000));
+        let vertices: Vec<Point> = cage.vertices().iter().map(|v| v.map(|c| c * scale)).collect();
+        let faces = cage.faces().iter().map(|face| Frame::new(&vertices, face)).collect();
+        let length = |ends: [u32; 2]| {
+            let [a, b] = ends.map(|v| vertices[v as usize]);
+            mesh::norm([b[0] - a[0], b[1] - a[1], b[2] - a[2]])
+        };
+        let edges = cage.edges().iter().map(|e| (e.vertices, length(e.vertices))).collect();
+        Self { vertices, scale, edges, faces }
+    }
+
+    /// What lengths are multiplied with to come into the unit of the prepared mesh: a power of two.
+    pub(super) fn scale(&self) -> f64 {
+        self.scale
+    }
+
+    /// Vertices, in the unit of the prepared mesh.
+    pub(super) fn vertices(&self) -> &[Point] {
+        &self.vertices
+    }
+
+    /// Faces, in the order of the cage.
+    pub(super) fn faces(&self) -> &[Frame] {
+        &self.faces
+    }
+
+    /// Mean of the areas of the faces, in the unit of the prepared mesh.
+    pub(super) fn mean_area(&self) -> f64 {
+        self.faces.iter().map(|f| 0.5 * f.length * f.height).sum::<f64>() / self.faces.len() as f64
+    }
+
+    pub(super) fn scratch(&self) -> Scratch {
+        Scratch {
+            corners: vec![[Lanes::ZERO; 4]; self.vertices.len()],
+            edges: vec![[Lanes::ZERO; 2]; self.edges.len()],
+            double: vec![Lanes::ZERO; self.vertices.len()],
+            single: vec![Lanes::ZERO; self.faces.len()],
+        }
+    }
+
+    /// The points from `first` on, in the unit of the prepared mesh; where there are none left, the last one again.
+    pub(super) fn group(&self, points: &[Point], first: usize) -> [Lanes; 3] {
+        let mut x = [Lanes::ZERO; 3];
+        for l in 0..LANES {
+            let point = points[(first + l).min(points.len() - 1)];
+            for k in 0..3 {
+                x[k].0[l] = point[k] * self.scale;
+            }
+        }
+        x
+    }
+
+    /// `φ`, n × v, and `ψ`, n × f, of the mesh at these points, in parallel; the result does not depend on the threads.
+    ///
+    /// A point within 1e-13 of the plane of a face gets its principal value: nothing of that face's solid angle.
+    #[allow(dead_code)]
+    pub(crate) fn potentials(&self, points: &[Point]) -> (Mat<f64>, Mat<f64>) {
+        let mut phi = zeros(points.len(), self.vertices.len());
+        let mut psi = zeros(points.len(), self.faces.len());
+        let single = INVERSE_4PI / self.scale;
+        phi.as_mut()
+            .par_row_chunks_mut(TASK_POINTS)
+            .zip(psi.as_mut().par_row_chunks_mut(TASK_POINTS))
+            .enumerate()
+            .for_each_init(
+                || self.scratch(),
+                |scratch, (task, (mut phi, mut psi))| {
+                    for start in (0..phi.nrows()).step_by(LANES) {
+                        group_potentials(self, &self.group(points, task * TASK_POINTS + start), scratch);
+                        write_group(phi.as_mut(), start, &scratch.double, INVERSE_4PI);
+                        write_group(psi.as_mut(), start, &scratch.single, single);
+                    }
+                },
+            );
+        (phi, psi)
+    }
+}
+
+/// `1/4π`.
+pub(super) const INVERSE_4PI: f64 = 1.0 / (4.0 * std::f64::consts::PI);
+
+/// Writes one lane group, times a factor, into the rows from `start` on, as far as there are rows.
+pub(super) fn write_group(mut rows: MatMut<'_, f64>, start: usize, values: &[Lanes], factor: f64) {
+    let count = LANES.min(rows.nrows() - start);
+    for (j, &value) in values.iter().enumerate() {
+        let scaled = value * factor;
+        let column = rows.as_mut().col_mut(j);
+        if let Some(entries) = column.try_as_col_major_mut() {
+            entries.as_slice_mut()[start..start + count].copy_from_slice(&scaled.0[..count]);
+        }
+    }
+}
+
+multiversion! {
+    /// Potentials at one lane group, left in the scratch.
+    pub(super) fn group_potentials(layers: &Layers, x: &[Lanes; 3], scratch: &mut Scratch) = group_potentials_generic;
+}
+
+#[inline(always)]
+fn group_potentials_generic(layers: &Layers, x: &[Lanes; 3], scratch: &mut Scratch) {
+    for (j, v) in layers.vertices.iter().enumerate() {
+        let r = [Lanes::splat(v[0]) - x[0], Lanes::splat(v[1]) - x[1], Lanes::splat(v[2]) - x[2]];
+        let corner = &mut scratch.corners[j];
+        corner[3] = dot(&r, &r).sqrt();
+        corner[0] = r[0];
+        corner[1] = r[1];
+        corner[2] = r[2];
+        scratch.double[j] = Lanes::ZERO;
+    }
+    for (k, &([a, b], length)) in layers.edges.iter().enumerate() {
+        let (a, b) = (&scratch.corners[a as usize], &scratch.corners[b as usize]);
+        let c = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+        let cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let product = a[3] * b[3];
+        let far = a[3] + b[3];
+        let sum = far + length;
+        // |a||b| + a·b, free of cancellation between the ends as well: |a × b|² / (|a||b| − a·b).
+        let between = cosine.map(|c| if c < 0.0 { 1.0 } else { 0.0 });
+        let top = sum * sum * (between * (product - cosine) + between.map(|b| 1.0 - b));
+        let bottom = (between * dot(&c, &c) + between.map(|b| 1.0 - b) * (product + cosine)) * 2.0;
+        let least = top * (1.0 / LARGEST);
+        let bottom = bottom.zip(least, |a, b| if a < b { b } else { a });
+        let edge = &mut scratch.edges[k];
+        edge[0] = ln_ratio(top, bottom, Lanes::splat(length) / far);
+        edge[1] = cosine;
+    }
+    for (f, face) in layers.faces.iter().enumerate() {
+        let [v0, v1, v2] = face.vertices.map(|v| v as usize);
+        let [e0, e1, e2] = face.edges.map(|e| &scratch.edges[e as usize]);
+        let (l0, l1, l2) = (e0[0], e1[0], e2[0]);
+        let (c0, c1, c2) = (&scratch.corners[v0], &scratch.corners[v1], &scratch.corners[v2]);
+        let along = |axis: &Point| c0[0] * axis[0] + c0[1] * axis[1] + c0[2] * axis[2];
+        let (p, q, h) = (along(&face.axes[0]), along(&face.axes[1]), along(&face.axes[2]));
+        let sine = h * (face.length * face.height);
+        let cosine = c0[3] * c1[3] * c2[3] + e0[1] * c0[3] + e1[1] * c1[3] + e2[1] * c2[3];
+        let half = angle(sine.map(f64::abs), cosine);
+        let least = IN_PLANE * face.length;
+        let omega = half.zip(h, |a, h| {
+            if h > least {
+                2.0 * a
+            } else if h < -least {
+                -2.0 * a
+            } else {
+                0.0
+            }
+        });
+        let across = q * (1.0 / face.height);
+        let first = p * (1.0 / face.length);
+        let [n0, n1] = face.normals;
+        let wx = l0 * n0[0] + l1 * n1[0];
+        let wy = l0 * n0[1] + l1 * n1[1] - l2;
+        let s = across * omega + h * wy * (1.0 / face.height);
+        let t = first * omega + h * wx * (1.0 / face.length);
+        let second = s * face.foot - t;
+        scratch.double[v2] = scratch.double[v2] - s;
+        scratch.double[v1] = scratch.double[v1] + second;
+        scratch.double[v0] = scratch.double[v0] + (omega + s - second);
+        let weight1 = across * face.foot - first;
+        let weight0 = across - weight1 + 1.0;
+        let around = weight0 * face.heights[0] * l0 + weight1 * face.heights[1] * l1 - q * l2;
+        scratch.single[f] = around - h * omega;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::TriMesh;
+
+    /// Integrates over a face by the centroids of 4^depth equal parts.
+    fn integrate([a, b, c]: [Point; 3], depth: u32, f: &mut impl FnMut(Point)) {
+        let middle = |p: Point, q: Point| [0, 1, 2].map(|k| 0.5 * (p[k] + q[k]));
+        if depth == 0 {
+            f([0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0));
+            return;
+        }
+        let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+        for part in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]] {
+            integrate(part, depth - 1, f);
+        }
+    }
+
+    #[test]
+    fn potentials_are_the_integrals_that_define_them() {
+        let vertices = vec![[0.1, 0.2, 0.0], [3.1, 0.0, 0.3], [0.4, 1.9, -0.2], [0.7, 0.5, 2.2]];
+        let triangles = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+        let cage = Cage::new(TriMesh { vertices, triangles }).unwrap();
+        let points = [[0.9, 0.7, 0.5], [-1.0, 3.0, 2.0], [5.0, -0.3, 0.4]];
+        let (phi, psi) = Layers::new(&cage).potentials(&points);
+        for (i, x) in points.iter().enumerate() {
+            let mut double = [0.0; 4];
+            for (f, face) in cage.faces().iter().enumerate() {
+                let corners = face.vertices.map(|v| cage.vertices()[v as usize]);
+                let [a, b, c] = corners;
+                let sides = [b, c].map(|p| [0, 1, 2].map(|k| p[k] - a[k]));
+                let normal = mesh::cross(sides[0], sides[1]);
+                let (double_area, parts) = (mesh::norm(normal), f64::from(4u32.pow(8)));
+                let mut single = 0.0;
+                integrate(corners, 8, &mut |y| {
+                    let r = [0, 1, 2].map(|k| y[k] - x[k]);
+                    let share = INVERSE_4PI / mesh::norm(r) * 0.5 * double_area / parts;
+                    single += share;
+                    let seen = share * mesh::dot(r, normal) / double_area / mesh::dot(r, r);
+                    for (i, &v) in face.vertices.iter().enumerate() {
+                        let across = [0, 1, 2].map(|k| corners[(i + 2) % 3][k] - corners[(i + 1) % 3][k]);
+                        let from = [0, 1, 2].map(|k| y[k] - corners[(i + 1) % 3][k]);
+                        let hat = mesh::dot(mesh::cross(across, from), normal) / (double_area * double_area);
+                        double[v as usize] += hat * seen;
+                    }
+                });
+                assert!((psi[(i, f)] - single).abs() < 1e-5, "face {f} from {x:?}: {} not {single}", psi[(i, f)]);
+            }
+            for (v, expected) in double.into_iter().enumerate() {
+                assert!((phi[(i, v)] - expected).abs() < 1e-5, "vertex {v} from {x:?}: {} not {expected}", phi[(i, v)]);
+            }
+        }
+    }
+}
