@@ -109,8 +109,8 @@ pub(crate) fn check(content: &Content, choices: &Choices) -> Result<(), ApiError
     if points < unknowns {
         return Ok(());
     }
-    check_options(points, unknowns, choices.solver_options(unknowns)).map_err(refused)?;
-    matrix.map_or(Ok(()), |matrix| matrix.delta(&cage, unknowns).map(|_| ()).map_err(|e| refused(e.into())))
+    check_options(points, unknowns, choices.solver_options(unknowns)).map_err(|error| refused(&error))?;
+    matrix.map_or(Ok(()), |matrix| matrix.delta(&cage, unknowns).map(|_| ()).map_err(|e| refused(&e.into())))
 }
 
 fn read_matrix(content: &Content, choices: &Choices) -> Result<Option<SparseMatrix>, ApiError> {
@@ -179,14 +179,14 @@ pub(crate) fn prepare(geometry: &Geometry, choices: &Choices, most_bytes: u64) -
         return Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(most_bytes));
     }
     let own = || geometry.matrix.as_ref().map(|matrix| matrix as &dyn Term).ok_or(TermError::Missing);
-    let term = options.regularizer.term().map_or_else(own, |term| Ok(term)).map_err(|error| refused(error.into()))?;
-    let solver =
-        Solver::prepare_with(choices.system, &geometry.cage, &geometry.rest.points, options, term).map_err(refused)?;
+    let term = options.regularizer.term().map_or_else(own, Ok).map_err(|error| refused(&error.into()))?;
+    let solver = Solver::prepare_with(choices.system, &geometry.cage, &geometry.rest.points, options, term)
+        .map_err(|error| refused(&error))?;
     Ok(with_solver(solver, &geometry.cage, options))
 }
 
 /// What a client hears of an error: which option it is about, or that it is the geometry.
-fn refused(error: PrepareError) -> ApiError {
+fn refused(error: &PrepareError) -> ApiError {
     let option = match error {
         PrepareError::SpectrumTooLarge { .. } => "spectrum",
         PrepareError::BadLambda { .. } => "lambda",
