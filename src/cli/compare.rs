@@ -45,7 +45,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     let result = compare(&job, &mut Progress { tell: &mut tell });
     bar.finish_and_clear();
     let (figures, pictures) = result.map_err(|error| match error {
-        CompareError::Prepare(error) => blame(error, &args.rest, &args.cage),
+        CompareError::Prepare(error) => blame(&error, &args.rest, &args.cage),
         CompareError::Formats(error) => error.into(),
     })?;
 

@@ -37,7 +37,7 @@ fn here(args: &EncodeArgs, rest: &Model, cage: &Cage, clock: Instant) -> Result<
     let choose = match (args.solver.spectrum, spectrum_bound(&args.solver)?) {
         (Some(SpectrumArg::Auto), bound) => {
             // What is wrong with the options is told before anything is read.
-            check_options(rest.points.len(), system.unknowns(cage), options).map_err(|e| name_file(e, args))?;
+            check_options(rest.points.len(), system.unknowns(cage), options).map_err(|e| name_file(&e, args))?;
             let mut again = open_frames(&args.frames, rest.points.len())?;
             let samples = sample_frames(again.as_mut(), options.regularizer == Regularizer::Temporal)?;
             Some(ChooseSpectrum { samples, bound })
@@ -133,20 +133,20 @@ fn finish(args: &EncodeArgs, encoded: Encoded, report_file: Option<AtomicFile>, 
 /// Errors of the mathematics know vertices and points; the user knows files.
 fn name_files(error: encode::EncodeError, args: &EncodeArgs) -> anyhow::Error {
     match error {
-        encode::EncodeError::Prepare(inner) => name_file(inner, args),
+        encode::EncodeError::Prepare(inner) => name_file(&inner, args),
         other => other.into(),
     }
 }
 
-fn name_file(error: PrepareError, args: &EncodeArgs) -> anyhow::Error {
-    match (&error, &args.solver.regularizer_matrix) {
+fn name_file(error: &PrepareError, args: &EncodeArgs) -> anyhow::Error {
+    match (error, &args.solver.regularizer_matrix) {
         (PrepareError::Term(_), Some(matrix)) => anyhow::anyhow!("{}: {error}", matrix.display()),
         _ => blame(error, &args.rest, &args.cage),
     }
 }
 
 /// Names the file or the option that is to blame.
-pub(super) fn blame(error: PrepareError, rest: &Path, cage: &Path) -> anyhow::Error {
+pub(super) fn blame(error: &PrepareError, rest: &Path, cage: &Path) -> anyhow::Error {
     let path = match error {
         PrepareError::BadLambda { .. } => return anyhow::anyhow!("--lambda: {error}"),
         PrepareError::SpectrumTooLarge { .. } => return anyhow::anyhow!("--spectrum: {error}"),

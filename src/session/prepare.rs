@@ -139,9 +139,9 @@ pub(crate) fn check(geometry: &Geometry, choices: &Choices, most_bytes: u64) -> 
     let unknowns = choices.system.unknowns(&geometry.cage);
     let options = choices.solver_options(unknowns);
     check_memory(geometry, choices, options, most_bytes)?;
-    Solver::check(choices.system, &geometry.cage, &geometry.rest.points, options).map_err(refused)?;
+    Solver::check(choices.system, &geometry.cage, &geometry.rest.points, options).map_err(|error| refused(&error))?;
     let Some(matrix) = &geometry.matrix else { return Ok(()) };
-    matrix.delta(&geometry.cage, unknowns).map_err(|error| refused(error.into()))?;
+    matrix.delta(&geometry.cage, unknowns).map_err(|error| refused(&error.into()))?;
     Ok(())
 }
 
@@ -154,14 +154,14 @@ pub(crate) fn prepare(geometry: &Geometry, choices: &Choices, most_bytes: u64) -
     let options = choices.solver_options(unknowns);
     check_memory(geometry, choices, options, most_bytes)?;
     let own = || geometry.matrix.as_ref().map(|matrix| matrix as &dyn Term).ok_or(TermError::Missing);
-    let term = options.regularizer.term().map_or_else(own, |term| Ok(term)).map_err(|error| refused(error.into()))?;
-    let solver =
-        Solver::prepare_with(choices.system, &geometry.cage, &geometry.rest.points, options, term).map_err(refused)?;
+    let term = options.regularizer.term().map_or_else(own, Ok).map_err(|error| refused(&error.into()))?;
+    let solver = Solver::prepare_with(choices.system, &geometry.cage, &geometry.rest.points, options, term)
+        .map_err(|error| refused(&error))?;
     Ok(with_solver(solver, &geometry.cage, options))
 }
 
 /// What a client hears of an error: which option it is about, or that it is the geometry.
-fn refused(error: PrepareError) -> ApiError {
+fn refused(error: &PrepareError) -> ApiError {
     let option = match error {
         PrepareError::SpectrumTooLarge { .. } => "spectrum",
         PrepareError::BadLambda { .. } => "lambda",
