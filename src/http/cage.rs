@@ -41,6 +41,7 @@ pub(crate) async fn get(
         }
         _ => return Err(not_acceptable("application/octet-stream or application/json")),
     };
+    response.headers_mut().insert(header::VARY, HeaderValue::from_static("accept"));
     for (name, count) in ["cager-vertices", "cager-faces"].into_iter().zip(counts) {
         response.headers_mut().insert(name, HeaderValue::from(count));
     }

@@ -7,7 +7,7 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::{Handles, SolverOptions};
 use cager_core::mesh::{Model, Point, TriMesh, diagonal, winding_number};
-use cager_formats::{open_frames, read_model};
+use cager_formats::{commit_together, open_frames, read_model};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -51,7 +51,9 @@ pub(crate) fn run_with(
     let mut frames = open_frames(folder.join("frames.npy"), rest.points.len()).expect("frames");
     let output = dir.path("out.cager");
     let job = Job { rest, cage, frames: frames.as_mut(), output: &output, system, options, term: None, choose: None };
-    encode(job, &mut |_| {}).expect("an encoding").report
+    let encoded = encode(job, &mut |_| {}).expect("an encoding");
+    commit_together(vec![encoded.container]).expect("a container");
+    encoded.report
 }
 
 /// Every cage of one capture against the independent reference.

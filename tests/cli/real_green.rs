@@ -25,12 +25,12 @@ fn spikes(cages: &[Vec<f32>], vertices: usize, size: f64) -> (f64, f64) {
 }
 
 /// Normals that follow from the vertices make cages several times as stable as free ones.
-fn consistent_cages_are_more_stable(capture: &str) {
+fn consistent_cages_are_more_stable(capture: &str, handles: &[Handles]) {
     let Some(root) = data() else { return };
     let folder = root.join(capture);
     let rest = read_model(&folder.join("rest.obj")).expect("a rest pose");
     let cage = cage_of(&folder.join("cage350.obj"));
-    for handles in [Handles::MaxVol, Handles::All] {
+    for &handles in handles {
         let found = [&Green::Free, &Green::Consistent].map(|system| {
             let dir = Dir::new();
             let options = SolverOptions { handles, ..SolverOptions::default() };
@@ -61,22 +61,22 @@ fn consistent_cages_are_more_stable(capture: &str) {
 
 #[test]
 fn consistent_cages_are_more_stable_on_the_horse() {
-    consistent_cages_are_more_stable("horse-gallop");
+    consistent_cages_are_more_stable("horse-gallop", &[Handles::MaxVol, Handles::All]);
 }
 
 #[test]
 fn consistent_cages_are_more_stable_on_the_dancer() {
-    consistent_cages_are_more_stable("samba");
+    consistent_cages_are_more_stable("samba", &[Handles::MaxVol]);
 }
 
 #[test]
 fn consistent_cages_are_more_stable_on_the_arm() {
-    consistent_cages_are_more_stable("supercages-arm");
+    consistent_cages_are_more_stable("supercages-arm", &[Handles::MaxVol]);
 }
 
 #[test]
 fn consistent_cages_are_more_stable_on_the_walk() {
-    consistent_cages_are_more_stable("makehuman-cmu-walk");
+    consistent_cages_are_more_stable("makehuman-cmu-walk", &[Handles::MaxVol]);
 }
 
 #[test]

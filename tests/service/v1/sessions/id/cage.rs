@@ -25,6 +25,7 @@ async fn the_rest_cage_is_the_same_in_numbers_and_in_json() {
     assert_eq!(cage.faces, expected.faces.triangulated());
     let reply = app.get(&path).await.expect(200);
     assert_eq!(reply.header("cager-vertices"), cage.vertices.len().to_string());
+    assert_eq!(reply.header("vary"), "accept");
     assert_eq!(reply.header("cager-faces"), cage.faces.len().to_string());
     assert_eq!(reply.body.len(), 24 * cage.vertices.len() + 12 * cage.faces.len());
     let by_client = app.client().cage(&session.id).await.expect("a cage");
