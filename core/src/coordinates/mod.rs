@@ -4,11 +4,13 @@ mod careful;
 mod doubt;
 mod error;
 mod green;
+mod harmonic;
 pub(crate) mod layer;
 mod mean_value;
 
 pub use error::CoordinatesError;
 pub use green::Green;
+pub use harmonic::Harmonic;
 pub use mean_value::MeanValue;
 
 use crate::cage::Cage;

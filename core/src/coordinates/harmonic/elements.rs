@@ -1,0 +1,145 @@
+//! Boundary elements: triangles on the cage's faces, each with a polynomial density of its own degree.
+
+use super::basis::functions;
+use super::potential::Triangle;
+use crate::mesh::{Point, distance2_to_triangle};
+use rayon::prelude::*;
+
+/// One element.
+#[derive(Clone, Debug)]
+pub(super) struct Element {
+    pub(super) triangle: Triangle,
+    /// Face of the cage it is part of.
+    pub(super) face: u32,
+    /// Degree of its density; one less in the coarse space.
+    pub(super) degree: usize,
+}
+
+impl Element {
+    /// Both halves, cut across the longest side.
+    fn halves(&self) -> [Self; 2] {
+        let corners = self.triangle.corners;
+        let length2 = |i: usize| -> f64 {
+            let (a, b) = (corners[(i + 1) % 3], corners[(i + 2) % 3]);
+            (0..3).map(|k| (a[k] - b[k]).powi(2)).sum()
+        };
+        let top = (0..3).fold(0, |a, b| if length2(b) > length2(a) { b } else { a });
+        let [a, b, c] = [top, (top + 1) % 3, (top + 2) % 3].map(|i| corners[i]);
+        let middle = [0, 1, 2].map(|k| 0.5 * (b[k] + c[k]));
+        [[a, b, middle], [a, middle, c]].map(|corners| Self { triangle: Triangle::new(corners), ..*self })
+    }
+
+    /// Highest degree that a triangle of this shape is given: polynomials of high degree nearly depend on each other in thin ones.
+    fn most(&self) -> usize {
+        let aspect = self.triangle.diameter() / self.triangle.height();
+        MOST.iter().find(|(limit, _)| aspect < *limit).map_or(LEAST, |m| m.1)
+    }
+
+    /// Distance to the nearest of these points, over the diameter.
+    fn nearness(&self, points: &[Point]) -> f64 {
+        let Triangle { centre, radius, corners, .. } = &self.triangle;
+        let mut nearest = f64::INFINITY;
+        let mut near2 = f64::INFINITY;
+        for &x in points {
+            let d2: f64 = (0..3).map(|k| (x[k] - centre[k]).powi(2)).sum();
+            if d2 < near2 {
+                let found = distance2_to_triangle(*corners, x);
+                if found < nearest {
+                    nearest = found;
+                    near2 = (nearest.sqrt() + radius).powi(2);
+                }
+            }
+        }
+        nearest.sqrt() / self.triangle.diameter()
+    }
+}
+
+/// Nearest point, in diameters, from which on each degree is enough.
+const ENOUGH: [(f64, usize); 3] = [(0.4, 3), (0.18, 4), (0.05, 5)];
+/// Ratio of length to height below which a triangle may have each degree,
+const MOST: [(f64, usize); 3] = [(4.0, 6), (8.0, 5), (14.0, 4)];
+/// and what any may have.
+const LEAST: usize = 3;
+/// Elements are not divided to less than this fraction of the widest face.
+const DIVIDED_TO: f64 = 1e-3;
+
+/// The faces of a cage, divided where points are near.
+pub(super) fn elements(faces: &[[Point; 3]], points: &[Point]) -> Vec<Element> {
+    let mut waiting: Vec<Element> = faces
+        .iter()
+        .enumerate()
+        .map(|(face, &corners)| Element { triangle: Triangle::new(corners), face: face as u32, degree: 0 })
+        .collect();
+    let widest = waiting.iter().map(|e| e.triangle.diameter()).fold(0.0, f64::max);
+    let mut done = Vec::new();
+    while !waiting.is_empty() {
+        let judged: Vec<Vec<Element>> = waiting
+            .into_par_iter()
+            .map(|element| {
+                let nearness = element.nearness(points);
+                let wanted = ENOUGH.iter().find(|(least, _)| nearness >= *least).map(|e| e.1);
+                let most = element.most();
+                match wanted {
+                    Some(degree) if degree <= most => vec![Element { degree, ..element }],
+                    _ if element.triangle.diameter() > DIVIDED_TO * widest => element.halves().to_vec(),
+                    _ => vec![Element { degree: most.min(ENOUGH[ENOUGH.len() - 1].1), ..element }],
+                }
+            })
+            .collect();
+        waiting = Vec::new();
+        for mut part in judged {
+            if part.len() == 1 { done.append(&mut part) } else { waiting.append(&mut part) }
+        }
+    }
+    done
+}
+
+/// The marked elements one degree higher, or divided.
+pub(super) fn refined(elements: &[Element], marked: &[bool]) -> Vec<Element> {
+    let mut out = Vec::new();
+    for (element, &marked) in elements.iter().zip(marked) {
+        if !marked {
+            out.push(element.clone());
+        } else if element.degree < element.most() {
+            out.push(Element { degree: element.degree + 1, ..element.clone() });
+        } else {
+            out.extend(element.halves());
+        }
+    }
+    out
+}
+
+/// Where the unknowns are: those of low degree of all elements are solved for together, those above around each vertex.
+pub(super) struct Unknowns {
+    pub(super) elements: Vec<Element>,
+    /// Number of low polynomials of every element.
+    pub(super) low: usize,
+    /// First high unknown of each element, and the number of all of them.
+    starts: Vec<usize>,
+}
+
+impl Unknowns {
+    pub(super) fn new(elements: Vec<Element>, low_degree: usize) -> Self {
+        let low = functions(low_degree);
+        let mut starts = vec![0];
+        for element in &elements {
+            starts.push(starts[starts.len() - 1] + functions(element.degree) - low);
+        }
+        Self { elements, low, starts }
+    }
+
+    /// Number of low unknowns.
+    pub(super) fn low_count(&self) -> usize {
+        self.low * self.elements.len()
+    }
+
+    /// Number of high unknowns.
+    pub(super) fn high_count(&self) -> usize {
+        self.starts[self.elements.len()]
+    }
+
+    /// The high unknowns of an element.
+    pub(super) fn high(&self, element: usize) -> std::ops::Range<usize> {
+        self.starts[element]..self.starts[element + 1]
+    }
+}
