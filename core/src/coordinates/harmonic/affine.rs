@@ -3,6 +3,7 @@
 use crate::mesh::Point;
 #[cfg(test)]
 use faer::Mat;
+use faer::MatMut;
 
 /// The linear functions that fit the hat functions of a cage best: value and gradient for each vertex.
 ///
@@ -46,21 +47,23 @@ impl AffineFit {
         Self { centre, columns, rows }
     }
 
-    /// Makes a row reproduce the linear functions at `x` exactly. Returns the largest
-    /// change of an entry.
-    pub(super) fn complete(&self, mut a: faer::MatMut<'_, f64>, i: usize, x: Point) -> f64 {
-        let mut missing = row(x, self.centre);
+    /// Makes the rows of these points reproduce linear functions exactly. Returns the largest change of an entry.
+    pub(super) fn complete(&self, mut a: MatMut<'_, f64>, points: impl Iterator<Item = Point>) -> f64 {
+        let mut missing: Vec<[f64; 4]> = points.map(|x| row(x, self.centre)).collect();
         for (j, row) in self.rows.iter().enumerate() {
-            let value = a[(i, j)];
-            for k in 0..4 {
-                missing[k] -= value * row[k];
+            for (missing, &value) in missing.iter_mut().zip(a.as_ref().col(j).iter()) {
+                for k in 0..4 {
+                    missing[k] -= value * row[k];
+                }
             }
         }
         let mut largest = 0.0f64;
         for (j, column) in self.columns.iter().enumerate() {
-            let change: f64 = (0..4).map(|k| missing[k] * column[k]).sum();
-            a[(i, j)] += change;
-            largest = largest.max(change.abs());
+            for (missing, value) in missing.iter().zip(a.as_mut().col_mut(j).iter_mut()) {
+                let change: f64 = (0..4).map(|k| missing[k] * column[k]).sum();
+                *value += change;
+                largest = largest.max(change.abs());
+            }
         }
         largest
     }

@@ -35,16 +35,17 @@ impl Element {
         MOST.iter().find(|(limit, _)| aspect < *limit).map_or(LEAST, |m| m.1)
     }
 
-    /// Distance to the nearest of these points, over the diameter.
+    /// Distance over the diameter to the nearest of these points, but for those as good as on it.
     fn nearness(&self, points: &[Point]) -> f64 {
         let Triangle { centre, radius, corners, .. } = &self.triangle;
         let mut nearest = f64::INFINITY;
         let mut near2 = f64::INFINITY;
+        let least2 = (ON * self.triangle.diameter()).powi(2);
         for &x in points {
             let d2: f64 = (0..3).map(|k| (x[k] - centre[k]).powi(2)).sum();
             if d2 < near2 {
                 let found = distance2_to_triangle(*corners, x);
-                if found < nearest {
+                if found < nearest && found >= least2 {
                     nearest = found;
                     near2 = (nearest.sqrt() + radius).powi(2);
                 }
@@ -55,13 +56,15 @@ impl Element {
 }
 
 /// Nearest point, in diameters, from which on each degree is enough.
-const ENOUGH: [(f64, usize); 3] = [(0.4, 3), (0.18, 4), (0.05, 5)];
+const ENOUGH: [(f64, usize); 4] = [(0.4, 3), (0.18, 4), (0.1, 5), (0.06, 6)];
+/// Points nearer than this are left to what is known on the surface.
+const ON: f64 = 0.01;
 /// Ratio of length to height below which a triangle may have each degree,
 const MOST: [(f64, usize); 3] = [(4.0, 6), (8.0, 5), (14.0, 4)];
 /// and what any may have.
 const LEAST: usize = 3;
-/// Elements are not divided to less than this fraction of the widest face.
-const DIVIDED_TO: f64 = 1e-3;
+/// No elements are divided for the sake of their shape once there are so many.
+const MANY: usize = 1200;
 
 /// The faces of a cage, divided where points are near.
 pub(super) fn elements(faces: &[[Point; 3]], points: &[Point]) -> Vec<Element> {
@@ -70,19 +73,19 @@ pub(super) fn elements(faces: &[[Point; 3]], points: &[Point]) -> Vec<Element> {
         .enumerate()
         .map(|(face, &corners)| Element { triangle: Triangle::new(corners), face: face as u32, degree: 0 })
         .collect();
-    let widest = waiting.iter().map(|e| e.triangle.diameter()).fold(0.0, f64::max);
-    let mut done = Vec::new();
+    let mut done: Vec<Element> = Vec::new();
     while !waiting.is_empty() {
+        let divide = done.len() + 2 * waiting.len() <= MANY;
         let judged: Vec<Vec<Element>> = waiting
             .into_par_iter()
             .map(|element| {
                 let nearness = element.nearness(points);
-                let wanted = ENOUGH.iter().find(|(least, _)| nearness >= *least).map(|e| e.1);
+                let wanted = ENOUGH.iter().find(|(least, _)| nearness >= *least).map_or(usize::MAX, |e| e.1);
                 let most = element.most();
-                match wanted {
-                    Some(degree) if degree <= most => vec![Element { degree, ..element }],
-                    _ if element.triangle.diameter() > DIVIDED_TO * widest => element.halves().to_vec(),
-                    _ => vec![Element { degree: most.min(ENOUGH[ENOUGH.len() - 1].1), ..element }],
+                if wanted > most && divide {
+                    element.halves().to_vec()
+                } else {
+                    vec![Element { degree: wanted.min(most), ..element }]
                 }
             })
             .collect();
@@ -112,7 +115,8 @@ pub(super) fn refined(elements: &[Element], marked: &[bool]) -> Vec<Element> {
 /// Where the unknowns are: those of low degree of all elements are solved for together, those above around each vertex.
 pub(super) struct Unknowns {
     pub(super) elements: Vec<Element>,
-    /// Number of low polynomials of every element.
+    /// Degree of the low polynomials, and how many every element has.
+    pub(super) low_degree: usize,
     pub(super) low: usize,
     /// First high unknown of each element, and the number of all of them.
     starts: Vec<usize>,
@@ -125,7 +129,7 @@ impl Unknowns {
         for element in &elements {
             starts.push(starts[starts.len() - 1] + functions(element.degree) - low);
         }
-        Self { elements, low, starts }
+        Self { elements, low_degree, low, starts }
     }
 
     /// Number of low unknowns.

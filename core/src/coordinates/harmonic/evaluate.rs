@@ -1,174 +1,293 @@
 //! Rows of `Φ` from the densities.
+//!
+//! Very near the surface the densities' finite degree shows. There the values on the surface help, which are the hat functions: what the
+//! densities give wrong at the nearest place is taken off, as far as that error reaches into the cage. So values are exact on
+//! the surface and continuous near it.
 
 use super::affine::AffineFit;
 use super::basis::{MAX_FUNCTIONS, functions};
 use super::elements::Unknowns;
 use super::potential::{Tables, potentials};
-use super::solve::Densities;
-use crate::coordinates::layer::{INVERSE_4PI, Layers, group_potentials, write_group};
-use crate::mesh::Point;
-use crate::simd::{LANES, Lanes};
+use super::solve::{Densities, Part};
+use super::surface::{Foot, ON_SURFACE};
+use crate::coordinates::layer::{self, INVERSE_4PI, Layers, group_potentials, write_group};
+use crate::mesh::{Point, distance2_to_triangle};
+use crate::simd::{LANES, Lanes, multiversion};
 use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, Par};
+use faer::{Accum, Mat, MatMut, Par};
 use rayon::prelude::*;
 
 const TASK_POINTS: usize = 16 * LANES;
 /// High unknowns are felt up to so many radii of their element.
-const FELT: f64 = 8.0;
+const FELT: f64 = 6.0;
+/// Elements with at least this part of the largest share of a change are marked.
+const MAIN: f64 = 0.3;
 
+/// What everything is computed from.
+pub(super) struct Solution<'a> {
+    pub(super) tables: &'a Tables,
+    pub(super) layers: &'a Layers,
+    pub(super) affine: &'a AffineFit,
+    pub(super) unknowns: &'a Unknowns,
+    pub(super) densities: &'a Densities,
+}
+
+/// Coordinates, and how far they are from final.
 pub(super) struct Evaluated {
     pub(super) phi: Mat<f64>,
-    /// Largest entry of each row of the change.
-    pub(super) changes: Vec<f64>,
-    /// Elements to be refined.
+    /// Largest change of an entry by the highest degrees.
+    pub(super) change: f64,
+    /// Elements that changes above the tolerance mostly come from.
     pub(super) marked: Vec<bool>,
-    /// Largest correction of a row that makes it reproduce linear functions.
+    /// Largest correction of an entry that makes the rows reproduce linear functions.
     pub(super) correction: f64,
 }
 
+/// What one task finds beside its rows.
+#[derive(Default)]
+struct Found {
+    change: f64,
+    marked: Vec<u32>,
+    correction: f64,
+}
+
+/// Working memory of one task.
 struct Scratch {
-    layers: crate::coordinates::layer::Scratch,
+    layers: layer::Scratch,
+    /// Single layers of the low polynomials, points × unknowns.
     singles: Mat<f64>,
-    /// High part and change of one lane group, by vertex.
-    high: Vec<Lanes>,
+    /// Hat functions' double layers and high densities, and changes, of one lane group by vertex.
+    values: Vec<Lanes>,
     change: Vec<Lanes>,
 }
 
-/// `Φ` at these points, and the change from the coarse space.
-pub(super) fn evaluate(
-    tables: &Tables,
-    layers: &Layers,
-    affine: &AffineFit,
-    unknowns: &Unknowns,
-    densities: &Densities,
-    points: &[Point],
-    tolerance: f64,
-) -> Evaluated {
-    let m = layers.vertices().len();
-    let low = unknowns.low;
-    let low_degree = (0..).find(|&d| functions(d) == low).unwrap_or(0);
+/// `Φ` at these points, in the unit of the layers.
+pub(super) fn evaluate(solution: &Solution<'_>, points: &[Point], feet: &[Foot], tolerance: f64) -> Evaluated {
+    let m = solution.layers.vertices().len();
+    let near = Near::new(solution, points, feet);
     let mut phi = crate::simd::zeros::<f64>(points.len(), m);
-    let found: Vec<(Vec<f64>, Vec<u32>, f64)> = phi
+    let found: Vec<Found> = phi
         .as_mut()
         .par_row_chunks_mut(TASK_POINTS)
         .enumerate()
         .map_init(
             || Scratch {
-                layers: layers.scratch(),
-                singles: Mat::zeros(TASK_POINTS, unknowns.low_count()),
-                high: vec![Lanes::ZERO; m],
+                layers: solution.layers.scratch(),
+                singles: Mat::zeros(TASK_POINTS, solution.unknowns.low_count()),
+                values: vec![Lanes::ZERO; m],
                 change: vec![Lanes::ZERO; m],
             },
-            |scratch, (task, mut rows)| {
-                let count = rows.nrows();
-                let first = task * TASK_POINTS;
-                let mut values = [Lanes::ZERO; MAX_FUNCTIONS];
-                let mut largest = Vec::new();
-                let mut marked = Vec::new();
-                for start in (0..count).step_by(LANES) {
-                    let x = layers.group(points, first + start);
-                    group_potentials(layers, &x, &mut scratch.layers);
-                    for v in 0..m {
-                        scratch.high[v] = scratch.layers.double[v] * INVERSE_4PI;
-                        scratch.change[v] = Lanes::ZERO;
-                    }
-                    let mut near = Vec::new();
-                    for (e, element) in unknowns.elements.iter().enumerate() {
-                        let t = &element.triangle;
-                        let limit = (FELT * t.radius).powi(2);
-                        let mut keep = Lanes::ZERO;
-                        let mut any = false;
-                        for l in 0..LANES {
-                            let d2: f64 = (0..3).map(|k| (x[k].0[l] - t.centre[k]).powi(2)).sum();
-                            keep.0[l] = if d2 < limit { 1.0 } else { 0.0 };
-                            any |= d2 < limit;
-                        }
-                        let part = &densities.parts[e];
-                        let any = any && !part.vertices.is_empty();
-                        let degree = if any { element.degree } else { low_degree };
-                        potentials(tables, t, degree, &x, &mut values);
-                        for k in 0..low {
-                            for l in 0..LANES.min(count - start) {
-                                scratch.singles[(start + l, e * low + k)] = values[k].0[l];
-                            }
-                        }
-                        if any {
-                            near.push(e as u32);
-                            let all = functions(element.degree);
-                            for value in &mut values[..all] {
-                                *value = *value * keep;
-                            }
-                            let highs = part.high.chunks_exact(all - low);
-                            for ((&v, high), change) in part.vertices.iter().zip(highs).zip(part.change.chunks_exact(all)) {
-                                let mut sum = scratch.high[v as usize];
-                                for k in low..all {
-                                    sum = sum + values[k] * high[k - low];
-                                }
-                                scratch.high[v as usize] = sum;
-                                let mut sum = scratch.change[v as usize];
-                                for k in 0..all {
-                                    sum = sum + values[k] * change[k];
-                                }
-                                scratch.change[v as usize] = sum;
-                            }
-                        }
-                    }
-                    write_group(rows.as_mut(), start, &scratch.high, 1.0);
-                    for l in 0..LANES.min(count - start) {
-                        let worst = (0..m).fold(0, |a, v| {
-                            if scratch.change[v].0[l].abs() > scratch.change[a].0[l].abs() { v } else { a }
-                        });
-                        let change = scratch.change[worst].0[l].abs();
-                        largest.push(change);
-                        if change > tolerance {
-                            let x = x.map(|c| Lanes::splat(c.0[l]));
-                            mark(tables, unknowns, densities, &near, worst as u32, &x, &mut marked);
-                        }
-                    }
-                }
-                let singles = scratch.singles.as_ref().subrows(0, count);
-                matmul(rows.as_mut(), Accum::Add, singles, densities.low.as_ref(), 1.0, Par::Seq);
-                let mut correction = 0.0f64;
-                for i in 0..count {
-                    let x = points[first + i].map(|c| c * layers.scale());
-                    correction = correction.max(affine.complete(rows.as_mut(), i, x));
-                }
-                (largest, marked, correction)
-            },
+            |scratch, (task, rows)| evaluate_task(solution, &near, task * TASK_POINTS, tolerance, rows, scratch),
         )
         .collect();
-    let mut marked = vec![false; unknowns.elements.len()];
-    for &e in found.iter().flat_map(|f| &f.1) {
-        marked[e as usize] = true;
+    let mut all = Evaluated { phi, change: 0.0, marked: vec![false; solution.unknowns.elements.len()], correction: 0.0 };
+    for found in found {
+        all.change = all.change.max(found.change);
+        all.correction = all.correction.max(found.correction);
+        for e in found.marked {
+            all.marked[e as usize] = true;
+        }
     }
-    let correction = found.iter().map(|f| f.2).fold(0.0, f64::max);
-    Evaluated { phi, changes: found.into_iter().flat_map(|f| f.0).collect(), marked, correction }
+    all
+}
+
+/// Points, and how much of the error at its foot each is freed from.
+struct Near<'a> {
+    points: &'a [Point],
+    feet: &'a [Foot],
+    /// From 0 inside to 1 on the surface.
+    shares: Vec<f64>,
+}
+
+impl<'a> Near<'a> {
+    fn new(solution: &Solution<'_>, points: &'a [Point], feet: &'a [Foot]) -> Self {
+        let faces = solution.layers.faces().len();
+        let mut of_face = vec![Vec::new(); faces];
+        for (e, element) in solution.unknowns.elements.iter().enumerate() {
+            of_face[element.face as usize].push(e);
+        }
+        let share = |foot: &Foot| {
+            // The error of a density of degree p changes its sign about p times along an element.
+            let reach = |e: &usize| {
+                let element = &solution.unknowns.elements[*e];
+                let apart = distance2_to_triangle(element.triangle.corners, foot.place);
+                (apart, 0.5 * element.triangle.diameter() / (element.degree + 1) as f64)
+            };
+            let reach = of_face[foot.face as usize].iter().map(reach).min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0.0, |r| r.1);
+            if foot.distance <= ON_SURFACE { 1.0 } else { (1.0 - foot.distance / reach).max(0.0).powi(3) }
+        };
+        let shares = feet.par_iter().map(share).collect();
+        Self { points, feet, shares }
+    }
+
+    /// Eight points, those places on the surface from which their shares come, just inside, and the shares; the last point again where
+    /// there are no more. Points on the surface need nothing of themselves, which the last lanes say.
+    fn group(&self, first: usize) -> Group {
+        let mut group = Group { x: [Lanes::ZERO; 3], y: [Lanes::ZERO; 3], share: Lanes::ZERO, own: Lanes::ZERO };
+        for l in 0..LANES {
+            let i = (first + l).min(self.points.len() - 1);
+            let (x, foot) = (self.points[i], &self.feet[i]);
+            let on_surface = foot.distance <= ON_SURFACE;
+            group.own.0[l] = if on_surface { 0.0 } else { 1.0 };
+            group.share.0[l] = if on_surface { 0.0 } else { self.shares[i] };
+            for k in 0..3 {
+                group.x[k].0[l] = x[k];
+                let inwards = ON_SURFACE / foot.distance.max(ON_SURFACE);
+                group.y[k].0[l] = if self.shares[i] > 0.0 { foot.place[k] + inwards * (x[k] - foot.place[k]) } else { x[k] };
+            }
+        }
+        group
+    }
+}
+
+struct Group {
+    x: [Lanes; 3],
+    y: [Lanes; 3],
+    share: Lanes,
+    own: Lanes,
+}
+
+fn evaluate_task(
+    solution: &Solution<'_>,
+    near: &Near<'_>,
+    first: usize,
+    tolerance: f64,
+    mut rows: MatMut<'_, f64>,
+    scratch: &mut Scratch,
+) -> Found {
+    let Solution { layers, unknowns, densities, .. } = solution;
+    let count = rows.nrows();
+    let mut found = Found::default();
+    for start in (0..count).step_by(LANES) {
+        let group = near.group(first + start);
+        evaluate_group(solution, &group, start, scratch);
+        let filled = LANES.min(count - start);
+        for (l, i) in (first + start..first + start + filled).enumerate() {
+            let foot = &near.feet[i];
+            for (&v, weight) in layers.triangles()[foot.face as usize].iter().zip(foot.weights) {
+                scratch.values[v as usize].0[l] += near.shares[i] * weight;
+            }
+        }
+        write_group(rows.as_mut(), start, &scratch.values, 1.0);
+        let largest = scratch.change.iter().fold(Lanes::ZERO, |a, c| a.zip(*c, |a, c| if c.abs() > a { c.abs() } else { a }));
+        for l in 0..filled {
+            found.change = found.change.max(largest.0[l]);
+            if largest.0[l] > tolerance {
+                let vertex = scratch.change.iter().position(|c| c.0[l].abs() == largest.0[l]).unwrap_or(0);
+                mark(solution, &group, l, vertex as u32, &mut found.marked);
+            }
+        }
+    }
+    let singles = scratch.singles.as_ref().subrows(0, count);
+    matmul(rows.as_mut(), Accum::Add, singles, densities.low.as_ref(), 1.0, Par::Seq);
+    debug_assert_eq!(singles.ncols(), unknowns.low_count());
+    found.correction = solution.affine.complete(rows, near.points[first..first + count].iter().copied());
+    found
+}
+
+/// Values and changes of one lane group, and its rows of the single layers.
+fn evaluate_group(solution: &Solution<'_>, group: &Group, start: usize, scratch: &mut Scratch) {
+    let Solution { tables, layers, unknowns, densities, .. } = solution;
+    let Group { x, y, share, own } = group;
+    let twice = share.0.iter().any(|s| *s > 0.0);
+    group_potentials(layers, x, &mut scratch.layers);
+    for (value, double) in scratch.values.iter_mut().zip(&scratch.layers.double) {
+        *value = *double * *own * INVERSE_4PI;
+    }
+    if twice {
+        group_potentials(layers, y, &mut scratch.layers);
+        for (value, double) in scratch.values.iter_mut().zip(&scratch.layers.double) {
+            *value = *value - *double * *share * INVERSE_4PI;
+        }
+    }
+    scratch.change.fill(Lanes::ZERO);
+    let low_degree = unknowns.low_degree;
+    let mut values = [Lanes::ZERO; MAX_FUNCTIONS];
+    for (e, element) in unknowns.elements.iter().enumerate() {
+        let part = &densities.parts[e];
+        let keep = is_felt(&element.triangle.centre, FELT * element.triangle.radius, x);
+        let near = !part.vertices.is_empty() && keep.0.iter().any(|k| *k > 0.0);
+        let degree = if near { element.degree } else { low_degree };
+        potentials(tables, &element.triangle, degree, x, &mut values);
+        for value in &mut values[..functions(degree)] {
+            *value = *value * *own;
+        }
+        if twice {
+            let mut others = [Lanes::ZERO; MAX_FUNCTIONS];
+            potentials(tables, &element.triangle, degree, y, &mut others);
+            for (value, other) in values[..functions(degree)].iter_mut().zip(&others) {
+                *value = *value - *other * *share;
+            }
+        }
+        for k in 0..unknowns.low {
+            // Rows beyond the last point are there, and not used.
+            scratch.singles.col_as_slice_mut(e * unknowns.low + k)[start..start + LANES].copy_from_slice(&values[k].0);
+        }
+        if near {
+            for value in &mut values[unknowns.low..functions(degree)] {
+                *value = *value * keep;
+            }
+        }
+        add_part(part, functions(element.degree), unknowns.low, near, &values, &mut scratch.values, &mut scratch.change);
+    }
+}
+
+/// One where a point is nearer than the limit.
+#[inline(always)]
+fn is_felt(centre: &Point, limit: f64, x: &[Lanes; 3]) -> Lanes {
+    let r = [x[0] - Lanes::splat(centre[0]), x[1] - Lanes::splat(centre[1]), x[2] - Lanes::splat(centre[2])];
+    crate::simd::dot(&r, &r).map(|d| if d < limit * limit { 1.0 } else { 0.0 })
+}
+
+multiversion! {
+    /// Adds the changes of one element, and its high densities if they are felt.
+    fn add_part(part: &Part, all: usize, low: usize, near: bool, potentials: &[Lanes; MAX_FUNCTIONS], values: &mut [Lanes], change: &mut [Lanes])
+        = add_part_generic;
+}
+
+#[inline(always)]
+fn add_part_generic(
+    part: &Part,
+    all: usize,
+    low: usize,
+    near: bool,
+    potentials: &[Lanes; MAX_FUNCTIONS],
+    values: &mut [Lanes],
+    change: &mut [Lanes],
+) {
+    let felt = if near { all } else { low };
+    for (c, &v) in part.vertices.iter().enumerate() {
+        let mut sum = Lanes::ZERO;
+        for (potential, &density) in potentials[..felt].iter().zip(&part.change[c * all..]) {
+            sum = sum + *potential * density;
+        }
+        change[v as usize] = change[v as usize] + sum;
+        if near {
+            let mut sum = Lanes::ZERO;
+            for (potential, &density) in potentials[low..all].iter().zip(&part.high[c * (all - low)..]) {
+                sum = sum + *potential * density;
+            }
+            values[v as usize] = values[v as usize] + sum;
+        }
+    }
 }
 
 /// Marks the elements that a change of one entry mostly comes from.
-fn mark(
-    tables: &Tables,
-    unknowns: &Unknowns,
-    densities: &Densities,
-    near: &[u32],
-    vertex: u32,
-    x: &[Lanes; 3],
-    marked: &mut Vec<u32>,
-) {
-    let mut values = [Lanes::ZERO; MAX_FUNCTIONS];
+fn mark(solution: &Solution<'_>, group: &Group, l: usize, vertex: u32, marked: &mut Vec<u32>) {
+    let Solution { tables, unknowns, densities, .. } = solution;
+    let [x, y] = [&group.x, &group.y].map(|p| p.map(|c| Lanes::splat(c.0[l])));
+    let (mut values, mut others) = ([Lanes::ZERO; MAX_FUNCTIONS], [Lanes::ZERO; MAX_FUNCTIONS]);
     let mut shares = Vec::new();
-    for &e in near {
-        let element = &unknowns.elements[e as usize];
-        let part = &densities.parts[e as usize];
+    for (e, (element, part)) in unknowns.elements.iter().zip(&densities.parts).enumerate() {
         let Ok(place) = part.vertices.binary_search(&vertex) else { continue };
         let all = functions(element.degree);
-        potentials(tables, &element.triangle, element.degree, x, &mut values);
-        let share: f64 = (0..all).map(|k| values[k].0[0] * part.change[place * all + k]).sum();
-        shares.push((share.abs(), e));
+        potentials(tables, &element.triangle, element.degree, &x, &mut values);
+        potentials(tables, &element.triangle, element.degree, &y, &mut others);
+        let share: f64 = (0..all)
+            .map(|k| (group.own.0[l] * values[k].0[0] - group.share.0[l] * others[k].0[0]) * part.change[place * all + k])
+            .sum();
+        shares.push((share.abs(), e as u32));
     }
     let largest = shares.iter().map(|s| s.0).fold(0.0, f64::max);
     marked.extend(shares.iter().filter(|s| s.0 >= MAIN * largest).map(|s| s.1));
 }
-
-/// Elements with at least this part of the largest share of a change are marked.
-const MAIN: f64 = 0.3;

@@ -3,73 +3,120 @@
 
 use super::basis::{MAX_FUNCTIONS, functions};
 use super::elements::{Element, Unknowns};
-use super::potential::{Tables, potentials};
+use super::potential::{Tables, Triangle, potentials};
 use super::quadrature::Rule;
 use crate::coordinates::layer::{INVERSE_4PI, Layers, group_potentials};
 use crate::mesh;
-use crate::simd::{LANES, Lanes};
+use crate::simd::{LANES, Lanes, multiversion};
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
 /// Elements nearer than so many sums of their radii are integrated with the dense rule.
 const NEAR: f64 = 1.5;
 /// Elements farther apart than so many sums of their radii feel each other's low unknowns only.
-const APART: f64 = 2.0;
+const APART: f64 = 1.5;
 
-/// Rules for the outer integral, with weighted polynomials at the nodes.
+/// Rules for the outer integral.
 pub(super) struct Outer {
-    near: (Rule, Vec<[f64; MAX_FUNCTIONS]>),
-    far: (Rule, Vec<[f64; MAX_FUNCTIONS]>),
+    near: OuterRule,
+    far: OuterRule,
+}
+
+/// Nodes in groups of eight, the last one filled up with weights of zero, and the weighted polynomials at each node.
+struct OuterRule {
+    nodes: Vec<[Lanes; 2]>,
+    weighted: Vec<[f64; MAX_FUNCTIONS]>,
+}
+
+impl OuterRule {
+    fn new(tables: &Tables, rule: &Rule) -> Self {
+        let values = tables.basis.weighted(rule);
+        let groups = rule.nodes.len().div_ceil(LANES);
+        let mut nodes = vec![[Lanes::splat(1.0 / 3.0); 2]; groups];
+        let mut weighted = vec![[0.0; MAX_FUNCTIONS]; LANES * groups];
+        for (q, (node, value)) in rule.nodes.iter().zip(&values).enumerate() {
+            let (group, l) = (q / LANES, q % LANES);
+            for k in 0..2 {
+                nodes[group][k].0[l] = node[k];
+            }
+            weighted[q] = *value;
+        }
+        Self { nodes, weighted }
+    }
+
+    /// The nodes of one group on a triangle.
+    fn at(&self, group: usize, triangle: &Triangle) -> [Lanes; 3] {
+        let mut x = [Lanes::ZERO; 3];
+        for l in 0..LANES {
+            let point = triangle.point(self.nodes[group][0].0[l], self.nodes[group][1].0[l]);
+            for k in 0..3 {
+                x[k].0[l] = point[k];
+            }
+        }
+        x
+    }
+}
+
+/// Lane groups that hold all polynomials.
+const GROUPS: usize = MAX_FUNCTIONS.div_ceil(LANES);
+
+/// Working memory for one pair of elements.
+struct BlockScratch {
+    /// Potentials by node, and by polynomial in lanes.
+    potentials: Vec<[Lanes; GROUPS]>,
+    out: Vec<[Lanes; GROUPS]>,
+}
+
+multiversion! {
+    /// Sums over the nodes of weights times potentials.
+    fn contract(weights: &[[f64; MAX_FUNCTIONS]], potentials: &[[Lanes; GROUPS]], out: &mut [[Lanes; GROUPS]])
+        = contract_generic;
+}
+
+#[inline(always)]
+fn contract_generic(weights: &[[f64; MAX_FUNCTIONS]], potentials: &[[Lanes; GROUPS]], out: &mut [[Lanes; GROUPS]]) {
+    for (i, row) in out.iter_mut().enumerate() {
+        let mut sums = [Lanes::ZERO; GROUPS];
+        for (weights, potentials) in weights.iter().zip(potentials) {
+            let weight = weights[i];
+            for g in 0..GROUPS {
+                sums[g] = sums[g] + potentials[g] * weight;
+            }
+        }
+        *row = sums;
+    }
 }
 
 impl Outer {
     pub(super) fn new(tables: &Tables) -> Self {
-        let with = |rule: Rule| {
-            let values = tables.basis.weighted(&rule);
-            (rule, values)
-        };
-        let q = std::env::var("HQ").is_ok();
-        let n = Rule::degree_8().quartered();
-        let n = if q { n.quartered() } else { n };
-        Self { near: with(n), far: with(Rule::degree_8()) }
+        let dense = Rule::degree_8().quartered();
+        Self { near: OuterRule::new(tables, &dense), far: OuterRule::new(tables, &Rule::degree_8()) }
     }
 }
 
 /// `∫ over the outer element of its polynomials times the potentials of the inner one's`.
 fn block(
     tables: &Tables,
-    outer_rules: &Outer,
+    rules: &Outer,
     (outer, outer_degree): (&Element, usize),
     (inner, inner_degree): (&Element, usize),
-    out: &mut [[f64; MAX_FUNCTIONS]],
+    scratch: &mut BlockScratch,
 ) {
     let (rows, columns) = (functions(outer_degree), functions(inner_degree));
     let apart = mesh::norm([0, 1, 2].map(|k| outer.triangle.centre[k] - inner.triangle.centre[k]));
     let near = apart < NEAR * (outer.triangle.radius + inner.triangle.radius);
-    let (rule, values) = if near { &outer_rules.near } else { &outer_rules.far };
-    for row in &mut out[..rows] {
-        row[..columns].fill(0.0);
-    }
+    let rule = if near { &rules.near } else { &rules.far };
     let mut found = [Lanes::ZERO; MAX_FUNCTIONS];
-    for (nodes, weighted) in rule.nodes.chunks(LANES).zip(values.chunks(LANES)) {
-        let mut x = [Lanes::ZERO; 3];
-        for l in 0..LANES {
-            let node = nodes[l.min(nodes.len() - 1)];
-            let point = outer.triangle.point(node[0], node[1]);
-            for k in 0..3 {
-                x[k].0[l] = point[k];
-            }
-        }
+    for (group, here) in scratch.potentials.chunks_exact_mut(LANES).enumerate().take(rule.nodes.len()) {
+        let x = rule.at(group, &outer.triangle);
         potentials(tables, &inner.triangle, inner_degree, &x, &mut found);
-        for (l, weights) in weighted.iter().enumerate() {
-            for i in 0..rows {
-                let weight = outer.triangle.area * weights[i];
-                for j in 0..columns {
-                    out[i][j] += weight * found[j].0[l];
-                }
+        for (j, found) in found[..columns].iter().enumerate() {
+            for l in 0..LANES {
+                here[l][j / LANES].0[j % LANES] = outer.triangle.area * found.0[l];
             }
         }
     }
+    contract(&rule.weighted, &scratch.potentials, &mut scratch.out[..rows]);
 }
 
 /// Elements that feel each other's high unknowns.
@@ -121,30 +168,37 @@ fn is_near(a: &Element, b: &Element) -> bool {
 pub(super) fn operator(tables: &Tables, outer: &Outer, unknowns: &Unknowns) -> Operator {
     let elements = &unknowns.elements;
     let low = unknowns.low;
-    let low_degree = (0..).find(|&d| functions(d) == low).unwrap_or(0);
     let mut a = crate::simd::zeros::<f64>(unknowns.low_count(), unknowns.low_count());
     let found: Vec<Vec<(u32, u32, Mat<f64>)>> = a
         .as_mut()
         .par_col_chunks_mut(low)
         .enumerate()
         .map_init(
-            || vec![[0.0; MAX_FUNCTIONS]; MAX_FUNCTIONS],
-            |out, (j, mut columns)| {
+            || BlockScratch {
+                potentials: vec![[Lanes::ZERO; GROUPS]; LANES * outer.near.nodes.len()],
+                out: vec![[Lanes::ZERO; GROUPS]; MAX_FUNCTIONS],
+            },
+            |scratch, (j, mut columns)| {
                 let column = &elements[j];
                 let mut found = Vec::new();
                 for (i, row) in elements.iter().enumerate().skip(j) {
                     let near = is_near(row, column);
-                    let degrees = if near { [row.degree, column.degree] } else { [low_degree; 2] };
+                    let degrees = if near { [row.degree, column.degree] } else { [unknowns.low_degree; 2] };
                     // The thinner one outside: the potential of the other varies little across it.
                     let swapped = row.triangle.height() > column.triangle.height();
                     if swapped {
-                        block(tables, outer, (column, degrees[1]), (row, degrees[0]), out);
+                        block(tables, outer, (column, degrees[1]), (row, degrees[0]), scratch);
                     } else {
-                        block(tables, outer, (row, degrees[0]), (column, degrees[1]), out);
+                        block(tables, outer, (row, degrees[0]), (column, degrees[1]), scratch);
                     }
+                    let out = &scratch.out;
                     let at = |k: usize, l: usize| {
-                        let value = if swapped { out[l][k] } else { out[k][l] };
-                        if i == j { 0.5 * (value + out[l][k]) } else { value }
+                        let at = |k: usize, l: usize| out[k][l / LANES].0[l % LANES];
+                        match (i == j, swapped) {
+                            (true, _) => 0.5 * (at(k, l) + at(l, k)),
+                            (false, true) => at(l, k),
+                            (false, false) => at(k, l),
+                        }
                     };
                     for l in 0..low {
                         for k in 0..low {
@@ -172,43 +226,36 @@ pub(super) struct RightHandSides {
 /// The right-hand sides, one per vertex of the cage.
 pub(super) fn right_hand_sides(outer: &Outer, layers: &Layers, unknowns: &Unknowns) -> RightHandSides {
     let m = layers.vertices().len();
-    let (rule, values) = &outer.near;
+    let rule = &outer.near;
+    let nodes = LANES * rule.nodes.len();
     let rows: Vec<Mat<f64>> = unknowns
         .elements
         .par_iter()
         .map_init(
-            || layers.scratch(),
-            |scratch, element| {
-                let count = functions(element.degree);
-                let mut rows = Mat::zeros(m, count);
+            || (layers.scratch(), Mat::<f64>::zeros(nodes, m)),
+            |(scratch, data), element| {
                 let face = &layers.faces()[element.face as usize];
-                for (nodes, weighted) in rule.nodes.chunks(LANES).zip(values.chunks(LANES)) {
-                    let mut x = [Lanes::ZERO; 3];
-                    for l in 0..LANES {
-                        let node = nodes[l.min(nodes.len() - 1)];
-                        let point = element.triangle.point(node[0], node[1]);
-                        for k in 0..3 {
-                            x[k].0[l] = point[k];
-                        }
-                    }
+                let corner = layers.vertices()[face.vertices[0] as usize];
+                for group in 0..rule.nodes.len() {
+                    let x = rule.at(group, &element.triangle);
                     group_potentials(layers, &x, scratch);
-                    for (l, weights) in weighted.iter().enumerate() {
-                        let at = [0, 1, 2].map(|k| x[k].0[l]);
-                        let corner = layers.vertices()[face.vertices[0] as usize];
-                        let (hats, _) = face.completion([0, 1, 2].map(|k| at[k] - corner[k]));
-                        for k in 0..count {
-                            let weight = element.triangle.area * weights[k];
-                            let factor = -INVERSE_4PI * weight;
-                            for v in 0..m {
-                                rows[(v, k)] += factor * scratch.double[v].0[l];
-                            }
-                            for i in 0..3 {
-                                rows[(face.vertices[i] as usize, k)] += 0.5 * weight * hats[i];
-                            }
+                    let here = LANES * group..LANES * (group + 1);
+                    for v in 0..m {
+                        let value = scratch.double[v] * -INVERSE_4PI;
+                        data.col_as_slice_mut(v)[here.clone()].copy_from_slice(&value.0);
+                    }
+                    for (l, q) in here.enumerate() {
+                        let (hats, _) = face.completion([0, 1, 2].map(|k| x[k].0[l] - corner[k]));
+                        for i in 0..3 {
+                            data[(q, face.vertices[i] as usize)] += 0.5 * hats[i];
                         }
                     }
                 }
-                rows
+                let count = functions(element.degree);
+                let weights = Mat::from_fn(count, nodes, |k, q| {
+                    element.triangle.area * rule.weighted[q][k]
+                });
+                crate::dense::product(weights.as_ref(), data.as_ref())
             },
         )
         .collect();
@@ -217,10 +264,10 @@ pub(super) fn right_hand_sides(outer: &Outer, layers: &Layers, unknowns: &Unknow
     for (e, rows) in rows.iter().enumerate() {
         for v in 0..m {
             for k in 0..unknowns.low {
-                low[(e * unknowns.low + k, v)] = rows[(v, k)];
+                low[(e * unknowns.low + k, v)] = rows[(k, v)];
             }
             for (k, place) in unknowns.high(e).enumerate() {
-                high[(place, v)] = rows[(v, unknowns.low + k)];
+                high[(place, v)] = rows[(unknowns.low + k, v)];
             }
         }
     }

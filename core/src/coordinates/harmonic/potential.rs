@@ -288,10 +288,11 @@ fn closed_form(
     let [c0, c1, c2] = &corners;
     let height = along(c0, &triangle.normal);
     let height2 = height * height;
-    let edges = [[c0, c1], [c1, c2], [c0, c2]];
-    let [e0, e1, e2] = [0, 1, 2].map(|e| {
-        edge_integrals(degree, triangle.lengths[e], &triangle.along[e], &triangle.outward[e], edges[e], height2)
-    });
+    // Written out: the closure of a map over them would be compiled for any machine.
+    let Triangle { lengths, along: ways, outward, .. } = triangle;
+    let e0 = edge_integrals(degree, lengths[0], &ways[0], &outward[0], [c0, c1], height2);
+    let e1 = edge_integrals(degree, lengths[1], &ways[1], &outward[1], [c1, c2], height2);
+    let e2 = edge_integrals(degree, lengths[2], &ways[2], &outward[2], [c0, c2], height2);
     let products = |a: &[Lanes; 4], b: &[Lanes; 4]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let size = height.map(f64::abs);
     let sine = size * (2.0 * triangle.area);

@@ -9,7 +9,7 @@ use super::elements::Unknowns;
 use super::galerkin::{NearPairs, Operator, RightHandSides};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::{cholesky::llt, matmul::matmul, triangular_solve};
-use faer::{Accum, Mat, MatRef, Par};
+use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
 /// High unknowns count where the residual of the low ones is above this, as a value on the boundary.
@@ -36,11 +36,11 @@ pub(super) struct Densities {
     pub(super) parts: Vec<Part>,
 }
 
-fn factor(mut a: Mat<f64>, par: Par) -> Option<Mat<f64>> {
+/// Lower Cholesky factor in place.
+fn factor(a: MatMut<'_, f64>, par: Par) -> Option<()> {
     let mut memory = MemBuffer::new(llt::factor::cholesky_in_place_scratch::<f64>(a.nrows(), par, Default::default()));
-    llt::factor::cholesky_in_place(a.as_mut(), Default::default(), par, MemStack::new(&mut memory), Default::default())
-        .ok()?;
-    Some(a)
+    llt::factor::cholesky_in_place(a, Default::default(), par, MemStack::new(&mut memory), Default::default()).ok()?;
+    Some(())
 }
 
 /// A matrix in single precision.
@@ -65,11 +65,12 @@ pub(super) fn solve(operator: Operator, b: &RightHandSides, unknowns: &Unknowns,
     let m = b.low.ncols();
     // The factor takes the place of the matrix, of which the patches need entries between elements that are not near.
     let far = single(operator.low.as_ref());
-    let factor = factor(operator.low, par)?;
+    let mut lower = operator.low;
+    factor(lower.as_mut(), par)?;
     let near = operator.near;
     let global = |mut x: Mat<f64>| {
-        triangular_solve::solve_lower_triangular_in_place(factor.as_ref(), x.as_mut(), par);
-        triangular_solve::solve_upper_triangular_in_place(factor.transpose(), x.as_mut(), par);
+        triangular_solve::solve_lower_triangular_in_place(lower.as_ref(), x.as_mut(), par);
+        triangular_solve::solve_upper_triangular_in_place(lower.transpose(), x.as_mut(), par);
         x
     };
     let mut low = global(b.low.clone());
@@ -87,7 +88,10 @@ pub(super) fn solve(operator: Operator, b: &RightHandSides, unknowns: &Unknowns,
             }
         }
         let found: Option<Vec<(Vec<f64>, Vec<f64>)>> =
-            patches.par_iter().map(|patch| solve_patch(&near, far.as_ref(), unknowns, patch, &residuals)).collect();
+            patches
+            .par_iter()
+            .map_init(Vec::new, |memory, patch| solve_patch(&near, far.as_ref(), unknowns, patch, &residuals, memory))
+            .collect();
         let found = found?;
         for (patch, (step, _)) in patches.iter().zip(&found) {
             let mut values = step.iter();
@@ -152,13 +156,13 @@ fn residual(
     let l = unknowns.low;
     (0..unknowns.elements.len())
         .into_par_iter()
-        .map(|e| {
+        .map_init(<[Vec<f64>; 2]>::default, |[a, x], e| {
             let mine = unknowns.high(e);
             let vertices = &high[e].vertices;
             let mut r = Mat::from_fn(mine.len(), vertices.len(), |k, c| b.high[(mine.start + k, vertices[c] as usize)]);
             let count: usize = near.of(e).map(|(other, _, _)| functions(unknowns.elements[other].degree)).sum();
-            let mut a = Mat::<f64>::zeros(mine.len(), count);
-            let mut x = Mat::<f64>::zeros(count, vertices.len());
+            let mut a = zeroed(a, mine.len(), count);
+            let mut x = zeroed(x, count, vertices.len());
             let mut start = 0;
             for (other, entries, transposed) in near.of(e) {
                 let all = functions(unknowns.elements[other].degree);
@@ -185,6 +189,13 @@ fn residual(
             r
         })
         .collect()
+}
+
+/// A matrix of zeros in memory that is used again and again.
+fn zeroed(memory: &mut Vec<f64>, rows: usize, columns: usize) -> MatMut<'_, f64> {
+    memory.clear();
+    memory.resize(rows * columns, 0.0);
+    MatMut::from_column_major_slice_mut(memory, rows, columns)
 }
 
 /// The largest residual, as a value on the boundary.
@@ -260,6 +271,7 @@ fn solve_patch(
     unknowns: &Unknowns,
     patch: &[Place],
     residuals: &[Mat<f64>],
+    memory: &mut Vec<f64>,
 ) -> Option<(Vec<f64>, Vec<f64>)> {
     let l = unknowns.low;
     // Places in the patch's matrix: low ones of all elements, then the others but the highest degree, then this.
@@ -285,7 +297,7 @@ fn solve_patch(
             places[i][1] + k - middle
         }
     };
-    let mut a = Mat::<f64>::zeros(count, count);
+    let mut a = zeroed(memory, count, count);
     let mut index = vec![usize::MAX; unknowns.elements.len()];
     for (i, &(e, _)) in patch.iter().enumerate() {
         index[e as usize] = i;
@@ -315,7 +327,7 @@ fn solve_patch(
             }
         }
     }
-    let a = factor(a, Par::Seq)?;
+    factor(a.as_mut(), Par::Seq)?;
     let mut x = Mat::<f64>::zeros(count, 2);
     for (i, &(e, column)) in patch.iter().enumerate() {
         for (k, &value) in residuals[e as usize].col(column as usize).iter().enumerate() {
@@ -327,7 +339,7 @@ fn solve_patch(
     for i in coarse..count {
         x[(i, 1)] = x[(i, 0)];
     }
-    triangular_solve::solve_upper_triangular_in_place(a.transpose(), x.as_mut(), Par::Seq);
+    triangular_solve::solve_upper_triangular_in_place(a.as_ref().transpose(), x.as_mut(), Par::Seq);
     let mut high = Vec::new();
     let mut change = Vec::new();
     for (i, &(e, _)) in patch.iter().enumerate() {
