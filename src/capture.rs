@@ -125,7 +125,9 @@ fn begin_report(encoding: &Encoding<'_>) -> Report {
         handles: encoding.options.handles.name().to_owned(),
         regularizer: encoding.options.regularizer.name().to_owned(),
         spectrum: encoding.options.spectrum,
+        spectrum_choice: None,
         lambda: encoding.options.lambda,
+        consistency: None,
         affine_reproduction_error: found.affine_reproduction_error,
         condition_number: Condition { full: found.condition_full, handles: found.condition_handles },
         rank: found.rank,
@@ -158,7 +160,7 @@ pub fn preparation_warnings(options: SolverOptions, solver: &Solver) -> Vec<Stri
     let mut warnings = Vec::new();
     if !found.outside.is_empty() {
         warnings.push(format!(
-            "{} of {} points lie outside the cage, by up to {:.2} % of the rest diagonal; mean value coordinates are defined there too, but an enlarged cage usually gives lower errors",
+            "{} of {} points lie outside the cage, by up to {:.2} % of the rest diagonal; its coordinates are defined there too, but an enlarged cage usually gives lower errors",
             found.outside.len(),
             solver.decoder().points(),
             100.0 * found.outside_distance
@@ -171,6 +173,7 @@ pub fn preparation_warnings(options: SolverOptions, solver: &Solver) -> Vec<Stri
             Regularizer::Laplacian | Regularizer::Global if options.lambda > 0.0 => {
                 "the cage's Laplacian takes care".to_owned()
             }
+            other if other.is_sub_spectral() && options.lambda > 0.0 => "the regularisation takes care".to_owned(),
             Regularizer::Tikhonov => "all are damped".to_owned(),
             Regularizer::TruncatedSvd if options.spectrum >= weak => "all are dropped".to_owned(),
             _ => format!(

@@ -1,13 +1,14 @@
 //! Coordinate systems by name, and what is chosen where nothing is said.
 
-use cager_core::coordinates::{CoordinateSystem, MeanValue};
+use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::inversion::SolverOptions;
+
+/// All, in the order of the documentation.
+pub(crate) const ALL: [&dyn CoordinateSystem; 3] = [&MeanValue, &Green::Consistent, &Green::Free];
 
 /// The coordinate system with this name on the command line, in reports and in containers.
 pub(crate) fn by_name(name: &str) -> Option<&'static dyn CoordinateSystem> {
-    static MEAN_VALUE: MeanValue = MeanValue;
-    let all: [&'static dyn CoordinateSystem; 1] = [&MEAN_VALUE];
-    all.into_iter().find(|system| system.name() == name)
+    ALL.into_iter().find(|system| system.name() == name)
 }
 
 /// The spectrum threshold where none is given: the paper's 20; less for a cage of which it would smooth the greater part.

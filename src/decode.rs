@@ -109,13 +109,14 @@ pub fn decoder(container: &mut Container, path: &Path) -> Result<(Model, Decoder
     if system.unknowns(&cage) != header.rows_per_frame as usize {
         return Err(unsupported(format!("it stores {} rows per frame", header.rows_per_frame)));
     }
-    if !coordinates_fit(rest.points.len(), system.unknowns(&cage), 2) {
-        let gigabytes = 12e-9 * rest.points.len() as f64 * system.unknowns(&cage) as f64;
+    let columns = system.columns(&cage);
+    if !coordinates_fit(rest.points.len(), columns, 2) {
+        let gigabytes = 12e-9 * rest.points.len() as f64 * columns as f64;
         return Err(DecodeError::Memory { path: path.to_owned(), gigabytes });
     }
     let coordinates = system.coordinates(&cage, &rest.points);
     let phi = coordinates.map_err(|cause| DecodeError::Coordinates { path: path.to_owned(), cause })?.phi;
-    let decoder = Decoder::new(phi.as_ref(), cage.vertices().len());
+    let decoder = Decoder::new(phi.as_ref(), cage.vertices().len()).with_tied_normals(system.tied_normals(&cage));
     Ok((rest, decoder))
 }
 

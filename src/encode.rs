@@ -1,11 +1,12 @@
 //! The main job: frames in, one cage per frame out, measured as a decoder will see it.
 
 use crate::capture::{CaptureWriter, Encoding, StoredError};
-use crate::report::{Report, Seconds};
+use crate::report::{Consistency, Report, Seconds, SpectrumChoice};
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{BATCH, PrepareError, Solver, SolverOptions};
+use cager_core::inversion::{Analysis, BATCH, Convergence, PrepareError, Sample, Solver, SolverOptions};
 use cager_core::mesh::Model;
+use cager_core::regularize::{Term, TermError};
 use cager_formats::{Action, AtomicFile, CompleteFile, FrameReader};
 use cager_proto::container;
 use rayon::prelude::*;
@@ -64,6 +65,54 @@ pub struct Job<'a> {
     pub system: &'a dyn CoordinateSystem,
     /// Solver options.
     pub options: SolverOptions,
+    /// The user's own term, for [`Regularizer::Matrix`](cager_core::regularize::Regularizer::Matrix).
+    pub term: Option<&'a dyn Term>,
+    /// Frames to choose the spectrum threshold by; that of the options counts where there are none.
+    pub choose: Option<ChooseSpectrum>,
+}
+
+/// What a spectrum threshold is chosen by.
+pub struct ChooseSpectrum {
+    /// Some frames of the capture, at least one: see [`sample_frames`].
+    pub samples: Vec<Sample>,
+    /// Largest extra L2 error, as a fraction of that at threshold 0.
+    pub bound: f64,
+}
+
+/// Evenly spaced frames of a capture to choose a spectrum threshold by, each with its predecessor if wanted: 24, or fewer where
+/// they are short of memory or there are no more.
+///
+/// # Errors
+/// Those of the reader.
+pub fn sample_frames(
+    frames: &mut dyn FrameReader,
+    with_predecessors: bool,
+) -> Result<Vec<Sample>, cager_formats::Error> {
+    const MOST: usize = 24;
+    let each = 24 * frames.points().max(1) * if with_predecessors { 2 } else { 1 };
+    let total = frames.frames();
+    let count = MOST.min(FRAMES_BYTES / each).clamp(1, total.max(1));
+    let mut samples = Vec::with_capacity(count);
+    let mut at = 0;
+    for k in 0..count {
+        let wanted = if count == 1 { total / 2 } else { k * (total - 1) / (count - 1) };
+        let first = if with_predecessors { wanted.saturating_sub(1).max(at) } else { wanted };
+        while at < first && frames.skip()? {
+            at += 1;
+        }
+        // Where samples follow each other, the predecessor was read already.
+        let mut previous =
+            samples.last().filter(|_| with_predecessors && first == wanted).map(|s: &Sample| s.frame.clone());
+        let mut frame = Vec::new();
+        while at <= wanted && frames.read_next(&mut frame)? {
+            if at < wanted {
+                previous = Some(std::mem::take(&mut frame));
+            }
+            at += 1;
+        }
+        samples.push(Sample { frame, previous: previous.filter(|_| with_predecessors) });
+    }
+    Ok(samples)
 }
 
 /// What an encoding gives.
@@ -85,12 +134,12 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Encoded, 
     let fail = |cause| EncodeError::container(job.output, cause);
     // Before the work, so that an unwritable place costs no waiting.
     let file = AtomicFile::create(job.output)?;
-    let solver = Solver::prepare(job.system, job.cage, &job.rest.points, job.options)?;
+    let (solver, options, choice) = prepare(&job)?;
     let encoding = Encoding {
         rest: job.rest,
         cage: job.cage,
         system: job.system,
-        options: job.options,
+        options,
         solver: &solver,
         frame_rate: job.frames.frame_rate(),
     };
@@ -103,12 +152,14 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Encoded, 
         ..Seconds::default()
     };
     let points = job.frames.points();
+    let mut convergence = Vec::new();
     std::thread::scope(|scope| -> Result<(), EncodeError> {
         let (full, batches) = sync_channel(rayon::current_num_threads());
         let (empty, recycled) = sync_channel(2 * rayon::current_num_threads() + 2);
         let frames = job.frames;
         let reader = scope.spawn(move || read_batches(frames, frames_per_batch(points), &full, &recycled));
         let mut done = 0;
+        let mut previous: Option<Vec<f32>> = None;
         while let Ok(first) = batches.recv() {
             let mut waiting = vec![first];
             while waiting.len() < rayon::current_num_threads() {
@@ -117,7 +168,17 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Encoded, 
                     Err(_) => break,
                 }
             }
-            let solved: Vec<SolvedBatch> = waiting.par_iter().map(|batch| solve(&solver, batch)).collect();
+            let solved: Vec<SolvedBatch> = if solver.follows_previous() {
+                let mut in_order = Vec::with_capacity(waiting.len());
+                for batch in &waiting {
+                    let solved = solve(&solver, batch, previous.as_deref());
+                    previous = solved.cages.last().cloned();
+                    in_order.push(solved);
+                }
+                in_order
+            } else {
+                waiting.par_iter().map(|batch| solve(&solver, batch, None)).collect()
+            };
             for batch in waiting {
                 // The reader may have stopped already.
                 let _ = empty.send(batch);
@@ -126,6 +187,7 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Encoded, 
             for batch in solved {
                 seconds.invert += batch.invert_seconds;
                 seconds.measure += batch.measure_seconds;
+                convergence.extend(batch.convergence);
                 for (cage, error) in batch.cages.iter().zip(&batch.errors) {
                     writer.write_frame(cage, &StoredError::new(error, solver.diagonal())).map_err(fail)?;
                     done += 1;
@@ -141,6 +203,8 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Encoded, 
 
     let clock_write = Instant::now();
     let (buffered, mut report) = writer.finish().map_err(fail)?;
+    report.spectrum_choice = choice;
+    report.consistency = Consistency::new(&convergence);
     let file = buffered.into_inner().map_err(|e| fail(container::Error::from(e.into_error())))?;
     let container = file.complete()?;
     report.bytes.output = container.length();
@@ -149,6 +213,23 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Encoded, 
     seconds.write += clock_write.elapsed().as_secs_f64();
     report.seconds = Seconds { total: clock.elapsed().as_secs_f64(), ..seconds };
     Ok(Encoded { report, container })
+}
+
+/// The solver, the options it has, and how its threshold was chosen.
+fn prepare(job: &Job<'_>) -> Result<(Solver, SolverOptions, Option<SpectrumChoice>), PrepareError> {
+    let mut options = job.options;
+    let own = || job.term.ok_or(TermError::Missing);
+    let term: &dyn Term = options.regularizer.term().map_or_else(own, |term| Ok(term))?;
+    let points = &job.rest.points;
+    let Some(ChooseSpectrum { samples, bound }) = &job.choose else {
+        return Ok((Solver::prepare_with(job.system, job.cage, points, options, term)?, options, None));
+    };
+    term.delta(job.cage, job.system.unknowns(job.cage))?;
+    let analysis = Analysis::for_options(job.system, job.cage, points, options)?;
+    let reading = analysis.reading(options.handles)?;
+    let found = reading.choose_threshold(options, term, samples, *bound)?;
+    options.spectrum = found.spectrum;
+    Ok((reading.solver_with(options, term)?, options, Some(SpectrumChoice::new(&found, *bound))))
 }
 
 type Batch = Vec<Vec<f64>>;
@@ -190,17 +271,22 @@ fn read_batches(
 struct SolvedBatch {
     cages: Vec<Vec<f32>>,
     errors: Vec<cager_core::decode::FrameError>,
+    /// Empty where nothing was iterated.
+    convergence: Vec<Convergence>,
     invert_seconds: f64,
     measure_seconds: f64,
 }
 
-fn solve(solver: &Solver, batch: &Batch) -> SolvedBatch {
+/// Solves a batch whose first frame comes after the one with the cage `previous`, where that matters.
+fn solve(solver: &Solver, batch: &Batch, previous: Option<&[f32]>) -> SolvedBatch {
     let frames: Vec<&[f64]> = batch.iter().map(Vec::as_slice).collect();
     let clock = Instant::now();
-    let cages = solver.invert(&frames);
+    let inverted = solver.invert_reporting(previous, &frames);
     let invert_seconds = clock.elapsed().as_secs_f64();
+    let convergence = inverted.iter().filter_map(|inverted| inverted.convergence).collect();
+    let cages: Vec<Vec<f32>> = inverted.into_iter().map(|inverted| inverted.cage).collect();
     let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
     let errors = solver.decoder().measure(&views, &frames);
     let measure_seconds = clock.elapsed().as_secs_f64() - invert_seconds;
-    SolvedBatch { cages, errors, invert_seconds, measure_seconds }
+    SolvedBatch { cages, errors, convergence, invert_seconds, measure_seconds }
 }

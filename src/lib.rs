@@ -9,7 +9,7 @@ pub mod decode;
 pub mod encode;
 pub mod engine;
 pub mod http;
-mod plot;
+pub(crate) mod plot;
 pub mod problem;
 pub mod remote;
 pub mod report;

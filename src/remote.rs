@@ -50,6 +50,8 @@ pub struct RemoteJob<'a, F> {
     pub rest: &'a Path,
     /// File with the cage around it.
     pub cage: &'a Path,
+    /// File with the matrix of the regularizer of that name.
+    pub matrix: Option<&'a Path>,
     /// The capture.
     pub frames: F,
     /// File to write.
@@ -108,6 +110,7 @@ async fn encode<F: FrameSource + 'static>(
     // Before the work, so that an unwritable place costs no waiting.
     let file = AtomicFile::create(job.output)?;
     let mut new = NewSession::new(mesh_file(job.rest)?, mesh_file(job.cage)?);
+    new.regularizer_matrix = job.matrix.map(mesh_file).transpose()?;
     new.options = job.options;
     let session = client.create(&new).await?.id;
     match run(&client, &session, job.frames, file, clock, progress).await {

@@ -1,5 +1,6 @@
 //! `report.json`: what encoding found out, for programs and people.
 
+use cager_core::inversion::{Convergence, Outcome};
 use serde::{Deserialize, Serialize};
 
 /// The report of one encoding. Lengths are fractions of the rest pose's bounding-box diagonal.
@@ -25,8 +26,14 @@ pub struct Report {
     pub regularizer: String,
     /// Spectrum threshold s.
     pub spectrum: usize,
+    /// Why this threshold, where it was chosen by measuring.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spectrum_choice: Option<SpectrumChoice>,
     /// Weight λ.
     pub lambda: f64,
+    /// How the iteration went, for coordinates whose inversion is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub consistency: Option<Consistency>,
     /// `max_i |Φ C_R − P_R|_i`.
     pub affine_reproduction_error: f64,
     /// Condition numbers over the numerical rank.
@@ -35,9 +42,9 @@ pub struct Report {
     pub rank: usize,
     /// Singular values of the inverted matrix, descending.
     pub singular_values: Vec<f64>,
-    /// How the handles were found.
+    /// How the handles of maximum volume were found.
     pub maxvol: MaxVol,
-    /// Rows of maximum volume.
+    /// Rows read, in their order: those of maximum volume first. Where every point is read, only those.
     pub handle_indices: Vec<u32>,
     /// Errors of what a decoder of the written file gets back.
     pub error: Errors,
@@ -54,8 +61,79 @@ pub struct Report {
 pub struct Condition {
     /// Of `Φ`.
     pub full: f64,
-    /// Of the handles' rows `Φ□`.
+    /// Of the handles' rows.
     pub handles: f64,
+}
+
+/// How a spectrum threshold was chosen: the largest whose mean L2 error on some frames of the capture stays within a bound of that at
+/// threshold 0.
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
+pub struct SpectrumChoice {
+    /// Bound of the extra error, as a fraction.
+    pub bound: f64,
+    /// Extra error at the chosen threshold, as a fraction.
+    pub extra: f64,
+    /// Frames measured, evenly spaced.
+    pub frames: usize,
+    /// Thresholds tried, ascending.
+    pub tried: Vec<TriedSpectrum>,
+}
+
+/// A threshold that was tried.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
+pub struct TriedSpectrum {
+    /// The threshold s.
+    pub spectrum: usize,
+    /// Mean L2 error of the frames measured.
+    pub l2_mean: f64,
+}
+
+impl SpectrumChoice {
+    /// What choosing within a bound found.
+    pub fn new(found: &cager_core::inversion::Threshold, bound: f64) -> Self {
+        let tried = found.tried.iter().map(|&(spectrum, l2_mean)| TriedSpectrum { spectrum, l2_mean }).collect();
+        Self { bound, extra: found.extra(), frames: found.frames, tried }
+    }
+}
+
+/// How the inversion of coordinates went whose normals follow from the vertices: it starts from a linear one and improves its
+/// cages.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
+pub struct Consistency {
+    /// Mean over frames of the Gauss–Newton steps taken.
+    pub steps_mean: f64,
+    /// Most steps of a frame.
+    pub steps_max: usize,
+    /// Mean over frames of the L2 error of the points read, as the linear inversion leaves it.
+    pub start_l2_mean: f64,
+    /// Mean over frames of the L2 error of the points read.
+    pub l2_mean: f64,
+    /// Frames whose last step changed next to nothing.
+    pub converged: usize,
+    /// Frames that took as many steps as are allowed, each of them an improvement.
+    pub stopped: usize,
+    /// Frames that no step improved: their cages are those of the linear inversion.
+    pub kept_start: usize,
+}
+
+impl Consistency {
+    /// Of all frames; `None` where there was no iteration.
+    pub fn new(frames: &[Convergence]) -> Option<Self> {
+        if frames.is_empty() {
+            return None;
+        }
+        let mean = |f: fn(&Convergence) -> f64| frames.iter().map(f).sum::<f64>() / frames.len() as f64;
+        let count = |outcome| frames.iter().filter(|frame| frame.outcome == outcome).count();
+        Some(Self {
+            steps_mean: mean(|frame| frame.steps as f64),
+            steps_max: frames.iter().map(|frame| frame.steps).max().unwrap_or(0),
+            start_l2_mean: mean(|frame| frame.start),
+            l2_mean: mean(|frame| frame.residual),
+            converged: count(Outcome::Converged),
+            stopped: count(Outcome::StepLimit),
+            kept_start: count(Outcome::KeptStart),
+        })
+    }
 }
 
 /// How the handles were found.

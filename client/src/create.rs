@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Bytes of a file handed to the connection at once.
 const CHUNK_BYTES: usize = 256 << 10;
 
-/// A mesh file: its bytes, and a name whose extension tells the format.
+/// A file, above all of a mesh: its bytes, and a name whose extension tells the format.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MeshFile {
     /// File name, such as `rest.obj`.
@@ -38,6 +38,8 @@ pub struct NewSession {
     pub rest: MeshFile,
     /// The cage around it; without one the service makes one, if it can.
     pub cage: Option<MeshFile>,
+    /// The matrix of the regularizer `matrix`: a file in the Matrix Market format.
+    pub regularizer_matrix: Option<MeshFile>,
     /// Choices; what is left out has the service's default.
     pub options: SessionOptions,
     /// Names this wish, so that asking twice creates one session; a random one where none is given. Give one that outlives
@@ -48,7 +50,13 @@ pub struct NewSession {
 impl NewSession {
     /// A session of a model and its cage with the service's defaults.
     pub fn new(rest: MeshFile, cage: MeshFile) -> Self {
-        Self { rest, cage: Some(cage), options: SessionOptions::default(), idempotency_key: None }
+        Self {
+            rest,
+            cage: Some(cage),
+            regularizer_matrix: None,
+            options: SessionOptions::default(),
+            idempotency_key: None,
+        }
     }
 }
 
@@ -69,6 +77,9 @@ impl Client {
                 .part("rest", part(&new.rest, &sent));
             if let Some(cage) = &new.cage {
                 form = form.part("cage", part(cage, &sent));
+            }
+            if let Some(matrix) = &new.regularizer_matrix {
+                form = form.part("regularizer_matrix", part(matrix, &sent));
             }
             let request = self.request(Method::POST, &["v1", "sessions"], &[]).await?;
             let request = request.header("Idempotency-Key", &key).multipart(form);

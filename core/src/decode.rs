@@ -1,11 +1,14 @@
-//! Positions from cages, and how far they are from a capture: `P = Φ·C` in single precision.
+//! Positions from cages, and how far they are from a capture: `P = Φ·Y` in single precision, where `Y` are the rows of a cage,
+//! and where its normals are tied to them, those as well.
 
+use crate::coordinates::TiedNormals;
 use crate::dense;
 use crate::inversion::product_columns;
 use crate::mesh::Point;
 use crate::simd::{self, multiversion};
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Rows of Φ that one task multiplies: their product with a batch of cages stays in the second-level cache.
 const BLOCK_ROWS: usize = 1024;
@@ -13,11 +16,13 @@ const BLOCK_ROWS: usize = 1024;
 /// Turns cages into positions of the model's points.
 #[derive(Clone, Debug)]
 pub struct Decoder {
-    /// `Φ`, n × m, column-major; zero rows follow up to a whole tile.
-    phi: Mat<f32>,
+    /// `Φ`, n × m, column-major; zero rows follow up to a whole tile. Shared by the solvers of one analysis.
+    phi: Arc<Mat<f32>>,
     points: usize,
-    /// Unknowns that are positions and follow a translation; the others are directions.
+    /// Columns of positions, which follow a translation; the others are of directions.
     positions: usize,
+    /// What the values of all columns after the positions follow from; otherwise they are rows of the cage.
+    normals: Option<Arc<TiedNormals>>,
 }
 
 /// Errors of one frame against the capture.
@@ -34,7 +39,7 @@ pub struct FrameError {
 }
 
 impl Decoder {
-    /// Takes coordinates n × m whose first `positions` unknowns are positions.
+    /// Takes coordinates n × m whose first `positions` columns are of positions.
     pub fn new(phi: MatRef<'_, f64>, positions: usize) -> Self {
         let points = phi.nrows();
         let mut single = simd::zeros(points.next_multiple_of(dense::WHOLE_ROWS), phi.ncols());
@@ -43,17 +48,17 @@ impl Decoder {
                 *s = x as f32;
             }
         });
-        Self { phi: single, points, positions }
+        Self { phi: Arc::new(single), points, positions, normals: None }
     }
 
-    /// Takes coordinates in single precision, n × `unknowns`, row-major, as they travel to who decodes elsewhere; the first
-    /// `positions` unknowns are positions. Decodes to the same bits as the decoder that they came from.
+    /// Takes coordinates in single precision, n × `columns`, row-major, as they travel to who decodes elsewhere; the first
+    /// `positions` columns are of positions. Decodes to the same bits as the decoder that they came from.
     ///
     /// # Panics
     /// Where the values are not whole rows.
-    pub fn from_rows(values: &[f32], unknowns: usize, positions: usize) -> Self {
-        assert!(values.len().is_multiple_of(unknowns), "whole rows of {unknowns} coordinates");
-        let rows = MatRef::from_row_major_slice(values, values.len() / unknowns, unknowns);
+    pub fn from_rows(values: &[f32], columns: usize, positions: usize) -> Self {
+        assert!(values.len().is_multiple_of(columns), "whole rows of {columns} coordinates");
+        let rows = MatRef::from_row_major_slice(values, values.len() / columns, columns);
         Self::from_single(rows.to_owned(), positions)
     }
 
@@ -61,10 +66,28 @@ impl Decoder {
     pub(crate) fn from_single(mut phi: Mat<f32>, positions: usize) -> Self {
         let points = phi.nrows();
         phi.resize_with(points.next_multiple_of(dense::WHOLE_ROWS), phi.ncols(), |_, _| 0.0);
-        Self { phi, points, positions }
+        Self { phi: Arc::new(phi), points, positions, normals: None }
     }
 
-    /// Unknowns that are positions and follow a translation; they come first.
+    /// The same coordinates for cages whose normals follow from their vertices.
+    ///
+    /// # Panics
+    /// Where there is not one column per vertex and face.
+    #[must_use]
+    pub fn with_tied_normals(mut self, normals: Option<TiedNormals>) -> Self {
+        if let Some(normals) = &normals {
+            assert_eq!(self.columns(), self.positions + normals.faces().len(), "one column per vertex and face");
+        }
+        self.normals = normals.map(Arc::new);
+        self
+    }
+
+    /// The rule by which normals follow from the vertices, where they do.
+    pub fn tied_normals(&self) -> Option<&TiedNormals> {
+        self.normals.as_deref()
+    }
+
+    /// Columns of positions, which follow a translation; they come first.
     pub fn positions(&self) -> usize {
         self.positions
     }
@@ -74,14 +97,23 @@ impl Decoder {
         self.points
     }
 
-    /// Number of unknowns m.
-    pub fn unknowns(&self) -> usize {
+    /// Number of columns of `Φ`.
+    pub fn columns(&self) -> usize {
         self.phi.ncols()
     }
 
-    /// `Φ` in single precision, n × m, column-major.
+    /// Number of unknowns m: rows of a cage.
+    pub fn unknowns(&self) -> usize {
+        if self.normals.is_some() { self.positions } else { self.phi.ncols() }
+    }
+
+    fn padded(&self) -> MatRef<'_, f32> {
+        (*self.phi).as_ref()
+    }
+
+    /// `Φ` in single precision, n × columns, column-major.
     pub fn coordinates(&self) -> MatRef<'_, f32> {
-        self.phi.as_ref().subrows(0, self.points)
+        self.padded().subrows(0, self.points)
     }
 
     /// Positions of up to [`BATCH`](crate::inversion::BATCH) frames, each n × 3 interleaved, from their cages, each m × 3 interleaved.
@@ -92,7 +124,7 @@ impl Decoder {
     /// Where the lengths do not fit.
     pub fn decode(&self, cages: &[&[f32]], out: &mut [Vec<f32>]) {
         assert_eq!(cages.len(), out.len(), "one output per cage");
-        let (columns, centres) = self.columns(cages);
+        let (columns, centres) = self.values(cages);
         let n = self.points();
         for positions in out.iter_mut() {
             positions.resize(3 * n, 0.0);
@@ -129,7 +161,7 @@ impl Decoder {
         assert_eq!(cages.len(), frames.len(), "one frame per cage");
         let n = self.points();
         assert!(frames.iter().all(|f| f.len() == 3 * n), "every frame has every point");
-        let (columns, centres) = self.columns(cages);
+        let (columns, centres) = self.values(cages);
         let blocks: Vec<Vec<Sums>> = (0..n.div_ceil(BLOCK_ROWS))
             .into_par_iter()
             .map_init(
@@ -148,11 +180,12 @@ impl Decoder {
         (0..frames.len()).map(|f| Sums::total(blocks.iter().map(|b| &b[f])).into_error(n)).collect()
     }
 
-    /// Cages side by side, m × 3 for each and padding, each about its own centre, which keeps the digits of a capture that travels.
-    fn columns(&self, cages: &[&[f32]]) -> (Mat<f32>, Vec<Point>) {
+    /// What `Φ` multiplies, side by side, three columns for each cage and padding; positions about their own centre, which keeps
+    /// the digits of a capture that travels.
+    fn values(&self, cages: &[&[f32]]) -> (Mat<f32>, Vec<Point>) {
         let m = self.unknowns();
         assert!(cages.iter().all(|c| c.len() == 3 * m), "every cage has every unknown");
-        let mut columns = Mat::zeros(m, product_columns(cages.len()));
+        let mut columns = Mat::zeros(self.columns(), product_columns(cages.len()));
         let mut centres = Vec::with_capacity(cages.len());
         for (f, cage) in cages.iter().enumerate() {
             let mut centre = [0.0; 3];
@@ -168,6 +201,14 @@ impl Decoder {
                     columns[(j, 3 * f + k)] = (f64::from(row[k]) - shift) as f32;
                 }
             }
+            if let Some(tied) = &self.normals {
+                let vertex = |v: u32| [0, 1, 2].map(|k| f64::from(cage[3 * v as usize + k]));
+                for (j, normal) in tied.normals(vertex).enumerate() {
+                    for k in 0..3 {
+                        columns[(self.positions + j, 3 * f + k)] = normal[k] as f32;
+                    }
+                }
+            }
             centres.push(centre);
         }
         (columns, centres)
@@ -177,7 +218,7 @@ impl Decoder {
         let first = block * BLOCK_ROWS;
         let rows = BLOCK_ROWS.min(self.points - first);
         let whole = rows.next_multiple_of(dense::WHOLE_ROWS);
-        dense::multiply(product.as_mut().subrows_mut(0, whole), self.phi.as_ref().subrows(first, whole), columns);
+        dense::multiply(product.as_mut().subrows_mut(0, whole), self.padded().subrows(first, whole), columns);
         product.as_ref().subrows(0, rows)
     }
 }

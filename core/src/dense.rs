@@ -107,8 +107,18 @@ pub(crate) fn cholesky(mut a: Mat<f64>) -> Option<Mat<f64>> {
 }
 
 /// Solves `A X = B` for symmetric positive definite A. `None` where A is not definite.
-pub(crate) fn solve_definite(a: Mat<f64>, mut b: Mat<f64>) -> Option<Mat<f64>> {
+pub(crate) fn solve_definite(a: Mat<f64>, b: Mat<f64>) -> Option<Mat<f64>> {
+    solve_determined(a, b, 0.0, 0.0)
+}
+
+/// As [`solve_definite`]; `None` also where a pivot is no more than rounding: the fraction `lost` of its diagonal entry, or a diagonal
+/// entry no larger than `nothing`.
+pub(crate) fn solve_determined(a: Mat<f64>, mut b: Mat<f64>, lost: f64, nothing: f64) -> Option<Mat<f64>> {
+    let diagonal: Vec<f64> = (0..a.nrows()).map(|i| a[(i, i)]).collect();
     let l = cholesky(a)?;
+    if diagonal.iter().enumerate().any(|(i, &d)| l[(i, i)] * l[(i, i)] <= lost * d || d <= nothing) {
+        return None;
+    }
     faer::linalg::triangular_solve::solve_lower_triangular_in_place(l.as_ref(), b.as_mut(), Par::Seq);
     faer::linalg::triangular_solve::solve_upper_triangular_in_place(l.transpose(), b.as_mut(), Par::Seq);
     Some(b)

@@ -4,6 +4,7 @@ pub mod cage;
 pub mod coordinates;
 pub mod decode;
 mod dense;
+pub mod handles;
 pub mod inversion;
 pub mod maxvol;
 pub mod mesh;

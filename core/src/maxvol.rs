@@ -27,13 +27,28 @@ const SEVERAL_ROUNDS: usize = 512;
 /// Every confirming pass either ends the search or has found rows to swap; the volume bounds their number far below this.
 const MAX_PASSES: usize = 64;
 
+/// One exchange: the row of the matrix that became a handle, and which handle it replaced.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Swap {
+    /// The new row.
+    pub row: u32,
+    /// Position of the replaced one among the picked rows.
+    pub position: u32,
+    /// `|B_ij|`, by which the volume grew.
+    pub growth: f64,
+}
+
 /// The handles picked from a tall matrix.
 #[derive(Clone, Debug)]
 pub struct MaxVol {
     /// Picked rows, one per column of the matrix.
     pub rows: Vec<u32>,
-    /// Number of swaps after the start by pivoted LU.
+    /// Rows the search started from: those of pivoted LU, or what was given.
+    pub start: Vec<u32>,
+    /// Number of swaps after the start.
     pub swaps: usize,
+    /// These swaps, in order.
+    pub trace: Vec<Swap>,
     /// `ln |det Φ□|` of the picked rows.
     pub log_volume: f64,
     /// The same for the rows the search started from.
@@ -61,18 +76,40 @@ pub struct Dependent {
 /// # Errors
 /// [`Dependent`] where the columns are numerically dependent.
 pub fn maxvol(phi: MatRef<'_, f64>, tolerance: f64) -> Result<MaxVol, Dependent> {
-    let mut rows = start_rows(phi)?;
-    let mut swaps = 0;
+    Ok(search(phi, start_rows(phi)?, tolerance))
+}
+
+/// As [`maxvol`], from m given rows instead of those of pivoted LU.
+///
+/// # Errors
+/// [`Dependent`] where these rows are numerically dependent.
+///
+/// # Panics
+/// Where there are not as many rows as columns.
+pub fn maxvol_from(phi: MatRef<'_, f64>, start: Vec<u32>, tolerance: f64) -> Result<MaxVol, Dependent> {
+    assert_eq!(start.len(), phi.ncols(), "as many rows as columns");
+    let smallest = dense::pivoted_rows(dense::rows_of(phi, &start)).smallest;
+    if smallest > RANK_TOLERANCE { Ok(search(phi, start, tolerance)) } else { Err(Dependent { smallest }) }
+}
+
+fn search(phi: MatRef<'_, f64>, start: Vec<u32>, tolerance: f64) -> MaxVol {
+    let mut rows = start.clone();
+    let mut trace = Vec::new();
     let (mut inverse, mut log_volume) = dense::inverse(dense::rows_of(phi, &rows).as_ref());
     let start_log_volume = log_volume;
+    let found = |rows, trace: Vec<Swap>, log_volume, max_entry, gram, inverse| {
+        let swaps = trace.len();
+        MaxVol { rows, start, swaps, trace, log_volume, start_log_volume, max_entry, gram, inverse }
+    };
     let mut row_max = row_maxima(phi, inverse.as_ref());
     for pass in 0..MAX_PASSES {
         let candidates: Vec<u32> = (0..phi.nrows() as u32).filter(|&i| row_max[i as usize] > CANDIDATE).collect();
         let done = swap_among(phi, &candidates, inverse.as_ref(), tolerance, &mut rows);
-        swaps += done;
+        let swapped = !done.is_empty();
+        trace.extend(done);
         (inverse, log_volume) = dense::inverse(dense::rows_of(phi, &rows).as_ref());
         // A pass that is about to find more rows to swap need not be exact.
-        if done > 0 && (pass > 0 || phi.ncols() >= SEVERAL_ROUNDS) {
+        if swapped && (pass > 0 || phi.ncols() >= SEVERAL_ROUNDS) {
             row_max = row_maxima(phi, inverse.as_ref());
             if row_max.iter().any(|&x| x > (1.0 + tolerance) as f32) {
                 continue;
@@ -81,14 +118,14 @@ pub fn maxvol(phi: MatRef<'_, f64>, tolerance: f64) -> Result<MaxVol, Dependent>
         let (maxima, gram) = maxima_and_gram(phi, inverse.as_ref(), 1.0 + tolerance);
         let max_entry = maxima.iter().copied().fold(0.0, f64::max);
         if max_entry <= 1.0 + tolerance {
-            return Ok(MaxVol { rows, swaps, log_volume, start_log_volume, max_entry, gram, inverse });
+            return found(rows, trace, log_volume, max_entry, gram, inverse);
         }
         row_max = maxima.iter().map(|&x| x as f32).collect();
     }
     // Reports say what was reached.
     let (maxima, gram) = maxima_and_gram(phi, inverse.as_ref(), f64::INFINITY);
     let max_entry = maxima.iter().copied().fold(0.0, f64::max);
-    Ok(MaxVol { rows, swaps, log_volume, start_log_volume, max_entry, gram, inverse })
+    found(rows, trace, log_volume, max_entry, gram, inverse)
 }
 
 /// Rows that LU with partial pivoting picks. Single precision decides the pivots as well as double does, in half the time,
@@ -211,22 +248,22 @@ struct Working {
     row_max: Vec<f32>,
 }
 
-/// Swaps rows among the candidates until no entry of theirs exceeds 1 + τ; returns the number of swaps.
+/// Swaps rows among the candidates until no entry of theirs exceeds 1 + τ; returns the swaps.
 fn swap_among(
     phi: MatRef<'_, f64>,
     candidates: &[u32],
     inverse: MatRef<'_, f64>,
     tolerance: f64,
     rows: &mut [u32],
-) -> usize {
+) -> Vec<Swap> {
     let width = phi.ncols();
     let mut work = Working::gather(phi, candidates, inverse);
     // Rounding of the updates must not end the swaps just above the tolerance.
     let enough = (1.0 + 0.2 * tolerance) as f32;
     // Each swap multiplies the volume by more than 1 + τ, and Hadamard's inequality bounds the volume.
     let limit = 100 * width + 1000;
-    let mut swaps = 0;
-    while swaps < limit {
+    let mut swaps = Vec::new();
+    while swaps.len() < limit {
         let mut best = (0, 0.0);
         for (i, &max) in work.row_max.iter().enumerate() {
             if max > best.1 {
@@ -240,7 +277,7 @@ fn swap_among(
         let Some(column) = row.iter().position(|x| x.abs() == best.1) else { break };
         rows[column] = candidates[best.0];
         work.exchange(best.0, column);
-        swaps += 1;
+        swaps.push(Swap { row: rows[column], position: column as u32, growth: f64::from(best.1) });
     }
     swaps
 }

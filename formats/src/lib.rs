@@ -1,4 +1,4 @@
-//! Meshes and point caches to and from files and byte slices.
+//! Meshes, point caches and sparse matrices to and from files and byte slices.
 //!
 //! Readers take bytes of any origin: they return an error for whatever they do not understand, never panic, and never
 //! allocate more than a small multiple of what the file holds. Writers make files that appear whole or not at all.
@@ -6,6 +6,7 @@
 pub mod atomic;
 mod error;
 pub mod frames;
+mod matrix;
 pub mod mesh;
 mod natural;
 mod text;
@@ -13,4 +14,5 @@ mod text;
 pub use atomic::{AtomicDir, AtomicFile, CompleteFile, ScratchDir, commit_together, remove_temporaries};
 pub use error::{Action, Error};
 pub use frames::{CacheFormat, FrameOptions, FrameReader, FrameWriter, create_frames, open_frames, open_frames_bytes};
+pub use matrix::{read_matrix, read_matrix_bytes};
 pub use mesh::{MeshFormat, read_model, read_model_bytes, write_model};

@@ -32,13 +32,22 @@ pub struct SessionOptions {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(pattern = "^mvc$"))]
     pub coordinates: Option<String>,
-    /// Points the inversion reads: `maxvol` or `all`.
+    /// Points the inversion reads: `maxvol`, `rectangular`, `spread` or `all`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(pattern = "^(maxvol|all)$"))]
+    #[cfg_attr(feature = "schema", schema(pattern = "^(maxvol|rectangular|spread|all)$"))]
     pub handles: Option<String>,
-    /// Treatment of the unstable end of the spectrum: `laplacian`, `none`, `truncated-svd`, `tikhonov` or `global`.
+    /// How many points `rectangular` and `spread` read, from the number of unknowns to that of points; twice the unknowns where it
+    /// is left out.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(pattern = "^(laplacian|none|truncated-svd|tikhonov|global)$"))]
+    #[cfg_attr(feature = "schema", schema(minimum = 1))]
+    pub handle_count: Option<u32>,
+    /// Treatment of the unstable end of the spectrum: `laplacian`, `differential`, `matrix` (with a part
+    /// `regularizer_matrix`), `none`, `truncated-svd`, `tikhonov` or `global`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(
+        feature = "schema",
+        schema(pattern = "^(laplacian|differential|matrix|none|truncated-svd|tikhonov|global)$")
+    )]
     pub regularizer: Option<String>,
     /// Spectrum threshold: how many of the last singular directions are regularised.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -78,7 +87,7 @@ pub struct Session {
     pub points: Option<u32>,
     /// Unknowns per frame, m: rows of a cage record.
     pub unknowns: Option<u32>,
-    /// Number of handles: rows of a frame with `rows=handles`.
+    /// Number of handles K: rows of a frame with `rows=handles`.
     pub handle_count: Option<u32>,
     /// Vertices of the cage.
     pub cage_vertices: Option<u32>,

@@ -82,14 +82,28 @@ pub(crate) struct SolverArgs {
     #[arg(long, value_enum, default_value_t = HandlesArg::Maxvol)]
     pub(crate) handles: HandlesArg,
 
+    /// How many points rectangular and spread read: from the number of the cage's unknowns to that of the model's points
+    /// [default: twice the unknowns].
+    #[arg(long, value_name = "K")]
+    pub(crate) handle_count: Option<usize>,
+
     /// Treatment of the unstable end of the spectrum.
     #[arg(long, value_enum, default_value_t = RegularizerArg::Laplacian)]
     pub(crate) regularizer: RegularizerArg,
 
-    /// Spectrum threshold: how many of the last singular directions are regularised [default: 20, or a quarter of a cage
-    /// with fewer than 40].
-    #[arg(long, value_name = "S")]
-    pub(crate) spectrum: Option<usize>,
+    /// The matrix of --regularizer matrix: sparse, in the Matrix Market format (coordinate), one column per vertex of the cage
+    /// in its order.
+    #[arg(long, value_name = "FILE.mtx")]
+    pub(crate) regularizer_matrix: Option<PathBuf>,
+
+    /// Spectrum threshold: how many of the last singular directions are regularised; "all" of them; or "auto": as many as
+    /// --spectrum-bound allows, measured on frames of the capture [default: 20, or a quarter of a cage with fewer than 40].
+    #[arg(long, value_name = "S", value_parser = spectrum)]
+    pub(crate) spectrum: Option<SpectrumArg>,
+
+    /// Largest extra L2 error of --spectrum auto, as a fraction of the error at threshold 0 [default: 0.05].
+    #[arg(long, value_name = "F", allow_negative_numbers = true)]
+    pub(crate) spectrum_bound: Option<f64>,
 
     /// Weight of the regularisation (the damping α for tikhonov).
     #[arg(long, value_name = "L", default_value_t = 1.0, allow_negative_numbers = true)]
@@ -179,30 +193,66 @@ pub(crate) struct CompletionsArgs {
 pub(crate) enum CoordinatesArg {
     /// Mean value coordinates: defined everywhere, fast.
     Mvc,
+    /// Green coordinates: the model keeps its angles better; normals of the cage follow from its vertices, found by iterating.
+    Green,
+    /// Green coordinates whose normals are unknowns of their own: the lowest errors, by cages with spikes.
+    GreenFree,
 }
 
 impl CoordinatesArg {
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Mvc => "mvc",
+            Self::Green => "green",
+            Self::GreenFree => "green-free",
         }
     }
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum HandlesArg {
-    /// As many as the cage has vertices, of maximum volume: stable and fast.
+    /// As many as the cage has unknowns, of maximum volume: stable and fast.
     Maxvol,
+    /// Those and the points of the largest leverage beside them: for comparison.
+    Rectangular,
+    /// Those and points spread over the model, between which frames are interpolated: nearly the error of all.
+    Spread,
     /// Every point: least squares, the lowest error.
     All,
 }
 
-impl From<HandlesArg> for Handles {
-    fn from(arg: HandlesArg) -> Self {
-        match arg {
-            HandlesArg::Maxvol => Self::MaxVol,
-            HandlesArg::All => Self::All,
-        }
+impl HandlesArg {
+    /// These handles, where they can read so many rows.
+    pub(crate) fn handles(self, count: Option<usize>) -> Option<Handles> {
+        let name = match self {
+            Self::Maxvol => "maxvol",
+            Self::Rectangular => "rectangular",
+            Self::Spread => "spread",
+            Self::All => "all",
+        };
+        Handles::by_name(name, count)
+    }
+}
+
+/// What can be given as the spectrum threshold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum SpectrumArg {
+    /// So many directions.
+    Threshold(usize),
+    /// Every direction.
+    All,
+    /// As many as a bound on the error allows.
+    Auto,
+}
+
+fn spectrum(text: &str) -> Result<SpectrumArg, String> {
+    match text {
+        "all" => Ok(SpectrumArg::All),
+        "auto" => Ok(SpectrumArg::Auto),
+        number => number
+            .parse()
+            .map(SpectrumArg::Threshold)
+            .map_err(|_| "give a whole number of at least 0, all, or auto".to_owned()),
     }
 }
 
@@ -210,13 +260,19 @@ impl From<HandlesArg> for Handles {
 pub(crate) enum RegularizerArg {
     /// Smooth the last S singular directions by the cage's Laplacian.
     Laplacian,
+    /// Give the last S singular directions the shape of the rest cage.
+    Differential,
+    /// Give the last S singular directions the shape of the previous frame's cage; frames are inverted in order.
+    Temporal,
+    /// Make the product of the matrix in --regularizer-matrix and the cage small in the last S singular directions.
+    Matrix,
     /// Follow the data alone.
     None,
     /// Drop the last S singular directions.
     TruncatedSvd,
     /// Damp every direction, with α = L.
     Tikhonov,
-    /// Smooth the whole spectrum by the cage's Laplacian.
+    /// Smooth the whole spectrum by the cage's Laplacian (for other terms: --spectrum all).
     Global,
 }
 
@@ -224,6 +280,9 @@ impl From<RegularizerArg> for Regularizer {
     fn from(arg: RegularizerArg) -> Self {
         match arg {
             RegularizerArg::Laplacian => Self::Laplacian,
+            RegularizerArg::Differential => Self::Differential,
+            RegularizerArg::Temporal => Self::Temporal,
+            RegularizerArg::Matrix => Self::Matrix,
             RegularizerArg::None => Self::None,
             RegularizerArg::TruncatedSvd => Self::TruncatedSvd,
             RegularizerArg::Tikhonov => Self::Tikhonov,

@@ -44,6 +44,7 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
         token: None,
         rest: &rest_file,
         cage: &cage_file,
+        matrix: None,
         frames: generated(&capture),
         output: &output,
         options: SessionOptions { name: Some("demo".to_owned()), ..SessionOptions::default() },

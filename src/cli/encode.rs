@@ -1,18 +1,21 @@
 //! `cager encode`.
 
-use super::args::{EncodeArgs, SolverArgs};
+use super::args::{EncodeArgs, SolverArgs, SpectrumArg};
 use super::{grouped, human_bytes, interrupt, plain, print, progress, warn};
 use crate::coordinates;
-use crate::encode::{self, Encoded, Job};
+use crate::encode::{self, ChooseSpectrum, Encoded, Job, sample_frames};
 use crate::remote::{EncodedRemotely, FileFrames, RemoteJob, encode_remotely};
 use crate::report::Report;
 use anyhow::{Context, Result, bail};
 use cager_client::FrameSource;
 use cager_client::messages::SessionOptions;
 use cager_core::cage::Cage;
-use cager_core::inversion::{PrepareError, SolverOptions};
+use cager_core::inversion::{PrepareError, SolverOptions, check_options};
 use cager_core::mesh::{Model, TriMesh};
-use cager_formats::{AtomicFile, CacheFormat, CompleteFile, MeshFormat, commit_together, open_frames, read_model};
+use cager_core::regularize::{Regularizer, SparseMatrix, Term};
+use cager_formats::{
+    AtomicFile, CacheFormat, CompleteFile, MeshFormat, commit_together, open_frames, read_matrix, read_model,
+};
 use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
@@ -31,10 +34,30 @@ fn here(args: &EncodeArgs, rest: &Model, cage: &Cage, clock: Instant) -> Result<
     let mut frames = open_frames(&args.frames, rest.points.len())?;
     let read_seconds = clock.elapsed().as_secs_f64();
     let (system, options) = solver(&args.solver, cage)?;
+    let matrix = matrix(&args.solver)?;
+    let choose = match (args.solver.spectrum, spectrum_bound(&args.solver)?) {
+        (Some(SpectrumArg::Auto), bound) => {
+            // What is wrong with the options is told before anything is read.
+            check_options(rest.points.len(), system.unknowns(cage), options).map_err(|e| name_file(e, args))?;
+            let mut again = open_frames(&args.frames, rest.points.len())?;
+            let samples = sample_frames(again.as_mut(), options.regularizer == Regularizer::Temporal)?;
+            Some(ChooseSpectrum { samples, bound })
+        }
+        _ => None,
+    };
     let report_file = begin(args)?;
 
     let bar = progress::frames("encoding", frames.frames());
-    let job = Job { rest, cage, frames: frames.as_mut(), output: &args.output, system, options };
+    let job = Job {
+        rest,
+        cage,
+        frames: frames.as_mut(),
+        output: &args.output,
+        system,
+        options,
+        term: matrix.as_ref().map(|matrix| matrix as &dyn Term),
+        choose,
+    };
     let result = encode::encode(job, &mut |done| bar.set_position(done as u64));
     bar.finish_and_clear();
     let mut encoded = result.map_err(|error| name_files(error, args))?;
@@ -47,6 +70,15 @@ fn elsewhere(args: &EncodeArgs, address: &str, rest: &Model, cage: &Cage, clock:
     let frames = FileFrames::open(&args.frames, rest.points.len())?;
     let read_seconds = clock.elapsed().as_secs_f64();
     let (system, options) = solver(&args.solver, cage)?;
+    // Read here too, for what may be wrong with it.
+    matrix(&args.solver)?;
+    spectrum_bound(&args.solver)?;
+    if args.solver.spectrum == Some(SpectrumArg::Auto) {
+        bail!(
+            "--spectrum auto: a service prepares before it sees a frame to measure; give a number, or encode without --server"
+        );
+    }
+    let handle_count = args.solver.handle_count.map(u32::try_from).transpose();
     let report_file = begin(args)?;
 
     let token = args.token.clone().or_else(|| std::env::var("CAGER_TOKEN").ok()).filter(|token| !token.is_empty());
@@ -54,6 +86,7 @@ fn elsewhere(args: &EncodeArgs, address: &str, rest: &Model, cage: &Cage, clock:
         name: args.output.file_stem().map(|name| name.to_string_lossy().chars().take(200).collect()),
         coordinates: Some(system.name().to_owned()),
         handles: Some(options.handles.name().to_owned()),
+        handle_count: handle_count.context("--handle-count: is larger than any number of points")?,
         regularizer: Some(options.regularizer.name().to_owned()),
         spectrum: Some(options.spectrum as u32),
         lambda: Some(options.lambda),
@@ -67,6 +100,7 @@ fn elsewhere(args: &EncodeArgs, address: &str, rest: &Model, cage: &Cage, clock:
         token: token.as_deref(),
         rest: &args.rest,
         cage: &args.cage,
+        matrix: args.solver.regularizer_matrix.as_deref(),
         frames,
         output: &args.output,
         options,
@@ -99,25 +133,29 @@ fn finish(args: &EncodeArgs, encoded: Encoded, report_file: Option<AtomicFile>, 
 /// Errors of the mathematics know vertices and points; the user knows files.
 fn name_files(error: encode::EncodeError, args: &EncodeArgs) -> anyhow::Error {
     match error {
-        encode::EncodeError::Prepare(inner) => {
-            let path = match inner {
-                PrepareError::NotFinite { .. }
-                | PrepareError::TooFewPoints { .. }
-                | PrepareError::NoExtent
-                | PrepareError::TooLarge
-                | PrepareError::NotReproduced { .. }
-                | PrepareError::TooFar { .. }
-                | PrepareError::OutOfMemory { .. } => &args.rest,
-                _ => &args.cage,
-            };
-            match inner {
-                PrepareError::BadLambda { .. } => anyhow::anyhow!("--lambda: {inner}"),
-                PrepareError::SpectrumTooLarge { .. } => anyhow::anyhow!("--spectrum: {inner}"),
-                _ => anyhow::anyhow!("{}: {inner}", path.display()),
-            }
-        }
+        encode::EncodeError::Prepare(inner) => name_file(inner, args),
         other => other.into(),
     }
+}
+
+fn name_file(error: PrepareError, args: &EncodeArgs) -> anyhow::Error {
+    let path = match error {
+        PrepareError::BadLambda { .. } => return anyhow::anyhow!("--lambda: {error}"),
+        PrepareError::SpectrumTooLarge { .. } => return anyhow::anyhow!("--spectrum: {error}"),
+        PrepareError::HandleCount { .. } | PrepareError::HandlesOutOfMemory { .. } => {
+            return anyhow::anyhow!("--handle-count: {error}");
+        }
+        PrepareError::Term(_) => args.solver.regularizer_matrix.as_ref().unwrap_or(&args.cage),
+        PrepareError::NotFinite { .. }
+        | PrepareError::TooFewPoints { .. }
+        | PrepareError::NoExtent
+        | PrepareError::TooLarge
+        | PrepareError::NotReproduced { .. }
+        | PrepareError::TooFar { .. }
+        | PrepareError::OutOfMemory { .. } => &args.rest,
+        _ => &args.cage,
+    };
+    anyhow::anyhow!("{}: {error}", path.display())
 }
 
 pub(super) fn read_cage(path: &Path, flip: bool) -> Result<Cage> {
@@ -138,13 +176,52 @@ pub(super) fn solver(
 ) -> Result<(&'static dyn cager_core::coordinates::CoordinateSystem, SolverOptions)> {
     let name = args.coordinates.name();
     let system = coordinates::by_name(name).with_context(|| format!("--coordinates: {name} is unknown"))?;
+    let unknowns = system.unknowns(cage);
     let options = SolverOptions {
-        handles: args.handles.into(),
+        handles: args
+            .handles
+            .handles(args.handle_count)
+            .context("--handle-count: maxvol and all read a number of points of their own; leave it out")?,
         regularizer: args.regularizer.into(),
-        spectrum: args.spectrum.unwrap_or_else(|| coordinates::default_spectrum(system.unknowns(cage))),
+        spectrum: match args.spectrum {
+            None => coordinates::default_spectrum(unknowns),
+            Some(SpectrumArg::Threshold(s)) => s,
+            Some(SpectrumArg::All) => unknowns,
+            Some(SpectrumArg::Auto) => 0,
+        },
         lambda: args.lambda,
     };
+    if matches!(args.spectrum, Some(SpectrumArg::Auto)) && !options.regularizer.has_threshold() {
+        bail!("--spectrum auto: {} has no threshold to choose; leave it out", options.regularizer.name());
+    }
     Ok((system, options))
+}
+
+/// The matrix of `--regularizer matrix`.
+fn matrix(args: &SolverArgs) -> Result<Option<SparseMatrix>> {
+    match (&args.regularizer_matrix, Regularizer::from(args.regularizer)) {
+        (Some(path), Regularizer::Matrix) => Ok(Some(read_matrix(path)?)),
+        (None, Regularizer::Matrix) => {
+            bail!("--regularizer matrix: needs a matrix; give --regularizer-matrix FILE.mtx")
+        }
+        (Some(_), other) => {
+            bail!("--regularizer-matrix: {} uses no matrix; give --regularizer matrix with it", other.name())
+        }
+        (None, _) => Ok(None),
+    }
+}
+
+fn spectrum_bound(args: &SolverArgs) -> Result<f64> {
+    const USUAL: f64 = 0.05;
+    match args.spectrum_bound {
+        Some(_) if args.spectrum != Some(SpectrumArg::Auto) => {
+            bail!("--spectrum-bound: only --spectrum auto looks at it; leave it out or choose automatically")
+        }
+        Some(bound) if !(bound.is_finite() && bound >= 0.0) => {
+            bail!("--spectrum-bound: is {bound}; give a finite fraction of at least 0")
+        }
+        bound => Ok(bound.unwrap_or(USUAL)),
+    }
 }
 
 pub(super) fn write_report(mut file: AtomicFile, report: &Report) -> Result<CompleteFile> {
@@ -158,7 +235,7 @@ pub(super) fn write_report(mut file: AtomicFile, report: &Report) -> Result<Comp
 fn refuse_overwriting(args: &EncodeArgs) -> Result<()> {
     for output in [Some(&args.output), args.report.as_ref()].into_iter().flatten() {
         let Ok(place) = output.canonicalize() else { continue };
-        for input in [&args.rest, &args.cage, &args.frames] {
+        for input in [&args.rest, &args.cage, &args.frames].into_iter().chain(&args.solver.regularizer_matrix) {
             if input.canonicalize().is_ok_and(|input| input == place) {
                 bail!(
                     "{}: is an input of this encoding, so it cannot be an output; name another file",
@@ -183,12 +260,21 @@ fn refuse_overwriting(args: &EncodeArgs) -> Result<()> {
 }
 
 fn summary(report: &Report, output: &Path) -> String {
+    let chosen = report.spectrum_choice.as_ref().map_or_else(String::new, |choice| {
+        format!(
+            "  chosen  spectrum {}: L2 {:.2} % above that of 0 on {} frames, at most {:.2} % allowed\n",
+            report.spectrum,
+            100.0 * choice.extra,
+            choice.frames,
+            100.0 * choice.bound
+        )
+    });
     format!(
         "{}: {} frames of {} points as cages of {} vertices\n\
          \x20 size    {} from {}: {:.1} times smaller, {:.2} bits per point and frame\n\
          \x20 error   L2 {:.4} % mean, {:.4} % max; L∞ {:.3} % mean, {:.3} % max (of the rest diagonal); KG {:.3} %\n\
          \x20 system  condition {:.1} (all points {:.1}), rank {} of {}, affine reproduction {:.1e}\n\
-         \x20 time    {:.3} s\n",
+         {chosen}\x20 time    {:.3} s\n",
         output.display(),
         grouped(report.frames as u64),
         grouped(report.points as u64),

@@ -3,7 +3,7 @@
 use super::frames::body_error;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::Content;
+use crate::store::{Content, MatrixFile};
 use axum::body::Body;
 use axum::extract::multipart::{Field, MultipartError};
 use axum::extract::{FromRequest, Multipart, Request};
@@ -94,14 +94,18 @@ pub(crate) async fn read(service: &Arc<Service>, request: Request) -> Result<Par
 }
 
 async fn read_parts(service: &Service, mut body: Multipart) -> Result<Parts, ApiError> {
-    let (mut rest, mut cage, mut options) = (None, None, None);
+    let (mut rest, mut cage, mut matrix, mut options) = (None, None, None, None);
     let mut left = service.config.max_rest_bytes;
     while let Some(field) = body.next_field().await.map_err(|e| broken(&e))? {
         let part = field.name().unwrap_or_default().to_owned();
         let twice = || bad(format!("part {part:?} is there twice; send it once"));
         match part.as_str() {
-            "rest" | "cage" => {
-                let place = if part == "rest" { &mut rest } else { &mut cage };
+            "rest" | "cage" | "regularizer_matrix" => {
+                let place = match part.as_str() {
+                    "rest" => &mut rest,
+                    "cage" => &mut cage,
+                    _ => &mut matrix,
+                };
                 if place.is_some() {
                     return Err(twice());
                 }
@@ -113,7 +117,7 @@ async fn read_parts(service: &Service, mut body: Multipart) -> Result<Parts, Api
                 }
                 options = Some(read_options(field).await?);
             }
-            _ => return Err(bad(format!("part {part:?} is unknown; send rest, cage and options"))),
+            _ => return Err(bad(format!("part {part:?} is unknown; send rest, cage, regularizer_matrix and options"))),
         }
     }
     let rest = rest.ok_or_else(|| bad("part rest is missing; send the rest pose as a file".to_owned()))?;
@@ -121,7 +125,13 @@ async fn read_parts(service: &Service, mut body: Multipart) -> Result<Parts, Api
         let detail = "part cage is missing: automatic cages are not available yet, so send a cage as a file";
         ApiError::new(problem::INVALID_OPTIONS, detail)
     })?;
-    let content = Content { rest_name: rest.name, rest: rest.bytes, cage_name: cage.name, cage: cage.bytes };
+    let content = Content {
+        rest_name: rest.name,
+        rest: rest.bytes,
+        cage_name: cage.name,
+        cage: cage.bytes,
+        matrix: matrix.map(|File { name, bytes }| MatrixFile { name, bytes }),
+    };
     Ok(Parts { content, options: options.unwrap_or_default(), room: Room::new() })
 }
 

@@ -39,6 +39,10 @@ pub(crate) struct NewSessionForm {
     /// Closed cage around it, a file of one of the same formats.
     #[schema(value_type = String, format = Binary)]
     cage: Vec<u8>,
+    /// The matrix of the regularizer `matrix`: a sparse matrix in the Matrix Market format (coordinate), one column per vertex of
+    /// the cage.
+    #[schema(value_type = String, format = Binary, required = false)]
+    regularizer_matrix: Vec<u8>,
     /// Choices.
     #[schema(required = false)]
     options: SessionOptions,

@@ -69,8 +69,12 @@ impl Service {
         choices: Choices,
         idempotency: Option<Idempotency>,
     ) -> Result<Arc<Session>, ApiError> {
-        self.check_quota(tenant, (content.rest.len() + content.cage.len()) as u64)?;
+        self.check_quota(tenant, content.size_bytes())?;
         let at_hand = self.solvers.at_hand(&key);
+        let content = match at_hand {
+            Some(_) => content,
+            None => blocking(move || super::prepare::check(&content, &choices).map(|()| content)).await??,
+        };
         let most = self.config.max_preparing + self.config.max_prepare_queue;
         if at_hand.is_none() && self.solvers.in_flight() >= most {
             self.rejected("prepare_queue");
@@ -95,7 +99,7 @@ impl Service {
             None => Status { phase: Phase::Preparing, facts: None },
         };
         let session = Arc::new(Session::new(meta, self.store.clone(), self.committer.clone(), status, true));
-        session.bytes.store((content.rest.len() + content.cage.len()) as u64, Relaxed);
+        session.bytes.store(content.size_bytes(), Relaxed);
         {
             let _content = self.registry.content_lock(&key).await;
             let (store, meta) = (self.store.clone(), session.meta.clone());
@@ -229,7 +233,10 @@ impl Service {
         session.live_lane(|| {
             let cost = {
                 let decoder = prepared.solver.decoder();
-                decoder.points() as f64 * decoder.unknowns() as f64
+                let (points, columns) = (decoder.points() as f64, decoder.columns() as f64);
+                // An iteration multiplies a square matrix so many times.
+                let products = if decoder.tied_normals().is_some() { 40.0 } else { 0.0 };
+                points * columns + products * columns * columns
             };
             let (weak, solver) = (Arc::downgrade(session), prepared);
             let run = move |jobs: Vec<FrameJob>| {
@@ -303,7 +310,10 @@ fn content_key(tenant: &str, content: &Content, options: &SessionOptions) -> Con
         extension(&content.cage_name).as_bytes(),
         &content.cage,
         &solving,
-    ] {
+    ]
+    .into_iter()
+    .chain(content.matrix.as_ref().map(|matrix| matrix.bytes.as_slice()))
+    {
         hasher.update(&(part.len() as u64).to_le_bytes());
         hasher.update(part);
     }

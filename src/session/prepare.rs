@@ -7,10 +7,10 @@ use crate::problem::{self, ApiError};
 use crate::store::Content;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions};
+use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions, check_options};
 use cager_core::mesh::{Model, TriMesh};
-use cager_core::regularize::Regularizer;
-use cager_formats::{MeshFormat, read_model_bytes};
+use cager_core::regularize::{Regularizer, SparseMatrix, Term, TermError};
+use cager_formats::{MeshFormat, read_matrix_bytes, read_model_bytes};
 use cager_proto::messages::SessionOptions;
 use std::path::Path;
 
@@ -48,16 +48,26 @@ impl Choices {
         }
         let name = options.coordinates.as_deref().unwrap_or("mvc");
         let Some(system) = coordinates::by_name(name) else {
-            return refuse(format!("coordinates: {name:?} is not available; give mvc"));
+            let names = coordinates::ALL.map(|system| system.name()).join(", ");
+            return refuse(format!("coordinates: {name:?} is not available; give one of {names}"));
         };
-        let handles = match options.handles.as_deref().unwrap_or(Handles::default().name()) {
-            "maxvol" => Handles::MaxVol,
-            "all" => Handles::All,
-            other => return refuse(format!("handles: {other:?} is not available; give maxvol or all")),
+        let wanted = options.handles.as_deref().unwrap_or(Handles::default().name());
+        if !Handles::NAMES.contains(&wanted) {
+            let names = Handles::NAMES.join(", ");
+            return refuse(format!("handles: {wanted:?} is not available; give one of {names}"));
+        }
+        let Some(handles) = Handles::by_name(wanted, options.handle_count.map(|count| count as usize)) else {
+            return refuse(format!("handle_count: {wanted} reads a number of points of its own; leave it out"));
         };
         let wanted = options.regularizer.as_deref().unwrap_or(Regularizer::default().name());
-        let Some(&regularizer) = Regularizer::ALL.iter().find(|r| r.name() == wanted) else {
-            let names: Vec<&str> = Regularizer::ALL.iter().map(|r| r.name()).collect();
+        if wanted == Regularizer::Temporal.name() {
+            return refuse(
+                "regularizer: temporal makes every frame depend on the one before, and a service takes frames in any order; encode with the command line, without --server".to_owned(),
+            );
+        }
+        let Some(regularizer) = Regularizer::by_name(wanted) else {
+            let names = Regularizer::ALL.iter().filter(|&&r| r != Regularizer::Temporal).map(|r| r.name());
+            let names: Vec<&str> = names.collect();
             return refuse(format!("regularizer: {wanted:?} is not available; give one of {}", names.join(", ")));
         };
         let lambda = options.lambda.unwrap_or(SolverOptions::default().lambda);
@@ -82,6 +92,44 @@ impl Choices {
 pub(crate) struct Geometry {
     pub(crate) rest: Model,
     pub(crate) cage: Cage,
+    /// The matrix of the regularizer of that name.
+    pub(crate) matrix: Option<SparseMatrix>,
+}
+
+/// Checks what the options say about the geometry, before a session is made. What is wrong with the geometry itself is left to
+/// its preparation.
+///
+/// # Errors
+/// Options that do not fit the cage or the rest pose; a matrix that cannot be read, is missing or not wanted.
+pub(crate) fn check(content: &Content, choices: &Choices) -> Result<(), ApiError> {
+    let matrix = read_matrix(content, choices)?;
+    let Ok(cage) = read_cage(content, choices) else { return Ok(()) };
+    let unknowns = choices.system.unknowns(&cage);
+    // The number of points matters for the number of handles alone, and a rest pose takes its time to be read.
+    let points = match choices.handles {
+        Handles::Rectangular { count: Some(_) } | Handles::Spread { count: Some(_) } => {
+            let Ok(rest) = read_part("rest", &content.rest_name, &content.rest) else { return Ok(()) };
+            rest.points.len()
+        }
+        _ => usize::MAX,
+    };
+    if points < unknowns {
+        return Ok(());
+    }
+    check_options(points, unknowns, choices.solver_options(unknowns)).map_err(refused)?;
+    matrix.map_or(Ok(()), |matrix| matrix.delta(&cage, unknowns).map(|_| ()).map_err(|e| refused(e.into())))
+}
+
+fn read_matrix(content: &Content, choices: &Choices) -> Result<Option<SparseMatrix>, ApiError> {
+    let refuse = |detail: String| Err(ApiError::new(problem::INVALID_OPTIONS, format!("regularizer_matrix: {detail}")));
+    match (&content.matrix, choices.regularizer) {
+        (Some(file), Regularizer::Matrix) => {
+            read_matrix_bytes(Path::new(&file.name), &file.bytes).map(Some).or_else(|error| refuse(error.to_string()))
+        }
+        (None, Regularizer::Matrix) => refuse("the regularizer matrix needs it; send it as a file".to_owned()),
+        (Some(_), other) => refuse(format!("{} uses no matrix; choose the regularizer matrix", other.name())),
+        (None, _) => Ok(None),
+    }
 }
 
 /// Reads and checks rest pose and cage.
@@ -90,7 +138,7 @@ pub(crate) struct Geometry {
 /// Bytes that cannot be read; a cage that cannot be used.
 pub(crate) fn read(content: &Content, choices: &Choices) -> Result<Geometry, ApiError> {
     let rest = read_part("rest", &content.rest_name, &content.rest)?;
-    Ok(Geometry { rest, cage: read_cage(content, choices)? })
+    Ok(Geometry { rest, cage: read_cage(content, choices)?, matrix: read_matrix(content, choices)? })
 }
 
 /// Reads and checks the cage.
@@ -121,25 +169,42 @@ pub(crate) fn prepare(geometry: &Geometry, choices: &Choices, most_bytes: u64) -
     let unknowns = choices.system.unknowns(&geometry.cage);
     let options = choices.solver_options(unknowns);
     // Two matrices of n × m in double precision and one in single, at their peak.
-    let needed = 20 * geometry.rest.points.len() as u64 * unknowns as u64;
+    let points = geometry.rest.points.len();
+    let handles = match choices.handles {
+        // The covariance of the handles, its factor, and what is solved with it.
+        Handles::Spread { .. } => {
+            let count = options.handles.count(points, unknowns) as u64;
+            count.saturating_mul(16 * (count + unknowns as u64))
+        }
+        _ => 0,
+    };
+    let columns = choices.system.columns(&geometry.cage) as u64;
+    // What an iteration takes beside them: their Gram matrix, and in single precision.
+    let iterated = if columns > unknowns as u64 { 12 * columns * columns } else { 0 };
+    let needed = (20 * points as u64 * columns).saturating_add(handles).saturating_add(iterated);
     if needed > most_bytes {
         let detail = format!(
-            "{} points times {unknowns} unknowns need {needed} bytes to be prepared, and this service allows {most_bytes}; use a coarser cage or a lighter model",
-            geometry.rest.points.len()
+            "{points} points times {columns} values of the cage need {needed} bytes to be prepared, and this service allows {most_bytes}; use a coarser cage or a lighter model"
         );
         return Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(most_bytes));
     }
+    let own = || geometry.matrix.as_ref().map(|matrix| matrix as &dyn Term).ok_or(TermError::Missing);
+    let term = options.regularizer.term().map_or_else(own, |term| Ok(term)).map_err(|error| refused(error.into()))?;
     let solver =
-        Solver::prepare(choices.system, &geometry.cage, &geometry.rest.points, options).map_err(
-            |error| match error {
-                PrepareError::SpectrumTooLarge { .. } => {
-                    ApiError::new(problem::INVALID_OPTIONS, format!("spectrum: {error}"))
-                }
-                PrepareError::BadLambda { .. } => ApiError::new(problem::INVALID_OPTIONS, format!("lambda: {error}")),
-                _ => self::geometry(error.to_string()),
-            },
-        )?;
+        Solver::prepare_with(choices.system, &geometry.cage, &geometry.rest.points, options, term).map_err(refused)?;
     Ok(with_solver(solver, &geometry.cage, options))
+}
+
+/// What a client hears of an error: which option it is about, or that it is the geometry.
+fn refused(error: PrepareError) -> ApiError {
+    let option = match error {
+        PrepareError::SpectrumTooLarge { .. } => "spectrum",
+        PrepareError::BadLambda { .. } => "lambda",
+        PrepareError::HandleCount { .. } | PrepareError::HandlesOutOfMemory { .. } => "handle_count",
+        PrepareError::Term(_) => "regularizer_matrix",
+        _ => return geometry(error.to_string()),
+    };
+    ApiError::new(problem::INVALID_OPTIONS, format!("{option}: {error}"))
 }
 
 /// A solver with what goes with it.

@@ -15,12 +15,40 @@ pub struct Content {
     pub cage_name: String,
     /// The file.
     pub cage: Vec<u8>,
+    /// The matrix of the regularizer of that name.
+    pub matrix: Option<MatrixFile>,
+}
+
+/// A matrix as it was uploaded.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MatrixFile {
+    /// File name, for messages.
+    pub name: String,
+    /// The file.
+    pub bytes: Vec<u8>,
+}
+
+impl Content {
+    /// Bytes of its files.
+    pub fn size_bytes(&self) -> u64 {
+        (self.rest.len() + self.cage.len() + self.matrix.as_ref().map_or(0, |matrix| matrix.bytes.len())) as u64
+    }
 }
 
 #[derive(Debug, Deserialize, Serialize)]
 struct Description {
     rest: Part,
     cage: Part,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    matrix: Option<Part>,
+}
+
+impl Description {
+    fn parts(&self) -> impl Iterator<Item = (&'static str, &Part)> {
+        [("rest", Some(&self.rest)), ("cage", Some(&self.cage)), ("matrix", self.matrix.as_ref())]
+            .into_iter()
+            .filter_map(|(name, part)| Some((name, part?)))
+    }
 }
 
 #[derive(Debug, Deserialize, Serialize)]
@@ -50,6 +78,7 @@ impl Store {
         let description = Description {
             rest: Part::of(&content.rest_name, &content.rest),
             cage: Part::of(&content.cage_name, &content.cage),
+            matrix: content.matrix.as_ref().map(|matrix| Part::of(&matrix.name, &matrix.bytes)),
         };
         if self.content_is_there(key, &place)? {
             return Ok(());
@@ -60,6 +89,9 @@ impl Store {
             files.disk.create_dir(&aside).map_err(|e| StoreError::of(&aside, "create", e))?;
             files.write_new(&aside.join("rest"), &content.rest)?;
             files.write_new(&aside.join("cage"), &content.cage)?;
+            if let Some(matrix) = &content.matrix {
+                files.write_new(&aside.join("matrix"), &matrix.bytes)?;
+            }
             files.write_new(&aside.join(DESCRIPTION), &bytes)?;
             files.sync_dir(&aside)?;
             let _one_at_a_time = self.publishing();
@@ -105,7 +137,7 @@ impl Store {
         let looked = self.describe(place).and_then(|description| {
             let Some(description) = description else { return Ok(()) };
             let entries = self.files().list(place)?;
-            for (name, part) in [("rest", &description.rest), ("cage", &description.cage)] {
+            for (name, part) in description.parts() {
                 if !entries.iter().any(|entry| entry.name == name && entry.bytes == part.bytes) {
                     return Err(StoreError::damaged(&place.join(name), "it is missing or of another length"));
                 }
@@ -134,7 +166,7 @@ impl Store {
     }
 
     fn read_content(&self, place: &Path) -> Result<Option<Content>, StoreError> {
-        let Some(Description { rest, cage }) = self.describe(place)? else { return Ok(None) };
+        let Some(Description { rest, cage, matrix }) = self.describe(place)? else { return Ok(None) };
         let read = |name: &str, part: &Part| {
             let path = place.join(name);
             let bytes = self.files().read(&path, part.bytes)?;
@@ -144,11 +176,14 @@ impl Store {
             }
             Ok(bytes)
         };
+        let matrix =
+            matrix.map(|part| Ok(MatrixFile { bytes: read("matrix", &part)?, name: part.name })).transpose()?;
         Ok(Some(Content {
             rest: read("rest", &rest)?,
             cage: read("cage", &cage)?,
             rest_name: rest.name,
             cage_name: cage.name,
+            matrix,
         }))
     }
 }

@@ -3,16 +3,22 @@
 
 use super::ContentKey;
 use super::disk::DiskFile;
-use cager_core::inversion::{Preparation, Solver, SolverParts};
-use faer::Mat;
+use cager_core::coordinates::TiedNormals;
+use cager_core::inversion::{Preparation, Pull, Solver, SolverParts, TiedParts};
+use faer::{Mat, MatRef};
 use std::io;
 
-const MAGIC: [u8; 8] = *b"CGRSOLV\x01";
-const COUNTS: usize = 9;
-const NUMBERS: usize = 10;
+const MAGIC: [u8; 8] = *b"CGRSOLV\x03";
+const COUNTS: usize = 12;
+const NUMBERS: usize = 11;
 /// Magic, key, counts, numbers, checksum.
 const HEADER_BYTES: usize = 8 + 32 + 8 * COUNTS + 8 * NUMBERS + 4;
 const PIECE_BYTES: usize = 1 << 18;
+
+/// What is added to `R · H`, the last of the counts.
+const NO_PULL: u64 = 0;
+const CONSTANT: u64 = 1;
+const PREVIOUS: u64 = 2;
 
 /// What a file turned out to be.
 pub(super) enum Found {
@@ -22,16 +28,32 @@ pub(super) enum Found {
 
 /// Length of the file that has these counts, where one can have it.
 fn file_bytes(counts: &[u64; COUNTS]) -> Option<u64> {
-    let [points, unknowns, handles, reads_all, values, outside, ..] = *counts;
-    // A matrix's columns are padded in memory: only tall ones take about what their file does.
-    if unknowns > points || reads_all > 1 {
+    let [points, unknowns, handles, reads_all, values, outside, _, _, _, columns, faces, pull] = *counts;
+    // A matrix's columns are padded in memory: only tall ones take about what their file does. A cage of v vertices has fewer than
+    // v² faces.
+    if unknowns > points || columns > points.checked_mul(points)? || reads_all > 1 || handles > points {
         return None;
     }
+    let tied = match faces {
+        0 => 0,
+        _ => faces.checked_mul(36)?.checked_add(columns.checked_mul(columns)?.checked_mul(8)?)?,
+    };
+    let pull = match pull {
+        NO_PULL => 0,
+        CONSTANT => unknowns.checked_mul(24)?,
+        PREVIOUS => unknowns.checked_mul(unknowns.checked_mul(8)?.checked_add(12)?)?,
+        _ => return None,
+    };
     let read = if reads_all == 1 { points } else { handles };
-    let phi = points.checked_mul(unknowns)?.checked_mul(4)?;
+    let phi = points.checked_mul(columns)?.checked_mul(4)?;
     let operator = read.checked_mul(unknowns)?.checked_mul(8)?;
     let small = handles.checked_add(outside)?.checked_mul(4)?.checked_add(values.checked_mul(8)?)?;
-    (HEADER_BYTES as u64 + 4).checked_add(phi)?.checked_add(operator)?.checked_add(small)
+    (HEADER_BYTES as u64 + 4)
+        .checked_add(phi)?
+        .checked_add(operator)?
+        .checked_add(small)?
+        .checked_add(pull)?
+        .checked_add(tied)
 }
 
 pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> io::Result<()> {
@@ -52,7 +74,7 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
         svd_seconds,
     } = solver.preparation();
     let decoder = solver.decoder();
-    let (phi, operator) = (decoder.coordinates(), solver.operator());
+    let (phi, operator, tied) = (decoder.coordinates(), solver.operator(), solver.tied());
     let mut header = Vec::with_capacity(HEADER_BYTES);
     header.extend_from_slice(&MAGIC);
     header.extend_from_slice(&key.0);
@@ -66,6 +88,13 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
         decoder.positions(),
         *rank,
         *swaps,
+        decoder.columns(),
+        decoder.tied_normals().map_or(0, |normals| normals.faces().len()),
+        match solver.pull() {
+            Pull::None => NO_PULL,
+            Pull::Constant(_) => CONSTANT,
+            Pull::Previous { .. } => PREVIOUS,
+        } as usize,
     ];
     header.extend(counts.iter().flat_map(|&count| (count as u64).to_le_bytes()));
     let numbers: [f64; NUMBERS] = [
@@ -79,6 +108,7 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
         *coordinates_seconds,
         *maxvol_seconds,
         *svd_seconds,
+        tied.map_or(0.0, |(_, _, weight)| weight),
     ];
     header.extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
     header.extend_from_slice(&crc32c::crc32c(&header).to_le_bytes());
@@ -89,6 +119,22 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
     out.put(singular_values.iter().map(|x| x.to_le_bytes()))?;
     for j in 0..operator.ncols() {
         out.put(operator.col(j).iter().map(|x| x.to_le_bytes()))?;
+    }
+    let mut put_matrix = |matrix: MatRef<'_, f64>| {
+        (0..matrix.ncols()).try_for_each(|j| out.put(matrix.col(j).iter().map(|x| x.to_le_bytes())))
+    };
+    match solver.pull() {
+        Pull::None => {}
+        Pull::Constant(offset) => put_matrix(offset.as_ref())?,
+        Pull::Previous { operator, first } => {
+            put_matrix(operator.as_ref())?;
+            out.put(first.iter().map(|x| x.to_le_bytes()))?;
+        }
+    }
+    if let Some((normals, gram, _)) = tied {
+        out.put(normals.faces().iter().flatten().map(|x| x.to_le_bytes()))?;
+        out.put(normals.weights().iter().flatten().map(|x| x.to_le_bytes()))?;
+        (0..gram.ncols()).try_for_each(|j| out.put(gram.col(j).iter().map(|x| x.to_le_bytes())))?;
     }
     for j in 0..phi.ncols() {
         out.put(phi.col(j).iter().map(|x| x.to_le_bytes()))?;
@@ -125,7 +171,7 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Found> {
     if file_bytes(&counts) != Some(bytes) {
         return damage("its length is not what its header says");
     }
-    let [points, unknowns, handle_count, reads_all, values, outside_count, positions, rank, swaps] =
+    let [points, unknowns, handle_count, reads_all, values, outside_count, positions, rank, swaps, columns, faces, _] =
         counts.map(|count| count as usize);
 
     let mut source = In { file, piece: Vec::new(), at: 0, offset: HEADER_BYTES as u64, end: bytes, crc: 0 };
@@ -136,12 +182,30 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Found> {
     source.fill(&mut outside, u32::from_le_bytes)?;
     let mut singular_values = vec![0.0; values];
     source.fill(&mut singular_values, f64::from_le_bytes)?;
-    let mut operator = Mat::<f64>::zeros(if reads_all == 1 { points } else { handle_count }, unknowns);
-    for j in 0..unknowns {
-        source.fill(operator.col_as_slice_mut(j), f64::from_le_bytes)?;
+    let operator = source.matrix(if reads_all == 1 { points } else { handle_count }, unknowns)?;
+    let pull = match counts[COUNTS - 1] {
+        CONSTANT => Pull::Constant(source.matrix(unknowns, 3)?),
+        PREVIOUS => {
+            let operator = source.matrix(unknowns, unknowns)?;
+            let mut first = vec![0.0; 3 * unknowns];
+            source.fill(&mut first, f32::from_le_bytes)?;
+            Pull::Previous { operator, first }
+        }
+        _ => Pull::None,
+    };
+    let mut tied = None;
+    if faces > 0 {
+        let (mut corners, mut weights) = (vec![[0; 3]; faces], vec![[0.0; 3]; faces]);
+        source.fill(corners.as_flattened_mut(), u32::from_le_bytes)?;
+        source.fill(weights.as_flattened_mut(), f64::from_le_bytes)?;
+        let gram = source.matrix(columns, columns)?;
+        let Some(normals) = TiedNormals::from_parts(corners, weights, positions) else {
+            return damage("its normals do not fit its cage");
+        };
+        tied = Some(TiedParts { normals, gram, weight: numbers[NUMBERS - 1] });
     }
-    let mut phi = Mat::<f32>::zeros(points, unknowns);
-    for j in 0..unknowns {
+    let mut phi = Mat::<f32>::zeros(points, columns);
+    for j in 0..columns {
         source.fill(phi.col_as_slice_mut(j), f32::from_le_bytes)?;
     }
     let crc = source.crc;
@@ -162,6 +226,7 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Found> {
         coordinates_seconds,
         maxvol_seconds,
         svd_seconds,
+        _,
     ] = numbers;
     let preparation = Preparation {
         rank,
@@ -178,7 +243,8 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Found> {
         maxvol_seconds,
         svd_seconds,
     };
-    let parts = SolverParts { handles, reads_all: reads_all == 1, operator, phi, positions, diagonal, preparation };
+    let parts =
+        SolverParts { handles, reads_all: reads_all == 1, operator, pull, phi, positions, tied, diagonal, preparation };
     match Solver::from_parts(parts) {
         Some(solver) => Ok(Found::Solver(Box::new(solver))),
         None => damage("its parts do not fit together"),
@@ -224,6 +290,12 @@ struct In<'a> {
 }
 
 impl In<'_> {
+    fn matrix(&mut self, rows: usize, columns: usize) -> io::Result<Mat<f64>> {
+        let mut matrix = Mat::<f64>::zeros(rows, columns);
+        (0..columns).try_for_each(|j| self.fill(matrix.col_as_slice_mut(j), f64::from_le_bytes))?;
+        Ok(matrix)
+    }
+
     fn fill<T, const N: usize>(&mut self, mut values: &mut [T], value: fn([u8; N]) -> T) -> io::Result<()> {
         while !values.is_empty() {
             if self.piece.len() - self.at < N {

@@ -39,7 +39,16 @@ fn run(folder: &Path, rest: &Model, cage: &Cage, options: SolverOptions) -> Repo
     let dir = Dir::new();
     let mut frames = open_frames(folder.join("frames.npy"), rest.points.len()).expect("frames");
     let output = dir.path("out.cager");
-    let job = Job { rest, cage, frames: frames.as_mut(), output: &output, system: &MeanValue, options };
+    let job = Job {
+        rest,
+        cage,
+        frames: frames.as_mut(),
+        output: &output,
+        system: &MeanValue,
+        options,
+        term: None,
+        choose: None,
+    };
     encode(job, &mut |_| {}).expect("an encoding").report
 }
 
@@ -173,6 +182,62 @@ fn posed(cage: &Cage, rest: &[Point], moved: &[Point]) -> Vec<f64> {
     (0..rest.len())
         .flat_map(|i| [0, 1, 2].map(|k| (0..moved.len()).map(|j| phi[(i, j)] * moved[j][k]).sum::<f64>()))
         .collect()
+}
+
+/// Mean L2 of every handle selection on one capture with its `cage350`, all frames, as a fraction over that of all points.
+fn spread_comes_near_all(capture: &str) {
+    let Some(root) = data() else { return };
+    let folder = root.join(capture);
+    let rest = read_model(&folder.join("rest.obj")).expect("a rest pose");
+    let cage = cage_of(&folder.join("cage350.obj"));
+    let count = None;
+    for spectrum in [0, 20] {
+        let l2 = |handles| {
+            let report = run(&folder, &rest, &cage, SolverOptions { handles, spectrum, ..SolverOptions::default() });
+            assert_eq!(
+                report.handle_indices.len(),
+                match handles {
+                    Handles::MaxVol | Handles::All => report.unknowns,
+                    _ => 2 * report.unknowns,
+                }
+            );
+            assert_eq!(report.handle_indices[..report.rank].len(), report.rank);
+            report.error.l2_mean
+        };
+        let all = l2(Handles::All);
+        let [maxvol, rectangular, spread] =
+            [Handles::MaxVol, Handles::Rectangular { count }, Handles::Spread { count }].map(l2);
+        eprintln!(
+            "{capture}, spectrum {spectrum}: mean L2 {:.4}e-2 maxvol, {:.4}e-2 rectangular, {:.4}e-2 spread, {:.4}e-2 all; spread {:+.1} %",
+            100.0 * maxvol,
+            100.0 * rectangular,
+            100.0 * spread,
+            100.0 * all,
+            100.0 * (spread / all - 1.0)
+        );
+        assert!(spread <= 1.12 * all, "{capture}: {spread} is not within 12 % of {all}");
+        assert!(spread < rectangular && rectangular < maxvol, "{capture}: {spread} {rectangular} {maxvol}");
+    }
+}
+
+#[test]
+fn spread_handles_come_near_all_points_on_the_horse() {
+    spread_comes_near_all("horse-gallop");
+}
+
+#[test]
+fn spread_handles_come_near_all_points_on_the_dancer() {
+    spread_comes_near_all("samba");
+}
+
+#[test]
+fn spread_handles_come_near_all_points_on_the_arm() {
+    spread_comes_near_all("supercages-arm");
+}
+
+#[test]
+fn spread_handles_come_near_all_points_on_the_walk() {
+    spread_comes_near_all("makehuman-cmu-walk");
 }
 
 #[test]

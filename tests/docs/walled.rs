@@ -114,6 +114,7 @@ fn encode_through(address: &str, folder: &Path) {
         token: None,
         rest: &folder.join("rest.obj"),
         cage: &folder.join("cage.obj"),
+        matrix: None,
         frames: MemoryFrames::new(values.len() / 3 / FRAMES, values),
         output: &folder.join("capture.cager"),
         options: SessionOptions::default(),

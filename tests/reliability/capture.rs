@@ -59,7 +59,16 @@ impl Reference {
 
         let output = folder.path().join("out.cager");
         let mut reader = Narrow { frames: &frames, points: rest.points.len(), next: 0 };
-        let job = Job { rest: &rest, cage: &cage, frames: &mut reader, output: &output, system: &MeanValue, options };
+        let job = Job {
+            rest: &rest,
+            cage: &cage,
+            frames: &mut reader,
+            output: &output,
+            system: &MeanValue,
+            options,
+            term: None,
+            choose: None,
+        };
         let encoded = encode(job, &mut |_| {}).expect("an encoding");
         commit_together(vec![encoded.container]).expect("the container");
         let container = std::fs::read(&output).expect("the container");
@@ -97,6 +106,7 @@ impl Reference {
                 spectrum: Some(SPECTRUM as u32),
                 ..SessionOptions::default()
             },
+            regularizer_matrix: None,
             idempotency_key: Some(name.to_owned()),
         }
     }

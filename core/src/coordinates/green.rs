@@ -11,7 +11,7 @@
 //! Normals have a length: the root of the mean area of the faces. So `Φ` has no unit, and a cage's rows have one.
 
 use super::layer::{self, Frame, Layers, Scratch};
-use super::{CoordinateSystem, Coordinates, CoordinatesError};
+use super::{CoordinateSystem, Coordinates, CoordinatesError, TiedNormals};
 use crate::cage::Cage;
 use crate::mesh::{self, Point};
 use crate::simd::{LANES, Lanes, zeros};
@@ -19,8 +19,14 @@ use faer::MatMut;
 use rayon::prelude::*;
 
 /// Green coordinates: cage vertices and face normals, defined inside and outside the cage.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Green;
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Green {
+    /// Normals follow from the vertices, see [`TiedNormals`]: the vertices are the unknowns, and the inversion is not linear.
+    #[default]
+    Consistent,
+    /// Normals are unknowns of their own, as in the paper of this method, which finds it the least stable case.
+    Free,
+}
 
 /// Rows that sum to one within this are left alone.
 const WHOLE: f64 = 1e-13;
@@ -31,24 +37,41 @@ const AT_THE_CAGE: f64 = 1e-13;
 
 impl CoordinateSystem for Green {
     fn name(&self) -> &'static str {
-        "green-free"
+        match self {
+            Self::Consistent => "green",
+            Self::Free => "green-free",
+        }
     }
 
-    fn unknowns(&self, cage: &Cage) -> usize {
+    fn columns(&self, cage: &Cage) -> usize {
         cage.vertices().len() + cage.faces().len()
     }
 
-    fn rest_unknowns(&self, cage: &Cage) -> Vec<Point> {
+    fn rest_values(&self, cage: &Cage) -> Vec<Point> {
         let layers = Layers::new(cage);
         let length = normal_length(&layers) / layers.scale();
         let normals = layers.faces().iter().map(|f| f.normal().map(|c| c * length));
         cage.vertices().iter().copied().chain(normals).collect()
     }
 
+    fn unknowns(&self, cage: &Cage) -> usize {
+        match self {
+            Self::Consistent => cage.vertices().len(),
+            Self::Free => self.columns(cage),
+        }
+    }
+
+    fn tied_normals(&self, cage: &Cage) -> Option<TiedNormals> {
+        (*self == Self::Consistent).then(|| {
+            let layers = Layers::new(cage);
+            TiedNormals::new(cage, normal_length(&layers) / layers.scale())
+        })
+    }
+
     fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError> {
         let layers = Layers::new(cage);
         let length = normal_length(&layers);
-        let mut phi = zeros(points.len(), self.unknowns(cage));
+        let mut phi = zeros(points.len(), self.columns(cage));
         let outside = phi
             .as_mut()
             .par_row_chunks_mut(layer::TASK_POINTS)

@@ -31,16 +31,16 @@ impl CoordinateSystem for MeanValue {
         "mvc"
     }
 
-    fn unknowns(&self, cage: &Cage) -> usize {
+    fn columns(&self, cage: &Cage) -> usize {
         cage.vertices().len()
     }
 
-    fn rest_unknowns(&self, cage: &Cage) -> Vec<Point> {
+    fn rest_values(&self, cage: &Cage) -> Vec<Point> {
         cage.vertices().to_vec()
     }
 
     fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError> {
-        let mut phi = zeros(points.len(), self.unknowns(cage));
+        let mut phi = zeros(points.len(), self.columns(cage));
         let outside = phi
             .as_mut()
             .par_row_chunks_mut(TASK_POINTS)

@@ -1,4 +1,5 @@
-//! Cage coordinates: every point as a fixed combination of the cage's unknowns, `P = Φ·C`.
+//! Cage coordinates: every point as a fixed combination of values that a cage has, `P = Φ·Y`: its vertices, and for some systems
+//! its face normals.
 
 mod careful;
 mod doubt;
@@ -7,11 +8,13 @@ mod green;
 mod harmonic;
 pub(crate) mod layer;
 mod mean_value;
+mod normals;
 
 pub use error::CoordinatesError;
 pub use green::Green;
 pub use harmonic::Harmonic;
 pub use mean_value::MeanValue;
+pub use normals::TiedNormals;
 
 use crate::cage::Cage;
 use crate::mesh::Point;
@@ -31,11 +34,21 @@ pub trait CoordinateSystem: Sync {
     /// The name on the command line, in reports and in containers.
     fn name(&self) -> &'static str;
 
-    /// Number of unknowns m of a cage.
-    fn unknowns(&self, cage: &Cage) -> usize;
+    /// Columns of `Φ`: the values of a cage that it multiplies.
+    fn columns(&self, cage: &Cage) -> usize;
 
-    /// The unknowns of the rest pose, m × 3: what `Φ` multiplies to give the rest points.
-    fn rest_unknowns(&self, cage: &Cage) -> Vec<Point>;
+    /// The values of the rest pose, columns × 3: what `Φ` multiplies to give the rest points. The vertices come first.
+    fn rest_values(&self, cage: &Cage) -> Vec<Point>;
+
+    /// Unknowns m of a cage: rows that a stored cage has per frame. As many as columns, unless some values follow from others.
+    fn unknowns(&self, cage: &Cage) -> usize {
+        self.columns(cage)
+    }
+
+    /// The rule by which normals follow from the vertices, where they do: then the vertices alone are unknown.
+    fn tied_normals(&self, _cage: &Cage) -> Option<TiedNormals> {
+        None
+    }
 
     /// `Φ` for these points. Rows sum to one; runs on the current rayon pool; the result does not depend on it.
     ///

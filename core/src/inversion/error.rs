@@ -1,6 +1,8 @@
 //! Why a solver cannot be prepared, and what to do about it.
 
 use crate::coordinates::CoordinatesError;
+use crate::regularize::TermError;
+
 /// Why a solver cannot be prepared.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PrepareError {
@@ -66,6 +68,29 @@ pub enum PrepareError {
         /// Number of unknowns m.
         unknowns: usize,
     },
+    /// K < m or K > n.
+    #[error(
+        "{count} handles cannot be read: they have to be at least the {unknowns} unknowns of the cage and at most the {points} points of the model"
+    )]
+    HandleCount {
+        /// The number K.
+        count: usize,
+        /// Number of unknowns m.
+        unknowns: usize,
+        /// Number of points n.
+        points: usize,
+    },
+    /// The covariance of the handles does not fit into memory.
+    #[error("interpolating between {count} handles needs {gigabytes:.0} GB of memory; read fewer, or all points")]
+    HandlesOutOfMemory {
+        /// The number K.
+        count: usize,
+        /// Memory that preparing needs.
+        gigabytes: f64,
+    },
+    /// The regularisation term does not fit.
+    #[error(transparent)]
+    Term(#[from] TermError),
     /// λ is negative or not finite.
     #[error("the weight lambda is {lambda}; give a finite number of at least 0")]
     BadLambda {

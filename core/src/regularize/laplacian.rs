@@ -1,10 +1,27 @@
-//! The uniform cage Laplacian.
+//! The uniform cage Laplacian: the paper's default term.
 
+use super::{Reference, Term, TermError};
 use crate::cage::Cage;
 use faer::Mat;
 
-/// `Δ = I − D⁻¹A` of the cage's vertex graph, v × v: each vertex minus the mean of its neighbours.
-pub(crate) fn cage_laplacian(cage: &Cage) -> Mat<f64> {
+/// Smooth cages: each vertex should be the mean of its neighbours, and where a cage's normals are unknown, each of them the
+/// mean of those across its face's edges. It forgets the rest cage's shape ("destructive", §5.1), hence the small s.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CageLaplacian;
+
+impl Term for CageLaplacian {
+    fn delta(&self, cage: &Cage, unknowns: usize) -> Result<Mat<f64>, TermError> {
+        Ok(cage_laplacian(cage, unknowns))
+    }
+
+    fn reference(&self) -> Reference {
+        Reference::Origin
+    }
+}
+
+/// `Δ = I − D⁻¹A`: of the graph of vertices, v × v; where there are unknown normals, a second block of the graph of faces.
+/// Normals have a length, as vertices do.
+pub(super) fn cage_laplacian(cage: &Cage, unknowns: usize) -> Mat<f64> {
     let v = cage.vertices().len();
     let mut degree = vec![0.0; v];
     for edge in cage.edges() {
@@ -12,11 +29,27 @@ pub(crate) fn cage_laplacian(cage: &Cage) -> Mat<f64> {
             degree[end as usize] += 1.0;
         }
     }
-    let mut delta = Mat::identity(v, v);
+    let mut delta = Mat::zeros(unknowns, unknowns);
+    for i in 0..v {
+        delta[(i, i)] = 1.0;
+    }
     for edge in cage.edges() {
         let [a, b] = edge.vertices.map(|e| e as usize);
         delta[(a, b)] = -1.0 / degree[a];
         delta[(b, a)] = -1.0 / degree[b];
+    }
+    if unknowns == v + cage.faces().len() {
+        let mut faces_of = vec![Vec::with_capacity(2); cage.edges().len()];
+        for (f, face) in cage.faces().iter().enumerate() {
+            delta[(v + f, v + f)] = 1.0;
+            face.edges.iter().for_each(|&edge| faces_of[edge as usize].push(v + f));
+        }
+        for pair in faces_of {
+            if let [f, g] = pair[..] {
+                delta[(f, g)] -= 1.0 / 3.0;
+                delta[(g, f)] -= 1.0 / 3.0;
+            }
+        }
     }
     delta
 }

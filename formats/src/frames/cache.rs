@@ -142,4 +142,10 @@ impl<R: Read + Seek + Send> FrameReader for CacheReader<R> {
         self.next += 1;
         Ok(true)
     }
+
+    fn skip(&mut self) -> Result<bool, Error> {
+        let more = self.next < self.frames;
+        self.next += usize::from(more);
+        Ok(more)
+    }
 }

@@ -36,6 +36,14 @@ pub trait FrameReader: Send {
     /// # Errors
     /// [`Error::NonFinite`], [`Error::PointCount`], and those of the format; the next call tries the same frame again.
     fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error>;
+
+    /// Passes over the next frame; false at the end. Nothing is found out about it, where that saves reading it.
+    ///
+    /// # Errors
+    /// As [`Self::read_next`].
+    fn skip(&mut self) -> Result<bool, Error> {
+        self.read_next(&mut Vec::new())
+    }
 }
 
 /// A file format for the frames of a capture.

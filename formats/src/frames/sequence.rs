@@ -43,4 +43,10 @@ impl FrameReader for SequenceReader {
         self.next += 1;
         Ok(true)
     }
+
+    fn skip(&mut self) -> Result<bool, Error> {
+        let more = self.next < self.files.len();
+        self.next += usize::from(more);
+        Ok(more)
+    }
 }

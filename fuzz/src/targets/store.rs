@@ -180,7 +180,13 @@ pub(super) const SMALL_FILES: Target = Target {
         store.create_session(&meta).expect("a session");
         let completion = cager::store::Completion { frames: 6, container_bytes: 7, container_digest: "00".into() };
         store.complete(ID, &completion).expect("a completion");
-        let content = Content { rest_name: "a.obj".into(), rest: vec![1], cage_name: "b.obj".into(), cage: vec![2] };
+        let content = Content {
+            rest_name: "a.obj".into(),
+            rest: vec![1],
+            cage_name: "b.obj".into(),
+            cage: vec![2],
+            matrix: None,
+        };
         store.put_content(&KEY, &content).expect("content");
         let seeds = FILES.iter().enumerate().flat_map(|(k, (path, kind))| {
             let file = disk.get(Path::new(path)).expect("a file");

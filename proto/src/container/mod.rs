@@ -71,9 +71,9 @@ pub struct Summary {
     pub rank: u64,
     /// Singular values of the inverted matrix, descending.
     pub singular_values: Vec<f64>,
-    /// How the handles were found.
+    /// How the handles of maximum volume were found.
     pub maxvol: MaxVolSummary,
-    /// Rows of maximum volume.
+    /// Rows read, in their order: those of maximum volume first. Where every point is read, only those.
     pub handle_indices: Vec<u32>,
     /// Errors of the capture over the rest diagonal.
     pub error: ErrorSummary,

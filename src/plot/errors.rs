@@ -1,5 +1,7 @@
 //! The per-frame error as a picture: one self-contained SVG.
 
+use super::scale::{Scale, nice_step};
+use super::text::{escaped, grouped, line, short, text};
 use std::fmt::Write;
 
 /// Size of the picture and the left, right and upper edges of its panels, in pixels.
@@ -11,10 +13,6 @@ const TOPS: [f64; 2] = [76.0, 276.0];
 const PANEL: f64 = 136.0;
 /// Up to this many frames each gets its own dot.
 const DOTS: usize = 60;
-/// A panel whose values span more than this factor has a logarithmic scale.
-const LINEAR_SPAN: f64 = 1000.0;
-/// Decades a logarithmic scale shows at most; below are rounding errors and zeros.
-const DECADES: f64 = 15.0;
 /// Characters of the title that fit above the panels.
 const TITLE_CHARACTERS: usize = 78;
 
@@ -67,32 +65,6 @@ fn open(svg: &mut String, title: &str) {
     }
     let shown = escaped(&shown);
     let _ = writeln!(svg, r##"<text x="{LEFT}" y="32" font-size="16" font-weight="bold" fill="#111">{shown}</text>"##);
-}
-
-/// Text that may stand between tags; characters XML forbids become spaces.
-fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\'' => out.push_str("&#39;"),
-            '\u{fffe}' | '\u{ffff}' => out.push(' '),
-            c if c.is_control() => out.push(' '),
-            c => out.push(c),
-        }
-    }
-    out
-}
-
-fn text(svg: &mut String, x: f64, y: f64, anchor: &str, colour: &str, content: &str) {
-    let _ = writeln!(svg, r#"<text x="{x:.1}" y="{y:.1}" text-anchor="{anchor}" fill="{colour}">{content}</text>"#);
-}
-
-fn line(svg: &mut String, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2], style: &str) {
-    let _ = writeln!(svg, r#"<line x1="{x1:.1}" y1="{y1:.1}" x2="{x2:.1}" y2="{y2:.1}" {style}/>"#);
 }
 
 /// One measure over all frames.
@@ -238,98 +210,6 @@ impl FrameAxis {
         let last = self.frames.saturating_sub(1);
         let step = (nice_step(last as f64, 8.0) as usize).max(1);
         (0..self.frames).step_by(step).collect()
-    }
-}
-
-/// A vertical axis.
-struct Scale {
-    logarithmic: bool,
-    low: f64,
-    high: f64,
-}
-
-impl Scale {
-    fn over(values: &[f64]) -> Self {
-        let positive = || values.iter().copied().filter(|value| value.is_finite() && *value > 0.0);
-        let largest = positive().fold(0.0, f64::max);
-        if largest < f64::MIN_POSITIVE {
-            return Self { logarithmic: false, low: 0.0, high: 1.0 };
-        }
-        let least = positive().fold(largest, f64::min);
-        if largest / least > LINEAR_SPAN {
-            let high = largest.log10().ceil();
-            let low = least.log10().floor().max(high - DECADES);
-            return Self { logarithmic: true, low: 10_f64.powf(low), high: 10_f64.powf(high) };
-        }
-        // Headroom, so that no curve runs along the panel's upper edge; none where it would overflow.
-        let reach = if largest < f64::MAX / 100.0 { 1.04 * largest } else { largest };
-        let step = nice_step(reach, 4.0);
-        let high = (step * (reach / step).ceil()).min(f64::MAX);
-        Self { logarithmic: false, low: 0.0, high }
-    }
-
-    /// Height of a value within the panel: 0 at the bottom, 1 at the top.
-    fn position(&self, value: f64) -> f64 {
-        let position = if self.logarithmic {
-            (value.max(self.low).log10() - self.low.log10()) / (self.high.log10() - self.low.log10())
-        } else {
-            value / self.high
-        };
-        position.clamp(0.0, 1.0)
-    }
-
-    fn ticks(&self) -> Vec<f64> {
-        if self.logarithmic {
-            let (low, high) = (self.low.log10().round() as i32, self.high.log10().round() as i32);
-            let step = ((high - low) as usize).div_ceil(5);
-            return (low..=high).step_by(step).map(|decade| 10_f64.powi(decade)).collect();
-        }
-        let step = nice_step(self.high, 4.0);
-        let count = (self.high / step + 0.5).floor() as usize;
-        (0..=count).map(|k| k as f64 * step).collect()
-    }
-}
-
-/// The least of 1, 2 and 5 times a power of ten that divides `span` into no more than `parts`.
-fn nice_step(span: f64, parts: f64) -> f64 {
-    if span <= 0.0 {
-        return 1.0;
-    }
-    let rough = span / parts;
-    let decade = 10_f64.powf(rough.log10().floor());
-    // The slack lets a span that is already a multiple of a step keep it.
-    [1.0, 2.0, 5.0, 10.0].iter().map(|m| m * decade).find(|step| *step >= rough * (1.0 - 1e-9)).unwrap_or(10.0 * decade)
-}
-
-/// Digits in groups of three.
-fn grouped(number: usize) -> String {
-    let digits = number.to_string();
-    let mut out = String::new();
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            out.push(',');
-        }
-        out.push(digit);
-    }
-    out
-}
-
-/// A number in three significant digits without trailing zeros.
-fn short(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return value.to_string();
-    }
-    let magnitude = value.abs().log10().floor() as i32;
-    let trimmed = |text: &str| {
-        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text.to_owned() }
-    };
-    if (-4..5).contains(&magnitude) {
-        return trimmed(&format!("{value:.*}", (2 - magnitude).max(0) as usize));
-    }
-    let scientific = format!("{value:.2e}");
-    match scientific.split_once('e') {
-        Some((mantissa, exponent)) => format!("{}e{exponent}", trimmed(mantissa)),
-        None => scientific,
     }
 }
 

@@ -1,0 +1,206 @@
+//! Where a frame is on its way, and the conjugate gradients of its next step.
+
+use super::Outcome;
+use super::product_columns;
+use crate::coordinates::TiedNormals;
+use crate::mesh::Point;
+use faer::{Mat, MatRef};
+
+/// One frame. Positions are about the centre of the start, which keeps the digits of a capture that travels.
+pub(super) struct Moving {
+    pub(super) origin: Point,
+    start: Vec<Point>,
+    pub(super) cage: Vec<Point>,
+    /// `(v/K) Φᵀ P`, T × 3.
+    pub(super) side: Vec<Point>,
+    /// `(v/K) Σ |P|²`.
+    pub(super) squares: f64,
+    /// `G Y` of the cage's values Y.
+    pub(super) products: Vec<Point>,
+    pub(super) energy: f64,
+    pub(super) start_energy: f64,
+    pub(super) steps: usize,
+    pub(super) outcome: Option<Outcome>,
+}
+
+impl Moving {
+    pub(super) fn new(cage: &[Point]) -> Self {
+        let mut origin = [0.0; 3];
+        for row in cage {
+            for k in 0..3 {
+                origin[k] += row[k];
+            }
+        }
+        let origin = origin.map(|c| c / cage.len() as f64);
+        let start: Vec<Point> = cage.iter().map(|p| [0, 1, 2].map(|k| p[k] - origin[k])).collect();
+        Self {
+            origin,
+            cage: start.clone(),
+            start,
+            side: Vec::new(),
+            squares: 0.0,
+            products: Vec::new(),
+            energy: 0.0,
+            start_energy: 0.0,
+            steps: 0,
+            outcome: None,
+        }
+    }
+
+    /// Vertices and the normals that follow from them, T × 3.
+    pub(super) fn values(&self, tied: &TiedNormals, cage: &[Point]) -> Vec<Point> {
+        cage.iter().copied().chain(tied.normals(|v| cage[v as usize])).collect()
+    }
+
+    /// The first term of E.
+    pub(super) fn data_energy(&self, values: &[Point], products: &[Point]) -> f64 {
+        let terms = values.iter().zip(products).zip(&self.side);
+        self.squares + terms.map(|((&y, g), s)| dot(y, [0, 1, 2].map(|k| g[k] - 2.0 * s[k]))).sum::<f64>()
+    }
+
+    pub(super) fn moved_by(&self, cage: &[Point]) -> Vec<Point> {
+        cage.iter().zip(&self.start).map(|(c, s)| [0, 1, 2].map(|k| c[k] - s[k])).collect()
+    }
+
+    /// The cage where it was found.
+    pub(super) fn write(&self, cage: &mut [Point]) {
+        if self.steps > 0 {
+            for (to, from) in cage.iter_mut().zip(&self.cage) {
+                *to = [0, 1, 2].map(|k| from[k] + self.origin[k]);
+            }
+        }
+    }
+}
+
+/// Conjugate gradients on `(JᵀGJ + λΔᵀΔ) d = −½ ∇E`, where `J` is the derivative of a cage's values.
+pub(super) struct Search {
+    derivatives: Vec<[[Point; 3]; 2]>,
+    step: Vec<Point>,
+    residual: Vec<Point>,
+    direction: Vec<Point>,
+    /// Product of the residual with the preconditioned one; the first one of all.
+    size: f64,
+    first_size: f64,
+    done: bool,
+}
+
+impl Search {
+    /// From a frame and the gradient of the second term of E, halved.
+    pub(super) fn new(tied: &TiedNormals, frame: &Moving, pull_back: &[Point]) -> Self {
+        let derivatives = tied.derivatives(&frame.cage);
+        let difference = |(s, g): (&Point, &Point)| [0, 1, 2].map(|k| s[k] - g[k]);
+        let open: Vec<Point> = frame.side.iter().zip(&frame.products).map(difference).collect();
+        let mut residual = gathered(tied, &derivatives, &open);
+        for (r, p) in residual.iter_mut().zip(pull_back) {
+            *r = [0, 1, 2].map(|k| r[k] - p[k]);
+        }
+        let zeros = vec![[0.0; 3]; residual.len()];
+        Self { derivatives, step: zeros.clone(), direction: zeros, residual, size: 0.0, first_size: 0.0, done: false }
+    }
+
+    pub(super) fn residual(&self) -> Vec<Point> {
+        self.residual.clone()
+    }
+
+    pub(super) fn is_done(&self) -> bool {
+        self.done
+    }
+
+    pub(super) fn into_step(self) -> Vec<Point> {
+        self.step
+    }
+
+    /// The next direction, by the preconditioned residual.
+    pub(super) fn turn(&mut self, better: &[Point], first: bool, tolerance: f64) {
+        if self.done {
+            return;
+        }
+        let size: f64 = self.residual.iter().zip(better).map(|(&r, &z)| dot(r, z)).sum();
+        if first {
+            self.first_size = size;
+        }
+        // Written so that it holds for NaN.
+        if !(size > tolerance * self.first_size || (first && size > 0.0)) {
+            self.done = true;
+            return;
+        }
+        let turn = if first { 0.0 } else { size / self.size };
+        for (d, z) in self.direction.iter_mut().zip(better) {
+            *d = [0, 1, 2].map(|k| z[k] + turn * d[k]);
+        }
+        self.size = size;
+    }
+
+    /// `J d` of the direction, T × 3.
+    pub(super) fn moved_values(&self, tied: &TiedNormals) -> Vec<Point> {
+        let d = &self.direction;
+        let of_face = |(&[a, b, c], derivative): (&[u32; 3], &[[Point; 3]; 2])| {
+            let [a, b, c] = [a, b, c].map(|v| d[v as usize]);
+            let (u, v) = ([0, 1, 2].map(|k| b[k] - a[k]), [0, 1, 2].map(|k| c[k] - a[k]));
+            [0, 1, 2].map(|i| dot(derivative[0][i], u) + dot(derivative[1][i], v))
+        };
+        d.iter().copied().chain(tied.faces().iter().zip(&self.derivatives).map(of_face)).collect()
+    }
+
+    /// Goes along the direction d, by the curvature times `J d`.
+    pub(super) fn advance(&mut self, tied: &TiedNormals, products: &[Point]) {
+        if self.done {
+            return;
+        }
+        let image = gathered(tied, &self.derivatives, products);
+        let curvature: f64 = self.direction.iter().zip(&image).map(|(&d, &i)| dot(d, i)).sum();
+        let length = self.size / curvature;
+        if !(length.is_finite() && length > 0.0) {
+            self.done = true;
+            return;
+        }
+        for (i, image) in image.iter().enumerate() {
+            for k in 0..3 {
+                self.step[i][k] += length * self.direction[i][k];
+                self.residual[i][k] -= length * image[k];
+            }
+        }
+    }
+}
+
+/// `Jᵀ w` of values w, T × 3.
+fn gathered(tied: &TiedNormals, derivatives: &[[[Point; 3]; 2]], w: &[Point]) -> Vec<Point> {
+    let vertices = w.len() - derivatives.len();
+    let mut out = w[..vertices].to_vec();
+    for ((&[a, b, c], derivative), w) in tied.faces().iter().zip(derivatives).zip(&w[vertices..]) {
+        let [u, v] =
+            derivative.map(|rows| [0, 1, 2].map(|k| rows[0][k] * w[0] + rows[1][k] * w[1] + rows[2][k] * w[2]));
+        for k in 0..3 {
+            out[a as usize][k] -= u[k] + v[k];
+            out[b as usize][k] += u[k];
+            out[c as usize][k] += v[k];
+        }
+    }
+    out
+}
+
+/// `A · X` for the X of every frame that has one, side by side. The bits of a frame do not depend on the others.
+pub(super) fn products<T: faer::traits::RealField + Copy>(
+    a: MatRef<'_, T>,
+    frames: &[Vec<Point>],
+    to: impl Fn(f64) -> T,
+    from: impl Fn(T) -> f64,
+) -> Vec<Vec<Point>> {
+    let width = product_columns(frames.len());
+    let mut columns = Mat::<T>::zeros(a.ncols(), width);
+    for (f, frame) in frames.iter().enumerate() {
+        for k in 0..3 {
+            for (to_entry, row) in columns.col_as_slice_mut(3 * f + k).iter_mut().zip(frame) {
+                *to_entry = to(row[k]);
+            }
+        }
+    }
+    let mut out = Mat::<T>::zeros(a.nrows(), width);
+    crate::dense::multiply(out.as_mut(), a, columns.as_ref());
+    let rows = |f: usize| (0..a.ncols()).map(|j| [0, 1, 2].map(|k| from(out[(j, 3 * f + k)]))).collect();
+    frames.iter().enumerate().map(|(f, frame)| if frame.is_empty() { Vec::new() } else { rows(f) }).collect()
+}
+
+pub(super) fn dot(a: Point, b: Point) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}

@@ -1,0 +1,59 @@
+//! What of Φ the inversion needs: sums over the points read, of the coordinates that the decoder has, so that what is minimised is
+//! what decoding leaves.
+
+use super::BLOCK_ROWS;
+use crate::decode::Decoder;
+use faer::{Accum, Mat, Par};
+use rayon::prelude::*;
+
+/// Columns of the Gram matrix that one task computes.
+const TASK_COLUMNS: usize = 64;
+
+/// Rows of Φ, in double precision.
+pub(super) fn rows_of(decoder: &Decoder, rows: &[u32]) -> Mat<f64> {
+    let phi = decoder.coordinates();
+    Mat::from_fn(rows.len(), phi.ncols(), |i, j| f64::from(phi[(rows[i] as usize, j)]))
+}
+
+/// Puts `count` rows from `first` on, and of them `columns` columns from `left` on, into a matrix in double precision.
+pub(super) fn convert(decoder: &Decoder, first: usize, count: usize, left: usize, columns: usize, out: &mut Mat<f64>) {
+    let phi = decoder.coordinates();
+    for j in 0..columns {
+        let from = phi.col(left + j).subrows(first, count);
+        for (to, &x) in out.col_as_slice_mut(j).iter_mut().zip(from.iter()) {
+            *to = f64::from(x);
+        }
+    }
+}
+
+/// `share · ΦᵀΦ` of the given rows, or of all points. The same bits for any number of threads.
+pub(super) fn gram(decoder: &Decoder, rows: Option<&[u32]>, share: f64) -> Mat<f64> {
+    let total = decoder.columns();
+    let mut gram = Mat::<f64>::zeros(total, total);
+    let gathered = rows.map(|rows| rows_of(decoder, rows));
+    gram.as_mut().par_col_chunks_mut(TASK_COLUMNS).enumerate().for_each(|(task, mut columns)| {
+        let (left, width) = (task * TASK_COLUMNS, columns.ncols());
+        if let Some(rows) = &gathered {
+            let some = rows.as_ref().subcols(left, width);
+            faer::linalg::matmul::matmul(columns, Accum::Replace, rows.transpose(), some, share, Par::Seq);
+            return;
+        }
+        let points = decoder.points();
+        let mut all = Mat::<f64>::zeros(BLOCK_ROWS.min(points), total);
+        for first in (0..points).step_by(BLOCK_ROWS) {
+            let count = BLOCK_ROWS.min(points - first);
+            convert(decoder, first, count, 0, total, &mut all);
+            let block = all.as_ref().subrows(0, count);
+            let accumulate = if first == 0 { Accum::Replace } else { Accum::Add };
+            let some = block.subcols(left, width);
+            faer::linalg::matmul::matmul(columns.as_mut(), accumulate, block.transpose(), some, share, Par::Seq);
+        }
+    });
+    // Symmetric to the last bit, as the gradients take it to be.
+    for j in 0..total {
+        for i in 0..j {
+            gram[(j, i)] = gram[(i, j)];
+        }
+    }
+    gram
+}

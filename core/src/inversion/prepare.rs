@@ -1,0 +1,174 @@
+//! Preparing: coordinates, handles, spectrum and operator.
+
+use super::operator::tall_product;
+use super::{Analysis, Handles, PrepareError, Solver, SolverOptions};
+use crate::cage::Cage;
+use crate::coordinates::CoordinateSystem;
+use crate::mesh::{Point, diagonal, distance_to_surface, norm};
+use crate::regularize::{Term, TermError};
+use faer::{Mat, MatRef};
+use rayon::prelude::*;
+
+/// Beyond this affine reproduction error, over the diagonal, coordinates are of no use.
+const NOT_REPRODUCED: f64 = 1e-6;
+/// Farther from the cage, in its diagonals, one point outweighs all others by the inverse of [`WEAK`](crate::regularize::WEAK).
+const FAR: f64 = 1e5;
+/// Points outside by less than this fraction of the diagonal lie on the cage.
+const ON_THE_CAGE: f64 = 1e-9;
+
+/// What preparing found out.
+#[derive(Clone, Debug, Default)]
+pub struct Preparation {
+    /// Numerical rank of `Φ`, at most m.
+    pub rank: usize,
+    /// `max_i |Φ C_R − P_R|_i` over the rest diagonal.
+    pub affine_reproduction_error: f64,
+    /// Condition number of `Φ`, over its rank.
+    pub condition_full: f64,
+    /// Condition number of `Φ□`, over its rank.
+    pub condition_handles: f64,
+    /// Singular values of the inverted matrix, descending: `Φ□`, or `Φ` where every point is read.
+    pub singular_values: Vec<f64>,
+    /// Swaps of maxvol after its start.
+    pub swaps: usize,
+    /// `ln |det Φ□|`.
+    pub log_volume: f64,
+    /// Largest `|B_ij|` after the last swap.
+    pub max_entry: f64,
+    /// Points outside the cage, ascending.
+    pub outside: Vec<u32>,
+    /// Largest distance of those to the cage, over the rest diagonal.
+    pub outside_distance: f64,
+    /// Seconds for the coordinates.
+    pub coordinates_seconds: f64,
+    /// Seconds for maxvol.
+    pub maxvol_seconds: f64,
+    /// Seconds for singular values, regularisation and the operator.
+    pub svd_seconds: f64,
+}
+
+impl Solver {
+    /// Computes coordinates, handles, spectrum and operator. Runs on the current rayon pool; its result does not depend on it.
+    ///
+    /// # Errors
+    /// See [`PrepareError`].
+    pub fn prepare(
+        system: &dyn CoordinateSystem,
+        cage: &Cage,
+        points: &[Point],
+        options: SolverOptions,
+    ) -> Result<Self, PrepareError> {
+        let term = options.regularizer.term().ok_or(TermError::Missing)?;
+        Self::prepare_with(system, cage, points, options, term)
+    }
+
+    /// As [`Self::prepare`], with a term of the caller's own, for
+    /// [`Regularizer::Matrix`](crate::regularize::Regularizer::Matrix).
+    ///
+    /// # Errors
+    /// See [`PrepareError`].
+    pub fn prepare_with(
+        system: &dyn CoordinateSystem,
+        cage: &Cage,
+        points: &[Point],
+        options: SolverOptions,
+        term: &dyn Term,
+    ) -> Result<Self, PrepareError> {
+        // Known before anything is computed.
+        term.delta(cage, system.unknowns(cage))?;
+        let analysis = Analysis::for_options(system, cage, points, options)?;
+        analysis.reading(options.handles)?.solver_with(options, term)
+    }
+}
+
+pub(super) fn refuse_far_points(cage: &Cage, points: &[Point]) -> Result<(), PrepareError> {
+    let [a, b, c] = cage.vertices()[0];
+    for (point, p) in points.iter().enumerate() {
+        let distance = norm([p[0] - a, p[1] - b, p[2] - c]) / cage.diagonal();
+        if distance > FAR {
+            return Err(PrepareError::TooFar { point, distance });
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a point whose coordinates are rounding. A stray point enlarges the model's own diagonal, not the cage's.
+pub(super) fn refuse_unreproduced(point: usize, error: f64, cage: &Cage, diagonal: f64) -> Result<(), PrepareError> {
+    let relative = error / diagonal.min(cage.diagonal());
+    if relative.is_nan() || relative > NOT_REPRODUCED {
+        return Err(PrepareError::NotReproduced { point, error: relative });
+    }
+    Ok(())
+}
+
+pub(super) fn check(points: &[Point], unknowns: usize, options: SolverOptions) -> Result<(), PrepareError> {
+    if let Some(point) = points.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
+        return Err(PrepareError::NotFinite { point });
+    }
+    if points.len() < unknowns {
+        return Err(PrepareError::TooFewPoints { points: points.len(), unknowns });
+    }
+    let diagonal = diagonal(points);
+    if diagonal == 0.0 {
+        return Err(PrepareError::NoExtent);
+    }
+    if !diagonal.is_finite() {
+        return Err(PrepareError::TooLarge);
+    }
+    check_options(points.len(), unknowns, options)
+}
+
+/// Checks options for so many points and unknowns.
+///
+/// # Errors
+/// The options among [`PrepareError`].
+pub fn check_options(points: usize, unknowns: usize, options: SolverOptions) -> Result<(), PrepareError> {
+    if options.regularizer.has_threshold() && options.spectrum > unknowns {
+        return Err(PrepareError::SpectrumTooLarge { spectrum: options.spectrum, unknowns });
+    }
+    if !(options.lambda.is_finite() && options.lambda >= 0.0) {
+        return Err(PrepareError::BadLambda { lambda: options.lambda });
+    }
+    let count = options.handles.count(points, unknowns);
+    if !(unknowns..=points).contains(&count) {
+        return Err(PrepareError::HandleCount { count, unknowns, points });
+    }
+    // Their covariance, its factor, and what is solved with it.
+    if matches!(options.handles, Handles::Spread { .. }) && !coordinates_fit(count, 2 * count + 2 * unknowns, 1) {
+        let gigabytes = 8e-9 * count as f64 * (2 * count + 2 * unknowns) as f64;
+        return Err(PrepareError::HandlesOutOfMemory { count, gigabytes });
+    }
+    Ok(())
+}
+
+/// Whether the system grants memory for `copies` double-precision matrices n × m.
+pub fn coordinates_fit(points: usize, unknowns: usize, copies: usize) -> bool {
+    let Some(entries) = points.checked_mul(unknowns).and_then(|n| n.checked_mul(copies)) else { return false };
+    Vec::<f64>::new().try_reserve_exact(entries).is_ok()
+}
+
+/// Of the points found outside, those that do not lie on the cage, and the largest distance over the diagonal.
+pub(super) fn outside(cage: &Cage, points: &[Point], found: &[u32], diagonal: f64) -> (Vec<u32>, f64) {
+    let distance = |i: u32| distance_to_surface(cage.vertices(), &cage.mesh().triangles, points[i as usize]) / diagonal;
+    let measured: Vec<(u32, f64)> =
+        found.par_iter().map(|&i| (i, distance(i))).filter(|&(_, distance)| distance > ON_THE_CAGE).collect();
+    let farthest = measured.iter().map(|&(_, distance)| distance).fold(0.0, f64::max);
+    (measured.into_iter().map(|(i, _)| i).collect(), farthest)
+}
+
+/// The point of the largest `|Φ C − P|`, and that distance. Measured about the cage's first vertex: far from the origin the
+/// sum itself would round.
+pub(super) fn reproduction_error(
+    phi: MatRef<'_, f64>,
+    unknowns: &[Point],
+    cage: &Cage,
+    points: &[Point],
+) -> (usize, f64) {
+    let o = cage.vertices()[0];
+    let positions = cage.vertices().len();
+    let c = Mat::from_fn(unknowns.len(), 3, |i, k| unknowns[i][k] - if i < positions { o[k] } else { 0.0 });
+    let product = tall_product(phi, c.as_ref());
+    let error =
+        |(i, p): (usize, &Point)| (i, (0..3).map(|k| (product[(i, k)] - (p[k] - o[k])).powi(2)).sum::<f64>().sqrt());
+    points.iter().enumerate().map(error).fold((0, 0.0), |a, b| if b.1 > a.1 || b.1.is_nan() { b } else { a })
+}

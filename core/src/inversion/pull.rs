@@ -1,0 +1,71 @@
+//! Terms whose reference is another cage: what they add to `R · H`.
+
+use faer::Mat;
+
+/// What pulls cages towards others.
+#[derive(Clone, Debug)]
+pub enum Pull {
+    /// Nothing.
+    None,
+    /// Towards the rest cage: `c₀` of `C = R·H + c₀`, m × 3.
+    Constant(Mat<f64>),
+    /// Towards the previous frame's cage: S of `C_t = R·H_t + S·C_{t−1}`.
+    Previous {
+        /// S, m × m; the entries of every row that meet positions sum to zero.
+        operator: Mat<f64>,
+        /// The first frame's predecessor, m × 3 interleaved: the rest cage.
+        first: Vec<f32>,
+    },
+}
+
+impl Pull {
+    /// Whether frames depend on their predecessors.
+    pub fn is_previous(&self) -> bool {
+        matches!(self, Self::Previous { .. })
+    }
+
+    /// Whether it can belong to a solver with so many unknowns.
+    pub(super) fn fits(&self, unknowns: usize) -> bool {
+        match self {
+            Self::None => true,
+            Self::Constant(offset) => offset.shape() == (unknowns, 3),
+            Self::Previous { operator, first } => {
+                operator.shape() == (unknowns, unknowns) && first.len() == 3 * unknowns
+            }
+        }
+    }
+
+    pub(super) fn size_bytes(&self) -> usize {
+        match self {
+            Self::None => 0,
+            Self::Constant(offset) => 8 * offset.nrows() * offset.ncols(),
+            Self::Previous { operator, first } => 8 * operator.nrows() * operator.ncols() + 4 * first.len(),
+        }
+    }
+
+    /// Adds what it adds to a cage, m × 3, whose predecessor was this.
+    pub(super) fn add(&self, cage: &mut [[f64; 3]], previous: Option<&[f32]>, positions: usize) {
+        match self {
+            Self::None => {}
+            Self::Constant(offset) => {
+                for (j, row) in cage.iter_mut().enumerate() {
+                    for k in 0..3 {
+                        row[k] += offset[(j, k)];
+                    }
+                }
+            }
+            Self::Previous { operator, first } => {
+                let previous = previous.unwrap_or(first).as_chunks::<3>().0;
+                let origin = previous[0].map(f64::from);
+                for (j, row) in previous.iter().enumerate() {
+                    let x = [0, 1, 2].map(|k| f64::from(row[k]) - if j < positions { origin[k] } else { 0.0 });
+                    for (row, &weight) in cage.iter_mut().zip(operator.col_as_slice(j)) {
+                        for k in 0..3 {
+                            row[k] += weight * x[k];
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

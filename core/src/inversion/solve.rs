@@ -1,0 +1,205 @@
+//! Cages from frames: one matrix product for a batch, and for some systems what follows it.
+
+use super::consistent::Consistent;
+use super::{BLOCK_ROWS, Convergence, Preparation, Pull};
+use crate::decode::Decoder;
+use crate::mesh::Point;
+use faer::{Accum, Mat, Par};
+use std::sync::Arc;
+
+/// Most frames of one matrix product.
+pub const BATCH: usize = 16;
+
+/// A prepared inversion: `C_t = R · H_t`, and for some terms a constant or a part of the previous cage beside it.
+#[derive(Clone, Debug)]
+pub struct Solver {
+    pub(super) handles: Vec<u32>,
+    pub(super) reads_all: bool,
+    /// `Rᵀ`, K × m, column-major: one row per point read; zero columns follow up to a whole tile.
+    pub(super) operator: Mat<f64>,
+    pub(super) pull: Pull,
+    /// What improves cages where their normals follow from their vertices.
+    pub(super) consistent: Option<Arc<Consistent>>,
+    pub(super) decoder: Decoder,
+    pub(super) diagonal: f64,
+    pub(super) preparation: Preparation,
+}
+
+/// The cage of a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inverted {
+    /// m × 3 interleaved.
+    pub cage: Vec<f32>,
+    /// How finding it went, where that took more than a matrix product.
+    pub convergence: Option<Convergence>,
+}
+
+impl Solver {
+    /// What preparing found out.
+    pub fn preparation(&self) -> &Preparation {
+        &self.preparation
+    }
+
+    /// The rows read, K, in their order: those of maximum volume first. With [`Handles::All`](crate::handles::Handles::All) there are
+    /// no others here: they only condition the solve, and every point is read.
+    pub fn handles(&self) -> &[u32] {
+        &self.handles
+    }
+
+    /// Diagonal of the rest pose's bounding box: the unit of errors.
+    pub fn diagonal(&self) -> f64 {
+        self.diagonal
+    }
+
+    /// Cages back to positions.
+    pub fn decoder(&self) -> &Decoder {
+        &self.decoder
+    }
+
+    /// Bytes the prepared solver holds.
+    pub fn size_bytes(&self) -> usize {
+        let phi = self.decoder.coordinates();
+        let operator = 8 * self.operator.nrows() * self.operator.ncols() + self.pull.size_bytes();
+        let consistent = self.consistent.as_ref().map_or(0, |consistent| consistent.size_bytes());
+        4 * phi.nrows() * phi.ncols() + operator + consistent + 4 * self.handles.len()
+    }
+
+    /// Whether every cage depends on the previous frame's, so that frames have to be inverted in order, by
+    /// [`Self::invert_after`].
+    pub fn follows_previous(&self) -> bool {
+        self.pull.is_previous()
+    }
+
+    /// Cages, each m × 3 interleaved, of up to [`BATCH`] frames, each n × 3 interleaved.
+    ///
+    /// The bits of a cage depend on its frame alone, not on the other frames of the batch.
+    ///
+    /// # Panics
+    /// Where a frame's length does not fit, more frames come than a batch holds, or the solver follows the previous frame.
+    pub fn invert<T: Copy + Into<f64>>(&self, frames: &[&[T]]) -> Vec<Vec<f32>> {
+        assert!(!self.follows_previous(), "every cage depends on the one before");
+        self.invert_after(None, frames)
+    }
+
+    /// As [`Self::invert`], for any solver: where it follows the previous frame, these are consecutive frames, the first after the
+    /// one whose cage is `previous`, or the first of all. Other solvers do not look at it.
+    ///
+    /// # Panics
+    /// Where lengths do not fit, or more frames come than a batch holds.
+    pub fn invert_after<T: Copy + Into<f64>>(&self, previous: Option<&[f32]>, frames: &[&[T]]) -> Vec<Vec<f32>> {
+        self.invert_reporting(previous, frames).into_iter().map(|inverted| inverted.cage).collect()
+    }
+
+    /// As [`Self::invert_after`], with how the inversion of each frame went.
+    ///
+    /// # Panics
+    /// As [`Self::invert_after`].
+    pub fn invert_reporting<T: Copy + Into<f64>>(&self, previous: Option<&[f32]>, frames: &[&[T]]) -> Vec<Inverted> {
+        assert!(frames.iter().all(|f| f.len() == 3 * self.decoder.points()), "every frame has every point");
+        self.solve(previous, frames, |row| if self.reads_all { row } else { self.handles[row] as usize })
+    }
+
+    /// As [`Self::invert`] of frames of which only the rows of [`Self::handles`] are there, K × 3 interleaved: the same bits.
+    ///
+    /// # Panics
+    /// As [`Self::invert`], and where the solver reads every point.
+    pub fn invert_handles<T: Copy + Into<f64>>(&self, frames: &[&[T]]) -> Vec<Vec<f32>> {
+        assert!(!self.follows_previous(), "every cage depends on the one before");
+        self.invert_handles_after(None, frames)
+    }
+
+    /// As [`Self::invert_after`] and [`Self::invert_handles`].
+    ///
+    /// # Panics
+    /// As both.
+    pub fn invert_handles_after<T: Copy + Into<f64>>(
+        &self,
+        previous: Option<&[f32]>,
+        frames: &[&[T]],
+    ) -> Vec<Vec<f32>> {
+        assert!(!self.reads_all, "handles are not enough for least squares over all points");
+        assert!(frames.iter().all(|f| f.len() == 3 * self.handles.len()), "every frame has every handle");
+        self.solve(previous, frames, |row| row).into_iter().map(|inverted| inverted.cage).collect()
+    }
+
+    fn solve<T: Copy + Into<f64>>(
+        &self,
+        previous: Option<&[f32]>,
+        frames: &[&[T]],
+        point_of_row: impl Fn(usize) -> usize,
+    ) -> Vec<Inverted> {
+        assert!(previous.is_none_or(|cage| cage.len() == 3 * self.decoder.unknowns()), "a cage has every unknown");
+        let mut cages = self.linear(frames, &point_of_row);
+        let position = |frame: usize, row: usize| {
+            let point = point_of_row(row);
+            [0, 1, 2].map(|k| frames[frame][3 * point + k].into())
+        };
+        if let (Some(consistent), false) = (&self.consistent, self.follows_previous()) {
+            for cage in &mut cages {
+                self.pull.add(cage, None, self.decoder.positions());
+            }
+            let found = consistent.refine(&self.decoder, &mut cages, position, self.diagonal);
+            let inverted = |(cage, found): (&Vec<Point>, _)| Inverted { cage: single(cage), convergence: Some(found) };
+            return cages.iter().zip(found).map(inverted).collect();
+        }
+        let mut solved: Vec<Inverted> = Vec::with_capacity(frames.len());
+        for (f, mut cage) in cages.into_iter().enumerate() {
+            let before = solved.last().map(|inverted| inverted.cage.as_slice()).or(previous);
+            self.pull.add(&mut cage, before, self.decoder.positions());
+            let mut cage = [cage];
+            let refine = |consistent: &Arc<Consistent>| {
+                consistent.refine(&self.decoder, &mut cage, |_, row| position(f, row), self.diagonal).pop()
+            };
+            let convergence = self.consistent.as_ref().and_then(refine);
+            solved.push(Inverted { cage: single(&cage[0]), convergence });
+        }
+        solved
+    }
+
+    /// `R · H`.
+    fn linear<T: Copy + Into<f64>>(&self, frames: &[&[T]], point_of_row: impl Fn(usize) -> usize) -> Vec<Vec<Point>> {
+        let (columns, padded) = self.operator.shape();
+        let m = self.decoder.unknowns();
+        let width = product_columns(frames.len());
+        let mut cages = Mat::<f64>::zeros(padded, width);
+        let mut block = Mat::<f64>::zeros(BLOCK_ROWS.min(columns), width);
+        let mut first = 0;
+        while first < columns {
+            let rows = BLOCK_ROWS.min(columns - first);
+            for (f, frame) in frames.iter().enumerate() {
+                for i in 0..rows {
+                    let point = point_of_row(first + i);
+                    for k in 0..3 {
+                        block[(i, 3 * f + k)] = frame[3 * point + k].into();
+                    }
+                }
+            }
+            faer::linalg::matmul::matmul(
+                cages.as_mut(),
+                if first == 0 { Accum::Replace } else { Accum::Add },
+                self.operator.as_ref().subrows(first, rows).transpose(),
+                block.as_ref().subrows(0, rows),
+                1.0,
+                Par::Seq,
+            );
+            first += rows;
+        }
+        (0..frames.len()).map(|f| (0..m).map(|j| [0, 1, 2].map(|k| cages[(j, 3 * f + k)])).collect()).collect()
+    }
+}
+
+fn single(cage: &[Point]) -> Vec<f32> {
+    cage.as_flattened().iter().map(|&x| x as f32).collect()
+}
+
+/// Columns of the product of a batch of frames.
+///
+/// Few frames cost less in a narrow product. Widths are whole tiles of the kernels, which sum over the unknowns in the same
+/// order in each: a test holds them to it.
+///
+/// # Panics
+/// Where more frames come than a batch holds.
+pub(crate) fn product_columns(frames: usize) -> usize {
+    assert!(frames <= BATCH, "at most {BATCH} frames in a batch");
+    3 * [BATCH / 4, BATCH / 2].into_iter().find(|&width| frames <= width).unwrap_or(BATCH)
+}

@@ -1,0 +1,114 @@
+//! A term on the unstable end of the spectrum, and the baselines (paper §5.2).
+
+use super::{Reference, Regularizer, WEAK};
+use crate::dense;
+use faer::{Mat, MatRef};
+
+/// What [`spectral_map`] needs to know of the decomposition.
+pub(crate) struct Spectrum<'a> {
+    /// Singular values above the rank tolerance, descending, r ≤ m.
+    pub(crate) sigma: &'a [f64],
+    /// Right singular vectors, m × m; the last m − r span the null space.
+    pub(crate) v: MatRef<'a, f64>,
+    /// Regularisation term Δ, rows × m.
+    pub(crate) delta: MatRef<'a, f64>,
+    /// What `Δ C` should be.
+    pub(crate) reference: Reference,
+}
+
+/// `q = data · (Uᵀ H) + pull · C₀`.
+pub(crate) struct SpectralMap {
+    /// m × r.
+    pub(crate) data: Mat<f64>,
+    /// m × m; none where the term has no reference, or no say.
+    pub(crate) pull: Option<Mat<f64>>,
+}
+
+/// The map for a threshold s. Directions the data says nothing about are always placed by Δ, but for the two baselines that have
+/// no term; with a term, those it says next to nothing about as well.
+///
+/// `None` where a factorisation fails.
+pub(crate) fn spectral_map(
+    spectrum: &Spectrum<'_>,
+    regularizer: Regularizer,
+    s: usize,
+    lambda: f64,
+) -> Option<SpectralMap> {
+    let (m, r) = (spectrum.v.ncols(), spectrum.sigma.len());
+    let dead = m - r;
+    let diagonal = |f: &dyn Fn(usize, f64) -> f64| {
+        let data = Mat::from_fn(m, r, |i, j| if i == j { f(i, spectrum.sigma[i]) } else { 0.0 });
+        SpectralMap { data, pull: None }
+    };
+    match regularizer {
+        Regularizer::TruncatedSvd => Some(diagonal(&|k, sigma| if k < m - s { 1.0 / sigma } else { 0.0 })),
+        Regularizer::Tikhonov => Some(diagonal(&|_, sigma| sigma / (sigma * sigma + lambda * lambda))),
+        Regularizer::Global => sub_spectral(spectrum, m, lambda),
+        _ if regularizer.is_sub_spectral() && lambda > 0.0 => sub_spectral(spectrum, s.max(weak(spectrum)), lambda),
+        _ => sub_spectral(spectrum, dead, 1.0),
+    }
+}
+
+/// Directions that a term takes whatever the threshold.
+fn weak(spectrum: &Spectrum<'_>) -> usize {
+    spectrum.v.ncols() - spectrum.sigma.iter().filter(|&&x| x >= WEAK * spectrum.sigma[0]).count()
+}
+
+/// Directions from m − s on minimise `λ‖Δ V_high q_high + Δ V_low q_low − Δ C₀‖² + ‖Σ_high q_high − U_highᵀ H‖²`.
+fn sub_spectral(spectrum: &Spectrum<'_>, s: usize, lambda: f64) -> Option<SpectralMap> {
+    let (m, r) = (spectrum.v.ncols(), spectrum.sigma.len());
+    let low = m - s;
+    let mut data = Mat::zeros(m, r);
+    for k in 0..low {
+        data[(k, k)] = 1.0 / spectrum.sigma[k];
+    }
+    if s == 0 {
+        return Some(SpectralMap { data, pull: None });
+    }
+    let bent = dense::product(spectrum.delta, spectrum.v);
+    let (bent_low, bent_high) = (bent.as_ref().subcols(0, low), bent.as_ref().subcols(low, s));
+    let mut system = dense::product(bent_high.transpose(), bent_high);
+    // What rounding leaves of a direction that Δ does not know.
+    let nothing = lambda * (1e-14 * spectrum.delta.norm_l2()).powi(2);
+    let coupling = dense::product(bent_high.transpose(), bent_low);
+    // The right-hand sides of the data, and after them those of the reference.
+    let pulled = if spectrum.reference == Reference::Origin { 0 } else { m };
+    let mut right = Mat::zeros(s, r + pulled);
+    for i in 0..s {
+        for j in 0..s {
+            system[(i, j)] *= lambda;
+        }
+        for k in 0..low {
+            right[(i, k)] = -lambda * coupling[(i, k)] / spectrum.sigma[k];
+        }
+        if low + i < r {
+            let sigma = spectrum.sigma[low + i];
+            system[(i, i)] += sigma * sigma;
+            right[(i, low + i)] = sigma;
+        }
+    }
+    if pulled > 0 {
+        let pull = dense::product(bent_high.transpose(), spectrum.delta);
+        for (i, j) in (0..m).flat_map(|j| (0..s).map(move |i| (i, j))) {
+            right[(i, r + j)] = lambda * pull[(i, j)];
+        }
+    }
+    let high = match dense::solve_determined(system.clone(), right.clone(), 1e-13, nothing) {
+        Some(high) => high,
+        // Δ leaves the place of a whole shell free, and no point feels that shell: hold it near the centre.
+        None => {
+            let size = (0..s).map(|i| system[(i, i)]).fold(0.0, f64::max);
+            for i in 0..s {
+                system[(i, i)] += if size > 0.0 { 1e-9 * size } else { 1.0 };
+            }
+            dense::solve_definite(system, right)?
+        }
+    };
+    for j in 0..r {
+        for i in 0..s {
+            data[(low + i, j)] = high[(i, j)];
+        }
+    }
+    let pull = (pulled > 0).then(|| Mat::from_fn(m, m, |i, j| if i < low { 0.0 } else { high[(i - low, r + j)] }));
+    Some(SpectralMap { data, pull })
+}

@@ -1,0 +1,11 @@
+//! Plots as SVG: scales, words and the two kinds of picture.
+
+mod chart;
+mod errors;
+mod scale;
+mod text;
+
+pub(crate) use chart::{Axis, Chart, Mark, Series};
+pub(crate) use errors::error_plot;
+pub(crate) use scale::Cover;
+pub(crate) use text::{escaped, grouped, short};

@@ -1,0 +1,124 @@
+//! Axes: which values they span, and where their ticks are.
+
+/// An axis whose values span more than this factor is logarithmic.
+const LINEAR_SPAN: f64 = 1000.0;
+/// Decades a logarithmic axis shows at most; below are rounding errors and zeros.
+const DECADES: f64 = 15.0;
+
+/// An axis of values.
+pub(crate) struct Scale {
+    /// Whether equal steps are equal factors.
+    pub(crate) logarithmic: bool,
+    /// Lower end.
+    pub(crate) low: f64,
+    /// Upper end.
+    pub(crate) high: f64,
+}
+
+/// How an axis covers its values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Cover {
+    /// Linear from zero; logarithmic where values span more than a factor of a thousand.
+    FromZero,
+    /// Linear around the values.
+    Around,
+    /// Linear from the least to the largest value exactly: frames, indices.
+    Exactly,
+    /// Logarithmic.
+    Factors,
+}
+
+impl Scale {
+    /// The axis for these values; those that are not finite do not count.
+    pub(crate) fn covering(cover: Cover, values: &[f64]) -> Self {
+        let finite = || values.iter().copied().filter(|value| value.is_finite());
+        let low = finite().fold(f64::INFINITY, f64::min);
+        let high = finite().fold(f64::NEG_INFINITY, f64::max);
+        match cover {
+            _ if low > high => Self { logarithmic: false, low: 0.0, high: 1.0 },
+            Cover::FromZero => Self::over(values),
+            Cover::Exactly if high > low => Self { logarithmic: false, low, high },
+            Cover::Around | Cover::Exactly => {
+                let span = if high > low { high - low } else { 0.1 * high.abs().max(1.0) };
+                let step = nice_step(span, 4.0);
+                let (low, high) = (step * (low / step).floor(), step * (high / step).ceil());
+                Self { logarithmic: false, low, high: if high > low { high } else { low + step } }
+            }
+            Cover::Factors => {
+                let positive = || finite().filter(|value| *value >= f64::MIN_POSITIVE);
+                let high = positive().fold(0.0, f64::max);
+                if high == 0.0 {
+                    return Self { logarithmic: true, low: 0.1, high: 1.0 };
+                }
+                let low = positive().fold(high, f64::min).max(high * 10_f64.powf(-DECADES));
+                // Whole decades where there are several, halves of them where there is one.
+                let (low, high) = (low.log10() - 0.02, high.log10() + 0.02);
+                let part = if high - low > 2.5 { 1.0 } else { 0.25 };
+                let (low, high) = (part * (low / part).floor(), part * (high / part).ceil());
+                Self { logarithmic: true, low: 10_f64.powf(low), high: 10_f64.powf(high) }
+            }
+        }
+    }
+
+    /// The axis from zero for values that are not negative, or the logarithmic one where they differ too much.
+    pub(crate) fn over(values: &[f64]) -> Self {
+        let positive = || values.iter().copied().filter(|value| value.is_finite() && *value > 0.0);
+        let largest = positive().fold(0.0, f64::max);
+        if largest < f64::MIN_POSITIVE {
+            return Self { logarithmic: false, low: 0.0, high: 1.0 };
+        }
+        let least = positive().fold(largest, f64::min);
+        if largest / least > LINEAR_SPAN {
+            let high = largest.log10().ceil();
+            let low = least.log10().floor().max(high - DECADES);
+            return Self { logarithmic: true, low: 10_f64.powf(low), high: 10_f64.powf(high) };
+        }
+        // Headroom, so that no curve runs along the panel's upper edge; none where it would overflow.
+        let reach = if largest < f64::MAX / 100.0 { 1.04 * largest } else { largest };
+        let step = nice_step(reach, 4.0);
+        let high = (step * (reach / step).ceil()).min(f64::MAX);
+        Self { logarithmic: false, low: 0.0, high }
+    }
+
+    /// Height of a value within the panel: 0 at the bottom, 1 at the top.
+    pub(crate) fn position(&self, value: f64) -> f64 {
+        let position = if self.logarithmic {
+            (value.max(self.low).log10() - self.low.log10()) / (self.high.log10() - self.low.log10())
+        } else {
+            (value - self.low) / (self.high - self.low)
+        };
+        position.clamp(0.0, 1.0)
+    }
+
+    /// Values to label.
+    pub(crate) fn ticks(&self) -> Vec<f64> {
+        if self.logarithmic {
+            let (low, high) = (self.low.log10(), self.high.log10());
+            if high - low < 2.5 {
+                let first = low.floor() as i32;
+                let all = (first..=high.ceil() as i32).flat_map(|d| [1.0, 2.0, 5.0].map(|m| m * 10_f64.powi(d)));
+                let slack = 1.0 + 1e-9;
+                return all.filter(|tick| *tick * slack >= self.low && *tick <= self.high * slack).collect();
+            }
+            let (low, high) = (low.round() as i32, high.round() as i32);
+            let step = ((high - low) as usize).div_ceil(5);
+            return (low..=high).step_by(step).map(|decade| 10_f64.powi(decade)).collect();
+        }
+        let step = nice_step(self.high - self.low, 4.0);
+        let first = (self.low / step - 1e-9).ceil();
+        let count = (self.high / step - first + 1e-9).floor() as usize;
+        // Minus zero is written as such.
+        (0..=count).map(|k| (first + k as f64) * step + 0.0).collect()
+    }
+}
+
+/// The least of 1, 2 and 5 times a power of ten that divides `span` into no more than `parts`.
+pub(crate) fn nice_step(span: f64, parts: f64) -> f64 {
+    if span <= 0.0 {
+        return 1.0;
+    }
+    let rough = span / parts;
+    let decade = 10_f64.powf(rough.log10().floor());
+    // The slack lets a span that is already a multiple of a step keep it.
+    [1.0, 2.0, 5.0, 10.0].iter().map(|m| m * decade).find(|step| *step >= rough * (1.0 - 1e-9)).unwrap_or(10.0 * decade)
+}
