@@ -27,6 +27,19 @@ pub struct Coordinates {
     pub phi: Mat<f64>,
     /// Points that lie outside the cage, ascending.
     pub outside: Vec<u32>,
+    /// How the solution was refined, for coordinates that are a numerical one.
+    pub refinement: Option<Refinement>,
+}
+
+/// How a numerical solution was refined.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refinement {
+    /// Boundary elements of the last solution.
+    pub elements: usize,
+    /// Solutions after the first.
+    pub refinements: usize,
+    /// Most that the last refinement changed a coordinate of a point by.
+    pub change: f64,
 }
 
 /// A system of cage coordinates. Every implementation passes the suite in `core/tests/conformance.rs`.

@@ -47,7 +47,8 @@ impl AffineFit {
         Self { centre, columns, rows }
     }
 
-    /// Makes the rows of these points reproduce linear functions exactly. Returns the largest change of an entry.
+    /// Makes the rows of these points reproduce linear functions exactly. Returns the largest change of an entry, NaN
+    /// where an entry is not finite.
     pub(super) fn complete(&self, mut a: MatMut<'_, f64>, points: impl Iterator<Item = Point>) -> f64 {
         let mut missing: Vec<[f64; 4]> = points.map(|x| row(x, self.centre)).collect();
         for (j, row) in self.rows.iter().enumerate() {
@@ -58,14 +59,16 @@ impl AffineFit {
             }
         }
         let mut largest = 0.0f64;
+        let mut finite = true;
         for (j, column) in self.columns.iter().enumerate() {
             for (missing, value) in missing.iter().zip(a.as_mut().col_mut(j).iter_mut()) {
                 let change: f64 = (0..4).map(|k| missing[k] * column[k]).sum();
                 *value += change;
+                finite &= value.is_finite();
                 largest = largest.max(change.abs());
             }
         }
-        largest
+        if finite { largest } else { f64::NAN }
     }
 
     /// As a dense matrix 4 × v, for tests and bounds.

@@ -16,17 +16,25 @@ pub(super) struct Element {
 }
 
 impl Element {
-    /// Both halves, cut across the longest side.
-    fn halves(&self) -> [Self; 2] {
+    /// Both halves, cut across the longest side; none where there is no single longest one.
+    fn halves(&self) -> Option<[Self; 2]> {
         let corners = self.triangle.corners;
         let length2 = |i: usize| -> f64 {
             let (a, b) = (corners[(i + 1) % 3], corners[(i + 2) % 3]);
             (0..3).map(|k| (a[k] - b[k]).powi(2)).sum()
         };
-        let top = (0..3).fold(0, |a, b| if length2(b) > length2(a) { b } else { a });
+        let top = (0..3).find(|&i| (1..3).all(|j| length2(i) > TIE * length2((i + j) % 3)))?;
         let [a, b, c] = [top, (top + 1) % 3, (top + 2) % 3].map(|i| corners[i]);
         let middle = [0, 1, 2].map(|k| 0.5 * (b[k] + c[k]));
-        [[a, b, middle], [a, middle, c]].map(|corners| Self { triangle: Triangle::new(corners), ..*self })
+        Some([[a, b, middle], [a, middle, c]].map(|corners| Self { triangle: Triangle::new(corners), ..*self }))
+    }
+
+    /// All four parts, cut between the middles of the sides.
+    fn quarters(&self) -> [Self; 4] {
+        let [a, b, c] = self.triangle.corners;
+        let middle = |p: Point, q: Point| [0, 1, 2].map(|k| 0.5 * (p[k] + q[k]));
+        let (d, e, f) = (middle(a, b), middle(b, c), middle(c, a));
+        [[a, d, f], [d, b, e], [f, e, c], [d, e, f]].map(|corners| Self { triangle: Triangle::new(corners), ..*self })
     }
 
     /// Highest degree that a triangle of this shape is given: polynomials of high degree nearly depend on each other in thin ones.
@@ -63,6 +71,9 @@ const ON: f64 = 0.01;
 const MOST: [(f64, usize); 3] = [(4.0, 6), (8.0, 5), (14.0, 4)];
 /// and what any may have.
 const LEAST: usize = 3;
+/// Sides are of different length when their squares differ by more than this factor: cages with symmetries are divided alike,
+/// however their vertices are ordered.
+const TIE: f64 = 1.0 + 1e-9;
 /// No elements are divided for the sake of their shape once there are so many.
 const MANY: usize = 1200;
 
@@ -82,10 +93,9 @@ pub(super) fn elements(faces: &[[Point; 3]], points: &[Point]) -> Vec<Element> {
                 let nearness = element.nearness(points);
                 let wanted = ENOUGH.iter().find(|(least, _)| nearness >= *least).map_or(usize::MAX, |e| e.1);
                 let most = element.most();
-                if wanted > most && divide {
-                    element.halves().to_vec()
-                } else {
-                    vec![Element { degree: wanted.min(most), ..element }]
+                match element.halves() {
+                    Some(halves) if wanted > most && divide => halves.to_vec(),
+                    _ => vec![Element { degree: wanted.min(most), ..element }],
                 }
             })
             .collect();
@@ -105,8 +115,10 @@ pub(super) fn refined(elements: &[Element], marked: &[bool]) -> Vec<Element> {
             out.push(element.clone());
         } else if element.degree < element.most() {
             out.push(Element { degree: element.degree + 1, ..element.clone() });
+        } else if let Some(halves) = element.halves() {
+            out.extend(halves);
         } else {
-            out.extend(element.halves());
+            out.extend(element.quarters());
         }
     }
     out

@@ -9,9 +9,9 @@ use super::basis::{MAX_FUNCTIONS, functions};
 use super::elements::Unknowns;
 use super::potential::{Tables, potentials};
 use super::solve::{Densities, Part};
-use super::surface::{Foot, ON_SURFACE};
+use super::surface::{Foot, Side, Surface};
 use crate::coordinates::layer::{self, INVERSE_4PI, Layers, group_potentials, write_group};
-use crate::mesh::{Point, distance2_to_triangle};
+use crate::mesh::{self, Point, distance2_to_triangle};
 use crate::simd::{LANES, Lanes, multiversion};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, Par};
@@ -27,6 +27,7 @@ const MAIN: f64 = 0.3;
 pub(super) struct Solution<'a> {
     pub(super) tables: &'a Tables,
     pub(super) layers: &'a Layers,
+    pub(super) surface: &'a Surface<'a>,
     pub(super) affine: &'a AffineFit,
     pub(super) unknowns: &'a Unknowns,
     pub(super) densities: &'a Densities,
@@ -83,7 +84,8 @@ pub(super) fn evaluate(solution: &Solution<'_>, points: &[Point], feet: &[Foot],
     let mut all = Evaluated { phi, change: 0.0, marked: vec![false; solution.unknowns.elements.len()], correction: 0.0 };
     for found in found {
         all.change = all.change.max(found.change);
-        all.correction = all.correction.max(found.correction);
+        // NaN stays.
+        all.correction = if found.correction <= all.correction { all.correction } else { found.correction };
         for e in found.marked {
             all.marked[e as usize] = true;
         }
@@ -97,27 +99,39 @@ struct Near<'a> {
     feet: &'a [Foot],
     /// From 0 inside to 1 on the surface.
     shares: Vec<f64>,
+    /// How far inside of the surface its values are taken.
+    inwards: f64,
 }
 
 impl<'a> Near<'a> {
     fn new(solution: &Solution<'_>, points: &'a [Point], feet: &'a [Foot]) -> Self {
-        let faces = solution.layers.faces().len();
-        let mut of_face = vec![Vec::new(); faces];
-        for (e, element) in solution.unknowns.elements.iter().enumerate() {
-            of_face[element.face as usize].push(e);
-        }
+        // The error of a density of degree p changes its sign about p times along an element.
+        let reaches: Vec<f64> = solution
+            .unknowns
+            .elements
+            .iter()
+            .map(|element| 0.5 * element.triangle.diameter() / (element.degree + 1) as f64)
+            .collect();
+        let farthest = reaches.iter().copied().fold(0.0, f64::max);
+        let touching = solution.surface.thickness();
         let share = |foot: &Foot| {
-            // The error of a density of degree p changes its sign about p times along an element.
-            let reach = |e: &usize| {
-                let element = &solution.unknowns.elements[*e];
-                let apart = distance2_to_triangle(element.triangle.corners, foot.place);
-                (apart, 0.5 * element.triangle.diameter() / (element.degree + 1) as f64)
-            };
-            let reach = of_face[foot.face as usize].iter().map(reach).min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0.0, |r| r.1);
-            if foot.distance <= ON_SURFACE { 1.0 } else { (1.0 - foot.distance / reach).max(0.0).powi(3) }
+            if foot.side == Side::On {
+                return 1.0;
+            } else if foot.distance >= farthest {
+                return 0.0;
+            }
+            // All elements that meet at the foot, so that the order of faces does not count.
+            let meet = solution.unknowns.elements.iter().zip(&reaches).filter(|(element, _)| {
+                let triangle = &element.triangle;
+                let apart = mesh::norm([0, 1, 2].map(|k| triangle.centre[k] - foot.place[k]));
+                apart <= triangle.radius + touching
+                    && distance2_to_triangle(triangle.corners, foot.place) <= touching * touching
+            });
+            let reach = meet.map(|(_, &reach)| reach).fold(f64::INFINITY, f64::min);
+            (1.0 - foot.distance / reach).max(0.0).powi(3)
         };
         let shares = feet.par_iter().map(share).collect();
-        Self { points, feet, shares }
+        Self { points, feet, shares, inwards: solution.surface.thickness() }
     }
 
     /// Eight points, those places on the surface from which their shares come, just inside, and the shares; the last point again where
@@ -127,12 +141,12 @@ impl<'a> Near<'a> {
         for l in 0..LANES {
             let i = (first + l).min(self.points.len() - 1);
             let (x, foot) = (self.points[i], &self.feet[i]);
-            let on_surface = foot.distance <= ON_SURFACE;
+            let on_surface = foot.side == Side::On;
             group.own.0[l] = if on_surface { 0.0 } else { 1.0 };
             group.share.0[l] = if on_surface { 0.0 } else { self.shares[i] };
             for k in 0..3 {
                 group.x[k].0[l] = x[k];
-                let inwards = ON_SURFACE / foot.distance.max(ON_SURFACE);
+                let inwards = self.inwards / foot.distance.max(self.inwards);
                 group.y[k].0[l] = if self.shares[i] > 0.0 { foot.place[k] + inwards * (x[k] - foot.place[k]) } else { x[k] };
             }
         }
@@ -155,7 +169,7 @@ fn evaluate_task(
     mut rows: MatMut<'_, f64>,
     scratch: &mut Scratch,
 ) -> Found {
-    let Solution { layers, unknowns, densities, .. } = solution;
+    let Solution { layers, densities, .. } = solution;
     let count = rows.nrows();
     let mut found = Found::default();
     for start in (0..count).step_by(LANES) {
@@ -173,14 +187,16 @@ fn evaluate_task(
         for l in 0..filled {
             found.change = found.change.max(largest.0[l]);
             if largest.0[l] > tolerance {
-                let vertex = scratch.change.iter().position(|c| c.0[l].abs() == largest.0[l]).unwrap_or(0);
-                mark(solution, &group, l, vertex as u32, &mut found.marked);
+                // More than one where the cage is symmetric.
+                let worst = |v: &usize| scratch.change[*v].0[l].abs() > (1.0 - 1e-6) * largest.0[l];
+                for vertex in (0..scratch.change.len()).filter(worst) {
+                    mark(solution, &group, l, vertex as u32, &mut found.marked);
+                }
             }
         }
     }
     let singles = scratch.singles.as_ref().subrows(0, count);
     matmul(rows.as_mut(), Accum::Add, singles, densities.low.as_ref(), 1.0, Par::Seq);
-    debug_assert_eq!(singles.ncols(), unknowns.low_count());
     found.correction = solution.affine.complete(rows, near.points[first..first + count].iter().copied());
     found
 }
@@ -289,5 +305,5 @@ fn mark(solution: &Solution<'_>, group: &Group, l: usize, vertex: u32, marked: &
         shares.push((share.abs(), e as u32));
     }
     let largest = shares.iter().map(|s| s.0).fold(0.0, f64::max);
-    marked.extend(shares.iter().filter(|s| s.0 >= MAIN * largest).map(|s| s.1));
+    marked.extend(shares.iter().filter(|s| s.0 >= MAIN * largest * (1.0 - 1e-6)).map(|s| s.1));
 }

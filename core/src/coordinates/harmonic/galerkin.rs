@@ -13,6 +13,8 @@ use rayon::prelude::*;
 
 /// Elements nearer than so many sums of their radii are integrated with the dense rule.
 const NEAR: f64 = 1.5;
+/// Elements of the same height up to this factor are integrated both ways.
+const ALIKE: f64 = 1.0 + 1e-9;
 /// Elements farther apart than so many sums of their radii feel each other's low unknowns only.
 const APART: f64 = 1.5;
 
@@ -174,9 +176,11 @@ pub(super) fn operator(tables: &Tables, outer: &Outer, unknowns: &Unknowns) -> O
         .par_col_chunks_mut(low)
         .enumerate()
         .map_init(
-            || BlockScratch {
-                potentials: vec![[Lanes::ZERO; GROUPS]; LANES * outer.near.nodes.len()],
-                out: vec![[Lanes::ZERO; GROUPS]; MAX_FUNCTIONS],
+            || {
+                [0, 1].map(|_| BlockScratch {
+                    potentials: vec![[Lanes::ZERO; GROUPS]; LANES * outer.near.nodes.len()],
+                    out: vec![[Lanes::ZERO; GROUPS]; MAX_FUNCTIONS],
+                })
             },
             |scratch, (j, mut columns)| {
                 let column = &elements[j];
@@ -185,20 +189,19 @@ pub(super) fn operator(tables: &Tables, outer: &Outer, unknowns: &Unknowns) -> O
                     let near = is_near(row, column);
                     let degrees = if near { [row.degree, column.degree] } else { [unknowns.low_degree; 2] };
                     // The thinner one outside: the potential of the other varies little across it.
-                    let swapped = row.triangle.height() > column.triangle.height();
-                    if swapped {
-                        block(tables, outer, (column, degrees[1]), (row, degrees[0]), scratch);
-                    } else {
-                        block(tables, outer, (row, degrees[0]), (column, degrees[1]), scratch);
+                    let (mine, theirs) = (row.triangle.height(), column.triangle.height());
+                    let outwards = [mine <= ALIKE * theirs, theirs <= ALIKE * mine];
+                    if outwards[0] {
+                        block(tables, outer, (row, degrees[0]), (column, degrees[1]), &mut scratch[0]);
                     }
-                    let out = &scratch.out;
-                    let at = |k: usize, l: usize| {
-                        let at = |k: usize, l: usize| out[k][l / LANES].0[l % LANES];
-                        match (i == j, swapped) {
-                            (true, _) => 0.5 * (at(k, l) + at(l, k)),
-                            (false, true) => at(l, k),
-                            (false, false) => at(k, l),
-                        }
+                    if outwards[1] {
+                        block(tables, outer, (column, degrees[1]), (row, degrees[0]), &mut scratch[1]);
+                    }
+                    let of = |which: usize, k: usize, l: usize| scratch[which].out[k][l / LANES].0[l % LANES];
+                    let at = |k: usize, l: usize| match outwards {
+                        [true, false] => of(0, k, l),
+                        [false, true] => of(1, l, k),
+                        _ => 0.5 * (of(0, k, l) + of(1, l, k)),
                     };
                     for l in 0..low {
                         for k in 0..low {

@@ -4,7 +4,15 @@ use crate::mesh::{self, Point};
 use rayon::prelude::*;
 
 /// Nearer to the surface than this, over the cage's diagonal, a point counts as on it.
-pub(super) const ON_SURFACE: f64 = 1e-9;
+const ON_SURFACE: f64 = 1e-9;
+
+/// Side of the surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Side {
+    Inside,
+    On,
+    Outside,
+}
 
 /// Nearest place on the surface.
 #[derive(Clone, Copy, Debug)]
@@ -14,7 +22,7 @@ pub(super) struct Foot {
     pub(super) weights: [f64; 3],
     pub(super) place: Point,
     pub(super) distance: f64,
-    pub(super) outside: bool,
+    pub(super) side: Side,
 }
 
 /// A surface, prepared for such questions.
@@ -28,6 +36,8 @@ pub(super) struct Surface<'a> {
     /// sides of edges and vertices apart (Bærentzen and Aanæs 2005).
     vertex_normals: Vec<Point>,
     across: Vec<[u32; 3]>,
+    /// Distance up to which points are on it.
+    thickness: f64,
 }
 
 impl<'a> Surface<'a> {
@@ -60,7 +70,13 @@ impl<'a> Surface<'a> {
         }
         let other = |e: u32, f: usize| at_edge[e as usize].into_iter().find(|&g| g != f as u32).unwrap_or(f as u32);
         let across = cage.faces().iter().enumerate().map(|(f, face)| face.edges.map(|e| other(e, f))).collect();
-        Self { vertices, faces, spheres, normals, vertex_normals, across }
+        let thickness = ON_SURFACE * mesh::diagonal(vertices);
+        Self { vertices, faces, spheres, normals, vertex_normals, across, thickness }
+    }
+
+    /// Distance up to which points count as on the surface.
+    pub(super) fn thickness(&self) -> f64 {
+        self.thickness
     }
 
     /// The feet of all points.
@@ -98,7 +114,14 @@ impl<'a> Surface<'a> {
             }
             _ => self.normals[face],
         };
-        Foot { face: face as u32, weights, place, distance, outside: mesh::dot(away, normal) > 0.0 }
+        let side = if distance <= self.thickness {
+            Side::On
+        } else if mesh::dot(away, normal) > 0.0 {
+            Side::Outside
+        } else {
+            Side::Inside
+        };
+        Foot { face: face as u32, weights, place, distance, side }
     }
 }
 
@@ -164,7 +187,7 @@ mod tests {
             let x = [0, 1, 2].map(|k| 0.5 * (low[k] + high[k]) + 1.2 * random() * (high[k] - low[k]));
             let foot = surface.foot(x);
             let inside = mesh::winding_number(cage.vertices(), &cage.mesh().triangles, x) > 0.5;
-            assert_eq!(foot.outside, !inside, "{x:?}");
+            assert_eq!(foot.side, if inside { Side::Inside } else { Side::Outside }, "{x:?}");
             counts[usize::from(inside)] += 1;
             let distance = mesh::distance_to_surface(cage.vertices(), &cage.mesh().triangles, x);
             assert!((foot.distance - distance).abs() < 1e-12 * cage.diagonal(), "{} {distance}", foot.distance);
