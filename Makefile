@@ -7,7 +7,7 @@ SCHEMATHESIS := target/schemathesis/bin/python
 
 LINT := target/lint-deploy
 
-.PHONY: help demo test soak lint lint-deploy doc bench openapi schemathesis fuzz audit clean
+.PHONY: help demo test soak lint lint-deploy doc bench paper openapi schemathesis fuzz audit clean
 
 help: ## list these commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
@@ -38,6 +38,10 @@ lint-deploy: $(LINT)/bin/python ## Dockerfile, manifests, alerts and dashboard a
 	$(LINT)/bin/check-jsonschema --builtin-schema vendor.compose-spec deploy/compose.yaml
 	$(LINT)/bin/kubernetes-validate --strict $(filter-out %/kustomization.yaml %/servicemonitor.yaml,$(wildcard deploy/kubernetes/*.yaml))
 	$(LINT)/bin/python deploy/check_queries.py
+	@if command -v kubectl >/dev/null; then \
+		kubectl kustomize deploy/kubernetes >$(LINT)/together.yaml && \
+		$(LINT)/bin/kubernetes-validate --strict $(LINT)/together.yaml; \
+	else echo "kubectl is not here, so the kustomization is not built"; fi
 
 $(LINT)/bin/python: Makefile
 	$(PYTHON) -m venv $(LINT)
@@ -56,6 +60,10 @@ $(PEERS): benches/peers/requirements.txt
 	$(PYTHON) -m venv benches/.venv
 	benches/.venv/bin/pip install --quiet --requirement benches/peers/requirements.txt
 	@touch $@
+
+paper: ## run the paper's comparisons on the captures in CAGER_DATA and write the tables of docs/PAPER.md; reports in out/paper/
+	$(CARGO) build --release --locked --bin cager
+	$(PYTHON) benches/paper.py
 
 openapi: ## write docs/openapi.json anew from the routes
 	CAGER_UPDATE_OPENAPI=1 $(CARGO) test --locked --quiet --test http openapi

@@ -3,7 +3,7 @@
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::inversion::SolverOptions;
 
-/// All, in the order of the documentation.
+/// Every coordinate system, the usual one first.
 pub(crate) const ALL: [&dyn CoordinateSystem; 3] = [&MeanValue, &Green::Consistent, &Green::Free];
 
 /// The coordinate system with this name on the command line, in reports and in containers.

@@ -219,7 +219,7 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Encoded, 
 fn prepare(job: &Job<'_>) -> Result<(Solver, SolverOptions, Option<SpectrumChoice>), PrepareError> {
     let mut options = job.options;
     let own = || job.term.ok_or(TermError::Missing);
-    let term: &dyn Term = options.regularizer.term().map_or_else(own, |term| Ok(term))?;
+    let term: &dyn Term = options.regularizer.term().map_or_else(own, Ok)?;
     let points = &job.rest.points;
     let Some(ChooseSpectrum { samples, bound }) = &job.choose else {
         return Ok((Solver::prepare_with(job.system, job.cage, points, options, term)?, options, None));

@@ -3,13 +3,14 @@
 pub mod auth;
 pub mod capture;
 pub mod cli;
+mod compare;
 pub mod config;
 mod coordinates;
 pub mod decode;
 pub mod encode;
 pub mod engine;
 pub mod http;
-pub(crate) mod plot;
+mod plot;
 pub mod problem;
 pub mod remote;
 pub mod report;

@@ -63,6 +63,12 @@ kinds! {
     QUOTA_EXCEEDED INSUFFICIENT_STORAGE "quota-exceeded" "The tenant's storage quota is used up";
 }
 
+impl From<ApiError> for std::io::Error {
+    fn from(error: ApiError) -> Self {
+        Self::other(error.problem.detail)
+    }
+}
+
 impl ApiError {
     /// An error of this kind; `detail` says what went wrong here and what to do.
     pub fn new(kind: Kind, detail: impl Into<String>) -> Self {

@@ -17,6 +17,8 @@ use tokio_util::sync::CancellationToken;
 
 /// Threads that write frame logs. Most of their time they wait for the disk.
 const COMMIT_THREADS: usize = 4;
+/// Threads that read new sessions' files at a time.
+const READING: usize = 2;
 
 /// How long a look at the disk counts.
 const PROBED_FOR: std::time::Duration = std::time::Duration::from_secs(1);
@@ -29,7 +31,9 @@ pub struct Service {
     pub(crate) engine: Engine,
     pub(crate) solvers: Arc<Solvers>,
     pub(crate) committer: Committer,
-    pub(crate) registry: Registry,
+    pub(crate) registry: Arc<Registry>,
+    /// Rest poses and cages of new sessions being read at a time: parsing keeps a processor busy.
+    pub(crate) reading: Semaphore,
     /// Memory for frames on their way, in KiB.
     pub(crate) frame_memory: Memory,
     /// Memory for rest poses and cages on their way, in KiB.
@@ -111,7 +115,8 @@ impl Service {
             engine,
             solvers: Arc::new(solvers),
             committer: Committer::start(COMMIT_THREADS).map_err(StartError::Threads)?,
-            registry: Registry::default(),
+            registry: Arc::default(),
+            reading: Semaphore::new(READING),
             frame_memory: Memory::new(config.frame_bytes),
             upload_memory: Memory::new(config.upload_bytes),
             streams: Arc::new(Semaphore::new(config.max_streams)),
@@ -126,6 +131,7 @@ impl Service {
         for meta in opened.sessions {
             service.resume(meta);
         }
+        service.forget_orphans();
         service.resumed.store(true, Ordering::Release);
         tracing::info!(sessions = count, quarantined = opened.quarantined.len(), "sessions resumed");
         tokio::spawn(Arc::clone(&service).sweep(stop.clone()));
@@ -133,6 +139,24 @@ impl Service {
         let watching = Arc::clone(&service);
         tokio::spawn(async move { watching.access.clone().watch(stop).await });
         Ok(service)
+    }
+
+    /// Removes rest poses and cages of no session: a crash between storing them and storing their session leaves them. Not where
+    /// something is in quarantine, which may be of use with its rest pose only.
+    fn forget_orphans(&self) {
+        let forget = || -> Result<(), StoreError> {
+            if self.store.has_quarantined()? {
+                return Ok(());
+            }
+            for key in self.store.contents()?.iter().filter(|key| !self.registry.uses_content(key)) {
+                self.store.remove_content(key)?;
+                tracing::info!(%key, "a rest pose and cage of no session are removed");
+            }
+            Ok(())
+        };
+        if let Err(error) = forget() {
+            tracing::warn!(%error, "rest poses and cages of no session may take space");
+        }
     }
 
     /// Reads the logs of all resumed sessions in the background, so that damage is found before somebody waits for it.

@@ -91,7 +91,7 @@ impl Client {
     pub async fn complete(&self, id: &str, frames: u32) -> Result<Session, ClientError> {
         self.retrying(|| async {
             let request = self.request(Method::POST, &["v1", "sessions", id, "complete"], &[]).await?;
-            json(self, self.send(request.json(&Complete { frames })).await?).await
+            json(self, self.send(request.json(&Complete { frames, discard_beyond: false })).await?).await
         })
         .await
     }

@@ -24,6 +24,8 @@ const BLOCK_ROWS: usize = 256;
 const GRAM_BYTES: usize = 16 << 20;
 /// From this many columns on, the first round of swaps is hardly ever the last.
 const SEVERAL_ROUNDS: usize = 512;
+/// Pivots of LU above this fraction of the largest: far enough from dependent for single precision.
+const SINGLE_IS_SAFE: f64 = 1e-4;
 /// Every confirming pass either ends the search or has found rows to swap; the volume bounds their number far below this.
 const MAX_PASSES: usize = 64;
 
@@ -82,14 +84,14 @@ pub fn maxvol(phi: MatRef<'_, f64>, tolerance: f64) -> Result<MaxVol, Dependent>
 /// As [`maxvol`], from m given rows instead of those of pivoted LU.
 ///
 /// # Errors
-/// [`Dependent`] where these rows are numerically dependent.
+/// [`Dependent`] where these rows are dependent, or so close to it that swaps in single precision would follow rounding.
 ///
 /// # Panics
 /// Where there are not as many rows as columns.
 pub fn maxvol_from(phi: MatRef<'_, f64>, start: Vec<u32>, tolerance: f64) -> Result<MaxVol, Dependent> {
     assert_eq!(start.len(), phi.ncols(), "as many rows as columns");
     let smallest = dense::pivoted_rows(dense::rows_of(phi, &start)).smallest;
-    if smallest > RANK_TOLERANCE { Ok(search(phi, start, tolerance)) } else { Err(Dependent { smallest }) }
+    if smallest > SINGLE_IS_SAFE { Ok(search(phi, start, tolerance)) } else { Err(Dependent { smallest }) }
 }
 
 fn search(phi: MatRef<'_, f64>, start: Vec<u32>, tolerance: f64) -> MaxVol {
@@ -131,7 +133,6 @@ fn search(phi: MatRef<'_, f64>, start: Vec<u32>, tolerance: f64) -> MaxVol {
 /// Rows that LU with partial pivoting picks. Single precision decides the pivots as well as double does, in half the time,
 /// as long as the columns are far from dependent.
 fn start_rows(phi: MatRef<'_, f64>) -> Result<Vec<u32>, Dependent> {
-    const SINGLE_IS_SAFE: f64 = 1e-4;
     let single = dense::pivoted_rows(to_single(phi));
     if single.smallest > SINGLE_IS_SAFE {
         return Ok(single.rows);

@@ -231,10 +231,10 @@ impl CoordinateSystem for WithNormals {
     fn name(&self) -> &'static str {
         "with-normals"
     }
-    fn unknowns(&self, cage: &Cage) -> usize {
+    fn columns(&self, cage: &Cage) -> usize {
         cage.vertices().len() + cage.faces().len()
     }
-    fn rest_unknowns(&self, cage: &Cage) -> Vec<Point> {
+    fn rest_values(&self, cage: &Cage) -> Vec<Point> {
         let normals = cage.faces().iter().map(|_| [0.0, 0.0, 1.0]);
         cage.vertices().iter().copied().chain(normals).collect()
     }

@@ -180,9 +180,9 @@ fn entry(line: &[u8], place: usize, kind: Kind, rows: u32, columns: u32) -> Resu
 
 fn refuse_repetition(entries: &mut [Entry]) -> Result<(), Fault> {
     entries.sort_by_key(|e| (e.row, e.column));
-    match entries.array_windows().find(|[a, b]| (a.row, a.column) == (b.row, b.column)) {
+    match entries.iter().zip(entries.iter().skip(1)).find(|(a, b)| (a.row, a.column) == (b.row, b.column)) {
         None => Ok(()),
-        Some([a, b]) => Err(Fault::damaged(format!(
+        Some((a, b)) => Err(Fault::damaged(format!(
             "line {}: row {}, column {} has an entry on line {} already; leave one of them",
             b.line,
             b.row + 1,

@@ -41,16 +41,16 @@ pub struct SessionOptions {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(minimum = 1))]
     pub handle_count: Option<u32>,
-    /// Treatment of the unstable end of the spectrum: `laplacian`, `differential`, `matrix` (with a part
-    /// `regularizer_matrix`), `none`, `truncated-svd`, `tikhonov` or `global`.
+    /// Treatment of the unstable end of the spectrum: `laplacian`, `differential`, `temporal` (frames have
+    /// to come in order), `matrix` (with a part `regularizer_matrix`), `none`, `truncated-svd`, `tikhonov` or `global`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(
         feature = "schema",
-        schema(pattern = "^(laplacian|differential|matrix|none|truncated-svd|tikhonov|global)$")
+        schema(pattern = "^(laplacian|differential|temporal|matrix|none|truncated-svd|tikhonov|global)$")
     )]
     pub regularizer: Option<String>,
     /// Spectrum threshold: how many of the last singular directions are regularised.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "threshold")]
     pub spectrum: Option<u32>,
     /// Weight of the regularisation.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -69,6 +69,37 @@ pub struct SessionOptions {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(exclusive_minimum = 0))]
     pub frame_rate: Option<f64>,
+}
+
+/// A threshold; the command line's `auto` needs frames to measure.
+fn threshold<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<u32>, D::Error> {
+    struct Threshold;
+
+    impl<'de> serde::de::Visitor<'de> for Threshold {
+        type Value = Option<u32>;
+
+        fn expecting(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+            out.write_str("a number of singular directions as spectrum")
+        }
+
+        fn visit_u64<E: serde::de::Error>(self, value: u64) -> Result<Self::Value, E> {
+            u32::try_from(value).map(Some).map_err(|_| E::invalid_value(serde::de::Unexpected::Unsigned(value), &self))
+        }
+
+        fn visit_str<E: serde::de::Error>(self, value: &str) -> Result<Self::Value, E> {
+            if value == "auto" {
+                let text = "spectrum auto is chosen by frames, and a service prepares before it sees any; give a number, or encode with the command line, without --server";
+                return Err(E::custom(text));
+            }
+            Err(E::invalid_value(serde::de::Unexpected::Str(value), &self))
+        }
+
+        fn visit_unit<E: serde::de::Error>(self) -> Result<Self::Value, E> {
+            Ok(None)
+        }
+    }
+
+    deserializer.deserialize_any(Threshold)
 }
 
 /// A session. Numbers that preparing finds are null until it is done.
@@ -205,13 +236,16 @@ pub struct FrameErrors {
 }
 
 /// Says that no more frames are coming.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Complete {
     /// Number of frames of the capture, at least 1.
     #[cfg_attr(feature = "schema", schema(minimum = 1))]
     pub frames: u32,
+    /// Leave out frames with this number and above, which were posted by mistake. Without it, such frames are an error.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub discard_beyond: bool,
 }
 
 /// Progress, the data of a server-sent event.

@@ -24,6 +24,7 @@ pub(crate) enum Command {
     Encode(Box<EncodeArgs>),
     Decode(DecodeArgs),
     Inspect(InspectArgs),
+    Compare(CompareArgs),
     Serve(Box<ServeFlags>),
     Health(HealthArgs),
     Demo(DemoArgs),
@@ -138,6 +139,50 @@ pub(crate) struct InspectArgs {
     pub(crate) json: bool,
 }
 
+/// Compare ways to invert a capture, with the figures of the paper, in one HTML file.
+///
+/// Every method is run on the capture: the report shows its errors, how calm its cages are, spectra, times and pictures, and
+/// which options the figures advise. Example: cager compare --rest rest.obj --cage cage.obj --frames walk.npy -o walk.html
+#[derive(Args, Debug)]
+pub(crate) struct CompareArgs {
+    /// Model in its rest pose: .obj .ply .off .stl .glb; a point cloud will do.
+    #[arg(long, value_name = "REST")]
+    pub(crate) rest: PathBuf,
+
+    /// Closed cage around the rest pose, same formats; polygons are triangulated.
+    #[arg(long, value_name = "CAGE")]
+    pub(crate) cage: PathBuf,
+
+    /// Capture, points in the order of the rest pose: a folder or quoted glob of mesh files (2.obj comes before 10.obj), .npy
+    /// (frames × points × 3), .pc2 or .mdd.
+    #[arg(long, value_name = "FRAMES")]
+    pub(crate) frames: PathBuf,
+
+    /// Report to write; it appears whole or not at all, and needs no other file and no network to be read.
+    #[arg(short, long, value_name = "REPORT.html")]
+    pub(crate) output: PathBuf,
+
+    /// Write all figures as JSON.
+    #[arg(long, value_name = "FIGURES.json")]
+    pub(crate) json: Option<PathBuf>,
+
+    /// Cage coordinates to compare, separated by commas [default: all].
+    #[arg(long, value_enum, value_delimiter = ',', hide_default_value = true)]
+    pub(crate) coordinates: Vec<CoordinatesArg>,
+
+    /// Frames to measure at the most: evenly spaced ones, each with its neighbours.
+    #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(crate) frames_at_most: u32,
+
+    /// Axis that points up in the pictures [default: y, or z where the model stands along it].
+    #[arg(long, value_enum)]
+    pub(crate) up: Option<UpArg>,
+
+    /// Turn all faces of the cage around: for cages whose normals point inwards.
+    #[arg(long)]
+    pub(crate) flip_cage: bool,
+}
+
 /// Ask a service on this machine whether it is ready: exit status 0, or 1 with the reason.
 ///
 /// For containers and scripts that have no curl. Of a service with TLS it sees only that it lives.
@@ -207,6 +252,16 @@ impl CoordinatesArg {
             Self::GreenFree => "green-free",
         }
     }
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum UpArg {
+    /// The first coordinate.
+    X,
+    /// The second, as in most modelling programs.
+    Y,
+    /// The third.
+    Z,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

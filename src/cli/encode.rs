@@ -1,6 +1,7 @@
 //! `cager encode`.
 
 use super::args::{EncodeArgs, SolverArgs, SpectrumArg};
+use super::outputs::refuse_overwriting;
 use super::{grouped, human_bytes, interrupt, plain, print, progress, warn};
 use crate::coordinates;
 use crate::encode::{self, ChooseSpectrum, Encoded, Job, sample_frames};
@@ -13,9 +14,7 @@ use cager_core::cage::Cage;
 use cager_core::inversion::{PrepareError, SolverOptions, check_options};
 use cager_core::mesh::{Model, TriMesh};
 use cager_core::regularize::{Regularizer, SparseMatrix, Term};
-use cager_formats::{
-    AtomicFile, CacheFormat, CompleteFile, MeshFormat, commit_together, open_frames, read_matrix, read_model,
-};
+use cager_formats::{AtomicFile, CompleteFile, commit_together, open_frames, read_matrix, read_model};
 use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
@@ -38,7 +37,7 @@ fn here(args: &EncodeArgs, rest: &Model, cage: &Cage, clock: Instant) -> Result<
     let choose = match (args.solver.spectrum, spectrum_bound(&args.solver)?) {
         (Some(SpectrumArg::Auto), bound) => {
             // What is wrong with the options is told before anything is read.
-            check_options(rest.points.len(), system.unknowns(cage), options).map_err(|e| name_file(e, args))?;
+            check_options(rest.points.len(), system.unknowns(cage), options).map_err(|e| name_file(&e, args))?;
             let mut again = open_frames(&args.frames, rest.points.len())?;
             let samples = sample_frames(again.as_mut(), options.regularizer == Regularizer::Temporal)?;
             Some(ChooseSpectrum { samples, bound })
@@ -115,7 +114,8 @@ fn elsewhere(args: &EncodeArgs, address: &str, rest: &Model, cage: &Cage, clock:
 
 /// What comes before the work, so that outputs that cannot be written cost no waiting.
 fn begin(args: &EncodeArgs) -> Result<Option<AtomicFile>> {
-    refuse_overwriting(args)?;
+    let inputs = [&args.rest, &args.cage, &args.frames].into_iter().chain(&args.solver.regularizer_matrix);
+    refuse_overwriting(&args.output, args.report.as_deref(), inputs)?;
     interrupt::leaves_nothing()?;
     Ok(args.report.as_ref().map(AtomicFile::create).transpose()?)
 }
@@ -133,27 +133,34 @@ fn finish(args: &EncodeArgs, encoded: Encoded, report_file: Option<AtomicFile>, 
 /// Errors of the mathematics know vertices and points; the user knows files.
 fn name_files(error: encode::EncodeError, args: &EncodeArgs) -> anyhow::Error {
     match error {
-        encode::EncodeError::Prepare(inner) => name_file(inner, args),
+        encode::EncodeError::Prepare(inner) => name_file(&inner, args),
         other => other.into(),
     }
 }
 
-fn name_file(error: PrepareError, args: &EncodeArgs) -> anyhow::Error {
+fn name_file(error: &PrepareError, args: &EncodeArgs) -> anyhow::Error {
+    match (error, &args.solver.regularizer_matrix) {
+        (PrepareError::Term(_), Some(matrix)) => anyhow::anyhow!("{}: {error}", matrix.display()),
+        _ => blame(error, &args.rest, &args.cage),
+    }
+}
+
+/// Names the file or the option that is to blame.
+pub(super) fn blame(error: &PrepareError, rest: &Path, cage: &Path) -> anyhow::Error {
     let path = match error {
         PrepareError::BadLambda { .. } => return anyhow::anyhow!("--lambda: {error}"),
         PrepareError::SpectrumTooLarge { .. } => return anyhow::anyhow!("--spectrum: {error}"),
         PrepareError::HandleCount { .. } | PrepareError::HandlesOutOfMemory { .. } => {
             return anyhow::anyhow!("--handle-count: {error}");
         }
-        PrepareError::Term(_) => args.solver.regularizer_matrix.as_ref().unwrap_or(&args.cage),
         PrepareError::NotFinite { .. }
         | PrepareError::TooFewPoints { .. }
         | PrepareError::NoExtent
         | PrepareError::TooLarge
         | PrepareError::NotReproduced { .. }
         | PrepareError::TooFar { .. }
-        | PrepareError::OutOfMemory { .. } => &args.rest,
-        _ => &args.cage,
+        | PrepareError::OutOfMemory { .. } => rest,
+        _ => cage,
     };
     anyhow::anyhow!("{}: {error}", path.display())
 }
@@ -229,34 +236,6 @@ pub(super) fn write_report(mut file: AtomicFile, report: &Report) -> Result<Comp
     text.push(b'\n');
     file.write_all(&text)?;
     Ok(file.complete()?)
-}
-
-/// An output in place of an input, or of the other output, is a slip that would cost the user a file.
-fn refuse_overwriting(args: &EncodeArgs) -> Result<()> {
-    for output in [Some(&args.output), args.report.as_ref()].into_iter().flatten() {
-        let Ok(place) = output.canonicalize() else { continue };
-        for input in [&args.rest, &args.cage, &args.frames].into_iter().chain(&args.solver.regularizer_matrix) {
-            if input.canonicalize().is_ok_and(|input| input == place) {
-                bail!(
-                    "{}: is an input of this encoding, so it cannot be an output; name another file",
-                    output.display()
-                );
-            }
-        }
-        // It may be a frame of the folder or pattern; no container or report has such a name.
-        if output.exists() && (MeshFormat::from_path(output).is_ok() || CacheFormat::from_path(output).is_some()) {
-            bail!("{}: is a mesh or a capture, so it is not replaced; name another file", output.display());
-        }
-    }
-    let place = |path: &Path| {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        path.canonicalize().ok().or_else(|| Some(folder.canonicalize().ok()?.join(path.file_name()?)))
-    };
-    let report = args.report.as_deref().and_then(place);
-    if report.is_some() && report == place(&args.output) {
-        bail!("{}: cannot hold both the capture and the report; name two files", args.output.display());
-    }
-    Ok(())
 }
 
 fn summary(report: &Report, output: &Path) -> String {

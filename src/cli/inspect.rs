@@ -106,11 +106,14 @@ fn as_text(name: &str, container: &Container, summary: Option<&Summary>, bytes: 
     writeln!(out, "{name}: {}, every checksum matches", human_bytes(bytes))?;
     writeln!(out, "  capture   {} frames of {} points", grouped(container.frames() as u64), grouped(h.points))?;
     writeln!(out, "  cage      {} vertices, {} faces", grouped(h.cage_vertices), grouped(h.cage_faces))?;
+    // How many of them is known where not every point is read.
+    let read = summary.filter(|_| h.handles != "all").map(|s| format!(" ({})", s.handle_indices.len()));
     writeln!(
         out,
-        "  solver    coordinates {}, handles {}, regularizer {}, spectrum {}, lambda {}",
+        "  solver    coordinates {}, handles {}{}, regularizer {}, spectrum {}, lambda {}",
         plain(&h.coordinates),
         plain(&h.handles),
+        read.unwrap_or_default(),
         plain(&h.regularizer),
         h.spectrum,
         h.lambda

@@ -1,12 +1,14 @@
 //! The command line: one file per command, each parses, calls and prints.
 
 mod args;
+mod compare;
 mod decode;
 mod demo;
 mod encode;
 mod health;
 mod inspect;
 mod interrupt;
+mod outputs;
 mod own_service;
 mod progress;
 pub(crate) mod serve;
@@ -22,6 +24,7 @@ pub fn run() -> ExitCode {
         Command::Encode(args) => encode::run(&args),
         Command::Decode(args) => decode::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Compare(args) => compare::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Serve(args) => serve::run(&args),
         Command::Health(args) => health::run(&args),

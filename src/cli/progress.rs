@@ -14,3 +14,12 @@ pub(crate) fn frames(what: &'static str, total: usize) -> ProgressBar {
         Err(_) => bar,
     }
 }
+
+/// A bar over steps that differ in length, on stderr; hidden where stderr is not a terminal.
+pub(crate) fn steps() -> ProgressBar {
+    let bar = frames("", 1);
+    match ProgressStyle::with_template("{msg:>24} {bar:40} {elapsed}") {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
+    }
+}

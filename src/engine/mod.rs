@@ -4,6 +4,7 @@
 //! product. Who comes next is the choice of `schedule`; what a batch does is the lane's.
 
 mod schedule;
+pub(crate) mod threads;
 
 use cager_core::inversion::BATCH;
 use schedule::{Next, Schedule};
@@ -46,11 +47,7 @@ impl Engine {
     /// # Errors
     /// The system's, where threads cannot be started.
     pub fn new(workers: usize) -> std::io::Result<Self> {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(workers)
-            .thread_name(|k| format!("solve-{k}"))
-            .build()
-            .map_err(std::io::Error::other)?;
+        let pool = threads::pool("solve", workers)?;
         let slots = pool.current_num_threads();
         let shared = Arc::new(Shared { state: Mutex::new(Schedule::new(slots)), changed: Condvar::new(), pool });
         let dispatching = Arc::clone(&shared);
@@ -70,6 +67,19 @@ impl Engine {
         let work = Arc::new(LaneWork { waiting: Mutex::new(VecDeque::new()), run: Box::new(run) });
         let id = lock(&self.shared.state).add(tenant, weight, cost, Arc::clone(&work) as Arc<dyn Batches>);
         Lane { engine: Arc::downgrade(&self.shared), id, work }
+    }
+
+    /// As [`Self::lane`], whose batches run one after another, in order of arrival.
+    pub fn lane_in_order<J: Send + 'static>(
+        &self,
+        tenant: &str,
+        weight: f64,
+        cost: f64,
+        run: impl Fn(Vec<J>) + Send + Sync + 'static,
+    ) -> Lane<J> {
+        let lane = self.lane(tenant, weight, cost, run);
+        lock(&self.shared.state).keep_order(lane.id);
+        lane
     }
 
     /// Jobs that wait in all lanes.

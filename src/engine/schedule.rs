@@ -43,6 +43,8 @@ struct LaneState<W> {
     oldest: Instant,
     last_finished: Option<Instant>,
     more: bool,
+    /// Whether its batches run one after another.
+    in_order: bool,
     /// Turn at which it was last served.
     served: u64,
 }
@@ -90,6 +92,7 @@ impl<W: Clone> Schedule<W> {
             oldest: Instant::now(),
             last_finished: None,
             more: false,
+            in_order: false,
             served: 0,
         };
         self.lanes.insert(id, lane);
@@ -122,6 +125,13 @@ impl<W: Clone> Schedule<W> {
                 tenant.pass = tenant.pass.max(behind.unwrap_or(self.time));
             }
             tenant.waiting += 1;
+        }
+    }
+
+    /// Has a lane's batches run one after another.
+    pub(super) fn keep_order(&mut self, id: u64) {
+        if let Some(lane) = self.lanes.get_mut(&id) {
+            lane.in_order = true;
         }
     }
 
@@ -192,7 +202,7 @@ impl<W: Clone> Schedule<W> {
 impl<W> LaneState<W> {
     /// How long until a batch should start: zero now; `None` where something must happen first.
     fn waits_for(&self, now: Instant, most: usize) -> Option<Duration> {
-        if self.waiting == 0 {
+        if self.waiting == 0 || (self.in_order && self.running > 0) {
             return None;
         }
         if self.waiting >= most {
@@ -306,6 +316,19 @@ mod tests {
         schedule.pushed(lane, now);
         schedule.expect_more(lane, false);
         assert!(matches!(schedule.next(now, 16), Next::Batch { count: 1, .. }), "the last are not held back");
+    }
+
+    #[test]
+    fn a_lane_in_order_runs_one_batch_at_a_time() {
+        let now = Instant::now();
+        let mut schedule = Schedule::new(4);
+        let lane = schedule.add("t", 1.0, 1.0, "t");
+        schedule.keep_order(lane);
+        (0..64).for_each(|_| schedule.pushed(lane, now));
+        assert!(matches!(schedule.next(now, 16), Next::Batch { count: 16, .. }));
+        assert!(matches!(schedule.next(now, 16), Next::Wait(None)));
+        schedule.finished(lane, now);
+        assert!(matches!(schedule.next(now, 16), Next::Batch { count: 16, .. }));
     }
 
     #[test]

@@ -29,14 +29,16 @@ pub(crate) async fn handles(
     prepared(&service, &session).await?;
     let solver = service.solver(&session).await?;
     let handles = solver.solver.handles();
-    match accept {
-        Accept::Json => Ok(Json(handles).into_response()),
+    let mut response = match accept {
+        Accept::Json => Json(handles).into_response(),
         Accept::Anything | Accept::Binary => {
             let bytes: Vec<u8> = handles.iter().flat_map(|handle| handle.to_le_bytes()).collect();
-            Ok(([(header::CONTENT_TYPE, "application/octet-stream")], bytes).into_response())
+            ([(header::CONTENT_TYPE, "application/octet-stream")], bytes).into_response()
         }
-        _ => Err(not_acceptable("application/octet-stream or application/json")),
-    }
+        _ => return Err(not_acceptable("application/octet-stream or application/json")),
+    };
+    response.headers_mut().insert(header::VARY, HeaderValue::from_static("accept"));
+    Ok(response)
 }
 
 /// `Φ` as f32 little-endian, row-major, `Cager-Rows` × `Cager-Columns`. It never changes.

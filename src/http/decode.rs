@@ -60,8 +60,8 @@ pub(crate) async fn post(
     let rest = futures_util::stream::unfold(decoding, |mut decoding| async {
         match decoding.next().await {
             Ok(None) => None,
-            Ok(Some(bytes)) => Some((Ok(bytes), decoding)),
-            Err(error) => Some((Err(io::Error::other(error.problem.detail)), decoding)),
+            Ok(Some(bytes)) => Some((Ok::<_, io::Error>(bytes), decoding)),
+            Err(error) => Some((Err(error.into()), decoding)),
         }
     });
     let first = futures_util::stream::iter(first.map(Ok));

@@ -23,15 +23,15 @@ const KEEP_ALIVE: Duration = Duration::from_secs(15);
 #[derive(utoipa::ToSchema)]
 #[allow(dead_code, reason = "it only describes")]
 pub(crate) struct Event {
-    /// `progress`, or `deleted` as the last.
+    /// `progress`; as the last one also `deleted`, or `stopping` where the service stops.
     event: Option<String>,
     /// What it tells, for `Last-Event-ID`.
     id: Option<String>,
-    /// JSON: `{"state": …, "received": …, "solved": …}` with the state and the frames of the session; `{}` where it was deleted.
+    /// JSON: `{"state": …, "received": …, "solved": …}` with the state and the frames of the session; `{}` of the two others.
     data: Option<String>,
 }
 
-/// Progress of the session: an event `progress` with each change, until it is completed, failed or deleted. An event's id says what it tells, so
+/// Progress of the session: an event `progress` with each change, until it is completed, failed or deleted, or the service stops. An event's id says what it tells, so
 /// that `Last-Event-ID` keeps a client that comes back from hearing the same again.
 #[utoipa::path(
     get, path = "/v1/sessions/{id}/events", operation_id = "get_events", tag = "sessions",
@@ -73,7 +73,9 @@ pub(crate) async fn get(
                 tokio::select! {
                     _ = changes.changed() => {}
                     () = session.deleted().cancelled() => {}
-                    () = service.stopping().cancelled() => return None,
+                    () = service.stopping().cancelled() => {
+                        return Some((Ok(Bytes::from_static(b"event: stopping\ndata: {}\n\n")), None));
+                    }
                     () = tokio::time::sleep(KEEP_ALIVE) => {
                         return Some((Ok(Bytes::from_static(b": still here\n\n")), Some((heard, changes, place))));
                     }

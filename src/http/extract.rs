@@ -132,7 +132,7 @@ pub(crate) enum Accept {
 }
 
 impl Accept {
-    /// The first known type of the header.
+    /// The known type of the header with the greatest weight (RFC 9110, §12.5.1); the first of equals.
     pub(crate) fn of(headers: &HeaderMap) -> Self {
         let Some(accept) = headers.get(header::ACCEPT).and_then(|value| value.to_str().ok()) else {
             return Self::Anything;
@@ -145,8 +145,23 @@ impl Accept {
             "application/octet-stream" => Some(Self::Binary),
             _ => None,
         };
-        accept.split(',').find_map(known).unwrap_or(Self::Other)
+        let mut best = (0.0, Self::Other);
+        for part in accept.split(',') {
+            if let Some(kind) = known(part)
+                && weight(part) > best.0
+            {
+                best = (weight(part), kind);
+            }
+        }
+        best.1
     }
+}
+
+/// The weight `q` of one part of the header; 1 where there is none, or none that can be read.
+fn weight(part: &str) -> f32 {
+    let weights =
+        part.split(';').skip(1).filter_map(|parameter| parameter.trim().strip_prefix(['q', 'Q'])?.strip_prefix('='));
+    weights.last().and_then(|q| q.trim().parse().ok()).filter(|q| (0.0..=1.0).contains(q)).unwrap_or(1.0)
 }
 
 impl<S: Sync> FromRequestParts<S> for Accept {
@@ -161,4 +176,26 @@ impl<S: Sync> FromRequestParts<S> for Accept {
 pub(crate) fn content_type(headers: &HeaderMap) -> Option<String> {
     let value = headers.get(header::CONTENT_TYPE)?.to_str().ok()?;
     Some(value.split(';').next().unwrap_or_default().trim().to_ascii_lowercase())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_greatest_weight_decides() {
+        let of = |value: &'static str| {
+            let mut headers = HeaderMap::new();
+            headers.insert(header::ACCEPT, http::HeaderValue::from_static(value));
+            Accept::of(&headers)
+        };
+        assert_eq!(Accept::of(&HeaderMap::new()), Accept::Anything);
+        assert_eq!(of("application/json"), Accept::Json);
+        assert_eq!(of("application/json;q=0.4, application/octet-stream"), Accept::Binary);
+        assert_eq!(of("application/octet-stream ; q=0.2, application/json; charset=utf-8 ;q=0.9"), Accept::Json);
+        assert_eq!(of("application/json, application/octet-stream"), Accept::Json);
+        assert_eq!(of("application/json;q=0, text/html"), Accept::Other);
+        assert_eq!(of("text/html, */*;q=0.1"), Accept::Anything);
+        assert_eq!(of("application/json;q=nonsense"), Accept::Json);
+    }
 }

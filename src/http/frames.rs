@@ -10,6 +10,8 @@ use crate::session::facts::Facts;
 use crate::session::upload::{FrameJob, Permits, Rows, Step, Upload};
 use crate::session::{LiveLane, Phase, Session, gone};
 use crate::store::LogEntry;
+use crate::telemetry::RequestId;
+use axum::Extension;
 use axum::body::Body;
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};
@@ -82,6 +84,7 @@ pub(crate) async fn post(
     Found { tenant, session }: Found,
     Query(query): Query<UploadQuery>,
     accept: Accept,
+    request_id: Option<Extension<RequestId>>,
     headers: HeaderMap,
     body: Body,
 ) -> Result<Response, ApiError> {
@@ -137,7 +140,8 @@ pub(crate) async fn post(
         Err(_) => None,
     };
     let media_type = if records_out { record::MEDIA_TYPE } else { "application/x-ndjson" };
-    let stream = answers(answering, session, first, records_out);
+    let request_id = request_id.map(|Extension(id)| id.0.to_string());
+    let stream = answers(answering, session, first, records_out, request_id);
     Ok(([(header::CONTENT_TYPE, media_type)], Body::from_stream(stream)).into_response())
 }
 
@@ -315,9 +319,10 @@ fn answers(
     session: Arc<Session>,
     first: Option<Step>,
     records: bool,
+    request_id: Option<String>,
 ) -> impl futures_util::Stream<Item = io::Result<Bytes>> {
     futures_util::stream::unfold((first, answering), move |(step, answering)| {
-        let session = Arc::clone(&session);
+        let (session, request_id) = (Arc::clone(&session), request_id.clone());
         async move {
             let step = match step {
                 Some(step) => step,
@@ -333,8 +338,9 @@ fn answers(
                     if records { as_records(session, entries).await } else { Ok(as_lines(&entries)) }
                 }
                 // What follows an error is the end.
-                Step::Failed(error) if records => Err(io::Error::other(error.problem.detail)),
-                Step::Failed(error) => {
+                Step::Failed(error) if records => Err(error.into()),
+                Step::Failed(mut error) => {
+                    error.problem.request_id = request_id;
                     let mut line = serde_json::to_vec(&error.problem).unwrap_or_default();
                     line.push(b'\n');
                     Ok(line.into())

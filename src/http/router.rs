@@ -12,7 +12,7 @@ use axum::extract::{DefaultBodyLimit, MatchedPath, Request};
 use axum::middleware::{Next, from_fn, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::{BoxError, Router};
-use http::{StatusCode, header};
+use http::{StatusCode, Version, header};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tower::limit::GlobalConcurrencyLimitLayer;
@@ -90,6 +90,7 @@ pub fn router(service: Arc<Service>) -> Router {
             let text = text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default();
             ApiError::internal(&format!("a request panicked: {text}")).into_response()
         }))
+        .layer(from_fn(host))
         .layer(from_fn(finish))
         .layer(from_fn(request_id))
 }
@@ -114,6 +115,16 @@ fn refused(error: &BoxError) -> ApiError {
     }
     metrics::counter!("cager_rejections_total", "reason" => "requests").increment(1);
     ApiError::new(problem::BUSY, "too many requests are being worked on; try again in a moment").retry_after(1)
+}
+
+/// HTTP/1.1 wants every request to name its host, once (RFC 9112, §3.2).
+async fn host(request: Request, next: Next) -> Response {
+    let named = request.headers().get_all(header::HOST).iter().count();
+    if request.version() == Version::HTTP_11 && named != 1 {
+        let detail = format!("the request has {named} Host headers; HTTP/1.1 wants one");
+        return ApiError::new(problem::BAD_REQUEST, detail).into_response();
+    }
+    next.run(request).await
 }
 
 /// Makes every error a problem with the request's id, and counts the request.

@@ -114,8 +114,8 @@ pub(crate) async fn delete(
 pub(crate) async fn complete(
     State(service): State<Arc<Service>>,
     Found { session, .. }: Found,
-    Body(Complete { frames }): Body<Complete>,
+    Body(complete): Body<Complete>,
 ) -> JsonResult<Session> {
-    service.complete(&session, frames).await?;
+    service.complete(&session, complete).await?;
     Ok(Json(session.view()))
 }

@@ -8,4 +8,4 @@ mod text;
 pub(crate) use chart::{Axis, Chart, Mark, Series};
 pub(crate) use errors::error_plot;
 pub(crate) use scale::Cover;
-pub(crate) use text::{escaped, grouped, short};
+pub(crate) use text::{escaped, grouped};

@@ -18,7 +18,7 @@ pub(crate) struct Scale {
 /// How an axis covers its values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Cover {
-    /// Linear from zero; logarithmic where values span more than a factor of a thousand.
+    /// Linear from zero.
     FromZero,
     /// Linear around the values.
     Around,
@@ -36,7 +36,11 @@ impl Scale {
         let high = finite().fold(f64::NEG_INFINITY, f64::max);
         match cover {
             _ if low > high => Self { logarithmic: false, low: 0.0, high: 1.0 },
-            Cover::FromZero => Self::over(values),
+            Cover::FromZero => {
+                let top = if high > 0.0 { 1.04 * high } else { 1.0 };
+                let step = nice_step(top, 4.0);
+                Self { logarithmic: false, low: 0.0, high: (step * (top / step).ceil()).min(f64::MAX) }
+            }
             Cover::Exactly if high > low => Self { logarithmic: false, low, high },
             Cover::Around | Cover::Exactly => {
                 let span = if high > low { high - low } else { 0.1 * high.abs().max(1.0) };

@@ -1,7 +1,7 @@
 //! Writing solved frames: what waits for a session is written together and synced once, then its uploads hear of it.
 
-use super::Session;
 use super::frames::Digests;
+use super::{Phase, Session};
 use crate::capture::StoredError;
 use crate::problem::{self, ApiError};
 use crate::store::{FrameLog, LogRecord, StoreError};
@@ -103,6 +103,10 @@ impl Session {
 
     /// Writes frames, syncs them and tells their uploads.
     fn write(&self, solved: &[Solved]) {
+        let solved = self.written_after_their_predecessors(solved);
+        if solved.is_empty() {
+            return;
+        }
         let records: Vec<LogRecord<'_>> = solved
             .iter()
             .map(|s| LogRecord {
@@ -117,6 +121,13 @@ impl Session {
             })
             .collect();
         let mut log = super::lock(&self.log);
+        if let Phase::Failed(problem) = self.status().phase {
+            // Its files are in quarantine.
+            drop(log);
+            self.bytes.fetch_sub(stored_bytes(solved), Relaxed);
+            self.give_up(solved, &ApiError::new(problem::SESSION_FAILED, problem.detail));
+            return;
+        }
         let outcome = self.open_log(&mut log).and_then(|log| log.append(&records));
         if outcome.is_err() {
             // Whether it can go on is found out by opening it again.
@@ -138,11 +149,29 @@ impl Session {
             Err(error) => {
                 self.bytes.fetch_sub(stored_bytes(solved), Relaxed);
                 tracing::warn!(session = %self.meta.id, %error, "frames could not be written");
-                let error = self.storage_error(&error);
+                let error = self.damaged_or(error);
                 self.give_up(solved, &error);
             }
         }
         self.touch();
+    }
+
+    /// Where frames depend on those before them, gives up the ones whose predecessor could not be written: what is on disk must
+    /// come from what is on disk.
+    fn written_after_their_predecessors<'a>(&self, solved: &'a [Solved]) -> &'a [Solved] {
+        if !self.follows_previous() {
+            return solved;
+        }
+        let there = |frame: u32, before: &[Solved]| {
+            before.iter().any(|s| s.frame == frame) || self.frames().entry(frame).is_some()
+        };
+        let orphan = (0..solved.len()).find(|&k| solved[k].frame > 0 && !there(solved[k].frame - 1, &solved[..k]));
+        let (written, orphans) = solved.split_at(orphan.unwrap_or(solved.len()));
+        if let Some(first) = orphans.first() {
+            self.bytes.fetch_sub(stored_bytes(orphans), Relaxed);
+            self.give_up(orphans, &super::upload::predecessor_missing(first.frame));
+        }
+        written
     }
 
     /// Tells the uploads of frames that are not written why.

@@ -10,6 +10,7 @@ use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{Completion, LogEntry, StoreError};
 use cager_proto::container;
+use cager_proto::messages::Complete;
 use std::io::{self, BufWriter, Write};
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -19,16 +20,17 @@ const READ_FRAMES: usize = 64;
 
 impl Service {
     /// Says that a session has `frames` frames, and writes its container. Once begun, it goes on where the client gives up.
-    pub(crate) async fn complete(self: &Arc<Self>, session: &Arc<Session>, frames: u32) -> Result<(), ApiError> {
+    pub(crate) async fn complete(self: &Arc<Self>, session: &Arc<Session>, wish: Complete) -> Result<(), ApiError> {
         let (service, session) = (Arc::clone(self), Arc::clone(session));
         let work = tokio::spawn(async move {
             let _one = session.completing.lock().await;
-            service.complete_alone(&session, frames).await
+            service.complete_alone(&session, wish).await
         });
         work.await.map_err(|error| ApiError::internal(&error))?
     }
 
-    async fn complete_alone(self: &Arc<Self>, session: &Arc<Session>, frames: u32) -> Result<(), ApiError> {
+    async fn complete_alone(self: &Arc<Self>, session: &Arc<Session>, wish: Complete) -> Result<(), ApiError> {
+        let frames = wish.frames;
         match session.status().phase {
             Phase::Completed(completion) if completion.frames == frames => return Ok(()),
             Phase::Completed(completion) => {
@@ -50,7 +52,7 @@ impl Service {
         let entries: Vec<LogEntry> = {
             let mut known = session.frames();
             // From here on no frame is answered that the container would lack.
-            match known.seal_at(frames) {
+            match known.seal_at(frames, wish.discard_beyond) {
                 Ok(()) => {}
                 Err(Unsealed::Missing(missing)) => {
                     let count: u64 = missing.iter().map(|[a, b]| u64::from(b - a)).sum();
@@ -59,16 +61,24 @@ impl Service {
                     return Err(ApiError::new(problem::FRAMES_MISSING, detail).missing(missing));
                 }
                 Err(Unsealed::Beyond(frame)) => {
-                    let detail = format!("frame {frame} was posted, so the capture has more than {frames} frames");
+                    let detail = format!(
+                        "frame {frame} was posted, so the capture has more than {frames} frames; say discard_beyond to leave it out"
+                    );
                     return Err(ApiError::new(problem::FRAME_CONFLICT, detail).frame(frame));
                 }
             }
-            known.entries().copied().collect()
+            known.entries().take_while(|entry| entry.frame < frames).copied().collect()
         };
         let mut sealed = Sealed { session, kept: false };
         let prepared = self.solver(session).await?;
         let writing = Arc::clone(session);
-        let completion = blocking(move || write(&writing, &prepared, &entries, frames)).await??;
+        let written = blocking(move || write(&writing, &prepared, &entries, frames)).await?;
+        let completion = written.map_err(|error| match session.status().phase {
+            // What was to be written proved damaged.
+            Phase::Failed(problem) => ApiError::new(problem::SESSION_FAILED, problem.detail),
+            _ => error,
+        })?;
+        session.frames().discard_from(frames);
         session.set_phase(Phase::Completed(completion));
         sealed.kept = true;
         Ok(())

@@ -1,8 +1,8 @@
 //! Making, preparing and deleting sessions.
 
 use super::facts::{Facts, Outcome};
-use super::prepare::Choices;
-use super::prepared::{Got, Prepared};
+use super::prepare::{self, Choices, Geometry};
+use super::prepared::{Got, Prepared, Wanted};
 use super::registry::Repetition;
 use super::upload::{self, FrameJob};
 use super::{LiveLane, Phase, Session, Status};
@@ -69,18 +69,18 @@ impl Service {
         choices: Choices,
         idempotency: Option<Idempotency>,
     ) -> Result<Arc<Session>, ApiError> {
-        self.check_quota(tenant, content.size_bytes())?;
+        let room = self.reserve(tenant, content.size_bytes())?;
         let at_hand = self.solvers.at_hand(&key);
-        let content = match at_hand {
-            Some(_) => content,
-            None => blocking(move || super::prepare::check(&content, &choices).map(|()| content)).await??,
-        };
         let most = self.config.max_preparing + self.config.max_prepare_queue;
-        if at_hand.is_none() && self.solvers.in_flight() >= most {
+        if at_hand.is_none() && self.solvers.in_flight_of(&tenant.name) >= most {
             self.rejected("prepare_queue");
-            let detail = format!("{most} sessions are being prepared or wait for it; try again later");
+            let detail = format!("{most} of your sessions are being prepared or wait for it; try again later");
             return Err(ApiError::new(problem::BUSY, detail).limit(most as u64).retry_after(5));
         }
+        let (content, geometry) = match at_hand {
+            Some(_) => (content, None),
+            None => self.read_geometry(&key, content, choices).await?,
+        };
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let meta = SessionMeta {
             id: uuid::Uuid::now_v7().simple().to_string(),
@@ -107,12 +107,13 @@ impl Service {
                 .await?
                 .map_err(|error| super::commit::storage_error(&error))?;
             self.registry.insert(Arc::clone(&session));
+            drop(room);
         }
         metrics::counter!("cager_sessions_created_total", "tenant" => tenant.name.clone()).increment(1);
         match session.facts() {
             // It would be found prepared after a restart as well; this only says it sooner.
             Some(facts) => drop(self.keep_outcome(&session, Outcome::Ready(Box::new(facts)))),
-            None => drop(tokio::spawn(Arc::clone(self).prepare(Arc::clone(&session), choices))),
+            None => drop(tokio::spawn(Arc::clone(self).prepare(Arc::clone(&session), choices, geometry))),
         }
         Ok(session)
     }
@@ -161,18 +162,41 @@ impl Service {
         self.registry.insert(Arc::clone(&session));
         if preparing {
             match choices {
-                Ok(choices) => drop(tokio::spawn(Arc::clone(self).prepare(session, choices))),
+                Ok(choices) => drop(tokio::spawn(Arc::clone(self).prepare(session, choices, None))),
                 Err(error) => session.set_phase(Phase::Failed(error.problem)),
             }
         }
     }
 
-    async fn prepare(self: Arc<Self>, session: Arc<Session>, choices: Choices) {
+    /// Reads rest pose and cage, so that who sends bad ones hears it at once. Rest pose and cage come back where they will be
+    /// prepared without much waiting; else they would only take memory.
+    async fn read_geometry(
+        &self,
+        key: &ContentKey,
+        content: Content,
+        choices: Choices,
+    ) -> Result<(Content, Option<Arc<Geometry>>), ApiError> {
+        if self.solvers.is_stored(key) {
+            return Ok((content, None));
+        }
+        let _one_of_few = self.reading.acquire().await;
+        let (content, geometry) = blocking(move || {
+            let geometry = prepare::read(&content, &choices);
+            (content, geometry)
+        })
+        .await?;
+        let geometry = Arc::new(geometry?);
+        prepare::check(&geometry, &choices, self.config.max_prepare_bytes)?;
+        let soon = self.solvers.in_flight() <= self.config.max_preparing;
+        Ok((content, soon.then_some(geometry)))
+    }
+
+    async fn prepare(self: Arc<Self>, session: Arc<Session>, choices: Choices, mut geometry: Option<Arc<Geometry>>) {
         let clock = Instant::now();
         let mut again = true;
         let got = loop {
             let got = tokio::select! {
-                got = self.solvers.get(session.meta.key, choices) => got,
+                got = self.solvers.get(wanted(&session, choices, geometry.take())) => got,
                 () = session.deleted().cancelled() => return,
             };
             // It may have come along with the preparation of a session that was deleted meanwhile, content and all.
@@ -225,7 +249,7 @@ impl Service {
     /// The solver of a session that is ready.
     pub(crate) async fn solver(self: &Arc<Self>, session: &Session) -> Result<Arc<Prepared>, ApiError> {
         let choices = Choices::of(&session.meta.options)?;
-        Ok(self.solvers.get(session.meta.key, choices).await?.prepared)
+        Ok(self.solvers.get(wanted(session, choices, None)).await?.prepared)
     }
 
     /// The lane that takes a session's frames to the engine.
@@ -238,13 +262,18 @@ impl Service {
                 let products = if decoder.tied_normals().is_some() { 40.0 } else { 0.0 };
                 points * columns + products * columns * columns
             };
+            let in_order = prepared.solver.follows_previous();
             let (weak, solver) = (Arc::downgrade(session), prepared);
             let run = move |jobs: Vec<FrameJob>| {
                 if let Some(session) = weak.upgrade() {
                     upload::solve(&session, &solver, jobs);
                 }
             };
-            LiveLane::new(self.engine.lane(&tenant.name, tenant.priority.weight(), cost, run))
+            let (name, weight) = (&tenant.name, tenant.priority.weight());
+            LiveLane::new(match in_order {
+                true => self.engine.lane_in_order(name, weight, cost, run),
+                false => self.engine.lane(name, weight, cost, run),
+            })
         })
     }
 
@@ -279,6 +308,10 @@ impl Service {
         }
         Ok(())
     }
+}
+
+fn wanted(session: &Session, choices: Choices, geometry: Option<Arc<Geometry>>) -> Wanted {
+    Wanted { key: session.meta.key, tenant: session.meta.tenant.clone(), choices, geometry }
 }
 
 /// Name of the note that holds the [`Outcome`].

@@ -95,23 +95,30 @@ impl Frames {
         Claim::Solve
     }
 
-    /// Takes no new frames from here on, if all of `frames` are there and none beyond, nor on its way.
+    /// Takes no new frames from here on, if all of `frames` are there and none is beyond or on its way there. With `discard` those
+    /// that are there already may be beyond.
     ///
     /// # Errors
     /// Why that cannot be yet; nothing changed.
-    pub(crate) fn seal_at(&mut self, frames: u32) -> Result<(), Unsealed> {
+    pub(crate) fn seal_at(&mut self, frames: u32, discard: bool) -> Result<(), Unsealed> {
         let missing = self.missing(Some(frames));
         if !missing.is_empty() {
             return Err(Unsealed::Missing(missing));
         }
         let on_its_way = self.pending.keys().copied().max();
-        match self.highest().max(on_its_way).filter(|&highest| highest >= frames) {
+        let highest = self.highest().filter(|_| !discard);
+        match highest.max(on_its_way).filter(|&highest| highest >= frames) {
             Some(highest) => Err(Unsealed::Beyond(highest)),
             None => {
                 self.sealed = true;
                 Ok(())
             }
         }
+    }
+
+    /// Forgets solved frames from this number on.
+    pub(crate) fn discard_from(&mut self, frames: u32) {
+        self.solved.split_off(&frames);
     }
 
     /// Takes no new frames from here on.
@@ -255,15 +262,18 @@ mod tests {
         let upload = Arc::new(Upload::default());
         let same = Digests { handles: [1; 16], full: Some([2; 16]) };
         let mut frames = Frames::new([0, 2].map(entry).to_vec());
-        assert_eq!(frames.seal_at(3), Err(Unsealed::Missing(vec![[1, 2]])));
+        assert_eq!(frames.seal_at(3, false), Err(Unsealed::Missing(vec![[1, 2]])));
         assert_eq!(frames.claim(1, same, &upload), Claim::Solve);
-        assert_eq!(frames.seal_at(3), Err(Unsealed::Missing(vec![[1, 2]])), "it is not on disk yet");
+        assert_eq!(frames.seal_at(3, false), Err(Unsealed::Missing(vec![[1, 2]])), "it is not on disk yet");
         frames.solved(entry(1));
-        assert_eq!(frames.seal_at(2), Err(Unsealed::Beyond(2)));
+        assert_eq!(frames.seal_at(2, false), Err(Unsealed::Beyond(2)));
+        assert_eq!(frames.seal_at(2, true), Ok(()));
+        frames.unseal();
         assert_eq!(frames.claim(3, same, &upload), Claim::Solve);
-        assert_eq!(frames.seal_at(3), Err(Unsealed::Beyond(3)), "its record will be sent");
+        assert_eq!(frames.seal_at(3, false), Err(Unsealed::Beyond(3)), "its record will be sent");
+        assert_eq!(frames.seal_at(3, true), Err(Unsealed::Beyond(3)), "its record will be sent");
         frames.gave_up(3);
-        assert_eq!(frames.seal_at(3), Ok(()));
+        assert_eq!(frames.seal_at(3, false), Ok(()));
         assert_eq!(frames.claim(3, same, &upload), Claim::Sealed);
         assert_eq!(frames.claim(2, same, &upload), Claim::Known);
         frames.unseal();

@@ -5,6 +5,7 @@ pub(crate) mod complete;
 pub(crate) mod create;
 pub(crate) mod facts;
 pub(crate) mod frames;
+mod places;
 pub(crate) mod prepare;
 pub(crate) mod prepared;
 pub(crate) mod registry;
@@ -14,6 +15,7 @@ pub(crate) mod upload;
 use crate::engine::Lane;
 use crate::problem::{self, ApiError};
 use crate::store::{Completion, FrameLog, LogEntry, LogReader, SessionMeta, Store, StoreError};
+use cager_core::regularize::Regularizer;
 use cager_proto::messages::{FrameCounts, Problem, Progress, Session as View, SessionState};
 use commit::{Committer, Waiting};
 use facts::Facts;
@@ -39,6 +41,8 @@ pub(crate) struct Session {
     /// Bytes of its files, of its content, and of frames about to be written.
     pub(crate) bytes: AtomicU64,
     waiting: Mutex<Waiting>,
+    /// The last solved frame with its cage, where the next depends on it.
+    last_solved: Mutex<Option<(u32, Vec<f32>)>>,
     log: Mutex<Option<FrameLog>>,
     reader: Mutex<Option<LogReader>>,
     lane: Mutex<Weak<LiveLane>>,
@@ -109,6 +113,7 @@ impl Session {
             queued: Arc::default(),
             bytes: AtomicU64::new(0),
             waiting: Mutex::default(),
+            last_solved: Mutex::default(),
             log: Mutex::default(),
             reader: Mutex::default(),
             lane: Mutex::default(),
@@ -193,14 +198,12 @@ impl Session {
             _ => {}
         }
         let mut log = lock(&self.log);
-        if log.is_none() && !self.loaded.load(Ordering::Acquire) {
-            match self.load_log() {
-                Ok(opened) => *log = Some(opened),
-                Err(StoreError::Damaged { path, what }) => return Err(self.quarantine(&path, &what)),
-                Err(error) => return Err(self.storage_error(&error)),
-            }
-        }
-        Ok(())
+        let opened = match log.is_none() && !self.loaded.load(Ordering::Acquire) {
+            true => self.load_log().map(|opened| *log = Some(opened)),
+            false => Ok(()),
+        };
+        drop(log);
+        opened.map_err(|error| self.damaged_or(error))
     }
 
     /// Makes the log of a session that has none yet. Blocks.
@@ -231,8 +234,12 @@ impl Session {
             let path = self.store.log_path(&self.meta.id);
             return Err(StoreError::Damaged { path, what: "the frame log is gone".to_owned() });
         }
-        let (log, entries) = self.store.open_log(&self.meta.id, rows)?;
+        let (log, mut entries) = self.store.open_log(&self.meta.id, rows)?;
         self.has_log.store(true, Ordering::Release);
+        if let Some(frames) = self.declared() {
+            // Those beyond were discarded at completion.
+            entries.retain(|entry| entry.frame < frames);
+        }
         if let Some(frames) = self.declared()
             && entries.len() < frames as usize
         {
@@ -251,38 +258,65 @@ impl Session {
         Ok(log)
     }
 
-    /// Puts a damaged session aside, so that others are not disturbed.
+    /// Puts a damaged session aside, so that others are not disturbed. The caller holds none of its locks.
     fn quarantine(&self, path: &std::path::Path, what: &str) -> ApiError {
+        let error = ApiError::new(
+            problem::SESSION_FAILED,
+            "stored frames of this session are damaged; the operator finds it in quarantine, and the capture has to be uploaded to a new session",
+        );
+        {
+            let mut status = lock(&self.status);
+            if matches!(status.phase, Phase::Failed(_)) {
+                // Another reader met the damage first.
+                return error;
+            }
+            status.phase = Phase::Failed(error.problem.clone());
+        }
+        self.touch();
+        // Nothing is appended, and so nothing answered, from here on.
+        *lock(&self.log) = None;
+        *lock(&self.reader) = None;
         tracing::error!(session = %self.meta.id, path = %path.display(), what, "the frame log is damaged; the session is put in quarantine");
         metrics::counter!("cager_quarantined_total").increment(1);
         if let Err(error) = self.store.quarantine_session(&self.meta.id, what) {
             tracing::error!(session = %self.meta.id, %error, "it could not be moved");
         }
-        let error = ApiError::new(
-            problem::SESSION_FAILED,
-            "stored frames of this session are damaged; the operator finds it in quarantine, and the capture has to be uploaded to a new session",
-        );
-        self.set_phase(Phase::Failed(error.problem.clone()));
         error
     }
 
     /// Reads the cages of these frames, m × 12 bytes each, one after another. Blocks.
     ///
     /// # Errors
-    /// What the store says.
-    pub(crate) fn read_cages(&self, entries: &[LogEntry], out: &mut Vec<u8>) -> Result<(), StoreError> {
-        let mut reader = lock(&self.reader).clone();
-        if reader.is_none() {
-            let mut log = lock(&self.log);
-            if log.is_none() {
-                *log = Some(self.load_log()?);
+    /// A damaged log, after which the session is failed and out of the way; what the system says.
+    pub(crate) fn read_cages(&self, entries: &[LogEntry], out: &mut Vec<u8>) -> Result<(), ApiError> {
+        self.reader().and_then(|reader| reader.read_cages(entries, out)).map_err(|error| self.damaged_or(error))
+    }
+
+    /// Reads the log, opened again if nobody used it for a while. What it holds is known, so it is not looked through again.
+    fn reader(&self) -> Result<LogReader, StoreError> {
+        let mut kept = lock(&self.reader);
+        if let Some(reader) = &*kept {
+            return Ok(reader.clone());
+        }
+        let rows = self.facts().map_or(0, |facts| facts.unknowns);
+        let reader = self.store.log_reader(&self.meta.id, rows)?;
+        Ok(kept.insert(reader).clone())
+    }
+
+    /// What a client hears when the store refuses; damage puts the session aside.
+    pub(crate) fn damaged_or(&self, error: StoreError) -> ApiError {
+        match error {
+            // Files on their way to the trash are not damaged.
+            StoreError::Damaged { path, what } if !self.deleting.load(Ordering::SeqCst) && !self.is_deleted() => {
+                self.quarantine(&path, &what)
             }
-            reader = lock(&self.reader).clone();
+            error => self.storage_error(&error),
         }
-        match reader {
-            Some(reader) => reader.read_cages(entries, out),
-            None => Ok(()),
-        }
+    }
+
+    /// Whether every frame depends on the one before, so that they have to come in order.
+    pub(crate) fn follows_previous(&self) -> bool {
+        self.meta.options.regularizer.as_deref() == Some(Regularizer::Temporal.name())
     }
 
     /// The lane of running uploads, if there is one.

@@ -7,7 +7,7 @@ use crate::problem::{self, ApiError};
 use crate::store::Content;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions, check_options};
+use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions};
 use cager_core::mesh::{Model, TriMesh};
 use cager_core::regularize::{Regularizer, SparseMatrix, Term, TermError};
 use cager_formats::{MeshFormat, read_matrix_bytes, read_model_bytes};
@@ -60,14 +60,8 @@ impl Choices {
             return refuse(format!("handle_count: {wanted} reads a number of points of its own; leave it out"));
         };
         let wanted = options.regularizer.as_deref().unwrap_or(Regularizer::default().name());
-        if wanted == Regularizer::Temporal.name() {
-            return refuse(
-                "regularizer: temporal makes every frame depend on the one before, and a service takes frames in any order; encode with the command line, without --server".to_owned(),
-            );
-        }
         let Some(regularizer) = Regularizer::by_name(wanted) else {
-            let names = Regularizer::ALL.iter().filter(|&&r| r != Regularizer::Temporal).map(|r| r.name());
-            let names: Vec<&str> = names.collect();
+            let names: Vec<&str> = Regularizer::ALL.iter().map(|r| r.name()).collect();
             return refuse(format!("regularizer: {wanted:?} is not available; give one of {}", names.join(", ")));
         };
         let lambda = options.lambda.unwrap_or(SolverOptions::default().lambda);
@@ -94,30 +88,6 @@ pub(crate) struct Geometry {
     pub(crate) cage: Cage,
     /// The matrix of the regularizer of that name.
     pub(crate) matrix: Option<SparseMatrix>,
-}
-
-/// Checks what the options say about the geometry, before a session is made. What is wrong with the geometry itself is left to
-/// its preparation.
-///
-/// # Errors
-/// Options that do not fit the cage or the rest pose; a matrix that cannot be read, is missing or not wanted.
-pub(crate) fn check(content: &Content, choices: &Choices) -> Result<(), ApiError> {
-    let matrix = read_matrix(content, choices)?;
-    let Ok(cage) = read_cage(content, choices) else { return Ok(()) };
-    let unknowns = choices.system.unknowns(&cage);
-    // The number of points matters for the number of handles alone, and a rest pose takes its time to be read.
-    let points = match choices.handles {
-        Handles::Rectangular { count: Some(_) } | Handles::Spread { count: Some(_) } => {
-            let Ok(rest) = read_part("rest", &content.rest_name, &content.rest) else { return Ok(()) };
-            rest.points.len()
-        }
-        _ => usize::MAX,
-    };
-    if points < unknowns {
-        return Ok(());
-    }
-    check_options(points, unknowns, choices.solver_options(unknowns)).map_err(refused)?;
-    matrix.map_or(Ok(()), |matrix| matrix.delta(&cage, unknowns).map(|_| ()).map_err(|e| refused(e.into())))
 }
 
 fn read_matrix(content: &Content, choices: &Choices) -> Result<Option<SparseMatrix>, ApiError> {
@@ -161,6 +131,20 @@ pub(crate) fn read_cage(content: &Content, choices: &Choices) -> Result<Cage, Ap
     })
 }
 
+/// Checks what is wrong of rest pose, cage and options together without computing much.
+///
+/// # Errors
+/// Geometry or options that do not go together.
+pub(crate) fn check(geometry: &Geometry, choices: &Choices, most_bytes: u64) -> Result<(), ApiError> {
+    let unknowns = choices.system.unknowns(&geometry.cage);
+    let options = choices.solver_options(unknowns);
+    check_memory(geometry, choices, options, most_bytes)?;
+    Solver::check(choices.system, &geometry.cage, &geometry.rest.points, options).map_err(|error| refused(&error))?;
+    let Some(matrix) = &geometry.matrix else { return Ok(()) };
+    matrix.delta(&geometry.cage, unknowns).map_err(|error| refused(&error.into()))?;
+    Ok(())
+}
+
 /// Prepares the solver.
 ///
 /// # Errors
@@ -168,35 +152,16 @@ pub(crate) fn read_cage(content: &Content, choices: &Choices) -> Result<Cage, Ap
 pub(crate) fn prepare(geometry: &Geometry, choices: &Choices, most_bytes: u64) -> Result<Prepared, ApiError> {
     let unknowns = choices.system.unknowns(&geometry.cage);
     let options = choices.solver_options(unknowns);
-    // Two matrices of n × m in double precision and one in single, at their peak.
-    let points = geometry.rest.points.len();
-    let handles = match choices.handles {
-        // The covariance of the handles, its factor, and what is solved with it.
-        Handles::Spread { .. } => {
-            let count = options.handles.count(points, unknowns) as u64;
-            count.saturating_mul(16 * (count + unknowns as u64))
-        }
-        _ => 0,
-    };
-    let columns = choices.system.columns(&geometry.cage) as u64;
-    // What an iteration takes beside them: their Gram matrix, and in single precision.
-    let iterated = if columns > unknowns as u64 { 12 * columns * columns } else { 0 };
-    let needed = (20 * points as u64 * columns).saturating_add(handles).saturating_add(iterated);
-    if needed > most_bytes {
-        let detail = format!(
-            "{points} points times {columns} values of the cage need {needed} bytes to be prepared, and this service allows {most_bytes}; use a coarser cage or a lighter model"
-        );
-        return Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(most_bytes));
-    }
+    check_memory(geometry, choices, options, most_bytes)?;
     let own = || geometry.matrix.as_ref().map(|matrix| matrix as &dyn Term).ok_or(TermError::Missing);
-    let term = options.regularizer.term().map_or_else(own, |term| Ok(term)).map_err(|error| refused(error.into()))?;
-    let solver =
-        Solver::prepare_with(choices.system, &geometry.cage, &geometry.rest.points, options, term).map_err(refused)?;
+    let term = options.regularizer.term().map_or_else(own, Ok).map_err(|error| refused(&error.into()))?;
+    let solver = Solver::prepare_with(choices.system, &geometry.cage, &geometry.rest.points, options, term)
+        .map_err(|error| refused(&error))?;
     Ok(with_solver(solver, &geometry.cage, options))
 }
 
 /// What a client hears of an error: which option it is about, or that it is the geometry.
-fn refused(error: PrepareError) -> ApiError {
+fn refused(error: &PrepareError) -> ApiError {
     let option = match error {
         PrepareError::SpectrumTooLarge { .. } => "spectrum",
         PrepareError::BadLambda { .. } => "lambda",
@@ -217,6 +182,36 @@ pub(crate) fn with_solver(solver: Solver, cage: &Cage, options: SolverOptions) -
         cage_faces: cage.faces().len() as u32,
         warnings,
     }
+}
+
+fn check_memory(
+    geometry: &Geometry,
+    choices: &Choices,
+    options: SolverOptions,
+    most_bytes: u64,
+) -> Result<(), ApiError> {
+    let points = geometry.rest.points.len();
+    let unknowns = choices.system.unknowns(&geometry.cage);
+    let handles = match options.handles {
+        // The covariance of the handles, its factor, and what is solved with it.
+        Handles::Spread { .. } => {
+            let count = options.handles.count(points, unknowns) as u64;
+            count.saturating_mul(16 * (count + unknowns as u64))
+        }
+        _ => 0,
+    };
+    let columns = choices.system.columns(&geometry.cage) as u64;
+    // What an iteration takes beside them: their Gram matrix, and in single precision.
+    let iterated = if columns > unknowns as u64 { 12 * columns * columns } else { 0 };
+    // Two matrices of all points and columns in double precision and one in single, at their peak.
+    let needed = (20 * points as u64 * columns).saturating_add(handles).saturating_add(iterated);
+    if needed > most_bytes {
+        let detail = format!(
+            "{points} points times {columns} values of the cage need {needed} bytes to be prepared, and this service allows {most_bytes}; use a coarser cage or a lighter model"
+        );
+        return Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(most_bytes));
+    }
+    Ok(())
 }
 
 fn read_part(part: &str, name: &str, bytes: &[u8]) -> Result<Model, ApiError> {

@@ -1,9 +1,11 @@
 //! Prepared solvers by content: in memory up to a budget, on disk beyond, each prepared once however many ask.
 
-use super::prepare::{self, Choices};
+use super::places::{Place, Places};
+use super::prepare::{self, Choices, Geometry};
 use crate::config::ServeConfig;
+use crate::engine::threads;
 use crate::problem::{self, ApiError};
-use crate::store::{ContentKey, Store};
+use crate::store::{Content, ContentKey, Store};
 use cager_core::inversion::{Solver, SolverOptions};
 use cager_proto::messages::{CacheUse, PreparationSeconds};
 use std::collections::HashMap;
@@ -28,7 +30,20 @@ pub(crate) struct Got {
     pub(crate) seconds: PreparationSeconds,
 }
 
+type Landing = watch::Sender<Option<Result<Got, ApiError>>>;
 type Flight = watch::Receiver<Option<Result<Got, ApiError>>>;
+
+/// A solver that somebody waits for.
+pub(crate) struct Wanted {
+    pub(crate) key: ContentKey,
+    pub(crate) tenant: String,
+    pub(crate) choices: Choices,
+    /// Rest pose and cage where they have been read already.
+    pub(crate) geometry: Option<Arc<Geometry>>,
+}
+
+/// Stored solvers read at a time: the disk decides how fast that is.
+const LOADS: usize = 4;
 
 /// The cache of solvers.
 pub(crate) struct Solvers {
@@ -39,7 +54,9 @@ pub(crate) struct Solvers {
     /// Memory that one preparation may take.
     most_bytes: u64,
     /// Solvers being prepared at a time.
-    places: Semaphore,
+    places: Arc<Places>,
+    /// Solvers being read from disk at a time.
+    loads: Semaphore,
     pool: Arc<rayon::ThreadPool>,
 }
 
@@ -48,7 +65,12 @@ struct Inner {
     kept: HashMap<ContentKey, Kept>,
     bytes: u64,
     clock: u64,
-    flights: HashMap<ContentKey, Flight>,
+    flights: HashMap<ContentKey, InFlight>,
+}
+
+struct InFlight {
+    landing: Arc<Landing>,
+    tenant: String,
 }
 
 struct Kept {
@@ -63,18 +85,15 @@ impl Solvers {
     /// # Errors
     /// The system's, where threads cannot be started.
     pub(crate) fn new(store: Store, config: &ServeConfig) -> std::io::Result<Self> {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(config.workers)
-            .thread_name(|k| format!("prepare-{k}"))
-            .build()
-            .map_err(std::io::Error::other)?;
+        let pool = threads::pool("prepare", config.workers)?;
         Ok(Self {
             inner: Mutex::default(),
             store,
             budget_bytes: config.cache_bytes,
             disk_budget_bytes: config.prepared_disk_bytes,
             most_bytes: config.max_prepare_bytes,
-            places: Semaphore::new(config.max_preparing.max(1)),
+            places: Places::new(config.max_preparing.max(1)),
+            loads: Semaphore::new(LOADS),
             pool: Arc::new(pool),
         })
     }
@@ -90,17 +109,28 @@ impl Solvers {
         Some(Arc::clone(&kept.prepared))
     }
 
+    /// Whether the solver of a content is stored, so that its rest pose and cage are known to be good.
+    pub(crate) fn is_stored(&self, key: &ContentKey) -> bool {
+        self.store.has_prepared(key)
+    }
+
     /// Preparations that run or wait.
     pub(crate) fn in_flight(&self) -> usize {
         super::lock(&self.inner).flights.len()
     }
 
-    /// The solver of a content: from memory, from disk, or prepared now. Goes on where the caller gives up.
-    pub(crate) async fn get(self: &Arc<Self>, key: ContentKey, choices: Choices) -> Result<Got, ApiError> {
-        if let Some(prepared) = self.at_hand(&key) {
+    /// Preparations that run or wait for one tenant.
+    pub(crate) fn in_flight_of(&self, tenant: &str) -> usize {
+        super::lock(&self.inner).flights.values().filter(|flight| flight.tenant == tenant).count()
+    }
+
+    /// The solver of a content: from memory, from disk, or prepared now. Where all give up before its turn has come, it is not
+    /// prepared.
+    pub(crate) async fn get(self: &Arc<Self>, wanted: Wanted) -> Result<Got, ApiError> {
+        if let Some(prepared) = self.at_hand(&wanted.key) {
             return Ok(Got { prepared, cache: CacheUse::Hit, seconds: PreparationSeconds::default() });
         }
-        let (mut flight, mine) = self.board(key, choices);
+        let (mut flight, mine) = self.board(wanted);
         loop {
             if let Some(result) = flight.borrow_and_update().clone() {
                 // Who only came along found it prepared.
@@ -113,69 +143,115 @@ impl Solvers {
     }
 
     /// The flight that prepares a content, begun if there is none; and whether it was begun here.
-    fn board(self: &Arc<Self>, key: ContentKey, choices: Choices) -> (Flight, bool) {
+    fn board(self: &Arc<Self>, wanted: Wanted) -> (Flight, bool) {
         let mut inner = super::lock(&self.inner);
-        if let Some(flight) = inner.flights.get(&key) {
+        if let Some(flight) = inner.flights.get(&wanted.key) {
             metrics::counter!("cager_cache_total", "result" => "joined").increment(1);
-            return (flight.clone(), false);
+            return (flight.landing.subscribe(), false);
         }
-        let (landed, flight) = watch::channel(None);
-        inner.flights.insert(key, flight.clone());
+        let (landing, flight) = watch::channel(None);
+        let landing = Arc::new(landing);
+        inner.flights.insert(wanted.key, InFlight { landing: Arc::clone(&landing), tenant: wanted.tenant.clone() });
         let solvers = Arc::clone(self);
-        tokio::spawn(async move {
-            let clock = Instant::now();
-            let result = {
-                let _place = solvers.places.acquire().await;
-                let queued = clock.elapsed().as_secs_f64();
-                let working = Arc::clone(&solvers);
-                let work = move || working.load_or_prepare(key, choices, queued);
-                tokio::task::spawn_blocking(work).await.unwrap_or_else(|e| Err(ApiError::internal(&e)))
-            };
-            if let Ok(got) = &result {
-                solvers.keep(key, &got.prepared);
-            }
-            super::lock(&solvers.inner).flights.remove(&key);
-            // Nobody may be listening any more.
-            let fresh =
-                result.as_ref().ok().filter(|got| got.cache == CacheUse::Miss).map(|got| Arc::clone(&got.prepared));
-            let _ = landed.send(Some(result));
-            // Nobody has to wait for it: without it the same solver is prepared again.
-            if let Some(prepared) = fresh {
-                drop(tokio::task::spawn_blocking(move || solvers.store(&key, &prepared)));
-            }
-        });
+        tokio::spawn(async move { solvers.fly(wanted, &landing).await });
         (flight, true)
     }
 
-    fn load_or_prepare(&self, key: ContentKey, choices: Choices, queued: f64) -> Result<Got, ApiError> {
-        let clock = Instant::now();
-        let stored = |error| super::commit::storage_error(&error);
-        let content =
-            self.store.content(&key).map_err(stored)?.ok_or_else(|| {
-                ApiError::new(problem::SESSION_DELETED, "the session was deleted before it was prepared")
-            })?;
-        match self.store.prepared(&key) {
-            Ok(Some(solver)) => {
-                let cage = prepare::read_cage(&content, &choices)?;
-                let options = choices.solver_options(choices.system.unknowns(&cage));
-                metrics::counter!("cager_cache_total", "result" => "disk").increment(1);
-                let seconds = PreparationSeconds {
-                    queued,
-                    read: clock.elapsed().as_secs_f64(),
-                    total: queued + clock.elapsed().as_secs_f64(),
-                    ..PreparationSeconds::default()
-                };
-                let prepared = Arc::new(prepare::with_solver(solver, &cage, options));
-                return Ok(Got { prepared, cache: CacheUse::Hit, seconds });
+    async fn fly(self: Arc<Self>, wanted: Wanted, landing: &Landing) {
+        let key = wanted.key;
+        let result = loop {
+            let flying = Arc::clone(&self).load_or_prepare(&wanted, landing);
+            match flying.await {
+                Some(result) => break result,
+                // Unless somebody came along just now.
+                None if self.called_off(&key, landing) => return,
+                None => {}
             }
-            Ok(None) => {}
-            // Preparing again mends it.
-            Err(error) => tracing::warn!(%error, "a stored solver cannot be read"),
+        };
+        if let Ok(got) = &result {
+            self.keep(key, &got.prepared);
         }
+        super::lock(&self.inner).flights.remove(&key);
+        let fresh = result.as_ref().ok().filter(|got| got.cache == CacheUse::Miss).map(|got| Arc::clone(&got.prepared));
+        // Nobody may be listening any more.
+        let _ = landing.send(Some(result));
+        // Nobody has to wait for it: without it the same solver is prepared again.
+        if let Some(prepared) = fresh {
+            drop(tokio::task::spawn_blocking(move || self.store(&key, &prepared)));
+        }
+    }
+
+    /// Takes a flight back that nobody waits for.
+    fn called_off(&self, key: &ContentKey, landing: &Landing) -> bool {
+        let mut inner = super::lock(&self.inner);
+        let off = landing.receiver_count() == 0;
+        if off {
+            inner.flights.remove(key);
+        }
+        off
+    }
+
+    /// None where nobody waits for it any more.
+    async fn load_or_prepare(self: Arc<Self>, wanted: &Wanted, landing: &Landing) -> Option<Result<Got, ApiError>> {
+        let clock = Instant::now();
+        let (key, choices) = (wanted.key, wanted.choices);
+        {
+            let _one_of_few = self.loads.acquire().await;
+            let solvers = Arc::clone(&self);
+            let load = move || solvers.load(&key, &choices, clock);
+            let loaded = tokio::task::spawn_blocking(load).await.unwrap_or_else(|e| Err(ApiError::internal(&e)));
+            if let Some(done) = loaded.transpose() {
+                return Some(done);
+            }
+        }
+        let place = tokio::select! {
+            place = self.places.take(&wanted.tenant) => place,
+            () = landing.closed() => return None,
+        };
+        let queued = clock.elapsed().as_secs_f64();
+        let geometry = wanted.geometry.clone();
+        let work = move || self.prepare(&key, &choices, geometry, queued, place);
+        Some(tokio::task::spawn_blocking(work).await.unwrap_or_else(|e| Err(ApiError::internal(&e))))
+    }
+
+    /// The stored solver of a content, if there is one. Blocks.
+    fn load(&self, key: &ContentKey, choices: &Choices, clock: Instant) -> Result<Option<Got>, ApiError> {
+        let queued = clock.elapsed().as_secs_f64();
+        let solver = match self.store.prepared(key) {
+            Ok(Some(solver)) => solver,
+            Ok(None) => return Ok(None),
+            // Preparing again mends it.
+            Err(error) => {
+                tracing::warn!(%error, "a stored solver cannot be read");
+                return Ok(None);
+            }
+        };
+        let cage = prepare::read_cage(&self.content(key)?, choices)?;
+        let options = choices.solver_options(choices.system.unknowns(&cage));
+        metrics::counter!("cager_cache_total", "result" => "disk").increment(1);
+        let total = clock.elapsed().as_secs_f64();
+        let seconds = PreparationSeconds { queued, read: total - queued, total, ..PreparationSeconds::default() };
+        let prepared = Arc::new(prepare::with_solver(solver, &cage, options));
+        Ok(Some(Got { prepared, cache: CacheUse::Hit, seconds }))
+    }
+
+    /// Prepares the solver of a content. Blocks.
+    fn prepare(
+        &self,
+        key: &ContentKey,
+        choices: &Choices,
+        geometry: Option<Arc<Geometry>>,
+        queued: f64,
+        _place: Place,
+    ) -> Result<Got, ApiError> {
+        let clock = Instant::now();
         metrics::counter!("cager_cache_total", "result" => "miss").increment(1);
-        let geometry = prepare::read(&content, &choices)?;
+        let geometry = match geometry {
+            Some(geometry) => geometry,
+            None => Arc::new(prepare::read(&self.content(key)?, choices)?),
+        };
         let read = clock.elapsed().as_secs_f64();
-        let prepared = self.pool.install(|| prepare::prepare(&geometry, &choices, self.most_bytes))?;
+        let prepared = self.pool.install(|| prepare::prepare(&geometry, choices, self.most_bytes))?;
         let found = prepared.solver.preparation();
         let seconds = PreparationSeconds {
             queued,
@@ -187,6 +263,11 @@ impl Solvers {
         };
         metrics::histogram!("cager_prepare_seconds").record(clock.elapsed().as_secs_f64());
         Ok(Got { prepared: Arc::new(prepared), cache: CacheUse::Miss, seconds })
+    }
+
+    fn content(&self, key: &ContentKey) -> Result<Content, ApiError> {
+        let content = self.store.content(key).map_err(|error| super::commit::storage_error(&error))?;
+        content.ok_or_else(|| ApiError::new(problem::SESSION_DELETED, "the session was deleted before it was prepared"))
     }
 
     /// Stores a solver for after a restart. Blocks. One that cannot be written costs time only.

@@ -19,6 +19,8 @@ pub(crate) struct Registry {
 struct Inner {
     sessions: BTreeMap<String, Arc<Session>>,
     requests: HashMap<(String, String), Request>,
+    /// Sessions that are being made, and their bytes, by tenant.
+    reserved: HashMap<String, (u64, u64)>,
 }
 
 /// A request with an idempotency key.
@@ -26,6 +28,34 @@ struct Request {
     fingerprint: String,
     /// The session it made; `None` while it is being made.
     session: Option<String>,
+}
+
+impl Inner {
+    fn usage_of(&self, tenant: &str) -> (u64, u64) {
+        let reserved = self.reserved.get(tenant).copied().unwrap_or_default();
+        let mine = self.sessions.values().filter(|session| session.meta.tenant == tenant);
+        mine.fold(reserved, |(count, bytes), session| (count + 1, bytes + session.bytes.load(Relaxed)))
+    }
+}
+
+/// Room for a session that is being made; free again when dropped.
+pub(crate) struct Reserved {
+    registry: Arc<Registry>,
+    tenant: String,
+    bytes: u64,
+}
+
+impl Drop for Reserved {
+    fn drop(&mut self) {
+        let mut inner = super::lock(&self.registry.inner);
+        if let Some((count, bytes)) = inner.reserved.get_mut(&self.tenant) {
+            *count -= 1;
+            *bytes -= self.bytes;
+            if *count == 0 {
+                inner.reserved.remove(&self.tenant);
+            }
+        }
+    }
 }
 
 /// What a repeated request meets.
@@ -80,11 +110,26 @@ impl Registry {
         super::lock(&self.inner).sessions.values().cloned().collect()
     }
 
-    /// Number of a tenant's sessions, and the bytes they take.
+    /// Number of a tenant's sessions, and the bytes they take; those that are being made count.
     pub(crate) fn usage_of(&self, tenant: &str) -> (u64, u64) {
-        let inner = super::lock(&self.inner);
-        let mine = inner.sessions.values().filter(|session| session.meta.tenant == tenant);
-        mine.fold((0, 0), |(count, bytes), session| (count + 1, bytes + session.bytes.load(Relaxed)))
+        super::lock(&self.inner).usage_of(tenant)
+    }
+
+    /// Keeps room for a session of so many bytes if `allowed` says so of what there is. Nobody else takes it meanwhile.
+    ///
+    /// # Errors
+    /// What `allowed` says.
+    pub(crate) fn reserve<E>(
+        self: &Arc<Self>,
+        tenant: &str,
+        bytes: u64,
+        allowed: impl FnOnce((u64, u64)) -> Result<(), E>,
+    ) -> Result<Reserved, E> {
+        let mut inner = super::lock(&self.inner);
+        allowed(inner.usage_of(tenant))?;
+        let entry = inner.reserved.entry(tenant.to_owned()).or_default();
+        *entry = (entry.0 + 1, entry.1 + bytes);
+        Ok(Reserved { registry: Arc::clone(self), tenant: tenant.to_owned(), bytes })
     }
 
     pub(crate) fn uses_content(&self, key: &ContentKey) -> bool {

@@ -1,6 +1,7 @@
 //! How much a tenant may keep and for how long.
 
 use super::create::blocking;
+use super::registry::Reserved;
 use crate::auth::Tenant;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
@@ -23,19 +24,19 @@ impl Service {
         usage.into_iter().map(|(tenant, (sessions, bytes))| (tenant, sessions, bytes)).collect()
     }
 
-    /// Whether a tenant may make one more session of so many bytes.
+    /// Room for one more session of so many bytes.
     ///
     /// # Errors
     /// A quota that is used up.
-    pub(crate) fn check_quota(&self, tenant: &Tenant, bytes: u64) -> Result<(), ApiError> {
-        let limits = &tenant.limits;
-        let (sessions, _) = self.registry.usage_of(&tenant.name);
-        if sessions >= limits.max_sessions {
-            self.rejected("tenant_sessions");
-            let detail = format!("you have {sessions} sessions; delete one that is not needed any more");
-            return Err(ApiError::new(problem::TOO_MANY_SESSIONS, detail).limit(limits.max_sessions));
-        }
-        self.check_bytes(tenant, bytes)
+    pub(crate) fn reserve(&self, tenant: &Tenant, bytes: u64) -> Result<Reserved, ApiError> {
+        self.registry.reserve(&tenant.name, bytes, |(sessions, used)| {
+            if sessions >= tenant.limits.max_sessions {
+                self.rejected("tenant_sessions");
+                let detail = format!("you have {sessions} sessions; delete one that is not needed any more");
+                return Err(ApiError::new(problem::TOO_MANY_SESSIONS, detail).limit(tenant.limits.max_sessions));
+            }
+            self.bytes_allowed(tenant, used, bytes)
+        })
     }
 
     /// Whether a tenant may store so many bytes more.
@@ -44,6 +45,10 @@ impl Service {
     /// A quota that is used up.
     pub(crate) fn check_bytes(&self, tenant: &Tenant, bytes: u64) -> Result<(), ApiError> {
         let (_, used) = self.registry.usage_of(&tenant.name);
+        self.bytes_allowed(tenant, used, bytes)
+    }
+
+    fn bytes_allowed(&self, tenant: &Tenant, used: u64, bytes: u64) -> Result<(), ApiError> {
         if used.saturating_add(bytes) <= tenant.limits.max_bytes {
             return Ok(());
         }

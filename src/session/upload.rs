@@ -134,7 +134,8 @@ pub(crate) struct FrameJob {
     rows: Rows,
     /// Little-endian f32, three for each row.
     bytes: Vec<u8>,
-    queued: Arc<AtomicU64>,
+    /// Where it counts as long as nobody has claimed its frame.
+    queued: Option<Arc<AtomicU64>>,
     arrived: Instant,
     settled: bool,
     permits: Option<Permits>,
@@ -164,7 +165,7 @@ impl FrameJob {
             frame,
             rows,
             bytes,
-            queued: Arc::clone(&session.queued),
+            queued: Some(Arc::clone(&session.queued)),
             arrived: Instant::now(),
             settled: false,
             permits: Some(permits),
@@ -183,9 +184,17 @@ impl FrameJob {
     }
 }
 
+impl FrameJob {
+    fn leave_queue(&mut self) {
+        if let Some(queued) = self.queued.take() {
+            queued.fetch_sub(1, Ordering::Relaxed);
+        }
+    }
+}
+
 impl Drop for FrameJob {
     fn drop(&mut self) {
-        self.queued.fetch_sub(1, Ordering::Relaxed);
+        self.leave_queue();
         if !self.settled {
             self.upload.fail(ApiError::new(
                 problem::SESSION_DELETED,
@@ -211,7 +220,7 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
     let clock = Instant::now();
     let mut whole = Vec::new();
     let mut handles = Vec::new();
-    for job in jobs {
+    for mut job in jobs {
         if job.upload.is_abandoned() || session.is_deleted() {
             continue;
         }
@@ -223,7 +232,13 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
             continue;
         }
         let digests = digests(prepared, &job);
-        match session.frames().claim(job.frame, digests, &job.upload) {
+        let claim = {
+            let mut frames = session.frames();
+            // At once, so that no frame counts twice.
+            job.leave_queue();
+            frames.claim(job.frame, digests, &job.upload)
+        };
+        match claim {
             Claim::Solve if job.rows == Rows::All => whole.push((job, digests)),
             Claim::Solve => handles.push((job, digests)),
             Claim::Waiting => job.settle(),
@@ -247,6 +262,9 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
             }
         }
     }
+    if prepared.solver.follows_previous() {
+        return solve_in_order(session, prepared, whole, handles);
+    }
     // A panic must not leave these frames claimed for ever.
     let batches = [(Rows::All, whole), (Rows::Handles, handles)].map(|(rows, jobs)| {
         let guard = GiveUp { session, frames: jobs.iter().map(|(job, _)| job.frame).collect() };
@@ -254,10 +272,70 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
     });
     for (rows, jobs, guard) in batches {
         if !jobs.is_empty() {
-            solve_alike(session, prepared, rows, jobs, guard);
+            solve_alike(session, prepared, rows, jobs, None, guard);
         }
     }
     metrics::histogram!("cager_solve_seconds").record(clock.elapsed().as_secs_f64());
+}
+
+/// Solves frames of which each depends on the one before: runs of consecutive frames, each after its predecessor's cage. Of a
+/// session's batches only one runs at a time.
+fn solve_in_order(
+    session: &Arc<Session>,
+    prepared: &Prepared,
+    whole: Vec<(FrameJob, Digests)>,
+    handles: Vec<(FrameJob, Digests)>,
+) {
+    let mut jobs: Vec<(FrameJob, Digests)> = whole.into_iter().chain(handles).collect();
+    jobs.sort_by_key(|(job, _)| job.frame);
+    let mut guard = GiveUp { session, frames: jobs.iter().map(|(job, _)| job.frame).collect() };
+    let mut jobs = jobs.into_iter().peekable();
+    while let Some(first) = jobs.next() {
+        let (frame, rows) = (first.0.frame, first.0.rows);
+        let mut run = vec![first];
+        while let Some(next) = jobs.next_if(|(job, _)| job.rows == rows && job.frame == frame + run.len() as u32) {
+            run.push(next);
+        }
+        guard.frames.drain(..run.len());
+        let own = GiveUp { session, frames: run.iter().map(|(job, _)| job.frame).collect() };
+        match predecessor(session, frame) {
+            Ok(previous) => solve_alike(session, prepared, rows, run, previous.as_deref(), own),
+            Err(error) => fail_all(session, run, own, &error),
+        }
+    }
+}
+
+fn fail_all(session: &Session, run: Vec<(FrameJob, Digests)>, mut guard: GiveUp<'_>, error: &ApiError) {
+    guard.frames.clear();
+    for (job, _) in run {
+        for upload in session.frames().gave_up(job.frame) {
+            upload.fail(error.clone());
+        }
+        job.settle();
+    }
+}
+
+/// The cage of the frame before, where there is one.
+fn predecessor(session: &Session, frame: u32) -> Result<Option<Vec<f32>>, ApiError> {
+    let Some(before) = frame.checked_sub(1) else { return Ok(None) };
+    if let Some((last, cage)) = &*super::lock(&session.last_solved)
+        && *last == before
+    {
+        return Ok(Some(cage.clone()));
+    }
+    let Some(entry) = session.frames().entry(before).copied() else { return Err(predecessor_missing(frame)) };
+    let mut bytes = Vec::new();
+    session.read_cages(&[entry], &mut bytes)?;
+    Ok(Some(bytes.as_chunks().0.iter().map(|&b| f32::from_le_bytes(b)).collect()))
+}
+
+/// What a client hears whose frame comes before the one that it depends on.
+pub(crate) fn predecessor_missing(frame: u32) -> ApiError {
+    let before = frame.saturating_sub(1);
+    let detail = format!(
+        "frame {frame} depends on frame {before} (the regularizer is temporal), which is not solved yet; post frames in order, frame {before} first"
+    );
+    ApiError::new(problem::FRAMES_MISSING, detail).frame(frame).missing(vec![[before, frame]])
 }
 
 fn solve_alike(
@@ -265,6 +343,7 @@ fn solve_alike(
     prepared: &Prepared,
     rows: Rows,
     jobs: Vec<(FrameJob, Digests)>,
+    previous: Option<&[f32]>,
     mut guard: GiveUp<'_>,
 ) {
     let mut numbers = NUMBERS.take();
@@ -277,17 +356,21 @@ fn solve_alike(
     let solver = &prepared.solver;
     let (cages, errors) = match rows {
         Rows::All => {
-            let cages = solver.invert(&views);
+            let cages = solver.invert_after(previous, &views);
             let cage_views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
             let errors = solver.decoder().measure(&cage_views, &views);
             (cages, errors.iter().map(|e| StoredError::new(e, solver.diagonal())).collect())
         }
-        Rows::Handles => (solver.invert_handles(&views), vec![StoredError::NOT_MEASURED; jobs.len()]),
+        Rows::Handles => (solver.invert_handles_after(previous, &views), vec![StoredError::NOT_MEASURED; jobs.len()]),
     };
     if numbers.iter().map(Vec::capacity).sum::<usize>() <= KEPT_NUMBERS {
         NUMBERS.set(numbers);
     }
     guard.frames.clear();
+    if solver.follows_previous() {
+        let last = jobs.last().zip(cages.last()).map(|((job, _), cage)| (job.frame, cage.clone()));
+        *super::lock(&session.last_solved) = last.filter(|(_, cage)| cage.iter().all(|x| x.is_finite()));
+    }
     let mut solved = Vec::with_capacity(jobs.len());
     for (((mut job, digests), cage), error) in jobs.into_iter().zip(cages).zip(errors) {
         let frame = job.frame;

@@ -123,13 +123,27 @@ impl Store {
         self.files().throw_away(&self.files().contents().join(key.to_string()))
     }
 
-    /// A quick look: metadata and lengths, not every byte. Makes sure that what is there is durable.
+    /// The keys of all content.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn contents(&self) -> Result<Vec<ContentKey>, StoreError> {
+        let entries = self.files().list(&self.files().contents())?;
+        Ok(entries.iter().filter_map(|entry| entry.name.to_str()?.parse().ok()).collect())
+    }
+
+    /// Whether anything is in quarantine.
+    pub fn has_quarantined(&self) -> Result<bool, StoreError> {
+        Ok(!self.files().list(&self.files().quarantine())?.is_empty())
+    }
+
     /// Bytes of a content's files; 0 where there is none.
     pub fn content_bytes(&self, key: &ContentKey) -> u64 {
         let folder = self.files().contents().join(key.to_string());
         self.files().disk.list(&folder).map_or(0, |all| all.iter().map(|e| e.bytes).sum())
     }
 
+    /// A quick look: metadata and lengths, not every byte. Makes sure that what is there is durable.
     fn content_is_there(&self, key: &ContentKey, place: &Path) -> Result<bool, StoreError> {
         if !self.files().exists(place)? {
             return Ok(false);

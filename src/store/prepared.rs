@@ -39,6 +39,11 @@ impl Store {
         make().inspect_err(|_| files.discard(&aside))
     }
 
+    /// Whether there is a prepared solver, as far as its name says.
+    pub fn has_prepared(&self, key: &ContentKey) -> bool {
+        self.files().exists(&self.prepared_path(key)).unwrap_or(false)
+    }
+
     /// A prepared solver, the same to the bit; None where there is none. A damaged one is quarantined and counts as none.
     ///
     /// # Errors

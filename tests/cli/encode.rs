@@ -171,7 +171,13 @@ fn report_counts_what_was_given_and_written() {
 
 #[test]
 fn report_errors_are_those_of_the_decoded_output() {
-    for options in ["", "--handles all --spectrum 0", "--regularizer global --lambda 0.01"] {
+    for options in [
+        "",
+        "--handles all --spectrum 0",
+        "--regularizer global --lambda 0.01",
+        "--handles spread --regularizer differential",
+        "--regularizer temporal",
+    ] {
         let (dir, small) = Dir::with_capture();
         let report = encode(&dir, options);
         dir.cager("decode out.cager -o decoded.npy").succeeds();
@@ -192,7 +198,9 @@ fn report_errors_are_those_of_the_decoded_output() {
 #[test]
 fn output_is_identical_each_time_and_for_any_number_of_threads() {
     let (dir, _) = Dir::with_capture();
-    for options in ["", "--handles all"] {
+    for options in
+        ["", "--handles all", "--handles spread", "--handles rectangular", "--regularizer temporal", "--spectrum auto"]
+    {
         dir.cager(&format!("{ENCODE} {options}")).succeeds();
         let first = dir.read("out.cager");
         dir.cager(&format!("{ENCODE} {options}")).succeeds();
@@ -245,7 +253,7 @@ fn unknowns_that_the_points_leave_open_are_a_warning() {
     let points: Vec<_> = (0..n).map(|i| small.rest.points[i % 40 * (n / 40)]).collect();
     dir.model("rest.obj", &Model { points: points.clone(), faces: Polygons::new() });
     dir.write("frames.npy", npy_f64(&[points.as_flattened().to_vec()]));
-    for handles in ["maxvol", "all"] {
+    for handles in ["maxvol", "rectangular", "spread", "all"] {
         let done = dir.cager(&format!("{ENCODE} --report report.json --spectrum 0 --handles {handles}")).succeeds();
         let report = dir.json("report.json");
         assert_eq!(report["rank"], 40);
@@ -318,8 +326,8 @@ fn frame_errors(report: &Value) -> Vec<f64> {
 fn every_regularizer_runs_and_is_named_in_the_report() {
     let (dir, _) = Dir::with_capture();
     let plain = encode(&dir, "--regularizer none --handles all");
-    for name in ["laplacian", "none", "truncated-svd", "tikhonov", "global"] {
-        for handles in ["maxvol", "all"] {
+    for name in ["laplacian", "differential", "temporal", "none", "truncated-svd", "tikhonov", "global"] {
+        for handles in ["maxvol", "rectangular", "spread", "all"] {
             let report = encode(&dir, &format!("--regularizer {name} --handles {handles} --spectrum 5 --lambda 0.01"));
             assert_eq!(report["regularizer"], name);
             assert_eq!(report["lambda"], 0.01);
@@ -328,6 +336,93 @@ fn every_regularizer_runs_and_is_named_in_the_report() {
             assert!(l2 >= best * (1.0 - 1e-6) && l2 < 0.05, "{name}, {handles}: {l2} where least squares has {best}");
         }
     }
+}
+
+#[test]
+fn handles_are_counted_as_asked_and_begin_with_those_of_maximum_volume() {
+    let (dir, small) = Dir::with_capture();
+    let m = small.cage.vertices.len();
+    let core = encode(&dir, "")["handle_indices"].clone();
+    let core = core.as_array().expect("handles");
+    for (options, count) in [
+        ("--handles spread", 2 * m),
+        ("--handles rectangular", 2 * m),
+        (&format!("--handles spread --handle-count {m}"), m),
+        (&format!("--handles spread --handle-count {}", m + 7), m + 7),
+        (&format!("--handles rectangular --handle-count {}", small.rest.points.len()), small.rest.points.len()),
+    ] {
+        let report = encode(&dir, options);
+        let handles = report["handle_indices"].as_array().expect("handles");
+        assert_eq!(handles.len(), count, "{options}");
+        assert_eq!(&handles[..m], core, "{options}");
+        assert_eq!(report["handles"], options.split(' ').nth(1).expect("a name"));
+        let inspected = dir.cager("inspect out.cager").succeeds().stdout;
+        assert!(inspected.contains(&format!("({count})")), "{inspected}");
+    }
+}
+
+/// The Laplacian of a cage as a file.
+fn laplacian_file(cage: &cager_core::mesh::TriMesh) -> String {
+    use cager_core::regularize::{CageLaplacian, Term as _};
+    let cage = cager_core::cage::Cage::new(cage.clone()).expect("a cage");
+    let m = cage.vertices().len();
+    let delta = CageLaplacian.delta(&cage, m).expect("a term");
+    let mut lines = Vec::new();
+    for (i, j) in (0..m).flat_map(|i| (0..m).map(move |j| (i, j))).filter(|&(i, j)| delta[(i, j)] != 0.0) {
+        lines.push(format!("{} {} {:?}", i + 1, j + 1, delta[(i, j)]));
+    }
+    let head = format!("%%MatrixMarket matrix coordinate real general\n{m} {m} {}\n", lines.len());
+    head + &lines.join("\n") + "\n"
+}
+
+#[test]
+fn the_laplacian_in_a_file_does_what_the_laplacian_does() {
+    let (dir, small) = Dir::with_capture();
+    let wanted = encode(&dir, "");
+    dir.write("delta.mtx", laplacian_file(&small.cage));
+    let report = encode(&dir, "--regularizer matrix --regularizer-matrix delta.mtx");
+    assert_eq!(report["regularizer"], "matrix");
+    close("l2", number(&report, "/error/l2_mean"), number(&wanted, "/error/l2_mean"), 1e-6);
+    dir.cager("decode out.cager -o back.npy").succeeds();
+}
+
+#[test]
+fn a_threshold_is_chosen_by_the_error_it_costs() {
+    let (dir, small) = Dir::with_capture();
+    let m = small.cage.vertices.len();
+    let l2 = |spectrum: u64| number(&encode(&dir, &format!("--spectrum {spectrum} --lambda 0.001")), "/error/l2_mean");
+    let zero = l2(0);
+    for bound in [0.01, 0.05] {
+        let line = format!("{ENCODE} --report report.json --spectrum auto --lambda 0.001 --spectrum-bound {bound}");
+        let said = dir.cager(&line).succeeds().stdout;
+        let report = dir.json("report.json");
+        let spectrum = report["spectrum"].as_u64().expect("a threshold");
+        let choice = &report["spectrum_choice"];
+        assert!(number(choice, "/extra") <= bound, "{choice}");
+        assert_eq!(number(choice, "/bound"), bound);
+        // All 20 frames are measured, so that what was promised is what comes out.
+        assert_eq!(choice["frames"], 20);
+        close("extra", l2(spectrum) / zero - 1.0 + 1.0, 1.0 + number(choice, "/extra"), 1e-4);
+        assert!(spectrum == m as u64 || l2(spectrum + 1) > zero * (1.0 + bound), "{choice}");
+        assert!(said.contains(&format!("spectrum {spectrum}: L2 ")), "{said}");
+    }
+    let report = encode(&dir, "--spectrum all");
+    assert_eq!(report["spectrum"], m);
+    assert!(report.get("spectrum_choice").is_none());
+    close(
+        "global",
+        number(&report, "/error/l2_mean"),
+        number(&encode(&dir, "--regularizer global"), "/error/l2_mean"),
+        1e-9,
+    );
+    // Folders of meshes are read again as well, and frames that follow each other in pairs.
+    for frame in 0..20 {
+        dir.model(&format!("poses/{frame}.obj"), &small.posed(frame));
+    }
+    let line =
+        "encode --rest rest.obj --cage cage.obj --frames poses -o out.cager --spectrum auto --report report.json";
+    dir.cager(&format!("{line} --regularizer temporal")).succeeds();
+    assert_eq!(dir.json("report.json")["spectrum_choice"]["frames"], 20);
 }
 
 #[test]

@@ -115,6 +115,20 @@ fn an_encoding_told_to_end_leaves_the_old_files_and_no_others() {
 }
 
 #[test]
+fn a_comparison_told_to_end_leaves_the_old_files_and_no_others() {
+    let (_inputs, dir, line) = long_encode();
+    dir.write("report.html", "an old report");
+    let line = line.replace("encode ", "compare ").replace("out.cager", "report.html").replace("--report", "--json");
+    let before = dir.contents();
+    for signal in ASKED {
+        let child = begin(&dir, &line, |child| writes(child, &dir, 2));
+        send(&child, signal);
+        assert_eq!(death(child), Some(signal.as_raw()));
+        assert!(dir.contents() == before, "{signal:?} left {:?}", dir.names(""));
+    }
+}
+
+#[test]
 fn a_decoding_told_to_end_leaves_no_folder_and_no_file() {
     let dir = long_decode();
     let before = dir.contents();

@@ -1,5 +1,6 @@
 //! The program as its users meet it: command lines in, files, words and exit statuses out.
 
+mod compare;
 mod decode;
 mod demo;
 mod encode;
@@ -9,6 +10,7 @@ mod inspect;
 #[cfg(target_os = "linux")]
 mod interrupted;
 mod real_data;
+mod real_methods;
 mod refused;
 mod support;
 mod usage;

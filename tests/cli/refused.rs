@@ -375,6 +375,7 @@ fn bad_solver_options_are_refused_by_the_options_name() {
     let (dir, small) = Dir::with_capture();
     for lambda in ["nan", "NaN", "-1", "-0.5", "inf"] {
         refused(&dir, &format!("{ENCODE} --lambda {lambda}"), &["--lambda", "at least 0"]);
+        refused(&dir, &format!("{ENCODE} --spectrum auto --lambda {lambda}"), &["--lambda", "at least 0"]);
     }
     let m = small.cage.vertices.len();
     refused(&dir, &format!("{ENCODE} --spectrum {}", m + 1), &["--spectrum", &format!("at most {m}")]);
@@ -545,4 +546,65 @@ fn a_point_far_from_the_cage_is_refused_by_number() {
     small.rest.points[17] = [1e9, 0.0, 0.0];
     dir.model("rest.obj", &small.rest);
     refused(&dir, ENCODE, &["rest.obj", "point 17 "]);
+}
+
+#[test]
+fn handles_that_cannot_be_read_are_refused_with_the_numbers_that_count() {
+    let (dir, small) = Dir::with_capture();
+    let (m, n) = (small.cage.vertices.len(), small.rest.points.len());
+    let range = [format!("{m} unknowns"), format!("{n} points")];
+    for handles in ["spread", "rectangular"] {
+        for count in [0, m - 1, n + 1] {
+            let line = format!("{ENCODE} --handles {handles} --handle-count {count}");
+            refused(&dir, &line, &["--handle-count", &count.to_string(), &range[0], &range[1]]);
+        }
+    }
+    for handles in ["maxvol", "all"] {
+        let line = format!("{ENCODE} --handles {handles} --handle-count {}", 2 * m);
+        refused(&dir, &line, &["--handle-count", "leave it out"]);
+    }
+}
+
+#[test]
+fn matrices_that_do_not_fit_are_refused_with_their_file() {
+    let (dir, small) = Dir::with_capture();
+    let m = small.cage.vertices.len();
+    let line = format!("{ENCODE} --regularizer matrix --regularizer-matrix d.mtx");
+    let head = "%%MatrixMarket matrix coordinate real general\n";
+    refused(&dir, &line, &["d.mtx", "cannot be read"]);
+    for (text, words) in [
+        ("v 0 0 0\n".to_owned(), vec!["line 1".to_owned(), "%%MatrixMarket".to_owned()]),
+        (format!("{head}3 {m} 1\n1 1 inf\n"), vec!["line 3".to_owned(), "NaN or infinite".to_owned()]),
+        (format!("{head}3 {m} 1\n4 1 1\n"), vec!["line 3".to_owned(), "from 1 to 3".to_owned()]),
+        (format!("{head}9999999999999 {m} 1\n1 1 1\n"), vec!["line 2".to_owned(), "larger than any".to_owned()]),
+        (format!("{head}3 {} 1\n1 1 1\n", m + 1), vec![format!("{} columns", m + 1), format!("{m} vertices")]),
+    ] {
+        dir.write("d.mtx", text);
+        let words: Vec<&str> = std::iter::once("d.mtx").chain(words.iter().map(String::as_str)).collect();
+        refused(&dir, &line, &words);
+    }
+    refused(
+        &dir,
+        &format!("{ENCODE} --regularizer matrix"),
+        &["--regularizer matrix", "--regularizer-matrix FILE.mtx"],
+    );
+    let line = format!("{ENCODE} --regularizer-matrix d.mtx");
+    refused(&dir, &line, &["--regularizer-matrix", "laplacian uses no matrix"]);
+}
+
+#[test]
+fn thresholds_that_cannot_be_chosen_are_refused() {
+    let (dir, _) = Dir::with_capture();
+    for bound in ["-0.1", "nan", "inf"] {
+        let line = format!("{ENCODE} --spectrum auto --spectrum-bound {bound}");
+        refused(&dir, &line, &["--spectrum-bound", "at least 0"]);
+    }
+    refused(&dir, &format!("{ENCODE} --spectrum-bound 0.1"), &["--spectrum-bound", "--spectrum auto"]);
+    refused(
+        &dir,
+        &format!("{ENCODE} --regularizer none --spectrum auto"),
+        &["--spectrum auto", "none has no threshold"],
+    );
+    let line = format!("{ENCODE} --spectrum auto --server http://127.0.0.1:9");
+    refused(&dir, &line, &["--spectrum auto", "without --server"]);
 }

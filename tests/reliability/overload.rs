@@ -58,6 +58,32 @@ fn watch_health(address: SocketAddr, stop: &AtomicBool) -> Times {
     Times(times)
 }
 
+/// Wants to upload until it is told to stop, as the loud tenant does, and notes how soon it is refused; on a thread of its own.
+fn watch_refusals(address: SocketAddr, path: &str, stop: &AtomicBool) -> Times {
+    let mut times = Vec::new();
+    let head = format!(
+        "POST {path} HTTP/1.1\r\nHost: h\r\nAuthorization: Bearer {LOUD}\r\nContent-Type: application/octet-stream\r\nContent-Length: 0\r\n\r\n"
+    );
+    let mut answer = [0; 4096];
+    'connect: while !stop.load(Ordering::Relaxed) {
+        let mut stream = TcpStream::connect(address).expect("a connection");
+        stream.set_nodelay(true).expect("a socket option");
+        while !stop.load(Ordering::Relaxed) {
+            let clock = Instant::now();
+            stream.write_all(head.as_bytes()).expect("a request");
+            let count = stream.read(&mut answer).expect("an answer");
+            if answer[..count].starts_with(b"HTTP/1.1 200") {
+                // It found a place; the answer may come in more pieces.
+                continue 'connect;
+            }
+            assert!(answer[..count].starts_with(b"HTTP/1.1 429"), "{}", String::from_utf8_lossy(&answer[..count]));
+            times.push(clock.elapsed());
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+    Times(times)
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn too_much_work_is_refused_quickly_and_disturbs_nobody() {
     let reference = Arc::new(Reference::new(4000, 120, 24));
@@ -113,6 +139,8 @@ async fn too_much_work_is_refused_quickly_and_disturbs_nobody() {
     let (mut rss, mut uploads) = (0.0_f64, Times(Vec::new()));
     let (watching, address) = (Arc::clone(&stop), server.address);
     let health = std::thread::spawn(move || watch_health(address, &watching));
+    let (watching, path) = (Arc::clone(&stop), format!("/v1/sessions/{}/frames?first=0", busy.id));
+    let refusals = std::thread::spawn(move || watch_refusals(address, &path, &watching));
     let clock = Instant::now();
     let mut first = 0;
     for round in 0.. {
@@ -136,15 +164,18 @@ async fn too_much_work_is_refused_quickly_and_disturbs_nobody() {
     }
     stop.store(true, Ordering::Relaxed);
     let mut health = tokio::task::spawn_blocking(|| health.join()).await.expect("a thread").expect("health");
-    let mut refused = Times(Vec::new());
+    let mut refused = tokio::task::spawn_blocking(|| refusals.join()).await.expect("a thread").expect("refusals");
+    let mut turned_away = Times(Vec::new());
     for worker in load {
-        refused.0.extend(worker.await.expect("a worker"));
+        turned_away.0.extend(worker.await.expect("a worker"));
     }
     println!("refused {}", refused.show());
+    println!("the load itself, waits for its own turn included: refused {}", turned_away.show());
     println!("health {}", health.show());
     println!("the other tenant's uploads {}", uploads.show());
     println!("{before:.0} MiB before, {rss:.0} MiB at most");
-    assert!(refused.0.len() > WANTED, "only {} were refused: there is no overload", refused.0.len());
+    assert!(turned_away.0.len() > WANTED, "only {} were refused: there is no overload", turned_away.0.len());
+    assert!(refused.0.len() > 100, "only {} refusals were timed", refused.0.len());
     assert!(uploads.0.len() > 3, "the other tenant came to nothing");
     // The machine that tests run on may be as overloaded as the service: what is typical is held to the limit here.
     assert!(refused.at(0.5) < Duration::from_millis(100), "refused: {}", refused.show());

@@ -1,7 +1,7 @@
 //! `cager encode --server`.
 
 use crate::server::{Server, capture};
-use crate::support::{Dir, ENCODE};
+use crate::support::{Dir, ENCODE, Small};
 use serde_json::Value;
 
 /// A token and its SHA-256.
@@ -12,7 +12,20 @@ const HASH: &str = "2482b372f3c76c863606bc41264596d81f6a2bd5cfd3d5c389f143604091
 fn a_service_gives_the_bytes_and_the_report_that_this_machine_gives() {
     let (dir, ..) = capture();
     let server = Server::start(&dir);
-    for options in ["", " --handles all", " --regularizer tikhonov --lambda 0.01", " --spectrum 3"] {
+    let head = "%%MatrixMarket matrix coordinate real general\n";
+    let columns = Small::new().cage.vertices.len();
+    dir.write("d.mtx", format!("{head}2 {columns} 3\n1 1 1\n1 2 -1\n2 3 0.5\n"));
+    for options in [
+        "",
+        " --handles all",
+        " --regularizer tikhonov --lambda 0.01",
+        " --spectrum 3",
+        " --handles spread",
+        " --handles rectangular --handle-count 100",
+        " --regularizer differential --spectrum all",
+        " --regularizer temporal",
+        " --regularizer matrix --regularizer-matrix d.mtx",
+    ] {
         dir.cager(&format!("{ENCODE} --report here.json{options}")).succeeds();
         let here = dir.read("out.cager");
         let said =

@@ -85,7 +85,8 @@ def run(cager, name, guarded, token, arguments):
             path = os.path.join(folder, "openapi.json")
             with open(path, "w") as file:
                 json.dump(document, file)
-            command = [SCHEMATHESIS, "run", path, "--url", url, "--seed", "1", "--request-timeout", "20", *arguments]
+            config = os.path.join(HERE, "schemathesis.toml")
+            command = [SCHEMATHESIS, "--config-file", config, "run", path, "--url", url, "--seed", "1", "--request-timeout", "20", *arguments]
             if token:
                 command += ["--header", f"Authorization: Bearer {token}"]
             print(f"== {name}", flush=True)

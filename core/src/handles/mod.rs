@@ -2,7 +2,7 @@
 //!
 //! | handles | rows read | L2 above least squares over all points, four captures |
 //! |---|---|---|
-//! | [`Handles::MaxVol`] | m | 31 … 55 % |
+//! | [`Handles::MaxVol`] | m | 29 … 55 % |
 //! | [`Handles::Rectangular`] | K = 2m | 19 … 43 % |
 //! | [`Handles::Spread`] | K = 2m | 1 … 7 % |
 //! | [`Handles::All`] | n | 0 |

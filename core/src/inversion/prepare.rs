@@ -48,6 +48,20 @@ pub struct Preparation {
 }
 
 impl Solver {
+    /// What [`Self::prepare`] would refuse before it computes anything.
+    ///
+    /// # Errors
+    /// See [`PrepareError`].
+    pub fn check(
+        system: &dyn CoordinateSystem,
+        cage: &Cage,
+        points: &[Point],
+        options: SolverOptions,
+    ) -> Result<(), PrepareError> {
+        check(points, system.unknowns(cage), options)?;
+        refuse_far_points(cage, points)
+    }
+
     /// Computes coordinates, handles, spectrum and operator. Runs on the current rayon pool; its result does not depend on it.
     ///
     /// # Errors

@@ -140,7 +140,13 @@ pub(super) const NEW_SESSION: Target = Target {
         vec![
             body("\u{7}", files.clone() + &part("options", "", options)),
             body("\u{7f}", part("options", "", "{\"max_error\":0.1}") + &files),
-            body("\u{1}", files),
+            body("\u{1}", files.clone()),
+            body(
+                "\u{3}",
+                part("regularizer_matrix", "d.mtx", "%%MatrixMarket matrix coordinate real general\n1 1 0\n")
+                    + &part("options", "", r#"{"regularizer":"matrix","handles":"spread","handle_count":700}"#)
+                    + &files,
+            ),
         ]
     },
     words: &[
@@ -155,6 +161,10 @@ pub(super) const NEW_SESSION: Target = Target {
         "options",
         "\"name\":",
         "\"spectrum\":",
+        "\"handle_count\":",
+        "\"spread\"",
+        "\"matrix\"",
+        "regularizer_matrix",
         "\"lambda\":",
         "\"cage_vertices\":",
         "\"max_error\":",

@@ -1,7 +1,7 @@
-//! Mesh files.
+//! Mesh files, and matrices.
 
 use crate::Target;
-use cager_formats::{MeshFormat, read_model_bytes};
+use cager_formats::{MeshFormat, read_matrix_bytes, read_model_bytes};
 use std::path::Path;
 
 const fn target(
@@ -247,3 +247,39 @@ fn read(format: MeshFormat, bytes: &[u8]) {
         }
     }
 }
+
+pub(super) const MTX: Target = target(
+    "mtx",
+    |bytes| {
+        let Ok(matrix) = read_matrix_bytes(Path::new("x.mtx"), bytes) else { return };
+        let inside = |&(i, j, x): &(u32, u32, f64)| {
+            (i as usize) < matrix.rows() && (j as usize) < matrix.columns() && x.abs() <= 1e100
+        };
+        assert!(matrix.entries().iter().all(inside), "an entry that cannot be");
+        assert!(matrix.entries().is_sorted_by_key(|&(i, j, _)| (i, j)), "entries out of order");
+    },
+    || {
+        let general = b"%%MatrixMarket matrix coordinate real general\n% c\n3 4 3\n1 1 0.5\n3 4 -1e-3\n2 1 7\n";
+        let symmetric = b"%%MatrixMarket matrix coordinate integer symmetric\r\n3 3 2\r\n2 1 -4\r\n3 3 1\r\n";
+        let pattern = b"%%MatrixMarket matrix coordinate pattern general\n2 2 1\n1 2\n";
+        vec![general.to_vec(), symmetric.to_vec(), pattern.to_vec()]
+    },
+    &[
+        "%%MatrixMarket matrix ",
+        "coordinate",
+        "array",
+        "real",
+        "integer",
+        "pattern",
+        "complex",
+        "general",
+        "symmetric",
+        "hermitian",
+        "1 1 1\n",
+        "4294967295",
+        "18446744073709551616",
+        "1e999",
+        "nan",
+        "%",
+    ],
+);

@@ -16,6 +16,7 @@ pub const TARGETS: &[Target] = &[
     meshes::OFF,
     meshes::STL,
     meshes::GLB,
+    meshes::MTX,
     frames::NPY,
     frames::PC2,
     frames::MDD,

@@ -141,6 +141,27 @@ impl Store {
 }
 
 impl Store {
+    /// Opens a session's log for reading frames that are known to be in it.
+    ///
+    /// # Errors
+    /// [`StoreError::Damaged`] where it is gone or of other cages, [`StoreError::BadId`], or what the system says.
+    pub fn log_reader(&self, id: &str, rows: u32) -> Result<LogReader, StoreError> {
+        check_id(id)?;
+        let path = self.log_path(id);
+        let file = self.files().disk.open(&path).map_err(|error| match error.kind() {
+            io::ErrorKind::NotFound => StoreError::damaged(&path, "the frame log is gone".to_owned()),
+            _ => StoreError::of(&path, "open", error),
+        })?;
+        let layout = Layout::new(id, rows);
+        let mut block = vec![0; format::DATA_START as usize];
+        file.read_exact_at(&mut block, 0).map_err(|error| match error.kind() {
+            io::ErrorKind::UnexpectedEof => StoreError::damaged(&path, "its first block is cut".to_owned()),
+            _ => StoreError::of(&path, "read", error),
+        })?;
+        layout.check_first_block(&block).map_err(|what| StoreError::damaged(&path, what))?;
+        Ok(LogReader::new(file, path, layout))
+    }
+
     /// Whether the disk may hold less of a session's log than the system shows, until the log is opened again with success.
     pub fn log_is_doubtful(&self, id: &str) -> bool {
         self.inner.logs.lock().unwrap_or_else(PoisonError::into_inner).doubtful.contains(id)

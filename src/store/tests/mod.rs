@@ -70,10 +70,13 @@ pub(crate) fn content() -> Content {
 }
 
 pub(crate) fn prepare(handles: Handles) -> Solver {
+    prepare_with(SolverOptions { handles, ..SolverOptions::default() })
+}
+
+pub(crate) fn prepare_with(options: SolverOptions) -> Solver {
     let capture = Capture::new(&Options { points: 400, frames: 2, cage_vertices: 40 });
     let cage = Cage::new(capture.cage.clone()).unwrap();
-    Solver::prepare(&MeanValue, &cage, &capture.rest.points, SolverOptions { handles, ..SolverOptions::default() })
-        .unwrap()
+    Solver::prepare(&MeanValue, &cage, &capture.rest.points, options).unwrap()
 }
 
 pub(crate) static SOLVER: LazyLock<Solver> = LazyLock::new(|| prepare(Handles::MaxVol));

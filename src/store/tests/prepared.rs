@@ -1,8 +1,9 @@
 //! Shared content and prepared solvers.
 
-use super::{Given, KEY, SOLVER, content, prepare};
+use super::{Given, KEY, SOLVER, content, prepare_with};
 use crate::store::{ContentKey, LocalDisk, Store};
-use cager_core::inversion::{BATCH, Handles, Solver};
+use cager_core::inversion::{BATCH, Handles, Solver, SolverOptions};
+use cager_core::regularize::Regularizer;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -12,7 +13,7 @@ fn bits(solver: &Solver) -> Vec<u64> {
     let frames: Vec<Vec<f64>> =
         (0..BATCH).map(|f| (0..3 * n).map(|i| ((i * 7 + f * 13) % 101) as f64 * 0.01).collect()).collect();
     let frames: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
-    let cages = solver.invert(&frames);
+    let cages = solver.invert_after(None, &frames);
     let cages: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
     let errors = solver.decoder().measure(&cages, &frames);
     let errors = errors.iter().flat_map(|e| [e.l2, e.linf, e.squared, e.spread]).map(f64::to_bits);
@@ -23,9 +24,16 @@ fn bits(solver: &Solver) -> Vec<u64> {
 fn a_solver_comes_back_the_same_to_the_bit() {
     let given = Given::new();
     let store = given.open().store;
-    for (i, handles) in [Handles::MaxVol, Handles::All].into_iter().enumerate() {
+    let spread = Handles::Spread { count: None };
+    let kinds = [
+        (Handles::MaxVol, Regularizer::Laplacian),
+        (Handles::All, Regularizer::Laplacian),
+        (spread, Regularizer::Differential),
+        (spread, Regularizer::Temporal),
+    ];
+    for (i, (handles, regularizer)) in kinds.into_iter().enumerate() {
         let key = ContentKey([i as u8; 32]);
-        let solver = prepare(handles);
+        let solver = prepare_with(SolverOptions { handles, regularizer, ..SolverOptions::default() });
         assert!(store.prepared(&key).unwrap().is_none());
         store.put_prepared(&key, &solver).unwrap();
         let found = store.prepared(&key).unwrap().unwrap();

@@ -135,3 +135,13 @@ async fn connections_beyond_the_limit_are_told_so_and_health_still_answers() {
     drop(held);
     eventually("a place is free", async || (app.get("/v1/sessions").await.status == 200).then_some(())).await;
 }
+
+#[tokio::test]
+async fn a_request_names_its_host_once() {
+    let app = TestApp::start();
+    for hosts in ["", "host: a\r\nhost: b\r\n"] {
+        let mut raw = Raw::connect(&app).await;
+        raw.write(format!("GET /v1/sessions HTTP/1.1\r\n{hosts}\r\n").as_bytes()).await;
+        assert!(raw.reply().await.problem(400, "bad-request").detail.contains("Host"));
+    }
+}

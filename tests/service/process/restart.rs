@@ -79,3 +79,18 @@ async fn what_was_being_prepared_is_prepared_after_a_restart() {
     app.prepared(&session.id).await;
     assert_eq!(app.upload(&session.id, 0, capture.raw(0..2)).await.len(), 2);
 }
+
+#[tokio::test]
+async fn a_rest_pose_that_a_crash_left_without_a_session_is_removed() {
+    let mut app = TestApp::start();
+    let kept = app.ready(Capture::tiny()).await;
+    let lost = app.ready(Capture::small()).await;
+    app.kill();
+    let contents = app.session_file(&kept.id, "../../contents");
+    let count = || std::fs::read_dir(&contents).expect("a folder").count();
+    assert_eq!(count(), 2);
+    std::fs::remove_dir_all(app.session_file(&lost.id, "")).expect("a session");
+    let app = app.again();
+    app.prepared(&kept.id).await;
+    assert_eq!(count(), 1);
+}

@@ -33,12 +33,20 @@ async fn open_streams_are_told_at_once_and_the_process_ends() {
     let last = within("the upload is told", SOON, upload.piece()).await.expect("a last line");
     let problem: Problem = serde_json::from_slice(&last).expect("a problem");
     assert_eq!((problem.status, problem.word()), (503, "stopping"));
+    assert!(problem.request_id.is_some(), "it has no id to ask about");
     let told = within("the upload without an answer is told", SOON, silent.reply()).await;
     told.problem(503, "stopping");
     assert!(told.retry_after() >= Duration::from_secs(1));
     let end = within("the follower is told", SOON, follower.chunk()).await;
     assert!(end.is_err(), "a stream of cages that is not whole must not look whole");
-    within("the events end", SOON, async { while let Ok(Some(_)) = events.chunk().await {} }).await;
+    let mut last = String::new();
+    within("the events end", SOON, async {
+        while let Ok(Some(piece)) = events.chunk().await {
+            last.push_str(&String::from_utf8_lossy(&piece));
+        }
+    })
+    .await;
+    assert!(last.ends_with("event: stopping\ndata: {}\n\n"), "{last:?}");
     let told = clock.elapsed();
     drop((upload, silent, follower, events));
     let (status, _) = app.ended().await;

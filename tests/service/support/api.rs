@@ -120,16 +120,9 @@ impl Api {
         session
     }
 
-    /// Why a rest pose and its cage are refused, by the answer or by the session.
+    /// Why a rest pose and its cage are refused at once.
     pub(crate) async fn refusal(&self, form: Form) -> Problem {
-        let reply = self.create_with(form, None).await;
-        if reply.status != 201 {
-            return reply.json();
-        }
-        let session: Session = reply.json();
-        let session = self.settled(&session.id).await;
-        assert_eq!(session.state, SessionState::Failed);
-        session.problem.expect("a failed session has a problem")
+        self.create_with(form, None).await.expect(422).json()
     }
 
     /// Posts whole frames; gives their results, ascending.

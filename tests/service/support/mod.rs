@@ -46,6 +46,11 @@ impl TestApp {
         Self::with(&[])
     }
 
+    /// A file of a session in the data folder.
+    pub(crate) fn session_file(&self, id: &str, name: &str) -> PathBuf {
+        self.place.path().join("data/sessions").join(id).join(name)
+    }
+
     /// Starts a service with these settings, each `KEY=VALUE`.
     pub(crate) fn with(settings: &[&str]) -> Self {
         let flags = settings.iter().flat_map(|setting| ["--set".to_owned(), (*setting).to_owned()]).collect();

@@ -1,7 +1,7 @@
 //! `POST /v1/sessions`: what it takes and what it refuses.
 
 use crate::support::{Capture, Raw, TestApp, chunked, file, form, text};
-use cager_proto::messages::{Session, SessionState};
+use cager_proto::messages::{CacheUse, Session, SessionState};
 use reqwest::multipart::{Form, Part};
 use serde_json::json;
 
@@ -55,11 +55,68 @@ async fn parts_that_are_missing_unknown_or_twice_are_named() {
 }
 
 #[tokio::test]
-async fn a_spectrum_beyond_the_cage_fails_the_session_with_the_reason() {
+async fn options_that_do_not_fit_the_cage_are_refused_at_once() {
     let app = TestApp::start();
-    let problem = app.refusal(form(Capture::tiny(), &json!({"spectrum": 5000}))).await;
-    assert_eq!((problem.status, problem.word()), (422, "invalid-options"));
-    assert!(problem.detail.contains("spectrum"), "{}", problem.detail);
+    let capture = Capture::tiny();
+    let (m, n) = (capture.cage.model.points.len(), capture.points());
+    let spread = |count: usize| json!({"handles": "spread", "handle_count": count});
+    for (options, words) in [
+        (json!({"spectrum": 5000}), vec!["spectrum: ".to_owned(), "5000".to_owned()]),
+        (spread(m - 1), vec!["handle_count: ".to_owned(), format!("{m} unknowns")]),
+        (spread(n + 1), vec!["handle_count: ".to_owned(), format!("{n} points")]),
+        (json!({"handles": "maxvol", "handle_count": m}), vec!["handle_count: ".to_owned(), "leave it out".to_owned()]),
+        (json!({"handles": "most"}), vec!["handles: ".to_owned(), "maxvol, rectangular, spread, all".to_owned()]),
+        (json!({"regularizer": "matrix"}), vec!["regularizer_matrix: ".to_owned(), "send it".to_owned()]),
+        (json!({"spectrum": "auto"}), vec!["spectrum auto".to_owned(), "give a number".to_owned()]),
+        (json!({"spectrum": "much"}), vec!["\"much\"".to_owned(), "a number of singular directions".to_owned()]),
+        (json!({"spectrum": -1}), vec!["-1".to_owned(), "a number of singular directions".to_owned()]),
+    ] {
+        let problem = app.create_with(form(capture, &options), None).await.problem(422, "invalid-options");
+        for word in words {
+            assert!(problem.detail.contains(&word), "{options}: {word}: {}", problem.detail);
+        }
+    }
+    assert_eq!(app.get("/v1/sessions").await.expect(200).json::<serde_json::Value>()["sessions"], json!([]));
+}
+
+/// A matrix of one row, with as many columns.
+fn matrix(columns: usize, value: &str) -> Vec<u8> {
+    format!("%%MatrixMarket matrix coordinate real general\n1 {columns} 2\n1 1 {value}\n1 2 -1\n").into_bytes()
+}
+
+#[tokio::test]
+async fn a_matrix_of_the_users_own_is_a_part_of_its_own() {
+    let app = TestApp::start();
+    let capture = Capture::tiny();
+    let m = capture.cage.model.points.len();
+    let options = json!({"regularizer": "matrix", "lambda": 100.0});
+    let with = |bytes: Vec<u8>| form(capture, &options).part("regularizer_matrix", file("d.mtx", &bytes));
+    for (bytes, word) in [
+        (b"v 0 0 0\n".to_vec(), "line 1"),
+        (matrix(m, "nan"), "line 3"),
+        (matrix(m + 1, "1"), "columns"),
+        (matrix(99_999_999_999, "1"), "larger than any"),
+    ] {
+        let problem = app.create_with(with(bytes), None).await.problem(422, "invalid-options");
+        assert!(problem.detail.starts_with("regularizer_matrix: ") && problem.detail.contains(word), "{problem:?}");
+    }
+    let unwanted = form(capture, &json!({})).part("regularizer_matrix", file("d.mtx", &matrix(m, "1")));
+    app.create_with(unwanted, None).await.problem(422, "invalid-options");
+    let twice = with(matrix(m, "1")).part("regularizer_matrix", file("d.mtx", &matrix(m, "1")));
+    app.create_with(twice, None).await.problem(400, "bad-request");
+
+    // Another matrix is another solver; the same again is found prepared.
+    let mut cages = Vec::new();
+    for value in ["1", "2", "1"] {
+        let session: Session = app.create_with(with(matrix(m, value)), None).await.expect(201).json();
+        let session = app.prepared(&session.id).await;
+        assert_eq!(session.regularizer, "matrix");
+        app.upload(&session.id, 0, capture.raw(0..2)).await;
+        cages.push((app.cages(&session.id).await, session.cache));
+    }
+    assert!(cages[0].0 != cages[1].0 && cages[0].0 == cages[2].0);
+    assert_eq!(cages[1].1, Some(CacheUse::Miss));
+    assert_eq!(cages[2].1, Some(CacheUse::Hit));
 }
 
 #[tokio::test]

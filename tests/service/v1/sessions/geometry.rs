@@ -79,27 +79,46 @@ async fn an_inward_cage_is_refused_and_flip_cage_turns_it() {
 }
 
 #[tokio::test]
-async fn a_session_that_failed_says_so_wherever_it_is_used() {
+async fn options_that_do_not_go_with_the_cage_are_refused_at_once() {
     let app = TestApp::start();
     let capture = Capture::small();
-    let parts = form_of(&capture.rest, &inward(), &json!({}));
-    let reply = app.create_with(parts, None).await;
-    if reply.status == 422 {
-        return;
-    }
-    let session: Session = reply.is(201);
-    app.settled(&session.id).await;
+    let unknowns = capture.cage.model.points.len();
+    let problem = app.refusal(form(capture, &json!({"spectrum": unknowns + 1}))).await;
+    assert_eq!(problem.word(), "invalid-options");
+    assert!(problem.detail.contains(&format!("{unknowns} unknowns")), "{}", problem.detail);
+    let few = Mesh::new(Model { points: capture.rest.model.points[..3].to_vec(), faces: Polygons::new() });
+    says(&app.refusal(form_of(&few, &capture.cage, &json!({}))).await, &["3 points", "fewer"]);
+    assert!(app.get("/v1/sessions").await.json::<cager_proto::messages::SessionList>().sessions.is_empty());
+}
+
+#[tokio::test]
+async fn a_session_whose_frames_are_damaged_says_so_wherever_it_is_used() {
+    let app = TestApp::start();
+    let capture = Capture::small();
+    let session = app.ready(capture).await;
+    app.upload(&session.id, 0, capture.raw(0..4)).await;
+    let log = app.session_file(&session.id, "frames.log");
+    let mut bytes = std::fs::read(&log).expect("a log");
+    let middle = bytes.len() - 100;
+    bytes[middle] ^= 1;
+    std::fs::write(&log, bytes).expect("a damaged log");
     let at = |what: &str| format!("/v1/sessions/{}/{what}", session.id);
-    let post = app.post(&at("frames?first=0"), crate::support::OCTETS, capture.frame(0)).await;
-    assert!(post.problem(409, "session-failed").detail.contains("inward"));
+    // Complete reads everything, and meets the damage.
+    let met = app.complete(&session.id, 4).await;
+    assert!(met.problem(409, "session-failed").detail.contains("damaged"));
+    assert!(!log.exists(), "the damaged log is out of the way");
+    let post = app.post(&at("frames?first=4"), crate::support::OCTETS, capture.frame(4)).await;
+    assert!(post.problem(409, "session-failed").detail.contains("damaged"));
     for what in ["handles", "coordinates", "cages?first=0", "cages?first=0&follow=true"] {
         app.get(&at(what)).await.problem(409, "session-failed");
     }
-    app.complete(&session.id, 1).await.problem(409, "session-failed");
+    app.complete(&session.id, 4).await.problem(409, "session-failed");
     app.post(&at("decode"), crate::support::OCTETS, vec![0; 12]).await.problem(409, "session-failed");
     let events = app.get(&at("events")).await.expect(200).text();
     assert!(events.contains("\"failed\""), "{events}");
     app.delete(&format!("/v1/sessions/{}", session.id)).await.expect(204);
+    let other = app.completed(capture, 3).await;
+    app.container(&other.id).await;
 }
 
 #[tokio::test]

@@ -134,3 +134,22 @@ async fn a_completed_session_takes_no_new_frames_after_a_restart() {
     app.post(&path, OCTETS, capture.frame(5)).await.problem(409, "session-completed");
     assert_eq!(app.errors(&session.id).await.len(), 5);
 }
+
+#[tokio::test]
+async fn a_frame_posted_beyond_the_end_by_mistake_can_be_left_out() {
+    let mut app = TestApp::start();
+    let capture = Capture::tiny();
+    let session = app.ready(capture).await;
+    app.upload(&session.id, 0, capture.raw(0..4)).await;
+    app.upload(&session.id, 4_000_000_000, capture.raw(5..6)).await;
+    let path = format!("/v1/sessions/{}/complete", session.id);
+    let problem = app.complete(&session.id, 4).await.problem(409, "frame-conflict");
+    assert_eq!(problem.frame, Some(4_000_000_000));
+    assert!(problem.detail.contains("discard_beyond"), "{}", problem.detail);
+    let done: Session = app.post_json(&path, &json!({"frames": 4, "discard_beyond": true})).await.is(200);
+    assert_eq!((done.frames.solved, done.frames.missing.len()), (4, 0));
+    assert!(app.container(&session.id).await == capture.encoded(4));
+    app.kill();
+    let app = app.again();
+    assert_eq!(app.errors(&session.id).await.len(), 4, "it comes back after a restart");
+}

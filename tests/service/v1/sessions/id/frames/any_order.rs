@@ -1,8 +1,9 @@
 //! Frames may come in any order, over any connections, cut into any pieces: the result is the same to the bit.
 
-use crate::support::{Api, Capture, OCTETS, RECORDS, Raw, TestApp, chunked, lines};
-use cager_proto::messages::FrameResult;
+use crate::support::{Api, Capture, OCTETS, RECORDS, Raw, TestApp, chunked, form, lines};
+use cager_proto::messages::{FrameResult, Session};
 use futures_util::future::join_all;
+use serde_json::json;
 use std::ops::Range;
 
 /// Pseudorandom numbers below `bound` (splitmix64).
@@ -78,20 +79,27 @@ async fn random_ranges_over_ten_connections_give_the_container_of_cager_encode()
 async fn handle_rows_alone_give_the_same_cages_to_the_bit() {
     let app = TestApp::start();
     let capture = Capture::small();
-    let whole = app.ready(capture).await;
-    let measured = app.upload(&whole.id, 0, capture.raw(0..capture.count())).await;
-    assert!(measured.iter().all(|result| result.l2.is_some() && result.linf.is_some()));
-    let light = app.ready(capture).await;
-    let handles = app.handles(&light.id).await;
-    assert_eq!(light.handle_count, Some(handles.len() as u32));
-    let path = format!("/v1/sessions/{}/frames?first=0&rows=handles", light.id);
-    let rows = capture.handle_rows(0..20, &handles);
-    let results = lines(&app.post(&path, OCTETS, rows).await.expect(200).body);
-    assert!(results.iter().all(|result| result.l2.is_none() && result.linf.is_none()), "nothing could be measured");
-    let path = format!("/v1/sessions/{}/frames", light.id);
-    let rows = capture.handle_records(20..capture.count(), &handles);
-    app.http2().post(&path, RECORDS, rows).await.expect(200);
-    assert!(app.cages(&light.id).await == app.cages(&whole.id).await);
+    for handles in ["maxvol", "rectangular", "spread"] {
+        let ready = async || {
+            let options = json!({ "handles": handles });
+            let session: Session = app.create_with(form(capture, &options), None).await.expect(201).json();
+            app.prepared(&session.id).await
+        };
+        let whole = ready().await;
+        let measured = app.upload(&whole.id, 0, capture.raw(0..capture.count())).await;
+        assert!(measured.iter().all(|result| result.l2.is_some() && result.linf.is_some()));
+        let light = ready().await;
+        let handles = app.handles(&light.id).await;
+        assert_eq!(light.handle_count, Some(handles.len() as u32));
+        let path = format!("/v1/sessions/{}/frames?first=0&rows=handles", light.id);
+        let rows = capture.handle_rows(0..20, &handles);
+        let results = lines(&app.post(&path, OCTETS, rows).await.expect(200).body);
+        assert!(results.iter().all(|result| result.l2.is_none() && result.linf.is_none()), "nothing could be measured");
+        let path = format!("/v1/sessions/{}/frames", light.id);
+        let rows = capture.handle_records(20..capture.count(), &handles);
+        app.http2().post(&path, RECORDS, rows).await.expect(200);
+        assert!(app.cages(&light.id).await == app.cages(&whole.id).await);
+    }
 }
 
 #[tokio::test]

@@ -1,0 +1,127 @@
+//! One analysis gives the solvers that preparing each by itself gives.
+
+mod common;
+
+use cager_core::cage::Cage;
+use cager_core::coordinates::MeanValue;
+use cager_core::inversion::{Analysis, Handles, PrepareError, Solver, SolverOptions};
+use cager_core::maxvol::{TOLERANCE, maxvol, maxvol_from};
+use cager_core::mesh::Point;
+use cager_core::regularize::Regularizer;
+use cager_core::synthetic::{Capture, Options};
+use common::Random;
+use faer::Mat;
+
+fn capture() -> (Capture, Cage) {
+    let capture = Capture::new(&Options { points: 700, frames: 9, cage_vertices: 60 });
+    let cage = Cage::new(capture.cage.clone()).unwrap();
+    (capture, cage)
+}
+
+#[test]
+fn solvers_of_an_analysis_have_the_bits_of_those_prepared_alone() {
+    let (capture, cage) = capture();
+    let points: &[Point] = &capture.rest.points;
+    let analysis = Analysis::new(&MeanValue, &cage, points).unwrap();
+    let mut frame = Vec::new();
+    capture.frame(4, &mut frame);
+    let some = [Handles::Rectangular { count: None }, Handles::Spread { count: Some(100) }];
+    for handles in [Handles::MaxVol, Handles::All].into_iter().chain(some) {
+        for regularizer in Regularizer::ALL.into_iter().filter(|r| r.term().is_some()) {
+            for spectrum in [0, 7] {
+                let options = SolverOptions { handles, regularizer, spectrum, lambda: 0.5 };
+                let alone = Solver::prepare(&MeanValue, &cage, points, options).unwrap();
+                let shared = analysis.solver(options).unwrap();
+                let invert = |solver: &Solver| solver.invert_after(None, &[frame.as_slice()]);
+                assert_eq!(invert(&shared), invert(&alone), "{options:?}");
+                assert_eq!(shared.handles(), alone.handles());
+                let (a, b) = (shared.preparation(), alone.preparation());
+                assert_eq!((a.rank, a.swaps, &a.singular_values), (b.rank, b.swaps, &b.singular_values));
+                assert_eq!(a.condition_handles, b.condition_handles);
+            }
+        }
+    }
+}
+
+#[test]
+fn spectra_are_those_of_the_matrices() {
+    let (capture, cage) = capture();
+    let analysis = Analysis::new(&MeanValue, &cage, &capture.rest.points).unwrap();
+    let m = analysis.coordinates().ncols();
+    let direct = analysis.coordinates().singular_values().unwrap();
+    for (found, wanted) in analysis.full_spectrum().iter().zip(direct) {
+        assert!((found - wanted).abs() < 1e-10 * analysis.full_spectrum()[0], "{found} {wanted}");
+    }
+    let rows = &analysis.handles().rows;
+    let again = analysis.spectrum_of(rows).unwrap();
+    for (found, wanted) in again.iter().zip(analysis.handle_spectrum()) {
+        assert!((found - wanted).abs() < 1e-12 * again[0], "{found} {wanted}");
+    }
+    // A right singular vector is stretched to its singular value.
+    let square = Mat::from_fn(m, m, |i, j| analysis.coordinates()[(rows[i] as usize, j)]);
+    for k in [0, m / 2, m - 1] {
+        let length = (&square * analysis.handle_vectors().col(k)).norm_l2();
+        assert!((length - analysis.handle_spectrum()[k]).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn rows_given_to_an_analysis_are_followed_exactly_where_they_determine_the_cage() {
+    let (capture, cage) = capture();
+    let analysis = Analysis::new(&MeanValue, &cage, &capture.rest.points).unwrap();
+    let options = SolverOptions { regularizer: Regularizer::None, spectrum: 0, ..SolverOptions::default() };
+    let rows = analysis.handles().rows.clone();
+    let (given, own) = (analysis.solver_reading(&rows, options).unwrap(), analysis.solver(options).unwrap());
+    let mut frame = Vec::new();
+    capture.frame(3, &mut frame);
+    let (a, b) = (given.invert(&[frame.as_slice()]), own.invert(&[frame.as_slice()]));
+    assert!(a[0].iter().zip(&b[0]).all(|(x, y)| (x - y).abs() < 1e-5));
+    // More rows than unknowns: least squares over them.
+    let more: Vec<u32> = (0..capture.rest.points.len() as u32).collect();
+    let all = analysis.solver(SolverOptions { handles: Handles::All, ..options }).unwrap();
+    let (a, b) =
+        (analysis.solver_reading(&more, options).unwrap().invert(&[frame.as_slice()]), all.invert(&[frame.as_slice()]));
+    assert!(a[0].iter().zip(&b[0]).all(|(x, y)| (x - y).abs() < 1e-4));
+    // The same row many times determines nothing but one direction, and the Laplacian places the rest.
+    let poor = analysis.solver_reading(&vec![5; rows.len()], options).unwrap();
+    let sigma = &poor.preparation().singular_values;
+    assert_eq!(sigma.iter().filter(|&&x| x > 1e-11 * sigma[0]).count(), 1);
+    assert!(poor.invert(&[frame.as_slice()])[0].iter().all(|x| x.is_finite()));
+}
+
+#[test]
+fn thresholds_beyond_the_unknowns_are_refused_by_an_analysis_too() {
+    let (capture, cage) = capture();
+    let analysis = Analysis::new(&MeanValue, &cage, &capture.rest.points).unwrap();
+    let unknowns = analysis.coordinates().ncols();
+    let options = SolverOptions { spectrum: unknowns + 1, ..SolverOptions::default() };
+    let refused = PrepareError::SpectrumTooLarge { spectrum: unknowns + 1, unknowns };
+    assert_eq!(analysis.solver(options).unwrap_err(), refused);
+    assert_eq!(analysis.solver_reading(&analysis.handles().rows, options).unwrap_err(), refused);
+}
+
+#[test]
+fn swaps_lead_from_the_start_to_the_handles_and_their_volume() {
+    let mut random = Random::new(3);
+    let a = Mat::from_fn(600, 25, |_, _| random.uniform().powi(3));
+    let bad: Vec<u32> = (0..25).collect();
+    for found in [maxvol(a.as_ref(), TOLERANCE).unwrap(), maxvol_from(a.as_ref(), bad, TOLERANCE).unwrap()] {
+        let mut rows = found.start.clone();
+        let mut volume = found.start_log_volume;
+        for swap in &found.trace {
+            assert!(swap.growth > 1.0);
+            rows[swap.position as usize] = swap.row;
+            volume += swap.growth.ln();
+        }
+        assert_eq!((rows, found.trace.len()), (found.rows.clone(), found.swaps));
+        assert!((volume - found.log_volume).abs() < 1e-4, "{volume} {}", found.log_volume);
+        assert!(found.max_entry <= 1.0 + TOLERANCE);
+    }
+    assert!(maxvol_from(a.as_ref(), vec![7; 25], TOLERANCE).is_err());
+    // All but dependent: the second row is the first but for 1e-7.
+    let mut near = a.clone();
+    for j in 0..25 {
+        near[(1, j)] = near[(0, j)] + if j == 3 { 1e-7 } else { 0.0 };
+    }
+    assert!(maxvol_from(near.as_ref(), (0..25).collect(), TOLERANCE).is_err());
+}

@@ -1,0 +1,37 @@
+//! Where the singular vectors of `Φ□` live on the cage (the paper's Figs. 11 and 15).
+
+use cager_core::inversion::Analysis;
+use serde::Serialize;
+
+/// Vectors painted from the beginning and from the end.
+const FIRST: usize = 3;
+const LAST: usize = 5;
+
+/// Singular vectors of `Φ□`.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Vectors {
+    /// For every singular direction, the number of unknowns it lives on: `1 / Σ v⁴`, m for one spread evenly, 1 for one on a
+    /// single unknown.
+    pub(crate) spread: Vec<f64>,
+    /// Mean of these over the first and over the last tenth.
+    pub(crate) spread_first: f64,
+    /// See above.
+    pub(crate) spread_last: f64,
+    /// Those the report paints, from 0.
+    pub(crate) painted: Vec<usize>,
+}
+
+impl Vectors {
+    /// Of an analysis.
+    pub(crate) fn of(analysis: &Analysis) -> Self {
+        let v = analysis.handle_vectors();
+        let m = v.ncols();
+        let spread: Vec<f64> = (0..m).map(|k| 1.0 / v.col(k).iter().map(|x| x.powi(4)).sum::<f64>()).collect();
+        let tenth = m.div_ceil(10);
+        let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
+        let (spread_first, spread_last) = (mean(&spread[..tenth]), mean(&spread[m - tenth..]));
+        let mut painted: Vec<usize> = (0..FIRST.min(m)).chain(m.saturating_sub(LAST)..m).collect();
+        painted.dedup();
+        Self { spread, spread_first, spread_last, painted }
+    }
+}

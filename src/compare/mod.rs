@@ -1,0 +1,230 @@
+//! `cager compare`: the comparisons of the paper on one capture, as figures and as a page to read.
+//!
+//! A system's analysis is computed once; every method is a solver that follows from it, and all of them go through the capture
+//! together, a batch of frames at a time.
+
+mod figures;
+mod methods;
+mod noise;
+mod page;
+mod pictures;
+mod render;
+mod sample;
+mod system;
+mod track;
+
+pub(crate) use figures::Figures;
+pub(crate) use page::page;
+pub(crate) use pictures::Pictures;
+pub(crate) use render::Up;
+
+use cager_core::cage::Cage;
+use cager_core::coordinates::CoordinateSystem;
+use cager_core::inversion::PrepareError;
+use cager_core::mesh::{Model, Point, TriMesh};
+use cager_formats::FrameReader;
+use figures::{System, claims, recommend};
+use pictures::{Looks, Painter};
+use sample::{Frame, Sample};
+use system::Outcome;
+use track::Shape;
+
+/// Why there is no comparison.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum CompareError {
+    /// No system can be computed for the rest pose and its cage.
+    #[error(transparent)]
+    Prepare(#[from] PrepareError),
+    /// The frames could not be read.
+    #[error(transparent)]
+    Formats(#[from] cager_formats::Error),
+}
+
+/// What to compare.
+pub(crate) struct Job<'a> {
+    /// Model in its rest pose.
+    pub(crate) rest: &'a Model,
+    /// Checked cage around it.
+    pub(crate) cage: &'a Cage,
+    /// Begins reading the capture.
+    pub(crate) open: &'a dyn Fn() -> Result<Box<dyn FrameReader>, cager_formats::Error>,
+    /// Coordinate systems.
+    pub(crate) systems: &'a [&'static dyn CoordinateSystem],
+    /// Frames to measure at the most.
+    pub(crate) frames_at_most: usize,
+    /// The vertical axis of pictures, where it is not to be guessed.
+    pub(crate) up: Option<Up>,
+    /// Rest pose, cage and frames as they were given.
+    pub(crate) names: [String; 3],
+}
+
+/// What is going on: a step, and how much of it is done.
+pub(crate) struct Progress<'a> {
+    /// Told the name of the step, how many parts of it are done and how many there are.
+    pub(crate) tell: &'a mut dyn FnMut(&str, usize, usize),
+}
+
+/// Compares.
+///
+/// # Errors
+/// See [`CompareError`]. A system that cannot be computed for this cage is part of the result, unless none can.
+pub(crate) fn compare(job: &Job<'_>, progress: &mut Progress<'_>) -> Result<(Figures, Vec<Pictures>), CompareError> {
+    let frames = (job.open)()?.frames();
+    let sample = Sample::new(frames, job.frames_at_most);
+    let shape = Shape::new(job.cage, &job.rest.points);
+    let mesh = TriMesh::from(job.rest);
+    let mut systems = Vec::new();
+    let mut pictures = Vec::new();
+    let mut refused = None;
+    let mut stage: Option<Painter<'_>> = None;
+    let mut motion = [f64::NAN; 2];
+    for &system in job.systems {
+        match system::study(job, system, &sample, &shape, progress)? {
+            Outcome::Studied(studied) => {
+                if stage.is_none() {
+                    motion = studied.motion;
+                    let looks = Looks { mesh: &mesh, cage: job.cage, up: job.up };
+                    stage = Some(Painter::new(looks, job.open, &sample, &studied.figures)?);
+                }
+                if let Some(stage) = &stage {
+                    (progress.tell)(&format!("{}: pictures", system.name()), 0, 1);
+                    pictures.push(stage.paint(&studied)?);
+                }
+                let figures = Some(Box::new(studied.figures));
+                systems.push(System { name: system.name().to_owned(), refused: None, figures });
+            }
+            Outcome::Refused(error) => {
+                systems.push(System {
+                    name: system.name().to_owned(),
+                    refused: Some(error.to_string()),
+                    figures: None,
+                });
+                refused.get_or_insert(error);
+            }
+        }
+    }
+    let Some(stage) = stage else {
+        return Err(refused.unwrap_or(PrepareError::NoSolution { what: "choice of coordinates" }).into());
+    };
+    let capture = figures::Capture {
+        rest: job.names[0].clone(),
+        cage: job.names[1].clone(),
+        source: job.names[2].clone(),
+        points: job.rest.points.len(),
+        triangles: mesh.triangles.len(),
+        cage_vertices: job.cage.vertices().len(),
+        cage_faces: job.cage.faces().len(),
+        frames,
+        measured: sample.measured().to_vec(),
+        diagonal: shape.diagonal,
+        motion_mean: motion[0],
+        motion_max: motion[1],
+        shown: stage.shown(),
+        noise_radius: noise::RADIUS,
+    };
+    let (recommendation, claims) = (recommend(&systems), claims(&systems));
+    Ok((Figures { program: env!("CARGO_PKG_VERSION"), capture, systems, recommendation, claims }, pictures))
+}
+
+/// Reads these frames, ascending.
+fn frames_of(reader: &mut dyn FrameReader, wanted: &[usize]) -> Result<Vec<Frame>, cager_formats::Error> {
+    let mut found = Vec::new();
+    let mut points = Vec::new();
+    for number in 0..=wanted.last().copied().unwrap_or(0) {
+        if !reader.read_next(&mut points)? {
+            break;
+        }
+        if wanted.contains(&number) {
+            found.push(Frame { number, measured: true, points: std::mem::take(&mut points) });
+        }
+    }
+    Ok(found)
+}
+
+/// Interleaved coordinates as points.
+fn as_points<T: Copy + Into<f64>>(coordinates: &[T]) -> Vec<Point> {
+    coordinates.as_chunks::<3>().0.iter().map(|p| p.map(Into::into)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cager_core::coordinates::{Coordinates, CoordinatesError, MeanValue};
+    use cager_core::synthetic::{Capture, Options};
+
+    /// A system that no cage is good enough for.
+    struct Never;
+
+    impl CoordinateSystem for Never {
+        fn name(&self) -> &'static str {
+            "never"
+        }
+
+        fn columns(&self, cage: &Cage) -> usize {
+            cage.vertices().len()
+        }
+
+        fn rest_values(&self, cage: &Cage) -> Vec<Point> {
+            cage.vertices().to_vec()
+        }
+
+        fn coordinates(&self, _: &Cage, _: &[Point]) -> Result<Coordinates, CoordinatesError> {
+            Err(CoordinatesError::Outside { system: "never", points: vec![3, 17], distance: 0.02 })
+        }
+    }
+
+    /// Frames that are made as they are read.
+    struct Made(Capture, usize);
+
+    impl FrameReader for Made {
+        fn points(&self) -> usize {
+            self.0.rest.points.len()
+        }
+
+        fn frames(&self) -> usize {
+            self.0.frames()
+        }
+
+        fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, cager_formats::Error> {
+            out.clear();
+            if self.1 == self.0.frames() {
+                return Ok(false);
+            }
+            self.0.frame(self.1, out);
+            self.1 += 1;
+            Ok(true)
+        }
+    }
+
+    fn run(systems: &[&'static dyn CoordinateSystem]) -> Result<(Figures, Vec<Pictures>), CompareError> {
+        let capture = Capture::new(&Options { points: 400, frames: 5, cage_vertices: 40 });
+        let cage = Cage::new(capture.cage.clone()).expect("a cage");
+        let open = || Ok(Box::new(Made(capture.clone(), 0)) as Box<dyn FrameReader>);
+        let job = Job {
+            rest: &capture.rest,
+            cage: &cage,
+            open: &open,
+            systems,
+            frames_at_most: 120,
+            up: None,
+            names: ["rest", "cage", "frames"].map(str::to_owned),
+        };
+        compare(&job, &mut Progress { tell: &mut |_, _, _| {} })
+    }
+
+    #[test]
+    fn a_system_that_cannot_be_computed_has_a_section_that_says_why() {
+        let (figures, pictures) = run(&[&Never, &MeanValue]).expect("a comparison");
+        assert_eq!(figures.computed().map(|(name, _)| name).collect::<Vec<_>>(), ["mvc"]);
+        let html = page(&figures, &pictures);
+        let section = html.split("<h2 id=\"refused\">").nth(1).and_then(|rest| rest.split("<h2").next());
+        assert!(section.is_some_and(|s| s.contains("never") && s.contains("2 points lie outside the cage (3, 17)")));
+        let alone = page(&run(&[&MeanValue]).expect("a comparison").0, &pictures);
+        assert!(!alone.contains("id=\"refused\""));
+    }
+
+    #[test]
+    fn nothing_to_compare_is_an_error() {
+        assert!(matches!(run(&[&Never]), Err(CompareError::Prepare(PrepareError::Coordinates(_)))));
+    }
+}

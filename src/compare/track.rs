@@ -1,0 +1,252 @@
+//! One method followed through the capture: errors of the model, spikes of the cage.
+
+use super::sample::{Frame, Sample};
+use cager_core::cage::Cage;
+use cager_core::inversion::Solver;
+use cager_core::mesh::{Point, diagonal};
+use serde::Serialize;
+use std::collections::VecDeque;
+use std::time::Instant;
+
+/// Times of an inversion are the least of this many.
+const REPEATS: usize = 3;
+
+/// The rest cage's edges and the unit of lengths.
+#[derive(Clone, Debug)]
+pub(crate) struct Shape {
+    edges: Vec<[u32; 2]>,
+    lengths: Vec<f64>,
+    mean_length: f64,
+    /// Diagonal of the rest pose's bounding box.
+    pub(crate) diagonal: f64,
+}
+
+impl Shape {
+    /// Of a cage around these rest points.
+    pub(crate) fn new(cage: &Cage, points: &[Point]) -> Self {
+        let edges: Vec<[u32; 2]> = cage.edges().iter().map(|edge| edge.vertices).collect();
+        let rest = cage.vertices();
+        let lengths: Vec<f64> = edges.iter().map(|e| length(rest[e[0] as usize], rest[e[1] as usize])).collect();
+        let mean_length = lengths.iter().sum::<f64>() / lengths.len() as f64;
+        Self { edges, lengths, mean_length, diagonal: diagonal(points) }
+    }
+
+    /// Mean and largest change of an edge's length, over the mean length of the rest cage's edges.
+    fn edge_change(&self, cage: &[f32]) -> [f64; 2] {
+        let (mut sum, mut largest) = (0.0, 0.0f64);
+        for (edge, rest) in self.edges.iter().zip(&self.lengths) {
+            let change = (length(vertex(cage, edge[0]), vertex(cage, edge[1])) - rest).abs() / self.mean_length;
+            sum += change;
+            largest = largest.max(change);
+        }
+        [sum / self.edges.len() as f64, largest]
+    }
+}
+
+fn vertex(cage: &[f32], index: u32) -> Point {
+    [0, 1, 2].map(|k| f64::from(cage[3 * index as usize + k]))
+}
+
+fn length(a: Point, b: Point) -> f64 {
+    (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
+}
+
+/// What is found out about every measured frame; lengths are fractions of the rest diagonal, and NaN is what does not exist.
+#[derive(Clone, Debug, Default, Serialize)]
+pub(crate) struct PerFrame {
+    /// `sqrt(mean |e|²)` over the points.
+    pub(crate) l2: Vec<f64>,
+    /// `max |e|`.
+    pub(crate) linf: Vec<f64>,
+    /// Mean over the cage's vertices of the second temporal difference `|C_{t+1} − 2 C_t + C_{t−1}|`.
+    pub(crate) spike_mean: Vec<f64>,
+    /// The largest of these.
+    pub(crate) spike_max: Vec<f64>,
+    /// Mean change of an edge's length against the rest cage, over the mean length of the rest cage's edges.
+    pub(crate) edges_mean: Vec<f64>,
+    /// The largest of these.
+    pub(crate) edges_max: Vec<f64>,
+}
+
+impl PerFrame {
+    fn empty(frames: usize) -> Self {
+        let none = || vec![f64::NAN; frames];
+        Self { l2: none(), linf: none(), spike_mean: none(), spike_max: none(), edges_mean: none(), edges_max: none() }
+    }
+}
+
+/// Means and maxima over the frames.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct Totals {
+    /// Mean of L2.
+    pub(crate) l2_mean: f64,
+    /// Largest L2.
+    pub(crate) l2_max: f64,
+    /// Mean of L∞.
+    pub(crate) linf_mean: f64,
+    /// Largest L∞.
+    pub(crate) linf_max: f64,
+    /// Mean second temporal difference of a cage vertex; null where there are fewer than three frames.
+    pub(crate) spike_mean: f64,
+    /// The largest one.
+    pub(crate) spike_max: f64,
+    /// Mean change of an edge's length.
+    pub(crate) edges_mean: f64,
+    /// The largest one.
+    pub(crate) edges_max: f64,
+}
+
+impl PerFrame {
+    /// Means and maxima.
+    pub(crate) fn totals(&self) -> Totals {
+        Totals {
+            l2_mean: mean(&self.l2),
+            l2_max: max(&self.l2),
+            linf_mean: mean(&self.linf),
+            linf_max: max(&self.linf),
+            spike_mean: mean(&self.spike_mean),
+            spike_max: max(&self.spike_max),
+            edges_mean: mean(&self.edges_mean),
+            edges_max: max(&self.edges_max),
+        }
+    }
+}
+
+/// Mean of the finite values; NaN where there are none.
+fn mean(values: &[f64]) -> f64 {
+    let (sum, count) = values.iter().filter(|x| x.is_finite()).fold((0.0, 0.0), |(s, c), x| (s + x, c + 1.0));
+    sum / count
+}
+
+/// Largest finite value; NaN where there is none.
+fn max(values: &[f64]) -> f64 {
+    values.iter().copied().filter(|x| x.is_finite()).fold(f64::NAN, f64::max)
+}
+
+/// A solver on its way through the capture.
+pub(crate) struct Track {
+    /// The solver.
+    pub(crate) solver: Solver,
+    /// Whether it reads the frames with noise.
+    pub(crate) noisy: bool,
+    /// What was found so far.
+    pub(crate) found: PerFrame,
+    /// L2 and L∞ against the frames without noise, of one that reads them with it.
+    pub(crate) clean: PerFrame,
+    /// Seconds of one inversion, on one thread; NaN before the first batch.
+    pub(crate) frame_seconds: f64,
+    /// The last cages and their frames.
+    before: VecDeque<(usize, Vec<f32>)>,
+}
+
+impl Track {
+    /// At the beginning.
+    pub(crate) fn new(solver: Solver, noisy: bool, sample: &Sample) -> Self {
+        let empty = || PerFrame::empty(sample.measured().len());
+        Self { solver, noisy, found: empty(), clean: empty(), frame_seconds: f64::NAN, before: VecDeque::new() }
+    }
+
+    /// Times one inversion per frame of a batch.
+    pub(crate) fn time(&mut self, batch: &[Frame]) {
+        let frames: Vec<&[f64]> = batch.iter().map(|frame| frame.points.as_slice()).collect();
+        let seconds = (0..REPEATS).map(|_| {
+            let clock = Instant::now();
+            std::hint::black_box(self.solver.invert_after(None, &frames));
+            clock.elapsed().as_secs_f64()
+        });
+        self.frame_seconds = seconds.fold(f64::INFINITY, f64::min) / frames.len() as f64;
+    }
+
+    /// Inverts and measures the frames that follow; `clean` are the same without noise.
+    pub(crate) fn take(&mut self, frames: &[Frame], clean: &[Frame], sample: &Sample, shape: &Shape) {
+        let views: Vec<&[f64]> = frames.iter().map(|frame| frame.points.as_slice()).collect();
+        let previous = self.before.back().map(|(_, cage)| cage.as_slice());
+        let cages = self.solver.invert_after(previous, &views);
+        let measured: Vec<usize> = (0..frames.len()).filter(|&i| frames[i].measured).collect();
+        let errors = |of: &[Frame]| {
+            let cages: Vec<&[f32]> = measured.iter().map(|&i| cages[i].as_slice()).collect();
+            let truth: Vec<&[f64]> = measured.iter().map(|&i| of[i].points.as_slice()).collect();
+            self.solver.decoder().measure(&cages, &truth)
+        };
+        let (found, against_clean) = (errors(frames), self.noisy.then(|| errors(clean)));
+        for (k, &i) in measured.iter().enumerate() {
+            let Some(at) = sample.position(frames[i].number) else { continue };
+            (self.found.l2[at], self.found.linf[at]) = (found[k].l2 / shape.diagonal, found[k].linf / shape.diagonal);
+            if let Some(errors) = &against_clean {
+                (self.clean.l2[at], self.clean.linf[at]) =
+                    (errors[k].l2 / shape.diagonal, errors[k].linf / shape.diagonal);
+            }
+            [self.found.edges_mean[at], self.found.edges_max[at]] = shape.edge_change(&cages[i]);
+        }
+        for (frame, cage) in frames.iter().zip(cages) {
+            self.follow(frame.number, cage, sample, shape.diagonal);
+        }
+    }
+
+    fn follow(&mut self, number: usize, cage: Vec<f32>, sample: &Sample, diagonal: f64) {
+        if let [(first, a), (middle, b)] = self.before.make_contiguous()
+            && *first + 2 == number
+            && *middle + 1 == number
+            && let Some(at) = sample.position(*middle)
+        {
+            let positions = self.solver.decoder().positions();
+            [self.found.spike_mean[at], self.found.spike_max[at]] =
+                second_difference([a, b, &cage], positions).map(|x| x / diagonal);
+        }
+        if self.before.len() == 2 {
+            self.before.pop_front();
+        }
+        self.before.push_back((number, cage));
+    }
+}
+
+/// Mean and largest `|C_{t+1} − 2 C_t + C_{t−1}|` of the first `count` rows.
+fn second_difference<T: Copy + Into<f64>>(three: [&[T]; 3], count: usize) -> [f64; 2] {
+    let lengths = second_differences(three, count);
+    [lengths.iter().sum::<f64>() / count as f64, lengths.iter().copied().fold(0.0, f64::max)]
+}
+
+/// `|C_{t+1} − 2 C_t + C_{t−1}|` of each of the first `count` rows.
+pub(crate) fn second_differences<T: Copy + Into<f64>>([a, b, c]: [&[T]; 3], count: usize) -> Vec<f64> {
+    let bend = |i: usize| -> f64 { a[i].into() - 2.0 * b[i].into() + c[i].into() };
+    (0..count).map(|i| (0..3).map(|k| bend(3 * i + k).powi(2)).sum::<f64>().sqrt()).collect()
+}
+
+/// The model's own second temporal differences, which no cage can be expected to stay below.
+#[derive(Clone, Debug)]
+pub(crate) struct Motion {
+    before: VecDeque<(usize, Vec<f64>)>,
+    mean: Vec<f64>,
+    max: Vec<f64>,
+}
+
+impl Motion {
+    /// At the beginning.
+    pub(crate) fn new(sample: &Sample) -> Self {
+        let none = vec![f64::NAN; sample.measured().len()];
+        Self { before: VecDeque::new(), mean: none.clone(), max: none }
+    }
+
+    /// Takes the frames that follow.
+    pub(crate) fn take(&mut self, frames: &[Frame], sample: &Sample, diagonal: f64) {
+        for frame in frames {
+            if let [(first, a), (middle, b)] = self.before.make_contiguous()
+                && *first + 2 == frame.number
+                && *middle + 1 == frame.number
+                && let Some(at) = sample.position(*middle)
+            {
+                [self.mean[at], self.max[at]] =
+                    second_difference([a, b, &frame.points], frame.points.len() / 3).map(|x| x / diagonal);
+            }
+            if self.before.len() == 2 {
+                self.before.pop_front();
+            }
+            self.before.push_back((frame.number, frame.points.clone()));
+        }
+    }
+
+    /// Mean and largest over all frames.
+    pub(crate) fn totals(&self) -> [f64; 2] {
+        [mean(&self.mean), max(&self.max)]
+    }
+}
