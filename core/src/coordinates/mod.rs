@@ -38,8 +38,19 @@ pub struct Refinement {
     pub elements: usize,
     /// Solutions after the first.
     pub refinements: usize,
-    /// Most that the last refinement changed a coordinate of a point by.
+    /// Most that a coordinate of a point differs from the solution before the last, or was corrected by to make linear functions
+    /// exact.
     pub change: f64,
+}
+
+impl Refinement {
+    /// Refining ends when it changes no coordinate of a point by more than this.
+    pub const TOLERANCE: f64 = 1e-3;
+
+    /// Whether refining ended so.
+    pub fn reached(&self) -> bool {
+        self.change <= Self::TOLERANCE
+    }
 }
 
 /// A system of cage coordinates. Every implementation passes the suite in `core/tests/conformance.rs`.

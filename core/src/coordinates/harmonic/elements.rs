@@ -1,7 +1,7 @@
 //! Boundary elements: triangles on the cage's faces, each with a polynomial density of its own degree.
 
 use super::basis::functions;
-use super::potential::Triangle;
+use super::triangle::Triangle;
 use crate::mesh::{Point, distance2_to_triangle};
 use rayon::prelude::*;
 
@@ -105,6 +105,15 @@ pub(super) fn elements(faces: &[[Point; 3]], points: &[Point]) -> Vec<Element> {
         }
     }
     done
+}
+
+/// Marks the thinnest elements too, where they are what makes the equations inexact.
+pub(super) fn mark_thin(elements: &[Element], marked: &mut [bool]) {
+    let aspect = |element: &Element| element.triangle.diameter() / element.triangle.height();
+    let limit = (0.4 * elements.iter().map(aspect).fold(0.0, f64::max)).max(MOST[0].0);
+    for (element, marked) in elements.iter().zip(marked) {
+        *marked |= aspect(element) >= limit;
+    }
 }
 
 /// The marked elements one degree higher, or divided.

@@ -81,7 +81,8 @@ pub(super) fn evaluate(solution: &Solution<'_>, points: &[Point], feet: &[Foot],
             |scratch, (task, rows)| evaluate_task(solution, &near, task * TASK_POINTS, tolerance, rows, scratch),
         )
         .collect();
-    let mut all = Evaluated { phi, change: 0.0, marked: vec![false; solution.unknowns.elements.len()], correction: 0.0 };
+    let mut all =
+        Evaluated { phi, change: 0.0, marked: vec![false; solution.unknowns.elements.len()], correction: 0.0 };
     for found in found {
         all.change = all.change.max(found.change);
         // NaN stays.
@@ -147,7 +148,8 @@ impl<'a> Near<'a> {
             for k in 0..3 {
                 group.x[k].0[l] = x[k];
                 let inwards = self.inwards / foot.distance.max(self.inwards);
-                group.y[k].0[l] = if self.shares[i] > 0.0 { foot.place[k] + inwards * (x[k] - foot.place[k]) } else { x[k] };
+                group.y[k].0[l] =
+                    if self.shares[i] > 0.0 { foot.place[k] + inwards * (x[k] - foot.place[k]) } else { x[k] };
             }
         }
         group
@@ -183,7 +185,8 @@ fn evaluate_task(
             }
         }
         write_group(rows.as_mut(), start, &scratch.values, 1.0);
-        let largest = scratch.change.iter().fold(Lanes::ZERO, |a, c| a.zip(*c, |a, c| if c.abs() > a { c.abs() } else { a }));
+        let largest =
+            scratch.change.iter().fold(Lanes::ZERO, |a, c| a.zip(*c, |a, c| if c.abs() > a { c.abs() } else { a }));
         for l in 0..filled {
             found.change = found.change.max(largest.0[l]);
             if largest.0[l] > tolerance {
@@ -244,7 +247,15 @@ fn evaluate_group(solution: &Solution<'_>, group: &Group, start: usize, scratch:
                 *value = *value * keep;
             }
         }
-        add_part(part, functions(element.degree), unknowns.low, near, &values, &mut scratch.values, &mut scratch.change);
+        add_part(
+            part,
+            functions(element.degree),
+            unknowns.low,
+            near,
+            &values,
+            &mut scratch.values,
+            &mut scratch.change,
+        );
     }
 }
 
@@ -300,7 +311,9 @@ fn mark(solution: &Solution<'_>, group: &Group, l: usize, vertex: u32, marked: &
         potentials(tables, &element.triangle, element.degree, &x, &mut values);
         potentials(tables, &element.triangle, element.degree, &y, &mut others);
         let share: f64 = (0..all)
-            .map(|k| (group.own.0[l] * values[k].0[0] - group.share.0[l] * others[k].0[0]) * part.change[place * all + k])
+            .map(|k| {
+                (group.own.0[l] * values[k].0[0] - group.share.0[l] * others[k].0[0]) * part.change[place * all + k]
+            })
             .sum();
         shares.push((share.abs(), e as u32));
     }

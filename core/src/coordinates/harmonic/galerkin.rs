@@ -3,8 +3,9 @@
 
 use super::basis::{MAX_FUNCTIONS, functions};
 use super::elements::{Element, Unknowns};
-use super::potential::{Tables, Triangle, potentials};
+use super::potential::{Tables, potentials};
 use super::quadrature::Rule;
+use super::triangle::Triangle;
 use crate::coordinates::layer::{INVERSE_4PI, Layers, group_potentials};
 use crate::mesh;
 use crate::simd::{LANES, Lanes, multiversion};
@@ -255,9 +256,7 @@ pub(super) fn right_hand_sides(outer: &Outer, layers: &Layers, unknowns: &Unknow
                     }
                 }
                 let count = functions(element.degree);
-                let weights = Mat::from_fn(count, nodes, |k, q| {
-                    element.triangle.area * rule.weighted[q][k]
-                });
+                let weights = Mat::from_fn(count, nodes, |k, q| element.triangle.area * rule.weighted[q][k]);
                 crate::dense::product(weights.as_ref(), data.as_ref())
             },
         )

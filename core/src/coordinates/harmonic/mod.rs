@@ -2,13 +2,16 @@
 
 mod affine;
 mod basis;
+mod closed_form;
 mod elements;
 mod evaluate;
 mod galerkin;
+mod patch;
 mod potential;
 mod quadrature;
 mod solve;
 mod surface;
+mod triangle;
 
 use super::layer::Layers;
 use super::{CoordinateSystem, Coordinates, CoordinatesError, Refinement};
@@ -23,12 +26,14 @@ use surface::{Foot, Side, Surface};
 pub struct Harmonic;
 
 const NAME: &str = "harmonic";
-/// Refining ends when it changes no coordinate of a point by more than this.
-const TOLERANCE: f64 = 1e-3;
 /// Refinements at most.
 const REFINEMENTS: usize = 8;
+/// Elements that refining may make, unless there are half as many at first: the time grows with their cube.
+const ELEMENTS: usize = 2500;
 /// Elements up to which all have so many low degrees: the equations of low unknowns are dense.
 const LOW_DEGREES: [(usize, usize); 3] = [(1300, 2), (3000, 1), (10_000, 0)];
+/// Linear functions that are missed by more than this say that nothing was solved.
+const MISSED: f64 = 0.1;
 
 impl CoordinateSystem for Harmonic {
     fn name(&self) -> &'static str {
@@ -52,7 +57,8 @@ impl CoordinateSystem for Harmonic {
         let surface = Surface::new(layers.vertices(), cage);
         let feet = surface.feet(&points);
         check_inside(&feet, cage.diagonal() * layers.scale())?;
-        let (found, refinement) = refine(&Problem { layers: &layers, surface: &surface, points: &points, feet: &feet })?;
+        let (found, refinement) =
+            refine(&Problem { layers: &layers, surface: &surface, points: &points, feet: &feet })?;
         Ok(Coordinates { phi: found.phi, outside: Vec::new(), refinement: Some(refinement) })
     }
 }
@@ -79,34 +85,45 @@ struct Problem<'a> {
     feet: &'a [Foot],
 }
 
-/// Solves on finer and finer elements until that changes nothing more.
+/// Solves on finer and finer elements until that changes nothing more, or no more of them are allowed.
 fn refine(problem: &Problem<'_>) -> Result<(Evaluated, Refinement), CoordinatesError> {
     let Problem { layers, points, feet, .. } = problem;
     let tables = potential::Tables::new();
     let affine = affine::AffineFit::new(layers.vertices());
-    let corners: Vec<[Point; 3]> = layers.triangles().iter().map(|t| t.map(|v| layers.vertices()[v as usize])).collect();
+    let corners: Vec<[Point; 3]> =
+        layers.triangles().iter().map(|t| t.map(|v| layers.vertices()[v as usize])).collect();
     let inside = feet.iter().zip(*points).filter(|(foot, _)| foot.side == Side::Inside);
     let inside: Vec<Point> = inside.map(|(_, &x)| x).collect();
     let mut elements = elements::elements(&corners, &inside);
+    let mut degree = low_degree(elements.len()).ok_or_else(|| {
+        not_computed(format!("it would take {} boundary elements, more than {}", elements.len(), LOW_DEGREES[2].0))
+    })?;
+    let most = ELEMENTS.max(2 * elements.len());
     let mut refinements = 0;
     loop {
-        let count = elements.len();
-        let Some((_, degree)) = LOW_DEGREES.iter().find(|(most, _)| count <= *most) else {
-            return Err(not_computed(format!("it would take {count} boundary elements, more than {}", LOW_DEGREES[2].0)));
-        };
-        let unknowns = Unknowns::new(elements, *degree);
-        let found = solve_on(problem, &tables, &affine, &unknowns)?;
-        if found.change <= TOLERANCE {
-            let refinement = Refinement { elements: count, refinements, change: found.change };
+        let unknowns = Unknowns::new(elements, degree);
+        let mut found = solve_on(problem, &tables, &affine, &unknowns)?;
+        let change = found.change.max(found.correction);
+        let refinement = Refinement { elements: unknowns.elements.len(), refinements, change };
+        if refinement.reached() || refinements == REFINEMENTS {
             return Ok((found, refinement));
         }
-        if refinements == REFINEMENTS {
-            let change = found.change;
-            return Err(not_computed(format!("{refinements} refinements on, they still change by {change:.0e}")));
+        if found.correction > Refinement::TOLERANCE {
+            elements::mark_thin(&unknowns.elements, &mut found.marked);
         }
-        refinements += 1;
         elements = elements::refined(&unknowns.elements, &found.marked);
+        let more = elements.len() <= most && found.marked.contains(&true);
+        let Some(next) = low_degree(elements.len()).filter(|_| more) else {
+            return Ok((found, refinement));
+        };
+        degree = next;
+        refinements += 1;
     }
+}
+
+/// Highest degree of the polynomials that all of so many elements have; `None` for too many.
+fn low_degree(elements: usize) -> Option<usize> {
+    LOW_DEGREES.iter().find(|(most, _)| elements <= *most).map(|(_, degree)| *degree)
 }
 
 /// Coordinates with these elements.
@@ -117,21 +134,15 @@ fn solve_on(
     unknowns: &Unknowns,
 ) -> Result<Evaluated, CoordinatesError> {
     let Problem { layers, surface, points, feet } = problem;
-    let clock = std::time::Instant::now();
-    let say = |what: &str| if std::env::var_os("HARMONIC_TIMES").is_some() { eprintln!("{:8.3} {what}", clock.elapsed().as_secs_f64()) };
     let outer = galerkin::Outer::new(tables);
     let operator = galerkin::operator(tables, &outer, unknowns);
-    say("operator");
     let sides = galerkin::right_hand_sides(&outer, layers, unknowns);
-    say("right-hand sides");
     let densities = solve::solve(operator, &sides, unknowns, layers.triangles())
         .ok_or_else(|| not_computed("the equations on its faces are singular in double precision".to_owned()))?;
-    say("solved");
     let solution = Solution { tables, layers, surface, affine, unknowns, densities: &densities };
-    let found = evaluate::evaluate(&solution, points, feet, TOLERANCE);
-    say(&format!("evaluated {} elements {} {} unknowns change {:.2e} marked {} correction {:.1e}", unknowns.elements.len(), unknowns.low_count(), unknowns.high_count(), found.change, found.marked.iter().filter(|m| **m).count(), found.correction));
+    let found = evaluate::evaluate(&solution, points, feet, Refinement::TOLERANCE);
     // Written so that NaN is an error.
-    if !(found.correction <= TOLERANCE && found.change.is_finite()) {
+    if !(found.correction <= MISSED && found.change.is_finite()) {
         return Err(not_computed(format!(
             "linear functions are missed by {:.0e}, as happens in cages much thinner than wide",
             found.correction
