@@ -66,11 +66,11 @@ pub(crate) async fn json<T: DeserializeOwned>(client: &Client, response: Respons
 }
 
 /// Little-endian bytes as numbers of four bytes each.
-pub(crate) fn numbers<T>(bytes: &[u8], read: fn([u8; 4]) -> T) -> Result<Vec<T>, Failure> {
-    let (numbers, rest) = bytes.as_chunks::<4>();
+pub(crate) fn numbers<T, const N: usize>(bytes: &[u8], read: fn([u8; N]) -> T) -> Result<Vec<T>, Failure> {
+    let (numbers, rest) = bytes.as_chunks::<N>();
     if rest.is_empty() {
         Ok(numbers.iter().map(|&b| read(b)).collect())
     } else {
-        Err(Failure::protocol(format!("its {} bytes are not numbers of four", bytes.len())))
+        Err(Failure::protocol(format!("its {} bytes are not numbers of {N}", bytes.len())))
     }
 }

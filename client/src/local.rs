@@ -3,8 +3,12 @@
 use crate::client::Client;
 use crate::error::ClientError;
 use crate::results::Coordinates;
+use cager_core::cage::Cage;
+use cager_core::coordinates::{CoordinateSystem, Green};
 use cager_core::decode::Decoder;
 use cager_core::inversion::BATCH;
+use cager_core::mesh::TriMesh;
+use cager_proto::messages::RestCage;
 
 /// Turns cages into positions without asking the service for each: its coordinates `Φ` are fetched once.
 ///
@@ -22,12 +26,33 @@ impl LocalDecoder {
     pub async fn fetch(client: &Client, id: &str) -> Result<Self, ClientError> {
         let session = client.session(id).await?;
         let coordinates = client.coordinates(id).await?;
-        // Unknowns beyond the cage's vertices are directions, as Green coordinates have them.
+        // Columns beyond the cage's vertices are of directions, as Green coordinates have them.
         let positions = session.cage_vertices.map_or(coordinates.columns, |vertices| vertices as usize);
-        Self::new(&coordinates, positions)
+        let decoder = Self::new(&coordinates, positions)?;
+        if session.unknowns.is_none_or(|unknowns| unknowns as usize == coordinates.columns) {
+            return Ok(decoder);
+        }
+        decoder.with_tied_normals(&client.cage(id).await?)
     }
 
-    /// A decoder from coordinates whose first `positions` unknowns are positions.
+    /// A decoder for cages whose face normals follow from their vertices, as they do where a session has fewer unknowns than
+    /// coordinates have columns; it takes the rest cage.
+    ///
+    /// # Errors
+    /// [`ClientError::Protocol`] where the cage is none, or does not fit the coordinates.
+    pub fn with_tied_normals(self, cage: &RestCage) -> Result<Self, ClientError> {
+        let mesh = TriMesh { vertices: cage.vertices.clone(), triangles: cage.faces.clone() };
+        let cage = Cage::new(mesh).map_err(|error| ClientError::Protocol(error.to_string()))?;
+        let (vertices, columns) = (cage.vertices().len(), Green::Consistent.columns(&cage));
+        if (self.decoder.positions(), self.decoder.columns()) != (vertices, columns) {
+            let what = format!("coordinates of a cage of {vertices} vertices have {columns} columns");
+            return Err(ClientError::Protocol(what));
+        }
+        Ok(Self { decoder: self.decoder.with_tied_normals(Green::Consistent.tied_normals(&cage)) })
+    }
+
+    /// A decoder from coordinates whose first `positions` columns are of positions, and whose other columns are of unknowns as
+    /// well; see [`Self::with_tied_normals`] where they are not.
     ///
     /// # Errors
     /// [`ClientError::Protocol`] where the numbers do not fit each other.

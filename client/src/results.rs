@@ -4,7 +4,7 @@ use crate::body::{numbers, whole};
 use crate::client::Client;
 use crate::error::{ClientError, Failure};
 use crate::sessions::known;
-use cager_proto::messages::{FrameErrors, FrameResult};
+use cager_proto::messages::{FrameErrors, FrameResult, RestCage};
 use reqwest::header::{ACCEPT, HeaderMap};
 use reqwest::{Method, Response};
 
@@ -16,9 +16,9 @@ const MOST_HANDLE_BYTES: u64 = 4 * u32::MAX as u64;
 pub struct Coordinates {
     /// Points of the model, n.
     pub rows: usize,
-    /// Unknowns per frame, m.
+    /// Values of a cage: its unknowns m, and its face normals where they follow from them.
     pub columns: usize,
-    /// n × m values, row-major.
+    /// `Φ`, row-major.
     pub values: Vec<f32>,
 }
 
@@ -45,7 +45,8 @@ impl Client {
         .await
     }
 
-    /// The coordinates that turn cages into positions: `P = Φ·C`.
+    /// The coordinates that turn cages into positions: `P = Φ·C`, or where there are more columns than unknowns, with the face
+    /// normals that follow from them in addition: see [`LocalDecoder`](crate::LocalDecoder).
     ///
     /// # Errors
     /// [`ClientError::Refused`] where the session has none yet, and those of the connection.
@@ -53,13 +54,17 @@ impl Client {
         let session = self.session(id).await?;
         self.retrying(|| async {
             let rows = known(id, "points", session.points)?;
-            let columns = known(id, "unknowns", session.unknowns)?;
+            let unknowns = known(id, "unknowns", session.unknowns)?;
             let response = self.octets(&["v1", "sessions", id, "coordinates"]).await?;
-            for (name, expected) in [("cager-rows", rows), ("cager-columns", columns)] {
-                let found = number(response.headers(), name)?;
-                if found != expected {
-                    return Err(Failure::protocol(format!("{name} is {found}, but the session says {expected}")));
-                }
+            let found = number(response.headers(), "cager-rows")?;
+            if found != rows {
+                return Err(Failure::protocol(format!("cager-rows is {found}, but the session says {rows}")));
+            }
+            let columns = number(response.headers(), "cager-columns")?;
+            let all = session.cage_vertices.unwrap_or(0).saturating_add(session.cage_faces.unwrap_or(0));
+            if columns != unknowns && columns != all {
+                let what = format!("cager-columns is {columns}, but the session says {unknowns} unknowns");
+                return Err(Failure::protocol(what));
             }
             let bytes = 4 * u64::from(rows) * u64::from(columns);
             let body = whole(self, response, bytes).await?;
@@ -68,6 +73,30 @@ impl Client {
             }
             let values = numbers(&body, f32::from_le_bytes)?;
             Ok(Coordinates { rows: rows as usize, columns: columns as usize, values })
+        })
+        .await
+    }
+
+    /// The rest cage: where normals follow from vertices, decoding needs it.
+    ///
+    /// # Errors
+    /// [`ClientError::Refused`] where the session is not ready, and those of the connection.
+    pub async fn cage(&self, id: &str) -> Result<RestCage, ClientError> {
+        let session = self.session(id).await?;
+        self.retrying(|| async {
+            let vertices = known(id, "cage_vertices", session.cage_vertices)?;
+            let faces = known(id, "cage_faces", session.cage_faces)?;
+            let response = self.octets(&["v1", "sessions", id, "cage"]).await?;
+            let bytes = 24 * u64::from(vertices) + 12 * u64::from(faces);
+            let body = whole(self, response, bytes).await?;
+            if body.len() as u64 != bytes {
+                let what = format!("{} bytes are no cage of {vertices} vertices and {faces} faces", body.len());
+                return Err(Failure::protocol(what));
+            }
+            let (points, corners) = body.split_at(24 * vertices as usize);
+            let vertices = numbers(points, f64::from_le_bytes)?.as_chunks().0.to_vec();
+            let faces = numbers(corners, u32::from_le_bytes)?.as_chunks().0.to_vec();
+            Ok(RestCage { vertices, faces })
         })
         .await
     }

@@ -75,14 +75,19 @@ pub(crate) fn inverse(a: MatRef<'_, f64>) -> (Mat<f64>, f64) {
 }
 
 /// Singular values and right singular vectors of a tall matrix, through its QR factorisation.
-pub(crate) fn right_singular(mut a: Mat<f64>) -> Option<Svd> {
+pub(crate) fn right_singular(a: Mat<f64>) -> Option<Svd> {
+    svd(upper_factor(a).as_ref())
+}
+
+/// R of the QR factorisation of a tall matrix.
+pub(crate) fn upper_factor(mut a: Mat<f64>) -> Mat<f64> {
     use faer::linalg::qr::no_pivoting::factor;
     let (n, m) = a.shape();
     let block = factor::recommended_block_size::<f64>(n, m);
     let mut reflectors = Mat::zeros(block, m);
     let mut memory = MemBuffer::new(factor::qr_in_place_scratch::<f64>(n, m, block, Par::Seq, Default::default()));
     factor::qr_in_place(a.as_mut(), reflectors.as_mut(), Par::Seq, MemStack::new(&mut memory), Default::default());
-    svd(Mat::from_fn(m, m, |i, j| if i <= j { a[(i, j)] } else { 0.0 }).as_ref())
+    Mat::from_fn(m, m, |i, j| if i <= j { a[(i, j)] } else { 0.0 })
 }
 
 /// Lower Cholesky factor in place of a symmetric positive definite matrix, zeros above; `None` where it is not definite.

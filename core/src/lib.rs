@@ -16,4 +16,4 @@ pub mod synthetic;
 mod wide;
 
 /// Version of the computation of coordinates and cages: containers name it, since their readers compute the coordinates anew.
-pub const SOLVER_VERSION: u32 = 2;
+pub const SOLVER_VERSION: u32 = 3;

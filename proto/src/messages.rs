@@ -28,9 +28,9 @@ pub struct SessionOptions {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(max_length = 200))]
     pub name: Option<String>,
-    /// Coordinate system: `mvc`.
+    /// Coordinate system: `mvc`, `green` (normals follow from the vertices) or `green-free` (normals are unknowns).
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(pattern = "^mvc$"))]
+    #[cfg_attr(feature = "schema", schema(pattern = "^(mvc|green|green-free)$"))]
     pub coordinates: Option<String>,
     /// Points the inversion reads: `maxvol`, `rectangular`, `spread` or `all`.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -151,6 +151,16 @@ pub struct Session {
     /// Why the session failed.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub problem: Option<Problem>,
+}
+
+/// A cage in its rest pose.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct RestCage {
+    /// Its vertices.
+    pub vertices: Vec<[f64; 3]>,
+    /// Its triangles, counter-clockwise seen from outside.
+    pub faces: Vec<[u32; 3]>,
 }
 
 /// Condition numbers.

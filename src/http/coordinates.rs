@@ -46,7 +46,7 @@ pub(crate) async fn handles(
     get, path = "/v1/sessions/{id}/coordinates", operation_id = "get_coordinates", tag = "results", params(openapi::Id, openapi::Conditions),
     responses(
         (status = 200, description = "Φ", content_type = "application/octet-stream", body = Vec<u8>,
-            headers(("Cager-Rows" = u32, description = "Points n"), ("Cager-Columns" = u32, description = "Unknowns m"))),
+            headers(("Cager-Rows" = u32, description = "Points n"), ("Cager-Columns" = u32, description = "Values of a cage: its unknowns m, and its face normals where they follow from them"))),
         (status = 206, description = "The range asked for", content_type = "application/octet-stream", body = Vec<u8>),
         (status = 304, description = "What the client has is still right"),
     ),
@@ -58,6 +58,7 @@ pub(crate) async fn get(
 ) -> Result<Response, ApiError> {
     let facts = prepared(&service, &session).await?;
     let prepared = service.solver(&session).await?;
+    let columns = prepared.solver.decoder().columns();
     let read = move |range: Range<u64>| {
         let phi = prepared.solver.decoder().coordinates();
         let stride = 4 * phi.ncols() as u64;
@@ -72,7 +73,7 @@ pub(crate) async fn get(
         Ok(Bytes::from(bytes).slice(from..from + (range.end - range.start) as usize))
     };
     let coordinates = Immutable {
-        length: 4 * u64::from(facts.points) * u64::from(facts.unknowns),
+        length: 4 * u64::from(facts.points) * columns as u64,
         etag: format!("{}-phi", session.meta.key),
         media_type: "application/octet-stream",
         public: !service.access.is_guarded(),
@@ -80,6 +81,6 @@ pub(crate) async fn get(
     };
     let mut response = coordinates.respond(&headers);
     response.headers_mut().insert("cager-rows", HeaderValue::from(facts.points));
-    response.headers_mut().insert("cager-columns", HeaderValue::from(facts.unknowns));
+    response.headers_mut().insert("cager-columns", HeaderValue::from(columns));
     Ok(response)
 }

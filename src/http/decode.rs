@@ -37,7 +37,7 @@ pub(crate) async fn post(
     let place = service.stream(&tenant)?;
     let facts = prepared(&service, &session).await?;
     let solver = service.solver(&session).await?;
-    let cost = f64::from(facts.points) * f64::from(facts.unknowns);
+    let cost = f64::from(facts.points) * solver.solver.decoder().columns() as f64;
     let lane = service.engine.lane(&tenant.name, tenant.priority.weight(), cost, move |jobs: Vec<Job>| {
         let (cages, replies): (Vec<_>, Vec<_>) = jobs.into_iter().map(|job| (job.cage, job.reply)).unzip();
         let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();

@@ -1,5 +1,6 @@
 //! HTTP: routes, what they take and give, and the listener.
 
+mod cage;
 mod cages;
 mod container;
 mod coordinates;

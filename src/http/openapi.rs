@@ -6,7 +6,7 @@ use super::respond::PROBLEM_JSON;
 use crate::problem;
 use axum::response::IntoResponse;
 use bytes::Bytes;
-use cager_proto::messages::{FrameErrors, FrameResult, Problem, Session, SessionList, SessionOptions};
+use cager_proto::messages::{FrameErrors, FrameResult, Problem, RestCage, Session, SessionList, SessionOptions};
 use http::header;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -56,7 +56,7 @@ pub(crate) struct NewSessionForm {
         description = "Turns animated mesh captures into cages: make a session from a rest pose and its cage, post frames, follow or download the cages.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0"),
     ),
-    components(schemas(Event, FrameErrors, FrameResult, Problem, RowsQuery, Session, SessionList, SessionOptions)),
+    components(schemas(Event, FrameErrors, FrameResult, Problem, RestCage, RowsQuery, Session, SessionList, SessionOptions)),
     security(("token" = [])),
     tags(
         (name = "sessions", description = "Sessions and their progress"),

@@ -2,7 +2,7 @@
 
 use super::respond::PROBLEM_JSON;
 use super::{
-    cages, container, coordinates, decode, errors, events, extract, frames, health, openapi, sessions, viewer,
+    cage, cages, container, coordinates, decode, errors, events, extract, frames, health, openapi, sessions, viewer,
 };
 use crate::problem::{self, ApiError, Kind};
 use crate::service::Service;
@@ -31,6 +31,7 @@ fn quick() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(sessions::get, sessions::delete))
         .routes(routes!(coordinates::handles))
         .routes(routes!(coordinates::get))
+        .routes(routes!(cage::get))
         .routes(routes!(errors::get))
         .routes(routes!(events::get))
         .routes(routes!(cages::get))

@@ -267,9 +267,9 @@ fn diamond(svg: &mut String, x: f64, y: f64) {
 mod tests {
     use super::*;
 
-    fn chart(points: Vec<(f64, f64)>, cover: Cover) -> Chart {
+    fn chart(points: &[(f64, f64)], cover: Cover) -> Chart {
         let series =
-            |label: &str, mark| Series { label: label.to_owned(), class: "k-all", mark, points: points.clone() };
+            |label: &str, mark| Series { label: label.to_owned(), class: "k-all", mark, points: points.to_vec() };
         Chart {
             title: "a<b".to_owned(),
             x: Axis::counting("frame"),
@@ -296,7 +296,7 @@ mod tests {
         ];
         for points in cases {
             for cover in [Cover::FromZero, Cover::Around, Cover::Exactly, Cover::Factors] {
-                let svg = chart(points.clone(), cover).svg();
+                let svg = chart(&points, cover).svg();
                 assert!(!svg.contains("NaN") && !svg.contains("inf"), "{cover:?} {svg}");
                 assert!(svg.contains("a&lt;b"));
                 for path in svg.split("class=\"c\" d=\"M").skip(1) {
@@ -315,7 +315,7 @@ mod tests {
 
     #[test]
     fn a_gap_in_the_points_is_a_gap_in_the_line() {
-        let svg = chart(vec![(0.0, 1.0), (1.0, 2.0), (2.0, f64::NAN), (3.0, 2.0), (4.0, 1.0)], Cover::FromZero).svg();
+        let svg = chart(&[(0.0, 1.0), (1.0, 2.0), (2.0, f64::NAN), (3.0, 2.0), (4.0, 1.0)], Cover::FromZero).svg();
         let path = svg.split("class=\"c\" d=\"").nth(3).and_then(|rest| rest.split('"').next());
         assert_eq!(path.map(|path| path.matches('M').count()), Some(2), "{svg}");
     }

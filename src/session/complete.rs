@@ -8,7 +8,8 @@ use super::{Phase, Session};
 use crate::capture::{CaptureWriter, Encoding, StoredError};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{Completion, LogEntry, StoreError};
+use crate::store::{Completion, Content, LogEntry, StoreError};
+use cager_core::cage::Cage;
 use cager_proto::container;
 use cager_proto::messages::Complete;
 use std::io::{self, BufWriter, Write};
@@ -99,15 +100,28 @@ impl Drop for Sealed<'_> {
     }
 }
 
+impl Session {
+    fn content(&self) -> Result<Content, ApiError> {
+        let content = self.store.content(&self.meta.key).map_err(|error| self.storage_error(&error))?;
+        content.ok_or_else(|| match self.is_deleted() {
+            true => super::gone(),
+            false => ApiError::internal(&"the rest pose of a session is gone"),
+        })
+    }
+
+    /// Reads the rest cage again. Blocks.
+    ///
+    /// # Errors
+    /// Those of the disk; a session that was deleted.
+    pub(crate) fn rest_cage(&self) -> Result<Cage, ApiError> {
+        prepare::read_cage(&self.content()?, &Choices::of(&self.meta.options)?)
+    }
+}
+
 fn write(session: &Session, prepared: &Prepared, entries: &[LogEntry], frames: u32) -> Result<Completion, ApiError> {
     let stored = |error: StoreError| session.storage_error(&error);
     let choices = Choices::of(&session.meta.options)?;
-    let content = session.store.content(&session.meta.key).map_err(stored)?;
-    let content = content.ok_or_else(|| match session.is_deleted() {
-        true => super::gone(),
-        false => ApiError::internal(&"the rest pose of a session is gone"),
-    })?;
-    let geometry = prepare::read(&content, &choices)?;
+    let geometry = prepare::read(&session.content()?, &choices)?;
     let encoding = Encoding {
         rest: &geometry.rest,
         cage: &geometry.cage,

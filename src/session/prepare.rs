@@ -48,7 +48,7 @@ impl Choices {
         }
         let name = options.coordinates.as_deref().unwrap_or("mvc");
         let Some(system) = coordinates::by_name(name) else {
-            let names = coordinates::ALL.map(|system| system.name()).join(", ");
+            let names = coordinates::ALL.map(CoordinateSystem::name).join(", ");
             return refuse(format!("coordinates: {name:?} is not available; give one of {names}"));
         };
         let wanted = options.handles.as_deref().unwrap_or(Handles::default().name());

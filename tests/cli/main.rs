@@ -6,10 +6,12 @@ mod demo;
 mod encode;
 #[cfg(unix)]
 mod full_disk;
+mod green;
 mod inspect;
 #[cfg(target_os = "linux")]
 mod interrupted;
 mod real_data;
+mod real_green;
 mod real_methods;
 mod refused;
 mod support;

@@ -7,7 +7,7 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::{Handles, SolverOptions};
 use cager_core::mesh::{Model, Point, TriMesh, diagonal, winding_number};
-use cager_formats::{open_frames, read_model};
+use cager_formats::{commit_together, open_frames, read_model};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -36,20 +36,24 @@ pub(crate) fn cage_of(path: &Path) -> Cage {
 }
 
 pub(crate) fn run(folder: &Path, rest: &Model, cage: &Cage, options: SolverOptions) -> Report {
-    let dir = Dir::new();
+    run_with(&Dir::new(), &MeanValue, folder, rest, cage, options)
+}
+
+/// Encodes a capture into `out.cager`.
+pub(crate) fn run_with(
+    dir: &Dir,
+    system: &dyn CoordinateSystem,
+    folder: &Path,
+    rest: &Model,
+    cage: &Cage,
+    options: SolverOptions,
+) -> Report {
     let mut frames = open_frames(folder.join("frames.npy"), rest.points.len()).expect("frames");
     let output = dir.path("out.cager");
-    let job = Job {
-        rest,
-        cage,
-        frames: frames.as_mut(),
-        output: &output,
-        system: &MeanValue,
-        options,
-        term: None,
-        choose: None,
-    };
-    encode(job, &mut |_| {}).expect("an encoding").report
+    let job = Job { rest, cage, frames: frames.as_mut(), output: &output, system, options, term: None, choose: None };
+    let encoded = encode(job, &mut |_| {}).expect("an encoding");
+    commit_together(vec![encoded.container]).expect("a container");
+    encoded.report
 }
 
 /// Every cage of one capture against the independent reference.

@@ -130,7 +130,8 @@ impl Decomposed {
         let (handles, reach) = farthest_points(points, &basis.handles.rows, count);
         let samples = Samples { points, rows: &handles, reach };
         let rows = dense::rows_of(phi, &handles);
-        let values = svd::singular_values(rows.as_ref()).ok_or(failed("singular value decomposition of the rows"))?;
+        let values = svd::singular_values(dense::upper_factor(rows.clone()).as_ref())
+            .ok_or(failed("singular value decomposition of the rows"))?;
         let (map, svd) = match whole(phi, rank, spectra)? {
             Whole::Direct(svd) => {
                 let u = svd.u.as_ref().subcols(0, rank);

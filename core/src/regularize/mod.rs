@@ -1,6 +1,6 @@
 //! Sub-spectral regularisation (Thiery, Tierny and Boubekeur 2012, §5) and the baselines it is compared with.
 //!
-//! A [`Term`] says what a good cage is; [`spectral`] applies it to the unstable end of the spectrum alone. With `A = U Σ Vᵀ`
+//! A [`Term`] says what a good cage is; it is applied to the unstable end of the spectrum alone. With `A = U Σ Vᵀ`
 //! and `C = V q` every method here is a matrix `T` in `q = T (Uᵀ H)`.
 
 mod differential;

@@ -5,7 +5,7 @@ use crate::Target;
 use crate::disk::MemoryDisk;
 use cager::store::{Content, ContentKey, LogRecord, SessionMeta, Store};
 use cager_core::cage::Cage;
-use cager_core::coordinates::MeanValue;
+use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::inversion::{Solver, SolverOptions};
 use cager_core::mesh::TriMesh;
 use cager_proto::messages::SessionOptions;
@@ -120,18 +120,22 @@ pub(super) const SOLVER: Target = Target {
         let points: Vec<_> =
             (0..24_u8).map(|k| [0.3, 0.5, 0.7].map(|x| (f64::from(k) * x * 1.7).sin() * 0.6)).collect();
         let options = SolverOptions { spectrum: 2, ..SolverOptions::default() };
-        let solver = Solver::prepare(&MeanValue, &cage, &points, options).expect("a solver");
-        let disk = MemoryDisk::default();
-        open(&disk).put_prepared(&KEY, &solver).expect("a file");
-        let file = disk.get(Path::new(SOLVER_PATH)).expect("a file");
-        vec![[&[0], &file[..]].concat(), [&[1], &file[..]].concat()]
+        let systems: [&dyn CoordinateSystem; 2] = [&MeanValue, &Green::Consistent];
+        let seeds = systems.into_iter().flat_map(|system| {
+            let solver = Solver::prepare(system, &cage, &points, options).expect("a solver");
+            let disk = MemoryDisk::default();
+            open(&disk).put_prepared(&KEY, &solver).expect("a file");
+            let file = disk.get(Path::new(SOLVER_PATH)).expect("a file");
+            [[&[0], &file[..]].concat(), [&[1], &file[..]].concat()]
+        });
+        seeds.collect()
     },
-    words: &["CGRSOLV\u{1}"],
+    words: &["CGRSOLV\u{3}"],
     fixed: 4 << 20,
     per_byte: 64,
 };
 
-const SOLVER_HEADER: usize = 196;
+const SOLVER_HEADER: usize = 228;
 
 fn solver(mut bytes: &[u8]) {
     let mode = byte(&mut bytes);
@@ -149,7 +153,7 @@ fn solver(mut bytes: &[u8]) {
         return;
     };
     let decoder = solver.decoder();
-    assert!(4 * decoder.points() * decoder.unknowns() <= file.len());
+    assert!(4 * decoder.points() * decoder.columns() <= file.len());
     assert!(solver.handles().iter().all(|&handle| (handle as usize) < decoder.points()), "a handle lies outside");
     let cage = vec![0.5; 3 * decoder.unknowns()];
     let mut out = [Vec::new()];

@@ -5,9 +5,11 @@ use super::parts::{Html, Table, coloured, percent, seconds};
 use crate::compare::figures::Figures;
 use crate::plot::{escaped, grouped};
 
-/// Table 1 of the paper: points, cage, frames, preparation, one frame, total (all in milliseconds), and where the text gives
-/// it, the mean L2 (in 1e-2).
-const PAPER: [(&str, usize, &str, usize, usize, usize, usize, &str); 5] = [
+/// A row of the paper's Table 1: points, cage, frames, preparation, one frame, total (all in milliseconds), and where the
+/// text gives it, the mean L2 (in 1e-2).
+type PaperRow = (&'static str, usize, &'static str, usize, usize, usize, usize, &'static str);
+
+const PAPER: [PaperRow; 5] = [
     ("Fig. 14, 1st row (capoeira)", 19_998, "330 / 656", 499, 5_616, 568, 289_048, "0.12"),
     ("Fig. 14, 2nd row", 19_998, "330 / 656", 179, 5_616, 568, 107_288, "–"),
     ("Fig. 14, 3rd row (skirt)", 19_990, "368 / 732", 437, 7_291, 890, 396_221, "–"),

@@ -106,7 +106,7 @@ mod tests {
     #[test]
     fn everything_fits_the_picture_whatever_points_up() {
         let points: Vec<Point> =
-            (0..200).map(|i| f64::from(i)).map(|t| [3.0 * t.sin(), 2.0 * (1.7 * t).cos(), 0.03 * t]).collect();
+            (0..200).map(f64::from).map(|t: f64| [3.0 * t.sin(), 2.0 * (1.7 * t).cos(), 0.03 * t]).collect();
         for up in [Up::X, Up::Y, Up::Z] {
             for aspect in [0.5, 1.0, 2.0] {
                 let camera = Camera::fitting(&points, &points, up, aspect);

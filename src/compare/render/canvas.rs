@@ -190,6 +190,7 @@ fn span(values: [f64; 3], end: usize) -> Option<[usize; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
     const RED: Rgb = [1.0, 0.0, 0.0];
     const BLUE: Rgb = [0.0, 0.0, 1.0];
@@ -235,7 +236,7 @@ mod tests {
 
     #[test]
     fn lines_have_their_width_in_every_direction() {
-        for angle in [0.0f64, 0.3, 0.785, 1.2, 1.5708, 2.5, 4.0] {
+        for angle in [0.0f64, 0.3, FRAC_PI_4, 1.2, FRAC_PI_2, 2.5, 4.0] {
             let mut canvas = Canvas::new(40, 40);
             let (sin, cos) = angle.sin_cos();
             let end = |s: f64| [60.0 + 40.0 * s * cos, 60.0 + 40.0 * s * sin, 0.0];

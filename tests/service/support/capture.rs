@@ -111,6 +111,11 @@ impl Capture {
 
     /// The container that `cager encode` makes of the first frames, without a service.
     pub(crate) fn encoded(&self, frames: u32) -> Vec<u8> {
+        self.encoded_with(frames, &[])
+    }
+
+    /// As [`Self::encoded`], with more arguments.
+    pub(crate) fn encoded_with(&self, frames: u32, more: &[&str]) -> Vec<u8> {
         let folder = super::folder();
         let path = |name: &str| folder.path().join(name);
         std::fs::write(path("rest.obj"), &self.rest.obj).expect("a rest pose");
@@ -125,6 +130,7 @@ impl Capture {
         writer.finish().expect("frames");
         let done = Command::new(env!("CARGO_BIN_EXE_cager"))
             .args("encode --rest rest.obj --cage cage.obj --frames frames.npy -o out.cager".split(' '))
+            .args(more)
             .current_dir(folder.path())
             .stdin(Stdio::null())
             .output()

@@ -242,14 +242,14 @@ impl Consistent {
             .collect();
         for gradient in 0..GRADIENTS {
             let residuals: Vec<Vec<Point>> =
-                searches.iter().map(|s| s.as_ref().map_or(Vec::new(), |s| s.residual())).collect();
+                searches.iter().map(|s| s.as_ref().map_or(Vec::new(), state::Search::residual)).collect();
             let better = state::products(self.preconditioner.as_ref(), &residuals, |x| x as f32, f64::from);
             for (search, better) in searches.iter_mut().zip(better) {
                 if let Some(search) = search {
                     search.turn(&better, gradient == 0, GRADIENT_TOLERANCE);
                 }
             }
-            if searches.iter().flatten().all(|search| search.is_done()) {
+            if searches.iter().flatten().all(state::Search::is_done) {
                 break;
             }
             let moved: Vec<Vec<Point>> =

@@ -11,7 +11,7 @@ async fn a_deleted_session_is_unknown_everywhere_and_takes_no_space() {
     let at = format!("/v1/sessions/{}", session.id);
     assert!(app.metric("cager_stored_bytes{tenant=\"local\"}").await > 0.0);
     assert_eq!(app.delete(&at).await.expect(204).body.len(), 0);
-    for what in ["", "/cages?first=0", "/errors", "/handles", "/coordinates", "/events", "/capture.cager"] {
+    for what in ["", "/cages?first=0", "/errors", "/cage", "/handles", "/coordinates", "/events", "/capture.cager"] {
         app.get(&format!("{at}{what}")).await.problem(404, "not-found");
     }
     app.post(&format!("{at}/frames?first=0"), OCTETS, capture.frame(0)).await.problem(404, "not-found");

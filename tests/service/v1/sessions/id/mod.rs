@@ -1,3 +1,4 @@
+mod cage;
 mod cages;
 mod capture_cager;
 mod complete;

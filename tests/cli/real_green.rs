@@ -1,0 +1,105 @@
+//! Green coordinates on the captures of `CAGER_DATA`, see `real_data`.
+
+use crate::real_data::{cage_of, data, run_with};
+use crate::support::{Dir, read_cages};
+use cager_core::coordinates::{CoordinateSystem, Green};
+use cager_core::inversion::{Handles, SolverOptions};
+use cager_core::mesh::{diagonal, winding_number};
+use cager_formats::read_model;
+use std::fs;
+
+/// Mean and largest second temporal difference of the vertices of a capture's cages, over the rest diagonal.
+fn spikes(cages: &[Vec<f32>], vertices: usize, size: f64) -> (f64, f64) {
+    let (mut sum, mut most, mut count) = (0.0, 0.0f64, 0);
+    for three in cages.windows(3) {
+        for v in 0..vertices {
+            let second = |k: usize| {
+                let [a, b, c] = [0, 1, 2].map(|t: usize| f64::from(three[t][3 * v + k]));
+                (a - 2.0 * b + c).powi(2)
+            };
+            let length = (0..3).map(second).sum::<f64>().sqrt() / size;
+            (sum, most, count) = (sum + length, most.max(length), count + 1);
+        }
+    }
+    (sum / f64::from(count), most)
+}
+
+/// Normals that follow from the vertices make cages several times as stable as free ones.
+fn consistent_cages_are_more_stable(capture: &str, handles: &[Handles]) {
+    let Some(root) = data() else { return };
+    let folder = root.join(capture);
+    let rest = read_model(&folder.join("rest.obj")).expect("a rest pose");
+    let cage = cage_of(&folder.join("cage350.obj"));
+    for &handles in handles {
+        let found = [&Green::Free, &Green::Consistent].map(|system| {
+            let dir = Dir::new();
+            let options = SolverOptions { handles, ..SolverOptions::default() };
+            let report = run_with(&dir, system, &folder, &rest, &cage, options);
+            let size = diagonal(&rest.points);
+            let (mean, most) = spikes(&read_cages(&dir.path("out.cager")), cage.vertices().len(), size);
+            eprintln!(
+                "{capture}, {}, {}: mean L2 {:.4}e-2, second difference mean {:.3}e-2, largest {:.2}e-2, {:?}",
+                system.name(),
+                handles.name(),
+                100.0 * report.error.l2_mean,
+                100.0 * mean,
+                100.0 * most,
+                report.consistency
+            );
+            assert!(report.affine_reproduction_error <= 1e-10, "{:e}", report.affine_reproduction_error);
+            if let Some(consistency) = report.consistency {
+                assert!(consistency.l2_mean < 0.8 * consistency.start_l2_mean, "{consistency:?}");
+                assert_eq!(consistency.kept_start, 0);
+            }
+            (mean, most)
+        });
+        let [(free, free_most), (consistent, consistent_most)] = found;
+        assert!(3.0 * consistent < free, "{capture}, {handles:?}: {consistent} against {free}");
+        assert!(consistent_most < free_most, "{capture}, {handles:?}: {consistent_most} against {free_most}");
+    }
+}
+
+#[test]
+fn consistent_cages_are_more_stable_on_the_horse() {
+    consistent_cages_are_more_stable("horse-gallop", &[Handles::MaxVol, Handles::All]);
+}
+
+#[test]
+fn consistent_cages_are_more_stable_on_the_dancer() {
+    consistent_cages_are_more_stable("samba", &[Handles::MaxVol]);
+}
+
+#[test]
+fn consistent_cages_are_more_stable_on_the_arm() {
+    consistent_cages_are_more_stable("supercages-arm", &[Handles::MaxVol]);
+}
+
+#[test]
+fn consistent_cages_are_more_stable_on_the_walk() {
+    consistent_cages_are_more_stable("makehuman-cmu-walk", &[Handles::MaxVol]);
+}
+
+#[test]
+fn every_pair_is_reproduced_and_points_outside_are_found() {
+    let Some(root) = data() else { return };
+    for entry in fs::read_dir(root.join("pairs")).expect("pairs") {
+        let folder = entry.expect("a pair").path();
+        let rest = read_model(&folder.join("mesh.obj")).expect("a model");
+        let cage = cage_of(&folder.join("cage.obj"));
+        let found = Green::Free.coordinates(&cage, &rest.points).expect("coordinates");
+        let (values, size) = (Green::Free.rest_values(&cage), diagonal(&rest.points));
+        let mut worst: f64 = 0.0;
+        for (i, p) in rest.points.iter().enumerate() {
+            for k in 0..3 {
+                let sum: f64 = values.iter().enumerate().map(|(j, v)| found.phi[(i, j)] * v[k]).sum();
+                worst = worst.max((sum - p[k]).abs() / size);
+            }
+        }
+        let (vertices, triangles) = (cage.vertices(), &cage.mesh().triangles);
+        let outside = |i: &u32| winding_number(vertices, triangles, rest.points[*i as usize]) < 0.5;
+        let expected: Vec<u32> = (0..rest.points.len() as u32).filter(outside).collect();
+        eprintln!("{}: off by {worst:.1e}, {} outside", folder.display(), expected.len());
+        assert!(worst <= 1e-10, "{}: {worst:e}", folder.display());
+        assert_eq!(found.outside, expected, "{}", folder.display());
+    }
+}
