@@ -14,18 +14,32 @@ use faer::Mat;
 
 #[test]
 fn mean_value_coordinates_conform() {
-    suite(&MeanValue, Promises { defined_outside: true, barycentric_on_faces: true, continuous_outside: true });
+    suite(
+        &MeanValue,
+        Promises { defined_outside: true, in_thin_cages: true, barycentric_on_faces: true, continuous_outside: true },
+    );
 }
 
 #[test]
 fn green_coordinates_conform() {
     // Both of them have the same Φ.
-    suite(&Green::Free, Promises { defined_outside: true, barycentric_on_faces: false, continuous_outside: false });
+    suite(
+        &Green::Free,
+        Promises { defined_outside: true, in_thin_cages: true, barycentric_on_faces: false, continuous_outside: false },
+    );
 }
 
 #[test]
 fn harmonic_coordinates_conform() {
-    suite(&Harmonic, Promises { defined_outside: false, barycentric_on_faces: true, continuous_outside: false });
+    suite(
+        &Harmonic,
+        Promises {
+            defined_outside: false,
+            in_thin_cages: false,
+            barycentric_on_faces: true,
+            continuous_outside: false,
+        },
+    );
 }
 
 #[test]
@@ -87,6 +101,8 @@ fn assert_reproduced(name: &str, row: &[f64], vertices: usize, unknowns: &[Point
 struct Promises {
     /// Coordinates exist outside the cage as well as inside and on it.
     defined_outside: bool,
+    /// Coordinates can be computed in cages of any thickness, not only in those up to some tens of times wider than thick.
+    in_thin_cages: bool,
     /// On a face, coordinates are the barycentric ones of its corners. Green coordinates interpolate no cage that is not similar
     /// to the one at rest.
     barycentric_on_faces: bool,
@@ -96,6 +112,10 @@ struct Promises {
 
 fn suite(system: &dyn CoordinateSystem, promises: Promises) {
     for (name, cage) in thin_cages() {
+        if !promises.in_thin_cages {
+            conforms_or_refuses(system, promises, name, &cage);
+            continue;
+        }
         reproduces_affine_functions_everywhere(system, promises, name, &cage);
         does_not_depend_on_the_order_of_vertices_and_faces(system, promises, name, &cage);
         if promises.barycentric_on_faces {
@@ -120,6 +140,34 @@ fn defined(promises: Promises, cage: &Cage, mut points: Vec<Point>) -> Vec<Point
     let on = |x: Point| distance_to_surface(vertices, triangles, x) < 0.99e-9 * cage.diagonal();
     points.retain(|&x| promises.defined_outside || on(x) || winding_number(vertices, triangles, x) > 0.5);
     points
+}
+
+/// Of a thin cage, what is promised of others, or a sentence that says what to do.
+fn conforms_or_refuses(system: &dyn CoordinateSystem, promises: Promises, name: &str, cage: &Cage) {
+    let mut random = Random::new(23);
+    let points = defined(promises, cage, probes(cage, &mut random));
+    let scaled = |factor: f64| -> Vec<Point> { points.iter().map(|p| p.map(|c| c * factor)).collect() };
+    let outcomes = [1e-6, 1.0, 1e6].map(|scale| {
+        let points = scaled(scale);
+        let cage = common::mapped(cage, |p| p.map(|c| c * scale));
+        match system.coordinates(&cage, &points) {
+            Ok(found) => {
+                let (unknowns, size) = (system.rest_values(&cage), diagonal(&points));
+                for (i, p) in points.iter().enumerate() {
+                    assert_reproduced(name, &row(&found.phi, i), cage.vertices().len(), &unknowns, *p, size);
+                }
+                is_barycentric_on_faces(system, name, &cage);
+                true
+            }
+            Err(error @ CoordinatesError::NotComputed { .. }) => {
+                let text = error.to_string();
+                assert!(text.contains(system.name()) && text.contains("use mean value coordinates"), "{name}: {text}");
+                false
+            }
+            Err(error) => panic!("{name}: {error}"),
+        }
+    });
+    assert!(outcomes.iter().all(|&done| done == outcomes[0]), "{name}: scaling changes what is computed");
 }
 
 /// Points with a distance to some part of the cage that goes down to zero, and points anywhere.

@@ -74,6 +74,14 @@ pub trait CoordinateSystem: Sync {
         None
     }
 
+    /// What [`Self::coordinates`] would refuse before it computes much.
+    ///
+    /// # Errors
+    /// Points for which the system is not defined.
+    fn check(&self, _cage: &Cage, _points: &[Point]) -> Result<(), CoordinatesError> {
+        Ok(())
+    }
+
     /// `Φ` for these points. Rows sum to one; runs on the current rayon pool; the result does not depend on it.
     ///
     /// # Errors

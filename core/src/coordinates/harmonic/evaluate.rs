@@ -211,12 +211,12 @@ fn evaluate_group(solution: &Solution<'_>, group: &Group, start: usize, scratch:
     let twice = share.0.iter().any(|s| *s > 0.0);
     group_potentials(layers, x, &mut scratch.layers);
     for (value, double) in scratch.values.iter_mut().zip(&scratch.layers.double) {
-        *value = *double * *own * INVERSE_4PI;
+        *value = weigh(*double, *own) * INVERSE_4PI;
     }
     if twice {
         group_potentials(layers, y, &mut scratch.layers);
         for (value, double) in scratch.values.iter_mut().zip(&scratch.layers.double) {
-            *value = *value - *double * *share * INVERSE_4PI;
+            *value = *value - weigh(*double, *share) * INVERSE_4PI;
         }
     }
     scratch.change.fill(Lanes::ZERO);
@@ -229,13 +229,13 @@ fn evaluate_group(solution: &Solution<'_>, group: &Group, start: usize, scratch:
         let degree = if near { element.degree } else { low_degree };
         potentials(tables, &element.triangle, degree, x, &mut values);
         for value in &mut values[..functions(degree)] {
-            *value = *value * *own;
+            *value = weigh(*value, *own);
         }
         if twice {
             let mut others = [Lanes::ZERO; MAX_FUNCTIONS];
             potentials(tables, &element.triangle, degree, y, &mut others);
             for (value, other) in values[..functions(degree)].iter_mut().zip(&others) {
-                *value = *value - *other * *share;
+                *value = *value - weigh(*other, *share);
             }
         }
         for k in 0..unknowns.low {
@@ -257,6 +257,12 @@ fn evaluate_group(solution: &Solution<'_>, group: &Group, start: usize, scratch:
             &mut scratch.change,
         );
     }
+}
+
+/// A part of a value, which need not be finite where the part is nothing, as on edges.
+#[inline(always)]
+fn weigh(value: Lanes, by: Lanes) -> Lanes {
+    value.zip(by, |value, by| if by == 0.0 { 0.0 } else { value * by })
 }
 
 /// One where a point is nearer than the limit.
@@ -310,11 +316,9 @@ fn mark(solution: &Solution<'_>, group: &Group, l: usize, vertex: u32, marked: &
         let all = functions(element.degree);
         potentials(tables, &element.triangle, element.degree, &x, &mut values);
         potentials(tables, &element.triangle, element.degree, &y, &mut others);
-        let share: f64 = (0..all)
-            .map(|k| {
-                (group.own.0[l] * values[k].0[0] - group.share.0[l] * others[k].0[0]) * part.change[place * all + k]
-            })
-            .sum();
+        let [own, twin] = [&group.own, &group.share].map(|by| Lanes::splat(by.0[l]));
+        let value = |k: usize| weigh(values[k], own).0[0] - weigh(others[k], twin).0[0];
+        let share: f64 = (0..all).map(|k| value(k) * part.change[place * all + k]).sum();
         shares.push((share.abs(), e as u32));
     }
     let largest = shares.iter().map(|s| s.0).fold(0.0, f64::max);

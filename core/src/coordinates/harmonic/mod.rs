@@ -48,6 +48,10 @@ impl CoordinateSystem for Harmonic {
         cage.vertices().to_vec()
     }
 
+    fn check(&self, cage: &Cage, points: &[Point]) -> Result<(), CoordinatesError> {
+        check_inside(&Surface::new(cage.vertices(), cage).feet(points), cage.diagonal())
+    }
+
     fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError> {
         if let Some(point) = points.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
             return Err(not_computed(format!("point {point} is not finite")));

@@ -187,12 +187,14 @@ mod tests {
                 let mut exact = [0.0; MAX_FUNCTIONS];
                 let unit = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
                 divided(&tables, &triangle, unit, MAX_DEGREE, x, &mut exact, 0);
+                let radii = mesh::norm(minus(triangle.centre, x)) / triangle.radius;
+                let limit = if radii < FARTHER { 2e-5 } else { 5e-4 };
                 let mut found = [Lanes::ZERO; MAX_FUNCTIONS];
                 potentials(&tables, &triangle, MAX_DEGREE, &x.map(Lanes::splat), &mut found);
                 for k in 0..MAX_FUNCTIONS {
                     let error = (found[k].0[0] - exact[k]).abs() / exact[0];
                     assert!(
-                        error < 5e-6,
+                        error < limit,
                         "{corners:?} ({alpha}, {beta}, {height}) polynomial {k}: {} for {} ({error:e})",
                         found[k].0[0],
                         exact[k]

@@ -94,8 +94,7 @@ impl<'a> Surface<'a> {
                 continue;
             }
             let corners = self.faces[f].map(|v| self.vertices[v as usize]);
-            let weights = nearest_in_triangle(corners, x);
-            let place = [0, 1, 2].map(|k| (0..3).map(|i| weights[i] * corners[i][k]).sum());
+            let (weights, place) = nearest_in_triangle(corners, self.normals[f], x);
             let distance = mesh::norm(minus(x, place));
             if distance < best || found.is_none() {
                 best = distance.min(best);
@@ -129,40 +128,35 @@ fn minus(a: Point, b: Point) -> Point {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// Barycentric coordinates of the point of a triangle that is nearest to x (Ericson 2005, 5.1.5).
-fn nearest_in_triangle([a, b, c]: [Point; 3], x: Point) -> [f64; 3] {
-    let (ab, ac) = (minus(b, a), minus(c, a));
-    let to = |p: Point| (mesh::dot(ab, minus(x, p)), mesh::dot(ac, minus(x, p)));
-    let (d1, d2) = to(a);
-    if d1 <= 0.0 && d2 <= 0.0 {
-        return [1.0, 0.0, 0.0];
+/// The point of a triangle that is nearest to x, and its barycentric coordinates. From distances to the edges, which are exact in
+/// thin triangles too.
+fn nearest_in_triangle(corners: [Point; 3], normal: Point, x: Point) -> ([f64; 3], Point) {
+    let mut weights = [0.0; 3];
+    let mut nearest: Option<([f64; 3], Point)> = None;
+    let mut least = f64::INFINITY;
+    for i in 0..3 {
+        let [j, k] = [(i + 1) % 3, (i + 2) % 3];
+        let (p, edge) = (corners[j], minus(corners[k], corners[j]));
+        let outward = mesh::cross(edge, normal);
+        let beyond = mesh::dot(outward, minus(x, p));
+        weights[i] = beyond / mesh::dot(outward, minus(corners[i], p));
+        if beyond > 0.0 {
+            let t = (mesh::dot(edge, minus(x, p)) / mesh::dot(edge, edge)).clamp(0.0, 1.0);
+            let place = [0, 1, 2].map(|c| p[c] + t * edge[c]);
+            let away = minus(x, place);
+            if mesh::dot(away, away) < least {
+                least = mesh::dot(away, away);
+                let mut at = [0.0; 3];
+                (at[j], at[k]) = (1.0 - t, t);
+                nearest = Some((at, place));
+            }
+        }
     }
-    let (d3, d4) = to(b);
-    if d3 >= 0.0 && d4 <= d3 {
-        return [0.0, 1.0, 0.0];
-    }
-    let (d5, d6) = to(c);
-    if d6 >= 0.0 && d5 <= d6 {
-        return [0.0, 0.0, 1.0];
-    }
-    let vc = d1 * d4 - d3 * d2;
-    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        let t = d1 / (d1 - d3);
-        return [1.0 - t, t, 0.0];
-    }
-    let vb = d5 * d2 - d1 * d6;
-    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        let t = d2 / (d2 - d6);
-        return [1.0 - t, 0.0, t];
-    }
-    let va = d3 * d6 - d5 * d4;
-    if va <= 0.0 && d4 >= d3 && d5 >= d6 {
-        let t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-        return [0.0, 1.0 - t, t];
-    }
-    let total = va + vb + vc;
-    let (v, w) = (vb / total, vc / total);
-    [1.0 - v - w, v, w]
+    nearest.unwrap_or_else(|| {
+        let height = mesh::dot(normal, minus(x, corners[0]));
+        let total: f64 = weights.iter().sum();
+        (weights.map(|w| w / total), [0, 1, 2].map(|c| x[c] - height * normal[c]))
+    })
 }
 
 #[cfg(test)]
