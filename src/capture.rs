@@ -128,6 +128,7 @@ fn begin_report(encoding: &Encoding<'_>) -> Report {
         spectrum_choice: None,
         lambda: encoding.options.lambda,
         consistency: None,
+        refinement: found.refinement.map(Into::into),
         affine_reproduction_error: found.affine_reproduction_error,
         condition_number: Condition { full: found.condition_full, handles: found.condition_handles },
         rank: found.rank,
@@ -164,6 +165,15 @@ pub fn preparation_warnings(options: SolverOptions, solver: &Solver) -> Vec<Stri
             found.outside.len(),
             solver.decoder().points(),
             100.0 * found.outside_distance
+        ));
+    }
+    if let Some(refined) = found.refinement.filter(|refined| !refined.reached()) {
+        warnings.push(format!(
+            "the coordinates still change by {:.1e} after {} refinements to {} boundary elements, more than the {:.0e} aimed at, as happens in cages much thinner than wide and where points are very near to a cage's long edges; make the cage roomier, or use mean value coordinates (mvc)",
+            refined.change,
+            refined.refinements,
+            refined.elements,
+            cager_core::coordinates::Refinement::TOLERANCE
         ));
     }
     let strong = found.singular_values.iter().filter(|&&s| s >= WEAK * found.singular_values[0]).count();

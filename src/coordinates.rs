@@ -1,10 +1,10 @@
 //! Coordinate systems by name, and what is chosen where nothing is said.
 
-use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
+use cager_core::coordinates::{CoordinateSystem, Green, Harmonic, MeanValue};
 use cager_core::inversion::SolverOptions;
 
 /// Every coordinate system, the usual one first.
-pub(crate) const ALL: [&dyn CoordinateSystem; 3] = [&MeanValue, &Green::Consistent, &Green::Free];
+pub(crate) const ALL: [&dyn CoordinateSystem; 4] = [&MeanValue, &Harmonic, &Green::Consistent, &Green::Free];
 
 /// The coordinate system with this name on the command line, in reports and in containers.
 pub(crate) fn by_name(name: &str) -> Option<&'static dyn CoordinateSystem> {

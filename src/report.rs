@@ -34,6 +34,9 @@ pub struct Report {
     /// How the iteration went, for coordinates whose inversion is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub consistency: Option<Consistency>,
+    /// How the coordinates were refined, where they are a numerical solution.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refinement: Option<Refinement>,
     /// `max_i |Φ C_R − P_R|_i`.
     pub affine_reproduction_error: f64,
     /// Condition numbers over the numerical rank.
@@ -54,6 +57,23 @@ pub struct Report {
     pub seconds: Seconds,
     /// What a user should know but that did not stop the work.
     pub warnings: Vec<String>,
+}
+
+/// How a numerical solution for the coordinates was refined.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
+pub struct Refinement {
+    /// Boundary elements of the last solution.
+    pub elements: usize,
+    /// Solutions after the first.
+    pub refinements: usize,
+    /// Most that the last refinement changed a coordinate of a point by; at most 1e-3 but where a warning says otherwise.
+    pub change: f64,
+}
+
+impl From<cager_core::coordinates::Refinement> for Refinement {
+    fn from(found: cager_core::coordinates::Refinement) -> Self {
+        Self { elements: found.elements, refinements: found.refinements, change: found.change }
+    }
 }
 
 /// Condition numbers.

@@ -7,20 +7,39 @@
 mod common;
 
 use cager_core::cage::Cage;
-use cager_core::coordinates::{CoordinateSystem, Coordinates, Green, MeanValue};
-use cager_core::mesh::{Point, diagonal};
+use cager_core::coordinates::{CoordinateSystem, Coordinates, CoordinatesError, Green, Harmonic, MeanValue};
+use cager_core::mesh::{Point, diagonal, distance_to_surface, winding_number};
 use common::{Random, cages, golden, thin_cages};
 use faer::Mat;
 
 #[test]
 fn mean_value_coordinates_conform() {
-    suite(&MeanValue, Promises { barycentric_on_faces: true, continuous_outside: true });
+    suite(
+        &MeanValue,
+        Promises { defined_outside: true, in_thin_cages: true, barycentric_on_faces: true, continuous_outside: true },
+    );
 }
 
 #[test]
 fn green_coordinates_conform() {
     // Both of them have the same Φ.
-    suite(&Green::Free, Promises { barycentric_on_faces: false, continuous_outside: false });
+    suite(
+        &Green::Free,
+        Promises { defined_outside: true, in_thin_cages: true, barycentric_on_faces: false, continuous_outside: false },
+    );
+}
+
+#[test]
+fn harmonic_coordinates_conform() {
+    suite(
+        &Harmonic,
+        Promises {
+            defined_outside: false,
+            in_thin_cages: false,
+            barycentric_on_faces: true,
+            continuous_outside: false,
+        },
+    );
 }
 
 #[test]
@@ -80,6 +99,10 @@ fn assert_reproduced(name: &str, row: &[f64], vertices: usize, unknowns: &[Point
 /// What some systems promise and others do not.
 #[derive(Clone, Copy)]
 struct Promises {
+    /// Coordinates exist outside the cage as well as inside and on it.
+    defined_outside: bool,
+    /// Coordinates can be computed in cages of any thickness, not only in those up to some tens of times wider than thick.
+    in_thin_cages: bool,
     /// On a face, coordinates are the barycentric ones of its corners. Green coordinates interpolate no cage that is not similar
     /// to the one at rest.
     barycentric_on_faces: bool,
@@ -89,22 +112,62 @@ struct Promises {
 
 fn suite(system: &dyn CoordinateSystem, promises: Promises) {
     for (name, cage) in thin_cages() {
-        reproduces_affine_functions_everywhere(system, name, &cage);
-        does_not_depend_on_the_order_of_vertices_and_faces(system, name, &cage);
+        if !promises.in_thin_cages {
+            conforms_or_refuses(system, promises, name, &cage);
+            continue;
+        }
+        reproduces_affine_functions_everywhere(system, promises, name, &cage);
+        does_not_depend_on_the_order_of_vertices_and_faces(system, promises, name, &cage);
         if promises.barycentric_on_faces {
             is_barycentric_on_faces(system, name, &cage);
         }
     }
     for (name, cage) in cages() {
-        reproduces_affine_functions_everywhere(system, name, &cage);
-        does_not_depend_on_the_order_of_vertices_and_faces(system, name, &cage);
-        follows_rigid_motions(system, name, &cage);
+        reproduces_affine_functions_everywhere(system, promises, name, &cage);
+        does_not_depend_on_the_order_of_vertices_and_faces(system, promises, name, &cage);
+        follows_rigid_motions(system, promises, name, &cage);
         if promises.barycentric_on_faces {
             is_barycentric_on_faces(system, name, &cage);
         }
-        is_continuous_at_the_cage(system, name, &cage);
-        is_continuous_across_planes_of_far_faces(system, name, &cage, promises.continuous_outside);
+        is_continuous_at_the_cage(system, promises, name, &cage);
+        is_continuous_across_planes_of_far_faces(system, promises, name, &cage);
     }
+}
+
+/// Those points at which the system promises coordinates. Points within 1e-9 of the cage lie on it.
+fn defined(promises: Promises, cage: &Cage, mut points: Vec<Point>) -> Vec<Point> {
+    let (vertices, triangles) = (cage.vertices(), &cage.mesh().triangles);
+    let on = |x: Point| distance_to_surface(vertices, triangles, x) < 0.99e-9 * cage.diagonal();
+    points.retain(|&x| promises.defined_outside || on(x) || winding_number(vertices, triangles, x) > 0.5);
+    points
+}
+
+/// Of a thin cage, what is promised of others, or a sentence that says what to do.
+fn conforms_or_refuses(system: &dyn CoordinateSystem, promises: Promises, name: &str, cage: &Cage) {
+    let mut random = Random::new(23);
+    let points = defined(promises, cage, probes(cage, &mut random));
+    let scaled = |factor: f64| -> Vec<Point> { points.iter().map(|p| p.map(|c| c * factor)).collect() };
+    let outcomes = [1e-6, 1.0, 1e6].map(|scale| {
+        let points = scaled(scale);
+        let cage = common::mapped(cage, |p| p.map(|c| c * scale));
+        match system.coordinates(&cage, &points) {
+            Ok(found) => {
+                let (unknowns, size) = (system.rest_values(&cage), diagonal(&points));
+                for (i, p) in points.iter().enumerate() {
+                    assert_reproduced(name, &row(&found.phi, i), cage.vertices().len(), &unknowns, *p, size);
+                }
+                is_barycentric_on_faces(system, name, &cage);
+                true
+            }
+            Err(error @ CoordinatesError::NotComputed { .. }) => {
+                let text = error.to_string();
+                assert!(text.contains(system.name()) && text.contains("use mean value coordinates"), "{name}: {text}");
+                false
+            }
+            Err(error) => panic!("{name}: {error}"),
+        }
+    });
+    assert!(outcomes.iter().all(|&done| done == outcomes[0]), "{name}: scaling changes what is computed");
 }
 
 /// Points with a distance to some part of the cage that goes down to zero, and points anywhere.
@@ -135,14 +198,15 @@ fn probes(cage: &Cage, random: &mut Random) -> Vec<Point> {
     points
 }
 
-fn reproduces_affine_functions_everywhere(system: &dyn CoordinateSystem, name: &str, cage: &Cage) {
+fn reproduces_affine_functions_everywhere(system: &dyn CoordinateSystem, promises: Promises, name: &str, cage: &Cage) {
     let mut random = Random::new(7);
-    let points = probes(cage, &mut random);
+    let points = defined(promises, cage, probes(cage, &mut random));
     for exponent in [-6, -3, 0, 3, 6] {
         let scale = 10f64.powi(exponent);
         let scaled = common::mapped(cage, |p| p.map(|c| c * scale));
         let points: Vec<Point> = points.iter().map(|p| p.map(|c| c * scale)).collect();
-        let phi = system.coordinates(&scaled, &points).unwrap().phi;
+        let found = system.coordinates(&scaled, &points).unwrap_or_else(|error| panic!("{name} × {scale:e}: {error}"));
+        let phi = found.phi;
         let unknowns = system.rest_values(&scaled);
         let size = diagonal(&points);
         for (i, p) in points.iter().enumerate() {
@@ -152,9 +216,14 @@ fn reproduces_affine_functions_everywhere(system: &dyn CoordinateSystem, name: &
     }
 }
 
-fn does_not_depend_on_the_order_of_vertices_and_faces(system: &dyn CoordinateSystem, name: &str, cage: &Cage) {
+fn does_not_depend_on_the_order_of_vertices_and_faces(
+    system: &dyn CoordinateSystem,
+    promises: Promises,
+    name: &str,
+    cage: &Cage,
+) {
     let mut random = Random::new(11);
-    let points = probes(cage, &mut random);
+    let points = defined(promises, cage, probes(cage, &mut random));
     let (shuffled, order) = common::shuffled(cage, &mut random);
     let a = system.coordinates(cage, &points).unwrap();
     let b = system.coordinates(&shuffled, &points).unwrap();
@@ -173,9 +242,10 @@ fn does_not_depend_on_the_order_of_vertices_and_faces(system: &dyn CoordinateSys
     }
 }
 
-fn follows_rigid_motions(system: &dyn CoordinateSystem, name: &str, cage: &Cage) {
+fn follows_rigid_motions(system: &dyn CoordinateSystem, promises: Promises, name: &str, cage: &Cage) {
     let mut random = Random::new(13);
     let points: Vec<Point> = (0..200).map(|_| [0, 1, 2].map(|_| cage.diagonal() * (random.uniform() - 0.5))).collect();
+    let points = defined(promises, cage, points);
     let motion = |p: Point| {
         let (s, c) = 0.7f64.sin_cos();
         let q = [c * p[0] - s * p[1], s * p[0] + c * p[1], p[2]];
@@ -195,26 +265,29 @@ fn follows_rigid_motions(system: &dyn CoordinateSystem, name: &str, cage: &Cage)
 }
 
 fn is_barycentric_on_faces(system: &dyn CoordinateSystem, name: &str, cage: &Cage) {
-    for face in cage.faces() {
-        let corners = face.vertices.map(|v| cage.vertices()[v as usize]);
-        let weights = [0.2, 0.3, 0.5];
-        let p = [0, 1, 2].map(|c| (0..3).map(|i| weights[i] * corners[i][c]).sum::<f64>());
-        let phi = system.coordinates(cage, &[p]).unwrap().phi;
+    let weights = [0.2, 0.3, 0.5];
+    let on = |corners: [Point; 3]| [0, 1, 2].map(|c| (0..3).map(|i| weights[i] * corners[i][c]).sum::<f64>());
+    let points: Vec<Point> =
+        cage.faces().iter().map(|face| on(face.vertices.map(|v| cage.vertices()[v as usize]))).collect();
+    let phi = system.coordinates(cage, &points).unwrap().phi;
+    for (f, face) in cage.faces().iter().enumerate() {
         for j in 0..cage.vertices().len() {
             let expected = face.vertices.iter().position(|&v| v as usize == j).map_or(0.0, |i| weights[i]);
             assert!(
-                (phi[(0, j)] - expected).abs() < 1e-9,
+                (phi[(f, j)] - expected).abs() < 1e-9,
                 "{name}: {} at vertex {j} of face {:?}, not {expected}",
-                phi[(0, j)],
+                phi[(f, j)],
                 face.vertices
             );
         }
     }
 }
 
-fn is_continuous_at_the_cage(system: &dyn CoordinateSystem, name: &str, cage: &Cage) {
+fn is_continuous_at_the_cage(system: &dyn CoordinateSystem, promises: Promises, name: &str, cage: &Cage) {
     let mut random = Random::new(19);
     let vertices = cage.vertices();
+    // Places on the cage, each with points beside it.
+    let mut places: Vec<Vec<Point>> = Vec::new();
     for face in cage.faces() {
         let [a, b, c] = face.vertices.map(|v| vertices[v as usize]);
         for weights in [[0.2, 0.3, 0.5], [0.6, 0.4, 0.0], [0.0, 0.1, 0.9], [1.0, 0.0, 0.0]] {
@@ -226,18 +299,30 @@ fn is_continuous_at_the_cage(system: &dyn CoordinateSystem, name: &str, cage: &C
                     points.push([0, 1, 2].map(|k| on[k] + distance * cage.diagonal() * direction[k]));
                 }
             }
-            let phi = system.coordinates(cage, &points).unwrap().phi;
-            for i in 1..points.len() {
-                for j in 0..phi.ncols() {
-                    let jump = (phi[(i, j)] - phi[(0, j)]).abs();
-                    assert!(jump < 1e-5, "{name}: column {j} jumps by {jump:e} from {on:?} to {:?}", points[i]);
-                }
+            places.push(defined(promises, cage, points));
+        }
+    }
+    let phi = system.coordinates(cage, &places.concat()).unwrap().phi;
+    let mut first = 0;
+    for points in &places {
+        for i in 1..points.len() {
+            for j in 0..phi.ncols() {
+                let jump = (phi[(first + i, j)] - phi[(first, j)]).abs();
+                assert!(jump < 1e-5, "{name}: column {j} jumps by {jump:e} from {:?} to {:?}", points[0], points[i]);
             }
         }
+        first += points.len();
     }
 }
 
-fn is_continuous_across_planes_of_far_faces(system: &dyn CoordinateSystem, name: &str, cage: &Cage, outside_too: bool) {
+fn is_continuous_across_planes_of_far_faces(
+    system: &dyn CoordinateSystem,
+    promises: Promises,
+    name: &str,
+    cage: &Cage,
+) {
+    // Places in the plane of a face, each with points above and below.
+    let mut places: Vec<Vec<Point>> = Vec::new();
     for face in cage.faces().iter().take(60) {
         let [a, b, c] = face.vertices.map(|v| cage.vertices()[v as usize]);
         let e = [0, 1, 2].map(|k| b[k] - a[k]);
@@ -246,26 +331,49 @@ fn is_continuous_across_planes_of_far_faces(system: &dyn CoordinateSystem, name:
         let length = n.iter().map(|x| x * x).sum::<f64>().sqrt();
         for (s, t) in [(1.7, 0.4), (-0.6, 0.9), (0.3, -1.1), (2.3, 2.1), (-1.3, -0.2)] {
             let on: Point = [0, 1, 2].map(|k| a[k] + s * e[k] + t * f[k]);
-            let near: Vec<Point> = std::iter::once(on)
-                .chain(
-                    [1e-16, -1e-14, 1e-12, 1e-10, 1e-9]
-                        .map(|h| [0, 1, 2].map(|k| on[k] + h * cage.diagonal() * n[k] / length)),
-                )
-                .collect();
-            let Coordinates { phi, outside } = system.coordinates(cage, &near).unwrap();
-            if !outside.is_empty() && !outside_too {
-                continue;
-            }
-            for i in 1..near.len() {
-                for j in 0..phi.ncols() {
-                    let jump = (phi[(i, j)] - phi[(0, j)]).abs();
-                    assert!(
-                        jump < 1e-6,
-                        "{name}: vertex {j} jumps by {jump:e} within 1e-9 of the plane of {:?} at {on:?}",
-                        face.vertices
-                    );
-                }
+            let beside = [1e-16, -1e-14, 1e-12, 1e-10, 1e-9]
+                .map(|h| [0, 1, 2].map(|k| on[k] + h * cage.diagonal() * n[k] / length));
+            let points = defined(promises, cage, std::iter::once(on).chain(beside).collect());
+            if !points.is_empty() {
+                places.push(points);
             }
         }
+    }
+    let Coordinates { phi, outside, .. } = system.coordinates(cage, &places.concat()).unwrap();
+    let mut first = 0;
+    for points in &places {
+        let here = first..first + points.len();
+        first = here.end;
+        if !promises.continuous_outside && outside.iter().any(|&i| here.contains(&(i as usize))) {
+            continue;
+        }
+        for i in 1..points.len() {
+            for j in 0..phi.ncols() {
+                let jump = (phi[(here.start + i, j)] - phi[(here.start, j)]).abs();
+                assert!(jump < 1e-6, "{name}: column {j} jumps by {jump:e} from {:?} to {:?}", points[0], points[i]);
+            }
+        }
+    }
+}
+
+#[test]
+fn harmonic_coordinates_do_not_exist_outside() {
+    for (name, cage) in cages().into_iter().chain(thin_cages()) {
+        let inside =
+            [0, 1, 2].map(|k| cage.vertices().iter().map(|v| v[k]).sum::<f64>() / cage.vertices().len() as f64);
+        let out = [0, 1, 2].map(|k| 1.25 * cage.vertices()[0][k] - 0.25 * inside[k]);
+        let far = [9.0 * cage.diagonal(), 0.0, 0.0];
+        let (vertices, triangles) = (cage.vertices(), &cage.mesh().triangles);
+        let expected: Vec<u32> = [inside, out, inside, far]
+            .iter()
+            .enumerate()
+            .filter(|(_, p)| winding_number(vertices, triangles, **p) < 0.5)
+            .map(|(i, _)| i as u32)
+            .collect();
+        let error = Harmonic.coordinates(&cage, &[inside, out, inside, far]).unwrap_err();
+        let CoordinatesError::Outside { system, points, distance } = error else { panic!("{name}: {error}") };
+        assert_eq!((system, points), ("harmonic", expected), "{name}");
+        let farthest = distance_to_surface(vertices, triangles, far) / cage.diagonal();
+        assert!((distance - farthest).abs() < 1e-9 * farthest, "{name}: {distance} for {farthest}");
     }
 }

@@ -28,9 +28,9 @@ pub struct SessionOptions {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(max_length = 200))]
     pub name: Option<String>,
-    /// Coordinate system: `mvc`, `green` (normals follow from the vertices) or `green-free` (normals are unknowns).
+    /// Coordinate system: `mvc`, `harmonic`, `green` (normals follow from the vertices) or `green-free` (normals are unknowns).
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(pattern = "^(mvc|green|green-free)$"))]
+    #[cfg_attr(feature = "schema", schema(pattern = "^(mvc|harmonic|green|green-free)$"))]
     pub coordinates: Option<String>,
     /// Points the inversion reads: `maxvol`, `rectangular`, `spread` or `all`.
     #[serde(skip_serializing_if = "Option::is_none")]

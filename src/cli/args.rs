@@ -238,6 +238,9 @@ pub(crate) struct CompletionsArgs {
 pub(crate) enum CoordinatesArg {
     /// Mean value coordinates: defined everywhere, fast.
     Mvc,
+    /// Harmonic coordinates: never negative, and felt through the inside of the cage only, where all points must be; seconds to
+    /// prepare.
+    Harmonic,
     /// Green coordinates: the model keeps its angles better; normals of the cage follow from its vertices, found by iterating.
     Green,
     /// Green coordinates whose normals are unknowns of their own: the lowest errors, by cages with spikes.
@@ -248,6 +251,7 @@ impl CoordinatesArg {
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Mvc => "mvc",
+            Self::Harmonic => "harmonic",
             Self::Green => "green",
             Self::GreenFree => "green-free",
         }

@@ -248,12 +248,18 @@ fn summary(report: &Report, output: &Path) -> String {
             100.0 * choice.bound
         )
     });
+    let refined = report.refinement.as_ref().map_or_else(String::new, |refined| {
+        format!(
+            "  solved  on {} boundary elements, {} times refined; no coordinate changed by more than {:.1e} at last\n",
+            refined.elements, refined.refinements, refined.change
+        )
+    });
     format!(
         "{}: {} frames of {} points as cages of {} vertices\n\
          \x20 size    {} from {}: {:.1} times smaller, {:.2} bits per point and frame\n\
          \x20 error   L2 {:.4} % mean, {:.4} % max; L∞ {:.3} % mean, {:.3} % max (of the rest diagonal); KG {:.3} %\n\
          \x20 system  condition {:.1} (all points {:.1}), rank {} of {}, affine reproduction {:.1e}\n\
-         {chosen}\x20 time    {:.3} s\n",
+         {refined}{chosen}\x20 time    {:.3} s\n",
         output.display(),
         grouped(report.frames as u64),
         grouped(report.points as u64),

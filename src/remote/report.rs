@@ -39,6 +39,7 @@ pub(super) fn report(container: impl Read + Seek) -> Result<Unfinished, Error> {
         spectrum_choice: None,
         lambda: header.lambda,
         consistency: None,
+        refinement: None,
         affine_reproduction_error: summary.affine_reproduction_error,
         condition_number: Condition { full: summary.condition_number.full, handles: summary.condition_number.handles },
         rank: summary.rank as usize,

@@ -3,22 +3,24 @@
 
 use super::ContentKey;
 use super::disk::DiskFile;
-use cager_core::coordinates::TiedNormals;
+use cager_core::coordinates::{Refinement, TiedNormals};
 use cager_core::inversion::{Preparation, Pull, Solver, SolverParts, TiedParts};
 use faer::{Mat, MatRef};
 use std::io;
 
-const MAGIC: [u8; 8] = *b"CGRSOLV\x03";
-const COUNTS: usize = 12;
-const NUMBERS: usize = 11;
+const MAGIC: [u8; 8] = *b"CGRSOLV\x04";
+const COUNTS: usize = 15;
+const NUMBERS: usize = 12;
 /// Magic, key, counts, numbers, checksum.
 const HEADER_BYTES: usize = 8 + 32 + 8 * COUNTS + 8 * NUMBERS + 4;
 const PIECE_BYTES: usize = 1 << 18;
 
-/// What is added to `R · H`, the last of the counts.
+/// What is added to `R · H`, one of the counts.
 const NO_PULL: u64 = 0;
 const CONSTANT: u64 = 1;
 const PREVIOUS: u64 = 2;
+/// Its place.
+const PULL_PLACE: usize = 11;
 
 /// What a file turned out to be.
 pub(super) enum Found {
@@ -28,7 +30,7 @@ pub(super) enum Found {
 
 /// Length of the file that has these counts, where one can have it.
 fn file_bytes(counts: &[u64; COUNTS]) -> Option<u64> {
-    let [points, unknowns, handles, reads_all, values, outside, _, _, _, columns, faces, pull] = *counts;
+    let [points, unknowns, handles, reads_all, values, outside, _, _, _, columns, faces, pull, ..] = *counts;
     // A matrix's columns are padded in memory: only tall ones take about what their file does. A cage of v vertices has fewer than
     // v² faces.
     if unknowns > points || columns > points.checked_mul(points)? || reads_all > 1 || handles > points {
@@ -69,6 +71,7 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
         max_entry,
         outside,
         outside_distance,
+        refinement,
         coordinates_seconds,
         maxvol_seconds,
         svd_seconds,
@@ -95,6 +98,9 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
             Pull::Constant(_) => CONSTANT,
             Pull::Previous { .. } => PREVIOUS,
         } as usize,
+        usize::from(refinement.is_some()),
+        refinement.map_or(0, |refined| refined.elements),
+        refinement.map_or(0, |refined| refined.refinements),
     ];
     header.extend(counts.iter().flat_map(|&count| (count as u64).to_le_bytes()));
     let numbers: [f64; NUMBERS] = [
@@ -109,6 +115,7 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
         *maxvol_seconds,
         *svd_seconds,
         tied.map_or(0.0, |(_, _, weight)| weight),
+        refinement.map_or(0.0, |refined| refined.change),
     ];
     header.extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
     header.extend_from_slice(&crc32c::crc32c(&header).to_le_bytes());
@@ -171,8 +178,23 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Found> {
     if file_bytes(&counts) != Some(bytes) {
         return damage("its length is not what its header says");
     }
-    let [points, unknowns, handle_count, reads_all, values, outside_count, positions, rank, swaps, columns, faces, _] =
-        counts.map(|count| count as usize);
+    let [
+        points,
+        unknowns,
+        handle_count,
+        reads_all,
+        values,
+        outside_count,
+        positions,
+        rank,
+        swaps,
+        columns,
+        faces,
+        _,
+        refined,
+        elements,
+        refinements,
+    ] = counts.map(|count| count as usize);
 
     let mut source = In { file, piece: Vec::new(), at: 0, offset: HEADER_BYTES as u64, end: bytes, crc: 0 };
     source.crc = crc32c::crc32c(&header);
@@ -183,7 +205,7 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Found> {
     let mut singular_values = vec![0.0; values];
     source.fill(&mut singular_values, f64::from_le_bytes)?;
     let operator = source.matrix(if reads_all == 1 { points } else { handle_count }, unknowns)?;
-    let pull = match counts[COUNTS - 1] {
+    let pull = match counts[PULL_PLACE] {
         CONSTANT => Pull::Constant(source.matrix(unknowns, 3)?),
         PREVIOUS => {
             let operator = source.matrix(unknowns, unknowns)?;
@@ -193,6 +215,7 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Found> {
         }
         _ => Pull::None,
     };
+    let [.., weight, change] = numbers;
     let mut tied = None;
     if faces > 0 {
         let (mut corners, mut weights) = (vec![[0; 3]; faces], vec![[0.0; 3]; faces]);
@@ -202,7 +225,7 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Found> {
         let Some(normals) = TiedNormals::from_parts(corners, weights, positions) else {
             return damage("its normals do not fit its cage");
         };
-        tied = Some(TiedParts { normals, gram, weight: numbers[NUMBERS - 1] });
+        tied = Some(TiedParts { normals, gram, weight });
     }
     let mut phi = Mat::<f32>::zeros(points, columns);
     for j in 0..columns {
@@ -226,7 +249,7 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Found> {
         coordinates_seconds,
         maxvol_seconds,
         svd_seconds,
-        _,
+        ..,
     ] = numbers;
     let preparation = Preparation {
         rank,
@@ -239,6 +262,7 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Found> {
         max_entry,
         outside,
         outside_distance,
+        refinement: (refined != 0).then_some(Refinement { elements, refinements, change }),
         coordinates_seconds,
         maxvol_seconds,
         svd_seconds,

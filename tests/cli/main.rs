@@ -7,11 +7,13 @@ mod encode;
 #[cfg(unix)]
 mod full_disk;
 mod green;
+mod harmonic;
 mod inspect;
 #[cfg(target_os = "linux")]
 mod interrupted;
 mod real_data;
 mod real_green;
+mod real_harmonic;
 mod real_methods;
 mod refused;
 mod support;

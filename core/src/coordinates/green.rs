@@ -84,7 +84,7 @@ impl CoordinateSystem for Green {
                 a.extend(b);
                 a
             });
-        Ok(Coordinates { phi, outside })
+        Ok(Coordinates { phi, outside, refinement: None })
     }
 }
 

@@ -33,6 +33,7 @@ pub(crate) struct Layers {
     /// Ends and length.
     edges: Vec<([u32; 2], f64)>,
     faces: Vec<Frame>,
+    triangles: Vec<[u32; 3]>,
 }
 
 /// A face in its own coordinates: its longest edge runs from the first corner, at the origin, to the second, at `(length, 0)`;
@@ -127,7 +128,7 @@ impl Layers {
             mesh::norm([b[0] - a[0], b[1] - a[1], b[2] - a[2]])
         };
         let edges = cage.edges().iter().map(|e| (e.vertices, length(e.vertices))).collect();
-        Self { vertices, scale, edges, faces }
+        Self { vertices, scale, edges, faces, triangles: cage.mesh().triangles.clone() }
     }
 
     /// What lengths are multiplied with to come into the unit of the prepared mesh: a power of two.
@@ -143,6 +144,11 @@ impl Layers {
     /// Faces, in the order of the cage.
     pub(super) fn faces(&self) -> &[Frame] {
         &self.faces
+    }
+
+    /// Corners of the faces as the cage has them.
+    pub(super) fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
     }
 
     /// Mean of the areas of the faces, in the unit of the prepared mesh.

@@ -53,7 +53,7 @@ impl CoordinateSystem for MeanValue {
                 a.extend(b);
                 a
             });
-        Ok(Coordinates { phi, outside })
+        Ok(Coordinates { phi, outside, refinement: None })
     }
 }
 

@@ -5,12 +5,14 @@ mod careful;
 mod doubt;
 mod error;
 mod green;
+mod harmonic;
 pub(crate) mod layer;
 mod mean_value;
 mod normals;
 
 pub use error::CoordinatesError;
 pub use green::Green;
+pub use harmonic::Harmonic;
 pub use mean_value::MeanValue;
 pub use normals::TiedNormals;
 
@@ -25,6 +27,30 @@ pub struct Coordinates {
     pub phi: Mat<f64>,
     /// Points that lie outside the cage, ascending.
     pub outside: Vec<u32>,
+    /// How the solution was refined, for coordinates that are a numerical one.
+    pub refinement: Option<Refinement>,
+}
+
+/// How a numerical solution was refined.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refinement {
+    /// Boundary elements of the last solution.
+    pub elements: usize,
+    /// Solutions after the first.
+    pub refinements: usize,
+    /// Most that a coordinate of a point differs from the solution before the last, or was corrected by to make linear functions
+    /// exact.
+    pub change: f64,
+}
+
+impl Refinement {
+    /// Refining ends when it changes no coordinate of a point by more than this.
+    pub const TOLERANCE: f64 = 1e-3;
+
+    /// Whether refining ended so.
+    pub fn reached(&self) -> bool {
+        self.change <= Self::TOLERANCE
+    }
 }
 
 /// A system of cage coordinates. Every implementation passes the suite in `core/tests/conformance.rs`.
@@ -46,6 +72,14 @@ pub trait CoordinateSystem: Sync {
     /// The rule by which normals follow from the vertices, where they do: then the vertices alone are unknown.
     fn tied_normals(&self, _cage: &Cage) -> Option<TiedNormals> {
         None
+    }
+
+    /// What [`Self::coordinates`] would refuse before it computes much.
+    ///
+    /// # Errors
+    /// Points for which the system is not defined.
+    fn check(&self, _cage: &Cage, _points: &[Point]) -> Result<(), CoordinatesError> {
+        Ok(())
     }
 
     /// `Φ` for these points. Rows sum to one; runs on the current rayon pool; the result does not depend on it.

@@ -117,6 +117,7 @@ impl Analysis {
             max_entry: basis.handles.max_entry,
             outside,
             outside_distance,
+            refinement: coordinates.refinement,
             coordinates_seconds,
             maxvol_seconds,
             svd_seconds: clock.elapsed().as_secs_f64(),

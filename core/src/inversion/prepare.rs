@@ -3,7 +3,7 @@
 use super::operator::tall_product;
 use super::{Analysis, Handles, PrepareError, Solver, SolverOptions};
 use crate::cage::Cage;
-use crate::coordinates::CoordinateSystem;
+use crate::coordinates::{CoordinateSystem, Refinement};
 use crate::mesh::{Point, diagonal, distance_to_surface, norm};
 use crate::regularize::{Term, TermError};
 use faer::{Mat, MatRef};
@@ -39,6 +39,8 @@ pub struct Preparation {
     pub outside: Vec<u32>,
     /// Largest distance of those to the cage, over the rest diagonal.
     pub outside_distance: f64,
+    /// How the coordinates were refined, where they are a numerical solution.
+    pub refinement: Option<Refinement>,
     /// Seconds for the coordinates.
     pub coordinates_seconds: f64,
     /// Seconds for maxvol.
@@ -59,7 +61,8 @@ impl Solver {
         options: SolverOptions,
     ) -> Result<(), PrepareError> {
         check(points, system.unknowns(cage), options)?;
-        refuse_far_points(cage, points)
+        refuse_far_points(cage, points)?;
+        Ok(system.check(cage, points)?)
     }
 
     /// Computes coordinates, handles, spectrum and operator. Runs on the current rayon pool; its result does not depend on it.

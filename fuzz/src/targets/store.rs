@@ -130,12 +130,12 @@ pub(super) const SOLVER: Target = Target {
         });
         seeds.collect()
     },
-    words: &["CGRSOLV\u{3}"],
+    words: &["CGRSOLV\u{4}"],
     fixed: 4 << 20,
     per_byte: 64,
 };
 
-const SOLVER_HEADER: usize = 228;
+const SOLVER_HEADER: usize = 260;
 
 fn solver(mut bytes: &[u8]) {
     let mode = byte(&mut bytes);

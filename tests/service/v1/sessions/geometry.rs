@@ -92,6 +92,24 @@ async fn options_that_do_not_go_with_the_cage_are_refused_at_once() {
 }
 
 #[tokio::test]
+async fn points_outside_a_cage_for_harmonic_coordinates_are_refused_at_once() {
+    let app = TestApp::start();
+    let capture = Capture::small();
+    let mut model = capture.rest.model.clone();
+    let far = capture.cage.model.points.iter().fold(0.0, |far: f64, v| far.max(v[0]));
+    for k in [4, 40] {
+        model.points[k][0] = far + 1.0;
+    }
+    let rest = Mesh::new(model);
+    let problem = app.refusal(form_of(&rest, &capture.cage, &json!({"coordinates": "harmonic"}))).await;
+    says(&problem, &["2 points lie outside the cage (4, 40)", "enlarge the cage or use mean value coordinates"]);
+    assert!(app.get("/v1/sessions").await.json::<cager_proto::messages::SessionList>().sessions.is_empty());
+    let form = form_of(&rest, &capture.cage, &json!({"coordinates": "mvc"}));
+    let session: Session = app.create_with(form, None).await.is(201);
+    app.prepared(&session.id).await;
+}
+
+#[tokio::test]
 async fn a_session_whose_frames_are_damaged_says_so_wherever_it_is_used() {
     let app = TestApp::start();
     let capture = Capture::small();

@@ -35,9 +35,9 @@ async fn the_rest_cage_is_the_same_in_numbers_and_in_json() {
 }
 
 #[tokio::test]
-async fn green_captures_are_those_of_the_command_line_before_and_after_a_restart() {
+async fn captures_of_all_systems_are_those_of_the_command_line_before_and_after_a_restart() {
     let capture = Capture::small();
-    for system in ["green", "green-free"] {
+    for system in ["harmonic", "green", "green-free"] {
         let mut app = TestApp::start();
         let session = ready(&app, system).await;
         assert_eq!(session.coordinates, system);

@@ -1,0 +1,170 @@
+//! Boundary elements: triangles on the cage's faces, each with a polynomial density of its own degree.
+
+use super::basis::functions;
+use super::triangle::Triangle;
+use crate::mesh::{Point, distance2_to_triangle};
+use rayon::prelude::*;
+
+/// One element.
+#[derive(Clone, Debug)]
+pub(super) struct Element {
+    pub(super) triangle: Triangle,
+    /// Face of the cage it is part of.
+    pub(super) face: u32,
+    /// Degree of its density; one less in the coarse space.
+    pub(super) degree: usize,
+}
+
+impl Element {
+    /// Both halves, cut across the longest side; none where there is no single longest one.
+    fn halves(&self) -> Option<[Self; 2]> {
+        let corners = self.triangle.corners;
+        let length2 = |i: usize| -> f64 {
+            let (a, b) = (corners[(i + 1) % 3], corners[(i + 2) % 3]);
+            (0..3).map(|k| (a[k] - b[k]).powi(2)).sum()
+        };
+        let top = (0..3).find(|&i| (1..3).all(|j| length2(i) > TIE * length2((i + j) % 3)))?;
+        let [a, b, c] = [top, (top + 1) % 3, (top + 2) % 3].map(|i| corners[i]);
+        let middle = [0, 1, 2].map(|k| 0.5 * (b[k] + c[k]));
+        Some([[a, b, middle], [a, middle, c]].map(|corners| Self { triangle: Triangle::new(corners), ..*self }))
+    }
+
+    /// All four parts, cut between the middles of the sides.
+    fn quarters(&self) -> [Self; 4] {
+        let [a, b, c] = self.triangle.corners;
+        let middle = |p: Point, q: Point| [0, 1, 2].map(|k| 0.5 * (p[k] + q[k]));
+        let (d, e, f) = (middle(a, b), middle(b, c), middle(c, a));
+        [[a, d, f], [d, b, e], [f, e, c], [d, e, f]].map(|corners| Self { triangle: Triangle::new(corners), ..*self })
+    }
+
+    /// Highest degree that a triangle of this shape is given: polynomials of high degree nearly depend on each other in thin ones.
+    fn most(&self) -> usize {
+        let aspect = self.triangle.diameter() / self.triangle.height();
+        MOST.iter().find(|(limit, _)| aspect < *limit).map_or(LEAST, |m| m.1)
+    }
+
+    /// Distance over the diameter to the nearest of these points, but for those as good as on it.
+    fn nearness(&self, points: &[Point]) -> f64 {
+        let Triangle { centre, radius, corners, .. } = &self.triangle;
+        let mut nearest = f64::INFINITY;
+        let mut near2 = f64::INFINITY;
+        let least2 = (ON * self.triangle.diameter()).powi(2);
+        for &x in points {
+            let d2: f64 = (0..3).map(|k| (x[k] - centre[k]).powi(2)).sum();
+            if d2 < near2 {
+                let found = distance2_to_triangle(*corners, x);
+                if found < nearest && found >= least2 {
+                    nearest = found;
+                    near2 = (nearest.sqrt() + radius).powi(2);
+                }
+            }
+        }
+        nearest.sqrt() / self.triangle.diameter()
+    }
+}
+
+/// Nearest point, in diameters, from which on each degree is enough.
+const ENOUGH: [(f64, usize); 4] = [(0.4, 3), (0.18, 4), (0.1, 5), (0.06, 6)];
+/// Points nearer than this are left to what is known on the surface.
+const ON: f64 = 0.01;
+/// Ratio of length to height below which a triangle may have each degree,
+const MOST: [(f64, usize); 3] = [(4.0, 6), (8.0, 5), (14.0, 4)];
+/// and what any may have.
+const LEAST: usize = 3;
+/// Sides are of different length when their squares differ by more than this factor: cages with symmetries are divided alike,
+/// however their vertices are ordered.
+const TIE: f64 = 1.0 + 1e-9;
+/// No elements are divided for the sake of their shape once there are so many.
+const MANY: usize = 1200;
+
+/// The faces of a cage, divided where points are near.
+pub(super) fn elements(faces: &[[Point; 3]], points: &[Point]) -> Vec<Element> {
+    let mut waiting: Vec<Element> = faces
+        .iter()
+        .enumerate()
+        .map(|(face, &corners)| Element { triangle: Triangle::new(corners), face: face as u32, degree: 0 })
+        .collect();
+    let mut done: Vec<Element> = Vec::new();
+    while !waiting.is_empty() {
+        let divide = done.len() + 2 * waiting.len() <= MANY;
+        let judged: Vec<Vec<Element>> = waiting
+            .into_par_iter()
+            .map(|element| {
+                let nearness = element.nearness(points);
+                let wanted = ENOUGH.iter().find(|(least, _)| nearness >= *least).map_or(usize::MAX, |e| e.1);
+                let most = element.most();
+                match element.halves() {
+                    Some(halves) if wanted > most && divide => halves.to_vec(),
+                    _ => vec![Element { degree: wanted.min(most), ..element }],
+                }
+            })
+            .collect();
+        waiting = Vec::new();
+        for mut part in judged {
+            if part.len() == 1 { done.append(&mut part) } else { waiting.append(&mut part) }
+        }
+    }
+    done
+}
+
+/// Marks the thinnest elements too, where they are what makes the equations inexact.
+pub(super) fn mark_thin(elements: &[Element], marked: &mut [bool]) {
+    let aspect = |element: &Element| element.triangle.diameter() / element.triangle.height();
+    let limit = (0.4 * elements.iter().map(aspect).fold(0.0, f64::max)).max(MOST[0].0);
+    for (element, marked) in elements.iter().zip(marked) {
+        *marked |= aspect(element) >= limit;
+    }
+}
+
+/// The marked elements one degree higher, or divided.
+pub(super) fn refined(elements: &[Element], marked: &[bool]) -> Vec<Element> {
+    let mut out = Vec::new();
+    for (element, &marked) in elements.iter().zip(marked) {
+        if !marked {
+            out.push(element.clone());
+        } else if element.degree < element.most() {
+            out.push(Element { degree: element.degree + 1, ..element.clone() });
+        } else if let Some(halves) = element.halves() {
+            out.extend(halves);
+        } else {
+            out.extend(element.quarters());
+        }
+    }
+    out
+}
+
+/// Where the unknowns are: those of low degree of all elements are solved for together, those above around each vertex.
+pub(super) struct Unknowns {
+    pub(super) elements: Vec<Element>,
+    /// Degree of the low polynomials, and how many every element has.
+    pub(super) low_degree: usize,
+    pub(super) low: usize,
+    /// First high unknown of each element, and the number of all of them.
+    starts: Vec<usize>,
+}
+
+impl Unknowns {
+    pub(super) fn new(elements: Vec<Element>, low_degree: usize) -> Self {
+        let low = functions(low_degree);
+        let mut starts = vec![0];
+        for element in &elements {
+            starts.push(starts[starts.len() - 1] + functions(element.degree) - low);
+        }
+        Self { elements, low_degree, low, starts }
+    }
+
+    /// Number of low unknowns.
+    pub(super) fn low_count(&self) -> usize {
+        self.low * self.elements.len()
+    }
+
+    /// Number of high unknowns.
+    pub(super) fn high_count(&self) -> usize {
+        self.starts[self.elements.len()]
+    }
+
+    /// The high unknowns of an element.
+    pub(super) fn high(&self, element: usize) -> std::ops::Range<usize> {
+        self.starts[element]..self.starts[element + 1]
+    }
+}

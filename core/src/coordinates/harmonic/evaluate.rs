@@ -1,0 +1,326 @@
+//! Rows of `Φ` from the densities.
+//!
+//! Very near the surface the densities' finite degree shows. There the values on the surface help, which are the hat functions: what the
+//! densities give wrong at the nearest place is taken off, as far as that error reaches into the cage. So values are exact on
+//! the surface and continuous near it.
+
+use super::affine::AffineFit;
+use super::basis::{MAX_FUNCTIONS, functions};
+use super::elements::Unknowns;
+use super::potential::{Tables, potentials};
+use super::solve::{Densities, Part};
+use super::surface::{Foot, Side, Surface};
+use crate::coordinates::layer::{self, INVERSE_4PI, Layers, group_potentials, write_group};
+use crate::mesh::{self, Point, distance2_to_triangle};
+use crate::simd::{LANES, Lanes, multiversion};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatMut, Par};
+use rayon::prelude::*;
+
+const TASK_POINTS: usize = 16 * LANES;
+/// High unknowns are felt up to so many radii of their element.
+const FELT: f64 = 6.0;
+/// Elements with at least this part of the largest share of a change are marked.
+const MAIN: f64 = 0.3;
+
+/// What everything is computed from.
+pub(super) struct Solution<'a> {
+    pub(super) tables: &'a Tables,
+    pub(super) layers: &'a Layers,
+    pub(super) surface: &'a Surface<'a>,
+    pub(super) affine: &'a AffineFit,
+    pub(super) unknowns: &'a Unknowns,
+    pub(super) densities: &'a Densities,
+}
+
+/// Coordinates, and how far they are from final.
+pub(super) struct Evaluated {
+    pub(super) phi: Mat<f64>,
+    /// Largest change of an entry by the highest degrees.
+    pub(super) change: f64,
+    /// Elements that changes above the tolerance mostly come from.
+    pub(super) marked: Vec<bool>,
+    /// Largest correction of an entry that makes the rows reproduce linear functions.
+    pub(super) correction: f64,
+}
+
+/// What one task finds beside its rows.
+#[derive(Default)]
+struct Found {
+    change: f64,
+    marked: Vec<u32>,
+    correction: f64,
+}
+
+/// Working memory of one task.
+struct Scratch {
+    layers: layer::Scratch,
+    /// Single layers of the low polynomials, points × unknowns.
+    singles: Mat<f64>,
+    /// Hat functions' double layers and high densities, and changes, of one lane group by vertex.
+    values: Vec<Lanes>,
+    change: Vec<Lanes>,
+}
+
+/// `Φ` at these points, in the unit of the layers.
+pub(super) fn evaluate(solution: &Solution<'_>, points: &[Point], feet: &[Foot], tolerance: f64) -> Evaluated {
+    let m = solution.layers.vertices().len();
+    let near = Near::new(solution, points, feet);
+    let mut phi = crate::simd::zeros::<f64>(points.len(), m);
+    let found: Vec<Found> = phi
+        .as_mut()
+        .par_row_chunks_mut(TASK_POINTS)
+        .enumerate()
+        .map_init(
+            || Scratch {
+                layers: solution.layers.scratch(),
+                singles: Mat::zeros(TASK_POINTS, solution.unknowns.low_count()),
+                values: vec![Lanes::ZERO; m],
+                change: vec![Lanes::ZERO; m],
+            },
+            |scratch, (task, rows)| evaluate_task(solution, &near, task * TASK_POINTS, tolerance, rows, scratch),
+        )
+        .collect();
+    let mut all =
+        Evaluated { phi, change: 0.0, marked: vec![false; solution.unknowns.elements.len()], correction: 0.0 };
+    for found in found {
+        all.change = all.change.max(found.change);
+        // NaN stays.
+        all.correction = if found.correction <= all.correction { all.correction } else { found.correction };
+        for e in found.marked {
+            all.marked[e as usize] = true;
+        }
+    }
+    all
+}
+
+/// Points, and how much of the error at its foot each is freed from.
+struct Near<'a> {
+    points: &'a [Point],
+    feet: &'a [Foot],
+    /// From 0 inside to 1 on the surface.
+    shares: Vec<f64>,
+    /// How far inside of the surface its values are taken.
+    inwards: f64,
+}
+
+impl<'a> Near<'a> {
+    fn new(solution: &Solution<'_>, points: &'a [Point], feet: &'a [Foot]) -> Self {
+        // The error of a density of degree p changes its sign about p times along an element.
+        let reaches: Vec<f64> = solution
+            .unknowns
+            .elements
+            .iter()
+            .map(|element| 0.5 * element.triangle.diameter() / (element.degree + 1) as f64)
+            .collect();
+        let farthest = reaches.iter().copied().fold(0.0, f64::max);
+        let touching = solution.surface.thickness();
+        let share = |foot: &Foot| {
+            if foot.side == Side::On {
+                return 1.0;
+            } else if foot.distance >= farthest {
+                return 0.0;
+            }
+            // All elements that meet at the foot, so that the order of faces does not count.
+            let meet = solution.unknowns.elements.iter().zip(&reaches).filter(|(element, _)| {
+                let triangle = &element.triangle;
+                let apart = mesh::norm([0, 1, 2].map(|k| triangle.centre[k] - foot.place[k]));
+                apart <= triangle.radius + touching
+                    && distance2_to_triangle(triangle.corners, foot.place) <= touching * touching
+            });
+            let reach = meet.map(|(_, &reach)| reach).fold(f64::INFINITY, f64::min);
+            (1.0 - foot.distance / reach).max(0.0).powi(3)
+        };
+        let shares = feet.par_iter().map(share).collect();
+        Self { points, feet, shares, inwards: solution.surface.thickness() }
+    }
+
+    /// Eight points, those places on the surface from which their shares come, just inside, and the shares; the last point again where
+    /// there are no more. Points on the surface need nothing of themselves, which the last lanes say.
+    fn group(&self, first: usize) -> Group {
+        let mut group = Group { x: [Lanes::ZERO; 3], y: [Lanes::ZERO; 3], share: Lanes::ZERO, own: Lanes::ZERO };
+        for l in 0..LANES {
+            let i = (first + l).min(self.points.len() - 1);
+            let (x, foot) = (self.points[i], &self.feet[i]);
+            let on_surface = foot.side == Side::On;
+            group.own.0[l] = if on_surface { 0.0 } else { 1.0 };
+            group.share.0[l] = if on_surface { 0.0 } else { self.shares[i] };
+            for k in 0..3 {
+                group.x[k].0[l] = x[k];
+                let inwards = self.inwards / foot.distance.max(self.inwards);
+                group.y[k].0[l] =
+                    if self.shares[i] > 0.0 { foot.place[k] + inwards * (x[k] - foot.place[k]) } else { x[k] };
+            }
+        }
+        group
+    }
+}
+
+struct Group {
+    x: [Lanes; 3],
+    y: [Lanes; 3],
+    share: Lanes,
+    own: Lanes,
+}
+
+fn evaluate_task(
+    solution: &Solution<'_>,
+    near: &Near<'_>,
+    first: usize,
+    tolerance: f64,
+    mut rows: MatMut<'_, f64>,
+    scratch: &mut Scratch,
+) -> Found {
+    let Solution { layers, densities, .. } = solution;
+    let count = rows.nrows();
+    let mut found = Found::default();
+    for start in (0..count).step_by(LANES) {
+        let group = near.group(first + start);
+        evaluate_group(solution, &group, start, scratch);
+        let filled = LANES.min(count - start);
+        for (l, i) in (first + start..first + start + filled).enumerate() {
+            let foot = &near.feet[i];
+            for (&v, weight) in layers.triangles()[foot.face as usize].iter().zip(foot.weights) {
+                scratch.values[v as usize].0[l] += near.shares[i] * weight;
+            }
+        }
+        write_group(rows.as_mut(), start, &scratch.values, 1.0);
+        let largest =
+            scratch.change.iter().fold(Lanes::ZERO, |a, c| a.zip(*c, |a, c| if c.abs() > a { c.abs() } else { a }));
+        for l in 0..filled {
+            found.change = found.change.max(largest.0[l]);
+            if largest.0[l] > tolerance {
+                // More than one where the cage is symmetric.
+                let worst = |v: &usize| scratch.change[*v].0[l].abs() > (1.0 - 1e-6) * largest.0[l];
+                for vertex in (0..scratch.change.len()).filter(worst) {
+                    mark(solution, &group, l, vertex as u32, &mut found.marked);
+                }
+            }
+        }
+    }
+    let singles = scratch.singles.as_ref().subrows(0, count);
+    matmul(rows.as_mut(), Accum::Add, singles, densities.low.as_ref(), 1.0, Par::Seq);
+    found.correction = solution.affine.complete(rows, near.points[first..first + count].iter().copied());
+    found
+}
+
+/// Values and changes of one lane group, and its rows of the single layers.
+fn evaluate_group(solution: &Solution<'_>, group: &Group, start: usize, scratch: &mut Scratch) {
+    let Solution { tables, layers, unknowns, densities, .. } = solution;
+    let Group { x, y, share, own } = group;
+    let twice = share.0.iter().any(|s| *s > 0.0);
+    group_potentials(layers, x, &mut scratch.layers);
+    for (value, double) in scratch.values.iter_mut().zip(&scratch.layers.double) {
+        *value = weigh(*double, *own) * INVERSE_4PI;
+    }
+    if twice {
+        group_potentials(layers, y, &mut scratch.layers);
+        for (value, double) in scratch.values.iter_mut().zip(&scratch.layers.double) {
+            *value = *value - weigh(*double, *share) * INVERSE_4PI;
+        }
+    }
+    scratch.change.fill(Lanes::ZERO);
+    let low_degree = unknowns.low_degree;
+    let mut values = [Lanes::ZERO; MAX_FUNCTIONS];
+    for (e, element) in unknowns.elements.iter().enumerate() {
+        let part = &densities.parts[e];
+        let keep = is_felt(&element.triangle.centre, FELT * element.triangle.radius, x);
+        let near = !part.vertices.is_empty() && keep.0.iter().any(|k| *k > 0.0);
+        let degree = if near { element.degree } else { low_degree };
+        potentials(tables, &element.triangle, degree, x, &mut values);
+        for value in &mut values[..functions(degree)] {
+            *value = weigh(*value, *own);
+        }
+        if twice {
+            let mut others = [Lanes::ZERO; MAX_FUNCTIONS];
+            potentials(tables, &element.triangle, degree, y, &mut others);
+            for (value, other) in values[..functions(degree)].iter_mut().zip(&others) {
+                *value = *value - weigh(*other, *share);
+            }
+        }
+        for k in 0..unknowns.low {
+            // Rows beyond the last point are there, and not used.
+            scratch.singles.col_as_slice_mut(e * unknowns.low + k)[start..start + LANES].copy_from_slice(&values[k].0);
+        }
+        if near {
+            for value in &mut values[unknowns.low..functions(degree)] {
+                *value = *value * keep;
+            }
+        }
+        add_part(
+            part,
+            functions(element.degree),
+            unknowns.low,
+            near,
+            &values,
+            &mut scratch.values,
+            &mut scratch.change,
+        );
+    }
+}
+
+/// A part of a value, which need not be finite where the part is nothing, as on edges.
+#[inline(always)]
+fn weigh(value: Lanes, by: Lanes) -> Lanes {
+    value.zip(by, |value, by| if by == 0.0 { 0.0 } else { value * by })
+}
+
+/// One where a point is nearer than the limit.
+#[inline(always)]
+fn is_felt(centre: &Point, limit: f64, x: &[Lanes; 3]) -> Lanes {
+    let r = [x[0] - Lanes::splat(centre[0]), x[1] - Lanes::splat(centre[1]), x[2] - Lanes::splat(centre[2])];
+    crate::simd::dot(&r, &r).map(|d| if d < limit * limit { 1.0 } else { 0.0 })
+}
+
+multiversion! {
+    /// Adds the changes of one element, and its high densities if they are felt.
+    fn add_part(part: &Part, all: usize, low: usize, near: bool, potentials: &[Lanes; MAX_FUNCTIONS], values: &mut [Lanes], change: &mut [Lanes])
+        = add_part_generic;
+}
+
+#[inline(always)]
+fn add_part_generic(
+    part: &Part,
+    all: usize,
+    low: usize,
+    near: bool,
+    potentials: &[Lanes; MAX_FUNCTIONS],
+    values: &mut [Lanes],
+    change: &mut [Lanes],
+) {
+    let felt = if near { all } else { low };
+    for (c, &v) in part.vertices.iter().enumerate() {
+        let mut sum = Lanes::ZERO;
+        for (potential, &density) in potentials[..felt].iter().zip(&part.change[c * all..]) {
+            sum = sum + *potential * density;
+        }
+        change[v as usize] = change[v as usize] + sum;
+        if near {
+            let mut sum = Lanes::ZERO;
+            for (potential, &density) in potentials[low..all].iter().zip(&part.high[c * (all - low)..]) {
+                sum = sum + *potential * density;
+            }
+            values[v as usize] = values[v as usize] + sum;
+        }
+    }
+}
+
+/// Marks the elements that a change of one entry mostly comes from.
+fn mark(solution: &Solution<'_>, group: &Group, l: usize, vertex: u32, marked: &mut Vec<u32>) {
+    let Solution { tables, unknowns, densities, .. } = solution;
+    let [x, y] = [&group.x, &group.y].map(|p| p.map(|c| Lanes::splat(c.0[l])));
+    let (mut values, mut others) = ([Lanes::ZERO; MAX_FUNCTIONS], [Lanes::ZERO; MAX_FUNCTIONS]);
+    let mut shares = Vec::new();
+    for (e, (element, part)) in unknowns.elements.iter().zip(&densities.parts).enumerate() {
+        let Ok(place) = part.vertices.binary_search(&vertex) else { continue };
+        let all = functions(element.degree);
+        potentials(tables, &element.triangle, element.degree, &x, &mut values);
+        potentials(tables, &element.triangle, element.degree, &y, &mut others);
+        let [own, twin] = [&group.own, &group.share].map(|by| Lanes::splat(by.0[l]));
+        let value = |k: usize| weigh(values[k], own).0[0] - weigh(others[k], twin).0[0];
+        let share: f64 = (0..all).map(|k| value(k) * part.change[place * all + k]).sum();
+        shares.push((share.abs(), e as u32));
+    }
+    let largest = shares.iter().map(|s| s.0).fold(0.0, f64::max);
+    marked.extend(shares.iter().filter(|s| s.0 >= MAIN * largest * (1.0 - 1e-6)).map(|s| s.1));
+}

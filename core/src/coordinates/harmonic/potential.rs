@@ -1,0 +1,206 @@
+//! Potentials of polynomial densities on a triangle, `∫ q(y) / 4π|x − y| dy`, for eight points at a time.
+//!
+//! Near the triangle in closed form, farther away by quadrature, very far with a few points for the lowest degrees.
+
+use super::basis::{Basis, MAX_FUNCTIONS, functions};
+use super::closed_form::closed_form;
+use super::quadrature::Rule;
+use super::triangle::Triangle;
+use crate::simd::{LANES, Lanes, dot, multiversion};
+
+/// Farther from the centre than so many radii, a triangle's potentials are taken by quadrature,
+const FAR: f64 = 3.0;
+/// and here with fewer points and degrees.
+const FARTHER: f64 = 6.0;
+/// Degree of the densities that are felt there.
+const FARTHER_DEGREE: usize = 2;
+
+/// What the potentials of all triangles need.
+pub(super) struct Tables {
+    pub(super) basis: Basis,
+    /// Rules with the polynomials at their nodes, times the weights.
+    pub(super) fine: (Rule, Vec<[f64; MAX_FUNCTIONS]>),
+    pub(super) coarse: (Rule, Vec<[f64; MAX_FUNCTIONS]>),
+}
+
+impl Tables {
+    pub(super) fn new() -> Self {
+        let basis = Basis::new();
+        let with = |rule: Rule| {
+            let values = basis.weighted(&rule);
+            (rule, values)
+        };
+        Self { fine: with(Rule::degree_8()), coarse: with(Rule::degree_5()), basis }
+    }
+}
+
+multiversion! {
+    /// Potentials at one lane group of the polynomials up to a degree on a triangle; as many entries of `out` are written.
+    pub(super) fn potentials(tables: &Tables, triangle: &Triangle, degree: usize, x: &[Lanes; 3], out: &mut [Lanes; MAX_FUNCTIONS])
+        = potentials_generic;
+}
+
+pub(super) const INVERSE_4PI: f64 = 1.0 / (4.0 * std::f64::consts::PI);
+
+#[inline(always)]
+fn potentials_generic(
+    tables: &Tables,
+    triangle: &Triangle,
+    degree: usize,
+    x: &[Lanes; 3],
+    out: &mut [Lanes; MAX_FUNCTIONS],
+) {
+    let c = &triangle.centre;
+    let r = [x[0] - Lanes::splat(c[0]), x[1] - Lanes::splat(c[1]), x[2] - Lanes::splat(c[2])];
+    let distance2 = dot(&r, &r);
+    let at = |radii: f64| (radii * triangle.radius) * (radii * triangle.radius);
+    let (far, farther) = (at(FAR), at(FARTHER));
+    let count = functions(degree);
+    let (mut near_any, mut far_any, mut farther_any) = (false, false, false);
+    for l in 0..LANES {
+        let d = distance2.0[l];
+        near_any |= d <= far;
+        far_any |= (d > far) & (d <= farther);
+        farther_any |= d > farther;
+    }
+    if near_any & !far_any & !farther_any {
+        closed_form(tables, triangle, degree, x, out);
+        return;
+    }
+    for value in &mut out[..count] {
+        *value = Lanes::ZERO;
+    }
+    let mut part = [Lanes::ZERO; MAX_FUNCTIONS];
+    if farther_any {
+        let low = degree.min(FARTHER_DEGREE);
+        quadrature(triangle, &tables.coarse, low, x, &mut part);
+        let keep = distance2.map(|d| if d > farther { 1.0 } else { 0.0 });
+        for k in 0..functions(low) {
+            out[k] = part[k] * keep;
+        }
+    }
+    if far_any {
+        quadrature(triangle, &tables.fine, degree, x, &mut part);
+        let keep = distance2.map(|d| if (d > far) & (d <= farther) { 1.0 } else { 0.0 });
+        for k in 0..count {
+            out[k] = out[k] + part[k] * keep;
+        }
+    }
+    if near_any {
+        closed_form(tables, triangle, degree, x, &mut part);
+        for k in 0..count {
+            for l in 0..LANES {
+                if distance2.0[l] <= far {
+                    out[k].0[l] = part[k].0[l];
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn quadrature(
+    triangle: &Triangle,
+    (rule, values): &(Rule, Vec<[f64; MAX_FUNCTIONS]>),
+    degree: usize,
+    x: &[Lanes; 3],
+    out: &mut [Lanes; MAX_FUNCTIONS],
+) {
+    let count = functions(degree);
+    for value in &mut out[..count] {
+        *value = Lanes::ZERO;
+    }
+    let scale = INVERSE_4PI * triangle.area;
+    for (node, weighted) in rule.nodes.iter().zip(values) {
+        let y = triangle.point(node[0], node[1]);
+        let r = [x[0] - Lanes::splat(y[0]), x[1] - Lanes::splat(y[1]), x[2] - Lanes::splat(y[2])];
+        let inverse = dot(&r, &r).sqrt().map(|d| scale / d);
+        for k in 0..count {
+            out[k] = out[k] + inverse * weighted[k];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::basis::MAX_DEGREE;
+    use super::super::triangle::minus;
+    use super::*;
+    use crate::mesh::{self, Point};
+
+    /// The same by brute force: the triangle divided until its parts are small against their distance.
+    fn divided(
+        tables: &Tables,
+        whole: &Triangle,
+        at: [[f64; 2]; 3],
+        degree: usize,
+        x: Point,
+        out: &mut [f64],
+        depth: usize,
+    ) {
+        let part = Triangle::new(at.map(|p| whole.point(p[0], p[1])));
+        if depth < 40 && mesh::norm(minus(part.centre, x)) < 8.0 * part.radius {
+            let middle = |p: [f64; 2], q: [f64; 2]| [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])];
+            let [a, b, c] = at;
+            let (d, e, f) = (middle(a, b), middle(b, c), middle(c, a));
+            for at in [[a, d, f], [d, b, e], [f, e, c], [d, e, f]] {
+                divided(tables, whole, at, degree, x, out, depth + 1);
+            }
+            return;
+        }
+        let mut values = [0.0; MAX_FUNCTIONS];
+        for node in &Rule::degree_8().nodes {
+            let [a, b, c] = at;
+            let p = [0, 1].map(|k| a[k] + node[0] * (b[k] - a[k]) + node[1] * (c[k] - a[k]));
+            tables.basis.values(p, &mut values[..functions(degree)]);
+            let weight = INVERSE_4PI * part.area * node[2] / mesh::norm(minus(whole.point(p[0], p[1]), x));
+            for k in 0..functions(degree) {
+                out[k] += weight * values[k];
+            }
+        }
+    }
+
+    #[test]
+    fn closed_form_and_quadrature_are_what_division_gives() {
+        let tables = Tables::new();
+        for corners in [
+            [[0.0, 0.0, 0.0], [1.0, 0.1, 0.0], [0.2, 0.9, 0.3]],
+            [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.98, 0.03, 0.0]],
+            [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 0.02, 0.01]],
+        ] {
+            let triangle = Triangle::new(corners);
+            for (alpha, beta, height) in [
+                (0.3, 0.3, 0.2),
+                (0.3, 0.3, 1e-3),
+                (0.5, 0.0, 1e-3),
+                (0.5, 0.5, 1e-2),
+                (0.0, 0.0, 1e-2),
+                (1.5, 0.2, 0.0),
+                (-0.7, 0.9, 0.4),
+                (2.0, 2.0, 1.0),
+                (3.5, 0.5, 0.5),
+                (0.2, 0.2, 5.0),
+                (0.2, 0.2, 12.0),
+            ] {
+                let on = triangle.point(alpha, beta);
+                let x = [0, 1, 2].map(|k| on[k] + height * triangle.normal[k]);
+                let mut exact = [0.0; MAX_FUNCTIONS];
+                let unit = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+                divided(&tables, &triangle, unit, MAX_DEGREE, x, &mut exact, 0);
+                let radii = mesh::norm(minus(triangle.centre, x)) / triangle.radius;
+                let limit = if radii < FARTHER { 2e-5 } else { 5e-4 };
+                let mut found = [Lanes::ZERO; MAX_FUNCTIONS];
+                potentials(&tables, &triangle, MAX_DEGREE, &x.map(Lanes::splat), &mut found);
+                for k in 0..MAX_FUNCTIONS {
+                    let error = (found[k].0[0] - exact[k]).abs() / exact[0];
+                    assert!(
+                        error < limit,
+                        "{corners:?} ({alpha}, {beta}, {height}) polynomial {k}: {} for {} ({error:e})",
+                        found[k].0[0],
+                        exact[k]
+                    );
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,191 @@
+//! Where points are: inside the cage, outside, or on its surface, and the nearest place there.
+
+use crate::mesh::{self, Point};
+use rayon::prelude::*;
+
+/// Nearer to the surface than this, over the cage's diagonal, a point counts as on it.
+const ON_SURFACE: f64 = 1e-9;
+
+/// Side of the surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Side {
+    Inside,
+    On,
+    Outside,
+}
+
+/// Nearest place on the surface.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Foot {
+    pub(super) face: u32,
+    /// Barycentric coordinates in the face.
+    pub(super) weights: [f64; 3],
+    pub(super) place: Point,
+    pub(super) distance: f64,
+    pub(super) side: Side,
+}
+
+/// A surface, prepared for such questions.
+pub(super) struct Surface<'a> {
+    vertices: &'a [Point],
+    faces: &'a [[u32; 3]],
+    /// Centre and radius of each face.
+    spheres: Vec<(Point, f64)>,
+    normals: Vec<Point>,
+    /// Sums of the normals around each vertex by angle, and the faces across the edges opposite each corner: what tells the
+    /// sides of edges and vertices apart (Bærentzen and Aanæs 2005).
+    vertex_normals: Vec<Point>,
+    across: Vec<[u32; 3]>,
+    /// Distance up to which points are on it.
+    thickness: f64,
+}
+
+impl<'a> Surface<'a> {
+    pub(super) fn new(vertices: &'a [Point], cage: &'a crate::cage::Cage) -> Self {
+        let faces = cage.mesh().triangles.as_slice();
+        let corners = |f: usize| faces[f].map(|v| vertices[v as usize]);
+        let mut vertex_normals = vec![[0.0; 3]; vertices.len()];
+        let (mut spheres, mut normals) = (Vec::new(), Vec::new());
+        for f in 0..faces.len() {
+            let p = corners(f);
+            let centre = [0, 1, 2].map(|k| (p[0][k] + p[1][k] + p[2][k]) / 3.0);
+            spheres.push((centre, p.iter().map(|&p| mesh::norm(minus(p, centre))).fold(0.0, f64::max)));
+            let normal = mesh::cross(minus(p[1], p[0]), minus(p[2], p[0]));
+            let length = mesh::norm(normal);
+            let normal = normal.map(|c| c / length);
+            normals.push(normal);
+            for i in 0..3 {
+                let (a, b) = (minus(p[(i + 1) % 3], p[i]), minus(p[(i + 2) % 3], p[i]));
+                let angle = mesh::norm(mesh::cross(a, b)).atan2(mesh::dot(a, b));
+                let sum = &mut vertex_normals[faces[f][i] as usize];
+                *sum = [0, 1, 2].map(|k| sum[k] + angle * normal[k]);
+            }
+        }
+        let mut at_edge = vec![[u32::MAX; 2]; cage.edges().len()];
+        for (f, face) in cage.faces().iter().enumerate() {
+            for &e in &face.edges {
+                let sides = &mut at_edge[e as usize];
+                sides[usize::from(sides[0] != u32::MAX)] = f as u32;
+            }
+        }
+        let other = |e: u32, f: usize| at_edge[e as usize].into_iter().find(|&g| g != f as u32).unwrap_or(f as u32);
+        let across = cage.faces().iter().enumerate().map(|(f, face)| face.edges.map(|e| other(e, f))).collect();
+        let thickness = ON_SURFACE * mesh::diagonal(vertices);
+        Self { vertices, faces, spheres, normals, vertex_normals, across, thickness }
+    }
+
+    /// Distance up to which points count as on the surface.
+    pub(super) fn thickness(&self) -> f64 {
+        self.thickness
+    }
+
+    /// The feet of all points.
+    pub(super) fn feet(&self, points: &[Point]) -> Vec<Foot> {
+        points.par_iter().map(|&x| self.foot(x)).collect()
+    }
+
+    fn foot(&self, x: Point) -> Foot {
+        // Centres are on the surface, so that the nearest of them bounds the distance.
+        let apart: Vec<f64> = self.spheres.iter().map(|(centre, _)| mesh::norm(minus(*centre, x))).collect();
+        let mut best = apart.iter().copied().fold(f64::INFINITY, f64::min);
+        let mut found: Option<([f64; 3], Point, usize)> = None;
+        for (f, (_, radius)) in self.spheres.iter().enumerate() {
+            if apart[f] - radius > best {
+                continue;
+            }
+            let corners = self.faces[f].map(|v| self.vertices[v as usize]);
+            let (weights, place) = nearest_in_triangle(corners, self.normals[f], x);
+            let distance = mesh::norm(minus(x, place));
+            if distance < best || found.is_none() {
+                best = distance.min(best);
+                found = Some((weights, place, f));
+            }
+        }
+        let (weights, place, face) = found.unwrap_or_default();
+        let distance = mesh::norm(minus(x, place));
+        let away = minus(x, place);
+        let at: Vec<usize> = (0..3).filter(|&i| weights[i] != 0.0).collect();
+        let normal = match at[..] {
+            [corner] => self.vertex_normals[self.faces[face][corner] as usize],
+            [a, b] => {
+                let other = self.normals[self.across[face][3 - a - b] as usize];
+                [0, 1, 2].map(|k| self.normals[face][k] + other[k])
+            }
+            _ => self.normals[face],
+        };
+        let side = if distance <= self.thickness {
+            Side::On
+        } else if mesh::dot(away, normal) > 0.0 {
+            Side::Outside
+        } else {
+            Side::Inside
+        };
+        Foot { face: face as u32, weights, place, distance, side }
+    }
+}
+
+fn minus(a: Point, b: Point) -> Point {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// The point of a triangle that is nearest to x, and its barycentric coordinates. From distances to the edges, which are exact in
+/// thin triangles too.
+fn nearest_in_triangle(corners: [Point; 3], normal: Point, x: Point) -> ([f64; 3], Point) {
+    let mut weights = [0.0; 3];
+    let mut nearest: Option<([f64; 3], Point)> = None;
+    let mut least = f64::INFINITY;
+    for i in 0..3 {
+        let [j, k] = [(i + 1) % 3, (i + 2) % 3];
+        let (p, edge) = (corners[j], minus(corners[k], corners[j]));
+        let outward = mesh::cross(edge, normal);
+        let beyond = mesh::dot(outward, minus(x, p));
+        weights[i] = beyond / mesh::dot(outward, minus(corners[i], p));
+        if beyond > 0.0 {
+            let t = (mesh::dot(edge, minus(x, p)) / mesh::dot(edge, edge)).clamp(0.0, 1.0);
+            let place = [0, 1, 2].map(|c| p[c] + t * edge[c]);
+            let away = minus(x, place);
+            if mesh::dot(away, away) < least {
+                least = mesh::dot(away, away);
+                let mut at = [0.0; 3];
+                (at[j], at[k]) = (1.0 - t, t);
+                nearest = Some((at, place));
+            }
+        }
+    }
+    nearest.unwrap_or_else(|| {
+        let height = mesh::dot(normal, minus(x, corners[0]));
+        let total: f64 = weights.iter().sum();
+        (weights.map(|w| w / total), [0, 1, 2].map(|c| x[c] - height * normal[c]))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cage::Cage;
+    use crate::synthetic::{Capture, Options};
+
+    #[test]
+    fn sides_and_distances_are_those_of_the_winding_number_and_of_all_faces() {
+        let mesh = Capture::new(&Options { points: 500, frames: 1, cage_vertices: 60 }).cage;
+        let cage = Cage::new(mesh).unwrap();
+        let surface = Surface::new(cage.vertices(), &cage);
+        let mut state = 1u64;
+        let mut random = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+        };
+        let (low, high) = mesh::bounds(cage.vertices());
+        let mut counts = [0, 0];
+        for _ in 0..2000 {
+            let x = [0, 1, 2].map(|k| 0.5 * (low[k] + high[k]) + 1.2 * random() * (high[k] - low[k]));
+            let foot = surface.foot(x);
+            let inside = mesh::winding_number(cage.vertices(), &cage.mesh().triangles, x) > 0.5;
+            assert_eq!(foot.side, if inside { Side::Inside } else { Side::Outside }, "{x:?}");
+            counts[usize::from(inside)] += 1;
+            let distance = mesh::distance_to_surface(cage.vertices(), &cage.mesh().triangles, x);
+            assert!((foot.distance - distance).abs() < 1e-12 * cage.diagonal(), "{} {distance}", foot.distance);
+        }
+        assert!(counts.iter().all(|&c| c > 100), "{counts:?}");
+    }
+}

@@ -1,0 +1,59 @@
+//! Triangles with what integrals over them need.
+
+use crate::mesh::{self, Point};
+
+/// A triangle with a polynomial density.
+#[derive(Clone, Debug)]
+pub(super) struct Triangle {
+    pub(super) corners: [Point; 3],
+    pub(super) centre: Point,
+    /// Largest distance of a corner from the centre.
+    pub(super) radius: f64,
+    pub(super) area: f64,
+    pub(super) normal: Point,
+    /// Gradients of α and β.
+    pub(super) gradients: [Point; 2],
+    /// Along the edges from corner 0 to 1, 1 to 2 and 0 to 2, their outward normals, and lengths.
+    pub(super) along: [Point; 3],
+    pub(super) outward: [Point; 3],
+    pub(super) lengths: [f64; 3],
+}
+
+pub(super) fn minus(a: Point, b: Point) -> Point {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+impl Triangle {
+    pub(super) fn new(corners: [Point; 3]) -> Self {
+        let [a, b, c] = corners;
+        let normal = mesh::cross(minus(b, a), minus(c, a));
+        let double_area = mesh::norm(normal);
+        let normal = normal.map(|x| x / double_area);
+        let centre = [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0);
+        let radius = corners.iter().map(|&p| mesh::norm(minus(p, centre))).fold(0.0, f64::max);
+        let sides = [minus(b, a), minus(c, b), minus(c, a)];
+        let lengths = sides.map(mesh::norm);
+        let along = [0, 1, 2].map(|e| sides[e].map(|x| x / lengths[e]));
+        let outward =
+            [mesh::cross(along[0], normal), mesh::cross(along[1], normal), mesh::cross(along[2], normal).map(|x| -x)];
+        let gradient = |opposite: Point| mesh::cross(normal, opposite).map(|x| x / double_area);
+        let gradients = [gradient(minus(a, c)), gradient(minus(b, a))];
+        Self { corners, centre, radius, area: 0.5 * double_area, normal, gradients, along, outward, lengths }
+    }
+
+    /// The point with these barycentric coordinates.
+    pub(super) fn point(&self, alpha: f64, beta: f64) -> Point {
+        let [a, b, c] = self.corners;
+        [0, 1, 2].map(|k| a[k] + alpha * (b[k] - a[k]) + beta * (c[k] - a[k]))
+    }
+
+    /// Height over the longest side.
+    pub(super) fn height(&self) -> f64 {
+        2.0 * self.area / self.diameter()
+    }
+
+    /// Length of the longest side.
+    pub(super) fn diameter(&self) -> f64 {
+        self.lengths.iter().copied().fold(0.0, f64::max)
+    }
+}
