@@ -4,10 +4,10 @@
 //! `figures --growth POINTS CAGE_VERTICES` prepares once and prints times and sizes.
 
 use cager_core::cage::Cage;
-use cager_core::coordinates::{CoordinateSystem, MeanValue};
+use cager_core::coordinates::{CoordinateSystem, Coordinates, Green, Harmonic, MeanValue, Refinement};
 use cager_core::inversion::{BATCH, Solver, SolverOptions};
 use cager_core::maxvol::{self, maxvol};
-use cager_core::mesh::{Model, Polygons};
+use cager_core::mesh::{self, Model, Point, Polygons};
 use cager_core::svd::svd;
 use cager_core::synthetic::{Capture, Options};
 use cager_formats::{FrameOptions, create_frames, write_model};
@@ -20,6 +20,8 @@ const POINTS: usize = 20_000;
 const FRAMES: usize = 499;
 const CAGE_VERTICES: usize = 330;
 const RUNS: usize = 9;
+/// Runs of what takes seconds.
+const FEW_RUNS: usize = 3;
 
 fn main() -> anyhow::Result<()> {
     // `cargo bench` adds --bench.
@@ -37,9 +39,14 @@ fn main() -> anyhow::Result<()> {
 }
 
 /// Best and median seconds of several runs after one that is not counted.
-fn timed<T>(mut work: impl FnMut() -> T) -> Value {
-    black_box(work());
-    let mut seconds: Vec<f64> = (0..RUNS)
+fn timed<T>(work: impl FnMut() -> T) -> Value {
+    timed_runs(RUNS, work).0
+}
+
+/// The same of so many runs, with the result of the one that is not counted.
+fn timed_runs<T>(runs: usize, mut work: impl FnMut() -> T) -> (Value, T) {
+    let result = black_box(work());
+    let mut seconds: Vec<f64> = (0..runs)
         .map(|_| {
             let clock = Instant::now();
             black_box(work());
@@ -47,7 +54,7 @@ fn timed<T>(mut work: impl FnMut() -> T) -> Value {
         })
         .collect();
     seconds.sort_by(f64::total_cmp);
-    json!({ "best": seconds[0], "median": seconds[RUNS / 2] })
+    (json!({ "best": seconds[0], "median": seconds[runs / 2], "runs": runs }), result)
 }
 
 fn per_frame(mut figure: Value, frames: usize) -> Value {
@@ -69,8 +76,16 @@ fn figures(folder: &Path) -> anyhow::Result<Value> {
     let points = &capture.rest.points;
     let frames = write(&capture, &cage, folder)?;
 
-    let mvc = timed(|| MeanValue.coordinates(&cage, points));
-    let phi = MeanValue.coordinates(&cage, points)?.phi;
+    let (mvc, mean_value) = timed_runs(RUNS, || MeanValue.coordinates(&cage, points));
+    let (green, green_found) = timed_runs(RUNS, || Green::Free.coordinates(&cage, points));
+    let (harmonic, harmonic_found) = timed_runs(FEW_RUNS, || Harmonic.coordinates(&cage, points));
+    let mean_value = mean_value?;
+    let coordinates = json!({
+        "mvc": quality(&MeanValue, &cage, points, &mean_value),
+        "green": quality(&Green::Free, &cage, points, &green_found?),
+        "harmonic": quality(&Harmonic, &cage, points, &harmonic_found?),
+    });
+    let phi = mean_value.phi;
     let handles = maxvol(phi.as_ref(), maxvol::TOLERANCE)?;
     let maxvol_figure = timed(|| maxvol(phi.as_ref(), maxvol::TOLERANCE));
     let m = phi.ncols();
@@ -81,6 +96,9 @@ fn figures(folder: &Path) -> anyhow::Result<Value> {
     let solver = Solver::prepare(&MeanValue, &cage, points, SolverOptions::default())?;
     let batches: Vec<Vec<&[f32]>> = frames.chunks(BATCH).map(|b| b.iter().map(Vec::as_slice).collect()).collect();
     let invert = timed(|| batches.iter().map(|b| solver.invert(b)).collect::<Vec<_>>());
+    // Normals that follow from the vertices: an iteration for every frame.
+    let consistent = Solver::prepare(&Green::Consistent, &cage, points, SolverOptions::default())?;
+    let green_invert = timed_runs(FEW_RUNS, || batches.iter().map(|b| consistent.invert(b)).collect::<Vec<_>>()).0;
     let cages: Vec<Vec<Vec<f32>>> = batches.iter().map(|b| solver.invert(b)).collect();
     let invert_measure = timed(|| {
         for batch in &batches {
@@ -105,16 +123,36 @@ fn figures(folder: &Path) -> anyhow::Result<Value> {
         "log_volume": handles.log_volume,
         "swaps": handles.swaps,
         "solver_bytes": solver.size_bytes(),
+        "coordinates": coordinates,
         "seconds": {
             "mvc": mvc,
+            "green": green,
+            "harmonic": harmonic,
             "maxvol": maxvol_figure,
             "svd": svd,
             "prepare": prepare,
             "invert_batched": per_frame(invert, frames.len()),
+            "green_invert_batched": per_frame(green_invert, frames.len()),
             "invert_measure": per_frame(invert_measure, frames.len()),
             "decode": per_frame(decode, frames.len()),
         },
     }))
+}
+
+/// How well coordinates reproduce the rest pose, at worst and over its diagonal, and how they were refined.
+fn quality(system: &dyn CoordinateSystem, cage: &Cage, points: &[Point], found: &Coordinates) -> Value {
+    let values = system.rest_values(cage);
+    let values = faer::Mat::from_fn(values.len(), 3, |j, k| values[j][k]);
+    let reproduced = &found.phi * &values;
+    let miss = |(i, p): (usize, &Point)| (0..3).map(|k| (reproduced[(i, k)] - p[k]).powi(2)).sum::<f64>().sqrt();
+    let farthest = points.iter().enumerate().map(miss).max_by(f64::total_cmp).unwrap_or(f64::NAN);
+    let mut quality = json!({ "affine_error": farthest / mesh::diagonal(points) });
+    if let Some(Refinement { elements, refinements, change }) = found.refinement {
+        quality["elements"] = json!(elements);
+        quality["refinements"] = json!(refinements);
+        quality["change"] = json!(change);
+    }
+    quality
 }
 
 /// Writes the capture for other programs; returns its frames as they read them.

@@ -14,10 +14,15 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 import teneva
 
+from green import Green, green_row, unit_normals
+from voxels import VoxelHarmonic
+
 # Points per work item of MVC: the few edge- and face-sized temporaries should stay in a core's L2 cache.
 MVC_CHUNK = 128
 # Frames per product where all frames at once would not fit in memory.
 FRAME_BLOCK = 32
+# Cells of the voxel grid along the cage's longest side.
+VOXELS = 64
 SPECTRUM = 20
 LAMBDA = 1.0
 # Bound of max |B|, where B = phi times the inverse of its handle rows.
@@ -330,6 +335,22 @@ def step_mvc(s):
     return figures
 
 
+def step_green(s):
+    figures, phi = timed(s.runs, lambda: Green(s.cage, s.triangles).evaluate(s.rest, s.threads))
+    figures["affine_reproduction_error"] = affine_error(phi, s, green_values(s))
+    return figures
+
+
+def step_harmonic(s):
+    solver = VoxelHarmonic(s.cage, s.triangles, VOXELS)
+    # It takes seconds, so once is enough.
+    figures, phi = timed(1, lambda: solver.evaluate(s.rest, s.threads))
+    figures["affine_reproduction_error"] = affine_error(phi, s)
+    figures["voxels"] = VOXELS
+    figures["unknowns"] = solver.unknowns
+    return figures
+
+
 def step_maxvol(s, method=maxvol_teneva):
     phi = s.phi()
     figures, (rows, swaps) = timed(s.runs, lambda: method(phi))
@@ -410,6 +431,8 @@ def step_pipeline(s):
 
 STEPS = {
     "mvc": step_mvc,
+    "green": step_green,
+    "harmonic": step_harmonic,
     "maxvol": step_maxvol,
     "maxvol_lapack": step_maxvol_lapack,
     "svd": step_svd,
@@ -421,8 +444,13 @@ STEPS = {
 }
 
 
-def affine_error(phi, s):
-    return float(np.linalg.norm(phi @ s.cage - s.rest, axis=1).max() / s.scale)
+def green_values(s):
+    return np.concatenate([s.cage, unit_normals(s.cage, s.triangles)])
+
+
+def affine_error(phi, s, values=None):
+    reproduced = phi @ (s.cage if values is None else values)
+    return float(np.linalg.norm(reproduced - s.rest, axis=1).max() / s.scale)
 
 
 def mean_value_row(point, vertices, triangles):
@@ -453,6 +481,18 @@ def self_check(s):
     plain = np.array([mean_value_row(s.rest[i], s.cage, s.triangles) for i in sample])
     textbook = float(np.abs(phi[sample] - plain).max())
     assert textbook < 1e-9, f"coordinates differ from the textbook form by {textbook:.1e}"
+    green = Green(s.cage, s.triangles).evaluate(s.rest, s.threads)
+    green_affine = affine_error(green, s, green_values(s))
+    assert green_affine < 1e-10, f"Green coordinates miss the rest pose by {green_affine:.1e} of the diagonal"
+    plain = np.array([green_row(s.rest[i], s.cage, s.triangles) for i in sample])
+    green_textbook = float(np.abs(green[sample] - plain).max())
+    assert green_textbook < 1e-8, f"Green coordinates differ from the paper's pseudocode by {green_textbook:.1e}"
+    # Harmonic functions take their extremes on the boundary, and coordinates sum to one; the grid misses the rest pose.
+    harmonic = VoxelHarmonic(s.cage, s.triangles, VOXELS).evaluate(s.rest, s.threads)
+    harmonic_sums = float(np.abs(harmonic.sum(axis=1) - 1.0).max())
+    assert harmonic.min() > -1e-4 and harmonic_sums < 1e-3, f"harmonic coordinates sum to 1 within {harmonic_sums:.1e}"
+    harmonic_affine = affine_error(harmonic, s)
+    assert harmonic_affine < 0.02, f"harmonic coordinates miss the rest pose by {harmonic_affine:.1e} of the diagonal"
     arguments = (phi, s.operator(), s.rows(), s.frames)
     batched, loop = invert_measure_batched(*arguments), invert_measure_per_frame(*arguments)
     agreement = max(float(np.abs(b - p).max()) for b, p in zip(batched, loop)) / s.scale
@@ -467,6 +507,10 @@ def self_check(s):
         "affine": affine,
         "row_sum": sums,
         "textbook": textbook,
+        "green_affine": green_affine,
+        "green_textbook": green_textbook,
+        "harmonic_affine": harmonic_affine,
+        "harmonic_row_sum": harmonic_sums,
         "batched_vs_loop": agreement,
         "max_entry": entry,
         "rest_cage_moved": moved,
