@@ -4,7 +4,7 @@ use crate::capture::{CaptureWriter, Encoding, StoredError};
 use crate::report::{Consistency, Report, Seconds, SpectrumChoice};
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{Analysis, BATCH, Convergence, PrepareError, Sample, Solver, SolverOptions};
+use cager_core::inversion::{Analysis, BATCH, Convergence, PrepareError, Solver, SolverOptions};
 use cager_core::mesh::Model;
 use cager_core::regularize::{Term, TermError};
 use cager_formats::{Action, AtomicFile, CompleteFile, FrameReader};
@@ -74,43 +74,38 @@ pub struct Job<'a> {
 /// What a spectrum threshold is chosen by.
 pub struct ChooseSpectrum {
     /// Some frames of the capture, at least one: see [`sample_frames`].
-    pub samples: Vec<Sample>,
+    pub samples: Vec<Vec<f64>>,
     /// Largest extra L2 error, as a fraction of that at threshold 0.
     pub bound: f64,
 }
 
-/// Evenly spaced frames of a capture to choose a spectrum threshold by, each with its predecessor if wanted: 24, or fewer where
-/// they are short of memory or there are no more.
+/// Frames of a capture to choose a spectrum threshold by: 24 evenly spaced ones, or the first 96 where cages follow their predecessors;
+/// fewer where they are short of memory or there are no more.
 ///
 /// # Errors
 /// Those of the reader.
-pub fn sample_frames(
-    frames: &mut dyn FrameReader,
-    with_predecessors: bool,
-) -> Result<Vec<Sample>, cager_formats::Error> {
-    const MOST: usize = 24;
-    let each = 24 * frames.points().max(1) * if with_predecessors { 2 } else { 1 };
+pub fn sample_frames(frames: &mut dyn FrameReader, first_ones: bool) -> Result<Vec<Vec<f64>>, cager_formats::Error> {
+    let most = if first_ones { 96 } else { 24 };
+    let each = 24 * frames.points().max(1);
     let total = frames.frames();
-    let count = MOST.min(FRAMES_BYTES / each).clamp(1, total.max(1));
+    let count = most.min(FRAMES_BYTES / each).clamp(1, total.max(1));
     let mut samples = Vec::with_capacity(count);
     let mut at = 0;
     for k in 0..count {
-        let wanted = if count == 1 { total / 2 } else { k * (total - 1) / (count - 1) };
-        let first = if with_predecessors { wanted.saturating_sub(1).max(at) } else { wanted };
-        while at < first && frames.skip()? {
+        let wanted = match count {
+            _ if first_ones => k,
+            1 => total / 2,
+            _ => k * (total - 1) / (count - 1),
+        };
+        while at < wanted && frames.skip()? {
             at += 1;
         }
-        // Where samples follow each other, the predecessor was read already.
-        let mut previous =
-            samples.last().filter(|_| with_predecessors && first == wanted).map(|s: &Sample| s.frame.clone());
         let mut frame = Vec::new();
-        while at <= wanted && frames.read_next(&mut frame)? {
-            if at < wanted {
-                previous = Some(std::mem::take(&mut frame));
-            }
-            at += 1;
+        if at < wanted || !frames.read_next(&mut frame)? {
+            break;
         }
-        samples.push(Sample { frame, previous: previous.filter(|_| with_predecessors) });
+        at += 1;
+        samples.push(frame);
     }
     Ok(samples)
 }
@@ -221,7 +216,8 @@ fn prepare(job: &Job<'_>) -> Result<(Solver, SolverOptions, Option<SpectrumChoic
     let own = || job.term.ok_or(TermError::Missing);
     let term: &dyn Term = options.regularizer.term().map_or_else(own, Ok)?;
     let points = &job.rest.points;
-    let Some(ChooseSpectrum { samples, bound }) = &job.choose else {
+    let chosen_by = job.choose.as_ref().filter(|choose| !choose.samples.is_empty());
+    let Some(ChooseSpectrum { samples, bound }) = chosen_by else {
         return Ok((Solver::prepare_with(job.system, job.cage, points, options, term)?, options, None));
     };
     term.delta(job.cage, job.system.unknowns(job.cage))?;

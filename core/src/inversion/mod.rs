@@ -24,7 +24,7 @@ pub use prepare::{Preparation, check_options, coordinates_fit};
 pub use pull::Pull;
 pub use reading::Reading;
 pub use solve::{BATCH, Inverted, Solver};
-pub use threshold::{Sample, Threshold};
+pub use threshold::Threshold;
 
 pub(crate) use operator::tall_product;
 pub(crate) use solve::product_columns;

@@ -169,20 +169,6 @@ impl Decomposed {
             }
         }
     }
-
-    /// `Uᵀ H` of whole frames, n × 3F, r × 3F.
-    pub(super) fn coefficients(&self, phi: MatRef<'_, f64>, frames: MatRef<'_, f64>) -> Mat<f64> {
-        match &self.left {
-            Left::Rows(left) if self.reads_all => dense::product(left.transpose(), frames),
-            Left::Rows(left) => dense::product(left.transpose(), dense::rows_of(frames, &self.handles).as_ref()),
-            Left::OfPoints { u, factor, to_basis } => {
-                let mut left = u.clone();
-                solve_upper(factor.as_ref(), &mut left);
-                let felt = dense::product(phi.transpose(), frames);
-                dense::product(left.transpose(), dense::product(to_basis.transpose(), felt.as_ref()).as_ref())
-            }
-        }
-    }
 }
 
 /// The decomposition of all of `Φ`.

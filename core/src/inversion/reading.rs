@@ -8,7 +8,7 @@ use super::translations::{cages_stay, keep_translations};
 use super::{Analysis, PrepareError, Solver, SolverOptions};
 use crate::dense;
 use crate::mesh::Point;
-use crate::regularize::{Reference, Regularizer, SpectralMap, Spectrum, Term, TermError, spectral_map};
+use crate::regularize::{CageLaplacian, Reference, Regularizer, SpectralMap, Spectrum, Term, TermError, spectral_map};
 use faer::Mat;
 use std::sync::Arc;
 use std::time::Instant;
@@ -44,9 +44,17 @@ impl Reading<'_> {
     pub fn solver_with(&self, options: SolverOptions, term: &dyn Term) -> Result<Solver, PrepareError> {
         let clock = Instant::now();
         let analysis = self.analysis;
-        check_options(analysis.phi.nrows(), analysis.phi.ncols(), options)?;
-        let bent = self.bent(term)?;
-        let map = self.map(&bent, options.regularizer, options.spectrum, options.lambda)?;
+        let m = analysis.phi.ncols();
+        check_options(analysis.phi.nrows(), m, options)?;
+        let tied = analysis.decoder.tied_normals().is_some();
+        // Where steps follow, the data alone decide by way of them: from a calm start, since a wild one leads to a worse minimum.
+        let calm = tied && follows_points_alone(options);
+        let bent = self.bent(if calm { &CageLaplacian } else { term })?;
+        let map = if calm {
+            self.map(&bent, Regularizer::Laplacian, SolverOptions::default().spectrum.min(m / 4), 1.0)?
+        } else {
+            self.map(&bent, options.regularizer, options.spectrum, options.lambda)?
+        };
         let positions = analysis.decoder.positions();
         let operator = self.decomposed.operator(analysis.phi.as_ref(), map.data.as_ref());
         let operator = with_whole_tiles(keep_translations(operator, positions));
@@ -113,11 +121,16 @@ impl Reading<'_> {
     }
 }
 
+/// Whether no term and no damping takes part.
+fn follows_points_alone(options: SolverOptions) -> bool {
+    options.regularizer == Regularizer::None || options.regularizer.is_sub_spectral() && options.spectrum == 0
+}
+
 /// How much the shape of the linear start counts beside the points: as much as a term, where there is one.
 fn shape_weight(options: SolverOptions) -> f64 {
     const WITHOUT_TERM: f64 = 1e-3;
     let has_term = options.regularizer.is_sub_spectral() || options.regularizer == Regularizer::Global;
-    if has_term { options.lambda } else { WITHOUT_TERM }
+    if has_term && !follows_points_alone(options) { options.lambda } else { WITHOUT_TERM }
 }
 
 /// Unknowns with the first vertex as origin, m × 3: the pull does not see the difference, and digits are kept.
