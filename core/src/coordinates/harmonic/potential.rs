@@ -188,7 +188,7 @@ mod tests {
                 let unit = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
                 divided(&tables, &triangle, unit, MAX_DEGREE, x, &mut exact, 0);
                 let radii = mesh::norm(minus(triangle.centre, x)) / triangle.radius;
-                let limit = if radii < FARTHER { 2e-5 } else { 5e-4 };
+                let limit = if radii < FARTHER { 1e-4 } else { 5e-4 };
                 let mut found = [Lanes::ZERO; MAX_FUNCTIONS];
                 potentials(&tables, &triangle, MAX_DEGREE, &x.map(Lanes::splat), &mut found);
                 for k in 0..MAX_FUNCTIONS {
