@@ -43,7 +43,7 @@ impl Service {
         let choices = Choices::of(&options)?;
         let (key, content) = {
             let (tenant, options) = (tenant.name.clone(), options.clone());
-            blocking(move || (content_key(&tenant, &content, &options), content)).await?
+            blocking(move || (content_key(&tenant, &content, &options, &choices), content)).await?
         };
         let fingerprint = fingerprint(&key, &options);
         let Some(idempotency_key) = idempotency_key else {
@@ -330,10 +330,19 @@ impl Drop for GiveUp<'_> {
 }
 
 /// Digest of all that a solver depends on. The tenant is part of it: what one tenant uploaded is never a hit for another.
-fn content_key(tenant: &str, content: &Content, options: &SessionOptions) -> ContentKey {
+fn content_key(tenant: &str, content: &Content, options: &SessionOptions, choices: &Choices) -> ContentKey {
     let mut hasher = blake3::Hasher::new();
     let extension = |name: &str| name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
-    let solving = SessionOptions { name: None, frame_rate: None, ..options.clone() };
+    // What is chosen where nothing is said is the same as when it is said.
+    let solving = SessionOptions {
+        name: None,
+        frame_rate: None,
+        coordinates: Some(choices.system.name().to_owned()),
+        handles: Some(choices.handles.name().to_owned()),
+        regularizer: Some(choices.regularizer.name().to_owned()),
+        lambda: Some(choices.lambda),
+        ..options.clone()
+    };
     let solving = serde_json::to_vec(&solving).unwrap_or_default();
     for part in [
         format!("cager solver {}", cager_core::SOLVER_VERSION).as_bytes(),

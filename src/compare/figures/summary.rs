@@ -7,7 +7,7 @@ use cager_core::inversion::Handles;
 use cager_core::regularize::Regularizer;
 use serde::Serialize;
 
-/// A method is accurate enough to be recommended where its mean L2 is at most this many times the lowest of all.
+/// A method is accurate enough to be recommended where its mean L2 is at most this many times the lowest of its system.
 const ACCURATE: f64 = 1.4;
 /// Differences below this are none.
 const CLEAR: f64 = 0.02;
@@ -19,7 +19,8 @@ pub(crate) struct Recommendation {
     pub(crate) editing: Option<Choice>,
     /// The method of the lowest error.
     pub(crate) accuracy: Option<Choice>,
-    /// Bound on the mean L2 of the accurate ones, as a multiple of the lowest.
+    /// Bound on the mean L2 of the accurate ones, as a multiple of the lowest of their system: systems that follow the capture more
+    /// closely by cages full of spikes do not rule out the others.
     pub(crate) accurate: f64,
 }
 
@@ -40,13 +41,16 @@ pub(crate) struct Choice {
 
 /// Chooses among all methods of all systems.
 pub(crate) fn recommend(systems: &[System]) -> Recommendation {
-    let all: Vec<Choice> = systems.iter().flat_map(choices).filter(|c| c.l2_mean.is_finite()).collect();
+    let all: Vec<Vec<Choice>> = systems.iter().map(choices).collect();
     let least = |of: &mut dyn Iterator<Item = &Choice>, by: fn(&Choice) -> f64| {
         of.min_by(|a, b| by(a).total_cmp(&by(b))).cloned()
     };
-    let accuracy = least(&mut all.iter(), |c| c.l2_mean);
-    let bound = ACCURATE * accuracy.as_ref().map_or(f64::NAN, |c| c.l2_mean);
-    let editing = least(&mut all.iter().filter(|c| c.l2_mean <= bound && c.smoothness.is_finite()), |c| c.smoothness);
+    let accuracy = least(&mut all.iter().flatten(), |c| c.l2_mean);
+    let accurate = |of: &[Choice]| {
+        let bound = ACCURATE * of.iter().map(|c| c.l2_mean).fold(f64::INFINITY, f64::min);
+        of.iter().filter(|c| c.l2_mean <= bound && c.smoothness.is_finite()).cloned().collect::<Vec<_>>()
+    };
+    let editing = least(&mut all.iter().flat_map(|of| accurate(of)).collect::<Vec<_>>().iter(), |c| c.smoothness);
     Recommendation { editing, accuracy, accurate: ACCURATE }
 }
 
@@ -59,7 +63,7 @@ fn choices(system: &System) -> Vec<Choice> {
         l2_mean: found.totals.l2_mean,
         smoothness: if found.totals.spike_mean.is_finite() { found.totals.spike_mean } else { found.totals.edges_mean },
     };
-    figures.methods.iter().map(choice).collect()
+    figures.methods.iter().map(choice).filter(|c| c.l2_mean.is_finite()).collect()
 }
 
 /// What became of a claim.

@@ -28,7 +28,7 @@ pub(super) fn head(figures: &Figures) -> String {
     let bound = format!("{:.0} %", 100.0 * (advice.accurate - 1.0));
     if let Some(choice) = &advice.editing {
         let why = format!(
-            "The smoothest cages among the methods whose mean L2 is at most {bound} above the lowest: mean L2 {} %, and a cage vertex's mean second difference in time is {} %.",
+            "The smoothest cages among the methods whose mean L2 is at most {bound} above the lowest of the same coordinates: mean L2 {} %, and a cage vertex's mean second difference in time is {} %.",
             percent(choice.l2_mean, 3),
             percent(choice.smoothness, 4)
         );

@@ -1,8 +1,9 @@
 //! Many sessions at once.
 
-use crate::support::{Api, Capture, TestApp};
-use cager_proto::messages::CacheUse;
+use crate::support::{Api, Capture, TestApp, form};
+use cager_proto::messages::{CacheUse, Session};
 use futures_util::future::join_all;
+use serde_json::json;
 use std::sync::Arc;
 
 const FRAMES: u32 = 5;
@@ -53,10 +54,20 @@ async fn another_option_is_another_solver() {
     let app = TestApp::start();
     let capture = Capture::tiny();
     app.ready(capture).await;
-    let form = crate::support::form(capture, &serde_json::json!({"regularizer": "none"}));
-    let other: cager_proto::messages::Session = app.create_with(form, None).await.is(201);
+    let parts = form(capture, &json!({"regularizer": "none"}));
+    let other: Session = app.create_with(parts, None).await.is(201);
     assert_eq!(app.prepared(&other.id).await.cache, Some(CacheUse::Miss));
-    let named = crate::support::form(capture, &serde_json::json!({"name": "the same under a name"}));
-    let named: cager_proto::messages::Session = app.create_with(named, None).await.is(201);
+    let named = form(capture, &json!({"name": "the same under a name"}));
+    let named: Session = app.create_with(named, None).await.is(201);
     assert_eq!(app.prepared(&named.id).await.cache, Some(CacheUse::Hit), "a name changes no number");
+}
+
+#[tokio::test]
+async fn defaults_that_are_written_out_are_the_same_content() {
+    let app = TestApp::start();
+    app.ready(Capture::small()).await;
+    let options = json!({ "coordinates": "mvc", "handles": "maxvol", "regularizer": "laplacian", "lambda": 1.0, "name": "again" });
+    let session: Session = app.create_with(form(Capture::small(), &options), None).await.is(201);
+    app.prepared(&session.id).await;
+    assert_eq!(app.metric("cager_cache_total{result=\"miss\"}").await, 1.0);
 }
