@@ -28,7 +28,7 @@ pub const CHUNK_FRAMES: usize = 16;
 pub struct Header {
     /// Version of the coordinate computation: decoders recompute `Φ`.
     pub solver_version: u32,
-    /// Coordinate system: `mvc`, `harmonic` or `green`.
+    /// Coordinate system: `mvc`, `harmonic`, `green` or `green-free`.
     pub coordinates: String,
     /// Points the inversion read: `maxvol`, `spread` or `all`.
     pub handles: String,

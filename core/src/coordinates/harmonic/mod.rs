@@ -1,4 +1,16 @@
 //! Harmonic coordinates (Joshi, Meyer, DeRose, Green and Sanocki 2007) by boundary elements.
+//!
+//! The coordinate of a cage vertex is harmonic inside the cage, and on it the hat function `u` of that vertex. With the single layer `S`
+//! and the double layer `K` of the cage, Green's representation formula is `u = S q − K u` inside and `S q = ½ u + K u` on the faces, up to
+//! the signs of the layers; the unknown is the normal derivative `q`. It is approximated by polynomials on elements that divide the
+//! faces, and found by Galerkin's method: symmetric positive definite equations, one factorisation for all vertices
+//! ([`galerkin`], [`solve`]). The double layer of hat functions has a closed form, and is exact.
+//!
+//! Elements are divided, or get a higher degree, where that changes a coordinate of one of the points ([`elements`]): the difference
+//! to the solution without the highest degrees is known with the solution itself. Refining ends when it is below 1e-3 everywhere, and
+//! the difference is reported. Values near faces and edges are tied to those on the surface ([`evaluate`]); they are
+//! never clamped, which would lose linear functions. Those have densities that are constant on faces; what quadrature misses
+//! of them is put back by a small correction of all coordinates ([`affine`]), so that they are exact to rounding.
 
 mod affine;
 mod basis;
