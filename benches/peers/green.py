@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 # Points per work item: the edge- and face-sized temporaries should stay in a core's L2 cache.
-CHUNK = 48
+CHUNK = 64
 
 
 def unit_normals(vertices, triangles):
@@ -18,9 +18,9 @@ def unit_normals(vertices, triangles):
 class Green:
     """Closed form in one logarithm per edge and one arctangent per face, without a division by the distance to a face.
 
-    Seen from x, a face has the solid angle W, and x has the height h over its plane (positive inside) and at its foot there
-    barycentric coordinates t_i. With L_k = ln((r + s + l) / (r + s - l)) / l over edge k of length l, whose ends are r and s away,
-    the integrals of the paper over the face of double area A are
+    Seen from x, a face has the solid angle W, and x has the height h over its plane (positive inside) and at its foot
+    there barycentric coordinates t_i. With L_k = ln((r + s + l) / (r + s - l)) / l over edge k of length l, whose ends
+    are r and s away, the integrals of the paper over the face of double area A are
         4 pi psi   = A (t_0 L_0 + t_1 L_1 + t_2 L_2) - h W
         4 pi phi_i = t_i W - h grad t_i . sum_k l_k u_k L_k
     for outward edge normals u_k in the plane. From sum_k l_k u_k = 0 and sum_i t_i = 1 follows the shorter form used here.
