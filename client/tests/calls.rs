@@ -222,6 +222,25 @@ async fn coordinates_of_another_shape_are_not_taken() {
 }
 
 #[tokio::test]
+async fn sizes_that_no_number_holds_are_not_believed() {
+    let address = numbered(|_, exchange| async move {
+        match exchange.path() {
+            path if path.ends_with("coordinates") => {
+                let headers = [("cager-rows", "4294967295"), ("cager-columns", "4294967295")];
+                exchange.reply(200, &headers, vec![0; 4]).await;
+            }
+            _ => {
+                let (points, unknowns) = (Some(u32::MAX), Some(u32::MAX));
+                exchange.json(json(&Session { points, unknowns, ..session(SessionState::Ready) })).await;
+            }
+        }
+    })
+    .await;
+    let error = client(&address).coordinates(ID).await.expect_err("2^66 bytes");
+    assert!(matches!(&error, ClientError::Protocol(what) if what.contains("more numbers")), "{error}");
+}
+
+#[tokio::test]
 async fn decoding_checks_both_ways() {
     let address = numbered(|_, mut exchange| async move {
         if exchange.path().ends_with("decode") {

@@ -7,7 +7,7 @@ use crate::problem::{self, ApiError};
 use crate::store::Content;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions};
+use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions, check_options};
 use cager_core::mesh::{Model, TriMesh};
 use cager_core::regularize::{Regularizer, SparseMatrix, Term, TermError};
 use cager_formats::{MeshFormat, read_matrix_bytes, read_model_bytes};
@@ -138,6 +138,13 @@ pub(crate) fn read_cage(content: &Content, choices: &Choices) -> Result<Cage, Ap
 pub(crate) fn check(geometry: &Geometry, choices: &Choices, most_bytes: u64) -> Result<(), ApiError> {
     let unknowns = choices.system.unknowns(&geometry.cage);
     let options = choices.solver_options(unknowns);
+    // Too many handles are wrong before they are too large. Where there are too few points, it is not the options' fault.
+    if geometry.rest.points.len() >= unknowns {
+        match check_options(geometry.rest.points.len(), unknowns, options) {
+            Ok(()) | Err(PrepareError::HandlesOutOfMemory { .. }) => {}
+            Err(error) => return Err(refused(&error)),
+        }
+    }
     check_memory(geometry, choices, options, most_bytes)?;
     Solver::check(choices.system, &geometry.cage, &geometry.rest.points, options).map_err(|error| refused(&error))?;
     let Some(matrix) = &geometry.matrix else { return Ok(()) };
