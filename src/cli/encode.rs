@@ -39,7 +39,8 @@ fn here(args: &EncodeArgs, rest: &Model, cage: &Cage, clock: Instant) -> Result<
             // What is wrong with the options is told before anything is read.
             check_options(rest.points.len(), system.unknowns(cage), options).map_err(|e| name_file(&e, args))?;
             let mut again = open_frames(&args.frames, rest.points.len())?;
-            let samples = sample_frames(again.as_mut(), options.regularizer == Regularizer::Temporal)?;
+            let samples = sample_frames(again.as_mut(), options.regularizer == Regularizer::Temporal)
+                .map_err(|error| name_files(error, args))?;
             Some(ChooseSpectrum { samples, bound })
         }
         _ => None,
@@ -141,6 +142,7 @@ fn finish(args: &EncodeArgs, encoded: Encoded, report_file: Option<AtomicFile>, 
 fn name_files(error: encode::EncodeError, args: &EncodeArgs) -> anyhow::Error {
     match error {
         encode::EncodeError::Prepare(inner) => name_file(&inner, args),
+        error @ encode::EncodeError::EndsEarly { .. } => anyhow::anyhow!("{}: {error}", args.frames.display()),
         other => other.into(),
     }
 }

@@ -108,26 +108,29 @@ fn read_matrix(content: &Content, choices: &Choices) -> Result<Option<SparseMatr
 /// Bytes that cannot be read; a cage that cannot be used.
 pub(crate) fn read(content: &Content, choices: &Choices) -> Result<Geometry, ApiError> {
     let rest = read_part("rest", &content.rest_name, &content.rest)?;
-    Ok(Geometry { rest, cage: read_cage(content, choices)?, matrix: read_matrix(content, choices)? })
+    Ok(Geometry {
+        rest,
+        cage: read_cage(&content.cage_name, &content.cage, choices)?,
+        matrix: read_matrix(content, choices)?,
+    })
 }
 
 /// Reads and checks the cage.
 ///
 /// # Errors
 /// As [`read`].
-pub(crate) fn read_cage(content: &Content, choices: &Choices) -> Result<Cage, ApiError> {
-    let model = read_part("cage", &content.cage_name, &content.cage)?;
+pub(crate) fn read_cage(name: &str, bytes: &[u8], choices: &Choices) -> Result<Cage, ApiError> {
+    let model = read_part("cage", name, bytes)?;
     if model.faces.is_empty() {
         return Err(geometry(format!(
-            "{}: has no faces, and a cage is a closed mesh; export the cage with its faces",
-            content.cage_name
+            "{name}: has no faces, and a cage is a closed mesh; export the cage with its faces"
         )));
     }
     let mesh = TriMesh::from(&model);
     let polygon_of = model.faces.polygon_of_triangle();
     Cage::new(if choices.flip_cage { mesh.flipped() } else { mesh }).map_err(|error| {
         let error = error.renumbered(|triangle| polygon_of[triangle] as usize);
-        geometry(format!("{}: {error}", content.cage_name))
+        geometry(format!("{name}: {error}"))
     })
 }
 
