@@ -220,7 +220,8 @@ fn header(encoding: &Encoding<'_>) -> Header {
         coordinates: encoding.system.name().to_owned(),
         handles: encoding.options.handles.name().to_owned(),
         regularizer: encoding.options.regularizer.name().to_owned(),
-        spectrum: encoding.options.spectrum as u32,
+        // Larger ones come only with what has no threshold.
+        spectrum: u32::try_from(encoding.options.spectrum).unwrap_or(u32::MAX),
         lambda: encoding.options.lambda,
         rows_per_frame: encoding.solver.decoder().unknowns() as u32,
         frame_rate: encoding.frame_rate,

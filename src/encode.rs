@@ -27,6 +27,14 @@ pub enum EncodeError {
     /// The frames could not be read, or the output not be created.
     #[error(transparent)]
     Formats(#[from] cager_formats::Error),
+    /// The frames end before they should.
+    #[error("ends after {found} frames where {announced} are announced; get the capture again")]
+    EndsEarly {
+        /// Frames that could be read.
+        found: usize,
+        /// Frames that the reader announced.
+        announced: usize,
+    },
     /// The container could not be written.
     #[error("{}: {cause}", .path.display())]
     Container {
@@ -83,8 +91,8 @@ pub struct ChooseSpectrum {
 /// fewer where they are short of memory or there are no more.
 ///
 /// # Errors
-/// Those of the reader.
-pub fn sample_frames(frames: &mut dyn FrameReader, first_ones: bool) -> Result<Vec<Vec<f64>>, cager_formats::Error> {
+/// Those of the reader, also where it ends before the frames it announced.
+pub fn sample_frames(frames: &mut dyn FrameReader, first_ones: bool) -> Result<Vec<Vec<f64>>, EncodeError> {
     let most = if first_ones { 96 } else { 24 };
     let each = 24 * frames.points().max(1);
     let total = frames.frames();
@@ -102,7 +110,7 @@ pub fn sample_frames(frames: &mut dyn FrameReader, first_ones: bool) -> Result<V
         }
         let mut frame = Vec::new();
         if at < wanted || !frames.read_next(&mut frame)? {
-            break;
+            return Err(EncodeError::EndsEarly { found: at, announced: total });
         }
         at += 1;
         samples.push(frame);
@@ -285,4 +293,42 @@ fn solve(solver: &Solver, batch: &Batch, previous: Option<&[f32]>) -> SolvedBatc
     let errors = solver.decoder().measure(&views, &frames);
     let measure_seconds = clock.elapsed().as_secs_f64() - invert_seconds;
     SolvedBatch { cages, errors, convergence, invert_seconds, measure_seconds }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Announces more frames than it has.
+    struct Short {
+        left: usize,
+    }
+
+    impl FrameReader for Short {
+        fn points(&self) -> usize {
+            1
+        }
+
+        fn frames(&self) -> usize {
+            10
+        }
+
+        fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, cager_formats::Error> {
+            *out = vec![0.0; 3];
+            let more = self.left > 0;
+            self.left = self.left.saturating_sub(1);
+            Ok(more)
+        }
+    }
+
+    #[test]
+    fn a_reader_that_ends_early_is_told_and_no_sample_is_empty() {
+        for first_ones in [false, true] {
+            for left in 0..10 {
+                let error = sample_frames(&mut Short { left }, first_ones).expect_err("too few frames");
+                assert!(matches!(error, EncodeError::EndsEarly { found, announced: 10 } if found == left), "{error}");
+            }
+            assert_eq!(sample_frames(&mut Short { left: 10 }, first_ones).expect("all").len(), 10);
+        }
+    }
 }

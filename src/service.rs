@@ -32,7 +32,7 @@ pub struct Service {
     pub(crate) solvers: Arc<Solvers>,
     pub(crate) committer: Committer,
     pub(crate) registry: Arc<Registry>,
-    /// Rest poses and cages of new sessions being read at a time: parsing keeps a processor busy.
+    /// Rest poses and cages of new sessions, and cages asked for, being read at a time: parsing keeps a processor busy.
     pub(crate) reading: Semaphore,
     /// Memory for frames on their way, in KiB.
     pub(crate) frame_memory: Memory,

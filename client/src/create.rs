@@ -64,8 +64,10 @@ impl Client {
     /// Creates a session. It prepares in the background, see [`Client::wait_ready`].
     ///
     /// # Errors
-    /// [`ClientError::Refused`] for bad geometry or options, and those of the connection.
+    /// [`ClientError::Mismatch`] for an option that is NaN or infinite, [`ClientError::Refused`] for bad geometry or options, and
+    /// those of the connection.
     pub async fn create(&self, new: &NewSession) -> Result<Session, ClientError> {
+        refuse_not_finite(&new.options)?;
         let key = new.idempotency_key.clone().unwrap_or_else(random_key);
         let options = serde_json::to_string(&new.options)
             .map_err(|error| ClientError::Mismatch(format!("the options: {error}")))?;
@@ -88,6 +90,29 @@ impl Client {
         })
         .await
     }
+}
+
+/// JSON has no such numbers: they would be sent as left out, and the service would take its default.
+fn refuse_not_finite(options: &SessionOptions) -> Result<(), ClientError> {
+    let SessionOptions {
+        name: _,
+        coordinates: _,
+        handles: _,
+        handle_count: _,
+        regularizer: _,
+        spectrum: _,
+        lambda,
+        max_error,
+        cage_vertices: _,
+        flip_cage: _,
+        frame_rate,
+    } = options;
+    for (name, value) in [("lambda", lambda), ("max_error", max_error), ("frame_rate", frame_rate)] {
+        if let Some(value) = value.filter(|value| !value.is_finite()) {
+            return Err(ClientError::Mismatch(format!("{name}: is {value}; give a finite number, or leave it out")));
+        }
+    }
+    Ok(())
 }
 
 fn part(file: &MeshFile, sent: &Arc<AtomicU64>) -> Part {

@@ -58,7 +58,7 @@ impl LocalDecoder {
     /// [`ClientError::Protocol`] where the numbers do not fit each other.
     pub fn new(coordinates: &Coordinates, positions: usize) -> Result<Self, ClientError> {
         let Coordinates { rows, columns, values } = coordinates;
-        if values.len() != rows * columns || positions == 0 || positions > *columns {
+        if rows.checked_mul(*columns) != Some(values.len()) || positions == 0 || positions > *columns {
             let what = format!("{rows} × {columns} coordinates of {positions} positions cannot be");
             return Err(ClientError::Protocol(what));
         }

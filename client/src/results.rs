@@ -66,7 +66,7 @@ impl Client {
                 let what = format!("cager-columns is {columns}, but the session says {unknowns} unknowns");
                 return Err(Failure::protocol(what));
             }
-            let bytes = 4 * u64::from(rows) * u64::from(columns);
+            let bytes = bytes_of([4, u64::from(rows), u64::from(columns)])?;
             let body = whole(self, response, bytes).await?;
             if body.len() as u64 != bytes {
                 return Err(Failure::protocol(format!("{} bytes are not {rows} × {columns} coordinates", body.len())));
@@ -128,7 +128,7 @@ impl Client {
                 .header("content-type", "application/octet-stream")
                 .header(ACCEPT, "application/octet-stream")
                 .body(body.clone());
-            let expected = 12 * u64::from(points) * (cages.len() / frame) as u64;
+            let expected = bytes_of([12, u64::from(points), (cages.len() / frame) as u64])?;
             let positions = whole(self, self.send(request).await?, expected).await?;
             if positions.len() as u64 != expected {
                 return Err(self.broken(format!("{} of {expected} bytes came", positions.len())));
@@ -142,4 +142,10 @@ impl Client {
 fn number(headers: &HeaderMap, name: &str) -> Result<u32, Failure> {
     let value = headers.get(name).and_then(|value| value.to_str().ok()?.parse().ok());
     value.ok_or_else(|| Failure::protocol(format!("the header {name} is missing or no number")))
+}
+
+/// A product of numbers that a service may have made up.
+fn bytes_of(factors: [u64; 3]) -> Result<u64, Failure> {
+    let bytes = factors.into_iter().try_fold(1u64, u64::checked_mul);
+    bytes.ok_or_else(|| Failure::protocol("it says that it has more numbers than there can be"))
 }

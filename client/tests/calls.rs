@@ -26,6 +26,37 @@ fn json(session: &Session) -> Vec<u8> {
 }
 
 #[tokio::test]
+async fn options_that_are_not_finite_are_refused_and_nothing_is_sent() {
+    let asked = Arc::new(AtomicUsize::new(0));
+    let count = Arc::clone(&asked);
+    let address = serve(move |mut exchange| {
+        count.fetch_add(1, Ordering::Relaxed);
+        async move {
+            exchange.whole_body().await;
+            exchange.reply(201, &[], json(&session(SessionState::Preparing))).await;
+        }
+    })
+    .await;
+    let client = client(&address);
+    let good = NewSession::new(MeshFile::new("rest.obj", ""), MeshFile::new("cage.obj", ""));
+    for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        for (name, set) in [
+            ("lambda", (|new, x| new.options.lambda = Some(x)) as fn(&mut NewSession, f64)),
+            ("max_error", |new, x| new.options.max_error = Some(x)),
+            ("frame_rate", |new, x| new.options.frame_rate = Some(x)),
+        ] {
+            let mut bad = good.clone();
+            set(&mut bad, value);
+            let error = client.create(&bad).await.expect_err("no number");
+            assert!(matches!(&error, ClientError::Mismatch(what) if what.starts_with(name)), "{error}");
+        }
+    }
+    assert_eq!(asked.load(Ordering::Relaxed), 0);
+    client.create(&good).await.expect("a session");
+    assert_eq!(asked.load(Ordering::Relaxed), 1);
+}
+
+#[tokio::test]
 async fn creating_again_after_a_lost_answer_names_the_same_wish() {
     let seen = Arc::new(Mutex::new(Vec::new()));
     let log = Arc::clone(&seen);
@@ -188,6 +219,25 @@ async fn coordinates_of_another_shape_are_not_taken() {
             assert!(matches!(found, Err(ClientError::Protocol(_))), "{found:?}");
         }
     }
+}
+
+#[tokio::test]
+async fn sizes_that_no_number_holds_are_not_believed() {
+    let address = numbered(|_, exchange| async move {
+        match exchange.path() {
+            path if path.ends_with("coordinates") => {
+                let headers = [("cager-rows", "4294967295"), ("cager-columns", "4294967295")];
+                exchange.reply(200, &headers, vec![0; 4]).await;
+            }
+            _ => {
+                let (points, unknowns) = (Some(u32::MAX), Some(u32::MAX));
+                exchange.json(json(&Session { points, unknowns, ..session(SessionState::Ready) })).await;
+            }
+        }
+    })
+    .await;
+    let error = client(&address).coordinates(ID).await.expect_err("2^66 bytes");
+    assert!(matches!(&error, ClientError::Protocol(what) if what.contains("more numbers")), "{error}");
 }
 
 #[tokio::test]

@@ -36,6 +36,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     let job = Job {
         rest: &rest,
         cage: &cage,
+        flip_cage: args.flip_cage,
         open: &open,
         systems: &systems,
         frames_at_most: args.frames_at_most as usize,
@@ -89,16 +90,16 @@ fn summary(figures: &Figures, output: &Path, bytes: u64, seconds: f64) -> Result
     )?;
     for system in &figures.systems {
         if let Some(reason) = &system.refused {
-            writeln!(out, "  {:<10}not compared: {}", system.name, plain(reason))?;
+            writeln!(out, "  {:<12}not compared: {}", system.name, plain(reason))?;
         }
     }
     for (name, choice) in [("calmest", &figures.recommendation.editing), ("closest", &figures.recommendation.accuracy)]
     {
         if let Some(choice) = choice {
-            writeln!(out, "  {name:<10}{}   (mean L2 {:.4} %)", choice.flags, 100.0 * choice.l2_mean)?;
+            writeln!(out, "  {name:<12}{}   (mean L2 {:.4} %)", choice.flags, 100.0 * choice.l2_mean)?;
         }
     }
-    writeln!(out, "  time      {seconds:.1} s")?;
+    writeln!(out, "  time        {seconds:.1} s")?;
     Ok(out)
 }
 

@@ -11,7 +11,7 @@ use anyhow::{Context, Result, bail};
 use cager_client::FrameSource;
 use cager_client::messages::SessionOptions;
 use cager_core::cage::Cage;
-use cager_core::inversion::{PrepareError, SolverOptions, check_options};
+use cager_core::inversion::{PrepareError, Solver, SolverOptions, check_options};
 use cager_core::mesh::{Model, TriMesh};
 use cager_core::regularize::{Regularizer, SparseMatrix, Term};
 use cager_formats::{AtomicFile, CompleteFile, commit_together, open_frames, read_matrix, read_model};
@@ -39,7 +39,8 @@ fn here(args: &EncodeArgs, rest: &Model, cage: &Cage, clock: Instant) -> Result<
             // What is wrong with the options is told before anything is read.
             check_options(rest.points.len(), system.unknowns(cage), options).map_err(|e| name_file(&e, args))?;
             let mut again = open_frames(&args.frames, rest.points.len())?;
-            let samples = sample_frames(again.as_mut(), options.regularizer == Regularizer::Temporal)?;
+            let samples = sample_frames(again.as_mut(), options.regularizer == Regularizer::Temporal)
+                .map_err(|error| name_files(error, args))?;
             Some(ChooseSpectrum { samples, bound })
         }
         _ => None,
@@ -64,18 +65,24 @@ fn here(args: &EncodeArgs, rest: &Model, cage: &Cage, clock: Instant) -> Result<
     finish(args, encoded, report_file, clock)
 }
 
-/// The files are read here as well, so that what is wrong with them is told before anything is sent, in words that name them.
+/// The files are read and the options checked here as well, so that what is wrong with them is told before anything is sent, in
+/// words that name them.
 fn elsewhere(args: &EncodeArgs, address: &str, rest: &Model, cage: &Cage, clock: Instant) -> Result<()> {
     let frames = FileFrames::open(&args.frames, rest.points.len())?;
     let read_seconds = clock.elapsed().as_secs_f64();
     let (system, options) = solver(&args.solver, cage)?;
-    // Read here too, for what may be wrong with it.
-    matrix(&args.solver)?;
+    let matrix = matrix(&args.solver)?;
     spectrum_bound(&args.solver)?;
     if args.solver.spectrum == Some(SpectrumArg::Auto) {
         bail!(
             "--spectrum auto: a service prepares before it sees a frame to measure; give a number, or encode without --server"
         );
+    }
+    let delta = matrix.map_or(Ok(()), |matrix| matrix.delta(cage, system.unknowns(cage)).map(|_| ()));
+    match delta.map_err(PrepareError::from).and_then(|()| Solver::check(system, cage, &rest.points, options)) {
+        // The service knows its own memory.
+        Ok(()) | Err(PrepareError::HandlesOutOfMemory { .. }) => {}
+        Err(error) => return Err(name_file(&error, args)),
     }
     let handle_count = args.solver.handle_count.map(u32::try_from).transpose();
     let report_file = begin(args)?;
@@ -87,7 +94,8 @@ fn elsewhere(args: &EncodeArgs, address: &str, rest: &Model, cage: &Cage, clock:
         handles: Some(options.handles.name().to_owned()),
         handle_count: handle_count.context("--handle-count: is larger than any number of points")?,
         regularizer: Some(options.regularizer.name().to_owned()),
-        spectrum: Some(options.spectrum as u32),
+        // Where there is a threshold it was checked; where there is none, none is used.
+        spectrum: Some(u32::try_from(options.spectrum).unwrap_or(u32::MAX)),
         lambda: Some(options.lambda),
         flip_cage: args.flip_cage,
         frame_rate: frames.frame_rate(),
@@ -134,6 +142,7 @@ fn finish(args: &EncodeArgs, encoded: Encoded, report_file: Option<AtomicFile>, 
 fn name_files(error: encode::EncodeError, args: &EncodeArgs) -> anyhow::Error {
     match error {
         encode::EncodeError::Prepare(inner) => name_file(&inner, args),
+        error @ encode::EncodeError::EndsEarly { .. } => anyhow::anyhow!("{}: {error}", args.frames.display()),
         other => other.into(),
     }
 }
@@ -220,12 +229,17 @@ fn matrix(args: &SolverArgs) -> Result<Option<SparseMatrix>> {
 
 fn spectrum_bound(args: &SolverArgs) -> Result<f64> {
     const USUAL: f64 = 0.05;
+    // Errors a hundred times as large are no encoding of the capture any more.
+    const MOST: f64 = 100.0;
     match args.spectrum_bound {
         Some(_) if args.spectrum != Some(SpectrumArg::Auto) => {
             bail!("--spectrum-bound: only --spectrum auto looks at it; leave it out or choose automatically")
         }
         Some(bound) if !(bound.is_finite() && bound >= 0.0) => {
             bail!("--spectrum-bound: is {bound}; give a finite fraction of at least 0")
+        }
+        Some(bound) if bound > MOST => {
+            bail!("--spectrum-bound: is {bound:e}; give a fraction of at most {MOST}, such as 0.05 for 5 %")
         }
         bound => Ok(bound.unwrap_or(USUAL)),
     }

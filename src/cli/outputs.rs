@@ -15,10 +15,7 @@ pub(super) fn refuse_overwriting<'a>(
         let Ok(place) = output.canonicalize() else { continue };
         for input in &inputs {
             if input.canonicalize().is_ok_and(|input| input == place) {
-                bail!(
-                    "{}: is an input of this encoding, so it cannot be an output; name another file",
-                    output.display()
-                );
+                bail!("{}: is an input, so it cannot be an output; name another file", output.display());
             }
         }
         // It may be a frame of the folder or pattern; no container or report has such a name.
@@ -32,7 +29,7 @@ pub(super) fn refuse_overwriting<'a>(
     };
     let second = report.and_then(place);
     if second.is_some() && second == place(output) {
-        bail!("{}: cannot hold both the capture and the report; name two files", output.display());
+        bail!("{}: cannot hold both outputs; name two files", output.display());
     }
     Ok(())
 }

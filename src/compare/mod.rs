@@ -46,6 +46,8 @@ pub(crate) struct Job<'a> {
     pub(crate) rest: &'a Model,
     /// Checked cage around it.
     pub(crate) cage: &'a Cage,
+    /// Whether the cage was turned inside out after it was read.
+    pub(crate) flip_cage: bool,
     /// Begins reading the capture.
     pub(crate) open: &'a dyn Fn() -> Result<Box<dyn FrameReader>, cager_formats::Error>,
     /// Coordinate systems.
@@ -110,6 +112,7 @@ pub(crate) fn compare(job: &Job<'_>, progress: &mut Progress<'_>) -> Result<(Fig
         rest: job.names[0].clone(),
         cage: job.names[1].clone(),
         source: job.names[2].clone(),
+        flip_cage: job.flip_cage,
         points: job.rest.points.len(),
         triangles: mesh.triangles.len(),
         cage_vertices: job.cage.vertices().len(),
@@ -203,6 +206,7 @@ mod tests {
         let job = Job {
             rest: &capture.rest,
             cage: &cage,
+            flip_cage: false,
             open: &open,
             systems,
             frames_at_most: 120,

@@ -12,8 +12,9 @@ use cager_core::inversion::{Analysis, BATCH, Handles, PrepareError, Reading, Sol
 use cager_core::regularize::Regularizer;
 use rayon::prelude::*;
 
-/// Operators of the methods that go through the capture together take at most this much memory, unless one takes more.
-const OPERATOR_BYTES: usize = 640 << 20;
+/// Solvers that go through the capture together take about this much memory beside the coordinates they share: another one is added
+/// as long as they take less.
+const SOLVER_BYTES: usize = 640 << 20;
 /// The same for a batch of frames.
 const BATCH_BYTES: usize = 256 << 20;
 
@@ -85,7 +86,7 @@ pub(super) fn study(
     while subjects.peek().is_some() {
         let mut group = Vec::new();
         let mut bytes = 0;
-        while bytes < OPERATOR_BYTES
+        while bytes < SOLVER_BYTES
             && let Some(subject) = subjects.next()
         {
             let solver = match workshop.solver(&subject) {
@@ -94,7 +95,7 @@ pub(super) fn study(
                 Err(_) if matches!(subject, Subject::Draw(..)) => continue,
                 Err(error) => return Ok(Outcome::Refused(error)),
             };
-            bytes += 8 * solver.operator().nrows() * solver.operator().ncols();
+            bytes += own_bytes(&solver);
             let noisy = matches!(subject, Subject::Noise(_));
             group.push((subject, Track::new(solver, noisy, sample)));
         }
@@ -169,6 +170,12 @@ impl<'a> Workshop<'a> {
             }
         }
     }
+}
+
+/// What a solver holds beside `Φ`, which all solvers of an analysis share.
+fn own_bytes(solver: &Solver) -> usize {
+    let phi = solver.decoder().coordinates();
+    solver.size_bytes() - 4 * phi.nrows() * phi.ncols()
 }
 
 /// Plain inversion.
@@ -264,4 +271,29 @@ fn middling(draws: &[Draw], rows: Vec<Vec<u32>>) -> Option<(String, Vec<u32>)> {
     random.sort_by(|a, b| a.0.totals.l2_mean.total_cmp(&b.0.totals.l2_mean));
     let middle = random.len() / 2;
     random.into_iter().nth(middle).map(|(draw, rows)| (draw.choice.clone(), rows))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cager_core::cage::Cage;
+    use cager_core::coordinates::Green;
+    use cager_core::synthetic::{Capture, Options};
+
+    #[test]
+    fn what_a_solver_iterates_with_counts_as_its_own() {
+        let capture = Capture::new(&Options { points: 400, frames: 2, cage_vertices: 40 });
+        let cage = Cage::new(capture.cage).expect("a cage");
+        let own = |system: &Green| {
+            let analysis = Analysis::new(system, &cage, &capture.rest.points).expect("an analysis");
+            let solver = analysis.solver(SolverOptions::default()).expect("a solver");
+            let columns = solver.decoder().columns();
+            (own_bytes(&solver) - 8 * solver.operator().nrows() * solver.operator().ncols(), columns)
+        };
+        let (free, columns) = own(&Green::Free);
+        assert!(free < 8 * columns * columns, "{free} bytes beside an operator");
+        // The Gram matrix, and in single precision.
+        let (consistent, columns) = own(&Green::Consistent);
+        assert!(consistent > 12 * columns * columns, "{consistent} bytes");
+    }
 }

@@ -29,7 +29,10 @@ pub(crate) async fn get(
 ) -> Result<Response, ApiError> {
     prepared(&service, &session).await?;
     let reading = Arc::clone(&session);
-    let cage = blocking(move || reading.rest_cage()).await??;
+    let cage = {
+        let _one_of_few = service.reading.acquire().await;
+        blocking(move || reading.rest_cage()).await??
+    };
     let (vertices, faces) = (cage.vertices().to_vec(), cage.mesh().triangles.clone());
     let counts = [vertices.len(), faces.len()];
     let mut response = match accept {

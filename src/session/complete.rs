@@ -8,7 +8,7 @@ use super::{Phase, Session};
 use crate::capture::{CaptureWriter, Encoding, StoredError};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{Completion, Content, LogEntry, StoreError};
+use crate::store::{CageFile, Completion, Content, LogEntry, StoreError};
 use cager_core::cage::Cage;
 use cager_proto::container;
 use cager_proto::messages::Complete;
@@ -103,18 +103,24 @@ impl Drop for Sealed<'_> {
 impl Session {
     fn content(&self) -> Result<Content, ApiError> {
         let content = self.store.content(&self.meta.key).map_err(|error| self.storage_error(&error))?;
-        content.ok_or_else(|| match self.is_deleted() {
-            true => super::gone(),
-            false => ApiError::internal(&"the rest pose of a session is gone"),
-        })
+        content.ok_or_else(|| self.content_is_gone())
     }
 
-    /// Reads the rest cage again. Blocks.
+    fn content_is_gone(&self) -> ApiError {
+        match self.is_deleted() {
+            true => super::gone(),
+            false => ApiError::internal(&"the rest pose of a session is gone"),
+        }
+    }
+
+    /// Reads the rest cage again, and nothing of the rest pose. Blocks.
     ///
     /// # Errors
     /// Those of the disk; a session that was deleted.
     pub(crate) fn rest_cage(&self) -> Result<Cage, ApiError> {
-        prepare::read_cage(&self.content()?, &Choices::of(&self.meta.options)?)
+        let file = self.store.content_cage(&self.meta.key).map_err(|error| self.storage_error(&error))?;
+        let CageFile { name, bytes } = file.ok_or_else(|| self.content_is_gone())?;
+        prepare::read_cage(&name, &bytes, &Choices::of(&self.meta.options)?)
     }
 }
 

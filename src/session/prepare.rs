@@ -7,7 +7,7 @@ use crate::problem::{self, ApiError};
 use crate::store::Content;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions};
+use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions, check_options};
 use cager_core::mesh::{Model, TriMesh};
 use cager_core::regularize::{Regularizer, SparseMatrix, Term, TermError};
 use cager_formats::{MeshFormat, read_matrix_bytes, read_model_bytes};
@@ -108,26 +108,29 @@ fn read_matrix(content: &Content, choices: &Choices) -> Result<Option<SparseMatr
 /// Bytes that cannot be read; a cage that cannot be used.
 pub(crate) fn read(content: &Content, choices: &Choices) -> Result<Geometry, ApiError> {
     let rest = read_part("rest", &content.rest_name, &content.rest)?;
-    Ok(Geometry { rest, cage: read_cage(content, choices)?, matrix: read_matrix(content, choices)? })
+    Ok(Geometry {
+        rest,
+        cage: read_cage(&content.cage_name, &content.cage, choices)?,
+        matrix: read_matrix(content, choices)?,
+    })
 }
 
 /// Reads and checks the cage.
 ///
 /// # Errors
 /// As [`read`].
-pub(crate) fn read_cage(content: &Content, choices: &Choices) -> Result<Cage, ApiError> {
-    let model = read_part("cage", &content.cage_name, &content.cage)?;
+pub(crate) fn read_cage(name: &str, bytes: &[u8], choices: &Choices) -> Result<Cage, ApiError> {
+    let model = read_part("cage", name, bytes)?;
     if model.faces.is_empty() {
         return Err(geometry(format!(
-            "{}: has no faces, and a cage is a closed mesh; export the cage with its faces",
-            content.cage_name
+            "{name}: has no faces, and a cage is a closed mesh; export the cage with its faces"
         )));
     }
     let mesh = TriMesh::from(&model);
     let polygon_of = model.faces.polygon_of_triangle();
     Cage::new(if choices.flip_cage { mesh.flipped() } else { mesh }).map_err(|error| {
         let error = error.renumbered(|triangle| polygon_of[triangle] as usize);
-        geometry(format!("{}: {error}", content.cage_name))
+        geometry(format!("{name}: {error}"))
     })
 }
 
@@ -138,6 +141,13 @@ pub(crate) fn read_cage(content: &Content, choices: &Choices) -> Result<Cage, Ap
 pub(crate) fn check(geometry: &Geometry, choices: &Choices, most_bytes: u64) -> Result<(), ApiError> {
     let unknowns = choices.system.unknowns(&geometry.cage);
     let options = choices.solver_options(unknowns);
+    // Too many handles are wrong before they are too large. Where there are too few points, it is not the options' fault.
+    if geometry.rest.points.len() >= unknowns {
+        match check_options(geometry.rest.points.len(), unknowns, options) {
+            Ok(()) | Err(PrepareError::HandlesOutOfMemory { .. }) => {}
+            Err(error) => return Err(refused(&error)),
+        }
+    }
     check_memory(geometry, choices, options, most_bytes)?;
     Solver::check(choices.system, &geometry.cage, &geometry.rest.points, options).map_err(|error| refused(&error))?;
     let Some(matrix) = &geometry.matrix else { return Ok(()) };

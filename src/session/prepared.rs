@@ -5,7 +5,7 @@ use super::prepare::{self, Choices, Geometry};
 use crate::config::ServeConfig;
 use crate::engine::threads;
 use crate::problem::{self, ApiError};
-use crate::store::{Content, ContentKey, Store};
+use crate::store::{CageFile, Content, ContentKey, Store};
 use cager_core::inversion::{Solver, SolverOptions};
 use cager_proto::messages::{CacheUse, PreparationSeconds};
 use std::collections::HashMap;
@@ -226,7 +226,9 @@ impl Solvers {
                 return Ok(None);
             }
         };
-        let cage = prepare::read_cage(&self.content(key)?, choices)?;
+        let file = self.store.content_cage(key).map_err(|error| super::commit::storage_error(&error))?;
+        let CageFile { name, bytes } = file.ok_or_else(deleted)?;
+        let cage = prepare::read_cage(&name, &bytes, choices)?;
         let options = choices.solver_options(choices.system.unknowns(&cage));
         metrics::counter!("cager_cache_total", "result" => "disk").increment(1);
         let total = clock.elapsed().as_secs_f64();
@@ -267,7 +269,7 @@ impl Solvers {
 
     fn content(&self, key: &ContentKey) -> Result<Content, ApiError> {
         let content = self.store.content(key).map_err(|error| super::commit::storage_error(&error))?;
-        content.ok_or_else(|| ApiError::new(problem::SESSION_DELETED, "the session was deleted before it was prepared"))
+        content.ok_or_else(deleted)
     }
 
     /// Stores a solver for after a restart. Blocks. One that cannot be written costs time only.
@@ -296,4 +298,8 @@ impl Solvers {
         }
         metrics::gauge!("cager_cache_bytes", "cache" => "solvers").set(inner.bytes as f64);
     }
+}
+
+fn deleted() -> ApiError {
+    ApiError::new(problem::SESSION_DELETED, "the session was deleted before it was prepared")
 }

@@ -19,6 +19,15 @@ pub struct Content {
     pub matrix: Option<MatrixFile>,
 }
 
+/// A cage as it was uploaded.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CageFile {
+    /// File name, for its ending.
+    pub name: String,
+    /// The file.
+    pub bytes: Vec<u8>,
+}
+
 /// A matrix as it was uploaded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MatrixFile {
@@ -114,6 +123,20 @@ impl Store {
         self.set_aside_if_damaged(&place, found)
     }
 
+    /// The cage of a content alone, by its key: a rest pose may be large. As [`Self::content`] otherwise.
+    ///
+    /// # Errors
+    /// As [`Self::content`].
+    pub fn content_cage(&self, key: &ContentKey) -> Result<Option<CageFile>, StoreError> {
+        let place = self.files().contents().join(key.to_string());
+        let found = self.describe(&place).and_then(|description| {
+            let Some(Description { cage, .. }) = description else { return Ok(None) };
+            let bytes = self.read_content_part(&place, "cage", &cage)?;
+            Ok(Some(CageFile { name: cage.name, bytes }))
+        });
+        self.set_aside_if_damaged(&place, found)
+    }
+
     /// Forgets content; fine where there is none. A prepared solver of the key stays.
     ///
     /// # Errors
@@ -179,17 +202,19 @@ impl Store {
         }
     }
 
+    fn read_content_part(&self, place: &Path, name: &str, part: &Part) -> Result<Vec<u8>, StoreError> {
+        let path = place.join(name);
+        let bytes = self.files().read(&path, part.bytes)?;
+        let bytes = bytes.ok_or_else(|| StoreError::damaged(&path, "it is missing"))?;
+        if bytes.len() as u64 != part.bytes || blake3::hash(&bytes).to_hex().as_str() != part.blake3 {
+            return Err(StoreError::damaged(&path, "its content does not match its checksum"));
+        }
+        Ok(bytes)
+    }
+
     fn read_content(&self, place: &Path) -> Result<Option<Content>, StoreError> {
         let Some(Description { rest, cage, matrix }) = self.describe(place)? else { return Ok(None) };
-        let read = |name: &str, part: &Part| {
-            let path = place.join(name);
-            let bytes = self.files().read(&path, part.bytes)?;
-            let bytes = bytes.ok_or_else(|| StoreError::damaged(&path, "it is missing"))?;
-            if bytes.len() as u64 != part.bytes || blake3::hash(&bytes).to_hex().as_str() != part.blake3 {
-                return Err(StoreError::damaged(&path, "its content does not match its checksum"));
-            }
-            Ok(bytes)
-        };
+        let read = |name: &str, part: &Part| self.read_content_part(place, name, part);
         let matrix =
             matrix.map(|part| Ok(MatrixFile { bytes: read("matrix", &part)?, name: part.name })).transpose()?;
         Ok(Some(Content {

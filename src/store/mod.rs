@@ -36,7 +36,7 @@ mod solver_file;
 #[cfg(test)]
 mod tests;
 
-pub use content::{Content, MatrixFile};
+pub use content::{CageFile, Content, MatrixFile};
 pub use disk::{Disk, LocalDisk};
 pub use error::StoreError;
 pub use log::{FrameLog, LogEntry, LogReader, LogRecord};

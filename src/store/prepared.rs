@@ -44,7 +44,8 @@ impl Store {
         self.files().exists(&self.prepared_path(key)).unwrap_or(false)
     }
 
-    /// A prepared solver, the same to the bit; None where there is none. A damaged one is quarantined and counts as none.
+    /// A prepared solver, the same to the bit; None where there is none. A damaged one is quarantined and counts as none; one of
+    /// another version of the format makes room for that of this version.
     ///
     /// # Errors
     /// What the system says.
@@ -57,6 +58,11 @@ impl Store {
         };
         let found = match solver_file::read(&*file, key) {
             Ok(Found::Solver(solver)) => Ok(*solver),
+            Ok(Found::Other(version)) => {
+                tracing::debug!(%key, version, "a stored solver is of another version of the format and is prepared anew");
+                self.forget_prepared(&place)?;
+                return Ok(None);
+            }
             Ok(Found::Damage(what)) => Err(StoreError::damaged(&place, what)),
             Err(error) => Err(StoreError::of(&place, "read", error)),
         };
@@ -70,6 +76,14 @@ impl Store {
                 Ok(None)
             }
             Err(error) => Err(error),
+        }
+    }
+
+    fn forget_prepared(&self, place: &Path) -> Result<(), StoreError> {
+        let _one_at_a_time = self.publishing();
+        match self.files().disk.remove_file(place) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(StoreError::of(place, "remove", error)),
+            _ => Ok(()),
         }
     }
 

@@ -8,6 +8,7 @@ use cager_core::inversion::{Preparation, Pull, Solver, SolverParts, TiedParts};
 use faer::{Mat, MatRef};
 use std::io;
 
+/// A name, and the version of the format.
 const MAGIC: [u8; 8] = *b"CGRSOLV\x04";
 const COUNTS: usize = 15;
 const NUMBERS: usize = 12;
@@ -25,6 +26,8 @@ const PULL_PLACE: usize = 11;
 /// What a file turned out to be.
 pub(super) enum Found {
     Solver(Box<Solver>),
+    /// Of another version of the format, as an older or newer program writes it; the version is given.
+    Other(u8),
     Damage(String),
 }
 
@@ -156,6 +159,15 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
 pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Found> {
     let bytes = file.length()?;
     let damage = |what: &str| Ok(Found::Damage(what.into()));
+    let mut magic = [0; MAGIC.len()];
+    if bytes >= magic.len() as u64 {
+        file.read_exact_at(&mut magic, 0)?;
+    }
+    // Before anything else: other versions have headers of other lengths.
+    let ([name @ .., version], [our_name @ .., our_version]) = (&magic, &MAGIC);
+    if name == our_name && version != our_version {
+        return Ok(Found::Other(*version));
+    }
     if bytes < HEADER_BYTES as u64 + 4 {
         return damage("it is too short");
     }
@@ -166,7 +178,7 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Found> {
         return damage("its header does not match its checksum");
     }
     if body[..8] != MAGIC {
-        return damage("it is not a solver of this version");
+        return damage("it is not a solver");
     }
     if body[8..40] != key.0 {
         return damage("it is of other content");

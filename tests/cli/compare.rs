@@ -241,6 +241,23 @@ fn a_point_cloud_of_one_frame_is_compared_too() {
     let figures = dir.json("figures.json");
     assert!(method(&figures, "maxvol", "none", 0)["totals"]["spike_mean"].is_null());
     assert!(figures["capture"]["motion_mean"].is_null() && figures["capture"]["triangles"] == 0);
+    // Without time there is another measure, and it is called by its name.
+    assert_eq!(figures["recommendation"]["editing"]["smoothness_of"], "edges");
+    assert!(html.contains("edge's length changes by") || html.contains("edge&#39;s length changes by"), "the measure");
+    assert!(!html.contains("second difference in time is"));
+}
+
+#[test]
+fn the_advised_command_turns_the_cage_as_the_comparison_did() {
+    let (dir, small) = Dir::with_capture();
+    dir.frames("frames.npy", &small.frames[..4]);
+    dir.cager(&format!("{COMPARE} --coordinates mvc")).succeeds();
+    assert!(!String::from_utf8(dir.read("report.html")).expect("UTF-8").contains("--flip-cage"));
+    dir.model("cage.obj", &crate::support::as_model(&small.cage.clone().flipped()));
+    dir.cager(&format!("{COMPARE} --coordinates mvc --flip-cage")).succeeds();
+    let html = String::from_utf8(dir.read("report.html")).expect("UTF-8");
+    assert_eq!(html.matches("--cage cage.obj --flip-cage").count(), 2);
+    assert_eq!(dir.json("figures.json")["recommendation"]["editing"]["smoothness_of"], "second-difference");
 }
 
 #[test]

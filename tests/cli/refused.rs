@@ -383,6 +383,30 @@ fn bad_solver_options_are_refused_by_the_options_name() {
 }
 
 #[test]
+fn bad_solver_options_are_refused_in_the_same_words_before_anything_is_sent() {
+    let (dir, small) = Dir::with_capture();
+    let (m, head) = (small.cage.vertices.len(), "%%MatrixMarket matrix coordinate real general\n");
+    dir.write("wide.mtx", format!("{head}3 {} 1\n1 1 1\n", m + 1));
+    for (options, words) in [
+        ("--lambda nan", ["--lambda", "at least 0"]),
+        ("--lambda inf", ["--lambda", "at least 0"]),
+        ("--lambda -1", ["--lambda", "at least 0"]),
+        ("--spectrum 4294967296", ["--spectrum", "at most"]),
+        ("--spectrum 4294967316", ["--spectrum", "at most"]),
+        ("--handles spread --handle-count 4294967296", ["--handle-count", "points"]),
+        ("--handles rectangular --handle-count 3", ["--handle-count", "unknowns"]),
+        ("--regularizer matrix --regularizer-matrix wide.mtx", ["wide.mtx", "columns"]),
+    ] {
+        let line = format!("{ENCODE} {options}");
+        refused(&dir, &line, &words);
+        // Nobody listens there: what is said is said without asking.
+        let there = format!("{line} --server http://127.0.0.1:9");
+        refused(&dir, &there, &words);
+        assert_eq!(dir.cager(&line).run().stderr, dir.cager(&there).run().stderr, "{options}");
+    }
+}
+
+#[test]
 fn output_that_cannot_be_written_is_refused_before_the_work() {
     let (dir, _) = Dir::with_encoded();
     let line = "encode --rest rest.obj --cage cage.obj --frames frames.npy";
@@ -598,6 +622,10 @@ fn thresholds_that_cannot_be_chosen_are_refused() {
     for bound in ["-0.1", "nan", "inf"] {
         let line = format!("{ENCODE} --spectrum auto --spectrum-bound {bound}");
         refused(&dir, &line, &["--spectrum-bound", "at least 0"]);
+    }
+    for bound in ["1e300", "101"] {
+        let line = format!("{ENCODE} --spectrum auto --spectrum-bound {bound}");
+        refused(&dir, &line, &["--spectrum-bound", "at most 100"]);
     }
     refused(&dir, &format!("{ENCODE} --spectrum-bound 0.1"), &["--spectrum-bound", "--spectrum auto"]);
     refused(

@@ -47,11 +47,13 @@ impl Reading<'_> {
         let m = analysis.phi.ncols();
         check_options(analysis.phi.nrows(), m, options)?;
         let tied = analysis.decoder.tied_normals().is_some();
-        // Where steps follow, the data alone decide by way of them: from a calm start, since a wild one leads to a worse minimum.
+        // Where steps follow, the points alone decide by way of them: from a calm start, since a wild one leads to a worse minimum.
         let calm = tied && follows_points_alone(options);
         let bent = self.bent(if calm { &CageLaplacian } else { term })?;
         let map = if calm {
-            self.map(&bent, Regularizer::Laplacian, SolverOptions::default().spectrum.min(m / 4), 1.0)?
+            let sigma = &self.decomposed.sigma;
+            let wild = sigma.iter().filter(|&&x| x < WILD * sigma[0]).count();
+            self.map(&bent, Regularizer::Laplacian, wild.min(m / 4), 1.0)?
         } else {
             self.map(&bent, options.regularizer, options.spectrum, options.lambda)?
         };
@@ -120,6 +122,9 @@ impl Reading<'_> {
         Pull::Previous { operator, first }
     }
 }
+
+/// Singular values below this fraction of the largest are of directions that the points hardly determine.
+const WILD: f64 = 1e-2;
 
 /// Whether no term and no damping takes part.
 fn follows_points_alone(options: SolverOptions) -> bool {

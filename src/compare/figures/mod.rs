@@ -8,7 +8,7 @@ mod vectors;
 
 pub(crate) use random::{Draw, draws};
 pub(crate) use spectra::Spectra;
-pub(crate) use summary::{Choice, Claim, Recommendation, Verdict, claims, recommend};
+pub(crate) use summary::{Choice, Claim, Recommendation, Smoothness, Verdict, claims, recommend};
 pub(crate) use swaps::{SwapTrace, Swaps};
 pub(crate) use vectors::Vectors;
 
@@ -38,6 +38,8 @@ pub(crate) struct Capture {
     pub(crate) rest: String,
     /// Cage, as given.
     pub(crate) cage: String,
+    /// Whether the cage's faces pointed inwards and were turned.
+    pub(crate) flip_cage: bool,
     /// Frames, as given.
     pub(crate) source: String,
     /// Points of the model, n.

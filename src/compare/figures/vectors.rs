@@ -30,8 +30,25 @@ impl Vectors {
         let tenth = m.div_ceil(10);
         let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
         let (spread_first, spread_last) = (mean(&spread[..tenth]), mean(&spread[m - tenth..]));
-        let mut painted: Vec<usize> = (0..FIRST.min(m)).chain(m.saturating_sub(LAST)..m).collect();
-        painted.dedup();
-        Self { spread, spread_first, spread_last, painted }
+        Self { spread, spread_first, spread_last, painted: painted(m) }
+    }
+}
+
+/// The first and the last of m, each once.
+fn painted(m: usize) -> Vec<usize> {
+    let first = FIRST.min(m);
+    (0..first).chain(m.saturating_sub(LAST).max(first)..m).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::painted;
+
+    #[test]
+    fn no_vector_is_painted_twice() {
+        for m in 1..9 {
+            assert_eq!(painted(m), (0..m).collect::<Vec<_>>());
+        }
+        assert_eq!(painted(10), [0, 1, 2, 5, 6, 7, 8, 9]);
     }
 }

@@ -26,7 +26,7 @@ pub(super) fn section(html: &mut Html, figures: &Figures, systems: &[Shown<'_>])
         html.plots(
             &charts,
             "Error of every measured frame, by method.",
-            "L2 is the root mean square over the model's points, L∞ the largest distance of a point, both in percent of the rest diagonal. Lower is better; a method whose curve lies close to “all points, data alone” loses little to what any cage of this system could reach. Dashed lines are regularised over the whole spectrum or damped.",
+            "L2 is the root mean square over the model's points, L∞ the largest distance of a point, both in percent of the rest diagonal. Lower is better; a method whose curve lies close to “all points, data alone” loses little to what any cage of this system could reach, if the system is linear: with green, whose cages are iterated for, other methods may come lower than it. Dashed lines are regularised over the whole spectrum or damped.",
             "Paper: Figs. 14 and 18.",
         );
         html.table(&table(found));

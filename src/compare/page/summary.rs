@@ -1,7 +1,7 @@
 //! What comes first: the capture, the advice, and the paper's claims.
 
 use super::parts::{Html, Table, percent};
-use crate::compare::figures::{Choice, Figures, Verdict};
+use crate::compare::figures::{Choice, Figures, Smoothness, Verdict};
 use crate::plot::{escaped, grouped};
 
 /// Title, facts and advice.
@@ -28,17 +28,17 @@ pub(super) fn head(figures: &Figures) -> String {
     let bound = format!("{:.0} %", 100.0 * (advice.accurate - 1.0));
     if let Some(choice) = &advice.editing {
         let why = format!(
-            "The smoothest cages among the methods whose mean L2 is at most {bound} above the lowest of the same coordinates: mean L2 {} %, and a cage vertex's mean second difference in time is {} %.",
+            "The smoothest cages among the methods whose mean L2 is at most {bound} above the lowest of the same coordinates: mean L2 {} %, and {}.",
             percent(choice.l2_mean, 3),
-            percent(choice.smoothness, 4)
+            smoothness(choice)
         );
         text.push_str(&card("For cages that people or programs work with", choice, &why, figures));
     }
     if let Some(choice) = &advice.accuracy {
         let why = format!(
-            "The lowest mean L2 of all methods here: {} %; a cage vertex's mean second difference in time is {} %.",
+            "The lowest mean L2 of all methods here: {} %; {}.",
             percent(choice.l2_mean, 3),
-            percent(choice.smoothness, 4)
+            smoothness(choice)
         );
         text.push_str(&card("For the lowest error", choice, &why, figures));
     }
@@ -52,12 +52,23 @@ pub(super) fn head(figures: &Figures) -> String {
     text
 }
 
+fn smoothness(choice: &Choice) -> String {
+    let value = percent(choice.smoothness, 4);
+    match choice.smoothness_of {
+        Smoothness::SecondDifference => format!("a cage vertex's mean second difference in time is {value} %"),
+        Smoothness::Edges => format!(
+            "a cage edge's length changes by {value} % of the mean length of the rest cage's edges on average (no three frames that follow each other were measured, so nothing is known of time)"
+        ),
+    }
+}
+
 fn card(title: &str, choice: &Choice, why: &str, figures: &Figures) -> String {
     let capture = &figures.capture;
     let command = format!(
-        "cager encode --rest {} \\\n  --cage {} \\\n  --frames {} \\\n  {} \\\n  -o out.cager",
+        "cager encode --rest {} \\\n  --cage {}{} \\\n  --frames {} \\\n  {} \\\n  -o out.cager",
         quoted(&capture.rest),
         quoted(&capture.cage),
+        if capture.flip_cage { " --flip-cage" } else { "" },
         quoted(&capture.source),
         choice.flags
     );

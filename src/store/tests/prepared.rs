@@ -86,6 +86,40 @@ fn a_damaged_solver_is_set_aside_and_made_anew() {
 }
 
 #[test]
+fn a_solver_of_another_version_is_made_anew_and_not_called_damaged() {
+    let given = Given::new();
+    let store = given.open().store;
+    store.put_prepared(&KEY, &SOLVER).unwrap();
+    let path = given.root().join(format!("prepared/{KEY}.solver"));
+    let file = std::fs::read(&path).unwrap();
+    for version in [3, 5] {
+        // Other versions have headers of other lengths and contents.
+        for mut other in [file.clone(), file[..30].to_vec(), file[..8].to_vec()] {
+            other[7] = version;
+            std::fs::write(&path, other).unwrap();
+            assert!(store.prepared(&KEY).unwrap().is_none());
+            assert!(!store.has_quarantined().unwrap(), "version {version}");
+            store.put_prepared(&KEY, &SOLVER).unwrap();
+            assert!(store.prepared(&KEY).unwrap().is_some(), "nothing took its place");
+        }
+    }
+}
+
+#[test]
+fn a_cage_is_read_without_its_rest_pose() {
+    let given = Given::new();
+    let store = given.open().store;
+    assert!(store.content_cage(&KEY).unwrap().is_none());
+    store.put_content(&KEY, &content()).unwrap();
+    let place = given.root().join(format!("contents/{KEY}"));
+    std::fs::remove_file(place.join("rest")).unwrap();
+    let found = store.content_cage(&KEY).unwrap().unwrap();
+    assert_eq!((found.name, found.bytes), (content().cage_name, content().cage));
+    std::fs::write(place.join("cage"), b"v 0 0 0").unwrap();
+    assert!(store.content_cage(&KEY).is_err() && store.has_quarantined().unwrap());
+}
+
+#[test]
 fn many_may_put_at_once() {
     let given = Given::new();
     let store = given.open().store;

@@ -2,8 +2,8 @@
 //! read.
 //!
 //! It starts from the cage `C₀` of a linear inversion, that of mean value coordinates, which lies close and has no folded faces, and keeps the
-//! shape that it has as far as the points leave it open. Where the points alone count, `C₀` is regularised all the same and λ small: from a
-//! wild cage the steps end in a worse minimum.
+//! shape that it has as far as the points leave it open. Where the points alone count, λ is small, and `C₀` is regularised all the same in directions
+//! that they hardly determine: from a wild cage the steps end in a worse minimum.
 //!
 //! `E(C) = (v/K) Σ |Φ_v C + Φ_f N(C) − P|² + λ ‖Δ (C − C₀)‖²`, with the cage Laplacian Δ over v vertices and K points read.
 //!

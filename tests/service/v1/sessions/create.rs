@@ -63,6 +63,7 @@ async fn options_that_do_not_fit_the_cage_are_refused_at_once() {
     for (options, words) in [
         (json!({"spectrum": 5000}), vec!["spectrum: ".to_owned(), "5000".to_owned()]),
         (spread(m - 1), vec!["handle_count: ".to_owned(), format!("{m} unknowns")]),
+        (spread(u32::MAX as usize), vec!["handle_count: ".to_owned(), format!("{n} points")]),
         (spread(n + 1), vec!["handle_count: ".to_owned(), format!("{n} points")]),
         (json!({"handles": "maxvol", "handle_count": m}), vec!["handle_count: ".to_owned(), "leave it out".to_owned()]),
         (json!({"handles": "most"}), vec!["handles: ".to_owned(), "maxvol, rectangular, spread, all".to_owned()]),
