@@ -3,6 +3,7 @@
 use super::basis::functions;
 use super::triangle::Triangle;
 use crate::mesh::{Point, distance2_to_triangle};
+use crate::simd::{LANES, Lanes, dot, multiversion};
 use rayon::prelude::*;
 
 /// One element.
@@ -44,23 +45,46 @@ impl Element {
     }
 
     /// Distance over the diameter to the nearest of these points, but for those as good as on it.
-    fn nearness(&self, points: &[Point]) -> f64 {
-        let Triangle { centre, radius, corners, .. } = &self.triangle;
-        let mut nearest = f64::INFINITY;
-        let mut near2 = f64::INFINITY;
-        let least2 = (ON * self.triangle.diameter()).powi(2);
-        for &x in points {
-            let d2: f64 = (0..3).map(|k| (x[k] - centre[k]).powi(2)).sum();
-            if d2 < near2 {
-                let found = distance2_to_triangle(*corners, x);
+    fn nearness(&self, points: &[[Lanes; 3]]) -> f64 {
+        nearest(&self.triangle, points) / self.triangle.diameter()
+    }
+}
+
+multiversion! {
+    /// Distance from a triangle to the nearest of these points, but for those as good as on it.
+    fn nearest(triangle: &Triangle, points: &[[Lanes; 3]]) -> f64 = nearest_generic;
+}
+
+#[inline(always)]
+fn nearest_generic(triangle: &Triangle, points: &[[Lanes; 3]]) -> f64 {
+    let Triangle { centre, radius, corners, .. } = triangle;
+    let mut nearest = f64::INFINITY;
+    let mut near2 = f64::INFINITY;
+    let least2 = (ON * triangle.diameter()).powi(2);
+    for group in points {
+        let r = [group[0] - centre[0], group[1] - centre[1], group[2] - centre[2]];
+        let d2 = dot(&r, &r);
+        if !d2.any(Lanes::splat(near2), |d2, near2| d2 < near2) {
+            continue;
+        }
+        for l in 0..LANES {
+            if d2.0[l] < near2 {
+                let found = distance2_to_triangle(*corners, group.map(|c| c.0[l]));
                 if found < nearest && found >= least2 {
                     nearest = found;
                     near2 = (nearest.sqrt() + radius).powi(2);
                 }
             }
         }
-        nearest.sqrt() / self.triangle.diameter()
     }
+    nearest.sqrt()
+}
+
+/// Points in groups of eight, the last one filled up with points far away.
+fn grouped(points: &[Point]) -> Vec<[Lanes; 3]> {
+    let far = [f64::INFINITY; 3];
+    let group = |points: &[Point]| [0, 1, 2].map(|k| Lanes(std::array::from_fn(|l| points.get(l).unwrap_or(&far)[k])));
+    points.chunks(LANES).map(group).collect()
 }
 
 /// Nearest point, in diameters, from which on each degree is enough.
@@ -79,6 +103,7 @@ const MANY: usize = 1200;
 
 /// The faces of a cage, divided where points are near.
 pub(super) fn elements(faces: &[[Point; 3]], points: &[Point]) -> Vec<Element> {
+    let points = grouped(points);
     let mut waiting: Vec<Element> = faces
         .iter()
         .enumerate()
@@ -90,7 +115,7 @@ pub(super) fn elements(faces: &[[Point; 3]], points: &[Point]) -> Vec<Element> {
         let judged: Vec<Vec<Element>> = waiting
             .into_par_iter()
             .map(|element| {
-                let nearness = element.nearness(points);
+                let nearness = element.nearness(&points);
                 let wanted = ENOUGH.iter().find(|(least, _)| nearness >= *least).map_or(usize::MAX, |e| e.1);
                 let most = element.most();
                 match element.halves() {

@@ -7,19 +7,20 @@
 use super::affine::AffineFit;
 use super::basis::{MAX_FUNCTIONS, functions};
 use super::elements::Unknowns;
+use super::near::{Group, Near};
 use super::potential::{Tables, potentials};
-use super::solve::{Densities, Part};
-use super::surface::{Foot, Side, Surface};
+use super::solve::{Densities, Part, single};
+use super::surface::{Foot, Surface};
 use crate::coordinates::layer::{self, INVERSE_4PI, Layers, group_potentials, write_group};
-use crate::mesh::{self, Point, distance2_to_triangle};
+use crate::mesh::Point;
 use crate::simd::{LANES, Lanes, multiversion};
 use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, MatMut, Par};
+use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
 const TASK_POINTS: usize = 16 * LANES;
 /// High unknowns are felt up to so many radii of their element.
-const FELT: f64 = 6.0;
+const FELT: f64 = 4.0;
 /// Elements with at least this part of the largest share of a change are marked.
 const MAIN: f64 = 0.3;
 
@@ -55,8 +56,9 @@ struct Found {
 /// Working memory of one task.
 struct Scratch {
     layers: layer::Scratch,
-    /// Single layers of the low polynomials, points × unknowns.
-    singles: Mat<f64>,
+    /// Single layers of the low polynomials, points × unknowns, and their products with the densities.
+    singles: Mat<f32>,
+    products: Mat<f32>,
     /// Hat functions' double layers and high densities, and changes, of one lane group by vertex.
     values: Vec<Lanes>,
     change: Vec<Lanes>,
@@ -66,6 +68,7 @@ struct Scratch {
 pub(super) fn evaluate(solution: &Solution<'_>, points: &[Point], feet: &[Foot], tolerance: f64) -> Evaluated {
     let m = solution.layers.vertices().len();
     let near = Near::new(solution, points, feet);
+    let low = single(solution.densities.low.as_ref());
     let mut phi = crate::simd::zeros::<f64>(points.len(), m);
     let found: Vec<Found> = phi
         .as_mut()
@@ -75,10 +78,13 @@ pub(super) fn evaluate(solution: &Solution<'_>, points: &[Point], feet: &[Foot],
             || Scratch {
                 layers: solution.layers.scratch(),
                 singles: Mat::zeros(TASK_POINTS, solution.unknowns.low_count()),
+                products: Mat::zeros(TASK_POINTS, m),
                 values: vec![Lanes::ZERO; m],
                 change: vec![Lanes::ZERO; m],
             },
-            |scratch, (task, rows)| evaluate_task(solution, &near, task * TASK_POINTS, tolerance, rows, scratch),
+            |scratch, (task, rows)| {
+                evaluate_task(solution, low.as_ref(), &near, task * TASK_POINTS, tolerance, rows, scratch)
+            },
         )
         .collect();
     let mut all =
@@ -94,84 +100,16 @@ pub(super) fn evaluate(solution: &Solution<'_>, points: &[Point], feet: &[Foot],
     all
 }
 
-/// Points, and how much of the error at its foot each is freed from.
-struct Near<'a> {
-    points: &'a [Point],
-    feet: &'a [Foot],
-    /// From 0 inside to 1 on the surface.
-    shares: Vec<f64>,
-    /// How far inside of the surface its values are taken.
-    inwards: f64,
-}
-
-impl<'a> Near<'a> {
-    fn new(solution: &Solution<'_>, points: &'a [Point], feet: &'a [Foot]) -> Self {
-        // The error of a density of degree p changes its sign about p times along an element.
-        let reaches: Vec<f64> = solution
-            .unknowns
-            .elements
-            .iter()
-            .map(|element| 0.5 * element.triangle.diameter() / (element.degree + 1) as f64)
-            .collect();
-        let farthest = reaches.iter().copied().fold(0.0, f64::max);
-        let touching = solution.surface.thickness();
-        let share = |foot: &Foot| {
-            if foot.side == Side::On {
-                return 1.0;
-            } else if foot.distance >= farthest {
-                return 0.0;
-            }
-            // All elements that meet at the foot, so that the order of faces does not count.
-            let meet = solution.unknowns.elements.iter().zip(&reaches).filter(|(element, _)| {
-                let triangle = &element.triangle;
-                let apart = mesh::norm([0, 1, 2].map(|k| triangle.centre[k] - foot.place[k]));
-                apart <= triangle.radius + touching
-                    && distance2_to_triangle(triangle.corners, foot.place) <= touching * touching
-            });
-            let reach = meet.map(|(_, &reach)| reach).fold(f64::INFINITY, f64::min);
-            (1.0 - foot.distance / reach).max(0.0).powi(3)
-        };
-        let shares = feet.par_iter().map(share).collect();
-        Self { points, feet, shares, inwards: solution.surface.thickness() }
-    }
-
-    /// Eight points, those places on the surface from which their shares come, just inside, and the shares; the last point again where
-    /// there are no more. Points on the surface need nothing of themselves, which the last lanes say.
-    fn group(&self, first: usize) -> Group {
-        let mut group = Group { x: [Lanes::ZERO; 3], y: [Lanes::ZERO; 3], share: Lanes::ZERO, own: Lanes::ZERO };
-        for l in 0..LANES {
-            let i = (first + l).min(self.points.len() - 1);
-            let (x, foot) = (self.points[i], &self.feet[i]);
-            let on_surface = foot.side == Side::On;
-            group.own.0[l] = if on_surface { 0.0 } else { 1.0 };
-            group.share.0[l] = if on_surface { 0.0 } else { self.shares[i] };
-            for k in 0..3 {
-                group.x[k].0[l] = x[k];
-                let inwards = self.inwards / foot.distance.max(self.inwards);
-                group.y[k].0[l] =
-                    if self.shares[i] > 0.0 { foot.place[k] + inwards * (x[k] - foot.place[k]) } else { x[k] };
-            }
-        }
-        group
-    }
-}
-
-struct Group {
-    x: [Lanes; 3],
-    y: [Lanes; 3],
-    share: Lanes,
-    own: Lanes,
-}
-
 fn evaluate_task(
     solution: &Solution<'_>,
+    low: MatRef<'_, f32>,
     near: &Near<'_>,
     first: usize,
     tolerance: f64,
     mut rows: MatMut<'_, f64>,
     scratch: &mut Scratch,
 ) -> Found {
-    let Solution { layers, densities, .. } = solution;
+    let layers = solution.layers;
     let count = rows.nrows();
     let mut found = Found::default();
     for start in (0..count).step_by(LANES) {
@@ -198,8 +136,13 @@ fn evaluate_task(
             }
         }
     }
-    let singles = scratch.singles.as_ref().subrows(0, count);
-    matmul(rows.as_mut(), Accum::Add, singles, densities.low.as_ref(), 1.0, Par::Seq);
+    // The densities are right to some 1e-3, for which single precision is more than enough; what it loses of linear functions
+    // is put back with the rest.
+    let mut products = scratch.products.as_mut().subrows_mut(0, count);
+    matmul(products.as_mut(), Accum::Replace, scratch.singles.as_ref().subrows(0, count), low, 1.0, Par::Seq);
+    for (row, product) in rows.as_mut().col_iter_mut().zip(products.col_iter()) {
+        faer::zip!(row, product).for_each(|faer::unzip!(row, product)| *row += f64::from(*product));
+    }
     found.correction = solution.affine.complete(rows, near.points[first..first + count].iter().copied());
     found
 }
@@ -240,7 +183,8 @@ fn evaluate_group(solution: &Solution<'_>, group: &Group, start: usize, scratch:
         }
         for k in 0..unknowns.low {
             // Rows beyond the last point are there, and not used.
-            scratch.singles.col_as_slice_mut(e * unknowns.low + k)[start..start + LANES].copy_from_slice(&values[k].0);
+            let column = &mut scratch.singles.col_as_slice_mut(e * unknowns.low + k)[start..start + LANES];
+            column.iter_mut().zip(&values[k].0).for_each(|(single, value)| *single = *value as f32);
         }
         if near {
             for value in &mut values[unknowns.low..functions(degree)] {

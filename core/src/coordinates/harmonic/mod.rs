@@ -18,6 +18,7 @@ mod closed_form;
 mod elements;
 mod evaluate;
 mod galerkin;
+mod near;
 mod patch;
 mod potential;
 mod quadrature;

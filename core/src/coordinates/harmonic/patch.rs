@@ -1,6 +1,6 @@
 //! The high unknowns of one vertex's hat function, together with the low ones of the elements where they matter.
 
-use super::basis::functions;
+use super::basis::{MAX_FUNCTIONS, functions};
 use super::elements::Unknowns;
 use super::galerkin::NearPairs;
 use super::solve::{Active, FELT};
@@ -84,7 +84,7 @@ pub(super) fn patches(
 /// High unknowns of a patch, by element, and what the highest degrees change of all unknowns there.
 pub(super) fn solve_patch(
     near: &NearPairs,
-    far: MatRef<'_, f32>,
+    far: &Mat<f32>,
     unknowns: &Unknowns,
     patch: &[Place],
     residuals: &[Mat<f64>],
@@ -115,18 +115,24 @@ pub(super) fn solve_patch(
         }
     };
     let mut index = vec![usize::MAX; unknowns.elements.len()];
-    for (i, &(e, _)) in patch.iter().enumerate() {
+    let mut rows = vec![[0; MAX_FUNCTIONS]; patch.len()];
+    for (i, (&(e, _), rows)) in patch.iter().zip(&mut rows).enumerate() {
         index[e as usize] = i;
+        rows[..functions(unknowns.elements[e as usize].degree)]
+            .iter_mut()
+            .enumerate()
+            .for_each(|(k, r)| *r = place(i, k));
     }
-    let fill = |a: &mut MatMut<'_, f64>| {
+    // The lower triangle, by columns.
+    let fill = |a: &mut [f64]| {
         for (j, &(f, _)) in patch.iter().enumerate() {
             let f = f as usize;
             for c in 0..l {
-                for (i, &(e, _)) in patch.iter().enumerate().skip(j) {
-                    let e = e as usize;
-                    for r in 0..l {
-                        a[(i * l + r, j * l + c)] = f64::from(far[(e * l + r, f * l + c)]);
-                    }
+                let from = far.col_as_slice(f * l + c);
+                let column = &mut a[(j * l + c) * count..][..count];
+                for (&(e, _), to) in patch.iter().zip(column.chunks_exact_mut(l)).skip(j) {
+                    let entries = &from[e as usize * l..][..l];
+                    to.iter_mut().zip(entries).for_each(|(to, entry)| *to = f64::from(*entry));
                 }
             }
             for (other, entries, transposed) in near.of(f) {
@@ -136,36 +142,38 @@ pub(super) fn solve_patch(
                     continue;
                 }
                 let entries = if transposed { entries } else { entries.transpose() };
-                for c in 0..entries.ncols() {
-                    for r in 0..entries.nrows() {
-                        let (row, column) = (place(i, r), place(j, c));
-                        a[(row.max(column), row.min(column))] = entries[(r, c)];
+                for (c, entries) in entries.col_iter().enumerate() {
+                    for (entry, row) in entries.iter().zip(&rows[i]) {
+                        let (row, column) = (*row, rows[j][c]);
+                        a[row.max(column) + count * row.min(column)] = *entry;
                     }
                 }
             }
         }
     };
-    let mut a = zeroed(memory, count, count);
+    zeroed(memory, count, count);
     let definite = DAMPING.iter().any(|&part| {
-        fill(&mut a);
+        fill(memory);
+        let mut a = MatMut::from_column_major_slice_mut(memory, count, count);
         damp(a.as_mut(), part);
-        factor(a.as_mut(), Par::Seq).is_some()
+        factor(a, Par::Seq).is_some()
     });
     if !definite {
         return None;
     }
+    let a = MatRef::from_column_major_slice(memory, count, count);
     let mut x = Mat::<f64>::zeros(count, 2);
     for (i, &(e, column)) in patch.iter().enumerate() {
         for (k, &value) in residuals[e as usize].col(column as usize).iter().enumerate() {
             x[(place(i, l + k), 0)] = value;
         }
     }
-    triangular_solve::solve_lower_triangular_in_place(a.as_ref(), x.as_mut().subcols_mut(0, 1), Par::Seq);
+    triangular_solve::solve_lower_triangular_in_place(a, x.as_mut().subcols_mut(0, 1), Par::Seq);
     // The coarse unknowns are those of the leading parts of the factor and of this vector; the difference comes of the rest.
     for i in coarse..count {
         x[(i, 1)] = x[(i, 0)];
     }
-    triangular_solve::solve_upper_triangular_in_place(a.as_ref().transpose(), x.as_mut(), Par::Seq);
+    triangular_solve::solve_upper_triangular_in_place(a.transpose(), x.as_mut(), Par::Seq);
     let mut high = Vec::new();
     let mut change = Vec::new();
     for (i, &(e, _)) in patch.iter().enumerate() {

@@ -35,7 +35,7 @@ pub(super) struct Densities {
 }
 
 /// A matrix in single precision.
-fn single(a: MatRef<'_, f64>) -> Mat<f32> {
+pub(super) fn single(a: MatRef<'_, f64>) -> Mat<f32> {
     let mut out = crate::simd::zeros::<f32>(a.nrows(), a.ncols());
     out.as_mut().par_col_iter_mut().zip(a.par_col_iter()).for_each(|(out, a)| {
         faer::zip!(out, a).for_each(|faer::unzip!(out, a)| *out = *a as f32);
@@ -94,7 +94,7 @@ pub(super) fn solve(
         }
         let found: Option<Vec<(Vec<f64>, Vec<f64>)>> = patches
             .par_iter()
-            .map_init(Vec::new, |memory, patch| solve_patch(&near, far.as_ref(), unknowns, patch, &residuals, memory))
+            .map_init(Vec::new, |memory, patch| solve_patch(&near, &far, unknowns, patch, &residuals, memory))
             .collect();
         let found = found?;
         for (patch, (step, _)) in patches.iter().zip(&found) {
