@@ -114,11 +114,10 @@ def times(runs):
 def errors(runs):
     rows = []
     for run in runs:
-        least = run.total(ALL, "l2_mean")
-        cells = []
-        for _, handles, regularizer, s in METHODS:
-            l2 = run.total((handles, regularizer, s), "l2_mean")
-            cells.append("–" if l2 is None else f"{percent(l2, 3)} ({l2 / least:.2f})")
+        found = [run.total((handles, regularizer, s), "l2_mean") for _, handles, regularizer, s in METHODS]
+        # Ratios say nothing where least squares itself is lost to rounding.
+        least = found[0] if found[0] < 2 * min(l2 for l2 in found if l2 is not None) else None
+        cells = [percent(l2, 3) + (f" ({l2 / least:.2f})" if l2 is not None and least else "") for l2 in found]
         rows.append(run.where() + cells)
     return table(["capture", "cage", "system"] + [title for title, *_ in METHODS], rows)
 

@@ -10,8 +10,9 @@ use serde::Serialize;
 const CONDITIONS: usize = 40;
 /// From more coordinates than this, the search with a random start takes evenly spaced points: it needs many swaps.
 const MOST_ENTRIES: usize = 6_000_000;
-/// Points drawn for a random start, as multiples of the unknowns: among few there may be no independent ones.
-const DRAWN: [usize; 6] = [2, 3, 4, 6, 8, 16];
+/// Points drawn for a random start, as multiples of the unknowns: among few there may be no independent ones, and all of them
+/// would be no draw.
+const DRAWN: [usize; 7] = [2, 3, 4, 5, 6, 8, 16];
 
 /// Both searches.
 #[derive(Clone, Debug, Serialize)]
@@ -58,8 +59,8 @@ fn from_random(analysis: &Analysis) -> Option<SwapTrace> {
     }
     let rows_of = |rows: &[u32]| Mat::from_fn(rows.len(), m, |i, j| phi[(rows[i] as usize, j)]);
     let some = rows_of(&rows);
-    let found = DRAWN.iter().find_map(|times| {
-        let drawn = Random::new(0).choose((times * m).min(rows.len()), rows.len());
+    let found = DRAWN.iter().map(|times| times * m).take_while(|&count| count < rows.len()).find_map(|count| {
+        let drawn = Random::new(0).choose(count, rows.len());
         let of_rows: Vec<u32> = drawn.iter().map(|&i| rows[i as usize]).collect();
         let start = maxvol(rows_of(&of_rows).as_ref(), TOLERANCE).ok()?.start;
         maxvol_from(some.as_ref(), start.iter().map(|&i| drawn[i as usize]).collect(), TOLERANCE).ok()
