@@ -36,9 +36,16 @@ pub(super) struct Densities {
 
 /// A matrix in single precision.
 pub(super) fn single(a: MatRef<'_, f64>) -> Mat<f32> {
+    single_from(a, |_| 0)
+}
+
+/// The same from the row on that belongs to each column; zeros above.
+fn single_from(a: MatRef<'_, f64>, first: impl Fn(usize) -> usize + Sync) -> Mat<f32> {
     let mut out = crate::simd::zeros::<f32>(a.nrows(), a.ncols());
-    out.as_mut().par_col_iter_mut().zip(a.par_col_iter()).for_each(|(out, a)| {
-        faer::zip!(out, a).for_each(|faer::unzip!(out, a)| *out = *a as f32);
+    out.as_mut().par_col_iter_mut().zip(a.par_col_iter()).enumerate().for_each(|(j, (out, a))| {
+        let first = first(j);
+        faer::zip!(out.subrows_mut(first, a.nrows() - first), a.subrows(first, a.nrows() - first))
+            .for_each(|faer::unzip!(out, a)| *out = *a as f32);
     });
     out
 }
@@ -59,8 +66,9 @@ pub(super) fn solve(
 ) -> Option<Densities> {
     let par = Par::rayon(0);
     let m = b.low.ncols();
-    // The factor takes the place of the matrix, of which the patches need entries between elements that are not near.
-    let far = single(operator.low.as_ref());
+    // The factor takes the place of the matrix, of which the patches need entries between elements that are not near, those on and
+    // below the diagonal.
+    let far = single_from(operator.low.as_ref(), |j| j - j % unknowns.low);
     let mut lower = operator.low;
     let damped = |part: &f64| {
         if *part > 0.0 {
@@ -160,36 +168,31 @@ fn residual(
     let l = unknowns.low;
     (0..unknowns.elements.len())
         .into_par_iter()
-        .map_init(<[Vec<f64>; 2]>::default, |[a, x], e| {
+        .map_init(Vec::new, |memory, e| {
             let mine = unknowns.high(e);
             let vertices = &high[e].vertices;
             let mut r = Mat::from_fn(mine.len(), vertices.len(), |k, c| b.high[(mine.start + k, vertices[c] as usize)]);
-            let count: usize = near.of(e).map(|(other, _, _)| functions(unknowns.elements[other].degree)).sum();
-            let mut a = zeroed(a, mine.len(), count);
-            let mut x = zeroed(x, count, vertices.len());
-            let mut start = 0;
             for (other, entries, transposed) in near.of(e) {
                 let all = functions(unknowns.elements[other].degree);
                 let entries = if transposed { entries.transpose() } else { entries };
-                a.as_mut().subcols_mut(start, all).copy_from(entries.subrows(l, mine.len()));
                 let theirs = &high[other];
+                let mut x = zeroed(memory, all, vertices.len());
                 let mut at = 0;
-                for (c, &v) in vertices.iter().enumerate() {
+                for (&v, mut x) in vertices.iter().zip(x.as_mut().col_iter_mut()) {
                     for k in 0..l {
-                        x[(start + k, c)] = low[(other * l + k, v as usize)];
+                        x[k] = low[(other * l + k, v as usize)];
                     }
                     while at < theirs.vertices.len() && theirs.vertices[at] < v {
                         at += 1;
                     }
                     if theirs.vertices.get(at) == Some(&v) {
                         for k in l..all {
-                            x[(start + k, c)] = theirs.values[(k - l, at)];
+                            x[k] = theirs.values[(k - l, at)];
                         }
                     }
                 }
-                start += all;
+                matmul(r.as_mut(), Accum::Add, entries.subrows(l, mine.len()), x.as_ref(), -1.0, Par::Seq);
             }
-            matmul(r.as_mut(), Accum::Add, a.as_ref(), x.as_ref(), -1.0, Par::Seq);
             r
         })
         .collect()
