@@ -85,9 +85,9 @@ impl Analysis {
         let (point, error) = reproduction_error(phi.as_ref(), &rest, cage, points);
         refuse_unreproduced(point, error, cage, diagonal)?;
         let (outside, outside_distance) = outside(cage, points, &coordinates.outside, diagonal);
-        let tied = system.tied_normals(cage);
-        let decoder = Decoder::new(phi.as_ref(), cage.vertices().len()).with_tied_normals(tied);
-        if decoder.tied_normals().is_some() {
+        let decoder_of = |phi: &Mat<f64>| Decoder::new(phi.as_ref(), cage.vertices().len());
+        let tied = system.tied_normals(cage).map(|tied| decoder_of(&phi).with_tied_normals(Some(tied)));
+        if tied.is_some() {
             drop(phi);
             phi = MeanValue.coordinates(cage, points)?.phi;
             rest.truncate(m);
@@ -98,6 +98,8 @@ impl Analysis {
         let no_handles = PrepareError::NoSolution { what: "choice of handles" };
         let mut basis = row_basis(phi.as_ref()).ok_or(no_handles.clone())?;
         let maxvol_seconds = clock.elapsed().as_secs_f64();
+        // Not before: maxvol takes the most memory.
+        let decoder = tied.unwrap_or_else(|| decoder_of(&phi));
 
         let clock = Instant::now();
         let mut spectra = Spectra::of(&basis, whole_frames)?;
