@@ -16,6 +16,8 @@ use tokio::sync::OwnedSemaphorePermit;
 pub(crate) const ENVELOPE_BYTES: u64 = 1 << 20;
 const OPTIONS_BYTES: usize = 64 << 10;
 const NAME_CHARACTERS: usize = 200;
+/// The part with the matrix of the regularizer of that name.
+const MATRIX: &str = "regularizer_matrix";
 /// Memory is asked for in pieces of this many bytes: small ones, so that hundreds of small models have room at the same time.
 const PIECE: u64 = 64 << 10;
 
@@ -100,7 +102,7 @@ async fn read_parts(service: &Service, mut body: Multipart) -> Result<Parts, Api
         let part = field.name().unwrap_or_default().to_owned();
         let twice = || bad(format!("part {part:?} is there twice; send it once"));
         match part.as_str() {
-            "rest" | "cage" | "regularizer_matrix" => {
+            "rest" | "cage" | MATRIX => {
                 let place = match part.as_str() {
                     "rest" => &mut rest,
                     "cage" => &mut cage,
@@ -140,7 +142,9 @@ async fn read_file(service: &Service, part: &str, mut field: Field<'_>, left: &m
     // Some clients send a path; only the name and its extension matter.
     let name: String =
         name.rsplit(['/', '\\']).next().unwrap_or_default().chars().filter(|c| !c.is_control()).collect();
-    if !name.contains('.') || name.chars().count() > NAME_CHARACTERS {
+    // There is one format of matrices, so that their names say nothing.
+    let name = if part == MATRIX && name.is_empty() { format!("{MATRIX}.mtx") } else { name };
+    if !(name.contains('.') || part == MATRIX) || name.chars().count() > NAME_CHARACTERS {
         let detail = format!("part {part:?} needs a file name whose extension says the format, such as rest.obj");
         return Err(bad(detail));
     }

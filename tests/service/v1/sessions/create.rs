@@ -106,10 +106,11 @@ async fn a_matrix_of_the_users_own_is_a_part_of_its_own() {
     let twice = with(matrix(m, "1")).part("regularizer_matrix", file("d.mtx", &matrix(m, "1")));
     app.create_with(twice, None).await.problem(400, "bad-request");
 
-    // Another matrix is another solver; the same again is found prepared.
+    // Another matrix is another solver; the same again is found prepared, whatever its name.
     let mut cages = Vec::new();
-    for value in ["1", "2", "1"] {
-        let session: Session = app.create_with(with(matrix(m, value)), None).await.expect(201).json();
+    for (value, name) in [("1", "d.mtx"), ("2", "d.mtx"), ("1", "differences")] {
+        let named = form(capture, &options).part("regularizer_matrix", file(name, &matrix(m, value)));
+        let session: Session = app.create_with(named, None).await.expect(201).json();
         let session = app.prepared(&session.id).await;
         assert_eq!(session.regularizer, "matrix");
         app.upload(&session.id, 0, capture.raw(0..2)).await;
