@@ -123,8 +123,9 @@ pub(super) fn solve_patch(
             .enumerate()
             .for_each(|(k, r)| *r = place(i, k));
     }
-    // The lower triangle, by columns.
+    // The lower triangle, by columns. High unknowns of elements that are not near do not feel each other.
     let fill = |a: &mut [f64]| {
+        a.fill(0.0);
         for (j, &(f, _)) in patch.iter().enumerate() {
             let f = f as usize;
             for c in 0..l {
@@ -151,7 +152,7 @@ pub(super) fn solve_patch(
             }
         }
     };
-    zeroed(memory, count, count);
+    memory.resize(count * count, 0.0);
     let definite = DAMPING.iter().any(|&part| {
         fill(memory);
         let mut a = MatMut::from_column_major_slice_mut(memory, count, count);
