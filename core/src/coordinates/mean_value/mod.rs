@@ -7,6 +7,8 @@
 //! affine reproduction depends only on the three-by-three solves. What rounding leaves too little of is computed again in
 //! 192 bits.
 
+mod gradient;
+
 use super::doubt::{Mended, TOLERANCE, is_kept, is_unreliable, mend_thin};
 use super::{CoordinateSystem, Coordinates, CoordinatesError, careful};
 use crate::cage::{Cage, Edge};
