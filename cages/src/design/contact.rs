@@ -1,0 +1,250 @@
+//! Moves of a cage that keep it enclosing and free of self-intersection.
+//!
+//! Before each move, all pairs of features that are near each other are found: points of the model and faces, vertices and faces, edges
+//! and edges, and each face's corners and opposite edges. A wished move is first corrected until it keeps every pair, linearised, at its
+//! least distance. Then each vertex is held to a share of the distance of every pair that it belongs to, less than half where both sides
+//! move, so that no pair can meet: a cage that is valid before a move is valid after it.
+
+use super::symmetry::Symmetry;
+use crate::geometry::distance::{closest_on_segment, closest_on_segments, closest_on_triangle};
+use crate::geometry::{Aabb, Bvh, Surface, triangles_intersect};
+use cager_core::cage::Cage;
+use cager_core::mesh::TriMesh;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Of the distance of a pair both of whose sides move, and of one to a point at rest, what each side may use up in one move.
+const SHARE: f64 = 0.45;
+const SHARE_OF_REST: f64 = 0.9;
+/// Of its own distance, what a corner may use up that is not at the nearest point: then no point between it and one that is can meet the
+/// other feature either, since `0.9 + 0.4 t ≤ √(1 + t²)` for all t.
+const SHARE_OF_FAR: f64 = 0.2;
+/// Sweeps of corrections.
+const SWEEPS: usize = 4;
+
+/// Least distances, in the model's unit.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Distances {
+    /// Between the model's points and faces.
+    pub(super) clearance: f64,
+    /// Between parts of the cage; `None` where it may cut itself.
+    pub(super) gap: Option<f64>,
+}
+
+/// What a cage must keep away from.
+pub(super) struct Obstacles {
+    points: Vec<DVec3>,
+    tree: Bvh,
+    distances: Distances,
+    symmetry: Option<Symmetry>,
+}
+
+/// Two features that are near each other: their distance is `normal · (Σ weight x)`, less `at_rest`, with x the cage's vertices.
+struct Pair {
+    /// Its vertices, the first `used` of them.
+    vertices: [u32; 4],
+    used: usize,
+    weights: [f64; 4],
+    normal: DVec3,
+    at_rest: f64,
+    distance: f64,
+    least: f64,
+    share: f64,
+}
+
+impl Obstacles {
+    /// Whether a collapse leaves the cage valid: its new faces cut no other one, and no point of the model passes to the other side.
+    pub(super) fn allow(&self, mesh: &TriMesh, old: &[[u32; 3]], new: &[[u32; 3]]) -> bool {
+        let at = |t: [u32; 3]| t.map(|v| DVec3::from(mesh.vertices[v as usize]));
+        let around = Aabb::around(old.iter().flat_map(|&t| at(t)));
+        if self.distances.gap.is_some() {
+            let kept = mesh.triangles.iter().filter(|t| !old.contains(t));
+            let near: Vec<[u32; 3]> = kept.copied().filter(|&t| Aabb::around(at(t)).overlaps(&around)).collect();
+            let cuts = |f: [u32; 3], g: [u32; 3]| triangles_intersect([f, g], [at(f), at(g)]);
+            let among = |(i, &f): (usize, &[u32; 3])| new[..i].iter().any(|&g| cuts(f, g));
+            if new.iter().any(|&f| near.iter().any(|&g| cuts(f, g))) || new.iter().enumerate().any(among) {
+                return false;
+            }
+        }
+        // Old faces and new ones turned around enclose what changes sides.
+        let between = old.iter().copied().chain(new.iter().map(|&[a, b, c]| [a, c, b])).collect();
+        let vertices = mesh.vertices.iter().map(|&v| v.into()).collect();
+        let between = Surface::new(vertices, between);
+        self.tree.visit(&around, |i| {
+            let p = self.points[i as usize];
+            between.winding(p) == 0 && between.distance_within(p, 0.25 * self.distances.clearance).is_none()
+        })
+    }
+
+    pub(super) fn new(points: Vec<DVec3>, distances: Distances, symmetry: Option<Symmetry>) -> Self {
+        let boxes: Vec<Aabb> = points.iter().map(|&p| Aabb { low: p, high: p }).collect();
+        Self { tree: Bvh::new(&boxes), points, distances, symmetry }
+    }
+
+    /// The cage's vertices after a move that is as near to the wished one as the obstacles allow.
+    pub(super) fn moved(&self, cage: &Cage, wishes: &[DVec3]) -> Vec<DVec3> {
+        let x: Vec<DVec3> = cage.vertices().iter().map(|&v| v.into()).collect();
+        let longest = wishes.iter().map(|w| w.length()).fold(0.0, f64::max);
+        let reach = (2.0 * longest).max(self.distances.gap.unwrap_or(0.0)).max(self.distances.clearance) / SHARE;
+        let pairs = self.pairs(cage, &x, reach);
+        let mut moves = wishes.to_vec();
+        for _ in 0..SWEEPS {
+            for pair in &pairs {
+                pair.correct(&x, &mut moves);
+            }
+        }
+        let mut most = vec![SHARE * reach; x.len()];
+        for pair in &pairs {
+            let middle = pair.middle(&x);
+            for k in 0..pair.used {
+                let v = pair.vertices[k] as usize;
+                // What takes no part in the nearest points is farther away, and may move by more.
+                let own = if pair.weights[k] == 0.0 {
+                    SHARE_OF_FAR * (x[v].distance(middle) - 0.5 * pair.distance).max(pair.distance)
+                } else {
+                    pair.share * pair.distance
+                };
+                most[v] = most[v].min(own);
+            }
+        }
+        if let Some(symmetry) = &self.symmetry {
+            symmetry.apply(&mut moves, &mut most);
+        }
+        let limited =
+            moves.iter().zip(&most).map(|(m, &most)| *m * (most / m.length().max(f64::MIN_POSITIVE)).min(1.0));
+        x.iter().zip(limited).map(|(&x, m)| x + m).collect()
+    }
+
+    fn pairs(&self, cage: &Cage, x: &[DVec3], reach: f64) -> Vec<Pair> {
+        let faces = cage.faces();
+        let corners = |f: usize| faces[f].vertices.map(|v| x[v as usize]);
+        let boxes: Vec<Aabb> = (0..faces.len()).map(|f| Aabb::around(corners(f))).collect();
+        let with_points = |f: usize| {
+            let mut found = Vec::new();
+            self.tree.visit(&boxes[f].grown(reach), |i| {
+                let p = self.points[i as usize];
+                found.extend(self.with_point(p, faces[f].vertices, corners(f), reach));
+                true
+            });
+            found.sort_by(|a: &Pair, b| a.distance.total_cmp(&b.distance));
+            found
+        };
+        let mut pairs: Vec<Pair> =
+            (0..faces.len()).into_par_iter().with_min_len(32).flat_map_iter(with_points).collect();
+        let Some(least) = self.distances.gap else { return pairs };
+        let limits = Limits { reach, least };
+        let tree = Bvh::new(&boxes);
+        let ends = |e: usize| cage.edges()[e].vertices.map(|v| x[v as usize]);
+        let edge_boxes: Vec<Aabb> = (0..cage.edges().len()).map(|e| Aabb::around(ends(e))).collect();
+        let edge_tree = Bvh::new(&edge_boxes);
+        let with_faces = |v: usize| {
+            let mut found = Vec::new();
+            tree.visit(&Aabb { low: x[v], high: x[v] }.grown(reach), |f| {
+                let vertices = faces[f as usize].vertices;
+                if !vertices.contains(&(v as u32)) {
+                    found.extend(limits.with_face(v, x[v], vertices, corners(f as usize)));
+                }
+                true
+            });
+            found
+        };
+        let with_edges = |e: usize| {
+            let [a, b] = cage.edges()[e].vertices;
+            let mut found = Vec::new();
+            edge_tree.visit(&edge_boxes[e].grown(reach), |other| {
+                let [c, d] = cage.edges()[other as usize].vertices;
+                if other as usize > e && a != c && a != d && b != c && b != d {
+                    found.extend(limits.with_edge([a, b, c, d], ends(e), ends(other as usize)));
+                }
+                true
+            });
+            found
+        };
+        let in_face = |f: usize| (0..3).filter_map(move |i| limits.in_face(faces[f].vertices, corners(f), i));
+        pairs.par_extend((0..x.len()).into_par_iter().with_min_len(32).flat_map_iter(with_faces));
+        pairs.par_extend((0..cage.edges().len()).into_par_iter().with_min_len(32).flat_map_iter(with_edges));
+        pairs.extend((0..faces.len()).flat_map(in_face));
+        pairs
+    }
+
+    fn with_point(&self, p: DVec3, vertices: [u32; 3], corners: [DVec3; 3], reach: f64) -> Option<Pair> {
+        let weights = closest_on_triangle(p, corners);
+        let nearest = weights[0] * corners[0] + weights[1] * corners[1] + weights[2] * corners[2];
+        let distance = nearest.distance(p);
+        let normal = (nearest - p) / distance;
+        (distance < reach && normal.is_finite()).then(|| Pair {
+            vertices: [vertices[0], vertices[1], vertices[2], 0],
+            weights: [weights[0], weights[1], weights[2], 0.0],
+            used: 3,
+            normal,
+            at_rest: normal.dot(p),
+            distance,
+            least: self.distances.clearance,
+            share: SHARE_OF_REST,
+        })
+    }
+}
+
+/// How near two moving features must be to count as a pair, and their least distance.
+#[derive(Clone, Copy)]
+struct Limits {
+    reach: f64,
+    least: f64,
+}
+
+impl Limits {
+    fn with_face(self, v: usize, p: DVec3, t: [u32; 3], corners: [DVec3; 3]) -> Option<Pair> {
+        let w = closest_on_triangle(p, corners);
+        let nearest = w[0] * corners[0] + w[1] * corners[1] + w[2] * corners[2];
+        self.pair(([v as u32, t[0], t[1], t[2]], 4), [1.0, -w[0], -w[1], -w[2]], p - nearest)
+    }
+
+    fn with_edge(self, vertices: [u32; 4], first: [DVec3; 2], second: [DVec3; 2]) -> Option<Pair> {
+        let (s, t) = closest_on_segments(first, second);
+        let apart = first[0].lerp(first[1], s) - second[0].lerp(second[1], t);
+        self.pair((vertices, 4), [1.0 - s, s, t - 1.0, -t], apart)
+    }
+
+    /// Corner i and the edge opposite.
+    fn in_face(self, t: [u32; 3], corners: [DVec3; 3], i: usize) -> Option<Pair> {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        let s = closest_on_segment(corners[i], corners[j], corners[k]);
+        let apart = corners[i] - corners[j].lerp(corners[k], s);
+        self.pair(([t[i], t[j], t[k], 0], 3), [1.0, s - 1.0, -s, 0.0], apart)
+    }
+
+    fn pair(self, (vertices, used): ([u32; 4], usize), weights: [f64; 4], apart: DVec3) -> Option<Pair> {
+        let distance = apart.length();
+        let normal = apart / distance;
+        let found = Pair { vertices, used, weights, normal, at_rest: 0.0, distance, least: self.least, share: SHARE };
+        (distance < self.reach && normal.is_finite()).then_some(found)
+    }
+}
+
+impl Pair {
+    /// The middle between the nearest points.
+    fn middle(&self, x: &[DVec3]) -> DVec3 {
+        let ahead = |k: &usize| self.weights[*k] > 0.0;
+        let nearest: DVec3 = (0..self.used).filter(ahead).map(|k| self.weights[k] * x[self.vertices[k] as usize]).sum();
+        nearest - 0.5 * self.distance * self.normal
+    }
+
+    /// Changes moves as little as brings the pair to its least distance.
+    fn correct(&self, x: &[DVec3], moves: &mut [DVec3]) {
+        let place = |k: usize| x[self.vertices[k] as usize] + moves[self.vertices[k] as usize];
+        let distance: f64 = (0..4)
+            .filter(|&k| self.weights[k] != 0.0)
+            .map(|k| self.weights[k] * self.normal.dot(place(k)))
+            .sum::<f64>()
+            - self.at_rest;
+        let missing = self.least - distance;
+        if missing > 0.0 {
+            let sum: f64 = self.weights.iter().map(|w| w * w).sum();
+            for k in 0..4 {
+                if self.weights[k] != 0.0 {
+                    moves[self.vertices[k] as usize] += self.normal * (self.weights[k] * missing / sum);
+                }
+            }
+        }
+    }
+}

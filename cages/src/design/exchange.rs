@@ -1,0 +1,146 @@
+//! Where a cage's vertices serve the motion best: splits of edges that would lower the error most, and vertices whose loss would raise
+//! it least.
+
+use super::contact::Obstacles;
+use super::fit::{Fit, solve, transposed_product};
+use super::topology::{self, Collapse, Neighbours};
+use cager_core::cage::Cage;
+use cager_core::coordinates::MeanValue;
+use cager_core::mesh::{Point, TriMesh};
+use faer::Mat;
+use glam::DVec3;
+
+/// A cage whose vertices lie elsewhere.
+pub(super) struct Exchange {
+    pub(super) mesh: TriMesh,
+    /// Which vertex each was before; those beyond the old ones are new.
+    pub(super) kept: Vec<u32>,
+}
+
+/// Splits the most useful edges and merges the least useful vertices into neighbours, up to a share of all of them, while a split gains more
+/// than a merger costs; beyond that as many as bring the cage towards `goal` vertices.
+pub(super) fn exchange(
+    cage: &Cage,
+    points: &[Point],
+    phi: &Mat<f64>,
+    fit: &Fit,
+    obstacles: &Obstacles,
+    share: f64,
+    goal: usize,
+) -> Exchange {
+    let mesh = cage.mesh();
+    let m = mesh.vertices.len();
+    let most = ((share * m as f64) as usize).max(1);
+    let (grow, shrink) = (goal.saturating_sub(m), m.saturating_sub(goal));
+    let neighbours = Neighbours::new(mesh);
+    let gains = gains(cage, points, phi, fit);
+    let costs = costs(mesh, &neighbours, fit);
+    let mut touched = vec![false; m];
+
+    let mut edges: Vec<usize> = (0..gains.len()).collect();
+    edges.sort_by(|&a, &b| gains[b].total_cmp(&gains[a]));
+    let mut splits: Vec<usize> = Vec::new();
+    for e in edges {
+        let ends = cage.edges()[e].vertices;
+        if splits.len() == most.max(grow.min(m / 4)) {
+            break;
+        }
+        if !ends.iter().any(|&v| touched[v as usize]) {
+            ends.iter().for_each(|&v| touched[v as usize] = true);
+            splits.push(e);
+        }
+    }
+
+    let mut order: Vec<usize> = (0..m).collect();
+    order.sort_by(|&a, &b| costs[a].total_cmp(&costs[b]));
+    let mut current = mesh.clone();
+    let mut merged: Vec<(u32, u32)> = Vec::new();
+    for v in order {
+        // The split that this merger would pay for.
+        let pays_for = splits.get((grow + merged.len()).saturating_sub(shrink));
+        let pays = merged.len() < shrink || pays_for.is_some_and(|&e| gains[e] > costs[v]);
+        if merged.len() >= most.max(shrink.min(m / 4)) || !pays {
+            break;
+        }
+        let ring = neighbours.of(v);
+        if touched[v] || ring.iter().any(|&w| touched[w as usize]) {
+            continue;
+        }
+        let allowed = |c: &Collapse| obstacles.allow(&current, &c.old, &c.new);
+        if let Some(Collapse { into, old, new, .. }) =
+            topology::collapses(mesh, &neighbours, v).into_iter().find(allowed)
+        {
+            current.triangles.retain(|t| !old.contains(t));
+            current.triangles.extend(new);
+            touched[v] = true;
+            ring.iter().for_each(|&w| touched[w as usize] = true);
+            merged.push((v as u32, into));
+        }
+    }
+    splits.truncate((grow + merged.len()).saturating_sub(shrink));
+    let mut mesh = mesh.clone();
+    for e in splits {
+        topology::split(&mut mesh, cage.edges()[e].vertices);
+    }
+    let (mesh, kept) = topology::merged(&mesh, &merged);
+    Exchange { mesh, kept }
+}
+
+/// For every edge of the cage, by how much a vertex at its middle would lower `‖X − Φ C‖²`.
+///
+/// Splitting an edge leaves the surface as it is and adds one function `b` to those that the cage has, so the error falls by
+/// `‖bᵀ R‖²/‖b − Π b‖²`, with `R` the residual and `Π` the projection on the columns of `Φ`. All edges' functions come from one
+/// subdivision of the whole cage, whose functions have a somewhat smaller support.
+fn gains(cage: &Cage, points: &[Point], phi: &Mat<f64>, fit: &Fit) -> Vec<f64> {
+    let m = cage.vertices().len();
+    let Ok(fine) = Cage::new(topology::subdivided(cage)) else { return vec![0.0; cage.edges().len()] };
+    let columns = MeanValue.smooth_coordinates(&fine, points);
+    let b = columns.as_ref().subcols(m, cage.edges().len());
+    let along = transposed_product(b, fit.residual.as_ref());
+    let overlap = transposed_product(phi.as_ref(), b);
+    let mut solved = overlap.clone();
+    solve(fit.factor.as_ref(), &mut solved);
+    let gains = (0..cage.edges().len()).map(|e| {
+        let own: f64 = (0..b.nrows()).map(|i| b[(i, e)] * b[(i, e)]).sum();
+        let explained: f64 = (0..m).map(|j| overlap[(j, e)] * solved[(j, e)]).sum();
+        let gain: f64 = (0..along.ncols()).map(|c| along[(e, c)] * along[(e, c)]).sum();
+        gain / (own - explained).max(0.02 * own).max(f64::MIN_POSITIVE)
+    });
+    gains.collect()
+}
+
+/// For every vertex, by how much `‖X − Φ C‖²` would rise if it followed its neighbours: with `a` the row that says so, `a C = 0`, the
+/// least-squares fit under that constraint is worse by `‖a C‖²/(a (ΦᵀΦ)⁻¹ aᵀ)`.
+fn costs(mesh: &TriMesh, neighbours: &Neighbours, fit: &Fit) -> Vec<f64> {
+    let m = mesh.vertices.len();
+    let mut inverse = Mat::<f64>::identity(m, m);
+    solve(fit.factor.as_ref(), &mut inverse);
+    let costs = (0..m).map(|v| {
+        let weights = following(mesh, v, &neighbours.of(v));
+        let row: Vec<(usize, f64)> = std::iter::once((v, 1.0)).chain(weights.iter().map(|&(k, w)| (k, -w))).collect();
+        let spread: f64 =
+            row.iter().map(|&(i, x)| row.iter().map(|&(j, y)| x * y * inverse[(i, j)]).sum::<f64>()).sum();
+        let moved: f64 =
+            (0..fit.cages.ncols()).map(|c| row.iter().map(|&(i, x)| x * fit.cages[(i, c)]).sum::<f64>().powi(2)).sum();
+        moved / spread.max(f64::MIN_POSITIVE)
+    });
+    costs.collect()
+}
+
+/// Weights of the neighbours that sum to one and reproduce a vertex's place as well as they can.
+fn following(mesh: &TriMesh, v: usize, ring: &[u32]) -> Vec<(usize, f64)> {
+    let at = |i: usize| DVec3::from_array(mesh.vertices[i]);
+    let k = ring.len();
+    let offsets: Vec<DVec3> = ring.iter().map(|&r| at(r as usize) - at(v)).collect();
+    let scale = offsets.iter().map(|o| o.length_squared()).sum::<f64>() / k as f64;
+    // min Σ λ² ε + |Σ λ o|²/scale with Σ λ = 1: λ = A⁻¹ 1, normalised.
+    let a = Mat::from_fn(k, k, |i, j| {
+        offsets[i].dot(offsets[j]) / scale.max(f64::MIN_POSITIVE) + if i == j { 0.05 } else { 0.0 }
+    });
+    let mut x = Mat::from_fn(k, 1, |_, _| 1.0);
+    if let Ok(llt) = a.llt(faer::Side::Lower) {
+        solve(llt.L(), &mut x);
+    }
+    let sum: f64 = (0..k).map(|i| x[(i, 0)]).sum();
+    ring.iter().enumerate().map(|(i, &r)| (r as usize, x[(i, 0)] / sum)).collect()
+}

@@ -1,0 +1,121 @@
+//! The motion that a cage is designed for: some points of the model and what is not affine in their motion, apart from what is held
+//! back to judge by.
+
+use super::fit::{Fit, gram};
+use cager_core::cage::Cage;
+use cager_core::coordinates::MeanValue;
+use cager_core::mesh::{Model, Point, diagonal};
+use faer::{Mat, MatRef};
+
+/// Points of a model at most looked at.
+const MOST_POINTS: usize = 20_000;
+/// Frames of one step.
+const STEP_FRAMES: usize = 32;
+/// Points and frames that a cage is judged by.
+const JUDGED_POINTS: usize = 4_000;
+const JUDGED_FRAMES: usize = 40;
+/// Vertices of a cage whose condition number is not looked at any more.
+const LARGE: usize = 1_000;
+
+/// Points and their motion.
+pub(super) struct Samples {
+    /// Rest positions, n.
+    points: Vec<Point>,
+    /// Motion that the design sees, n × 3F: every frame less its best affine image of the rest pose, which coordinates reproduce anyway.
+    designed: Mat<f64>,
+    /// Points to judge by, and what they do in frames that the design sees and in those that it does not.
+    judged: Vec<Point>,
+    judged_designed: Mat<f64>,
+    judged_held_back: Mat<f64>,
+    /// Diagonal of the rest pose.
+    pub(super) diagonal: f64,
+}
+
+/// Points and frames of one step.
+pub(super) struct Batch {
+    pub(super) points: Vec<Point>,
+    /// n × 3F.
+    pub(super) motion: Mat<f64>,
+}
+
+/// Least-squares errors of a cage over points and frames, as fractions of the diagonal.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Judged {
+    pub(super) designed: f64,
+    pub(super) held_back: f64,
+}
+
+impl Samples {
+    /// Takes frames in turns for the design and held back; a single one counts as both.
+    pub(super) fn new(rest: &Model, frames: &[Vec<f64>], random: &mut fastrand::Rng) -> Self {
+        let every = |first: usize| -> Vec<&[f64]> { frames.iter().skip(first).step_by(2).map(Vec::as_slice).collect() };
+        let (designed, mut held_back) = (every(0), every(1));
+        if held_back.is_empty() {
+            held_back.clone_from(&designed);
+        }
+        let mut some = |count: usize| -> Vec<usize> {
+            let mut indices = random.choose_multiple(0..rest.points.len(), count);
+            indices.sort_unstable();
+            indices
+        };
+        let (used, judged) = (some(MOST_POINTS), some(JUDGED_POINTS));
+        let at = |indices: &[usize]| -> Vec<Point> { indices.iter().map(|&i| rest.points[i]).collect() };
+        Self {
+            points: at(&used),
+            designed: without_affine(&rest.points, &used, &designed),
+            judged: at(&judged),
+            judged_designed: without_affine(&rest.points, &judged, &evenly(&designed, JUDGED_FRAMES)),
+            judged_held_back: without_affine(&rest.points, &judged, &evenly(&held_back, JUDGED_FRAMES)),
+            diagonal: diagonal(&rest.points),
+        }
+    }
+
+    /// Random points and frames of those that the design sees.
+    pub(super) fn batch(&self, points: usize, random: &mut fastrand::Rng) -> Batch {
+        let mut rows = random.choose_multiple(0..self.points.len(), points);
+        rows.sort_unstable();
+        let mut frames = random.choose_multiple(0..self.designed.ncols() / 3, STEP_FRAMES);
+        frames.sort_unstable();
+        let motion =
+            Mat::from_fn(rows.len(), 3 * frames.len(), |i, c| self.designed[(rows[i], 3 * frames[c / 3] + c % 3)]);
+        Batch { points: rows.iter().map(|&i| self.points[i]).collect(), motion }
+    }
+
+    /// Root mean square errors of a cage, as fractions of the diagonal; infinite where it has none.
+    pub(super) fn judge(&self, cage: &Cage) -> Judged {
+        let phi = MeanValue.smooth_coordinates(cage, &self.judged);
+        let error = |motion: MatRef<'_, f64>| {
+            let squared = Fit::new(phi.as_ref(), motion, 1e-6).map_or(f64::INFINITY, |fit| fit.squared);
+            (squared / (motion.nrows() * motion.ncols()) as f64 * 3.0).sqrt() / self.diagonal
+        };
+        Judged { designed: error(self.judged_designed.as_ref()), held_back: error(self.judged_held_back.as_ref()) }
+    }
+
+    /// Condition number of the coordinates of the points to judge by; infinite where they have none, or where it takes longer to find out
+    /// than it is worth.
+    pub(super) fn condition_number(&self, cage: &Cage) -> f64 {
+        if cage.vertices().len() > LARGE {
+            return f64::INFINITY;
+        }
+        let phi = MeanValue.smooth_coordinates(cage, &self.judged);
+        match gram(phi.as_ref()).self_adjoint_eigenvalues(faer::Side::Lower) {
+            Ok(values) if values[0] > 0.0 => (values[values.len() - 1] / values[0]).sqrt(),
+            _ => f64::INFINITY,
+        }
+    }
+}
+
+/// At most `count` of the frames, evenly spaced.
+pub(super) fn evenly<'a>(frames: &[&'a [f64]], count: usize) -> Vec<&'a [f64]> {
+    let count = count.min(frames.len());
+    (0..count).map(|k| frames[k * frames.len() / count]).collect()
+}
+
+/// The motion of some points, less the best affine image of the rest pose.
+fn without_affine(rest: &[Point], rows: &[usize], frames: &[&[f64]]) -> Mat<f64> {
+    let motion = Mat::from_fn(rows.len(), 3 * frames.len(), |i, c| frames[c / 3][3 * rows[i] + c % 3]);
+    let center: Point = std::array::from_fn(|k| rest.iter().map(|p| p[k]).sum::<f64>() / rest.len() as f64);
+    let scale = diagonal(rest);
+    let basis = Mat::from_fn(rows.len(), 4, |i, k| if k < 3 { (rest[rows[i]][k] - center[k]) / scale } else { 1.0 });
+    Fit::new(basis.as_ref(), motion.as_ref(), 1e-12).map_or(motion, |fit| fit.residual)
+}

@@ -1,0 +1,110 @@
+//! The smallest cage that meets an error: its number of vertices follows from how the error falls with it.
+
+use super::MOST_VERTICES;
+use super::descent::Descent;
+use super::run::{Best, Leg, Run};
+use super::samples::{Judged, evenly};
+use cager_core::cage::Cage;
+use cager_core::coordinates::MeanValue;
+use cager_core::inversion::{BATCH, Handles, Solver, SolverOptions};
+use std::ops::ControlFlow;
+
+/// Vertices to begin with, and at most.
+const FIRST_VERTICES: usize = 100;
+/// Steps with each number of vertices, and how many numbers are tried.
+const STEPS: usize = 80;
+const ROUNDS: usize = 8;
+/// The error falls about as this power of the number of vertices.
+const POWER: f64 = 1.0;
+/// A cage whose error is within this of the goal is small enough.
+const CLOSE: f64 = 0.93;
+/// Frames that the encoder's error is measured on.
+const FRAMES: usize = 24;
+
+/// Vertices to begin with around so many points.
+pub(super) fn first_vertices(points: usize) -> usize {
+    FIRST_VERTICES.min(points / 2).max(4)
+}
+
+impl Run<'_> {
+    /// Grows or shrinks the cage until its error, as the encoder's default options would leave it on held-back frames, is at most `error`
+    /// and not much less.
+    pub(super) fn search(
+        &mut self,
+        descent: &mut Descent<'_>,
+        frames: &[Vec<f64>],
+        error: f64,
+        warnings: &mut Vec<String>,
+    ) -> ControlFlow<()> {
+        let mut goal = descent.cage.vertices().len();
+        let most = MOST_VERTICES.min(self.rest.points.len() / 2).max(goal);
+        let mut smallest: Option<Best> = None;
+        let mut lowest: Option<(f64, Best)> = None;
+        let mut ended = ControlFlow::Continue(());
+        for round in 0..ROUNDS {
+            let fraction = [round as f64 / ROUNDS as f64, (round + 1) as f64 / ROUNDS as f64];
+            // What an earlier leg reached with another number of vertices does not count.
+            let judged = Judged { designed: f64::INFINITY, held_back: f64::INFINITY };
+            self.best = Best { mesh: descent.cage.mesh().clone(), judged };
+            ended = self.leg(descent, &Leg { stage: "searching the smallest cage", steps: STEPS, goal, fraction });
+            if !self.best.judged.held_back.is_finite() {
+                self.best = Best { mesh: descent.cage.mesh().clone(), judged: self.samples.judge(&descent.cage) };
+            }
+            let best = self.best.clone();
+            let found = self.encoded_error(&best, frames);
+            if lowest.as_ref().is_none_or(|(least, _)| found < *least) {
+                lowest = Some((found, best.clone()));
+            }
+            let count = best.mesh.vertices.len();
+            let is_smaller = smallest.as_ref().is_none_or(|other| count < other.mesh.vertices.len());
+            if found <= error && is_smaller {
+                smallest = Some(best);
+            }
+            if ended.is_break() || (found <= error && found >= CLOSE * error) {
+                break;
+            }
+            let aimed = (goal as f64 * (found / (0.97 * error)).powf(1.0 / POWER)).ceil() as usize;
+            let next = aimed.clamp(goal / 2, goal * 2).clamp(4, most);
+            if next == goal {
+                break;
+            }
+            goal = next;
+        }
+        match smallest {
+            Some(best) => self.best = best,
+            None => {
+                let Some((least, best)) = lowest else { return ended };
+                warnings.push(format!(
+                    "the error asked for, {error:.2e} of the diagonal, was not reached {}; the cage of {} vertices leaves {least:.2e}",
+                    if ended.is_break() { "in time".to_owned() } else { format!("with up to {most} vertices") },
+                    best.mesh.vertices.len()
+                ));
+                self.best = best;
+            }
+        }
+        ended
+    }
+
+    /// Mean L2 error on held-back frames of the encoder with spread handles, as a fraction of the diagonal; infinite where it refuses the
+    /// cage.
+    fn encoded_error(&self, best: &Best, frames: &[Vec<f64>]) -> f64 {
+        let Ok(cage) = Cage::new(best.mesh.clone()) else { return f64::INFINITY };
+        let unknowns = cage.vertices().len();
+        let options = SolverOptions {
+            handles: Handles::Spread { count: None },
+            spectrum: 20.min(unknowns / 16),
+            ..SolverOptions::default()
+        };
+        let Ok(solver) = Solver::prepare(&MeanValue, &cage, &self.rest.points, options) else { return f64::INFINITY };
+        let held_back: Vec<&[f64]> =
+            frames.iter().skip(usize::from(frames.len() > 1)).step_by(2).map(Vec::as_slice).collect();
+        let mut errors = Vec::new();
+        for frames in evenly(&held_back, FRAMES).chunks(BATCH) {
+            let cages: Vec<Vec<f32>> =
+                solver.invert_reporting(None, frames).into_iter().map(|found| found.cage).collect();
+            let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
+            errors.extend(solver.decoder().measure(&views, frames));
+        }
+        errors.iter().map(|e| e.l2).sum::<f64>() / errors.len() as f64 / solver.diagonal()
+    }
+}

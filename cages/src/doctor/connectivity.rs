@@ -1,0 +1,107 @@
+//! How the faces of a mesh, polygons of any arity, hang together; nothing about the mesh is taken for granted.
+
+use std::collections::{BTreeMap, HashMap};
+
+/// Every edge, with the smaller vertex first, and the faces at it, each with whether it runs from the smaller to the larger vertex.
+pub(super) type Edges = BTreeMap<[u32; 2], Vec<(u32, bool)>>;
+
+/// Sides of a polygon, in its direction.
+pub(super) fn sides(face: &[u32]) -> impl Iterator<Item = [u32; 2]> + '_ {
+    (0..face.len()).map(move |k| [face[k], face[(k + 1) % face.len()]])
+}
+
+/// The edges of some faces.
+pub(super) fn edges(faces: &[impl AsRef<[u32]>]) -> Edges {
+    let mut edges = Edges::new();
+    for (f, face) in faces.iter().enumerate() {
+        for [a, b] in sides(face.as_ref()) {
+            edges.entry([a.min(b), a.max(b)]).or_default().push((f as u32, a < b));
+        }
+    }
+    edges
+}
+
+/// The number of the connected part that each face belongs to, by edges shared by two faces, and how many parts there are.
+pub(super) fn shells(faces: usize, edges: &Edges) -> (Vec<u32>, u32) {
+    let mut group: Vec<u32> = (0..faces as u32).collect();
+    for users in edges.values().filter(|u| u.len() == 2) {
+        let [a, b] = [users[0].0, users[1].0].map(|f| root(&mut group, f));
+        group[a.max(b) as usize] = a.min(b);
+    }
+    let mut number = HashMap::new();
+    let labels: Vec<u32> = (0..faces as u32)
+        .map(|f| {
+            let next = number.len() as u32;
+            *number.entry(root(&mut group, f)).or_insert(next)
+        })
+        .collect();
+    (labels, number.len() as u32)
+}
+
+fn root(group: &mut [u32], mut f: u32) -> u32 {
+    while group[f as usize] != f {
+        group[f as usize] = group[group[f as usize] as usize];
+        f = group[f as usize];
+    }
+    f
+}
+
+/// The faces around each vertex, in groups that hang together by edges at that vertex: one group at a manifold vertex.
+pub(super) fn fans(vertices: usize, faces: &[impl AsRef<[u32]>]) -> Vec<Vec<Vec<u32>>> {
+    let mut around: Vec<Vec<u32>> = vec![Vec::new(); vertices];
+    for (f, face) in faces.iter().enumerate() {
+        face.as_ref().iter().for_each(|&v| around[v as usize].push(f as u32));
+    }
+    let fans_at = |(v, faces_at): (usize, Vec<u32>)| {
+        let mut fans: Vec<(Vec<u32>, Vec<u32>)> = Vec::new();
+        for f in faces_at {
+            let face = faces[f as usize].as_ref();
+            let spokes: Vec<u32> = sides(face)
+                .filter_map(|[a, b]| match v as u32 {
+                    v if a == v => Some(b),
+                    v if b == v => Some(a),
+                    _ => None,
+                })
+                .collect();
+            let (mut joined, apart): (Vec<_>, Vec<_>) =
+                fans.into_iter().partition(|(_, s)| s.iter().any(|w| spokes.contains(w)));
+            let mut fan = (vec![f], spokes);
+            for (more_faces, more_spokes) in joined.drain(..) {
+                fan.0.extend(more_faces);
+                fan.1.extend(more_spokes);
+            }
+            fan.0.sort_unstable();
+            fans = apart;
+            fans.push(fan);
+        }
+        let mut fans: Vec<Vec<u32>> = fans.into_iter().map(|f| f.0).collect();
+        fans.sort_unstable();
+        fans
+    };
+    around.into_iter().enumerate().map(fans_at).collect()
+}
+
+/// Border loops, each as its vertices in the direction in which a face would have to run that fills it. Borders that branch are left
+/// out.
+pub(super) fn border_loops(edges: &Edges) -> Vec<Vec<u32>> {
+    let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for ([a, b], users) in edges.iter().filter(|(_, u)| u.len() == 1) {
+        let [from, to] = if users[0].1 { [*b, *a] } else { [*a, *b] };
+        next.entry(from).or_default().push(to);
+    }
+    let mut loops = Vec::new();
+    while let Some((&start, _)) = next.first_key_value() {
+        let mut path = Vec::new();
+        let mut at = start;
+        let mut whole = true;
+        while let Some(to) = next.remove(&at) {
+            whole &= to.len() == 1;
+            path.push(at);
+            at = to[0];
+        }
+        if whole && at == start && path.len() >= 3 {
+            loops.push(path);
+        }
+    }
+    loops
+}

@@ -1,0 +1,94 @@
+//! Slight enlargement of a closed cage, only where points of the model are outside.
+
+use crate::geometry::{Surface, self_intersections};
+use cager_core::mesh::{Model, TriMesh, diagonal};
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// No vertex is moved farther than this fraction of the diagonal; what needs more is another cage.
+const FARTHEST: f64 = 0.06;
+
+/// Points end up this far inside, as a fraction of the diagonal.
+const MARGIN: f64 = 5e-4;
+
+const ROUNDS: usize = 60;
+
+/// Vertices moved outwards along their normals until all points are inside, if that takes little and cuts no faces that were apart.
+pub(super) fn enlarged(cage: &TriMesh, model: &Model) -> Option<Vec<DVec3>> {
+    let extent = diagonal(&model.points);
+    let start: Vec<DVec3> = cage.vertices.iter().map(|&p| p.into()).collect();
+    let allowed = self_intersections(cage);
+    let mut positions = start.clone();
+    for _ in 0..ROUNDS {
+        let surface = Surface::new(positions.clone(), cage.triangles.clone());
+        let pushes = pushes(&surface, model, MARGIN * extent);
+        if pushes.is_empty() {
+            return Some(positions);
+        }
+        let normals = normals(&surface);
+        let mut step = vec![0.0_f64; positions.len()];
+        for (vertex, push) in pushes {
+            step[vertex as usize] = step[vertex as usize].max(push.min(0.01 * extent));
+        }
+        if !advance(&mut positions, &start, &normals, step, &allowed, cage, extent) {
+            return None;
+        }
+    }
+    None
+}
+
+/// Moves vertices; those of faces that would newly cut another take smaller steps. Says whether any could move.
+fn advance(
+    positions: &mut [DVec3],
+    start: &[DVec3],
+    normals: &[DVec3],
+    mut step: Vec<f64>,
+    allowed: &[[u32; 2]],
+    cage: &TriMesh,
+    extent: f64,
+) -> bool {
+    for _ in 0..6 {
+        let moved: Vec<DVec3> = (0..positions.len()).map(|v| positions[v] + step[v] * normals[v]).collect();
+        let vertices = moved.iter().map(DVec3::to_array).collect();
+        let cuts = self_intersections(&TriMesh { vertices, triangles: cage.triangles.clone() });
+        let new: Vec<u32> = cuts.into_iter().filter(|c| allowed.binary_search(c).is_err()).flatten().collect();
+        if new.is_empty() {
+            let far = (0..moved.len()).any(|v| moved[v].distance(start[v]) > FARTHEST * extent);
+            let any = step.iter().any(|&s| s > 0.0);
+            positions.copy_from_slice(&moved);
+            return any && !far;
+        }
+        for v in new.into_iter().flat_map(|f| cage.triangles[f as usize]) {
+            step[v as usize] *= 0.3;
+        }
+    }
+    false
+}
+
+/// For the corners of the faces nearest to points that are outside or too close, how far to move out.
+fn pushes(surface: &Surface, model: &Model, margin: f64) -> Vec<(u32, f64)> {
+    let of_point = |p: &[f64; 3]| {
+        let p = DVec3::from(*p);
+        let inside = surface.contains(p);
+        let limit = if inside { margin * (1.0 - 1e-6) } else { f64::INFINITY };
+        let nearest = surface.nearest_within(p, limit)?;
+        let depth = if inside { margin - nearest.distance } else { margin + nearest.distance };
+        // The face moves by the weighted mean of its corners' steps.
+        let squares: f64 = nearest.weights.iter().map(|w| w * w).sum();
+        let corners = surface.triangles[nearest.face as usize];
+        let share = move |k: usize| (corners[k], 1.1 * depth * nearest.weights[k] / squares);
+        Some([share(0), share(1), share(2)])
+    };
+    let found: Vec<[(u32, f64); 3]> = model.points.par_iter().with_min_len(256).filter_map(of_point).collect();
+    found.into_iter().flatten().filter(|(_, push)| *push > 0.0).collect()
+}
+
+/// Normals of the vertices, faces weighted by area.
+fn normals(surface: &Surface) -> Vec<DVec3> {
+    let mut normals = vec![DVec3::ZERO; surface.vertices.len()];
+    for (f, triangle) in surface.triangles.iter().enumerate() {
+        let [a, b, c] = surface.corners(f as u32);
+        triangle.iter().for_each(|&v| normals[v as usize] += (b - a).cross(c - a));
+    }
+    normals.into_iter().map(DVec3::normalize_or_zero).collect()
+}

@@ -1,0 +1,41 @@
+//! What the vertices of a cage do to a model: which move nothing, and how well-conditioned the coordinates are.
+
+use cager_core::cage::Cage;
+use cager_core::coordinates::{CoordinateSystem, MeanValue};
+use cager_core::mesh::{Model, Point, TriMesh};
+use cager_core::svd::svd;
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatRef, Par};
+
+/// A vertex moves no point when none of its coordinates is larger.
+const IDLE: f64 = 1e-4;
+
+/// Coordinates that are looked at, at most: of fewer points where the cage has many vertices.
+const ENTRIES: usize = 20_000_000;
+
+/// Cages with more vertices are not judged: it would take minutes.
+const MOST_VERTICES: usize = 2_000;
+
+/// Vertices that move no point, and the condition number of the mean value coordinates; neither of a cage of thousands of vertices.
+pub(super) fn influence(mesh: &TriMesh, model: &Model) -> (Vec<u32>, Option<f64>) {
+    let Ok(cage) = Cage::new(mesh.clone()) else { return (Vec::new(), None) };
+    if mesh.vertices.len() > MOST_VERTICES {
+        return (Vec::new(), None);
+    }
+    let stride = (model.points.len() * mesh.vertices.len()).div_ceil(ENTRIES).max(1);
+    let points: Vec<Point> = model.points.iter().step_by(stride).copied().collect();
+    let Ok(coordinates) = MeanValue.coordinates(&cage, &points) else { return (Vec::new(), None) };
+    let phi = &coordinates.phi;
+    let most = |v: usize| (0..phi.nrows()).map(|i| phi[(i, v)].abs()).fold(0.0, f64::max);
+    let idle = (0..phi.ncols()).filter(|&v| most(v) < IDLE).map(|v| v as u32).collect();
+    let condition = (phi.nrows() >= phi.ncols()).then(|| condition_number(phi.as_ref())).flatten();
+    (idle, condition)
+}
+
+/// From the eigenvalues of the Gram matrix: above 10⁷ only its order is known.
+fn condition_number(phi: MatRef<'_, f64>) -> Option<f64> {
+    let mut gram = Mat::zeros(phi.ncols(), phi.ncols());
+    matmul(gram.as_mut(), Accum::Replace, phi.transpose(), phi, 1.0, Par::Seq);
+    let squares = svd(gram.as_ref())?.sigma;
+    Some((squares.first()? / squares.last()?).sqrt())
+}

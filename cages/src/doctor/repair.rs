@@ -1,0 +1,255 @@
+//! Repair of a cage: what can be repaired without changing its shape or its faces more than needed.
+
+use super::connectivity::{border_loops, edges, fans, shells, sides};
+use super::enlarge::enlarged;
+use super::findings::{Findings, check, is_cavity, shell_volume};
+use super::holes::{LONGEST, fill};
+use cager_core::mesh::{Model, Polygons, TriMesh, diagonal};
+use glam::DVec3;
+use std::collections::{HashMap, HashSet, VecDeque};
+
+/// A repaired cage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Repair {
+    /// The cage. Polygons stay polygons.
+    pub cage: Model,
+    /// What was changed, a sentence each; empty where nothing was.
+    pub changes: Vec<String>,
+    /// What is still wrong.
+    pub remaining: Findings,
+}
+
+/// Vertices closer than this fraction of the diagonal are merged where the surface is open.
+const SAME_PLACE: f64 = 1e-6;
+
+/// Repairs a cage: merges doubled vertices along open borders, removes degenerate and doubled faces and loose vertices, splits vertices
+/// at which parts only touch, makes the orientation consistent and outward, fills small holes, and moves vertices out slightly where
+/// points of the model are outside.
+pub fn repair(cage: &Model, model: &Model) -> Repair {
+    let mut repairing = Repairing {
+        points: cage.points.iter().map(|&p| p.into()).collect(),
+        faces: cage.faces.iter().map(<[u32]>::to_vec).collect(),
+        changes: Vec::new(),
+    };
+    repairing.drop_unusable_faces();
+    repairing.merge_border_vertices();
+    repairing.drop_repeated_faces();
+    repairing.split_touching_vertices();
+    repairing.orient_consistently();
+    repairing.fill_holes();
+    repairing.orient_outwards();
+    repairing.drop_loose_vertices();
+    repairing.enlarge(model);
+    let cage = repairing.model();
+    let remaining = check(&TriMesh::from(&cage), model);
+    Repair { cage, changes: repairing.changes, remaining }
+}
+
+struct Repairing {
+    points: Vec<DVec3>,
+    faces: Vec<Vec<u32>>,
+    changes: Vec<String>,
+}
+
+impl Repairing {
+    fn changed(&mut self, count: usize, what: impl Fn(usize) -> String) {
+        if count > 0 {
+            self.changes.push(what(count));
+        }
+    }
+
+    fn drop_unusable_faces(&mut self) {
+        let before = self.faces.len();
+        let points = &self.points;
+        let sound = |v: &u32| points.get(*v as usize).is_some_and(|p| p.is_finite());
+        self.faces.retain(|face| face.iter().all(sound));
+        self.changed(before - self.faces.len(), |n| {
+            format!("removed {} without finite corners", counted(n, "face", "faces"))
+        });
+    }
+
+    fn merge_border_vertices(&mut self) {
+        let edges = edges(&self.faces);
+        let mut border: Vec<u32> = edges.iter().filter(|(_, u)| u.len() == 1).flat_map(|(e, _)| *e).collect();
+        border.sort_unstable();
+        border.dedup();
+        let finite: Vec<[f64; 3]> = self.points.iter().filter(|p| p.is_finite()).map(DVec3::to_array).collect();
+        let tolerance = (SAME_PLACE * diagonal(&finite)).max(f64::MIN_POSITIVE);
+        let cell = |p: DVec3| (p / tolerance).round().to_array().map(|x| x as i64);
+        let mut first: HashMap<[i64; 3], u32> = HashMap::new();
+        let mut target: Vec<u32> = (0..self.points.len() as u32).collect();
+        for v in border {
+            let p = self.points[v as usize];
+            let [x, y, z] = cell(p);
+            let near = (0..27).find_map(|i| {
+                let key = [x.saturating_add(i % 3 - 1), y.saturating_add(i / 3 % 3 - 1), z.saturating_add(i / 9 - 1)];
+                first.get(&key).copied().filter(|&w| self.points[w as usize].distance(p) <= tolerance)
+            });
+            match near {
+                Some(w) => target[v as usize] = w,
+                None => {
+                    first.insert(cell(p), v);
+                }
+            }
+        }
+        let merged = target.iter().enumerate().filter(|(v, t)| *v != **t as usize).count();
+        self.faces.iter_mut().flatten().for_each(|v| *v = target[*v as usize]);
+        self.changed(merged, |n| format!("merged {} with another in the same place", counted(n, "vertex", "vertices")));
+    }
+
+    fn drop_repeated_faces(&mut self) {
+        let before = self.faces.len();
+        for face in &mut self.faces {
+            face.dedup();
+            while face.len() > 1 && face.first() == face.last() {
+                face.pop();
+            }
+        }
+        let distinct = |face: &[u32]| face.iter().collect::<HashSet<_>>().len() == face.len();
+        self.faces.retain(|face| face.len() >= 3 && distinct(face));
+        let degenerate = before - self.faces.len();
+        let mut seen = HashSet::new();
+        self.faces.retain(|face| {
+            let mut key = face.clone();
+            key.sort_unstable();
+            seen.insert(key)
+        });
+        let doubled = before - degenerate - self.faces.len();
+        self.changed(degenerate, |n| format!("removed {} without area", counted(n, "face", "faces")));
+        self.changed(doubled, |n| format!("removed {} doubling another", counted(n, "face", "faces")));
+    }
+
+    /// A vertex at which several parts of the surface touch becomes one for each.
+    fn split_touching_vertices(&mut self) {
+        let mut split = 0;
+        for (v, fans) in fans(self.points.len(), &self.faces).into_iter().enumerate() {
+            for fan in fans.iter().skip(1) {
+                let copy = self.points.len() as u32;
+                self.points.push(self.points[v]);
+                split += 1;
+                for &f in fan {
+                    self.faces[f as usize].iter_mut().filter(|w| **w == v as u32).for_each(|w| *w = copy);
+                }
+            }
+        }
+        self.changed(split, |n| {
+            format!("split {} at which parts of the surface only touched", counted(n, "vertex", "vertices"))
+        });
+    }
+
+    /// Within each part, most faces decide; the others are turned around.
+    fn orient_consistently(&mut self) {
+        let edges = edges(&self.faces);
+        let mut turned: Vec<Option<bool>> = vec![None; self.faces.len()];
+        let mut flips = 0;
+        for start in 0..self.faces.len() {
+            if turned[start].is_some() {
+                continue;
+            }
+            turned[start] = Some(false);
+            let mut part = vec![start];
+            let mut queue = VecDeque::from([start]);
+            while let Some(f) = queue.pop_front() {
+                for [a, b] in sides(&self.faces[f]) {
+                    let Some([p, q]) = edges.get(&[a.min(b), a.max(b)]).map(Vec::as_slice) else { continue };
+                    let (own, other) = if p.0 as usize == f { (p, q) } else { (q, p) };
+                    if turned[other.0 as usize].is_none() {
+                        turned[other.0 as usize] = Some(turned[f].unwrap_or(false) != (own.1 == other.1));
+                        part.push(other.0 as usize);
+                        queue.push_back(other.0 as usize);
+                    }
+                }
+            }
+            let against = part.iter().filter(|&&f| turned[f] == Some(true)).count();
+            let turn = 2 * against <= part.len();
+            for f in part {
+                if (turned[f] == Some(true)) == turn {
+                    self.faces[f].reverse();
+                    flips += 1;
+                }
+            }
+        }
+        self.changed(flips, |n| format!("turned {} around to agree with the rest", counted(n, "face", "faces")));
+    }
+
+    fn fill_holes(&mut self) {
+        let loops = border_loops(&edges(&self.faces));
+        let small: Vec<&Vec<u32>> = loops.iter().filter(|l| l.len() <= LONGEST).collect();
+        for border in &small {
+            let new = fill(border, |v| self.points[v as usize]);
+            self.faces.extend(new);
+        }
+        self.changed(small.len(), |n| format!("filled {}", counted(n, "hole", "holes")));
+    }
+
+    fn orient_outwards(&mut self) {
+        let edges = edges(&self.faces);
+        let (labels, count) = shells(self.faces.len(), &edges);
+        let mut closed = vec![true; count as usize];
+        for users in edges.values().filter(|u| u.len() != 2) {
+            users.iter().for_each(|u| closed[labels[u.0 as usize] as usize] = false);
+        }
+        let mut turned = 0;
+        for part in (0..count).filter(|&p| closed[p as usize]) {
+            let (mesh, triangle_labels) = self.labelled(&labels);
+            let inward = shell_volume(&mesh, &mesh.triangles, &triangle_labels, part) < 0.0;
+            if inward && !is_cavity(&mesh, &mesh.triangles, &triangle_labels, part) {
+                let faces = self.faces.iter_mut().zip(&labels).filter(|(_, l)| **l == part);
+                faces.for_each(|(face, _)| face.reverse());
+                turned += 1;
+            }
+        }
+        self.changed(turned, |n| format!("turned {} to point outwards", counted(n, "part", "parts")));
+    }
+
+    fn labelled(&self, labels: &[u32]) -> (TriMesh, Vec<u32>) {
+        let model = self.model();
+        let of_triangle = model.faces.polygon_of_triangle().iter().map(|&f| labels[f as usize]).collect();
+        (TriMesh::from(&model), of_triangle)
+    }
+
+    fn drop_loose_vertices(&mut self) {
+        let mut used = vec![false; self.points.len()];
+        self.faces.iter().flatten().for_each(|&v| used[v as usize] = true);
+        let mut new = vec![0; used.len()];
+        let mut kept = Vec::new();
+        for v in 0..used.len() {
+            if used[v] {
+                new[v] = kept.len() as u32;
+                kept.push(self.points[v]);
+            }
+        }
+        self.changed(self.points.len() - kept.len(), |n| {
+            format!("removed {} that no face uses any more", counted(n, "vertex", "vertices"))
+        });
+        self.points = kept;
+        self.faces.iter_mut().flatten().for_each(|v| *v = new[*v as usize]);
+    }
+
+    fn enlarge(&mut self, model: &Model) {
+        let mesh = TriMesh::from(&self.model());
+        let findings = check(&mesh, model);
+        let Some(outside) = findings.outside.filter(|_| findings.misfit.is_none()) else { return };
+        let Some(positions) = enlarged(&mesh, model) else { return };
+        let moves: Vec<f64> = positions.iter().zip(&self.points).map(|(a, b)| a.distance(*b)).collect();
+        let moved = moves.iter().filter(|m| **m > 0.0).count();
+        let farthest = moves.iter().fold(0.0_f64, |a, b| a.max(*b)) / diagonal(&model.points);
+        self.points = positions;
+        self.changes.push(format!(
+            "moved {} outwards, by {:.2} % of the diagonal at most, around {} that were outside",
+            counted(moved, "vertex", "vertices"),
+            100.0 * farthest,
+            counted(outside.count, "point", "points"),
+        ));
+    }
+
+    fn model(&self) -> Model {
+        let mut faces = Polygons::new();
+        self.faces.iter().for_each(|face| faces.push(face));
+        Model { points: self.points.iter().map(DVec3::to_array).collect(), faces }
+    }
+}
+
+fn counted(n: usize, one: &str, many: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { many })
+}

@@ -1,0 +1,161 @@
+//! A cage around a model, from its rest pose alone.
+
+mod fair;
+mod lattice;
+mod offset;
+mod patch;
+mod quadric;
+mod simplify;
+mod source;
+
+use crate::geometry::{Surface, self_intersections};
+use cager_core::mesh::{Model, TriMesh};
+use fair::fair;
+use glam::DVec3;
+use offset::offset_surface;
+use patch::Contents;
+use rayon::prelude::*;
+use simplify::Simplifier;
+use source::Source;
+
+/// How a cage is made around a model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EncloseOptions {
+    /// Most vertices that the cage may have.
+    pub vertices: usize,
+    /// Least distance of the model's points to the cage, as a fraction of the diagonal; chosen where it is `None`, usually a fifth of
+    /// the offset.
+    pub clearance: Option<f64>,
+    /// One closed surface for each connected part of the model, instead of one around all. Parts closer together than about two
+    /// hundredths of the diagonal share one.
+    pub per_part: bool,
+}
+
+impl Default for EncloseOptions {
+    fn default() -> Self {
+        Self { vertices: 350, clearance: None, per_part: false }
+    }
+}
+
+/// Why no cage can be made around a model.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum EncloseError {
+    /// No points at all.
+    #[error("the rest pose has no points; a cage needs a model to enclose")]
+    Empty,
+    /// NaN or infinity.
+    #[error("rest point {point} has a coordinate that is NaN or infinite; repair or delete it")]
+    NotFinite {
+        /// The point.
+        point: usize,
+    },
+    /// All points in one place.
+    #[error(
+        "all points of the rest pose lie in one place, so there is nothing to enclose; check the file's unit and contents"
+    )]
+    NoExtent,
+    /// Too few vertices to enclose this model.
+    #[error("a cage of at most {vertices} vertices cannot enclose this model; ask for at least {least}")]
+    TooFewVertices {
+        /// What was asked for.
+        vertices: usize,
+        /// What will do.
+        least: usize,
+    },
+}
+
+/// A closed, outward-oriented cage around a model, free of self-intersection, with no point of the model outside: an offset surface,
+/// simplified under quadric error metrics with validity kept at every collapse. The offset grows until the number of vertices is
+/// reached. Runs on the current rayon pool; the result does not depend on it.
+///
+/// # Errors
+/// See [`EncloseError`].
+pub fn enclose(model: &Model, options: &EncloseOptions) -> Result<TriMesh, EncloseError> {
+    let clearance = options.clearance.filter(|c| c.is_finite()).unwrap_or(0.0).clamp(0.0, LARGEST_CLEARANCE);
+    let mut offset = first_offset(options.vertices).max(2.0 * clearance);
+    let source = Source::new(model, offset)?;
+    if options.vertices < LEAST {
+        return Err(EncloseError::TooFewVertices { vertices: options.vertices, least: LEAST });
+    }
+    let mut least = usize::MAX;
+    while offset < LARGEST_OFFSET.max(4.0 * clearance) {
+        match enclose_at(&source, offset, clearance, options) {
+            Ok(cage) => return Ok(cage),
+            Err(reached) => least = least.min(reached),
+        }
+        offset *= 1.35;
+    }
+    let too_few = EncloseError::TooFewVertices { vertices: options.vertices, least };
+    simple_shape(&source, options.vertices, clearance).ok_or(too_few)
+}
+
+/// Vertices of the least closed surface.
+const LEAST: usize = 4;
+
+/// A larger offset is tried at once where there would be fewer vertices for each part, or for every second handle.
+const VERTICES_PER_PART: usize = 6;
+
+/// An offset, as a fraction of the diagonal, at which every model is a blob.
+const LARGEST_OFFSET: f64 = 1.0;
+
+/// Larger clearances are taken as this, a fraction of the diagonal.
+const LARGEST_CLEARANCE: f64 = 10.0;
+
+/// Clearance kept where none is asked for, as a fraction of the offset.
+const USUAL_CLEARANCE: f64 = 0.2;
+
+/// A small offset keeps limbs apart; a large one lets few vertices enclose. 1.2 % of the diagonal suits 350 vertices.
+fn first_offset(vertices: usize) -> f64 {
+    (0.012 * (350.0 / vertices as f64).powf(0.45)).clamp(0.009, 0.06)
+}
+
+/// A valid cage at one offset, or how many vertices were left.
+fn enclose_at(source: &Source, offset: f64, clearance: f64, options: &EncloseOptions) -> Result<TriMesh, usize> {
+    let most_parts = options.vertices / if options.per_part { LEAST } else { VERTICES_PER_PART };
+    let surface = offset_surface(source, offset, options.per_part, most_parts.max(1));
+    let (positions, faces) = surface.ok_or(usize::MAX)?;
+    // A closed surface of V vertices and F faces has V − F/2 = 2 (components − handles).
+    let handles = (faces.len() / 2).saturating_sub(positions.len());
+    if handles * VERTICES_PER_PART > options.vertices {
+        return Err(usize::MAX);
+    }
+    let kept = clearance.max(USUAL_CLEARANCE * offset) + source.thinned;
+    let contents = Contents::new(source.samples.clone(), kept);
+    let mut simplifier = Simplifier::new(positions, faces, &contents);
+    if !simplifier.simplify(options.vertices) {
+        return Err(simplifier.len());
+    }
+    fair(&mut simplifier.mesh, &simplifier.quadrics, &contents);
+    let (used, triangles) = simplifier.mesh.compacted();
+    let positions: Vec<DVec3> = used.iter().map(|&v| simplifier.mesh.positions[v as usize]).collect();
+    verified(source, &positions, triangles, clearance).ok_or(usize::MAX)
+}
+
+/// The cage in the model's frame of reference, if it is valid there.
+fn verified(source: &Source, positions: &[DVec3], triangles: Vec<[u32; 3]>, clearance: f64) -> Option<TriMesh> {
+    let surface = Surface::new(positions.to_vec(), triangles.clone());
+    let encloses = |&p: &DVec3| surface.contains(p) && surface.distance_within(p, clearance).is_none();
+    let vertices = positions.iter().map(|&p| source.restored(p)).collect();
+    let cage = TriMesh { vertices, triangles };
+    (source.points.par_iter().with_min_len(256).all(encloses) && self_intersections(&cage).is_empty()).then_some(cage)
+}
+
+/// A box, octahedron or tetrahedron around the model.
+fn simple_shape(source: &Source, vertices: usize, clearance: f64) -> Option<TriMesh> {
+    let bounds = source.surface.tree.bounds().grown(clearance + 0.02);
+    let (center, half) = (bounds.center(), 0.5 * bounds.size());
+    let (corners, triangles): (Vec<DVec3>, Vec<[u32; 3]>) = if vertices >= 8 {
+        let sign = |i: usize, k: usize| if i >> k & 1 == 0 { -1.0 } else { 1.0 };
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let halves = |q: &[u32; 4]| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]];
+        (
+            (0..8).map(|i| DVec3::new(sign(i, 0), sign(i, 1), sign(i, 2))).collect(),
+            quads.iter().flat_map(halves).collect(),
+        )
+    } else {
+        let corners = [[3.0, 3.0, 3.0], [3.0, -3.0, -3.0], [-3.0, 3.0, -3.0], [-3.0, -3.0, 3.0]];
+        (corners.map(DVec3::from).to_vec(), vec![[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
+    };
+    let positions: Vec<DVec3> = corners.iter().map(|&c| center + half * c).collect();
+    verified(source, &positions, triangles, clearance)
+}

@@ -1,0 +1,226 @@
+//! A closed mesh whose faces can be exchanged patch by patch, as long as the model stays enclosed and no face cuts another.
+
+use crate::geometry::distance::point_triangle2;
+use crate::geometry::surface::crossing;
+use crate::geometry::{Aabb, Bvh, triangles_intersect};
+use glam::DVec3;
+
+/// Corners of a face that was removed.
+const REMOVED: [u32; 3] = [u32::MAX; 3];
+
+/// Points that must stay inside, at a distance from the surface.
+#[derive(Debug)]
+pub(super) struct Contents {
+    points: Vec<DVec3>,
+    /// Trees over some of the points, by which most faults are found, and over the others.
+    trees: [Bvh; 2],
+    clearance: f64,
+}
+
+/// One point of so many is looked at first.
+const STRIDE: usize = 8;
+
+impl Contents {
+    pub(super) fn new(mut points: Vec<DVec3>, clearance: f64) -> Self {
+        let some = points.len().div_ceil(STRIDE);
+        (0..some).for_each(|i| points.swap(i, i * STRIDE));
+        let boxes: Vec<Aabb> = points.iter().map(|&p| Aabb { low: p, high: p }).collect();
+        Self { trees: [Bvh::new(&boxes[..some]), Bvh::new(&boxes[some..])], points, clearance }
+    }
+}
+
+/// Faces that would take the place of others with the same border.
+#[derive(Clone, Debug)]
+pub(super) struct Exchange {
+    /// Faces that go.
+    pub(super) old: Vec<u32>,
+    /// Faces that come.
+    pub(super) new: Vec<[u32; 3]>,
+    /// A vertex that moves, and where to; all its faces must be among the old.
+    pub(super) moved: Option<(u32, DVec3)>,
+}
+
+/// What is wrong with an exchange.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Fault {
+    /// A point would be outside or too close, by so much.
+    Uncovered(f64),
+    /// A new face would cut another face.
+    Intersecting,
+}
+
+/// A closed mesh with the faces around every vertex and a tree over its faces.
+#[derive(Debug)]
+pub(super) struct PatchMesh {
+    pub(super) positions: Vec<DVec3>,
+    pub(super) faces: Vec<[u32; 3]>,
+    /// Faces around each vertex.
+    pub(super) around: Vec<Vec<u32>>,
+    tree: Bvh,
+}
+
+impl PatchMesh {
+    pub(super) fn new(positions: Vec<DVec3>, faces: Vec<[u32; 3]>) -> Self {
+        let mut around = vec![Vec::new(); positions.len()];
+        for (f, face) in faces.iter().enumerate() {
+            face.iter().for_each(|&v| around[v as usize].push(f as u32));
+        }
+        let boxes: Vec<Aabb> = faces.iter().map(|f| Aabb::around(f.map(|v| positions[v as usize]))).collect();
+        Self { tree: Bvh::new(&boxes), positions, faces, around }
+    }
+
+    pub(super) fn is_removed(&self, face: u32) -> bool {
+        self.faces[face as usize] == REMOVED
+    }
+
+    pub(super) fn corners(&self, face: u32) -> [DVec3; 3] {
+        self.faces[face as usize].map(|v| self.positions[v as usize])
+    }
+
+    /// Vertices joined to one by an edge, ascending.
+    pub(super) fn ring(&self, vertex: u32) -> Vec<u32> {
+        let faces = self.around[vertex as usize].iter();
+        let mut ring: Vec<u32> = faces.flat_map(|&f| self.faces[f as usize]).filter(|&v| v != vertex).collect();
+        ring.sort_unstable();
+        ring.dedup();
+        ring
+    }
+
+    /// Whether two vertices share a face.
+    pub(super) fn joined(&self, [a, b]: [u32; 2]) -> bool {
+        self.around[a as usize].iter().any(|&f| self.faces[f as usize].contains(&b))
+    }
+
+    /// Corners of a face once a vertex has moved.
+    pub(super) fn corners_after(&self, face: [u32; 3], moved: Option<(u32, DVec3)>) -> [DVec3; 3] {
+        face.map(|v| match moved {
+            Some((vertex, to)) if vertex == v => to,
+            _ => self.positions[v as usize],
+        })
+    }
+
+    /// Whether the model would stay enclosed and the mesh free of self-intersection.
+    pub(super) fn check(&self, exchange: &Exchange, contents: &Contents) -> Result<(), Fault> {
+        let new: Vec<[DVec3; 3]> = exchange.new.iter().map(|&f| self.corners_after(f, exchange.moved)).collect();
+        self.check_contents(exchange, &new, contents)?;
+        self.check_intersections(exchange, &new)
+    }
+
+    /// A point stays inside when a ray from it crosses as many of the new faces as of the old.
+    fn check_contents(&self, exchange: &Exchange, new: &[[DVec3; 3]], contents: &Contents) -> Result<(), Fault> {
+        let old: Vec<[DVec3; 3]> = exchange.old.iter().map(|&f| self.corners(f)).collect();
+        let clearance = contents.clearance;
+        let boxes: Vec<Aabb> = new.iter().map(|&t| Aabb::around(t).grown(clearance)).collect();
+        let around = boxes.iter().fold(Aabb::around(old.iter().flatten().copied()), |b, t| b.union(t));
+        let some = contents.points.len().div_ceil(STRIDE);
+        let (first, others) = contents.points.split_at(some);
+        for (tree, points) in contents.trees.iter().zip([first, others]) {
+            let worst = uncovered(tree, points, [&old, new], &boxes, &around, clearance);
+            if worst > 0.0 {
+                return Err(Fault::Uncovered(worst));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_intersections(&self, exchange: &Exchange, new: &[[DVec3; 3]]) -> Result<(), Fault> {
+        let boxes: Vec<Aabb> = new.iter().map(|&t| Aabb::around(t)).collect();
+        let around = boxes.iter().fold(Aabb::EMPTY, |b, t| b.union(t));
+        let clear = self.tree.visit(&around, |other| {
+            if self.is_removed(other) || exchange.old.contains(&other) {
+                return true;
+            }
+            let corners = self.corners(other);
+            let other_box = Aabb::around(corners);
+            (0..new.len()).all(|i| {
+                let ids = [exchange.new[i], self.faces[other as usize]];
+                !boxes[i].overlaps(&other_box) || !triangles_intersect(ids, [new[i], corners])
+            })
+        });
+        let cut = |i: usize, j: usize| triangles_intersect([exchange.new[i], exchange.new[j]], [new[i], new[j]]);
+        if !clear || (0..new.len()).any(|i| (0..i).any(|j| cut(i, j))) {
+            return Err(Fault::Intersecting);
+        }
+        Ok(())
+    }
+
+    /// Carries an exchange out. The new faces take the places of the old, of which there are at least as many.
+    pub(super) fn apply(&mut self, exchange: &Exchange) {
+        if let Some((vertex, to)) = exchange.moved {
+            self.positions[vertex as usize] = to;
+        }
+        for &f in &exchange.old {
+            for v in self.faces[f as usize] {
+                self.around[v as usize].retain(|&g| g != f);
+            }
+        }
+        for (i, &f) in exchange.old.iter().enumerate() {
+            let face = exchange.new.get(i).copied().unwrap_or(REMOVED);
+            self.faces[f as usize] = face;
+            if face != REMOVED {
+                face.iter().for_each(|&v| self.around[v as usize].push(f));
+            }
+        }
+        let (faces, positions) = (&self.faces, &self.positions);
+        for &f in &exchange.old {
+            self.tree.refit_item(f, |g| match faces[g as usize] {
+                REMOVED => Aabb::EMPTY,
+                face => Aabb::around(face.map(|v| positions[v as usize])),
+            });
+        }
+    }
+
+    /// The vertices still in use, with their old numbers, and the faces over them.
+    pub(super) fn compacted(&self) -> (Vec<u32>, Vec<[u32; 3]>) {
+        let used: Vec<u32> = (0..self.around.len() as u32).filter(|&v| !self.around[v as usize].is_empty()).collect();
+        let mut new = vec![u32::MAX; self.around.len()];
+        used.iter().enumerate().for_each(|(i, &v)| new[v as usize] = i as u32);
+        let faces = self.faces.iter().filter(|&&f| f != REMOVED).map(|f| f.map(|v| new[v as usize])).collect();
+        (used, faces)
+    }
+}
+
+/// Shape of a triangle: 1 where it is equilateral, 0 where it has no area.
+pub(super) fn quality([a, b, c]: [DVec3; 3]) -> f64 {
+    let edges = (b - a).length_squared() + (c - b).length_squared() + (a - c).length_squared();
+    2.0 * 3.0_f64.sqrt() * (b - a).cross(c - a).length() / edges.max(f64::MIN_POSITIVE)
+}
+
+/// Unit normal, or zero for a triangle without area.
+pub(super) fn normal([a, b, c]: [DVec3; 3]) -> DVec3 {
+    (b - a).cross(c - a).normalize_or_zero()
+}
+
+/// How far the worst of some points is outside or too close once `old` faces have become `new`; `boxes` are those of the new, grown by
+/// the clearance, and `around` is around all.
+fn uncovered(
+    tree: &Bvh,
+    points: &[DVec3],
+    [old, new]: [&[[DVec3; 3]]; 2],
+    boxes: &[Aabb],
+    around: &Aabb,
+    clearance: f64,
+) -> f64 {
+    let mut worst = 0.0_f64;
+    tree.visit(around, |i| {
+        let p = points[i as usize];
+        if around.distance2(p) > 0.0 {
+            return true;
+        }
+        let mut near2 = f64::INFINITY;
+        for (t, b) in new.iter().zip(boxes) {
+            if b.distance2(p) == 0.0 {
+                near2 = near2.min(point_triangle2(p, *t));
+            }
+        }
+        let leaves = |faces: &[[DVec3; 3]]| faces.iter().map(|&t| crossing(p, t)).sum::<i32>();
+        if leaves(new) < leaves(old) {
+            let depth2 = new.iter().map(|&t| point_triangle2(p, t)).fold(f64::INFINITY, f64::min);
+            worst = worst.max(clearance + depth2.sqrt());
+        } else if near2 < clearance * clearance {
+            worst = worst.max(clearance - near2.sqrt());
+        }
+        true
+    });
+    worst
+}

@@ -1,0 +1,245 @@
+//! Simplification of a closed mesh by edge collapses that keep it valid: its topology (link condition), the model inside, and free of
+//! self-intersection.
+
+use super::patch::{Contents, Exchange, Fault, PatchMesh, normal, quality};
+use super::quadric::Quadric;
+use glam::DVec3;
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+/// How far shapes may degrade.
+#[derive(Clone, Copy, Debug)]
+struct Limits {
+    /// Least cosine between a face's normals before and after.
+    turn: f64,
+    /// Least quality of a face, unless it was worse before.
+    quality: f64,
+}
+
+/// Tried in turn, the next where the one before leads no further, at a price.
+const LIMITS: [Limits; 3] =
+    [Limits { turn: 0.5, quality: 0.3 }, Limits { turn: 0.2, quality: 0.15 }, Limits { turn: -0.2, quality: 0.04 }];
+
+/// How many times dearer a collapse is under the next limits.
+const PRICE: f64 = 8.0;
+
+/// Why an edge cannot be collapsed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Refusal {
+    /// A face would be badly shaped.
+    Shape,
+    /// The mesh would be invalid.
+    Validity,
+}
+
+/// A collapse that may be worth trying.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    cost: f64,
+    edge: [u32; 2],
+    /// Ages of the ends when it was proposed.
+    ages: [u32; 2],
+    /// Where the vertex was found valid, if that cost more than expected.
+    position: Option<DVec3>,
+    /// Which limits hold.
+    stage: usize,
+}
+
+impl PartialEq for Candidate {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Candidate {}
+
+impl PartialOrd for Candidate {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Candidate {
+    /// The cheapest is the greatest.
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.cost.total_cmp(&self.cost).then_with(|| other.edge.cmp(&self.edge))
+    }
+}
+
+/// A mesh that is being simplified.
+pub(super) struct Simplifier<'a> {
+    pub(super) mesh: PatchMesh,
+    pub(super) quadrics: Vec<Quadric>,
+    contents: &'a Contents,
+    ages: Vec<u32>,
+    /// Edges of each vertex that could not be collapsed; they are tried again when something near them changes.
+    refused: Vec<Vec<[u32; 2]>>,
+    vertices: usize,
+}
+
+impl<'a> Simplifier<'a> {
+    pub(super) fn new(positions: Vec<DVec3>, faces: Vec<[u32; 3]>, contents: &'a Contents) -> Self {
+        let mut quadrics = vec![Quadric::ZERO; positions.len()];
+        for face in &faces {
+            let corners = face.map(|v| positions[v as usize]);
+            (0..3).for_each(|k| quadrics[face[k] as usize] += Quadric::of_corner(corners, k));
+        }
+        let (ages, vertices) = (vec![0; positions.len()], positions.len());
+        let refused = vec![Vec::new(); vertices];
+        Self { mesh: PatchMesh::new(positions, faces), quadrics, contents, ages, refused, vertices }
+    }
+
+    /// Number of vertices.
+    pub(super) fn len(&self) -> usize {
+        self.vertices
+    }
+
+    /// Collapses edges until at most `target` vertices are left. Says whether it came that far.
+    pub(super) fn simplify(&mut self, target: usize) -> bool {
+        while self.vertices > target {
+            let before = self.vertices;
+            let goal = target.max(before * 6 / 10);
+            self.collapse_cheapest(goal);
+            self.compact();
+            if self.vertices > goal && before - self.vertices < before / 50 + 1 {
+                return false;
+            }
+        }
+        true
+    }
+
+    fn collapse_cheapest(&mut self, goal: usize) {
+        let mut heap = BinaryHeap::new();
+        for v in 0..self.mesh.positions.len() as u32 {
+            self.propose_around(v, |w| v < w, &mut heap);
+        }
+        while self.vertices > goal {
+            let Some(candidate) = heap.pop() else { return };
+            let [u, v] = candidate.edge;
+            if [u, v].map(|w| self.ages[w as usize]) != candidate.ages {
+                continue;
+            }
+            let (exchange, cost) = match self.admissible(&candidate) {
+                Ok(found) => found,
+                Err(Refusal::Shape) if candidate.stage + 1 < LIMITS.len() => {
+                    heap.push(Candidate { cost: PRICE * candidate.cost, stage: candidate.stage + 1, ..candidate });
+                    continue;
+                }
+                Err(_) => {
+                    self.refused[u as usize].push([u, v]);
+                    continue;
+                }
+            };
+            let position = exchange.moved.map(|m| m.1);
+            if candidate.position.is_none() && cost > 1.5 * candidate.cost {
+                heap.push(Candidate { cost, position, ..candidate });
+                continue;
+            }
+            self.mesh.apply(&exchange);
+            let merged = self.quadrics[v as usize];
+            self.quadrics[u as usize] += merged;
+            self.vertices -= 1;
+            self.ages[v as usize] += 1;
+            self.ages[u as usize] += 1;
+            self.propose_around(u, |_| true, &mut heap);
+            for w in self.mesh.ring(u) {
+                for edge in std::mem::take(&mut self.refused[w as usize]) {
+                    if edge.iter().all(|&x| x != u) && self.mesh.joined(edge) {
+                        self.propose(edge, &mut heap);
+                    }
+                }
+            }
+        }
+    }
+
+    fn propose_around(&self, v: u32, wanted: impl Fn(u32) -> bool, heap: &mut BinaryHeap<Candidate>) {
+        for w in self.mesh.ring(v) {
+            if wanted(w) {
+                self.propose([v.min(w), v.max(w)], heap);
+            }
+        }
+    }
+
+    fn propose(&self, edge: [u32; 2], heap: &mut BinaryHeap<Candidate>) {
+        let (position, quadric) = self.optimum(edge);
+        let ages = edge.map(|x| self.ages[x as usize]);
+        heap.push(Candidate { cost: quadric.at(position), edge, ages, position: None, stage: 0 });
+    }
+
+    fn optimum(&self, edge: [u32; 2]) -> (DVec3, Quadric) {
+        let [p, q] = edge.map(|v| self.mesh.positions[v as usize]);
+        let mut quadric = self.quadrics[edge[0] as usize];
+        quadric += self.quadrics[edge[1] as usize];
+        let middle = 0.5 * (p + q);
+        let best = quadric.least(middle, 1e-3);
+        let far = best.distance(middle) > 2.0 * p.distance(q);
+        (if far { middle } else { best }, quadric)
+    }
+
+    /// The collapse with a valid position for its vertex, and its cost there.
+    fn admissible(&self, candidate: &Candidate) -> Result<(Exchange, f64), Refusal> {
+        let limits = LIMITS[candidate.stage];
+        let [u, v] = candidate.edge;
+        let mesh = &self.mesh;
+        let (ring_u, ring_v) = (mesh.ring(u), mesh.ring(v));
+        let common: Vec<u32> = ring_u.iter().filter(|w| ring_v.binary_search(w).is_ok()).copied().collect();
+        if common.len() != 2 || common.iter().any(|&w| mesh.around[w as usize].len() < 4) {
+            return Err(Refusal::Validity);
+        }
+        let (best, quadric) = self.optimum(candidate.edge);
+        let mut kept = Vec::new();
+        let mut removed = Vec::new();
+        for &f in &mesh.around[u as usize] {
+            let shared = mesh.faces[f as usize].contains(&v);
+            if shared { removed.push(f) } else { kept.push(f) }
+        }
+        kept.extend(mesh.around[v as usize].iter().filter(|&&f| !mesh.faces[f as usize].contains(&u)));
+        let new: Vec<[u32; 3]> =
+            kept.iter().map(|&f| mesh.faces[f as usize].map(|w| if w == v { u } else { w })).collect();
+        let outwards = kept.iter().chain(&removed).map(|&f| normal(mesh.corners(f))).sum::<DVec3>().normalize_or_zero();
+        let old: Vec<u32> = kept.iter().chain(&removed).copied().collect();
+        let mut at = candidate.position.unwrap_or(best);
+        let mut exchange = Exchange { old, new, moved: Some((u, at)) };
+        let size = mesh.positions[u as usize].distance(mesh.positions[v as usize]);
+        let mut pushed = 0.0;
+        for attempt in 0..5 {
+            if !self.well_shaped(&exchange, kept.len(), limits) {
+                return Err(Refusal::Shape);
+            }
+            match mesh.check(&exchange, self.contents) {
+                Ok(()) => return Ok((exchange, quadric.at(at) * PRICE.powi(candidate.stage as i32))),
+                Err(Fault::Uncovered(depth)) if attempt < 4 => {
+                    let step = depth * (1.2 + 0.5 * f64::from(attempt)) + 1e-4 * size;
+                    pushed += step;
+                    if pushed > 2.0 * size {
+                        break;
+                    }
+                    at += step * outwards;
+                    exchange.moved = Some((u, at));
+                }
+                Err(_) => break,
+            }
+        }
+        Err(Refusal::Validity)
+    }
+
+    /// Whether no face turns or degrades too much. The first `kept` old faces become the new ones.
+    fn well_shaped(&self, exchange: &Exchange, kept: usize, limits: Limits) -> bool {
+        (0..kept).all(|i| {
+            let before = self.mesh.corners(exchange.old[i]);
+            let after = self.mesh.corners_after(exchange.new[i], exchange.moved);
+            let q = quality(after);
+            normal(before).dot(normal(after)) >= limits.turn && (q >= limits.quality || q >= 1.05 * quality(before))
+        })
+    }
+
+    /// Gives up what was removed.
+    fn compact(&mut self) {
+        let (used, faces) = self.mesh.compacted();
+        let positions = used.iter().map(|&v| self.mesh.positions[v as usize]).collect();
+        self.quadrics = used.iter().map(|&v| self.quadrics[v as usize]).collect();
+        self.ages = vec![0; used.len()];
+        self.refused = vec![Vec::new(); used.len()];
+        self.mesh = PatchMesh::new(positions, faces);
+    }
+}

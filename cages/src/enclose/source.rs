@@ -1,0 +1,107 @@
+//! A model made ready to be enclosed: centred, of diagonal one, with all there is of it as triangles.
+
+use super::EncloseError;
+use crate::geometry::Surface;
+use cager_core::mesh::{Model, bounds, diagonal};
+use glam::DVec3;
+use std::collections::HashSet;
+
+/// No more points than this are looked at while a cage is simplified; more are thinned.
+const CHECKED_POINTS: usize = 60_000;
+
+/// The model in a frame of reference where it is centred and its diagonal is one.
+#[derive(Debug)]
+pub(super) struct Source {
+    /// All points of the model.
+    pub(super) points: Vec<DVec3>,
+    /// Faces as triangles, points without a face as triangles with one corner three times.
+    pub(super) surface: Surface,
+    /// Whether faces have free edges.
+    pub(super) open: bool,
+    /// Points that stand for the model while a cage is simplified.
+    pub(super) samples: Vec<DVec3>,
+    /// Every point is this close to a sample.
+    pub(super) thinned: f64,
+    center: DVec3,
+    scale: f64,
+}
+
+impl Source {
+    pub(super) fn new(model: &Model, spacing: f64) -> Result<Self, EncloseError> {
+        if model.points.is_empty() {
+            return Err(EncloseError::Empty);
+        }
+        if let Some(point) = model.points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+            return Err(EncloseError::NotFinite { point });
+        }
+        let (low, high) = bounds(&model.points);
+        let (low, high) = (DVec3::from(low), DVec3::from(high));
+        let scale = diagonal(&model.points);
+        let magnitude = low.abs().max(high.abs()).max_element();
+        if !scale.is_finite() || scale <= 1e-12 * magnitude {
+            return Err(EncloseError::NoExtent);
+        }
+        let center = 0.5 * low + 0.5 * high;
+        let points: Vec<DVec3> = model.points.iter().map(|&p| (DVec3::from(p) - center) / scale).collect();
+        let exists = |t: &[u32; 3]| t.iter().all(|&v| (v as usize) < points.len());
+        let mut triangles: Vec<[u32; 3]> = model.faces.triangulated().into_iter().filter(exists).collect();
+        let open = has_free_edges(&triangles);
+        let mut used = vec![false; points.len()];
+        triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
+        let surface_area = triangles.iter().map(|t| area(t.map(|v| points[v as usize]))).sum::<f64>();
+        let spacing_on_faces = (2.5 * spacing).max((surface_area / 10_000.0).sqrt());
+        let (mut samples, thinned) = thin(&points, spacing);
+        for t in &triangles {
+            sample_face(t.map(|v| points[v as usize]), spacing_on_faces, &mut samples);
+        }
+        triangles.extend((0..points.len() as u32).filter(|&v| !used[v as usize]).map(|v| [v; 3]));
+        let surface = Surface::new(points.clone(), triangles);
+        Ok(Self { points, surface, open, samples, thinned, center, scale })
+    }
+
+    /// Back in the model's own frame of reference.
+    pub(super) fn restored(&self, p: DVec3) -> [f64; 3] {
+        (self.center + self.scale * p).to_array()
+    }
+}
+
+fn area([a, b, c]: [DVec3; 3]) -> f64 {
+    0.5 * (b - a).cross(c - a).length()
+}
+
+/// One point per voxel where there are too many, with how far a point may be from the one that stands for it.
+fn thin(points: &[DVec3], spacing: f64) -> (Vec<DVec3>, f64) {
+    if points.len() <= CHECKED_POINTS {
+        return (points.to_vec(), 0.0);
+    }
+    let voxel = 0.2 * spacing;
+    let mut seen = HashSet::new();
+    let first = |p: &&DVec3| seen.insert((**p / voxel).floor().to_array().map(|x| x as i64));
+    (points.iter().filter(first).copied().collect(), voxel * 3.0_f64.sqrt())
+}
+
+/// Points on a face that is large beside the spacing, so that it stays inside too.
+fn sample_face([a, b, c]: [DVec3; 3], spacing: f64, samples: &mut Vec<DVec3>) {
+    let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+    let n = ((longest / spacing).ceil() as u32).min(400);
+    for i in 0..=n {
+        for j in 0..=n - i {
+            let corner = (i == 0 && (j == 0 || j == n)) || i == n;
+            if !corner {
+                let (s, t) = (f64::from(i) / f64::from(n), f64::from(j) / f64::from(n));
+                samples.push(a + s * (b - a) + t * (c - a));
+            }
+        }
+    }
+}
+
+/// Whether some edge is not run along as often in one direction as in the other.
+fn has_free_edges(triangles: &[[u32; 3]]) -> bool {
+    let mut edges: Vec<(u32, u32, i32)> = triangles
+        .iter()
+        .flat_map(|t| (0..3).map(|k| (t[k], t[(k + 1) % 3])))
+        .map(|(a, b)| (a.min(b), a.max(b), if a < b { 1 } else { -1 }))
+        .collect();
+    edges.sort_unstable();
+    edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).any(|same| same.iter().map(|e| e.2).sum::<i32>() != 0)
+}

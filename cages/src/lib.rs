@@ -1,0 +1,11 @@
+//! Cages: made around a model, checked, repaired, and designed from its motion. Plain data in, plain data out; no files, no async.
+
+mod design;
+pub mod doctor;
+mod enclose;
+mod general;
+pub mod geometry;
+
+pub use design::{Design, DesignError, DesignOptions, Goal, MOST_VERTICES, Progress, Stage, Style, design};
+pub use enclose::{EncloseError, EncloseOptions, enclose};
+pub use general::{General, general};

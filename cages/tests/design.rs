@@ -1,0 +1,273 @@
+//! Cages designed from a motion.
+
+mod common;
+
+use cager_cages::{Design, DesignError, DesignOptions, Goal, Style, design, enclose};
+use cager_core::cage::Cage;
+use cager_core::inversion::{BATCH, Handles, Solver, SolverOptions};
+use cager_core::mesh::{Model, TriMesh};
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+struct Capture {
+    rest: Model,
+    frames: Vec<Vec<f64>>,
+}
+
+/// An arm that bends at two joints: a tube whose points follow the bones around them.
+fn capture() -> Capture {
+    const FRAMES: usize = 24;
+    let (rings, around) = (64, 20);
+    let mut rest = Model::default();
+    for i in 0..=rings {
+        for k in 0..around {
+            let turn = std::f64::consts::TAU * k as f64 / around as f64;
+            let radius = 0.12 + 0.03 * (i as f64 * 0.4).sin();
+            rest.points.push([radius * turn.cos(), radius * turn.sin(), -1.0 + 2.0 * i as f64 / rings as f64]);
+        }
+    }
+    for i in 0..rings {
+        for k in 0..around {
+            let at = |i: u32, k: u32| i * around + k % around;
+            let (i, k) = (i as u32, k);
+            rest.faces.push(&[at(i, k), at(i, k + 1), at(i + 1, k + 1), at(i + 1, k)]);
+        }
+    }
+    // Bent at z = ±0.35 about x and y, blended over a tenth.
+    let bent = |p: [f64; 3], t: usize| {
+        let phase = std::f64::consts::TAU * t as f64 / FRAMES as f64;
+        let mut q = p;
+        for (joint, axis, angle) in [(0.35, 1, 0.9 * phase.sin()), (-0.35, 0, 0.7 * (phase + 1.0).sin())] {
+            let along: f64 = if joint > 0.0 { p[2] - joint } else { joint - p[2] };
+            let weight = (0.5 + along / 0.1).clamp(0.0, 1.0);
+            let (sin, cos) = (weight * angle * if joint > 0.0 { 1.0 } else { -1.0 }).sin_cos();
+            let (u, v) = (q[axis], q[2] - joint);
+            q[axis] = cos * u + sin * v;
+            q[2] = joint - sin * u + cos * v;
+        }
+        q
+    };
+    let frames = (0..FRAMES).map(|t| rest.points.iter().flat_map(|&p| bent(p, t)).collect()).collect();
+    Capture { rest, frames }
+}
+
+fn designed(capture: &Capture, start: Option<&TriMesh>, options: &DesignOptions) -> Result<Design, DesignError> {
+    design(&capture.rest, &capture.frames, start, options, &mut |_| ControlFlow::Continue(()))
+}
+
+fn with_vertices(vertices: usize, style: Style) -> DesignOptions {
+    DesignOptions { goal: Goal::Vertices(vertices), style, ..DesignOptions::default() }
+}
+
+/// Mean L2 error of the encoder with spread handles, as a fraction of the diagonal.
+fn encoded(cage: &TriMesh, rest: &Model, frames: &[Vec<f64>]) -> f64 {
+    let cage = Cage::new(cage.clone()).unwrap();
+    let spectrum = 20.min(cage.vertices().len() / 16);
+    let options = SolverOptions { handles: Handles::Spread { count: None }, spectrum, ..SolverOptions::default() };
+    let solver = Solver::prepare(&cager_core::coordinates::MeanValue, &cage, &rest.points, options).unwrap();
+    let frames: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
+    let mut errors = Vec::new();
+    for frames in frames.chunks(BATCH) {
+        let cages: Vec<Vec<f32>> = solver.invert_reporting(None, frames).into_iter().map(|found| found.cage).collect();
+        let cages: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
+        errors.extend(solver.decoder().measure(&cages, frames));
+    }
+    errors.iter().map(|e| e.l2).sum::<f64>() / errors.len() as f64 / solver.diagonal()
+}
+
+#[test]
+fn a_designed_cage_is_several_times_more_accurate_than_one_of_the_rest_pose_also_on_frames_it_did_not_see() {
+    let capture = capture();
+    let all: Vec<Vec<f64>> = capture.frames.clone();
+    let seen = Capture { rest: capture.rest.clone(), frames: all.iter().step_by(2).cloned().collect() };
+    let unseen: Vec<Vec<f64>> = all.into_iter().skip(1).step_by(2).collect();
+    let found = designed(&seen, None, &with_vertices(80, Style::Free)).unwrap();
+    assert!(found.cage.vertices.len() <= 80);
+    let enclosing = enclose(&seen.rest, &cager_cages::EncloseOptions { vertices: 80, ..Default::default() }).unwrap();
+    let (before, after) = (encoded(&enclosing, &seen.rest, &unseen), encoded(&found.cage, &seen.rest, &unseen));
+    assert!(after < before / 2.0, "{before} {after}");
+    // What is reported is what was reached, and it fell.
+    let (first, last) = (&found.stages[0], found.stages.last().unwrap());
+    assert!(last.held_back < first.held_back / 2.0 && last.designed < first.designed / 2.0);
+    assert!(last.held_back < 1.5 * last.designed);
+}
+
+#[test]
+fn a_cage_for_editing_is_valid_and_far_more_accurate_than_where_it_began() {
+    let capture = capture();
+    let found = designed(&capture, None, &with_vertices(80, Style::Editable)).unwrap();
+    let verdict = common::verdict(&found.cage, &capture.rest);
+    assert!(verdict.is_valid(1), "{verdict:?}");
+    let (first, last) = (&found.stages[0], found.stages.last().unwrap());
+    assert!(last.held_back < first.held_back / 1.8, "{first:?} {last:?}");
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bits_whatever_the_number_of_threads() {
+    let capture = capture();
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        // A few steps say as much as all.
+        let mut calls = 0;
+        let options = DesignOptions { seed: 7, ..with_vertices(40, Style::Editable) };
+        pool.install(|| {
+            design(&capture.rest, &capture.frames, None, &options, &mut |_| {
+                calls += 1;
+                if calls < 63 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+            })
+            .unwrap()
+            .cage
+        })
+    };
+    let one = with(1);
+    assert_eq!(one, with(3));
+    assert_ne!(
+        one,
+        enclose(&capture.rest, &cager_cages::EncloseOptions { vertices: 40, ..Default::default() }).unwrap()
+    );
+}
+
+#[test]
+fn an_error_asked_for_is_met_by_the_encoder_with_no_more_vertices_than_it_takes() {
+    let capture = capture();
+    let options = |error| DesignOptions { goal: Goal::MeanError(error), ..DesignOptions::default() };
+    let (coarse, fine) =
+        (designed(&capture, None, &options(0.004)).unwrap(), designed(&capture, None, &options(0.001)).unwrap());
+    for (found, error) in [(&coarse, 0.004), (&fine, 0.001)] {
+        assert!(found.warnings.is_empty(), "{:?}", found.warnings);
+        let reached = encoded(&found.cage, &capture.rest, &capture.frames);
+        assert!(reached <= 1.1 * error, "{reached} for {error}");
+    }
+    assert!(coarse.cage.vertices.len() < fine.cage.vertices.len());
+    // Nothing reaches this one, and it is said.
+    let none =
+        designed(&capture, None, &DesignOptions { time_limit: Some(Duration::from_secs(3)), ..options(1e-9) }).unwrap();
+    assert!(none.warnings.iter().any(|w| w.contains("was not reached")), "{:?}", none.warnings);
+}
+
+#[test]
+fn an_artists_cage_keeps_its_faces_and_its_symmetry() {
+    let capture = capture();
+    // A box with a vertex in the middle of each edge and face, symmetric across x.
+    let start = symmetric_box(&capture.rest);
+    let options = DesignOptions {
+        keep_connectivity: true,
+        symmetry: Some(0),
+        style: Style::Editable,
+        time_limit: Some(Duration::from_secs(10)),
+        ..DesignOptions::default()
+    };
+    let found = designed(&capture, Some(&start), &options).unwrap();
+    assert_eq!(found.cage.triangles, start.triangles);
+    assert_ne!(found.cage.vertices, start.vertices);
+    assert!(found.stages.last().unwrap().held_back < found.stages[0].held_back);
+    let middle = start.vertices.iter().map(|v| v[0]).sum::<f64>() / start.vertices.len() as f64;
+    for v in &found.cage.vertices {
+        let image = [2.0 * middle - v[0], v[1], v[2]];
+        let nearest = found.cage.vertices.iter().map(|w| (0..3).map(|k| (w[k] - image[k]).powi(2)).sum::<f64>());
+        assert!(nearest.fold(f64::INFINITY, f64::min).sqrt() < 1e-9, "{v:?}");
+    }
+    let mut skewed = start.clone();
+    skewed.vertices[0][0] -= 0.3;
+    let error = designed(&capture, Some(&skewed), &options).unwrap_err();
+    assert!(matches!(error, DesignError::NotSymmetric { axis: 0, .. }), "{error}");
+}
+
+/// The bounding box of a model, twice subdivided.
+fn symmetric_box(model: &Model) -> TriMesh {
+    let (low, high) = cager_core::mesh::bounds(&model.points);
+    let at = |c: [usize; 3]| -> [f64; 3] {
+        std::array::from_fn(|k| low[k] + (high[k] - low[k]) * (c[k] as f64 / 2.0 * 1.2 - 0.1))
+    };
+    let mut mesh = TriMesh::default();
+    let mut index = std::collections::BTreeMap::new();
+    let mut vertex = |c: [usize; 3], mesh: &mut TriMesh| {
+        *index.entry(c).or_insert_with(|| {
+            mesh.vertices.push(at(c));
+            mesh.vertices.len() as u32 - 1
+        })
+    };
+    for axis in 0..3 {
+        for side in [0, 2] {
+            for i in 0..2 {
+                for j in 0..2 {
+                    let corner = |a: usize, b: usize| {
+                        let mut c = [0; 3];
+                        c[axis] = side;
+                        c[(axis + 1) % 3] = i + a;
+                        c[(axis + 2) % 3] = j + b;
+                        c
+                    };
+                    let mut q = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)].map(|c| vertex(c, &mut mesh));
+                    if side == 0 {
+                        q.reverse();
+                    }
+                    mesh.triangles.extend([[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
+                }
+            }
+        }
+    }
+    mesh
+}
+
+#[test]
+fn the_watcher_hears_of_the_first_cage_and_may_stop_and_the_time_limit_holds() {
+    let capture = capture();
+    let mut first = None;
+    let found = design(&capture.rest, &capture.frames, None, &with_vertices(60, Style::Free), &mut |now| {
+        first = first.take().or_else(|| now.better.cloned());
+        if first.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    assert_eq!(Some(found.unwrap().cage), first);
+    let stopped =
+        design(&capture.rest, &capture.frames, None, &with_vertices(60, Style::Free), &mut |_| ControlFlow::Break(()));
+    assert_eq!(stopped, Err(DesignError::Stopped));
+    let clock = Instant::now();
+    let limit = DesignOptions { time_limit: Some(Duration::from_millis(1)), ..with_vertices(60, Style::Free) };
+    let cut = designed(&capture, None, &limit).unwrap();
+    assert!(cut.timed_out && clock.elapsed() < Duration::from_secs(20));
+}
+
+#[test]
+fn what_no_cage_can_be_designed_from_is_said() {
+    let Capture { rest, frames } = capture();
+    let message = |rest: &Model, frames: &[Vec<f64>], goal: Goal| {
+        let options = DesignOptions { goal, ..DesignOptions::default() };
+        design(rest, frames, None, &options, &mut |_| ControlFlow::Continue(())).unwrap_err().to_string()
+    };
+    let usual = Goal::Vertices(50);
+    assert!(message(&rest, &[], usual).contains("no frames"));
+    let mut short = frames[..2].to_vec();
+    short[1].truncate(30);
+    assert!(message(&rest, &short, usual).contains("frame 1 has 10 points where the rest pose has"));
+    let mut broken = frames[..2].to_vec();
+    broken[0][32] = f64::NAN;
+    assert!(message(&rest, &broken, usual).contains("frame 0: point 10"));
+    assert!(message(&rest, &frames, Goal::MeanError(0.0)).contains("above 0"));
+    assert!(message(&rest, &frames, Goal::MeanError(f64::NAN)).contains("above 0"));
+    let empty = Model::default();
+    assert!(message(&empty, &[Vec::new()], usual).contains("no points"));
+    let open = TriMesh { vertices: rest.points[..4].to_vec(), triangles: vec![[0, 1, 2]; 4] };
+    let error = design(&rest, &frames, Some(&open), &DesignOptions::default(), &mut |_| ControlFlow::Continue(()));
+    assert!(matches!(error, Err(DesignError::Start(_))));
+}
+
+#[test]
+fn motion_that_tears_the_model_apart_and_a_model_that_does_not_move_still_give_a_cage() {
+    let Capture { rest, frames } = capture();
+    let torn: Vec<Vec<f64>> = frames
+        .iter()
+        .enumerate()
+        .map(|(t, frame)| {
+            frame.iter().enumerate().map(|(i, x)| x + 10.0 * (((i * 7919 + t * 31) % 13) as f64)).collect()
+        })
+        .collect();
+    let still: Vec<Vec<f64>> = vec![rest.points.iter().flatten().copied().collect(); 3];
+    for (frames, warned) in [(torn, true), (still, false)] {
+        let limit = DesignOptions { time_limit: Some(Duration::from_secs(2)), ..with_vertices(60, Style::Editable) };
+        let found = designed(&Capture { rest: rest.clone(), frames }, None, &limit).unwrap();
+        let verdict = common::verdict(&found.cage, &rest);
+        assert!(verdict.is_valid(1), "{verdict:?}");
+        assert_eq!(found.warnings.iter().any(|w| w.contains("tear the model apart")), warned, "{:?}", found.warnings);
+    }
+}

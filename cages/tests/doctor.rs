@@ -1,0 +1,146 @@
+//! Cages broken on purpose are diagnosed and repaired.
+
+mod common;
+
+use cager_cages::doctor::{check, repair};
+use cager_cages::{EncloseOptions, enclose};
+use cager_core::mesh::{Model, Polygons, TriMesh};
+use common::{append, model, sphere, verdict};
+
+fn ball() -> Model {
+    model(&sphere([0.0; 3], 1.0, 12))
+}
+
+fn cage() -> TriMesh {
+    enclose(&ball(), &EncloseOptions { vertices: 60, ..EncloseOptions::default() }).unwrap()
+}
+
+fn quad_cube(half: f64) -> Model {
+    let points = (0..8).map(|i| [0, 1, 2].map(|k| if i >> k & 1 == 0 { -half } else { half })).collect();
+    let mut faces = Polygons::new();
+    for quad in [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]] {
+        faces.push(&quad);
+    }
+    Model { points, faces }
+}
+
+#[test]
+fn a_sound_cage_has_nothing_to_report() {
+    let findings = check(&cage(), &ball());
+    assert!(findings.editable() && findings.sentences().is_empty(), "{findings}");
+    assert!(findings.condition_number.is_some_and(|c| c > 1.0 && c < 1e4));
+    let repaired = repair(&model(&cage()), &ball());
+    assert!(repaired.changes.is_empty());
+    assert_eq!(TriMesh::from(&repaired.cage), cage());
+}
+
+#[test]
+fn everything_wrong_is_reported_at_once() {
+    let mut broken = cage();
+    broken.triangles[3].swap(1, 2);
+    broken.triangles.remove(10);
+    broken.vertices.push([9.0; 3]);
+    broken.triangles.push(broken.triangles[0]);
+    let findings = check(&broken, &ball());
+    assert!(!findings.usable() && !findings.editable());
+    assert_eq!(findings.open_edges.len(), 3);
+    assert!(!findings.inconsistent_edges.is_empty() && !findings.non_manifold_edges.is_empty());
+    assert_eq!(findings.loose_vertices, [60]);
+    assert_eq!(findings.duplicate_faces, [[0, findings.faces as u32 - 1]]);
+    assert!(findings.sentences().len() >= 5, "{findings}");
+
+    let repaired = repair(&model(&broken), &ball());
+    assert!(repaired.remaining.editable(), "{:?}\n{}", repaired.changes, repaired.remaining);
+    assert!(verdict(&TriMesh::from(&repaired.cage), &ball()).is_valid(1));
+    assert_eq!(repaired.cage.points.len(), 60);
+}
+
+#[test]
+fn seams_holes_and_orientation_are_repaired_and_quads_stay_quads() {
+    let mut cube = quad_cube(1.2);
+    let mut faces: Vec<Vec<u32>> = cube.faces.iter().map(<[u32]>::to_vec).collect();
+    faces[5].iter_mut().for_each(|v| {
+        cube.points.push(cube.points[*v as usize]);
+        *v = cube.points.len() as u32 - 1;
+    });
+    faces.iter_mut().for_each(|f| f.reverse());
+    faces[1].reverse();
+    faces.remove(0);
+    cube.faces = Polygons::new();
+    faces.iter().for_each(|f| cube.faces.push(f));
+    let repaired = repair(&cube, &ball());
+    assert!(repaired.remaining.editable(), "{:?}\n{}", repaired.changes, repaired.remaining);
+    assert_eq!(repaired.cage.faces.arities(), [4; 6]);
+    assert_eq!(repaired.cage.points.len(), 8);
+}
+
+#[test]
+fn a_cage_that_is_slightly_small_is_enlarged_and_a_much_smaller_one_is_not() {
+    let small = |scale: f64| {
+        let mut small = cage();
+        small.vertices.iter_mut().flatten().for_each(|x| *x *= scale);
+        small
+    };
+    let findings = check(&small(0.95), &ball());
+    assert!(findings.usable() && !findings.editable() && findings.outside.is_some());
+    let repaired = repair(&model(&small(0.95)), &ball());
+    assert!(repaired.remaining.editable(), "{:?}\n{}", repaired.changes, repaired.remaining);
+    let repaired = repair(&model(&small(0.6)), &ball());
+    assert!(repaired.remaining.outside.is_some() && repaired.changes.is_empty());
+}
+
+#[test]
+fn units_and_axes_are_guessed() {
+    let mut tall = ball();
+    tall.points.iter_mut().for_each(|p| *p = [0.5 * p[0], 2.0 * p[1] + 2.0, 0.3 * p[2]]);
+    let fitting = enclose(&tall, &EncloseOptions { vertices: 80, ..EncloseOptions::default() }).unwrap();
+    let mut centimetres = fitting.clone();
+    centimetres.vertices.iter_mut().flatten().for_each(|x| *x *= 100.0);
+    // A cage a hundred times too large encloses, but one too small does not.
+    let mut metres = fitting.clone();
+    metres.vertices.iter_mut().flatten().for_each(|x| *x *= 0.01);
+    let misfit = check(&metres, &tall).misfit.unwrap();
+    assert_eq!((misfit.scale, misfit.axes), (100.0, None));
+    let mut z_up = fitting;
+    z_up.vertices.iter_mut().for_each(|p| *p = [p[0], -p[2], p[1]]);
+    let misfit = check(&z_up, &tall).misfit.unwrap();
+    assert_eq!((misfit.scale, misfit.axes), (1.0, Some("y and z")));
+    assert!(misfit.to_string().contains("y and z"));
+}
+
+#[test]
+fn no_input_is_too_broken() {
+    let nan = TriMesh { vertices: vec![[f64::NAN; 3]; 3], triangles: vec![[0, 1, 2], [0, 1, 9]] };
+    for mesh in [TriMesh::default(), nan] {
+        let findings = check(&mesh, &Model::default());
+        assert!(!findings.usable());
+        let mut broken = Model { points: mesh.vertices.clone(), faces: Polygons::new() };
+        mesh.triangles.iter().for_each(|t| broken.faces.push(t));
+        let _ = check(&mesh, &ball());
+        assert!(!repair(&broken, &ball()).remaining.usable());
+    }
+    let mut two = ball();
+    append(&mut two, &sphere([0.5, 0.0, 0.0], 1.0, 12));
+    assert!(!check(&TriMesh::from(&two), &ball()).self_intersections.is_empty());
+}
+
+#[test]
+fn cages_of_the_data_are_judged_and_repaired() {
+    let Some(data) = common::data() else { return };
+    for (folder, cage, mesh, usable) in [
+        ("invalid/pgc_elephant", "cage.obj", "mesh.obj", false),
+        ("invalid/deepcage_tpose", "cage.obj", "mesh.obj", true),
+        ("pairs/qmvc_beast", "cage_poly.obj", "mesh.obj", true),
+        ("pairs/qmvc_ogre", "cage_poly.obj", "mesh.obj", true),
+        ("makehuman-cmu-walk", "cage.obj", "rest.obj", true),
+    ] {
+        let [cage, model] = [cage, mesh].map(|file| common::read_obj(&data.join(folder).join(file)));
+        let findings = check(&TriMesh::from(&cage), &model);
+        eprintln!("\n{folder}: {findings}");
+        assert_eq!(findings.usable(), usable, "{folder}");
+        assert!(!findings.sentences().is_empty());
+        let repaired = repair(&cage, &model);
+        eprintln!("-> {:?}\n-> {}", repaired.changes, repaired.remaining);
+        assert!(repaired.remaining.usable(), "{folder}");
+    }
+}
