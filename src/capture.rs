@@ -127,6 +127,7 @@ fn begin_report(encoding: &Encoding<'_>) -> Report {
         spectrum: encoding.options.spectrum,
         spectrum_choice: None,
         lambda: encoding.options.lambda,
+        design: None,
         consistency: None,
         refinement: found.refinement.map(Into::into),
         affine_reproduction_error: found.affine_reproduction_error,

@@ -68,6 +68,16 @@ pub struct ServeConfig {
     pub max_prepare_bytes: u64,
     /// Sessions waiting to be prepared.
     pub max_prepare_queue: usize,
+    /// Cages designed at the same time.
+    pub max_designs: usize,
+    /// Cage designs of a tenant waiting for their turn.
+    pub max_design_queue: usize,
+    /// Seconds that a design may take; then the best cage so far is the result.
+    pub max_design_seconds: u64,
+    /// Memory that the frames of one design may take, in bytes: so many of those that were sent are looked at.
+    pub max_design_bytes: u64,
+    /// Bytes of the frames that a cage is designed from.
+    pub max_frames_bytes: u64,
     /// Frames waiting to be solved.
     pub max_queue_frames: usize,
     /// Seconds for a request's header to arrive.
@@ -119,6 +129,11 @@ impl Default for ServeConfig {
             max_preparing: 2,
             max_prepare_bytes: 8 * GIB,
             max_prepare_queue: 64,
+            max_designs: 1,
+            max_design_queue: 16,
+            max_design_seconds: 120,
+            max_design_bytes: 512 * MIB,
+            max_frames_bytes: 4 * GIB,
             max_queue_frames: 4096,
             header_timeout_s: 10,
             body_timeout_s: 30,

@@ -87,13 +87,15 @@ pub struct ChooseSpectrum {
     pub bound: f64,
 }
 
-/// Frames of a capture to choose a spectrum threshold by: 24 evenly spaced ones, or the first 96 where cages follow their predecessors;
-/// fewer where they are short of memory or there are no more.
+/// At most so many frames of a capture, evenly spaced or the first ones; fewer where they are short of memory or there are no more.
 ///
 /// # Errors
 /// Those of the reader, also where it ends before the frames it announced.
-pub fn sample_frames(frames: &mut dyn FrameReader, first_ones: bool) -> Result<Vec<Vec<f64>>, EncodeError> {
-    let most = if first_ones { 96 } else { 24 };
+pub fn sample_frames(
+    frames: &mut dyn FrameReader,
+    most: usize,
+    first_ones: bool,
+) -> Result<Vec<Vec<f64>>, EncodeError> {
     let each = 24 * frames.points().max(1);
     let total = frames.frames();
     let count = most.min(FRAMES_BYTES / each).clamp(1, total.max(1));
@@ -325,10 +327,10 @@ mod tests {
     fn a_reader_that_ends_early_is_told_and_no_sample_is_empty() {
         for first_ones in [false, true] {
             for left in 0..10 {
-                let error = sample_frames(&mut Short { left }, first_ones).expect_err("too few frames");
+                let error = sample_frames(&mut Short { left }, 24, first_ones).expect_err("too few frames");
                 assert!(matches!(error, EncodeError::EndsEarly { found, announced: 10 } if found == left), "{error}");
             }
-            assert_eq!(sample_frames(&mut Short { left: 10 }, first_ones).expect("all").len(), 10);
+            assert_eq!(sample_frames(&mut Short { left: 10 }, 24, first_ones).expect("all").len(), 10);
         }
     }
 }

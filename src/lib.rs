@@ -1,15 +1,20 @@
 //! The `cager` program: the command line and the service over the crates that do the work.
 
 pub mod auth;
+#[doc(hidden)]
+pub mod cage_job;
 pub mod capture;
 pub mod cli;
 mod compare;
 pub mod config;
 mod coordinates;
 pub mod decode;
+pub mod design;
 pub mod encode;
 pub mod engine;
 pub mod http;
+mod idempotency;
+mod picture;
 mod plot;
 pub mod problem;
 pub mod remote;

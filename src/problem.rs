@@ -44,6 +44,8 @@ kinds! {
     SESSION_COMPLETED CONFLICT "session-completed" "The session is completed and does not change any more";
     SESSION_FAILED CONFLICT "session-failed" "The session failed and cannot be used";
     NOT_READY CONFLICT "not-ready" "The session is still being prepared";
+    CAGE_NOT_READY CONFLICT "cage-not-ready" "The cage is still being designed";
+    CAGE_FAILED CONFLICT "cage-failed" "No cage could be designed";
     KEY_IN_USE CONFLICT "idempotency-key-in-use" "A request with this idempotency key is still being worked on";
     SESSION_DELETED GONE "session-deleted" "The session was deleted";
     TOO_LARGE PAYLOAD_TOO_LARGE "too-large" "The body is larger than allowed";

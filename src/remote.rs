@@ -1,12 +1,15 @@
 //! Encoding by a service: the same files in and the same container out as [`crate::encode`], but another machine computes.
 
+mod cage;
 mod frames;
 mod report;
 
+pub use cage::RemoteCage;
 pub use frames::FileFrames;
 
 use crate::encode::Encoded;
-use cager_client::messages::{FrameResult, SessionOptions};
+use cager_client::cage_messages::CageProgress;
+use cager_client::messages::{CageSource, FrameResult, SessionOptions};
 use cager_client::{Client, ClientError, ClientOptions, FrameSource, MeshFile, NewSession, UploadOptions};
 use cager_formats::{Action, AtomicFile};
 use cager_proto::container;
@@ -48,8 +51,8 @@ pub struct RemoteJob<'a, F> {
     pub token: Option<&'a str>,
     /// File with the model in its rest pose.
     pub rest: &'a Path,
-    /// File with the cage around it.
-    pub cage: &'a Path,
+    /// The cage around it.
+    pub cage: RemoteCage<'a>,
     /// File with the matrix of the regularizer of that name.
     pub matrix: Option<&'a Path>,
     /// The capture.
@@ -58,6 +61,15 @@ pub struct RemoteJob<'a, F> {
     pub output: &'a Path,
     /// Choices for the session.
     pub options: SessionOptions,
+}
+
+/// How far an encoding by a service is.
+#[derive(Clone, Copy, Debug)]
+pub enum RemoteProgress<'a> {
+    /// The cage is being designed.
+    Designing(&'a CageProgress),
+    /// So many frames are done.
+    Frames(usize),
 }
 
 /// A capture that a service has encoded.
@@ -85,13 +97,13 @@ pub struct Steps {
     pub download: Duration,
 }
 
-/// Has a service encode a capture. `progress` is told the number of frames done.
+/// Has a service encode a capture, and design its cage where there is none.
 ///
 /// # Errors
 /// See [`RemoteError`]; the session is then deleted, where the service can still be reached.
 pub fn encode_remotely<F: FrameSource + 'static>(
     job: RemoteJob<'_, F>,
-    progress: &mut (dyn FnMut(usize) + Send),
+    progress: &mut (dyn FnMut(RemoteProgress<'_>) + Send),
 ) -> Result<EncodedRemotely, RemoteError> {
     // One thread moves bytes; frames are read on another.
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(RemoteError::Runtime)?;
@@ -99,8 +111,8 @@ pub fn encode_remotely<F: FrameSource + 'static>(
 }
 
 async fn encode<F: FrameSource + 'static>(
-    job: RemoteJob<'_, F>,
-    progress: &mut (dyn FnMut(usize) + Send),
+    mut job: RemoteJob<'_, F>,
+    progress: &mut (dyn FnMut(RemoteProgress<'_>) + Send),
 ) -> Result<EncodedRemotely, RemoteError> {
     let clock = Instant::now();
     let mut client = Client::new(job.address)?;
@@ -109,18 +121,40 @@ async fn encode<F: FrameSource + 'static>(
     }
     // Before the work, so that an unwritable place costs no waiting.
     let file = AtomicFile::create(job.output)?;
-    let mut new = NewSession::new(mesh_file(job.rest)?, mesh_file(job.cage)?);
-    new.regularizer_matrix = job.matrix.map(mesh_file).transpose()?;
-    new.options = job.options;
-    let session = client.create(&new).await?.id;
+    let mut new = NewSession {
+        rest: mesh_file(job.rest)?,
+        cage: None,
+        regularizer_matrix: job.matrix.map(mesh_file).transpose()?,
+        options: job.options,
+        idempotency_key: None,
+    };
+    let session = match job.cage {
+        RemoteCage::File(path) => {
+            new.cage = Some(mesh_file(path)?);
+            client.create(&new).await?.id
+        }
+        RemoteCage::Designed(options) => {
+            let design = cage::design(&client, &new.rest, &mut job.frames, options, progress).await?;
+            new.options.cage = Some(CageSource { id: Some(design.clone()), ..CageSource::default() });
+            let created = client.create(&new).await;
+            // The session has a cage of its own now.
+            clean_up(&client, async |client| client.delete_cage(&design).await).await;
+            created?.id
+        }
+    };
     match run(&client, &session, job.frames, file, clock, progress).await {
         Ok((encoded, steps)) => Ok(EncodedRemotely { encoded, session, steps }),
         Err(error) => {
-            let hasty = client.with_options(ClientOptions { retries: 0, ..ClientOptions::default() });
-            let _ = tokio::time::timeout(CLEAN_UP_WITHIN, hasty.delete(&session)).await;
+            clean_up(&client, async |client| client.delete(&session).await).await;
             Err(error)
         }
     }
+}
+
+/// Removes what is of no more use on the service, if that is quickly done.
+async fn clean_up(client: &Client, remove: impl AsyncFnOnce(Client) -> Result<(), ClientError>) {
+    let hasty = client.clone().with_options(ClientOptions { retries: 0, ..ClientOptions::default() });
+    let _ = tokio::time::timeout(CLEAN_UP_WITHIN, remove(hasty)).await;
 }
 
 async fn run(
@@ -129,7 +163,7 @@ async fn run(
     frames: impl FrameSource + 'static,
     mut file: AtomicFile,
     clock: Instant,
-    progress: &mut (dyn FnMut(usize) + Send),
+    progress: &mut (dyn FnMut(RemoteProgress<'_>) + Send),
 ) -> Result<(Encoded, Steps), RemoteError> {
     let ready = client.wait_ready(session, READY_WITHIN).await?;
     let mut steps = Steps { prepare: clock.elapsed(), ..Steps::default() };
@@ -137,7 +171,7 @@ async fn run(
     let mut done = 0;
     let mut on_frame = |_: FrameResult| {
         done += 1;
-        progress(done);
+        progress(RemoteProgress::Frames(done));
     };
     let options = UploadOptions { on_frame: Some(&mut on_frame), ..UploadOptions::default() };
     let uploaded = client.upload(&ready, frames, options).await?;

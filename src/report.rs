@@ -1,5 +1,6 @@
 //! `report.json`: what encoding found out, for programs and people.
 
+use crate::design::DesignReport;
 use cager_core::inversion::{Convergence, Outcome};
 use serde::{Deserialize, Serialize};
 
@@ -31,6 +32,9 @@ pub struct Report {
     pub spectrum_choice: Option<SpectrumChoice>,
     /// Weight λ.
     pub lambda: f64,
+    /// How the cage was designed, where none was given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub design: Option<DesignReport>,
     /// How the iteration went, for coordinates whose inversion is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub consistency: Option<Consistency>,

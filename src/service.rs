@@ -1,9 +1,12 @@
 //! The service put together: store, engine, caches, sessions, and how it starts and stops.
 
 use crate::auth::{Access, Tenant};
+use crate::cage_job::registry::CageJobs;
+use crate::cage_job::{Designer, Designs, local_designer};
 use crate::config::ServeConfig;
 use crate::engine::Engine;
 use crate::problem::{self, ApiError};
+use crate::session::cage_source::CageMaker;
 use crate::session::commit::Committer;
 use crate::session::prepared::Solvers;
 use crate::session::registry::Registry;
@@ -32,6 +35,9 @@ pub struct Service {
     pub(crate) solvers: Arc<Solvers>,
     pub(crate) committer: Committer,
     pub(crate) registry: Arc<Registry>,
+    pub(crate) cage_jobs: CageJobs,
+    pub(crate) designs: Designs,
+    pub(crate) cage_maker: CageMaker,
     /// Rest poses and cages of new sessions, and cages asked for, being read at a time: parsing keeps a processor busy.
     pub(crate) reading: Semaphore,
     /// Memory for frames on their way, in KiB.
@@ -101,6 +107,20 @@ impl Service {
     /// # Errors
     /// See [`StartError`].
     pub fn start(config: ServeConfig, disk: Arc<dyn Disk>, stop: CancellationToken) -> Result<Arc<Self>, StartError> {
+        Self::start_with(config, disk, local_designer(), stop)
+    }
+
+    /// As [`Self::start`], with another way to design cages.
+    ///
+    /// # Errors
+    /// See [`StartError`].
+    #[doc(hidden)]
+    pub fn start_with(
+        config: ServeConfig,
+        disk: Arc<dyn Disk>,
+        designer: Arc<Designer>,
+        stop: CancellationToken,
+    ) -> Result<Arc<Self>, StartError> {
         let access = Access::open(config.tokens.as_deref(), config.tenant_limits())?;
         let opened = Store::open(&config.data, disk)?;
         for damaged in &opened.quarantined {
@@ -116,6 +136,9 @@ impl Service {
             solvers: Arc::new(solvers),
             committer: Committer::start(COMMIT_THREADS).map_err(StartError::Threads)?,
             registry: Arc::default(),
+            cage_jobs: CageJobs::default(),
+            designs: Designs::new(&config, designer).map_err(StartError::Threads)?,
+            cage_maker: CageMaker::new(config.max_preparing.max(1)),
             reading: Semaphore::new(READING),
             frame_memory: Memory::new(config.frame_bytes),
             upload_memory: Memory::new(config.upload_bytes),
@@ -131,9 +154,13 @@ impl Service {
         for meta in opened.sessions {
             service.resume(meta);
         }
+        let cage_jobs = opened.cage_jobs.len();
+        for meta in opened.cage_jobs {
+            service.resume_cage_job(meta);
+        }
         service.forget_orphans();
         service.resumed.store(true, Ordering::Release);
-        tracing::info!(sessions = count, quarantined = opened.quarantined.len(), "sessions resumed");
+        tracing::info!(sessions = count, cage_jobs, quarantined = opened.quarantined.len(), "sessions resumed");
         tokio::spawn(Arc::clone(&service).sweep(stop.clone()));
         tokio::spawn(Arc::clone(&service).check_logs(stop.clone()));
         let watching = Arc::clone(&service);

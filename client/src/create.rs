@@ -36,7 +36,7 @@ impl MeshFile {
 pub struct NewSession {
     /// The model in its rest pose.
     pub rest: MeshFile,
-    /// The cage around it; without one the service makes one, if it can.
+    /// The cage around it; without one the service makes one, or takes a designed one, as [`SessionOptions::cage`] says.
     pub cage: Option<MeshFile>,
     /// The matrix of the regularizer `matrix`: a file in the Matrix Market format.
     pub regularizer_matrix: Option<MeshFile>,
@@ -103,7 +103,7 @@ fn refuse_not_finite(options: &SessionOptions) -> Result<(), ClientError> {
         spectrum: _,
         lambda,
         max_error,
-        cage_vertices: _,
+        cage: _,
         flip_cage: _,
         frame_rate,
     } = options;
@@ -115,7 +115,7 @@ fn refuse_not_finite(options: &SessionOptions) -> Result<(), ClientError> {
     Ok(())
 }
 
-fn part(file: &MeshFile, sent: &Arc<AtomicU64>) -> Part {
+pub(crate) fn part(file: &MeshFile, sent: &Arc<AtomicU64>) -> Part {
     let length = file.bytes.len() as u64;
     let sent = Arc::clone(sent);
     let chunks = stream::unfold(file.bytes.clone(), move |mut rest| {
@@ -131,6 +131,6 @@ fn plain_name(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() || matches!(c, '.' | '-' | '_') { c } else { '_' }).collect()
 }
 
-fn random_key() -> String {
+pub(crate) fn random_key() -> String {
     format!("{:032x}", fastrand::u128(..))
 }

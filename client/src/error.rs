@@ -46,6 +46,17 @@ pub enum ClientError {
         /// How long it was waited for.
         waited: Duration,
     },
+    /// No cage could be designed: its problem says what to mend before asking for another.
+    #[error("no cage could be designed: {}", said(.0))]
+    NoCage(Box<Problem>),
+    /// The cage was not designed within the time allowed: wait longer.
+    #[error("cage design {id} is still going on after {} s; wait longer, or look at the service's load", .waited.as_secs())]
+    NotDesigned {
+        /// The design.
+        id: String,
+        /// How long it was waited for.
+        waited: Duration,
+    },
     /// The answer is not what such a service sends: check that the address is that of a CageR service of this version.
     #[error(
         "the answer is not that of a CageR service ({0}); check the address, and that client and service are of the same version"

@@ -10,6 +10,7 @@ use futures_util::stream::BoxStream;
 use futures_util::{StreamExt, stream};
 use reqwest::header::ACCEPT;
 use reqwest::{Method, Response, StatusCode};
+use serde::de::DeserializeOwned;
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -25,10 +26,41 @@ impl Client {
     ///
     /// An error, such as [`ClientError::Refused`] for a session that was deleted, ends the stream.
     pub fn events(&self, id: &str) -> BoxStream<'static, Result<Progress, ClientError>> {
-        let events = Events {
-            client: self.clone(),
-            id: id.to_owned(),
-            backoff: self.backoff(),
+        let is_last = |progress: &Progress| matches!(progress.state, SessionState::Completed | SessionState::Failed);
+        Events::stream(self, Place { resource: "sessions", id: id.to_owned() }, is_last)
+    }
+}
+
+/// Whose events.
+pub(crate) struct Place {
+    pub(crate) resource: &'static str,
+    pub(crate) id: String,
+}
+
+pub(crate) struct Events<T> {
+    client: Client,
+    place: Place,
+    /// Whether nothing follows.
+    is_last: fn(&T) -> bool,
+    backoff: Backoff,
+    connection: Option<(Response, SseParser)>,
+    last_id: Option<String>,
+    pause: Duration,
+    waiting: VecDeque<T>,
+    done: bool,
+}
+
+impl<T: DeserializeOwned + Send + 'static> Events<T> {
+    pub(crate) fn stream(
+        client: &Client,
+        place: Place,
+        is_last: fn(&T) -> bool,
+    ) -> BoxStream<'static, Result<T, ClientError>> {
+        let events = Self {
+            client: client.clone(),
+            place,
+            is_last,
+            backoff: client.backoff(),
             connection: None,
             last_id: None,
             pause: RECONNECT,
@@ -38,25 +70,12 @@ impl Client {
         stream::try_unfold(events, async |mut events| Ok(events.next().await?.map(|progress| (progress, events))))
             .boxed()
     }
-}
 
-struct Events {
-    client: Client,
-    id: String,
-    backoff: Backoff,
-    connection: Option<(Response, SseParser)>,
-    last_id: Option<String>,
-    pause: Duration,
-    waiting: VecDeque<Progress>,
-    done: bool,
-}
-
-impl Events {
-    async fn next(&mut self) -> Result<Option<Progress>, ClientError> {
+    async fn next(&mut self) -> Result<Option<T>, ClientError> {
         loop {
             if let Some(progress) = self.waiting.pop_front() {
                 self.backoff.progress();
-                self.done = matches!(progress.state, SessionState::Completed | SessionState::Failed);
+                self.done = (self.is_last)(&progress);
                 return Ok(Some(progress));
             }
             if self.done {
@@ -107,7 +126,8 @@ impl Events {
     }
 
     async fn connect(&mut self) -> Result<Option<Response>, Failure> {
-        let mut request = self.client.request(Method::GET, &["v1", "sessions", &self.id, "events"], &[]).await?;
+        let mut request =
+            self.client.request(Method::GET, &["v1", self.place.resource, &self.place.id, "events"], &[]).await?;
         request = request.header(ACCEPT, "text/event-stream");
         if let Some(id) = &self.last_id {
             request = request.header("Last-Event-ID", id);

@@ -20,6 +20,7 @@
 mod address;
 mod backoff;
 mod body;
+mod cages;
 #[cfg(test)]
 mod chunks;
 mod client;
@@ -39,7 +40,8 @@ mod source;
 mod sse;
 mod upload;
 
-pub use cager_proto::messages;
+pub use cager_proto::{cage_messages, messages};
+pub use cages::NewCage;
 pub use client::Client;
 pub use create::{MeshFile, NewSession};
 pub use error::ClientError;

@@ -67,6 +67,7 @@ short! {
     record "record" 360_000;
     frames "frames" 240_000;
     new_session "new-session" 24_000;
+    new_cage "new-cage" 12_000;
     range "range" 120_000;
     tokens "tokens" 30_000;
     config "config" 30_000;

@@ -1,5 +1,6 @@
 //! Everything of CageR that is stored or crosses a wire.
 //!
+//! * [`cage_messages`]: the JSON bodies of cage design.
 //! * [`container`]: the `.cager` file: a rest pose, its cage and one solved cage per frame, with random access.
 //! * [`messages`]: the JSON bodies of the service.
 //! * [`record`]: the frame record, `application/vnd.cager.frames`: one frame with its number and its error.
@@ -8,6 +9,7 @@
 //! The binary ones are little-endian with fixed-width integers. `README.md` of this crate has the frame record byte by byte,
 //! `docs/FORMAT.md` of the repository the container.
 
+pub mod cage_messages;
 pub mod container;
 mod le;
 pub mod messages;

@@ -59,9 +59,9 @@ pub struct SessionOptions {
     /// Bound on every vertex's error. Not available yet: a session that asks for it is refused.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_error: Option<f64>,
-    /// Vertices of an automatic cage. Not available yet: a session that asks for it is refused.
+    /// Where the cage comes from if none is sent as a part; made from the rest pose where this is left out as well.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub cage_vertices: Option<u32>,
+    pub cage: Option<CageSource>,
     /// Turn a cage inside out whose faces all point inwards.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub flip_cage: bool,
@@ -69,6 +69,21 @@ pub struct SessionOptions {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(exclusive_minimum = 0))]
     pub frame_rate: Option<f64>,
+}
+
+/// A cage that is not sent. At most one of its fields is given.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(default, deny_unknown_fields)]
+pub struct CageSource {
+    /// The cage is made around the rest pose, with at most so many vertices; 350 where it is left out, or half as many as the model has
+    /// points.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schema(minimum = 4, maximum = 20000))]
+    pub vertices: Option<u32>,
+    /// The cage is that of this completed design, see `POST /v1/cages`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub id: Option<String>,
 }
 
 /// A threshold; the command line's `auto` needs frames to measure.

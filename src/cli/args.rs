@@ -1,5 +1,6 @@
 //! What can be typed: one definition gives parsing, help and shell completions.
 
+use super::cage_args::CageArgs;
 use crate::config::ServeFlags;
 use cager_core::inversion::Handles;
 use cager_core::regularize::Regularizer;
@@ -24,6 +25,7 @@ pub(crate) enum Command {
     Encode(Box<EncodeArgs>),
     Decode(DecodeArgs),
     Inspect(InspectArgs),
+    Cage(Box<CageArgs>),
     Compare(CompareArgs),
     Serve(Box<ServeFlags>),
     Health(HealthArgs),
@@ -33,16 +35,20 @@ pub(crate) enum Command {
 
 /// Recover the cage of every frame of a capture and write a .cager file.
 ///
-/// Example: cager encode --rest rest.obj --cage cage.obj --frames 'walk/*.obj' -o walk.cager
+/// Without --cage, a cage is designed from the capture first.
+/// Example: cager encode --rest rest.obj --frames 'walk/*.obj' -o walk.cager
 #[derive(Args, Debug)]
 pub(crate) struct EncodeArgs {
     /// Model in its rest pose: .obj .ply .off .stl .glb; a point cloud will do.
     #[arg(long, value_name = "REST")]
     pub(crate) rest: PathBuf,
 
-    /// Closed cage around the rest pose, same formats; polygons are triangulated.
-    #[arg(long, value_name = "CAGE")]
-    pub(crate) cage: PathBuf,
+    /// Closed cage around the rest pose, same formats; polygons are triangulated [default: one is designed from the capture].
+    #[arg(long, value_name = "CAGE", hide_default_value = true)]
+    pub(crate) cage: Option<PathBuf>,
+
+    #[command(flatten)]
+    pub(crate) design: DesignArgs,
 
     /// Capture, points in the order of the rest pose: a folder or quoted glob of mesh files (2.obj comes before 10.obj), .npy
     /// (frames × points × 3), .pc2 or .mdd.
@@ -61,7 +67,7 @@ pub(crate) struct EncodeArgs {
     pub(crate) report: Option<PathBuf>,
 
     /// Turn all faces of the cage around: for cages whose normals point inwards.
-    #[arg(long)]
+    #[arg(long, requires = "cage")]
     pub(crate) flip_cage: bool,
 
     /// Have a service compute: its address, such as http://127.0.0.1:8080.
@@ -71,6 +77,38 @@ pub(crate) struct EncodeArgs {
     /// Token to show to the service [default: the environment's CAGER_TOKEN, which other users of this machine do not see].
     #[arg(long, value_name = "T", requires = "server", hide_default_value = true)]
     pub(crate) token: Option<String>,
+}
+
+/// How the cage is designed where none is given.
+#[derive(Args, Debug)]
+pub(crate) struct DesignArgs {
+    /// Most vertices of the designed cage [default: 350].
+    #[arg(long, value_name = "N", conflicts_with_all = ["cage", "mean_error"], value_parser = clap::value_parser!(u32).range(4..=1_500))]
+    pub(crate) cage_vertices: Option<u32>,
+
+    /// Design the smallest cage whose mean L2 error is at most E, a fraction of the rest pose's diagonal.
+    #[arg(long, value_name = "E", conflicts_with = "cage", allow_negative_numbers = true)]
+    pub(crate) mean_error: Option<f64>,
+
+    /// What the designed cage is for [default: free].
+    #[arg(long, value_enum, value_name = "STYLE", conflicts_with = "cage")]
+    pub(crate) style: Option<StyleArg>,
+
+    /// Seed of what a design draws at random: the same seed gives the same cage [default: 0].
+    #[arg(long, value_name = "SEED", conflicts_with = "cage")]
+    pub(crate) seed: Option<u64>,
+
+    /// End the design with the best cage so far after so many seconds.
+    #[arg(long, value_name = "S", conflicts_with = "cage", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) time_limit: Option<u32>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum StyleArg {
+    /// For compression and viewing: the lowest error; the cage may cut itself.
+    Free,
+    /// For editing by hand: closed, free of self-intersection, enclosing, smooth.
+    Editable,
 }
 
 #[derive(Args, Debug)]

@@ -7,7 +7,7 @@ use super::{grouped, human_bytes, interrupt, print, progress};
 use crate::decode;
 use crate::encode::Encoded;
 use crate::plot::error_plot;
-use crate::remote::{EncodedRemotely, RemoteJob, Steps, encode_remotely};
+use crate::remote::{EncodedRemotely, RemoteCage, RemoteJob, RemoteProgress, Steps, encode_remotely};
 use crate::report::Report;
 use anyhow::{Context, Result, ensure};
 use cager_client::FnFrames;
@@ -43,14 +43,18 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
         address: service.address(),
         token: None,
         rest: &rest_file,
-        cage: &cage_file,
+        cage: RemoteCage::File(&cage_file),
         matrix: None,
         frames: generated(&capture),
         output: &output,
         options: SessionOptions { name: Some("demo".to_owned()), ..SessionOptions::default() },
     };
     let bar = progress::frames("encoding", capture.frames());
-    let result = encode_remotely(job, &mut |done| bar.set_position(done as u64));
+    let result = encode_remotely(job, &mut |told| {
+        if let RemoteProgress::Frames(done) = told {
+            bar.set_position(done as u64);
+        }
+    });
     bar.finish_and_clear();
     let EncodedRemotely { encoded: Encoded { report, container }, steps, .. } = result?;
     service.stop()?;

@@ -1,35 +1,76 @@
 //! `cager encode`.
 
-use super::args::{EncodeArgs, SolverArgs, SpectrumArg};
+use super::args::{CoordinatesArg, EncodeArgs, SolverArgs, SpectrumArg, StyleArg};
+use super::design;
 use super::outputs::refuse_overwriting;
 use super::{grouped, human_bytes, interrupt, plain, print, progress, warn};
 use crate::coordinates;
+use crate::design::{DesignReport, read_frames};
 use crate::encode::{self, ChooseSpectrum, Encoded, Job, sample_frames};
-use crate::remote::{EncodedRemotely, FileFrames, RemoteJob, encode_remotely};
+use crate::remote::{EncodedRemotely, FileFrames, RemoteCage, RemoteJob, RemoteProgress, encode_remotely};
 use crate::report::Report;
 use anyhow::{Context, Result, bail};
+use cager_cages::DesignOptions;
 use cager_client::FrameSource;
 use cager_client::messages::SessionOptions;
 use cager_core::cage::Cage;
+use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{PrepareError, Solver, SolverOptions, check_options};
 use cager_core::mesh::{Model, TriMesh};
 use cager_core::regularize::{Regularizer, SparseMatrix, Term};
-use cager_formats::{AtomicFile, CompleteFile, commit_together, open_frames, read_matrix, read_model};
+use cager_formats::{AtomicFile, CompleteFile, FrameReader, commit_together, open_frames, read_matrix, read_model};
 use std::io::Write;
 use std::path::Path;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 pub(super) fn run(args: &EncodeArgs) -> Result<()> {
     let clock = Instant::now();
     let rest = read_model(&args.rest)?;
-    let cage = read_cage(&args.cage, args.flip_cage)?;
-    match &args.server {
-        None => here(args, &rest, &cage, clock),
-        Some(address) => elsewhere(args, address, &rest, &cage, clock),
+    let cage = args.cage.as_ref().map(|path| read_cage(path, args.flip_cage)).transpose()?;
+    match (&args.server, &cage) {
+        (None, Some(cage)) => here(args, &rest, cage, None, clock),
+        (None, None) => {
+            let (cage, report) = designed(args, &rest)?;
+            here(args, &rest, &cage, Some(report), clock)
+        }
+        (Some(address), cage) => elsewhere(args, address, &rest, cage.as_ref(), clock),
     }
 }
 
-fn here(args: &EncodeArgs, rest: &Model, cage: &Cage, clock: Instant) -> Result<()> {
+/// How a cage is designed. Mean value coordinates do without a tidy one; the others want all points inside.
+fn design_options(args: &EncodeArgs, points: usize) -> Result<DesignOptions> {
+    let usual = match args.solver.coordinates {
+        CoordinatesArg::Mvc => StyleArg::Free,
+        _ => StyleArg::Editable,
+    };
+    if args.design.mean_error.is_some() && !matches!(args.solver.coordinates, CoordinatesArg::Mvc) {
+        bail!(
+            "--mean-error: is measured with mean value coordinates; give --cage-vertices, or leave --coordinates out"
+        );
+    }
+    Ok(DesignOptions {
+        goal: design::goal(args.design.cage_vertices, args.design.mean_error, points)?,
+        style: args.design.style.unwrap_or(usual).into(),
+        seed: args.design.seed.unwrap_or(0),
+        time_limit: args.design.time_limit.map(|s| Duration::from_secs(s.into())),
+        ..DesignOptions::default()
+    })
+}
+
+/// A cage from the capture itself.
+fn designed(args: &EncodeArgs, rest: &Model) -> Result<(Cage, DesignReport)> {
+    let options = design_options(args, rest.points.len())?;
+    // Outputs that cannot be written cost no waiting.
+    refuse_outputs(args)?;
+    let frames = read_frames(&args.frames, rest.points.len()).map_err(|error| name_files(error, args))?;
+    let design = design::design((&args.rest, rest), (&args.frames, &frames), None, &options)?;
+    warn(&design.warnings);
+    let report = DesignReport::new(&design, &options, frames.len());
+    let cage = Cage::new(design.cage).with_context(|| args.rest.display().to_string())?;
+    Ok((cage, report))
+}
+
+fn here(args: &EncodeArgs, rest: &Model, cage: &Cage, design: Option<DesignReport>, clock: Instant) -> Result<()> {
     let mut frames = open_frames(&args.frames, rest.points.len())?;
     let read_seconds = clock.elapsed().as_secs_f64();
     let (system, options) = solver(&args.solver, cage)?;
@@ -39,7 +80,7 @@ fn here(args: &EncodeArgs, rest: &Model, cage: &Cage, clock: Instant) -> Result<
             // What is wrong with the options is told before anything is read.
             check_options(rest.points.len(), system.unknowns(cage), options).map_err(|e| name_file(&e, args))?;
             let mut again = open_frames(&args.frames, rest.points.len())?;
-            let samples = sample_frames(again.as_mut(), options.regularizer == Regularizer::Temporal)
+            let samples = choosing_frames(again.as_mut(), options.regularizer == Regularizer::Temporal)
                 .map_err(|error| name_files(error, args))?;
             Some(ChooseSpectrum { samples, bound })
         }
@@ -62,15 +103,20 @@ fn here(args: &EncodeArgs, rest: &Model, cage: &Cage, clock: Instant) -> Result<
     bar.finish_and_clear();
     let mut encoded = result.map_err(|error| name_files(error, args))?;
     encoded.report.seconds.read += read_seconds;
+    encoded.report.design = design;
     finish(args, encoded, report_file, clock)
+}
+
+/// Frames to choose a spectrum threshold by: the first ones where cages follow their predecessors.
+fn choosing_frames(frames: &mut dyn FrameReader, first_ones: bool) -> Result<Vec<Vec<f64>>, encode::EncodeError> {
+    sample_frames(frames, if first_ones { 96 } else { 24 }, first_ones)
 }
 
 /// The files are read and the options checked here as well, so that what is wrong with them is told before anything is sent, in
 /// words that name them.
-fn elsewhere(args: &EncodeArgs, address: &str, rest: &Model, cage: &Cage, clock: Instant) -> Result<()> {
+fn elsewhere(args: &EncodeArgs, address: &str, rest: &Model, cage: Option<&Cage>, clock: Instant) -> Result<()> {
     let frames = FileFrames::open(&args.frames, rest.points.len())?;
     let read_seconds = clock.elapsed().as_secs_f64();
-    let (system, options) = solver(&args.solver, cage)?;
     let matrix = matrix(&args.solver)?;
     spectrum_bound(&args.solver)?;
     if args.solver.spectrum == Some(SpectrumArg::Auto) {
@@ -78,12 +124,23 @@ fn elsewhere(args: &EncodeArgs, address: &str, rest: &Model, cage: &Cage, clock:
             "--spectrum auto: a service prepares before it sees a frame to measure; give a number, or encode without --server"
         );
     }
-    let delta = matrix.map_or(Ok(()), |matrix| matrix.delta(cage, system.unknowns(cage)).map(|_| ()));
-    match delta.map_err(PrepareError::from).and_then(|()| Solver::check(system, cage, &rest.points, options)) {
-        // The service knows its own memory.
-        Ok(()) | Err(PrepareError::HandlesOutOfMemory { .. }) => {}
-        Err(error) => return Err(name_file(&error, args)),
-    }
+    let (system, options, spectrum) = match cage {
+        Some(cage) => {
+            let (system, options) = solver(&args.solver, cage)?;
+            let delta = matrix.map_or(Ok(()), |matrix| matrix.delta(cage, system.unknowns(cage)).map(|_| ()));
+            match delta.map_err(PrepareError::from).and_then(|()| Solver::check(system, cage, &rest.points, options)) {
+                // The service knows its own memory.
+                Ok(()) | Err(PrepareError::HandlesOutOfMemory { .. }) => {}
+                Err(error) => return Err(name_file(&error, args)),
+            }
+            // Where there is a threshold it was checked; where there is none, none is used.
+            (system, options, Some(u32::try_from(options.spectrum).unwrap_or(u32::MAX)))
+        }
+        None => {
+            let (system, options) = solver_for(&args.solver, |_| 0)?;
+            (system, options, designed_spectrum(&args.solver)?)
+        }
+    };
     let handle_count = args.solver.handle_count.map(u32::try_from).transpose();
     let report_file = begin(args)?;
 
@@ -94,25 +151,36 @@ fn elsewhere(args: &EncodeArgs, address: &str, rest: &Model, cage: &Cage, clock:
         handles: Some(options.handles.name().to_owned()),
         handle_count: handle_count.context("--handle-count: is larger than any number of points")?,
         regularizer: Some(options.regularizer.name().to_owned()),
-        // Where there is a threshold it was checked; where there is none, none is used.
-        spectrum: Some(u32::try_from(options.spectrum).unwrap_or(u32::MAX)),
+        spectrum,
         lambda: Some(options.lambda),
         flip_cage: args.flip_cage,
         frame_rate: frames.frame_rate(),
         ..SessionOptions::default()
     };
+    let design = design_options(args, rest.points.len())?;
     let bar = progress::frames("encoding", frames.frames().unwrap_or(0) as usize);
     let job = RemoteJob {
         address,
         token: token.as_deref(),
         rest: &args.rest,
-        cage: &args.cage,
+        cage: match &args.cage {
+            Some(path) => RemoteCage::File(path),
+            None => RemoteCage::Designed(&design),
+        },
         matrix: args.solver.regularizer_matrix.as_deref(),
         frames,
         output: &args.output,
         options,
     };
-    let result = encode_remotely(job, &mut |done| bar.set_position(done as u64));
+    let designing = progress::steps();
+    let result = encode_remotely(job, &mut |told| match told {
+        RemoteProgress::Designing(told) => progress::design(&designing, told),
+        RemoteProgress::Frames(done) => {
+            designing.finish_and_clear();
+            bar.set_position(done as u64);
+        }
+    });
+    designing.finish_and_clear();
     bar.finish_and_clear();
     let EncodedRemotely { mut encoded, session, .. } = result?;
     encoded.report.seconds.read += read_seconds;
@@ -122,10 +190,14 @@ fn elsewhere(args: &EncodeArgs, address: &str, rest: &Model, cage: &Cage, clock:
 
 /// What comes before the work, so that outputs that cannot be written cost no waiting.
 fn begin(args: &EncodeArgs) -> Result<Option<AtomicFile>> {
-    let inputs = [&args.rest, &args.cage, &args.frames].into_iter().chain(&args.solver.regularizer_matrix);
-    refuse_overwriting(&args.output, args.report.as_deref(), inputs)?;
+    refuse_outputs(args)?;
     interrupt::leaves_nothing()?;
     Ok(args.report.as_ref().map(AtomicFile::create).transpose()?)
+}
+
+fn refuse_outputs(args: &EncodeArgs) -> Result<()> {
+    let inputs = [&args.rest, &args.frames].into_iter().chain(&args.cage).chain(&args.solver.regularizer_matrix);
+    refuse_overwriting(&args.output, args.report.as_deref(), inputs)
 }
 
 fn finish(args: &EncodeArgs, encoded: Encoded, report_file: Option<AtomicFile>, clock: Instant) -> Result<()> {
@@ -150,7 +222,7 @@ fn name_files(error: encode::EncodeError, args: &EncodeArgs) -> anyhow::Error {
 fn name_file(error: &PrepareError, args: &EncodeArgs) -> anyhow::Error {
     match (error, &args.solver.regularizer_matrix) {
         (PrepareError::Term(_), Some(matrix)) => anyhow::anyhow!("{}: {error}", matrix.display()),
-        _ => blame(error, &args.rest, &args.cage),
+        _ => blame(error, &args.rest, args.cage.as_deref().unwrap_or(&args.rest)),
     }
 }
 
@@ -186,13 +258,18 @@ pub(super) fn read_cage(path: &Path, flip: bool) -> Result<Cage> {
         .with_context(|| path.display().to_string())
 }
 
-pub(super) fn solver(
+pub(super) fn solver(args: &SolverArgs, cage: &Cage) -> Result<(&'static dyn CoordinateSystem, SolverOptions)> {
+    solver_for(args, |system| system.unknowns(cage))
+}
+
+/// As [`solver`], for a cage of so many unknowns.
+fn solver_for(
     args: &SolverArgs,
-    cage: &Cage,
-) -> Result<(&'static dyn cager_core::coordinates::CoordinateSystem, SolverOptions)> {
+    unknowns: impl FnOnce(&'static dyn CoordinateSystem) -> usize,
+) -> Result<(&'static dyn CoordinateSystem, SolverOptions)> {
     let name = args.coordinates.name();
     let system = coordinates::by_name(name).with_context(|| format!("--coordinates: {name} is unknown"))?;
-    let unknowns = system.unknowns(cage);
+    let unknowns = unknowns(system);
     let options = SolverOptions {
         handles: args
             .handles
@@ -211,6 +288,17 @@ pub(super) fn solver(
         bail!("--spectrum auto: {} has no threshold to choose; leave it out", options.regularizer.name());
     }
     Ok((system, options))
+}
+
+/// The threshold for a cage that is not known yet; none where the service chooses.
+fn designed_spectrum(args: &SolverArgs) -> Result<Option<u32>> {
+    match args.spectrum {
+        Some(SpectrumArg::Threshold(s)) => Ok(Some(u32::try_from(s).unwrap_or(u32::MAX))),
+        Some(SpectrumArg::All) => {
+            bail!("--spectrum all: the cage is not known yet; give a number, or a cage with --cage")
+        }
+        Some(SpectrumArg::Auto) | None => Ok(None),
+    }
 }
 
 /// The matrix of `--regularizer matrix`.

@@ -1,9 +1,13 @@
 //! The command line: one file per command, each parses, calls and prints.
 
 mod args;
+mod cage;
+mod cage_args;
 mod compare;
 mod decode;
 mod demo;
+mod design;
+mod doctor;
 mod encode;
 mod health;
 mod inspect;
@@ -24,6 +28,7 @@ pub fn run() -> ExitCode {
         Command::Encode(args) => encode::run(&args),
         Command::Decode(args) => decode::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Cage(args) => cage::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Serve(args) => serve::run(&args),

@@ -1,5 +1,6 @@
 //! Progress on terminals, silence in pipes.
 
+use cager_proto::cage_messages::CageProgress;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 
@@ -22,4 +23,16 @@ pub(crate) fn steps() -> ProgressBar {
         Ok(style) => bar.with_style(style),
         Err(_) => bar,
     }
+}
+
+/// Shows how far the design of a cage is, on a bar over steps.
+pub(crate) fn design(bar: &ProgressBar, told: &CageProgress) {
+    const STEPS: u64 = 1000;
+    bar.set_length(STEPS);
+    bar.set_position((told.fraction * STEPS as f64) as u64);
+    let stage = told.stage.clone().unwrap_or_else(|| "cage".to_owned());
+    bar.set_message(match told.error {
+        Some(error) => format!("{stage}: {:.3} %", 100.0 * error),
+        None => stage,
+    });
 }

@@ -8,7 +8,7 @@ mod methods;
 mod noise;
 mod page;
 mod pictures;
-mod render;
+pub(crate) mod render;
 mod sample;
 mod system;
 mod track;

@@ -47,7 +47,7 @@ impl Engine {
     /// # Errors
     /// The system's, where threads cannot be started.
     pub fn new(workers: usize) -> std::io::Result<Self> {
-        let pool = threads::pool("solve", workers)?;
+        let pool = threads::pool("solve", workers, threads::GIVES_WAY)?;
         let slots = pool.current_num_threads();
         let shared = Arc::new(Shared { state: Mutex::new(Schedule::new(slots)), changed: Condvar::new(), pool });
         let dispatching = Arc::clone(&shared);

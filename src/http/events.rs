@@ -2,22 +2,14 @@
 
 use super::extract::Found;
 use super::openapi;
+use super::progress::{self, Followed, Standing};
 use crate::problem::ApiError;
 use crate::service::Service;
-use axum::body::Body;
 use axum::extract::State;
-use axum::response::{IntoResponse, Response};
-use bytes::Bytes;
+use axum::response::Response;
 use cager_proto::messages::{Progress, SessionState};
-use http::{HeaderMap, header};
-use std::io;
+use http::HeaderMap;
 use std::sync::Arc;
-use std::time::Duration;
-
-/// Changes closer together than this are one event.
-const AT_MOST_EVERY: Duration = Duration::from_millis(100);
-/// Without changes, a comment keeps proxies from closing the connection.
-const KEEP_ALIVE: Duration = Duration::from_secs(15);
 
 /// A server-sent event.
 #[derive(utoipa::ToSchema)]
@@ -44,47 +36,16 @@ pub(crate) async fn get(
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let place = service.stream(&tenant)?;
-    let heard = headers.get("last-event-id").and_then(|id| id.to_str().ok()).map(str::to_owned);
-    let changes = session.changes();
-    let stream = futures_util::stream::unfold(Some((heard, changes, place)), move |state| {
-        let (service, session) = (Arc::clone(&service), Arc::clone(&session));
-        async move {
-            let (heard, mut changes, place) = state?;
-            loop {
-                changes.mark_unchanged();
-                if session.is_deleted() {
-                    return Some((Ok(Bytes::from_static(b"event: deleted\ndata: {}\n\n")), None));
-                }
-                let progress = session.progress();
-                let last = matches!(progress.state, SessionState::Completed | SessionState::Failed);
-                let id = id_of(&progress);
-                if heard.as_deref() != Some(id.as_str()) {
-                    if heard.is_some() {
-                        tokio::time::sleep(AT_MOST_EVERY).await;
-                    }
-                    let progress = session.progress();
-                    let (event, id) = (event(&progress), id_of(&progress));
-                    let rest = (!last).then_some((Some(id), changes, place));
-                    return Some((event, rest));
-                }
-                if last {
-                    return None;
-                }
-                tokio::select! {
-                    _ = changes.changed() => {}
-                    () = session.deleted().cancelled() => {}
-                    () = service.stopping().cancelled() => {
-                        return Some((Ok(Bytes::from_static(b"event: stopping\ndata: {}\n\n")), None));
-                    }
-                    () = tokio::time::sleep(KEEP_ALIVE) => {
-                        return Some((Ok(Bytes::from_static(b": still here\n\n")), Some((heard, changes, place))));
-                    }
-                }
-            }
+    let (changes, deleted) = (session.changes(), session.deleted().clone());
+    let look = move || {
+        let progress = session.progress();
+        Standing {
+            id: id_of(&progress),
+            data: serde_json::to_string(&progress).unwrap_or_default(),
+            last: matches!(progress.state, SessionState::Completed | SessionState::Failed),
         }
-    });
-    let response_headers = [(header::CONTENT_TYPE, "text/event-stream"), (header::CACHE_CONTROL, "no-store")];
-    Ok((response_headers, Body::from_stream(stream)).into_response())
+    };
+    Ok(progress::stream(service, place, &headers, Followed { changes, deleted, look: Box::new(look) }))
 }
 
 fn id_of(progress: &Progress) -> String {
@@ -95,9 +56,4 @@ fn id_of(progress: &Progress) -> String {
         SessionState::Failed => 'f',
     };
     format!("{state}{}.{}", progress.received, progress.solved)
-}
-
-fn event(progress: &Progress) -> io::Result<Bytes> {
-    let data = serde_json::to_string(progress)?;
-    Ok(format!("event: progress\nid: {}\ndata: {data}\n\n", id_of(progress)).into())
 }

@@ -1,6 +1,7 @@
 //! What handlers take from a request: the tenant, the tenant's session, checked queries and bodies.
 
 use crate::auth::Tenant;
+use crate::cage_job::CageJob;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::Session;
@@ -65,6 +66,25 @@ impl FromRequestParts<Arc<Service>> for Found {
             loaded => loaded?,
         }
         Ok(Self { tenant, session })
+    }
+}
+
+/// The caller's cage job of this address. Rejects with 404 where there is none, or it is another tenant's.
+pub(crate) struct FoundJob {
+    pub(crate) tenant: Arc<Tenant>,
+    pub(crate) job: Arc<CageJob>,
+}
+
+impl FromRequestParts<Arc<Service>> for FoundJob {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, service: &Arc<Service>) -> Result<Self, ApiError> {
+        let Caller(tenant) = Caller::from_request_parts(parts, service).await?;
+        let Path(id) = Path::<String>::from_request_parts(parts, service)
+            .await
+            .map_err(|_| ApiError::new(problem::NOT_FOUND, "the id of a cage design is missing"))?;
+        let job = service.cage_jobs.find(&tenant.name, &id)?;
+        Ok(Self { tenant, job })
     }
 }
 
@@ -169,6 +189,24 @@ impl<S: Sync> FromRequestParts<S> for Accept {
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Infallible> {
         Ok(Self::of(&parts.headers))
+    }
+}
+
+/// Most characters of an idempotency key.
+const KEY_CHARACTERS: usize = 255;
+
+/// The client's name for its request.
+///
+/// # Errors
+/// One that is empty, too long or not ASCII.
+pub(crate) fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, ApiError> {
+    match headers.get("idempotency-key").map(|value| value.to_str()) {
+        None => Ok(None),
+        Some(Ok(key)) if (1..=KEY_CHARACTERS).contains(&key.len()) => Ok(Some(key.to_owned())),
+        Some(_) => {
+            let detail = format!("Idempotency-Key: give 1 to {KEY_CHARACTERS} visible ASCII characters");
+            Err(ApiError::new(problem::BAD_REQUEST, detail))
+        }
     }
 }
 

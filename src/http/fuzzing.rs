@@ -1,5 +1,6 @@
 //! Doors for the fuzz targets to what reads requests. They panic where a promise is broken.
 
+use super::cage_jobs;
 use super::frames_in::{FrameReader, Layout};
 use super::multipart;
 use super::ranged::Immutable;
@@ -87,7 +88,25 @@ pub async fn new_session(
     request.headers_mut().insert(header::CONTENT_TYPE, content_type);
     let parts = multipart::read(service, request).await?;
     Choices::of(&parts.options)?;
-    Ok((parts.content.rest.len(), parts.content.cage.len()))
+    let uploaded = parts.uploaded;
+    Ok((uploaded.rest.len(), uploaded.cage.map_or(0, |cage| cage.bytes.len())))
+}
+
+/// Reads the multipart body that asks for a cage; gives the bytes of rest pose and frames.
+///
+/// # Errors
+/// What the client would hear.
+pub async fn new_cage(
+    service: &Arc<Service>,
+    content_type: HeaderValue,
+    pieces: Vec<Bytes>,
+) -> Result<(usize, u64), ApiError> {
+    let body = Body::from_stream(futures_util::stream::iter(pieces.into_iter().map(Ok::<_, io::Error>)));
+    let mut request = Request::new(body);
+    request.headers_mut().insert(header::CONTENT_TYPE, content_type);
+    let tenant = service.access.tenant("local");
+    let new = cage_jobs::parts::read(service, &tenant, request, None).await?;
+    Ok((new.rest.len(), new.frames.bytes()))
 }
 
 /// The response to a request for bytes that never change.

@@ -1,6 +1,7 @@
 //! HTTP: routes, what they take and give, and the listener.
 
 mod cage;
+mod cage_jobs;
 mod cages;
 mod container;
 mod coordinates;
@@ -16,6 +17,7 @@ mod health;
 pub mod listen;
 mod multipart;
 pub mod openapi;
+mod progress;
 mod ranged;
 mod respond;
 mod router;

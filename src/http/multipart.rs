@@ -3,27 +3,29 @@
 use super::frames::body_error;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{Content, MatrixFile};
+use crate::session::cage_source::Uploaded;
+use crate::store::{CageFile, MatrixFile};
 use axum::body::Body;
 use axum::extract::multipart::{Field, MultipartError};
 use axum::extract::{FromRequest, Multipart, Request};
 use cager_proto::messages::SessionOptions;
 use futures_util::StreamExt as _;
+use serde::de::DeserializeOwned;
 use std::sync::{Arc, Mutex};
 use tokio::sync::OwnedSemaphorePermit;
 
 /// Bytes of a body beside rest pose and cage.
 pub(crate) const ENVELOPE_BYTES: u64 = 1 << 20;
 const OPTIONS_BYTES: usize = 64 << 10;
-const NAME_CHARACTERS: usize = 200;
+pub(super) const NAME_CHARACTERS: usize = 200;
 /// The part with the matrix of the regularizer of that name.
 const MATRIX: &str = "regularizer_matrix";
 /// Memory is asked for in pieces of this many bytes: small ones, so that hundreds of small models have room at the same time.
-const PIECE: u64 = 64 << 10;
+pub(super) const PIECE: u64 = 64 << 10;
 
 /// What the parts hold, and the room they take until it is dropped.
 pub(crate) struct Parts {
-    pub(crate) content: Content,
+    pub(crate) uploaded: Uploaded,
     pub(crate) options: SessionOptions,
     pub(crate) room: Room,
 }
@@ -123,25 +125,17 @@ async fn read_parts(service: &Service, mut body: Multipart) -> Result<Parts, Api
         }
     }
     let rest = rest.ok_or_else(|| bad("part rest is missing; send the rest pose as a file".to_owned()))?;
-    let cage = cage.ok_or_else(|| {
-        let detail = "part cage is missing: automatic cages are not available yet, so send a cage as a file";
-        ApiError::new(problem::INVALID_OPTIONS, detail)
-    })?;
-    let content = Content {
+    let uploaded = Uploaded {
         rest_name: rest.name,
         rest: rest.bytes,
-        cage_name: cage.name,
-        cage: cage.bytes,
+        cage: cage.map(|File { name, bytes }| CageFile { name, bytes }),
         matrix: matrix.map(|File { name, bytes }| MatrixFile { name, bytes }),
     };
-    Ok(Parts { content, options: options.unwrap_or_default(), room: Room::new() })
+    Ok(Parts { uploaded, options: options.unwrap_or_default(), room: Room::new() })
 }
 
 async fn read_file(service: &Service, part: &str, mut field: Field<'_>, left: &mut u64) -> Result<File, ApiError> {
-    let name = field.file_name().unwrap_or_default();
-    // Some clients send a path; only the name and its extension matter.
-    let name: String =
-        name.rsplit(['/', '\\']).next().unwrap_or_default().chars().filter(|c| !c.is_control()).collect();
+    let name = file_name(&field);
     // There is one format of matrices, so that their names say nothing.
     let name = if part == MATRIX && name.is_empty() { format!("{MATRIX}.mtx") } else { name };
     if !(name.contains('.') || part == MATRIX) || name.chars().count() > NAME_CHARACTERS {
@@ -161,7 +155,17 @@ async fn read_file(service: &Service, part: &str, mut field: Field<'_>, left: &m
     Ok(File { name, bytes })
 }
 
-async fn read_options(mut field: Field<'_>) -> Result<SessionOptions, ApiError> {
+/// The name that the part's file was sent under. Some clients send a path; only the name and its extension matter.
+pub(super) fn file_name(field: &Field<'_>) -> String {
+    let name = field.file_name().unwrap_or_default();
+    name.rsplit(['/', '\\']).next().unwrap_or_default().chars().filter(|c| !c.is_control()).collect()
+}
+
+/// Reads a part of JSON.
+///
+/// # Errors
+/// More than options need; what does not fit.
+pub(super) async fn read_options<T: DeserializeOwned>(mut field: Field<'_>) -> Result<T, ApiError> {
     let mut bytes = Vec::new();
     while let Some(chunk) = field.chunk().await.map_err(|e| broken(&e))? {
         bytes.extend_from_slice(&chunk);
@@ -174,11 +178,11 @@ async fn read_options(mut field: Field<'_>) -> Result<SessionOptions, ApiError> 
         .map_err(|error| ApiError::new(problem::INVALID_OPTIONS, format!("part \"options\": {error}")))
 }
 
-fn bad(detail: String) -> ApiError {
+pub(super) fn bad(detail: String) -> ApiError {
     ApiError::new(problem::BAD_REQUEST, detail)
 }
 
-fn broken(error: &MultipartError) -> ApiError {
+pub(super) fn broken(error: &MultipartError) -> ApiError {
     let general = body_error(error);
     if general.problem.word() == problem::REQUEST_TIMEOUT.word {
         return general;

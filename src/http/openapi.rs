@@ -6,7 +6,10 @@ use super::respond::PROBLEM_JSON;
 use crate::problem;
 use axum::response::IntoResponse;
 use bytes::Bytes;
-use cager_proto::messages::{FrameErrors, FrameResult, Problem, RestCage, Session, SessionList, SessionOptions};
+use cager_proto::cage_messages::{CageJob, CageJobList, CageOptions, CageProgress};
+use cager_proto::messages::{
+    CageSource, FrameErrors, FrameResult, Problem, RestCage, Session, SessionList, SessionOptions,
+};
 use http::header;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -29,6 +32,31 @@ pub(crate) struct Id {
     id: String,
 }
 
+/// The path parameter of a cage design.
+#[derive(IntoParams)]
+#[into_params(parameter_in = Path)]
+#[allow(dead_code, reason = "it only describes")]
+pub(crate) struct CageId {
+    /// Id of the cage design.
+    id: String,
+}
+
+/// The parts that ask for a cage.
+#[derive(ToSchema)]
+#[allow(dead_code, reason = "it only describes")]
+pub(crate) struct NewCageForm {
+    /// Model in its rest pose, a file whose name ends in .obj, .ply, .off, .stl or .glb.
+    #[schema(value_type = String, format = Binary)]
+    rest: Vec<u8>,
+    /// Frames of its motion, points in the order of the rest pose: a file whose name ends in .npy (frames × points × 3), .pc2 or .mdd; else
+    /// raw little-endian f32, frame after frame, whose number `options.frames` says.
+    #[schema(value_type = String, format = Binary)]
+    frames: Vec<u8>,
+    /// Choices.
+    #[schema(required = false)]
+    options: CageOptions,
+}
+
 /// The parts that make a session.
 #[derive(ToSchema)]
 #[allow(dead_code, reason = "it only describes")]
@@ -36,8 +64,8 @@ pub(crate) struct NewSessionForm {
     /// Model in its rest pose, a file whose name ends in .obj, .ply, .off, .stl or .glb.
     #[schema(value_type = String, format = Binary)]
     rest: Vec<u8>,
-    /// Closed cage around it, a file of one of the same formats.
-    #[schema(value_type = String, format = Binary)]
+    /// Closed cage around it, a file of one of the same formats. Where it is left out, `options.cage` says where it comes from.
+    #[schema(value_type = String, format = Binary, required = false)]
     cage: Vec<u8>,
     /// The matrix of the regularizer `matrix`: a sparse matrix in the Matrix Market format (coordinate), one column per vertex of
     /// the cage.
@@ -56,12 +84,13 @@ pub(crate) struct NewSessionForm {
         description = "Turns animated mesh captures into cages: make a session from a rest pose and its cage, post frames, follow or download the cages.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0"),
     ),
-    components(schemas(Event, FrameErrors, FrameResult, Problem, RestCage, RowsQuery, Session, SessionList, SessionOptions)),
+    components(schemas(CageJob, CageJobList, CageOptions, CageProgress, CageSource, Event, FrameErrors, FrameResult, Problem, RestCage, RowsQuery, Session, SessionList, SessionOptions)),
     security(("token" = [])),
     tags(
         (name = "sessions", description = "Sessions and their progress"),
         (name = "frames", description = "Frames of a capture"),
         (name = "results", description = "What comes out"),
+        (name = "cages", description = "Cages designed from a motion"),
         (name = "operation", description = "For operators"),
     ),
     modifiers(&Token),
@@ -128,11 +157,11 @@ pub(crate) fn finished(mut document: utoipa::openapi::OpenApi) -> Value {
     let mut document = serde_json::to_value(&document).unwrap_or_default();
     mend_ranges(&mut document);
     let schemas = &mut document["components"]["schemas"];
-    schemas["NewSessionForm"]["additionalProperties"] = false.into();
-    for refused in ["max_error", "cage_vertices"] {
-        let property = &mut schemas["SessionOptions"]["properties"][refused];
-        *property = json!({ "type": "null", "description": property["description"] });
+    for form in ["NewSessionForm", "NewCageForm"] {
+        schemas[form]["additionalProperties"] = false.into();
     }
+    let refused = &mut schemas["SessionOptions"]["properties"]["max_error"];
+    *refused = json!({ "type": "null", "description": refused["description"] });
     document
 }
 
@@ -205,8 +234,9 @@ fn describe_content(media_type: &str, content: &mut RefOr<Content>) {
         content.schema = Some(ObjectBuilder::new().schema_type(Type::String).format(Some(format)).build().into());
     }
     if media_type == "multipart/form-data" {
-        for part in ["rest", "cage"] {
-            let example = format!("form-data; name=\"{part}\"; filename=\"{part}.obj\"");
+        let second = if designs_cage(content) { ("frames", "npy") } else { ("cage", "obj") };
+        for (part, ending) in [("rest", "obj"), second] {
+            let example = format!("form-data; name=\"{part}\"; filename=\"{part}.{ending}\"");
             let name = HeaderBuilder::new()
                 .description(Some("With a file name, whose extension says the format"))
                 .schema(Some(text()))
@@ -217,6 +247,11 @@ fn describe_content(media_type: &str, content: &mut RefOr<Content>) {
         let options = EncodingBuilder::new().content_type(Some("application/json".to_owned()));
         content.encoding.insert("options".to_owned(), options.build());
     }
+}
+
+/// Whether a body is the form that asks for a cage.
+fn designs_cage(content: &Content) -> bool {
+    matches!(&content.schema, Some(RefOr::Ref(form)) if form.ref_location.ends_with("/NewCageForm"))
 }
 
 /// The header that every request may have, and those that responses have.

@@ -2,7 +2,8 @@
 
 use super::respond::PROBLEM_JSON;
 use super::{
-    cage, cages, container, coordinates, decode, errors, events, extract, frames, health, openapi, sessions, viewer,
+    cage, cage_jobs, cages, container, coordinates, decode, errors, events, extract, frames, health, openapi, sessions,
+    viewer,
 };
 use crate::problem::{self, ApiError, Kind};
 use crate::service::Service;
@@ -36,6 +37,10 @@ fn quick() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(events::get))
         .routes(routes!(cages::get))
         .routes(routes!(container::get))
+        .routes(routes!(cage_jobs::jobs::list))
+        .routes(routes!(cage_jobs::jobs::get, cage_jobs::jobs::delete))
+        .routes(routes!(cage_jobs::events::get))
+        .routes(routes!(cage_jobs::cage_obj::get))
 }
 
 /// Routes that take as long as their work.
@@ -45,7 +50,11 @@ fn completing() -> OpenApiRouter<Arc<Service>> {
 
 /// Routes that take as long as their bodies, which they read piece by piece.
 fn streaming() -> OpenApiRouter<Arc<Service>> {
-    OpenApiRouter::new().routes(routes!(sessions::create)).routes(routes!(frames::post)).routes(routes!(decode::post))
+    OpenApiRouter::new()
+        .routes(routes!(sessions::create))
+        .routes(routes!(frames::post))
+        .routes(routes!(decode::post))
+        .routes(routes!(cage_jobs::create::create))
 }
 
 /// Routes for operators and browsers, outside all limits.

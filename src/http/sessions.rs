@@ -1,6 +1,6 @@
 //! `/v1/sessions`: making, listing, looking at, completing and deleting sessions.
 
-use super::extract::{Body, Caller, Found, Query, content_type};
+use super::extract::{Body, Caller, Found, Query, content_type, idempotency_key};
 use super::frames::{SLOWEST_BYTES_PER_SECOND, too_slow};
 use super::respond::JsonResult;
 use super::{multipart, openapi};
@@ -17,11 +17,11 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::time::timeout;
 
-const PAGE: usize = 100;
-const KEY_CHARACTERS: usize = 255;
+pub(super) const PAGE: usize = 100;
 
-/// Makes a session: parts `rest` and `cage` are files whose names carry their format, part `options` is JSON. It is prepared in
-/// the background; frames may be posted at once and wait for it.
+/// Makes a session: parts `rest` and `cage` are files whose names carry their format, part `options` is JSON. Without a cage one is made
+/// from the rest pose, or taken from a design, as `options.cage` says. It is prepared in the background; frames may be posted at once
+/// and wait for it.
 #[utoipa::path(
     post, path = "/v1/sessions", operation_id = "create_session", tag = "sessions",
     params(("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[ -~]+$", description = "A repetition with the same key and content gives the same session")),
@@ -46,18 +46,11 @@ pub(crate) async fn create(
         let detail = format!("the body has {declared} bytes, but rest pose and cage may have {limit} together");
         return Err(ApiError::new(problem::TOO_LARGE, detail).limit(limit));
     }
-    let idempotency_key = match headers.get("idempotency-key").map(|value| value.to_str()) {
-        None => None,
-        Some(Ok(key)) if (1..=KEY_CHARACTERS).contains(&key.len()) => Some(key.to_owned()),
-        Some(_) => {
-            let detail = format!("Idempotency-Key: give 1 to {KEY_CHARACTERS} visible ASCII characters");
-            return Err(ApiError::new(problem::BAD_REQUEST, detail));
-        }
-    };
+    let idempotency_key = idempotency_key(headers)?;
     let most = if declared > 0 { declared } else { limit };
     let patience = Duration::from_secs(service.config.body_timeout_s + most / SLOWEST_BYTES_PER_SECOND);
     let parts = timeout(patience, multipart::read(&service, request)).await.map_err(|_| too_slow())??;
-    let new = NewSession { content: parts.content, options: parts.options, idempotency_key, room: parts.room };
+    let new = NewSession { uploaded: parts.uploaded, options: parts.options, idempotency_key, room: parts.room };
     let session = service.create(&tenant, new).await?;
     let location = format!("/v1/sessions/{}", session.meta.id);
     Ok((StatusCode::CREATED, [(header::LOCATION, location)], Json(session.view())).into_response())
@@ -69,7 +62,7 @@ pub(crate) async fn create(
 #[into_params(parameter_in = Query)]
 pub(crate) struct PageQuery {
     /// The `next` of the page before.
-    after: Option<String>,
+    pub(super) after: Option<String>,
 }
 
 /// Lists the tenant's sessions, oldest first, a hundred at a time.

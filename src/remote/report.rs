@@ -38,6 +38,7 @@ pub(super) fn report(container: impl Read + Seek) -> Result<Unfinished, Error> {
         spectrum: header.spectrum as usize,
         spectrum_choice: None,
         lambda: header.lambda,
+        design: None,
         consistency: None,
         refinement: None,
         affine_reproduction_error: summary.affine_reproduction_error,

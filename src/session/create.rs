@@ -1,12 +1,13 @@
 //! Making, preparing and deleting sessions.
 
+use super::cage_source::Uploaded;
 use super::facts::{Facts, Outcome};
 use super::prepare::{self, Choices, Geometry};
 use super::prepared::{Got, Prepared, Wanted};
-use super::registry::Repetition;
 use super::upload::{self, FrameJob};
 use super::{LiveLane, Phase, Session, Status};
 use crate::auth::Tenant;
+use crate::idempotency::Repetition;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{Completion, Content, ContentKey, Idempotency, SessionMeta};
@@ -18,11 +19,20 @@ use tokio::sync::OwnedSemaphorePermit;
 
 /// A request to make a session.
 pub(crate) struct NewSession {
-    pub(crate) content: Content,
+    pub(crate) uploaded: Uploaded,
     pub(crate) options: SessionOptions,
     pub(crate) idempotency_key: Option<String>,
-    /// The room that the content takes.
+    /// The room that the files take.
     pub(crate) room: Vec<OwnedSemaphorePermit>,
+}
+
+/// A request whose options are right.
+struct Checked {
+    key: ContentKey,
+    content: Content,
+    made_cage: Option<ContentKey>,
+    options: SessionOptions,
+    choices: Choices,
 }
 
 impl Service {
@@ -39,15 +49,16 @@ impl Service {
     }
 
     async fn create_for(self: &Arc<Self>, tenant: &Tenant, new: NewSession) -> Result<Arc<Session>, ApiError> {
-        let NewSession { content, options, idempotency_key, room: _room } = new;
+        let NewSession { uploaded, options, idempotency_key, room: _room } = new;
         let choices = Choices::of(&options)?;
+        let (content, made_cage) = self.with_cage(&tenant.name, uploaded, &options).await?;
         let (key, content) = {
             let (tenant, options) = (tenant.name.clone(), options.clone());
             blocking(move || (content_key(&tenant, &content, &options, &choices), content)).await?
         };
         let fingerprint = fingerprint(&key, &options);
         let Some(idempotency_key) = idempotency_key else {
-            return self.create_new(tenant, key, content, options, choices, None).await;
+            return self.create_new(tenant, Checked { key, content, made_cage, options, choices }, None).await;
         };
         match self.registry.begin(&tenant.name, &idempotency_key, &fingerprint)? {
             Repetition::Done(session) => Ok(session),
@@ -55,7 +66,8 @@ impl Service {
                 // Frees the key also after a panic.
                 let _free = GiveUp { service: self, tenant: &tenant.name, key: &idempotency_key };
                 let idempotency = Idempotency { key: idempotency_key.clone(), fingerprint };
-                self.create_new(tenant, key, content, options, choices, Some(idempotency)).await
+                let checked = Checked { key, content, made_cage, options, choices };
+                self.create_new(tenant, checked, Some(idempotency)).await
             }
         }
     }
@@ -63,12 +75,10 @@ impl Service {
     async fn create_new(
         self: &Arc<Self>,
         tenant: &Tenant,
-        key: ContentKey,
-        content: Content,
-        options: SessionOptions,
-        choices: Choices,
+        checked: Checked,
         idempotency: Option<Idempotency>,
     ) -> Result<Arc<Session>, ApiError> {
+        let Checked { key, content, made_cage, options, choices } = checked;
         let room = self.reserve(tenant, content.size_bytes())?;
         let at_hand = self.solvers.at_hand(&key);
         let most = self.config.max_preparing + self.config.max_prepare_queue;
@@ -89,6 +99,7 @@ impl Service {
             key,
             solver_version: cager_core::SOLVER_VERSION,
             options,
+            made_cage,
             idempotency,
         };
         let status = match &at_hand {
@@ -337,6 +348,8 @@ fn content_key(tenant: &str, content: &Content, options: &SessionOptions, choice
     let solving = SessionOptions {
         name: None,
         frame_rate: None,
+        // Its bytes count, wherever they came from.
+        cage: None,
         coordinates: Some(choices.system.name().to_owned()),
         handles: Some(choices.handles.name().to_owned()),
         regularizer: Some(choices.regularizer.name().to_owned()),

@@ -1,11 +1,12 @@
 //! What a session is: a rest pose with its cage, being prepared, ready for frames, completed or failed. Nothing about HTTP.
 
+pub(crate) mod cage_source;
 pub(crate) mod commit;
 pub(crate) mod complete;
 pub(crate) mod create;
 pub(crate) mod facts;
 pub(crate) mod frames;
-mod places;
+pub(crate) mod places;
 pub(crate) mod prepare;
 pub(crate) mod prepared;
 pub(crate) mod registry;

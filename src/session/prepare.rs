@@ -40,9 +40,6 @@ impl Choices {
         if options.max_error.is_some() {
             return refuse("max_error: is not available yet; leave it out".to_owned());
         }
-        if options.cage_vertices.is_some() {
-            return refuse("cage_vertices: automatic cages are not available yet; send a cage".to_owned());
-        }
         if options.frame_rate.is_some_and(|rate| !(rate.is_finite() && rate > 0.0)) {
             return refuse("frame_rate: give a positive number of frames per second".to_owned());
         }
@@ -224,7 +221,11 @@ fn check_memory(
     Ok(())
 }
 
-fn read_part(part: &str, name: &str, bytes: &[u8]) -> Result<Model, ApiError> {
+/// Reads the bytes of a mesh file, the part of this name.
+///
+/// # Errors
+/// Bytes that cannot be read.
+pub(crate) fn read_part(part: &str, name: &str, bytes: &[u8]) -> Result<Model, ApiError> {
     let path = Path::new(name);
     let format = MeshFormat::from_path(path).map_err(|error| geometry(format!("{part}: {error}")))?;
     read_model_bytes(format, path, bytes).map_err(|error| geometry(format!("{part}: {error}")))

@@ -85,7 +85,7 @@ impl Solvers {
     /// # Errors
     /// The system's, where threads cannot be started.
     pub(crate) fn new(store: Store, config: &ServeConfig) -> std::io::Result<Self> {
-        let pool = threads::pool("prepare", config.workers)?;
+        let pool = threads::pool("prepare", config.workers, threads::GIVES_WAY)?;
         Ok(Self {
             inner: Mutex::default(),
             store,
@@ -96,6 +96,11 @@ impl Solvers {
             loads: Semaphore::new(LOADS),
             pool: Arc::new(pool),
         })
+    }
+
+    /// The threads that prepare.
+    pub(crate) fn pool(&self) -> Arc<rayon::ThreadPool> {
+        Arc::clone(&self.pool)
     }
 
     /// The solver of a content if it is in memory.

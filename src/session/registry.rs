@@ -1,6 +1,7 @@
 //! Which sessions there are, whose they are, and which requests made them.
 
 use super::Session;
+use crate::idempotency::{Repetition, Requests};
 use crate::problem::{self, ApiError};
 use crate::store::ContentKey;
 use std::collections::{BTreeMap, HashMap};
@@ -18,16 +19,9 @@ pub(crate) struct Registry {
 #[derive(Default)]
 struct Inner {
     sessions: BTreeMap<String, Arc<Session>>,
-    requests: HashMap<(String, String), Request>,
+    requests: Requests,
     /// Sessions that are being made, and their bytes, by tenant.
     reserved: HashMap<String, (u64, u64)>,
-}
-
-/// A request with an idempotency key.
-struct Request {
-    fingerprint: String,
-    /// The session it made; `None` while it is being made.
-    session: Option<String>,
 }
 
 impl Inner {
@@ -38,11 +32,27 @@ impl Inner {
     }
 }
 
-/// Room for a session that is being made; free again when dropped.
+/// Room for a session or a cage job that is being made; free again when dropped.
 pub(crate) struct Reserved {
     registry: Arc<Registry>,
     tenant: String,
     bytes: u64,
+}
+
+impl Reserved {
+    /// Keeps room for so many bytes more, as [`Registry::reserve`].
+    ///
+    /// # Errors
+    /// What `allowed` says.
+    pub(crate) fn extend<E>(&mut self, bytes: u64, allowed: impl FnOnce((u64, u64)) -> Result<(), E>) -> Result<(), E> {
+        let mut inner = super::lock(&self.registry.inner);
+        allowed(inner.usage_of(&self.tenant))?;
+        if let Some((_, reserved)) = inner.reserved.get_mut(&self.tenant) {
+            *reserved += bytes;
+        }
+        self.bytes += bytes;
+        Ok(())
+    }
 }
 
 impl Drop for Reserved {
@@ -58,21 +68,12 @@ impl Drop for Reserved {
     }
 }
 
-/// What a repeated request meets.
-pub(crate) enum Repetition {
-    /// It is the first of its kind; the guard frees its key if it fails.
-    First,
-    /// It was done before; here is what it made.
-    Done(Arc<Session>),
-}
-
 impl Registry {
     pub(crate) fn insert(&self, session: Arc<Session>) {
         let mut inner = super::lock(&self.inner);
         let meta = &session.meta;
         if let Some(idempotency) = &meta.idempotency {
-            let request = Request { fingerprint: idempotency.fingerprint.clone(), session: Some(meta.id.clone()) };
-            inner.requests.insert((meta.tenant.clone(), idempotency.key.clone()), request);
+            inner.requests.made(&meta.tenant, idempotency, &meta.id);
         }
         inner.sessions.insert(meta.id.clone(), session);
     }
@@ -82,7 +83,7 @@ impl Registry {
         if let Some(session) = inner.sessions.remove(id)
             && let Some(idempotency) = &session.meta.idempotency
         {
-            inner.requests.remove(&(session.meta.tenant.clone(), idempotency.key.clone()));
+            inner.requests.forget(&session.meta.tenant, idempotency);
         }
     }
 
@@ -132,6 +133,13 @@ impl Registry {
         Ok(Reserved { registry: Arc::clone(self), tenant: tenant.to_owned(), bytes })
     }
 
+    /// A content of the tenant's whose cage was made from this.
+    pub(crate) fn made_cage(&self, tenant: &str, made: &ContentKey) -> Option<ContentKey> {
+        let inner = super::lock(&self.inner);
+        let mut mine = inner.sessions.values().filter(|session| session.meta.tenant == tenant);
+        mine.find(|session| session.meta.made_cage.as_ref() == Some(made)).map(|session| session.meta.key)
+    }
+
     pub(crate) fn uses_content(&self, key: &ContentKey) -> bool {
         super::lock(&self.inner).sessions.values().any(|session| session.meta.key == *key)
     }
@@ -145,38 +153,23 @@ impl Registry {
     ///
     /// # Errors
     /// The key belongs to another request, or to one that is still being worked on.
-    pub(crate) fn begin(&self, tenant: &str, key: &str, fingerprint: &str) -> Result<Repetition, ApiError> {
+    pub(crate) fn begin(
+        &self,
+        tenant: &str,
+        key: &str,
+        fingerprint: &str,
+    ) -> Result<Repetition<Arc<Session>>, ApiError> {
         let mut inner = super::lock(&self.inner);
-        let place = (tenant.to_owned(), key.to_owned());
-        match inner.requests.get(&place) {
-            None => {
-                let request = Request { fingerprint: fingerprint.to_owned(), session: None };
-                inner.requests.insert(place, request);
-                Ok(Repetition::First)
-            }
-            Some(request) if request.fingerprint != fingerprint => Err(ApiError::new(
-                problem::KEY_REUSED,
-                "this Idempotency-Key came with another rest pose, cage or options before; use a new key for a new session",
-            )),
-            Some(Request { session: Some(id), .. }) => {
-                inner.sessions.get(id).cloned().map(Repetition::Done).ok_or_else(|| {
-                    ApiError::new(problem::NOT_FOUND, "the session that this request made was deleted; use a new key")
-                })
-            }
-            Some(Request { session: None, .. }) => Err(ApiError::new(
-                problem::KEY_IN_USE,
-                "the same request is being worked on right now; ask again in a moment",
-            )
-            .retry_after(1)),
+        match inner.requests.begin(tenant, key, fingerprint)? {
+            Repetition::First => Ok(Repetition::First),
+            Repetition::Done(id) => inner.sessions.get(&id).cloned().map(Repetition::Done).ok_or_else(|| {
+                ApiError::new(problem::NOT_FOUND, "the session that this request made was deleted; use a new key")
+            }),
         }
     }
 
     /// Frees the key of a request that made nothing.
     pub(crate) fn give_up(&self, tenant: &str, key: &str) {
-        let mut inner = super::lock(&self.inner);
-        let place = (tenant.to_owned(), key.to_owned());
-        if inner.requests.get(&place).is_some_and(|request| request.session.is_none()) {
-            inner.requests.remove(&place);
-        }
+        super::lock(&self.inner).requests.give_up(tenant, key);
     }
 }

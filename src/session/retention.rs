@@ -13,7 +13,7 @@ use tokio_util::sync::CancellationToken;
 const SWEEP_EVERY: Duration = Duration::from_secs(20);
 
 impl Service {
-    /// Sessions and bytes of every tenant that has any.
+    /// Sessions, and bytes of these and of cage jobs, of every tenant that has any.
     pub(crate) fn usage(&self) -> Vec<(String, usize, u64)> {
         let mut usage = std::collections::BTreeMap::<String, (usize, u64)>::new();
         for session in self.registry.all() {
@@ -21,22 +21,40 @@ impl Service {
             entry.0 += 1;
             entry.1 += session.bytes.load(Relaxed);
         }
+        for job in self.cage_jobs.all() {
+            usage.entry(job.meta.tenant.clone()).or_default().1 += job.bytes.load(Relaxed);
+        }
         usage.into_iter().map(|(tenant, (sessions, bytes))| (tenant, sessions, bytes)).collect()
     }
 
-    /// Room for one more session of so many bytes.
+    /// Room for one more session or cage job of so many bytes.
     ///
     /// # Errors
     /// A quota that is used up.
     pub(crate) fn reserve(&self, tenant: &Tenant, bytes: u64) -> Result<Reserved, ApiError> {
-        self.registry.reserve(&tenant.name, bytes, |(sessions, used)| {
-            if sessions >= tenant.limits.max_sessions {
+        self.registry.reserve(&tenant.name, bytes, |usage| {
+            let (count, used) = self.with_cage_jobs(tenant, usage);
+            if count >= tenant.limits.max_sessions {
                 self.rejected("tenant_sessions");
-                let detail = format!("you have {sessions} sessions; delete one that is not needed any more");
+                let detail =
+                    format!("you have {count} sessions and cage designs; delete one that is not needed any more");
                 return Err(ApiError::new(problem::TOO_MANY_SESSIONS, detail).limit(tenant.limits.max_sessions));
             }
             self.bytes_allowed(tenant, used, bytes)
         })
+    }
+
+    /// Room for so many bytes more of something that is being made.
+    ///
+    /// # Errors
+    /// As [`Self::reserve`].
+    pub(crate) fn reserve_more(&self, tenant: &Tenant, room: &mut Reserved, bytes: u64) -> Result<(), ApiError> {
+        room.extend(bytes, |usage| self.bytes_allowed(tenant, self.with_cage_jobs(tenant, usage).1, bytes))
+    }
+
+    fn with_cage_jobs(&self, tenant: &Tenant, (count, used): (u64, u64)) -> (u64, u64) {
+        let (jobs, theirs) = self.cage_jobs.usage_of(&tenant.name);
+        (count + jobs, used + theirs)
     }
 
     /// Whether a tenant may store so many bytes more.
@@ -44,8 +62,8 @@ impl Service {
     /// # Errors
     /// A quota that is used up.
     pub(crate) fn check_bytes(&self, tenant: &Tenant, bytes: u64) -> Result<(), ApiError> {
-        let (_, used) = self.registry.usage_of(&tenant.name);
-        self.bytes_allowed(tenant, used, bytes)
+        let usage = self.registry.usage_of(&tenant.name);
+        self.bytes_allowed(tenant, self.with_cage_jobs(tenant, usage).1, bytes)
     }
 
     fn bytes_allowed(&self, tenant: &Tenant, used: u64, bytes: u64) -> Result<(), ApiError> {
@@ -54,7 +72,7 @@ impl Service {
         }
         self.rejected("tenant_bytes");
         let detail = format!(
-            "your sessions take {used} of {} bytes, and this needs {bytes} more; delete sessions that are not needed any more",
+            "your sessions and cage designs take {used} of {} bytes, and this needs {bytes} more; delete those that are not needed any more",
             tenant.limits.max_bytes
         );
         Err(ApiError::new(problem::QUOTA_EXCEEDED, detail).limit(tenant.limits.max_bytes))
@@ -74,10 +92,20 @@ impl Service {
     /// One round of [`Self::sweep`].
     pub(crate) async fn sweep_once(self: &Arc<Self>) {
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_millis() as u64;
+        let expired = |tenant: &str, created_ms: u64| {
+            let most_s = self.access.tenant(tenant).limits.max_age_s;
+            most_s > 0 && now.saturating_sub(created_ms) / 1000 >= most_s
+        };
+        for job in self.cage_jobs.all() {
+            if expired(&job.meta.tenant, job.meta.created_ms) {
+                tracing::info!(job = %job.meta.id, "deleted, because its time is over");
+                if let Err(error) = self.delete_cage_job(&job).await {
+                    tracing::warn!(job = %job.meta.id, detail = %error.problem.detail, "could not be deleted");
+                }
+            }
+        }
         for session in self.registry.all() {
-            let limits = self.access.tenant(&session.meta.tenant).limits;
-            let age_ms = now.saturating_sub(session.meta.created_ms);
-            if limits.max_age_s > 0 && age_ms / 1000 >= limits.max_age_s {
+            if expired(&session.meta.tenant, session.meta.created_ms) {
                 tracing::info!(session = %session.meta.id, "deleted, because its time is over");
                 metrics::counter!("cager_sessions_expired_total").increment(1);
                 if let Err(error) = self.delete(&session).await {

@@ -33,6 +33,14 @@ impl Files {
         self.sessions().join(id)
     }
 
+    pub(crate) fn cages(&self) -> PathBuf {
+        self.root.join("cages")
+    }
+
+    pub(crate) fn cage_job(&self, id: &str) -> PathBuf {
+        self.cages().join(id)
+    }
+
     pub(crate) fn contents(&self) -> PathBuf {
         self.root.join("contents")
     }
@@ -93,6 +101,34 @@ impl Files {
     pub(crate) fn publish(&self, from: &Path, to: &Path) -> Result<(), StoreError> {
         self.disk.rename(from, to).map_err(|e| StoreError::of(to, "put in place", e))?;
         self.sync_dir(parent(to))
+    }
+
+    /// Makes a folder that is not there yet, filled by `fill`: whole or not at all, durable on Ok. Renaming onto a folder with something
+    /// in it is refused, so a name is never taken twice.
+    pub(crate) fn publish_folder(
+        &self,
+        place: &Path,
+        fill: impl FnOnce(&Path) -> Result<(), StoreError>,
+    ) -> Result<(), StoreError> {
+        let name = place.file_name().map_or_else(|| "unnamed".into(), |name| name.to_string_lossy());
+        let aside = self.temporary(&name);
+        let prepare = || {
+            self.disk.create_dir(&aside).map_err(|e| StoreError::of(&aside, "create", e))?;
+            fill(&aside)?;
+            self.sync_dir(&aside)
+        };
+        prepare().inspect_err(|_| self.discard(&aside))?;
+        if let Err(error) = self.disk.rename(&aside, place) {
+            self.discard(&aside);
+            let taken = matches!(error.kind(), io::ErrorKind::DirectoryNotEmpty | io::ErrorKind::AlreadyExists);
+            let error = if taken { io::ErrorKind::AlreadyExists.into() } else { error };
+            return Err(StoreError::of(place, "create", error));
+        }
+        self.sync_dir(parent(place)).inspect_err(|_| {
+            if let Err(error) = self.throw_away(place) {
+                tracing::warn!(%error, path = %place.display(), "what could not be created is still there");
+            }
+        })
     }
 
     /// Removes a temporary, best effort: what stays is removed when the store is opened again.

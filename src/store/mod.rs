@@ -3,6 +3,7 @@
 //!
 //! ```text
 //! sessions/<id>/   session.json  frames.log  capture.cager  complete.json  outcome.json
+//! cages/<id>/      job.json  rest  frames  cage.obj  outcome.json
 //! contents/<key>/  content.json  rest  cage
 //! prepared/<key>.solver
 //! tmp/             being written; emptied at start       trash/       being removed; emptied at start
@@ -10,7 +11,7 @@
 //! ```
 //!
 //! Whole files and folders are written in `tmp/`, synced and renamed into place; folders go through `trash/` before they are
-//! removed. So what is visible in `sessions`, `contents` and `prepared` is whole. The frame log is the one file that
+//! removed. So what is visible in `sessions`, `cages`, `contents` and `prepared` is whole. The frame log is the one file that
 //! grows; [`log`] says how it recovers.
 
 use crate::store::files::Files;
@@ -20,6 +21,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
+mod cage_jobs;
 mod content;
 pub mod disk;
 mod error;
@@ -32,16 +34,19 @@ mod names;
 mod prepared;
 mod sessions;
 mod solver_file;
+mod spool;
 
 #[cfg(test)]
 mod tests;
 
+pub use cage_jobs::{CageJobMeta, StoredPart};
 pub use content::{CageFile, Content, MatrixFile};
 pub use disk::{Disk, LocalDisk};
 pub use error::StoreError;
 pub use log::{FrameLog, LogEntry, LogReader, LogRecord};
 pub use names::{ContentKey, is_session_id};
 pub use sessions::{Completion, Container, Idempotency, SessionMeta};
+pub use spool::{Spool, StoredFile};
 
 /// A folder of everything that must survive. Clones share it.
 #[derive(Clone, Debug)]
@@ -75,7 +80,9 @@ pub struct Opened {
     pub store: Store,
     /// Its sessions, oldest first.
     pub sessions: Vec<SessionMeta>,
-    /// Sessions that are damaged and were moved out of the way.
+    /// Its cage jobs, oldest first.
+    pub cage_jobs: Vec<CageJobMeta>,
+    /// Sessions and cage jobs that are damaged and were moved out of the way.
     pub quarantined: Vec<Quarantined>,
 }
 
@@ -103,13 +110,19 @@ impl Store {
         let lock = disk.lock(&lock_path).map_err(|e| StoreError::of(&lock_path, "lock", e))?;
         let lock = lock.ok_or_else(|| StoreError::Locked { path: root.to_owned() })?;
         let files = Files::new(root, disk);
-        for folder in
-            [files.sessions(), files.contents(), files.prepared(), files.quarantine(), files.trash(), files.tmp()]
-        {
+        for folder in [
+            files.sessions(),
+            files.cages(),
+            files.contents(),
+            files.prepared(),
+            files.quarantine(),
+            files.trash(),
+            files.tmp(),
+        ] {
             make_folder(&*files.disk, &folder)?;
         }
         // What an earlier process did and did not live to sync counts from here on: nobody sees a deleted session any more.
-        for folder in [files.trash(), files.sessions(), files.contents(), files.prepared()] {
+        for folder in [files.trash(), files.sessions(), files.cages(), files.contents(), files.prepared()] {
             files.sync_dir(&folder)?;
         }
         for folder in [files.trash(), files.tmp()] {
@@ -118,9 +131,14 @@ impl Store {
                 tracing::warn!(%error, "something deleted still takes space");
             }
         }
-        let (sessions, quarantined) = sessions::find(&files)?;
+        let (mut sessions, mut quarantined) = sessions::find(&files)?;
+        let (mut cage_jobs, damaged) = cage_jobs::find(&files)?;
+        quarantined.extend(damaged);
+        sessions.sort_by(|a, b| (a.created_ms, &a.id).cmp(&(b.created_ms, &b.id)));
+        cage_jobs.sort_by(|a, b| (a.created_ms, &a.id).cmp(&(b.created_ms, &b.id)));
+        quarantined.sort_by(|a, b| a.name.cmp(&b.name));
         let inner = Inner { files, lock: Arc::new(lock), logs: Arc::default(), publishing: Mutex::new(()) };
-        Ok(Opened { store: Self { inner: Arc::new(inner) }, sessions, quarantined })
+        Ok(Opened { store: Self { inner: Arc::new(inner) }, sessions, cage_jobs, quarantined })
     }
 
     fn files(&self) -> &Files {

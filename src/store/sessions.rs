@@ -8,7 +8,7 @@ use cager_proto::messages::SessionOptions;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -28,6 +28,9 @@ pub struct SessionMeta {
     pub solver_version: u32,
     /// Choices, as they were given.
     pub options: SessionOptions,
+    /// Digest of the rest pose and the wish that its cage was made from, where none was sent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made_cage: Option<ContentKey>,
     /// The request that made it, so that a repetition finds it.
     pub idempotency: Option<Idempotency>,
 }
@@ -77,25 +80,7 @@ impl Store {
         let files = self.files();
         let place = files.session(&meta.id);
         let bytes = meta::wrap(&place.join(META), "session", meta)?;
-        let aside = files.temporary(&meta.id);
-        let prepare = || {
-            files.disk.create_dir(&aside).map_err(|e| StoreError::of(&aside, "create", e))?;
-            files.write_new(&aside.join(META), &bytes)?;
-            files.sync_dir(&aside)
-        };
-        prepare().inspect_err(|_| files.discard(&aside))?;
-        // Renaming onto a folder with something in it is refused, so an id is never taken twice.
-        if let Err(error) = files.disk.rename(&aside, &place) {
-            files.discard(&aside);
-            let taken = matches!(error.kind(), io::ErrorKind::DirectoryNotEmpty | io::ErrorKind::AlreadyExists);
-            let error = if taken { io::ErrorKind::AlreadyExists.into() } else { error };
-            return Err(StoreError::of(&place, "create the session", error));
-        }
-        files.sync_dir(&files.sessions()).inspect_err(|_| {
-            if let Err(error) = files.throw_away(&place) {
-                tracing::warn!(%error, session = %meta.id, "a session that could not be created is still there");
-            }
-        })
+        files.publish_folder(&place, |aside| files.write_new(&aside.join(META), &bytes))
     }
 
     /// Deletes a session; fine where there is none. On Ok it does not come back; after an error it is there whole, or gone.
@@ -207,37 +192,45 @@ impl Store {
     }
 }
 
-/// The sessions, oldest first, and those set aside.
+/// The sessions, and those set aside.
 pub(super) fn find(files: &Files) -> Result<(Vec<SessionMeta>, Vec<Quarantined>), StoreError> {
-    let mut sessions = Vec::new();
-    let mut quarantined = Vec::new();
-    for entry in files.list(&files.sessions())? {
-        let folder = files.sessions().join(&entry.name);
-        let name = entry.name.to_string_lossy().into_owned();
-        let found = if entry.is_dir && is_session_id(&name) {
-            meta::read::<SessionMeta>(files, &folder.join(META), "session")
+    find_in(files, &files.sessions(), META, "session", |meta: &SessionMeta| &meta.id)
+}
+
+/// What lies in the folders of `place` by its metadata, a file of this `name` in each, and those folders that were set aside.
+pub(super) fn find_in<M: DeserializeOwned>(
+    files: &Files,
+    place: &Path,
+    name: &str,
+    kind: &str,
+    id: impl Fn(&M) -> &str,
+) -> Result<(Vec<M>, Vec<Quarantined>), StoreError> {
+    let (mut found, mut quarantined) = (Vec::new(), Vec::new());
+    for entry in files.list(place)? {
+        let folder = place.join(&entry.name);
+        let own_name = entry.name.to_string_lossy().into_owned();
+        let meta = if entry.is_dir && is_session_id(&own_name) {
+            meta::read::<M>(files, &folder.join(name), kind)
         } else {
-            Err(StoreError::damaged(&folder, "it is not a session's folder"))
+            Err(StoreError::damaged(&folder, format!("it is not a {kind}'s folder")))
         };
-        let error = match found {
-            Ok(Some(meta)) if meta.id == name => {
-                sessions.push(meta);
+        let error = match meta {
+            Ok(Some(meta)) if id(&meta) == own_name => {
+                found.push(meta);
                 continue;
             }
-            Ok(Some(meta)) => StoreError::damaged(&folder, format!("its metadata is of the session {}", meta.id)),
-            Ok(None) => StoreError::damaged(&folder, format!("{META} is missing")),
+            Ok(Some(meta)) => StoreError::damaged(&folder, format!("its metadata is of the {kind} {}", id(&meta))),
+            Ok(None) => StoreError::damaged(&folder, format!("{name} is missing")),
             Err(error) => error,
         };
-        tracing::warn!(%error, session = %name, "a session is left out");
+        tracing::warn!(%error, kind, id = %own_name, "something stored is left out");
         let why = error.to_string();
         // What could not be read may be readable the next time, so it stays where it is.
         let aside =
             if matches!(error, StoreError::Damaged { .. }) { files.set_aside(&folder, &why).ok() } else { None };
-        quarantined.push(aside.unwrap_or(Quarantined { name, path: folder, why }));
+        quarantined.push(aside.unwrap_or(Quarantined { name: own_name, path: folder, why }));
     }
-    sessions.sort_by(|a, b| (a.created_ms, &a.id).cmp(&(b.created_ms, &b.id)));
-    quarantined.sort_by(|a, b| a.name.cmp(&b.name));
-    Ok((sessions, quarantined))
+    Ok((found, quarantined))
 }
 
 /// Writes a file and computes its digest on the way.

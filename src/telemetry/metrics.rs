@@ -19,6 +19,7 @@ pub fn recorder() -> &'static PrometheusHandle {
         let builder = builder
             .set_buckets(SHORT)
             .and_then(|b| b.set_buckets_for_metric(named("cager_prepare_seconds"), LONG))
+            .and_then(|b| b.set_buckets_for_metric(named("cager_design_seconds"), LONG))
             .expect("the buckets are not empty");
         let recorder = builder.build_recorder();
         let handle = recorder.handle();
@@ -36,6 +37,8 @@ pub(crate) fn observe(service: &Service) {
     metrics::gauge!("cager_queue_frames").set(service.engine.waiting() as f64);
     metrics::gauge!("cager_streams").set(service.open_streams() as f64);
     metrics::gauge!("cager_preparing").set(service.solvers.in_flight() as f64);
+    metrics::gauge!("cager_designing").set(service.cage_jobs.unfinished() as f64);
+    metrics::gauge!("cager_memory_bytes", "use" => "designs").set(service.designs.bytes() as f64);
     metrics::gauge!("cager_memory_bytes", "use" => "frames").set(service.frame_memory.used() as f64);
     metrics::gauge!("cager_memory_bytes", "use" => "uploads").set(service.upload_memory.used() as f64);
     metrics::gauge!("cager_disk_free_bytes").set(service.store.free_bytes() as f64);
@@ -77,11 +80,17 @@ fn describe() {
     describe_gauge!("cager_queue_frames", "Frames and cages waiting to be solved or decoded");
     describe_gauge!("cager_streams", "Uploads, followers and decodings that run");
     describe_gauge!("cager_preparing", "Sessions being prepared or waiting for it");
+    describe_gauge!("cager_designing", "Cages being designed or waiting for it");
+    describe_counter!(
+        "cager_designs_total",
+        "Cage designs that ended, by result: completed, failed, or known from an earlier one"
+    );
+    describe_histogram!("cager_design_seconds", Unit::Seconds, "Designing a cage");
     describe_gauge!("cager_memory_bytes", Unit::Bytes, "Memory taken by what is on its way");
     describe_gauge!("cager_disk_free_bytes", Unit::Bytes, "Free space of the data folder's file system");
     describe_gauge!("cager_uptime_seconds", Unit::Seconds, "Time since the service started");
     describe_gauge!("cager_sessions", "Sessions, by tenant");
-    describe_gauge!("cager_stored_bytes", Unit::Bytes, "Disk space of sessions, by tenant");
+    describe_gauge!("cager_stored_bytes", Unit::Bytes, "Disk space of sessions and cage designs, by tenant");
     describe_histogram!("cager_queue_seconds", Unit::Seconds, "Wait of a batch's oldest frame");
     describe_histogram!("cager_solve_seconds", Unit::Seconds, "Inverting and measuring a batch of up to 16 frames");
     describe_histogram!("cager_prepare_seconds", Unit::Seconds, "Preparing a solver");

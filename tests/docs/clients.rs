@@ -71,8 +71,10 @@ fn the_curl_examples_encode() {
         assert_container(&folder.join("capture.cager"), FRAMES);
         let cage = fs::read(folder.join("cage-0.f32")).expect("a cage");
         assert!(!cage.is_empty() && cage.len().is_multiple_of(12));
+        cager_formats::read_model(&folder.join("designed.obj")).expect("a designed cage");
         let sessions = fs::read_dir(folder.join("data/sessions")).expect("the data folder").count();
         assert_eq!(sessions, 0, "the last step deletes the session");
+        assert_eq!(fs::read_dir(folder.join("data/cages")).expect("the data folder").count(), 0);
     });
 }
 
@@ -81,9 +83,9 @@ fn the_python_example_encodes_with_nothing_but_the_standard_library() {
     if !is_there("python3") {
         return;
     }
-    let [script] = &blocks(DOCUMENT, "python")[..] else { panic!("one block") };
+    let script = blocks(DOCUMENT, "python").concat();
     let python = |folder: &Path| {
-        fs::write(folder.join("script.py"), script).expect("a script");
+        fs::write(folder.join("script.py"), &script).expect("a script");
         let mut command = Command::new("python3");
         // Isolated: no packages of the user's.
         command.args(["-I", "-S", "script.py"]);
@@ -92,5 +94,6 @@ fn the_python_example_encodes_with_nothing_but_the_standard_library() {
     try_out(python, |folder, out| {
         assert_eq!(out.lines().filter(|line| line.starts_with("frame ")).count(), 3, "{out}");
         assert_container(&folder.join("capture.cager"), 3);
+        assert!(out.contains("designed cage of "), "{out}");
     });
 }

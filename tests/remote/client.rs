@@ -2,11 +2,13 @@
 
 use crate::server::{Server, capture, ready};
 use crate::support::{ENCODE, read_cages, read_frames};
-use cager_client::messages::{FrameResult, Problem, Session, SessionState};
+use cager_client::cage_messages::CageState;
+use cager_client::messages::{CageSource, FrameResult, Problem, Session, SessionState};
 use cager_client::{
-    CageFrame, Client, ClientError, ClientOptions, FnFrames, LocalDecoder, MemoryFrames, Rows, UploadOptions,
+    CageFrame, Client, ClientError, ClientOptions, FnFrames, LocalDecoder, MemoryFrames, MeshFile, NewCage, Rows,
+    UploadOptions,
 };
-use futures_util::TryStreamExt;
+use futures_util::{StreamExt as _, TryStreamExt as _};
 use std::time::Duration;
 
 async fn upload(client: &Client, session: &Session, points: usize, values: &[f32]) -> Vec<u32> {
@@ -145,10 +147,8 @@ async fn a_bad_pair_fails_with_the_reason() {
     let cage = String::from_utf8(dir.read("cage.obj")).expect("text");
     let open =
         cage.lines().filter(|line| !line.starts_with("f ")).map(|l| format!("{l}\n")).collect::<String>() + "f 1 2 3\n";
-    let new = cager_client::NewSession::new(
-        cager_client::MeshFile::new("rest.obj", dir.read("rest.obj")),
-        cager_client::MeshFile::new("cage.obj", open),
-    );
+    let new =
+        cager_client::NewSession::new(MeshFile::new("rest.obj", dir.read("rest.obj")), MeshFile::new("cage.obj", open));
     let outcome = match client.create(&new).await {
         Ok(session) => client.wait_ready(&session.id, Duration::from_secs(60)).await,
         refused => refused,
@@ -179,4 +179,35 @@ async fn a_session_deleted_under_an_upload_ends_it() {
     assert!(matches!(error.status(), Some(404 | 410)), "{error}");
     let error = follower.await.expect("no panic").expect_err("deleted");
     assert!(matches!(&error, ClientError::Refused(_)) && error.status() == Some(404), "{error}");
+}
+
+#[tokio::test]
+async fn a_cage_is_designed_followed_fetched_used_and_deleted() {
+    let (dir, points, values) = capture();
+    let server = Server::start(&dir);
+    let client = server.client();
+    let rest = || MeshFile::new("rest.obj", dir.read("rest.obj"));
+    let bytes: Vec<u8> = values.iter().flat_map(|x| x.to_le_bytes()).collect();
+    let mut new = NewCage::new(rest(), MeshFile::new("frames.f32", bytes));
+    new.options.frames = Some((values.len() / points / 3) as u32);
+    new.options.vertices = Some(60);
+    new.options.time_limit_s = Some(3.0);
+    new.idempotency_key = Some("the same".to_owned());
+    let job = client.design_cage(&new).await.expect("a design");
+    assert_eq!(client.design_cage(&new).await.expect("the same design").id, job.id);
+    let heard: Vec<_> = client.cage_events(&job.id).collect().await;
+    let last = heard.last().expect("an event").as_ref().expect("progress");
+    assert_eq!((last.state, last.fraction), (CageState::Completed, 1.0));
+    let job = client.wait_cage(&job.id, Duration::from_secs(60)).await.expect("a cage");
+    assert_eq!(client.cage_jobs().await.expect("designs"), std::slice::from_ref(&job));
+    let obj = client.cage_obj(&job.id).await.expect("a cage");
+    assert!(obj.starts_with(b"v "));
+    let mut new = cager_client::NewSession::new(rest(), MeshFile::new("cage.obj", obj));
+    new.cage = None;
+    new.options.cage = Some(CageSource { id: Some(job.id.clone()), ..CageSource::default() });
+    let session = client.create(&new).await.expect("a session");
+    client.delete_cage(&job.id).await.expect("deleted");
+    assert!(matches!(client.cage_job(&job.id).await, Err(ClientError::Refused(problem)) if problem.status == 404));
+    let session = client.wait_ready(&session.id, Duration::from_secs(60)).await.expect("a ready session");
+    assert_eq!(session.cage_vertices, job.vertices);
 }

@@ -42,6 +42,37 @@ fn a_service_gives_the_bytes_and_the_report_that_this_machine_gives() {
 }
 
 #[test]
+fn without_a_cage_the_service_designs_one_and_keeps_nothing_of_the_design() {
+    let (dir, ..) = capture();
+    let server = Server::start(&dir);
+    let encode = ENCODE.replace(" --cage cage.obj", "") + " --report r.json --server " + &server.address();
+    dir.cager(&format!("{encode} --cage-vertices 60")).succeeds();
+    let report = dir.json("r.json");
+    assert!(report["cage_vertices"].as_u64().is_some_and(|vertices| vertices <= 60), "{report}");
+    assert_eq!(report["frames"], 20);
+    assert_eq!(designs(&server), 0);
+    // The container has the cage, so that it decodes without the service.
+    dir.cager("decode out.cager -o decoded.npy").succeeds();
+
+    for (options, status, word) in [
+        ("--mean-error -1", 1, "--mean-error: is -1"),
+        ("--mean-error 0.01 --cage-vertices 60", 2, "cannot be used with"),
+        ("--cage-vertices 3", 2, "3 is not in"),
+        ("--spectrum all", 1, "--spectrum all"),
+    ] {
+        let said = dir.cager(&format!("{encode} {options}")).run();
+        assert_eq!(said.status, Some(status), "{options}");
+        assert!(said.stderr.contains(word), "{options}: {}", said.stderr);
+    }
+    assert_eq!((designs(&server), sessions(&server)), (0, 1));
+}
+
+#[tokio::main(flavor = "current_thread")]
+async fn designs(server: &Server) -> usize {
+    server.client().cage_jobs().await.expect("designs").len()
+}
+
+#[test]
 fn a_frame_that_cannot_be_read_is_named_and_nothing_is_left_anywhere() {
     let (dir, ..) = capture();
     let server = Server::start(&dir);

@@ -14,7 +14,7 @@ use std::path::Path;
 use crate::error::{Error, Fault};
 use crate::mesh::{MeshFormat, extensions};
 
-pub use source::{open_frames, open_frames_bytes};
+pub use source::{open_frames, open_frames_bytes, open_frames_in};
 pub use write::{FrameOptions, FrameWriter, create_frames};
 
 /// Positions of one capture, frame by frame, in order. Memory does not grow with the number of frames.

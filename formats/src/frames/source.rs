@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::{self, Cursor};
+use std::io::{self, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 
 use super::cache::CacheReader;
@@ -48,8 +48,21 @@ pub fn open_frames_bytes<'a>(
     bytes: &'a [u8],
     expected_points: usize,
 ) -> Result<Box<dyn FrameReader + 'a>, Error> {
-    let reader = CacheReader::open(format, name, Cursor::new(bytes), bytes.len() as u64, expected_points)?;
-    Ok(Box::new(reader))
+    open_frames_in(format, name, Cursor::new(bytes), bytes.len() as u64, expected_points)
+}
+
+/// Opens the frames of a cache file of `length` bytes wherever it lies; `name` is the path in error messages.
+///
+/// # Errors
+/// As [`open_frames`].
+pub fn open_frames_in<'a>(
+    format: CacheFormat,
+    name: &Path,
+    source: impl Read + Seek + Send + 'a,
+    length: u64,
+    expected_points: usize,
+) -> Result<Box<dyn FrameReader + 'a>, Error> {
+    Ok(Box::new(CacheReader::open(format, name, source, length, expected_points)?))
 }
 
 fn open_file(path: &Path, length: u64, expected_points: usize) -> Result<Box<dyn FrameReader>, Error> {

@@ -14,7 +14,7 @@ use cager_core::mesh::Model;
 
 use crate::error::{Error, Fault};
 
-pub use write::write_model;
+pub use write::{model_bytes, obj_bytes, write_model};
 pub(crate) use write::{write_obj_faces, write_ply};
 
 /// A mesh file format.

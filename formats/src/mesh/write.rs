@@ -18,20 +18,31 @@ use crate::error::{Error, Fault};
 /// [`Error::Unsupported`] for other formats, [`Error::Invalid`] for a model that could not be read back,
 /// [`Error::Target`] and [`Error::Io`] where the file cannot be created.
 pub fn write_model(path: &Path, model: &Model) -> Result<(), Error> {
-    let write: fn(&mut AtomicFile, &Model) -> io::Result<()> = match MeshFormat::guess(path) {
-        Some(MeshFormat::Obj) => write_obj,
-        Some(MeshFormat::Ply) => write_ply,
-        Some(MeshFormat::Off) => write_off,
-        _ => {
-            let written = extensions(&[MeshFormat::Obj, MeshFormat::Ply, MeshFormat::Off]);
-            let what = format!("is not of a mesh format that is written; end its name in one of {written}");
-            return Err(Fault::unsupported(what).at(path));
-        }
+    let bytes = model_bytes(path, model)?;
+    let mut file = AtomicFile::create(path)?;
+    file.write_all(&bytes).map_err(|cause| Error::write(path, cause))?;
+    file.commit()
+}
+
+/// A model as the bytes of a mesh file of this name.
+///
+/// # Errors
+/// A name that says no format that is written; a model with NaN, infinities or faces without points.
+pub fn model_bytes(path: &Path, model: &Model) -> Result<Vec<u8>, Error> {
+    let Some(format @ (MeshFormat::Obj | MeshFormat::Ply | MeshFormat::Off)) = MeshFormat::guess(path) else {
+        let written = extensions(&[MeshFormat::Obj, MeshFormat::Ply, MeshFormat::Off]);
+        let what = format!("is not of a mesh format that is written; end its name in one of {written}");
+        return Err(Fault::unsupported(what).at(path));
     };
     check(model).map_err(|fault| fault.at(path))?;
-    let mut file = AtomicFile::create(path)?;
-    write(&mut file, model).map_err(|cause| Error::write(path, cause))?;
-    file.commit()
+    let mut bytes = Vec::new();
+    let written = match format {
+        MeshFormat::Ply => write_ply(&mut bytes, model),
+        MeshFormat::Off => write_off(&mut bytes, model),
+        _ => write_obj(&mut bytes, model),
+    };
+    written.map_err(|cause| Error::write(path, cause))?;
+    Ok(bytes)
 }
 
 fn check(model: &Model) -> Result<(), Fault> {
@@ -50,7 +61,15 @@ fn check(model: &Model) -> Result<(), Fault> {
     Ok(())
 }
 
-fn write_obj(out: &mut AtomicFile, model: &Model) -> io::Result<()> {
+/// A model as the bytes of an OBJ file, with every coordinate exact.
+pub fn obj_bytes(model: &Model) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    // Writing to memory cannot fail.
+    let _ = write_obj(&mut bytes, model);
+    bytes
+}
+
+fn write_obj<W: Write>(out: &mut W, model: &Model) -> io::Result<()> {
     for [x, y, z] in &model.points {
         writeln!(out, "v {x:?} {y:?} {z:?}")?;
     }
@@ -69,7 +88,7 @@ pub(crate) fn write_obj_faces<'a>(out: &mut impl Write, faces: impl Iterator<Ite
     Ok(())
 }
 
-fn write_off(out: &mut AtomicFile, model: &Model) -> io::Result<()> {
+fn write_off(out: &mut impl Write, model: &Model) -> io::Result<()> {
     writeln!(out, "OFF\n{} {} 0", model.points.len(), model.faces.len())?;
     for [x, y, z] in &model.points {
         writeln!(out, "{x:?} {y:?} {z:?}")?;

@@ -122,17 +122,48 @@ fn mend_records(body: &mut [u8], points: u32, handles: u32) {
     }
 }
 
+/// A part of a multipart body, a file where it has a file's name.
+fn part(name: &str, file: &str, content: &str) -> String {
+    let file = if file.is_empty() { String::new() } else { format!("; filename=\"{file}\"") };
+    format!(
+        "--B\r\nContent-Disposition: form-data; name=\"{name}\"{file}\r\nContent-Type: application/json\r\n\r\n{content}\r\n"
+    )
+}
+
+/// As [`NEW_SESSION`], of a cage to be designed.
+pub(super) const NEW_CAGE: Target = Target {
+    name: "new-cage",
+    run: new_cage,
+    seeds: || {
+        let options =
+            r#"{"name":"a","vertices":20,"coordinates":"mvc","style":"free","seed":7,"time_limit_s":2.5,"frames":3}"#;
+        let rest = part("rest", "a/rest.obj", "v 0 0 0\n");
+        let body =
+            |cut: &str, rest: String| format!("{cut}multipart/form-data; boundary=B\n{rest}--B--\r\n").into_bytes();
+        vec![
+            body("\u{7}", rest.clone() + &part("options", "", options) + &part("frames", "f.f32", "0123456789ab")),
+            body("\u{7f}", part("frames", "", &"x".repeat(3000)) + &rest),
+            body("\u{1}", part("options", "", r#"{"mean_error":0.01,"style":"editable"}"#) + &rest),
+        ]
+    },
+    words: &[
+        "form-data; name=\"frames\"; filename=\"f.npy\"",
+        "multipart/form-data; boundary=",
+        "\r\n--B\r\n",
+        "\r\n--B--",
+        "\"vertices\":",
+        "\"mean_error\":",
+        "\"frames\":",
+    ],
+    fixed: 6 << 20,
+    per_byte: 1024,
+};
+
 /// The first byte says how the body is cut; then the media type up to the end of the line, then the body.
 pub(super) const NEW_SESSION: Target = Target {
     name: "new-session",
     run: new_session,
     seeds: || {
-        let part = |name: &str, file: &str, content: &str| {
-            let file = if file.is_empty() { String::new() } else { format!("; filename=\"{file}\"") };
-            format!(
-                "--B\r\nContent-Disposition: form-data; name=\"{name}\"{file}\r\nContent-Type: application/json\r\n\r\n{content}\r\n"
-            )
-        };
         let options = r#"{"name":"a","coordinates":"mvc","handles":"maxvol","regularizer":"laplacian","spectrum":20,"lambda":1.0,"flip_cage":true,"frame_rate":24}"#;
         let files = part("rest", "a/rest.obj", "v 0 0 0\n") + &part("cage", "cage.ply", "ply\n");
         let body =
@@ -202,17 +233,32 @@ static SERVICE: LazyLock<Arc<Service>> = LazyLock::new(|| {
     Service::start(config, Arc::new(MemoryDisk::default()), CancellationToken::new()).expect("a service")
 });
 
-fn new_session(mut bytes: &[u8]) {
+fn new_session(bytes: &[u8]) {
+    let Some((media_type, pieces, length)) = request(bytes) else { return };
+    match RUNTIME.block_on(fuzzing::new_session(&SERVICE, media_type, pieces)) {
+        Ok((rest, cage)) => assert!(rest + cage <= 4096 && rest + cage <= length, "{rest} and {cage} bytes"),
+        Err(error) => assert!(error.status().is_client_error(), "{error:?}"),
+    }
+}
+
+fn new_cage(bytes: &[u8]) {
+    let Some((media_type, pieces, length)) = request(bytes) else { return };
+    match RUNTIME.block_on(fuzzing::new_cage(&SERVICE, media_type, pieces)) {
+        Ok((rest, frames)) => {
+            assert!(rest <= 4096 && rest as u64 + frames <= length as u64, "{rest} and {frames} bytes");
+        }
+        Err(error) => assert!(error.status().is_client_error(), "{error:?}"),
+    }
+}
+
+/// Media type, pieces of the body, and its length.
+fn request(mut bytes: &[u8]) -> Option<(HeaderValue, Vec<Bytes>, usize)> {
     let chunk = usize::from(byte(&mut bytes)).max(1);
     let end = bytes.iter().position(|&b| b == b'\n').unwrap_or(bytes.len());
     let (media_type, body) = bytes.split_at(end);
-    let Ok(media_type) = HeaderValue::from_bytes(media_type) else { return };
     let body = body.get(1..).unwrap_or_default();
     let pieces = body.chunks(chunk).map(Bytes::copy_from_slice).collect();
-    match RUNTIME.block_on(fuzzing::new_session(&SERVICE, media_type, pieces)) {
-        Ok((rest, cage)) => assert!(rest + cage <= 4096 && rest + cage <= body.len(), "{rest} and {cage} bytes"),
-        Err(error) => assert!(error.status().is_client_error(), "{error:?}"),
-    }
+    Some((HeaderValue::from_bytes(media_type).ok()?, pieces, body.len()))
 }
 
 /// The first byte says how many bytes there are; then the values of `Range`, `If-Range` and `If-None-Match`, a line each.

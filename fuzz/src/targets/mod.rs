@@ -24,6 +24,7 @@ pub const TARGETS: &[Target] = &[
     bodies::RECORD,
     bodies::FRAMES,
     bodies::NEW_SESSION,
+    bodies::NEW_CAGE,
     bodies::RANGE,
     settings::TOKENS,
     settings::CONFIG,

@@ -173,6 +173,7 @@ pub(super) const SMALL_FILES: Target = Target {
         let options = SessionOptions { lambda: Some(0.3), name: Some("n".into()), ..SessionOptions::default() };
         let idempotency = Some(cager::store::Idempotency { key: "k".into(), fingerprint: "f".into() });
         let meta = SessionMeta {
+            made_cage: None,
             id: ID.into(),
             tenant: "t".into(),
             created_ms: 1,

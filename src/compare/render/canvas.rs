@@ -129,8 +129,13 @@ impl Canvas {
         self.colours[at] = [0, 1, 2, 3].map(|k| opacity * over[k] + (1.0 - opacity) * under[k]);
     }
 
-    /// The picture: the mean of each pixel's samples.
+    /// The picture.
     pub(super) fn png(&self) -> Png {
+        Png::new(self.width / SAMPLES, self.height / SAMPLES, &self.pixels())
+    }
+
+    /// Its pixels, rows from above, red, green, blue and opacity: the mean of each one's samples.
+    pub(super) fn pixels(&self) -> Vec<[u8; 4]> {
         let (width, height) = (self.width / SAMPLES, self.height / SAMPLES);
         let mut pixels = Vec::with_capacity(width * height);
         for y in 0..height {
@@ -151,7 +156,7 @@ impl Canvas {
                 pixels.push([channel(0), channel(1), channel(2), covered]);
             }
         }
-        Png::new(width, height, &pixels)
+        pixels
     }
 }
 

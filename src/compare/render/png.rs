@@ -39,6 +39,11 @@ impl Png {
         Self { width, height, bytes }
     }
 
+    /// The bytes of a file.
+    pub(crate) fn into_bytes(self) -> Vec<u8> {
+        self.bytes
+    }
+
     /// As the address of an `img` element, which then needs no other file.
     pub(crate) fn data_url(&self) -> String {
         const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";

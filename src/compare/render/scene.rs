@@ -100,6 +100,11 @@ impl Scene {
         self.canvas.png()
     }
 
+    /// Its pixels, rows from above, red, green, blue and opacity.
+    pub(crate) fn pixels(&self) -> Vec<[u8; 4]> {
+        self.canvas.pixels()
+    }
+
     fn places(&self, points: &[Point]) -> Vec<Point> {
         points.iter().map(|p| self.camera.project(*p, self.canvas.size())).collect()
     }

@@ -65,7 +65,7 @@ fn live(given: &Given, told: &mut Told) -> Result<(), ()> {
 
 /// Opens the store and compares; gives what it showed, which counts from there on.
 fn look(given: &Given, told: &Told, what: &str) -> Told {
-    let Opened { store, sessions, quarantined } = given.open();
+    let Opened { store, sessions, quarantined, .. } = given.open();
     assert!(quarantined.is_empty(), "{what}: {quarantined:?}");
     let ids: Vec<&str> = sessions.iter().map(|session| session.id.as_str()).collect();
     for session in &sessions {
@@ -223,7 +223,7 @@ fn a_deletion_may_be_interrupted_anywhere() {
             let told = store.delete_session("b").is_ok();
             drop(store);
             given.disk.restart(loss).unwrap();
-            let Opened { store, sessions, quarantined } = given.open();
+            let Opened { store, sessions, quarantined, .. } = given.open();
             assert!(quarantined.is_empty());
             let there = sessions.iter().any(|session| session.id == "b");
             assert!(!(told && there), "it came back, step {nth}, {loss:?}");

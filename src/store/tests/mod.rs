@@ -12,6 +12,7 @@ use std::path::Path;
 use std::sync::{Arc, LazyLock};
 use tempfile::TempDir;
 
+mod cage_jobs;
 mod faults;
 mod prepared;
 mod sessions;
@@ -53,6 +54,7 @@ pub(crate) fn meta(id: &str) -> SessionMeta {
         key: KEY,
         options: SessionOptions { lambda: Some(0.1 + 0.2), name: Some("Ärmel".into()), ..SessionOptions::default() },
         solver_version: cager_core::SOLVER_VERSION,
+        made_cage: None,
         idempotency: Some(Idempotency { key: "k".into(), fingerprint: "f".into() }),
     }
 }

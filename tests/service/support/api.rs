@@ -3,6 +3,7 @@
 use super::{Capture, HANG, Mesh, eventually, within};
 use bytes::Bytes;
 use cager_client::CageFrame;
+use cager_proto::cage_messages::CageJob;
 use cager_proto::messages::{FrameErrors, FrameResult, Problem, Session, SessionState};
 use cager_proto::record::{self, Kind};
 use http::{HeaderMap, Method};
@@ -101,6 +102,30 @@ impl Api {
         self.complete(&session.id, frames).await.is(200)
     }
 
+    pub(crate) async fn design_with(&self, form: Form, key: Option<&str>) -> Reply {
+        let request = self.request(Method::POST, "/v1/cages").multipart(form);
+        self.send(match key {
+            Some(key) => request.header("idempotency-key", key),
+            None => request,
+        })
+        .await
+    }
+
+    /// A cage design of all frames of a capture, perhaps still waiting.
+    pub(crate) async fn design(&self, capture: &Capture, options: &Value) -> CageJob {
+        self.design_with(cage_form(capture, options), None).await.is(202)
+    }
+
+    pub(crate) async fn cage_job(&self, id: &str) -> CageJob {
+        self.get(&format!("/v1/cages/{id}")).await.is(200)
+    }
+
+    /// Waits until a design is over.
+    pub(crate) async fn designed(&self, id: &str) -> CageJob {
+        eventually("the cage is designed", async || Some(self.cage_job(id).await).filter(|job| job.state.is_final()))
+            .await
+    }
+
     pub(crate) async fn session(&self, id: &str) -> Session {
         self.get(&format!("/v1/sessions/{id}")).await.is(200)
     }
@@ -166,6 +191,20 @@ pub(crate) fn form_of(rest: &Mesh, cage: &Mesh, options: &Value) -> Form {
         .part("rest", file("rest.obj", &rest.obj))
         .part("cage", file("cage.obj", &cage.obj))
         .part("options", text(options))
+}
+
+/// The parts that ask for a cage, with all frames of a capture as raw numbers.
+pub(crate) fn cage_form(capture: &Capture, options: &Value) -> Form {
+    let mut options = options.clone();
+    options["frames"] = capture.count().into();
+    cage_form_of(&capture.rest.obj, "frames.f32", &capture.raw(0..capture.count()), &options)
+}
+
+pub(crate) fn cage_form_of(rest: &[u8], frames_name: &str, frames: &[u8], options: &Value) -> Form {
+    Form::new()
+        .part("rest", file("rest.obj", rest))
+        .part("options", text(options))
+        .part("frames", file(frames_name, frames))
 }
 
 pub(crate) fn file(name: &str, bytes: &[u8]) -> Part {

@@ -2,10 +2,14 @@
 
 mod api;
 mod capture;
+mod inside;
 mod raw;
 
-pub(crate) use api::{Api, OCTETS, RECORDS, Reply, cages_of, file, form, form_of, lines, piece, records, text};
+pub(crate) use api::{
+    Api, OCTETS, RECORDS, Reply, cage_form, cage_form_of, cages_of, file, form, form_of, lines, piece, records, text,
+};
 pub(crate) use capture::{Capture, Mesh};
+pub(crate) use inside::{Inside, SlowDesigns};
 pub(crate) use raw::{Raw, chunked};
 
 use sha2::{Digest as _, Sha256};
@@ -41,6 +45,11 @@ impl Deref for TestApp {
 }
 
 impl TestApp {
+    /// A file of a cage design in the data folder.
+    pub(crate) fn cage_file(&self, id: &str, name: &str) -> PathBuf {
+        self.place.path().join("data/cages").join(id).join(name)
+    }
+
     /// Starts a service with default settings.
     pub(crate) fn start() -> Self {
         Self::with(&[])

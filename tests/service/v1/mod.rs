@@ -1,1 +1,2 @@
+mod cages;
 mod sessions;

@@ -4,3 +4,4 @@ mod geometry;
 mod id;
 mod idempotency;
 mod list;
+mod without_cage;

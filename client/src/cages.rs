@@ -1,0 +1,177 @@
+//! Cages designed by example: asking for one, following it, fetching it.
+
+use crate::body::json;
+use crate::client::Client;
+use crate::create::{MeshFile, part, random_key};
+use crate::error::{ClientError, Failure};
+use crate::events::{Events, Place};
+use bytes::Bytes;
+use cager_proto::cage_messages::{CageJob, CageJobList, CageOptions, CageProgress, CageState};
+use cager_proto::messages::Problem;
+use futures_util::stream::BoxStream;
+use reqwest::Method;
+use reqwest::multipart::{Form, Part};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// Pauses between two looks at a design.
+const FIRST_PAUSE: Duration = Duration::from_millis(50);
+const LONGEST_PAUSE: Duration = Duration::from_secs(2);
+
+/// What a cage is designed from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NewCage {
+    /// The model in its rest pose.
+    pub rest: MeshFile,
+    /// Frames of its motion: a file whose name ends in `.npy`, or raw little-endian f32, whose number
+    /// [`CageOptions::frames`] says. Evenly spaced ones, 160 at most, are enough.
+    pub frames: MeshFile,
+    /// Choices; what is left out has the service's default.
+    pub options: CageOptions,
+    /// Names this wish, so that asking twice begins one design; a random one where none is given.
+    pub idempotency_key: Option<String>,
+}
+
+impl NewCage {
+    /// A cage with the service's defaults.
+    pub fn new(rest: MeshFile, frames: MeshFile) -> Self {
+        Self { rest, frames, options: CageOptions::default(), idempotency_key: None }
+    }
+}
+
+impl Client {
+    /// Has a cage designed. It is designed in the background, see [`Client::wait_cage`] and [`Client::cage_events`]; a session then takes it
+    /// by [`SessionOptions::cage`](cager_proto::messages::SessionOptions::cage).
+    ///
+    /// # Errors
+    /// [`ClientError::Mismatch`] for an option that is NaN or infinite, [`ClientError::Refused`] for bad input, and those of the
+    /// connection.
+    pub async fn design_cage(&self, new: &NewCage) -> Result<CageJob, ClientError> {
+        for (name, value) in [("mean_error", new.options.mean_error), ("time_limit_s", new.options.time_limit_s)] {
+            if let Some(value) = value.filter(|value| !value.is_finite()) {
+                return Err(ClientError::Mismatch(format!(
+                    "{name}: is {value}; give a finite number, or leave it out"
+                )));
+            }
+        }
+        let key = new.idempotency_key.clone().unwrap_or_else(random_key);
+        let options = serde_json::to_string(&new.options)
+            .map_err(|error| ClientError::Mismatch(format!("the options: {error}")))?;
+        self.retrying(|| async {
+            let sent = Arc::new(AtomicU64::new(0));
+            let options = Part::text(options.clone()).mime_str("application/json");
+            let form = Form::new()
+                .part("options", options.map_err(|error| self.network(&error))?)
+                .part("rest", part(&new.rest, &sent))
+                .part("frames", part(&new.frames, &sent));
+            let request = self.request(Method::POST, &["v1", "cages"], &[]).await?;
+            let request = request.header("Idempotency-Key", &key).multipart(form);
+            let job: CageJob = json(self, self.send_counted(request, &sent).await?).await?;
+            Ok::<_, Failure>(job)
+        })
+        .await
+    }
+
+    /// A cage design as it is now.
+    ///
+    /// # Errors
+    /// [`ClientError::Refused`] with status 404 where there is none of that id, and those of the connection.
+    pub async fn cage_job(&self, id: &str) -> Result<CageJob, ClientError> {
+        self.fetch(Method::GET, &["v1", "cages", id], &[]).await
+    }
+
+    /// All cage designs, oldest first, page after page.
+    ///
+    /// # Errors
+    /// Those of the connection.
+    pub async fn cage_jobs(&self) -> Result<Vec<CageJob>, ClientError> {
+        let mut all = Vec::new();
+        let mut query = Vec::new();
+        loop {
+            let page: CageJobList = self.fetch(Method::GET, &["v1", "cages"], &query).await?;
+            let grew = !page.cages.is_empty();
+            all.extend(page.cages);
+            match page.next {
+                None => return Ok(all),
+                // An empty page that names a next one would go on for ever.
+                Some(_) if !grew => return Err(ClientError::Protocol("its list of cages has no end".to_owned())),
+                Some(next) => query = vec![("after", next)],
+            }
+        }
+    }
+
+    /// Progress of a design as it happens, until the cage is there or cannot be; that is the last item. A broken connection is taken up
+    /// again after the last event.
+    ///
+    /// An error, such as [`ClientError::Refused`] for a design that was deleted, ends the stream.
+    pub fn cage_events(&self, id: &str) -> BoxStream<'static, Result<CageProgress, ClientError>> {
+        let is_last = |progress: &CageProgress| progress.state.is_final();
+        Events::stream(self, Place { resource: "cages", id: id.to_owned() }, is_last)
+    }
+
+    /// Waits until a cage is designed.
+    ///
+    /// # Errors
+    /// [`ClientError::NoCage`] with the reason where none could be, [`ClientError::NotDesigned`] after `limit`, and those of the
+    /// connection.
+    pub async fn wait_cage(&self, id: &str, limit: Duration) -> Result<CageJob, ClientError> {
+        let clock = Instant::now();
+        let mut pause = FIRST_PAUSE;
+        loop {
+            let job = self.cage_job(id).await?;
+            match job.state {
+                CageState::Completed => return Ok(job),
+                CageState::Failed => return Err(ClientError::NoCage(Box::new(reason(job)))),
+                CageState::Queued | CageState::Running => {}
+            }
+            let waited = clock.elapsed();
+            if waited >= limit {
+                return Err(ClientError::NotDesigned { id: id.to_owned(), waited });
+            }
+            tokio::time::sleep(pause.min(limit - waited)).await;
+            pause = pause.mul_f64(1.25).min(LONGEST_PAUSE);
+        }
+    }
+
+    /// The best cage of a design so far, and in the end its result: an OBJ file.
+    ///
+    /// # Errors
+    /// [`ClientError::Refused`] with status 409 where there is none yet, and those of the connection.
+    pub async fn cage_obj(&self, id: &str) -> Result<Bytes, ClientError> {
+        self.retrying(|| async {
+            let request = self.request(Method::GET, &["v1", "cages", id, "cage.obj"], &[]).await?;
+            let response = self.send(request).await?;
+            response.bytes().await.map_err(|error| self.network(&error))
+        })
+        .await
+    }
+
+    /// Deletes a cage design; one that runs stops. Sessions that took its cage keep it.
+    ///
+    /// # Errors
+    /// [`ClientError::Refused`] with status 404 where there is none of that id, and those of the connection.
+    pub async fn delete_cage(&self, id: &str) -> Result<(), ClientError> {
+        let asked = AtomicBool::new(false);
+        self.retrying(|| async {
+            let request = self.request(Method::DELETE, &["v1", "cages", id], &[]).await?;
+            let again = asked.swap(true, Ordering::Relaxed);
+            match self.send(request).await {
+                // An earlier attempt deleted it, and its answer was lost.
+                Err(failure) if again && failure.status() == Some(404) => Ok(()),
+                answer => answer.map(drop),
+            }
+        })
+        .await
+    }
+}
+
+/// Why there is no cage.
+fn reason(job: CageJob) -> Problem {
+    job.problem.unwrap_or_else(|| Problem {
+        kind: "about:blank".to_owned(),
+        title: "No cage could be designed".to_owned(),
+        detail: "the service does not say why; look at its log".to_owned(),
+        ..Problem::default()
+    })
+}

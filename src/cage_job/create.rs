@@ -1,0 +1,280 @@
+//! Making, resuming and deleting cage jobs.
+
+use super::{CageJob, Finished, Outcome, Phase, samples, wish};
+use crate::auth::Tenant;
+use crate::config::ServeConfig;
+use crate::idempotency::Repetition;
+use crate::problem::{self, ApiError};
+use crate::service::Service;
+use crate::session::cage_source::check_extent;
+use crate::session::commit::storage_error;
+use crate::session::create::blocking;
+use crate::session::prepare::read_part;
+use crate::session::registry::Reserved;
+use crate::store::{CageJobMeta, ContentKey, Idempotency, Spool, StoredPart};
+use cager_proto::cage_messages::CageOptions;
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
+use std::time::{SystemTime, UNIX_EPOCH};
+use tokio::sync::OwnedSemaphorePermit;
+
+/// A request to design a cage.
+pub(crate) struct NewCageJob {
+    pub(crate) rest_name: String,
+    pub(crate) rest: Vec<u8>,
+    pub(crate) frames_name: String,
+    pub(crate) frames: Spool,
+    pub(crate) options: CageOptions,
+    pub(crate) idempotency_key: Option<String>,
+    /// The room in memory that the rest pose takes.
+    pub(crate) room: Vec<OwnedSemaphorePermit>,
+    /// The room on disk that both take.
+    pub(crate) reserved: Reserved,
+}
+
+/// What was found out about the input.
+struct Checked {
+    key: ContentKey,
+    points: u32,
+    frame_count: u32,
+}
+
+impl Service {
+    /// Makes a job and queues it. What comes back is on disk. Once begun, it goes on where the client gives up.
+    ///
+    /// # Errors
+    /// Input that cannot be used, a quota or a queue that is full, and those of the disk.
+    pub(crate) async fn create_cage_job(
+        self: &Arc<Self>,
+        tenant: &Arc<Tenant>,
+        new: NewCageJob,
+    ) -> Result<Arc<CageJob>, ApiError> {
+        let (service, tenant) = (Arc::clone(self), Arc::clone(tenant));
+        let work = tokio::spawn(async move { service.create_cage_job_for(&tenant, new).await });
+        work.await.map_err(|error| ApiError::internal(&error))?
+    }
+
+    async fn create_cage_job_for(self: &Arc<Self>, tenant: &Tenant, new: NewCageJob) -> Result<Arc<CageJob>, ApiError> {
+        let (new, checked) = {
+            let _one_of_few = self.reading.acquire().await;
+            let (config, name) = (self.config.clone(), tenant.name.clone());
+            let (new, checked) = blocking(move || {
+                let checked = check(&new, &name, config.max_design_seconds, config.max_design_bytes);
+                (new, checked)
+            })
+            .await?;
+            (new, checked?)
+        };
+        let Some(key) = new.idempotency_key.clone() else {
+            return self.create_new_cage_job(tenant, new, checked, None).await;
+        };
+        let fingerprint = fingerprint(&checked.key, &new.options);
+        match self.cage_jobs.begin(&tenant.name, &key, &fingerprint)? {
+            Repetition::Done(job) => Ok(job),
+            Repetition::First => {
+                // Frees the key also after a panic.
+                let _free = GiveUp { service: self, tenant: &tenant.name, key: &key };
+                let idempotency = Idempotency { key: key.clone(), fingerprint };
+                self.create_new_cage_job(tenant, new, checked, Some(idempotency)).await
+            }
+        }
+    }
+
+    async fn create_new_cage_job(
+        self: &Arc<Self>,
+        tenant: &Tenant,
+        new: NewCageJob,
+        checked: Checked,
+        idempotency: Option<Idempotency>,
+    ) -> Result<Arc<CageJob>, ApiError> {
+        let NewCageJob { rest_name, rest, frames_name, frames, options, room: _room, mut reserved, .. } = new;
+        let part = |name: String, bytes: u64, digest: blake3::Hash| StoredPart {
+            name,
+            bytes,
+            blake3: digest.to_hex().to_string(),
+        };
+        let meta = CageJobMeta {
+            id: uuid::Uuid::now_v7().simple().to_string(),
+            tenant: tenant.name.clone(),
+            created_ms: SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_millis() as u64,
+            key: checked.key,
+            options,
+            points: checked.points,
+            frame_count: checked.frame_count,
+            rest: part(rest_name, rest.len() as u64, blake3::hash(&rest)),
+            frames: part(frames_name, frames.bytes(), frames.digest()),
+            idempotency,
+        };
+        if let Some(twin) = self.cage_jobs.twin(&tenant.name, &meta.key, None)
+            && let Some(job) = self.create_finished(&meta, &twin).await
+        {
+            return Ok(job);
+        }
+        let most = self.config.max_design_queue;
+        if self.cage_jobs.waiting_of(&tenant.name) >= most {
+            self.rejected("design_queue");
+            let detail = format!("{most} of your cage designs wait for their turn; try again later, or delete one");
+            return Err(ApiError::new(problem::BUSY, detail).limit(most as u64).retry_after(10));
+        }
+        self.reserve_more(tenant, &mut reserved, meta.rest.bytes)?;
+        let bytes = meta.rest.bytes + meta.frames.bytes;
+        let (store, kept) = (self.store.clone(), meta.clone());
+        blocking(move || store.create_cage_job(&kept, &rest, frames)).await?.map_err(|error| storage_error(&error))?;
+        let job = Arc::new(CageJob::new(meta, Phase::Queued, bytes));
+        self.cage_jobs.insert(Arc::clone(&job));
+        drop(reserved);
+        tokio::spawn(Arc::clone(self).run_cage_job(Arc::clone(&job)));
+        Ok(job)
+    }
+
+    /// A job whose outcome a completed one has; none where that cannot be read.
+    async fn create_finished(self: &Arc<Self>, meta: &CageJobMeta, twin: &Arc<CageJob>) -> Option<Arc<CageJob>> {
+        let Phase::Completed(found) = twin.phase() else { return None };
+        let (store, twin, kept, finished) = (self.store.clone(), Arc::clone(twin), meta.clone(), found.clone());
+        let stored = blocking(move || {
+            let cage = twin.completed_cage(&store).ok()?;
+            store.create_finished_cage_job(&kept, &Outcome::Completed(finished), &cage).ok()
+        });
+        stored.await.ok()??;
+        let job = Arc::new(CageJob::new(meta.clone(), Phase::Completed(found.clone()), found.cage_bytes));
+        self.cage_jobs.insert(Arc::clone(&job));
+        metrics::counter!("cager_designs_total", "result" => "known").increment(1);
+        Some(job)
+    }
+
+    /// Goes on with a job found on disk: one that was not over begins anew.
+    pub(crate) fn resume_cage_job(self: &Arc<Self>, meta: CageJobMeta) {
+        let id = meta.id.clone();
+        let outcome: Option<Outcome> = self.store.cage_job_outcome(&id).unwrap_or_else(|error| {
+            tracing::warn!(job = %id, %error, "the outcome of a cage job is unreadable, so the cage is designed again");
+            None
+        });
+        let phase = match outcome {
+            Some(Outcome::Completed(found)) => Phase::Completed(found),
+            Some(Outcome::Failed(problem)) => Phase::Failed(problem),
+            None => Phase::Queued,
+        };
+        let unfinished = matches!(phase, Phase::Queued);
+        if !unfinished {
+            self.store.forget_cage_job_input(&id);
+        }
+        let job = Arc::new(CageJob::new(meta, phase, self.store.cage_job_bytes(&id)));
+        self.cage_jobs.insert(Arc::clone(&job));
+        if unfinished {
+            tokio::spawn(Arc::clone(self).run_cage_job(job));
+        }
+    }
+
+    /// Keeps the outcome of a job, then tells those who follow it.
+    pub(super) async fn finish_cage_job(&self, job: &Arc<CageJob>, outcome: Outcome, cage: Option<Vec<u8>>) {
+        let (store, id, kept) = (self.store.clone(), job.meta.id.clone(), outcome.clone());
+        let stored = blocking(move || {
+            let stored = store.finish_cage_job(&id, &kept, cage.as_deref());
+            stored.map(|()| store.cage_job_bytes(&id))
+        });
+        match stored.await {
+            _ if job.deleted().is_cancelled() => return,
+            Ok(Ok(bytes)) => job.bytes.store(bytes, Relaxed),
+            Ok(Err(error)) => {
+                tracing::warn!(job = %job.meta.id, %error, "the outcome of a cage job could not be kept; a restart designs it again");
+                if matches!(outcome, Outcome::Completed(_)) {
+                    return job.set_phase(Phase::Failed(storage_error(&error).problem));
+                }
+            }
+            Err(error) => return job.set_phase(Phase::Failed(error.problem)),
+        }
+        let (phase, result) = match outcome {
+            Outcome::Completed(found) => (Phase::Completed(found), "completed"),
+            Outcome::Failed(problem) => (Phase::Failed(problem), "failed"),
+        };
+        metrics::counter!("cager_designs_total", "result" => result).increment(1);
+        job.set_phase(phase);
+    }
+
+    /// Takes over the outcome of a job of the same input; false where that cannot be read.
+    pub(super) async fn adopt_outcome(&self, job: &Arc<CageJob>, twin: &Arc<CageJob>, found: Box<Finished>) -> bool {
+        let (store, twin) = (self.store.clone(), Arc::clone(twin));
+        let Ok(Ok(cage)) = blocking(move || twin.completed_cage(&store)).await else { return false };
+        self.finish_cage_job(job, Outcome::Completed(found), Some(cage.to_vec())).await;
+        true
+    }
+
+    /// Deletes a job; its design stops. Once begun, it goes on where the client gives up.
+    ///
+    /// # Errors
+    /// Those of the disk.
+    pub(crate) async fn delete_cage_job(self: &Arc<Self>, job: &Arc<CageJob>) -> Result<(), ApiError> {
+        let (service, job) = (Arc::clone(self), Arc::clone(job));
+        let work = tokio::spawn(async move {
+            let (store, id) = (service.store.clone(), job.meta.id.clone());
+            blocking(move || store.delete_cage_job(&id)).await?.map_err(|error| storage_error(&error))?;
+            service.cage_jobs.remove(&job.meta.id);
+            job.deleted.cancel();
+            job.touch();
+            Ok(())
+        });
+        work.await.map_err(|error| ApiError::internal(&error))?
+    }
+}
+
+/// Checks options alone.
+///
+/// # Errors
+/// An option that is out of range, not available, or contradicts another.
+pub(crate) fn check_options(options: &CageOptions, config: &ServeConfig) -> Result<(), ApiError> {
+    wish::design_options(options, config.max_design_seconds).map(|_| ())
+}
+
+/// Reads rest pose and sample frames, so that who sends bad ones hears it at once. Blocks.
+fn check(new: &NewCageJob, tenant: &str, most_seconds: u64, most_bytes: u64) -> Result<Checked, ApiError> {
+    let design = wish::design_options(&new.options, most_seconds)?;
+    let rest = read_part("rest", &new.rest_name, &new.rest)?;
+    check_extent(&rest)?;
+    let points = rest.points.len();
+    drop(rest);
+    let frames = &new.frames;
+    let mut reader = samples::open(&new.frames_name, frames.stored(), frames.bytes(), points, new.options.frames)?;
+    let frame_count = u32::try_from(reader.frames())
+        .map_err(|_| ApiError::new(problem::INVALID_FRAME, "frames: there are more than 4294967295; send fewer"))?;
+    let count = samples::sampled(reader.frames(), points, most_bytes);
+    if count < reader.frames().min(2) {
+        let detail = format!(
+            "two frames of {points} points take more memory than the {most_bytes} bytes that a design may; use a lighter model"
+        );
+        return Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(most_bytes));
+    }
+    samples::read(&mut *reader, count, |_| ())?;
+    let mut hasher = blake3::Hasher::new();
+    let extension = |name: &str| name.rsplit_once('.').map_or("", |(_, ending)| ending).to_ascii_lowercase();
+    for part in [
+        format!("cage design {design:?} {points} {frame_count} {count}").as_bytes(),
+        tenant.as_bytes(),
+        extension(&new.rest_name).as_bytes(),
+        blake3::hash(&new.rest).as_bytes(),
+        extension(&new.frames_name).as_bytes(),
+        frames.digest().as_bytes(),
+    ] {
+        hasher.update(&(part.len() as u64).to_le_bytes());
+        hasher.update(part);
+    }
+    Ok(Checked { key: ContentKey(*hasher.finalize().as_bytes()), points: points as u32, frame_count })
+}
+
+fn fingerprint(key: &ContentKey, options: &CageOptions) -> String {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(&key.0);
+    hasher.update(&serde_json::to_vec(options).unwrap_or_default());
+    hasher.finalize().to_hex().to_string()
+}
+
+struct GiveUp<'a> {
+    service: &'a Service,
+    tenant: &'a str,
+    key: &'a str,
+}
+
+impl Drop for GiveUp<'_> {
+    fn drop(&mut self) {
+        self.service.cage_jobs.give_up(self.tenant, self.key);
+    }
+}

@@ -1,0 +1,121 @@
+//! Which cage jobs there are, whose they are, and which requests made them.
+
+use super::{CageJob, Phase};
+use crate::idempotency::{Repetition, Requests};
+use crate::problem::{self, ApiError};
+use crate::session::lock;
+use cager_proto::cage_messages::CageState;
+use std::collections::BTreeMap;
+use std::sync::atomic::Ordering::Relaxed;
+use std::sync::{Arc, Mutex};
+
+/// All jobs. Ids are in order of creation.
+#[derive(Default)]
+pub(crate) struct CageJobs {
+    inner: Mutex<Inner>,
+}
+
+#[derive(Default)]
+struct Inner {
+    jobs: BTreeMap<String, Arc<CageJob>>,
+    requests: Requests,
+}
+
+impl CageJobs {
+    pub(crate) fn insert(&self, job: Arc<CageJob>) {
+        let mut inner = lock(&self.inner);
+        if let Some(idempotency) = &job.meta.idempotency {
+            inner.requests.made(&job.meta.tenant, idempotency, &job.meta.id);
+        }
+        inner.jobs.insert(job.meta.id.clone(), job);
+    }
+
+    pub(crate) fn remove(&self, id: &str) {
+        let mut inner = lock(&self.inner);
+        if let Some(job) = inner.jobs.remove(id)
+            && let Some(idempotency) = &job.meta.idempotency
+        {
+            inner.requests.forget(&job.meta.tenant, idempotency);
+        }
+    }
+
+    /// A tenant's job; another tenant's is not there.
+    ///
+    /// # Errors
+    /// 404 where there is none.
+    pub(crate) fn find(&self, tenant: &str, id: &str) -> Result<Arc<CageJob>, ApiError> {
+        let inner = lock(&self.inner);
+        inner.jobs.get(id).filter(|job| job.meta.tenant == tenant).cloned().ok_or_else(|| {
+            ApiError::new(problem::NOT_FOUND, "there is no cage design with this id; list them at /v1/cages")
+        })
+    }
+
+    /// Up to `most` of a tenant's jobs that follow `after`, oldest first.
+    pub(crate) fn page(&self, tenant: &str, after: Option<&str>, most: usize) -> Vec<Arc<CageJob>> {
+        use std::ops::Bound::{Excluded, Unbounded};
+        let inner = lock(&self.inner);
+        let from = after.map_or(Unbounded, Excluded);
+        let later = inner.jobs.range::<str, _>((from, Unbounded)).map(|(_, job)| job);
+        later.filter(|job| job.meta.tenant == tenant).take(most).cloned().collect()
+    }
+
+    pub(crate) fn all(&self) -> Vec<Arc<CageJob>> {
+        lock(&self.inner).jobs.values().cloned().collect()
+    }
+
+    /// Number of a tenant's jobs, and the bytes they take.
+    pub(crate) fn usage_of(&self, tenant: &str) -> (u64, u64) {
+        let inner = lock(&self.inner);
+        let mine = inner.jobs.values().filter(|job| job.meta.tenant == tenant);
+        mine.fold((0, 0), |(count, bytes), job| (count + 1, bytes + job.bytes.load(Relaxed)))
+    }
+
+    /// Jobs that run or wait.
+    pub(crate) fn unfinished(&self) -> usize {
+        lock(&self.inner).jobs.values().filter(|job| !job.state().is_final()).count()
+    }
+
+    /// A tenant's jobs that wait.
+    pub(crate) fn waiting_of(&self, tenant: &str) -> usize {
+        let inner = lock(&self.inner);
+        inner.jobs.values().filter(|job| job.meta.tenant == tenant && job.state() == CageState::Queued).count()
+    }
+
+    /// A job of the same input: a completed one, or else one that comes before this and is not over yet.
+    pub(super) fn twin(
+        &self,
+        tenant: &str,
+        key: &crate::store::ContentKey,
+        before: Option<&str>,
+    ) -> Option<Arc<CageJob>> {
+        let inner = lock(&self.inner);
+        let same = || inner.jobs.values().filter(|job| job.meta.key == *key && job.meta.tenant == tenant);
+        let completed = same().find(|job| matches!(job.phase(), Phase::Completed(_)));
+        let earlier = || same().find(|job| before.is_some_and(|id| *job.meta.id < *id) && !job.state().is_final());
+        completed.or_else(earlier).cloned()
+    }
+
+    /// Announces a request with an idempotency key.
+    ///
+    /// # Errors
+    /// As [`Requests::begin`].
+    pub(super) fn begin(
+        &self,
+        tenant: &str,
+        key: &str,
+        fingerprint: &str,
+    ) -> Result<Repetition<Arc<CageJob>>, ApiError> {
+        let mut inner = lock(&self.inner);
+        match inner.requests.begin(tenant, key, fingerprint)? {
+            Repetition::First => Ok(Repetition::First),
+            Repetition::Done(id) => inner.jobs.get(&id).cloned().map(Repetition::Done).ok_or_else(|| {
+                ApiError::new(problem::NOT_FOUND, "the cage design of this request was deleted; use a new key")
+            }),
+        }
+    }
+
+    /// Frees the key of a request that made nothing.
+    pub(super) fn give_up(&self, tenant: &str, key: &str) {
+        lock(&self.inner).requests.give_up(tenant, key);
+    }
+}

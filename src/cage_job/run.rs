@@ -1,0 +1,246 @@
+//! Running designs: a few at a time, tenants in turn, on threads that give way to everything else.
+
+use super::{Best, CageJob, Finished, Outcome, Phase, samples, wish};
+use crate::config::ServeConfig;
+use crate::engine::threads;
+use crate::problem::{self, ApiError};
+use crate::service::Service;
+use crate::session::create::blocking;
+use crate::session::places::{Place, Places};
+use crate::session::prepare::read_part;
+use crate::store::StoreError;
+use cager_cages::{Design, DesignError, DesignOptions, Progress, design};
+use cager_core::mesh::Model;
+use cager_proto::cage_messages::{CageError, CageStage};
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::time::{Duration, Instant};
+
+/// A design that does not keep to its time limit is stopped after so much more.
+const GRACE: Duration = Duration::from_secs(5);
+
+/// Beginnings of a design that never came to an end, after which it is given up: it may be what ends the process.
+const MOST_ATTEMPTS: u32 = 5;
+
+/// What designs cages; tests have others.
+pub type Designer = dyn Fn(
+        &Model,
+        &[Vec<f64>],
+        &DesignOptions,
+        &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
+    ) -> Result<Design, DesignError>
+    + Send
+    + Sync;
+
+/// The design of `cager-cages`.
+pub(crate) fn local_designer() -> Arc<Designer> {
+    Arc::new(|rest, frames, options, watch| design(rest, frames, None, options, watch))
+}
+
+/// Where designs run.
+pub(crate) struct Designs {
+    places: Arc<Places>,
+    pool: Arc<rayon::ThreadPool>,
+    designer: Arc<Designer>,
+    /// Memory of sample frames.
+    bytes: AtomicU64,
+}
+
+impl Designs {
+    /// Starts the threads that design.
+    ///
+    /// # Errors
+    /// The system's, where threads cannot be started.
+    pub(crate) fn new(config: &ServeConfig, designer: Arc<Designer>) -> std::io::Result<Self> {
+        let pool = Arc::new(threads::pool("design", config.workers, threads::GIVES_WAY_TO_ALL)?);
+        Ok(Self { places: Places::new(config.max_designs), pool, designer, bytes: AtomicU64::new(0) })
+    }
+
+    /// Memory of the frames that designs look at.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.bytes.load(Relaxed)
+    }
+}
+
+/// How a run ended.
+enum Ended {
+    Designed(Box<Finished>, Vec<u8>),
+    Failed(ApiError),
+    /// The job was deleted, or the service stops: nothing is to be kept.
+    Stopped,
+}
+
+impl Service {
+    /// Waits for the job's turn, designs its cage and keeps the outcome.
+    pub(super) async fn run_cage_job(self: Arc<Self>, job: Arc<CageJob>) {
+        let place = loop {
+            if let Some(place) = self.turn_of(&job).await {
+                break place;
+            }
+            if job.state().is_final() || job.deleted().is_cancelled() || self.stopping().is_cancelled() {
+                return;
+            }
+        };
+        job.set_phase(Phase::Running);
+        let (service, running) = (Arc::clone(&self), Arc::clone(&job));
+        let ended = blocking(move || service.design(&running, place)).await.unwrap_or_else(Ended::Failed);
+        match ended {
+            // An orderly end says nothing about the design.
+            Ended::Stopped => {
+                if let Err(error) = self.store.forget_beginning(&job.meta.id) {
+                    tracing::debug!(job = %job.meta.id, %error, "the count of its beginnings stays");
+                }
+            }
+            Ended::Designed(found, cage) => {
+                self.finish_cage_job(&job, Outcome::Completed(found), Some(cage)).await;
+            }
+            Ended::Failed(error) if error.status().is_client_error() => {
+                tracing::info!(job = %job.meta.id, detail = %error.problem.detail, "no cage can be designed");
+                self.finish_cage_job(&job, Outcome::Failed(error.problem), None).await;
+            }
+            // What may succeed another time is tried again after a restart.
+            Ended::Failed(error) => job.set_phase(Phase::Failed(error.problem)),
+        }
+    }
+
+    /// A place to run in. None where another job of the same input has to be looked at again, or the job is over.
+    async fn turn_of(&self, job: &Arc<CageJob>) -> Option<Place> {
+        let (tenant, id) = (&job.meta.tenant, Some(job.meta.id.as_str()));
+        let twin = || self.cage_jobs.twin(tenant, &job.meta.key, id).filter(|twin| !Arc::ptr_eq(twin, job));
+        let mut unreadable = false;
+        if let Some(twin) = twin() {
+            let mut changes = twin.changes();
+            match twin.phase() {
+                Phase::Completed(found) if self.adopt_outcome(job, &twin, found.clone()).await => return None,
+                // It cannot be read, and has failed by now.
+                Phase::Completed(_) | Phase::Failed(_) => unreadable = true,
+                Phase::Queued | Phase::Running => {
+                    tokio::select! {
+                        _ = changes.changed() => {}
+                        () = twin.deleted().cancelled() => {}
+                        () = job.deleted().cancelled() => {}
+                        () = self.stopping().cancelled() => {}
+                    }
+                    return None;
+                }
+            }
+        }
+        let place = tokio::select! {
+            place = self.designs.places.take(tenant) => place,
+            () = job.deleted().cancelled() => return None,
+            () = self.stopping().cancelled() => return None,
+        };
+        // One may have been completed meanwhile, and is looked at; one that could not be read is not looked at again.
+        let completed = |twin: &Arc<CageJob>| matches!(twin.phase(), Phase::Completed(_));
+        if !unreadable && twin().as_ref().is_some_and(completed) { None } else { Some(place) }
+    }
+
+    /// Designs the cage of a job. Blocks.
+    fn design(&self, job: &Arc<CageJob>, _place: Place) -> Ended {
+        let clock = Instant::now();
+        let ended = match self.design_with(job, clock) {
+            Ok(_) | Err(_) if job.deleted().is_cancelled() || self.stopping().is_cancelled() => Ended::Stopped,
+            Ok((found, cage)) => Ended::Designed(Box::new(found), cage),
+            Err(error) => Ended::Failed(error),
+        };
+        metrics::histogram!("cager_design_seconds").record(clock.elapsed().as_secs_f64());
+        ended
+    }
+
+    fn design_with(&self, job: &Arc<CageJob>, clock: Instant) -> Result<(Finished, Vec<u8>), ApiError> {
+        let meta = &job.meta;
+        let damaged = |error: StoreError| job.damaged_or(&self.store, &error);
+        if self.store.begin_cage_job(&meta.id).map_err(damaged)? > MOST_ATTEMPTS {
+            let detail = format!(
+                "the service ended {MOST_ATTEMPTS} times while this cage was designed, so it is given up; try a lighter model, or fewer frames"
+            );
+            return Err(ApiError::new(problem::INVALID_GEOMETRY, detail));
+        }
+        let options = wish::design_options(&meta.options, self.config.max_design_seconds.max(1))?;
+        let rest = read_part("rest", &meta.rest.name, &self.store.cage_job_rest(meta).map_err(damaged)?)?;
+        let frames = self.store.cage_job_frames(meta).map_err(damaged)?;
+        let bytes = frames.bytes();
+        let mut reader = samples::open(&meta.frames.name, frames, bytes, meta.points as usize, meta.options.frames)?;
+        let count = samples::sampled(reader.frames(), rest.points.len(), self.config.max_design_bytes);
+        let taken = Taken::new(&self.designs.bytes, 24 * count as u64 * u64::from(meta.points));
+        let mut frames = Vec::with_capacity(count);
+        samples::read(&mut *reader, count, |frame| frames.push(frame.to_vec()))?;
+        drop(reader);
+        job.set_sampled(count);
+
+        let latest = clock + options.time_limit.unwrap_or_default() + GRACE;
+        let mut watch = |told: Progress<'_>| {
+            job.progressed(&told);
+            let over = Instant::now() > latest || job.deleted().is_cancelled() || self.stopping().is_cancelled();
+            if over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let designed = self.designs.pool.install(|| (self.designs.designer)(&rest, &frames, &options, &mut watch));
+        drop((frames, taken));
+        let designed = designed.map_err(|error| refused(&error))?;
+        let best = Best::new(&designed.cage);
+        let found = finished(&designed, &best, count, job.progress().error, clock);
+        Ok((found, best.obj.to_vec()))
+    }
+}
+
+fn finished(designed: &Design, best: &Best, sampled: usize, told: Option<f64>, clock: Instant) -> Finished {
+    let finite = |x: f64| Some(x).filter(|x| x.is_finite());
+    let stages: Vec<CageStage> = designed
+        .stages
+        .iter()
+        .map(|stage| CageStage {
+            name: stage.name.clone(),
+            vertices: stage.vertices as u32,
+            error: CageError { designed: finite(stage.designed), held_back: finite(stage.held_back) },
+            condition_number: finite(stage.condition_number),
+            seconds: stage.seconds,
+        })
+        .collect();
+    Finished {
+        vertices: best.vertices,
+        faces: best.faces,
+        sampled: sampled as u32,
+        error: stages.last().map_or(CageError { designed: None, held_back: told }, |stage| stage.error),
+        stages,
+        seconds: clock.elapsed().as_secs_f64(),
+        timed_out: designed.timed_out,
+        warnings: designed.warnings.clone(),
+        cage_bytes: best.obj.len() as u64,
+        cage_digest: best.digest.clone(),
+    }
+}
+
+/// What a client hears of a design that came to nothing.
+fn refused(error: &DesignError) -> ApiError {
+    use cager_cages::EncloseError::TooFewVertices;
+    match error {
+        DesignError::Enclose(TooFewVertices { .. }) | DesignError::TooManyVertices { .. } => {
+            ApiError::new(problem::INVALID_OPTIONS, format!("vertices: {error}"))
+        }
+        DesignError::FrameSize { .. } | DesignError::NotFinite { .. } | DesignError::NoFrames => {
+            ApiError::new(problem::INVALID_FRAME, format!("frames: {error}"))
+        }
+        DesignError::Stopped => ApiError::internal(error),
+        _ => ApiError::new(problem::INVALID_GEOMETRY, format!("rest: {error}")),
+    }
+}
+
+/// Memory in use, until it is dropped.
+struct Taken<'a> {
+    all: &'a AtomicU64,
+    bytes: u64,
+}
+
+impl<'a> Taken<'a> {
+    fn new(all: &'a AtomicU64, bytes: u64) -> Self {
+        all.fetch_add(bytes, Relaxed);
+        Self { all, bytes }
+    }
+}
+
+impl Drop for Taken<'_> {
+    fn drop(&mut self) {
+        self.all.fetch_sub(self.bytes, Relaxed);
+    }
+}

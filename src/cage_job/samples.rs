@@ -1,0 +1,169 @@
+//! The frames that a design looks at: evenly spaced ones of those that were sent, one read at a time.
+
+use crate::problem::{self, ApiError};
+use cager_formats::{CacheFormat, Error, FrameReader, open_frames_in};
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+/// A design looks at no more frames: beyond these it gains little and takes longer.
+const MOST_FRAMES: usize = 160;
+
+/// How many of so many frames are looked at where they may take `most_bytes` of memory; 0 where not even one fits.
+pub(super) fn sampled(frames: usize, points: usize, most_bytes: u64) -> usize {
+    let room = most_bytes / (24 * points.max(1) as u64);
+    frames.min(MOST_FRAMES).min(usize::try_from(room).unwrap_or(usize::MAX))
+}
+
+/// Opens frames that were sent under a file name: a point cache where its ending says so, else raw little-endian f32, which need their
+/// number.
+///
+/// # Errors
+/// A length or a number of points that does not match.
+pub(super) fn open<'a>(
+    name: &str,
+    source: impl Read + Seek + Send + 'a,
+    bytes: u64,
+    points: usize,
+    announced: Option<u32>,
+) -> Result<Box<dyn FrameReader + 'a>, ApiError> {
+    let path = Path::new(name);
+    if let Some(format) = CacheFormat::from_path(path) {
+        let reader = open_frames_in(format, path, source, bytes, points).map_err(|error| unreadable(&error))?;
+        return match announced.filter(|&announced| announced as usize != reader.frames()) {
+            None => Ok(reader),
+            Some(announced) => Err(mismatch(format!(
+                "options.frames is {announced}, but {name} has {} frames; leave the option out",
+                reader.frames()
+            ))),
+        };
+    }
+    let Some(frames) = announced else {
+        let detail = "frames: the part has no name ending in .npy, so it is raw numbers; say how many frames it has as options.frames";
+        return Err(ApiError::new(problem::INVALID_OPTIONS, detail));
+    };
+    let expected = u64::from(frames).saturating_mul(12 * points as u64);
+    if bytes != expected {
+        return Err(mismatch(format!(
+            "frames: {frames} frames of {points} points are {expected} bytes, but {bytes} were sent; send x y z of every point as f32, frame after frame"
+        )));
+    }
+    Ok(Box::new(RawFrames { path: path.to_owned(), source, points, frames: frames as usize, next: 0 }))
+}
+
+/// Reads `count` evenly spaced frames, the first and the last among them, and hands each over.
+///
+/// # Errors
+/// A frame that cannot be read, or has a coordinate that is NaN or infinite.
+pub(super) fn read(reader: &mut dyn FrameReader, count: usize, mut each: impl FnMut(&[f64])) -> Result<(), ApiError> {
+    let last = reader.frames() - 1;
+    let mut next = 0;
+    let mut frame = Vec::new();
+    for k in 0..count {
+        let wanted = if count > 1 { k * last / (count - 1) } else { 0 };
+        while next < wanted {
+            reader.skip().map_err(|error| unreadable(&error))?;
+            next += 1;
+        }
+        if !reader.read_next(&mut frame).map_err(|error| unreadable(&error))? {
+            return Err(mismatch("frames: there are fewer than announced; send them again".to_owned()));
+        }
+        next += 1;
+        each(&frame);
+    }
+    Ok(())
+}
+
+fn mismatch(detail: String) -> ApiError {
+    ApiError::new(problem::INVALID_FRAME, detail)
+}
+
+fn unreadable(error: &Error) -> ApiError {
+    let refused = mismatch(format!("frames: {error}"));
+    match error {
+        Error::NonFinite { frame, .. } => refused.frame(u32::try_from(*frame).unwrap_or(u32::MAX)),
+        Error::Io { cause, .. } if cause.kind() != std::io::ErrorKind::UnexpectedEof => ApiError::internal(error),
+        _ => refused,
+    }
+}
+
+/// Frames back to back, nothing else.
+struct RawFrames<R> {
+    path: PathBuf,
+    source: R,
+    points: usize,
+    frames: usize,
+    next: usize,
+}
+
+impl<R: Read + Seek + Send> FrameReader for RawFrames<R> {
+    fn points(&self) -> usize {
+        self.points
+    }
+
+    fn frames(&self) -> usize {
+        self.frames
+    }
+
+    fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error> {
+        out.clear();
+        if self.next == self.frames {
+            return Ok(false);
+        }
+        let failed = |cause| Error::Io { path: self.path.clone(), action: cager_formats::Action::Read, cause };
+        let mut bytes = vec![0; 12 * self.points];
+        self.source.seek(SeekFrom::Start((self.next * bytes.len()) as u64)).map_err(failed)?;
+        self.source.read_exact(&mut bytes).map_err(failed)?;
+        out.extend(bytes.as_chunks().0.iter().map(|&value| f64::from(f32::from_le_bytes(value))));
+        if let Some(at) = out.iter().position(|x| !x.is_finite()) {
+            return Err(Error::NonFinite { path: self.path.clone(), frame: self.next, point: at / 3 });
+        }
+        self.next += 1;
+        Ok(true)
+    }
+
+    fn skip(&mut self) -> Result<bool, Error> {
+        let more = self.next < self.frames;
+        self.next += usize::from(more);
+        Ok(more)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Cursor;
+
+    fn raw(frames: u32, points: usize) -> Vec<u8> {
+        (0..frames).flat_map(|t| vec![t as f32; 3 * points]).flat_map(f32::to_le_bytes).collect()
+    }
+
+    #[test]
+    fn evenly_spaced_frames_are_read_with_the_first_and_the_last() {
+        let bytes = raw(11, 2);
+        let length = bytes.len() as u64;
+        for (count, expected) in [(1, vec![0.0]), (2, vec![0.0, 10.0]), (3, vec![0.0, 5.0, 10.0])] {
+            let mut reader = open("frames", Cursor::new(&bytes), length, 2, Some(11)).expect("frames");
+            let mut found = Vec::new();
+            read(&mut *reader, count, |frame| found.push(frame[0])).expect("frames");
+            assert_eq!(found, expected);
+        }
+    }
+
+    #[test]
+    fn memory_bounds_the_number_of_frames() {
+        assert_eq!(sampled(1000, 1000, 1 << 30), 160);
+        assert_eq!(sampled(20, 1000, 1 << 30), 20);
+        assert_eq!(sampled(1000, 1000, 240_000), 10);
+        assert_eq!(sampled(1000, 1000, 23_999), 0);
+    }
+
+    #[test]
+    fn raw_numbers_of_another_length_are_refused() {
+        let bytes = raw(3, 2);
+        for (frames, points) in [(4, 2), (3, 3), (2, 2)] {
+            let refused = open("frames.f32", Cursor::new(&bytes), bytes.len() as u64, points, Some(frames));
+            assert!(refused.is_err_and(|error| error.problem.detail.contains("72 were sent")));
+        }
+        assert!(open("frames", Cursor::new(&bytes), bytes.len() as u64, 2, None).is_err());
+    }
+}

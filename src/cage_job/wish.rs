@@ -1,0 +1,60 @@
+//! What a cage is to be, as it was asked for and checked.
+
+use crate::problem::{self, ApiError};
+use crate::session::cage_source::{VERTICES, vertices_detail};
+use cager_cages::{DesignOptions, Goal, Style};
+use cager_proto::cage_messages::{CageOptions, CageStyle};
+use std::time::Duration;
+
+const NAME_CHARACTERS: usize = 200;
+
+/// Checks the options of a design and gives them as the design wants them.
+///
+/// # Errors
+/// An option that is out of range, not available, or contradicts another.
+pub(super) fn design_options(options: &CageOptions, most_seconds: u64) -> Result<DesignOptions, ApiError> {
+    let mut design = DesignOptions::default();
+    let refuse = |detail: String| Err(ApiError::new(problem::INVALID_OPTIONS, detail));
+    if options.name.as_ref().is_some_and(|name| name.chars().count() > NAME_CHARACTERS) {
+        return refuse(format!("name: is longer than {NAME_CHARACTERS} characters; shorten it"));
+    }
+    if let Some(name) = options.coordinates.as_deref().filter(|&name| name != "mvc") {
+        return refuse(format!("coordinates: cages are designed for mvc only, not for {name:?}; leave it out"));
+    }
+    design.goal = match (options.vertices, options.mean_error) {
+        (Some(_), Some(_)) => {
+            return refuse(
+                "vertices and mean_error: give the number of vertices or the error to reach, not both".into(),
+            );
+        }
+        (Some(vertices), None) if !VERTICES.contains(&vertices) => return refuse(vertices_detail(vertices)),
+        (Some(vertices), None) => Goal::Vertices(vertices as usize),
+        (None, Some(error)) if !(error.is_finite() && error > 0.0) => {
+            return refuse(format!("mean_error: is {error}; give a positive fraction of the diagonal, such as 0.001"));
+        }
+        (None, Some(error)) => Goal::MeanError(error),
+        (None, None) => design.goal,
+    };
+    if options.frames == Some(0) {
+        return refuse("frames: a capture has at least one frame".into());
+    }
+    let most = Duration::from_secs(most_seconds);
+    let limit = match options.time_limit_s {
+        None => most,
+        Some(seconds) if !(seconds.is_finite() && seconds > 0.0) => {
+            return refuse(format!("time_limit_s: is {seconds}; give a positive number of seconds"));
+        }
+        Some(seconds) if seconds > most.as_secs_f64() => {
+            let detail = format!("time_limit_s: is {seconds}, and this service allows {most_seconds} s");
+            return Err(ApiError::new(problem::INVALID_OPTIONS, detail).limit(most_seconds));
+        }
+        Some(seconds) => Duration::from_secs_f64(seconds),
+    };
+    design.style = match options.style.unwrap_or_default() {
+        CageStyle::Free => Style::Free,
+        CageStyle::Editable => Style::Editable,
+    };
+    design.time_limit = Some(limit);
+    design.seed = options.seed.unwrap_or(design.seed);
+    Ok(design)
+}

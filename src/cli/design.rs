@@ -1,0 +1,72 @@
+//! Designing a cage while a bar shows how its error falls: what `cager cage` and `cager encode` share.
+
+use super::args::StyleArg;
+use super::progress;
+use anyhow::{Result, bail};
+use cager_cages::{Design, DesignError, DesignOptions, Goal, Progress, Style};
+use cager_core::mesh::{Model, TriMesh};
+use std::ops::ControlFlow;
+use std::path::Path;
+
+/// Vertices of a cage where no number is given: fewer for a model whose points could not determine so many.
+pub(super) fn usual_vertices(points: usize) -> usize {
+    350.min(points / 2).max(4)
+}
+
+impl From<StyleArg> for Style {
+    fn from(arg: StyleArg) -> Self {
+        match arg {
+            StyleArg::Free => Self::Free,
+            StyleArg::Editable => Self::Editable,
+        }
+    }
+}
+
+/// What the number of vertices of a cage around so many points follows from.
+pub(super) fn goal(vertices: Option<u32>, mean_error: Option<f64>, points: usize) -> Result<Goal> {
+    if let Some(vertices) = vertices.filter(|&vertices| vertices as usize > points) {
+        bail!(
+            "a cage of {vertices} vertices has more unknowns than the rest pose has points ({points}); ask for fewer vertices"
+        );
+    }
+    match mean_error {
+        Some(error) if !(error.is_finite() && error > 0.0) => {
+            bail!("--mean-error: is {error}; give a fraction of the rest pose's diagonal above 0, such as 0.001")
+        }
+        Some(error) => Ok(Goal::MeanError(error)),
+        None => Ok(Goal::Vertices(vertices.map_or(usual_vertices(points), |n| n as usize))),
+    }
+}
+
+/// Designs a cage; errors name the file that is to blame.
+pub(super) fn design(
+    rest: (&Path, &Model),
+    frames: (&Path, &[Vec<f64>]),
+    start: Option<(&Path, &TriMesh)>,
+    options: &DesignOptions,
+) -> Result<Design> {
+    const PARTS: u64 = 1000;
+    let bar = progress::steps();
+    bar.set_length(PARTS);
+    let mut watch = |now: Progress<'_>| {
+        let error = now.error.map_or_else(String::new, |error| format!(", error {:.4} %", 100.0 * error));
+        bar.set_message(format!("{}{error}", now.stage));
+        bar.set_position((now.fraction * PARTS as f64) as u64);
+        ControlFlow::Continue(())
+    };
+    let start_mesh = start.map(|(_, mesh)| mesh);
+    let result = cager_cages::design(rest.1, frames.1, start_mesh, options, &mut watch);
+    bar.finish_and_clear();
+    result.map_err(|error| {
+        let path = match &error {
+            DesignError::TooManyVertices { .. } if start.is_none() => return anyhow::anyhow!("--vertices: {error}"),
+            DesignError::Enclose(_) => rest.0,
+            DesignError::Start(_) | DesignError::NotSymmetric { .. } | DesignError::TooManyVertices { .. } => {
+                start.map_or(rest.0, |(path, _)| path)
+            }
+            DesignError::BadGoal(_) => return anyhow::anyhow!("--mean-error: {error}"),
+            _ => frames.0,
+        };
+        anyhow::anyhow!("{}: {error}", path.display())
+    })
+}

@@ -1,0 +1,143 @@
+//! `cager cage --check` and `--repair`: what is wrong with a cage, and what of it can be repaired.
+
+use super::cage::{finish_repaired, picture_of, pretty, refuse_outputs, whole};
+use super::cage_args::CageArgs;
+use super::{interrupt, print};
+use anyhow::{Result, bail};
+use cager_cages::doctor::{Findings, check, repair};
+use cager_core::mesh::{Model, TriMesh};
+use cager_formats::{commit_together, read_model};
+use serde::Serialize;
+use std::fmt::Write;
+use std::path::Path;
+
+/// What was found out about a cage. Counts are of what [`cager_cages::doctor::Findings`] lists.
+#[derive(Serialize)]
+pub(super) struct CheckReport {
+    /// Whether it may be encoded with.
+    usable: bool,
+    /// Whether it is also free of self-intersection and encloses every point.
+    editable: bool,
+    vertices: usize,
+    faces: usize,
+    components: usize,
+    open_edges: usize,
+    non_manifold_edges: usize,
+    inconsistent_edges: usize,
+    inward_parts: usize,
+    self_intersections: usize,
+    duplicate_vertices: usize,
+    degenerate_faces: usize,
+    loose_vertices: usize,
+    idle_vertices: usize,
+    points_outside: Option<usize>,
+    /// How far the farthest of them is from the cage, as a fraction of the rest pose's diagonal.
+    outside_distance: Option<f64>,
+    condition_number: Option<f64>,
+    /// What was changed, where the cage was repaired.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    changes: Vec<String>,
+    /// What is wrong, a sentence each, with what to do.
+    findings: Vec<String>,
+}
+
+impl CheckReport {
+    fn new(found: &Findings, changes: Vec<String>) -> Self {
+        Self {
+            usable: found.usable(),
+            editable: found.editable(),
+            vertices: found.vertices,
+            faces: found.faces,
+            components: found.components,
+            open_edges: found.open_edges.len(),
+            non_manifold_edges: found.non_manifold_edges.len(),
+            inconsistent_edges: found.inconsistent_edges.len(),
+            inward_parts: found.inward_parts,
+            self_intersections: found.self_intersections.len(),
+            duplicate_vertices: found.duplicate_vertices.len(),
+            degenerate_faces: found.degenerate_faces.len(),
+            loose_vertices: found.loose_vertices.len(),
+            idle_vertices: found.idle_vertices.len(),
+            points_outside: found.outside.map(|outside| outside.count),
+            outside_distance: found.outside.map(|outside| outside.distance),
+            condition_number: found.condition_number,
+            changes,
+            findings: found.sentences(),
+        }
+    }
+}
+
+pub(super) fn run(args: &CageArgs, rest: &Model) -> Result<()> {
+    refuse_outputs(args)?;
+    interrupt::leaves_nothing()?;
+    match (&args.check, &args.repair, &args.output) {
+        (Some(path), _, _) => check_cage(args, rest, path),
+        (None, Some(path), Some(output)) => repair_cage(args, rest, path, output),
+        _ => bail!("-o: say where to write the repaired cage"),
+    }
+}
+
+/// Exit status 1 for a cage that cannot be encoded with, so that scripts can ask.
+fn check_cage(args: &CageArgs, rest: &Model, path: &Path) -> Result<()> {
+    let cage = read_model(path)?;
+    let mesh = TriMesh::from(&cage);
+    let found = check(&mesh, rest);
+    let mut files = Vec::new();
+    if let Some(report) = &args.report {
+        files.push(whole(report, &pretty(&CheckReport::new(&found, Vec::new()))?)?);
+    }
+    if let Some(picture) = &args.picture {
+        files.push(whole(picture, &picture_of(args, &TriMesh::from(rest), &mesh))?);
+    }
+    commit_together(files)?;
+    print(&verdict(path, &found))?;
+    if !found.usable() {
+        bail!("{}: cannot be encoded with; try --repair", path.display());
+    }
+    Ok(())
+}
+
+fn repair_cage(args: &CageArgs, rest: &Model, path: &Path, output: &Path) -> Result<()> {
+    let repaired = repair(&read_model(path)?, rest);
+    if !repaired.remaining.usable() {
+        bail!(
+            "{}: could not be repaired: {}; nothing was written",
+            path.display(),
+            repaired.remaining.sentences().join("; ")
+        );
+    }
+    let report = CheckReport::new(&repaired.remaining, repaired.changes.clone());
+    finish_repaired(args, output, rest, &repaired.cage, &report)?;
+    let mut text = String::new();
+    for change in &repaired.changes {
+        let _ = writeln!(text, "  changed  {change}");
+    }
+    if repaired.changes.is_empty() {
+        text += "  changed  nothing: there was nothing to repair\n";
+    }
+    print(&format!("{}{text}", verdict(output, &repaired.remaining)))
+}
+
+fn verdict(path: &Path, found: &Findings) -> String {
+    let sentence = match (found.usable(), found.editable()) {
+        (_, true) => "usable, free of self-intersection and around every point",
+        (true, false) => "usable, but not for every purpose",
+        (false, false) => "not usable",
+    };
+    let mut text = format!(
+        "{}: {sentence}\n  cage     {} vertices, {} triangles, {} part{}",
+        path.display(),
+        found.vertices,
+        found.faces,
+        found.components,
+        if found.components == 1 { "" } else { "s" }
+    );
+    if let Some(condition) = found.condition_number {
+        let _ = write!(text, ", condition number {condition:.1}");
+    }
+    text.push('\n');
+    for sentence in found.sentences() {
+        let _ = writeln!(text, "  found    {sentence}");
+    }
+    text
+}

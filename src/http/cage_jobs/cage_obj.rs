@@ -1,0 +1,49 @@
+//! `GET /v1/cages/{id}/cage.obj`: the best cage so far, and in the end the result.
+
+use crate::cage_job::Cage;
+use crate::http::extract::FoundJob;
+use crate::http::openapi;
+use crate::http::ranged::Immutable;
+use crate::problem::ApiError;
+use crate::service::Service;
+use crate::session::create::blocking;
+use axum::extract::State;
+use axum::response::Response;
+use bytes::Bytes;
+use http::header::{CACHE_CONTROL, CONTENT_DISPOSITION};
+use http::{HeaderMap, HeaderValue};
+use std::sync::Arc;
+
+/// The best cage so far, an OBJ file. The `ETag` names it; while the design runs another may follow, when it is completed it never changes.
+#[utoipa::path(
+    get, path = "/v1/cages/{id}/cage.obj", operation_id = "get_designed_cage", tag = "cages", params(openapi::CageId, openapi::Conditions),
+    responses(
+        (status = 200, description = "The cage", content_type = "model/obj", body = String),
+        (status = 206, description = "The range asked for", content_type = "model/obj", body = String),
+        (status = 304, description = "What the client has is still right"),
+    ),
+)]
+pub(crate) async fn get(
+    State(service): State<Arc<Service>>,
+    FoundJob { job, .. }: FoundJob,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    let store = service.store.clone();
+    let cage = blocking(move || job.cage(&store)).await??;
+    let is_final = matches!(cage, Cage::Final { .. });
+    let (Cage::SoFar { obj, digest } | Cage::Final { obj, digest }) = cage;
+    let bytes = Immutable {
+        length: obj.len() as u64,
+        etag: digest,
+        media_type: "model/obj",
+        public: !service.access.is_guarded(),
+        read: Arc::new(move |range| Ok(Bytes::slice(&obj, range.start as usize..range.end as usize))),
+    };
+    let mut response = bytes.respond(&headers);
+    if !is_final {
+        response.headers_mut().insert(CACHE_CONTROL, HeaderValue::from_static("no-cache"));
+    }
+    let name = HeaderValue::from_static("attachment; filename=\"cage.obj\"");
+    response.headers_mut().insert(CONTENT_DISPOSITION, name);
+    Ok(response)
+}

@@ -1,0 +1,36 @@
+//! `GET /v1/cages/{id}/events`: progress of a design as server-sent events.
+
+use crate::http::events::Event;
+use crate::http::extract::FoundJob;
+use crate::http::openapi;
+use crate::http::progress::{self, Followed, Standing};
+use crate::problem::ApiError;
+use crate::service::Service;
+use axum::extract::State;
+use axum::response::Response;
+use http::HeaderMap;
+use std::sync::Arc;
+
+/// Progress of the design: an event `progress` with each change, whose data is a `CageProgress`, until it is completed, failed or deleted,
+/// or the service stops. An event's id says what it tells, so that `Last-Event-ID` keeps a client that comes back from hearing the
+/// same again.
+#[utoipa::path(
+    get, path = "/v1/cages/{id}/events", operation_id = "get_cage_events", tag = "cages",
+    params(openapi::CageId, ("Last-Event-ID" = Option<String>, Header, description = "The last event heard")),
+    responses((status = 200, description = "Events whose data is JSON", content_type = "text/event-stream", body = Event)),
+)]
+pub(crate) async fn get(
+    State(service): State<Arc<Service>>,
+    FoundJob { job, tenant }: FoundJob,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    let place = service.stream(&tenant)?;
+    let (changes, deleted) = (job.changes(), job.deleted().clone());
+    let look = move || {
+        let progress = job.progress();
+        let data = serde_json::to_string(&progress).unwrap_or_default();
+        let id = blake3::hash(data.as_bytes()).to_hex()[..16].to_owned();
+        Standing { id, data, last: progress.state.is_final() }
+    };
+    Ok(progress::stream(service, place, &headers, Followed { changes, deleted, look: Box::new(look) }))
+}

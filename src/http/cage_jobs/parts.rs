@@ -1,0 +1,214 @@
+//! The multipart body that asks for a cage: the rest pose goes to memory, frames to the disk as they come.
+
+use crate::auth::Tenant;
+use crate::cage_job::create::{NewCageJob, check_options};
+use crate::http::multipart::{ENVELOPE_BYTES, NAME_CHARACTERS, PIECE, Room, bad, broken, file_name, read_options};
+use crate::problem::{self, ApiError};
+use crate::service::Service;
+use crate::session::commit::storage_error;
+use crate::session::create::blocking;
+use crate::session::lock;
+use crate::session::registry::Reserved;
+use crate::store::Spool;
+use axum::body::{Body, BodyDataStream};
+use axum::extract::multipart::Field;
+use axum::extract::{FromRequest, Multipart, Request};
+use bytes::{Bytes, BytesMut};
+use cager_proto::cage_messages::CageOptions;
+use futures_util::Stream;
+use std::pin::Pin;
+use std::sync::{Arc, Mutex};
+use std::task::{Context, Poll};
+
+/// Bytes of frames written at a time; quota is asked for in the same pieces.
+const WRITTEN: usize = 1 << 20;
+
+/// Reads all parts.
+///
+/// # Errors
+/// Parts that are missing, twice there, unknown or too large; no room; those of the disk.
+pub(in crate::http) async fn read(
+    service: &Arc<Service>,
+    tenant: &Arc<Tenant>,
+    request: Request,
+    idempotency_key: Option<String>,
+) -> Result<NewCageJob, ApiError> {
+    let pace = Arc::new(Mutex::new(Pace::default()));
+    let counted = Arc::clone(&pace);
+    let request = request
+        .map(|body| Body::from_stream(OneAtATime { inner: body.into_data_stream(), pace: counted, gave: false }));
+    let body = Multipart::from_request(request, &())
+        .await
+        .map_err(|error| bad(format!("the multipart body cannot be read: {}", error.body_text())))?;
+    let receiver = Receiver {
+        service,
+        tenant,
+        pace: Arc::clone(&pace),
+        room: Room::new(),
+        granted: 0,
+        reserved: service.reserve(tenant, 0)?,
+    };
+    let read = receiver.read(body, idempotency_key).await;
+    let stuck = lock(&pace).stuck;
+    if stuck { Err(bad("the multipart body has no parts; check its boundary".to_owned())) } else { read }
+}
+
+struct Receiver<'a> {
+    service: &'a Arc<Service>,
+    tenant: &'a Arc<Tenant>,
+    pace: Arc<Mutex<Pace>>,
+    room: Room,
+    granted: u64,
+    reserved: Reserved,
+}
+
+impl Receiver<'_> {
+    async fn read(mut self, mut body: Multipart, idempotency_key: Option<String>) -> Result<NewCageJob, ApiError> {
+        let (mut rest, mut frames, mut options) = (None, None, None);
+        while let Some(field) = body.next_field().await.map_err(|e| broken(&e))? {
+            let part = field.name().unwrap_or_default().to_owned();
+            let there = match part.as_str() {
+                "rest" => rest.is_some(),
+                "frames" => frames.is_some(),
+                "options" => options.is_some(),
+                _ => return Err(bad(format!("part {part:?} is unknown; send rest, frames and options"))),
+            };
+            if there {
+                return Err(bad(format!("part {part:?} is there twice; send it once")));
+            }
+            match part.as_str() {
+                "rest" => rest = Some(self.read_rest(field).await?),
+                "frames" => frames = Some(self.read_frames(field).await?),
+                _ => {
+                    let wish: CageOptions = read_options(field).await?;
+                    // Before the frames arrive, if that is how they are sent.
+                    check_options(&wish, &self.service.config)?;
+                    options = Some(wish);
+                }
+            }
+        }
+        let (rest_name, rest) =
+            rest.ok_or_else(|| bad("part rest is missing; send the rest pose as a file".to_owned()))?;
+        let (frames_name, frames) = frames.ok_or_else(|| {
+            bad("part frames is missing; send frames as .npy or raw f32, or make a cage from the rest pose alone by POST /v1/sessions".to_owned())
+        })?;
+        let (options, room, reserved) = (options.unwrap_or_default(), self.room, self.reserved);
+        Ok(NewCageJob { rest_name, rest, frames_name, frames, options, idempotency_key, room, reserved })
+    }
+
+    async fn read_rest(&mut self, mut field: Field<'_>) -> Result<(String, Vec<u8>), ApiError> {
+        let name = file_name(&field);
+        if !name.contains('.') || name.chars().count() > NAME_CHARACTERS {
+            let detail = "part \"rest\" needs a file name whose extension says the format, such as rest.obj";
+            return Err(bad(detail.to_owned()));
+        }
+        let limit = self.service.config.max_rest_bytes;
+        let mut bytes = Vec::new();
+        while let Some(chunk) = self.chunk(&mut field).await? {
+            if (bytes.len() + chunk.len()) as u64 > limit {
+                return Err(
+                    self.too_large(&format!("the rest pose is larger than {limit} bytes; send a lighter model"), limit)
+                );
+            }
+            while self.granted < (bytes.len() + chunk.len()) as u64 {
+                self.room.push(self.service.upload_memory.try_take(PIECE).ok_or_else(|| {
+                    self.service.rejected("upload_memory");
+                    let detail = "too many models are being uploaded at the moment; try again later";
+                    ApiError::new(problem::BUSY, detail).retry_after(5)
+                })?);
+                self.granted += PIECE;
+            }
+            bytes.extend_from_slice(&chunk);
+        }
+        Ok((name, bytes))
+    }
+
+    async fn read_frames(&mut self, mut field: Field<'_>) -> Result<(String, Spool), ApiError> {
+        let name = file_name(&field);
+        if name.chars().count() > NAME_CHARACTERS {
+            return Err(bad(format!("part \"frames\" has a file name of more than {NAME_CHARACTERS} characters")));
+        }
+        let limit = self.service.config.max_frames_bytes;
+        let store = self.service.store.clone();
+        let mut spool = blocking(move || store.spool()).await?.map_err(|error| storage_error(&error))?;
+        let mut waiting = BytesMut::new();
+        loop {
+            let chunk = self.chunk(&mut field).await?;
+            let ended = chunk.is_none();
+            waiting.extend_from_slice(&chunk.unwrap_or_default());
+            if waiting.len() < WRITTEN && !ended {
+                continue;
+            }
+            if spool.bytes() + waiting.len() as u64 > limit {
+                let detail = format!(
+                    "the frames have more than {limit} bytes; send every second or fewer, a design looks at 160 at most"
+                );
+                return Err(self.too_large(&detail, limit));
+            }
+            self.service.reserve_more(self.tenant, &mut self.reserved, waiting.len() as u64)?;
+            let piece = waiting.split().freeze();
+            let written;
+            (spool, written) = blocking(move || {
+                let written = spool.write(&piece);
+                (spool, written)
+            })
+            .await?;
+            written.map_err(|error| storage_error(&error))?;
+            if ended {
+                return Ok((if name.is_empty() { "frames".to_owned() } else { name }, spool));
+            }
+        }
+    }
+
+    async fn chunk(&self, field: &mut Field<'_>) -> Result<Option<Bytes>, ApiError> {
+        let chunk = field.chunk().await.map_err(|e| broken(&e))?;
+        if let Some(chunk) = &chunk {
+            let mut pace = lock(&self.pace);
+            pace.unused = pace.unused.saturating_sub(chunk.len() as u64);
+        }
+        Ok(chunk)
+    }
+
+    fn too_large(&self, detail: &str, limit: u64) -> ApiError {
+        self.service.rejected("body_too_large");
+        ApiError::new(problem::TOO_LARGE, detail).limit(limit)
+    }
+}
+
+/// How far the parser of parts is behind what has arrived.
+#[derive(Default)]
+struct Pace {
+    /// Bytes that arrived and are in no part yet: what is kept until a part is found.
+    unused: u64,
+    /// There were too many of them.
+    stuck: bool,
+}
+
+/// Gives the pieces of a body one at a time: the parser keeps all that it can get at once, and should not get a whole capture.
+struct OneAtATime {
+    inner: BodyDataStream,
+    pace: Arc<Mutex<Pace>>,
+    gave: bool,
+}
+
+impl Stream for OneAtATime {
+    type Item = Result<Bytes, axum::Error>;
+
+    fn poll_next(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Option<Self::Item>> {
+        if std::mem::take(&mut self.gave) {
+            context.waker().wake_by_ref();
+            return Poll::Pending;
+        }
+        let piece = std::task::ready!(Pin::new(&mut self.inner).poll_next(context));
+        self.gave = true;
+        if let Some(Ok(bytes)) = &piece {
+            let mut pace = lock(&self.pace);
+            pace.unused += bytes.len() as u64;
+            if pace.unused > 2 * ENVELOPE_BYTES {
+                pace.stuck = true;
+                return Poll::Ready(Some(Err(axum::Error::new("it has no parts"))));
+            }
+        }
+        Poll::Ready(piece)
+    }
+}

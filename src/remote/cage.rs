@@ -1,0 +1,135 @@
+//! A cage designed by the service from evenly spaced frames of a capture that is on this machine.
+
+use super::{RemoteError, RemoteProgress};
+use cager_cages::{DesignOptions, Goal, Style};
+use cager_client::cage_messages::{CageOptions, CageState, CageStyle};
+use cager_client::{Client, ClientError, FrameSource, MeshFile, NewCage};
+use futures_util::StreamExt as _;
+use std::io;
+use std::time::Duration;
+
+/// Frames sent at most: a design looks at no more.
+const MOST_FRAMES: u32 = 160;
+/// Bytes of frames sent at most, unless two take more.
+const MOST_BYTES: usize = 512 << 20;
+/// Longest wait for a design, its turn included.
+const DESIGNED_WITHIN: Duration = Duration::from_secs(3600);
+
+/// Where the cage of a capture comes from.
+#[derive(Clone, Copy, Debug)]
+pub enum RemoteCage<'a> {
+    /// This file.
+    File(&'a std::path::Path),
+    /// The service designs it from the capture.
+    Designed(&'a DesignOptions),
+}
+
+/// Has the service design a cage; gives the id of the design, which stays on the service. `frames` is read from its beginning.
+pub(super) async fn design(
+    client: &Client,
+    rest: &MeshFile,
+    frames: &mut impl FrameSource,
+    options: &DesignOptions,
+    progress: &mut (dyn FnMut(RemoteProgress<'_>) + Send),
+) -> Result<String, RemoteError> {
+    let (count, bytes) = sample(frames)?;
+    let mut new = NewCage::new(rest.clone(), MeshFile::new("frames.f32", bytes));
+    let (vertices, mean_error) = match options.goal {
+        Goal::Vertices(vertices) => (Some(u32::try_from(vertices).unwrap_or(u32::MAX)), None),
+        Goal::MeanError(error) => (None, Some(error)),
+    };
+    let style = match options.style {
+        Style::Free => CageStyle::Free,
+        Style::Editable => CageStyle::Editable,
+    };
+    new.options = CageOptions {
+        vertices,
+        mean_error,
+        style: Some(style),
+        frames: Some(count),
+        seed: Some(options.seed),
+        time_limit_s: options.time_limit.map(|limit| limit.as_secs_f64()),
+        ..CageOptions::default()
+    };
+    let id = client.design_cage(&new).await?.id;
+    drop(new);
+    match follow(client, &id, progress).await {
+        Ok(()) => Ok(id),
+        Err(error) => {
+            super::clean_up(client, async |client| client.delete_cage(&id).await).await;
+            Err(error)
+        }
+    }
+}
+
+async fn follow(
+    client: &Client,
+    id: &str,
+    progress: &mut (dyn FnMut(RemoteProgress<'_>) + Send),
+) -> Result<(), RemoteError> {
+    let mut events = client.cage_events(id);
+    while let Some(told) = events.next().await {
+        let told = told?;
+        progress(RemoteProgress::Designing(&told));
+        if told.state == CageState::Completed {
+            return Ok(());
+        }
+    }
+    // It failed, which is told in whole here.
+    client.wait_cage(id, DESIGNED_WITHIN).await?;
+    Ok(())
+}
+
+/// Evenly spaced frames, the first and the last among them, back to back as they are sent; and their number.
+fn sample(frames: &mut impl FrameSource) -> Result<(u32, Vec<u8>), ClientError> {
+    let frame_bytes = 12 * frames.points().max(1);
+    let most = u32::try_from(MOST_BYTES / frame_bytes).unwrap_or(u32::MAX).clamp(2, MOST_FRAMES);
+    let all = match frames.frames() {
+        Some(all) => all,
+        None => counted(frames)?,
+    };
+    let count = all.min(most);
+    let mut bytes = Vec::with_capacity(count as usize * frame_bytes);
+    let mut values = Vec::new();
+    for k in 0..count {
+        let wanted = if count > 1 { u64::from(k) * u64::from(all - 1) / u64::from(count - 1) } else { 0 };
+        let frame = wanted as u32;
+        let failed = |cause| ClientError::Source { frame, cause };
+        frames.seek(frame).map_err(failed)?;
+        if !frames.read(&mut values).map_err(failed)? {
+            let what = format!("frame {frame} is not there any more; get the capture again");
+            return Err(failed(io::Error::other(what)));
+        }
+        bytes.extend(values.iter().flat_map(|x| x.to_le_bytes()));
+    }
+    frames.seek(0).map_err(|cause| ClientError::Source { frame: 0, cause })?;
+    Ok((count, bytes))
+}
+
+/// The number of frames of a source that does not know it.
+fn counted(frames: &mut impl FrameSource) -> Result<u32, ClientError> {
+    let (mut frame, mut values) = (0, Vec::new());
+    frames.seek(0).map_err(|cause| ClientError::Source { frame, cause })?;
+    while frames.read(&mut values).map_err(|cause| ClientError::Source { frame, cause })? {
+        frame += 1;
+    }
+    Ok(frame)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cager_client::MemoryFrames;
+
+    #[test]
+    fn frames_are_sampled_evenly_from_the_first_to_the_last() {
+        let values: Vec<f32> = (0..400).flat_map(|t| [t as f32; 6]).collect();
+        let (count, bytes) = sample(&mut MemoryFrames::new(2, values)).expect("frames");
+        assert_eq!((count, bytes.len()), (160, 160 * 24));
+        let first = |frame: usize| f32::from_le_bytes(bytes[24 * frame..][..4].try_into().expect("four bytes"));
+        assert_eq!([first(0), first(159)], [0.0, 399.0]);
+        assert!((1..160).all(|k| (2.0..=3.0).contains(&(first(k) - first(k - 1)))));
+        let (count, _) = sample(&mut MemoryFrames::new(2, vec![0.0; 18])).expect("frames");
+        assert_eq!(count, 3);
+    }
+}

@@ -1,0 +1,237 @@
+//! Cage jobs: what a cage is to be designed from, and the cage that came of it.
+
+use super::files::Files;
+use super::names::check_id;
+use super::sessions::find_in;
+use super::{ContentKey, Idempotency, Quarantined, Spool, Store, StoreError, StoredFile, is_session_id, meta};
+use cager_proto::cage_messages::CageOptions;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::io;
+
+/// What is known of a cage job from its creation on.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+pub struct CageJobMeta {
+    /// Its id; also the name of its folder.
+    pub id: String,
+    /// Whose it is.
+    pub tenant: String,
+    /// Creation time, milliseconds since 1970.
+    pub created_ms: u64,
+    /// Digest of tenant, rest pose, frames and options: the same gives the same cage.
+    pub key: ContentKey,
+    /// Choices, as they were given.
+    pub options: CageOptions,
+    /// Points of the rest pose.
+    pub points: u32,
+    /// Number of frames.
+    pub frame_count: u32,
+    /// The rest pose.
+    pub rest: StoredPart,
+    /// The frames.
+    pub frames: StoredPart,
+    /// The request that made it, so that a repetition finds it.
+    pub idempotency: Option<Idempotency>,
+}
+
+/// A file as it was uploaded.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
+pub struct StoredPart {
+    /// File name, for its ending.
+    pub name: String,
+    /// Its length.
+    pub bytes: u64,
+    /// Its digest, BLAKE3, hexadecimal.
+    pub blake3: String,
+}
+
+const META: &str = "job.json";
+const OUTCOME: &str = "outcome.json";
+const ATTEMPTS: &str = "attempts.json";
+const REST: &str = "rest";
+const FRAMES: &str = "frames";
+const CAGE: &str = "cage.obj";
+/// No cage is larger, in bytes.
+const CAGE_BYTES: u64 = 64 << 20;
+
+impl Store {
+    /// Makes a job with its input: whole or not at all, durable on Ok.
+    ///
+    /// # Errors
+    /// [`StoreError::BadId`], [`StoreError::Full`].
+    pub fn create_cage_job(&self, meta: &CageJobMeta, rest: &[u8], frames: Spool) -> Result<(), StoreError> {
+        check_id(&meta.id)?;
+        let files = self.files();
+        let place = files.cage_job(&meta.id);
+        let bytes = meta::wrap(&place.join(META), "cage job", meta)?;
+        files.publish_folder(&place, |aside| {
+            files.write_new(&aside.join(META), &bytes)?;
+            files.write_new(&aside.join(REST), rest)?;
+            frames.move_to(&aside.join(FRAMES))
+        })
+    }
+
+    /// Makes a job whose outcome is known: whole or not at all, durable on Ok. It has no input.
+    ///
+    /// # Errors
+    /// As [`Self::create_cage_job`].
+    pub fn create_finished_cage_job<T: Serialize>(
+        &self,
+        meta: &CageJobMeta,
+        outcome: &T,
+        cage: &[u8],
+    ) -> Result<(), StoreError> {
+        check_id(&meta.id)?;
+        let files = self.files();
+        let place = files.cage_job(&meta.id);
+        let bytes = meta::wrap(&place.join(META), "cage job", meta)?;
+        let outcome = meta::wrap(&place.join(OUTCOME), "cage outcome", outcome)?;
+        files.publish_folder(&place, |aside| {
+            files.write_new(&aside.join(META), &bytes)?;
+            files.write_new(&aside.join(CAGE), cage)?;
+            files.write_new(&aside.join(OUTCOME), &outcome)
+        })
+    }
+
+    /// The rest pose of a job that is not finished.
+    ///
+    /// # Errors
+    /// [`StoreError::Damaged`], or what the system says.
+    pub fn cage_job_rest(&self, meta: &CageJobMeta) -> Result<Vec<u8>, StoreError> {
+        self.cage_job_part(&meta.id, REST, meta.rest.bytes, &meta.rest.blake3)
+    }
+
+    /// The frames of a job that is not finished. Their digest is not compared: a few of them are read, and each is looked at.
+    ///
+    /// # Errors
+    /// [`StoreError::Damaged`] where the length differs, or what the system says.
+    pub fn cage_job_frames(&self, meta: &CageJobMeta) -> Result<StoredFile, StoreError> {
+        check_id(&meta.id)?;
+        let path = self.files().cage_job(&meta.id).join(FRAMES);
+        let file = match self.files().disk.open(&path).and_then(StoredFile::open) {
+            Ok(file) => file,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                return Err(StoreError::damaged(&path, "it is missing"));
+            }
+            Err(error) => return Err(StoreError::of(&path, "open", error)),
+        };
+        if file.bytes() != meta.frames.bytes {
+            let what = format!("it has {} bytes where {} were stored", file.bytes(), meta.frames.bytes);
+            return Err(StoreError::damaged(&path, what));
+        }
+        Ok(file)
+    }
+
+    /// Counts one more beginning of the design, durably; gives how many there were. What brings the process down must not do so at every
+    /// start.
+    ///
+    /// # Errors
+    /// [`StoreError::Full`], or what the system says.
+    pub fn begin_cage_job(&self, id: &str) -> Result<u32, StoreError> {
+        check_id(id)?;
+        let path = self.files().cage_job(id).join(ATTEMPTS);
+        // One that cannot be read counts from the beginning.
+        let before: u32 = meta::read(self.files(), &path, "attempts").ok().flatten().unwrap_or(0);
+        self.files().replace(&path, &meta::wrap(&path, "attempts", &(before + 1))?)?;
+        Ok(before + 1)
+    }
+
+    /// Takes back the last beginning of a design that was stopped in good order.
+    ///
+    /// # Errors
+    /// [`StoreError::Full`], or what the system says; not found where the job was deleted.
+    pub fn forget_beginning(&self, id: &str) -> Result<(), StoreError> {
+        check_id(id)?;
+        let path = self.files().cage_job(id).join(ATTEMPTS);
+        let before: u32 = meta::read(self.files(), &path, "attempts").ok().flatten().unwrap_or(0);
+        self.files().replace(&path, &meta::wrap(&path, "attempts", &before.saturating_sub(1))?)
+    }
+
+    /// Keeps the outcome of a job, and its cage where it has one, and forgets its input: durable on Ok.
+    ///
+    /// # Errors
+    /// [`StoreError::BadId`], [`StoreError::Full`]; not found where the job was deleted.
+    pub fn finish_cage_job<T: Serialize>(&self, id: &str, outcome: &T, cage: Option<&[u8]>) -> Result<(), StoreError> {
+        check_id(id)?;
+        let files = self.files();
+        let folder = files.cage_job(id);
+        if let Some(cage) = cage {
+            files.replace(&folder.join(CAGE), cage)?;
+        }
+        let path = folder.join(OUTCOME);
+        files.replace(&path, &meta::wrap(&path, "cage outcome", outcome)?)?;
+        self.forget_cage_job_input(id);
+        Ok(())
+    }
+
+    /// The outcome of a job; None where it is not finished.
+    ///
+    /// # Errors
+    /// [`StoreError::Damaged`], [`StoreError::BadId`].
+    pub fn cage_job_outcome<T: DeserializeOwned>(&self, id: &str) -> Result<Option<T>, StoreError> {
+        check_id(id)?;
+        meta::read(self.files(), &self.files().cage_job(id).join(OUTCOME), "cage outcome")
+    }
+
+    /// The cage of a completed job, an OBJ file of this length and digest.
+    ///
+    /// # Errors
+    /// [`StoreError::Damaged`], or what the system says.
+    pub fn cage_job_cage(&self, id: &str, bytes: u64, digest: &str) -> Result<Vec<u8>, StoreError> {
+        self.cage_job_part(id, CAGE, bytes.min(CAGE_BYTES), digest)
+    }
+
+    /// Removes the input of a finished job, best effort: what stays is removed at the next start.
+    pub fn forget_cage_job_input(&self, id: &str) {
+        for name in [REST, FRAMES, ATTEMPTS] {
+            let path = self.files().cage_job(id).join(name);
+            match self.files().disk.remove_file(&path) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                    tracing::warn!(job = id, %error, "the input of a finished cage job still takes space");
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Deletes a job; fine where there is none. On Ok it does not come back.
+    ///
+    /// # Errors
+    /// [`StoreError::BadId`], or what the system says.
+    pub fn delete_cage_job(&self, id: &str) -> Result<(), StoreError> {
+        check_id(id)?;
+        self.files().throw_away(&self.files().cage_job(id))
+    }
+
+    /// Moves a damaged job to `quarantine/`, with a note of what is wrong.
+    ///
+    /// # Errors
+    /// [`StoreError::BadId`], or what the system says.
+    pub fn quarantine_cage_job(&self, id: &str, why: &str) -> Result<(), StoreError> {
+        check_id(id)?;
+        self.files().set_aside(&self.files().cage_job(id), why).map(|_| ())
+    }
+
+    /// Bytes of a job's files; 0 where there is none.
+    pub fn cage_job_bytes(&self, id: &str) -> u64 {
+        if !is_session_id(id) {
+            return 0;
+        }
+        self.files().disk.list(&self.files().cage_job(id)).map_or(0, |all| all.iter().map(|e| e.bytes).sum())
+    }
+
+    fn cage_job_part(&self, id: &str, name: &str, bytes: u64, digest: &str) -> Result<Vec<u8>, StoreError> {
+        check_id(id)?;
+        let path = self.files().cage_job(id).join(name);
+        let found = self.files().read(&path, bytes)?.ok_or_else(|| StoreError::damaged(&path, "it is missing"))?;
+        if found.len() as u64 != bytes || blake3::hash(&found).to_hex().as_str() != digest {
+            return Err(StoreError::damaged(&path, "its content does not match its checksum"));
+        }
+        Ok(found)
+    }
+}
+
+/// The jobs, and those set aside.
+pub(super) fn find(files: &Files) -> Result<(Vec<CageJobMeta>, Vec<Quarantined>), StoreError> {
+    find_in(files, &files.cages(), META, "cage job", |meta: &CageJobMeta| &meta.id)
+}

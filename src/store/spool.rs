@@ -1,0 +1,117 @@
+//! Files that arrive in pieces: written aside with their digest, read back at any place, and moved to where they belong or forgotten.
+
+use super::disk::DiskFile;
+use super::{Store, StoreError};
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A file that is being received; gone when dropped, unless something took it.
+#[derive(Debug)]
+pub struct Spool {
+    store: Store,
+    path: PathBuf,
+    file: Arc<dyn DiskFile>,
+    bytes: u64,
+    digest: blake3::Hasher,
+    taken: bool,
+}
+
+impl Store {
+    /// A new empty file for what arrives.
+    ///
+    /// # Errors
+    /// [`StoreError::Full`], or what the system says.
+    pub fn spool(&self) -> Result<Spool, StoreError> {
+        let path = self.files().temporary("spool");
+        let file = self.files().create(&path)?;
+        Ok(Spool { store: self.clone(), path, file, bytes: 0, digest: blake3::Hasher::new(), taken: false })
+    }
+}
+
+impl Spool {
+    /// Appends these bytes. After an error nothing more can be done with it.
+    ///
+    /// # Errors
+    /// [`StoreError::Full`], or what the system says.
+    pub fn write(&mut self, bytes: &[u8]) -> Result<(), StoreError> {
+        self.file.write_all_at(bytes, self.bytes).map_err(|e| StoreError::of(&self.path, "write", e))?;
+        self.digest.update(bytes);
+        self.bytes += bytes.len() as u64;
+        Ok(())
+    }
+
+    /// Bytes so far.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Digest of the bytes so far, BLAKE3.
+    pub fn digest(&self) -> blake3::Hash {
+        self.digest.finalize()
+    }
+
+    /// What was written so far, to be read.
+    pub fn stored(&self) -> StoredFile {
+        StoredFile { file: Arc::clone(&self.file), bytes: self.bytes, at: 0 }
+    }
+
+    /// Syncs it and moves it into a folder that is not visible yet.
+    pub(super) fn move_to(mut self, place: &Path) -> Result<(), StoreError> {
+        let files = self.store.files();
+        files.sync_file(&*self.file, &self.path)?;
+        files.disk.rename(&self.path, place).map_err(|e| StoreError::of(place, "put in place", e))?;
+        self.taken = true;
+        Ok(())
+    }
+}
+
+impl Drop for Spool {
+    fn drop(&mut self) {
+        if !self.taken {
+            self.store.files().discard(&self.path);
+        }
+    }
+}
+
+/// A stored file open for reading.
+#[derive(Clone, Debug)]
+pub struct StoredFile {
+    file: Arc<dyn DiskFile>,
+    bytes: u64,
+    at: u64,
+}
+
+impl StoredFile {
+    pub(super) fn open(file: Arc<dyn DiskFile>) -> io::Result<Self> {
+        let bytes = file.length()?;
+        Ok(Self { file, bytes, at: 0 })
+    }
+
+    /// Its length.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+}
+
+impl Read for StoredFile {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        let wanted = out.len().min(usize::try_from(self.bytes - self.at).unwrap_or(usize::MAX));
+        let read = self.file.read_at(&mut out[..wanted], self.at)?;
+        self.at += read as u64;
+        Ok(read)
+    }
+}
+
+impl Seek for StoredFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        let place = match to {
+            SeekFrom::Start(at) => Some(at),
+            SeekFrom::End(by) => self.bytes.checked_add_signed(by),
+            SeekFrom::Current(by) => self.at.checked_add_signed(by),
+        };
+        // Beyond the end there is nothing to read.
+        self.at = place.ok_or(io::ErrorKind::InvalidInput)?.min(self.bytes);
+        Ok(self.at)
+    }
+}

@@ -1,0 +1,3 @@
+mod cage_obj;
+mod delete;
+mod events;

@@ -1,0 +1,7 @@
+mod background;
+mod create;
+mod id;
+mod idempotency;
+mod list;
+mod refused;
+mod restart;
