@@ -7,7 +7,7 @@ SCHEMATHESIS := target/schemathesis/bin/python
 
 LINT := target/lint-deploy
 
-.PHONY: help demo test soak lint lint-deploy doc bench paper openapi schemathesis fuzz audit clean
+.PHONY: help demo test soak lint lint-deploy doc bench paper cages openapi schemathesis fuzz audit clean
 
 help: ## list these commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
@@ -64,6 +64,10 @@ $(PEERS): benches/peers/requirements.txt
 paper: ## run the paper's comparisons on the captures in CAGER_DATA and write the tables of docs/PAPER.md; reports in out/paper/
 	$(CARGO) build --release --locked --bin cager
 	$(PYTHON) benches/paper.py
+
+cages: ## make and design cages for the captures in CAGER_DATA and write their tables in docs/PAPER.md; cages in out/cages/
+	$(CARGO) build --release --locked --bin cager
+	$(PYTHON) benches/cages.py
 
 openapi: ## write docs/openapi.json anew from the routes
 	CAGER_UPDATE_OPENAPI=1 $(CARGO) test --locked --quiet --test http openapi
