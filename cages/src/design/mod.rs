@@ -32,7 +32,7 @@ pub const MOST_VERTICES: usize = 1_500;
 /// What a cage is designed to be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Style {
-    /// Whatever reproduces the motion best: it may cut itself and leave points outside. For compression and viewing.
+    /// Whatever reproduces the motion best: it may cut itself. For compression and viewing.
     #[default]
     Free,
     /// Closed, free of self-intersection and enclosing, and smooth: to be edited by hand.
@@ -153,7 +153,7 @@ pub enum DesignError {
     /// The watcher said stop before there was a cage.
     #[error("the design was stopped before it had a cage")]
     Stopped,
-    /// The cage to start with is none.
+    /// The mesh to start with is not a usable cage.
     #[error("the cage to start with cannot be used: {0}")]
     Start(#[from] CageError),
     /// The cage to start with is not symmetric.
