@@ -2,6 +2,7 @@
 
 use crate::encode::{EncodeError, sample_frames};
 use cager_cages::{Design, DesignOptions, Style};
+use cager_client::cage_messages::CageJob;
 use cager_formats::{FrameReader, open_frames};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -73,15 +74,36 @@ impl DesignReport {
                 seconds: stage.seconds,
             })
             .collect();
+        Self::of_stages(stages, options, frames, design.timed_out)
+    }
+
+    /// What is worth telling of a design that a service made.
+    pub fn of_job(job: &CageJob, options: &DesignOptions) -> Self {
+        let stages: Vec<StageReport> = job
+            .stages
+            .iter()
+            .map(|stage| StageReport {
+                name: stage.name.clone(),
+                vertices: stage.vertices as usize,
+                designed_error: stage.error.designed.unwrap_or(0.0),
+                held_back_error: stage.error.held_back.unwrap_or(0.0),
+                condition_number: stage.condition_number,
+                seconds: stage.seconds,
+            })
+            .collect();
+        Self::of_stages(stages, options, job.sampled_frames as usize, job.timed_out)
+    }
+
+    fn of_stages(stages: Vec<StageReport>, options: &DesignOptions, frames: usize, timed_out: bool) -> Self {
         let last = stages.last();
         Self {
             style: style_name(options.style).to_owned(),
             seed: options.seed,
-            vertices: design.cage.vertices.len(),
+            vertices: last.map_or(0, |stage| stage.vertices),
             frames: frames.div_ceil(2),
             designed_error: last.map_or(0.0, |stage| stage.designed_error),
             held_back_error: last.map_or(0.0, |stage| stage.held_back_error),
-            timed_out: design.timed_out,
+            timed_out,
             stages,
         }
     }

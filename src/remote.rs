@@ -7,6 +7,7 @@ mod report;
 pub use cage::RemoteCage;
 pub use frames::FileFrames;
 
+use crate::design::DesignReport;
 use crate::encode::Encoded;
 use cager_client::cage_messages::CageProgress;
 use cager_client::messages::{CageSource, FrameResult, SessionOptions};
@@ -128,6 +129,7 @@ async fn encode<F: FrameSource + 'static>(
         options: job.options,
         idempotency_key: None,
     };
+    let mut designed = None;
     let session = match job.cage {
         RemoteCage::File(path) => {
             new.cage = Some(mesh_file(path)?);
@@ -135,15 +137,22 @@ async fn encode<F: FrameSource + 'static>(
         }
         RemoteCage::Designed(options) => {
             let design = cage::design(&client, &new.rest, &mut job.frames, options, progress).await?;
-            new.options.cage = Some(CageSource { id: Some(design.clone()), ..CageSource::default() });
+            new.options.cage = Some(CageSource { id: Some(design.id.clone()), ..CageSource::default() });
             let created = client.create(&new).await;
             // The session has a cage of its own now.
-            clean_up(&client, async |client| client.delete_cage(&design).await).await;
+            clean_up(&client, async |client| client.delete_cage(&design.id).await).await;
+            designed = Some((DesignReport::of_job(&design, options), design.warnings));
             created?.id
         }
     };
     match run(&client, &session, job.frames, file, clock, progress).await {
-        Ok((encoded, steps)) => Ok(EncodedRemotely { encoded, session, steps }),
+        Ok((mut encoded, steps)) => {
+            if let Some((report, warnings)) = designed {
+                encoded.report.design = Some(report);
+                encoded.report.warnings.extend(warnings);
+            }
+            Ok(EncodedRemotely { encoded, session, steps })
+        }
         Err(error) => {
             clean_up(&client, async |client| client.delete(&session).await).await;
             Err(error)

@@ -117,7 +117,8 @@ fn no_input_is_too_broken() {
         let mut broken = Model { points: mesh.vertices.clone(), faces: Polygons::new() };
         mesh.triangles.iter().for_each(|t| broken.faces.push(t));
         let _ = check(&mesh, &ball());
-        assert!(!repair(&broken, &ball()).remaining.usable());
+        let remaining = repair(&broken, &ball()).remaining;
+        assert!(!remaining.usable() && !remaining.sentences().is_empty());
     }
     let mut two = ball();
     append(&mut two, &sphere([0.5, 0.0, 0.0], 1.0, 12));

@@ -61,6 +61,12 @@ pub(super) fn design(
         let path = match &error {
             DesignError::TooManyVertices { .. } if start.is_none() => return anyhow::anyhow!("--vertices: {error}"),
             DesignError::Enclose(_) => rest.0,
+            DesignError::Start(error) if error.is_inward() => {
+                let path = start.map_or(rest.0, |(path, _)| path).display();
+                return anyhow::anyhow!(
+                    "{path}: the faces of the cage point inwards; turn them with `cager cage --repair {path}` first"
+                );
+            }
             DesignError::Start(_) | DesignError::NotSymmetric { .. } | DesignError::TooManyVertices { .. } => {
                 start.map_or(rest.0, |(path, _)| path)
             }

@@ -2,7 +2,7 @@
 
 use super::{RemoteError, RemoteProgress};
 use cager_cages::{DesignOptions, Goal, Style};
-use cager_client::cage_messages::{CageOptions, CageState, CageStyle};
+use cager_client::cage_messages::{CageJob, CageOptions, CageState, CageStyle};
 use cager_client::{Client, ClientError, FrameSource, MeshFile, NewCage};
 use futures_util::StreamExt as _;
 use std::io;
@@ -24,14 +24,14 @@ pub enum RemoteCage<'a> {
     Designed(&'a DesignOptions),
 }
 
-/// Has the service design a cage; gives the id of the design, which stays on the service. `frames` is read from its beginning.
+/// Has the service design a cage; gives the finished design, which stays on the service. `frames` is read from its beginning.
 pub(super) async fn design(
     client: &Client,
     rest: &MeshFile,
     frames: &mut impl FrameSource,
     options: &DesignOptions,
     progress: &mut (dyn FnMut(RemoteProgress<'_>) + Send),
-) -> Result<String, RemoteError> {
+) -> Result<CageJob, RemoteError> {
     let (count, bytes) = sample(frames)?;
     let mut new = NewCage::new(rest.clone(), MeshFile::new("frames.f32", bytes));
     let (vertices, mean_error) = match options.goal {
@@ -54,7 +54,7 @@ pub(super) async fn design(
     let id = client.design_cage(&new).await?.id;
     drop(new);
     match follow(client, &id, progress).await {
-        Ok(()) => Ok(id),
+        Ok(job) => Ok(job),
         Err(error) => {
             super::clean_up(client, async |client| client.delete_cage(&id).await).await;
             Err(error)
@@ -66,18 +66,17 @@ async fn follow(
     client: &Client,
     id: &str,
     progress: &mut (dyn FnMut(RemoteProgress<'_>) + Send),
-) -> Result<(), RemoteError> {
+) -> Result<CageJob, RemoteError> {
     let mut events = client.cage_events(id);
     while let Some(told) = events.next().await {
         let told = told?;
         progress(RemoteProgress::Designing(&told));
         if told.state == CageState::Completed {
-            return Ok(());
+            break;
         }
     }
-    // It failed, which is told in whole here.
-    client.wait_cage(id, DESIGNED_WITHIN).await?;
-    Ok(())
+    // Over: what came of it, and why where it failed, is told in whole here.
+    Ok(client.wait_cage(id, DESIGNED_WITHIN).await?)
 }
 
 /// Evenly spaced frames, the first and the last among them, back to back as they are sent; and their number.

@@ -50,6 +50,8 @@ fn without_a_cage_the_service_designs_one_and_keeps_nothing_of_the_design() {
     let report = dir.json("r.json");
     assert!(report["cage_vertices"].as_u64().is_some_and(|vertices| vertices <= 60), "{report}");
     assert_eq!(report["frames"], 20);
+    assert_eq!(report["design"]["vertices"], report["cage_vertices"]);
+    assert!(report["design"]["stages"].as_array().is_some_and(|stages| stages.len() > 1), "{report}");
     assert_eq!(designs(&server), 0);
     // The container has the cage, so that it decodes without the service.
     dir.cager("decode out.cager -o decoded.npy").succeeds();

@@ -17,8 +17,9 @@ use glam::DVec3;
 const RIDGE: f64 = 1e-4;
 /// Length of the longest steps, as a fraction of the diagonal.
 const STEP: f64 = 0.001;
-/// Points of one step.
-const STEP_POINTS: usize = 2200;
+/// Points of one step, and of one exchange: what hangs on few vertices is seen by few points, and looks better served than it is.
+const STEP_POINTS: usize = 2_200;
+const EXCHANGE_POINTS: usize = 5_000;
 /// Share of the way to the middle of its neighbours that a vertex of a cage for editing goes in each of the longest steps.
 const FAIRING: f64 = 0.02;
 
@@ -80,7 +81,7 @@ impl<'a> Descent<'a> {
 
     /// Exchanges up to a share of the vertices, and grows or shrinks the cage towards `goal` vertices by up to as many.
     pub(super) fn exchange(&mut self, share: f64, goal: usize) {
-        let batch = self.samples.batch(STEP_POINTS, &mut self.random);
+        let batch = self.samples.batch(EXCHANGE_POINTS, &mut self.random);
         let phi = MeanValue.smooth_coordinates(&self.cage, &batch.points);
         let Some(fit) = Fit::new(phi.as_ref(), batch.motion.as_ref(), RIDGE) else { return };
         let Exchange { mesh, kept } =

@@ -18,8 +18,6 @@ pub(super) struct Fit {
     pub(super) residual: Mat<f64>,
     /// Lower Cholesky factor of `ΦᵀΦ + ρ`, m × m.
     pub(super) factor: Mat<f64>,
-    /// `‖X − Φ C‖²`.
-    pub(super) squared: f64,
 }
 
 /// Sums `f(rows)` over blocks of rows, in their order.
@@ -95,7 +93,7 @@ impl Fit {
         solve(factor.as_ref(), &mut cages);
         let mut residual = motion.to_owned();
         product(&mut residual, Accum::Add, phi, cages.as_ref(), -1.0);
-        let squared = residual.as_ref().squared_norm_l2();
-        squared.is_finite().then_some(Self { cages, residual, factor, squared })
+        let finite = residual.as_ref().squared_norm_l2().is_finite();
+        finite.then_some(Self { cages, residual, factor })
     }
 }

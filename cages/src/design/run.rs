@@ -12,13 +12,13 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 /// Steps of a design with a given number of vertices.
-const STEPS: usize = 240;
+const STEPS: usize = 190;
 /// Vertices are exchanged after so many steps each, up to this share of them at a time, until this share of the steps is done.
 const EXCHANGE_EVERY: usize = 10;
 const EXCHANGED: f64 = 0.08;
 const EXCHANGE_UNTIL: f64 = 0.7;
 /// The cage is judged after so many steps each, and what was gained is noted this often.
-const JUDGE_EVERY: usize = 20;
+const JUDGE_EVERY: usize = 30;
 const NOTE_EVERY: usize = 60;
 
 /// An error, as a fraction of the diagonal, that no cage of a model that holds together leaves.

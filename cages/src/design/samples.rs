@@ -1,18 +1,18 @@
 //! The motion that a cage is designed for: some points of the model and what is not affine in their motion, apart from what is held
 //! back to judge by.
 
-use super::fit::{Fit, gram};
+use super::fit::{Fit, gram, product};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_core::mesh::{Model, Point, diagonal};
-use faer::{Mat, MatRef};
+use faer::{Accum, Mat};
 
 /// Points of a model at most looked at.
 const MOST_POINTS: usize = 20_000;
-/// Frames of one step.
-const STEP_FRAMES: usize = 32;
+/// Columns that the motion is kept in: as many principal directions of its frames' coordinates.
+const COLUMNS: usize = 96;
 /// Points and frames that a cage is judged by.
-const JUDGED_POINTS: usize = 4_000;
+const JUDGED_POINTS: usize = 8_000;
 const JUDGED_FRAMES: usize = 40;
 /// Vertices of a cage whose condition number is not looked at any more.
 const LARGE: usize = 1_000;
@@ -21,20 +21,21 @@ const LARGE: usize = 1_000;
 pub(super) struct Samples {
     /// Rest positions, n.
     points: Vec<Point>,
-    /// Motion that the design sees, n × 3F: every frame less its best affine image of the rest pose, which coordinates reproduce anyway.
+    /// Motion that the design sees, n × c: every frame less its best affine image of the rest pose, which coordinates reproduce anyway, in
+    /// the principal directions of all of them. A fit to these leaves the same sum of squares as one to the frames, up to what they leave out.
     designed: Mat<f64>,
-    /// Points to judge by, and what they do in frames that the design sees and in those that it does not.
+    /// Points to judge by, and what they do in frames that the design sees and, from a column on, in those that it does not.
     judged: Vec<Point>,
-    judged_designed: Mat<f64>,
-    judged_held_back: Mat<f64>,
+    judged_motion: Mat<f64>,
+    held_back_from: usize,
     /// Diagonal of the rest pose.
     pub(super) diagonal: f64,
 }
 
-/// Points and frames of one step.
+/// Points of one step.
 pub(super) struct Batch {
     pub(super) points: Vec<Point>,
-    /// n × 3F.
+    /// n × c.
     pub(super) motion: Mat<f64>,
 }
 
@@ -59,36 +60,39 @@ impl Samples {
             indices
         };
         let (used, judged) = (some(MOST_POINTS), some(JUDGED_POINTS));
+        let (seen, unseen) = (evenly(&designed, JUDGED_FRAMES), evenly(&held_back, JUDGED_FRAMES));
         let at = |indices: &[usize]| -> Vec<Point> { indices.iter().map(|&i| rest.points[i]).collect() };
         Self {
             points: at(&used),
-            designed: without_affine(&rest.points, &used, &designed),
+            designed: principal(&without_affine(&rest.points, &used, &designed)),
             judged: at(&judged),
-            judged_designed: without_affine(&rest.points, &judged, &evenly(&designed, JUDGED_FRAMES)),
-            judged_held_back: without_affine(&rest.points, &judged, &evenly(&held_back, JUDGED_FRAMES)),
+            judged_motion: without_affine(&rest.points, &judged, &[seen.as_slice(), &unseen].concat()),
+            held_back_from: 3 * seen.len(),
             diagonal: diagonal(&rest.points),
         }
     }
 
-    /// Random points and frames of those that the design sees.
+    /// Random points and their motion.
     pub(super) fn batch(&self, points: usize, random: &mut fastrand::Rng) -> Batch {
         let mut rows = random.choose_multiple(0..self.points.len(), points);
         rows.sort_unstable();
-        let mut frames = random.choose_multiple(0..self.designed.ncols() / 3, STEP_FRAMES);
-        frames.sort_unstable();
-        let motion =
-            Mat::from_fn(rows.len(), 3 * frames.len(), |i, c| self.designed[(rows[i], 3 * frames[c / 3] + c % 3)]);
+        let motion = Mat::from_fn(rows.len(), self.designed.ncols(), |i, c| self.designed[(rows[i], c)]);
         Batch { points: rows.iter().map(|&i| self.points[i]).collect(), motion }
     }
 
     /// Root mean square errors of a cage, as fractions of the diagonal; infinite where it has none.
     pub(super) fn judge(&self, cage: &Cage) -> Judged {
         let phi = MeanValue.smooth_coordinates(cage, &self.judged);
-        let error = |motion: MatRef<'_, f64>| {
-            let squared = Fit::new(phi.as_ref(), motion, 1e-6).map_or(f64::INFINITY, |fit| fit.squared);
-            (squared / (motion.nrows() * motion.ncols()) as f64 * 3.0).sqrt() / self.diagonal
+        let fit = Fit::new(phi.as_ref(), self.judged_motion.as_ref(), 1e-6);
+        let error = |first: usize, last: usize| {
+            let Some(fit) = &fit else { return f64::INFINITY };
+            let left = fit.residual.as_ref().subcols(first, last - first);
+            (left.squared_norm_l2() / (left.nrows() * left.ncols()) as f64 * 3.0).sqrt() / self.diagonal
         };
-        Judged { designed: error(self.judged_designed.as_ref()), held_back: error(self.judged_held_back.as_ref()) }
+        Judged {
+            designed: error(0, self.held_back_from),
+            held_back: error(self.held_back_from, self.judged_motion.ncols()),
+        }
     }
 
     /// Condition number of the coordinates of the points to judge by; infinite where they have none, or where it takes longer to find out
@@ -109,6 +113,18 @@ impl Samples {
 pub(super) fn evenly<'a>(frames: &[&'a [f64]], count: usize) -> Vec<&'a [f64]> {
     let count = count.min(frames.len());
     (0..count).map(|k| frames[k * frames.len() / count]).collect()
+}
+
+/// A motion in its principal directions, at most [`COLUMNS`] of them.
+fn principal(motion: &Mat<f64>) -> Mat<f64> {
+    let columns = motion.ncols();
+    if columns <= COLUMNS {
+        return motion.clone();
+    }
+    let Ok(eigen) = gram(motion.as_ref()).self_adjoint_eigen(faer::Side::Lower) else { return motion.clone() };
+    let mut out = Mat::zeros(motion.nrows(), COLUMNS);
+    product(&mut out, Accum::Replace, motion.as_ref(), eigen.U().subcols(columns - COLUMNS, COLUMNS), 1.0);
+    out
 }
 
 /// The motion of some points, less the best affine image of the rest pose.

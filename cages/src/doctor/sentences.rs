@@ -26,6 +26,10 @@ impl Findings {
         };
         let f = self;
         say(
+            usize::from(f.faces == 0),
+            "no faces, where a cage is a closed surface; export it as a mesh with its faces".to_owned(),
+        );
+        say(
             f.not_finite.len(),
             format!(
                 "{} with coordinates that are NaN or infinite ({}); delete them or export the cage again",

@@ -4,7 +4,7 @@ use super::operator::tall_product;
 use super::{Analysis, Handles, PrepareError, Solver, SolverOptions};
 use crate::cage::Cage;
 use crate::coordinates::{CoordinateSystem, Refinement};
-use crate::mesh::{Point, diagonal, distance_to_surface, norm};
+use crate::mesh::{Point, diagonal, distance_to_surface, norm, winding_number};
 use crate::regularize::{Term, TermError};
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
@@ -164,11 +164,16 @@ pub fn coordinates_fit(points: usize, unknowns: usize, copies: usize) -> bool {
     Vec::<f64>::new().try_reserve_exact(entries).is_ok()
 }
 
-/// Of the points found outside, those that do not lie on the cage, and the largest distance over the diagonal.
+/// Of the points found outside, those that do not lie on the cage and that no part of a cage that cuts itself encloses; and the largest
+/// distance over the diagonal.
 pub(super) fn outside(cage: &Cage, points: &[Point], found: &[u32], diagonal: f64) -> (Vec<u32>, f64) {
     let distance = |i: u32| distance_to_surface(cage.vertices(), &cage.mesh().triangles, points[i as usize]) / diagonal;
-    let measured: Vec<(u32, f64)> =
-        found.par_iter().map(|&i| (i, distance(i))).filter(|&(_, distance)| distance > ON_THE_CAGE).collect();
+    let enclosed = |i: u32| winding_number(cage.vertices(), &cage.mesh().triangles, points[i as usize]) > 0.5;
+    let measured: Vec<(u32, f64)> = found
+        .par_iter()
+        .map(|&i| (i, distance(i)))
+        .filter(|&(i, distance)| distance > ON_THE_CAGE && !enclosed(i))
+        .collect();
     let farthest = measured.iter().map(|&(_, distance)| distance).fold(0.0, f64::max);
     (measured.into_iter().map(|(i, _)| i).collect(), farthest)
 }
