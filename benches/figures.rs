@@ -91,13 +91,13 @@ fn figures(folder: &Path) -> anyhow::Result<Value> {
     let m = phi.ncols();
     let square = faer::Mat::from_fn(m, m, |i, j| phi[(handles.rows[i] as usize, j)]);
     let svd = timed(|| svd(square.as_ref()));
-    let prepare = timed(|| Solver::prepare(&MeanValue, &cage, points, SolverOptions::default()));
+    let prepare = timed(|| Solver::prepare(&MeanValue, &cage, points, SolverOptions::PAPER));
 
-    let solver = Solver::prepare(&MeanValue, &cage, points, SolverOptions::default())?;
+    let solver = Solver::prepare(&MeanValue, &cage, points, SolverOptions::PAPER)?;
     let batches: Vec<Vec<&[f32]>> = frames.chunks(BATCH).map(|b| b.iter().map(Vec::as_slice).collect()).collect();
     let invert = timed(|| batches.iter().map(|b| solver.invert(b)).collect::<Vec<_>>());
     // Normals that follow from the vertices: an iteration for every frame.
-    let consistent = Solver::prepare(&Green::Consistent, &cage, points, SolverOptions::default())?;
+    let consistent = Solver::prepare(&Green::Consistent, &cage, points, SolverOptions::PAPER)?;
     let green_invert = timed_runs(FEW_RUNS, || batches.iter().map(|b| consistent.invert(b)).collect::<Vec<_>>()).0;
     let cages: Vec<Vec<Vec<f32>>> = batches.iter().map(|b| solver.invert(b)).collect();
     let invert_measure = timed(|| {
@@ -180,7 +180,7 @@ fn write(capture: &Capture, cage: &Cage, folder: &Path) -> anyhow::Result<Vec<Ve
 fn growth(points: usize, cage_vertices: usize) -> anyhow::Result<Value> {
     let (capture, cage) = capture(points, cage_vertices)?;
     let clock = Instant::now();
-    let solver = Solver::prepare(&MeanValue, &cage, &capture.rest.points, SolverOptions::default())?;
+    let solver = Solver::prepare(&MeanValue, &cage, &capture.rest.points, SolverOptions::PAPER)?;
     let seconds = clock.elapsed().as_secs_f64();
     let found = solver.preparation();
     Ok(json!({

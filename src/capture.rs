@@ -1,6 +1,6 @@
 //! From solved frames to a container and its report: what `encode` and the service share, so that both write the same bytes.
 
-use crate::report::{Bytes, Condition, Errors, FrameError, MaxVol, Report, Seconds};
+use crate::report::{Bytes, Condition, Errors, FrameError, MaxVol, Report, Seconds, WorstError};
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{Solver, SolverOptions};
@@ -104,6 +104,7 @@ impl<W: Write> CaptureWriter<W> {
         let error = &mut self.report.error;
         (error.l2_mean, error.l2_max, error.linf_mean, error.linf_max) = (l2_mean, l2_max, linf_mean, linf_max);
         error.kg_percent = kg_percent;
+        error.worst = WorstError::of_frames(&error.per_frame, self.diagonal);
         self.report.bytes.capture =
             self.report.bytes.capture * 4 + 12 * (self.report.points as u64) * (self.report.frames as u64);
         let summary = summary(&self.report);
@@ -118,6 +119,7 @@ fn begin_report(encoding: &Encoding<'_>) -> Report {
         points: encoding.rest.points.len(),
         triangles: encoding.rest.faces.arities().iter().map(|&a| (a as usize).saturating_sub(2)).sum(),
         frames: 0,
+        diagonal: solver.diagonal(),
         unknowns: solver.decoder().unknowns(),
         cage_vertices: encoding.cage.vertices().len(),
         cage_faces: encoding.cage.faces().len(),
@@ -142,6 +144,7 @@ fn begin_report(encoding: &Encoding<'_>) -> Report {
             linf_mean: 0.0,
             linf_max: 0.0,
             kg_percent: 0.0,
+            worst: None,
             per_frame: Vec::new(),
         },
         bytes: Bytes {
@@ -181,18 +184,18 @@ pub fn preparation_warnings(options: SolverOptions, solver: &Solver) -> Vec<Stri
     let weak = unknowns - strong;
     if weak > 0 {
         let consequence = match options.regularizer {
-            Regularizer::Laplacian | Regularizer::Global if options.lambda > 0.0 => {
-                "the cage's Laplacian takes care".to_owned()
-            }
-            other if other.is_sub_spectral() && options.lambda > 0.0 => "the regularisation takes care".to_owned(),
-            Regularizer::Tikhonov => "all are damped".to_owned(),
-            Regularizer::TruncatedSvd if options.spectrum >= weak => "all are dropped".to_owned(),
+            Regularizer::Laplacian | Regularizer::Global if options.lambda > 0.0 => "it is smoothed there".to_owned(),
+            Regularizer::Differential if options.lambda > 0.0 => "it keeps the shape of the rest cage there".to_owned(),
+            Regularizer::Temporal if options.lambda > 0.0 => "it keeps the previous frame's shape there".to_owned(),
+            Regularizer::Matrix if options.lambda > 0.0 => "it follows the matrix there".to_owned(),
+            Regularizer::Tikhonov => "what they leave open is damped".to_owned(),
+            Regularizer::TruncatedSvd if options.spectrum >= weak => "what they leave open is dropped".to_owned(),
             _ => format!(
-                "they follow the rounding of the data, so expect spikes, or use --regularizer laplacian --spectrum {weak}"
+                "it follows the rounding of the data there, so expect spikes, or use --regularizer differential --spectrum {weak}"
             ),
         };
         warnings.push(format!(
-            "the points determine only {strong} of the {unknowns} unknowns of the cage; of the {weak} others, {consequence}"
+            "the points determine only {strong} of the cage's {unknowns} unknowns, as where parts of it are far from all of them; {consequence}"
         ));
     }
     if found.affine_reproduction_error > 1e-10 {

@@ -1,7 +1,7 @@
 //! The main job: frames in, one cage per frame out, measured as a decoder will see it.
 
 use crate::capture::{CaptureWriter, Encoding, StoredError};
-use crate::report::{Consistency, Report, Seconds, SpectrumChoice};
+use crate::report::{Consistency, Report, Seconds, SpectrumChoice, WorstError};
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{Analysis, BATCH, Convergence, PrepareError, Solver, SolverOptions};
@@ -158,6 +158,7 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Encoded, 
     };
     let points = job.frames.points();
     let mut convergence = Vec::new();
+    let mut worst = None;
     std::thread::scope(|scope| -> Result<(), EncodeError> {
         let (full, batches) = sync_channel(rayon::current_num_threads());
         let (empty, recycled) = sync_channel(2 * rayon::current_num_threads() + 2);
@@ -184,6 +185,11 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Encoded, 
             } else {
                 waiting.par_iter().map(|batch| solve(&solver, batch, None)).collect()
             };
+            let mut first = done;
+            for (batch, solved) in waiting.iter().zip(&solved) {
+                look_for_worst(&mut worst, first, &solver, batch, solved);
+                first += batch.len();
+            }
             for batch in waiting {
                 // The reader may have stopped already.
                 let _ = empty.send(batch);
@@ -210,6 +216,7 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Encoded, 
     let (buffered, mut report) = writer.finish().map_err(fail)?;
     report.spectrum_choice = choice;
     report.consistency = Consistency::new(&convergence);
+    report.error.worst = worst;
     let file = buffered.into_inner().map_err(|e| fail(container::Error::from(e.into_error())))?;
     let container = file.complete()?;
     report.bytes.output = container.length();
@@ -284,6 +291,17 @@ struct SolvedBatch {
 }
 
 /// Solves a batch whose first frame comes after the one with the cage `previous`, where that matters.
+/// Keeps the largest error so far; frames of a batch count from `first` on.
+fn look_for_worst(worst: &mut Option<WorstError>, first: usize, solver: &Solver, batch: &Batch, solved: &SolvedBatch) {
+    let largest = solved.errors.iter().enumerate().reduce(|a, b| if b.1.linf > a.1.linf { b } else { a });
+    if let Some((k, error)) = largest
+        && worst.is_none_or(|worst| error.linf > worst.distance)
+    {
+        let (point, distance) = solver.decoder().worst_point(&solved.cages[k], &batch[k]);
+        *worst = Some(WorstError { frame: first + k, point: Some(point), distance });
+    }
+}
+
 fn solve(solver: &Solver, batch: &Batch, previous: Option<&[f32]>) -> SolvedBatch {
     let frames: Vec<&[f64]> = batch.iter().map(Vec::as_slice).collect();
     let clock = Instant::now();

@@ -13,6 +13,9 @@ pub struct Report {
     pub triangles: usize,
     /// Frames of the capture.
     pub frames: usize,
+    /// Diagonal of the rest pose's bounding box, in the unit of its file: what errors are fractions of.
+    #[serde(default)]
+    pub diagonal: f64,
     /// Unknowns per frame, m.
     pub unknowns: usize,
     /// Vertices of the cage.
@@ -184,8 +187,32 @@ pub struct Errors {
     pub linf_max: f64,
     /// `100 · ‖A − Â‖_F / ‖A − E(A)‖_F` (Karni and Gotsman 2004).
     pub kg_percent: f64,
+    /// Where it is largest, if that was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub worst: Option<WorstError>,
     /// Every frame.
     pub per_frame: Vec<FrameError>,
+}
+
+/// The largest error of a capture.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
+pub struct WorstError {
+    /// The frame, counted from 0.
+    pub frame: usize,
+    /// The point, where the positions are at hand to tell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub point: Option<u32>,
+    /// How far off it is, in the unit of the capture.
+    pub distance: f64,
+}
+
+impl WorstError {
+    /// The frame of the largest error, over a rest pose of this diagonal; none where nothing was measured.
+    pub fn of_frames(frames: &[FrameError], diagonal: f64) -> Option<Self> {
+        let measured = frames.iter().enumerate().filter(|(_, error)| error.linf.is_finite());
+        let (frame, error) = measured.reduce(|a, b| if b.1.linf > a.1.linf { b } else { a })?;
+        Some(Self { frame, point: None, distance: error.linf * diagonal })
+    }
 }
 
 /// Errors of one frame.

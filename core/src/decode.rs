@@ -180,6 +180,23 @@ impl Decoder {
         (0..frames.len()).map(|f| Sums::total(blocks.iter().map(|b| &b[f])).into_error(n)).collect()
     }
 
+    /// The point of a frame that its cage leaves farthest from its place, and how far, in the capture's unit.
+    ///
+    /// # Panics
+    /// Where the lengths do not fit.
+    pub fn worst_point<T: Copy + Into<f64>>(&self, cage: &[f32], frame: &[T]) -> (u32, f64) {
+        assert_eq!(frame.len(), 3 * self.points(), "every frame has every point");
+        let mut decoded = [Vec::new()];
+        self.decode(&[cage], &mut decoded);
+        let squared = |(found, wanted): (&[f32], &[T])| -> f64 {
+            found.iter().zip(wanted).map(|(&a, &b)| (f64::from(a) - b.into()).powi(2)).sum()
+        };
+        let distances = decoded[0].chunks_exact(3).zip(frame.chunks_exact(3)).map(squared);
+        let (point, distance) =
+            distances.enumerate().fold((0, 0.0), |worst, here| if here.1 > worst.1 { here } else { worst });
+        (point as u32, distance.sqrt())
+    }
+
     /// What `Φ` multiplies, side by side, three columns for each cage and padding; positions about their own centre, which keeps
     /// the digits of a capture that travels.
     fn values(&self, cages: &[&[f32]]) -> (Mat<f32>, Vec<Point>) {

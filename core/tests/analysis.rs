@@ -69,7 +69,7 @@ fn spectra_are_those_of_the_matrices() {
 fn rows_given_to_an_analysis_are_followed_exactly_where_they_determine_the_cage() {
     let (capture, cage) = capture();
     let analysis = Analysis::new(&MeanValue, &cage, &capture.rest.points).unwrap();
-    let options = SolverOptions { regularizer: Regularizer::None, spectrum: 0, ..SolverOptions::default() };
+    let options = SolverOptions { regularizer: Regularizer::None, spectrum: 0, ..SolverOptions::PAPER };
     let rows = analysis.handles().rows.clone();
     let (given, own) = (analysis.solver_reading(&rows, options).unwrap(), analysis.solver(options).unwrap());
     let mut frame = Vec::new();
@@ -94,7 +94,7 @@ fn thresholds_beyond_the_unknowns_are_refused_by_an_analysis_too() {
     let (capture, cage) = capture();
     let analysis = Analysis::new(&MeanValue, &cage, &capture.rest.points).unwrap();
     let unknowns = analysis.coordinates().ncols();
-    let options = SolverOptions { spectrum: unknowns + 1, ..SolverOptions::default() };
+    let options = SolverOptions { spectrum: unknowns + 1, ..SolverOptions::PAPER };
     let refused = PrepareError::SpectrumTooLarge { spectrum: unknowns + 1, unknowns };
     assert_eq!(analysis.solver(options).unwrap_err(), refused);
     assert_eq!(analysis.solver_reading(&analysis.handles().rows, options).unwrap_err(), refused);

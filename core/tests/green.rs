@@ -41,11 +41,11 @@ fn farthest(cage: &[f32], truth: &[Point]) -> f64 {
 #[test]
 fn a_cage_has_one_row_per_vertex_and_the_coordinates_one_column_more_per_face() {
     let (capture, cage) = capture();
-    let solver = prepare(&capture, &cage, SolverOptions::default());
+    let solver = prepare(&capture, &cage, SolverOptions::PAPER);
     let (v, f) = (cage.vertices().len(), cage.faces().len());
     assert_eq!((solver.decoder().unknowns(), solver.decoder().columns()), (v, v + f));
     assert_eq!(solver.handles().len(), v);
-    let free = Solver::prepare(&Green::Free, &cage, &capture.rest.points, SolverOptions::default()).unwrap();
+    let free = Solver::prepare(&Green::Free, &cage, &capture.rest.points, SolverOptions::PAPER).unwrap();
     assert_eq!((free.decoder().unknowns(), free.decoder().columns()), (v + f, v + f));
 }
 
@@ -59,7 +59,7 @@ fn similar_poses_of_the_rest_cage_pose_the_model_alike_and_come_back() {
     let positions: Vec<f64> = capture.rest.points.iter().flat_map(|&p| motion(p)).collect();
     let truth: Vec<Point> = cage.vertices().iter().map(|&p| motion(p)).collect();
     for handles in HANDLES {
-        let solver = prepare(&capture, &cage, SolverOptions { handles, spectrum: 0, ..SolverOptions::default() });
+        let solver = prepare(&capture, &cage, SolverOptions { handles, spectrum: 0, ..SolverOptions::PAPER });
         let posed = solver.decoder().measure(&[&single(&truth)], &[&positions])[0];
         assert!(posed.linf < 1e-5 * solver.diagonal(), "{handles:?}: {}", posed.linf);
         let found = solver.invert_reporting(None, &[&positions]).remove(0);
@@ -72,7 +72,7 @@ fn similar_poses_of_the_rest_cage_pose_the_model_alike_and_come_back() {
 fn models_posed_by_a_cage_are_explained_by_one() {
     let (capture, cage) = capture();
     for handles in [Handles::MaxVol, Handles::All] {
-        let options = SolverOptions { handles, lambda: 1e-6, spectrum: 0, ..SolverOptions::default() };
+        let options = SolverOptions { handles, lambda: 1e-6, spectrum: 0, ..SolverOptions::PAPER };
         let solver = prepare(&capture, &cage, options);
         for t in [0, 13, 39] {
             let mut posed = vec![Vec::new()];
@@ -91,7 +91,7 @@ fn the_points_read_are_never_worse_than_where_the_iteration_starts() {
     let (capture, cage) = capture();
     for handles in HANDLES {
         for regularizer in [Regularizer::Laplacian, Regularizer::Temporal, Regularizer::None, Regularizer::Tikhonov] {
-            let options = SolverOptions { handles, regularizer, ..SolverOptions::default() };
+            let options = SolverOptions { handles, regularizer, ..SolverOptions::PAPER };
             let solver = prepare(&capture, &cage, options);
             let frames: Vec<Vec<f64>> = [5, 20, 35].map(|t| frame(&capture, t)).to_vec();
             let views: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
@@ -107,8 +107,8 @@ fn the_points_read_are_never_worse_than_where_the_iteration_starts() {
 #[test]
 fn the_iteration_lowers_the_error_of_the_linear_start() {
     let (capture, cage) = capture();
-    let start = Solver::prepare(&MeanValue, &cage, &capture.rest.points, SolverOptions::default()).unwrap();
-    let solver = prepare(&capture, &cage, SolverOptions::default());
+    let start = Solver::prepare(&MeanValue, &cage, &capture.rest.points, SolverOptions::PAPER).unwrap();
+    let solver = prepare(&capture, &cage, SolverOptions::PAPER);
     for t in [7, 21, 33] {
         let positions = frame(&capture, t);
         let error = |cage: &[f32]| solver.decoder().measure(&[cage], &[&positions])[0].l2;
@@ -121,7 +121,7 @@ fn the_iteration_lowers_the_error_of_the_linear_start() {
 fn bits_depend_on_the_frame_alone() {
     let (capture, cage) = capture();
     for handles in [Handles::MaxVol, Handles::All] {
-        let solver = prepare(&capture, &cage, SolverOptions { handles, ..SolverOptions::default() });
+        let solver = prepare(&capture, &cage, SolverOptions { handles, ..SolverOptions::PAPER });
         let frames: Vec<Vec<f64>> = (0..BATCH).map(|t| frame(&capture, 2 * t)).collect();
         let views: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
         let together = solver.invert(&views);
@@ -143,9 +143,7 @@ fn bits_depend_on_the_frame_alone() {
         }
         let threads = |count| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap();
-            pool.install(|| {
-                prepare(&capture, &cage, SolverOptions { handles, ..SolverOptions::default() }).invert(&views)
-            })
+            pool.install(|| prepare(&capture, &cage, SolverOptions { handles, ..SolverOptions::PAPER }).invert(&views))
         };
         assert_eq!(threads(1), together);
         assert_eq!(threads(3), together);
@@ -156,7 +154,7 @@ fn bits_depend_on_the_frame_alone() {
 fn a_solver_put_together_again_gives_the_same_bits() {
     let (capture, cage) = capture();
     for handles in [Handles::MaxVol, Handles::All] {
-        let solver = prepare(&capture, &cage, SolverOptions { handles, ..SolverOptions::default() });
+        let solver = prepare(&capture, &cage, SolverOptions { handles, ..SolverOptions::PAPER });
         let (normals, gram, weight) = solver.tied().unwrap();
         let parts = SolverParts {
             handles: solver.handles().to_vec(),
@@ -197,10 +195,10 @@ fn collapsed_cages_have_finite_positions() {
 #[test]
 fn free_normals_follow_translations_and_explain_what_a_consistent_cage_poses() {
     let (capture, cage) = capture();
-    let consistent = prepare(&capture, &cage, SolverOptions::default());
+    let consistent = prepare(&capture, &cage, SolverOptions::PAPER);
     let v = cage.vertices().len();
     for handles in HANDLES {
-        let options = SolverOptions { handles, spectrum: 0, ..SolverOptions::default() };
+        let options = SolverOptions { handles, spectrum: 0, ..SolverOptions::PAPER };
         let solver = Solver::prepare(&Green::Free, &cage, &capture.rest.points, options).unwrap();
         let mut posed = vec![Vec::new()];
         consistent.decoder().decode(&[&single(&capture.deformed_cage(17))], &mut posed);

@@ -23,7 +23,7 @@ fn capture() -> (Capture, Cage) {
 }
 
 fn prepare(capture: &Capture, cage: &Cage, handles: Handles) -> Solver {
-    let options = SolverOptions { handles, regularizer: Regularizer::None, ..SolverOptions::default() };
+    let options = SolverOptions { handles, regularizer: Regularizer::None, ..SolverOptions::PAPER };
     Solver::prepare(&MeanValue, cage, &capture.rest.points, options).unwrap()
 }
 
@@ -114,7 +114,7 @@ fn too_few_and_too_many_handles_are_refused() {
     let (unknowns, points) = (cage.vertices().len(), capture.rest.points.len());
     for count in [0, unknowns - 1, points + 1, usize::MAX] {
         for handles in [Handles::Rectangular { count: Some(count) }, Handles::Spread { count: Some(count) }] {
-            let options = SolverOptions { handles, ..SolverOptions::default() };
+            let options = SolverOptions { handles, ..SolverOptions::PAPER };
             let error = Solver::prepare(&MeanValue, &cage, &capture.rest.points, options).unwrap_err();
             assert_eq!(error, PrepareError::HandleCount { count, unknowns, points });
         }

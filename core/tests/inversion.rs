@@ -48,7 +48,7 @@ fn farthest(cage: &[f32], truth: &[Point]) -> f64 {
 fn cages_that_posed_the_model_come_back() {
     let (capture, cage) = capture();
     for handles in HANDLES {
-        let solver = prepare(&capture, &cage, SolverOptions { handles, spectrum: 0, ..SolverOptions::default() });
+        let solver = prepare(&capture, &cage, SolverOptions { handles, spectrum: 0, ..SolverOptions::PAPER });
         for t in [0, 13, 39] {
             let truth = capture.deformed_cage(t);
             let positions = posed(&cage, &capture.rest.points, &truth);
@@ -63,7 +63,7 @@ fn cages_that_posed_the_model_come_back() {
 #[test]
 fn the_measured_error_is_that_of_the_decoded_positions() {
     let (capture, cage) = capture();
-    let solver = prepare(&capture, &cage, SolverOptions::default());
+    let solver = prepare(&capture, &cage, SolverOptions::PAPER);
     let frames: Vec<Vec<f64>> = (0..5).map(|t| frame(&capture, t)).collect();
     let views: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
     let cages = solver.invert(&views);
@@ -86,7 +86,7 @@ fn the_measured_error_is_that_of_the_decoded_positions() {
 #[test]
 fn coordinates_that_have_travelled_decode_to_the_same_bits() {
     let (capture, cage) = capture();
-    let solver = prepare(&capture, &cage, SolverOptions::default());
+    let solver = prepare(&capture, &cage, SolverOptions::PAPER);
     let frame = frame(&capture, 3);
     let cages = solver.invert(&[&frame]);
     let phi = solver.decoder().coordinates();
@@ -102,7 +102,7 @@ fn coordinates_that_have_travelled_decode_to_the_same_bits() {
 #[test]
 fn decoding_follows_double_precision_to_a_few_parts_in_ten_million() {
     let (capture, cage) = capture();
-    let solver = prepare(&capture, &cage, SolverOptions::default());
+    let solver = prepare(&capture, &cage, SolverOptions::PAPER);
     let far: Vec<Point> = capture.deformed_cage(7).iter().map(|p| [p[0] + 1000.0, p[1], p[2]]).collect();
     let rounded: Vec<Point> = far.iter().map(|p| p.map(|x| f64::from(x as f32))).collect();
     let truth = posed(&cage, &capture.rest.points, &rounded);
@@ -118,7 +118,7 @@ fn decoding_follows_double_precision_to_a_few_parts_in_ten_million() {
 fn a_frame_has_the_same_bits_alone_in_any_place_of_a_batch_and_with_any_threads() {
     let (capture, cage) = capture();
     for handles in HANDLES {
-        let options = SolverOptions { handles, ..SolverOptions::default() };
+        let options = SolverOptions { handles, ..SolverOptions::PAPER };
         let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let one = pool(1).install(|| prepare(&capture, &cage, options));
         let many = pool(4).install(|| prepare(&capture, &cage, options));
@@ -145,7 +145,7 @@ fn a_frame_has_the_same_bits_alone_in_any_place_of_a_batch_and_with_any_threads(
 fn the_handle_rows_of_a_frame_give_the_same_cage_as_the_whole_frame() {
     let (capture, cage) = capture();
     for handles in HANDLES.into_iter().filter(|&handles| handles != Handles::All) {
-        let solver = prepare(&capture, &cage, SolverOptions { handles, ..SolverOptions::default() });
+        let solver = prepare(&capture, &cage, SolverOptions { handles, ..SolverOptions::PAPER });
         assert!(!solver.reads_all());
         let whole: Vec<Vec<f64>> = (0..5).map(|t| frame(&capture, t)).collect();
         let rows = |f: &Vec<f64>| -> Vec<f64> {
@@ -165,7 +165,7 @@ fn every_method_follows_a_translation_exactly() {
     let own = SparseMatrix::new(3, m, vec![(0, 0, 1.0), (1, 3, -2.0), (2, 4, 0.5), (2, 7, 0.5)]).unwrap();
     for handles in HANDLES {
         for regularizer in Regularizer::ALL {
-            let options = SolverOptions { handles, regularizer, lambda: 0.1, ..SolverOptions::default() };
+            let options = SolverOptions { handles, regularizer, lambda: 0.1, ..SolverOptions::PAPER };
             let term: &dyn Term = regularizer.term().unwrap_or(&own);
             let solver = Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, options, term).unwrap();
             let here = frame(&capture, 9);
@@ -258,7 +258,7 @@ fn vertices_that_no_point_feels_are_counted_and_placed_by_their_neighbours() {
     let m = cage.vertices().len();
     for handles in HANDLES {
         for regularizer in [Regularizer::None, Regularizer::Laplacian] {
-            let options = SolverOptions { handles, regularizer, ..SolverOptions::default() };
+            let options = SolverOptions { handles, regularizer, ..SolverOptions::PAPER };
             let solver = Solver::prepare(&Deaf(3), &cage, &capture.rest.points, options).unwrap();
             assert_eq!(solver.preparation().rank, m - 3);
             let read = if matches!(handles, Handles::MaxVol | Handles::All) { m - 3 } else { 2 * m };
@@ -286,7 +286,7 @@ fn what_cannot_be_solved_is_refused() {
     let m = cage.vertices().len();
     let refused = |points: &[Point], options| Solver::prepare(&MeanValue, &cage, points, options).unwrap_err();
     let good = &capture.rest.points;
-    let options = SolverOptions::default();
+    let options = SolverOptions::PAPER;
     assert_eq!(refused(&good[..m - 1], options), PrepareError::TooFewPoints { points: m - 1, unknowns: m });
     let mut broken = good.clone();
     broken[17][2] = f64::INFINITY;
@@ -303,7 +303,7 @@ fn what_cannot_be_solved_is_refused() {
 fn a_model_of_few_places_repeated_many_times_is_solved_as_far_as_it_goes() {
     let (capture, cage) = capture();
     let points: Vec<Point> = (0..2_000).map(|i| capture.rest.points[(i % 30) * 60]).collect();
-    let solver = Solver::prepare(&MeanValue, &cage, &points, SolverOptions::default()).unwrap();
+    let solver = Solver::prepare(&MeanValue, &cage, &points, SolverOptions::PAPER).unwrap();
     assert_eq!(solver.preparation().rank, 30);
     let positions: Vec<f64> = points.iter().flatten().copied().collect();
     let found = solver.invert(&[&positions]);
@@ -322,7 +322,7 @@ fn a_model_far_too_small_for_its_cage_is_still_followed_by_every_method() {
             points.iter().flat_map(|p| [1.1 * p[0] + 0.2 * p[1], p[1] - 0.1 * p[0] + 3.0, p[2]]).collect();
         for handles in HANDLES {
             for spectrum in [0, 20] {
-                let options = SolverOptions { handles, spectrum, ..SolverOptions::default() };
+                let options = SolverOptions { handles, spectrum, ..SolverOptions::PAPER };
                 let solver = Solver::prepare(&MeanValue, &cage, &points, options).unwrap();
                 let found = solver.invert(&[&moved]);
                 let error = solver.decoder().measure(&[&found[0]], &[&moved])[0];

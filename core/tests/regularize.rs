@@ -40,7 +40,7 @@ fn every_term_minimises_its_energy() {
     let lambda = 0.3;
     for regularizer in [Regularizer::Laplacian, Regularizer::Differential, Regularizer::Temporal, Regularizer::Matrix] {
         let term: &dyn Term = regularizer.term().unwrap_or(&own);
-        let options = SolverOptions { regularizer, spectrum: m, lambda, ..SolverOptions::default() };
+        let options = SolverOptions { regularizer, spectrum: m, lambda, ..SolverOptions::PAPER };
         let solver = Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, options, term).unwrap();
         let previous = solver.invert_after(None, &[&before]).remove(0);
         let found = as_matrix(&solver.invert_after(Some(&previous), &[&now])[0]);
@@ -68,7 +68,7 @@ fn the_rest_cage_comes_back_where_its_differential_coordinates_are_kept() {
     let (capture, cage) = capture();
     let rest: Vec<f64> = capture.rest.points.as_flattened().to_vec();
     let far = |regularizer| {
-        let options = SolverOptions { regularizer, spectrum: 60, lambda: 100.0, ..SolverOptions::default() };
+        let options = SolverOptions { regularizer, spectrum: 60, lambda: 100.0, ..SolverOptions::PAPER };
         let solver = Solver::prepare(&MeanValue, &cage, &capture.rest.points, options).unwrap();
         let found = solver.invert_after(None, &[&rest]).remove(0);
         let apart = found.iter().zip(cage.vertices().as_flattened()).map(|(a, b)| (f64::from(*a) - b).abs());
@@ -83,7 +83,7 @@ fn the_rest_cage_comes_back_where_its_differential_coordinates_are_kept() {
 fn frames_that_follow_each_other_have_the_same_bits_in_any_batches() {
     let (capture, cage) = capture();
     for handles in [Handles::MaxVol, Handles::Spread { count: None }, Handles::All] {
-        let options = SolverOptions { regularizer: Regularizer::Temporal, handles, ..SolverOptions::default() };
+        let options = SolverOptions { regularizer: Regularizer::Temporal, handles, ..SolverOptions::PAPER };
         let solver = Solver::prepare(&MeanValue, &cage, &capture.rest.points, options).unwrap();
         assert!(solver.follows_previous());
         let frames: Vec<Vec<f64>> = (0..2 * BATCH).map(|t| frame(&capture, t)).collect();
@@ -121,7 +121,7 @@ fn a_matrix_that_is_the_laplacian_does_what_the_laplacian_does() {
     let (capture, cage) = capture();
     let positions = frame(&capture, 8);
     let solve = |regularizer, term: &dyn Term| {
-        let options = SolverOptions { regularizer, ..SolverOptions::default() };
+        let options = SolverOptions { regularizer, ..SolverOptions::PAPER };
         let solver = Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, options, term).unwrap();
         as_matrix(&solver.invert(&[&positions])[0])
     };
@@ -136,7 +136,7 @@ fn a_matrix_that_is_the_laplacian_does_what_the_laplacian_does() {
 fn a_matrix_that_does_not_fit_is_refused() {
     let (capture, cage) = capture();
     let m = cage.vertices().len();
-    let options = SolverOptions { regularizer: Regularizer::Matrix, ..SolverOptions::default() };
+    let options = SolverOptions { regularizer: Regularizer::Matrix, ..SolverOptions::PAPER };
     let points = &capture.rest.points;
     assert_eq!(
         Solver::prepare(&MeanValue, &cage, points, options).unwrap_err(),
@@ -167,7 +167,7 @@ fn the_chosen_threshold_is_the_largest_within_the_bound() {
         [Handles::MaxVol, Handles::Rectangular { count: None }, Handles::Spread { count: None }, Handles::All]
     {
         for regularizer in [Regularizer::Laplacian, Regularizer::Differential, Regularizer::TruncatedSvd] {
-            let options = SolverOptions { handles, regularizer, lambda: 0.001, ..SolverOptions::default() };
+            let options = SolverOptions { handles, regularizer, lambda: 0.001, ..SolverOptions::PAPER };
             let term = regularizer.term().unwrap();
             let reading = analysis.reading(handles).unwrap();
             let measured = |spectrum| {
@@ -194,7 +194,7 @@ fn the_chosen_threshold_is_the_largest_within_the_bound() {
             );
         }
     }
-    let options = SolverOptions::default();
+    let options = SolverOptions::PAPER;
     let reading = analysis.reading(options.handles).unwrap();
     let at = |bound| reading.choose_threshold(options, &CageLaplacian, &samples, bound).unwrap().spectrum;
     assert!(at(0.0) <= at(0.2) && at(0.2) < at(2.0), "{} {} {}", at(0.0), at(0.2), at(2.0));
@@ -205,7 +205,7 @@ fn the_chosen_threshold_is_the_largest_within_the_bound() {
 fn a_threshold_for_frames_that_follow_each_other_is_measured_in_their_order() {
     let (capture, cage) = capture();
     let analysis = Analysis::new(&MeanValue, &cage, &capture.rest.points).unwrap();
-    let options = SolverOptions { regularizer: Regularizer::Temporal, ..SolverOptions::default() };
+    let options = SolverOptions { regularizer: Regularizer::Temporal, ..SolverOptions::PAPER };
     let samples: Vec<Vec<f64>> = (0..20).map(|t| frame(&capture, t)).collect();
     let reading = analysis.reading(options.handles).unwrap();
     let term = options.regularizer.term().unwrap();
@@ -230,7 +230,7 @@ fn a_threshold_for_normals_that_follow_is_measured_on_the_cages_that_are_found()
     let (capture, cage) = capture();
     let analysis = Analysis::new(&Green::Consistent, &cage, &capture.rest.points).unwrap();
     let samples: Vec<Vec<f64>> = (0..4).map(|k| frame(&capture, 9 * k)).collect();
-    let options = SolverOptions::default();
+    let options = SolverOptions::PAPER;
     let reading = analysis.reading(options.handles).unwrap();
     let found = reading.choose_threshold(options, &CageLaplacian, &samples, 0.2).unwrap();
     for &(spectrum, l2) in found.tried.iter().step_by(4) {
@@ -292,7 +292,7 @@ fn terms_know_cages_with_normals() {
     for regularizer in [Regularizer::Laplacian, Regularizer::Differential, Regularizer::Matrix] {
         let own = own_term(v);
         let term: &dyn Term = regularizer.term().unwrap_or(&own);
-        let options = SolverOptions { regularizer, ..SolverOptions::default() };
+        let options = SolverOptions { regularizer, ..SolverOptions::PAPER };
         let solver = Solver::prepare_with(&WithNormals, &cage, &capture.rest.points, options, term).unwrap();
         let found = solver.invert(&[&positions]);
         let error = solver.decoder().measure(&[&found[0]], &[&positions])[0];

@@ -14,10 +14,29 @@ use std::path::PathBuf;
 /// cage of every frame and writes one small .cager file; `decode` turns it back into positions. Try `cager demo` first: it
 /// needs no files.
 #[derive(Debug, Parser)]
-#[command(name = "cager", version, max_term_width = 100, arg_required_else_help = true)]
+#[command(name = "cager", version = env!("CAGER_VERSION"), max_term_width = 100, arg_required_else_help = true)]
 pub(crate) struct Cli {
+    #[command(flatten)]
+    pub(crate) manners: Manners,
+
     #[command(subcommand)]
     pub(crate) command: Command,
+}
+
+/// How every command works and what it says.
+#[derive(Args, Debug)]
+pub(crate) struct Manners {
+    /// Threads to work on [default: one for each processor].
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(crate) threads: Option<u16>,
+
+    /// Say nothing but warnings, errors and what was asked for: no summary, no progress.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    pub(crate) quiet: bool,
+
+    /// Say how long each step took, too.
+    #[arg(short, long, global = true)]
+    pub(crate) verbose: bool,
 }
 
 #[derive(Debug, Subcommand)]
@@ -31,6 +50,7 @@ pub(crate) enum Command {
     Health(HealthArgs),
     Demo(DemoArgs),
     Completions(CompletionsArgs),
+    Man(ManArgs),
 }
 
 /// Recover the cage of every frame of a capture and write a .cager file.
@@ -118,7 +138,7 @@ pub(crate) struct SolverArgs {
     pub(crate) coordinates: CoordinatesArg,
 
     /// Points the inversion reads.
-    #[arg(long, value_enum, default_value_t = HandlesArg::Maxvol)]
+    #[arg(long, value_enum, default_value_t = HandlesArg::Spread)]
     pub(crate) handles: HandlesArg,
 
     /// How many points rectangular and spread read: from the number of the cage's unknowns to that of the model's points
@@ -127,7 +147,7 @@ pub(crate) struct SolverArgs {
     pub(crate) handle_count: Option<usize>,
 
     /// Treatment of the unstable end of the spectrum.
-    #[arg(long, value_enum, default_value_t = RegularizerArg::Laplacian)]
+    #[arg(long, value_enum, default_value_t = RegularizerArg::Differential)]
     pub(crate) regularizer: RegularizerArg,
 
     /// The matrix of --regularizer matrix: sparse, in the Matrix Market format (coordinate), one column per vertex of the cage
@@ -136,7 +156,7 @@ pub(crate) struct SolverArgs {
     pub(crate) regularizer_matrix: Option<PathBuf>,
 
     /// Spectrum threshold: how many of the last singular directions are regularised; "all" of them; or "auto": as many as
-    /// --spectrum-bound allows, measured on frames of the capture [default: 20, or a quarter of a cage with fewer than 40].
+    /// --spectrum-bound allows, measured on frames of the capture [default: 20, or a sixteenth of the unknowns where that is less].
     #[arg(long, value_name = "S", value_parser = spectrum)]
     pub(crate) spectrum: Option<SpectrumArg>,
 
@@ -270,6 +290,16 @@ pub(crate) struct CompletionsArgs {
     /// The shell.
     #[arg(value_enum)]
     pub(crate) shell: clap_complete::Shell,
+}
+
+/// Write the manual pages: cager.1 and one for each command.
+///
+/// Example: cager man -o /usr/local/share/man/man1
+#[derive(Args, Debug)]
+pub(crate) struct ManArgs {
+    /// Folder for the pages; pages of the same names in it are replaced.
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

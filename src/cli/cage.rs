@@ -3,7 +3,7 @@
 use super::args::UpArg;
 use super::cage_args::{CageArgs, GeneralArg};
 use super::design::{self, usual_vertices};
-use super::{grouped, interrupt, print, warn};
+use super::{grouped, interrupt, tell, warn};
 use crate::compare::render::Up;
 use crate::design::{DesignReport, read_frames};
 use crate::picture;
@@ -168,7 +168,7 @@ fn finish(
     }
     commit_together(complete)?;
     warn(&report.warnings);
-    print(&summary(&report, output))
+    tell(&summary(&report, output))
 }
 
 /// Writes a repaired cage with what belongs to it.

@@ -3,7 +3,7 @@
 use super::args::{CompareArgs, CoordinatesArg, UpArg};
 use super::encode::{blame, read_cage};
 use super::outputs::refuse_overwriting;
-use super::{human_bytes, interrupt, plain, print, progress};
+use super::{human_bytes, interrupt, plain, progress};
 use crate::compare::{CompareError, Figures, Job, Progress, Up, compare, page};
 use crate::coordinates;
 use anyhow::{Context, Result};
@@ -61,7 +61,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
         outputs.insert(0, file.complete()?);
     }
     commit_together(outputs)?;
-    print(&summary(&figures, &args.output, bytes, clock.elapsed().as_secs_f64())?)
+    super::tell(&summary(&figures, &args.output, bytes, clock.elapsed().as_secs_f64())?)
 }
 
 /// The systems asked for, each once; all where none is.

@@ -1,7 +1,7 @@
 //! `cager decode`.
 
 use super::args::DecodeArgs;
-use super::{grouped, interrupt, print, progress};
+use super::{grouped, interrupt, progress, tell};
 use crate::decode;
 use anyhow::Result;
 use std::time::Instant;
@@ -16,7 +16,7 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     let result = decode::decode(&args.input, &args.output, &mut |done| bar.set_position(done as u64));
     bar.finish_and_clear();
     result?;
-    print(&format!(
+    tell(&format!(
         "{}: {} frames of {} points in {:.3} s\n",
         args.output.display(),
         grouped(frames as u64),

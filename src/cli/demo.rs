@@ -3,7 +3,7 @@
 use super::args::DemoArgs;
 use super::encode::write_report;
 use super::own_service::OwnService;
-use super::{grouped, human_bytes, interrupt, print, progress};
+use super::{grouped, human_bytes, interrupt, progress, tell};
 use crate::decode;
 use crate::encode::Encoded;
 use crate::plot::error_plot;
@@ -78,7 +78,7 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
     let mut plot = AtomicFile::create(folder.join("errors.svg"))?;
     plot.write_all(error_plot(&title, &l2, &linf).as_bytes())?;
     plot.commit()?;
-    print(&table(&report, &steps, decode_seconds, folder)?)
+    tell(&table(&report, &steps, decode_seconds, folder)?)
 }
 
 fn as_model(cage: &Cage) -> Model {

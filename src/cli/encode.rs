@@ -3,7 +3,7 @@
 use super::args::{CoordinatesArg, EncodeArgs, SolverArgs, SpectrumArg, StyleArg};
 use super::design;
 use super::outputs::refuse_overwriting;
-use super::{grouped, human_bytes, interrupt, plain, print, progress, warn};
+use super::{grouped, human_bytes, interrupt, is_verbose, plain, progress, tell, warn};
 use crate::coordinates;
 use crate::design::{DesignReport, read_frames};
 use crate::encode::{self, ChooseSpectrum, Encoded, Job, sample_frames};
@@ -15,7 +15,7 @@ use cager_client::FrameSource;
 use cager_client::messages::SessionOptions;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{PrepareError, Solver, SolverOptions, check_options};
+use cager_core::inversion::{PrepareError, Solver, SolverOptions, check_options, usual_spectrum};
 use cager_core::mesh::{Model, TriMesh};
 use cager_core::regularize::{Regularizer, SparseMatrix, Term};
 use cager_formats::{AtomicFile, CompleteFile, FrameReader, commit_together, open_frames, read_matrix, read_model};
@@ -185,7 +185,7 @@ fn elsewhere(args: &EncodeArgs, address: &str, rest: &Model, cage: Option<&Cage>
     let EncodedRemotely { mut encoded, session, .. } = result?;
     encoded.report.seconds.read += read_seconds;
     finish(args, encoded, report_file, clock)?;
-    print(&format!("  service {}, session {}\n", plain(address), plain(&session)))
+    tell(&format!("  service {}, session {}\n", plain(address), plain(&session)))
 }
 
 /// What comes before the work, so that outputs that cannot be written cost no waiting.
@@ -207,7 +207,7 @@ fn finish(args: &EncodeArgs, encoded: Encoded, report_file: Option<AtomicFile>, 
     let report_file = report_file.map(|file| write_report(file, &report)).transpose()?;
     commit_together(report_file.into_iter().chain([container]).collect())?;
     warn(&report.warnings);
-    print(&summary(&report, &args.output))
+    tell(&summary(&report, &args.output))
 }
 
 /// Errors of the mathematics know vertices and points; the user knows files.
@@ -277,7 +277,7 @@ fn solver_for(
             .context("--handle-count: maxvol and all read a number of points of their own; leave it out")?,
         regularizer: args.regularizer.into(),
         spectrum: match args.spectrum {
-            None => coordinates::default_spectrum(unknowns),
+            None => usual_spectrum(unknowns),
             Some(SpectrumArg::Threshold(s)) => s,
             Some(SpectrumArg::All) => unknowns,
             Some(SpectrumArg::Auto) => 0,
@@ -340,6 +340,21 @@ pub(super) fn write_report(mut file: AtomicFile, report: &Report) -> Result<Comp
     Ok(file.complete()?)
 }
 
+/// A length to three digits.
+fn significant(length: f64) -> String {
+    if length == 0.0 || !length.is_finite() {
+        return length.to_string();
+    }
+    let digits = 2 - length.abs().log10().floor() as i32;
+    if (0..=8).contains(&digits) {
+        format!("{length:.*}", digits as usize)
+    } else if digits < 0 && digits > -8 {
+        format!("{length:.0}")
+    } else {
+        format!("{length:.2e}")
+    }
+}
+
 fn summary(report: &Report, output: &Path) -> String {
     let chosen = report.spectrum_choice.as_ref().map_or_else(String::new, |choice| {
         format!(
@@ -356,12 +371,30 @@ fn summary(report: &Report, output: &Path) -> String {
             refined.elements, refined.refinements, refined.change
         )
     });
+    let worst = report.error.worst.map_or_else(String::new, |worst| {
+        let point = worst.point.map_or_else(String::new, |point| format!("point {point} of "));
+        format!(
+            "  worst   {point}frame {}: off by {} where the rest pose is {} across\n",
+            worst.frame,
+            significant(worst.distance),
+            significant(report.diagonal)
+        )
+    });
+    let s = &report.seconds;
+    let steps = if is_verbose() {
+        format!(
+            "  steps   read {:.3} s, coordinates {:.3} s, handles {:.3} s, SVD {:.3} s, inversion {:.3} s, errors {:.3} s, writing {:.3} s\n",
+            s.read, s.coordinates, s.maxvol, s.svd, s.invert, s.measure, s.write
+        )
+    } else {
+        String::new()
+    };
     format!(
         "{}: {} frames of {} points as cages of {} vertices\n\
          \x20 size    {} from {}: {:.1} times smaller, {:.2} bits per point and frame\n\
-         \x20 error   L2 {:.4} % mean, {:.4} % max; L∞ {:.3} % mean, {:.3} % max (of the rest diagonal); KG {:.3} %\n\
+         \x20 error   L2 {:.4} % mean, {:.4} % max; L∞ {:.3} % mean, {:.3} % max (of the rest diagonal); KG {:.3} %\n{worst}\
          \x20 system  condition {:.1} (all points {:.1}), rank {} of {}, affine reproduction {:.1e}\n\
-         {refined}{chosen}\x20 time    {:.3} s\n",
+         {refined}{chosen}\x20 time    {:.3} s\n{steps}",
         output.display(),
         grouped(report.frames as u64),
         grouped(report.points as u64),

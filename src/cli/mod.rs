@@ -12,6 +12,8 @@ mod encode;
 mod health;
 mod inspect;
 mod interrupt;
+mod manners;
+mod manual;
 mod outputs;
 mod own_service;
 mod progress;
@@ -19,12 +21,18 @@ pub(crate) mod serve;
 
 use args::{Cli, Command};
 use clap::{CommandFactory, Parser};
+pub(crate) use manners::{is_quiet, is_verbose, tell};
 use std::io::Write;
 use std::process::ExitCode;
 
 /// Runs the command given to this process. Exit status 0 done, 1 failed, 2 wrong usage.
 pub fn run() -> ExitCode {
-    let result = match Cli::parse().command {
+    let Cli { manners, command } = Cli::parse();
+    if let Err(error) = manners.adopt() {
+        let _ = writeln!(std::io::stderr(), "cager: {error:#}");
+        return ExitCode::FAILURE;
+    }
+    let result = match command {
         Command::Encode(args) => encode::run(&args),
         Command::Decode(args) => decode::run(&args),
         Command::Inspect(args) => inspect::run(&args),
@@ -38,6 +46,7 @@ pub fn run() -> ExitCode {
             clap_complete::generate(args.shell, &mut Cli::command(), "cager", &mut script);
             print(&String::from_utf8_lossy(&script))
         }
+        Command::Man(args) => manual::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,13 +1,17 @@
 //! Progress on terminals, silence in pipes.
 
+use super::is_quiet;
 use cager_proto::cage_messages::CageProgress;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 
-/// A bar over frames on stderr; hidden where stderr is not a terminal.
+/// A bar over frames on stderr; hidden where stderr is not a terminal, and by --quiet.
 pub(crate) fn frames(what: &'static str, total: usize) -> ProgressBar {
-    let target =
-        if std::io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+    let target = if std::io::stderr().is_terminal() && !is_quiet() {
+        ProgressDrawTarget::stderr()
+    } else {
+        ProgressDrawTarget::hidden()
+    };
     let style = ProgressStyle::with_template("{msg:>9} {bar:40} {pos}/{len} frames, {per_sec}, {eta} left");
     let bar = ProgressBar::with_draw_target(Some(total as u64), target).with_message(what);
     match style {
@@ -16,7 +20,7 @@ pub(crate) fn frames(what: &'static str, total: usize) -> ProgressBar {
     }
 }
 
-/// A bar over steps that differ in length, on stderr; hidden where stderr is not a terminal.
+/// A bar over steps that differ in length, on stderr; hidden where stderr is not a terminal, and by --quiet.
 pub(crate) fn steps() -> ProgressBar {
     let bar = frames("", 1);
     match ProgressStyle::with_template("{msg:>24} {bar:40} {elapsed}") {

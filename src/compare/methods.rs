@@ -57,6 +57,7 @@ impl Method {
             (Handles::MaxVol, Regularizer::Differential) => "k-differential",
             (Handles::MaxVol, Regularizer::Temporal) => "k-temporal",
             (Handles::Spread { .. }, Regularizer::None) => "k-spread-data",
+            (Handles::Spread { .. }, Regularizer::Differential) => "k-usual",
             (Handles::Spread { .. }, _) => "k-spread",
             (Handles::Rectangular { .. }, Regularizer::None) => "k-rectangular-data",
             (Handles::Rectangular { .. }, _) => "k-rectangular",
@@ -145,6 +146,7 @@ pub(crate) fn methods(unknowns: usize, usual: usize, damping: f64, in_order: boo
         all.push(Method::new(handles, Regularizer::None, 0));
         all.push(curve(Method::new(handles, Regularizer::Laplacian, usual)));
     }
+    all.push(curve(Method::new(Handles::Spread { count: None }, Regularizer::Differential, usual)));
     all.push(Method::new(Handles::MaxVol, Regularizer::Differential, usual));
     if in_order {
         all.push(Method::new(Handles::MaxVol, Regularizer::Temporal, usual));

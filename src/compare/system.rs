@@ -6,9 +6,8 @@ use super::noise::{RADIUS, noisy};
 use super::sample::{Frame, Sample};
 use super::track::{Motion, Shape, Track};
 use super::{CompareError, Job, Progress};
-use crate::coordinates::default_spectrum;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{Analysis, BATCH, Handles, PrepareError, Reading, Solver, SolverOptions};
+use cager_core::inversion::{Analysis, BATCH, Handles, PrepareError, Reading, Solver, SolverOptions, usual_spectrum};
 use cager_core::regularize::Regularizer;
 use rayon::prelude::*;
 
@@ -63,7 +62,7 @@ pub(super) fn study(
     (progress.tell)(&format!("{name}: swaps"), 0, 1);
     let (spectra, swaps, vectors) = (Spectra::of(&analysis), Swaps::of(&analysis), Vectors::of(&analysis));
     let unknowns = analysis.coordinates().ncols();
-    let usual = default_spectrum(unknowns);
+    let usual = usual_spectrum(unknowns);
     let damping = spectra.handles[spectra.handles.len().saturating_sub(usual + 1)];
 
     let mut subjects: Vec<Subject> =
@@ -71,7 +70,7 @@ pub(super) fn study(
     subjects.extend(noise_methods(unknowns, usual, damping).into_iter().map(Subject::Noise));
     let start = analysis.handles().start.clone();
     let drawn = draws(unknowns, job.rest.points.len()).into_iter().chain([("pivoted LU".to_owned(), start)]);
-    let regularised = SolverOptions { spectrum: usual, ..SolverOptions::default() };
+    let regularised = SolverOptions { spectrum: usual, ..SolverOptions::PAPER };
     for (choice, rows) in drawn {
         for options in [data_alone(), regularised] {
             subjects.push(Subject::Draw(choice.clone(), rows.clone(), options));

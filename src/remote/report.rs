@@ -1,7 +1,7 @@
 //! The report of a capture that was encoded elsewhere, from its container.
 
 use super::Steps;
-use crate::report::{Bytes, Condition, Errors, FrameError, MaxVol, Report, Seconds};
+use crate::report::{Bytes, Condition, Errors, FrameError, MaxVol, Report, Seconds, WorstError};
 use cager_client::messages::PreparationSeconds;
 use cager_proto::container::{ContainerReader, Error};
 use std::io::{Read, Seek};
@@ -24,11 +24,16 @@ pub(super) fn report(container: impl Read + Seek) -> Result<Unfinished, Error> {
     let summary =
         container.summary()?.ok_or_else(|| Error::Corrupt { offset: 0, what: "it has no summary".to_owned() })?;
     let per_frame = container.errors()?;
+    let rest = container.rest()?;
     let header = container.header();
+    let diagonal = cager_core::mesh::diagonal(&rest.points);
+    let per_frame: Vec<FrameError> =
+        per_frame.iter().map(|e| FrameError { l2: e.l2.into(), linf: e.linf.into() }).collect();
     Ok(Unfinished(Report {
         points: header.points as usize,
         triangles: summary.triangles as usize,
         frames: container.frames(),
+        diagonal,
         unknowns: header.rows_per_frame as usize,
         cage_vertices: header.cage_vertices as usize,
         cage_faces: header.cage_faces as usize,
@@ -57,7 +62,8 @@ pub(super) fn report(container: impl Read + Seek) -> Result<Unfinished, Error> {
             linf_mean: summary.error.linf_mean,
             linf_max: summary.error.linf_max,
             kg_percent: summary.error.kg_percent,
-            per_frame: per_frame.iter().map(|e| FrameError { l2: e.l2.into(), linf: e.linf.into() }).collect(),
+            worst: WorstError::of_frames(&per_frame, diagonal),
+            per_frame,
         },
         bytes: Bytes { capture: summary.capture_bytes, output: 0, ratio: 0.0, bits_per_vertex_per_frame: 0.0 },
         seconds: Seconds::default(),

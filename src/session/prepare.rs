@@ -7,7 +7,7 @@ use crate::problem::{self, ApiError};
 use crate::store::Content;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions, check_options};
+use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions, check_options, usual_spectrum};
 use cager_core::mesh::{Model, TriMesh};
 use cager_core::regularize::{Regularizer, SparseMatrix, Term, TermError};
 use cager_formats::{MeshFormat, read_matrix_bytes, read_model_bytes};
@@ -73,7 +73,7 @@ impl Choices {
         SolverOptions {
             handles: self.handles,
             regularizer: self.regularizer,
-            spectrum: self.spectrum.map_or_else(|| coordinates::default_spectrum(unknowns), |s| s as usize),
+            spectrum: self.spectrum.map_or_else(|| usual_spectrum(unknowns), |s| s as usize),
             lambda: self.lambda,
         }
     }

@@ -3,6 +3,7 @@
 mod cage;
 mod compare;
 mod decode;
+mod defaults;
 mod demo;
 mod encode;
 #[cfg(unix)]
@@ -12,6 +13,7 @@ mod harmonic;
 mod inspect;
 #[cfg(target_os = "linux")]
 mod interrupted;
+mod manners;
 mod real_data;
 mod real_green;
 mod real_harmonic;

@@ -66,7 +66,7 @@ fn reproduces_the_reference(capture: &str) {
         cages += 1;
         let cage = cage_of(&root.join(format!("{name}.obj")));
         let m = cage.vertices().len();
-        let options = |handles, spectrum| SolverOptions { handles, spectrum, ..SolverOptions::default() };
+        let options = |handles, spectrum| SolverOptions { handles, spectrum, ..SolverOptions::PAPER };
         let all = run(&folder, &rest, &cage, options(Handles::All, 0));
         assert_eq!((all.points, all.frames), (rest.points.len(), expected["frames"].as_u64().unwrap_or(0) as usize));
         let e = &all.error;

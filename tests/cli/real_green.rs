@@ -33,7 +33,7 @@ fn consistent_cages_are_more_stable(capture: &str, handles: &[Handles]) {
     for &handles in handles {
         let found = [&Green::Free, &Green::Consistent].map(|system| {
             let dir = Dir::new();
-            let options = SolverOptions { handles, ..SolverOptions::default() };
+            let options = SolverOptions { handles, ..SolverOptions::PAPER };
             let report = run_with(&dir, system, &folder, &rest, &cage, options);
             let size = diagonal(&rest.points);
             let (mean, most) = spikes(&read_cages(&dir.path("out.cager")), cage.vertices().len(), size);

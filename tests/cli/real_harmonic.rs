@@ -13,7 +13,7 @@ fn is_refined_and_inverts(capture: &str) {
     let rest = read_model(&folder.join("rest.obj")).expect("a rest pose");
     let cage = cage_of(&folder.join("cage350.obj"));
     let dir = Dir::new();
-    let options = SolverOptions::default();
+    let options = SolverOptions::PAPER;
     let found = run_with(&dir, &Harmonic, &folder, &rest, &cage, options);
     let usual = run_with(&dir, &MeanValue, &folder, &rest, &cage, options);
     eprintln!(

@@ -17,7 +17,7 @@ fn spread_comes_near_all(capture: &str) {
     let count = None;
     for spectrum in [0, 20] {
         let l2 = |handles| {
-            let report = run(&folder, &rest, &cage, SolverOptions { handles, spectrum, ..SolverOptions::default() });
+            let report = run(&folder, &rest, &cage, SolverOptions { handles, spectrum, ..SolverOptions::PAPER });
             assert_eq!(
                 report.handle_indices.len(),
                 match handles {
@@ -132,7 +132,7 @@ fn make(solver: &Solver, frames: &[Vec<f64>]) -> Made {
 #[test]
 fn maximum_volume_lowers_the_condition_number() {
     for Real { name, rest, cage, .. } in captures(&["horse-gallop", "samba", "makehuman-cmu-walk", "chickenCrossing"]) {
-        let solver = Solver::prepare(&MeanValue, &cage, &rest.points, SolverOptions::default()).expect("a solver");
+        let solver = Solver::prepare(&MeanValue, &cage, &rest.points, SolverOptions::PAPER).expect("a solver");
         let found = solver.preparation();
         eprintln!(
             "{name}: condition {:.1} of the handles, {:.1} of all points",
@@ -149,7 +149,7 @@ fn sub_spectral_regularisation_calms_cages_at_less_error_than_global_regularisat
     {
         let analysis = Analysis::new(&MeanValue, &cage, &rest.points).expect("an analysis");
         let with = |regularizer, spectrum| {
-            let options = SolverOptions { regularizer, spectrum, ..SolverOptions::default() };
+            let options = SolverOptions { regularizer, spectrum, ..SolverOptions::PAPER };
             make(&analysis.solver(options).expect("a solver"), &frames)
         };
         let plain = with(Regularizer::None, 0);
@@ -187,7 +187,7 @@ fn noise_raises_the_largest_error_by_about_its_own_size() {
     };
     for Real { name, rest, cage, frames } in captures(&["horse-gallop", "samba", "makehuman-cmu-walk"]) {
         for handles in [Handles::MaxVol, Handles::Spread { count: None }, Handles::All] {
-            let options = SolverOptions { handles, ..SolverOptions::default() };
+            let options = SolverOptions { handles, ..SolverOptions::PAPER };
             let solver = Solver::prepare(&MeanValue, &cage, &rest.points, options).expect("a solver");
             let clean = make(&solver, &frames);
             let noisy: Vec<Vec<f64>> = frames

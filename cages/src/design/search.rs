@@ -6,7 +6,7 @@ use super::run::{Best, Leg, Run};
 use super::samples::{Judged, evenly};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
-use cager_core::inversion::{BATCH, Handles, Solver, SolverOptions};
+use cager_core::inversion::{BATCH, Solver, SolverOptions};
 use std::ops::ControlFlow;
 
 /// Vertices to begin with, and at most.
@@ -89,12 +89,7 @@ impl Run<'_> {
     /// cage.
     fn encoded_error(&self, best: &Best, frames: &[Vec<f64>]) -> f64 {
         let Ok(cage) = Cage::new(best.mesh.clone()) else { return f64::INFINITY };
-        let unknowns = cage.vertices().len();
-        let options = SolverOptions {
-            handles: Handles::Spread { count: None },
-            spectrum: 20.min(unknowns / 16),
-            ..SolverOptions::default()
-        };
+        let options = SolverOptions::usual(cage.vertices().len());
         let Ok(solver) = Solver::prepare(&MeanValue, &cage, &self.rest.points, options) else { return f64::INFINITY };
         let held_back: Vec<&[f64]> =
             frames.iter().skip(usize::from(frames.len() > 1)).step_by(2).map(Vec::as_slice).collect();

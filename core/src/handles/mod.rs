@@ -12,10 +12,9 @@ pub(crate) mod interpolation;
 pub(crate) mod rectangular;
 
 /// Which points the inversion reads.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Handles {
     /// As many as unknowns, of maximum volume: stable, and a frame costs microseconds.
-    #[default]
     MaxVol,
     /// Those of maximum volume, and the rows of the largest leverage beside them (Mikhalev and Oseledets 2018): for comparison.
     Rectangular {
@@ -30,6 +29,13 @@ pub enum Handles {
     },
     /// Every point: least squares, the lowest error.
     All,
+}
+
+impl Default for Handles {
+    /// On four captures 19 to 32 % less error than maximum volume alone.
+    fn default() -> Self {
+        Self::Spread { count: None }
+    }
 }
 
 impl Handles {

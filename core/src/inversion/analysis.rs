@@ -70,7 +70,7 @@ impl Analysis {
         copies: usize,
     ) -> Result<Self, PrepareError> {
         let m = system.unknowns(cage);
-        check(points, m, SolverOptions { spectrum: 0, ..SolverOptions::default() })?;
+        check(points, m, SolverOptions { spectrum: 0, ..SolverOptions::PAPER })?;
         let diagonal = diagonal(points);
         let clock = Instant::now();
         let columns = system.columns(cage);
@@ -134,7 +134,7 @@ impl Analysis {
     /// As [`Solver::prepare`].
     pub fn reading(&self, handles: Handles) -> Result<Reading<'_>, PrepareError> {
         let clock = Instant::now();
-        let options = SolverOptions { handles, spectrum: 0, ..SolverOptions::default() };
+        let options = SolverOptions { handles, spectrum: 0, ..SolverOptions::PAPER };
         check_options(self.phi.nrows(), self.phi.ncols(), options)?;
         let decomposed = Decomposed::new(self.phi.as_ref(), &self.points, &self.basis, &self.spectra, handles)?;
         Ok(Reading { analysis: self, decomposed, seconds: clock.elapsed().as_secs_f64() })

@@ -18,7 +18,7 @@ pub use crate::handles::Handles;
 pub use analysis::Analysis;
 pub use consistent::{Convergence, Outcome};
 pub use error::PrepareError;
-pub use options::SolverOptions;
+pub use options::{SolverOptions, usual_spectrum};
 pub use parts::{SolverParts, TiedParts};
 pub use prepare::{Preparation, check_options, coordinates_fit};
 pub use pull::Pull;

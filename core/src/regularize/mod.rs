@@ -23,9 +23,10 @@ pub(crate) use spectral::{SpectralMap, Spectrum, spectral_map};
 pub enum Regularizer {
     /// Smooth the last s singular directions by the cage Laplacian: minimise `λ‖Δ C‖² + ‖Φ□ C − H‖²` over them, the others
     /// fixed by the data (Eq. 5–7). See [`CageLaplacian`].
-    #[default]
     Laplacian,
-    /// As the Laplacian, but keep the rest cage's shape: `λ‖Δ C − Δ C_R‖²`. See [`Differential`].
+    /// As the Laplacian, but keep the rest cage's shape: `λ‖Δ C − Δ C_R‖²`, so that a frame that equals the rest pose gives the rest
+    /// cage. See [`Differential`].
+    #[default]
     Differential,
     /// As the Laplacian, but keep the shape of the previous frame's cage: `λ‖Δ C_t − Δ C_{t−1}‖²`. Makes every frame depend on
     /// the ones before it. See [`Temporal`].

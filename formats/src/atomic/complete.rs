@@ -5,7 +5,7 @@ use std::io::{self, Seek};
 use std::path::{Path, PathBuf};
 
 use super::temporary::{self, Live, Temporary};
-use super::{Place, anonymous, hide_temporary};
+use super::{Place, anonymous, hide_temporary, inherit};
 use crate::error::Error;
 
 /// A file whose contents are durable but which does not have its name yet; dropped it leaves nothing.
@@ -45,6 +45,7 @@ impl CompleteFile {
     /// Gives the file its name and says how to take that back. `keep` saves what had the name before.
     fn put_in_place(&mut self, live: &mut Live, keep: bool) -> io::Result<Undo> {
         let target = &self.place.target;
+        inherit(&self.file, target)?;
         if self.temporary.is_none() {
             match anonymous::link(&self.file, target) {
                 Err(cause) if cause.kind() == io::ErrorKind::AlreadyExists => {
@@ -191,6 +192,28 @@ mod tests {
             assert!(!error.contains(".cager-"), "{error}");
             let before: &[_] = if old { &[("a", "old"), ("b", "")] } else { &[("b", "")] };
             assert_eq!(contents(folder.path()), expected(before), "{named} {old}");
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_file_that_replaces_another_keeps_its_mode_and_its_links() {
+        use std::os::unix::fs::{PermissionsExt, symlink};
+        for named in [false, true] {
+            let folder = tempdir().unwrap();
+            let [old, link, dangling] = ["old", "link", "dangling"].map(|name| folder.path().join(name));
+            fs::write(&old, "old").unwrap();
+            fs::set_permissions(&old, fs::Permissions::from_mode(0o640)).unwrap();
+            symlink("old", &link).unwrap();
+            symlink("made", &dangling).unwrap();
+            commit_together(vec![begin(&link, named), begin(&dangling, named)]).unwrap();
+            assert_eq!(fs::metadata(&old).unwrap().permissions().mode() & 0o777, 0o640, "{named}");
+            assert!(
+                fs::symlink_metadata(&link).unwrap().is_symlink()
+                    && fs::symlink_metadata(&dangling).unwrap().is_symlink()
+            );
+            assert_eq!(contents(folder.path())["old"], "new");
+            assert_eq!(contents(folder.path())["made"], "new", "{named}");
         }
     }
 

@@ -30,7 +30,7 @@ impl Place {
     fn new(path: &Path) -> Result<Self, Error> {
         let target = match fs::canonicalize(path) {
             Ok(target) => target,
-            Err(cause) if cause.kind() == io::ErrorKind::NotFound => path.to_owned(),
+            Err(cause) if cause.kind() == io::ErrorKind::NotFound => behind_links(path),
             Err(cause) => return Err(Error::write(path, cause)),
         };
         if target.file_name().is_none() {
@@ -50,6 +50,30 @@ impl Place {
     fn sync_folder(&self) -> io::Result<()> {
         sync_folder(&self.folder)
     }
+}
+
+/// What a symbolic link to a file that is yet to be made names; a path that is no link as it is.
+fn behind_links(path: &Path) -> PathBuf {
+    const MOST: usize = 40;
+    let mut path = path.to_owned();
+    for _ in 0..MOST {
+        let Ok(next) = fs::read_link(&path) else { break };
+        // An absolute one replaces the whole.
+        path = path.parent().unwrap_or(Path::new("")).join(next);
+    }
+    path
+}
+
+/// Gives a new file the mode and, where it is allowed to, the owner of the one that it replaces.
+fn inherit(file: &File, old: &Path) -> io::Result<()> {
+    let Ok(found) = fs::metadata(old) else { return Ok(()) };
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::{MetadataExt, fchown};
+        // Only root may give files away; before the mode, since a change of owner clears parts of it.
+        let _ = fchown(file, Some(found.uid()), Some(found.gid()));
+    }
+    file.set_permissions(found.permissions())
 }
 
 /// Makes the names in a folder durable, where the system can.

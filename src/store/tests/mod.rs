@@ -72,7 +72,7 @@ pub(crate) fn content() -> Content {
 }
 
 pub(crate) fn prepare(handles: Handles) -> Solver {
-    prepare_with(SolverOptions { handles, ..SolverOptions::default() })
+    prepare_with(SolverOptions { handles, ..SolverOptions::PAPER })
 }
 
 pub(crate) fn prepare_with(options: SolverOptions) -> Solver {

@@ -33,7 +33,7 @@ fn a_solver_comes_back_the_same_to_the_bit() {
     ];
     for (i, (handles, regularizer)) in kinds.into_iter().enumerate() {
         let key = ContentKey([i as u8; 32]);
-        let solver = prepare_with(SolverOptions { handles, regularizer, ..SolverOptions::default() });
+        let solver = prepare_with(SolverOptions { handles, regularizer, ..SolverOptions::PAPER });
         assert!(store.prepared(&key).unwrap().is_none());
         store.put_prepared(&key, &solver).unwrap();
         let found = store.prepared(&key).unwrap().unwrap();
@@ -205,7 +205,7 @@ fn loading_takes_milliseconds() {
     let store = Store::open(folder.path(), Arc::new(LocalDisk)).unwrap().store;
     let capture = Capture::new(&Options::default());
     let cage = Cage::new(capture.cage.clone()).unwrap();
-    let solver = Solver::prepare(&MeanValue, &cage, &capture.rest.points, SolverOptions::default()).unwrap();
+    let solver = Solver::prepare(&MeanValue, &cage, &capture.rest.points, SolverOptions::PAPER).unwrap();
     let clock = Instant::now();
     store.put_prepared(&KEY, &solver).unwrap();
     println!("put {} MB: {:?}", solver.size_bytes() / 1_000_000, clock.elapsed());
