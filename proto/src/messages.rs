@@ -32,7 +32,7 @@ pub struct SessionOptions {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(pattern = "^(mvc|harmonic|green|green-free)$"))]
     pub coordinates: Option<String>,
-    /// Points the inversion reads: `maxvol`, `rectangular`, `spread` or `all`.
+    /// Points the inversion reads: `spread` (where it is left out), `maxvol`, `rectangular` or `all`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(pattern = "^(maxvol|rectangular|spread|all)$"))]
     pub handles: Option<String>,
@@ -41,15 +41,17 @@ pub struct SessionOptions {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(minimum = 1))]
     pub handle_count: Option<u32>,
-    /// Treatment of the unstable end of the spectrum: `laplacian`, `differential`, `temporal` (frames have
-    /// to come in order), `matrix` (with a part `regularizer_matrix`), `none`, `truncated-svd`, `tikhonov` or `global`.
+    /// Treatment of the unstable end of the spectrum: `differential` (where it is left out: keeps the shape of the rest cage),
+    /// `laplacian`, `temporal` (frames have to come in order), `matrix` (with a part `regularizer_matrix`), `none`, `truncated-svd`,
+    /// `tikhonov` or `global`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(
         feature = "schema",
         schema(pattern = "^(laplacian|differential|temporal|matrix|none|truncated-svd|tikhonov|global)$")
     )]
     pub regularizer: Option<String>,
-    /// Spectrum threshold: how many of the last singular directions are regularised.
+    /// Spectrum threshold: how many of the last singular directions are regularised; 20, or a sixteenth of the unknowns where that
+    /// is less, where it is left out.
     #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "threshold")]
     pub spectrum: Option<u32>,
     /// Weight of the regularisation.
