@@ -12,6 +12,7 @@ mod harmonic;
 mod inspect;
 #[cfg(target_os = "linux")]
 mod interrupted;
+mod mistakes;
 mod real_data;
 mod real_green;
 mod real_harmonic;
