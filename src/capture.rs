@@ -1,6 +1,7 @@
 //! From solved frames to a container and its report: what `encode` and the service share, so that both write the same bytes.
 
 use crate::report::{Bytes, Condition, Errors, FrameError, MaxVol, Report, Seconds, WorstError};
+use crate::timing::counted_from_zero;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{Solver, SolverOptions};
@@ -57,6 +58,8 @@ pub struct CaptureWriter<W: Write> {
     squared: f64,
     spread: f64,
     diagonal: f64,
+    /// Numbers of the frames; none where they are 0, 1, 2, …
+    numbers: Vec<f64>,
     /// Frame whose cage lies farthest from the origin, and how far.
     farthest: (usize, f64),
 }
@@ -70,7 +73,14 @@ impl<W: Write> CaptureWriter<W> {
         let writer = ContainerWriter::new(out, &header(encoding), encoding.rest, encoding.cage.mesh())?;
         let report = begin_report(encoding);
         let diagonal = encoding.solver.diagonal();
-        Ok(Self { writer, report, squared: 0.0, spread: 0.0, diagonal, farthest: (0, 0.0) })
+        Ok(Self { writer, report, squared: 0.0, spread: 0.0, diagonal, numbers: Vec::new(), farthest: (0, 0.0) })
+    }
+
+    /// Says which numbers the frames have, one for each that is going to be written.
+    pub fn number_frames(&mut self, numbers: Vec<f64>) {
+        if !counted_from_zero(&numbers) {
+            self.numbers = numbers;
+        }
     }
 
     /// Adds the next frame: its cage, m × 3, and its error.
@@ -107,6 +117,10 @@ impl<W: Write> CaptureWriter<W> {
         error.worst = WorstError::of_frames(&error.per_frame, self.diagonal);
         self.report.bytes.capture =
             self.report.bytes.capture * 4 + 12 * (self.report.points as u64) * (self.report.frames as u64);
+        if !self.numbers.is_empty() {
+            self.writer.add_frame_numbers(&self.numbers)?;
+        }
+        self.report.frame_numbers = self.numbers;
         let summary = summary(&self.report);
         Ok((self.writer.finish(Some(&summary))?, self.report))
     }
@@ -120,6 +134,7 @@ fn begin_report(encoding: &Encoding<'_>) -> Report {
         triangles: encoding.rest.faces.arities().iter().map(|&a| (a as usize).saturating_sub(2)).sum(),
         frames: 0,
         diagonal: solver.diagonal(),
+        frame_numbers: Vec::new(),
         unknowns: solver.decoder().unknowns(),
         cage_vertices: encoding.cage.vertices().len(),
         cage_faces: encoding.cage.faces().len(),
@@ -164,10 +179,14 @@ pub fn preparation_warnings(options: SolverOptions, solver: &Solver) -> Vec<Stri
     let unknowns = solver.decoder().unknowns();
     let mut warnings = Vec::new();
     if !found.outside.is_empty() {
+        let (outside, points) = (found.outside.len(), solver.decoder().points());
+        let what = if 2 * outside > points {
+            "see what `cager cage --check` says of it, above all of units and axes"
+        } else {
+            "points outside follow the cage too, but an enlarged cage usually gives lower errors"
+        };
         warnings.push(format!(
-            "{} of {} points lie outside the cage, by up to {:.2} % of the rest diagonal; its coordinates are defined there too, but an enlarged cage usually gives lower errors",
-            found.outside.len(),
-            solver.decoder().points(),
+            "{outside} of {points} points lie outside the cage, by up to {:.2} % of the rest diagonal; {what}",
             100.0 * found.outside_distance
         ));
     }

@@ -1,6 +1,7 @@
 //! Containers back to positions.
 
 use crate::coordinates;
+use crate::timing::Timing;
 use cager_core::cage::{Cage, CageError};
 use cager_core::coordinates::CoordinatesError;
 use cager_core::decode::Decoder;
@@ -22,6 +23,12 @@ pub enum DecodeError {
         path: PathBuf,
         /// What went wrong; part of the message, so not a source as well.
         cause: container::Error,
+    },
+    /// The container is a pipe or a device.
+    #[error("{}: is a pipe or a device, and frames are read from anywhere in a .cager file; save it as a file first", .path.display())]
+    NotAFile {
+        /// The container.
+        path: PathBuf,
     },
     /// The container holds a cage that is none.
     #[error("{}: {cause}", .path.display())]
@@ -79,6 +86,10 @@ pub type Container = ContainerReader<BufReader<File>>;
 /// A file that cannot be read or is no container; the path is named.
 pub fn open(path: &Path) -> Result<Container, DecodeError> {
     let fail = |cause| DecodeError::container(path, cause);
+    // Opening a pipe would wait for somebody to write to it.
+    if std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+        return Err(DecodeError::NotAFile { path: path.to_owned() });
+    }
     let file = File::open(path).map_err(|e| fail(container::Error::from(e)))?;
     if file.metadata().is_ok_and(|m| m.is_dir()) {
         return Err(fail(container::Error::NotAContainer));
@@ -120,15 +131,17 @@ pub fn decoder(container: &mut Container, path: &Path) -> Result<(Model, Decoder
     Ok((rest, decoder))
 }
 
-/// Decodes all frames into `output`, which appears whole or not at all. `progress` is told the number of frames done.
+/// Decodes all frames into `output`, which appears whole or not at all; `timing` goes before what the container tells. `progress` is told the number of frames done.
 ///
 /// # Errors
 /// See [`DecodeError`].
-pub fn decode(input: &Path, output: &Path, progress: &mut dyn FnMut(usize)) -> Result<(), DecodeError> {
+pub fn decode(input: &Path, output: &Path, timing: Timing, progress: &mut dyn FnMut(usize)) -> Result<(), DecodeError> {
     let fail = |cause| DecodeError::container(input, cause);
     let mut container = open(input)?;
     let frames = container.frames();
-    let options = container.header().frame_rate.map_or_else(FrameOptions::default, |fps| FrameOptions { fps });
+    let fps = timing.fps.or(container.header().frame_rate).unwrap_or(FrameOptions::default().fps);
+    let numbers = timing.numbers(container.frame_numbers().map_err(fail)?);
+    let options = FrameOptions { fps, numbers };
     // Decoding needs neither, but a damaged file is refused wherever the damage is.
     container.errors().map_err(fail)?;
     container.summary().map_err(fail)?;

@@ -1,11 +1,10 @@
 //! Designing a cage from a capture on disk: which frames are looked at, and what is reported.
 
 use crate::encode::{EncodeError, sample_frames};
+use crate::frames::CaptureFiles;
 use cager_cages::{Design, DesignOptions, Style};
 use cager_client::cage_messages::CageJob;
-use cager_formats::{FrameReader, open_frames};
 use serde::{Deserialize, Serialize};
-use std::path::Path;
 
 /// Frames of a capture that a design looks at, at most: every second one to design by, the others to judge by.
 pub const FRAMES: usize = 160;
@@ -14,9 +13,8 @@ pub const FRAMES: usize = 160;
 ///
 /// # Errors
 /// Those of the reader, also where it ends before the frames it announced.
-pub fn read_frames(path: &Path, points: usize) -> Result<Vec<Vec<f64>>, EncodeError> {
-    let mut frames: Box<dyn FrameReader> = open_frames(path, points)?;
-    sample_frames(frames.as_mut(), FRAMES, false)
+pub fn read_frames(files: &CaptureFiles) -> Result<Vec<Vec<f64>>, EncodeError> {
+    sample_frames(files.open()?.as_mut(), FRAMES, false)
 }
 
 /// How a cage was designed. Errors are least-squares errors over sampled points, root mean square, as fractions of the rest pose's

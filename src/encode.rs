@@ -149,6 +149,7 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Encoded, 
         frame_rate: job.frames.frame_rate(),
     };
     let mut writer = CaptureWriter::new(BufWriter::with_capacity(1 << 20, file), &encoding).map_err(fail)?;
+    writer.number_frames((0..job.frames.frames()).map(|frame| job.frames.number(frame)).collect());
     let found = solver.preparation();
     let mut seconds = Seconds {
         coordinates: found.coordinates_seconds,

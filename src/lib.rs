@@ -1,6 +1,7 @@
 //! The `cager` program: the command line and the service over the crates that do the work.
 
 pub mod auth;
+pub mod belong;
 #[doc(hidden)]
 pub mod cage_job;
 pub mod capture;
@@ -12,6 +13,7 @@ pub mod decode;
 pub mod design;
 pub mod encode;
 pub mod engine;
+pub mod frames;
 pub mod http;
 mod idempotency;
 mod picture;
@@ -23,3 +25,4 @@ pub mod service;
 mod session;
 pub mod store;
 pub mod telemetry;
+pub mod timing;

@@ -16,6 +16,9 @@ pub struct Report {
     /// Diagonal of the rest pose's bounding box, in the unit of its file: what errors are fractions of.
     #[serde(default)]
     pub diagonal: f64,
+    /// The number of each frame where it comes from, as in the names of its files; absent where they are 0, 1, 2, …
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub frame_numbers: Vec<f64>,
     /// Unknowns per frame, m.
     pub unknowns: usize,
     /// Vertices of the cage.

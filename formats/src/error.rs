@@ -143,13 +143,14 @@ impl Error {
 
 fn advice(action: Action, cause: &io::Error) -> &'static str {
     use io::ErrorKind::{
-        FileTooLarge, IsADirectory, NotADirectory, NotFound, PermissionDenied, QuotaExceeded, ReadOnlyFilesystem,
-        StorageFull,
+        FileTooLarge, IsADirectory, NotADirectory, NotFound, NotSeekable, PermissionDenied, QuotaExceeded,
+        ReadOnlyFilesystem, StorageFull,
     };
     match (action, cause.kind()) {
         (Action::Read, NotFound | NotADirectory) => "check the path",
         (Action::Read, PermissionDenied) => "change its permissions or copy it elsewhere",
         (Action::Read, IsADirectory) => "name a file",
+        (Action::Read, NotSeekable) => "save what the pipe carries as a file first",
         (Action::Write, NotFound | NotADirectory) => "create its folder first",
         (Action::Write, PermissionDenied | ReadOnlyFilesystem) => "choose a folder that you may write to",
         (Action::Write, StorageFull | QuotaExceeded | FileTooLarge) => "free some space or write to another disk",

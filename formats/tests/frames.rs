@@ -3,11 +3,13 @@
 mod support;
 
 use std::fs;
+use std::io::Write as _;
 use std::path::Path;
 
 use cager_core::mesh::Polygons;
 use cager_formats::{
-    CacheFormat, Error, FrameOptions, FrameReader, create_frames, open_frames, open_frames_bytes, read_model,
+    CacheFormat, Error, FrameOptions, FrameReader, create_frames, missing_frames, open_frames, open_frames_bytes,
+    read_model,
 };
 use support::*;
 use tempfile::tempdir;
@@ -71,6 +73,72 @@ fn an_array_of_points_is_one_frame() {
     assert_eq!(all(&mut *open("a.npy", &file, 4).unwrap()), [two_frames().concat()]);
 }
 
+/// Two frames of two points, as `numpy` stores them with their axes in another order, and so on.
+fn rearranged(at: impl Fn(usize, usize, usize) -> usize) -> Vec<f32> {
+    let mut out = vec![1.0; 16];
+    for (t, frame) in coordinates().chunks(6).enumerate() {
+        for (i, point) in frame.chunks(3).enumerate() {
+            for (k, &x) in point.iter().enumerate() {
+                out[at(t, i, k)] = x;
+            }
+        }
+    }
+    out
+}
+
+#[test]
+fn arrays_whose_axes_come_in_another_order_are_read_and_not_scrambled() {
+    let read = |rest: &str, data: &[f32]| all(&mut *open("a.npy", &npy("'<f4'", rest, &little(data)), 2).unwrap());
+    let axes = rearranged(|t, i, k| 6 * t + 2 * k + i);
+    assert_eq!(read("'fortran_order': False, 'shape': (2, 3, 2)", &axes[..12]), two_frames());
+    let fourth = rearranged(|t, i, k| 8 * t + 4 * i + k);
+    assert_eq!(read("'fortran_order': False, 'shape': (2, 2, 4)", &fourth), two_frames());
+    let fortran = rearranged(|t, i, k| t + 2 * i + 4 * k);
+    assert_eq!(read("'fortran_order': True, 'shape': (2, 2, 3)", &fortran[..12]), two_frames());
+    let both = rearranged(|t, i, k| t + 2 * k + 6 * i);
+    assert_eq!(read("'fortran_order': True, 'shape': (2, 3, 2)", &both[..12]), two_frames());
+}
+
+#[test]
+fn a_fourth_coordinate_that_is_not_one_is_refused_with_its_point() {
+    let mut fourth = rearranged(|t, i, k| 8 * t + 4 * i + k);
+    fourth[15] = 0.5;
+    let file = npy("'<f4'", "'fortran_order': False, 'shape': (2, 2, 4)", &little(&fourth));
+    let mut reader = open("a.npy", &file, 2).unwrap();
+    let mut frame = Vec::new();
+    assert!(reader.read_next(&mut frame).unwrap());
+    let error = message(reader.read_next(&mut frame));
+    assert!(error.starts_with("a.npy: frame 1: point 1 has the fourth coordinate 0.5 "), "{error}");
+}
+
+/// An archive as `numpy.savez` and `numpy.savez_compressed` make it.
+fn npz(arrays: &[&str], method: zip::CompressionMethod) -> Vec<u8> {
+    let mut archive = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    for name in arrays {
+        let options = zip::write::SimpleFileOptions::default().compression_method(method).large_file(true);
+        archive.start_file(format!("{name}.npy"), options).unwrap();
+        archive.write_all(&npy_f4()).unwrap();
+    }
+    archive.finish().unwrap().into_inner()
+}
+
+#[test]
+fn an_archive_with_one_array_is_read_stored_or_compressed() {
+    let folder = tempdir().unwrap();
+    let path = folder.path().join("walk.npz");
+    for method in [zip::CompressionMethod::Stored, zip::CompressionMethod::Deflated] {
+        let whole = npz(&["arr_0"], method);
+        fs::write(&path, &whole).unwrap();
+        assert_eq!(all(&mut *open_frames(&path, 2).unwrap()), two_frames());
+        for length in [0, 1, 30, whole.len() / 2, whole.len() - 1] {
+            fs::write(&path, &whole[..length]).unwrap();
+            assert!(message(open_frames(&path, 2)).contains("walk.npz: cannot be unpacked ("), "{length}");
+        }
+    }
+    fs::write(&path, npz(&["walk", "run"], zip::CompressionMethod::Stored)).unwrap();
+    assert!(message(open_frames(&path, 2)).contains("has 2 arrays (walk, run); "));
+}
+
 #[test]
 fn arrays_that_are_not_read_are_described_with_the_line_that_converts_them() {
     let of = |descr, rest| message(open("a.npy", &npy(descr, rest, &[0; 48]), 2));
@@ -81,9 +149,11 @@ fn arrays_that_are_not_read_are_described_with_the_line_that_converts_them() {
          convert it with numpy.save(path, numpy.load(path).astype('<f4'))"
     );
     assert!(of("[('x', '<f4'), ('y', '<f4', (2,))]", "'fortran_order': False, 'shape': (2,)").contains("has records"));
-    assert!(of("'<f4'", "'fortran_order': True, 'shape': (2, 2, 3)").contains("numpy.ascontiguousarray"));
     let error = of("'<f4'", "'fortran_order': False, 'shape': (2, 6)");
-    assert!(error.contains("has the shape [2, 6], not (frames, points, 3); convert it with"), "{error}");
+    assert!(error.contains("has the shape [2, 6], not (frames, points, 3); bring its axes into this order"), "{error}");
+    // The order of its axes is told; `reshape` would scramble it.
+    let error = message(open("a.npy", &npy("'<f4'", "'fortran_order': False, 'shape': (5, 2, 3)", &[0; 120]), 5));
+    assert!(error.contains("has the shape (5, 2, 3), points before frames; ") && error.contains("transpose(1, 0, 2)"));
     assert!(of("'<f4'", "'fortran_order': False, 'shape': (2, 2, 3) + (1)").contains("is not understood"));
 }
 
@@ -210,7 +280,8 @@ fn an_output_that_is_not_finished_leaves_nothing() {
 fn outputs_that_make_no_sense_are_refused() {
     let folder = tempdir().unwrap();
     let create = |name: &str, points, frames, faces: &Polygons, fps| {
-        create_frames(folder.path().join(name), points, frames, faces, &FrameOptions { fps }).map(drop)
+        create_frames(folder.path().join(name), points, frames, faces, &FrameOptions { fps, ..FrameOptions::default() })
+            .map(drop)
     };
     let none = Polygons::new();
     let error = message(create("a.abc", 1, 1, &none, 24.0));
@@ -265,6 +336,47 @@ fn a_folder_whose_name_looks_like_a_pattern_is_a_folder() {
     fs::create_dir(&folder).unwrap();
     fs::write(folder.join("1.obj"), "v 1 0 0").unwrap();
     assert_eq!(open_frames(&folder, 1).unwrap().frames(), 1);
+}
+
+#[test]
+fn frames_have_the_numbers_of_their_files_signs_and_fractions_included() {
+    let folder = tempdir().unwrap();
+    for (name, x) in [("f-2", -2.0), ("f-1", -1.0), ("f0", 0.0), ("f1", 1.0), ("f1.5", 1.5), ("f2", 2.0), ("f10", 10.0)]
+    {
+        fs::write(folder.path().join(format!("{name}.obj")), format!("v {x} 0 0\n")).unwrap();
+    }
+    let mut reader = open_frames(folder.path(), 1).unwrap();
+    let told: Vec<f64> = (0..reader.frames()).map(|k| reader.number(k)).collect();
+    assert_eq!(told, [-2.0, -1.0, 0.0, 1.0, 1.5, 2.0, 10.0]);
+    assert_eq!(numbers(&mut *reader), told);
+    assert_eq!(missing_frames(&told).as_deref(), Some("3 to 9"));
+}
+
+#[test]
+fn start_and_step_of_a_point_cache_are_its_frame_numbers_and_are_kept() {
+    let folder = tempdir().unwrap();
+    for (name, numbers, fps) in [
+        ("a.pc2", vec![101.0, 103.0], None),
+        ("a.mdd", vec![48.0, 49.0], Some(25.0)),
+        ("frames", vec![-1.0, 0.5], None),
+    ] {
+        let path = folder.path().join(name);
+        let options = FrameOptions { fps: fps.unwrap_or(24.0), numbers: numbers.clone() };
+        let mut writer = create_frames(&path, 2, 2, &Polygons::new(), &options).unwrap();
+        coordinates().chunks(6).for_each(|frame| writer.write_frame(frame).unwrap());
+        writer.finish().unwrap();
+        let reader = open_frames(&path, 2).unwrap();
+        assert_eq!((0..2).map(|k| reader.number(k)).collect::<Vec<_>>(), numbers, "{name}");
+        assert_eq!(reader.frame_rate(), fps, "{name}");
+    }
+    assert!(
+        folder.path().join("frames/frame_-0001.obj").exists() && folder.path().join("frames/frame_0000.5.obj").exists()
+    );
+    let twice = FrameOptions { numbers: vec![1.0, 1.0], ..FrameOptions::default() };
+    assert!(matches!(
+        create_frames(folder.path().join("b"), 2, 2, &Polygons::new(), &twice),
+        Err(Error::Invalid { .. })
+    ));
 }
 
 #[test]

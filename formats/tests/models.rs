@@ -277,3 +277,19 @@ fn a_missing_file_is_named() {
     assert!(error.to_string().starts_with("no/such.obj: cannot be read ("), "{error}");
     assert!(error.to_string().ends_with("); check the path"), "{error}");
 }
+
+#[test]
+fn a_web_page_or_utf_16_given_as_a_mesh_is_called_that() {
+    let utf16 = |text: &str| text.encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<u8>>();
+    for name in ["a.obj", "a.ply", "a.off", "a.stl", "a.glb"] {
+        for page in ["<!DOCTYPE html>\n<html></html>", "\n  <HTML lang=en>"] {
+            assert!(
+                message(read(name, page)).contains("is a web page and no mesh; download the file itself"),
+                "{name}"
+            );
+        }
+        for text in [utf16("\u{feff}v 0 0 0\nv 1 0 0\n"), utf16("v 0 0 0\nv 1 0 0\n")] {
+            assert!(message(read(name, text)).contains("is text in UTF-16; save it as UTF-8"), "{name}");
+        }
+    }
+}

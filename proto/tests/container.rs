@@ -333,3 +333,27 @@ fn first_bytes_are_those_of_the_worked_example() {
     assert_eq!(expected.len(), PRELUDE + SECTION);
     assert_eq!(small_container()[..PRELUDE + SECTION], expected);
 }
+
+#[test]
+fn frame_numbers_come_back_and_are_0_1_2_where_there_are_none() {
+    let (rest, cage) = (small_model(), tetrahedron());
+    let written = |numbers: Option<&[f64]>| {
+        let mut writer = ContainerWriter::new(Vec::new(), &header(4), &rest, &cage)?;
+        for _ in 0..3 {
+            writer.write_frame(&[0.5; 12], 0.0, 0.0)?;
+        }
+        numbers.map_or(Ok(()), |numbers| writer.add_frame_numbers(numbers))?;
+        writer.finish(None)
+    };
+    for (numbers, expected) in [(None, [0.0, 1.0, 2.0]), (Some(&[-2.0, 1.5, 100.0][..]), [-2.0, 1.5, 100.0])] {
+        let bytes = written(numbers).unwrap();
+        let mut reader = open(&bytes).unwrap();
+        reader.verify().unwrap();
+        assert_eq!(reader.frame_numbers().unwrap(), expected);
+    }
+    for wrong in
+        [&[1.0, 2.0][..], &[1.0, 1.0, 2.0], &[2.0, 1.0, 3.0], &[0.0, f64::NAN, 1.0], &[0.0, 1.0, f64::INFINITY]]
+    {
+        assert!(written(Some(wrong)).is_err(), "{wrong:?}");
+    }
+}

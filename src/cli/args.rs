@@ -1,6 +1,7 @@
 //! What can be typed: one definition gives parsing, help and shell completions.
 
 use super::cage_args::CageArgs;
+use super::checks::{CaptureArgs, TimingArgs};
 use crate::config::ServeFlags;
 use cager_core::inversion::Handles;
 use cager_core::regularize::Regularizer;
@@ -71,9 +72,12 @@ pub(crate) struct EncodeArgs {
     pub(crate) design: DesignArgs,
 
     /// Capture, points in the order of the rest pose: a folder or quoted glob of mesh files (2.obj comes before 10.obj), .npy
-    /// (frames × points × 3), .pc2 or .mdd.
+    /// (frames × points × 3), .npz with one array, .pc2 or .mdd.
     #[arg(long, value_name = "FRAMES")]
     pub(crate) frames: PathBuf,
+
+    #[command(flatten)]
+    pub(crate) capture: CaptureArgs,
 
     /// File to write; it appears whole or not at all.
     #[arg(short, long, value_name = "OUT.cager")]
@@ -157,7 +161,7 @@ pub(crate) struct SolverArgs {
 
     /// Spectrum threshold: how many of the last singular directions are regularised; "all" of them; or "auto": as many as
     /// --spectrum-bound allows, measured on frames of the capture [default: 20, or a sixteenth of the unknowns where that is less].
-    #[arg(long, value_name = "S", value_parser = spectrum)]
+    #[arg(long, value_name = "S", value_parser = spectrum, allow_negative_numbers = true)]
     pub(crate) spectrum: Option<SpectrumArg>,
 
     /// Largest extra L2 error of --spectrum auto, as a fraction of the error at threshold 0 [default: 0.05].
@@ -181,6 +185,9 @@ pub(crate) struct DecodeArgs {
     /// Where to write: .npy, .pc2, .mdd, or a folder that is to hold one .obj per frame ('FOLDER/*.ply' for .ply).
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
+
+    #[command(flatten)]
+    pub(crate) timing: TimingArgs,
 }
 
 /// Show what a .cager file holds: sizes, spectrum, errors.

@@ -2,10 +2,12 @@
 
 use super::args::UpArg;
 use super::cage_args::{CageArgs, GeneralArg};
+use super::checks::check_capture;
 use super::design::{self, usual_vertices};
 use super::{grouped, interrupt, tell, warn};
 use crate::compare::render::Up;
 use crate::design::{DesignReport, read_frames};
+use crate::frames::CaptureFiles;
 use crate::picture;
 use anyhow::{Result, bail};
 use cager_cages::{DesignOptions, EncloseError, EncloseOptions, General, Style, enclose, general};
@@ -117,7 +119,10 @@ fn designed(
         keep_connectivity: start.is_some(),
         symmetry: args.symmetry.map(|axis| axis as usize),
     };
-    let frames = read_frames(frames_path, rest.points.len())?;
+    let mut files = CaptureFiles::new(frames_path, rest.points.len());
+    files.allow_gaps = args.checks.allow_gaps;
+    check_capture(&files, (&args.rest[0], rest), &args.checks, false)?;
+    let frames = read_frames(&files)?;
     let mesh = start.as_ref().map(|(_, model)| TriMesh::from(model));
     let start_mesh = start.as_ref().zip(mesh.as_ref()).map(|((path, _), mesh)| (path.as_path(), mesh));
     let found = design::design((&args.rest[0], rest), (frames_path, &frames), start_mesh, &options)?;

@@ -1,6 +1,7 @@
 //! What can be typed after `cager cage`.
 
 use super::args::{StyleArg, UpArg};
+use super::checks::CheckArgs;
 use clap::{ArgGroup, Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -19,6 +20,9 @@ pub(crate) struct CageArgs {
     /// Capture to design the cage from, as for encode: a folder or quoted glob of mesh files, .npy, .pc2 or .mdd.
     #[arg(long, value_name = "FRAMES")]
     pub(crate) frames: Option<PathBuf>,
+
+    #[command(flatten)]
+    pub(crate) checks: CheckArgs,
 
     /// Cage to write, .obj or .ply.
     #[arg(short, long, value_name = "CAGE.obj", required_unless_present = "check")]

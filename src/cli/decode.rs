@@ -13,7 +13,8 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     drop(container);
     interrupt::leaves_nothing()?;
     let bar = progress::frames("decoding", frames);
-    let result = decode::decode(&args.input, &args.output, &mut |done| bar.set_position(done as u64));
+    let result =
+        decode::decode(&args.input, &args.output, (&args.timing).into(), &mut |done| bar.set_position(done as u64));
     bar.finish_and_clear();
     result?;
     tell(&format!(

@@ -9,6 +9,7 @@ use crate::encode::Encoded;
 use crate::plot::error_plot;
 use crate::remote::{EncodedRemotely, RemoteCage, RemoteJob, RemoteProgress, Steps, encode_remotely};
 use crate::report::Report;
+use crate::timing::Timing;
 use anyhow::{Context, Result, ensure};
 use cager_client::FnFrames;
 use cager_client::messages::SessionOptions;
@@ -64,7 +65,7 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
     let decoded = folder.join("decoded.npy");
     let clock = Instant::now();
     let bar = progress::frames("decoding", capture.frames());
-    decode::decode(&output, &decoded, &mut |done| bar.set_position(done as u64))?;
+    decode::decode(&output, &decoded, Timing::default(), &mut |done| bar.set_position(done as u64))?;
     bar.finish_and_clear();
     let decode_seconds = clock.elapsed().as_secs_f64();
     compare(&capture, &decoded, &report)?;

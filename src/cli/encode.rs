@@ -1,16 +1,20 @@
 //! `cager encode`.
 
 use super::args::{CoordinatesArg, EncodeArgs, SolverArgs, SpectrumArg, StyleArg};
+use super::checks::{capture_files, check_cage, check_capture};
 use super::design;
 use super::outputs::refuse_overwriting;
 use super::{grouped, human_bytes, interrupt, is_verbose, plain, progress, tell, warn};
 use crate::coordinates;
 use crate::design::{DesignReport, read_frames};
 use crate::encode::{self, ChooseSpectrum, Encoded, Job, sample_frames};
+use crate::frames::CaptureFiles;
 use crate::remote::{EncodedRemotely, FileFrames, RemoteCage, RemoteJob, RemoteProgress, encode_remotely};
 use crate::report::Report;
+use crate::timing::counted_from_zero;
 use anyhow::{Context, Result, bail};
 use cager_cages::DesignOptions;
+use cager_cages::doctor::weld;
 use cager_client::FrameSource;
 use cager_client::messages::SessionOptions;
 use cager_core::cage::Cage;
@@ -18,22 +22,30 @@ use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{PrepareError, Solver, SolverOptions, check_options, usual_spectrum};
 use cager_core::mesh::{Model, TriMesh};
 use cager_core::regularize::{Regularizer, SparseMatrix, Term};
-use cager_formats::{AtomicFile, CompleteFile, FrameReader, commit_together, open_frames, read_matrix, read_model};
+use cager_formats::{AtomicFile, CompleteFile, FrameReader, commit_together, read_matrix, read_model};
 use std::io::Write;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 pub(super) fn run(args: &EncodeArgs) -> Result<()> {
     let clock = Instant::now();
-    let rest = read_model(&args.rest)?;
+    let mut rest = read_model(&args.rest)?;
+    let files = capture_files(&args.capture, &args.frames, &mut rest);
     let cage = args.cage.as_ref().map(|path| read_cage(path, args.flip_cage)).transpose()?;
+    if args.capture.weld && args.server.is_some() {
+        bail!("--weld: a service reads the rest pose as it is; give --server one without seams, or encode here");
+    }
+    check_capture(&files, (&args.rest, &rest), &args.capture.checks, true)?;
+    if let (Some(path), Some(cage)) = (&args.cage, &cage) {
+        check_cage((path, cage.mesh()), &rest, &args.capture.checks)?;
+    }
     match (&args.server, &cage) {
-        (None, Some(cage)) => here(args, &rest, cage, None, clock),
+        (None, Some(cage)) => here(args, &files, &rest, cage, None, clock),
         (None, None) => {
-            let (cage, report) = designed(args, &rest)?;
-            here(args, &rest, &cage, Some(report), clock)
+            let (cage, report) = designed(args, &files, &rest)?;
+            here(args, &files, &rest, &cage, Some(report), clock)
         }
-        (Some(address), cage) => elsewhere(args, address, &rest, cage.as_ref(), clock),
+        (Some(address), cage) => elsewhere(args, address, files, &rest, cage.as_ref(), clock),
     }
 }
 
@@ -58,11 +70,11 @@ fn design_options(args: &EncodeArgs, points: usize) -> Result<DesignOptions> {
 }
 
 /// A cage from the capture itself.
-fn designed(args: &EncodeArgs, rest: &Model) -> Result<(Cage, DesignReport)> {
+fn designed(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<(Cage, DesignReport)> {
     let options = design_options(args, rest.points.len())?;
     // Outputs that cannot be written cost no waiting.
     refuse_outputs(args)?;
-    let frames = read_frames(&args.frames, rest.points.len()).map_err(|error| name_files(error, args))?;
+    let frames = read_frames(files).map_err(|error| name_files(error, args))?;
     let design = design::design((&args.rest, rest), (&args.frames, &frames), None, &options)?;
     warn(&design.warnings);
     let report = DesignReport::new(&design, &options, frames.len());
@@ -70,8 +82,15 @@ fn designed(args: &EncodeArgs, rest: &Model) -> Result<(Cage, DesignReport)> {
     Ok((cage, report))
 }
 
-fn here(args: &EncodeArgs, rest: &Model, cage: &Cage, design: Option<DesignReport>, clock: Instant) -> Result<()> {
-    let mut frames = open_frames(&args.frames, rest.points.len())?;
+fn here(
+    args: &EncodeArgs,
+    files: &CaptureFiles,
+    rest: &Model,
+    cage: &Cage,
+    design: Option<DesignReport>,
+    clock: Instant,
+) -> Result<()> {
+    let mut frames = files.open()?;
     let read_seconds = clock.elapsed().as_secs_f64();
     let (system, options) = solver(&args.solver, cage)?;
     let matrix = matrix(&args.solver)?;
@@ -79,7 +98,7 @@ fn here(args: &EncodeArgs, rest: &Model, cage: &Cage, design: Option<DesignRepor
         (Some(SpectrumArg::Auto), bound) => {
             // What is wrong with the options is told before anything is read.
             check_options(rest.points.len(), system.unknowns(cage), options).map_err(|e| name_file(&e, args))?;
-            let mut again = open_frames(&args.frames, rest.points.len())?;
+            let mut again = files.open()?;
             let samples = choosing_frames(again.as_mut(), options.regularizer == Regularizer::Temporal)
                 .map_err(|error| name_files(error, args))?;
             Some(ChooseSpectrum { samples, bound })
@@ -114,8 +133,18 @@ fn choosing_frames(frames: &mut dyn FrameReader, first_ones: bool) -> Result<Vec
 
 /// The files are read and the options checked here as well, so that what is wrong with them is told before anything is sent, in
 /// words that name them.
-fn elsewhere(args: &EncodeArgs, address: &str, rest: &Model, cage: Option<&Cage>, clock: Instant) -> Result<()> {
-    let frames = FileFrames::open(&args.frames, rest.points.len())?;
+fn elsewhere(
+    args: &EncodeArgs,
+    address: &str,
+    files: CaptureFiles,
+    rest: &Model,
+    cage: Option<&Cage>,
+    clock: Instant,
+) -> Result<()> {
+    let frames = FileFrames::open(files)?;
+    if !counted_from_zero(&frames.numbers()) {
+        warn(&["a service numbers frames from 0; encode here to keep the numbers of the files".to_owned()]);
+    }
     let read_seconds = clock.elapsed().as_secs_f64();
     let matrix = matrix(&args.solver)?;
     spectrum_bound(&args.solver)?;
@@ -247,9 +276,17 @@ pub(super) fn blame(error: &PrepareError, rest: &Path, cage: &Path) -> anyhow::E
 }
 
 pub(super) fn read_cage(path: &Path, flip: bool) -> Result<Cage> {
-    let model = read_model(path)?;
+    let mut model = read_model(path)?;
     if model.faces.is_empty() {
         bail!("{}: has no faces, and a cage is a closed mesh; export the cage with its faces", path.display());
+    }
+    if let Some(welded) = weld(&model) {
+        let places = grouped(welded.merged as u64);
+        warn(&[format!(
+            "{}: merged {places} vertices with others in the same place, as seams split them",
+            path.display()
+        )]);
+        model = welded.model;
     }
     let mesh = TriMesh::from(&model);
     let cage = Cage::new(if flip { mesh.flipped() } else { mesh });

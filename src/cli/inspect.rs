@@ -3,7 +3,9 @@
 use super::args::InspectArgs;
 use super::{grouped, human_bytes, plain, print, warn};
 use crate::decode::{self, Container, DecodeError};
+use crate::timing::counted_from_zero;
 use anyhow::Result;
+use cager_formats::missing_frames;
 use cager_proto::container::Summary;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -15,24 +17,37 @@ pub(super) fn run(args: &InspectArgs) -> Result<()> {
     container.verify().map_err(fail)?;
     let summary = container.summary().map_err(fail)?;
     let errors = container.errors().map_err(fail)?;
+    let numbers = container.frame_numbers().map_err(fail)?;
     let bytes = std::fs::metadata(&args.input)?.len();
     if args.json {
         let per_frame: Vec<Value> =
             errors.iter().map(|e| json!({ "l2": f64::from(e.l2), "linf": f64::from(e.linf) })).collect();
-        let value = as_json(&container, summary.as_ref(), per_frame, bytes);
+        let value = as_json(&container, summary.as_ref(), &numbers, per_frame, bytes);
         return print(&format!("{}\n", serde_json::to_string_pretty(&value)?));
     }
     warn(summary.as_ref().map_or(&[], |s| &s.warnings));
-    print(&as_text(&args.input.display().to_string(), &container, summary.as_ref(), bytes)?)
+    print(&as_text(&args.input.display().to_string(), &container, summary.as_ref(), &numbers, bytes)?)
 }
 
 /// The keys of `report.json`, less the times and plus the sections.
-fn as_json(container: &Container, summary: Option<&Summary>, per_frame: Vec<Value>, bytes: u64) -> Value {
+fn as_json(
+    container: &Container,
+    summary: Option<&Summary>,
+    numbers: &[f64],
+    per_frame: Vec<Value>,
+    bytes: u64,
+) -> Value {
     let h = container.header();
     let mut out = Map::new();
     let mut put = |key: &str, value: Value| out.insert(key.to_owned(), value);
     put("points", json!(h.points));
     put("frames", json!(container.frames()));
+    if !counted_from_zero(numbers) {
+        put("frame_numbers", json!(numbers));
+    }
+    if let Some(rate) = h.frame_rate {
+        put("frame_rate", json!(rate));
+    }
     put("unknowns", json!(h.rows_per_frame));
     put("cage_vertices", json!(h.cage_vertices));
     put("cage_faces", json!(h.cage_faces));
@@ -100,11 +115,22 @@ fn sections(container: &Container) -> Vec<(String, Sizes)> {
     kinds
 }
 
-fn as_text(name: &str, container: &Container, summary: Option<&Summary>, bytes: u64) -> Result<String> {
+fn as_text(
+    name: &str,
+    container: &Container,
+    summary: Option<&Summary>,
+    numbers: &[f64],
+    bytes: u64,
+) -> Result<String> {
     let h = container.header();
     let mut out = String::new();
     writeln!(out, "{name}: {}, every checksum matches", human_bytes(bytes))?;
     writeln!(out, "  capture   {} frames of {} points", grouped(container.frames() as u64), grouped(h.points))?;
+    let rate = h.frame_rate.map(|rate| format!(", {rate} frames per second")).unwrap_or_default();
+    if let ([first, .., last] | [first @ last], false) = (numbers, counted_from_zero(numbers) && rate.is_empty()) {
+        let gaps = missing_frames(numbers).map(|missing| format!(" without {missing}")).unwrap_or_default();
+        writeln!(out, "  numbers   {first} to {last}{gaps}{rate}")?;
+    }
     writeln!(out, "  cage      {} vertices, {} faces", grouped(h.cage_vertices), grouped(h.cage_faces))?;
     // How many of them is known where not every point is read.
     let read = summary.filter(|_| h.handles != "all").map(|s| format!(" ({})", s.handle_indices.len()));

@@ -3,6 +3,7 @@
 mod args;
 mod cage;
 mod cage_args;
+mod checks;
 mod compare;
 mod decode;
 mod demo;
@@ -27,7 +28,10 @@ use std::process::ExitCode;
 
 /// Runs the command given to this process. Exit status 0 done, 1 failed, 2 wrong usage.
 pub fn run() -> ExitCode {
-    let Cli { manners, command } = Cli::parse();
+    let Cli { manners, command } = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return refused(&error),
+    };
     if let Err(error) = manners.adopt() {
         let _ = writeln!(std::io::stderr(), "cager: {error:#}");
         return ExitCode::FAILURE;
@@ -56,6 +60,25 @@ pub fn run() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// What clap says, and a hint where a shell expanded a pattern: then files follow each other without an option between them.
+fn refused(error: &clap::Error) -> ExitCode {
+    let _ = error.print();
+    let stray = match error.get(clap::error::ContextKind::InvalidArg) {
+        Some(clap::error::ContextValue::String(word)) if error.kind() == clap::error::ErrorKind::UnknownArgument => {
+            Some(word).filter(|word| !word.starts_with('-') && std::path::Path::new(word).exists())
+        }
+        _ => None,
+    };
+    if let Some(word) = stray {
+        let _ = writeln!(
+            std::io::stderr(),
+            "\n  tip: if {} comes from a pattern, quote the pattern, as in --frames 'walk/*.obj'",
+            plain(word)
+        );
+    }
+    ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
 }
 
 /// Writes to stdout; a reader that has seen enough, as `head` has, is no failure.

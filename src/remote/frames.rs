@@ -1,14 +1,13 @@
 //! Frames of a capture on disk, as a service takes them.
 
+use crate::frames::CaptureFiles;
 use cager_client::FrameSource;
-use cager_formats::{Error, FrameReader, open_frames};
+use cager_formats::{Error, FrameReader};
 use std::io;
-use std::path::{Path, PathBuf};
 
 /// The frames of a capture on disk in single precision: a folder or pattern of mesh files, or a point cache.
 pub struct FileFrames {
-    path: PathBuf,
-    points: usize,
+    files: CaptureFiles,
     frames: u32,
     frame_rate: Option<f64>,
     reader: Box<dyn FrameReader>,
@@ -18,24 +17,28 @@ pub struct FileFrames {
 }
 
 impl FileFrames {
-    /// Opens the frames of a capture whose rest pose has `points` points, see [`open_frames`].
+    /// Opens the frames.
     ///
     /// # Errors
-    /// Those of [`open_frames`]; more frames than a session can have.
-    pub fn open(path: impl AsRef<Path>, points: usize) -> Result<Self, Error> {
-        let path = path.as_ref().to_owned();
-        let reader = open_frames(&path, points)?;
+    /// Those of [`CaptureFiles::open`]; more frames than a session can have.
+    pub fn open(files: CaptureFiles) -> Result<Self, Error> {
+        let reader = files.open()?;
         let Ok(frames) = u32::try_from(reader.frames()) else {
             let what = format!("has {} frames, more than a session can have; split it", reader.frames());
-            return Err(Error::Unsupported { path, what });
+            return Err(Error::Unsupported { path: files.path, what });
         };
         let frame_rate = reader.frame_rate();
-        Ok(Self { path, points, frames, frame_rate, reader, next: 0, wide: Vec::new() })
+        Ok(Self { files, frames, frame_rate, reader, next: 0, wide: Vec::new() })
     }
 
     /// Frames per second, where the files tell.
     pub fn frame_rate(&self) -> Option<f64> {
         self.frame_rate
+    }
+
+    /// The number of each frame where it comes from.
+    pub fn numbers(&self) -> Vec<f64> {
+        (0..self.reader.frames()).map(|frame| self.reader.number(frame)).collect()
     }
 
     fn read_wide(&mut self) -> io::Result<bool> {
@@ -47,7 +50,7 @@ impl FileFrames {
 
 impl FrameSource for FileFrames {
     fn points(&self) -> usize {
-        self.points
+        self.files.points
     }
 
     fn frames(&self) -> Option<u32> {
@@ -56,7 +59,7 @@ impl FrameSource for FileFrames {
 
     fn seek(&mut self, frame: u32) -> io::Result<()> {
         if frame < self.next {
-            self.reader = open_frames(&self.path, self.points).map_err(io::Error::other)?;
+            self.reader = self.files.open().map_err(io::Error::other)?;
             self.next = 0;
         }
         // Readers go forward only.
@@ -74,7 +77,7 @@ impl FrameSource for FileFrames {
         match out.iter().position(|x| !x.is_finite()) {
             None => Ok(true),
             Some(at) => Err(io::Error::other(Error::Invalid {
-                path: self.path.clone(),
+                path: self.files.path.clone(),
                 what: format!(
                     "frame {frame}: point {} is too large for single precision, in which frames are sent; scale the capture down",
                     at / 3
@@ -100,7 +103,7 @@ mod tests {
             writer.write_frame(&[frame as f32; 6]).expect("a frame");
         }
         writer.finish().expect("a cache");
-        let mut frames = FileFrames::open(&path, 2).expect("frames");
+        let mut frames = FileFrames::open(CaptureFiles::new(&path, 2)).expect("frames");
         assert_eq!((frames.points(), frames.frames()), (2, Some(5)));
         let mut out = Vec::new();
         for frame in [3, 0, 4, 1, 2, 3] {
@@ -110,6 +113,6 @@ mod tests {
         }
         frames.seek(5).expect("the end");
         assert!(!frames.read(&mut out).expect("nothing"));
-        assert!(FileFrames::open(&path, 3).is_err());
+        assert!(FileFrames::open(CaptureFiles::new(&path, 3)).is_err());
     }
 }

@@ -2,6 +2,7 @@
 
 use super::Steps;
 use crate::report::{Bytes, Condition, Errors, FrameError, MaxVol, Report, Seconds, WorstError};
+use crate::timing::counted_from_zero;
 use cager_client::messages::PreparationSeconds;
 use cager_proto::container::{ContainerReader, Error};
 use std::io::{Read, Seek};
@@ -25,6 +26,7 @@ pub(super) fn report(container: impl Read + Seek) -> Result<Unfinished, Error> {
         container.summary()?.ok_or_else(|| Error::Corrupt { offset: 0, what: "it has no summary".to_owned() })?;
     let per_frame = container.errors()?;
     let rest = container.rest()?;
+    let numbers = container.frame_numbers()?;
     let header = container.header();
     let diagonal = cager_core::mesh::diagonal(&rest.points);
     let per_frame: Vec<FrameError> =
@@ -34,6 +36,7 @@ pub(super) fn report(container: impl Read + Seek) -> Result<Unfinished, Error> {
         triangles: summary.triangles as usize,
         frames: container.frames(),
         diagonal,
+        frame_numbers: if counted_from_zero(&numbers) { Vec::new() } else { numbers },
         unknowns: header.rows_per_frame as usize,
         cage_vertices: header.cage_vertices as usize,
         cage_faces: header.cage_faces as usize,

@@ -5,6 +5,7 @@ use crate::capture::preparation_warnings;
 use crate::coordinates;
 use crate::problem::{self, ApiError};
 use crate::store::Content;
+use cager_cages::doctor::weld;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions, check_options, usual_spectrum};
@@ -123,6 +124,7 @@ pub(crate) fn read_cage(name: &str, bytes: &[u8], choices: &Choices) -> Result<C
             "{name}: has no faces, and a cage is a closed mesh; export the cage with its faces"
         )));
     }
+    let model = weld(&model).map(|welded| welded.model).unwrap_or(model);
     let mesh = TriMesh::from(&model);
     let polygon_of = model.faces.polygon_of_triangle();
     Cage::new(if choices.flip_cage { mesh.flipped() } else { mesh }).map_err(|error| {

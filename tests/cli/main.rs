@@ -14,6 +14,7 @@ mod inspect;
 #[cfg(target_os = "linux")]
 mod interrupted;
 mod manners;
+mod mistakes;
 mod real_data;
 mod real_green;
 mod real_harmonic;

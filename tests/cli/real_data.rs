@@ -1,6 +1,7 @@
 //! The captures of `CAGER_DATA` (default `../shared/data`), which are not part of the project.
 
 use crate::support::{Dir, Output, TestCommand, close, npy_f64, read_cages};
+use cager::belong::{FRAMES, Mismatch, Up, mismatches};
 use cager::encode::{Job, encode};
 use cager::report::Report;
 use cager_core::cage::Cage;
@@ -358,5 +359,37 @@ fn cages_that_leave_most_of_the_model_outside_get_an_error_or_a_warning_that_cou
             assert_eq!(done.stderr.lines().count(), 1);
             assert!(dir.names("").is_empty());
         }
+    }
+}
+
+#[test]
+fn no_real_capture_is_taken_for_a_mistake_and_every_mixed_up_one_is() {
+    let Some(root) = data() else { return };
+    for name in ["horse-gallop", "samba", "chickenCrossing", "makehuman-cmu-walk", "supercages-arm"] {
+        let rest = read_model(&root.join(name).join("rest.obj")).expect("a rest pose");
+        let n = rest.points.len();
+        let all = crate::support::read_frames(&root.join(name).join("frames.npy"), n);
+        let cloud = Model { points: rest.points.clone(), ..Model::default() };
+        for model in [&rest, &cloud] {
+            for frame in &all {
+                assert_eq!(mismatches(model, std::slice::from_ref(frame)), [], "{name}");
+            }
+        }
+        let some = |change: &dyn Fn(&[Point], usize) -> Point| -> Vec<Vec<f64>> {
+            let frames = (0..FRAMES).map(|k| all[k * (all.len() - 1) / (FRAMES - 1)].as_chunks().0);
+            frames.map(|frame| (0..n).flat_map(|i| change(frame, i)).collect()).collect()
+        };
+        // Any other frame as the rest pose is as good.
+        for k in 0..10 {
+            let posed =
+                Model { points: all[k * (all.len() - 1) / 9].as_chunks().0.to_vec(), faces: rest.faces.clone() };
+            assert_eq!(mismatches(&posed, &some(&|frame, i| frame[i])), [], "{name}");
+        }
+        let larger = mismatches(&rest, &some(&|frame, i| frame[i].map(|x| 100.0 * x)));
+        assert!(matches!(larger[..], [Mismatch::Units(factor)] if (factor - 100.0).abs() < 0.01), "{name}: {larger:?}");
+        let z_up = mismatches(&rest, &some(&|frame, i| [frame[i][0], -frame[i][2], frame[i][1]]));
+        assert_eq!(z_up, [Mismatch::Axes(Up::Z)], "{name}");
+        let reversed = mismatches(&rest, &some(&|frame, i| frame[n - 1 - i]));
+        assert!(matches!(reversed[..], [Mismatch::Order(_)]), "{name}: {reversed:?}");
     }
 }

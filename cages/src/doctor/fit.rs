@@ -15,8 +15,9 @@ const UNITS: [f64; 13] =
 /// A change of axes.
 type Turn = fn(Point) -> Point;
 
-/// The least change after which nine of ten points are inside.
-pub(super) fn misfit(mesh: &TriMesh, model: &Model) -> Option<Misfit> {
+/// The least change of unit, axes and place after which nine of ten points of a model are inside a cage; none where none of the usual
+/// ones does it.
+pub fn misfit(mesh: &TriMesh, model: &Model) -> Option<Misfit> {
     let stride = model.points.len().div_ceil(SAMPLE).max(1);
     let sample: Vec<Point> = model.points.iter().step_by(stride).copied().collect();
     let (low, high) = bounds(&model.points);

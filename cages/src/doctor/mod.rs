@@ -8,6 +8,9 @@ mod holes;
 mod influence;
 mod repair;
 mod sentences;
+mod weld;
 
 pub use findings::{Findings, Misfit, Outside, check};
+pub use fit::misfit;
 pub use repair::{Repair, repair};
+pub use weld::{Welded, weld};

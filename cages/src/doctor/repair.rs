@@ -4,9 +4,10 @@ use super::connectivity::{border_loops, edges, fans, shells, sides};
 use super::enlarge::enlarged;
 use super::findings::{Findings, check, is_cavity, shell_volume};
 use super::holes::{LONGEST, fill};
+use super::weld::same_place;
 use cager_core::mesh::{Model, Polygons, TriMesh, diagonal};
 use glam::DVec3;
-use std::collections::{HashMap, HashSet, VecDeque};
+use std::collections::{HashSet, VecDeque};
 
 /// A repaired cage.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,9 +19,6 @@ pub struct Repair {
     /// What is still wrong.
     pub remaining: Findings,
 }
-
-/// Vertices closer than this fraction of the diagonal are merged where the surface is open.
-const SAME_PLACE: f64 = 1e-6;
 
 /// Repairs a cage: merges doubled vertices along open borders, removes degenerate and doubled faces and loose vertices, splits vertices
 /// at which parts only touch, makes the orientation consistent and outward, fills small holes, and moves vertices out slightly where
@@ -69,29 +67,7 @@ impl Repairing {
     }
 
     fn merge_border_vertices(&mut self) {
-        let edges = edges(&self.faces);
-        let mut border: Vec<u32> = edges.iter().filter(|(_, u)| u.len() == 1).flat_map(|(e, _)| *e).collect();
-        border.sort_unstable();
-        border.dedup();
-        let finite: Vec<[f64; 3]> = self.points.iter().filter(|p| p.is_finite()).map(DVec3::to_array).collect();
-        let tolerance = (SAME_PLACE * diagonal(&finite)).max(f64::MIN_POSITIVE);
-        let cell = |p: DVec3| (p / tolerance).round().to_array().map(|x| x as i64);
-        let mut first: HashMap<[i64; 3], u32> = HashMap::new();
-        let mut target: Vec<u32> = (0..self.points.len() as u32).collect();
-        for v in border {
-            let p = self.points[v as usize];
-            let [x, y, z] = cell(p);
-            let near = (0..27).find_map(|i| {
-                let key = [x.saturating_add(i % 3 - 1), y.saturating_add(i / 3 % 3 - 1), z.saturating_add(i / 9 - 1)];
-                first.get(&key).copied().filter(|&w| self.points[w as usize].distance(p) <= tolerance)
-            });
-            match near {
-                Some(w) => target[v as usize] = w,
-                None => {
-                    first.insert(cell(p), v);
-                }
-            }
-        }
+        let target = same_place(&self.points, &self.faces);
         let merged = target.iter().enumerate().filter(|(v, t)| *v != **t as usize).count();
         self.faces.iter_mut().flatten().for_each(|v| *v = target[*v as usize]);
         self.changed(merged, |n| format!("merged {} with another in the same place", counted(n, "vertex", "vertices")));

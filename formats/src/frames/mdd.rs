@@ -19,7 +19,13 @@ pub(super) fn layout(head: &[u8]) -> Result<Layout, Fault> {
         (Some(first), Some(second)) if frames > 1 => rate(second - first),
         _ => None,
     };
-    Ok(Layout { points, frames, start: 8 + 4 * frames, scalar: Scalar::F32Big, frame_rate })
+    let mut layout = Layout::new(points, frames, 8 + 4 * frames, Scalar::F32Big);
+    layout.frame_rate = frame_rate;
+    if let (Some(rate), Some(time)) = (frame_rate, time(0)) {
+        let first = (1000.0 * rate * time).round() / 1000.0;
+        layout.first = if first.abs() < 1e9 { first } else { 0.0 };
+    }
+    Ok(layout)
 }
 
 /// Times are single precision: thousandths of a frame per second are all they tell.

@@ -3,6 +3,8 @@
 mod cache;
 mod mdd;
 mod npy;
+mod npz;
+mod numbers;
 mod pc2;
 mod sequence;
 mod source;
@@ -14,6 +16,7 @@ use std::path::Path;
 use crate::error::{Error, Fault};
 use crate::mesh::{MeshFormat, extensions};
 
+pub use numbers::missing_frames;
 pub use source::{open_frames, open_frames_bytes, open_frames_in};
 pub use write::{FrameOptions, FrameWriter, create_frames};
 
@@ -28,6 +31,12 @@ pub trait FrameReader: Send {
     /// Frames per second, where the source tells.
     fn frame_rate(&self) -> Option<f64> {
         None
+    }
+
+    /// The number that the source gives a frame, which is counted from 0: a file's own number, or how often a cache was sampled. Numbers
+    /// ascend.
+    fn number(&self, frame: usize) -> f64 {
+        frame as f64
     }
 
     /// Reads the next frame into `out`, which then holds 3 × points coordinates `x y z x y z …`; false at the end, with
@@ -49,7 +58,8 @@ pub trait FrameReader: Send {
 /// A file format for the frames of a capture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum CacheFormat {
-    /// A NumPy array, frames × points × 3, or points × 3 for one frame; 32- or 64-bit floats.
+    /// A NumPy array, frames × points × 3, or points × 3 for one frame; 32- or 64-bit floats. Frames × 3 × points, a fourth coordinate
+    /// that is 1 throughout, and Fortran order are read as well.
     Npy,
     /// Point cache 2, as 3ds Max and Blender write it.
     Pc2,
@@ -79,7 +89,7 @@ impl CacheFormat {
 
 /// An extension that no format of frames has.
 fn unknown_extension(path: &Path, read: bool) -> Error {
-    let caches = ".npy .pc2 .mdd";
+    let caches = if read { ".npy .pc2 .mdd .npz" } else { ".npy .pc2 .mdd" };
     Fault::unsupported(if read {
         format!(
             "is not a capture that is read; give {caches}, or {} files in a folder",

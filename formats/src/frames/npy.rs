@@ -1,13 +1,13 @@
 //! NumPy arrays: a header that is a Python dictionary, then the array.
 
-use super::cache::{LONGEST_HEADER, Layout};
+use super::cache::{LONGEST_HEADER, Layout, Order};
 use super::widen::Scalar;
 use crate::error::Fault;
 use crate::text::{integer, quoted};
 
 const MAGIC: &[u8; 6] = b"\x93NUMPY";
 
-pub(super) fn layout(head: &[u8]) -> Result<Layout, Fault> {
+pub(super) fn layout(head: &[u8], expected_points: u64) -> Result<Layout, Fault> {
     let Some(rest) = head.strip_prefix(MAGIC) else {
         return Err(Fault::damaged("does not begin as a .npy file does; save the array again with numpy.save"));
     };
@@ -33,7 +33,7 @@ pub(super) fn layout(head: &[u8]) -> Result<Layout, Fault> {
             quoted(text)
         ))
     })?;
-    array.layout((start + length) as u64)
+    array.layout((start + length) as u64, expected_points)
 }
 
 fn truncated() -> Fault {
@@ -49,7 +49,7 @@ struct Array<'a> {
 }
 
 impl Array<'_> {
-    fn layout(self, start: u64) -> Result<Layout, Fault> {
+    fn layout(self, start: u64, expected_points: u64) -> Result<Layout, Fault> {
         let scalar = match self.kind {
             Some(b"<f4") => Scalar::F32Little,
             Some(b">f4") => Scalar::F32Big,
@@ -62,22 +62,24 @@ impl Array<'_> {
                 )));
             }
         };
-        let (frames, points) = match *self.shape {
-            [frames, points, 3] => (frames, points),
-            [points, 3] => (1, points),
+        let (frames, points, order) = match *self.shape {
+            [frames, points, 3] => (frames, points, Order::Points),
+            [points, 3] => (1, points, Order::Points),
+            [frames, points, 4] if points == expected_points => (frames, points, Order::Homogeneous),
+            [frames, 3, points] => (frames, points, Order::Axes),
+            [3, points] => (1, points, Order::Axes),
+            [frames, points, 4] => (frames, points, Order::Homogeneous),
             _ => {
                 return Err(Fault::unsupported(format!(
-                    "has the shape {:?}, not (frames, points, 3); convert it with numpy.save(path, numpy.load(path).reshape(frames, points, 3))",
+                    "has the shape {:?}, not (frames, points, 3); bring its axes into this order with numpy.transpose, or with reshape where each row has the coordinates x y z x y z of one frame",
                     self.shape
                 )));
             }
         };
-        if self.fortran {
-            return Err(Fault::unsupported(
-                "is in Fortran order; convert it with numpy.save(path, numpy.ascontiguousarray(numpy.load(path)))",
-            ));
-        }
-        Ok(Layout { points, frames, start, scalar, frame_rate: None })
+        let mut layout = Layout::new(points, frames, start, scalar);
+        layout.order = order;
+        layout.fortran = self.fortran.then_some(self.shape);
+        Ok(layout)
     }
 }
 

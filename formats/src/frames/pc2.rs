@@ -7,6 +7,8 @@ use crate::error::Fault;
 
 const MAGIC: &[u8; 12] = b"POINTCACHE2\0";
 const HEADER: usize = 32;
+/// Frame numbers beyond are no numbers of frames.
+const MOST: f64 = 1e9;
 
 pub(super) fn layout(head: &[u8]) -> Result<Layout, Fault> {
     let Some(fields) = head.strip_prefix(MAGIC) else {
@@ -22,16 +24,24 @@ pub(super) fn layout(head: &[u8]) -> Result<Layout, Fault> {
     let (Ok(points), Ok(frames)) = (u64::try_from(points), u64::try_from(frames)) else {
         return Err(Fault::damaged(format!("promises {frames} frames of {points} points; export it again")));
     };
-    Ok(Layout { points, frames, start: HEADER as u64, scalar: Scalar::F32Little, frame_rate: None })
+    let real = |k: usize| fields.as_chunks().0.get(k).map(|bytes| f64::from(f32::from_le_bytes(*bytes)));
+    // Some programs leave both at zero.
+    let (first, step) = match (real(2), real(3)) {
+        (Some(first), Some(step)) if first.abs() < MOST && step > 0.0 && step < MOST => (first, step),
+        _ => (0.0, 1.0),
+    };
+    let mut layout = Layout::new(points, frames, HEADER as u64, Scalar::F32Little);
+    (layout.first, layout.step) = (first, step);
+    Ok(layout)
 }
 
-/// A header for frames 0, 1, 2, …
-pub(super) fn header(points: i32, frames: i32) -> Vec<u8> {
+/// A header for frames whose numbers begin at `first`, `step` apart.
+pub(super) fn header(points: i32, frames: i32, first: f32, step: f32) -> Vec<u8> {
     let mut header = MAGIC.to_vec();
     header.extend(1_i32.to_le_bytes());
     header.extend(points.to_le_bytes());
-    header.extend(0_f32.to_le_bytes());
-    header.extend(1_f32.to_le_bytes());
+    header.extend(first.to_le_bytes());
+    header.extend(step.to_le_bytes());
     header.extend(frames.to_le_bytes());
     header
 }

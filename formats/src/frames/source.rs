@@ -5,16 +5,16 @@ use std::fs::{self, File};
 use std::io::{self, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 
-use super::cache::CacheReader;
+use super::cache;
 use super::sequence::SequenceReader;
-use super::{CacheFormat, FrameReader, unknown_extension};
+use super::{CacheFormat, FrameReader, npz, unknown_extension};
 use crate::error::{Error, Fault};
 use crate::mesh::{MeshFormat, extensions};
 use crate::natural;
 
 /// Opens the frames of a capture whose rest pose has `expected_points` points.
 ///
-/// `source` is a `.npy`, `.pc2` or `.mdd` file, one mesh file, a folder of mesh files or a glob pattern for such files.
+/// `source` is a `.npy`, `.pc2` or `.mdd` file, a `.npz` file with one array, one mesh file, a folder of mesh files or a glob pattern for such files.
 /// Folder and pattern give the files of one mesh format in natural order, `2.obj` before `10.obj`; other files, and in
 /// a folder hidden ones, are passed over.
 ///
@@ -62,13 +62,17 @@ pub fn open_frames_in<'a>(
     length: u64,
     expected_points: usize,
 ) -> Result<Box<dyn FrameReader + 'a>, Error> {
-    Ok(Box::new(CacheReader::open(format, name, source, length, expected_points)?))
+    cache::open(format, name, source, length, expected_points)
 }
 
 fn open_file(path: &Path, length: u64, expected_points: usize) -> Result<Box<dyn FrameReader>, Error> {
     if let Some(format) = CacheFormat::from_path(path) {
         let file = File::open(path).map_err(|cause| Error::read(path, cause))?;
-        return Ok(Box::new(CacheReader::open(format, path, file, length, expected_points)?));
+        return cache::open(format, path, file, length, expected_points);
+    }
+    if path.extension().is_some_and(|found| found.eq_ignore_ascii_case("npz")) {
+        let (file, length) = npz::only_array(path)?;
+        return cache::open(CacheFormat::Npy, path, file, length, expected_points);
     }
     if MeshFormat::guess(path).is_some() {
         return Ok(Box::new(SequenceReader::new(vec![path.to_owned()], expected_points)));

@@ -118,6 +118,8 @@ pub(crate) fn read_file(path: &Path, contents: Contents) -> Result<Model, Error>
 fn read_bytes(format: MeshFormat, name: &Path, bytes: &[u8], contents: Contents) -> Result<Model, Error> {
     let model = if bytes.is_empty() {
         Err(Fault::damaged("is empty; export the mesh or copy the file again"))
+    } else if let Some(what) = foreign_text(bytes) {
+        Err(Fault::damaged(what))
     } else {
         match format {
             MeshFormat::Obj => obj::read(bytes, contents),
@@ -136,6 +138,22 @@ fn read_bytes(format: MeshFormat, name: &Path, bytes: &[u8], contents: Contents)
             _ => Ok(model),
         })
         .map_err(|fault| fault.at(name))
+}
+
+/// What text is that no mesh format begins with; a download that went wrong, or an editor's encoding.
+fn foreign_text(bytes: &[u8]) -> Option<&'static str> {
+    if matches!(
+        bytes,
+        [0xff, 0xfe, ..]
+            | [0xfe, 0xff, ..]
+            | [b' '..=b'~', 0, b' '..=b'~', 0, ..]
+            | [0, b' '..=b'~', 0, b' '..=b'~', ..]
+    ) {
+        return Some("is text in UTF-16; save it as UTF-8, or export the mesh again");
+    }
+    let start = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    let begins = |word: &str| start.get(..word.len()).is_some_and(|found| found.eq_ignore_ascii_case(word.as_bytes()));
+    (begins("<!doctype") || begins("<html")).then_some("is a web page and no mesh; download the file itself")
 }
 
 /// Checks the corners of one face, which `place` names in messages, against the number of points.

@@ -136,6 +136,11 @@ fn number_or_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::
     Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
 
+/// Numbers of frames are finite and ascend.
+pub(crate) fn are_frame_numbers(numbers: &[f64]) -> bool {
+    numbers.iter().all(|x| x.is_finite()) && numbers.windows(2).all(|pair| pair[0] < pair[1])
+}
+
 /// The sections this program knows.
 pub(crate) mod tag {
     pub(crate) const HEADER: [u8; 4] = *b"HEAD";
@@ -146,7 +151,8 @@ pub(crate) mod tag {
     pub(crate) const FRAMES: [u8; 4] = *b"FRAM";
     pub(crate) const ERRORS: [u8; 4] = *b"ERRS";
     pub(crate) const CONTENTS: [u8; 4] = *b"TOC_";
+    pub(crate) const NUMBERS: [u8; 4] = *b"fnum";
     pub(crate) const SUMMARY: [u8; 4] = *b"summ";
-    pub(crate) const KNOWN: [[u8; 4]; 9] =
-        [HEADER, REST_POINTS, REST_FACES, CAGE_VERTICES, CAGE_FACES, FRAMES, ERRORS, CONTENTS, SUMMARY];
+    pub(crate) const KNOWN: [[u8; 4]; 10] =
+        [HEADER, REST_POINTS, REST_FACES, CAGE_VERTICES, CAGE_FACES, FRAMES, ERRORS, CONTENTS, NUMBERS, SUMMARY];
 }

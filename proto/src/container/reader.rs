@@ -175,6 +175,23 @@ impl<R: Read + Seek> ContainerReader<R> {
         Ok(raw.chunks_exact(8).map(|b| FrameError { l2: f32_at(b, 0), linf: f32_at(b, 4) }).collect())
     }
 
+    /// The numbers that the frames have where they come from, such as those of their files; 0, 1, 2, … where the file has none.
+    ///
+    /// # Errors
+    /// Damage.
+    pub fn frame_numbers(&mut self) -> Result<Vec<f64>, Error> {
+        let Some(&entry) = self.entries.iter().find(|e| e.header.tag == tag::NUMBERS) else {
+            return Ok((0..self.frames).map(|frame| frame as f64).collect());
+        };
+        let raw = self.raw(entry)?;
+        let numbers: Vec<f64> = raw.chunks_exact(8).map(|b| f64::from_bits(u64_at(b, 0))).collect();
+        if super::are_frame_numbers(&numbers) {
+            Ok(numbers)
+        } else {
+            Err(Error::corrupt(entry.offset, "the numbers of the frames do not ascend"))
+        }
+    }
+
     /// What the encoder found out, where it said so.
     ///
     /// # Errors
@@ -206,6 +223,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         self.rest()?;
         self.cage()?;
         self.errors()?;
+        self.frame_numbers()?;
         self.summary()?;
         let mut cage = Vec::new();
         for frame in 0..self.frames {
@@ -293,9 +311,12 @@ impl<R: Read + Seek> ContainerReader<R> {
             self.entry(tag)?;
         }
         let most_faces = usize::from(self.header.rest_faces > 0);
-        for (tag, least, most) in
-            [(tag::REST_FACES, most_faces, most_faces), (tag::SUMMARY, 0, 1), (tag::CONTENTS, 0, 0)]
-        {
+        for (tag, least, most) in [
+            (tag::REST_FACES, most_faces, most_faces),
+            (tag::NUMBERS, 0, 1),
+            (tag::SUMMARY, 0, 1),
+            (tag::CONTENTS, 0, 0),
+        ] {
             let count = self.entries.iter().filter(|e| e.header.tag == tag).count();
             if count < least || count > most {
                 let name = String::from_utf8_lossy(&tag);
@@ -312,12 +333,13 @@ impl<R: Read + Seek> ContainerReader<R> {
                 tag::FRAMES => {
                     u64::from(s.count).checked_mul(12).and_then(|n| n.checked_mul(u64::from(h.rows_per_frame)))
                 }
-                tag::ERRORS => Some(8 * self.frames as u64),
+                tag::ERRORS | tag::NUMBERS => Some(8 * self.frames as u64),
                 _ => Some(s.raw_bytes),
             };
             let width_fits = match s.tag {
                 tag::REST_POINTS | tag::CAGE_VERTICES => s.width == 4 || s.width == 8,
                 tag::REST_FACES | tag::CAGE_FACES | tag::FRAMES | tag::ERRORS => s.width == 4,
+                tag::NUMBERS => s.width == 8,
                 _ => s.width > 0,
             };
             if expected != Some(s.raw_bytes) || !width_fits {

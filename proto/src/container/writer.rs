@@ -99,6 +99,18 @@ impl<W: Write> ContainerWriter<W> {
         self.section(tag, PLANES, 1, 0, bytes)
     }
 
+    /// Adds the numbers that the frames have where they come from, ascending; left out they are 0, 1, 2, …
+    ///
+    /// # Errors
+    /// Numbers that readers would refuse; an output that refuses.
+    pub fn add_frame_numbers(&mut self, numbers: &[f64]) -> Result<(), Error> {
+        if numbers.len() != self.errors.len() / 8 || !super::are_frame_numbers(numbers) {
+            return Err(Error::TooLarge("frame numbers that are not one for each frame, ascending".to_owned()));
+        }
+        let raw: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
+        self.section(tag::NUMBERS, PLANES, 8, 0, &raw)
+    }
+
     /// Writes what comes after the frames and gives back the output, which the caller flushes.
     ///
     /// # Errors

@@ -25,11 +25,14 @@ impl CacheWriter {
             return Err(Fault::unsupported(what).at(&announced.path));
         };
         if format == CacheFormat::Pc2 {
-            return Self::begin(announced, false, |file| file.write_all(&pc2::header(points, frames)));
+            return Self::begin(announced, false, |file| {
+                file.write_all(&pc2::header(points, frames, options.number(0) as f32, options.step() as f32))
+            });
         }
         Self::begin(announced, true, |file| {
             file.write_all(&mdd::header(points, frames))?;
-            (0..frames).try_for_each(|k| file.write_all(&((f64::from(k) / options.fps) as f32).to_be_bytes()))
+            let time = |k: i32| (options.number(k as usize) / options.fps) as f32;
+            (0..frames).try_for_each(|k| file.write_all(&time(k).to_be_bytes()))
         })
     }
 

@@ -30,22 +30,37 @@ pub trait FrameWriter: Send {
 }
 
 /// What some formats store beside the positions.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct FrameOptions {
     /// Frames per second, for the times in `.mdd`: 24 by default.
     pub fps: f64,
+    /// The number of each frame, ascending, for the names of files and the times in `.pc2` and `.mdd`; 0, 1, 2, … where there are none.
+    pub numbers: Vec<f64>,
+}
+
+impl FrameOptions {
+    fn number(&self, frame: usize) -> f64 {
+        self.numbers.get(frame).copied().unwrap_or(frame as f64)
+    }
+
+    /// The distance of two frames; 1 where it is not the same throughout.
+    fn step(&self) -> f64 {
+        let mut steps = self.numbers.windows(2).map(|pair| pair[1] - pair[0]);
+        let first = steps.next().unwrap_or(1.0);
+        if steps.all(|step| (step - first).abs() <= 1e-6 * first) { first } else { 1.0 }
+    }
 }
 
 impl Default for FrameOptions {
     fn default() -> Self {
-        Self { fps: 24.0 }
+        Self { fps: 24.0, numbers: Vec::new() }
     }
 }
 
 /// Begins an output of `frames` frames of `points` points each.
 ///
 /// The extension of `path` says what: `.npy` (frames × points × 3, `<f4`), `.pc2` or `.mdd`. Without an extension, with
-/// a `/` at the end, or as an existing folder it becomes a folder of files `frame_0000.obj`, …, each with `faces`;
+/// a `/` at the end, or as an existing folder it becomes a folder of files `frame_0000.obj`, …, each with `faces` and its number;
 /// `FOLDER/*.ply` makes them `.ply` files.
 ///
 /// # Errors
@@ -66,7 +81,7 @@ pub fn create_frames(
     let announced = Announced { path: path.to_owned(), points, frames, written: 0 };
     announced.check(options).map_err(|fault| fault.at(path))?;
     if folder.is_some() || is_folder(path) {
-        return Ok(Box::new(SequenceWriter::create(announced, faces, pattern == Some("*.ply"))?));
+        return Ok(Box::new(SequenceWriter::create(announced, faces, pattern == Some("*.ply"), options)?));
     }
     match CacheFormat::from_path(path) {
         Some(format) => Ok(Box::new(CacheWriter::create(announced, format, options)?)),
@@ -102,6 +117,11 @@ impl Announced {
                 self.points,
                 u32::MAX
             )));
+        }
+        let ascending = options.numbers.windows(2).all(|pair| pair[0] < pair[1]);
+        let counted = options.numbers.is_empty() || options.numbers.len() == self.frames;
+        if !(ascending && counted && options.numbers.iter().all(|x| x.is_finite())) {
+            return Err(Fault::invalid("cannot have these frame numbers; give one for each frame, ascending"));
         }
         if !(options.fps > 0.0 && options.fps.is_finite()) {
             return Err(Fault::invalid(format!(

@@ -4,7 +4,8 @@ use std::io::{self, BufWriter, Write};
 
 use cager_core::mesh::{Model, Polygons};
 
-use super::{Announced, FrameWriter};
+use super::super::numbers::padded;
+use super::{Announced, FrameOptions, FrameWriter};
 use crate::atomic::AtomicDir;
 use crate::error::{Error, Fault};
 use crate::mesh::{write_obj_faces, write_ply};
@@ -13,6 +14,7 @@ pub(super) struct SequenceWriter {
     announced: Announced,
     folder: AtomicDir,
     format: Format,
+    options: FrameOptions,
     digits: usize,
 }
 
@@ -25,7 +27,12 @@ enum Format {
 }
 
 impl SequenceWriter {
-    pub(super) fn create(announced: Announced, faces: &Polygons, ply: bool) -> Result<Self, Error> {
+    pub(super) fn create(
+        announced: Announced,
+        faces: &Polygons,
+        ply: bool,
+        options: &FrameOptions,
+    ) -> Result<Self, Error> {
         if let Some(&index) = faces.indices().iter().find(|&&index| index as usize >= announced.points) {
             return Err(Fault::invalid(format!(
                 "the faces to write name vertex {index}, but there are {} points; give the faces of this mesh",
@@ -41,8 +48,9 @@ impl SequenceWriter {
             write_obj_faces(&mut text, faces.iter()).map_err(|cause| Error::write(&announced.path, cause))?;
             Format::Obj(text)
         };
-        let digits = (announced.frames - 1).to_string().len().max(4);
-        Ok(Self { announced, folder, format, digits })
+        let whole = |frame: usize| options.number(frame).abs().trunc().to_string().len();
+        let digits = whole(0).max(whole(announced.frames - 1)).max(4);
+        Ok(Self { announced, folder, format, options: options.clone(), digits })
     }
 
     fn write_file(&mut self, name: &str, positions: &[f32]) -> io::Result<()> {
@@ -69,7 +77,8 @@ impl FrameWriter for SequenceWriter {
     fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error> {
         self.announced.admit(positions)?;
         let extension = if matches!(self.format, Format::Ply(_)) { "ply" } else { "obj" };
-        let name = format!("frame_{:0digits$}.{extension}", self.announced.written, digits = self.digits);
+        let number = padded(self.options.number(self.announced.written), self.digits);
+        let name = format!("frame_{number}.{extension}");
         self.write_file(&name, positions).map_err(|cause| Error::write(&self.announced.path.join(&name), cause))?;
         self.announced.written += 1;
         Ok(())

@@ -1,0 +1,159 @@
+//! The numbers of frames, as the names of their files tell them.
+
+use std::path::{Path, PathBuf};
+
+/// Runs of missing frames that a message lists.
+const LISTED: usize = 6;
+
+/// The numbers in names that differ by nothing else: `f-2 f0 f1.5` or `walk.0010_left walk.0011_left`. Files as they stand get theirs;
+/// none where a name has no number, two have the same, or they differ by more.
+pub(super) fn of_files(files: &[PathBuf]) -> Option<Vec<f64>> {
+    let folder = files.first()?.parent();
+    let stems: Option<Vec<&str>> =
+        files.iter().filter(|file| file.parent() == folder).map(|file| Path::new(file).file_stem()?.to_str()).collect();
+    let stems = stems.filter(|stems| stems.len() == files.len() && stems.len() > 1)?;
+    let prefix = prefix(&stems);
+    let ends: Vec<&str> = stems.iter().map(|stem| &stem[prefix..]).collect();
+    let suffix = suffix(&ends);
+    let numbers: Vec<f64> =
+        ends.iter().map(|end| number(&end[..end.len().checked_sub(suffix)?])).collect::<Option<_>>()?;
+    let mut sorted = numbers.clone();
+    sorted.sort_by(f64::total_cmp);
+    sorted.windows(2).all(|pair| pair[0] < pair[1]).then_some(numbers)
+}
+
+/// Bytes before the number: what all names begin with, less the digits and the sign that belong to the number.
+fn prefix(stems: &[&str]) -> usize {
+    let first = stems[0].as_bytes();
+    let same = |k: &usize| stems.iter().all(|stem| stem.as_bytes().get(*k) == Some(&first[*k]));
+    let mut end = (0..first.len()).take_while(same).count();
+    while end > 0 && first[end - 1].is_ascii_digit() {
+        end -= 1;
+    }
+    // `walk-1` has a hyphen, `f_-1` and `-1` a sign.
+    let separated = end < 2 || !first[end - 2].is_ascii_alphanumeric();
+    if end > 0 && first[end - 1] == b'-' && separated {
+        end -= 1;
+    }
+    while !stems[0].is_char_boundary(end) {
+        end -= 1;
+    }
+    end
+}
+
+/// Bytes after the number: what all names end with, less the digits and the fraction that belong to the number.
+fn suffix(ends: &[&str]) -> usize {
+    let last = ends[0].as_bytes();
+    let from_end = |text: &[u8], k: usize| text.len().checked_sub(k + 1).map(|at| text[at]);
+    let same = |k: &usize| ends.iter().all(|end| from_end(end.as_bytes(), *k) == from_end(last, *k));
+    let mut length = (0..last.len()).take_while(same).count();
+    loop {
+        let rest = &last[last.len() - length..];
+        match rest {
+            [first, ..] if first.is_ascii_digit() || !ends[0].is_char_boundary(last.len() - length) => length -= 1,
+            [b'.', digit, ..] if digit.is_ascii_digit() => length -= 1,
+            _ => return length,
+        }
+    }
+}
+
+/// Decimal digits, with a sign and a fraction where there are any; none where `f64` would round.
+fn number(text: &str) -> Option<f64> {
+    let digits = text.strip_prefix('-').unwrap_or(text);
+    let (whole, fraction) = digits.split_once('.').unwrap_or((digits, "0"));
+    let plain = |part: &str| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
+    (plain(whole) && plain(fraction) && digits.len() <= 15).then(|| text.parse().ok())?.map(|x: f64| x + 0.0)
+}
+
+/// The frames that are missing from these numbers, in words such as `4, 7–9`; none where they have the same distance throughout. Only
+/// whole numbers are looked at, so that frames between frames are no gaps.
+pub fn missing_frames(numbers: &[f64]) -> Option<String> {
+    let whole: Vec<i64> = numbers.iter().filter(|x| x.fract() == 0.0 && x.abs() < 1e15).map(|&x| x as i64).collect();
+    let steps: Vec<i64> = whole.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let often = |step: i64| steps.iter().filter(|&&s| s == step).count();
+    let step = steps.iter().copied().filter(|&s| s > 0).max_by_key(|&s| (often(s), -s))?;
+    let gaps: Vec<[i64; 2]> = whole
+        .windows(2)
+        .filter(|pair| pair[1] - pair[0] > step)
+        .map(|pair| [pair[0] + step, pair[1] - 1 - (pair[1] - 1 - pair[0]).rem_euclid(step)])
+        .collect();
+    let mut words: Vec<String> = gaps
+        .iter()
+        .take(LISTED)
+        .map(|&[first, last]| match (last - first) / step {
+            0 => first.to_string(),
+            _ if step == 1 => format!("{first} to {last}"),
+            _ => format!("{first} to {last} in steps of {step}"),
+        })
+        .collect();
+    if gaps.len() > LISTED {
+        words.push("more".to_owned());
+    }
+    let last = words.pop()?;
+    Some(if words.is_empty() { last } else { format!("{} and {last}", words.join(", ")) })
+}
+
+/// A number as names have it: at least `digits` digits before the point, and only as many after it as there must be.
+pub(super) fn padded(number: f64, digits: usize) -> String {
+    let sign = if number < 0.0 { "-" } else { "" };
+    let text = number.abs().to_string();
+    let whole = text.split('.').next().unwrap_or_default().len();
+    format!("{sign}{}{text}", "0".repeat(digits.saturating_sub(whole)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(names: &[&str]) -> Option<Vec<f64>> {
+        of_files(&names.iter().map(|name| PathBuf::from(format!("a/{name}.obj"))).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn names_that_differ_by_a_number_tell_it() {
+        for (names, numbers) in [
+            (vec!["f-2", "f-1", "f0", "f1"], vec![-2.0, -1.0, 0.0, 1.0]),
+            (vec!["f1", "f1.5", "f2"], vec![1.0, 1.5, 2.0]),
+            (vec!["frame_-002", "frame_-001"], vec![-2.0, -1.0]),
+            (vec!["-2", "-1"], vec![-2.0, -1.0]),
+            (vec!["walk-1", "walk-2", "walk-10"], vec![1.0, 2.0, 10.0]),
+            (vec!["shot2.0010", "shot2.0011"], vec![10.0, 11.0]),
+            (vec!["v2_0999_left", "v2_1000_left"], vec![999.0, 1000.0]),
+            (vec!["f1.0", "f1.5", "f2.0", "f2.5"], vec![1.0, 1.5, 2.0, 2.5]),
+            (vec!["é1", "é2"], vec![1.0, 2.0]),
+        ] {
+            assert_eq!(of(&names), Some(numbers), "{names:?}");
+        }
+        for names in
+            [vec!["a1", "b2"], vec!["run", "walk"], vec!["1", "01"], vec!["f1"], vec!["f", "f1"], vec!["è1", "é1"]]
+        {
+            assert_eq!(of(&names), None, "{names:?}");
+        }
+    }
+
+    #[test]
+    fn missing_frames_are_named_and_a_regular_step_is_none() {
+        for (numbers, missing) in [
+            (vec![1.0, 2.0, 3.0], None),
+            (vec![0.0, 2.0, 4.0, 6.0], None),
+            (vec![-2.0, -1.0, 0.0], None),
+            (vec![1.0, 1.5, 2.0, 3.0], None),
+            (vec![7.0], None),
+            (vec![], None),
+            (vec![1.0, 2.0, 3.0, 5.0, 6.0, 10.0], Some("4 and 7 to 9")),
+            (vec![0.0, 2.0, 4.0, 10.0], Some("6 to 8 in steps of 2")),
+        ] {
+            assert_eq!(missing_frames(&numbers).as_deref(), missing, "{numbers:?}");
+        }
+        let holes: Vec<f64> = (0..40).map(|k| f64::from(k + k / 4)).collect();
+        assert!(missing_frames(&holes).is_some_and(|words| words.ends_with(" and more")));
+    }
+
+    #[test]
+    fn numbers_are_written_as_they_are_read() {
+        for (number, text) in [(7.0, "0007"), (-2.0, "-0002"), (1.5, "0001.5"), (12345.0, "12345")] {
+            assert_eq!(padded(number, 4), text);
+            assert_eq!(super::number(text), Some(number));
+        }
+    }
+}

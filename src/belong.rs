@@ -1,0 +1,377 @@
+//! Whether the frames of a capture belong to a rest pose: units, axes and the order of points, told by edge lengths, extents and
+//! the correlation of positions. What deformation does to all three is far from what a mix-up does.
+
+use cager_core::mesh::{Model, Point, bounds};
+use std::fmt;
+
+/// Frames that are worth comparing with a rest pose, evenly spaced.
+pub const FRAMES: usize = 5;
+
+/// Edges, or pairs of points, looked at in a frame.
+const PAIRS: usize = 20_000;
+
+/// Distances computed at most to find the neighbours of a point cloud's points.
+const DISTANCES: usize = 20_000_000;
+
+/// What a capture that does not belong to its rest pose looks like. Ratios are of the capture to the rest pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Mismatch {
+    /// The points come in another order: the first frame's edges are so many times longer, and no edge is one any more.
+    Order(f64),
+    /// Everything is larger or smaller by this factor in every frame.
+    Units(f64),
+    /// The axes y and z changed places.
+    Axes(Up),
+}
+
+/// Which axis points up in a capture whose axes are not those of its rest pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Up {
+    /// The second; the third does in the rest pose.
+    Y,
+    /// The third; the second does in the rest pose.
+    Z,
+    /// Neither of the two usual conversions leads from one to the other.
+    Other,
+}
+
+/// What is wrong with a capture, by some of its frames, the first among them, points × 3 each; empty where it may well belong to the
+/// rest pose. Every frame has to agree: a capture that deforms a model in earnest is not taken for a mistake.
+pub fn mismatches(rest: &Model, frames: &[Vec<f64>]) -> Vec<Mismatch> {
+    let Some(rest_shape) = Shape::of(&rest.points) else { return Vec::new() };
+    let pairs = neighbours(rest);
+    let compared: Vec<Compared> =
+        frames.iter().filter_map(|frame| Compared::new(rest, &rest_shape, &pairs, frame.as_chunks().0)).collect();
+    let Some(first) = compared.first() else { return Vec::new() };
+    if compared.iter().all(Compared::is_shuffled) {
+        return vec![Mismatch::Order(first.edges)];
+    }
+    let mut found = Vec::new();
+    if in_other_units(&compared) {
+        found.push(Mismatch::Units(first.edges));
+    }
+    let exchanged: Vec<Up> = compared.iter().filter_map(|frame| frame.turn.exchanged()).collect();
+    if 5 * exchanged.len() >= 2 * compared.len() && !compared.iter().any(|frame| frame.turn.is_clearly_none()) {
+        found.push(Mismatch::Axes(exchanged[0]));
+    }
+    found
+}
+
+/// A factor of its own in every frame is motion; the same one in all, on every edge, is a unit.
+fn in_other_units(compared: &[Compared]) -> bool {
+    let ratios = || compared.iter().map(|frame| frame.edges);
+    let (least, most) = (ratios().fold(f64::INFINITY, f64::min), ratios().fold(0.0, f64::max));
+    let alike = |frame: &Compared| (frame.edges / frame.extent).ln().abs() < 0.7;
+    let even = compared.iter().all(|frame| frame.unevenness < 0.3) && most < 1.1 * least;
+    let factor = if even { 2.2 } else { 5.0 };
+    let away = least > factor || most < 1.0 / factor;
+    away && most < 1.5 * least && compared.iter().all(alike)
+}
+
+/// Where a shape is and how large.
+struct Shape {
+    centre: Point,
+    /// Root mean square distance from the centre.
+    radius: f64,
+    diagonal: f64,
+    /// Median distance of two points chosen at random.
+    distance: f64,
+}
+
+impl Shape {
+    /// None for points in one place, or not finite.
+    fn of(points: &[Point]) -> Option<Self> {
+        let n = points.len() as f64;
+        let (low, high) = bounds(points);
+        let diagonal = distance(low, high);
+        if !(diagonal.is_finite() && diagonal > 0.0) {
+            return None;
+        }
+        let centre: Point = std::array::from_fn(|k| points.iter().map(|p| p[k]).sum::<f64>() / n);
+        let radius = (points.iter().map(|&p| distance(p, centre).powi(2)).sum::<f64>() / n).sqrt();
+        let count = points.len().min(2_000);
+        // Multiples of an odd number far from every regularity of a mesh.
+        let other = |k: usize| k.wrapping_mul(0x9e37_79b9_7f4a_7c15) % points.len();
+        let pairs = (1..=count).map(|k| distance(points[other(k)], points[other(k + count)])).collect();
+        (radius.is_finite() && radius > 0.0).then_some(())?;
+        Some(Self { centre, radius, diagonal, distance: quartiles(pairs)?[1] })
+    }
+}
+
+/// A frame beside the rest pose.
+struct Compared {
+    /// Median ratio of an edge's length.
+    edges: f64,
+    /// Logarithm of the ratio of the upper to the lower quartile of those ratios.
+    unevenness: f64,
+    /// Ratio of the diagonals of the bounding boxes.
+    extent: f64,
+    /// Median length of an edge, as a fraction of the distance of two points chosen at random: about 1 where an edge is as good as any
+    /// other two points; in the rest pose and in the frame.
+    edge_in_rest: f64,
+    edge_in_frame: f64,
+    turn: Turn,
+}
+
+impl Compared {
+    fn new(rest: &Model, rest_shape: &Shape, pairs: &[[u32; 2]], frame: &[Point]) -> Option<Self> {
+        let shape = Shape::of(frame)?;
+        let length = |points: &[Point], [a, b]: [u32; 2]| distance(points[a as usize], points[b as usize]);
+        let both: Vec<(f64, f64)> = pairs.iter().map(|&e| (length(&rest.points, e), length(frame, e))).collect();
+        let [lower, edges, upper] = quartiles(both.iter().map(|(r, f)| f / r).collect())?;
+        Some(Self {
+            edges,
+            unevenness: (upper / lower.max(f64::MIN_POSITIVE)).ln(),
+            extent: shape.diagonal / rest_shape.diagonal,
+            edge_in_rest: quartiles(both.iter().map(|b| b.0).collect())?[1] / rest_shape.distance,
+            edge_in_frame: quartiles(both.iter().map(|b| b.1).collect())?[1] / shape.distance,
+            turn: Turn::new(&correlation((&rest.points, rest_shape), (frame, &shape))),
+        })
+    }
+
+    fn is_shuffled(&self) -> bool {
+        let longer = self.edges / self.extent;
+        let like_any_two = self.edge_in_frame / self.edge_in_rest;
+        let least = longer.min(like_any_two);
+        // A model that is crumpled up keeps its edges.
+        self.edges > 1.2 && (least > 2.0 && self.unevenness > 1.0 || least > 5.0 && self.unevenness > 0.6)
+    }
+}
+
+/// Edges of a mesh, or nearest neighbours in a point cloud, that have a length; some of them where there are many.
+fn neighbours(rest: &Model) -> Vec<[u32; 2]> {
+    let points = &rest.points;
+    let apart = |&[a, b]: &[u32; 2]| distance(points[a as usize], points[b as usize]) > 0.0;
+    let stride = rest.faces.indices().len().div_ceil(PAIRS).max(1);
+    if rest.faces.is_empty() {
+        let n = points.len();
+        let count = (DISTANCES / n.max(1)).clamp(32, 500).min(n);
+        let nearest = |a: usize| {
+            let to = |b: usize| distance(points[a], points[b]);
+            let others = (0..n).filter(|&b| to(b) > 0.0);
+            others.min_by(|&b, &c| to(b).total_cmp(&to(c))).map(|b| [a as u32, b as u32])
+        };
+        return (0..count).filter_map(|k| nearest(k * n / count)).collect();
+    }
+    let sides = rest.faces.iter().flat_map(|face| (0..face.len()).map(|k| [face[k], face[(k + 1) % face.len()]]));
+    sides.step_by(stride).filter(apart).collect()
+}
+
+/// `Σ p qᵀ` over the points of rest pose and frame, about their centres and divided by their radii and number: the identity over three
+/// for a ball that did not move.
+fn correlation((rest, of_rest): (&[Point], &Shape), (frame, of_frame): (&[Point], &Shape)) -> [Point; 3] {
+    let mut sum = [[0.0; 3]; 3];
+    let scale = 1.0 / (of_rest.radius * of_frame.radius * rest.len() as f64);
+    for (p, q) in rest.iter().zip(frame) {
+        for (i, row) in sum.iter_mut().enumerate() {
+            for (j, cell) in row.iter_mut().enumerate() {
+                *cell += scale * (p[i] - of_rest.centre[i]) * (q[j] - of_frame.centre[j]);
+            }
+        }
+    }
+    sum
+}
+
+/// How well the turns that map axes to axes take the rest pose to a frame: 1 where one of them is all that happened. A model that
+/// faces another way, turned about its upward axis, has no exchanged axes.
+struct Turn {
+    /// The best without an exchange of y and z, mirror images included.
+    without: f64,
+    /// The best proper one with it.
+    with: f64,
+    /// The best mirror image with it.
+    mirrored: f64,
+    /// What the best proper one does.
+    up: Up,
+}
+
+impl Turn {
+    fn new(correlation: &[Point; 3]) -> Self {
+        const ORDERS: [([usize; 3], f64); 6] = [
+            ([0, 1, 2], 1.0),
+            ([0, 2, 1], -1.0),
+            ([1, 0, 2], -1.0),
+            ([1, 2, 0], 1.0),
+            ([2, 0, 1], 1.0),
+            ([2, 1, 0], -1.0),
+        ];
+        let none = f64::NEG_INFINITY;
+        let mut best = Self { without: none, with: none, mirrored: none, up: Up::Other };
+        for (order, parity) in ORDERS {
+            for signs in 0..8 {
+                let sign: Point = std::array::from_fn(|k| if signs >> k & 1 == 0 { 1.0 } else { -1.0 });
+                let fit: f64 = (0..3).map(|k| sign[k] * correlation[k][order[k]]).sum();
+                let proper = parity * sign[0] * sign[1] * sign[2] > 0.0;
+                if order[1] != 2 && order[2] != 1 {
+                    best.without = best.without.max(fit);
+                } else if !proper {
+                    best.mirrored = best.mirrored.max(fit);
+                } else if fit > best.with {
+                    best.with = fit;
+                    best.up = match (order[1] == 2 && sign[1] > 0.0, order[2] == 1 && sign[2] > 0.0) {
+                        (true, false) => Up::Z,
+                        (false, true) => Up::Y,
+                        _ => Up::Other,
+                    };
+                }
+            }
+        }
+        best
+    }
+
+    /// The axis that points up, where y and z are clearly exchanged.
+    fn exchanged(&self) -> Option<Up> {
+        let best = self.with.max(self.mirrored);
+        let mirror = 1.0 - self.mirrored < 0.5 * (1.0 - self.with);
+        Self::clearly(best, self.without).then_some(if mirror { Up::Other } else { self.up })
+    }
+
+    fn is_clearly_none(&self) -> bool {
+        Self::clearly(self.without, self.with.max(self.mirrored))
+    }
+
+    fn clearly(better: f64, worse: f64) -> bool {
+        better > 0.8 && 1.0 - worse > 3.0 * (1.0 - better)
+    }
+}
+
+fn distance(a: Point, b: Point) -> f64 {
+    (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Lower quartile, median and upper quartile; none of no or of infinite numbers.
+fn quartiles(mut values: Vec<f64>) -> Option<[f64; 3]> {
+    values.sort_by(f64::total_cmp);
+    let found = [1, 2, 3].map(|k| values.get(k * values.len() / 4).copied().unwrap_or(f64::NAN));
+    found.iter().all(|x| x.is_finite()).then_some(found)
+}
+
+impl fmt::Display for Mismatch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Order(ratio) => write!(
+                f,
+                "its points come in another order: edges of the rest pose are {ratio:.0} times longer in frame 0"
+            ),
+            Self::Units(ratio) if ratio > 1.0 => {
+                write!(
+                    f,
+                    "frame 0 is {} times larger than the rest pose, and so are the others, as with other units",
+                    Factor(ratio)
+                )
+            }
+            Self::Units(ratio) => {
+                write!(
+                    f,
+                    "frame 0 is {} times smaller than the rest pose, and so are the others, as with other units",
+                    Factor(1.0 / ratio)
+                )
+            }
+            Self::Axes(Up::Y) => f.write_str("its axes y and z look exchanged: y is up where z is in the rest pose"),
+            Self::Axes(Up::Z) => f.write_str("its axes y and z look exchanged: z is up where y is in the rest pose"),
+            Self::Axes(Up::Other) => f.write_str("its axes look exchanged"),
+        }
+    }
+}
+
+/// A ratio as people write it: 2.54, 39.4, 1000.
+struct Factor(f64);
+
+impl fmt::Display for Factor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let rounded = self.0.round();
+        if (self.0 / rounded - 1.0).abs() < 0.005 {
+            return write!(f, "{rounded}");
+        }
+        let decimals = if self.0 < 10.0 { 2 } else { usize::from(self.0 < 100.0) };
+        write!(f, "{:.decimals$}", self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cager_core::mesh::Polygons;
+
+    /// A bent and uneven tube standing along y, as a mesh of quads.
+    fn tube() -> Model {
+        let (rings, sides) = (40, 12);
+        let mut model = Model::default();
+        for ring in 0..rings {
+            let y = f64::from(ring) / 10.0;
+            for side in 0..sides {
+                let angle = std::f64::consts::TAU * f64::from(side) / f64::from(sides);
+                let radius = 0.4 + 0.1 * (3.0 * y).sin();
+                model.points.push([0.1 * y * y + radius * angle.cos(), y, 0.6 * radius * angle.sin()]);
+            }
+        }
+        for ring in 1..rings {
+            for side in 0..sides {
+                let (a, b) = (ring * sides + side, ring * sides + (side + 1) % sides);
+                model.faces.push(&[a - sides, b - sides, b, a].map(|v| v as u32));
+            }
+        }
+        model
+    }
+
+    fn frames(model: &Model, change: impl Fn(usize, Point) -> Point) -> Vec<Vec<f64>> {
+        (0..3).map(|t| model.points.iter().flat_map(|&p| change(t, p)).collect()).collect()
+    }
+
+    fn found(change: impl Fn(usize, Point) -> Point) -> [Vec<Mismatch>; 2] {
+        let mesh = tube();
+        let cloud = Model { points: mesh.points.clone(), faces: Polygons::new() };
+        let frames = frames(&mesh, change);
+        [mismatches(&mesh, &frames), mismatches(&cloud, &frames)]
+    }
+
+    #[test]
+    fn motion_however_strong_is_no_mistake() {
+        let none = [Vec::new(), Vec::new()];
+        assert_eq!(found(|_, p| p), none);
+        assert_eq!(found(|_, p| p.map(|x| x + 1e6)), none, "far away");
+        assert_eq!(found(|t, [x, y, z]| [x + (t as f64 * y).sin(), y, z]), none, "bent");
+        assert_eq!(found(|_, [x, y, z]| [3.0 * x, 0.2 * y, 3.0 * z]), none, "squashed");
+        assert_eq!(found(|t, p| p.map(|x| x * f64::from(1 + 4 * t as u32))), none, "growing");
+        assert_eq!(found(|_, [x, y, z]| [z, y, -x]), none, "facing another way");
+        assert_eq!(found(|t, p| if t == 1 { [0.0; 3] } else { p }), none, "a frame in one place");
+        let first = |t: usize, [x, y, z]: Point| if t == 0 { [x, -z, y] } else { [x, y, z] };
+        assert_eq!(found(first), none, "lying in one frame");
+    }
+
+    #[test]
+    fn tiny_parts_and_too_few_points_are_no_mistake() {
+        let one = Model { points: vec![[1.0, 2.0, 3.0]], faces: Polygons::new() };
+        assert!(mismatches(&one, &[vec![4.0, 5.0, 6.0]]).is_empty());
+        assert!(mismatches(&Model::default(), &[Vec::new()]).is_empty());
+        assert!(mismatches(&tube(), &[]).is_empty());
+        assert!(mismatches(&tube(), &frames(&tube(), |_, p| p.map(|x| x * 1e200))).len() <= 1);
+    }
+
+    #[test]
+    fn units_axes_and_orders_are_recognised_with_and_without_edges() {
+        for factor in [100.0, 2.54, 0.01, 1.0 / 39.37] {
+            for found in found(|t, [x, y, z]| [x + 0.1 * (t as f64 * y).sin(), y, z].map(|x| factor * x)) {
+                assert!(
+                    matches!(found[..], [Mismatch::Units(f)] if (f / factor - 1.0).abs() < 0.05),
+                    "{factor}: {found:?}"
+                );
+            }
+        }
+        assert_eq!(found(|_, [x, y, z]| [x, -z, y]), [[Mismatch::Axes(Up::Z)], [Mismatch::Axes(Up::Z)]]);
+        assert_eq!(found(|_, [x, y, z]| [x, z, -y]), [[Mismatch::Axes(Up::Y)], [Mismatch::Axes(Up::Y)]]);
+        let mesh = tube();
+        let n = mesh.points.len();
+        let shuffled: Vec<f64> = (0..n).flat_map(|i| mesh.points[(i * 7919 + 13) % n]).collect();
+        assert!(matches!(mismatches(&mesh, &[shuffled])[..], [Mismatch::Order(ratio)] if ratio > 3.0));
+    }
+
+    #[test]
+    fn what_was_found_is_told_with_its_size() {
+        assert_eq!(
+            Mismatch::Units(0.0254).to_string(),
+            "frame 0 is 39.4 times smaller than the rest pose, and so are the others, as with other units"
+        );
+        assert!(Mismatch::Order(40.2).to_string().contains("edges of the rest pose are 40 times longer in frame 0"));
+    }
+}

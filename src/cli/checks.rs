@@ -1,0 +1,174 @@
+//! What is checked before an encoding or a design: that rest pose, cage and capture belong together. A mistake ends the work, unless
+//! --force turns it into a warning.
+
+use super::args::UpArg;
+use super::warn;
+use crate::belong::{self, Mismatch, Up, mismatches};
+use crate::encode::{EncodeError, sample_frames};
+use crate::frames::CaptureFiles;
+use crate::timing::Timing;
+use anyhow::{Result, bail};
+use cager_cages::doctor::{misfit, weld};
+use cager_cages::geometry::outside;
+use cager_core::mesh::{Model, TriMesh, diagonal};
+use clap::Args;
+use std::path::Path;
+
+/// A cage so many times larger than its model is looked at more closely.
+const ROOMY: f64 = 5.0;
+
+/// How a capture is read, where its files do not tell.
+#[derive(Args, Debug)]
+pub(crate) struct CaptureArgs {
+    #[command(flatten)]
+    pub(super) checks: CheckArgs,
+
+    /// Axis that points up in the capture, where another one does in the rest pose: frames are turned to the rest pose's axes.
+    #[arg(long = "up", id = "capture_up", value_name = "AXIS", value_parser = up)]
+    pub(super) up: Option<UpArg>,
+
+    /// Merge the points of the rest pose that seams split (flat shading, UVs); frames are read split or merged.
+    #[arg(long)]
+    pub(super) weld: bool,
+
+    #[command(flatten)]
+    pub(super) timing: TimingArgs,
+}
+
+/// What is accepted of a capture.
+#[derive(Args, Debug)]
+pub(crate) struct CheckArgs {
+    /// Go on where numbers are missing from the names of the capture's files.
+    #[arg(long)]
+    pub(super) allow_gaps: bool,
+
+    /// Go on where rest pose, cage and capture look as if they did not belong together: other units, axes or order of points.
+    #[arg(long)]
+    pub(super) force: bool,
+}
+
+/// When frames are.
+#[derive(Args, Debug)]
+pub(crate) struct TimingArgs {
+    /// Frames per second [default: what the files tell].
+    #[arg(long, value_name = "F", value_parser = rate, allow_negative_numbers = true, hide_default_value = true)]
+    pub(super) fps: Option<f64>,
+
+    /// Number of the first frame [default: what the files tell].
+    #[arg(long, value_name = "T", value_parser = frame_number, allow_negative_numbers = true, hide_default_value = true)]
+    pub(super) start: Option<f64>,
+}
+
+fn up(text: &str) -> Result<UpArg, String> {
+    match text {
+        "y" => Ok(UpArg::Y),
+        "z" => Ok(UpArg::Z),
+        _ => Err("give y or z".to_owned()),
+    }
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    let found = text.parse().ok().filter(|rate: &f64| rate.is_finite() && *rate > 0.0);
+    found.ok_or_else(|| "give a positive number of frames per second".to_owned())
+}
+
+fn frame_number(text: &str) -> Result<f64, String> {
+    let found = text.parse().ok().filter(|number: &f64| number.abs() < 1e9);
+    found.ok_or_else(|| "give the number of a frame".to_owned())
+}
+
+impl From<&TimingArgs> for Timing {
+    fn from(args: &TimingArgs) -> Self {
+        Self { fps: args.fps, start: args.start }
+    }
+}
+
+/// The files of a capture for a rest pose, which is welded first if it should be.
+pub(super) fn capture_files(args: &CaptureArgs, path: &Path, rest: &mut Model) -> CaptureFiles {
+    let mut files = CaptureFiles::new(path, rest.points.len());
+    files.allow_gaps = args.checks.allow_gaps;
+    files.timing = (&args.timing).into();
+    files.up = args.up.map(|up| if matches!(up, UpArg::Z) { Up::Z } else { Up::Y });
+    if let Some(welded) = args.weld.then(|| weld(rest)).flatten() {
+        *rest = welded.model;
+        files.points = rest.points.len();
+        files.weld = Some(welded.target);
+    }
+    files
+}
+
+/// Compares some frames of a capture with its rest pose.
+pub(super) fn check_capture(files: &CaptureFiles, rest: (&Path, &Model), args: &CheckArgs, turns: bool) -> Result<()> {
+    let opened = files.open().map_err(EncodeError::from);
+    let frames = opened.and_then(|mut reader| sample_frames(reader.as_mut(), belong::FRAMES, false));
+    let frames = frames.map_err(|error| explained(error, files, rest))?;
+    let found = mismatches(rest.1, &frames);
+    if found.is_empty() {
+        return Ok(());
+    }
+    let advice = match found[0] {
+        Mismatch::Axes(up @ (Up::Y | Up::Z)) if turns => {
+            format!("pass --up {}", if up == Up::Z { "z" } else { "y" })
+        }
+        Mismatch::Order(_) => "export both from one program with the order of the points kept".to_owned(),
+        Mismatch::Axes(_) => "export both with the same axes".to_owned(),
+        Mismatch::Units(_) => "scale one of them".to_owned(),
+    };
+    let words: Vec<String> = found.iter().map(ToString::to_string).collect();
+    let what = format!(
+        "{}: does not look like a capture of {}: {}",
+        files.path.display(),
+        rest.0.display(),
+        words.join(", and ")
+    );
+    refuse_or_warn(what, &format!("; {advice}"), args.force)
+}
+
+/// Whether a cage of other units or axes was given; asked where it leaves most points outside, or is far larger than the model.
+pub(super) fn check_cage(cage: (&Path, &TriMesh), rest: &Model, args: &CheckArgs) -> Result<()> {
+    let missed = outside(cage.1, &rest.points).len();
+    let most_outside = 2 * missed > rest.points.len();
+    if !most_outside && diagonal(&cage.1.vertices) <= ROOMY * diagonal(&rest.points) {
+        return Ok(());
+    }
+    let Some(misfit) = misfit(cage.1, rest).filter(|found| most_outside || found.shift == [0.0; 3]) else {
+        return Ok(());
+    };
+    let path = cage.0.display();
+    let what = if most_outside {
+        format!("{path}: leaves {missed} of {} points of the rest pose outside, and {misfit}", rest.points.len())
+    } else {
+        format!(
+            "{path}: is {:.0} times larger than the rest pose, and {misfit}",
+            diagonal(&cage.1.vertices) / diagonal(&rest.points)
+        )
+    };
+    refuse_or_warn(what, "", args.force)
+}
+
+fn refuse_or_warn(what: String, advice: &str, force: bool) -> Result<()> {
+    if !force {
+        bail!("{what}{advice}, or pass --force to go on");
+    }
+    warn(&[what]);
+    Ok(())
+}
+
+/// Numbers of points that differ by what seams split are told as that.
+fn explained(error: EncodeError, files: &CaptureFiles, (path, rest): (&Path, &Model)) -> anyhow::Error {
+    use cager_formats::Error::PointCount;
+    match error {
+        EncodeError::Formats(PointCount { path: ref capture, expected, found, .. })
+            if weld(rest).is_some_and(|welded| welded.model.points.len() as u64 == found) =>
+        {
+            anyhow::anyhow!(
+                "{}: has {found} points where {} has {expected}, {} of them doubles along seams that flat shading or UVs split; pass --weld",
+                capture.display(),
+                path.display(),
+                expected as u64 - found
+            )
+        }
+        error @ EncodeError::EndsEarly { .. } => anyhow::anyhow!("{}: {error}", files.path.display()),
+        other => other.into(),
+    }
+}

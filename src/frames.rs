@@ -1,0 +1,139 @@
+//! The files of a capture as they are to be read: gaps allowed or not, turned, welded, with times of their own.
+
+use crate::belong::Up;
+use crate::timing::Timing;
+use cager_formats::{Error, FrameReader, missing_frames, open_frames};
+use std::path::PathBuf;
+
+/// The files of a capture, and what is to be done with what they hold.
+#[derive(Clone, Debug, Default)]
+pub struct CaptureFiles {
+    /// A folder or pattern of mesh files, or a point cache: see [`open_frames`].
+    pub path: PathBuf,
+    /// Points of the rest pose.
+    pub points: usize,
+    /// Whether numbers may be missing from the files' names.
+    pub allow_gaps: bool,
+    /// The axis that points up in the frames, where another one does in the rest pose.
+    pub up: Option<Up>,
+    /// For each point of a rest pose before it was welded, the point that it became.
+    pub weld: Option<Vec<u32>>,
+    /// Frame rate and number of the first frame, where they are given.
+    pub timing: Timing,
+}
+
+impl CaptureFiles {
+    /// The files as they are.
+    pub fn new(path: impl Into<PathBuf>, points: usize) -> Self {
+        Self { path: path.into(), points, ..Self::default() }
+    }
+
+    /// Opens the frames from the first.
+    ///
+    /// # Errors
+    /// Those of [`open_frames`]; numbers that are missing.
+    pub fn open(&self) -> Result<Box<dyn FrameReader>, Error> {
+        let (inner, first_of) = self.open_welded()?;
+        let found: Vec<f64> = (0..inner.frames()).map(|frame| inner.number(frame)).collect();
+        if let Some(missing) = missing_frames(&found).filter(|_| !self.allow_gaps) {
+            let many = missing.contains([',', ' ']);
+            let (frames, are) = if many { ("frames", "are") } else { ("frame", "is") };
+            let what =
+                format!("{frames} {missing} {are} missing; add the files, or pass --allow-gaps to go on without them");
+            return Err(Error::Invalid { path: self.path.clone(), what });
+        }
+        let numbers = self.timing.numbers(found);
+        let frame_rate = self.timing.fps.or(inner.frame_rate());
+        Ok(Box::new(Adapted {
+            inner,
+            files: self.clone(),
+            first_of,
+            numbers,
+            frame_rate,
+            frame: 0,
+            values: Vec::new(),
+        }))
+    }
+
+    /// The reader, and for each welded point the first point that became it, where the frames are split as the rest pose was.
+    fn open_welded(&self) -> Result<(Box<dyn FrameReader>, Option<Vec<u32>>), Error> {
+        let Some(weld) = &self.weld else { return Ok((open_frames(&self.path, self.points)?, None)) };
+        // Files of a sequence tell their points only when they are read.
+        let split = open_frames(&self.path, weld.len()).and_then(|mut reader| reader.read_next(&mut Vec::new()));
+        if let Err(Error::PointCount { .. }) = split {
+            return Ok((open_frames(&self.path, self.points)?, None));
+        }
+        let mut first_of = vec![u32::MAX; self.points];
+        for (point, &welded) in weld.iter().enumerate().rev() {
+            first_of[welded as usize] = point as u32;
+        }
+        Ok((open_frames(&self.path, weld.len())?, Some(first_of)))
+    }
+}
+
+/// A reader whose frames are brought to the rest pose's points and axes, and are small enough for a container.
+struct Adapted {
+    inner: Box<dyn FrameReader>,
+    files: CaptureFiles,
+    first_of: Option<Vec<u32>>,
+    numbers: Vec<f64>,
+    frame_rate: Option<f64>,
+    frame: usize,
+    /// A frame before it is welded.
+    values: Vec<f64>,
+}
+
+impl FrameReader for Adapted {
+    fn points(&self) -> usize {
+        self.files.points
+    }
+
+    fn frames(&self) -> usize {
+        self.inner.frames()
+    }
+
+    fn frame_rate(&self) -> Option<f64> {
+        self.frame_rate
+    }
+
+    fn number(&self, frame: usize) -> f64 {
+        self.numbers.get(frame).copied().unwrap_or(frame as f64)
+    }
+
+    fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error> {
+        if !self.inner.read_next(out)? {
+            return Ok(false);
+        }
+        if let Some(first_of) = &self.first_of {
+            std::mem::swap(out, &mut self.values);
+            let points: &[[f64; 3]] = self.values.as_chunks().0;
+            out.clear();
+            out.extend(first_of.iter().flat_map(|&point| points[point as usize]));
+        }
+        if let Some(at) = out.iter().position(|x| x.abs() > f64::from(f32::MAX)) {
+            let what = format!(
+                "frame {}: point {} has the coordinate {:e}, too large for single precision; repair the frame or scale the capture down",
+                self.frame,
+                at / 3,
+                out[at]
+            );
+            return Err(Error::Invalid { path: self.files.path.clone(), what });
+        }
+        for point in out.as_chunks_mut::<3>().0 {
+            let [x, y, z] = *point;
+            match self.files.up {
+                Some(Up::Z) => *point = [x, z, -y],
+                Some(Up::Y) => *point = [x, -z, y],
+                Some(Up::Other) | None => break,
+            }
+        }
+        self.frame += 1;
+        Ok(true)
+    }
+
+    fn skip(&mut self) -> Result<bool, Error> {
+        let more = self.inner.skip()?;
+        self.frame += usize::from(more);
+        Ok(more)
+    }
+}
