@@ -3,19 +3,19 @@
 use crate::encode::{EncodeError, sample_frames};
 use cager_cages::{Design, DesignOptions, Style};
 use cager_client::cage_messages::CageJob;
-use cager_formats::{FrameReader, open_frames};
+use cager_formats::{FrameRange, FrameReader, open_frames_range};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Frames of a capture that a design looks at, at most: every second one to design by, the others to judge by.
 pub const FRAMES: usize = 160;
 
-/// Evenly spaced frames of a capture to design a cage from.
+/// Evenly spaced frames of a capture, or of a range of it, to design a cage from.
 ///
 /// # Errors
 /// Those of the reader, also where it ends before the frames it announced.
-pub fn read_frames(path: &Path, points: usize) -> Result<Vec<Vec<f64>>, EncodeError> {
-    let mut frames: Box<dyn FrameReader> = open_frames(path, points)?;
+pub fn read_frames(path: &Path, points: usize, range: Option<FrameRange>) -> Result<Vec<Vec<f64>>, EncodeError> {
+    let mut frames: Box<dyn FrameReader> = open_frames_range(path, points, range)?;
     sample_frames(frames.as_mut(), FRAMES, false)
 }
 

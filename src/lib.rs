@@ -3,6 +3,7 @@
 pub mod auth;
 #[doc(hidden)]
 pub mod cage_job;
+pub mod cages_out;
 pub mod capture;
 pub mod cli;
 mod compare;
@@ -10,6 +11,8 @@ pub mod config;
 mod coordinates;
 pub mod decode;
 pub mod design;
+pub mod edit;
+pub mod edited;
 pub mod encode;
 pub mod engine;
 pub mod http;

@@ -210,7 +210,8 @@ fn an_output_that_is_not_finished_leaves_nothing() {
 fn outputs_that_make_no_sense_are_refused() {
     let folder = tempdir().unwrap();
     let create = |name: &str, points, frames, faces: &Polygons, fps| {
-        create_frames(folder.path().join(name), points, frames, faces, &FrameOptions { fps }).map(drop)
+        create_frames(folder.path().join(name), points, frames, faces, &FrameOptions { fps, ..FrameOptions::default() })
+            .map(drop)
     };
     let none = Polygons::new();
     let error = message(create("a.abc", 1, 1, &none, 24.0));

@@ -117,7 +117,7 @@ fn designed(
         keep_connectivity: start.is_some(),
         symmetry: args.symmetry.map(|axis| axis as usize),
     };
-    let frames = read_frames(frames_path, rest.points.len())?;
+    let frames = read_frames(frames_path, rest.points.len(), None)?;
     let mesh = start.as_ref().map(|(_, model)| TriMesh::from(model));
     let start_mesh = start.as_ref().zip(mesh.as_ref()).map(|((path, _), mesh)| (path.as_path(), mesh));
     let found = design::design((&args.rest[0], rest), (frames_path, &frames), start_mesh, &options)?;

@@ -4,7 +4,7 @@ use super::args::DemoArgs;
 use super::encode::write_report;
 use super::own_service::OwnService;
 use super::{grouped, human_bytes, interrupt, print, progress};
-use crate::decode;
+use crate::decode::{self, Decoding};
 use crate::encode::Encoded;
 use crate::plot::error_plot;
 use crate::remote::{EncodedRemotely, RemoteCage, RemoteJob, RemoteProgress, Steps, encode_remotely};
@@ -64,7 +64,7 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
     let decoded = folder.join("decoded.npy");
     let clock = Instant::now();
     let bar = progress::frames("decoding", capture.frames());
-    decode::decode(&output, &decoded, &mut |done| bar.set_position(done as u64))?;
+    decode::decode(&output, &decoded, Decoding::default(), &mut |done| bar.set_position(done as u64))?;
     bar.finish_and_clear();
     let decode_seconds = clock.elapsed().as_secs_f64();
     compare(&capture, &decoded, &report)?;

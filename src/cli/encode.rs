@@ -18,7 +18,9 @@ use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{PrepareError, Solver, SolverOptions, check_options};
 use cager_core::mesh::{Model, TriMesh};
 use cager_core::regularize::{Regularizer, SparseMatrix, Term};
-use cager_formats::{AtomicFile, CompleteFile, FrameReader, commit_together, open_frames, read_matrix, read_model};
+use cager_formats::{
+    AtomicFile, CompleteFile, FrameReader, commit_together, open_frames_range, read_matrix, read_model,
+};
 use std::io::Write;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -62,7 +64,8 @@ fn designed(args: &EncodeArgs, rest: &Model) -> Result<(Cage, DesignReport)> {
     let options = design_options(args, rest.points.len())?;
     // Outputs that cannot be written cost no waiting.
     refuse_outputs(args)?;
-    let frames = read_frames(&args.frames, rest.points.len()).map_err(|error| name_files(error, args))?;
+    let frames =
+        read_frames(&args.frames, rest.points.len(), args.frames_range).map_err(|error| name_files(error, args))?;
     let design = design::design((&args.rest, rest), (&args.frames, &frames), None, &options)?;
     warn(&design.warnings);
     let report = DesignReport::new(&design, &options, frames.len());
@@ -71,7 +74,7 @@ fn designed(args: &EncodeArgs, rest: &Model) -> Result<(Cage, DesignReport)> {
 }
 
 fn here(args: &EncodeArgs, rest: &Model, cage: &Cage, design: Option<DesignReport>, clock: Instant) -> Result<()> {
-    let mut frames = open_frames(&args.frames, rest.points.len())?;
+    let mut frames = open_frames_range(&args.frames, rest.points.len(), args.frames_range)?;
     let read_seconds = clock.elapsed().as_secs_f64();
     let (system, options) = solver(&args.solver, cage)?;
     let matrix = matrix(&args.solver)?;
@@ -79,7 +82,7 @@ fn here(args: &EncodeArgs, rest: &Model, cage: &Cage, design: Option<DesignRepor
         (Some(SpectrumArg::Auto), bound) => {
             // What is wrong with the options is told before anything is read.
             check_options(rest.points.len(), system.unknowns(cage), options).map_err(|e| name_file(&e, args))?;
-            let mut again = open_frames(&args.frames, rest.points.len())?;
+            let mut again = open_frames_range(&args.frames, rest.points.len(), args.frames_range)?;
             let samples = choosing_frames(again.as_mut(), options.regularizer == Regularizer::Temporal)
                 .map_err(|error| name_files(error, args))?;
             Some(ChooseSpectrum { samples, bound })
@@ -115,7 +118,7 @@ fn choosing_frames(frames: &mut dyn FrameReader, first_ones: bool) -> Result<Vec
 /// The files are read and the options checked here as well, so that what is wrong with them is told before anything is sent, in
 /// words that name them.
 fn elsewhere(args: &EncodeArgs, address: &str, rest: &Model, cage: Option<&Cage>, clock: Instant) -> Result<()> {
-    let frames = FileFrames::open(&args.frames, rest.points.len())?;
+    let frames = FileFrames::open(&args.frames, rest.points.len(), args.frames_range)?;
     let read_seconds = clock.elapsed().as_secs_f64();
     let matrix = matrix(&args.solver)?;
     spectrum_bound(&args.solver)?;

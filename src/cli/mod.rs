@@ -8,6 +8,7 @@ mod decode;
 mod demo;
 mod design;
 mod doctor;
+mod edit;
 mod encode;
 mod health;
 mod inspect;
@@ -16,6 +17,7 @@ mod outputs;
 mod own_service;
 mod progress;
 pub(crate) mod serve;
+mod transfer_args;
 
 use args::{Cli, Command};
 use clap::{CommandFactory, Parser};
@@ -27,6 +29,7 @@ pub fn run() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Encode(args) => encode::run(&args),
         Command::Decode(args) => decode::run(&args),
+        Command::Edit(args) => edit::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Cage(args) => cage::run(&args),
         Command::Compare(args) => compare::run(&args),

@@ -1,7 +1,7 @@
 //! Frames of a capture on disk, as a service takes them.
 
 use cager_client::FrameSource;
-use cager_formats::{Error, FrameReader, open_frames};
+use cager_formats::{Error, FrameRange, FrameReader, open_frames_range};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 pub struct FileFrames {
     path: PathBuf,
     points: usize,
+    range: Option<FrameRange>,
     frames: u32,
     frame_rate: Option<f64>,
     reader: Box<dyn FrameReader>,
@@ -18,19 +19,19 @@ pub struct FileFrames {
 }
 
 impl FileFrames {
-    /// Opens the frames of a capture whose rest pose has `points` points, see [`open_frames`].
+    /// Opens the frames of a capture whose rest pose has `points` points, see [`open_frames_range`].
     ///
     /// # Errors
-    /// Those of [`open_frames`]; more frames than a session can have.
-    pub fn open(path: impl AsRef<Path>, points: usize) -> Result<Self, Error> {
+    /// Those of [`open_frames_range`]; more frames than a session can have.
+    pub fn open(path: impl AsRef<Path>, points: usize, range: Option<FrameRange>) -> Result<Self, Error> {
         let path = path.as_ref().to_owned();
-        let reader = open_frames(&path, points)?;
+        let reader = open_frames_range(&path, points, range)?;
         let Ok(frames) = u32::try_from(reader.frames()) else {
             let what = format!("has {} frames, more than a session can have; split it", reader.frames());
             return Err(Error::Unsupported { path, what });
         };
         let frame_rate = reader.frame_rate();
-        Ok(Self { path, points, frames, frame_rate, reader, next: 0, wide: Vec::new() })
+        Ok(Self { path, points, range, frames, frame_rate, reader, next: 0, wide: Vec::new() })
     }
 
     /// Frames per second, where the files tell.
@@ -56,7 +57,7 @@ impl FrameSource for FileFrames {
 
     fn seek(&mut self, frame: u32) -> io::Result<()> {
         if frame < self.next {
-            self.reader = open_frames(&self.path, self.points).map_err(io::Error::other)?;
+            self.reader = open_frames_range(&self.path, self.points, self.range).map_err(io::Error::other)?;
             self.next = 0;
         }
         // Readers go forward only.
@@ -100,7 +101,7 @@ mod tests {
             writer.write_frame(&[frame as f32; 6]).expect("a frame");
         }
         writer.finish().expect("a cache");
-        let mut frames = FileFrames::open(&path, 2).expect("frames");
+        let mut frames = FileFrames::open(&path, 2, None).expect("frames");
         assert_eq!((frames.points(), frames.frames()), (2, Some(5)));
         let mut out = Vec::new();
         for frame in [3, 0, 4, 1, 2, 3] {
@@ -110,6 +111,6 @@ mod tests {
         }
         frames.seek(5).expect("the end");
         assert!(!frames.read(&mut out).expect("nothing"));
-        assert!(FileFrames::open(&path, 3).is_err());
+        assert!(FileFrames::open(&path, 3, None).is_err());
     }
 }

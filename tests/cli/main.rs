@@ -1,6 +1,7 @@
 //! The program as its users meet it: command lines in, files, words and exit statuses out.
 
 mod cage;
+mod cages_out;
 mod compare;
 mod decode;
 mod demo;
@@ -12,10 +13,13 @@ mod harmonic;
 mod inspect;
 #[cfg(target_os = "linux")]
 mod interrupted;
+mod ranges;
 mod real_data;
 mod real_green;
 mod real_harmonic;
 mod real_methods;
+mod real_transfer;
 mod refused;
 mod support;
+mod transfer;
 mod usage;

@@ -3,7 +3,9 @@
 mod cache;
 mod mdd;
 mod npy;
+mod numbered;
 mod pc2;
+mod range;
 mod sequence;
 mod source;
 mod widen;
@@ -14,6 +16,7 @@ use std::path::Path;
 use crate::error::{Error, Fault};
 use crate::mesh::{MeshFormat, extensions};
 
+pub use range::{FrameRange, open_frames_range};
 pub use source::{open_frames, open_frames_bytes, open_frames_in};
 pub use write::{FrameOptions, FrameWriter, create_frames};
 

@@ -4,7 +4,8 @@ use std::io::{self, BufWriter, Write};
 
 use cager_core::mesh::{Model, Polygons};
 
-use super::{Announced, FrameWriter};
+use super::super::numbered::Numbered;
+use super::{Announced, FrameOptions, FrameWriter};
 use crate::atomic::AtomicDir;
 use crate::error::{Error, Fault};
 use crate::mesh::{write_obj_faces, write_ply};
@@ -13,7 +14,9 @@ pub(super) struct SequenceWriter {
     announced: Announced,
     folder: AtomicDir,
     format: Format,
-    digits: usize,
+    names: Numbered,
+    /// Numbers of the first frame and from one to the next.
+    numbers: (usize, usize),
 }
 
 /// What the files are, with what is the same in all of them.
@@ -25,7 +28,12 @@ enum Format {
 }
 
 impl SequenceWriter {
-    pub(super) fn create(announced: Announced, faces: &Polygons, ply: bool) -> Result<Self, Error> {
+    pub(super) fn create(
+        announced: Announced,
+        faces: &Polygons,
+        names: Numbered,
+        options: &FrameOptions,
+    ) -> Result<Self, Error> {
         if let Some(&index) = faces.indices().iter().find(|&&index| index as usize >= announced.points) {
             return Err(Fault::invalid(format!(
                 "the faces to write name vertex {index}, but there are {} points; give the faces of this mesh",
@@ -34,15 +42,14 @@ impl SequenceWriter {
             .at(&announced.path));
         }
         let folder = AtomicDir::create(&announced.path)?;
-        let format = if ply {
+        let format = if names.extension_is("ply") {
             Format::Ply(Model { points: Vec::new(), faces: faces.clone() })
         } else {
             let mut text = Vec::new();
             write_obj_faces(&mut text, faces.iter()).map_err(|cause| Error::write(&announced.path, cause))?;
             Format::Obj(text)
         };
-        let digits = (announced.frames - 1).to_string().len().max(4);
-        Ok(Self { announced, folder, format, digits })
+        Ok(Self { announced, folder, format, names, numbers: (options.first, options.step) })
     }
 
     fn write_file(&mut self, name: &str, positions: &[f32]) -> io::Result<()> {
@@ -68,8 +75,8 @@ impl SequenceWriter {
 impl FrameWriter for SequenceWriter {
     fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error> {
         self.announced.admit(positions)?;
-        let extension = if matches!(self.format, Format::Ply(_)) { "ply" } else { "obj" };
-        let name = format!("frame_{:0digits$}.{extension}", self.announced.written, digits = self.digits);
+        let (first, step) = self.numbers;
+        let name = self.names.name(first + step * self.announced.written);
         self.write_file(&name, positions).map_err(|cause| Error::write(&self.announced.path.join(&name), cause))?;
         self.announced.written += 1;
         Ok(())
