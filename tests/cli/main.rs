@@ -1,5 +1,6 @@
 //! The program as its users meet it: command lines in, files, words and exit statuses out.
 
+mod blender;
 mod cage;
 mod cages_out;
 mod compare;
