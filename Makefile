@@ -5,9 +5,11 @@ PYTHON ?= python3
 PEERS := benches/.venv/bin/python
 SCHEMATHESIS := target/schemathesis/bin/python
 
+BLENDER := target/blender/bin/python
+
 LINT := target/lint-deploy
 
-.PHONY: help demo test soak lint lint-deploy doc bench paper cages openapi schemathesis fuzz audit clean
+.PHONY: help demo test blender soak lint lint-deploy doc bench paper cages openapi schemathesis fuzz audit clean
 
 help: ## list these commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
@@ -22,6 +24,14 @@ test: ## run every test
 	else \
 		$(CARGO) test --workspace --locked --lib --bins --tests; \
 	fi
+
+blender: $(BLENDER) ## the round trip through Blender itself; installs bpy, which needs Python 3.11
+	CAGER_BLENDER_PYTHON=$(abspath $(BLENDER)) $(CARGO) test --locked --test cli blender -- --nocapture
+
+$(BLENDER): Makefile
+	python3.11 -m venv target/blender
+	target/blender/bin/pip install --quiet bpy==4.5.15
+	@touch $@
 
 soak: ## kill the service a hundred times under load; KILLS and SEED change how often and when
 	CAGER_SOAK_KILLS=$(or $(KILLS),100) $(if $(SEED),CAGER_SOAK_SEED=$(SEED)) \

@@ -1,13 +1,14 @@
 //! Containers back to positions.
 
 use crate::coordinates;
+use crate::edited::EditedCages;
 use crate::timing::Timing;
 use cager_core::cage::{Cage, CageError};
 use cager_core::coordinates::CoordinatesError;
 use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, coordinates_fit};
 use cager_core::mesh::Model;
-use cager_formats::{Action, FrameOptions, create_frames};
+use cager_formats::{Action, FrameOptions, FrameRange, create_frames};
 use cager_proto::container::{self, ContainerReader};
 use std::fs::File;
 use std::io::BufReader;
@@ -62,7 +63,15 @@ pub enum DecodeError {
         /// What decoding needs.
         gigabytes: f64,
     },
-    /// The positions cannot be written.
+    /// The edited cages do not belong to the container.
+    #[error("{}: {what}", .path.display())]
+    Edited {
+        /// The file of edited cages.
+        path: PathBuf,
+        /// What is wrong with it, and what to do.
+        what: String,
+    },
+    /// The positions cannot be written, or the edited cages not be read.
     #[error(transparent)]
     Formats(#[from] cager_formats::Error),
 }
@@ -97,11 +106,42 @@ pub fn open(path: &Path) -> Result<Container, DecodeError> {
     ContainerReader::open(BufReader::new(file)).map_err(fail)
 }
 
-/// The rest pose of a container and what turns its cages into positions.
+/// What is decoded, where it is not every frame of a container's own model and cages.
+#[derive(Default)]
+pub struct Decoding<'a> {
+    /// Another model within the rest cage, and the file that it comes from.
+    pub model: Option<(&'a Path, &'a Model)>,
+    /// Edited cages.
+    pub cages: Option<EditedCages>,
+    /// Only these frames.
+    pub range: Option<FrameRange>,
+    /// Frame rate and number of the first frame, where they are given.
+    pub timing: Timing,
+}
+
+/// What was decoded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Decoded {
+    /// Points of every frame.
+    pub points: usize,
+    /// Number of frames.
+    pub frames: usize,
+    /// Points that lie outside the rest cage.
+    pub outside: usize,
+}
+
+/// A model in its rest pose, what turns cages into its positions, and how many of its points lie outside the rest cage.
+struct Bound {
+    rest: Model,
+    decoder: Decoder,
+    outside: usize,
+}
+
+/// Binds the container's model, or another, to the container's cage.
 ///
 /// # Errors
 /// Damage, or coordinates that this program does not compute.
-pub fn decoder(container: &mut Container, path: &Path) -> Result<(Model, Decoder), DecodeError> {
+fn bind(container: &mut Container, path: &Path, other: Option<(&Path, &Model)>) -> Result<Bound, DecodeError> {
     let fail = |cause| DecodeError::container(path, cause);
     let unsupported = |what| DecodeError::Unsupported { path: path.to_owned(), what };
     let header = container.header().clone();
@@ -111,7 +151,8 @@ pub fn decoder(container: &mut Container, path: &Path) -> Result<(Model, Decoder
     if header.solver_version != cager_core::SOLVER_VERSION {
         return Err(unsupported(format!("its coordinates are of version {}", header.solver_version)));
     }
-    let rest = container.rest().map_err(fail)?;
+    let own = container.rest().map_err(fail)?;
+    let (model_path, rest) = other.map_or_else(|| (path, own), |(path, model)| (path, model.clone()));
     if let Some(face) = rest.faces.arities().iter().position(|&corners| corners < 3) {
         return Err(fail(container::Error::Corrupt { offset: 0, what: format!("face {face} of the model is none") }));
     }
@@ -123,29 +164,56 @@ pub fn decoder(container: &mut Container, path: &Path) -> Result<(Model, Decoder
     let columns = system.columns(&cage);
     if !coordinates_fit(rest.points.len(), columns, 2) {
         let gigabytes = 12e-9 * rest.points.len() as f64 * columns as f64;
-        return Err(DecodeError::Memory { path: path.to_owned(), gigabytes });
+        return Err(DecodeError::Memory { path: model_path.to_owned(), gigabytes });
     }
     let coordinates = system.coordinates(&cage, &rest.points);
-    let phi = coordinates.map_err(|cause| DecodeError::Coordinates { path: path.to_owned(), cause })?.phi;
-    let decoder = Decoder::new(phi.as_ref(), cage.vertices().len()).with_tied_normals(system.tied_normals(&cage));
-    Ok((rest, decoder))
+    let found = coordinates.map_err(|cause| DecodeError::Coordinates { path: model_path.to_owned(), cause })?;
+    let decoder = Decoder::new(found.phi.as_ref(), cage.vertices().len()).with_tied_normals(system.tied_normals(&cage));
+    Ok(Bound { rest, decoder, outside: found.outside.len() })
 }
 
-/// Decodes all frames into `output`, which appears whole or not at all; `timing` goes before what the container tells. `progress` is told the number of frames done.
+/// Times and numbers of `there` frames in the outputs of a container, or of some of them; `timing` goes before what the container tells.
+///
+/// # Errors
+/// Damage.
+pub(crate) fn frame_options(
+    container: &mut Container,
+    there: usize,
+    range: FrameRange,
+    timing: Timing,
+) -> Result<FrameOptions, container::Error> {
+    let fps = timing.fps.or(container.header().frame_rate).unwrap_or(FrameOptions::default().fps);
+    let mut found = container.frame_numbers()?;
+    if found.len() != there {
+        found = (0..there).map(|frame| frame as f64).collect();
+    }
+    let numbers = timing.numbers(found);
+    let numbers = (0..range.count()).filter_map(|place| numbers.get(range.frame(place)).copied()).collect();
+    Ok(FrameOptions { fps, numbers })
+}
+
+/// Decodes frames into `output`, which appears whole or not at all. `progress` is told the number of frames done.
 ///
 /// # Errors
 /// See [`DecodeError`].
-pub fn decode(input: &Path, output: &Path, timing: Timing, progress: &mut dyn FnMut(usize)) -> Result<(), DecodeError> {
+pub fn decode(
+    input: &Path,
+    output: &Path,
+    what: Decoding<'_>,
+    progress: &mut dyn FnMut(usize),
+) -> Result<Decoded, DecodeError> {
     let fail = |cause| DecodeError::container(input, cause);
     let mut container = open(input)?;
-    let frames = container.frames();
-    let fps = timing.fps.or(container.header().frame_rate).unwrap_or(FrameOptions::default().fps);
-    let numbers = timing.numbers(container.frame_numbers().map_err(fail)?);
-    let options = FrameOptions { fps, numbers };
+    let Decoding { model, cages: mut edited, range, timing } = what;
+    let there = edited.as_ref().map_or(container.frames(), EditedCages::frames);
+    range.map_or(Ok(()), |range| range.check(there, input))?;
+    let taken = range.unwrap_or(FrameRange::all(there));
+    let frames = if there == 0 { 0 } else { taken.count() };
+    let options = frame_options(&mut container, there, taken, timing).map_err(fail)?;
     // Decoding needs neither, but a damaged file is refused wherever the damage is.
     container.errors().map_err(fail)?;
     container.summary().map_err(fail)?;
-    let (rest, decoder) = decoder(&mut container, input)?;
+    let Bound { rest, decoder, outside } = bind(&mut container, input, model)?;
     let mut writer = create_frames(output, rest.points.len(), frames, &rest.faces, &options)?;
     // Both keep their allocations from batch to batch.
     let mut cages = vec![Vec::new(); BATCH];
@@ -154,7 +222,11 @@ pub fn decode(input: &Path, output: &Path, timing: Timing, progress: &mut dyn Fn
     while first < frames {
         let count = BATCH.min(frames - first);
         for (k, cage) in cages[..count].iter_mut().enumerate() {
-            container.read_frame(first + k, cage).map_err(fail)?;
+            let frame = taken.frame(first + k);
+            match &mut edited {
+                Some(edited) => edited.read_frame(frame, cage)?,
+                None => container.read_frame(frame, cage).map_err(fail)?,
+            }
         }
         let views: Vec<&[f32]> = cages[..count].iter().map(Vec::as_slice).collect();
         decoder.decode(&views, &mut positions[..count]);
@@ -164,5 +236,6 @@ pub fn decode(input: &Path, output: &Path, timing: Timing, progress: &mut dyn Fn
         first += count;
         progress(first);
     }
-    Ok(writer.finish()?)
+    writer.finish()?;
+    Ok(Decoded { points: rest.points.len(), frames, outside })
 }

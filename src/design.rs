@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// Frames of a capture that a design looks at, at most: every second one to design by, the others to judge by.
 pub const FRAMES: usize = 160;
 
-/// Evenly spaced frames of a capture to design a cage from.
+/// Evenly spaced frames of a capture, or of a range of it, to design a cage from.
 ///
 /// # Errors
 /// Those of the reader, also where it ends before the frames it announced.

@@ -2,7 +2,7 @@
 
 use crate::belong::Up;
 use crate::timing::Timing;
-use cager_formats::{Error, FrameReader, missing_frames, open_frames};
+use cager_formats::{Error, FrameRange, FrameReader, missing_frames, open_frames, open_frames_range};
 use std::path::PathBuf;
 
 /// The files of a capture, and what is to be done with what they hold.
@@ -12,6 +12,8 @@ pub struct CaptureFiles {
     pub path: PathBuf,
     /// Points of the rest pose.
     pub points: usize,
+    /// The frames that are taken; all where none is given.
+    pub range: Option<FrameRange>,
     /// Whether numbers may be missing from the files' names.
     pub allow_gaps: bool,
     /// The axis that points up in the frames, where another one does in the rest pose.
@@ -57,17 +59,21 @@ impl CaptureFiles {
 
     /// The reader, and for each welded point the first point that became it, where the frames are split as the rest pose was.
     fn open_welded(&self) -> Result<(Box<dyn FrameReader>, Option<Vec<u32>>), Error> {
-        let Some(weld) = &self.weld else { return Ok((open_frames(&self.path, self.points)?, None)) };
+        let Some(weld) = &self.weld else { return Ok((self.open_with(self.points)?, None)) };
         // Files of a sequence tell their points only when they are read.
         let split = open_frames(&self.path, weld.len()).and_then(|mut reader| reader.read_next(&mut Vec::new()));
         if let Err(Error::PointCount { .. }) = split {
-            return Ok((open_frames(&self.path, self.points)?, None));
+            return Ok((self.open_with(self.points)?, None));
         }
         let mut first_of = vec![u32::MAX; self.points];
         for (point, &welded) in weld.iter().enumerate().rev() {
             first_of[welded as usize] = point as u32;
         }
-        Ok((open_frames(&self.path, weld.len())?, Some(first_of)))
+        Ok((self.open_with(weld.len())?, Some(first_of)))
+    }
+
+    fn open_with(&self, points: usize) -> Result<Box<dyn FrameReader>, Error> {
+        open_frames_range(&self.path, points, self.range)
     }
 }
 

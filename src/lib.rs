@@ -4,6 +4,7 @@ pub mod auth;
 pub mod belong;
 #[doc(hidden)]
 pub mod cage_job;
+pub mod cages_out;
 pub mod capture;
 pub mod cli;
 mod compare;
@@ -11,6 +12,8 @@ pub mod config;
 mod coordinates;
 pub mod decode;
 pub mod design;
+pub mod edit;
+pub mod edited;
 pub mod encode;
 pub mod engine;
 pub mod frames;

@@ -2,9 +2,11 @@
 
 use super::cage_args::CageArgs;
 use super::checks::{CaptureArgs, TimingArgs};
+use super::transfer_args::{EditArgs, TransferArgs};
 use crate::config::ServeFlags;
 use cager_core::inversion::Handles;
 use cager_core::regularize::Regularizer;
+use cager_formats::FrameRange;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -44,6 +46,7 @@ pub(crate) struct Manners {
 pub(crate) enum Command {
     Encode(Box<EncodeArgs>),
     Decode(DecodeArgs),
+    Edit(EditArgs),
     Inspect(InspectArgs),
     Cage(Box<CageArgs>),
     Compare(CompareArgs),
@@ -71,10 +74,14 @@ pub(crate) struct EncodeArgs {
     #[command(flatten)]
     pub(crate) design: DesignArgs,
 
-    /// Capture, points in the order of the rest pose: a folder or quoted glob of mesh files (2.obj comes before 10.obj), .npy
-    /// (frames × points × 3), .npz with one array, .pc2 or .mdd.
+    /// Capture, points in the order of the rest pose: a folder, quoted glob or numbered name (walk.%04d.obj, walk.####.obj) of
+    /// mesh files (2.obj comes before 10.obj), .npy (frames × points × 3), .npz with one array, .pc2 or .mdd.
     #[arg(long, value_name = "FRAMES")]
     pub(crate) frames: PathBuf,
+
+    /// Take only frames A to B, both included, every STEP-th; counted from 0 in the order of FRAMES.
+    #[arg(long, value_name = "A-B[xSTEP]")]
+    pub(crate) frames_range: Option<FrameRange>,
 
     #[command(flatten)]
     pub(crate) capture: CaptureArgs,
@@ -173,7 +180,7 @@ pub(crate) struct SolverArgs {
     pub(crate) lambda: f64,
 }
 
-/// Turn a .cager file back into positions.
+/// Turn a .cager file back into positions, or into its cages; move other models by them.
 ///
 /// Example: cager decode walk.cager -o walk.pc2
 #[derive(Args, Debug)]
@@ -182,12 +189,16 @@ pub(crate) struct DecodeArgs {
     #[arg(value_name = "IN.cager")]
     pub(crate) input: PathBuf,
 
-    /// Where to write: .npy, .pc2, .mdd, or a folder that is to hold one .obj per frame ('FOLDER/*.ply' for .ply).
+    /// Where to write: .npy, .pc2, .mdd, or a folder that is to hold one .obj per frame ('FOLDER/*.ply' for .ply,
+    /// FOLDER/walk.%04d.obj or FOLDER/walk.####.obj for names of your own).
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
 
     #[command(flatten)]
     pub(crate) timing: TimingArgs,
+
+    #[command(flatten)]
+    pub(crate) transfer: TransferArgs,
 }
 
 /// Show what a .cager file holds: sizes, spectrum, errors.

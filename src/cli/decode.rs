@@ -1,27 +1,81 @@
 //! `cager decode`.
 
 use super::args::DecodeArgs;
-use super::{grouped, interrupt, progress, tell};
-use crate::decode;
+use super::outputs::refuse_input;
+use super::{grouped, interrupt, progress, tell, warn};
+use crate::cages_out::write_cages;
+use crate::decode::{self, Decoding};
+use crate::edited::EditedCages;
 use anyhow::Result;
+use cager_formats::{FrameRange, read_model};
+use std::path::Path;
 use std::time::Instant;
 
 pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     let clock = Instant::now();
+    let transfer = &args.transfer;
+    refuse_input(
+        &args.output,
+        [Some(&args.input), transfer.with_cages.as_ref(), transfer.model.as_ref()].into_iter().flatten(),
+    )?;
     let container = decode::open(&args.input)?;
-    let (frames, points) = (container.frames(), container.header().points);
+    let edited = transfer.with_cages.as_ref().map(|path| EditedCages::open(path, &container)).transpose()?;
+    let model = transfer.model.as_ref().map(|path| read_model(path)).transpose()?;
+    let there = edited.as_ref().map_or(container.frames(), EditedCages::frames);
     drop(container);
+    let range = transfer.range();
+    // A range is checked against the file that has the frames.
+    range.map_or(Ok(()), |range| range.check(there, transfer.with_cages.as_ref().unwrap_or(&args.input)))?;
     interrupt::leaves_nothing()?;
-    let bar = progress::frames("decoding", frames);
-    let result =
-        decode::decode(&args.input, &args.output, (&args.timing).into(), &mut |done| bar.set_position(done as u64));
+    let bar = progress::frames("decoding", range.as_ref().map_or(there, FrameRange::count));
+    let mut watch = |done: usize| bar.set_position(done as u64);
+    if transfer.cages {
+        let result = write_cages(&args.input, &args.output, (range, (&args.timing).into()), &mut watch);
+        bar.finish_and_clear();
+        let found = result?;
+        if found.normals > 0 {
+            warn(&[format!("the {} normals of each cage are left out: they are no positions", found.normals)]);
+        }
+        return tell(&format!(
+            "{}: {} cages of {} vertices; the rest cage with its faces is {}\n",
+            args.output.display(),
+            grouped(found.frames as u64),
+            grouped(found.vertices),
+            found.rest.display()
+        ));
+    }
+    let what = Decoding {
+        model: transfer.model.as_deref().zip(model.as_ref()),
+        cages: edited,
+        range,
+        timing: (&args.timing).into(),
+    };
+    let result = decode::decode(&args.input, &args.output, what, &mut watch);
     bar.finish_and_clear();
-    result?;
+    let found = result?;
+    // Of the file's own model, the encoding said so.
+    if let (Some(path), true) = (&transfer.model, found.outside > 0) {
+        warn(&[outside(path, found.outside, found.points)]);
+    }
     tell(&format!(
         "{}: {} frames of {} points in {:.3} s\n",
         args.output.display(),
-        grouped(frames as u64),
-        grouped(points),
+        grouped(found.frames as u64),
+        grouped(found.points as u64),
         clock.elapsed().as_secs_f64()
     ))
+}
+
+fn outside(path: &Path, outside: usize, points: usize) -> String {
+    let advice = if 2 * outside > points {
+        "is it in the units, axes and place of the rest pose?"
+    } else {
+        "they follow the cage less closely"
+    };
+    format!(
+        "{}: {} of {} points lie outside the rest cage; {advice}",
+        path.display(),
+        grouped(outside as u64),
+        grouped(points as u64)
+    )
 }

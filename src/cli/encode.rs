@@ -30,7 +30,8 @@ use std::time::{Duration, Instant};
 pub(super) fn run(args: &EncodeArgs) -> Result<()> {
     let clock = Instant::now();
     let mut rest = read_model(&args.rest)?;
-    let files = capture_files(&args.capture, &args.frames, &mut rest);
+    let mut files = capture_files(&args.capture, &args.frames, &mut rest);
+    files.range = args.frames_range;
     let cage = args.cage.as_ref().map(|path| read_cage(path, args.flip_cage)).transpose()?;
     if args.capture.weld && args.server.is_some() {
         bail!("--weld: a service reads the rest pose as it is; give --server one without seams, or encode here");
@@ -412,7 +413,7 @@ fn summary(report: &Report, output: &Path) -> String {
         let point = worst.point.map_or_else(String::new, |point| format!("point {point} of "));
         format!(
             "  worst   {point}frame {}: off by {} where the rest pose is {} across\n",
-            worst.frame,
+            report.frame_numbers.get(worst.frame).copied().unwrap_or(worst.frame as f64),
             significant(worst.distance),
             significant(report.diagonal)
         )

@@ -153,15 +153,19 @@ fn as_text(
             s.capture_bytes as f64 / bytes as f64,
             human_bytes(s.capture_bytes)
         )?;
-        writeln!(
-            out,
-            "  error     L2 {:.4} % mean, {:.4} % max; L∞ {:.3} % mean, {:.3} % max (of the rest diagonal); KG {:.3} %",
-            100.0 * e.l2_mean,
-            100.0 * e.l2_max,
-            100.0 * e.linf_mean,
-            100.0 * e.linf_max,
-            e.kg_percent
-        )?;
+        if e.l2_mean.is_nan() {
+            writeln!(out, "  error     not measured, or not of every frame (--json has those that are)")?;
+        } else {
+            writeln!(
+                out,
+                "  error     L2 {:.4} % mean, {:.4} % max; L∞ {:.3} % mean, {:.3} % max (of the rest diagonal); KG {:.3} %",
+                100.0 * e.l2_mean,
+                100.0 * e.l2_max,
+                100.0 * e.linf_mean,
+                100.0 * e.linf_max,
+                e.kg_percent
+            )?;
+        }
         let (first, last) =
             (s.singular_values.first().copied().unwrap_or(0.0), s.singular_values.last().copied().unwrap_or(0.0));
         writeln!(

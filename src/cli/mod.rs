@@ -9,6 +9,7 @@ mod decode;
 mod demo;
 mod design;
 mod doctor;
+mod edit;
 mod encode;
 mod health;
 mod inspect;
@@ -19,6 +20,7 @@ mod outputs;
 mod own_service;
 mod progress;
 pub(crate) mod serve;
+mod transfer_args;
 
 use args::{Cli, Command};
 use clap::{CommandFactory, Parser};
@@ -39,6 +41,7 @@ pub fn run() -> ExitCode {
     let result = match command {
         Command::Encode(args) => encode::run(&args),
         Command::Decode(args) => decode::run(&args),
+        Command::Edit(args) => edit::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Cage(args) => cage::run(&args),
         Command::Compare(args) => compare::run(&args),

@@ -12,12 +12,7 @@ pub(super) fn refuse_overwriting<'a>(
 ) -> Result<()> {
     let inputs: Vec<&PathBuf> = inputs.into_iter().collect();
     for output in [Some(output), report].into_iter().flatten() {
-        let Ok(place) = output.canonicalize() else { continue };
-        for input in &inputs {
-            if input.canonicalize().is_ok_and(|input| input == place) {
-                bail!("{}: is an input, so it cannot be an output; name another file", output.display());
-            }
-        }
+        refuse_input(output, inputs.iter().copied())?;
         // It may be a frame of the folder or pattern; no container or report has such a name.
         if output.exists() && (MeshFormat::from_path(output).is_ok() || CacheFormat::from_path(output).is_some()) {
             bail!("{}: is a mesh or a capture, so it is not replaced; name another file", output.display());
@@ -30,6 +25,17 @@ pub(super) fn refuse_overwriting<'a>(
     let second = report.and_then(place);
     if second.is_some() && second == place(output) {
         bail!("{}: cannot hold both outputs; name two files", output.display());
+    }
+    Ok(())
+}
+
+/// An input cannot be written over while it is read.
+pub(super) fn refuse_input<'a>(output: &Path, inputs: impl IntoIterator<Item = &'a PathBuf>) -> Result<()> {
+    let Ok(place) = output.canonicalize() else { return Ok(()) };
+    for input in inputs {
+        if input.canonicalize().is_ok_and(|input| input == place) {
+            bail!("{}: is an input, so it cannot be an output; name another file", output.display());
+        }
     }
     Ok(())
 }

@@ -2,17 +2,18 @@
 
 use super::extract::{Found, content_type};
 use super::frames::{body_error, prepared, stopping};
-use super::openapi;
+use super::{openapi, other_model};
 use crate::engine::Lane;
 use crate::problem::{self, ApiError};
 use crate::service::{Service, StreamPlace};
 use crate::session::{Session, gone};
 use axum::body::Body;
-use axum::extract::State;
+use axum::extract::{Request, State};
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
-use http::{HeaderMap, header};
-use http_body_util::BodyExt;
+use futures_util::StreamExt as _;
+use futures_util::stream::BoxStream;
+use http::{HeaderValue, header};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;
@@ -20,39 +21,64 @@ use std::sync::{Arc, Mutex};
 use tokio::sync::{oneshot, watch};
 
 /// Positions of a cage: m × 3 little-endian f32 in, n × 3 out, for as many cages as the body has. Cages may be edited.
+///
+/// As a form, another model that lies in the same rest cage is moved instead: its points are those of the file in the part `model`, and
+/// `Cager-Outside` says how many of them lie outside the rest cage.
 #[utoipa::path(
     post, path = "/v1/sessions/{id}/decode", operation_id = "decode_cages", tag = "results", params(openapi::Id),
-    request_body(content = Vec<u8>, content_type = "application/octet-stream", description = "m × 3 numbers per cage"),
-    responses((status = 200, description = "n × 3 numbers per cage", content_type = "application/octet-stream", body = Vec<u8>)),
+    request_body(description = "m × 3 numbers per cage", content(
+        (Vec<u8> = "application/octet-stream"), (openapi::OtherModelForm = "multipart/form-data"),
+    )),
+    responses((status = 200, description = "n × 3 numbers per cage", content_type = "application/octet-stream", body = Vec<u8>,
+        headers(("Cager-Outside" = u32, description = "With another model: its points outside the rest cage")))),
 )]
 pub(crate) async fn post(
     State(service): State<Arc<Service>>,
     Found { session, tenant }: Found,
-    headers: HeaderMap,
-    body: Body,
+    request: Request,
 ) -> Result<Response, ApiError> {
-    if content_type(&headers).as_deref() != Some("application/octet-stream") {
-        return Err(ApiError::new(problem::MEDIA_TYPE, "send cages as application/octet-stream"));
-    }
+    let media_type = content_type(request.headers());
+    let with_model = match media_type.as_deref() {
+        Some("application/octet-stream") => false,
+        Some("multipart/form-data") => true,
+        _ => {
+            let detail = "send cages as application/octet-stream, or a model and cages as multipart/form-data";
+            return Err(ApiError::new(problem::MEDIA_TYPE, detail));
+        }
+    };
     let place = service.stream(&tenant)?;
     let facts = prepared(&service, &session).await?;
-    let solver = service.solver(&session).await?;
-    let cost = f64::from(facts.points) * solver.solver.decoder().columns() as f64;
+    let (model, cages) = if with_model {
+        let (model, cages) = other_model::read(&service, request).await?;
+        (Some(model), cages)
+    } else {
+        let cages = request.into_body().into_data_stream().map(|piece| piece.map_err(|error| body_error(&error)));
+        (None, cages.boxed())
+    };
+    // Before the model is bound: what the client sends meanwhile must not wait for it.
+    let spool = Arc::new(Spool::new(&service.config.data).map_err(|error| spool_error(&error))?);
+    let arrived = spool.arrived.subscribe();
+    let limit = service.config.max_rest_bytes;
+    tokio::spawn(spool_cages(Arc::clone(&spool), cages, limit, Arc::clone(&service), Arc::clone(&session)));
+    let (decoder, outside) = match model {
+        Some(model) => {
+            let bound = other_model::bind(&service, &session, &tenant.name, model).await?;
+            (bound.decoder, Some(bound.outside))
+        }
+        None => (service.solver(&session).await?.solver.decoder().clone(), None),
+    };
+    let cost = decoder.points() as f64 * decoder.columns() as f64;
     let lane = service.engine.lane(&tenant.name, tenant.priority.weight(), cost, move |jobs: Vec<Job>| {
         let (cages, replies): (Vec<_>, Vec<_>) = jobs.into_iter().map(|job| (job.cage, job.reply)).unzip();
         let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
         let mut positions = vec![Vec::new(); cages.len()];
-        solver.solver.decoder().decode(&views, &mut positions);
+        decoder.decode(&views, &mut positions);
         for (positions, reply) in positions.into_iter().zip(replies) {
             let bytes: Vec<u8> = positions.iter().flat_map(|x| x.to_le_bytes()).collect();
             // The client may be gone.
             let _ = reply.send(bytes.into());
         }
     });
-    let spool = Arc::new(Spool::new(&service.config.data).map_err(|error| spool_error(&error))?);
-    let arrived = spool.arrived.subscribe();
-    let limit = service.config.max_rest_bytes;
-    tokio::spawn(spool_body(Arc::clone(&spool), body, limit, service, Arc::clone(&session)));
     let mut decoding =
         Decoding { spool, arrived, lane, session, frame_bytes: 12 * u64::from(facts.unknowns), next: 0, _place: place };
     // The first is waited for, so that its error still has a status.
@@ -65,8 +91,12 @@ pub(crate) async fn post(
         }
     });
     let first = futures_util::stream::iter(first.map(Ok));
-    let stream = futures_util::StreamExt::chain(first, rest);
-    Ok(([(header::CONTENT_TYPE, "application/octet-stream")], Body::from_stream(stream)).into_response())
+    let body = Body::from_stream(first.chain(rest));
+    let mut response = ([(header::CONTENT_TYPE, "application/octet-stream")], body).into_response();
+    if let Some(outside) = outside {
+        response.headers_mut().insert("cager-outside", HeaderValue::from(outside));
+    }
+    Ok(response)
 }
 
 struct Job {
@@ -107,19 +137,25 @@ impl Spool {
     }
 }
 
-async fn spool_body(spool: Arc<Spool>, mut body: Body, limit: u64, service: Arc<Service>, session: Arc<Session>) {
+async fn spool_cages(
+    spool: Arc<Spool>,
+    mut cages: BoxStream<'static, Result<Bytes, ApiError>>,
+    limit: u64,
+    service: Arc<Service>,
+    session: Arc<Session>,
+) {
     let mut bytes = 0u64;
     let end = loop {
         let next = tokio::select! {
-            next = body.frame() => next,
+            next = cages.next() => next,
             () = session.deleted().cancelled() => break Err(gone()),
             () = service.stopping().cancelled() => break Err(stopping()),
             () = spool.arrived.closed() => return,
         };
         let chunk = match next {
             None => break Ok(()),
-            Some(Ok(frame)) => frame.into_data().unwrap_or_default(),
-            Some(Err(error)) => break Err(body_error(&error)),
+            Some(Ok(chunk)) => chunk,
+            Some(Err(error)) => break Err(error),
         };
         if bytes + chunk.len() as u64 > limit {
             let detail = format!("the cages take more than {limit} bytes; decode fewer at a time");

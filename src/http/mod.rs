@@ -17,6 +17,7 @@ mod health;
 pub mod listen;
 mod multipart;
 pub mod openapi;
+mod other_model;
 mod progress;
 mod ranged;
 mod respond;

@@ -57,6 +57,18 @@ pub(crate) struct NewCageForm {
     options: CageOptions,
 }
 
+/// The parts that have another model moved by cages.
+#[derive(ToSchema)]
+#[allow(dead_code, reason = "it only describes")]
+pub(crate) struct OtherModelForm {
+    /// Model that lies in the rest cage, a file whose name ends in .obj, .ply, .off, .stl or .glb. It comes first.
+    #[schema(value_type = String, format = Binary)]
+    model: Vec<u8>,
+    /// m × 3 little-endian f32 for each cage, cage after cage.
+    #[schema(value_type = String, format = Binary)]
+    cages: Vec<u8>,
+}
+
 /// The parts that make a session.
 #[derive(ToSchema)]
 #[allow(dead_code, reason = "it only describes")]
@@ -157,7 +169,7 @@ pub(crate) fn finished(mut document: utoipa::openapi::OpenApi) -> Value {
     let mut document = serde_json::to_value(&document).unwrap_or_default();
     mend_ranges(&mut document);
     let schemas = &mut document["components"]["schemas"];
-    for form in ["NewSessionForm", "NewCageForm"] {
+    for form in ["NewSessionForm", "NewCageForm", "OtherModelForm"] {
         schemas[form]["additionalProperties"] = false.into();
     }
     let refused = &mut schemas["SessionOptions"]["properties"]["max_error"];
@@ -234,24 +246,33 @@ fn describe_content(media_type: &str, content: &mut RefOr<Content>) {
         content.schema = Some(ObjectBuilder::new().schema_type(Type::String).format(Some(format)).build().into());
     }
     if media_type == "multipart/form-data" {
-        let second = if designs_cage(content) { ("frames", "npy") } else { ("cage", "obj") };
-        for (part, ending) in [("rest", "obj"), second] {
+        let files: &[_] = match form(content) {
+            "OtherModelForm" => &[("model", "obj")],
+            "NewCageForm" => &[("rest", "obj"), ("frames", "npy")],
+            _ => &[("rest", "obj"), ("cage", "obj")],
+        };
+        for (part, ending) in files {
             let example = format!("form-data; name=\"{part}\"; filename=\"{part}.{ending}\"");
             let name = HeaderBuilder::new()
                 .description(Some("With a file name, whose extension says the format"))
                 .schema(Some(text()))
                 .example(Some(example.into()));
             let part_headers = EncodingBuilder::new().header("Content-Disposition", name.build());
-            content.encoding.insert(part.to_owned(), part_headers.build());
+            content.encoding.insert((*part).to_owned(), part_headers.build());
         }
-        let options = EncodingBuilder::new().content_type(Some("application/json".to_owned()));
-        content.encoding.insert("options".to_owned(), options.build());
+        if form(content) != "OtherModelForm" {
+            let options = EncodingBuilder::new().content_type(Some("application/json".to_owned()));
+            content.encoding.insert("options".to_owned(), options.build());
+        }
     }
 }
 
-/// Whether a body is the form that asks for a cage.
-fn designs_cage(content: &Content) -> bool {
-    matches!(&content.schema, Some(RefOr::Ref(form)) if form.ref_location.ends_with("/NewCageForm"))
+/// The name of the form that a body is.
+fn form(content: &Content) -> &str {
+    match &content.schema {
+        Some(RefOr::Ref(form)) => form.ref_location.rsplit('/').next().unwrap_or_default(),
+        _ => "",
+    }
 }
 
 /// The header that every request may have, and those that responses have.

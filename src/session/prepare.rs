@@ -223,6 +223,22 @@ fn check_memory(
     Ok(())
 }
 
+/// Refuses coordinates of so many points and columns that this service does not allow.
+///
+/// # Errors
+/// More than `most_bytes` at their peak.
+pub(crate) fn check_columns(points: usize, columns: usize, most_bytes: u64) -> Result<(), ApiError> {
+    // One matrix in double precision, what it is solved with, and one in single precision.
+    let needed = 20 * points as u64 * columns as u64;
+    if needed <= most_bytes {
+        return Ok(());
+    }
+    let detail = format!(
+        "model: {points} points times {columns} values of the cage need {needed} bytes, and this service allows {most_bytes}; send a lighter model"
+    );
+    Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(most_bytes))
+}
+
 /// Reads the bytes of a mesh file, the part of this name.
 ///
 /// # Errors

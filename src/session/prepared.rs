@@ -98,6 +98,11 @@ impl Solvers {
         })
     }
 
+    /// A place among what may be prepared at a time.
+    pub(crate) async fn place(&self, tenant: &str) -> Place {
+        self.places.take(tenant).await
+    }
+
     /// The threads that prepare.
     pub(crate) fn pool(&self) -> Arc<rayon::ThreadPool> {
         Arc::clone(&self.pool)

@@ -1,6 +1,8 @@
 //! The program as its users meet it: command lines in, files, words and exit statuses out.
 
+mod blender;
 mod cage;
+mod cages_out;
 mod compare;
 mod decode;
 mod defaults;
@@ -15,10 +17,13 @@ mod inspect;
 mod interrupted;
 mod manners;
 mod mistakes;
+mod ranges;
 mod real_data;
 mod real_green;
 mod real_harmonic;
 mod real_methods;
+mod real_transfer;
 mod refused;
 mod support;
+mod transfer;
 mod usage;

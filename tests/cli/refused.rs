@@ -5,7 +5,7 @@ use cager_core::mesh::{Model, Polygons, TriMesh};
 
 /// Runs a command that must be refused with one line that has all these words, and must leave the folder as it was.
 #[track_caller]
-fn refused(dir: &Dir, line: &str, words: &[&str]) {
+pub(crate) fn refused(dir: &Dir, line: &str, words: &[&str]) {
     let before = dir.contents();
     let done = dir.cager(line).run();
     assert_eq!(done.status, Some(1), "{line}: {}{}", done.stdout, done.stderr);

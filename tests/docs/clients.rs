@@ -71,6 +71,8 @@ fn the_curl_examples_encode() {
         assert_container(&folder.join("capture.cager"), FRAMES);
         let cage = fs::read(folder.join("cage-0.f32")).expect("a cage");
         assert!(!cage.is_empty() && cage.len().is_multiple_of(12));
+        let positions = fs::read(folder.join("positions.f32")).expect("positions");
+        assert!(!positions.is_empty() && fs::read(folder.join("other-positions.f32")).expect("positions") == positions);
         cager_formats::read_model(&folder.join("designed.obj")).expect("a designed cage");
         let sessions = fs::read_dir(folder.join("data/sessions")).expect("the data folder").count();
         assert_eq!(sessions, 0, "the last step deletes the session");

@@ -4,8 +4,10 @@ mod cache;
 mod mdd;
 mod npy;
 mod npz;
+mod numbered;
 mod numbers;
 mod pc2;
+mod range;
 mod sequence;
 mod source;
 mod widen;
@@ -17,6 +19,7 @@ use crate::error::{Error, Fault};
 use crate::mesh::{MeshFormat, extensions};
 
 pub use numbers::missing_frames;
+pub use range::{FrameRange, open_frames_range};
 pub use source::{open_frames, open_frames_bytes, open_frames_in};
 pub use write::{FrameOptions, FrameWriter, create_frames};
 

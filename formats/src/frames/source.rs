@@ -6,6 +6,7 @@ use std::io::{self, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 
 use super::cache;
+use super::numbered::Numbered;
 use super::sequence::SequenceReader;
 use super::{CacheFormat, FrameReader, npz, unknown_extension};
 use crate::error::{Error, Fault};
@@ -14,9 +15,10 @@ use crate::natural;
 
 /// Opens the frames of a capture whose rest pose has `expected_points` points.
 ///
-/// `source` is a `.npy`, `.pc2` or `.mdd` file, a `.npz` file with one array, one mesh file, a folder of mesh files or a glob pattern for such files.
-/// Folder and pattern give the files of one mesh format in natural order, `2.obj` before `10.obj`; other files, and in
-/// a folder hidden ones, are passed over.
+/// `source` is a `.npy`, `.pc2` or `.mdd` file, a `.npz` file with one array, one mesh file, a folder of mesh files or a pattern for such
+/// files. Folder and glob pattern give the files of one mesh format in natural order, `2.obj` before `10.obj`; other files, and in
+/// a folder hidden ones, are passed over. A name with `%04d` or `####` gives the files with a number in its place, in the
+/// order of the numbers.
 ///
 /// # Errors
 /// [`Error::PointCount`] where a cache has another number of points, [`Error::Damaged`] where its size is not what its
@@ -32,6 +34,7 @@ pub fn open_frames(source: impl AsRef<Path>, expected_points: usize) -> Result<B
         Ok(found) if !found.is_file() => Err(Fault::unsupported("is not a regular file; copy it to one").at(path)),
         Ok(found) => open_file(path, found.len(), expected_points),
         Err(cause) => match path.to_str() {
+            _ if Numbered::of(path).is_some() => open_numbered(path, expected_points),
             Some(pattern) if pattern.contains(['*', '?', '[']) => open_pattern(path, pattern, expected_points),
             _ => Err(Error::read(path, cause)),
         },
@@ -102,6 +105,18 @@ fn open_pattern(path: &Path, pattern: &str, expected_points: usize) -> Result<Bo
         }
         _ => open_sequence(path, files, expected_points),
     }
+}
+
+fn open_numbered(path: &Path, expected_points: usize) -> Result<Box<dyn FrameReader>, Error> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let number = |file: &PathBuf| Numbered::of(path)?.number(file.file_name()?.to_str()?);
+    let mut files: Vec<_> = list(folder)?.into_iter().filter_map(|file| Some((number(&file)?, file))).collect();
+    if files.is_empty() {
+        let what = "matches no file; the place of the number stands for as many digits or more, filled up with zeros";
+        return Err(Fault::invalid(what).at(path));
+    }
+    files.sort();
+    open_sequence(path, files.into_iter().map(|(_, file)| file).collect(), expected_points)
 }
 
 fn list(folder: &Path) -> Result<Vec<PathBuf>, Error> {

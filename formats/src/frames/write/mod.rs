@@ -7,6 +7,7 @@ use std::path::{MAIN_SEPARATOR, Path, PathBuf};
 
 use cager_core::mesh::Polygons;
 
+use super::numbered::Numbered;
 use super::{CacheFormat, unknown_extension};
 use crate::error::{Error, Fault};
 use cache::CacheWriter;
@@ -61,7 +62,7 @@ impl Default for FrameOptions {
 ///
 /// The extension of `path` says what: `.npy` (frames × points × 3, `<f4`), `.pc2` or `.mdd`. Without an extension, with
 /// a `/` at the end, or as an existing folder it becomes a folder of files `frame_0000.obj`, …, each with `faces` and its number;
-/// `FOLDER/*.ply` makes them `.ply` files.
+/// `FOLDER/*.ply` makes them `.ply` files, and `FOLDER/NAME.%04d.obj` or `FOLDER/NAME.####.ply` gives their names.
 ///
 /// # Errors
 /// [`Error::Unsupported`] for other extensions and for more points or frames than a format can count,
@@ -76,17 +77,38 @@ pub fn create_frames(
 ) -> Result<Box<dyn FrameWriter>, Error> {
     let given = path.as_ref();
     let pattern = given.file_name().and_then(|name| name.to_str()).filter(|name| matches!(*name, "*.ply" | "*.obj"));
-    let folder = given.parent().filter(|_| pattern.is_some());
+    let numbered = Numbered::of(given);
+    let folder = given.parent().filter(|_| pattern.is_some() || numbered.is_some());
     let path = folder.unwrap_or(given);
     let announced = Announced { path: path.to_owned(), points, frames, written: 0 };
     announced.check(options).map_err(|fault| fault.at(path))?;
+    if let Some(names) = numbered {
+        check_numbered(&names, path).map_err(|fault| fault.at(given))?;
+        return Ok(Box::new(SequenceWriter::create(announced, faces, names, options)?));
+    }
     if folder.is_some() || is_folder(path) {
-        return Ok(Box::new(SequenceWriter::create(announced, faces, pattern == Some("*.ply"), options)?));
+        let whole = |frame: usize| options.number(frame).abs().trunc().to_string().len();
+        let digits = whole(0).max(whole(frames - 1)).max(4);
+        let extension = if pattern == Some("*.ply") { ".ply" } else { ".obj" };
+        let names = Numbered::new("frame_", digits, extension);
+        return Ok(Box::new(SequenceWriter::create(announced, faces, names, options)?));
     }
     match CacheFormat::from_path(path) {
         Some(format) => Ok(Box::new(CacheWriter::create(announced, format, options)?)),
         None => Err(unknown_extension(path, false)),
     }
+}
+
+fn check_numbered(names: &Numbered, folder: &Path) -> Result<(), Fault> {
+    if !(names.extension_is("obj") || names.extension_is("ply")) {
+        return Err(Fault::unsupported(
+            "is not of a mesh format that is written for frames; end the name in .obj or .ply",
+        ));
+    }
+    if folder.as_os_str().is_empty() {
+        return Err(Fault::invalid("names no folder; give the files a new one, as in FOLDER/NAME.####.obj"));
+    }
+    Ok(())
 }
 
 fn is_folder(path: &Path) -> bool {

@@ -4,7 +4,7 @@ use std::io::{self, BufWriter, Write};
 
 use cager_core::mesh::{Model, Polygons};
 
-use super::super::numbers::padded;
+use super::super::numbered::Numbered;
 use super::{Announced, FrameOptions, FrameWriter};
 use crate::atomic::AtomicDir;
 use crate::error::{Error, Fault};
@@ -14,8 +14,8 @@ pub(super) struct SequenceWriter {
     announced: Announced,
     folder: AtomicDir,
     format: Format,
+    names: Numbered,
     options: FrameOptions,
-    digits: usize,
 }
 
 /// What the files are, with what is the same in all of them.
@@ -30,7 +30,7 @@ impl SequenceWriter {
     pub(super) fn create(
         announced: Announced,
         faces: &Polygons,
-        ply: bool,
+        names: Numbered,
         options: &FrameOptions,
     ) -> Result<Self, Error> {
         if let Some(&index) = faces.indices().iter().find(|&&index| index as usize >= announced.points) {
@@ -41,16 +41,14 @@ impl SequenceWriter {
             .at(&announced.path));
         }
         let folder = AtomicDir::create(&announced.path)?;
-        let format = if ply {
+        let format = if names.extension_is("ply") {
             Format::Ply(Model { points: Vec::new(), faces: faces.clone() })
         } else {
             let mut text = Vec::new();
             write_obj_faces(&mut text, faces.iter()).map_err(|cause| Error::write(&announced.path, cause))?;
             Format::Obj(text)
         };
-        let whole = |frame: usize| options.number(frame).abs().trunc().to_string().len();
-        let digits = whole(0).max(whole(announced.frames - 1)).max(4);
-        Ok(Self { announced, folder, format, options: options.clone(), digits })
+        Ok(Self { announced, folder, format, names, options: options.clone() })
     }
 
     fn write_file(&mut self, name: &str, positions: &[f32]) -> io::Result<()> {
@@ -76,9 +74,7 @@ impl SequenceWriter {
 impl FrameWriter for SequenceWriter {
     fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error> {
         self.announced.admit(positions)?;
-        let extension = if matches!(self.format, Format::Ply(_)) { "ply" } else { "obj" };
-        let number = padded(self.options.number(self.announced.written), self.digits);
-        let name = format!("frame_{number}.{extension}");
+        let name = self.names.name(self.options.number(self.announced.written));
         self.write_file(&name, positions).map_err(|cause| Error::write(&self.announced.path.join(&name), cause))?;
         self.announced.written += 1;
         Ok(())

@@ -1,8 +1,10 @@
 //! `POST …/decode`: positions from cages, edited or not.
 
-use crate::support::{Capture, OCTETS, Raw, TestApp, cages_of, chunked};
+use crate::support::{Capture, OCTETS, Raw, Reply, TestApp, cages_of, chunked, file};
 use cager_core::decode::Decoder;
 use cager_proto::messages::Session;
+use reqwest::Method;
+use reqwest::multipart::{Form, Part};
 
 fn bytes(cages: &[Vec<f32>]) -> Vec<u8> {
     cages.iter().flatten().flat_map(|x| x.to_le_bytes()).collect()
@@ -72,4 +74,48 @@ async fn what_is_no_cage_is_refused() {
     let problem = app.post(&path, OCTETS, nan).await.problem(422, "invalid-frame");
     assert!(problem.detail.contains("cage 0") && problem.detail.contains("vertex 10"), "{}", problem.detail);
     assert!(app.post(&path, OCTETS, Vec::new()).await.expect(200).body.is_empty());
+}
+
+/// Posts a model and cages as a form.
+async fn moved(app: &TestApp, session: &Session, form: Form) -> Reply {
+    let path = format!("/v1/sessions/{}/decode", session.id);
+    Reply::of(app.request(Method::POST, &path).multipart(form).send().await.expect("an answer")).await
+}
+
+#[tokio::test]
+async fn another_model_is_moved_by_the_cages_and_its_points_outside_are_counted() {
+    let app = TestApp::start();
+    let (session, cages, _) = edited(&app).await;
+    let cages_part = || Part::bytes(bytes(&cages));
+    let path = format!("/v1/sessions/{}/decode", session.id);
+    let own = app.post(&path, OCTETS, bytes(&cages)).await.expect(200).body;
+    let rest = &Capture::small().rest.obj;
+
+    // The session's own model, as any other.
+    let form = Form::new().part("model", file("rest.obj", rest)).part("cages", cages_part());
+    let reply = moved(&app, &session, form).await.expect(200);
+    assert!(reply.body == own);
+    assert_eq!(reply.header("cager-outside"), "0");
+
+    // Two of its points, and one far away.
+    let text = String::from_utf8(rest.clone()).expect("text");
+    let mut lines: Vec<&str> = text.lines().filter(|line| line.starts_with("v ")).take(2).collect();
+    lines.push("v 50 0 0");
+    let form = || Form::new().part("model", file("three.obj", lines.join("\n").as_bytes()));
+    let reply = moved(&app, &session, form().part("cages", cages_part())).await.expect(200);
+    assert_eq!(reply.header("cager-outside"), "1");
+    assert_eq!(reply.body.len(), 36 * cages.len());
+    let points = own.len() / cages.len();
+    for (three, all) in reply.body.chunks(36).zip(own.chunks(points)) {
+        assert_eq!(three[..24], all[..24]);
+    }
+
+    let problem = moved(&app, &session, form()).await.problem(400, "bad-request");
+    assert!(problem.detail.contains("\"cages\" is missing"), "{}", problem.detail);
+    let late = Form::new().part("cages", cages_part()).part("model", file("rest.obj", rest));
+    let problem = moved(&app, &session, late).await.problem(400, "bad-request");
+    assert!(problem.detail.contains("before the part"), "{}", problem.detail);
+    let bad = Form::new().part("model", file("bad.obj", b"v 0 0\n")).part("cages", cages_part());
+    let problem = moved(&app, &session, bad).await.problem(422, "invalid-geometry");
+    assert!(problem.detail.contains("bad.obj"), "{}", problem.detail);
 }

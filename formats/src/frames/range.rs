@@ -1,0 +1,182 @@
+//! Some frames of a capture: from one to another, every so many.
+
+use std::fmt;
+use std::path::Path;
+use std::str::FromStr;
+
+use super::{FrameReader, open_frames};
+use crate::error::{Error, Fault};
+
+/// Frames `first` to `last`, both included, every `step`-th of them, counted from 0 in the order of their source. Written
+/// `A-B` or `A-BxSTEP`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FrameRange {
+    first: usize,
+    last: usize,
+    step: usize,
+}
+
+impl FrameRange {
+    /// A single frame.
+    pub fn only(frame: usize) -> Self {
+        Self { first: frame, last: frame, step: 1 }
+    }
+
+    /// All of so many frames, at least one.
+    pub fn all(frames: usize) -> Self {
+        Self { first: 0, last: frames.saturating_sub(1), step: 1 }
+    }
+
+    /// How many frames these are.
+    pub fn count(&self) -> usize {
+        (self.last - self.first) / self.step + 1
+    }
+
+    /// The frame at a place among these.
+    pub fn frame(&self, place: usize) -> usize {
+        self.first + place * self.step
+    }
+
+    /// Whether there are all of these among `frames` frames of `source`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with the frames that there are.
+    pub fn check(&self, frames: usize, source: &Path) -> Result<(), Error> {
+        if self.last < frames {
+            return Ok(());
+        }
+        let there = match frames {
+            0 => "has no frames".to_owned(),
+            1 => "has one frame, frame 0".to_owned(),
+            _ => format!("has frames 0 to {}", frames - 1),
+        };
+        Err(Fault::invalid(format!("{there}, so {self} cannot be taken from it; give frames that it has")).at(source))
+    }
+}
+
+impl fmt::Display for FrameRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.first == self.last, self.step) {
+            (true, _) => write!(f, "frame {}", self.first),
+            (false, 1) => write!(f, "frames {}-{}", self.first, self.last),
+            (false, step) => write!(f, "frames {}-{}x{step}", self.first, self.last),
+        }
+    }
+}
+
+impl FromStr for FrameRange {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (bounds, step) = text.split_once('x').unwrap_or((text, "1"));
+        let numbers = bounds.split_once('-').and_then(|(first, last)| {
+            Some(Self { first: first.parse().ok()?, last: last.parse().ok()?, step: step.parse().ok()? })
+        });
+        match numbers {
+            None => Err("write it as A-B or A-BxSTEP, such as 0-99 or 10-50x2; frames are counted from 0".to_owned()),
+            Some(range) if range.last < range.first => {
+                Err(format!("frame {} comes after frame {}; write the smaller number first", range.first, range.last))
+            }
+            Some(range) if range.step == 0 => Err("a step of 0 never ends; give 1 or more".to_owned()),
+            Some(range) => Ok(range),
+        }
+    }
+}
+
+/// [`open_frames`], and of the frames there only those of a range.
+///
+/// # Errors
+/// Those of [`open_frames`]; a range that goes beyond the frames there.
+pub fn open_frames_range(
+    source: impl AsRef<Path>,
+    expected_points: usize,
+    range: Option<FrameRange>,
+) -> Result<Box<dyn FrameReader>, Error> {
+    let source = source.as_ref();
+    let reader = open_frames(source, expected_points)?;
+    let Some(range) = range else { return Ok(reader) };
+    range.check(reader.frames(), source)?;
+    Ok(Box::new(Taken { reader, range, taken: 0, at: 0 }))
+}
+
+/// The frames of a range.
+struct Taken {
+    reader: Box<dyn FrameReader>,
+    range: FrameRange,
+    /// How many of the range were read or skipped.
+    taken: usize,
+    /// The frame that the reader gives next.
+    at: usize,
+}
+
+impl Taken {
+    /// Moves the reader to the next frame of the range; false at the end.
+    fn advance(&mut self) -> Result<bool, Error> {
+        if self.taken == self.range.count() {
+            return Ok(false);
+        }
+        while self.at < self.range.frame(self.taken) {
+            if !self.reader.skip()? {
+                return Ok(false);
+            }
+            self.at += 1;
+        }
+        Ok(true)
+    }
+
+    fn took(&mut self, more: bool) -> bool {
+        self.at += usize::from(more);
+        self.taken += usize::from(more);
+        more
+    }
+}
+
+impl FrameReader for Taken {
+    fn points(&self) -> usize {
+        self.reader.points()
+    }
+
+    fn frames(&self) -> usize {
+        self.range.count()
+    }
+
+    fn frame_rate(&self) -> Option<f64> {
+        self.reader.frame_rate()
+    }
+
+    /// Those of the source, so that what is left takes as long as before.
+    fn number(&self, frame: usize) -> f64 {
+        self.reader.number(self.range.frame(frame))
+    }
+
+    fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error> {
+        if !self.advance()? {
+            out.clear();
+            return Ok(false);
+        }
+        let more = self.reader.read_next(out)?;
+        Ok(self.took(more))
+    }
+
+    fn skip(&mut self) -> Result<bool, Error> {
+        let more = self.advance()? && self.reader.skip()?;
+        Ok(self.took(more))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_read_as_they_are_written() {
+        let range: FrameRange = "3-10x3".parse().unwrap();
+        assert_eq!((range.count(), range.frame(0), range.frame(2)), (3, 3, 9));
+        assert_eq!(range.to_string(), "frames 3-10x3");
+        assert_eq!("7-7".parse(), Ok(FrameRange::only(7)));
+        assert_eq!("0-4".parse(), Ok(FrameRange::all(5)));
+        for wrong in ["", "3", "a-b", "3-", "-3", "5-3", "0-9x0", "0-9x", "0-9x-1", "0--9"] {
+            assert!(wrong.parse::<FrameRange>().is_err(), "{wrong}");
+        }
+    }
+}

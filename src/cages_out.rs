@@ -1,0 +1,117 @@
+//! The cages of a container as files that other programs open.
+
+use crate::decode::{DecodeError, frame_options, open};
+use crate::timing::Timing;
+use cager_core::mesh::{Model, Polygons};
+use cager_formats::{AtomicFile, FrameRange, commit_together, create_frames, obj_bytes};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// What [`write_cages`] has written.
+pub struct CagesWritten {
+    /// Number of frames.
+    pub frames: usize,
+    /// Vertices of the cage.
+    pub vertices: u64,
+    /// The file with the rest cage.
+    pub rest: PathBuf,
+    /// Normals of each frame that are no positions and were left out: those of `green-free`.
+    pub normals: u64,
+}
+
+/// Writes the cages of a container, or a range of them, to `output` in any format of frames, and the rest cage with its faces
+/// beside them: see [`rest_cage_path`]. Both appear whole or not at all.
+///
+/// # Errors
+/// Damage; an output that refuses; another file in the place of the rest cage.
+pub fn write_cages(
+    input: &Path,
+    output: &Path,
+    (range, timing): (Option<FrameRange>, Timing),
+    progress: &mut dyn FnMut(usize),
+) -> Result<CagesWritten, DecodeError> {
+    let fail = |cause| DecodeError::container(input, cause);
+    let mut container = open(input)?;
+    let range = range.unwrap_or(FrameRange::all(container.frames()));
+    let there = container.frames();
+    range.check(there, input)?;
+    container.errors().map_err(fail)?;
+    container.summary().map_err(fail)?;
+    let mesh = container.cage().map_err(fail)?;
+    let mut faces = Polygons::new();
+    mesh.triangles.iter().for_each(|triangle| faces.push(triangle));
+    let cage = Model { points: mesh.vertices, faces };
+    let rest = rest_cage_path(output);
+    let rest_file = rest_file(&rest, &obj_bytes(&cage))?;
+
+    let rows = cage.points.len();
+    let options = frame_options(&mut container, there, range, timing).map_err(fail)?;
+    let mut writer = create_frames(output, rows, range.count(), &cage.faces, &options)?;
+    let mut frame = Vec::new();
+    for place in 0..range.count() {
+        container.read_frame(range.frame(place), &mut frame).map_err(fail)?;
+        writer.write_frame(&frame[..3 * rows])?;
+        progress(place + 1);
+    }
+    // Complete before the frames have their name, so that a full disk leaves neither.
+    let rest_file = rest_file.map(AtomicFile::complete).transpose()?;
+    writer.finish()?;
+    commit_together(rest_file.into_iter().collect())?;
+    let header = container.header();
+    Ok(CagesWritten {
+        frames: range.count(),
+        vertices: header.cage_vertices,
+        rest,
+        normals: u64::from(header.rows_per_frame).saturating_sub(header.cage_vertices),
+    })
+}
+
+/// The file beside `output` that holds the rest cage: `walk.cage.obj` beside `walk.npy`, `walk/` and `walk/*.ply`.
+pub fn rest_cage_path(output: &Path) -> PathBuf {
+    let pattern = |name: &str| name.contains(['*', '#', '%']);
+    let name = output.file_name().and_then(|name| name.to_str());
+    let named = match output.parent() {
+        Some(folder) if name.is_some_and(pattern) && folder.file_name().is_some() => folder,
+        _ => output,
+    };
+    named.with_extension("cage.obj")
+}
+
+/// Begins the file of the rest cage; none where it is there already. No name was given for it, so it replaces nothing else.
+fn rest_file(path: &Path, bytes: &[u8]) -> Result<Option<AtomicFile>, DecodeError> {
+    match std::fs::read(path) {
+        Ok(there) if there == bytes => Ok(None),
+        Ok(_) => {
+            let what = "is another file where the rest cage is to be written; move it, or name another output";
+            Err(cager_formats::Error::Target { path: path.to_owned(), what: what.to_owned() }.into())
+        }
+        Err(_) => {
+            let mut file = AtomicFile::create(path)?;
+            file.write_all(bytes).map_err(|cause| cager_formats::Error::Io {
+                path: path.to_owned(),
+                action: cager_formats::Action::Write,
+                cause,
+            })?;
+            Ok(Some(file))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rest_cage_lies_beside_the_frames() {
+        for (output, rest) in [
+            ("walk.npy", "walk.cage.obj"),
+            ("out/walk.pc2", "out/walk.cage.obj"),
+            ("walk", "walk.cage.obj"),
+            ("out/walk/", "out/walk.cage.obj"),
+            ("out/walk/*.ply", "out/walk.cage.obj"),
+            ("walk/f.####.obj", "walk.cage.obj"),
+        ] {
+            assert_eq!(rest_cage_path(Path::new(output)), Path::new(rest), "{output}");
+        }
+    }
+}

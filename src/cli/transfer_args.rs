@@ -1,0 +1,55 @@
+//! What can be typed after `cager decode` beside its files, and after `cager edit`.
+
+use cager_formats::FrameRange;
+use clap::Args;
+use std::path::PathBuf;
+
+/// What is decoded, where it is not every frame of the file's own model and cages.
+#[derive(Args, Debug)]
+pub(crate) struct TransferArgs {
+    /// Write the cages instead of the model, and the rest cage with its faces beside them (OUT.cage.obj).
+    #[arg(long, conflicts_with_all = ["with_cages", "model"])]
+    pub(crate) cages: bool,
+
+    /// Move the model by these cages instead: those of --cages, edited; folder, quoted glob or numbered name of mesh files, .npy,
+    /// .pc2 or .mdd, of any number of frames.
+    #[arg(long, value_name = "EDITED")]
+    pub(crate) with_cages: Option<PathBuf>,
+
+    /// Move another model instead, which lies in the same rest cage: another resolution, garments, eyes; .obj .ply .off .stl .glb.
+    #[arg(long, value_name = "OTHER")]
+    pub(crate) model: Option<PathBuf>,
+
+    /// Only frame K, counted from 0.
+    #[arg(long, value_name = "K", conflicts_with = "range")]
+    pub(crate) frame: Option<usize>,
+
+    /// Only frames A to B, both included, every STEP-th; counted from 0.
+    #[arg(long, value_name = "A-B[xSTEP]")]
+    pub(crate) range: Option<FrameRange>,
+}
+
+impl TransferArgs {
+    pub(crate) fn range(&self) -> Option<FrameRange> {
+        self.frame.map(FrameRange::only).or(self.range)
+    }
+}
+
+/// Write a .cager file again with edited cages.
+///
+/// `cager decode --cages` writes the cages to edit. Errors of the frames that changed are not measured: the capture is not there.
+/// Example: cager edit walk.cager --with-cages edited.npy -o edited.cager
+#[derive(Args, Debug)]
+pub(crate) struct EditArgs {
+    /// File to read.
+    #[arg(value_name = "IN.cager")]
+    pub(crate) input: PathBuf,
+
+    /// Edited cages: folder, quoted glob or numbered name of mesh files, .npy, .pc2 or .mdd, of any number of frames.
+    #[arg(long, value_name = "EDITED")]
+    pub(crate) with_cages: PathBuf,
+
+    /// File to write; it appears whole or not at all.
+    #[arg(short, long, value_name = "OUT.cager")]
+    pub(crate) output: PathBuf,
+}

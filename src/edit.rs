@@ -1,0 +1,88 @@
+//! Containers with edited cages in the place of their own.
+
+use crate::decode::{Container, DecodeError};
+use crate::edited::EditedCages;
+use cager_formats::{Action, AtomicFile};
+use cager_proto::container::{self, ContainerWriter, ErrorSummary, FrameError, Summary};
+use std::io::BufWriter;
+use std::path::Path;
+
+/// What a summary says of errors that are not known.
+const NOT_MEASURED: &str = "the cages were edited: their errors are not measured";
+
+/// What [`edit`] has written.
+pub struct Edited {
+    /// Number of frames.
+    pub frames: usize,
+    /// Frames whose cage is another than in the container it came from, or has no counterpart there.
+    pub changed: usize,
+}
+
+/// Writes the container at `input` again, with edited cages. A frame whose cage is the same keeps its errors; of the others they
+/// are not measured, as the capture is not there.
+///
+/// # Errors
+/// Damage; edited cages that cannot be read; an output that refuses.
+pub fn edit(
+    mut container: Container,
+    input: &Path,
+    mut edited: EditedCages,
+    output: &Path,
+    progress: &mut dyn FnMut(usize),
+) -> Result<Edited, DecodeError> {
+    let fail = |cause| DecodeError::container(input, cause);
+    let refused = |cause: container::Error| written(output, cause);
+    let (rest, cage) = (container.rest().map_err(fail)?, container.cage().map_err(fail)?);
+    let errors = container.errors().map_err(fail)?;
+    let summary = container.summary().map_err(fail)?;
+    let corners = rest.faces.indices().len() as u64;
+    let file = BufWriter::with_capacity(1 << 20, AtomicFile::create(output)?);
+    let mut writer = ContainerWriter::new(file, container.header(), &rest, &cage).map_err(refused)?;
+    let (frames, mut changed) = (edited.frames(), 0);
+    let (mut old, mut new) = (Vec::new(), Vec::new());
+    for frame in 0..frames {
+        edited.read_frame(frame, &mut new)?;
+        let mut error = FrameError { l2: f32::NAN, linf: f32::NAN };
+        if frame < container.frames() {
+            container.read_frame(frame, &mut old).map_err(fail)?;
+            if old == new {
+                error = errors[frame];
+            }
+        }
+        changed += usize::from(old != new || frame >= container.frames());
+        writer.write_frame(&new, error.l2, error.linf).map_err(refused)?;
+        progress(frame + 1);
+    }
+    let same = changed == 0 && frames == container.frames();
+    let summary = summary.map(|summary| if same { summary } else { after_editing(summary) }).map(|summary| Summary {
+        capture_bytes: 4 * corners + 12 * rest.points.len() as u64 * frames as u64,
+        ..summary
+    });
+    let buffered = writer.finish(summary.as_ref()).map_err(refused)?;
+    let file = buffered.into_inner().map_err(|error| refused(error.into_error().into()))?;
+    file.commit()?;
+    Ok(Edited { frames, changed })
+}
+
+/// What is still true of the encoding.
+fn after_editing(summary: Summary) -> Summary {
+    let unknown = f64::NAN;
+    let error =
+        ErrorSummary { l2_mean: unknown, l2_max: unknown, linf_mean: unknown, linf_max: unknown, kg_percent: unknown };
+    let mut warnings = summary.warnings;
+    warnings.retain(|warning| warning != NOT_MEASURED);
+    warnings.push(NOT_MEASURED.to_owned());
+    let generator = concat!("cager ", env!("CARGO_PKG_VERSION")).to_owned();
+    Summary { generator, error, warnings, ..summary }
+}
+
+fn written(output: &Path, cause: container::Error) -> DecodeError {
+    match cause {
+        // What `AtomicFile` passes through `io::Write` has the path in it already.
+        container::Error::Io(io) => match io.downcast() {
+            Ok(named) => DecodeError::Formats(named),
+            Err(cause) => cager_formats::Error::Io { path: output.to_owned(), action: Action::Write, cause }.into(),
+        },
+        cause => DecodeError::container(output, cause),
+    }
+}

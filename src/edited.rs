@@ -1,0 +1,90 @@
+//! Cages that were edited outside the program, in the place of those in a container.
+
+use crate::decode::{Container, DecodeError};
+use cager_formats::{Error, FrameReader, open_frames};
+use std::path::{Path, PathBuf};
+
+/// Edited cages of a container, frame by frame in any order.
+pub struct EditedCages {
+    path: PathBuf,
+    vertices: usize,
+    reader: Box<dyn FrameReader>,
+    /// The frame that the reader gives next.
+    next: usize,
+    wide: Vec<f64>,
+}
+
+impl EditedCages {
+    /// Opens frames of the cage in `container`, in any format that captures come in; there may be more or fewer of them than
+    /// the container has.
+    ///
+    /// # Errors
+    /// Frames that cannot be read or have another number of vertices; cages with normals of their own, which no file of
+    /// positions holds.
+    pub fn open(path: &Path, container: &Container) -> Result<Self, DecodeError> {
+        let header = container.header();
+        let fail = |what: String| DecodeError::Edited { path: path.to_owned(), what };
+        if u64::from(header.rows_per_frame) != header.cage_vertices {
+            return Err(fail(format!(
+                "edited cages have no normals, which {} coordinates keep for every face beside the vertices; encode the capture with --coordinates green or mvc to edit its cages",
+                header.coordinates
+            )));
+        }
+        let vertices = header.rows_per_frame as usize;
+        let reader = open_frames(path, vertices).map_err(|error| named(error, vertices, header.points))?;
+        Ok(Self { path: path.to_owned(), vertices, reader, next: 0, wide: Vec::new() })
+    }
+
+    /// Number of frames.
+    pub fn frames(&self) -> usize {
+        self.reader.frames()
+    }
+
+    /// Reads the cage of one frame, vertices × 3. Neighbours are fastest one after another.
+    ///
+    /// # Errors
+    /// Damage, another number of vertices, and coordinates beyond single precision.
+    pub fn read_frame(&mut self, frame: usize, out: &mut Vec<f32>) -> Result<(), DecodeError> {
+        if frame < self.next {
+            self.reader = open_frames(&self.path, self.vertices)?;
+            self.next = 0;
+        }
+        while self.next < frame && self.reader.skip()? {
+            self.next += 1;
+        }
+        let vertices = self.vertices;
+        let more = self.reader.read_next(&mut self.wide).map_err(|error| named(error, vertices, 0))?;
+        if !more {
+            return Err(self.fail(format!("ends before frame {frame}, though it has announced more; export it again")));
+        }
+        self.next += 1;
+        out.clear();
+        out.extend(self.wide.iter().map(|&x| x as f32));
+        match out.iter().position(|x| !x.is_finite()) {
+            Some(k) => Err(self.fail(format!(
+                "frame {frame}: vertex {} of the cage is too far away for single precision, in which cages are kept; move it closer",
+                k / 3
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    fn fail(&self, what: String) -> DecodeError {
+        DecodeError::Edited { path: self.path.clone(), what }
+    }
+}
+
+/// Says of a wrong number of points that a cage is expected, and what came instead.
+fn named(error: Error, vertices: usize, points: u64) -> DecodeError {
+    let Error::PointCount { path, frame, found, .. } = error else { return error.into() };
+    let place = frame.map_or_else(String::new, |frame| format!("frame {frame} "));
+    let cure = if found == points {
+        "these are frames of the model, not of its cage"
+    } else {
+        "edit the cages that `cager decode --cages` writes, and neither add nor remove vertices"
+    };
+    DecodeError::Edited {
+        path,
+        what: format!("{place}has {found} points where the cage has {vertices} vertices; {cure}"),
+    }
+}
