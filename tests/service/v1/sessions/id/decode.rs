@@ -73,6 +73,8 @@ async fn what_is_no_cage_is_refused() {
     nan[4 * 31..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
     let problem = app.post(&path, OCTETS, nan).await.problem(422, "invalid-frame");
     assert!(problem.detail.contains("cage 0") && problem.detail.contains("vertex 10"), "{}", problem.detail);
+    let large = Form::new().part("model", file("large.obj", &vec![b'#'; 2 << 20])).part("cages", Part::bytes(one));
+    moved(&app, &session, large).await.problem(413, "too-large");
     assert!(app.post(&path, OCTETS, Vec::new()).await.expect(200).body.is_empty());
 }
 
