@@ -133,8 +133,10 @@ impl Compared {
         let longer = self.edges / self.extent;
         let like_any_two = self.edge_in_frame / self.edge_in_rest;
         let least = longer.min(like_any_two);
+        let scattered = self.unevenness > 1.0 && least > 2.0;
+        let like_strangers = self.unevenness > 0.5 && least > 2.5 && self.edge_in_frame > 0.5;
         // A model that is crumpled up keeps its edges.
-        self.edges > 1.2 && (least > 2.0 && self.unevenness > 1.0 || least > 5.0 && self.unevenness > 0.6)
+        self.edges > 1.2 && (scattered || like_strangers)
     }
 }
 
@@ -274,17 +276,17 @@ impl fmt::Display for Mismatch {
     }
 }
 
-/// A ratio as people write it: 2.54, 39.4, 1000.
+/// A ratio as people write it: that of two usual units where it is near to one, as motion changes edges a little.
 struct Factor(f64);
 
 impl fmt::Display for Factor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let rounded = self.0.round();
-        if (self.0 / rounded - 1.0).abs() < 0.005 {
-            return write!(f, "{rounded}");
+        const UNITS: [f64; 9] = [2.54, 3.28, 10.0, 12.0, 25.4, 30.48, 39.37, 100.0, 1000.0];
+        let near = UNITS.into_iter().find(|unit| (self.0 / unit - 1.0).abs() < 0.05);
+        match near {
+            Some(unit) => write!(f, "about {unit}"),
+            None => write!(f, "{:.1}", self.0),
         }
-        let decimals = if self.0 < 10.0 { 2 } else { usize::from(self.0 < 100.0) };
-        write!(f, "{:.decimals$}", self.0)
     }
 }
 
@@ -370,7 +372,7 @@ mod tests {
     fn what_was_found_is_told_with_its_size() {
         assert_eq!(
             Mismatch::Units(0.0254).to_string(),
-            "frame 0 is 39.4 times smaller than the rest pose, and so are the others, as with other units"
+            "frame 0 is about 39.37 times smaller than the rest pose, and so are the others, as with other units"
         );
         assert!(Mismatch::Order(40.2).to_string().contains("edges of the rest pose are 40 times longer in frame 0"));
     }

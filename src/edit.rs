@@ -2,6 +2,7 @@
 
 use crate::decode::{Container, DecodeError};
 use crate::edited::EditedCages;
+use crate::timing::counted_from_zero;
 use cager_formats::{Action, AtomicFile};
 use cager_proto::container::{self, ContainerWriter, ErrorSummary, FrameError, Summary};
 use std::io::BufWriter;
@@ -58,6 +59,10 @@ pub fn edit(
         capture_bytes: 4 * corners + 12 * rest.points.len() as u64 * frames as u64,
         ..summary
     });
+    let numbers = container.frame_numbers().map_err(fail)?;
+    if frames == container.frames() && !counted_from_zero(&numbers) {
+        writer.add_frame_numbers(&numbers).map_err(refused)?;
+    }
     let buffered = writer.finish(summary.as_ref()).map_err(refused)?;
     let file = buffered.into_inner().map_err(|error| refused(error.into_error().into()))?;
     file.commit()?;

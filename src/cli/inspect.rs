@@ -3,8 +3,10 @@
 use super::args::InspectArgs;
 use super::{grouped, human_bytes, plain, print, warn};
 use crate::decode::{self, Container, DecodeError};
+use crate::report::{FrameError, WorstError};
 use crate::timing::counted_from_zero;
 use anyhow::Result;
+use cager_core::mesh::diagonal;
 use cager_formats::missing_frames;
 use cager_proto::container::Summary;
 use serde_json::{Map, Value, json};
@@ -20,9 +22,10 @@ pub(super) fn run(args: &InspectArgs) -> Result<()> {
     let numbers = container.frame_numbers().map_err(fail)?;
     let bytes = std::fs::metadata(&args.input)?.len();
     if args.json {
-        let per_frame: Vec<Value> =
-            errors.iter().map(|e| json!({ "l2": f64::from(e.l2), "linf": f64::from(e.linf) })).collect();
-        let value = as_json(&container, summary.as_ref(), &numbers, per_frame, bytes);
+        let per_frame: Vec<FrameError> =
+            errors.iter().map(|e| FrameError { l2: e.l2.into(), linf: e.linf.into() }).collect();
+        let diagonal = diagonal(&container.rest().map_err(fail)?.points);
+        let value = as_json(&container, summary.as_ref(), &numbers, (diagonal, &per_frame), bytes);
         return print(&format!("{}\n", serde_json::to_string_pretty(&value)?));
     }
     warn(summary.as_ref().map_or(&[], |s| &s.warnings));
@@ -34,7 +37,7 @@ fn as_json(
     container: &Container,
     summary: Option<&Summary>,
     numbers: &[f64],
-    per_frame: Vec<Value>,
+    (diagonal, per_frame): (f64, &[FrameError]),
     bytes: u64,
 ) -> Value {
     let h = container.header();
@@ -48,6 +51,7 @@ fn as_json(
     if let Some(rate) = h.frame_rate {
         put("frame_rate", json!(rate));
     }
+    put("diagonal", json!(diagonal));
     put("unknowns", json!(h.rows_per_frame));
     put("cage_vertices", json!(h.cage_vertices));
     put("cage_faces", json!(h.cage_faces));
@@ -83,7 +87,10 @@ fn as_json(
     } else {
         put("bytes", json!({ "output": bytes }));
     }
-    error.insert("per_frame".to_owned(), Value::Array(per_frame));
+    if let Some(worst) = WorstError::of_frames(per_frame, diagonal) {
+        error.insert("worst".to_owned(), json!(worst));
+    }
+    error.insert("per_frame".to_owned(), json!(per_frame));
     put("error", Value::Object(error));
     let sections: Vec<Value> = sections(container)
         .into_iter()

@@ -113,7 +113,7 @@ fn every_comparison_of_the_paper_has_its_section() {
 #[test]
 fn figures_are_those_of_encodings_with_the_same_options() {
     let (dir, _, figures) = compared();
-    let usual = figures["systems"][0]["figures"]["unknowns"].as_u64().map_or(0, |m| if m >= 40 { 20 } else { m / 4 });
+    let usual = figures["systems"][0]["figures"]["unknowns"].as_u64().map_or(0, |m| 20.min(m / 16));
     for (handles, regularizer, spectrum) in [
         ("maxvol", "laplacian", usual),
         ("maxvol", "none", 0),

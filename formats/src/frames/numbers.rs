@@ -1,5 +1,6 @@
 //! The numbers of frames, as the names of their files tell them.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Runs of missing frames that a message lists.
@@ -70,8 +71,9 @@ fn number(text: &str) -> Option<f64> {
 pub fn missing_frames(numbers: &[f64]) -> Option<String> {
     let whole: Vec<i64> = numbers.iter().filter(|x| x.fract() == 0.0 && x.abs() < 1e15).map(|&x| x as i64).collect();
     let steps: Vec<i64> = whole.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let often = |step: i64| steps.iter().filter(|&&s| s == step).count();
-    let step = steps.iter().copied().filter(|&s| s > 0).max_by_key(|&s| (often(s), -s))?;
+    let mut often: BTreeMap<i64, usize> = BTreeMap::new();
+    steps.iter().filter(|&&step| step > 0).for_each(|&step| *often.entry(step).or_default() += 1);
+    let (&step, _) = often.iter().max_by_key(|&(&step, &count)| (count, -step))?;
     let gaps: Vec<[i64; 2]> = whole
         .windows(2)
         .filter(|pair| pair[1] - pair[0] > step)
