@@ -58,7 +58,7 @@ impl CaptureFiles {
     }
 
     /// The reader, and for each welded point the first point that became it, where the frames are split as the rest pose was.
-    fn open_welded(&self) -> Result<(Box<dyn FrameReader>, Option<Vec<u32>>), Error> {
+    fn open_welded(&self) -> Result<Welded, Error> {
         let Some(weld) = &self.weld else { return Ok((self.open_with(self.points)?, None)) };
         // Files of a sequence tell their points only when they are read.
         let split = open_frames(&self.path, weld.len()).and_then(|mut reader| reader.read_next(&mut Vec::new()));
@@ -76,6 +76,9 @@ impl CaptureFiles {
         open_frames_range(&self.path, points, self.range)
     }
 }
+
+/// A reader, and for each welded point the first point that became it, where its frames are to be welded.
+type Welded = (Box<dyn FrameReader>, Option<Vec<u32>>);
 
 /// A reader whose frames are brought to the rest pose's points and axes, and are small enough for a container.
 struct Adapted {

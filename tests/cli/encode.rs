@@ -162,7 +162,7 @@ fn report_counts_what_was_given_and_written() {
         report["handle_indices"].as_array().expect("handles").iter().filter_map(Value::as_u64).collect();
     handles.sort_unstable();
     handles.dedup();
-    assert_eq!(handles.len(), small.cage.vertices.len());
+    assert_eq!(handles.len(), 2 * small.cage.vertices.len());
     assert!(handles.iter().all(|&h| (h as usize) < small.rest.points.len()));
     assert!(number(&report, "/affine_reproduction_error") <= 1e-10);
     assert!(number(&report, "/maxvol/max_entry") <= 1.1);

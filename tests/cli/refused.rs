@@ -612,7 +612,7 @@ fn matrices_that_do_not_fit_are_refused_with_their_file() {
         &["--regularizer matrix", "--regularizer-matrix FILE.mtx"],
     );
     let line = format!("{ENCODE} --regularizer-matrix d.mtx");
-    refused(&dir, &line, &["--regularizer-matrix", "laplacian uses no matrix"]);
+    refused(&dir, &line, &["--regularizer-matrix", "differential uses no matrix"]);
 }
 
 #[test]

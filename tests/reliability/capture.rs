@@ -47,7 +47,7 @@ impl Reference {
         let rest = read_model_bytes(MeshFormat::Obj, Path::new("rest.obj"), &rest_obj).expect("the rest pose");
         let cage = read_model_bytes(MeshFormat::Obj, Path::new("cage.obj"), &cage_obj).expect("the cage");
         let cage = Cage::new(TriMesh::from(&cage)).expect("a cage");
-        let options = SolverOptions { spectrum: SPECTRUM, ..SolverOptions::PAPER };
+        let options = SolverOptions { spectrum: SPECTRUM, ..SolverOptions::default() };
 
         let mut wide = Vec::new();
         let frames: Vec<Vec<f32>> = (0..frames)

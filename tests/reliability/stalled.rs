@@ -35,7 +35,7 @@ async fn highest_rss(server: &Server, work: impl Future<Output = ()>) -> f64 {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn memory_stays_small_when_nobody_reads() {
-    const FRAMES: usize = 56_000;
+    const FRAMES: usize = 28_000;
     let reference = Reference::new(1500, 330, 1);
     let rows = le_bytes(&reference.handle_rows(0));
     let bytes = FRAMES * rows.len();

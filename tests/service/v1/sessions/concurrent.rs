@@ -66,7 +66,7 @@ async fn another_option_is_another_solver() {
 async fn defaults_that_are_written_out_are_the_same_content() {
     let app = TestApp::start();
     app.ready(Capture::small()).await;
-    let options = json!({ "coordinates": "mvc", "handles": "maxvol", "regularizer": "laplacian", "lambda": 1.0, "name": "again" });
+    let options = json!({ "coordinates": "mvc", "handles": "spread", "regularizer": "differential", "lambda": 1.0, "name": "again" });
     let session: Session = app.create_with(form(Capture::small(), &options), None).await.is(201);
     app.prepared(&session.id).await;
     assert_eq!(app.metric("cager_cache_total{result=\"miss\"}").await, 1.0);
