@@ -169,7 +169,7 @@ fn report_counts_what_was_given_and_written() {
     let sigma: Vec<f64> =
         report["singular_values"].as_array().expect("sigma").iter().filter_map(Value::as_f64).collect();
     assert!(sigma.len() == small.cage.vertices.len() && sigma.is_sorted_by(|a, b| a >= b));
-    close("condition", number(&report, "/condition_number/handles"), sigma[0] / sigma[sigma.len() - 1], 1e-9);
+    close("condition", number(&report, "/condition_number/full"), sigma[0] / sigma[sigma.len() - 1], 1e-9);
 }
 
 #[test]
