@@ -76,7 +76,7 @@ impl Client {
     /// A cage design as it is now.
     ///
     /// # Errors
-    /// [`ClientError::Refused`] with status 404 where there is none of that id, and those of the connection.
+    /// [`ClientError::Refused`] with status 404 for an unknown id, and those of the connection.
     pub async fn cage_job(&self, id: &str) -> Result<CageJob, ClientError> {
         self.fetch(Method::GET, &["v1", "cages", id], &[]).await
     }
@@ -150,7 +150,7 @@ impl Client {
     /// Deletes a cage design; one that runs stops. Sessions that took its cage keep it.
     ///
     /// # Errors
-    /// [`ClientError::Refused`] with status 404 where there is none of that id, and those of the connection.
+    /// [`ClientError::Refused`] with status 404 for an unknown id, and those of the connection.
     pub async fn delete_cage(&self, id: &str) -> Result<(), ClientError> {
         let asked = AtomicBool::new(false);
         self.retrying(|| async {

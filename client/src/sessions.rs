@@ -16,7 +16,7 @@ impl Client {
     /// A session as it is now.
     ///
     /// # Errors
-    /// [`ClientError::Refused`] with status 404 where there is none of that id, and those of the connection.
+    /// [`ClientError::Refused`] with status 404 for an unknown id, and those of the connection.
     pub async fn session(&self, id: &str) -> Result<Session, ClientError> {
         self.fetch(Method::GET, &["v1", "sessions", id], &[]).await
     }
@@ -44,7 +44,7 @@ impl Client {
     /// Deletes a session with all its results, and stops work for it.
     ///
     /// # Errors
-    /// [`ClientError::Refused`] with status 404 where there is none of that id, and those of the connection.
+    /// [`ClientError::Refused`] with status 404 for an unknown id, and those of the connection.
     pub async fn delete(&self, id: &str) -> Result<(), ClientError> {
         let asked = AtomicBool::new(false);
         self.retrying(|| async {

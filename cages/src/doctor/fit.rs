@@ -8,7 +8,7 @@ use std::fmt;
 /// Points that candidates are judged by.
 const SAMPLE: usize = 400;
 
-/// Ratios of usual units: powers of ten, inches, feet.
+/// How many of one usual unit of length make another: powers of ten, inches, feet.
 const UNITS: [f64; 13] =
     [1.0, 10.0, 0.1, 100.0, 0.01, 1000.0, 0.001, 2.54, 1.0 / 2.54, 25.4, 0.0254, 0.3048, 1.0 / 0.3048];
 

@@ -19,7 +19,7 @@ pub struct Welded {
     pub merged: usize,
 }
 
-/// Merges vertices in the same place where the surface is open; none where there are none. Parts of a closed surface that touch stay apart.
+/// Merges vertices in the same place where the surface is open; `None` where no two are. Parts of a closed surface that touch stay apart.
 pub fn weld(model: &Model) -> Option<Welded> {
     if model.faces.indices().iter().any(|&v| v as usize >= model.points.len()) {
         return None;
