@@ -197,7 +197,10 @@ fn a_folder_appears_only_when_committed_and_never_over_files() {
     assert_eq!((names(&path), names(folder.path())), (vec!["a".to_owned()], vec!["frames".to_owned()]));
 
     let error = AtomicDir::create(&path).unwrap_err();
-    assert!(error.to_string().ends_with("is a folder that is not empty; empty it or name another"), "{error}");
+    assert!(
+        error.to_string().ends_with("is a folder that is not empty, as it holds a; empty it or name another"),
+        "{error}"
+    );
     let error = AtomicDir::create(path.join("a")).unwrap_err();
     assert!(error.to_string().contains("is a file; name a folder"), "{error}");
 }
@@ -211,4 +214,32 @@ fn files_that_others_put_in_the_folder_meanwhile_are_kept() {
     fs::write(path.join("theirs"), "1").unwrap();
     assert!(matches!(dir.commit(), Err(Error::Target { .. })));
     assert_eq!((names(&path), names(folder.path())), (vec!["theirs".to_owned()], vec!["frames".to_owned()]));
+}
+
+#[test]
+fn a_folder_of_files_that_may_be_replaced_is_replaced_as_a_whole() {
+    let folder = tempdir().unwrap();
+    let path = folder.path().join("frames");
+    let begin = || AtomicDir::create_over(&path, |name| name.ends_with(".obj"));
+    fs::create_dir(&path).unwrap();
+    for name in ["a.obj", "b.obj"] {
+        fs::write(path.join(name), "old").unwrap();
+    }
+    let dir = begin().unwrap();
+    fs::write(dir.folder().join("c.obj"), "new").unwrap();
+    assert_eq!(names(&path), ["a.obj", "b.obj"]);
+    dir.commit().unwrap();
+    assert_eq!((names(&path), names(folder.path())), (vec!["c.obj".to_owned()], vec!["frames".to_owned()]));
+
+    // One that appears during the work is not.
+    let dir = begin().unwrap();
+    fs::write(path.join("d.obj"), "theirs").unwrap();
+    assert!(matches!(dir.commit(), Err(Error::Target { .. })));
+    assert_eq!(
+        (names(&path), names(folder.path())),
+        (vec!["c.obj".to_owned(), "d.obj".to_owned()], vec!["frames".to_owned()])
+    );
+
+    fs::create_dir(path.join("e.obj")).unwrap();
+    assert!(matches!(begin(), Err(Error::Target { .. })));
 }

@@ -1,19 +1,21 @@
 //! Complete files that take their names, all or none.
 
 use std::fs::{self, File};
-use std::io::{self, Seek};
-use std::path::{Path, PathBuf};
+use std::io::{self, Seek, Write};
+use std::path::Path;
 
+use super::target::Target;
 use super::temporary::{self, Live, Temporary};
-use super::{Place, anonymous, hide_temporary, inherit};
+use super::{Place, anonymous, hide_temporary, inherit, occupied};
 use crate::error::Error;
 
 /// A file whose contents are durable but which does not have its name yet; dropped it leaves nothing.
 #[derive(Debug)]
 #[must_use = "it has no name before `commit_together`"]
 pub struct CompleteFile {
-    pub(super) path: PathBuf,
-    pub(super) place: Place,
+    pub(super) target: Target,
+    /// None for standard output.
+    pub(super) place: Option<Place>,
     pub(super) file: File,
     pub(super) temporary: Option<Temporary>,
     /// What had the name before, for as long as it may have to come back.
@@ -22,9 +24,9 @@ pub struct CompleteFile {
 }
 
 impl CompleteFile {
-    /// The path as it was given to [`AtomicFile::create`](super::AtomicFile::create).
+    /// The path of the target given to [`AtomicFile::create`](super::AtomicFile::create).
     pub fn path(&self) -> &Path {
-        &self.path
+        self.target.path()
     }
 
     /// Bytes in the file.
@@ -39,27 +41,30 @@ impl CompleteFile {
     /// [`Error::Io`].
     pub fn reader(&self) -> Result<File, Error> {
         let reader = self.file.try_clone().and_then(|mut file| file.rewind().map(|()| file));
-        reader.map_err(|cause| hide_temporary(&self.path, &cause))
+        reader.map_err(|cause| hide_temporary(self.path(), &cause))
     }
 
     /// Gives the file its name and says how to take that back. `keep` saves what had the name before.
     fn put_in_place(&mut self, live: &mut Live, keep: bool) -> io::Result<Undo> {
-        let target = &self.place.target;
+        let Some(Place { folder, target }) = &self.place else { return Ok(Undo::Nothing) };
         inherit(&self.file, target)?;
         if self.temporary.is_none() {
             match anonymous::link(&self.file, target) {
-                Err(cause) if cause.kind() == io::ErrorKind::AlreadyExists => {
+                Err(cause) if cause.kind() == io::ErrorKind::AlreadyExists && self.target.replaces() => {
                     // Only renaming replaces a file in one step, and only what has a name can be renamed.
-                    let ((), name) = live.begin(&self.place.folder, |path| anonymous::link(&self.file, path))?;
+                    let ((), name) = live.begin(folder, |path| anonymous::link(&self.file, path))?;
                     self.temporary = Some(name);
                 }
                 linked => return linked.map(|()| Undo::Remove),
             }
         }
         let Some(temporary) = &self.temporary else { return Ok(Undo::Nothing) };
+        if !self.target.replaces() {
+            return live.name_new(temporary, target).map(|()| Undo::Remove);
+        }
         let replaces = target.exists();
         if replaces && keep {
-            let kept = live.begin(&self.place.folder, |path| fs::hard_link(target, path));
+            let kept = live.begin(folder, |path| fs::hard_link(target, path));
             self.replaced = kept.ok().map(|((), name)| name);
         }
         live.rename(temporary, target)?;
@@ -71,10 +76,28 @@ impl CompleteFile {
     }
 
     fn take_back(&self, live: &mut Live, how: Undo) -> io::Result<()> {
-        match (how, &self.replaced) {
-            (Undo::Remove, _) => fs::remove_file(&self.place.target),
-            (Undo::Restore, Some(old)) => live.rename(old, &self.place.target),
+        match (how, &self.place, &self.replaced) {
+            (Undo::Remove, Some(place), _) => fs::remove_file(&place.target),
+            (Undo::Restore, Some(place), Some(old)) => live.rename(old, &place.target),
             _ => Ok(()),
+        }
+    }
+
+    fn copy_to_standard_output(&self) -> io::Result<()> {
+        let mut file = &self.file;
+        file.rewind()?;
+        let mut out = io::stdout().lock();
+        match io::copy(&mut file, &mut out).and_then(|_| out.flush()) {
+            // A reader that has seen enough, as `head` has, is no failure.
+            Err(cause) if cause.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+            copied => copied,
+        }
+    }
+
+    fn error(&self, cause: &io::Error) -> Error {
+        match cause.kind() {
+            io::ErrorKind::AlreadyExists if !self.target.replaces() => occupied(self.path()),
+            _ => hide_temporary(self.path(), cause),
         }
     }
 }
@@ -84,26 +107,30 @@ impl CompleteFile {
 enum Undo {
     Remove,
     Restore,
-    /// Where a file cannot have two names, what was replaced is gone.
+    /// Standard output, or where a file cannot have two names: what was replaced is gone.
     Nothing,
 }
 
-/// Gives complete files their names, in place of files that had them, as one step: where one of them cannot have its
-/// name, none has, and those that stood there before stay.
+/// Gives complete files their names, in place of files that had them where they may, as one step: where one of them cannot
+/// have its name, none has, and those that stood there before stay. What goes to standard output is copied there first.
 ///
 /// A process killed in between may leave a part of them; that takes microseconds, since all else was done before. What
 /// was replaced can be restored only where the system lets a file have two names.
 ///
 /// # Errors
-/// [`Error::Io`]; the files are then not created, unless it is a name alone that could not be made durable.
+/// [`Error::Io`], or [`Error::Target`] where a file that may not be replaced has appeared meanwhile; the files are then not
+/// created, unless it is a name alone that could not be made durable.
 pub fn commit_together(mut files: Vec<CompleteFile>) -> Result<(), Error> {
+    for file in files.iter().filter(|file| file.place.is_none()) {
+        file.copy_to_standard_output().map_err(|cause| file.error(&cause))?;
+    }
     name_all(&mut files)?;
     for file in &mut files {
         // Before what takes time, in which a killed process would leave it.
         file.replaced = None;
     }
     for file in &files {
-        file.place.sync_folder().map_err(|cause| hide_temporary(&file.path, &cause))?;
+        file.place.as_ref().map_or(Ok(()), Place::sync_folder).map_err(|cause| file.error(&cause))?;
     }
     Ok(())
 }
@@ -121,7 +148,7 @@ fn name_all(files: &mut [CompleteFile]) -> Result<(), Error> {
                     // The first error is the one to tell.
                     let _ = file.take_back(&mut live, undo);
                 }
-                return Err(hide_temporary(&files[k].path, &cause));
+                return Err(files[k].error(&cause));
             }
         }
     }
@@ -133,13 +160,12 @@ mod tests {
     use super::*;
     use crate::atomic::AtomicFile;
     use std::collections::BTreeMap;
-    use std::io::Write;
     use tempfile::tempdir;
 
     /// A complete file, under a temporary name or, where the system has that, without any.
-    fn begin(path: &Path, named: bool) -> CompleteFile {
+    fn begin(target: impl Into<Target>, named: bool) -> CompleteFile {
         let unnamed = |folder: &Path| if named { None } else { anonymous::create(folder) };
-        let mut file = AtomicFile::create_as(path, unnamed).unwrap();
+        let mut file = AtomicFile::create_as(target.into(), unnamed).unwrap();
         file.write_all(b"new").unwrap();
         file.complete().unwrap()
     }
@@ -192,6 +218,23 @@ mod tests {
             assert!(!error.contains(".cager-"), "{error}");
             let before: &[_] = if old { &[("a", "old"), ("b", "")] } else { &[("b", "")] };
             assert_eq!(contents(folder.path()), expected(before), "{named} {old}");
+        }
+    }
+
+    #[test]
+    fn a_new_file_takes_the_name_of_none_that_appeared_meanwhile() {
+        for named in [false, true] {
+            let folder = tempdir().unwrap();
+            let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+            commit_together(vec![begin(Target::new(&a), named)]).unwrap();
+            assert_eq!(contents(folder.path()), expected(&[("a", "new")]), "{named}");
+            let files = vec![begin(Target::new(&b), named), begin(Target::new(folder.path().join("c")), named)];
+            fs::write(folder.path().join("c"), "theirs").unwrap();
+            let error = commit_together(files).unwrap_err().to_string();
+            assert!(error.ends_with("c: is there already; name another file"), "{error}");
+            assert_eq!(contents(folder.path()), expected(&[("a", "new"), ("c", "theirs")]), "{named}");
+            let error = AtomicFile::create(Target::new(&a)).unwrap_err();
+            assert!(matches!(error, Error::Target { .. }), "{error}");
         }
     }
 

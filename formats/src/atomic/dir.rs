@@ -1,5 +1,7 @@
 //! One folder of files.
 
+use std::collections::BTreeSet;
+use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -18,6 +20,8 @@ pub struct AtomicDir {
     path: PathBuf,
     place: Place,
     folder: Temporary,
+    /// Files that were there at the beginning and are replaced.
+    replaced: BTreeSet<OsString>,
 }
 
 impl AtomicDir {
@@ -27,12 +31,21 @@ impl AtomicDir {
     /// [`Error::Target`] where `path` is a file or a folder with something in it, [`Error::Io`] where the folder around
     /// it is missing or closed to writing.
     pub fn create(path: impl AsRef<Path>) -> Result<Self, Error> {
+        Self::create_over(path, |_| false)
+    }
+
+    /// Begins a folder as [`AtomicDir::create`] does, also where there is one with files that may all be replaced by
+    /// their names. They go when the new folder takes the name.
+    ///
+    /// # Errors
+    /// Those of [`AtomicDir::create`].
+    pub fn create_over(path: impl AsRef<Path>, may_replace: impl Fn(&str) -> bool) -> Result<Self, Error> {
         let path = path.as_ref();
         let place = Place::new(path)?;
-        check_free(path, &place.target)?;
+        let replaced = check_free(path, &place.target, |name| name.to_str().is_some_and(&may_replace))?;
         let begun = temporary::lock().begin(&place.folder, |path| fs::create_dir(path));
         let ((), folder) = begun.map_err(|cause| hide_temporary(path, &cause))?;
-        Ok(Self { path: path.to_owned(), place, folder })
+        Ok(Self { path: path.to_owned(), place, folder, replaced })
     }
 
     /// The path as it was given to [`AtomicDir::create`].
@@ -61,9 +74,9 @@ impl AtomicDir {
     /// [`Error::Target`] where someone else has put files there meanwhile, [`Error::Io`]; the folder is then not
     /// created, unless it is its name alone that could not be made durable.
     pub fn commit(self) -> Result<(), Error> {
-        check_free(&self.path, &self.place.target)?;
+        check_free(&self.path, &self.place.target, |name| self.replaced.contains(name))?;
         self.put_in_place().map_err(|cause| match cause.kind() {
-            io::ErrorKind::DirectoryNotEmpty | io::ErrorKind::AlreadyExists => occupied(&self.path),
+            io::ErrorKind::DirectoryNotEmpty | io::ErrorKind::AlreadyExists => not_empty(&self.path, "files".as_ref()),
             _ => hide_temporary(&self.path, &cause),
         })
     }
@@ -73,33 +86,58 @@ impl AtomicDir {
             File::open(entry?.path())?.sync_all()?;
         }
         sync_folder(self.folder())?;
+        // Outlives the lock, which removing it takes.
+        let mut old = None;
         {
-            let mut live = temporary::lock();
-            if cfg!(not(unix)) && self.place.target.exists() {
-                fs::remove_dir(&self.place.target)?;
+            let (mut live, target) = (temporary::lock(), &self.place.target);
+            if !self.replaced.is_empty() {
+                old = Some(live.begin(&self.place.folder, |aside| fs::rename(target, aside))?.1);
+            } else if cfg!(not(unix)) && target.exists() {
+                fs::remove_dir(target)?;
             }
-            live.rename(&self.folder, &self.place.target)?;
+            if let Err(cause) = live.rename(&self.folder, target) {
+                if let Some(old) = &old {
+                    live.rename(old, target)?;
+                }
+                return Err(cause);
+            }
         }
+        drop(old);
         self.place.sync_folder()
     }
 }
 
-fn check_free(path: &Path, target: &Path) -> Result<(), Error> {
-    match fs::read_dir(target) {
-        Ok(mut entries) => match entries.next() {
-            None => Ok(()),
-            Some(_) => Err(occupied(path)),
-        },
+/// What is in the way of a folder: nothing, or files that may be replaced.
+fn check_free(
+    path: &Path,
+    target: &Path,
+    may_replace: impl Fn(&OsString) -> bool,
+) -> Result<BTreeSet<OsString>, Error> {
+    let entries = match fs::read_dir(target) {
+        Ok(entries) => entries,
         Err(cause) => match cause.kind() {
-            io::ErrorKind::NotFound => Ok(()),
+            io::ErrorKind::NotFound => return Ok(BTreeSet::new()),
             io::ErrorKind::NotADirectory => {
-                Err(Error::target(path, "is a file; name a folder, or remove the file first"))
+                return Err(Error::target(path, "is a file; name a folder, or remove the file first"));
             }
-            _ => Err(Error::write(path, cause)),
+            _ => return Err(Error::write(path, cause)),
         },
+    };
+    let mut replaced = BTreeSet::new();
+    for entry in entries {
+        let entry = entry.map_err(|cause| Error::write(path, cause))?;
+        let name = entry.file_name();
+        if !(entry.file_type().is_ok_and(|kind| kind.is_file()) && may_replace(&name)) {
+            return Err(not_empty(path, &name));
+        }
+        replaced.insert(name);
     }
+    Ok(replaced)
 }
 
-fn occupied(path: &Path) -> Error {
-    Error::target(path, "is a folder that is not empty; empty it or name another")
+fn not_empty(path: &Path, holds: &OsStr) -> Error {
+    Error::target(
+        path,
+        format!("is a folder that is not empty, as it holds {}; empty it or name another", holds.display()),
+    )
 }

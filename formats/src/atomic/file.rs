@@ -2,11 +2,12 @@
 
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::complete::{CompleteFile, commit_together};
+use super::target::Target;
 use super::temporary::{self, Temporary};
-use super::{Place, anonymous, hide_temporary};
+use super::{Place, anonymous, hide_temporary, occupied};
 use crate::error::Error;
 
 /// A file that takes its name once it is complete; dropped before [`AtomicFile::commit`] it leaves nothing, and what
@@ -18,30 +19,40 @@ use crate::error::Error;
 /// Writing is buffered. The errors of [`Write`] and [`Seek`] carry an [`Error`] that names the file.
 #[derive(Debug)]
 pub struct AtomicFile {
-    path: PathBuf,
-    place: Place,
+    target: Target,
+    /// None for standard output.
+    place: Option<Place>,
     // Before its name, so that it is closed first: not every system removes open files.
     file: BufWriter<File>,
     temporary: Option<Temporary>,
 }
 
 impl AtomicFile {
-    /// Begins a file at `path` with the permissions of any new file; its folder must exist.
+    /// Begins a file with the permissions of any new file; its folder must exist.
     ///
     /// # Errors
-    /// [`Error::Target`] where `path` is a folder or a device, [`Error::Io`] where the folder is missing or closed to
-    /// writing.
-    pub fn create(path: impl AsRef<Path>) -> Result<Self, Error> {
-        Self::create_as(path.as_ref(), anonymous::create)
+    /// [`Error::Target`] where there is a folder or a device, or a file that may not be replaced, [`Error::Io`] where the
+    /// folder is missing or closed to writing.
+    pub fn create(target: impl Into<Target>) -> Result<Self, Error> {
+        Self::create_as(target.into(), anonymous::create)
     }
 
-    pub(super) fn create_as(path: &Path, unnamed: impl FnOnce(&Path) -> Option<File>) -> Result<Self, Error> {
+    pub(super) fn create_as(target: Target, unnamed: impl FnOnce(&Path) -> Option<File>) -> Result<Self, Error> {
+        let buffered = |file| BufWriter::with_capacity(1 << 16, file);
+        if target.is_standard_output() {
+            let file = tempfile::tempfile().map_err(|cause| Error::write(&std::env::temp_dir(), cause))?;
+            return Ok(Self { target, place: None, file: buffered(file), temporary: None });
+        }
+        let path = target.path();
         let place = Place::new(path)?;
         if place.target.is_dir() {
             return Err(Error::target(path, "is a folder; name a file in it"));
         }
         if place.target.exists() && !place.target.is_file() {
             return Err(Error::target(path, "is not a regular file; name one"));
+        }
+        if !target.replaces() && place.target.exists() {
+            return Err(occupied(path));
         }
         let (file, temporary) = match unnamed(&place.folder) {
             Some(file) => (file, None),
@@ -52,12 +63,12 @@ impl AtomicFile {
                 (file, Some(temporary))
             }
         };
-        Ok(Self { path: path.to_owned(), place, file: BufWriter::with_capacity(1 << 16, file), temporary })
+        Ok(Self { target, place: Some(place), file: buffered(file), temporary })
     }
 
-    /// The path as it was given to [`AtomicFile::create`].
+    /// The path of the target given to [`AtomicFile::create`].
     pub fn path(&self) -> &Path {
-        &self.path
+        self.target.path()
     }
 
     /// Makes the contents durable; all that is left to do is to give the file its name.
@@ -65,18 +76,20 @@ impl AtomicFile {
     /// # Errors
     /// [`Error::Io`]; the file is then not created.
     pub fn complete(self) -> Result<CompleteFile, Error> {
-        let Self { path, place, file, temporary } = self;
+        let Self { target, place, file, temporary } = self;
         let finish = || {
             let file = file.into_inner().map_err(io::IntoInnerError::into_error)?;
-            file.sync_all()?;
+            if place.is_some() {
+                file.sync_all()?;
+            }
             let length = file.metadata()?.len();
             Ok((file, length))
         };
-        let (file, length) = finish().map_err(|cause: io::Error| hide_temporary(&path, &cause))?;
-        Ok(CompleteFile { path, place, file, temporary, replaced: None, length })
+        let (file, length) = finish().map_err(|cause: io::Error| hide_temporary(target.path(), &cause))?;
+        Ok(CompleteFile { target, place, file, temporary, replaced: None, length })
     }
 
-    /// Makes the contents durable and gives the file its name, in place of a file that had it.
+    /// Makes the contents durable and gives the file its name, or copies them to standard output.
     ///
     /// # Errors
     /// [`Error::Io`]; the file is then not created, unless it is its name alone that could not be made durable.
@@ -87,7 +100,7 @@ impl AtomicFile {
     fn name<T>(&self, result: io::Result<T>) -> io::Result<T> {
         result.map_err(|cause| {
             let kind = cause.kind();
-            io::Error::new(kind, hide_temporary(&self.path, &cause))
+            io::Error::new(kind, hide_temporary(self.target.path(), &cause))
         })
     }
 }

@@ -5,6 +5,7 @@ mod complete;
 mod dir;
 mod file;
 mod scratch;
+mod target;
 mod temporary;
 
 use std::fs::{self, File};
@@ -15,6 +16,7 @@ pub use complete::{CompleteFile, commit_together};
 pub use dir::AtomicDir;
 pub use file::AtomicFile;
 pub use scratch::ScratchDir;
+pub use target::Target;
 pub use temporary::remove_temporaries;
 
 use crate::error::Error;
@@ -85,6 +87,11 @@ fn sync_folder(folder: &Path) -> io::Result<()> {
         Err(cause) if matches!(cause.kind(), io::ErrorKind::InvalidInput | io::ErrorKind::Unsupported) => Ok(()),
         result => result,
     }
+}
+
+/// The error of an output where there was to be nothing.
+fn occupied(path: &Path) -> Error {
+    Error::target(path, "is there already; name another file")
 }
 
 /// The error of a temporary file under the name of the final one.

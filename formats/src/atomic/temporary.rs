@@ -51,6 +51,17 @@ impl Live {
         self.0.remove(&temporary.0);
         Ok(())
     }
+
+    /// Gives a temporary file its name for good, where nothing has it; the temporary name goes when it is dropped.
+    pub(super) fn name_new(&mut self, temporary: &Temporary, target: &Path) -> io::Result<()> {
+        match fs::hard_link(&temporary.0, target) {
+            Err(cause) if cause.kind() != io::ErrorKind::AlreadyExists => {
+                // A file system without second names: it is looked just before.
+                if target.exists() { Err(io::ErrorKind::AlreadyExists.into()) } else { self.rename(temporary, target) }
+            }
+            linked => linked,
+        }
+    }
 }
 
 /// A temporary file or folder, removed when dropped unless it has been renamed. Dropping takes the lock.

@@ -20,8 +20,8 @@ use crate::mesh::{MeshFormat, extensions};
 
 pub use numbers::missing_frames;
 pub use range::{FrameRange, open_frames_range};
-pub use source::{open_frames, open_frames_bytes, open_frames_in};
-pub use write::{FrameOptions, FrameWriter, create_frames};
+pub use source::{frame_files, open_frames, open_frames_bytes, open_frames_in};
+pub use write::{FrameOptions, FrameWriter, create_frames, frames_path};
 
 /// Positions of one capture, frame by frame, in order. Memory does not grow with the number of frames.
 pub trait FrameReader: Send {

@@ -41,6 +41,17 @@ pub fn open_frames(source: impl AsRef<Path>, expected_points: usize) -> Result<B
     }
 }
 
+/// The files that [`open_frames`] reads for `source`; none where it finds none.
+pub fn frame_files(source: impl AsRef<Path>) -> Vec<PathBuf> {
+    let path = source.as_ref();
+    match path.to_str() {
+        _ if path.is_dir() => sort(list(path).unwrap_or_default()).0,
+        _ if path.exists() => vec![path.to_owned()],
+        Some(pattern) if Numbered::of(path).is_none() => glob::glob(pattern).into_iter().flatten().flatten().collect(),
+        _ => numbered_files(path).unwrap_or_default(),
+    }
+}
+
 /// Opens the frames in the bytes of a cache file; `name` is the path in error messages.
 ///
 /// # Errors
@@ -108,15 +119,21 @@ fn open_pattern(path: &Path, pattern: &str, expected_points: usize) -> Result<Bo
 }
 
 fn open_numbered(path: &Path, expected_points: usize) -> Result<Box<dyn FrameReader>, Error> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let number = |file: &PathBuf| Numbered::of(path)?.number(file.file_name()?.to_str()?);
-    let mut files: Vec<_> = list(folder)?.into_iter().filter_map(|file| Some((number(&file)?, file))).collect();
+    let files = numbered_files(path)?;
     if files.is_empty() {
         let what = "matches no file; the place of the number stands for as many digits or more, filled up with zeros";
         return Err(Fault::invalid(what).at(path));
     }
+    open_sequence(path, files, expected_points)
+}
+
+/// The files with a number in the place for it, in the order of the numbers.
+fn numbered_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let number = |file: &PathBuf| Numbered::of(path)?.number(file.file_name()?.to_str()?);
+    let mut files: Vec<_> = list(folder)?.into_iter().filter_map(|file| Some((number(&file)?, file))).collect();
     files.sort();
-    open_sequence(path, files.into_iter().map(|(_, file)| file).collect(), expected_points)
+    Ok(files.into_iter().map(|(_, file)| file).collect())
 }
 
 fn list(folder: &Path) -> Result<Vec<PathBuf>, Error> {

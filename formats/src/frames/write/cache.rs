@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use super::super::{mdd, npy, pc2};
 use super::{Announced, CacheFormat, FrameOptions, FrameWriter};
-use crate::atomic::AtomicFile;
+use crate::atomic::{AtomicFile, Target};
 use crate::error::{Error, Fault};
 
 pub(super) struct CacheWriter {
@@ -15,21 +15,26 @@ pub(super) struct CacheWriter {
 }
 
 impl CacheWriter {
-    pub(super) fn create(announced: Announced, format: CacheFormat, options: &FrameOptions) -> Result<Self, Error> {
+    pub(super) fn create(
+        announced: Announced,
+        target: &Target,
+        format: CacheFormat,
+        options: &FrameOptions,
+    ) -> Result<Self, Error> {
         let Announced { points, frames, .. } = announced;
         if format == CacheFormat::Npy {
-            return Self::begin(announced, false, |file| file.write_all(&npy::header(points, frames)));
+            return Self::begin(announced, target, false, |file| file.write_all(&npy::header(points, frames)));
         }
         let (Ok(points), Ok(frames)) = (i32::try_from(points), i32::try_from(frames)) else {
             let what = format!("cannot count more than {} frames or points; write .npy instead", i32::MAX);
             return Err(Fault::unsupported(what).at(&announced.path));
         };
         if format == CacheFormat::Pc2 {
-            return Self::begin(announced, false, |file| {
+            return Self::begin(announced, target, false, |file| {
                 file.write_all(&pc2::header(points, frames, options.number(0) as f32, options.step() as f32))
             });
         }
-        Self::begin(announced, true, |file| {
+        Self::begin(announced, target, true, |file| {
             file.write_all(&mdd::header(points, frames))?;
             let time = |k: i32| (options.number(k as usize) / options.fps) as f32;
             (0..frames).try_for_each(|k| file.write_all(&time(k).to_be_bytes()))
@@ -38,10 +43,11 @@ impl CacheWriter {
 
     fn begin(
         announced: Announced,
+        target: &Target,
         big_endian: bool,
         header: impl FnOnce(&mut AtomicFile) -> io::Result<()>,
     ) -> Result<Self, Error> {
-        let mut file = AtomicFile::create(&announced.path)?;
+        let mut file = AtomicFile::create(target)?;
         header(&mut file).map_err(|cause| Error::write(&announced.path, cause))?;
         Ok(Self { announced, file, big_endian, bytes: Vec::new() })
     }

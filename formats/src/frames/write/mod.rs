@@ -9,6 +9,7 @@ use cager_core::mesh::Polygons;
 
 use super::numbered::Numbered;
 use super::{CacheFormat, unknown_extension};
+use crate::atomic::Target;
 use crate::error::{Error, Fault};
 use cache::CacheWriter;
 use sequence::SequenceWriter;
@@ -58,43 +59,55 @@ impl Default for FrameOptions {
     }
 }
 
+/// The file or folder that [`create_frames`] makes for this path: of a pattern, the folder.
+pub fn frames_path(path: &Path) -> &Path {
+    let pattern = mesh_pattern(path).is_some() || Numbered::of(path).is_some();
+    path.parent().filter(|_| pattern).unwrap_or(path)
+}
+
+fn mesh_pattern(path: &Path) -> Option<&str> {
+    path.file_name()?.to_str().filter(|name| matches!(*name, "*.ply" | "*.obj"))
+}
+
 /// Begins an output of `frames` frames of `points` points each.
 ///
 /// The extension of `path` says what: `.npy` (frames × points × 3, `<f4`), `.pc2` or `.mdd`. Without an extension, with
 /// a `/` at the end, or as an existing folder it becomes a folder of files `frame_0000.obj`, …, each with `faces` and its number;
 /// `FOLDER/*.ply` makes them `.ply` files, and `FOLDER/NAME.%04d.obj` or `FOLDER/NAME.####.ply` gives their names.
+/// A folder with nothing but such files is replaced as a whole where the target may be. Standard output gets `.npy`.
 ///
 /// # Errors
 /// [`Error::Unsupported`] for other extensions and for more points or frames than a format can count,
 /// [`Error::Invalid`] for no points, no frames, faces without their points and a frame rate that is not positive,
 /// [`Error::Target`] and [`Error::Io`] where the output cannot be created.
 pub fn create_frames(
-    path: impl AsRef<Path>,
+    target: impl Into<Target>,
     points: usize,
     frames: usize,
     faces: &Polygons,
     options: &FrameOptions,
 ) -> Result<Box<dyn FrameWriter>, Error> {
-    let given = path.as_ref();
-    let pattern = given.file_name().and_then(|name| name.to_str()).filter(|name| matches!(*name, "*.ply" | "*.obj"));
-    let numbered = Numbered::of(given);
-    let folder = given.parent().filter(|_| pattern.is_some() || numbered.is_some());
-    let path = folder.unwrap_or(given);
+    let target = target.into();
+    let given = target.path();
+    let (path, pattern) = (frames_path(given), mesh_pattern(given));
     let announced = Announced { path: path.to_owned(), points, frames, written: 0 };
     announced.check(options).map_err(|fault| fault.at(path))?;
-    if let Some(names) = numbered {
-        check_numbered(&names, path).map_err(|fault| fault.at(given))?;
-        return Ok(Box::new(SequenceWriter::create(announced, faces, names, options)?));
+    if target.is_standard_output() {
+        return Ok(Box::new(CacheWriter::create(announced, &target, CacheFormat::Npy, options)?));
     }
-    if folder.is_some() || is_folder(path) {
+    if let Some(names) = Numbered::of(given) {
+        check_numbered(&names, path).map_err(|fault| fault.at(given))?;
+        return Ok(Box::new(SequenceWriter::create(announced, &target, faces, names, options)?));
+    }
+    if pattern.is_some() || is_folder(path) {
         let whole = |frame: usize| options.number(frame).abs().trunc().to_string().len();
         let digits = whole(0).max(whole(frames - 1)).max(4);
         let extension = if pattern == Some("*.ply") { ".ply" } else { ".obj" };
         let names = Numbered::new("frame_", digits, extension);
-        return Ok(Box::new(SequenceWriter::create(announced, faces, names, options)?));
+        return Ok(Box::new(SequenceWriter::create(announced, &target, faces, names, options)?));
     }
     match CacheFormat::from_path(path) {
-        Some(format) => Ok(Box::new(CacheWriter::create(announced, format, options)?)),
+        Some(format) => Ok(Box::new(CacheWriter::create(announced, &target, format, options)?)),
         None => Err(unknown_extension(path, false)),
     }
 }

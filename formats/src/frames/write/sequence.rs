@@ -6,7 +6,7 @@ use cager_core::mesh::{Model, Polygons};
 
 use super::super::numbered::Numbered;
 use super::{Announced, FrameOptions, FrameWriter};
-use crate::atomic::AtomicDir;
+use crate::atomic::{AtomicDir, Target};
 use crate::error::{Error, Fault};
 use crate::mesh::{write_obj_faces, write_ply};
 
@@ -29,6 +29,7 @@ enum Format {
 impl SequenceWriter {
     pub(super) fn create(
         announced: Announced,
+        target: &Target,
         faces: &Polygons,
         names: Numbered,
         options: &FrameOptions,
@@ -40,7 +41,7 @@ impl SequenceWriter {
             ))
             .at(&announced.path));
         }
-        let folder = AtomicDir::create(&announced.path)?;
+        let folder = AtomicDir::create_over(&announced.path, |name| target.replaces() && names.number(name).is_some())?;
         let format = if names.extension_is("ply") {
             Format::Ply(Model { points: Vec::new(), faces: faces.clone() })
         } else {
