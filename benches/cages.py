@@ -40,7 +40,7 @@ def encoded(folder, capture, name, cage, frames=None):
         at = os.path.join(DATA, capture)
         frames = frames or f"{at}/frames.npy"
         out = os.path.join(folder, "out.cager")
-        run("encode", "--rest", f"{at}/rest.obj", "--cage", cage, "--frames", frames, "--handles", "spread", "-o", out, "--report", report)
+        run("encode", "--rest", f"{at}/rest.obj", "--cage", cage, "--frames", frames, "--handles", "spread", "-o", out, "--report", report, "--overwrite")
     return read(report)
 
 

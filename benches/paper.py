@@ -46,7 +46,7 @@ def compare(folder, capture, cage, systems):
         at = os.path.join(DATA, capture)
         command = [CAGER, "compare", "--rest", f"{at}/rest.obj", "--cage", f"{at}/{cage}.obj", "--frames", f"{at}/frames.npy"]
         command += [] if systems == "all" else ["--coordinates", systems]
-        subprocess.run(command + ["-o", report, "--json", figures], check=True)
+        subprocess.run(command + ["-o", report, "--json", figures, "--overwrite"], check=True)
     with open(figures, encoding="utf-8") as file:
         return json.load(file)
 

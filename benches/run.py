@@ -74,7 +74,7 @@ def first_preparation(program):
 def encode_command(folder, frames, output):
     names = ["--rest", "rest.obj", "--cage", "cage.obj"]
     names = [os.path.join(folder, n) if not n.startswith("--") else n for n in names]
-    return [CAGER, "encode", *names, "--frames", os.path.join(folder, frames), "-o", os.path.join(folder, output)]
+    return [CAGER, "encode", *names, "--frames", os.path.join(folder, frames), "-o", os.path.join(folder, output), "--overwrite"]
 
 
 def measure():
@@ -89,7 +89,7 @@ def measure():
         encode = encode_command(folder, "frames.npy", "capture.cager")
         container = os.path.join(folder, "capture.cager")
         ours["seconds"]["encode"] = wall(encode)
-        decode = [CAGER, "decode", container, "-o", os.path.join(folder, "decoded.npy")]
+        decode = [CAGER, "decode", container, "-o", os.path.join(folder, "decoded.npy"), "--overwrite"]
         ours["seconds"]["decode_all"] = wall(decode)
         ours["report"] = run_json([CAGER, "inspect", "--json", container])
         for key in ("singular_values", "handle_indices", "sections"):

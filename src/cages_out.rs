@@ -3,7 +3,7 @@
 use crate::decode::{DecodeError, frame_options, open};
 use crate::timing::Timing;
 use cager_core::mesh::{Model, Polygons};
-use cager_formats::{AtomicFile, FrameRange, commit_together, create_frames, obj_bytes};
+use cager_formats::{AtomicFile, FrameRange, Target, commit_together, create_frames, obj_bytes};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -13,21 +13,22 @@ pub struct CagesWritten {
     pub frames: usize,
     /// Vertices of the cage.
     pub vertices: u64,
-    /// The file with the rest cage.
-    pub rest: PathBuf,
+    /// The file with the rest cage; standard output has none beside it.
+    pub rest: Option<PathBuf>,
     /// Normals of each frame that are no positions and were left out: those of `green-free`.
     pub normals: u64,
 }
 
 /// Writes the cages of a container, or a range of them, to `output` in any format of frames, and the rest cage with its faces
-/// beside them: see [`rest_cage_path`]. Both appear whole or not at all.
+/// beside them: see [`rest_cage_path`]. Both appear whole or not at all. A dry run reads and checks, and writes neither.
 ///
 /// # Errors
 /// Damage; an output that refuses; another file in the place of the rest cage.
 pub fn write_cages(
     input: &Path,
-    output: &Path,
+    output: &Target,
     (range, timing): (Option<FrameRange>, Timing),
+    dry_run: bool,
     progress: &mut dyn FnMut(usize),
 ) -> Result<CagesWritten, DecodeError> {
     let fail = |cause| DecodeError::container(input, cause);
@@ -41,8 +42,11 @@ pub fn write_cages(
     let mut faces = Polygons::new();
     mesh.triangles.iter().for_each(|triangle| faces.push(triangle));
     let cage = Model { points: mesh.vertices, faces };
-    let rest = rest_cage_path(output);
-    let rest_file = rest_file(&rest, &obj_bytes(&cage))?;
+    let rest = (!output.is_standard_output()).then(|| rest_cage_path(output.path()));
+    let rest_file = match &rest {
+        Some(path) => rest_file(path, output.replaces(), &obj_bytes(&cage))?,
+        None => None,
+    };
 
     let rows = cage.points.len();
     let options = frame_options(&mut container, there, range, timing).map_err(fail)?;
@@ -50,13 +54,17 @@ pub fn write_cages(
     let mut frame = Vec::new();
     for place in 0..range.count() {
         container.read_frame(range.frame(place), &mut frame).map_err(fail)?;
-        writer.write_frame(&frame[..3 * rows])?;
+        if !dry_run {
+            writer.write_frame(&frame[..3 * rows])?;
+        }
         progress(place + 1);
     }
-    // Complete before the frames have their name, so that a full disk leaves neither.
-    let rest_file = rest_file.map(AtomicFile::complete).transpose()?;
-    writer.finish()?;
-    commit_together(rest_file.into_iter().collect())?;
+    if !dry_run {
+        // Complete before the frames have their name, so that a full disk leaves neither.
+        let rest_file = rest_file.map(AtomicFile::complete).transpose()?;
+        writer.finish()?;
+        commit_together(rest_file.into_iter().collect())?;
+    }
     let header = container.header();
     Ok(CagesWritten {
         frames: range.count(),
@@ -77,16 +85,17 @@ pub fn rest_cage_path(output: &Path) -> PathBuf {
     named.with_extension("cage.obj")
 }
 
-/// Begins the file of the rest cage; none where it is there already. No name was given for it, so it replaces nothing else.
-fn rest_file(path: &Path, bytes: &[u8]) -> Result<Option<AtomicFile>, DecodeError> {
+/// Begins the file of the rest cage; none where it is there already.
+fn rest_file(path: &Path, replaces: bool, bytes: &[u8]) -> Result<Option<AtomicFile>, DecodeError> {
     match std::fs::read(path) {
         Ok(there) if there == bytes => Ok(None),
-        Ok(_) => {
-            let what = "is another file where the rest cage is to be written; move it, or name another output";
+        Ok(_) if !replaces => {
+            let what = "is another file where the rest cage is to be written; name another output, or give --overwrite to replace it";
             Err(cager_formats::Error::Target { path: path.to_owned(), what: what.to_owned() }.into())
         }
-        Err(_) => {
-            let mut file = AtomicFile::create(path)?;
+        _ => {
+            let target = if replaces { Target::replacing(path) } else { Target::new(path) };
+            let mut file = AtomicFile::create(target)?;
             file.write_all(bytes).map_err(|cause| cager_formats::Error::Io {
                 path: path.to_owned(),
                 action: cager_formats::Action::Write,

@@ -8,7 +8,7 @@ use cager_core::coordinates::CoordinatesError;
 use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, coordinates_fit};
 use cager_core::mesh::Model;
-use cager_formats::{Action, FrameOptions, FrameRange, create_frames};
+use cager_formats::{Action, FrameOptions, FrameRange, Target, create_frames};
 use cager_proto::container::{self, ContainerReader};
 use std::fs::File;
 use std::io::BufReader;
@@ -117,6 +117,8 @@ pub struct Decoding<'a> {
     pub range: Option<FrameRange>,
     /// Frame rate and number of the first frame, where they are given.
     pub timing: Timing,
+    /// Whether all is read and checked, and nothing written.
+    pub dry_run: bool,
 }
 
 /// What was decoded.
@@ -198,13 +200,13 @@ pub(crate) fn frame_options(
 /// See [`DecodeError`].
 pub fn decode(
     input: &Path,
-    output: &Path,
+    output: impl Into<Target>,
     what: Decoding<'_>,
     progress: &mut dyn FnMut(usize),
 ) -> Result<Decoded, DecodeError> {
     let fail = |cause| DecodeError::container(input, cause);
     let mut container = open(input)?;
-    let Decoding { model, cages: mut edited, range, timing } = what;
+    let Decoding { model, cages: mut edited, range, timing, dry_run } = what;
     let there = edited.as_ref().map_or(container.frames(), EditedCages::frames);
     range.map_or(Ok(()), |range| range.check(there, input))?;
     let taken = range.unwrap_or(FrameRange::all(there));
@@ -228,14 +230,18 @@ pub fn decode(
                 None => container.read_frame(frame, cage).map_err(fail)?,
             }
         }
-        let views: Vec<&[f32]> = cages[..count].iter().map(Vec::as_slice).collect();
-        decoder.decode(&views, &mut positions[..count]);
-        for frame in &positions[..count] {
-            writer.write_frame(frame)?;
+        if !dry_run {
+            let views: Vec<&[f32]> = cages[..count].iter().map(Vec::as_slice).collect();
+            decoder.decode(&views, &mut positions[..count]);
+            for frame in &positions[..count] {
+                writer.write_frame(frame)?;
+            }
         }
         first += count;
         progress(first);
     }
-    writer.finish()?;
+    if !dry_run {
+        writer.finish()?;
+    }
     Ok(Decoded { points: rest.points.len(), frames, outside })
 }

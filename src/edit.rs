@@ -3,7 +3,7 @@
 use crate::decode::{Container, DecodeError};
 use crate::edited::EditedCages;
 use crate::timing::counted_from_zero;
-use cager_formats::{Action, AtomicFile};
+use cager_formats::{Action, AtomicFile, CompleteFile, Target};
 use cager_proto::container::{self, ContainerWriter, ErrorSummary, FrameError, Summary};
 use std::io::BufWriter;
 use std::path::Path;
@@ -11,12 +11,14 @@ use std::path::Path;
 /// What a summary says of errors that are not known.
 const NOT_MEASURED: &str = "the cages were edited: their errors are not measured";
 
-/// What [`edit`] has written.
+/// What [`edit`] gives.
 pub struct Edited {
     /// Number of frames.
     pub frames: usize,
     /// Frames whose cage is another than in the container it came from, or has no counterpart there.
     pub changed: usize,
+    /// The container, complete but for its name.
+    pub container: CompleteFile,
 }
 
 /// Writes the container at `input` again, with edited cages. A frame whose cage is the same keeps its errors; of the others they
@@ -28,11 +30,11 @@ pub fn edit(
     mut container: Container,
     input: &Path,
     mut edited: EditedCages,
-    output: &Path,
+    output: &Target,
     progress: &mut dyn FnMut(usize),
 ) -> Result<Edited, DecodeError> {
     let fail = |cause| DecodeError::container(input, cause);
-    let refused = |cause: container::Error| written(output, cause);
+    let refused = |cause: container::Error| written(output.path(), cause);
     let (rest, cage) = (container.rest().map_err(fail)?, container.cage().map_err(fail)?);
     let errors = container.errors().map_err(fail)?;
     let summary = container.summary().map_err(fail)?;
@@ -65,8 +67,7 @@ pub fn edit(
     }
     let buffered = writer.finish(summary.as_ref()).map_err(refused)?;
     let file = buffered.into_inner().map_err(|error| refused(error.into_error().into()))?;
-    file.commit()?;
-    Ok(Edited { frames, changed })
+    Ok(Edited { frames, changed, container: file.complete()? })
 }
 
 /// What is still true of the encoding.

@@ -7,7 +7,7 @@ use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{Analysis, BATCH, Convergence, PrepareError, Solver, SolverOptions};
 use cager_core::mesh::Model;
 use cager_core::regularize::{Term, TermError};
-use cager_formats::{Action, AtomicFile, CompleteFile, FrameReader};
+use cager_formats::{Action, AtomicFile, CompleteFile, FrameReader, Target};
 use cager_proto::container;
 use rayon::prelude::*;
 use std::io::BufWriter;
@@ -67,8 +67,8 @@ pub struct Job<'a> {
     pub cage: &'a Cage,
     /// The capture.
     pub frames: &'a mut dyn FrameReader,
-    /// File to write.
-    pub output: &'a Path,
+    /// Where to write.
+    pub output: &'a Target,
     /// Coordinate system.
     pub system: &'a dyn CoordinateSystem,
     /// Solver options.
@@ -136,7 +136,7 @@ pub struct Encoded {
 /// See [`EncodeError`].
 pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Encoded, EncodeError> {
     let clock = Instant::now();
-    let fail = |cause| EncodeError::container(job.output, cause);
+    let fail = |cause| EncodeError::container(job.output.path(), cause);
     // Before the work, so that an unwritable place costs no waiting.
     let file = AtomicFile::create(job.output)?;
     let (solver, options, choice) = prepare(&job)?;

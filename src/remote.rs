@@ -12,7 +12,7 @@ use crate::encode::Encoded;
 use cager_client::cage_messages::CageProgress;
 use cager_client::messages::{CageSource, FrameResult, SessionOptions};
 use cager_client::{Client, ClientError, ClientOptions, FrameSource, MeshFile, NewSession, UploadOptions};
-use cager_formats::{Action, AtomicFile};
+use cager_formats::{Action, AtomicFile, Target};
 use cager_proto::container;
 use report::{Times, report};
 use std::io::{self, BufReader};
@@ -58,8 +58,8 @@ pub struct RemoteJob<'a, F> {
     pub matrix: Option<&'a Path>,
     /// The capture.
     pub frames: F,
-    /// File to write.
-    pub output: &'a Path,
+    /// Where to write.
+    pub output: &'a Target,
     /// Choices for the session.
     pub options: SessionOptions,
 }

@@ -2,6 +2,7 @@
 
 use super::cage_args::CageArgs;
 use super::checks::{CaptureArgs, TimingArgs};
+use super::outputs::OutputArgs;
 use super::transfer_args::{EditArgs, TransferArgs};
 use crate::config::ServeFlags;
 use cager_core::inversion::Handles;
@@ -86,9 +87,12 @@ pub(crate) struct EncodeArgs {
     #[command(flatten)]
     pub(crate) capture: CaptureArgs,
 
-    /// File to write; it appears whole or not at all.
+    /// File to write, or - for standard output; it appears whole or not at all.
     #[arg(short, long, value_name = "OUT.cager")]
     pub(crate) output: PathBuf,
+
+    #[command(flatten)]
+    pub(crate) outputs: OutputArgs,
 
     #[command(flatten)]
     pub(crate) solver: SolverArgs,
@@ -190,9 +194,12 @@ pub(crate) struct DecodeArgs {
     pub(crate) input: PathBuf,
 
     /// Where to write: .npy, .pc2, .mdd, or a folder that is to hold one .obj per frame ('FOLDER/*.ply' for .ply,
-    /// FOLDER/walk.%04d.obj or FOLDER/walk.####.obj for names of your own).
+    /// FOLDER/walk.%04d.obj or FOLDER/walk.####.obj for names of your own), or - for .npy on standard output.
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
+
+    #[command(flatten)]
+    pub(crate) outputs: OutputArgs,
 
     #[command(flatten)]
     pub(crate) timing: TimingArgs,
@@ -234,9 +241,13 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_name = "FRAMES")]
     pub(crate) frames: PathBuf,
 
-    /// Report to write; it appears whole or not at all, and needs no other file and no network to be read.
+    /// Report to write, or - for standard output; it appears whole or not at all, and needs no other file and no network to be
+    /// read.
     #[arg(short, long, value_name = "REPORT.html")]
     pub(crate) output: PathBuf,
+
+    #[command(flatten)]
+    pub(crate) outputs: OutputArgs,
 
     /// Write all figures as JSON.
     #[arg(long, value_name = "FIGURES.json")]

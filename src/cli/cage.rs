@@ -4,7 +4,9 @@ use super::args::UpArg;
 use super::cage_args::{CageArgs, GeneralArg};
 use super::checks::check_capture;
 use super::design::{self, usual_vertices};
-use super::{grouped, interrupt, tell, warn};
+use super::dry_run::{read_files, tell_would};
+use super::outputs::Outputs;
+use super::{grouped, tell, warn};
 use crate::compare::render::Up;
 use crate::design::{DesignReport, read_frames};
 use crate::frames::CaptureFiles;
@@ -12,7 +14,7 @@ use crate::picture;
 use anyhow::{Result, bail};
 use cager_cages::{DesignOptions, EncloseError, EncloseOptions, General, Style, enclose, general};
 use cager_core::mesh::{Model, Polygons, TriMesh};
-use cager_formats::{AtomicFile, commit_together, model_bytes, read_model};
+use cager_formats::{AtomicFile, CompleteFile, Target, commit_together, model_bytes, obj_bytes, read_model};
 use serde::Serialize;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -39,6 +41,7 @@ struct CageReport {
 
 pub(super) fn run(args: &CageArgs) -> Result<()> {
     let clock = Instant::now();
+    let targets = Targets::new(args)?;
     let models: Vec<Model> = args.rest.iter().map(|path| read_model(path)).collect::<Result<_, _>>()?;
     if models.len() > 1 && args.general.is_none() {
         bail!("--rest: was given {} times; only --general takes several models", models.len());
@@ -52,17 +55,20 @@ pub(super) fn run(args: &CageArgs) -> Result<()> {
         );
     }
     if args.check.is_some() || args.repair.is_some() {
-        return super::doctor::run(args, rest);
+        return super::doctor::run(args, &targets, rest);
     }
     if let Some(clearance) = args.clearance
         && !(0.0..=MOST_CLEARANCE).contains(&clearance)
     {
         bail!("--clearance: is {clearance}; give a fraction of the rest pose's diagonal from 0 to {MOST_CLEARANCE}");
     }
-    let Some(output) = &args.output else { bail!("-o: say which file to write") };
-    refuse_outputs(args)?;
-    interrupt::leaves_nothing()?;
-    let files = Outputs::begin(args, output)?;
+    let Some(output) = &targets.output else { bail!("-o: say which file to write") };
+    if args.outputs.dry_run {
+        if let Some(frames) = &args.frames {
+            read_files(&Motion::new(args, rest, frames)?.files)?;
+        }
+        return tell_would(output, "a cage", &[targets.report.clone(), targets.picture.clone()]);
+    }
     let vertices = args.vertices.map_or(usual_vertices(rest.points.len()), |n| n as usize);
     let mut warnings = Vec::new();
     let (cage, report) = match (&args.frames, args.general) {
@@ -81,25 +87,74 @@ pub(super) fn run(args: &CageArgs) -> Result<()> {
             (of_triangles(enclose(rest, &options).map_err(|e| name_file(&e, args))?), None)
         }
     };
-    finish(args, (output, files), &models, &cage, report, warnings, clock)
+    finish(args, (output, &targets), &models, &cage, report, warnings, clock)
 }
 
-/// The files to be written, which have no name until all are complete. Made before the work, so that what cannot be written costs none.
-struct Outputs {
-    cage: AtomicFile,
-    report: Option<AtomicFile>,
-    picture: Option<AtomicFile>,
+/// Where outputs go.
+pub(super) struct Targets {
+    pub(super) output: Option<Target>,
+    pub(super) report: Option<Target>,
+    pub(super) picture: Option<Target>,
 }
 
-impl Outputs {
-    fn begin(args: &CageArgs, output: &Path) -> Result<Self> {
-        // Any model will do to learn whether its name is one of a mesh that is written.
-        model_bytes(output, &Model { points: vec![[0.0; 3]], faces: Polygons::new() })?;
+impl Targets {
+    fn new(args: &CageArgs) -> Result<Self> {
+        let inputs = args.rest.iter().chain(&args.frames).chain(&args.improve).chain(&args.repair).chain(&args.check);
+        let mut outputs = Outputs::new(args.outputs, inputs)?;
+        let output = args.output.as_ref().map(|path| outputs.text(path)).transpose()?;
+        if let Some(output) = &output {
+            // Any model will do to learn whether its name is one of a mesh that is written.
+            cage_bytes(output, &Model { points: vec![[0.0; 3]], faces: Polygons::new() })?;
+        }
         Ok(Self {
-            cage: AtomicFile::create(output)?,
-            report: args.report.as_ref().map(AtomicFile::create).transpose()?,
-            picture: args.picture.as_ref().map(AtomicFile::create).transpose()?,
+            output,
+            report: args.report.as_ref().map(|path| outputs.text(path)).transpose()?,
+            picture: args.picture.as_ref().map(|path| outputs.binary(path, "cage.png")).transpose()?,
         })
+    }
+
+    /// The report and the picture, where they are asked for, complete but for their names.
+    pub(super) fn complete(
+        &self,
+        report: &impl Serialize,
+        picture: impl FnOnce() -> Vec<u8>,
+    ) -> Result<Vec<CompleteFile>> {
+        let mut files = Vec::new();
+        if let Some(target) = &self.report {
+            let mut text = serde_json::to_vec_pretty(report)?;
+            text.push(b'\n');
+            files.push(whole(target, &text)?);
+        }
+        if let Some(target) = &self.picture {
+            files.push(whole(target, &picture())?);
+        }
+        Ok(files)
+    }
+}
+
+/// What a cage is designed from, checked.
+struct Motion<'a> {
+    /// The cage to improve.
+    start: Option<(&'a PathBuf, Model)>,
+    options: DesignOptions,
+    files: CaptureFiles,
+}
+
+impl<'a> Motion<'a> {
+    fn new(args: &'a CageArgs, rest: &Model, frames: &Path) -> Result<Self> {
+        let start = args.improve.as_ref().map(|path| read_model(path).map(|model| (path, model))).transpose()?;
+        let options = DesignOptions {
+            goal: design::goal(args.vertices, args.mean_error, rest.points.len())?,
+            style: args.style.map_or(Style::Editable, Into::into),
+            seed: args.seed,
+            time_limit: args.time_limit.map(|s| Duration::from_secs(s.into())),
+            keep_connectivity: start.is_some(),
+            symmetry: args.symmetry.map(|axis| axis as usize),
+        };
+        let mut files = CaptureFiles::new(frames, rest.points.len());
+        files.allow_gaps = args.checks.allow_gaps;
+        check_capture(&files, (&args.rest[0], rest), &args.checks, false)?;
+        Ok(Self { start, options, files })
     }
 }
 
@@ -110,18 +165,7 @@ fn designed(
     frames_path: &Path,
     warnings: &mut Vec<String>,
 ) -> Result<(Model, Option<DesignReport>)> {
-    let start = args.improve.as_ref().map(|path| read_model(path).map(|model| (path, model))).transpose()?;
-    let options = DesignOptions {
-        goal: design::goal(args.vertices, args.mean_error, rest.points.len())?,
-        style: args.style.map_or(Style::Editable, Into::into),
-        seed: args.seed,
-        time_limit: args.time_limit.map(|s| Duration::from_secs(s.into())),
-        keep_connectivity: start.is_some(),
-        symmetry: args.symmetry.map(|axis| axis as usize),
-    };
-    let mut files = CaptureFiles::new(frames_path, rest.points.len());
-    files.allow_gaps = args.checks.allow_gaps;
-    check_capture(&files, (&args.rest[0], rest), &args.checks, false)?;
+    let Motion { start, options, files } = Motion::new(args, rest, frames_path)?;
     let frames = read_frames(&files)?;
     let mesh = start.as_ref().map(|(_, model)| TriMesh::from(model));
     let start_mesh = start.as_ref().zip(mesh.as_ref()).map(|((path, _), mesh)| (path.as_path(), mesh));
@@ -146,7 +190,7 @@ fn of_triangles(mesh: TriMesh) -> Model {
 
 fn finish(
     args: &CageArgs,
-    (output, files): (&Path, Outputs),
+    (output, targets): (&Target, &Targets),
     models: &[Model],
     cage: &Model,
     design: Option<DesignReport>,
@@ -164,34 +208,19 @@ fn finish(
         seconds: clock.elapsed().as_secs_f64(),
         warnings,
     };
-    let mut complete = vec![filled(files.cage, &model_bytes(output, cage)?)?];
-    if let Some(file) = files.report {
-        complete.push(filled(file, &pretty(&report)?)?);
-    }
-    if let Some(file) = files.picture {
-        complete.push(filled(file, &picture_of(args, &together(models), &mesh))?);
-    }
+    let mut complete = vec![whole(output, &cage_bytes(output, cage)?)?];
+    complete.extend(targets.complete(&report, || picture_of(args, &together(models), &mesh))?);
     commit_together(complete)?;
     warn(&report.warnings);
-    tell(&summary(&report, output))
+    tell(&summary(&report, output.path()))
 }
 
-/// Writes a repaired cage with what belongs to it.
-pub(super) fn finish_repaired(
-    args: &CageArgs,
-    output: &Path,
-    rest: &Model,
-    cage: &Model,
-    report: &impl Serialize,
-) -> Result<()> {
-    let mut files = vec![whole(output, &model_bytes(output, cage)?)?];
-    if let Some(path) = &args.report {
-        files.push(whole(path, &pretty(report)?)?);
+/// A cage as a mesh file of its target's name; standard output has none and gets `.obj`.
+pub(super) fn cage_bytes(target: &Target, cage: &Model) -> Result<Vec<u8>> {
+    if target.is_standard_output() {
+        return Ok(obj_bytes(cage));
     }
-    if let Some(path) = &args.picture {
-        files.push(whole(path, &picture_of(args, &TriMesh::from(rest), &TriMesh::from(cage)))?);
-    }
-    Ok(commit_together(files)?)
+    Ok(model_bytes(target.path(), cage)?)
 }
 
 /// A picture of models in a cage, or beside it.
@@ -204,17 +233,8 @@ pub(super) fn picture_of(args: &CageArgs, model: &TriMesh, cage: &TriMesh) -> Ve
     picture::of_cage(model, cage, up)
 }
 
-pub(super) fn pretty(report: &impl Serialize) -> Result<Vec<u8>> {
-    let mut text = serde_json::to_vec_pretty(report)?;
-    text.push(b'\n');
-    Ok(text)
-}
-
-pub(super) fn whole(path: &Path, bytes: &[u8]) -> Result<cager_formats::CompleteFile> {
-    filled(AtomicFile::create(path)?, bytes)
-}
-
-fn filled(mut file: AtomicFile, bytes: &[u8]) -> Result<cager_formats::CompleteFile> {
+pub(super) fn whole(target: &Target, bytes: &[u8]) -> Result<CompleteFile> {
+    let mut file = AtomicFile::create(target)?;
     file.write_all(bytes)?;
     Ok(file.complete()?)
 }
@@ -228,31 +248,6 @@ fn together(models: &[Model]) -> TriMesh {
         all.vertices.extend(mesh.vertices);
     }
     all
-}
-
-/// Files that exist stay, unless they may be replaced; inputs always do.
-pub(super) fn refuse_outputs(args: &CageArgs) -> Result<()> {
-    let inputs = args.rest.iter().chain(&args.frames).chain(&args.improve).chain(&args.repair).chain(&args.check);
-    let inputs: Vec<PathBuf> = inputs.filter_map(|path| path.canonicalize().ok()).collect();
-    let outputs: Vec<&PathBuf> = args.output.iter().chain(&args.report).chain(&args.picture).collect();
-    for (k, output) in outputs.iter().enumerate() {
-        if outputs[..k].iter().any(|other| place(other) == place(output)) {
-            bail!("{}: cannot hold two outputs; name two files", output.display());
-        }
-        if output.canonicalize().is_ok_and(|place| inputs.contains(&place)) {
-            bail!("{}: is an input, so it cannot be an output; name another file", output.display());
-        }
-        if output.exists() && !args.overwrite {
-            bail!("{}: exists; name another file, or pass --overwrite to replace it", output.display());
-        }
-    }
-    Ok(())
-}
-
-/// Where a file is, or will be.
-fn place(path: &Path) -> Option<PathBuf> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    path.canonicalize().ok().or_else(|| Some(folder.canonicalize().ok()?.join(path.file_name()?)))
 }
 
 fn name_file(error: &EncloseError, args: &CageArgs) -> anyhow::Error {

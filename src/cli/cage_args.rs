@@ -2,6 +2,7 @@
 
 use super::args::{StyleArg, UpArg};
 use super::checks::CheckArgs;
+use super::outputs::OutputArgs;
 use clap::{ArgGroup, Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -24,7 +25,7 @@ pub(crate) struct CageArgs {
     #[command(flatten)]
     pub(crate) checks: CheckArgs,
 
-    /// Cage to write, .obj or .ply.
+    /// Cage to write, .obj or .ply, or - for .obj on standard output.
     #[arg(short, long, value_name = "CAGE.obj", required_unless_present = "check")]
     pub(crate) output: Option<PathBuf>,
 
@@ -88,9 +89,8 @@ pub(crate) struct CageArgs {
     #[arg(long, value_name = "REPORT.json")]
     pub(crate) report: Option<PathBuf>,
 
-    /// Replace files that exist.
-    #[arg(long)]
-    pub(crate) overwrite: bool,
+    #[command(flatten)]
+    pub(crate) outputs: OutputArgs,
 }
 
 /// Cages that are no closer to a model than their shape allows.

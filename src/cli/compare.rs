@@ -1,9 +1,10 @@
 //! `cager compare`.
 
 use super::args::{CompareArgs, CoordinatesArg, UpArg};
+use super::dry_run::{read_all, tell_would};
 use super::encode::{blame, read_cage};
-use super::outputs::refuse_overwriting;
-use super::{human_bytes, interrupt, plain, progress};
+use super::outputs::Outputs;
+use super::{human_bytes, plain, progress};
 use crate::compare::{CompareError, Figures, Job, Progress, Up, compare, page};
 use crate::coordinates;
 use anyhow::{Context, Result};
@@ -16,16 +17,21 @@ use std::time::Instant;
 
 pub(super) fn run(args: &CompareArgs) -> Result<()> {
     let clock = Instant::now();
+    let mut outputs = Outputs::new(args.outputs, [&args.rest, &args.cage, &args.frames])?;
+    let output = outputs.text(&args.output)?;
+    let json = args.json.as_ref().map(|path| outputs.text(path)).transpose()?;
     let rest = read_model(&args.rest)?;
     let cage = read_cage(&args.cage, args.flip_cage)?;
     let open = || open_frames(&args.frames, rest.points.len());
     open()?;
     let systems = systems(&args.coordinates)?;
-    // Before the work, so that outputs that cannot be written cost no waiting.
-    refuse_overwriting(&args.output, args.json.as_deref(), [&args.rest, &args.cage, &args.frames])?;
-    interrupt::leaves_nothing()?;
-    let mut report = AtomicFile::create(&args.output)?;
-    let json = args.json.as_ref().map(AtomicFile::create).transpose()?;
+    if args.outputs.dry_run {
+        let frames = read_all(open()?.as_mut())?;
+        let what = format!("a comparison on at most {} of {frames} frames", args.frames_at_most.min(frames as u32));
+        return tell_would(&output, &what, &[json]);
+    }
+    let mut report = AtomicFile::create(&output)?;
+    let json = json.as_ref().map(AtomicFile::create).transpose()?;
 
     let bar = progress::steps();
     let mut tell = |step: &str, done: usize, all: usize| {
@@ -61,7 +67,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
         outputs.insert(0, file.complete()?);
     }
     commit_together(outputs)?;
-    super::tell(&summary(&figures, &args.output, bytes, clock.elapsed().as_secs_f64())?)
+    super::tell(&summary(&figures, output.path(), bytes, clock.elapsed().as_secs_f64())?)
 }
 
 /// The systems asked for, each once; all where none is.

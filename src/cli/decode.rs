@@ -1,23 +1,23 @@
 //! `cager decode`.
 
 use super::args::DecodeArgs;
-use super::outputs::refuse_input;
-use super::{grouped, interrupt, progress, tell, warn};
+use super::dry_run::{size, tell_would};
+use super::outputs::Outputs;
+use super::{grouped, progress, tell, warn};
 use crate::cages_out::write_cages;
 use crate::decode::{self, Decoding};
 use crate::edited::EditedCages;
 use anyhow::Result;
-use cager_formats::{FrameRange, read_model};
+use cager_formats::{FrameRange, Target, read_model};
 use std::path::Path;
 use std::time::Instant;
 
 pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     let clock = Instant::now();
     let transfer = &args.transfer;
-    refuse_input(
-        &args.output,
-        [Some(&args.input), transfer.with_cages.as_ref(), transfer.model.as_ref()].into_iter().flatten(),
-    )?;
+    let dry_run = args.outputs.dry_run;
+    let inputs = [Some(&args.input), transfer.with_cages.as_ref(), transfer.model.as_ref()];
+    let output = Outputs::new(args.outputs, inputs.into_iter().flatten())?.frames(&args.output)?;
     let container = decode::open(&args.input)?;
     let edited = transfer.with_cages.as_ref().map(|path| EditedCages::open(path, &container)).transpose()?;
     let model = transfer.model.as_ref().map(|path| read_model(path)).transpose()?;
@@ -26,22 +26,26 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     let range = transfer.range();
     // A range is checked against the file that has the frames.
     range.map_or(Ok(()), |range| range.check(there, transfer.with_cages.as_ref().unwrap_or(&args.input)))?;
-    interrupt::leaves_nothing()?;
     let bar = progress::frames("decoding", range.as_ref().map_or(there, FrameRange::count));
     let mut watch = |done: usize| bar.set_position(done as u64);
     if transfer.cages {
-        let result = write_cages(&args.input, &args.output, (range, (&args.timing).into()), &mut watch);
+        let result = write_cages(&args.input, &output, (range, (&args.timing).into()), dry_run, &mut watch);
         bar.finish_and_clear();
         let found = result?;
         if found.normals > 0 {
             warn(&[format!("the {} normals of each cage are left out: they are no positions", found.normals)]);
         }
+        if dry_run {
+            let rest = found.rest.map(Target::replacing);
+            return tell_would(&output, &size(found.frames, found.vertices as usize, "vertices"), &[rest]);
+        }
+        let rest =
+            found.rest.map_or_else(String::new, |path| format!("; the rest cage with its faces is {}", path.display()));
         return tell(&format!(
-            "{}: {} cages of {} vertices; the rest cage with its faces is {}\n",
-            args.output.display(),
+            "{}: {} cages of {} vertices{rest}\n",
+            output.path().display(),
             grouped(found.frames as u64),
             grouped(found.vertices),
-            found.rest.display()
         ));
     }
     let what = Decoding {
@@ -49,17 +53,21 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
         cages: edited,
         range,
         timing: (&args.timing).into(),
+        dry_run,
     };
-    let result = decode::decode(&args.input, &args.output, what, &mut watch);
+    let result = decode::decode(&args.input, &output, what, &mut watch);
     bar.finish_and_clear();
     let found = result?;
     // Of the file's own model, the encoding said so.
     if let (Some(path), true) = (&transfer.model, found.outside > 0) {
         warn(&[outside(path, found.outside, found.points)]);
     }
+    if dry_run {
+        return tell_would(&output, &size(found.frames, found.points, "points"), &[]);
+    }
     tell(&format!(
         "{}: {} frames of {} points in {:.3} s\n",
-        args.output.display(),
+        output.path().display(),
         grouped(found.frames as u64),
         grouped(found.points as u64),
         clock.elapsed().as_secs_f64()

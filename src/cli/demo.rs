@@ -15,7 +15,7 @@ use cager_client::messages::SessionOptions;
 use cager_core::cage::Cage;
 use cager_core::mesh::{Model, Polygons, diagonal};
 use cager_core::synthetic::{Capture, Options};
-use cager_formats::{AtomicFile, commit_together, open_frames, write_model};
+use cager_formats::{AtomicFile, Target, commit_together, open_frames, write_model};
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
@@ -46,7 +46,7 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
         cage: RemoteCage::File(&cage_file),
         matrix: None,
         frames: generated(&capture),
-        output: &output,
+        output: &Target::from(&output),
         options: SessionOptions { name: Some("demo".to_owned()), ..SessionOptions::default() },
     };
     let bar = progress::frames("encoding", capture.frames());

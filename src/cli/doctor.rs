@@ -1,12 +1,13 @@
 //! `cager cage --check` and `--repair`: what is wrong with a cage, and what of it can be repaired.
 
-use super::cage::{finish_repaired, picture_of, pretty, refuse_outputs, whole};
+use super::cage::{Targets, cage_bytes, picture_of, whole};
 use super::cage_args::CageArgs;
-use super::{interrupt, print};
+use super::dry_run::tell_would;
+use super::print;
 use anyhow::{Result, bail};
 use cager_cages::doctor::{Findings, check, repair};
 use cager_core::mesh::{Model, TriMesh};
-use cager_formats::{commit_together, read_model};
+use cager_formats::{Target, commit_together, read_model};
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::Path;
@@ -67,29 +68,23 @@ impl CheckReport {
     }
 }
 
-pub(super) fn run(args: &CageArgs, rest: &Model) -> Result<()> {
-    refuse_outputs(args)?;
-    interrupt::leaves_nothing()?;
-    match (&args.check, &args.repair, &args.output) {
-        (Some(path), _, _) => check_cage(args, rest, path),
-        (None, Some(path), Some(output)) => repair_cage(args, rest, path, output),
+pub(super) fn run(args: &CageArgs, targets: &Targets, rest: &Model) -> Result<()> {
+    match (&args.check, &args.repair, &targets.output) {
+        (Some(path), _, _) => check_cage(args, targets, rest, path),
+        (None, Some(path), Some(output)) => repair_cage(args, (output, targets), rest, path),
         _ => bail!("-o: say where to write the repaired cage"),
     }
 }
 
 /// Exit status 1 for a cage that cannot be encoded with, so that scripts can ask.
-fn check_cage(args: &CageArgs, rest: &Model, path: &Path) -> Result<()> {
+fn check_cage(args: &CageArgs, targets: &Targets, rest: &Model, path: &Path) -> Result<()> {
     let cage = read_model(path)?;
     let mesh = TriMesh::from(&cage);
     let found = check(&mesh, rest);
-    let mut files = Vec::new();
-    if let Some(report) = &args.report {
-        files.push(whole(report, &pretty(&CheckReport::new(&found, Vec::new()))?)?);
+    if !args.outputs.dry_run {
+        let report = CheckReport::new(&found, Vec::new());
+        commit_together(targets.complete(&report, || picture_of(args, &TriMesh::from(rest), &mesh))?)?;
     }
-    if let Some(picture) = &args.picture {
-        files.push(whole(picture, &picture_of(args, &TriMesh::from(rest), &mesh))?);
-    }
-    commit_together(files)?;
     print(&verdict(path, &found))?;
     if !found.usable() {
         bail!("{}: cannot be encoded with; try --repair", path.display());
@@ -97,7 +92,7 @@ fn check_cage(args: &CageArgs, rest: &Model, path: &Path) -> Result<()> {
     Ok(())
 }
 
-fn repair_cage(args: &CageArgs, rest: &Model, path: &Path, output: &Path) -> Result<()> {
+fn repair_cage(args: &CageArgs, (output, targets): (&Target, &Targets), rest: &Model, path: &Path) -> Result<()> {
     let repaired = repair(&read_model(path)?, rest);
     if !repaired.remaining.usable() {
         bail!(
@@ -107,7 +102,13 @@ fn repair_cage(args: &CageArgs, rest: &Model, path: &Path, output: &Path) -> Res
         );
     }
     let report = CheckReport::new(&repaired.remaining, repaired.changes.clone());
-    finish_repaired(args, output, rest, &repaired.cage, &report)?;
+    if args.outputs.dry_run {
+        return tell_would(output, "a repaired cage", &[targets.report.clone(), targets.picture.clone()]);
+    }
+    let mut files = vec![whole(output, &cage_bytes(output, &repaired.cage)?)?];
+    let picture = || picture_of(args, &TriMesh::from(rest), &TriMesh::from(&repaired.cage));
+    files.extend(targets.complete(&report, picture)?);
+    commit_together(files)?;
     let mut text = String::new();
     for change in &repaired.changes {
         let _ = writeln!(text, "  changed  {change}");
@@ -115,7 +116,7 @@ fn repair_cage(args: &CageArgs, rest: &Model, path: &Path, output: &Path) -> Res
     if repaired.changes.is_empty() {
         text += "  changed  nothing: there was nothing to repair\n";
     }
-    print(&format!("{}{text}", verdict(output, &repaired.remaining)))
+    print(&format!("{}{text}", verdict(output.path(), &repaired.remaining)))
 }
 
 fn verdict(path: &Path, found: &Findings) -> String {

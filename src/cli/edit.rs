@@ -1,24 +1,30 @@
 //! `cager edit`.
 
-use super::outputs::refuse_overwriting;
+use super::dry_run::{size, tell_would};
+use super::outputs::Outputs;
 use super::transfer_args::EditArgs;
-use super::{grouped, interrupt, print, progress};
+use super::{grouped, progress, tell};
 use crate::edited::EditedCages;
 use crate::{decode, edit};
 use anyhow::Result;
+use cager_formats::commit_together;
 
 pub(super) fn run(args: &EditArgs) -> Result<()> {
-    refuse_overwriting(&args.output, None, [&args.input, &args.with_cages])?;
+    let output = Outputs::new(args.outputs, [&args.input, &args.with_cages])?.binary(&args.output, "edited.cager")?;
     let container = decode::open(&args.input)?;
     let edited = EditedCages::open(&args.with_cages, &container)?;
-    interrupt::leaves_nothing()?;
+    let rows = container.header().rows_per_frame as usize;
     let bar = progress::frames("editing", edited.frames());
-    let result = edit::edit(container, &args.input, edited, &args.output, &mut |done| bar.set_position(done as u64));
+    let result = edit::edit(container, &args.input, edited, &output, &mut |done| bar.set_position(done as u64));
     bar.finish_and_clear();
     let found = result?;
-    print(&format!(
+    if args.outputs.dry_run {
+        return tell_would(&output, &size(found.frames, rows, "vertices"), &[]);
+    }
+    commit_together(vec![found.container])?;
+    tell(&format!(
         "{}: {} frames, {} of them with another cage; errors of these are not measured\n",
-        args.output.display(),
+        output.path().display(),
         grouped(found.frames as u64),
         grouped(found.changed as u64)
     ))

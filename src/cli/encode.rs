@@ -3,8 +3,9 @@
 use super::args::{CoordinatesArg, EncodeArgs, SolverArgs, SpectrumArg, StyleArg};
 use super::checks::{capture_files, check_cage, check_capture};
 use super::design;
-use super::outputs::refuse_overwriting;
-use super::{grouped, human_bytes, interrupt, is_verbose, plain, progress, tell, warn};
+use super::dry_run::{read_files, size, tell_would};
+use super::outputs::Outputs;
+use super::{grouped, human_bytes, is_verbose, plain, progress, tell, warn};
 use crate::coordinates;
 use crate::design::{DesignReport, read_frames};
 use crate::encode::{self, ChooseSpectrum, Encoded, Job, sample_frames};
@@ -22,13 +23,14 @@ use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{PrepareError, Solver, SolverOptions, check_options, usual_spectrum};
 use cager_core::mesh::{Model, TriMesh};
 use cager_core::regularize::{Regularizer, SparseMatrix, Term};
-use cager_formats::{AtomicFile, CompleteFile, FrameReader, commit_together, read_matrix, read_model};
+use cager_formats::{AtomicFile, CompleteFile, FrameReader, Target, commit_together, read_matrix, read_model};
 use std::io::Write;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 pub(super) fn run(args: &EncodeArgs) -> Result<()> {
     let clock = Instant::now();
+    let targets = Targets::new(args)?;
     let mut rest = read_model(&args.rest)?;
     let mut files = capture_files(&args.capture, &args.frames, &mut rest);
     files.range = args.frames_range;
@@ -40,14 +42,67 @@ pub(super) fn run(args: &EncodeArgs) -> Result<()> {
     if let (Some(path), Some(cage)) = (&args.cage, &cage) {
         check_cage((path, cage.mesh()), &rest, &args.capture.checks)?;
     }
+    if args.outputs.dry_run {
+        return dry_run(args, &targets, &files, &rest, cage.as_ref());
+    }
     match (&args.server, &cage) {
-        (None, Some(cage)) => here(args, &files, &rest, cage, None, clock),
+        (None, Some(cage)) => here(args, &targets, &files, &rest, cage, None, clock),
         (None, None) => {
             let (cage, report) = designed(args, &files, &rest)?;
-            here(args, &files, &rest, &cage, Some(report), clock)
+            here(args, &targets, &files, &rest, &cage, Some(report), clock)
         }
-        (Some(address), cage) => elsewhere(args, address, files, &rest, cage.as_ref(), clock),
+        (Some(address), cage) => elsewhere(args, &targets, address, files, &rest, cage.as_ref(), clock),
     }
+}
+
+/// Where the container goes, and the report.
+struct Targets {
+    output: Target,
+    report: Option<Target>,
+}
+
+impl Targets {
+    fn new(args: &EncodeArgs) -> Result<Self> {
+        let inputs = [&args.rest, &args.frames].into_iter().chain(&args.cage).chain(&args.solver.regularizer_matrix);
+        let mut outputs = Outputs::new(args.outputs, inputs)?;
+        let output = outputs.binary(&args.output, "walk.cager")?;
+        Ok(Self { output, report: args.report.as_ref().map(|path| outputs.text(path)).transpose()? })
+    }
+
+    fn begin_report(&self) -> Result<Option<AtomicFile>> {
+        Ok(self.report.as_ref().map(AtomicFile::create).transpose()?)
+    }
+}
+
+/// What can be known without designing a cage and solving, and without a service.
+fn dry_run(
+    args: &EncodeArgs,
+    targets: &Targets,
+    files: &CaptureFiles,
+    rest: &Model,
+    cage: Option<&Cage>,
+) -> Result<()> {
+    let matrix = matrix(&args.solver)?;
+    spectrum_bound(&args.solver)?;
+    if args.server.is_some() {
+        refuse_choosing(&args.solver)?;
+    }
+    let what = match cage {
+        Some(cage) => {
+            let (system, _) = checked_solver(args, rest, cage, matrix.as_ref())?;
+            let frames = read_files(files)?;
+            format!("cages of {}, and the rest pose", size(frames, system.unknowns(cage), "unknowns"))
+        }
+        None => {
+            design_options(args, rest.points.len())?;
+            solver_for(&args.solver, |_| 0)?;
+            if args.server.is_some() {
+                designed_spectrum(&args.solver)?;
+            }
+            format!("{} frames; a cage would be designed from them first", grouped(read_files(files)? as u64))
+        }
+    };
+    tell_would(&targets.output, &what, std::slice::from_ref(&targets.report))
 }
 
 /// How a cage is designed. Mean value coordinates do without a tidy one; the others want all points inside.
@@ -73,8 +128,6 @@ fn design_options(args: &EncodeArgs, points: usize) -> Result<DesignOptions> {
 /// A cage from the capture itself.
 fn designed(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<(Cage, DesignReport)> {
     let options = design_options(args, rest.points.len())?;
-    // Outputs that cannot be written cost no waiting.
-    refuse_outputs(args)?;
     let frames = read_frames(files).map_err(|error| name_files(error, args))?;
     let design = design::design((&args.rest, rest), (&args.frames, &frames), None, &options)?;
     warn(&design.warnings);
@@ -85,6 +138,7 @@ fn designed(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<(Ca
 
 fn here(
     args: &EncodeArgs,
+    targets: &Targets,
     files: &CaptureFiles,
     rest: &Model,
     cage: &Cage,
@@ -106,14 +160,14 @@ fn here(
         }
         _ => None,
     };
-    let report_file = begin(args)?;
+    let report_file = targets.begin_report()?;
 
     let bar = progress::frames("encoding", frames.frames());
     let job = Job {
         rest,
         cage,
         frames: frames.as_mut(),
-        output: &args.output,
+        output: &targets.output,
         system,
         options,
         term: matrix.as_ref().map(|matrix| matrix as &dyn Term),
@@ -124,7 +178,7 @@ fn here(
     let mut encoded = result.map_err(|error| name_files(error, args))?;
     encoded.report.seconds.read += read_seconds;
     encoded.report.design = design;
-    finish(args, encoded, report_file, clock)
+    finish(targets, encoded, report_file, clock)
 }
 
 /// Frames to choose a spectrum threshold by: the first ones where cages follow their predecessors.
@@ -136,6 +190,7 @@ fn choosing_frames(frames: &mut dyn FrameReader, first_ones: bool) -> Result<Vec
 /// words that name them.
 fn elsewhere(
     args: &EncodeArgs,
+    targets: &Targets,
     address: &str,
     files: CaptureFiles,
     rest: &Model,
@@ -149,20 +204,10 @@ fn elsewhere(
     let read_seconds = clock.elapsed().as_secs_f64();
     let matrix = matrix(&args.solver)?;
     spectrum_bound(&args.solver)?;
-    if args.solver.spectrum == Some(SpectrumArg::Auto) {
-        bail!(
-            "--spectrum auto: a service prepares before it sees a frame to measure; give a number, or encode without --server"
-        );
-    }
+    refuse_choosing(&args.solver)?;
     let (system, options, spectrum) = match cage {
         Some(cage) => {
-            let (system, options) = solver(&args.solver, cage)?;
-            let delta = matrix.map_or(Ok(()), |matrix| matrix.delta(cage, system.unknowns(cage)).map(|_| ()));
-            match delta.map_err(PrepareError::from).and_then(|()| Solver::check(system, cage, &rest.points, options)) {
-                // The service knows its own memory.
-                Ok(()) | Err(PrepareError::HandlesOutOfMemory { .. }) => {}
-                Err(error) => return Err(name_file(&error, args)),
-            }
+            let (system, options) = checked_solver(args, rest, cage, matrix.as_ref())?;
             // Where there is a threshold it was checked; where there is none, none is used.
             (system, options, Some(u32::try_from(options.spectrum).unwrap_or(u32::MAX)))
         }
@@ -172,11 +217,15 @@ fn elsewhere(
         }
     };
     let handle_count = args.solver.handle_count.map(u32::try_from).transpose();
-    let report_file = begin(args)?;
+    let report_file = targets.begin_report()?;
 
     let token = args.token.clone().or_else(|| std::env::var("CAGER_TOKEN").ok()).filter(|token| !token.is_empty());
     let options = SessionOptions {
-        name: args.output.file_stem().map(|name| name.to_string_lossy().chars().take(200).collect()),
+        name: args
+            .output
+            .file_stem()
+            .filter(|&name| name != "-")
+            .map(|name| name.to_string_lossy().chars().take(200).collect()),
         coordinates: Some(system.name().to_owned()),
         handles: Some(options.handles.name().to_owned()),
         handle_count: handle_count.context("--handle-count: is larger than any number of points")?,
@@ -199,7 +248,7 @@ fn elsewhere(
         },
         matrix: args.solver.regularizer_matrix.as_deref(),
         frames,
-        output: &args.output,
+        output: &targets.output,
         options,
     };
     let designing = progress::steps();
@@ -214,30 +263,44 @@ fn elsewhere(
     bar.finish_and_clear();
     let EncodedRemotely { mut encoded, session, .. } = result?;
     encoded.report.seconds.read += read_seconds;
-    finish(args, encoded, report_file, clock)?;
+    finish(targets, encoded, report_file, clock)?;
     tell(&format!("  service {}, session {}\n", plain(address), plain(&session)))
 }
 
-/// What comes before the work, so that outputs that cannot be written cost no waiting.
-fn begin(args: &EncodeArgs) -> Result<Option<AtomicFile>> {
-    refuse_outputs(args)?;
-    interrupt::leaves_nothing()?;
-    Ok(args.report.as_ref().map(AtomicFile::create).transpose()?)
+fn refuse_choosing(args: &SolverArgs) -> Result<()> {
+    if args.spectrum == Some(SpectrumArg::Auto) {
+        bail!(
+            "--spectrum auto: a service prepares before it sees a frame to measure; give a number, or encode without --server"
+        );
+    }
+    Ok(())
 }
 
-fn refuse_outputs(args: &EncodeArgs) -> Result<()> {
-    let inputs = [&args.rest, &args.frames].into_iter().chain(&args.cage).chain(&args.solver.regularizer_matrix);
-    refuse_overwriting(&args.output, args.report.as_deref(), inputs)
+/// [`solver`] for this rest pose and cage, with all checked that needs no coordinates.
+fn checked_solver(
+    args: &EncodeArgs,
+    rest: &Model,
+    cage: &Cage,
+    matrix: Option<&SparseMatrix>,
+) -> Result<(&'static dyn CoordinateSystem, SolverOptions)> {
+    let (system, options) = solver(&args.solver, cage)?;
+    let delta = matrix.map_or(Ok(()), |matrix| matrix.delta(cage, system.unknowns(cage)).map(|_| ()));
+    match delta.map_err(PrepareError::from).and_then(|()| Solver::check(system, cage, &rest.points, options)) {
+        // A service knows its own memory.
+        Err(PrepareError::HandlesOutOfMemory { .. }) if args.server.is_some() => {}
+        checked => checked.map_err(|error| name_file(&error, args))?,
+    }
+    Ok((system, options))
 }
 
-fn finish(args: &EncodeArgs, encoded: Encoded, report_file: Option<AtomicFile>, clock: Instant) -> Result<()> {
+fn finish(targets: &Targets, encoded: Encoded, report_file: Option<AtomicFile>, clock: Instant) -> Result<()> {
     let Encoded { mut report, container } = encoded;
     report.seconds.total = clock.elapsed().as_secs_f64();
     // A full disk shows here, before either file has its name.
     let report_file = report_file.map(|file| write_report(file, &report)).transpose()?;
     commit_together(report_file.into_iter().chain([container]).collect())?;
     warn(&report.warnings);
-    tell(&summary(&report, &args.output))
+    tell(&summary(&report, targets.output.path()))
 }
 
 /// Errors of the mathematics know vertices and points; the user knows files.

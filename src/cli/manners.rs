@@ -4,9 +4,13 @@ use super::args::Manners;
 use super::print;
 use anyhow::{Context, Result};
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// How much is said; set once, before the command.
 static SAID: OnceLock<Said> = OnceLock::new();
+
+/// Whether stdout holds an output, so that nothing else may go there.
+static STDOUT_TAKEN: AtomicBool = AtomicBool::new(false);
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Said {
@@ -41,7 +45,16 @@ pub(crate) fn is_verbose() -> bool {
     SAID.get() == Some(&Said::Most)
 }
 
-/// Says on stdout what was done.
+/// Takes stdout for an output; false where another one has it.
+pub(super) fn take_stdout() -> bool {
+    !STDOUT_TAKEN.swap(true, Ordering::Relaxed)
+}
+
+pub(super) fn stdout_is_taken() -> bool {
+    STDOUT_TAKEN.load(Ordering::Relaxed)
+}
+
+/// Says on stdout what was done, or on stderr where stdout holds an output.
 pub(crate) fn tell(text: &str) -> Result<()> {
     if is_quiet() { Ok(()) } else { print(text) }
 }

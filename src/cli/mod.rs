@@ -9,6 +9,7 @@ mod decode;
 mod demo;
 mod design;
 mod doctor;
+mod dry_run;
 mod edit;
 mod encode;
 mod health;
@@ -84,8 +85,13 @@ fn refused(error: &clap::Error) -> ExitCode {
     ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
 }
 
-/// Writes to stdout; a reader that has seen enough, as `head` has, is no failure.
+/// Writes to stdout, or to stderr where stdout holds an output; a reader that has seen enough, as `head` has, is no failure.
 fn print(text: &str) -> anyhow::Result<()> {
+    if manners::stdout_is_taken() {
+        // As for errors, nowhere is left to report a closed stderr to.
+        let _ = std::io::stderr().write_all(text.as_bytes());
+        return Ok(());
+    }
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {

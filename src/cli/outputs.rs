@@ -1,41 +1,112 @@
-//! Where outputs may not go.
+//! Where outputs go, and where they may not.
 
+use super::{interrupt, manners};
 use anyhow::{Result, bail};
-use cager_formats::{CacheFormat, MeshFormat};
+use cager_formats::{AtomicFile, Target, frame_files, frames_path};
+use clap::Args;
+use std::fs;
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
-/// An output in place of an input, or of the other output, is a slip that would cost the user a file.
-pub(super) fn refuse_overwriting<'a>(
-    output: &Path,
-    report: Option<&Path>,
-    inputs: impl IntoIterator<Item = &'a PathBuf>,
-) -> Result<()> {
-    let inputs: Vec<&PathBuf> = inputs.into_iter().collect();
-    for output in [Some(output), report].into_iter().flatten() {
-        refuse_input(output, inputs.iter().copied())?;
-        // It may be a frame of the folder or pattern; no container or report has such a name.
-        if output.exists() && (MeshFormat::from_path(output).is_ok() || CacheFormat::from_path(output).is_some()) {
-            bail!("{}: is a mesh or a capture, so it is not replaced; name another file", output.display());
-        }
+/// What holds for every output of a command.
+#[derive(Args, Clone, Copy, Debug)]
+pub(crate) struct OutputArgs {
+    /// Replace outputs that are there already.
+    #[arg(long)]
+    pub(super) overwrite: bool,
+
+    /// Check files and options, say what would be written, and write nothing.
+    #[arg(long)]
+    pub(super) dry_run: bool,
+}
+
+/// The outputs of a command, each checked when it is named: before the work, so that one that cannot be written costs no waiting.
+pub(super) struct Outputs {
+    overwrite: bool,
+    inputs: Vec<PathBuf>,
+    taken: Vec<PathBuf>,
+}
+
+impl Outputs {
+    /// Outputs that may not be in place of these inputs, files or captures.
+    pub(super) fn new<'a>(args: OutputArgs, inputs: impl IntoIterator<Item = &'a PathBuf>) -> Result<Self> {
+        interrupt::leaves_nothing()?;
+        let inputs = inputs.into_iter().flat_map(frame_files).filter_map(|path| path.canonicalize().ok()).collect();
+        Ok(Self { overwrite: args.overwrite, inputs, taken: Vec::new() })
     }
-    let place = |path: &Path| {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        path.canonicalize().ok().or_else(|| Some(folder.canonicalize().ok()?.join(path.file_name()?)))
-    };
-    let second = report.and_then(place);
-    if second.is_some() && second == place(output) {
-        bail!("{}: cannot hold both outputs; name two files", output.display());
+
+    /// A file of text.
+    pub(super) fn text(&mut self, path: &Path) -> Result<Target> {
+        let target = self.target(path, path)?;
+        // Whether it can be written; dropped at once, which leaves nothing.
+        drop(AtomicFile::create(&target)?);
+        Ok(target)
+    }
+
+    /// A file that is nothing for a terminal, called like `example`.
+    pub(super) fn binary(&mut self, path: &Path, example: &str) -> Result<Target> {
+        refuse_terminal(path, example)?;
+        self.text(path)
+    }
+
+    /// Frames in any of their formats.
+    pub(super) fn frames(&mut self, path: &Path) -> Result<Target> {
+        refuse_terminal(path, "walk.npy")?;
+        let place = frames_path(path);
+        let target = self.target(path, place)?;
+        if !self.overwrite && fs::read_dir(place).is_ok_and(|mut files| files.next().is_some()) {
+            bail!(
+                "{}: is a folder that is not empty; name another, or give --overwrite to replace frames in it",
+                path.display()
+            );
+        }
+        Ok(target)
+    }
+
+    fn target(&mut self, path: &Path, place: &Path) -> Result<Target> {
+        let shown = path.display();
+        if path.as_os_str() == "-" {
+            if !manners::take_stdout() {
+                bail!("-: standard output cannot hold two outputs; name a file for one of them");
+            }
+            return Ok(Target::standard_output());
+        }
+        if let Some(at) = resolved(place) {
+            if self.taken.contains(&at) {
+                bail!("{shown}: cannot hold two outputs; name two files");
+            }
+            match self.inputs.iter().find(|input| input.starts_with(&at)) {
+                Some(input) if *input == at => {
+                    bail!("{shown}: is an input, so it cannot be an output; name another file")
+                }
+                // It would be replaced as a whole.
+                Some(_) => bail!("{shown}: is a folder with an input in it, so it cannot be an output; name another"),
+                None => self.taken.push(at),
+            }
+        }
+        match fs::metadata(place) {
+            Ok(found) if found.is_dir() => {}
+            Ok(found) if !found.is_file() => {
+                bail!("{shown}: is not a regular file; name one, or give - for standard output")
+            }
+            Ok(_) if !self.overwrite => {
+                bail!("{shown}: is there already; name another file, or give --overwrite to replace it")
+            }
+            _ => {}
+        }
+        Ok(if self.overwrite { Target::replacing(path) } else { Target::new(path) })
+    }
+}
+
+fn refuse_terminal(path: &Path, example: &str) -> Result<()> {
+    if path.as_os_str() == "-" && std::io::stdout().is_terminal() {
+        bail!("-: standard output is a terminal; redirect it, as in -o - > {example}");
     }
     Ok(())
 }
 
-/// An input cannot be written over while it is read.
-pub(super) fn refuse_input<'a>(output: &Path, inputs: impl IntoIterator<Item = &'a PathBuf>) -> Result<()> {
-    let Ok(place) = output.canonicalize() else { return Ok(()) };
-    for input in inputs {
-        if input.canonicalize().is_ok_and(|input| input == place) {
-            bail!("{}: is an input, so it cannot be an output; name another file", output.display());
-        }
-    }
-    Ok(())
+/// Where a file is, or will be.
+fn resolved(path: &Path) -> Option<PathBuf> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    path.canonicalize().ok().or_else(|| Some(folder.canonicalize().ok()?.join(path.file_name()?)))
 }

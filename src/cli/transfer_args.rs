@@ -1,5 +1,6 @@
 //! What can be typed after `cager decode` beside its files, and after `cager edit`.
 
+use super::outputs::OutputArgs;
 use cager_formats::FrameRange;
 use clap::Args;
 use std::path::PathBuf;
@@ -49,7 +50,10 @@ pub(crate) struct EditArgs {
     #[arg(long, value_name = "EDITED")]
     pub(crate) with_cages: PathBuf,
 
-    /// File to write; it appears whole or not at all.
+    /// File to write, or - for standard output; it appears whole or not at all.
     #[arg(short, long, value_name = "OUT.cager")]
     pub(crate) output: PathBuf,
+
+    #[command(flatten)]
+    pub(crate) outputs: OutputArgs,
 }

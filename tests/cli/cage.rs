@@ -72,9 +72,10 @@ fn a_designed_cage_encodes_more_accurately_than_one_of_the_rest_pose_and_is_repo
     let cage = read_cage(&dir, "moved.obj");
     assert_eq!(faults(&cage, &small.rest), Vec::<String>::new());
     let error = |cage: &str| {
-        let line = format!("encode --rest rest.obj --cage {cage} --frames frames.npy --handles all -o out.cager");
+        let line =
+            format!("encode --rest rest.obj --cage {cage} --frames frames.npy --handles all -o out.cager --overwrite");
         dir.cager(&line).succeeds();
-        dir.cager("decode out.cager -o out.npy").succeeds();
+        dir.cager("decode out.cager -o out.npy --overwrite").succeeds();
         mean(
             &measure(&small.rest.points, &small.frames, &read_frames(&dir.path("out.npy"), small.rest.points.len())).l2,
         )
@@ -92,13 +93,13 @@ fn a_designed_cage_encodes_more_accurately_than_one_of_the_rest_pose_and_is_repo
 #[test]
 fn encode_without_a_cage_designs_one_and_its_file_decodes() {
     let (dir, small) = Dir::with_capture();
-    let line = "encode --rest rest.obj --frames frames.npy --cage-vertices 40 --time-limit 10 -o out.cager --report report.json";
+    let line = "encode --rest rest.obj --frames frames.npy --cage-vertices 40 --time-limit 10 -o out.cager --overwrite --report report.json";
     dir.cager(line).succeeds();
     let report = dir.json("report.json");
     assert_eq!(report["design"]["style"], "free");
     assert_eq!(report["design"]["vertices"], report["cage_vertices"]);
     assert!(report["cage_vertices"].as_u64().expect("a number") <= 40);
-    dir.cager("decode out.cager -o out.npy").succeeds();
+    dir.cager("decode out.cager -o out.npy --overwrite").succeeds();
     let found = measure(&small.rest.points, &small.frames, &read_frames(&dir.path("out.npy"), small.rest.points.len()));
     let told = report["error"]["l2_mean"].as_f64().expect("an error");
     assert!((mean(&found.l2) - told).abs() < 1e-6 * told + 1e-9, "{told}");
@@ -107,7 +108,7 @@ fn encode_without_a_cage_designs_one_and_its_file_decodes() {
 #[test]
 fn harmonic_coordinates_without_a_cage_get_one_with_every_point_inside() {
     let (dir, _) = Dir::with_capture();
-    let line = "encode --rest rest.obj --frames frames.npy --coordinates harmonic --cage-vertices 30 --time-limit 5 -o out.cager --report report.json";
+    let line = "encode --rest rest.obj --frames frames.npy --coordinates harmonic --cage-vertices 30 --time-limit 5 -o out.cager --overwrite --report report.json";
     dir.cager(line).succeeds();
     assert_eq!(dir.json("report.json")["design"]["style"], "editable");
 }
@@ -134,7 +135,7 @@ fn check_names_everything_that_is_wrong_and_repair_puts_it_right() {
     let repaired = dir.cager("cage --rest rest.obj --repair broken.obj -o repaired.obj").succeeds().stdout;
     assert!(repaired.contains("changed"), "{repaired}");
     assert_eq!(faults(&read_cage(&dir, "repaired.obj"), &small.rest), Vec::<String>::new());
-    dir.cager("encode --rest rest.obj --cage repaired.obj --frames frames.npy -o out.cager").succeeds();
+    dir.cager("encode --rest rest.obj --cage repaired.obj --frames frames.npy -o out.cager --overwrite").succeeds();
 }
 
 #[test]
@@ -216,8 +217,7 @@ fn the_smallest_cage_for_an_error_is_found() {
     assert_eq!(made.rest, small.rest);
     dir.cager("cage --rest rest.obj --frames frames.npy --mean-error 0.004 -o small.obj --report small.json")
         .succeeds();
-    let line =
-        "encode --rest rest.obj --cage small.obj --frames frames.npy --handles spread -o out.cager --report out.json";
+    let line = "encode --rest rest.obj --cage small.obj --frames frames.npy --handles spread -o out.cager --overwrite --report out.json";
     dir.cager(line).succeeds();
     let reached = dir.json("out.json")["error"]["l2_mean"].as_f64().expect("an error");
     assert!(reached < 0.0045, "{reached}");

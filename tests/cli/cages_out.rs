@@ -43,10 +43,12 @@ fn cages_are_written_in_every_format_with_the_rest_cage_and_its_faces_beside_the
     let posed = read_model(&dir.path("folder/frame_0007.obj")).expect("a cage");
     assert_eq!(posed.faces, as_model(&small.cage).faces);
     assert_eq!(dir.names("named")[19], "c.019.obj");
-    // The same once more replaces nothing; what else lies there stays.
-    dir.cager("decode out.cager --cages -o cages.npy").succeeds();
+    // The same rest cage may lie there already; another one stays, unless it may be replaced.
+    dir.cager("decode out.cager --cages -o cages.pc2").succeeds();
     dir.write("other.cage.obj", "v 0 0 0\n");
-    refused(&dir, "decode out.cager --cages -o other.npy", &["other.cage.obj", "another file"]);
+    refused(&dir, "decode out.cager --cages -o other.npy", &["other.cage.obj", "another file", "--overwrite"]);
+    dir.cager("decode out.cager --cages -o other.npy --overwrite").succeeds();
+    assert_eq!(dir.read("other.cage.obj"), dir.read("cages.cage.obj"));
 }
 
 #[test]
@@ -57,7 +59,7 @@ fn cages_decode_to_the_same_positions_and_edited_ones_to_moved_ones() {
     let truth = read_frames(&dir.path("model.npy"), points);
     for edited in ["cages.npy", "cages.pc2", "cages/"] {
         dir.cager(&format!("decode out.cager --cages -o {edited}")).succeeds();
-        let line = format!("decode out.cager --with-cages {edited} -o same.npy");
+        let line = format!("decode out.cager --with-cages {edited} -o same.npy --overwrite");
         dir.cager(&line).succeeds();
         assert!(same(&read_frames(&dir.path("same.npy"), points), &truth), "{edited}");
     }
@@ -66,7 +68,7 @@ fn cages_decode_to_the_same_positions_and_edited_ones_to_moved_ones() {
     for frames in [3, 20, 40] {
         let edited: Vec<_> = moved(&cages, 2.0).into_iter().cycle().take(frames).collect();
         dir.frames("edited.npy", &edited);
-        dir.cager("decode out.cager --with-cages edited.npy -o moved.npy").succeeds();
+        dir.cager("decode out.cager --with-cages edited.npy -o moved.npy --overwrite").succeeds();
         let found = read_frames(&dir.path("moved.npy"), points);
         assert_eq!(found.len(), frames);
         for (found, truth) in found.iter().zip(truth.iter().cycle()) {

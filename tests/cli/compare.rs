@@ -6,7 +6,8 @@ use cager_core::mesh::{Model, Polygons};
 use serde_json::Value;
 use std::collections::BTreeSet;
 
-const COMPARE: &str = "compare --rest rest.obj --cage cage.obj --frames frames.npy -o report.html --json figures.json";
+const COMPARE: &str =
+    "compare --rest rest.obj --cage cage.obj --frames frames.npy -o report.html --json figures.json --overwrite";
 
 fn compared() -> (Dir, String, Value) {
     let (dir, _) = Dir::with_capture();
@@ -123,7 +124,7 @@ fn figures_are_those_of_encodings_with_the_same_options() {
     ] {
         let options = format!("--handles {handles} --regularizer {regularizer} --spectrum {spectrum}");
         let line = format!(
-            "encode --rest rest.obj --cage cage.obj --frames frames.npy -o out.cager --report e.json {options}"
+            "encode --rest rest.obj --cage cage.obj --frames frames.npy -o out.cager --overwrite --report e.json {options}"
         );
         dir.cager(&line).succeeds();
         let report = dir.json("e.json");

@@ -53,7 +53,7 @@ fn decoding_is_identical_each_time_and_for_any_number_of_threads() {
     dir.cager("decode out.cager -o back.npy").succeeds();
     let first = dir.read("back.npy");
     for threads in ["1", "2", "5"] {
-        dir.cager("decode out.cager -o back.npy").env("RAYON_NUM_THREADS", threads).succeeds();
+        dir.cager("decode out.cager -o back.npy --overwrite").env("RAYON_NUM_THREADS", threads).succeeds();
         assert!(dir.read("back.npy") == first, "{threads} threads give other positions");
     }
 }

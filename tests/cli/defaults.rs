@@ -12,8 +12,10 @@ const SYSTEMS: [&str; 4] = ["mvc", "harmonic", "green", "green-free"];
 #[test]
 fn points_are_spread_and_the_end_of_the_spectrum_keeps_the_shape_of_the_rest_cage() {
     let (dir, _) = Dir::with_capture();
-    dir.cager("encode --rest rest.obj --cage cage.obj --frames frames.npy -o out.cager --report report.json")
-        .succeeds();
+    dir.cager(
+        "encode --rest rest.obj --cage cage.obj --frames frames.npy -o out.cager --overwrite --report report.json",
+    )
+    .succeeds();
     let report = dir.json("report.json");
     let unknowns = report["unknowns"].as_u64().expect("unknowns");
     assert_eq!((&report["handles"], &report["regularizer"]), (&"spread".into(), &"differential".into()));
@@ -27,7 +29,8 @@ fn a_frame_that_equals_the_rest_pose_gives_the_rest_cage() {
     fs::create_dir(dir.path("only")).expect("a folder");
     fs::copy(dir.path("rest.obj"), dir.path("only/1.obj")).expect("a frame");
     for system in SYSTEMS {
-        let encode = "encode --rest rest.obj --cage cage.obj --frames only -o out.cager --report report.json";
+        let encode =
+            "encode --rest rest.obj --cage cage.obj --frames only -o out.cager --overwrite --report report.json";
         dir.cager(&format!("{encode} --coordinates {system}")).succeeds();
         let largest = dir.json("report.json")["error"]["linf_max"].as_f64().expect("an error");
         assert!(largest <= 1e-6, "{system}: {largest:e}");
@@ -67,7 +70,9 @@ fn a_rest_pose_of_the_pairs_gives_its_cage() {
 fn the_worst_frame_and_point_are_named_with_their_distance_in_the_unit_of_the_files() {
     let (dir, small) = Dir::with_capture();
     let said = dir
-        .cager("encode --rest rest.obj --cage cage.obj --frames frames.npy -o out.cager --report report.json")
+        .cager(
+            "encode --rest rest.obj --cage cage.obj --frames frames.npy -o out.cager --overwrite --report report.json",
+        )
         .succeeds();
     let report = dir.json("report.json");
     let (worst, diagonal) = (&report["error"]["worst"], report["diagonal"].as_f64().expect("a diagonal"));

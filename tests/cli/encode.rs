@@ -30,7 +30,7 @@ fn every_source_of_the_same_frames_gives_the_same_file() {
     dir.frames("frames.mdd", &small.frames);
     let mut files = Vec::new();
     for source in ["frames.npy", "wide.npy", "frames.pc2", "poses", "poses/*.obj", "mixed/pose*.ply"] {
-        dir.cager("encode --rest rest.obj --cage cage.obj -o out.cager --frames").arg(source).succeeds();
+        dir.cager("encode --rest rest.obj --cage cage.obj -o out.cager --overwrite --frames").arg(source).succeeds();
         assert_eq!(read_cages(&dir.path("out.cager")).len(), 20, "{source}");
         files.push((source, dir.read("out.cager")));
     }
@@ -39,7 +39,7 @@ fn every_source_of_the_same_frames_gives_the_same_file() {
     }
     // This one knows its frame rate too.
     let cages = read_cages(&dir.path("out.cager"));
-    dir.cager("encode --rest rest.obj --cage cage.obj -o out.cager --frames frames.mdd").succeeds();
+    dir.cager("encode --rest rest.obj --cage cage.obj -o out.cager --overwrite --frames frames.mdd").succeeds();
     assert_eq!(read_cages(&dir.path("out.cager")), cages);
 }
 
@@ -183,7 +183,7 @@ fn report_errors_are_those_of_the_decoded_output() {
     ] {
         let (dir, small) = Dir::with_capture();
         let report = encode(&dir, options);
-        dir.cager("decode out.cager -o decoded.npy").succeeds();
+        dir.cager("decode out.cager -o decoded.npy --overwrite").succeeds();
         let decoded = read_frames(&dir.path("decoded.npy"), small.rest.points.len());
         let found = measure(&small.rest.points, &small.frames, &decoded);
         for (t, (l2, linf)) in found.l2.iter().zip(&found.linf).enumerate() {
@@ -423,8 +423,7 @@ fn a_threshold_is_chosen_by_the_error_it_costs() {
     for frame in 0..20 {
         dir.model(&format!("poses/{frame}.obj"), &small.posed(frame));
     }
-    let line =
-        "encode --rest rest.obj --cage cage.obj --frames poses -o out.cager --spectrum auto --report report.json";
+    let line = "encode --rest rest.obj --cage cage.obj --frames poses -o out.cager --overwrite --spectrum auto --report report.json";
     dir.cager(&format!("{line} --regularizer temporal")).succeeds();
     assert_eq!(dir.json("report.json")["spectrum_choice"]["frames"], 20);
 }
@@ -432,8 +431,7 @@ fn a_threshold_is_chosen_by_the_error_it_costs() {
 #[test]
 fn one_mesh_file_is_a_capture_of_one_frame() {
     let (dir, _) = Dir::with_capture();
-    let line =
-        "encode --rest rest.obj --cage cage.obj --frames rest.obj --spectrum 0 -o out.cager --report report.json";
+    let line = "encode --rest rest.obj --cage cage.obj --frames rest.obj --spectrum 0 -o out.cager --overwrite --report report.json";
     dir.cager(line).succeeds();
     let report = dir.json("report.json");
     assert_eq!(report["frames"], 1);
@@ -452,7 +450,7 @@ fn an_old_output_is_replaced_by_success_and_kept_byte_for_byte_by_failure() {
     let failed = dir.cager(&format!("{ENCODE} --report report.json")).run();
     assert_eq!(failed.status, Some(1), "{}", failed.stderr);
     assert!(dir.contents() == before, "a failed encoding changed {:?}", dir.names(""));
-    let line = "encode --rest rest.obj --cage cage.obj --frames good.npy -o out.cager --report report.json";
+    let line = "encode --rest rest.obj --cage cage.obj --frames good.npy -o out.cager --overwrite --report report.json";
     dir.cager(line).succeeds();
     assert_ne!(dir.read("out.cager"), b"the old capture");
     assert_eq!(dir.json("report.json")["frames"], 20);
@@ -482,7 +480,8 @@ fn half_a_model_in_the_cage_of_the_whole_is_encoded_well_with_the_default_option
         small.frames.iter().map(|f| upper.iter().flat_map(|&i| f[3 * i..3 * i + 3].to_vec()).collect()).collect();
     dir.model("rest.ply", &rest);
     dir.frames("frames.npy", &frames);
-    let line = "encode --rest rest.ply --cage cage.obj --frames frames.npy -o out.cager --report report.json";
+    let line =
+        "encode --rest rest.ply --cage cage.obj --frames frames.npy -o out.cager --overwrite --report report.json";
     for options in ["", " --handles all", " --spectrum 0"] {
         dir.cager(&format!("{line}{options}")).succeeds();
         let report = dir.json("report.json");

@@ -3,7 +3,7 @@
 use crate::support::{Dir, close, largest, mean, measure, read_cages, read_frames};
 
 const ENCODE_GREEN: &str =
-    "encode --rest rest.obj --cage cage.obj --frames frames.npy -o out.cager --report report.json";
+    "encode --rest rest.obj --cage cage.obj --frames frames.npy -o out.cager --overwrite --report report.json";
 
 #[test]
 fn captures_come_back_from_both_systems_with_the_errors_that_were_reported() {
@@ -19,7 +19,7 @@ fn captures_come_back_from_both_systems_with_the_errors_that_were_reported() {
             assert!(report["affine_reproduction_error"].as_f64().is_some_and(|e| e < 1e-10), "{what}");
             let cages = read_cages(&dir.path("out.cager"));
             assert!(cages.len() == 20 && cages.iter().all(|cage| cage.len() == 3 * rows), "{what}");
-            dir.cager("decode out.cager -o back.npy").succeeds();
+            dir.cager("decode out.cager -o back.npy --overwrite").succeeds();
             let found = read_frames(&dir.path("back.npy"), small.rest.points.len());
             let errors = measure(&small.rest.points, &small.frames, &found);
             let number = |key: &str| report["error"][key].as_f64().expect(key);
@@ -80,7 +80,7 @@ fn points_outside_are_encoded_and_counted() {
         assert!(said.contains("points lie outside the cage"), "{said}");
         let report = dir.json("report.json");
         assert!(report["affine_reproduction_error"].as_f64().is_some_and(|e| e < 1e-10), "{system}");
-        dir.cager("decode out.cager -o back.npy").succeeds();
+        dir.cager("decode out.cager -o back.npy --overwrite").succeeds();
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::refused::assert_sentence;
 use crate::support::{Dir, as_model, close, largest, mean, measure, read_cages, read_frames};
 
-const ENCODE_HARMONIC: &str = "encode --rest rest.obj --cage cage.obj --frames frames.npy -o out.cager --report report.json --coordinates harmonic";
+const ENCODE_HARMONIC: &str = "encode --rest rest.obj --cage cage.obj --frames frames.npy -o out.cager --overwrite --report report.json --coordinates harmonic";
 
 #[test]
 fn captures_come_back_with_the_errors_that_were_reported() {
@@ -20,7 +20,7 @@ fn captures_come_back_with_the_errors_that_were_reported() {
         assert!(refined["refinements"].is_u64(), "{refined}");
         assert!(refined["change"].as_f64().is_some_and(|change| change > 0.0 && change <= 1e-3), "{refined}");
         assert_eq!(read_cages(&dir.path("out.cager")).len(), 20);
-        dir.cager("decode out.cager -o back.npy").succeeds();
+        dir.cager("decode out.cager -o back.npy --overwrite").succeeds();
         let found = read_frames(&dir.path("back.npy"), small.rest.points.len());
         let errors = measure(&small.rest.points, &small.frames, &found);
         let number = |key: &str| report["error"][key].as_f64().expect(key);

@@ -27,7 +27,7 @@ fn inputs(frames: usize) -> Dir {
 fn encode(inputs: &Dir) -> String {
     let path = |name| inputs.path(name).display().to_string();
     let (rest, cage, frames) = (path("rest.obj"), path("cage.obj"), path("frames.npy"));
-    format!("encode --rest {rest} --cage {cage} --frames {frames} -o out.cager --report report.json")
+    format!("encode --rest {rest} --cage {cage} --frames {frames} -o out.cager --overwrite --report report.json")
 }
 
 /// A capture that takes minutes to encode, and a folder with outputs of earlier times.

@@ -17,6 +17,7 @@ mod inspect;
 mod interrupted;
 mod manners;
 mod mistakes;
+mod outputs;
 mod ranges;
 mod real_data;
 mod real_green;

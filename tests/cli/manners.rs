@@ -3,7 +3,7 @@
 use crate::support::Dir;
 use std::fs;
 
-const ENCODE: &str = "encode --rest rest.obj --cage cage.obj --frames frames.npy -o out.cager";
+const ENCODE: &str = "encode --rest rest.obj --cage cage.obj --frames frames.npy -o out.cager --overwrite";
 
 #[test]
 fn a_quiet_command_says_nothing_and_a_verbose_one_says_how_long_steps_took() {

@@ -99,7 +99,7 @@ fn gaps_in_frame_numbers_are_refused_with_the_missing_numbers() {
     for number in [1, 2, 3, 5, 8] {
         dir.model(&format!("poses/f{number}.obj"), &small.posed(number));
     }
-    let line = "encode --rest rest.obj --cage cage.obj --frames poses -o out.cager";
+    let line = "encode --rest rest.obj --cage cage.obj --frames poses -o out.cager --overwrite";
     let done = dir.cager(line).run();
     assert_eq!(done.status, Some(1));
     assert_sentence(line, &done.stderr, &["poses", "4 and 6 to 7 are missing", "--allow-gaps"]);
@@ -113,7 +113,7 @@ fn the_numbers_of_frame_files_signs_and_fractions_included_come_back_in_decoded_
     for (k, name) in ["f-2", "f-1", "f0", "f1", "f1.5", "f2"].iter().enumerate() {
         dir.model(&format!("poses/{name}.obj"), &small.posed(k));
     }
-    dir.cager("encode --rest rest.obj --cage cage.obj --frames poses -o out.cager").succeeds();
+    dir.cager("encode --rest rest.obj --cage cage.obj --frames poses -o out.cager --overwrite").succeeds();
     dir.cager("decode out.cager -o back").succeeds();
     let names = ["-0002", "-0001", "0000", "0001", "0001.5", "0002"].map(|number| format!("frame_{number}.obj"));
     let mut sorted = names.to_vec();
@@ -154,7 +154,7 @@ fn frame_rate_and_start_are_kept_and_can_be_given() {
     pc2[20..24].copy_from_slice(&101_f32.to_le_bytes());
     pc2[24..28].copy_from_slice(&2_f32.to_le_bytes());
     dir.write("walk.pc2", &pc2);
-    dir.cager("encode --rest rest.obj --cage cage.obj --frames walk.pc2 -o out.cager").succeeds();
+    dir.cager("encode --rest rest.obj --cage cage.obj --frames walk.pc2 -o out.cager --overwrite").succeeds();
     dir.cager("decode out.cager -o back.pc2").succeeds();
     assert_eq!(dir.read("back.pc2")[..32], pc2[..32]);
     for wrong in ["--fps 0", "--fps -1", "--fps nan", "--start x"] {
@@ -229,7 +229,8 @@ fn a_rest_pose_split_at_seams_is_welded_where_that_is_asked_for() {
         .map(|frame| from.iter().flat_map(|&v| [0, 1, 2].map(|k| frame[3 * v + k])).collect())
         .collect();
     dir.write("split.npy", npy_f64(&all));
-    let line = "encode --rest rest.obj --cage cage.obj --frames split.npy -o out.cager --report report.json";
+    let line =
+        "encode --rest rest.obj --cage cage.obj --frames split.npy -o out.cager --overwrite --report report.json";
     dir.cager(&format!("{line} --weld")).succeeds();
     assert_eq!(dir.json("report.json")["points"], n);
     let welded = dir.json("report.json")["error"]["l2_mean"].as_f64().expect("an error");
@@ -252,7 +253,7 @@ fn an_expanded_pattern_gets_the_hint_to_quote_it() {
     let (dir, small) = Dir::with_capture();
     dir.model("poses/1.obj", &small.posed(1));
     dir.model("poses/2.obj", &small.posed(2));
-    let line = "encode --rest rest.obj --cage cage.obj --frames poses/1.obj poses/2.obj -o out.cager";
+    let line = "encode --rest rest.obj --cage cage.obj --frames poses/1.obj poses/2.obj -o out.cager --overwrite";
     let done = dir.cager(line).run();
     assert_eq!(done.status, Some(2));
     assert!(done.stderr.contains("quote the pattern"), "{}", done.stderr);

@@ -13,8 +13,8 @@ fn encode_takes_a_range_of_frames_and_decode_gives_one() {
         dir.cager(&ENCODE.replace("out.cager", &format!("part.cager --frames-range {range}"))).succeeds();
         let wanted: Vec<_> = frames.iter().map(|&k: &usize| whole[k].clone()).collect();
         assert_eq!(read_cages(&dir.path("part.cager")), wanted, "{range}");
-        dir.cager(&format!("decode out.cager --range {range} -o part.npy")).succeeds();
-        dir.cager("decode part.cager -o direct.npy").succeeds();
+        dir.cager(&format!("decode out.cager --range {range} -o part.npy --overwrite")).succeeds();
+        dir.cager("decode part.cager -o direct.npy --overwrite").succeeds();
         assert_eq!(dir.read("part.npy"), dir.read("direct.npy"), "{range}");
     }
     dir.cager("decode out.cager -o all.npy").succeeds();

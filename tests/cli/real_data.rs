@@ -8,7 +8,7 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::{Handles, SolverOptions};
 use cager_core::mesh::{Model, Point, TriMesh, diagonal, winding_number};
-use cager_formats::{commit_together, open_frames, read_model};
+use cager_formats::{Target, commit_together, open_frames, read_model};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -51,7 +51,16 @@ pub(crate) fn run_with(
 ) -> Report {
     let mut frames = open_frames(folder.join("frames.npy"), rest.points.len()).expect("frames");
     let output = dir.path("out.cager");
-    let job = Job { rest, cage, frames: frames.as_mut(), output: &output, system, options, term: None, choose: None };
+    let job = Job {
+        rest,
+        cage,
+        frames: frames.as_mut(),
+        output: &Target::from(&output),
+        system,
+        options,
+        term: None,
+        choose: None,
+    };
     let encoded = encode(job, &mut |_| {}).expect("an encoding");
     commit_together(vec![encoded.container]).expect("a container");
     encoded.report
@@ -156,7 +165,7 @@ fn a_real_capture_through_the_program_has_the_errors_of_the_reference() {
     let Some(root) = data() else { return };
     let folder = root.join("supercages-arm");
     let dir = Dir::new();
-    let line = "encode --handles all --spectrum 0 -o out.cager --report report.json";
+    let line = "encode --handles all --spectrum 0 -o out.cager --overwrite --report report.json";
     encode_files(&dir, line, &folder.join("rest.obj"), &folder.join("cage.obj"), &folder.join("frames.npy"));
     let (report, expected) = (dir.json("report.json"), &reference(&root)["supercages-arm/cage"]["least_squares"]);
     for key in ["l2_mean", "l2_max", "linf_mean", "linf_max", "kg_percent"] {
@@ -178,7 +187,7 @@ fn on_files(dir: &Dir, line: &str, rest: &Path, cage: &Path, frames: &Path) -> T
 /// Encodes a pair with its rest pose as the only frame, which may fail.
 fn encode_rest_pose(dir: &Dir, folder: &Path) -> Output {
     let (mesh, cage) = (folder.join("mesh.obj"), folder.join("cage.obj"));
-    on_files(dir, "encode -o out.cager --report report.json", &mesh, &cage, &mesh).run()
+    on_files(dir, "encode -o out.cager --overwrite --report report.json", &mesh, &cage, &mesh).run()
 }
 
 /// `Φ · C` in double precision.
@@ -201,7 +210,7 @@ fn armadillo_posed_with_ten_cages_gives_the_ten_cages_back() {
     let frames: Vec<Vec<f64>> = moved.iter().map(|cage_k| posed(&cage, &rest.points, cage_k)).collect();
     let dir = Dir::new();
     dir.write("frames.npy", npy_f64(&frames));
-    let line = "encode --spectrum 0 -o out.cager --report report.json";
+    let line = "encode --spectrum 0 -o out.cager --overwrite --report report.json";
     let (rest_file, cage_file) = (folder.join("armadilloman.obj"), folder.join("bounding_mesh.obj"));
     encode_files(&dir, line, &rest_file, &cage_file, &dir.path("frames.npy"));
     let size = diagonal(&rest.points);
@@ -226,7 +235,7 @@ fn encode_pair(folder: &Path, cage_file: &str) -> (Value, String) {
     }
     let dir = Dir::new();
     dir.write("frames.npy", npy_f64(&frames));
-    let line = "encode --spectrum 0 -o out.cager --report report.json";
+    let line = "encode --spectrum 0 -o out.cager --overwrite --report report.json";
     let said = encode_files(&dir, line, &folder.join("mesh.obj"), &folder.join(cage_file), &dir.path("frames.npy"));
     dir.cager("decode out.cager -o back.npy").succeeds();
     (dir.json("report.json"), said)

@@ -137,7 +137,11 @@ fn loose_vertex_and_too_small_cages_are_refused() {
 fn cage_without_faces_is_refused() {
     let (dir, small) = Dir::with_capture();
     dir.model("cage.ply", &Model { points: small.cage.vertices, faces: Polygons::new() });
-    refused(&dir, "encode --rest rest.obj --cage cage.ply --frames frames.npy -o out.cager", &["cage.ply", "no faces"]);
+    refused(
+        &dir,
+        "encode --rest rest.obj --cage cage.ply --frames frames.npy -o out.cager --overwrite",
+        &["cage.ply", "no faces"],
+    );
 }
 
 #[test]
@@ -149,7 +153,7 @@ fn fewer_points_than_unknowns_are_refused_with_both_numbers() {
     let m = format!("{} unknowns", small.cage.vertices.len());
     refused(
         &dir,
-        "encode --rest rest.obj --cage cage.obj --frames few.npy -o out.cager",
+        "encode --rest rest.obj --cage cage.obj --frames few.npy -o out.cager --overwrite",
         &["rest.obj", "50 points", &m],
     );
 }
@@ -219,7 +223,7 @@ fn binary_mesh_that_is_not_finite_is_refused_with_the_vertex() {
         dir.write("rest.ply", ply);
         refused(
             &dir,
-            "encode --rest rest.ply --cage cage.obj --frames frames.npy -o out.cager",
+            "encode --rest rest.ply --cage cage.obj --frames frames.npy -o out.cager --overwrite",
             &["rest.ply", &format!("vertex {vertex}")],
         );
     }
@@ -250,7 +254,7 @@ fn wrong_frame_in_a_folder_is_refused_with_its_file_and_frame() {
     for frame in 0..12 {
         dir.model(&format!("poses/{frame}.obj"), &small.posed(frame));
     }
-    let line = "encode --rest rest.obj --cage cage.obj --frames poses -o out.cager";
+    let line = "encode --rest rest.obj --cage cage.obj --frames poses -o out.cager --overwrite";
     let mut short = small.posed(10);
     short.points.pop();
     short.faces = Polygons::new();
@@ -273,7 +277,7 @@ fn capture_of_another_mesh_is_refused_with_both_numbers() {
         dir.frames(name, &frames);
         refused(
             &dir,
-            &format!("encode --rest rest.obj --cage cage.obj --frames {name} -o out.cager"),
+            &format!("encode --rest rest.obj --cage cage.obj --frames {name} -o out.cager --overwrite"),
             &[name, &(n - 1).to_string(), &format!("{n} are expected")],
         );
     }
@@ -300,7 +304,7 @@ fn frames_that_are_not_there_are_refused() {
     ] {
         refused(
             &dir,
-            &format!("encode --rest rest.obj --cage cage.obj --frames {frames} -o out.cager"),
+            &format!("encode --rest rest.obj --cage cage.obj --frames {frames} -o out.cager --overwrite"),
             &[frames, word],
         );
     }
@@ -323,9 +327,9 @@ fn missing_and_unreadable_meshes_are_refused() {
         ("text.obj", "no points"),
         ("folder.obj", "name a file"),
     ] {
-        let rest_line = format!("encode --rest {rest} --cage cage.obj --frames frames.npy -o out.cager");
+        let rest_line = format!("encode --rest {rest} --cage cage.obj --frames frames.npy -o out.cager --overwrite");
         refused(&dir, &rest_line, &[rest, word]);
-        let cage_line = format!("encode --rest rest.obj --cage {rest} --frames frames.npy -o out.cager");
+        let cage_line = format!("encode --rest rest.obj --cage {rest} --frames frames.npy -o out.cager --overwrite");
         refused(&dir, &cage_line, &[rest, word]);
     }
 }
@@ -337,7 +341,7 @@ fn truncated_point_cache_is_refused_wherever_it_was_cut() {
         dir.frames(&format!("whole.{kind}"), &small.frames);
         let whole = dir.read(&format!("whole.{kind}"));
         let name = format!("cut.{kind}");
-        let line = format!("encode --rest rest.obj --cage cage.obj --frames {name} -o out.cager");
+        let line = format!("encode --rest rest.obj --cage cage.obj --frames {name} -o out.cager --overwrite");
         for length in [0, 1, 4, 7, 11, 20, 31, whole.len() / 2, whole.len() - 1] {
             dir.write(&name, &whole[..length]);
             refused(&dir, &line, &[&name]);
@@ -436,11 +440,11 @@ fn output_in_place_of_an_input_is_refused() {
     let line = "encode --rest rest.obj --cage cage.obj --frames frames.npy";
     for input in ["rest.obj", "./cage.obj", "frames.npy"] {
         refused(&dir, &format!("{line} -o {input}"), &[input, "input"]);
-        refused(&dir, &format!("{line} -o out.cager --report {input}"), &[input, "input"]);
+        refused(&dir, &format!("{line} -o out.cager --overwrite --report {input}"), &[input, "input"]);
     }
     refused(&dir, &format!("{line} -o both --report both"), &["both", "two files"]);
     dir.write("both", "an old file");
-    refused(&dir, &format!("{line} -o both --report ./both"), &["both", "two files"]);
+    refused(&dir, &format!("{line} -o both --report ./both --overwrite"), &["both", "two files"]);
 }
 
 #[test]
@@ -549,7 +553,8 @@ fn a_frame_of_the_captures_own_folder_is_not_replaced_by_the_output() {
     }
     for frames in ["walk", "walk/*.obj"] {
         let line = format!("encode --rest rest.obj --cage cage.obj --frames {frames} -o walk/1.obj");
-        refused(&dir, &line, &["1.obj", "name another file"]);
+        refused(&dir, &line, &["1.obj", "is an input"]);
+        refused(&dir, &format!("{line} --overwrite"), &["1.obj", "is an input"]);
     }
 }
 

@@ -13,7 +13,7 @@ use std::process::{Command, Stdio};
 use tempfile::TempDir;
 
 /// What most tests encode, in a folder made by [`Dir::with_capture`].
-pub(crate) const ENCODE: &str = "encode --rest rest.obj --cage cage.obj --frames frames.npy -o out.cager";
+pub(crate) const ENCODE: &str = "encode --rest rest.obj --cage cage.obj --frames frames.npy -o out.cager --overwrite";
 
 /// A folder of its own for one test.
 pub(crate) struct Dir(TempDir);
@@ -151,6 +151,14 @@ impl TestCommand {
             stdout: String::from_utf8(done.stdout).expect("stdout is UTF-8"),
             stderr: String::from_utf8(done.stderr).expect("stderr is UTF-8"),
         }
+    }
+
+    /// Runs it, expects exit status 0 and gives the bytes that it wrote to stdout, and what it said on stderr.
+    pub(crate) fn streams(mut self) -> (Vec<u8>, String) {
+        let done = self.0.output().expect("the program runs");
+        let said = String::from_utf8(done.stderr).expect("stderr is UTF-8");
+        assert_eq!(done.status.code(), Some(0), "{said}");
+        (done.stdout, said)
     }
 
     /// Runs it and expects exit status 0.

@@ -48,8 +48,8 @@ fn the_model_itself_as_another_model_gives_the_same_positions() {
     for coordinates in ["mvc", "green", "harmonic"] {
         let line = "encode --rest rest.obj --cage cage.obj --frames frames.npy --frames-range 0-2";
         dir.cager(&format!("{line} --coordinates {coordinates} -o {coordinates}.cager")).succeeds();
-        dir.cager(&format!("decode {coordinates}.cager -o own.npy")).succeeds();
-        dir.cager(&format!("decode {coordinates}.cager --model rest.obj -o other.npy")).succeeds();
+        dir.cager(&format!("decode {coordinates}.cager -o own.npy --overwrite")).succeeds();
+        dir.cager(&format!("decode {coordinates}.cager --model rest.obj -o other.npy --overwrite")).succeeds();
         assert_eq!(dir.read("own.npy"), dir.read("other.npy"), "{coordinates}");
     }
 }

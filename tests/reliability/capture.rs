@@ -8,7 +8,7 @@ use cager_core::coordinates::MeanValue;
 use cager_core::inversion::{Solver, SolverOptions};
 use cager_core::mesh::{Model, Polygons, TriMesh};
 use cager_core::synthetic::{Capture, Options};
-use cager_formats::{FrameReader, MeshFormat, commit_together, read_model_bytes, write_model};
+use cager_formats::{FrameReader, MeshFormat, Target, commit_together, read_model_bytes, write_model};
 use std::path::Path;
 
 const SPECTRUM: usize = 12;
@@ -63,7 +63,7 @@ impl Reference {
             rest: &rest,
             cage: &cage,
             frames: &mut reader,
-            output: &output,
+            output: &Target::from(&output),
             system: &MeanValue,
             options,
             term: None,
