@@ -116,7 +116,7 @@ fn encode_through(address: &str, folder: &Path) {
         cage: RemoteCage::File(&folder.join("cage.obj")),
         matrix: None,
         frames: MemoryFrames::new(values.len() / 3 / FRAMES, values),
-        output: &folder.join("capture.cager"),
+        output: &cager_formats::Target::from(folder.join("capture.cager")),
         options: SessionOptions::default(),
     };
     let done = encode_remotely(job, &mut |_| ()).expect("the service encodes");

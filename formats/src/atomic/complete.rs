@@ -264,7 +264,7 @@ mod tests {
     fn a_file_dropped_with_or_without_a_name_leaves_nothing() {
         for named in [false, true] {
             let folder = tempdir().unwrap();
-            let file = begin(&folder.path().join("a"), named);
+            let file = begin(folder.path().join("a"), named);
             assert!(contents(folder.path()).len() <= 1);
             drop(file);
             assert!(contents(folder.path()).is_empty());
