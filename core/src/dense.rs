@@ -1,12 +1,20 @@
 //! The few dense factorisations the method needs, on top of faer.
 //!
-//! Everything here runs sequentially unless it says otherwise: singular vectors of a parallel run differ in their last bits.
+//! Large products and solves are split into blocks of columns that the threads of the current rayon pool share. The blocks follow
+//! from the shape alone, so that the bits do not depend on the threads; everything else here runs sequentially unless it says
+//! otherwise.
 
 use crate::svd::{Svd, svd};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::matmul::matmul;
 use faer::linalg::{cholesky, lu};
 use faer::{Accum, Mat, MatMut, MatRef, Par};
+use rayon::prelude::*;
+
+/// Columns that one task computes of a large product or solve.
+const BLOCK_COLUMNS: usize = 192;
+/// Multiplications below which a product or solve is one task's.
+const WORTH_TASKS: usize = 1 << 26;
 
 /// Pivoted rows of a tall matrix.
 pub(crate) struct PivotedRows {
@@ -62,16 +70,35 @@ pub(crate) fn inverse(a: MatRef<'_, f64>) -> (Mat<f64>, f64) {
     );
     let log_volume = (0..m).map(|j| factors[(j, j)].abs().ln()).sum();
     let mut result = Mat::zeros(m, m);
-    let mut memory = MemBuffer::new(lu::partial_pivoting::inverse::inverse_scratch::<usize, f64>(m, Par::Seq));
-    lu::partial_pivoting::inverse::inverse(
-        result.as_mut(),
-        factors.as_ref(),
-        factors.as_ref(),
-        permutation,
-        Par::Seq,
-        MemStack::new(&mut memory),
-    );
+    if m * m * m < WORTH_TASKS {
+        let mut memory = MemBuffer::new(lu::partial_pivoting::inverse::inverse_scratch::<usize, f64>(m, Par::Seq));
+        let factors = factors.as_ref();
+        let stack = MemStack::new(&mut memory);
+        lu::partial_pivoting::inverse::inverse(result.as_mut(), factors, factors, permutation, Par::Seq, stack);
+        return (result, log_volume);
+    }
+    // A = Pᵀ L U: column `forward[k]` of P's inverse is unit vector k.
+    for (k, &row) in forward.iter().enumerate() {
+        result[(k, row)] = 1.0;
+    }
+    in_column_blocks(result.as_mut(), m * m, |mut columns| {
+        faer::linalg::triangular_solve::solve_unit_lower_triangular_in_place(
+            factors.as_ref(),
+            columns.as_mut(),
+            Par::Seq,
+        );
+        faer::linalg::triangular_solve::solve_upper_triangular_in_place(factors.as_ref(), columns, Par::Seq);
+    });
     (result, log_volume)
+}
+
+/// Calls `work` for blocks of columns that follow from the shape alone; one block where `each`, the multiplications that a column
+/// takes, are few in all.
+fn in_column_blocks(a: MatMut<'_, f64>, each: usize, work: impl Fn(MatMut<'_, f64>) + Send + Sync) {
+    if a.ncols().saturating_mul(each) < WORTH_TASKS || a.ncols() <= BLOCK_COLUMNS {
+        return work(a);
+    }
+    a.par_col_chunks_mut(BLOCK_COLUMNS).for_each(work);
 }
 
 /// Singular values and right singular vectors of a tall matrix, through its QR factorisation.
@@ -124,15 +151,38 @@ pub(crate) fn solve_determined(a: Mat<f64>, mut b: Mat<f64>, lost: f64, nothing:
     if diagonal.iter().enumerate().any(|(i, &d)| l[(i, i)] * l[(i, i)] <= lost * d || d <= nothing) {
         return None;
     }
-    faer::linalg::triangular_solve::solve_lower_triangular_in_place(l.as_ref(), b.as_mut(), Par::Seq);
-    faer::linalg::triangular_solve::solve_upper_triangular_in_place(l.transpose(), b.as_mut(), Par::Seq);
+    in_column_blocks(b.as_mut(), 2 * l.nrows() * l.nrows(), |mut columns| {
+        faer::linalg::triangular_solve::solve_lower_triangular_in_place(l.as_ref(), columns.as_mut(), Par::Seq);
+        faer::linalg::triangular_solve::solve_upper_triangular_in_place(l.transpose(), columns, Par::Seq);
+    });
     Some(b)
 }
 
-/// `A · B`, sequentially.
+/// `L⁻¹ X` in place, for a lower triangular L.
+pub(crate) fn solve_lower(l: MatRef<'_, f64>, x: &mut Mat<f64>) {
+    in_column_blocks(x.as_mut(), l.nrows() * l.nrows(), |columns| {
+        faer::linalg::triangular_solve::solve_lower_triangular_in_place(l, columns, Par::Seq);
+    });
+}
+
+/// `R⁻¹ X` in place, for an upper triangular R.
+pub(crate) fn solve_upper(r: MatRef<'_, f64>, x: &mut Mat<f64>) {
+    in_column_blocks(x.as_mut(), r.nrows() * r.nrows(), |columns| {
+        faer::linalg::triangular_solve::solve_upper_triangular_in_place(r, columns, Par::Seq);
+    });
+}
+
+/// `A · B`.
 pub(crate) fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     let mut out = Mat::zeros(a.nrows(), b.ncols());
-    multiply(out.as_mut(), a, b);
+    if a.nrows() * a.ncols() * b.ncols() < WORTH_TASKS || b.ncols() <= BLOCK_COLUMNS {
+        multiply(out.as_mut(), a, b);
+        return out;
+    }
+    out.as_mut().par_col_chunks_mut(BLOCK_COLUMNS).enumerate().for_each(|(block, columns)| {
+        let count = columns.ncols();
+        multiply(columns, a, b.subcols(block * BLOCK_COLUMNS, count));
+    });
     out
 }
 

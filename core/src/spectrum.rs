@@ -60,9 +60,4 @@ impl RowBasis {
     pub(crate) fn gram_factor(&self) -> Option<Mat<f64>> {
         Some(dense::cholesky(self.handles.gram.clone())?.transpose().to_owned())
     }
-
-    /// `R Φ□`, r × m: small, but with the spectrum of all of `Φ`.
-    pub(crate) fn compressed(&self) -> Option<Mat<f64>> {
-        Some(dense::product(self.gram_factor()?.as_ref(), self.square.as_ref()))
-    }
 }

@@ -125,3 +125,30 @@ fn swaps_lead_from_the_start_to_the_handles_and_their_volume() {
     }
     assert!(maxvol_from(near.as_ref(), (0..25).collect(), TOLERANCE).is_err());
 }
+
+#[test]
+fn many_unknowns_are_prepared_to_the_same_bits_by_any_threads_and_as_an_analysis_of_everything_does() {
+    let capture = Capture::new(&Options { points: 2_600, frames: 3, cage_vertices: 560 });
+    let cage = Cage::new(capture.cage.clone()).unwrap();
+    let points: &[Point] = &capture.rest.points;
+    let everything = Analysis::new(&MeanValue, &cage, points).unwrap();
+    assert!(everything.coordinates().ncols() >= 512, "the sizes where only the ends of some spectra are computed");
+    for handles in [Handles::MaxVol, Handles::Spread { count: None }, Handles::All] {
+        let options = SolverOptions { handles, ..SolverOptions::default() };
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| Solver::prepare(&MeanValue, &cage, points, options).unwrap())
+        };
+        let (one, three) = (with(1), with(3));
+        assert_eq!(one.operator(), three.operator(), "{handles:?}");
+        let (a, b) = (one.preparation(), three.preparation());
+        assert_eq!(a.condition_full.to_bits(), b.condition_full.to_bits());
+        assert_eq!(a.condition_handles.to_bits(), b.condition_handles.to_bits());
+        let whole = everything.solver(options).unwrap();
+        let c = whole.preparation();
+        assert_eq!(one.handles(), whole.handles());
+        assert!((a.condition_full / c.condition_full - 1.0).abs() < 1e-9, "{} {}", a.condition_full, c.condition_full);
+        assert!((a.condition_handles / c.condition_handles - 1.0).abs() < 1e-9, "{handles:?}");
+        assert_eq!(a.singular_values, c.singular_values, "{handles:?}");
+    }
+}

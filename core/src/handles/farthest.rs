@@ -118,6 +118,14 @@ fn nearer_generic(places: &[[Lanes; 3]], squared: &mut [Lanes], p: &Point) -> us
 
 /// All points in blocks along the curve of Morton, and the place of each point on it.
 fn sorted_blocks(points: &[Point]) -> (Vec<Block>, Vec<u32>) {
+    let ids = along_curve(points);
+    let mut place = vec![0; ids.len()];
+    ids.iter().enumerate().for_each(|(at, &id)| place[id as usize] = at as u32);
+    (ids.par_chunks(BLOCK_POINTS).map(|ids| Block::new(points, ids)).collect(), place)
+}
+
+/// All points in the order of the curve of Morton.
+pub(super) fn along_curve(points: &[Point]) -> Vec<u32> {
     const CELLS: f64 = 1024.0;
     let (low, high) = bounds(points);
     let widest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
@@ -132,10 +140,7 @@ fn sorted_blocks(points: &[Point]) -> (Vec<Block>, Vec<u32>) {
         })
         .collect();
     order.par_sort_unstable();
-    let ids: Vec<u32> = order.into_iter().map(|(_, i)| i).collect();
-    let mut place = vec![0; ids.len()];
-    ids.iter().enumerate().for_each(|(at, &id)| place[id as usize] = at as u32);
-    (ids.par_chunks(BLOCK_POINTS).map(|ids| Block::new(points, ids)).collect(), place)
+    order.into_iter().map(|(_, i)| i).collect()
 }
 
 /// Ten bits with two zeros between each.

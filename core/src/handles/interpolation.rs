@@ -16,10 +16,11 @@
 //! variance of the prediction 4, 1, 1, 5 % (for n·K² work), after Lloyd relaxation 6, 2, 1, 3 %; without the rows of maximum volume it
 //! is unstable. Kernels with or without compact support and any width beyond four times the spacing differ by less than a percent.
 
+use super::farthest::along_curve;
 use crate::dense;
-use crate::mesh::{Point, diagonal};
+use crate::mesh::{Point, bounds, diagonal};
 use crate::simd::{LANES, Lanes, flat_mut, multiversion};
-use faer::{Accum, Mat, MatRef, Par};
+use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
 /// Support of the covariance, in distances of the farthest point from its nearest sample.
@@ -27,7 +28,9 @@ const SUPPORT: f64 = 6.0;
 /// Variance of what does not vary smoothly, relative to what does. Keeps coincident samples apart.
 const NUGGET: f64 = 1e-2;
 const BLOCK_ROWS: usize = 256;
-/// Partial sums take this much memory together, unless two already take more.
+/// Samples in the reach of a block, about, where there are many.
+const NEAR_SAMPLES: usize = 512;
+/// Partial sums take about this much memory together, unless two already take more.
 const PARTS_BYTES: usize = 64 << 20;
 
 /// Covariance of residuals as a function of distance.
@@ -70,47 +73,72 @@ pub(crate) fn interpolated(
     let cross = with_all_points(covariance, samples.points, &places, wide);
     let cross = to_basis.map_or_else(|| cross.clone(), |t| dense::product(t.transpose(), cross.as_ref()));
 
-    // Ω⁻¹ [B_S, (Bᵀk)ᵀ]
-    let mut right = Mat::zeros(k, 2 * r);
-    right.as_mut().subcols_mut(0, r).copy_from(sampled);
-    right.as_mut().subcols_mut(r, r).copy_from(cross.transpose());
-    let solved = dense::solve_definite(omega, right)?;
-    let (whitened, predicted) = (solved.as_ref().subcols(0, r), solved.as_ref().subcols(r, r));
-    let normal = dense::product(sampled.transpose(), whitened);
-    let fit = dense::solve_definite(normal, whitened.transpose().to_owned())?;
-    let unexplained = gram - dense::product(cross.as_ref(), whitened);
-    let mut map = dense::product(unexplained.as_ref(), fit.as_ref()) + predicted.transpose();
+    // With Ω = L Lᵀ, S = L⁻¹ B_S and X = L⁻¹ (Bᵀk)ᵀ: Bᵀ N = (M Sᵀ + Xᵀ) L⁻¹, where M SᵀS = BᵀB − XᵀS.
+    let l = dense::cholesky(omega)?;
+    let mut both = Mat::zeros(k, 2 * r);
+    both.as_mut().subcols_mut(0, r).copy_from(sampled);
+    both.as_mut().subcols_mut(r, r).copy_from(cross.transpose());
+    dense::solve_lower(l.as_ref(), &mut both);
+    let (whitened, predicted) = (both.as_ref().subcols(0, r), both.as_ref().subcols(r, r));
+    let normal = dense::cholesky(dense::product(whitened.transpose(), whitened))?;
+    let unexplained = gram - dense::product(predicted.transpose(), whitened);
+    // Both sides transposed: SᵀS Mᵀ = (…)ᵀ.
+    let mut fit = unexplained.transpose().to_owned();
+    dense::solve_lower(normal.as_ref(), &mut fit);
+    dense::solve_upper(normal.transpose(), &mut fit);
+    let mut map = dense::product(whitened, fit.as_ref()) + predicted;
+    dense::solve_upper(l.transpose(), &mut map);
     // Rounding must not cost exactness where a cage explains the frame: BᵀN B_S = BᵀB.
-    let missing = gram - dense::product(map.as_ref(), sampled);
-    map += dense::product(missing.as_ref(), fit.as_ref());
-    Some(map)
+    let mut missing = (gram - dense::product(map.transpose(), sampled)).transpose().to_owned();
+    dense::solve_lower(normal.as_ref(), &mut missing);
+    dense::solve_upper(normal.transpose(), &mut missing);
+    let mut repair = dense::product(whitened, missing.as_ref());
+    dense::solve_upper(l.transpose(), &mut repair);
+    Some((map + repair).transpose().to_owned())
 }
 
-/// `wideᵀ k`, columns of `wide` × K, with the covariance k of all points with the samples. Summed in groups that follow from the
-/// shape alone, so that the threads do not matter.
+/// `wideᵀ k`, columns of `wide` × K, with the covariance k of all points with the samples. Points are taken in blocks along a
+/// space-filling curve, each with the samples in its reach, and added up in that order, so that the threads do not matter.
 fn with_all_points(covariance: Covariance, points: &[Point], samples: &[Point], wide: MatRef<'_, f64>) -> Mat<f64> {
-    let (m, k) = (wide.ncols(), samples.len());
-    let groups = (PARTS_BYTES / (8 * m * k)).clamp(2, 16);
-    let rows_per_group = points.len().div_ceil(groups).next_multiple_of(BLOCK_ROWS);
-    let parts: Vec<Mat<f64>> = points
-        .par_chunks(rows_per_group)
-        .enumerate()
-        .map(|(group, points)| {
-            let mut part = Mat::zeros(m, k);
-            for (block, points) in points.chunks(BLOCK_ROWS).enumerate() {
-                let first = group * rows_per_group + block * BLOCK_ROWS;
-                let near = covariances(covariance, points, samples);
-                let rows = wide.subrows(first, points.len());
-                faer::linalg::matmul::matmul(part.as_mut(), Accum::Add, rows.transpose(), near.as_ref(), 1.0, Par::Seq);
+    let m = wide.ncols();
+    let mut sum = Mat::zeros(m, samples.len());
+    let order = along_curve(points);
+    let blocks: Vec<&[u32]> = order.chunks(BLOCK_ROWS).collect();
+    let together = (PARTS_BYTES / (8 * m * samples.len().min(NEAR_SAMPLES))).clamp(2, 64);
+    for blocks in blocks.chunks(together) {
+        let parts: Vec<(Vec<usize>, Mat<f64>)> = blocks
+            .par_iter()
+            .map(|block| {
+                let own: Vec<Point> = block.iter().map(|&i| points[i as usize]).collect();
+                let near = covariance.in_reach(&own, samples);
+                let places: Vec<Point> = near.iter().map(|&j| samples[j]).collect();
+                let weights = covariances(covariance, &own, &places);
+                let rows = dense::rows_of(wide, block);
+                let mut part = Mat::zeros(m, near.len());
+                dense::multiply(part.as_mut(), rows.transpose(), weights.as_ref());
+                (near, part)
+            })
+            .collect();
+        for (near, part) in &parts {
+            for (k, &j) in near.iter().enumerate() {
+                for (sum, x) in sum.col_mut(j).iter_mut().zip(part.col(k).iter()) {
+                    *sum += x;
+                }
             }
-            part
-        })
-        .collect();
-    let mut sum = Mat::zeros(m, k);
-    for part in &parts {
-        sum += part;
+        }
     }
     sum
+}
+
+impl Covariance {
+    /// The samples that may have a covariance with one of the points.
+    fn in_reach(self, points: &[Point], samples: &[Point]) -> Vec<usize> {
+        let (low, high) = bounds(points);
+        // Rounding may make a box seem as far as the points in it.
+        let most = (1.0 + 1e-9) / (self.inverse_support * self.inverse_support);
+        let squared = |p: &Point| (0..3).map(|k| (low[k] - p[k]).max(p[k] - high[k]).max(0.0).powi(2)).sum::<f64>();
+        samples.iter().enumerate().filter(|(_, p)| squared(p) <= most).map(|(j, _)| j).collect()
+    }
 }
 
 /// Covariances of points with samples, points × samples.

@@ -1,7 +1,7 @@
 //! A rest pose and its cage, analysed: coordinates, handles of maximum volume and decompositions, which solvers with any
 //! options share.
 
-use super::operator::{Decomposed, Spectra};
+use super::operator::{Decomposed, Spectra, Wanted};
 use super::prepare::{
     check, check_options, coordinates_fit, outside, refuse_far_points, refuse_unreproduced, reproduction_error,
 };
@@ -44,7 +44,7 @@ impl Analysis {
     /// # Errors
     /// As [`Solver::prepare`].
     pub fn new(system: &dyn CoordinateSystem, cage: &Cage, points: &[Point]) -> Result<Self, PrepareError> {
-        Self::with_copies(system, cage, points, true, 3)
+        Self::with_copies(system, cage, points, Wanted::Everything, 3)
     }
 
     /// As [`Self::new`], with what solvers of these options need and no more.
@@ -57,16 +57,15 @@ impl Analysis {
         points: &[Point],
         options: SolverOptions,
     ) -> Result<Self, PrepareError> {
-        let whole_frames = matches!(options.handles, Handles::All | Handles::Spread { .. });
         check(points, system.unknowns(cage), options)?;
-        Self::with_copies(system, cage, points, whole_frames, 2)
+        Self::with_copies(system, cage, points, Wanted::For(options.handles), 2)
     }
 
     fn with_copies(
         system: &dyn CoordinateSystem,
         cage: &Cage,
         points: &[Point],
-        whole_frames: bool,
+        wanted: Wanted,
         copies: usize,
     ) -> Result<Self, PrepareError> {
         let m = system.unknowns(cage);
@@ -102,17 +101,17 @@ impl Analysis {
         let decoder = tied.unwrap_or_else(|| decoder_of(&phi));
 
         let clock = Instant::now();
-        let mut spectra = Spectra::of(&basis, whole_frames)?;
-        if basis.rank == m && spectra.full_sigma[m - 1] <= RANK_TOLERANCE * spectra.full_sigma[0] {
+        let mut spectra = Spectra::of(&basis, wanted)?;
+        if basis.rank == m && spectra.full_ends[2] <= RANK_TOLERANCE * spectra.full_ends[0] {
             basis = deficient_basis(phi.as_ref()).ok_or(no_handles)?;
-            spectra = Spectra::of(&basis, whole_frames)?;
+            spectra = Spectra::of(&basis, wanted)?;
         }
         let rank = basis.rank;
         let preparation = Preparation {
             rank,
             affine_reproduction_error: error / diagonal,
-            condition_full: spectra.full_sigma[0] / spectra.full_sigma[rank - 1],
-            condition_handles: spectra.handles.sigma[0] / spectra.handles.sigma[rank - 1],
+            condition_full: spectra.full_ends[0] / spectra.full_ends[1],
+            condition_handles: spectra.handles_ends[0] / spectra.handles_ends[1],
             singular_values: Vec::new(),
             swaps: basis.handles.swaps,
             log_volume: basis.handles.log_volume,
@@ -182,17 +181,18 @@ impl Analysis {
         &self.basis.handles
     }
 
-    /// Singular values of `Φ□`, descending.
+    /// Singular values of `Φ□`, descending; of an analysis [for options](Self::for_options) that do not need them, none.
     pub fn handle_spectrum(&self) -> &[f64] {
-        &self.spectra.handles.sigma
+        self.spectra.handles.as_ref().map_or(&[], |svd| &svd.sigma)
     }
 
-    /// Right singular vectors of `Φ□`, m × m, one per column in the order of [`Self::handle_spectrum`].
+    /// Right singular vectors of `Φ□`, m × m, one per column in the order of [`Self::handle_spectrum`]; 0 × 0 where there are none.
     pub fn handle_vectors(&self) -> MatRef<'_, f64> {
-        self.spectra.handles.v.as_ref()
+        self.spectra.handles.as_ref().map_or(MatRef::from_column_major_slice(&[], 0, 0), |svd| svd.v.as_ref())
     }
 
-    /// Singular values of `Φ`, descending. Those of `ΦᵀΦ` are their squares.
+    /// Singular values of `Φ`, descending. Those of `ΦᵀΦ` are their squares. Of an analysis [for options](Self::for_options) that do
+    /// not need them, none.
     pub fn full_spectrum(&self) -> &[f64] {
         &self.spectra.full_sigma
     }

@@ -10,34 +10,80 @@ use crate::mesh::Point;
 use crate::simd::zeros;
 use crate::spectrum::{RANK_TOLERANCE, RowBasis};
 use crate::svd::{self, Svd};
-use faer::{Mat, MatRef, Par};
+use faer::{Mat, MatRef};
 use rayon::prelude::*;
+
+/// Which decompositions are wanted.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Wanted {
+    /// All of them.
+    Everything,
+    /// What solvers that read these handles need.
+    For(Handles),
+}
+
+/// From this many unknowns on, decompositions of which only the ends are wanted are not made.
+const ENDS_ALONE: usize = 512;
 
 /// Decompositions of the handles of maximum volume and of all points.
 #[derive(Clone)]
 pub(super) struct Spectra {
-    pub(super) handles: Svd,
+    /// Of `Φ□`; none where only its ends are known.
+    pub(super) handles: Option<Svd>,
+    /// Largest and smallest singular value of `Φ□` over the rank; NaN where nobody asks.
+    pub(super) handles_ends: [f64; 2],
+    /// Singular values of `Φ`; none where only the ends are known.
     pub(super) full_sigma: Vec<f64>,
+    /// The largest of them, the smallest over the rank, and the last of all.
+    pub(super) full_ends: [f64; 3],
     /// Of `R Φ□`, where a frame is inverted as a whole.
     pub(super) full: Option<Svd>,
 }
 
 impl Spectra {
-    pub(super) fn of(basis: &RowBasis, whole_frames: bool) -> Result<Self, PrepareError> {
-        let (handles, full) = rayon::join(
-            || svd::svd(basis.square.as_ref()),
-            || {
-                let compressed = basis.compressed()?;
-                if whole_frames {
-                    svd::svd(compressed.as_ref()).map(|svd| (svd.sigma.clone(), Some(svd)))
-                } else {
-                    Some((svd::singular_values(compressed.as_ref())?, None))
-                }
-            },
-        );
-        let handles = handles.ok_or(failed("singular value decomposition of the handles"))?;
-        let (full_sigma, full) = full.ok_or(failed("singular value decomposition of the coordinates"))?;
-        Ok(Self { handles, full_sigma, full })
+    pub(super) fn of(basis: &RowBasis, wanted: Wanted) -> Result<Self, PrepareError> {
+        let m = basis.square.ncols();
+        let (rank, large) = (basis.rank, m >= ENDS_ALONE && basis.rank == m);
+        let whole_frames = matches!(wanted, Wanted::Everything | Wanted::For(Handles::All | Handles::Spread { .. }));
+        let vectors_of_handles = !large || matches!(wanted, Wanted::Everything | Wanted::For(Handles::MaxVol));
+        let values_of_all = !large || wanted == Wanted::Everything;
+        let factor = basis.gram_factor();
+        let whole = || {
+            let factor = factor.as_ref()?;
+            if !whole_frames && !values_of_all {
+                return Some((Vec::new(), None));
+            }
+            let compressed = dense::product(factor.as_ref(), basis.square.as_ref());
+            if whole_frames {
+                svd::svd(compressed.as_ref()).map(|svd| (svd.sigma.clone(), Some(svd)))
+            } else {
+                Some((svd::singular_values(compressed.as_ref())?, None))
+            }
+        };
+        let (handles, full) = rayon::join(|| vectors_of_handles.then(|| svd::svd(basis.square.as_ref())), whole);
+        let handles = match handles {
+            Some(None) => return Err(failed("singular value decomposition of the handles")),
+            Some(Some(svd)) => Some(svd),
+            None => None,
+        };
+        let no_spectrum = failed("singular value decomposition of the coordinates");
+        let (full_sigma, full) = full.ok_or(no_spectrum.clone())?;
+        let inverse = basis.handles.inverse.as_ref();
+        let full_ends = match full_sigma.last() {
+            Some(&last) => [full_sigma[0], full_sigma[rank - 1], last],
+            None => {
+                let [first, last] = svd::ends(factor.ok_or(no_spectrum)?.as_ref(), basis.square.as_ref(), inverse);
+                [first, last, last]
+            }
+        };
+        let handles_ends = match (&handles, wanted) {
+            (Some(svd), _) => [svd.sigma[0], svd.sigma[rank - 1]],
+            (None, Wanted::For(Handles::All)) => {
+                svd::ends(Mat::identity(m, m).as_ref(), basis.square.as_ref(), inverse)
+            }
+            (None, _) => [f64::NAN; 2],
+        };
+        Ok(Self { handles, handles_ends, full_sigma, full_ends, full })
     }
 }
 
@@ -78,7 +124,11 @@ impl Decomposed {
     ) -> Result<Self, PrepareError> {
         let count = handles.count(phi.nrows(), phi.ncols());
         match handles {
-            Handles::MaxVol => Ok(Self::of_rows(basis.handles.rows.clone(), basis.rank, spectra.handles.clone())),
+            Handles::MaxVol => {
+                let known = spectra.handles.clone().or_else(|| svd::svd(basis.square.as_ref()));
+                let svd = known.ok_or(failed("singular value decomposition of the handles"))?;
+                Ok(Self::of_rows(basis.handles.rows.clone(), basis.rank, svd))
+            }
             Handles::Rectangular { .. } => Self::of_given_rows(phi, rectangular_rows(phi, basis, count), basis.rank),
             Handles::Spread { .. } => Self::of_samples(phi, points, basis, spectra, count),
             Handles::All => Self::of_all(phi, basis, spectra),
@@ -114,7 +164,7 @@ impl Decomposed {
                 (left, svd.sigma.clone(), svd.v.clone())
             }
         };
-        let condition = spectra.handles.sigma[0] / spectra.handles.sigma[rank - 1];
+        let condition = spectra.handles_ends[0] / spectra.handles_ends[1];
         Ok(Self { handles: basis.handles.rows.clone(), reads_all: true, left, sigma, rank, v, condition })
     }
 
@@ -130,8 +180,7 @@ impl Decomposed {
         let (handles, reach) = farthest_points(points, &basis.handles.rows, count);
         let samples = Samples { points, rows: &handles, reach };
         let rows = dense::rows_of(phi, &handles);
-        let values = svd::singular_values(dense::upper_factor(rows.clone()).as_ref())
-            .ok_or(failed("singular value decomposition of the rows"))?;
+        let condition = condition_of(rows.as_ref(), basis).ok_or(failed("singular value decomposition of the rows"))?;
         let (map, svd) = match whole(phi, rank, spectra)? {
             Whole::Direct(svd) => {
                 let u = svd.u.as_ref().subcols(0, rank);
@@ -147,12 +196,11 @@ impl Decomposed {
                 // Uᵀ N = (R⁻¹ U')ᵀ Bᵀ N
                 let mut left = svd.u.subcols(0, rank).to_owned();
                 let factor = basis.gram_factor().ok_or(failed("factorisation of the handles"))?;
-                solve_upper(factor.as_ref(), &mut left);
+                dense::solve_upper(factor.as_ref(), &mut left);
                 (map.map(|map| dense::product(left.transpose(), map.as_ref())), svd.clone())
             }
         };
         let left = Left::Rows(map.ok_or(failed("interpolation between the handles"))?.transpose().to_owned());
-        let condition = values[0] / values[rank - 1];
         Ok(Self { handles, reads_all: false, left, sigma: svd.sigma, rank, v: svd.v, condition })
     }
 
@@ -164,7 +212,7 @@ impl Decomposed {
             Left::Rows(left) => dense::product(left.as_ref(), to_cage.transpose()),
             Left::OfPoints { u, factor, to_basis } => {
                 let mut inverse = dense::product(u.as_ref(), to_cage.transpose());
-                solve_upper(factor.as_ref(), &mut inverse);
+                dense::solve_upper(factor.as_ref(), &mut inverse);
                 tall_product(phi, dense::product(to_basis.as_ref(), inverse.as_ref()).as_ref())
             }
         }
@@ -182,16 +230,22 @@ enum Whole<'a> {
 fn whole<'a>(phi: MatRef<'_, f64>, rank: usize, spectra: &'a Spectra) -> Result<Whole<'a>, PrepareError> {
     let what = "singular value decomposition of the coordinates";
     match &spectra.full {
-        Some(full) if spectra.full_sigma[0] <= GRAM_IS_SAFE * spectra.full_sigma[rank - 1] => {
-            Ok(Whole::Compressed(full))
-        }
+        Some(full) if full.sigma[0] <= GRAM_IS_SAFE * full.sigma[rank - 1] => Ok(Whole::Compressed(full)),
         _ => svd::svd(phi).map(Whole::Direct).ok_or(failed(what)),
     }
 }
 
-/// `R⁻¹ X`, in place.
-fn solve_upper(factor: MatRef<'_, f64>, x: &mut Mat<f64>) {
-    faer::linalg::triangular_solve::solve_upper_triangular_in_place(factor, x.as_mut(), Par::Seq);
+/// Condition number over the rank of rows of `Φ`, K × m; where there are many unknowns, by way of the basis.
+fn condition_of(rows: MatRef<'_, f64>, basis: &RowBasis) -> Option<f64> {
+    let (m, rank) = (rows.ncols(), basis.rank);
+    if m >= ENDS_ALONE && rank == m {
+        let sampled = dense::product(rows, basis.to_basis.as_ref());
+        let factor = dense::cholesky(dense::product(sampled.transpose(), sampled.as_ref()))?;
+        let [first, last] = svd::ends(factor.transpose(), basis.square.as_ref(), basis.handles.inverse.as_ref());
+        return Some(first / last);
+    }
+    let values = svd::singular_values(dense::upper_factor(rows.to_owned()).as_ref())?;
+    Some(values[0] / values[rank - 1])
 }
 
 pub(super) fn failed(what: &'static str) -> PrepareError {

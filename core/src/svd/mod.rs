@@ -6,7 +6,10 @@
 
 mod bidiagonal;
 mod divide;
+mod ends;
 mod secular;
+
+pub(crate) use ends::ends;
 
 use bidiagonal::{Bidiagonal, bidiagonalise};
 use divide::{Vectors, decompose};

@@ -1,0 +1,133 @@
+//! The largest and the smallest singular value alone, by the method of Lanczos (1950) with every vector kept orthogonal to all
+//! before: some dozens of products where a decomposition takes as many as columns.
+
+use crate::dense;
+use faer::{Mat, MatRef};
+
+/// Steps that the method takes at the most.
+const STEPS: usize = 240;
+/// It ends when as many steps change the value by less than this fraction.
+const SETTLED: f64 = 1e-13;
+const CALM: usize = 4;
+
+/// Largest and smallest singular value of `R A` from the upper triangular R, m × m, and from A, m × m, with its inverse.
+pub(crate) fn ends(factor: MatRef<'_, f64>, a: MatRef<'_, f64>, inverse: MatRef<'_, f64>) -> [f64; 2] {
+    let m = a.ncols();
+    let (first, last) = rayon::join(
+        || {
+            largest(m, |x| {
+                let image = dense::product(factor, dense::product(a, x).as_ref());
+                dense::product(a.transpose(), dense::product(factor.transpose(), image.as_ref()).as_ref())
+            })
+        },
+        || {
+            largest(m, |x| {
+                let mut image = dense::product(inverse.transpose(), x);
+                faer::linalg::triangular_solve::solve_lower_triangular_in_place(
+                    factor.transpose(),
+                    image.as_mut(),
+                    faer::Par::Seq,
+                );
+                dense::solve_upper(factor, &mut image);
+                dense::product(inverse, image.as_ref())
+            })
+        },
+    );
+    [first.sqrt(), 1.0 / last.sqrt()]
+}
+
+/// Largest eigenvalue of a symmetric positive operator on vectors of length m, given as columns.
+fn largest(m: usize, apply: impl Fn(MatRef<'_, f64>) -> Mat<f64>) -> f64 {
+    let steps = STEPS.min(m);
+    let mut basis = Mat::<f64>::zeros(m, steps + 1);
+    let mut state = 0x9e37_79b9_7f4a_7c15u64;
+    for x in basis.col_mut(0).iter_mut() {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        *x = (state >> 33) as f64 / (1u64 << 30) as f64 - 1.0;
+    }
+    let norm = basis.col(0).norm_l2();
+    basis.col_mut(0).iter_mut().for_each(|x| *x /= norm);
+    let (mut diagonal, mut beside) = (Vec::new(), Vec::new());
+    let (mut value, mut calm) = (0.0, 0);
+    for k in 0..steps {
+        let mut next = apply(basis.as_ref().subcols(k, 1));
+        let known = basis.as_ref().subcols(0, k + 1);
+        // Twice is enough (Kahan and Parlett).
+        for pass in 0..2 {
+            let along = dense::product(known.transpose(), next.as_ref());
+            if pass == 0 {
+                diagonal.push(along[(k, 0)]);
+            }
+            next -= dense::product(known, along.as_ref());
+        }
+        let now = largest_of_tridiagonal(&diagonal, &beside);
+        calm = if (now - value).abs() <= SETTLED * now { calm + 1 } else { 0 };
+        value = now;
+        let length = next.norm_l2();
+        if calm >= CALM || length.is_nan() || length <= f64::EPSILON * now {
+            break;
+        }
+        beside.push(length);
+        for (to, &x) in basis.col_mut(k + 1).iter_mut().zip(next.col(0).iter()) {
+            *to = x / length;
+        }
+    }
+    value
+}
+
+/// Largest eigenvalue of a symmetric tridiagonal matrix, by bisection on the signs of its pivots.
+fn largest_of_tridiagonal(diagonal: &[f64], beside: &[f64]) -> f64 {
+    let around = |i: usize| {
+        let before = if i > 0 { beside[i - 1].abs() } else { 0.0 };
+        before + beside.get(i).filter(|_| i + 1 < diagonal.len()).map_or(0.0, |x| x.abs())
+    };
+    let (mut low, mut high) = (diagonal.iter().copied().fold(f64::NEG_INFINITY, f64::max), f64::NEG_INFINITY);
+    for (i, &d) in diagonal.iter().enumerate() {
+        high = high.max(d + around(i));
+    }
+    let is_above_all = |x: f64| {
+        let mut pivot = f64::INFINITY;
+        diagonal.iter().enumerate().all(|(i, &d)| {
+            let before = if i > 0 { beside[i - 1] } else { 0.0 };
+            pivot = x - d - before * before / pivot;
+            pivot > 0.0
+        })
+    };
+    for _ in 0..100 {
+        let middle = low.midpoint(high);
+        if middle <= low || middle >= high {
+            break;
+        }
+        if is_above_all(middle) { high = middle } else { low = middle }
+    }
+    high
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::svd::singular_values;
+
+    #[test]
+    fn the_ends_are_those_of_the_decomposition() {
+        for m in [1, 2, 3, 20, 150] {
+            let a = Mat::from_fn(m, m, |i, j| {
+                ((i * 31 + j * 17 + i * j) % 23) as f64 / (1 + i + 2 * j) as f64 + if i == j { 3.0 } else { 0.0 }
+            });
+            let factor = Mat::from_fn(m, m, |i, j| {
+                if i == j {
+                    2.0
+                } else if i < j {
+                    1.0 / (1 + i + j) as f64
+                } else {
+                    0.0
+                }
+            });
+            let inverse = dense::inverse(a.as_ref()).0;
+            let all = singular_values(dense::product(factor.as_ref(), a.as_ref()).as_ref()).unwrap();
+            let [first, last] = ends(factor.as_ref(), a.as_ref(), inverse.as_ref());
+            assert!((first / all[0] - 1.0).abs() < 1e-12, "{m}: {first} {}", all[0]);
+            assert!((last / all[m - 1] - 1.0).abs() < 1e-9, "{m}: {last} {}", all[m - 1]);
+        }
+    }
+}
