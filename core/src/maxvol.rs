@@ -258,7 +258,7 @@ fn swap_among(
     rows: &mut [u32],
 ) -> Vec<Swap> {
     let width = phi.ncols();
-    let mut work = Working::gather(phi, candidates, inverse);
+    let mut work = Working::gather(phi, candidates, rows, inverse);
     // Rounding of the updates must not end the swaps just above the tolerance.
     let enough = (1.0 + 0.2 * tolerance) as f32;
     // Each swap multiplies the volume by more than 1 + τ, and Hadamard's inequality bounds the volume.
@@ -284,19 +284,30 @@ fn swap_among(
 }
 
 impl Working {
-    fn gather(phi: MatRef<'_, f64>, candidates: &[u32], inverse: MatRef<'_, f64>) -> Self {
+    /// B at the candidates, for the handles `picked`, whose inverse is given.
+    fn gather(phi: MatRef<'_, f64>, candidates: &[u32], picked: &[u32], inverse: MatRef<'_, f64>) -> Self {
         let width = phi.ncols();
         let mut entries = vec![0.0f32; candidates.len() * width];
         let mut row_max = vec![0.0f32; candidates.len()];
+        // At the handles B is the identity.
+        let mut position = vec![None; phi.nrows()];
+        picked.iter().enumerate().for_each(|(j, &row)| position[row as usize] = Some(j));
         let blocks = entries.par_chunks_mut(BLOCK_ROWS * width).zip(row_max.par_chunks_mut(BLOCK_ROWS));
         blocks.zip(candidates.par_chunks(BLOCK_ROWS)).for_each(|((entries, row_max), candidates)| {
             // Transposed, so that a row of B is contiguous.
-            let rows = dense::rows_of(phi, candidates);
+            let others: Vec<u32> = candidates.iter().copied().filter(|&i| position[i as usize].is_none()).collect();
+            let rows = dense::rows_of(phi, &others);
             let b = dense::product(inverse.transpose(), rows.transpose());
-            for (i, (row, max)) in entries.chunks_exact_mut(width).zip(row_max).enumerate() {
-                for (entry, &x) in row.iter_mut().zip(b.col(i).iter()) {
-                    *entry = x as f32;
-                    *max = if entry.abs() > *max { entry.abs() } else { *max };
+            let mut columns = b.col_iter();
+            for ((row, max), &i) in entries.chunks_exact_mut(width).zip(row_max).zip(candidates) {
+                if let Some(j) = position[i as usize] {
+                    row[j] = 1.0;
+                    *max = 1.0;
+                } else if let Some(column) = columns.next() {
+                    for (entry, &x) in row.iter_mut().zip(column.iter()) {
+                        *entry = x as f32;
+                        *max = if entry.abs() > *max { entry.abs() } else { *max };
+                    }
                 }
             }
         });
@@ -331,6 +342,10 @@ fn update_rows_generic(entries: &mut [f32], row_max: &mut [f32], direction: &[f3
     const WIDE: usize = 16;
     for (row, max) in entries.chunks_exact_mut(direction.len()).zip(row_max) {
         let factor = row[column];
+        // Rows of other handles, among many, are left as they are.
+        if factor == 0.0 {
+            continue;
+        }
         let mut lanes = [0.0f32; WIDE];
         let mut chunks = row.chunks_exact_mut(WIDE);
         let mut steps = direction.chunks_exact(WIDE);
