@@ -158,13 +158,6 @@ pub(crate) fn solve_determined(a: Mat<f64>, mut b: Mat<f64>, lost: f64, nothing:
     Some(b)
 }
 
-/// `L⁻¹ X` in place, for a lower triangular L.
-pub(crate) fn solve_lower(l: MatRef<'_, f64>, x: &mut Mat<f64>) {
-    in_column_blocks(x.as_mut(), l.nrows() * l.nrows(), |columns| {
-        faer::linalg::triangular_solve::solve_lower_triangular_in_place(l, columns, Par::Seq);
-    });
-}
-
 /// `R⁻¹ X` in place, for an upper triangular R.
 pub(crate) fn solve_upper(r: MatRef<'_, f64>, x: &mut Mat<f64>) {
     in_column_blocks(x.as_mut(), r.nrows() * r.nrows(), |columns| {

@@ -15,10 +15,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Default tolerance τ: swaps end when no entry of B exceeds 1.01.
 pub const TOLERANCE: f64 = 0.01;
+/// From this many columns on swaps end at [`LOOSE`].
+const MANY_COLUMNS: usize = 1024;
+/// Tolerance for many columns: each swap costs more there, and the rest of them change errors by less than a hundredth.
+const LOOSE: f64 = 1.0;
 /// Rows whose largest entry of B exceeds this take part in the swaps.
 const CANDIDATE: f32 = 0.9;
 /// Rows of one block of `B`: small enough to share the work evenly, large enough for products at full speed.
 const BLOCK_ROWS: usize = 256;
+/// The same for many columns, where every block's product begins with packing `Φ□⁻¹` anew.
+const LARGE_BLOCK_ROWS: usize = 1024;
 /// The blocks' Gram matrices are added up in a number of groups that follows from the shape alone, so that the sum does not
 /// depend on the threads. They take this much memory together, unless four already take more.
 const GRAM_BYTES: usize = 16 << 20;
@@ -69,6 +75,16 @@ pub struct MaxVol {
 pub struct Dependent {
     /// Smallest pivot of the LU factorisation, relative to the largest.
     pub smallest: f64,
+}
+
+/// The tolerance that handles of so many unknowns are searched with: [`TOLERANCE`], and for cages of more than a thousand unknowns
+/// a looser one.
+pub fn tolerance(unknowns: usize) -> f64 {
+    if unknowns < MANY_COLUMNS { TOLERANCE } else { LOOSE }
+}
+
+fn block_rows(columns: usize) -> usize {
+    if columns < MANY_COLUMNS { BLOCK_ROWS } else { LARGE_BLOCK_ROWS }
 }
 
 /// Picks m rows of the n × m matrix `phi`, n ≥ m, such that no single exchange enlarges their volume by more than 1 + τ.
@@ -157,12 +173,13 @@ fn to_single(phi: MatRef<'_, f64>) -> Mat<f32> {
 /// Largest `|B_ij|` of every row, in single precision: good enough to choose candidates by.
 fn row_maxima(phi: MatRef<'_, f64>, inverse: MatRef<'_, f64>) -> Vec<f32> {
     let (n, m) = phi.shape();
+    let block_rows = block_rows(m);
     let inverse = Mat::<f32>::from_fn(m, m, |i, j| inverse[(i, j)] as f32);
     let mut maxima = vec![0.0f32; n];
-    maxima.par_chunks_mut(BLOCK_ROWS).enumerate().for_each_init(
-        || (Mat::<f32>::zeros(BLOCK_ROWS, m), Mat::<f32>::zeros(BLOCK_ROWS, m)),
+    maxima.par_chunks_mut(block_rows).enumerate().for_each_init(
+        || (Mat::<f32>::zeros(block_rows, m), Mat::<f32>::zeros(block_rows, m)),
         |(single, b), (block, maxima)| {
-            let rows = phi.subrows(block * BLOCK_ROWS, maxima.len());
+            let rows = phi.subrows(block * block_rows, maxima.len());
             let mut single = single.as_mut().subrows_mut(0, maxima.len());
             for j in 0..m {
                 for (s, &x) in single.rb_mut().col_mut(j).iter_mut().zip(rows.col(j).iter()) {
@@ -185,18 +202,19 @@ fn row_maxima(phi: MatRef<'_, f64>, inverse: MatRef<'_, f64>) -> Vec<f32> {
 /// Gram matrix is of no use and is left unfinished.
 fn maxima_and_gram(phi: MatRef<'_, f64>, inverse: MatRef<'_, f64>, limit: f64) -> (Vec<f64>, Mat<f64>) {
     let (n, m) = phi.shape();
+    let block_rows = block_rows(m);
     let mut maxima = vec![0.0f64; n];
     let groups = (GRAM_BYTES / (8 * m * m)).clamp(4, 16);
-    let blocks_per_group = n.div_ceil(BLOCK_ROWS).div_ceil(groups);
+    let blocks_per_group = n.div_ceil(block_rows).div_ceil(groups);
     let exceeded = AtomicBool::new(false);
     let grams: Vec<Mat<f64>> = maxima
-        .par_chunks_mut(blocks_per_group * BLOCK_ROWS)
+        .par_chunks_mut(blocks_per_group * block_rows)
         .enumerate()
         .map(|(group, maxima)| {
             let mut gram = Mat::zeros(m, m);
-            let mut b = Mat::zeros(BLOCK_ROWS.min(maxima.len()), m);
-            for (k, maxima) in maxima.chunks_mut(BLOCK_ROWS).enumerate() {
-                let first = (group * blocks_per_group + k) * BLOCK_ROWS;
+            let mut b = Mat::zeros(block_rows.min(maxima.len()), m);
+            for (k, maxima) in maxima.chunks_mut(block_rows).enumerate() {
+                let first = (group * blocks_per_group + k) * block_rows;
                 let mut b = b.as_mut().subrows_mut(0, maxima.len());
                 dense::multiply(b.rb_mut(), phi.subrows(first, maxima.len()), inverse);
                 for j in 0..m {

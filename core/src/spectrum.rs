@@ -25,7 +25,7 @@ pub(crate) struct RowBasis {
 /// `None` where a decomposition does not converge.
 pub(crate) fn row_basis(phi: MatRef<'_, f64>) -> Option<RowBasis> {
     let m = phi.ncols();
-    if let Ok(handles) = maxvol::maxvol(phi, maxvol::TOLERANCE) {
+    if let Ok(handles) = maxvol::maxvol(phi, maxvol::tolerance(m)) {
         let square = dense::rows_of(phi, &handles.rows);
         let to_basis = handles.inverse.clone();
         return Some(RowBasis { handles, square, rank: m, to_basis });
@@ -43,7 +43,7 @@ pub(crate) fn deficient_basis(phi: MatRef<'_, f64>) -> Option<RowBasis> {
         // Directions the points do feel, of full rank; one fewer each time a borderline singular value still spoils it.
         let alive = v.as_ref().subcols(0, rank);
         let felt = crate::inversion::tall_product(phi, alive);
-        match maxvol::maxvol(felt.as_ref(), maxvol::TOLERANCE) {
+        match maxvol::maxvol(felt.as_ref(), maxvol::tolerance(rank)) {
             Ok(handles) => {
                 let square = dense::rows_of(phi, &handles.rows);
                 let to_basis = dense::product(alive, handles.inverse.as_ref());

@@ -50,18 +50,30 @@ pub(crate) struct Samples<'a> {
     pub(crate) reach: f64,
 }
 
-/// `Bᵀ N`, r × K, for `B = wide · to_basis`, given the rows `B_S` (K × r) and `BᵀB` (r × r). `to_basis` is left out where `wide` is
-/// B itself.
+/// A basis L of the columns of `Φ`, n × r, `wide · to_basis`, and how it stands to B, which is the identity at the first r samples.
+pub(crate) struct Drift<'a> {
+    /// n × m; L itself where `to_basis` is left out.
+    pub(crate) wide: MatRef<'a, f64>,
+    /// m × r.
+    pub(crate) to_basis: Option<MatRef<'a, f64>>,
+    /// B at the samples after the first r, (K − r) × r.
+    pub(crate) others: MatRef<'a, f64>,
+    /// `LᵀB`, r × r.
+    pub(crate) gram: MatRef<'a, f64>,
+}
+
+/// `Lᵀ N`, r × K.
 ///
-/// `None` where a factorisation fails.
-pub(crate) fn interpolated(
-    samples: &Samples<'_>,
-    wide: MatRef<'_, f64>,
-    to_basis: Option<MatRef<'_, f64>>,
-    sampled: MatRef<'_, f64>,
-    gram: MatRef<'_, f64>,
-) -> Option<Mat<f64>> {
-    let (k, r) = sampled.shape();
+/// With `B_S = [I; D]` no cage is seen by `W = [−D, I]`, and `N = [B, 0] + (k − B Ω₁) Wᵀ (W Ω Wᵀ)⁻¹ W` is the same prediction, from
+/// K − r equations; Ω₁ are the first r rows of Ω.
+///
+/// `None` where the factorisation fails.
+pub(crate) fn interpolated(samples: &Samples<'_>, drift: &Drift<'_>) -> Option<Mat<f64>> {
+    let (p, r) = drift.others.shape();
+    let k = p + r;
+    if p == 0 {
+        return Some(drift.gram.to_owned());
+    }
     // No distance is left where every point lies at a sample.
     let reach = samples.reach.max(1e-9 * diagonal(samples.points));
     let covariance = Covariance { inverse_support: 1.0 / (SUPPORT * reach) };
@@ -70,31 +82,21 @@ pub(crate) fn interpolated(
     for i in 0..k {
         omega[(i, i)] += NUGGET;
     }
-    let cross = with_all_points(covariance, samples.points, &places, wide);
-    let cross = to_basis.map_or_else(|| cross.clone(), |t| dense::product(t.transpose(), cross.as_ref()));
+    let cross = with_all_points(covariance, samples.points, &places, drift.wide);
+    let cross = drift.to_basis.map_or_else(|| cross.clone(), |t| dense::product(t.transpose(), cross.as_ref()));
 
-    // With Ω = L Lᵀ, S = L⁻¹ B_S and X = L⁻¹ (Bᵀk)ᵀ: Bᵀ N = (M Sᵀ + Xᵀ) L⁻¹, where M SᵀS = BᵀB − XᵀS.
-    let l = dense::cholesky(omega)?;
-    let mut both = Mat::zeros(k, 2 * r);
-    both.as_mut().subcols_mut(0, r).copy_from(sampled);
-    both.as_mut().subcols_mut(r, r).copy_from(cross.transpose());
-    dense::solve_lower(l.as_ref(), &mut both);
-    let (whitened, predicted) = (both.as_ref().subcols(0, r), both.as_ref().subcols(r, r));
-    let normal = dense::cholesky(dense::product(whitened.transpose(), whitened))?;
-    let unexplained = gram - dense::product(predicted.transpose(), whitened);
-    // Both sides transposed: SᵀS Mᵀ = (…)ᵀ.
-    let mut fit = unexplained.transpose().to_owned();
-    dense::solve_lower(normal.as_ref(), &mut fit);
-    dense::solve_upper(normal.transpose(), &mut fit);
-    let mut map = dense::product(whitened, fit.as_ref()) + predicted;
-    dense::solve_upper(l.transpose(), &mut map);
-    // Rounding must not cost exactness where a cage explains the frame: BᵀN B_S = BᵀB.
-    let mut missing = (gram - dense::product(map.transpose(), sampled)).transpose().to_owned();
-    dense::solve_lower(normal.as_ref(), &mut missing);
-    dense::solve_upper(normal.transpose(), &mut missing);
-    let mut repair = dense::product(whitened, missing.as_ref());
-    dense::solve_upper(l.transpose(), &mut repair);
-    Some((map + repair).transpose().to_owned())
+    let first = omega.as_ref().subrows(0, r);
+    let unseen = |rows: Mat<f64>| {
+        let (left, right) = (rows.as_ref().subcols(0, r), rows.as_ref().subcols(r, p));
+        right - dense::product(left, drift.others.transpose())
+    };
+    let seen = unseen(cross - dense::product(drift.gram, first));
+    let among = unseen(omega.as_ref().subrows(r, p) - dense::product(drift.others, first));
+    let weights = dense::solve_definite(among, seen.transpose().to_owned())?;
+    let mut map = Mat::zeros(r, k);
+    map.as_mut().subcols_mut(0, r).copy_from(drift.gram - dense::product(weights.transpose(), drift.others));
+    map.as_mut().subcols_mut(r, p).copy_from(weights.transpose());
+    Some(map)
 }
 
 /// `wideᵀ k`, columns of `wide` × K, with the covariance k of all points with the samples. Points are taken in blocks along a

@@ -4,7 +4,7 @@ use super::{BLOCK_ROWS, PrepareError};
 use crate::dense;
 use crate::handles::Handles;
 use crate::handles::farthest::farthest_points;
-use crate::handles::interpolation::{Samples, interpolated};
+use crate::handles::interpolation::{Drift, Samples, interpolated};
 use crate::handles::rectangular::rectangular_rows;
 use crate::mesh::Point;
 use crate::simd::zeros;
@@ -179,27 +179,29 @@ impl Decomposed {
         let rank = basis.rank;
         let (handles, reach) = farthest_points(points, &basis.handles.rows, count);
         let samples = Samples { points, rows: &handles, reach };
-        let rows = dense::rows_of(phi, &handles);
-        let condition = condition_of(rows.as_ref(), basis).ok_or(failed("singular value decomposition of the rows"))?;
-        let (map, svd) = match whole(phi, rank, spectra)? {
+        let (first, others) = handles.split_at(rank);
+        let (map, others, svd) = match whole(phi, rank, spectra)? {
             Whole::Direct(svd) => {
                 let u = svd.u.as_ref().subcols(0, rank);
-                let sampled = dense::rows_of(u, &handles);
-                let gram = Mat::<f64>::identity(rank, rank);
-                (interpolated(&samples, u, None, sampled.as_ref(), gram.as_ref()), svd)
+                let (inverse, _) = dense::inverse(dense::rows_of(u, first).as_ref());
+                let others = dense::product(dense::rows_of(u, others).as_ref(), inverse.as_ref());
+                let drift = Drift { wide: u, to_basis: None, others: others.as_ref(), gram: inverse.as_ref() };
+                (interpolated(&samples, &drift), others, svd)
             }
             Whole::Compressed(svd) => {
-                let to_basis = basis.to_basis.as_ref();
-                let sampled = dense::product(rows.as_ref(), to_basis);
-                let gram = basis.handles.gram.as_ref();
-                let map = interpolated(&samples, phi, Some(to_basis), sampled.as_ref(), gram);
+                let (to_basis, gram) = (basis.to_basis.as_ref(), basis.handles.gram.as_ref());
+                let others = dense::product(dense::rows_of(phi, others).as_ref(), to_basis);
+                let drift = Drift { wide: phi, to_basis: Some(to_basis), others: others.as_ref(), gram };
+                let map = interpolated(&samples, &drift);
                 // Uᵀ N = (R⁻¹ U')ᵀ Bᵀ N
                 let mut left = svd.u.subcols(0, rank).to_owned();
                 let factor = basis.gram_factor().ok_or(failed("factorisation of the handles"))?;
                 dense::solve_upper(factor.as_ref(), &mut left);
-                (map.map(|map| dense::product(left.transpose(), map.as_ref())), svd.clone())
+                (map.map(|map| dense::product(left.transpose(), map.as_ref())), others, svd.clone())
             }
         };
+        let condition = condition_of(phi, &handles, others.as_ref(), basis)
+            .ok_or(failed("singular value decomposition of the rows"))?;
         let left = Left::Rows(map.ok_or(failed("interpolation between the handles"))?.transpose().to_owned());
         Ok(Self { handles, reads_all: false, left, sigma: svd.sigma, rank, v: svd.v, condition })
     }
@@ -235,16 +237,15 @@ fn whole<'a>(phi: MatRef<'_, f64>, rank: usize, spectra: &'a Spectra) -> Result<
     }
 }
 
-/// Condition number over the rank of rows of `Φ`, K × m; where there are many unknowns, by way of the basis.
-fn condition_of(rows: MatRef<'_, f64>, basis: &RowBasis) -> Option<f64> {
-    let (m, rank) = (rows.ncols(), basis.rank);
+/// Condition number over the rank of the handles' rows of `Φ`; where there are many unknowns, from `B_S = [I; others]`.
+fn condition_of(phi: MatRef<'_, f64>, handles: &[u32], others: MatRef<'_, f64>, basis: &RowBasis) -> Option<f64> {
+    let (m, rank) = (phi.ncols(), basis.rank);
     if m >= ENDS_ALONE && rank == m {
-        let sampled = dense::product(rows, basis.to_basis.as_ref());
-        let factor = dense::cholesky(dense::product(sampled.transpose(), sampled.as_ref()))?;
+        let factor = dense::cholesky(Mat::<f64>::identity(m, m) + dense::product(others.transpose(), others))?;
         let [first, last] = svd::ends(factor.transpose(), basis.square.as_ref(), basis.handles.inverse.as_ref());
         return Some(first / last);
     }
-    let values = svd::singular_values(dense::upper_factor(rows.to_owned()).as_ref())?;
+    let values = svd::singular_values(dense::upper_factor(dense::rows_of(phi, handles)).as_ref())?;
     Some(values[0] / values[rank - 1])
 }
 
