@@ -11,6 +11,7 @@ mod tests;
 pub use error::{ConfigError, Origin};
 pub use flags::ServeFlags;
 pub(crate) use layers::line_of;
+pub(crate) use settings::bytes;
 
 use crate::auth::TenantLimits;
 use crate::http::listen::{Limits, Tls};

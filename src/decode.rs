@@ -2,12 +2,13 @@
 
 use crate::coordinates;
 use crate::edited::EditedCages;
+use crate::memory::Memory;
 use crate::timing::Timing;
 use cager_core::cage::{Cage, CageError};
 use cager_core::coordinates::CoordinatesError;
 use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, coordinates_fit};
-use cager_core::mesh::Model;
+use cager_core::mesh::{Model, Point};
 use cager_formats::{Action, FrameOptions, FrameRange, Target, create_frames};
 use cager_proto::container::{self, ContainerReader};
 use std::fs::File;
@@ -119,6 +120,8 @@ pub struct Decoding<'a> {
     pub timing: Timing,
     /// Whether all is read and checked, and nothing written.
     pub dry_run: bool,
+    /// What decoding may hold in memory: half of what is free, where nothing is said.
+    pub memory: Option<Memory>,
 }
 
 /// What was decoded.
@@ -128,7 +131,7 @@ pub struct Decoded {
     pub points: usize,
     /// Number of frames.
     pub frames: usize,
-    /// Points that lie outside the rest cage.
+    /// Points of another model that lie outside the rest cage.
     pub outside: usize,
 }
 
@@ -139,11 +142,20 @@ struct Bound {
     outside: usize,
 }
 
-/// Binds the container's model, or another, to the container's cage.
+/// Coordinates that are computed at a time to find the points outside.
+const OUTSIDE_ENTRIES: usize = 1 << 23;
+
+/// Binds the container's model, or another, to the container's cage; `keeps` is asked whether to keep coordinates of so many points and
+/// columns.
 ///
 /// # Errors
 /// Damage, or coordinates that this program does not compute.
-fn bind(container: &mut Container, path: &Path, other: Option<(&Path, &Model)>) -> Result<Bound, DecodeError> {
+fn bind(
+    container: &mut Container,
+    path: &Path,
+    other: Option<(&Path, &Model)>,
+    keeps: impl FnOnce(usize, usize) -> bool,
+) -> Result<Bound, DecodeError> {
     let fail = |cause| DecodeError::container(path, cause);
     let unsupported = |what| DecodeError::Unsupported { path: path.to_owned(), what };
     let header = container.header().clone();
@@ -164,6 +176,15 @@ fn bind(container: &mut Container, path: &Path, other: Option<(&Path, &Model)>) 
         return Err(unsupported(format!("it stores {} rows per frame", header.rows_per_frame)));
     }
     let columns = system.columns(&cage);
+    if let Some(by_point) = system.by_point() {
+        let keeps = keeps(rest.points.len(), columns);
+        let decoder = if keeps { Decoder::keeping } else { Decoder::computing }(by_point, &cage, &rest.points, columns);
+        let decoder = decoder.with_tied_normals(system.tied_normals(&cage));
+        let some = (OUTSIDE_ENTRIES / columns).max(1);
+        let outside = |points: &[Point]| by_point(&cage, points).outside.len();
+        let outside = other.map_or(0, |_| rest.points.chunks(some).map(outside).sum());
+        return Ok(Bound { rest, decoder, outside });
+    }
     if !coordinates_fit(rest.points.len(), columns, 2) {
         let gigabytes = 12e-9 * rest.points.len() as f64 * columns as f64;
         return Err(DecodeError::Memory { path: model_path.to_owned(), gigabytes });
@@ -206,7 +227,8 @@ pub fn decode(
 ) -> Result<Decoded, DecodeError> {
     let fail = |cause| DecodeError::container(input, cause);
     let mut container = open(input)?;
-    let Decoding { model, cages: mut edited, range, timing, dry_run } = what;
+    let Decoding { model, cages: mut edited, range, timing, dry_run, memory } = what;
+    let memory = memory.unwrap_or_else(Memory::half_of_free);
     let there = edited.as_ref().map_or(container.frames(), EditedCages::frames);
     range.map_or(Ok(()), |range| range.check(there, input))?;
     let taken = range.unwrap_or(FrameRange::all(there));
@@ -215,14 +237,17 @@ pub fn decode(
     // Decoding needs neither, but a damaged file is refused wherever the damage is.
     container.errors().map_err(fail)?;
     container.summary().map_err(fail)?;
-    let Bound { rest, decoder, outside } = bind(&mut container, input, model)?;
+    let batch = |points: usize| memory.frames(12 * points, BATCH);
+    let keeps = |points: usize, columns: usize| memory.keeps(points, columns, frames.div_ceil(batch(points)));
+    let Bound { rest, decoder, outside } = bind(&mut container, input, model, keeps)?;
+    let batch = batch(rest.points.len());
     let mut writer = create_frames(output, rest.points.len(), frames, &rest.faces, &options)?;
     // Both keep their allocations from batch to batch.
-    let mut cages = vec![Vec::new(); BATCH];
-    let mut positions = vec![Vec::new(); BATCH];
+    let mut cages = vec![Vec::new(); batch];
+    let mut positions = vec![Vec::new(); batch];
     let mut first = 0;
     while first < frames {
-        let count = BATCH.min(frames - first);
+        let count = batch.min(frames - first);
         for (k, cage) in cages[..count].iter_mut().enumerate() {
             let frame = taken.frame(first + k);
             match &mut edited {

@@ -1,12 +1,14 @@
 //! The main job: frames in, one cage per frame out, measured as a decoder will see it.
 
 use crate::capture::{CaptureWriter, Encoding, StoredError};
+use crate::memory::Memory;
 use crate::report::{Consistency, Report, Seconds, SpectrumChoice, WorstError};
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{Analysis, BATCH, Convergence, PrepareError, Solver, SolverOptions};
+use cager_core::decode::FrameError;
+use cager_core::inversion::{Analysis, BATCH, Convergence, PrepareError, Preparing, Solver, SolverOptions};
 use cager_core::mesh::Model;
-use cager_core::regularize::{Term, TermError};
+use cager_core::regularize::Term;
 use cager_formats::{Action, AtomicFile, CompleteFile, FrameReader, Target};
 use cager_proto::container;
 use rayon::prelude::*;
@@ -14,9 +16,6 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Instant;
-
-/// Frames on their way take at most this much memory, unless one frame per batch already takes more.
-const FRAMES_BYTES: usize = 640 << 20;
 
 /// Why encoding stopped; nothing was written.
 #[derive(Debug, thiserror::Error)]
@@ -77,6 +76,8 @@ pub struct Job<'a> {
     pub term: Option<&'a dyn Term>,
     /// Frames to choose the spectrum threshold by; that of the options counts where there are none.
     pub choose: Option<ChooseSpectrum>,
+    /// What the encoding may hold in memory.
+    pub memory: Memory,
 }
 
 /// What a spectrum threshold is chosen by.
@@ -95,10 +96,10 @@ pub fn sample_frames(
     frames: &mut dyn FrameReader,
     most: usize,
     first_ones: bool,
+    memory: Memory,
 ) -> Result<Vec<Vec<f64>>, EncodeError> {
-    let each = 24 * frames.points().max(1);
     let total = frames.frames();
-    let count = most.min(FRAMES_BYTES / each).clamp(1, total.max(1));
+    let count = memory.frames(24 * frames.points(), most.min(total));
     let mut samples = Vec::with_capacity(count);
     let mut at = 0;
     for k in 0..count {
@@ -130,16 +131,25 @@ pub struct Encoded {
     pub container: CompleteFile,
 }
 
-/// Encodes a capture into one container. `progress` is told the number of frames done.
+/// How far an encoding is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EncodeProgress {
+    /// What is prepared next.
+    Preparing(&'static str),
+    /// So many frames are done.
+    Frames(usize),
+}
+
+/// Encodes a capture into one container.
 ///
 /// # Errors
 /// See [`EncodeError`].
-pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Encoded, EncodeError> {
+pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded, EncodeError> {
     let clock = Instant::now();
     let fail = |cause| EncodeError::container(job.output.path(), cause);
     // Before the work, so that an unwritable place costs no waiting.
     let file = AtomicFile::create(job.output)?;
-    let (solver, options, choice) = prepare(&job)?;
+    let (solver, options, choice) = prepare(&job, &|step| progress(EncodeProgress::Preparing(step)))?;
     let encoding = Encoding {
         rest: job.rest,
         cage: job.cage,
@@ -157,14 +167,14 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Encoded, 
         svd: found.svd_seconds,
         ..Seconds::default()
     };
-    let points = job.frames.points();
+    let size = frames_per_batch(job.memory, job.frames.points());
     let mut convergence = Vec::new();
     let mut worst = None;
     std::thread::scope(|scope| -> Result<(), EncodeError> {
         let (full, batches) = sync_channel(rayon::current_num_threads());
         let (empty, recycled) = sync_channel(2 * rayon::current_num_threads() + 2);
         let frames = job.frames;
-        let reader = scope.spawn(move || read_batches(frames, frames_per_batch(points), &full, &recycled));
+        let reader = scope.spawn(move || read_batches(frames, size, &full, &recycled));
         let mut done = 0;
         let mut previous: Option<Vec<f32>> = None;
         while let Ok(first) = batches.recv() {
@@ -188,7 +198,7 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Encoded, 
             };
             let mut first = done;
             for (batch, solved) in waiting.iter().zip(&solved) {
-                look_for_worst(&mut worst, first, &solver, batch, solved);
+                look_for_worst(&mut worst, first, &solved.errors);
                 first += batch.len();
             }
             for batch in waiting {
@@ -206,7 +216,7 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Encoded, 
                 }
             }
             seconds.write += clock.elapsed().as_secs_f64();
-            progress(done);
+            progress(EncodeProgress::Frames(done));
         }
         let outcome = reader.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
         seconds.read += outcome?;
@@ -229,17 +239,23 @@ pub fn encode(job: Job<'_>, progress: &mut dyn FnMut(usize)) -> Result<Encoded, 
 }
 
 /// The solver, the options it has, and how its threshold was chosen.
-fn prepare(job: &Job<'_>) -> Result<(Solver, SolverOptions, Option<SpectrumChoice>), PrepareError> {
+fn prepare(
+    job: &Job<'_>,
+    tell: &dyn Fn(&'static str),
+) -> Result<(Solver, SolverOptions, Option<SpectrumChoice>), PrepareError> {
     let mut options = job.options;
-    let own = || job.term.ok_or(TermError::Missing);
-    let term: &dyn Term = options.regularizer.term().map_or_else(own, Ok)?;
     let points = &job.rest.points;
+    let batches = job.frames.frames().div_ceil(frames_per_batch(job.memory, points.len()));
+    let keeps_coordinates = job.memory.keeps(points.len(), job.system.columns(job.cage), batches);
+    let preparing = Preparing { term: job.term, keeps_coordinates, tell };
+    let term = preparing.term(options)?;
     let chosen_by = job.choose.as_ref().filter(|choose| !choose.samples.is_empty());
     let Some(ChooseSpectrum { samples, bound }) = chosen_by else {
-        return Ok((Solver::prepare_with(job.system, job.cage, points, options, term)?, options, None));
+        return Ok((Solver::prepare_with(job.system, job.cage, points, options, &preparing)?, options, None));
     };
     term.delta(job.cage, job.system.unknowns(job.cage))?;
-    let analysis = Analysis::for_options(job.system, job.cage, points, options)?;
+    let analysis = Analysis::for_options(job.system, job.cage, points, options, &preparing)?;
+    tell("threshold");
     let reading = analysis.reading(options.handles)?;
     let found = reading.choose_threshold(options, term, samples, *bound)?;
     options.spectrum = found.spectrum;
@@ -248,9 +264,9 @@ fn prepare(job: &Job<'_>) -> Result<(Solver, SolverOptions, Option<SpectrumChoic
 
 type Batch = Vec<Vec<f64>>;
 
-fn frames_per_batch(points: usize) -> usize {
+fn frames_per_batch(memory: Memory, points: usize) -> usize {
     let batches = 2 * rayon::current_num_threads() + 1;
-    (FRAMES_BYTES / batches / (24 * points)).clamp(1, BATCH)
+    memory.frames(24 * batches * points, BATCH)
 }
 
 /// Reads all frames; returns the seconds that took, not counting the time it waited for the solver.
@@ -284,25 +300,23 @@ fn read_batches(
 
 struct SolvedBatch {
     cages: Vec<Vec<f32>>,
-    errors: Vec<cager_core::decode::FrameError>,
+    errors: Vec<FrameError>,
     /// Empty where nothing was iterated.
     convergence: Vec<Convergence>,
     invert_seconds: f64,
     measure_seconds: f64,
 }
 
-/// Solves a batch whose first frame comes after the one with the cage `previous`, where that matters.
 /// Keeps the largest error so far; frames of a batch count from `first` on.
-fn look_for_worst(worst: &mut Option<WorstError>, first: usize, solver: &Solver, batch: &Batch, solved: &SolvedBatch) {
-    let largest = solved.errors.iter().enumerate().reduce(|a, b| if b.1.linf > a.1.linf { b } else { a });
-    if let Some((k, error)) = largest
-        && worst.is_none_or(|worst| error.linf > worst.distance)
-    {
-        let (point, distance) = solver.decoder().worst_point(&solved.cages[k], &batch[k]);
-        *worst = Some(WorstError { frame: first + k, point: Some(point), distance });
+fn look_for_worst(worst: &mut Option<WorstError>, first: usize, errors: &[FrameError]) {
+    for (k, error) in errors.iter().enumerate() {
+        if worst.is_none_or(|worst| error.linf > worst.distance) {
+            *worst = Some(WorstError { frame: first + k, point: Some(error.worst), distance: error.linf });
+        }
     }
 }
 
+/// Solves a batch whose first frame comes after the one with the cage `previous`, where that matters.
 fn solve(solver: &Solver, batch: &Batch, previous: Option<&[f32]>) -> SolvedBatch {
     let frames: Vec<&[f64]> = batch.iter().map(Vec::as_slice).collect();
     let clock = Instant::now();
@@ -344,12 +358,13 @@ mod tests {
 
     #[test]
     fn a_reader_that_ends_early_is_told_and_no_sample_is_empty() {
+        let memory = Memory::at_most(1 << 30);
         for first_ones in [false, true] {
             for left in 0..10 {
-                let error = sample_frames(&mut Short { left }, 24, first_ones).expect_err("too few frames");
+                let error = sample_frames(&mut Short { left }, 24, first_ones, memory).expect_err("too few frames");
                 assert!(matches!(error, EncodeError::EndsEarly { found, announced: 10 } if found == left), "{error}");
             }
-            assert_eq!(sample_frames(&mut Short { left: 10 }, 24, first_ones).expect("all").len(), 10);
+            assert_eq!(sample_frames(&mut Short { left: 10 }, 24, first_ones, memory).expect("all").len(), 10);
         }
     }
 }

@@ -19,6 +19,7 @@ pub mod engine;
 pub mod frames;
 pub mod http;
 mod idempotency;
+pub mod memory;
 mod picture;
 mod plot;
 pub mod problem;

@@ -185,7 +185,7 @@ pub(crate) fn multiply<T: faer::traits::ComplexField>(out: MatMut<'_, T>, a: Mat
 }
 
 /// The given rows of a matrix, in the given order.
-pub(crate) fn rows_of(a: MatRef<'_, f64>, rows: &[u32]) -> Mat<f64> {
+pub(crate) fn rows_of<T: Copy>(a: MatRef<'_, T>, rows: &[u32]) -> Mat<T> {
     Mat::from_fn(rows.len(), a.ncols(), |i, j| a[(rows[i] as usize, j)])
 }
 

@@ -161,7 +161,7 @@ fn a_solver_put_together_again_gives_the_same_bits() {
             reads_all: solver.reads_all(),
             operator: solver.operator().to_owned(),
             pull: solver.pull().clone(),
-            phi: solver.decoder().coordinates().to_owned(),
+            phi: solver.decoder().coordinates().unwrap().to_owned(),
             positions: solver.decoder().positions(),
             tied: Some(TiedParts { normals: normals.clone(), gram: gram.to_owned(), weight }),
             diagonal: solver.diagonal(),

@@ -5,7 +5,7 @@ mod common;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Coordinates, CoordinatesError, MeanValue};
 use cager_core::decode::Decoder;
-use cager_core::inversion::{BATCH, Handles, PrepareError, Solver, SolverOptions};
+use cager_core::inversion::{BATCH, Handles, PrepareError, Preparing, Solver, SolverOptions};
 use cager_core::mesh::Point;
 use cager_core::regularize::{Regularizer, SparseMatrix, Term};
 use cager_core::synthetic::{Capture, Options};
@@ -89,7 +89,7 @@ fn coordinates_that_have_travelled_decode_to_the_same_bits() {
     let solver = prepare(&capture, &cage, SolverOptions::PAPER);
     let frame = frame(&capture, 3);
     let cages = solver.invert(&[&frame]);
-    let phi = solver.decoder().coordinates();
+    let phi = solver.decoder().coordinates().unwrap();
     let rows: Vec<f32> = (0..phi.nrows()).flat_map(|i| (0..phi.ncols()).map(move |j| phi[(i, j)])).collect();
     let elsewhere = Decoder::from_rows(&rows, phi.ncols(), cage.vertices().len());
     assert_eq!((elsewhere.points(), elsewhere.unknowns()), (phi.nrows(), phi.ncols()));
@@ -167,7 +167,14 @@ fn every_method_follows_a_translation_exactly() {
         for regularizer in Regularizer::ALL {
             let options = SolverOptions { handles, regularizer, lambda: 0.1, ..SolverOptions::PAPER };
             let term: &dyn Term = regularizer.term().unwrap_or(&own);
-            let solver = Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, options, term).unwrap();
+            let solver = Solver::prepare_with(
+                &MeanValue,
+                &cage,
+                &capture.rest.points,
+                options,
+                &Preparing { term: Some(term), ..Preparing::default() },
+            )
+            .unwrap();
             let here = frame(&capture, 9);
             let there: Vec<f64> = here.chunks_exact(3).flat_map(|p| [p[0] + 50.0, p[1] - 20.0, p[2] + 3.0]).collect();
             let cages = [&here, &there].map(|frame| solver.invert_after(None, &[frame]).remove(0));

@@ -2,7 +2,7 @@
 
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
-use cager_core::inversion::{Analysis, BATCH, Handles, PrepareError, Solver, SolverOptions};
+use cager_core::inversion::{Analysis, BATCH, Handles, PrepareError, Preparing, Solver, SolverOptions};
 use cager_core::mesh::Point;
 use cager_core::regularize::{CageLaplacian, Reference, Regularizer, SparseMatrix, Term, TermError};
 use cager_core::synthetic::{Capture, Options};
@@ -41,7 +41,14 @@ fn every_term_minimises_its_energy() {
     for regularizer in [Regularizer::Laplacian, Regularizer::Differential, Regularizer::Temporal, Regularizer::Matrix] {
         let term: &dyn Term = regularizer.term().unwrap_or(&own);
         let options = SolverOptions { regularizer, spectrum: m, lambda, ..SolverOptions::PAPER };
-        let solver = Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, options, term).unwrap();
+        let solver = Solver::prepare_with(
+            &MeanValue,
+            &cage,
+            &capture.rest.points,
+            options,
+            &Preparing { term: Some(term), ..Preparing::default() },
+        )
+        .unwrap();
         let previous = solver.invert_after(None, &[&before]).remove(0);
         let found = as_matrix(&solver.invert_after(Some(&previous), &[&now])[0]);
         let rows = Mat::from_fn(m, m, |i, j| phi[(solver.handles()[i] as usize, j)]);

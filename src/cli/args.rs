@@ -4,7 +4,8 @@ use super::cage_args::CageArgs;
 use super::checks::{CaptureArgs, TimingArgs};
 use super::outputs::OutputArgs;
 use super::transfer_args::{EditArgs, TransferArgs};
-use crate::config::ServeFlags;
+use crate::config::{ServeFlags, bytes};
+use crate::memory::Memory;
 use cager_core::inversion::Handles;
 use cager_core::regularize::Regularizer;
 use cager_formats::FrameRange;
@@ -96,6 +97,11 @@ pub(crate) struct EncodeArgs {
 
     #[command(flatten)]
     pub(crate) solver: SolverArgs,
+
+    /// Memory to take beside the model itself, such as 1GB; what does not fit is computed in parts, to the same result [default: half of
+    /// what is free].
+    #[arg(long, value_name = "SIZE", value_parser = memory, hide_default_value = true)]
+    pub(crate) memory: Option<Memory>,
 
     /// Write sizes, errors per frame, spectrum and times as JSON.
     #[arg(long, value_name = "REPORT.json")]
@@ -203,6 +209,11 @@ pub(crate) struct DecodeArgs {
 
     #[command(flatten)]
     pub(crate) timing: TimingArgs,
+
+    /// Memory to take beside the model itself, such as 1GB; what does not fit is computed in parts, to the same result [default: half of
+    /// what is free].
+    #[arg(long, value_name = "SIZE", value_parser = memory, hide_default_value = true)]
+    pub(crate) memory: Option<Memory>,
 
     #[command(flatten)]
     pub(crate) transfer: TransferArgs,
@@ -329,6 +340,15 @@ pub(crate) struct ManArgs {
     /// Folder for the pages; pages of the same names in it are replaced.
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
+}
+
+fn memory(text: &str) -> Result<Memory, String> {
+    const LEAST: u64 = 100_000_000;
+    match bytes(text) {
+        Some(size) if size >= LEAST => Ok(Memory::at_most(size)),
+        Some(_) => Err("give at least 100MB".to_owned()),
+        None => Err("give a size such as 800MB or 2GiB".to_owned()),
+    }
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

@@ -26,9 +26,10 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     let range = transfer.range();
     // A range is checked against the file that has the frames.
     range.map_or(Ok(()), |range| range.check(there, transfer.with_cages.as_ref().unwrap_or(&args.input)))?;
-    let bar = progress::frames("decoding", range.as_ref().map_or(there, FrameRange::count));
-    let mut watch = |done: usize| bar.set_position(done as u64);
+    let taken = range.as_ref().map_or(there, FrameRange::count);
     if transfer.cages {
+        let bar = progress::frames("decoding", taken);
+        let mut watch = |done: usize| bar.set_position(done as u64);
         let result = write_cages(&args.input, &output, (range, (&args.timing).into()), dry_run, &mut watch);
         bar.finish_and_clear();
         let found = result?;
@@ -54,9 +55,12 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
         range,
         timing: (&args.timing).into(),
         dry_run,
+        memory: args.memory,
     };
-    let result = decode::decode(&args.input, &output, what, &mut watch);
-    bar.finish_and_clear();
+    let bar = progress::Prepared::new("decoding", taken);
+    bar.preparing("coordinates");
+    let result = decode::decode(&args.input, &output, what, &mut |done| bar.done(done));
+    bar.finish();
     let found = result?;
     // Of the file's own model, the encoding said so.
     if let (Some(path), true) = (&transfer.model, found.outside > 0) {

@@ -8,8 +8,9 @@ use super::outputs::Outputs;
 use super::{grouped, human_bytes, is_verbose, plain, progress, tell, warn};
 use crate::coordinates;
 use crate::design::{DesignReport, read_frames};
-use crate::encode::{self, ChooseSpectrum, Encoded, Job, sample_frames};
+use crate::encode::{self, ChooseSpectrum, EncodeProgress, Encoded, Job, sample_frames};
 use crate::frames::CaptureFiles;
+use crate::memory::Memory;
 use crate::remote::{EncodedRemotely, FileFrames, RemoteCage, RemoteJob, RemoteProgress, encode_remotely};
 use crate::report::Report;
 use crate::timing::counted_from_zero;
@@ -145,6 +146,7 @@ fn here(
     design: Option<DesignReport>,
     clock: Instant,
 ) -> Result<()> {
+    let memory = args.memory.unwrap_or_else(Memory::half_of_free);
     let mut frames = files.open()?;
     let read_seconds = clock.elapsed().as_secs_f64();
     let (system, options) = solver(&args.solver, cage)?;
@@ -154,7 +156,7 @@ fn here(
             // What is wrong with the options is told before anything is read.
             check_options(rest.points.len(), system.unknowns(cage), options).map_err(|e| name_file(&e, args))?;
             let mut again = files.open()?;
-            let samples = choosing_frames(again.as_mut(), options.regularizer == Regularizer::Temporal)
+            let samples = choosing_frames(again.as_mut(), options.regularizer == Regularizer::Temporal, memory)
                 .map_err(|error| name_files(error, args))?;
             Some(ChooseSpectrum { samples, bound })
         }
@@ -162,7 +164,7 @@ fn here(
     };
     let report_file = targets.begin_report()?;
 
-    let bar = progress::frames("encoding", frames.frames());
+    let bar = progress::Prepared::new("encoding", frames.frames());
     let job = Job {
         rest,
         cage,
@@ -172,9 +174,13 @@ fn here(
         options,
         term: matrix.as_ref().map(|matrix| matrix as &dyn Term),
         choose,
+        memory,
     };
-    let result = encode::encode(job, &mut |done| bar.set_position(done as u64));
-    bar.finish_and_clear();
+    let result = encode::encode(job, &|told| match told {
+        EncodeProgress::Preparing(step) => bar.preparing(step),
+        EncodeProgress::Frames(done) => bar.done(done),
+    });
+    bar.finish();
     let mut encoded = result.map_err(|error| name_files(error, args))?;
     encoded.report.seconds.read += read_seconds;
     encoded.report.design = design;
@@ -182,8 +188,12 @@ fn here(
 }
 
 /// Frames to choose a spectrum threshold by: the first ones where cages follow their predecessors.
-fn choosing_frames(frames: &mut dyn FrameReader, first_ones: bool) -> Result<Vec<Vec<f64>>, encode::EncodeError> {
-    sample_frames(frames, if first_ones { 96 } else { 24 }, first_ones)
+fn choosing_frames(
+    frames: &mut dyn FrameReader,
+    first_ones: bool,
+    memory: Memory,
+) -> Result<Vec<Vec<f64>>, encode::EncodeError> {
+    sample_frames(frames, if first_ones { 96 } else { 24 }, first_ones, memory)
 }
 
 /// The files are read and the options checked here as well, so that what is wrong with them is told before anything is sent, in

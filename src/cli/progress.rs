@@ -3,7 +3,9 @@
 use super::is_quiet;
 use cager_proto::cage_messages::CageProgress;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::cell::OnceCell;
 use std::io::IsTerminal;
+use std::time::Duration;
 
 /// A bar over frames on stderr; hidden where stderr is not a terminal, and by --quiet.
 pub(crate) fn frames(what: &'static str, total: usize) -> ProgressBar {
@@ -26,6 +28,48 @@ pub(crate) fn steps() -> ProgressBar {
     match ProgressStyle::with_template("{msg:>24} {bar:40} {elapsed}") {
         Ok(style) => bar.with_style(style),
         Err(_) => bar,
+    }
+}
+
+/// What is being prepared, with a clock that ticks; then a bar over frames.
+pub(crate) struct Prepared {
+    what: &'static str,
+    total: usize,
+    clock: ProgressBar,
+    frames: OnceCell<ProgressBar>,
+}
+
+impl Prepared {
+    pub(crate) fn new(what: &'static str, total: usize) -> Self {
+        let clock = steps();
+        if !clock.is_hidden() {
+            clock.enable_steady_tick(Duration::from_millis(250));
+        }
+        let clock = match ProgressStyle::with_template("{spinner} preparing: {msg}, {elapsed}") {
+            Ok(style) => clock.with_style(style),
+            Err(_) => clock,
+        };
+        Self { what, total, clock, frames: OnceCell::new() }
+    }
+
+    pub(crate) fn preparing(&self, step: &'static str) {
+        self.clock.set_message(step);
+    }
+
+    /// The bar begins with the first frames, so that what is left is judged by frames alone.
+    pub(crate) fn done(&self, frames: usize) {
+        let begun = || {
+            self.clock.finish_and_clear();
+            self::frames(self.what, self.total)
+        };
+        self.frames.get_or_init(begun).set_position(frames as u64);
+    }
+
+    pub(crate) fn finish(&self) {
+        self.clock.finish_and_clear();
+        if let Some(bar) = self.frames.get() {
+            bar.finish_and_clear();
+        }
     }
 }
 

@@ -173,8 +173,7 @@ impl<'a> Workshop<'a> {
 
 /// What a solver holds beside `Φ`, which all solvers of an analysis share.
 fn own_bytes(solver: &Solver) -> usize {
-    let phi = solver.decoder().coordinates();
-    solver.size_bytes() - 4 * phi.nrows() * phi.ncols()
+    solver.size_bytes() - solver.decoder().size_bytes()
 }
 
 /// Plain inversion.

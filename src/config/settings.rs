@@ -129,7 +129,7 @@ fn in_range(number: Option<u64>, least: u64, most: u64) -> Option<Value> {
 }
 
 /// A size: digits and, after an optional space, a unit.
-fn bytes(text: &str) -> Option<u64> {
+pub(crate) fn bytes(text: &str) -> Option<u64> {
     let text = text.trim();
     let end = text.find(|c: char| !c.is_ascii_digit() && c != '_').unwrap_or(text.len());
     let number: u64 = text[..end].replace('_', "").parse().ok()?;

@@ -11,6 +11,7 @@ use axum::extract::State;
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
 use http::{HeaderMap, HeaderValue, header};
+use std::io;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -60,7 +61,11 @@ pub(crate) async fn get(
     let prepared = service.solver(&session).await?;
     let columns = prepared.solver.decoder().columns();
     let read = move |range: Range<u64>| {
-        let phi = prepared.solver.decoder().coordinates();
+        let phi = prepared
+            .solver
+            .decoder()
+            .coordinates()
+            .ok_or_else(|| io::Error::other("a solver without its coordinates"))?;
         let stride = 4 * phi.ncols() as u64;
         let (begin, end) = (range.start / stride, range.end.div_ceil(stride));
         let mut bytes = Vec::with_capacity(((end - begin) * stride) as usize);

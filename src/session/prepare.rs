@@ -8,9 +8,9 @@ use crate::store::Content;
 use cager_cages::doctor::weld;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions, check_options, usual_spectrum};
+use cager_core::inversion::{Handles, PrepareError, Preparing, Solver, SolverOptions, check_options, usual_spectrum};
 use cager_core::mesh::{Model, TriMesh};
-use cager_core::regularize::{Regularizer, SparseMatrix, Term, TermError};
+use cager_core::regularize::{Regularizer, SparseMatrix, Term};
 use cager_formats::{MeshFormat, read_matrix_bytes, read_model_bytes};
 use cager_proto::messages::SessionOptions;
 use std::path::Path;
@@ -162,9 +162,9 @@ pub(crate) fn prepare(geometry: &Geometry, choices: &Choices, most_bytes: u64) -
     let unknowns = choices.system.unknowns(&geometry.cage);
     let options = choices.solver_options(unknowns);
     check_memory(geometry, choices, options, most_bytes)?;
-    let own = || geometry.matrix.as_ref().map(|matrix| matrix as &dyn Term).ok_or(TermError::Missing);
-    let term = options.regularizer.term().map_or_else(own, Ok).map_err(|error| refused(&error.into()))?;
-    let solver = Solver::prepare_with(choices.system, &geometry.cage, &geometry.rest.points, options, term)
+    let term = geometry.matrix.as_ref().map(|matrix| matrix as &dyn Term);
+    let preparing = Preparing { term, ..Preparing::default() };
+    let solver = Solver::prepare_with(choices.system, &geometry.cage, &geometry.rest.points, options, &preparing)
         .map_err(|error| refused(&error))?;
     Ok(with_solver(solver, &geometry.cage, options))
 }

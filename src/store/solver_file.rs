@@ -80,7 +80,9 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
         svd_seconds,
     } = solver.preparation();
     let decoder = solver.decoder();
-    let (phi, operator, tied) = (decoder.coordinates(), solver.operator(), solver.tied());
+    let no_coordinates = || io::Error::new(io::ErrorKind::InvalidInput, "a solver without its coordinates");
+    let phi = decoder.coordinates().ok_or_else(no_coordinates)?;
+    let (operator, tied) = (solver.operator(), solver.tied());
     let mut header = Vec::with_capacity(HEADER_BYTES);
     header.extend_from_slice(&MAGIC);
     header.extend_from_slice(&key.0);

@@ -16,6 +16,8 @@ mod inspect;
 #[cfg(target_os = "linux")]
 mod interrupted;
 mod manners;
+#[cfg(target_os = "linux")]
+mod memory;
 mod mistakes;
 mod outputs;
 mod ranges;

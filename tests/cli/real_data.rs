@@ -3,6 +3,7 @@
 use crate::support::{Dir, Output, TestCommand, close, npy_f64, read_cages};
 use cager::belong::{FRAMES, Mismatch, Up, mismatches};
 use cager::encode::{Job, encode};
+use cager::memory::Memory;
 use cager::report::Report;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
@@ -60,8 +61,9 @@ pub(crate) fn run_with(
         options,
         term: None,
         choose: None,
+        memory: Memory::half_of_free(),
     };
-    let encoded = encode(job, &mut |_| {}).expect("an encoding");
+    let encoded = encode(job, &|_| {}).expect("an encoding");
     commit_together(vec![encoded.container]).expect("a container");
     encoded.report
 }

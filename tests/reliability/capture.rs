@@ -2,6 +2,7 @@
 
 use cager::capture::{CaptureWriter, Encoding, StoredError};
 use cager::encode::{Job, encode};
+use cager::memory::Memory;
 use cager_client::{MeshFile, NewSession, messages::SessionOptions};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
@@ -68,8 +69,9 @@ impl Reference {
             options,
             term: None,
             choose: None,
+            memory: Memory::half_of_free(),
         };
-        let encoded = encode(job, &mut |_| {}).expect("an encoding");
+        let encoded = encode(job, &|_| {}).expect("an encoding");
         commit_together(vec![encoded.container]).expect("the container");
         let container = std::fs::read(&output).expect("the container");
 

@@ -11,7 +11,7 @@
 //! Normals have a length: the root of the mean area of the faces. So `Φ` has no unit, and a cage's rows have one.
 
 use super::layer::{self, Frame, Layers, Scratch};
-use super::{CoordinateSystem, Coordinates, CoordinatesError, TiedNormals};
+use super::{ByPoint, CoordinateSystem, Coordinates, CoordinatesError, TiedNormals};
 use crate::cage::Cage;
 use crate::mesh::{self, Point};
 use crate::simd::{LANES, Lanes, zeros};
@@ -68,24 +68,32 @@ impl CoordinateSystem for Green {
         })
     }
 
-    fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError> {
-        let layers = Layers::new(cage);
-        let length = normal_length(&layers);
-        let mut phi = zeros(points.len(), self.columns(cage));
-        let outside = phi
-            .as_mut()
-            .par_row_chunks_mut(layer::TASK_POINTS)
-            .enumerate()
-            .map_init(
-                || layers.scratch(),
-                |scratch, (task, rows)| rows_of(&layers, length, points, task * layer::TASK_POINTS, rows, scratch),
-            )
-            .reduce(Vec::new, |mut a, b| {
-                a.extend(b);
-                a
-            });
-        Ok(Coordinates { phi, outside, refinement: None })
+    fn by_point(&self) -> Option<ByPoint> {
+        Some(coordinates)
     }
+
+    fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError> {
+        Ok(coordinates(cage, points))
+    }
+}
+
+fn coordinates(cage: &Cage, points: &[Point]) -> Coordinates {
+    let layers = Layers::new(cage);
+    let length = normal_length(&layers);
+    let mut phi = zeros(points.len(), cage.vertices().len() + cage.faces().len());
+    let outside = phi
+        .as_mut()
+        .par_row_chunks_mut(layer::TASK_POINTS)
+        .enumerate()
+        .map_init(
+            || layers.scratch(),
+            |scratch, (task, rows)| rows_of(&layers, length, points, task * layer::TASK_POINTS, rows, scratch),
+        )
+        .reduce(Vec::new, |mut a, b| {
+            a.extend(b);
+            a
+        });
+    Coordinates { phi, outside, refinement: None }
 }
 
 /// Length of the normals, in the unit of the layers.

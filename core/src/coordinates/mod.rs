@@ -53,6 +53,9 @@ impl Refinement {
     }
 }
 
+/// Coordinates of some points, whatever other points there are.
+pub type ByPoint = fn(&Cage, &[Point]) -> Coordinates;
+
 /// A system of cage coordinates. Every implementation passes the suite in `core/tests/conformance.rs`.
 pub trait CoordinateSystem: Sync {
     /// The name on the command line, in reports and in containers.
@@ -80,6 +83,12 @@ pub trait CoordinateSystem: Sync {
     /// Points for which the system is not defined.
     fn check(&self, _cage: &Cage, _points: &[Point]) -> Result<(), CoordinatesError> {
         Ok(())
+    }
+
+    /// The same as [`Self::coordinates`], where a point's do not depend on the other points and always exist: then `Φ` can be computed
+    /// in parts.
+    fn by_point(&self) -> Option<ByPoint> {
+        None
     }
 
     /// `Φ` for these points. Rows sum to one; runs on the current rayon pool; the result does not depend on it.

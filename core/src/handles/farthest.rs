@@ -125,7 +125,7 @@ fn sorted_blocks(points: &[Point]) -> (Vec<Block>, Vec<u32>) {
 }
 
 /// All points in the order of the curve of Morton.
-pub(super) fn along_curve(points: &[Point]) -> Vec<u32> {
+pub(crate) fn along_curve(points: &[Point]) -> Vec<u32> {
     const CELLS: f64 = 1024.0;
     let (low, high) = bounds(points);
     let widest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);

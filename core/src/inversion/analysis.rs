@@ -1,14 +1,13 @@
 //! A rest pose and its cage, analysed: coordinates, handles of maximum volume and decompositions, which solvers with any
 //! options share.
 
+use super::coordinates::{Found, coordinates};
 use super::operator::{Decomposed, Spectra, Wanted};
-use super::prepare::{
-    check, check_options, coordinates_fit, outside, refuse_far_points, refuse_unreproduced, reproduction_error,
-};
+use super::prepare::{check, check_options, refuse_far_points};
 use super::reading::Reading;
-use super::{Preparation, PrepareError, Solver, SolverOptions};
+use super::{Preparation, PrepareError, Preparing, Solver, SolverOptions};
 use crate::cage::Cage;
-use crate::coordinates::{CoordinateSystem, MeanValue};
+use crate::coordinates::CoordinateSystem;
 use crate::decode::Decoder;
 use crate::dense;
 use crate::handles::Handles;
@@ -26,9 +25,13 @@ use std::time::Instant;
 /// Of a system whose normals follow from the vertices, it analyses where its inversion starts from: mean value coordinates of the
 /// same cage and points. Only the decoder and the errors of reproduction are the system's own.
 pub struct Analysis {
+    /// Of the points analysed.
     pub(super) phi: Mat<f64>,
     pub(super) cage: Cage,
-    pub(super) points: Vec<Point>,
+    /// The points analysed.
+    points: Vec<Point>,
+    /// Which points they are, where they are not all.
+    sample: Option<Vec<u32>>,
     /// Unknowns of the rest pose, m × 3.
     pub(super) rest: Vec<Point>,
     basis: RowBasis,
@@ -44,10 +47,11 @@ impl Analysis {
     /// # Errors
     /// As [`Solver::prepare`].
     pub fn new(system: &dyn CoordinateSystem, cage: &Cage, points: &[Point]) -> Result<Self, PrepareError> {
-        Self::with_copies(system, cage, points, Wanted::Everything, 3)
+        check(points, system.unknowns(cage), SolverOptions { spectrum: 0, ..SolverOptions::PAPER })?;
+        Self::of(system, cage, points, Wanted::Everything, &Preparing::default())
     }
 
-    /// As [`Self::new`], with what solvers of these options need and no more.
+    /// As [`Self::new`], with what solvers of these options need and no more. Of a model of very many points it analyses a sample.
     ///
     /// # Errors
     /// As [`Solver::prepare`].
@@ -56,51 +60,37 @@ impl Analysis {
         cage: &Cage,
         points: &[Point],
         options: SolverOptions,
+        preparing: &Preparing<'_>,
     ) -> Result<Self, PrepareError> {
         check(points, system.unknowns(cage), options)?;
-        Self::with_copies(system, cage, points, Wanted::For(options.handles), 2)
+        Self::of(system, cage, points, Wanted::For(options.handles), preparing)
     }
 
-    fn with_copies(
+    fn of(
         system: &dyn CoordinateSystem,
         cage: &Cage,
         points: &[Point],
         wanted: Wanted,
-        copies: usize,
+        preparing: &Preparing<'_>,
     ) -> Result<Self, PrepareError> {
-        let m = system.unknowns(cage);
-        check(points, m, SolverOptions { spectrum: 0, ..SolverOptions::PAPER })?;
-        let diagonal = diagonal(points);
+        let (m, diagonal) = (system.unknowns(cage), diagonal(points));
         let clock = Instant::now();
-        let columns = system.columns(cage);
-        if !coordinates_fit(points.len(), columns, copies) {
-            let gigabytes = (4 + 8 * copies) as f64 * 1e-9 * points.len() as f64 * columns as f64;
-            return Err(PrepareError::OutOfMemory { points: points.len(), unknowns: m, gigabytes });
-        }
         refuse_far_points(cage, points)?;
-        let coordinates = system.coordinates(cage, points)?;
-        let mut phi = coordinates.phi;
-        let mut rest = system.rest_values(cage);
-        let (point, error) = reproduction_error(phi.as_ref(), &rest, cage, points);
-        refuse_unreproduced(point, error, cage, diagonal)?;
-        let (outside, outside_distance) = outside(cage, points, &coordinates.outside, diagonal);
-        let decoder_of = |phi: &Mat<f64>| Decoder::new(phi.as_ref(), cage.vertices().len());
-        let tied = system.tied_normals(cage).map(|tied| decoder_of(&phi).with_tied_normals(Some(tied)));
-        if tied.is_some() {
-            drop(phi);
-            phi = MeanValue.coordinates(cage, points)?.phi;
-            rest.truncate(m);
-        }
+        (preparing.tell)("coordinates");
+        let Found { phi, sample, decoder, rest, error, outside: (outside, outside_distance), refinement } =
+            coordinates(system, cage, points, wanted, preparing.keeps_coordinates)?;
         let coordinates_seconds = clock.elapsed().as_secs_f64();
 
         let clock = Instant::now();
+        (preparing.tell)("handles");
         let no_handles = PrepareError::NoSolution { what: "choice of handles" };
         let mut basis = row_basis(phi.as_ref()).ok_or(no_handles.clone())?;
         let maxvol_seconds = clock.elapsed().as_secs_f64();
         // Not before: maxvol takes the most memory.
-        let decoder = tied.unwrap_or_else(|| decoder_of(&phi));
+        let decoder = decoder.unwrap_or_else(|| Decoder::new(phi.as_ref(), cage.vertices().len()));
 
         let clock = Instant::now();
+        (preparing.tell)("singular values");
         let mut spectra = Spectra::of(&basis, wanted)?;
         if basis.rank == m && spectra.full_ends[2] <= RANK_TOLERANCE * spectra.full_ends[0] {
             basis = deficient_basis(phi.as_ref()).ok_or(no_handles)?;
@@ -118,13 +108,17 @@ impl Analysis {
             max_entry: basis.handles.max_entry,
             outside,
             outside_distance,
-            refinement: coordinates.refinement,
+            refinement,
             coordinates_seconds,
             maxvol_seconds,
             svd_seconds: clock.elapsed().as_secs_f64(),
         };
-        let (cage, points) = (cage.clone(), points.to_vec());
-        Ok(Self { phi, cage, points, rest, basis, spectra, decoder, diagonal, preparation })
+        let points = match &sample {
+            Some(sample) => sample.iter().map(|&i| points[i as usize]).collect(),
+            None => points.to_vec(),
+        };
+        let cage = cage.clone();
+        Ok(Self { phi, cage, points, sample, rest, basis, spectra, decoder, diagonal, preparation })
     }
 
     /// A choice of handles, decomposed: solvers with any regularisation follow.
@@ -149,6 +143,19 @@ impl Analysis {
         Ok(Reading { analysis: self, decomposed, seconds: clock.elapsed().as_secs_f64() })
     }
 
+    /// Which points of the model these rows of `Φ` are of.
+    pub(super) fn points_of(&self, rows: &[u32]) -> Vec<u32> {
+        match &self.sample {
+            Some(sample) => rows.iter().map(|&row| sample[row as usize]).collect(),
+            None => rows.to_vec(),
+        }
+    }
+
+    /// Which points of the model are analysed, where they are not all.
+    pub(super) fn sample(&self) -> Option<&[u32]> {
+        self.sample.as_deref()
+    }
+
     /// The solver with these options.
     ///
     /// # Errors
@@ -171,7 +178,7 @@ impl Analysis {
         &self.preparation
     }
 
-    /// `Φ`, n × m.
+    /// `Φ` of the points analysed, n × m.
     pub fn coordinates(&self) -> MatRef<'_, f64> {
         self.phi.as_ref()
     }

@@ -3,6 +3,7 @@
 
 mod analysis;
 mod consistent;
+mod coordinates;
 mod error;
 mod operator;
 mod options;
@@ -20,7 +21,7 @@ pub use consistent::{Convergence, Outcome};
 pub use error::PrepareError;
 pub use options::{SolverOptions, usual_spectrum};
 pub use parts::{SolverParts, TiedParts};
-pub use prepare::{Preparation, check_options, coordinates_fit};
+pub use prepare::{Preparation, Preparing, check_options, coordinates_fit};
 pub use pull::Pull;
 pub use reading::Reading;
 pub use solve::{BATCH, Inverted, Solver};

@@ -75,12 +75,10 @@ impl Solver {
         points: &[Point],
         options: SolverOptions,
     ) -> Result<Self, PrepareError> {
-        let term = options.regularizer.term().ok_or(TermError::Missing)?;
-        Self::prepare_with(system, cage, points, options, term)
+        Self::prepare_with(system, cage, points, options, &Preparing::default())
     }
 
-    /// As [`Self::prepare`], with a term of the caller's own, for
-    /// [`Regularizer::Matrix`](crate::regularize::Regularizer::Matrix).
+    /// As [`Self::prepare`], otherwise than usual.
     ///
     /// # Errors
     /// See [`PrepareError`].
@@ -89,12 +87,42 @@ impl Solver {
         cage: &Cage,
         points: &[Point],
         options: SolverOptions,
-        term: &dyn Term,
+        preparing: &Preparing<'_>,
     ) -> Result<Self, PrepareError> {
+        let term = preparing.term(options)?;
         // Known before anything is computed.
         term.delta(cage, system.unknowns(cage))?;
-        let analysis = Analysis::for_options(system, cage, points, options)?;
+        let analysis = Analysis::for_options(system, cage, points, options, preparing)?;
+        (preparing.tell)("operator");
         analysis.reading(options.handles)?.solver_with(options, term)
+    }
+}
+
+/// How to prepare, beside the options of the solver.
+#[derive(Clone, Copy)]
+pub struct Preparing<'a> {
+    /// A term of the caller's own, for [`Regularizer::Matrix`](crate::regularize::Regularizer::Matrix).
+    pub term: Option<&'a dyn Term>,
+    /// Whether the decoder of a model of very many points keeps their coordinates, which takes four bytes for each point and column, or
+    /// computes them anew whenever it is used.
+    pub keeps_coordinates: bool,
+    /// Told what is computed next.
+    pub tell: &'a dyn Fn(&'static str),
+}
+
+impl Default for Preparing<'_> {
+    fn default() -> Self {
+        Self { term: None, keeps_coordinates: true, tell: &|_| {} }
+    }
+}
+
+impl<'a> Preparing<'a> {
+    /// The term of these options.
+    ///
+    /// # Errors
+    /// [`TermError::Missing`] where it would be the caller's own.
+    pub fn term(&self, options: SolverOptions) -> Result<&'a dyn Term, TermError> {
+        self.term.or_else(|| options.regularizer.term()).ok_or(TermError::Missing)
     }
 }
 

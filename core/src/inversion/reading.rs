@@ -62,10 +62,15 @@ impl Reading<'_> {
         let operator = with_whole_tiles(keep_translations(operator, positions));
         let pull = self.pull(&map, bent.reference);
         let decoder = analysis.decoder.clone();
+        // All points of a sample are some of the model's.
+        let (handles, reads_all) = match analysis.sample() {
+            Some(sample) if self.decomposed.reads_all => (sample.to_vec(), false),
+            _ => (analysis.points_of(&self.decomposed.handles), self.decomposed.reads_all),
+        };
         let consistent = match decoder.tied_normals() {
             None => None,
             Some(_) => {
-                let rows = (!self.decomposed.reads_all).then_some(self.decomposed.handles.as_slice());
+                let rows = (!reads_all).then_some(handles.as_slice());
                 let prepared = Consistent::new(&decoder, rows, shape_weight(options));
                 Some(Arc::new(prepared.ok_or(failed("preparation of the consistent inversion"))?))
             }
@@ -74,16 +79,7 @@ impl Reading<'_> {
         preparation.condition_handles = self.decomposed.condition;
         preparation.singular_values = self.decomposed.sigma.clone();
         preparation.svd_seconds += self.seconds + clock.elapsed().as_secs_f64();
-        Ok(Solver {
-            handles: self.decomposed.handles.clone(),
-            reads_all: self.decomposed.reads_all,
-            operator,
-            pull,
-            consistent,
-            decoder,
-            diagonal: analysis.diagonal,
-            preparation,
-        })
+        Ok(Solver { handles, reads_all, operator, pull, consistent, decoder, diagonal: analysis.diagonal, preparation })
     }
 
     pub(super) fn bent(&self, term: &dyn Term) -> Result<Bent, PrepareError> {

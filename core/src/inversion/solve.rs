@@ -58,10 +58,9 @@ impl Solver {
 
     /// Bytes the prepared solver holds.
     pub fn size_bytes(&self) -> usize {
-        let phi = self.decoder.coordinates();
         let operator = 8 * self.operator.nrows() * self.operator.ncols() + self.pull.size_bytes();
         let consistent = self.consistent.as_ref().map_or(0, |consistent| consistent.size_bytes());
-        4 * phi.nrows() * phi.ncols() + operator + consistent + 4 * self.handles.len()
+        self.decoder.size_bytes() + operator + consistent + 4 * self.handles.len()
     }
 
     /// Whether every cage depends on the previous frame's, so that frames have to be inverted in order, by

@@ -10,7 +10,7 @@
 mod gradient;
 
 use super::doubt::{Mended, TOLERANCE, is_kept, is_unreliable, mend_thin};
-use super::{CoordinateSystem, Coordinates, CoordinatesError, careful};
+use super::{ByPoint, CoordinateSystem, Coordinates, CoordinatesError, careful};
 use crate::cage::{Cage, Edge};
 use crate::mesh::{self, Point};
 use crate::simd::{LANES, Lanes, angle, cross, dot, multiversion, zeros};
@@ -41,22 +41,30 @@ impl CoordinateSystem for MeanValue {
         cage.vertices().to_vec()
     }
 
-    fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError> {
-        let mut phi = zeros(points.len(), self.columns(cage));
-        let outside = phi
-            .as_mut()
-            .par_row_chunks_mut(TASK_POINTS)
-            .enumerate()
-            .map_init(
-                || Scratch::new(cage),
-                |scratch, (task, rows)| task_coordinates(cage, points, task * TASK_POINTS, rows, scratch),
-            )
-            .reduce(Vec::new, |mut a, b| {
-                a.extend(b);
-                a
-            });
-        Ok(Coordinates { phi, outside, refinement: None })
+    fn by_point(&self) -> Option<ByPoint> {
+        Some(coordinates)
     }
+
+    fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError> {
+        Ok(coordinates(cage, points))
+    }
+}
+
+fn coordinates(cage: &Cage, points: &[Point]) -> Coordinates {
+    let mut phi = zeros(points.len(), cage.vertices().len());
+    let outside = phi
+        .as_mut()
+        .par_row_chunks_mut(TASK_POINTS)
+        .enumerate()
+        .map_init(
+            || Scratch::new(cage),
+            |scratch, (task, rows)| task_coordinates(cage, points, task * TASK_POINTS, rows, scratch),
+        )
+        .reduce(Vec::new, |mut a, b| {
+            a.extend(b);
+            a
+        });
+    Coordinates { phi, outside, refinement: None }
 }
 
 /// Working memory of one task; every entry holds one lane group.

@@ -222,7 +222,7 @@ impl Consistent {
             let rows = match &self.rows {
                 Some(rows) => rows.as_ref().subrows(first, count),
                 None => {
-                    sums::convert(decoder, first, count, 0, total, &mut converted);
+                    sums::convert(decoder, first, count, &mut converted);
                     converted.as_ref().subrows(0, count)
                 }
             };

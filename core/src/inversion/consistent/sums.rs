@@ -11,16 +11,22 @@ const TASK_COLUMNS: usize = 64;
 
 /// Rows of Φ, in double precision.
 pub(super) fn rows_of(decoder: &Decoder, rows: &[u32]) -> Mat<f64> {
-    let phi = decoder.coordinates();
-    Mat::from_fn(rows.len(), phi.ncols(), |i, j| f64::from(phi[(rows[i] as usize, j)]))
+    let phi = decoder.rows(rows);
+    Mat::from_fn(rows.len(), phi.ncols(), |i, j| f64::from(phi[(i, j)]))
 }
 
-/// Puts `count` rows from `first` on, and of them `columns` columns from `left` on, into a matrix in double precision.
-pub(super) fn convert(decoder: &Decoder, first: usize, count: usize, left: usize, columns: usize, out: &mut Mat<f64>) {
-    let phi = decoder.coordinates();
-    for j in 0..columns {
-        let from = phi.col(left + j).subrows(first, count);
-        for (to, &x) in out.col_as_slice_mut(j).iter_mut().zip(from.iter()) {
+/// Puts `count` rows of Φ from `first` on into a matrix in double precision.
+pub(super) fn convert(decoder: &Decoder, first: usize, count: usize, out: &mut Mat<f64>) {
+    let computed;
+    let phi = match decoder.coordinates() {
+        Some(phi) => phi.subrows(first, count),
+        None => {
+            computed = decoder.rows(&(first as u32..(first + count) as u32).collect::<Vec<_>>());
+            computed.as_ref()
+        }
+    };
+    for j in 0..phi.ncols() {
+        for (to, &x) in out.col_as_slice_mut(j).iter_mut().zip(phi.col(j).iter()) {
             *to = f64::from(x);
         }
     }
@@ -42,7 +48,7 @@ pub(super) fn gram(decoder: &Decoder, rows: Option<&[u32]>, share: f64) -> Mat<f
         let mut all = Mat::<f64>::zeros(BLOCK_ROWS.min(points), total);
         for first in (0..points).step_by(BLOCK_ROWS) {
             let count = BLOCK_ROWS.min(points - first);
-            convert(decoder, first, count, 0, total, &mut all);
+            convert(decoder, first, count, &mut all);
             let block = all.as_ref().subrows(0, count);
             let accumulate = if first == 0 { Accum::Replace } else { Accum::Add };
             let some = block.subcols(left, width);

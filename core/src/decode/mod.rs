@@ -1,0 +1,252 @@
+//! Positions from cages, and how far they are from a capture: `P = Φ·Y` in single precision, where `Y` are the rows of a cage,
+//! and where its normals are tied to them, those as well.
+
+mod error;
+mod phi;
+
+pub use error::FrameError;
+pub(crate) use phi::in_parts;
+
+use crate::cage::Cage;
+use crate::coordinates::{ByPoint, TiedNormals};
+use crate::dense;
+use crate::inversion::product_columns;
+use crate::mesh::Point;
+use error::{Sums, block_sums};
+use faer::{Mat, MatRef};
+use phi::{Phi, padded, single};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Rows of Φ that one task multiplies: their product with a batch of cages stays in the second-level cache.
+const BLOCK_ROWS: usize = 1024;
+
+/// Turns cages into positions of the model's points.
+#[derive(Clone, Debug)]
+pub struct Decoder {
+    /// Shared by the solvers of one analysis.
+    phi: Phi,
+    points: usize,
+    /// Columns of positions, which follow a translation; the others are of directions.
+    positions: usize,
+    /// What the values of all columns after the positions follow from; otherwise they are rows of the cage.
+    normals: Option<Arc<TiedNormals>>,
+}
+
+impl Decoder {
+    /// Takes coordinates n × m whose first `positions` columns are of positions.
+    pub fn new(phi: MatRef<'_, f64>, positions: usize) -> Self {
+        let (points, phi) = (phi.nrows(), Phi::Kept(Arc::new(single(phi))));
+        Self { phi, points, positions, normals: None }
+    }
+
+    /// The coordinates of these points, which the decoder keeps. None is ever held in double precision as a whole.
+    pub fn keeping(by_point: ByPoint, cage: &Cage, points: &[Point], columns: usize) -> Self {
+        let mut phi = padded(points.len(), columns);
+        in_parts(by_point, cage, points, columns, |first, part| {
+            for j in 0..columns {
+                let to = phi.col_as_slice_mut(j)[first..].iter_mut();
+                to.zip(part.phi.col(j).iter()).for_each(|(to, &x)| *to = x as f32);
+            }
+        });
+        Self { phi: Phi::Kept(Arc::new(phi)), points: points.len(), positions: cage.vertices().len(), normals: None }
+    }
+
+    /// The coordinates of these points, which are computed anew, some at a time, wherever the decoder is used: the same bits, for
+    /// models whose `Φ` is larger than memory.
+    pub fn computing(by_point: ByPoint, cage: &Cage, points: &[Point], columns: usize) -> Self {
+        let positions = cage.vertices().len();
+        let phi = Phi::computed(by_point, cage.clone(), points.to_vec(), columns);
+        Self { phi, points: points.len(), positions, normals: None }
+    }
+
+    /// Takes coordinates in single precision, n × `columns`, row-major, as they travel to who decodes elsewhere; the first
+    /// `positions` columns are of positions. Decodes to the same bits as the decoder that they came from.
+    ///
+    /// # Panics
+    /// Where the values are not whole rows.
+    pub fn from_rows(values: &[f32], columns: usize, positions: usize) -> Self {
+        assert!(values.len().is_multiple_of(columns), "whole rows of {columns} coordinates");
+        let rows = MatRef::from_row_major_slice(values, values.len() / columns, columns);
+        Self::from_single(rows.to_owned(), positions)
+    }
+
+    /// Takes coordinates n × m that are in single precision already.
+    pub(crate) fn from_single(mut phi: Mat<f32>, positions: usize) -> Self {
+        let points = phi.nrows();
+        phi.resize_with(points.next_multiple_of(dense::WHOLE_ROWS), phi.ncols(), |_, _| 0.0);
+        Self { phi: Phi::Kept(Arc::new(phi)), points, positions, normals: None }
+    }
+
+    /// The same coordinates for cages whose normals follow from their vertices.
+    ///
+    /// # Panics
+    /// Where there is not one column per vertex and face.
+    #[must_use]
+    pub fn with_tied_normals(mut self, normals: Option<TiedNormals>) -> Self {
+        if let Some(normals) = &normals {
+            assert_eq!(self.columns(), self.positions + normals.faces().len(), "one column per vertex and face");
+        }
+        self.normals = normals.map(Arc::new);
+        self
+    }
+
+    /// The rule by which normals follow from the vertices, where they do.
+    pub fn tied_normals(&self) -> Option<&TiedNormals> {
+        self.normals.as_deref()
+    }
+
+    /// Columns of positions, which follow a translation; they come first.
+    pub fn positions(&self) -> usize {
+        self.positions
+    }
+
+    /// Number of points n.
+    pub fn points(&self) -> usize {
+        self.points
+    }
+
+    /// Number of columns of `Φ`.
+    pub fn columns(&self) -> usize {
+        self.phi.columns()
+    }
+
+    /// Number of unknowns m: rows of a cage.
+    pub fn unknowns(&self) -> usize {
+        if self.normals.is_some() { self.positions } else { self.columns() }
+    }
+
+    /// `Φ` in single precision, n × columns, column-major; `None` where it is not kept.
+    pub fn coordinates(&self) -> Option<MatRef<'_, f32>> {
+        self.phi.kept().map(|phi| phi.subrows(0, self.points))
+    }
+
+    /// Some rows of `Φ`.
+    pub(crate) fn rows(&self, rows: &[u32]) -> Mat<f32> {
+        self.phi.rows(rows)
+    }
+
+    /// Bytes of the coordinates that are kept.
+    pub fn size_bytes(&self) -> usize {
+        self.coordinates().map_or(0, |phi| 4 * phi.nrows() * phi.ncols())
+    }
+
+    /// Positions of up to [`BATCH`](crate::inversion::BATCH) frames, each n × 3 interleaved, from their cages, each m × 3 interleaved.
+    ///
+    /// The bits of a frame depend on its cage alone, not on the other frames of the batch.
+    ///
+    /// # Panics
+    /// Where the lengths do not fit.
+    pub fn decode(&self, cages: &[&[f32]], out: &mut [Vec<f32>]) {
+        assert_eq!(cages.len(), out.len(), "one output per cage");
+        let (columns, centres) = self.values(cages);
+        let n = self.points();
+        for positions in out.iter_mut() {
+            positions.resize(3 * n, 0.0);
+        }
+        // Frames are split into the same blocks, so that each task owns its part of every frame.
+        let mut parts: Vec<Vec<&mut [f32]>> =
+            (0..n.div_ceil(BLOCK_ROWS)).map(|_| Vec::with_capacity(out.len())).collect();
+        for positions in out.iter_mut() {
+            for (part, chunk) in parts.iter_mut().zip(positions.chunks_mut(3 * BLOCK_ROWS)) {
+                part.push(chunk);
+            }
+        }
+        self.phi.for_parts(|first, phi| {
+            let blocks = phi.nrows().div_ceil(BLOCK_ROWS);
+            parts[first / BLOCK_ROWS..][..blocks].par_iter_mut().enumerate().for_each_init(
+                || Mat::zeros(BLOCK_ROWS, columns.ncols()),
+                |product, (block, parts)| {
+                    let rows = parts.first().map_or(0, |part| part.len() / 3);
+                    let product = block_product(phi, block, rows, columns.as_ref(), product);
+                    for (f, part) in parts.iter_mut().enumerate() {
+                        let [x, y, z] = frame_columns(product, f);
+                        for (i, p) in part.chunks_exact_mut(3).enumerate() {
+                            p[0] = (f64::from(x[i]) + centres[f][0]) as f32;
+                            p[1] = (f64::from(y[i]) + centres[f][1]) as f32;
+                            p[2] = (f64::from(z[i]) + centres[f][2]) as f32;
+                        }
+                    }
+                },
+            );
+        });
+    }
+
+    /// Errors of up to [`BATCH`](crate::inversion::BATCH) frames: what [`Self::decode`] gives for these cages against the capture's own positions.
+    ///
+    /// # Panics
+    /// Where the lengths do not fit.
+    pub fn measure<T: Copy + Into<f64> + Sync>(&self, cages: &[&[f32]], frames: &[&[T]]) -> Vec<FrameError> {
+        assert_eq!(cages.len(), frames.len(), "one frame per cage");
+        let n = self.points();
+        assert!(frames.iter().all(|f| f.len() == 3 * n), "every frame has every point");
+        let (columns, centres) = self.values(cages);
+        let mut blocks: Vec<Vec<Sums>> = Vec::with_capacity(n.div_ceil(BLOCK_ROWS));
+        self.phi.for_parts(|first, phi| {
+            let count = phi.nrows().div_ceil(BLOCK_ROWS);
+            blocks.par_extend((0..count).into_par_iter().map_init(
+                || Mat::zeros(BLOCK_ROWS, columns.ncols()),
+                |product, block| {
+                    let start = first + block * BLOCK_ROWS;
+                    let product = block_product(phi, block, BLOCK_ROWS.min(n - start), columns.as_ref(), product);
+                    let part = |f: usize| &frames[f][3 * start..][..3 * product.nrows()];
+                    (0..frames.len())
+                        .map(|f| block_sums(frame_columns(product, f), part(f), centres[f], start))
+                        .collect()
+                },
+            ));
+        });
+        (0..frames.len()).map(|f| Sums::total(blocks.iter().map(|b| &b[f])).into_error(n)).collect()
+    }
+
+    /// What `Φ` multiplies, side by side, three columns for each cage and padding; positions about their own centre, which keeps
+    /// the digits of a capture that travels.
+    fn values(&self, cages: &[&[f32]]) -> (Mat<f32>, Vec<Point>) {
+        let m = self.unknowns();
+        assert!(cages.iter().all(|c| c.len() == 3 * m), "every cage has every unknown");
+        let mut columns = Mat::zeros(self.columns(), product_columns(cages.len()));
+        let mut centres = Vec::with_capacity(cages.len());
+        for (f, cage) in cages.iter().enumerate() {
+            let mut centre = [0.0; 3];
+            for row in cage.chunks_exact(3).take(self.positions) {
+                for k in 0..3 {
+                    centre[k] += f64::from(row[k]);
+                }
+            }
+            let centre = centre.map(|c| c / self.positions as f64);
+            for (j, row) in cage.chunks_exact(3).enumerate() {
+                for k in 0..3 {
+                    let shift = if j < self.positions { centre[k] } else { 0.0 };
+                    columns[(j, 3 * f + k)] = (f64::from(row[k]) - shift) as f32;
+                }
+            }
+            if let Some(tied) = &self.normals {
+                let vertex = |v: u32| [0, 1, 2].map(|k| f64::from(cage[3 * v as usize + k]));
+                for (j, normal) in tied.normals(vertex).enumerate() {
+                    for k in 0..3 {
+                        columns[(self.positions + j, 3 * f + k)] = normal[k] as f32;
+                    }
+                }
+            }
+            centres.push(centre);
+        }
+        (columns, centres)
+    }
+}
+
+/// `rows` rows of the product of a block of `phi` with columns.
+fn block_product<'a>(
+    phi: MatRef<'_, f32>,
+    block: usize,
+    rows: usize,
+    columns: MatRef<'_, f32>,
+    product: &'a mut Mat<f32>,
+) -> MatRef<'a, f32> {
+    let whole = rows.next_multiple_of(dense::WHOLE_ROWS);
+    dense::multiply(product.as_mut().subrows_mut(0, whole), phi.subrows(block * BLOCK_ROWS, whole), columns);
+    product.as_ref().subrows(0, rows)
+}
+
+fn frame_columns(product: MatRef<'_, f32>, frame: usize) -> [&[f32]; 3] {
+    [0, 1, 2].map(|k| product.col(3 * frame + k).try_as_col_major().map_or(&[][..], |c| c.as_slice()))
+}

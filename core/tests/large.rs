@@ -1,0 +1,102 @@
+//! Models of so many points that some of them are analysed, and coordinates are computed in parts.
+
+use cager_core::cage::Cage;
+use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
+use cager_core::decode::{Decoder, FrameError};
+use cager_core::inversion::{Analysis, Handles, Preparing, Solver, SolverOptions};
+use cager_core::synthetic::{Capture, Options};
+
+fn capture(points: u32, cage_vertices: u32) -> (Capture, Cage) {
+    let capture = Capture::new(&Options { points: points as usize, frames: 12, cage_vertices: cage_vertices as usize });
+    let cage = Cage::new(capture.cage.clone()).unwrap();
+    (capture, cage)
+}
+
+fn frames(capture: &Capture) -> Vec<Vec<f64>> {
+    let frame = |t: usize| {
+        let mut frame = Vec::new();
+        capture.frame(t, &mut frame);
+        frame
+    };
+    [1, 4, 7].map(frame).to_vec()
+}
+
+fn errors(solver: &Solver, frames: &[Vec<f64>]) -> (Vec<Vec<f32>>, Vec<FrameError>) {
+    let frames: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
+    let cages = solver.invert(&frames);
+    let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
+    let errors = solver.decoder().measure(&views, &frames);
+    (cages, errors)
+}
+
+fn prepare(system: &dyn CoordinateSystem, (capture, cage): &(Capture, Cage), handles: Handles, keeps: bool) -> Solver {
+    let options = SolverOptions { handles, ..SolverOptions::default() };
+    let preparing = Preparing { keeps_coordinates: keeps, ..Preparing::default() };
+    Solver::prepare_with(system, cage, &capture.rest.points, options, &preparing).unwrap()
+}
+
+#[test]
+fn decoders_that_compute_their_coordinates_have_the_bits_of_those_that_keep_them() {
+    // Parts are whole blocks, and these are two and a bit.
+    let (capture, cage) = capture(70_001, 200);
+    let points = &capture.rest.points;
+    for system in [&MeanValue as &dyn CoordinateSystem, &Green::Consistent] {
+        let (by_point, columns) = (system.by_point().unwrap(), system.columns(&cage));
+        let phi = system.coordinates(&cage, points).unwrap().phi;
+        let decoders = [
+            Decoder::new(phi.as_ref(), cage.vertices().len()),
+            Decoder::keeping(by_point, &cage, points, columns),
+            Decoder::computing(by_point, &cage, points, columns),
+        ];
+        assert!(decoders[1].size_bytes() > 0 && decoders[2].size_bytes() == 0);
+        let decoders = decoders.map(|decoder| decoder.with_tied_normals(system.tied_normals(&cage)));
+        let bent: Vec<f32> =
+            cage.vertices().iter().flat_map(|p| [p[0] + 0.1 * p[1] * p[1], p[1], p[2]]).map(|x| x as f32).collect();
+        let found = decoders.map(|decoder| {
+            let mut out = vec![Vec::new()];
+            decoder.decode(&[&bent], &mut out);
+            (out, decoder.measure(&[&bent], &[&points.concat()]))
+        });
+        assert!(found[0] == found[1] && found[0] == found[2], "{}", system.name());
+        // The point that is named is the worst.
+        let (out, errors) = &found[0];
+        let distance =
+            |(p, q): (&[f32], &[f64; 3])| (0..3).map(|k| (f64::from(p[k]) - q[k]).powi(2)).sum::<f64>().sqrt();
+        let distances: Vec<f64> = out[0].chunks_exact(3).zip(points).map(distance).collect();
+        let worst = distances.iter().copied().fold(0.0, f64::max);
+        assert!((distances[errors[0].worst as usize] - worst).abs() < 1e-12 && (worst - errors[0].linf).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn a_sample_of_a_large_model_gives_nearly_the_errors_of_all_its_points() {
+    let large = capture(150_000, 250);
+    let frames = frames(&large.0);
+    let whole = Analysis::new(&MeanValue, &large.1, &large.0.rest.points).unwrap();
+    for handles in [Handles::MaxVol, Handles::Spread { count: None }, Handles::All] {
+        let options = SolverOptions { handles, ..SolverOptions::default() };
+        let (_, wanted) = errors(&whole.solver(options).unwrap(), &frames);
+        let [kept, computed] = [true, false].map(|keeps| prepare(&MeanValue, &large, handles, keeps));
+        assert_eq!(kept.handles(), computed.handles());
+        assert!(!kept.reads_all() && kept.handles().iter().any(|&point| point > 140_000), "{handles:?}");
+        let (cages, found) = errors(&kept, &frames);
+        assert_eq!((&cages, &found), (&errors(&computed, &frames).0, &errors(&computed, &frames).1));
+        // Other rows of maximum volume are as good as these, within what their choice leaves open.
+        let most = if handles == Handles::MaxVol { 1.2 } else { 1.01 };
+        for (found, wanted) in found.iter().zip(&wanted) {
+            assert!(found.l2 < most * wanted.l2, "{handles:?}: {} {}", found.l2, wanted.l2);
+        }
+    }
+}
+
+#[test]
+fn normals_that_follow_are_found_from_a_sample() {
+    let large = capture(150_000, 250);
+    let frames = frames(&large.0);
+    let [kept, computed] = [true, false].map(|keeps| prepare(&Green::Consistent, &large, Handles::default(), keeps));
+    let (cages, found) = errors(&kept, &frames);
+    assert_eq!((&cages, &found), (&errors(&computed, &frames).0, &errors(&computed, &frames).1));
+    for error in found {
+        assert!(error.l2 < 1e-2 * kept.diagonal(), "{}", error.l2);
+    }
+}
