@@ -4,6 +4,7 @@
 mod analysis;
 mod consistent;
 mod error;
+mod factored;
 mod operator;
 mod options;
 mod parts;
@@ -18,6 +19,7 @@ pub use crate::handles::Handles;
 pub use analysis::Analysis;
 pub use consistent::{Convergence, Outcome};
 pub use error::PrepareError;
+pub use factored::{Factored, Projected};
 pub use options::{SolverOptions, usual_spectrum};
 pub use parts::{SolverParts, TiedParts};
 pub use prepare::{Preparation, check_options, coordinates_fit};
