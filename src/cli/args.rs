@@ -1,7 +1,7 @@
 //! What can be typed: one definition gives parsing, help and shell completions.
 
 use super::cage_args::CageArgs;
-use super::checks::{CaptureArgs, TimingArgs};
+use super::checks::{CaptureArgs, CheckArgs, TimingArgs};
 use super::outputs::OutputArgs;
 use super::transfer_args::{EditArgs, TransferArgs};
 use crate::config::{ServeFlags, bytes};
@@ -271,6 +271,9 @@ pub(crate) struct CompareArgs {
     /// Frames to measure at the most: evenly spaced ones, each with its neighbours.
     #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) frames_at_most: u32,
+
+    #[command(flatten)]
+    pub(crate) checks: CheckArgs,
 
     /// Axis that points up in the pictures [default: y, or z where the model stands along it].
     #[arg(long, value_enum)]

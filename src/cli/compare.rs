@@ -1,15 +1,18 @@
 //! `cager compare`.
 
 use super::args::{CompareArgs, CoordinatesArg, UpArg};
+use super::checks::{check_cage, check_capture};
 use super::dry_run::{read_all, tell_would};
 use super::encode::{blame, read_cage};
 use super::outputs::Outputs;
 use super::{human_bytes, plain, progress};
-use crate::compare::{CompareError, Figures, Job, Progress, Up, compare, page};
+use crate::compare::{CompareError, Figures, Job, Progress, Up, compare, page, seconds};
 use crate::coordinates;
+use crate::frames::CaptureFiles;
 use anyhow::{Context, Result};
 use cager_core::coordinates::CoordinateSystem;
-use cager_formats::{AtomicFile, commit_together, open_frames, read_model};
+use cager_formats::{AtomicFile, commit_together, read_model};
+use indicatif::ProgressBar;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
@@ -22,8 +25,12 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     let json = args.json.as_ref().map(|path| outputs.text(path)).transpose()?;
     let rest = read_model(&args.rest)?;
     let cage = read_cage(&args.cage, args.flip_cage)?;
-    let open = || open_frames(&args.frames, rest.points.len());
-    open()?;
+    let mut files = CaptureFiles::new(&args.frames, rest.points.len());
+    files.allow_gaps = args.checks.allow_gaps;
+    check_capture(&files, (&args.rest, &rest), &args.checks, false)?;
+    check_cage((&args.cage, cage.mesh()), &rest, &args.checks)?;
+    let open = || files.open();
+    let frames = open()?.frames();
     let systems = systems(&args.coordinates)?;
     if args.outputs.dry_run {
         let frames = read_all(open()?.as_mut())?;
@@ -33,23 +40,22 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     let mut report = AtomicFile::create(&output)?;
     let json = json.as_ref().map(AtomicFile::create).transpose()?;
 
-    let bar = progress::steps();
-    let mut tell = |step: &str, done: usize, all: usize| {
-        bar.set_message(step.to_owned());
-        bar.set_length(all as u64);
-        bar.set_position(done as u64);
-    };
     let job = Job {
         rest: &rest,
         cage: &cage,
         flip_cage: args.flip_cage,
         open: &open,
+        frames,
         systems: &systems,
         frames_at_most: args.frames_at_most as usize,
         up: args.up.map(Into::into),
         names: [&args.rest, &args.cage, &args.frames].map(|path| path.display().to_string()),
     };
-    let result = compare(&job, &mut Progress { tell: &mut tell });
+    let expected = seconds(&job);
+    let bar = progress::timed_steps();
+    let plural = if systems.len() == 1 { "" } else { "s" };
+    bar.println(format!("about {} for {} coordinate system{plural}", duration(expected), systems.len()));
+    let result = compare(&job, &mut Progress { tell: &mut |step, done| show(&bar, step, done, expected) });
     bar.finish_and_clear();
     let (figures, pictures) = result.map_err(|error| match error {
         CompareError::Prepare(error) => blame(&error, &args.rest, &args.cage),
@@ -68,6 +74,24 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     }
     commit_together(outputs)?;
     super::tell(&summary(&figures, output.path(), bytes, clock.elapsed().as_secs_f64())?)
+}
+
+/// Shows a step, and the time left: as long as little is done, more by what was `expected` of the whole than by what has passed.
+fn show(bar: &ProgressBar, step: &str, done: f64, expected: f64) {
+    let by_now = bar.elapsed().as_secs_f64() / done.max(1e-3);
+    let left = (1.0 - done) * (done * by_now + (1.0 - done) * expected);
+    bar.set_message(step.to_owned());
+    bar.set_prefix(format!("about {} left", duration(left)));
+    bar.set_position((done * progress::STEPS as f64) as u64);
+}
+
+/// A rough time in words.
+fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 90.0 => format!("{:.0} s", s.max(1.0)),
+        s if s < 5400.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.1} h", s / 3600.0),
+    }
 }
 
 /// The systems asked for, each once; all where none is.
@@ -116,5 +140,24 @@ impl From<UpArg> for Up {
             UpArg::Y => Self::Y,
             UpArg::Z => Self::Z,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn durations_are_told_in_the_unit_that_fits() {
+        assert_eq!([0.2, 42.4, 150.0, 9000.0].map(duration), ["1 s", "42 s", "2 min", "2.5 h"]);
+    }
+
+    #[test]
+    fn time_left_follows_what_was_expected_at_first_and_what_has_passed_at_the_end() {
+        let bar = ProgressBar::hidden();
+        show(&bar, "mvc: coordinates", 0.0, 60.0);
+        assert_eq!(bar.prefix(), "about 60 s left");
+        show(&bar, "mvc: pictures", 1.0, 60.0);
+        assert_eq!((bar.prefix().as_str(), bar.position()), ("about 1 s left", progress::STEPS));
     }
 }

@@ -73,9 +73,23 @@ impl Prepared {
     }
 }
 
+/// Positions of a bar over the whole of a work.
+pub(crate) const STEPS: u64 = 1000;
+
+/// As [`steps`], with a clock that ticks during long steps, and the time left as its prefix.
+pub(crate) fn timed_steps() -> ProgressBar {
+    let bar = frames("", STEPS as usize);
+    if !bar.is_hidden() {
+        bar.enable_steady_tick(Duration::from_millis(250));
+    }
+    match ProgressStyle::with_template("{spinner} {msg:26} {bar:30} {elapsed}, {prefix}") {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
+    }
+}
+
 /// Shows how far the design of a cage is, on a bar over steps.
 pub(crate) fn design(bar: &ProgressBar, told: &CageProgress) {
-    const STEPS: u64 = 1000;
     bar.set_length(STEPS);
     bar.set_position((told.fraction * STEPS as f64) as u64);
     let stage = told.stage.clone().unwrap_or_else(|| "cage".to_owned());

@@ -1,8 +1,10 @@
 //! `cager compare`: the comparisons of the paper on one capture, as figures and as a page to read.
 //!
-//! A system's analysis is computed once; every method is a solver that follows from it, and all of them go through the capture
-//! together, a batch of frames at a time.
+//! A system's analysis is computed once, and each choice of rows is decomposed once. All methods go through the capture together, a
+//! batch of frames at a time, which is projected once for all methods that read the same rows.
 
+mod choices;
+mod estimate;
 mod figures;
 mod methods;
 mod noise;
@@ -13,6 +15,7 @@ mod sample;
 mod system;
 mod track;
 
+pub(crate) use estimate::seconds;
 pub(crate) use figures::Figures;
 pub(crate) use page::page;
 pub(crate) use pictures::Pictures;
@@ -20,13 +23,12 @@ pub(crate) use render::Up;
 
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::PrepareError;
+use cager_core::inversion::{Analysis, PrepareError};
 use cager_core::mesh::{Model, Point, TriMesh};
 use cager_formats::FrameReader;
 use figures::{System, claims, recommend};
 use pictures::{Looks, Painter};
 use sample::{Frame, Sample};
-use system::Outcome;
 use track::Shape;
 
 /// Why there is no comparison.
@@ -50,6 +52,8 @@ pub(crate) struct Job<'a> {
     pub(crate) flip_cage: bool,
     /// Begins reading the capture.
     pub(crate) open: &'a dyn Fn() -> Result<Box<dyn FrameReader>, cager_formats::Error>,
+    /// Frames of the capture.
+    pub(crate) frames: usize,
     /// Coordinate systems.
     pub(crate) systems: &'a [&'static dyn CoordinateSystem],
     /// Frames to measure at the most.
@@ -62,8 +66,8 @@ pub(crate) struct Job<'a> {
 
 /// What is going on: a step, and how much of it is done.
 pub(crate) struct Progress<'a> {
-    /// Told the name of the step, how many parts of it are done and how many there are.
-    pub(crate) tell: &'a mut dyn FnMut(&str, usize, usize),
+    /// Told the name of the step, and which fraction of all is done.
+    pub(crate) tell: &'a mut dyn FnMut(&str, f64),
 }
 
 /// Compares.
@@ -71,7 +75,7 @@ pub(crate) struct Progress<'a> {
 /// # Errors
 /// See [`CompareError`]. A system that cannot be computed for this cage is part of the result, unless none can.
 pub(crate) fn compare(job: &Job<'_>, progress: &mut Progress<'_>) -> Result<(Figures, Vec<Pictures>), CompareError> {
-    let frames = (job.open)()?.frames();
+    let frames = job.frames;
     let sample = Sample::new(frames, job.frames_at_most);
     let shape = Shape::new(job.cage, &job.rest.points);
     let mesh = TriMesh::from(job.rest);
@@ -80,30 +84,43 @@ pub(crate) fn compare(job: &Job<'_>, progress: &mut Progress<'_>) -> Result<(Fig
     let mut refused = None;
     let mut stage: Option<Painter<'_>> = None;
     let mut motion = [f64::NAN; 2];
-    for &system in job.systems {
-        match system::study(job, system, &sample, &shape, progress)? {
-            Outcome::Studied(studied) => {
-                if stage.is_none() {
-                    motion = studied.motion;
-                    let looks = Looks { mesh: &mesh, cage: job.cage, up: job.up };
-                    stage = Some(Painter::new(looks, job.open, &sample, &studied.figures)?);
-                }
-                if let Some(stage) = &stage {
-                    (progress.tell)(&format!("{}: pictures", system.name()), 0, 1);
-                    pictures.push(stage.paint(&studied)?);
-                }
-                let figures = Some(Box::new(studied.figures));
-                systems.push(System { name: system.name().to_owned(), refused: None, figures });
+    let works: Vec<f64> = job.systems.iter().map(|system| estimate::work(job, *system)).collect();
+    let all_work: f64 = works.iter().sum();
+    for (k, &system) in job.systems.iter().enumerate() {
+        let name = system.name();
+        let before: f64 = works[..k].iter().sum();
+        let mut tell = |step: &str, part: f64| (progress.tell)(step, (before + part * works[k]) / all_work);
+        let mut refuse = |error: PrepareError| {
+            systems.push(System { name: name.to_owned(), refused: Some(error.to_string()), figures: None });
+            refused.get_or_insert(error);
+        };
+        tell(&format!("{name}: coordinates"), 0.0);
+        let analysis = match Analysis::new(system, job.cage, &job.rest.points) {
+            Ok(analysis) => analysis,
+            Err(error) => {
+                refuse(error);
+                continue;
             }
-            Outcome::Refused(error) => {
-                systems.push(System {
-                    name: system.name().to_owned(),
-                    refused: Some(error.to_string()),
-                    figures: None,
-                });
-                refused.get_or_insert(error);
+        };
+        let studied = match system::study(job, name, &analysis, &sample, &shape, &mut Progress { tell: &mut tell }) {
+            Ok(studied) => studied,
+            Err(CompareError::Prepare(error)) => {
+                refuse(error);
+                continue;
             }
+            Err(error) => return Err(error),
+        };
+        if stage.is_none() {
+            motion = studied.motion;
+            let looks = Looks { mesh: &mesh, cage: job.cage, up: job.up };
+            stage = Some(Painter::new(looks, job.open, &sample, &studied.figures)?);
         }
+        if let Some(stage) = &stage {
+            tell(&format!("{name}: pictures"), 0.9);
+            pictures.push(stage.paint(&studied)?);
+        }
+        let figures = Some(Box::new(studied.figures));
+        systems.push(System { name: name.to_owned(), refused: None, figures });
     }
     let Some(stage) = stage else {
         return Err(refused.unwrap_or(PrepareError::NoSolution { what: "choice of coordinates" }).into());
@@ -208,12 +225,13 @@ mod tests {
             cage: &cage,
             flip_cage: false,
             open: &open,
+            frames: 5,
             systems,
             frames_at_most: 120,
             up: None,
             names: ["rest", "cage", "frames"].map(str::to_owned),
         };
-        compare(&job, &mut Progress { tell: &mut |_, _, _| {} })
+        compare(&job, &mut Progress { tell: &mut |_, _| {} })
     }
 
     #[test]

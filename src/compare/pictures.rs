@@ -1,14 +1,16 @@
 //! The pictures of a report: what they show, and on which scale.
 
+use super::choices::data_alone;
 use super::figures::SystemFigures;
 use super::methods::Method;
 use super::render::{Camera, Mesh, Png, Ramp, Scene, Shade, Up, diverging};
 use super::sample::{Frame, Sample};
-use super::system::{Studied, data_alone};
+use super::system::Studied;
 use super::track::second_differences;
 use super::{CompareError, as_points, frames_of};
 use cager_core::cage::Cage;
-use cager_core::inversion::Solver;
+use cager_core::decode::Decoder;
+use cager_core::inversion::SolverOptions;
 use cager_core::mesh::{Point, TriMesh};
 use cager_formats::FrameReader;
 use rayon::prelude::*;
@@ -73,6 +75,8 @@ pub(super) struct Painter<'a> {
     looks: Looks<'a>,
     up: Up,
     edges: Vec<[u32; 2]>,
+    /// Diagonal of the rest pose's bounding box.
+    diagonal: f64,
     shown: usize,
     frames: Vec<Frame>,
     row: Vec<usize>,
@@ -96,7 +100,8 @@ impl<'a> Painter<'a> {
         let frames = frames_of(open()?.as_mut(), &wanted)?;
         let up = looks.up.unwrap_or_else(|| Up::guess(&looks.mesh.vertices));
         let edges = looks.cage.edges().iter().map(|edge| edge.vertices).collect();
-        Ok(Self { looks, up, edges, shown, frames, row })
+        let diagonal = cager_core::mesh::diagonal(&looks.mesh.vertices);
+        Ok(Self { looks, up, edges, diagonal, shown, frames, row })
     }
 
     /// The frame that cages and errors are shown of.
@@ -105,12 +110,12 @@ impl<'a> Painter<'a> {
     }
 
     /// Paints a system.
-    pub(super) fn paint(&self, studied: &Studied) -> Result<Pictures, CompareError> {
+    pub(super) fn paint(&self, studied: &Studied<'_>) -> Result<Pictures, CompareError> {
         let figures = &studied.figures;
-        let (cages, cages_top) = self.cages(studied)?;
+        let (cages, cages_top) = self.cages(studied);
         let (models, models_top) = self.models(studied)?;
         let row = match figures.method(|m| m.is_cager() && m.curve) {
-            Some(usual) => self.row(&studied.analysis.solver(usual.method.options())?),
+            Some(usual) => self.row(studied, usual.method.options()),
             None => Vec::new(),
         };
         Ok(Pictures {
@@ -140,7 +145,7 @@ impl<'a> Painter<'a> {
         (Camera::fitting(points, rest, self.up, width as f64 / height as f64), width, height)
     }
 
-    fn handles(&self, studied: &Studied) -> Picture {
+    fn handles(&self, studied: &Studied<'_>) -> Picture {
         let (mesh, cage) = (self.looks.mesh, self.looks.cage);
         let both: Vec<Point> = mesh.vertices.iter().chain(cage.vertices()).copied().collect();
         let (camera, width, height) = self.camera(&both, HANDLES_PIXELS);
@@ -158,15 +163,16 @@ impl<'a> Painter<'a> {
         }
     }
 
-    fn row(&self, solver: &Solver) -> Vec<Picture> {
+    fn row(&self, studied: &Studied<'_>, usual: SolverOptions) -> Vec<Picture> {
         let mesh = self.looks.mesh;
+        let decoder = studied.analysis.decoder();
         let shots: Vec<(usize, Vec<Point>, Vec<Point>)> = self
             .row
             .iter()
             .filter_map(|&number| {
-                let cage = solver.invert(&[self.frame(number)?.points.as_slice()]).pop()?;
-                let decoded = decode(solver, &cage);
-                Some((number, as_points(&cage[..3 * solver.decoder().positions()]), as_points(&decoded)))
+                let cage = studied.invert(usual, &[self.frame(number)?.points.as_slice()])?.pop()?;
+                let decoded = decode(decoder, &cage);
+                Some((number, as_points(&cage[..3 * decoder.positions()]), as_points(&decoded)))
             })
             .collect();
         shots
@@ -183,23 +189,21 @@ impl<'a> Painter<'a> {
     }
 
     /// Cages of the shown frame by the methods whose cages the paper shows.
-    fn cages(&self, studied: &Studied) -> Result<(Vec<Picture>, f64), CompareError> {
-        let Some(frame) = self.frame(self.shown) else { return Ok((Vec::new(), 1.0)) };
+    fn cages(&self, studied: &Studied<'_>) -> (Vec<Picture>, f64) {
+        let Some(frame) = self.frame(self.shown) else { return (Vec::new(), 1.0) };
         let three = [self.shown.checked_sub(1), Some(self.shown), Some(self.shown + 1)];
         let three: Option<Vec<&[f64]>> =
             three.map(|number| Some(self.frame(number?)?.points.as_slice())).into_iter().collect();
         let mut shots = Vec::new();
         for found in studied.figures.methods.iter().filter(|found| shows_cage(&found.method, &studied.figures)) {
-            let solver = studied.analysis.solver(found.method.options())?;
-            let count = solver.decoder().positions();
-            let (cage, bends) = match &three {
-                Some(three) => {
-                    let cages = solver.invert(three);
-                    let bends = second_differences([&cages[0], &cages[1], &cages[2]], count);
-                    (cages[1].clone(), bends.iter().map(|x| x / solver.diagonal()).collect())
-                }
-                None => (solver.invert(&[frame.points.as_slice()]).remove(0), vec![0.0; count]),
+            let count = studied.analysis.decoder().positions();
+            let frames = three.clone().unwrap_or_else(|| vec![frame.points.as_slice()]);
+            let Some(mut cages) = studied.invert(found.method.options(), &frames) else { continue };
+            let bends = match &cages[..] {
+                [a, b, c] => second_differences([a, b, c], count).iter().map(|x| x / self.diagonal).collect(),
+                _ => vec![0.0; count],
             };
+            let cage = cages.swap_remove(cages.len() / 2);
             shots.push((found.method.name(), as_points(&cage[..3 * count]), bends));
         }
         let all: Vec<f64> = shots.iter().flat_map(|(_, _, bends): &(_, _, Vec<f64>)| bends).copied().collect();
@@ -223,29 +227,33 @@ impl<'a> Painter<'a> {
                 Picture { title: title.clone(), note, png: scene.png() }
             })
             .collect();
-        Ok((pictures, ramp.top))
+        (pictures, ramp.top)
     }
 
     /// The shown frame as the methods reconstruct it.
-    fn models(&self, studied: &Studied) -> Result<(Vec<Picture>, f64), CompareError> {
+    fn models(&self, studied: &Studied<'_>) -> Result<(Vec<Picture>, f64), CompareError> {
         let Some(frame) = self.frame(self.shown) else { return Ok((Vec::new(), 1.0)) };
-        let mut solvers = Vec::new();
+        let frames = [frame.points.as_slice()];
+        let decoder = studied.analysis.decoder();
+        let mut cages = Vec::new();
         if let Some((name, rows)) = &studied.middling {
             let usual = studied.figures.method(|m| m.is_cager() && m.curve).map(|m| m.method.options());
-            let solver = studied.analysis.solver_reading(rows, usual.unwrap_or_else(data_alone))?;
-            solvers.push((format!("{name}, sub-spectral"), solver));
+            let reading = studied.analysis.reading_of(rows)?;
+            let method = reading.factored(usual.unwrap_or_else(data_alone))?;
+            let found = reading.cages(&method, None, &reading.project(&frames), &frames);
+            cages.extend(found.into_iter().map(|cage| (format!("{name}, sub-spectral"), cage)));
         }
         for found in studied.figures.methods.iter().filter(|found| shows_model(&found.method)) {
-            solvers.push((found.method.name(), studied.analysis.solver(found.method.options())?));
+            let inverted = studied.invert(found.method.options(), &frames).unwrap_or_default();
+            cages.extend(inverted.into_iter().map(|cage| (found.method.name(), cage)));
         }
-        let shots: Vec<(String, Vec<Point>, Vec<f64>)> = solvers
+        let shots: Vec<(String, Vec<Point>, Vec<f64>)> = cages
             .into_iter()
-            .map(|(title, solver)| {
-                let cage = solver.invert(&[frame.points.as_slice()]).remove(0);
-                let decoded = as_points(&decode(&solver, &cage));
+            .map(|(title, cage)| {
+                let decoded = as_points(&decode(decoder, &cage));
                 let truth = frame.points.as_chunks::<3>().0;
                 let error = |(p, q): (&Point, &Point)| (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt();
-                let errors = decoded.iter().zip(truth).map(|pair| error(pair) / solver.diagonal()).collect();
+                let errors = decoded.iter().zip(truth).map(|pair| error(pair) / self.diagonal).collect();
                 (title, decoded, errors)
             })
             .collect();
@@ -272,7 +280,7 @@ impl<'a> Painter<'a> {
         Ok((pictures, ramp.top))
     }
 
-    fn vectors(&self, studied: &Studied) -> Vec<Picture> {
+    fn vectors(&self, studied: &Studied<'_>) -> Vec<Picture> {
         let cage = self.looks.cage;
         let (camera, width, height) = self.camera(cage.vertices(), PIXELS);
         let (v, sigma) = (studied.analysis.handle_vectors(), studied.analysis.handle_spectrum());
@@ -347,9 +355,9 @@ fn model<'a>(points: &'a [Point], mesh: &'a TriMesh) -> Mesh<'a> {
     Mesh { points, triangles: &mesh.triangles }
 }
 
-fn decode(solver: &Solver, cage: &[f32]) -> Vec<f32> {
+fn decode(decoder: &Decoder, cage: &[f32]) -> Vec<f32> {
     let mut out = [Vec::new()];
-    solver.decoder().decode(&[cage], &mut out);
+    decoder.decode(&[cage], &mut out);
     let [points] = out;
     points
 }

@@ -1,111 +1,99 @@
 //! One coordinate system, studied: every method on every measured frame.
 
-use super::figures::{Draw, MethodFigures, NoiseFigures, Seconds, Spectra, Swaps, SystemFigures, Vectors, draws};
-use super::methods::{Method, methods};
+use super::choices::{Choice, Plan, Subject, plans};
+use super::figures::{Draw, MethodFigures, NoiseFigures, Seconds, Spectra, Swaps, SystemFigures, Vectors};
 use super::noise::{RADIUS, noisy};
 use super::sample::{Frame, Sample};
 use super::track::{Motion, Shape, Track};
 use super::{CompareError, Job, Progress};
-use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{Analysis, BATCH, Handles, PrepareError, Reading, Solver, SolverOptions, usual_spectrum};
-use cager_core::regularize::Regularizer;
+use cager_core::inversion::{Analysis, BATCH, SolverOptions, usual_spectrum};
 use rayon::prelude::*;
 
-/// Solvers that go through the capture together take about this much memory beside the coordinates they share: another one is added
-/// as long as they take less.
-const SOLVER_BYTES: usize = 640 << 20;
+/// Choices of rows that go through the capture together take about this much memory beside the coordinates they share.
+const CHOICE_BYTES: usize = 640 << 20;
 /// The same for a batch of frames.
 const BATCH_BYTES: usize = 256 << 20;
 
 /// Rows whose singular values are below this fraction of the largest are dependent to the working precision.
 const DEPENDENT: f64 = 1e-11;
 
-/// What became of a system.
-pub(super) enum Outcome {
-    /// Everything was measured.
-    Studied(Box<Studied>),
-    /// It cannot be computed for this cage.
-    Refused(PrepareError),
-}
-
 /// A system with its figures, and what its pictures need.
-pub(super) struct Studied {
+pub(super) struct Studied<'a> {
     pub(super) figures: SystemFigures,
-    pub(super) analysis: Analysis,
+    pub(super) analysis: &'a Analysis,
+    /// The choices of rows of the methods, with these.
+    pub(super) choices: Vec<Choice<'a>>,
     /// Mean and largest second temporal difference of the model itself.
     pub(super) motion: [f64; 2],
     /// Rows of the random draw whose error is the middle one, and its name.
     pub(super) middling: Option<(String, Vec<u32>)>,
 }
 
-/// What a track is of.
-enum Subject {
-    Method(Method),
-    Noise(Method),
-    Draw(String, Vec<u32>, SolverOptions),
+impl Studied<'_> {
+    /// Cages of up to a batch of frames by one of the methods.
+    pub(super) fn invert(&self, options: SolverOptions, frames: &[&[f64]]) -> Option<Vec<Vec<f32>>> {
+        self.choices.iter().find_map(|choice| choice.invert(options, frames))
+    }
 }
 
 /// Studies a system on the sample.
-pub(super) fn study(
+///
+/// # Errors
+/// [`CompareError::Prepare`] where it cannot be inverted for this cage.
+pub(super) fn study<'a>(
     job: &Job<'_>,
-    system: &dyn CoordinateSystem,
+    name: &str,
+    analysis: &'a Analysis,
     sample: &Sample,
     shape: &Shape,
     progress: &mut Progress<'_>,
-) -> Result<Outcome, CompareError> {
-    let name = system.name();
-    (progress.tell)(&format!("{name}: coordinates"), 0, 1);
-    let analysis = match Analysis::new(system, job.cage, &job.rest.points) {
-        Ok(analysis) => analysis,
-        Err(error) => return Ok(Outcome::Refused(error)),
-    };
-    (progress.tell)(&format!("{name}: swaps"), 0, 1);
-    let (spectra, swaps, vectors) = (Spectra::of(&analysis), Swaps::of(&analysis), Vectors::of(&analysis));
+) -> Result<Studied<'a>, CompareError> {
+    (progress.tell)(&format!("{name}: swaps"), 0.1);
+    let (spectra, swaps, vectors) = (Spectra::of(analysis), Swaps::of(analysis), Vectors::of(analysis));
     let unknowns = analysis.coordinates().ncols();
     let usual = usual_spectrum(unknowns);
     let damping = spectra.handles[spectra.handles.len().saturating_sub(usual + 1)];
+    let start = ("pivoted LU".to_owned(), analysis.handles().start.clone());
+    let plans = plans(job.rest.points.len(), unknowns, usual, damping, sample.is_whole(), start);
 
-    let mut subjects: Vec<Subject> =
-        methods(unknowns, usual, damping, sample.is_whole()).into_iter().map(Subject::Method).collect();
-    subjects.extend(noise_methods(unknowns, usual, damping).into_iter().map(Subject::Noise));
-    let start = analysis.handles().start.clone();
-    let drawn = draws(unknowns, job.rest.points.len()).into_iter().chain([("pivoted LU".to_owned(), start)]);
-    let regularised = SolverOptions { spectrum: usual, ..SolverOptions::PAPER };
-    for (choice, rows) in drawn {
-        for options in [data_alone(), regularised] {
-            subjects.push(Subject::Draw(choice.clone(), rows.clone(), options));
-        }
-    }
-
-    let mut workshop = Workshop { analysis: &analysis, readings: Vec::new(), drawn: None };
     let mut found = Found::default();
     let mut motion = Motion::new(sample);
-    let mut subjects = subjects.into_iter().peekable();
-    let mut first = true;
-    while subjects.peek().is_some() {
-        let mut group = Vec::new();
+    let mut kept = Vec::new();
+    let total: usize = plans.iter().map(|plan| plan.subjects.len()).sum();
+    let mut through = 0;
+    let mut waiting = plans.as_slice();
+    while !waiting.is_empty() {
         let mut bytes = 0;
-        while bytes < SOLVER_BYTES
-            && let Some(subject) = subjects.next()
-        {
-            let solver = match workshop.solver(&subject) {
-                Ok(solver) => solver,
-                // Rows drawn at random may determine nothing.
-                Err(_) if matches!(subject, Subject::Draw(..)) => continue,
-                Err(error) => return Ok(Outcome::Refused(error)),
-            };
-            bytes += own_bytes(&solver);
-            let noisy = matches!(subject, Subject::Noise(_));
-            group.push((subject, Track::new(solver, noisy, sample)));
-        }
-        let motion = first.then_some(&mut motion);
-        follow(job, &mut group, motion, sample, shape, &mut |done| {
-            (progress.tell)(&format!("{name}: frames"), done, sample.to_read());
+        let fits = |plan: &&Plan| {
+            let before = bytes;
+            bytes += plan.bytes(analysis);
+            before < CHOICE_BYTES
+        };
+        let (group, later) = waiting.split_at(waiting.iter().take_while(fits).count());
+        waiting = later;
+        let fraction = |part: f64, here: usize| 0.2 + 0.7 * (through as f64 + part * here as f64) / total as f64;
+        (progress.tell)(&format!("{name}: inversions"), fraction(0.0, 0));
+        let prepared: Vec<_> = group.par_iter().map(|plan| Choice::prepare(analysis, plan, sample)).collect();
+        // Rows drawn at random may determine nothing.
+        let useful = prepared.into_iter().zip(group).filter(|(choice, plan)| choice.is_ok() || !plan.is_draw());
+        let mut choices: Vec<Choice<'a>> = useful.map(|(choice, _)| choice).collect::<Result<_, _>>()?;
+        let here: usize = group.iter().map(|plan| plan.subjects.len()).sum();
+        let motion = (through == 0).then_some(&mut motion);
+        follow(job, &mut choices, motion, sample, shape, &mut |done| {
+            let part = done as f64 / sample.to_read().max(1) as f64;
+            (progress.tell)(&format!("{name}: frame {done} of {}", sample.to_read()), fraction(part, here));
         })?;
-        first = false;
-        group.into_iter().for_each(|(subject, track)| found.add(subject, track));
+        through += here;
+        for choice in choices {
+            let is_draw = choice.is_draw();
+            let kept_choice = found.add(choice);
+            kept.extend((!is_draw).then_some(kept_choice));
+        }
     }
+    found.methods.sort_by_key(|(order, _)| *order);
+    found.noise.sort_by_key(|(order, _)| *order);
     let prepared = analysis.preparation();
+    let usual_seconds = |(_, m): &&(usize, MethodFigures)| m.method.is_cager() && m.method.spectrum == usual;
     let figures = SystemFigures {
         unknowns,
         rank: prepared.rank,
@@ -118,73 +106,20 @@ pub(super) fn study(
             coordinates: prepared.coordinates_seconds,
             maxvol: prepared.maxvol_seconds,
             svd: prepared.svd_seconds,
-            per_frame: found.usual_seconds(usual),
+            per_frame: found.methods.iter().find(usual_seconds).map_or(f64::NAN, |(_, m)| m.frame_seconds),
         },
         random: found.draws,
-        methods: found.methods,
-        noise: found.noise,
+        methods: found.methods.into_iter().map(|(_, found)| found).collect(),
+        noise: found.noise.into_iter().map(|(_, found)| found).collect(),
     };
     let middling = middling(&figures.random, found.rows);
-    Ok(Outcome::Studied(Box::new(Studied { figures, analysis, motion: motion.totals(), middling })))
+    Ok(Studied { figures, analysis, choices: kept, motion: motion.totals(), middling })
 }
 
-/// The methods that noise is tried on: plain least squares, and what reads fewer points.
-fn noise_methods(unknowns: usize, usual: usize, damping: f64) -> Vec<Method> {
-    let wanted = |m: &Method| {
-        let plain = m.regularizer == Regularizer::None && matches!(m.handles, Handles::All | Handles::MaxVol);
-        let proposed = m.regularizer == Regularizer::Laplacian && m.handles != Handles::All;
-        m.curve && (plain || proposed || m.regularizer == Regularizer::Global)
-    };
-    methods(unknowns, usual, damping, false).into_iter().filter(wanted).collect()
-}
-
-/// Solvers of an analysis, each choice of handles decomposed once.
-struct Workshop<'a> {
-    analysis: &'a Analysis,
-    readings: Vec<(Handles, Reading<'a>)>,
-    /// The last rows drawn.
-    drawn: Option<(Vec<u32>, Reading<'a>)>,
-}
-
-impl<'a> Workshop<'a> {
-    fn solver(&mut self, subject: &Subject) -> Result<Solver, PrepareError> {
-        match subject {
-            Subject::Method(method) | Subject::Noise(method) => {
-                if self.readings.iter().all(|(handles, _)| *handles != method.handles) {
-                    self.readings.push((method.handles, self.analysis.reading(method.handles)?));
-                }
-                let of_handles = |(handles, _): &&(Handles, Reading<'a>)| *handles == method.handles;
-                match self.readings.iter().find(of_handles) {
-                    Some((_, reading)) => reading.solver(method.options()),
-                    None => self.analysis.solver(method.options()),
-                }
-            }
-            Subject::Draw(_, rows, options) => {
-                let known = self.drawn.take().filter(|(of, _)| of == rows);
-                let drawn = match known {
-                    Some(drawn) => drawn,
-                    None => (rows.clone(), self.analysis.reading_of(rows)?),
-                };
-                self.drawn.insert(drawn).1.solver(*options)
-            }
-        }
-    }
-}
-
-/// What a solver holds beside `Φ`, which all solvers of an analysis share.
-fn own_bytes(solver: &Solver) -> usize {
-    solver.size_bytes() - solver.decoder().size_bytes()
-}
-
-/// Plain inversion.
-pub(super) fn data_alone() -> SolverOptions {
-    SolverOptions { regularizer: Regularizer::None, spectrum: 0, ..SolverOptions::default() }
-}
-
-/// Takes all tracks through the capture.
+/// Takes all choices of rows through the capture.
 fn follow(
     job: &Job<'_>,
-    group: &mut [(Subject, Track)],
+    choices: &mut [Choice<'_>],
     mut motion: Option<&mut Motion>,
     sample: &Sample,
     shape: &Shape,
@@ -192,7 +127,7 @@ fn follow(
 ) -> Result<(), CompareError> {
     let mut reader = (job.open)()?;
     let size = (BATCH_BYTES / (24 * job.rest.points.len())).clamp(1, BATCH);
-    let any_noise = group.iter().any(|(_, track)| track.noisy);
+    let any_noise = choices.iter().any(Choice::reads_noise);
     let (mut next, mut batch, mut timed) = (0, Vec::new(), false);
     loop {
         sample.fill(reader.as_mut(), &mut next, size, &mut batch)?;
@@ -200,7 +135,9 @@ fn follow(
             return Ok(());
         }
         if !timed {
-            group.iter_mut().for_each(|(_, track)| track.time(&batch));
+            for choice in choices.iter_mut() {
+                choice.time(&batch)?;
+            }
             timed = true;
         }
         if let Some(motion) = &mut motion {
@@ -211,54 +148,55 @@ fn follow(
             true => batch.par_iter().map(|f| Frame { points: noisy(&f.points, f.number, radius), ..*f }).collect(),
             false => Vec::new(),
         };
-        group.par_iter_mut().for_each(|(_, track)| {
-            let frames = if track.noisy { &with_noise } else { &batch };
-            track.take(frames, &batch, sample, shape);
-        });
+        choices.par_iter_mut().for_each(|choice| choice.take(&batch, &with_noise, sample, shape));
         tell(next);
     }
 }
 
-/// What the tracks that are through have found.
+/// What the tracks that are through have found; methods with their place among all.
 #[derive(Default)]
 struct Found {
-    methods: Vec<MethodFigures>,
-    noise: Vec<NoiseFigures>,
+    methods: Vec<(usize, MethodFigures)>,
+    noise: Vec<(usize, NoiseFigures)>,
     draws: Vec<Draw>,
     rows: Vec<Vec<u32>>,
 }
 
 impl Found {
-    fn add(&mut self, subject: Subject, track: Track) {
+    /// Takes what the tracks of a choice have found; gives the choice back without them.
+    fn add<'a>(&mut self, mut choice: Choice<'a>) -> Choice<'a> {
+        for (subject, track) in std::mem::take(&mut choice.tracks) {
+            self.add_track(&choice, subject, track);
+        }
+        choice
+    }
+
+    fn add_track(&mut self, choice: &Choice<'_>, subject: Subject, track: Track) {
         let totals = track.found.totals();
         match subject {
-            Subject::Method(method) => {
+            Subject::Method(order, method) => {
                 let frame_seconds = track.frame_seconds;
-                self.methods.push(MethodFigures { method, totals, per_frame: track.found, frame_seconds });
+                self.methods.push((order, MethodFigures { method, totals, per_frame: track.found, frame_seconds }));
             }
-            Subject::Noise(method) => {
+            Subject::Noise(order, method) => {
                 let clean = track.clean.totals();
                 let (clean_l2_mean, clean_linf_max) = (clean.l2_mean, clean.linf_max);
-                self.noise.push(NoiseFigures { method, totals, per_frame: track.found, clean_l2_mean, clean_linf_max });
+                let per_frame = track.found;
+                self.noise.push((order, NoiseFigures { method, totals, per_frame, clean_l2_mean, clean_linf_max }));
             }
-            Subject::Draw(choice, rows, _) => match self.draws.last_mut().filter(|draw| draw.choice == choice) {
+            Subject::Draw(name, rows, _) => match self.draws.last_mut().filter(|draw| draw.choice == name) {
                 Some(draw) => draw.totals = totals,
                 None => {
-                    let sigma = &track.solver.preparation().singular_values;
+                    let sigma = choice.reading.singular_values();
                     let (first, last) = (sigma.first().copied().unwrap_or(0.0), sigma.last().copied().unwrap_or(0.0));
                     // Of what is dependent, rounding decides; infinity has no place in a plot.
                     let condition = (first / last).min(1.0 / f64::EPSILON);
                     let rank = sigma.iter().filter(|&&x| x > DEPENDENT * first).count();
-                    self.draws.push(Draw { choice, rank, condition, data_alone: totals, totals });
+                    self.draws.push(Draw { choice: name, rank, condition, data_alone: totals, totals });
                     self.rows.push(rows);
                 }
             },
         }
-    }
-
-    fn usual_seconds(&self, usual: usize) -> f64 {
-        let found = self.methods.iter().find(|m| m.method.is_cager() && m.method.spectrum == usual);
-        found.map_or(f64::NAN, |m| m.frame_seconds)
     }
 }
 
@@ -269,29 +207,4 @@ fn middling(draws: &[Draw], rows: Vec<Vec<u32>>) -> Option<(String, Vec<u32>)> {
     random.sort_by(|a, b| a.0.totals.l2_mean.total_cmp(&b.0.totals.l2_mean));
     let middle = random.len() / 2;
     random.into_iter().nth(middle).map(|(draw, rows)| (draw.choice.clone(), rows))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use cager_core::cage::Cage;
-    use cager_core::coordinates::Green;
-    use cager_core::synthetic::{Capture, Options};
-
-    #[test]
-    fn what_a_solver_iterates_with_counts_as_its_own() {
-        let capture = Capture::new(&Options { points: 400, frames: 2, cage_vertices: 40 });
-        let cage = Cage::new(capture.cage).expect("a cage");
-        let own = |system: &Green| {
-            let analysis = Analysis::new(system, &cage, &capture.rest.points).expect("an analysis");
-            let solver = analysis.solver(SolverOptions::default()).expect("a solver");
-            let columns = solver.decoder().columns();
-            (own_bytes(&solver) - 8 * solver.operator().nrows() * solver.operator().ncols(), columns)
-        };
-        let (free, columns) = own(&Green::Free);
-        assert!(free < 8 * columns * columns, "{free} bytes beside an operator");
-        // The Gram matrix, and in single precision.
-        let (consistent, columns) = own(&Green::Consistent);
-        assert!(consistent > 12 * columns * columns, "{consistent} bytes");
-    }
 }

@@ -2,14 +2,12 @@
 
 use super::sample::{Frame, Sample};
 use cager_core::cage::Cage;
-use cager_core::inversion::Solver;
+use cager_core::inversion::{Factored, Projected, Reading};
 use cager_core::mesh::{Point, diagonal};
 use serde::Serialize;
 use std::collections::VecDeque;
+use std::sync::Arc;
 use std::time::Instant;
-
-/// Times of an inversion are the least of this many.
-const REPEATS: usize = 3;
 
 /// The rest cage's edges and the unit of lengths.
 #[derive(Clone, Debug)]
@@ -123,10 +121,25 @@ fn max(values: &[f64]) -> f64 {
     values.iter().copied().filter(|x| x.is_finite()).fold(f64::NAN, f64::max)
 }
 
-/// A solver on its way through the capture.
+/// A batch of frames for one method.
+#[derive(Clone, Copy)]
+pub(crate) struct Batch<'a> {
+    /// What the method reads.
+    pub(crate) reading: &'a Reading<'a>,
+    /// The frames as it sees them.
+    pub(crate) projected: &'a Projected,
+    /// Whether to take the time of the inversion.
+    pub(crate) timed: bool,
+    /// The frames.
+    pub(crate) frames: &'a [Frame],
+    /// The same without noise.
+    pub(crate) clean: &'a [Frame],
+}
+
+/// A method on its way through the capture.
 pub(crate) struct Track {
-    /// The solver.
-    pub(crate) solver: Solver,
+    /// The method.
+    pub(crate) method: Arc<Factored>,
     /// Whether it reads the frames with noise.
     pub(crate) noisy: bool,
     /// What was found so far.
@@ -141,32 +154,27 @@ pub(crate) struct Track {
 
 impl Track {
     /// At the beginning.
-    pub(crate) fn new(solver: Solver, noisy: bool, sample: &Sample) -> Self {
+    pub(crate) fn new(method: Arc<Factored>, noisy: bool, sample: &Sample) -> Self {
         let empty = || PerFrame::empty(sample.measured().len());
-        Self { solver, noisy, found: empty(), clean: empty(), frame_seconds: f64::NAN, before: VecDeque::new() }
+        Self { method, noisy, found: empty(), clean: empty(), frame_seconds: f64::NAN, before: VecDeque::new() }
     }
 
-    /// Times one inversion per frame of a batch.
-    pub(crate) fn time(&mut self, batch: &[Frame]) {
-        let frames: Vec<&[f64]> = batch.iter().map(|frame| frame.points.as_slice()).collect();
-        let seconds = (0..REPEATS).map(|_| {
-            let clock = Instant::now();
-            std::hint::black_box(self.solver.invert_after(None, &frames));
-            clock.elapsed().as_secs_f64()
-        });
-        self.frame_seconds = seconds.fold(f64::INFINITY, f64::min) / frames.len() as f64;
-    }
-
-    /// Inverts and measures the frames that follow; `clean` are the same without noise.
-    pub(crate) fn take(&mut self, frames: &[Frame], clean: &[Frame], sample: &Sample, shape: &Shape) {
+    /// Inverts and measures the frames that follow.
+    pub(crate) fn take(&mut self, on: &Batch<'_>, sample: &Sample, shape: &Shape) {
+        let Batch { reading, projected, timed, frames, clean } = *on;
         let views: Vec<&[f64]> = frames.iter().map(|frame| frame.points.as_slice()).collect();
         let previous = self.before.back().map(|(_, cage)| cage.as_slice());
-        let cages = self.solver.invert_after(previous, &views);
+        let clock = Instant::now();
+        let cages = reading.cages(&self.method, previous, projected, &views);
+        if timed {
+            self.frame_seconds = self.frame_seconds.min(clock.elapsed().as_secs_f64() / frames.len() as f64);
+        }
+        let decoder = reading.decoder();
         let measured: Vec<usize> = (0..frames.len()).filter(|&i| frames[i].measured).collect();
         let errors = |of: &[Frame]| {
             let cages: Vec<&[f32]> = measured.iter().map(|&i| cages[i].as_slice()).collect();
             let truth: Vec<&[f64]> = measured.iter().map(|&i| of[i].points.as_slice()).collect();
-            self.solver.decoder().measure(&cages, &truth)
+            decoder.measure(&cages, &truth)
         };
         let (found, against_clean) = (errors(frames), self.noisy.then(|| errors(clean)));
         for (k, &i) in measured.iter().enumerate() {
@@ -179,17 +187,16 @@ impl Track {
             [self.found.edges_mean[at], self.found.edges_max[at]] = shape.edge_change(&cages[i]);
         }
         for (frame, cage) in frames.iter().zip(cages) {
-            self.follow(frame.number, cage, sample, shape.diagonal);
+            self.follow(frame.number, cage, decoder.positions(), sample, shape.diagonal);
         }
     }
 
-    fn follow(&mut self, number: usize, cage: Vec<f32>, sample: &Sample, diagonal: f64) {
+    fn follow(&mut self, number: usize, cage: Vec<f32>, positions: usize, sample: &Sample, diagonal: f64) {
         if let [(first, a), (middle, b)] = self.before.make_contiguous()
             && *first + 2 == number
             && *middle + 1 == number
             && let Some(at) = sample.position(*middle)
         {
-            let positions = self.solver.decoder().positions();
             [self.found.spike_mean[at], self.found.spike_max[at]] =
                 second_difference([a, b, &cage], positions).map(|x| x / diagonal);
         }

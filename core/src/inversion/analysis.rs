@@ -130,7 +130,7 @@ impl Analysis {
         let options = SolverOptions { handles, spectrum: 0, ..SolverOptions::PAPER };
         check_options(self.phi.nrows(), self.phi.ncols(), options)?;
         let decomposed = Decomposed::new(self.phi.as_ref(), &self.points, &self.basis, &self.spectra, handles)?;
-        Ok(Reading { analysis: self, decomposed, seconds: clock.elapsed().as_secs_f64() })
+        Ok(Reading::new(self, decomposed, clock.elapsed().as_secs_f64()))
     }
 
     /// As [`Self::reading`], of the given rows, as many as unknowns or more.
@@ -140,15 +140,7 @@ impl Analysis {
     pub fn reading_of(&self, rows: &[u32]) -> Result<Reading<'_>, PrepareError> {
         let clock = Instant::now();
         let decomposed = Decomposed::of_given_rows(self.phi.as_ref(), rows.to_vec(), self.phi.ncols())?;
-        Ok(Reading { analysis: self, decomposed, seconds: clock.elapsed().as_secs_f64() })
-    }
-
-    /// Which points of the model these rows of `Φ` are of.
-    pub(super) fn points_of(&self, rows: &[u32]) -> Vec<u32> {
-        match &self.sample {
-            Some(sample) => rows.iter().map(|&row| sample[row as usize]).collect(),
-            None => rows.to_vec(),
-        }
+        Ok(Reading::new(self, decomposed, clock.elapsed().as_secs_f64()))
     }
 
     /// Which points of the model are analysed, where they are not all.
@@ -176,6 +168,11 @@ impl Analysis {
     /// What preparing found out; the singular values are empty, see [`Self::handle_spectrum`] and [`Self::full_spectrum`].
     pub fn preparation(&self) -> &Preparation {
         &self.preparation
+    }
+
+    /// Cages back to positions.
+    pub fn decoder(&self) -> &Decoder {
+        &self.decoder
     }
 
     /// `Φ` of the points analysed, n × m.

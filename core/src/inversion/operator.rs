@@ -219,6 +219,23 @@ impl Decomposed {
             }
         }
     }
+
+    /// `Uᵀ H` of the rows read H, K × columns.
+    pub(super) fn project(&self, phi: MatRef<'_, f64>, read: MatRef<'_, f64>) -> Mat<f64> {
+        match &self.left {
+            Left::Rows(left) => dense::product(left.transpose(), read),
+            Left::OfPoints { u, factor, to_basis } => {
+                let mut of_basis = dense::product(to_basis.transpose(), dense::product(phi.transpose(), read).as_ref());
+                let lower = factor.transpose();
+                faer::linalg::triangular_solve::solve_lower_triangular_in_place(
+                    lower,
+                    of_basis.as_mut(),
+                    faer::Par::Seq,
+                );
+                dense::product(u.transpose(), of_basis.as_ref())
+            }
+        }
+    }
 }
 
 /// The decomposition of all of `Φ`.

@@ -1,16 +1,18 @@
 //! From a choice of handles to solvers: a regularised map, and what pulls cages towards others.
 
 use super::consistent::Consistent;
+use super::factored::Factored;
 use super::operator::{Decomposed, failed, with_whole_tiles};
 use super::prepare::check_options;
 use super::pull::Pull;
 use super::translations::{cages_stay, keep_translations};
 use super::{Analysis, PrepareError, Solver, SolverOptions};
+use crate::decode::Decoder;
 use crate::dense;
 use crate::mesh::Point;
 use crate::regularize::{CageLaplacian, Reference, Regularizer, SpectralMap, Spectrum, Term, TermError, spectral_map};
 use faer::Mat;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// A choice of handles of an [`Analysis`], decomposed: solvers with any regularisation follow at little cost.
@@ -19,6 +21,8 @@ pub struct Reading<'a> {
     pub(super) decomposed: Decomposed,
     /// Time the decomposition took.
     pub(super) seconds: f64,
+    /// The Gram matrix of the rows read, where normals are tied: what takes longest there, computed when it is first needed.
+    gram: OnceLock<Mat<f64>>,
 }
 
 /// A term as numbers.
@@ -27,7 +31,21 @@ pub(super) struct Bent {
     pub(super) reference: Reference,
 }
 
-impl Reading<'_> {
+impl<'a> Reading<'a> {
+    pub(super) fn new(analysis: &'a Analysis, decomposed: Decomposed, seconds: f64) -> Self {
+        Self { analysis, decomposed, seconds, gram: OnceLock::new() }
+    }
+
+    /// Cages back to positions.
+    pub fn decoder(&self) -> &'a Decoder {
+        &self.analysis.decoder
+    }
+
+    /// Singular values of the matrix that is inverted, descending.
+    pub fn singular_values(&self) -> &[f64] {
+        &self.decomposed.sigma
+    }
+
     /// The solver with these options; the handles among them are not looked at.
     ///
     /// # Errors
@@ -44,6 +62,56 @@ impl Reading<'_> {
     pub fn solver_with(&self, options: SolverOptions, term: &dyn Term) -> Result<Solver, PrepareError> {
         let clock = Instant::now();
         let analysis = self.analysis;
+        let (map, pull, consistent) = self.parts(options, term)?;
+        let operator = self.decomposed.operator(analysis.phi.as_ref(), map.data.as_ref());
+        let operator = with_whole_tiles(keep_translations(operator, analysis.decoder.positions()));
+        let (handles, reads_all) = self.points_read();
+        let mut preparation = analysis.preparation.clone();
+        preparation.condition_handles = self.decomposed.condition;
+        preparation.singular_values = self.decomposed.sigma.clone();
+        preparation.svd_seconds += self.seconds + clock.elapsed().as_secs_f64();
+        Ok(Solver {
+            handles,
+            reads_all,
+            operator,
+            pull,
+            consistent,
+            decoder: analysis.decoder.clone(),
+            diagonal: analysis.diagonal,
+            preparation,
+        })
+    }
+
+    /// As [`Self::solver`], in factors: much cheaper to prepare, and cheaper to apply where many are applied to the same frames.
+    ///
+    /// # Errors
+    /// As [`Solver::prepare`].
+    pub fn factored(&self, options: SolverOptions) -> Result<Factored, PrepareError> {
+        if self.analysis.decoder.tied_normals().is_some() {
+            return Ok(self.solver(options)?.into());
+        }
+        let (map, pull, _) = self.parts(options, options.regularizer.term().ok_or(TermError::Missing)?)?;
+        Ok(Factored::new(self, &map, pull))
+    }
+
+    /// The points of the model that are read, unless all are.
+    fn points_read(&self) -> (Vec<u32>, bool) {
+        let reads_all = self.decomposed.reads_all;
+        match self.analysis.sample() {
+            // All points of a sample are some of the model's.
+            Some(sample) if reads_all => (sample.to_vec(), false),
+            Some(sample) => (self.decomposed.handles.iter().map(|&row| sample[row as usize]).collect(), false),
+            None => (self.decomposed.handles.clone(), reads_all),
+        }
+    }
+
+    /// The map of singular directions, what pulls the cages, and what improves them afterwards.
+    fn parts(
+        &self,
+        options: SolverOptions,
+        term: &dyn Term,
+    ) -> Result<(SpectralMap, Pull, Option<Arc<Consistent>>), PrepareError> {
+        let analysis = self.analysis;
         let m = analysis.phi.ncols();
         check_options(analysis.phi.nrows(), m, options)?;
         let tied = analysis.decoder.tied_normals().is_some();
@@ -57,29 +125,19 @@ impl Reading<'_> {
         } else {
             self.map(&bent, options.regularizer, options.spectrum, options.lambda)?
         };
-        let positions = analysis.decoder.positions();
-        let operator = self.decomposed.operator(analysis.phi.as_ref(), map.data.as_ref());
-        let operator = with_whole_tiles(keep_translations(operator, positions));
         let pull = self.pull(&map, bent.reference);
-        let decoder = analysis.decoder.clone();
-        // All points of a sample are some of the model's.
-        let (handles, reads_all) = match analysis.sample() {
-            Some(sample) if self.decomposed.reads_all => (sample.to_vec(), false),
-            _ => (analysis.points_of(&self.decomposed.handles), self.decomposed.reads_all),
-        };
+        let decoder = &analysis.decoder;
         let consistent = match decoder.tied_normals() {
             None => None,
             Some(_) => {
+                let (handles, reads_all) = self.points_read();
                 let rows = (!reads_all).then_some(handles.as_slice());
-                let prepared = Consistent::new(&decoder, rows, shape_weight(options));
+                let gram = self.gram.get_or_init(|| Consistent::gram_of(decoder, rows)).clone();
+                let prepared = Consistent::from_gram(decoder, rows, shape_weight(options), gram);
                 Some(Arc::new(prepared.ok_or(failed("preparation of the consistent inversion"))?))
             }
         };
-        let mut preparation = analysis.preparation.clone();
-        preparation.condition_handles = self.decomposed.condition;
-        preparation.singular_values = self.decomposed.sigma.clone();
-        preparation.svd_seconds += self.seconds + clock.elapsed().as_secs_f64();
-        Ok(Solver { handles, reads_all, operator, pull, consistent, decoder, diagonal: analysis.diagonal, preparation })
+        Ok((map, pull, consistent))
     }
 
     pub(super) fn bent(&self, term: &dyn Term) -> Result<Bent, PrepareError> {

@@ -200,5 +200,5 @@ fn single(cage: &[Point]) -> Vec<f32> {
 /// Where more frames come than a batch holds.
 pub(crate) fn product_columns(frames: usize) -> usize {
     assert!(frames <= BATCH, "at most {BATCH} frames in a batch");
-    3 * [BATCH / 4, BATCH / 2].into_iter().find(|&width| frames <= width).unwrap_or(BATCH)
+    3 * frames.max(1).next_multiple_of(BATCH / 4)
 }

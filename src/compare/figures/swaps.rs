@@ -4,6 +4,7 @@ use crate::compare::noise::Random;
 use cager_core::inversion::Analysis;
 use cager_core::maxvol::{MaxVol, TOLERANCE, maxvol, maxvol_from};
 use faer::Mat;
+use rayon::prelude::*;
 use serde::Serialize;
 
 /// Condition numbers are computed after at most this many swaps, evenly spaced.
@@ -41,8 +42,9 @@ impl Swaps {
     pub(crate) fn of(analysis: &Analysis) -> Self {
         let phi = analysis.coordinates();
         let all: Vec<u32> = (0..phi.nrows() as u32).collect();
-        let from_lu = SwapTrace::of(analysis.handles(), analysis, &all);
-        Self { from_lu, from_random: from_random(analysis) }
+        let from_lu = || SwapTrace::of(analysis.handles(), analysis, &all);
+        let (from_lu, from_random) = rayon::join(from_lu, || from_random(analysis));
+        Self { from_lu, from_random }
     }
 }
 
@@ -75,16 +77,17 @@ impl SwapTrace {
         let mut volume = found.start_log_volume;
         let mut picked: Vec<u32> = found.start.iter().map(|&i| rows[i as usize]).collect();
         let step = found.trace.len().div_ceil(CONDITIONS).max(1);
-        let (mut after, mut condition) = (vec![0], vec![condition_of(analysis, &picked)]);
+        let (mut after, mut looked_at) = (vec![0], vec![picked.clone()]);
         for (k, swap) in found.trace.iter().enumerate() {
             volume += swap.growth.ln();
             log_volume.push(volume);
             picked[swap.position as usize] = rows[swap.row as usize];
             if (k + 1) % step == 0 || k + 1 == found.trace.len() {
                 after.push(k + 1);
-                condition.push(condition_of(analysis, &picked));
+                looked_at.push(picked.clone());
             }
         }
+        let condition = looked_at.par_iter().map(|rows| condition_of(analysis, rows)).collect();
         Self { points: rows.len(), log_volume, after, condition }
     }
 

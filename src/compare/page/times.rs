@@ -72,7 +72,7 @@ pub(super) fn section(html: &mut Html, figures: &Figures, systems: &[Shown<'_>])
         );
     }
     html.table(&table);
-    html.paragraph("Times of this machine and run, for maxvol handles with sub-spectral regularisation at the usual threshold; they differ from run to run. “Maxvol + SVD” here includes the decomposition over all points, which other methods need. One frame is one inversion on one thread within a batch of sixteen, without reading and measuring it. Grey rows: Table 1 and §6.3 of the paper (Core 2 Duo 2.53 GHz and GeForce GTX 260 M, 2012), whose total includes the preparation; captures and cages are others than here, so they are for orientation. Form of the table: the paper's Table 1.");
+    html.paragraph("Times of this machine and run, for maxvol handles with sub-spectral regularisation at the usual threshold; they differ from run to run. “Maxvol + SVD” here includes the decomposition over all points, which other methods need. One frame is one inversion on one thread within a batch of sixteen, without reading and measuring it; methods that read the same rows take the same matrix product, which is timed once, and green coordinates are timed while other methods run. Grey rows: Table 1 and §6.3 of the paper (Core 2 Duo 2.53 GHz and GeForce GTX 260 M, 2012), whose total includes the preparation; captures and cages are others than here, so they are for orientation. Form of the table: the paper's Table 1.");
     let mut methods = Table::new(&["system", "method", "one frame"], 2);
     for (name, found, _) in systems {
         for m in &found.methods {

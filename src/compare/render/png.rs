@@ -34,7 +34,7 @@ impl Png {
         header.extend([8, 6, 0, 0, 0]);
         let mut bytes = b"\x89PNG\r\n\x1a\n".to_vec();
         chunk(&mut bytes, b"IHDR", &header);
-        chunk(&mut bytes, b"IDAT", &compress_to_vec_zlib(&rows, 8));
+        chunk(&mut bytes, b"IDAT", &compress_to_vec_zlib(&rows, 6));
         chunk(&mut bytes, b"IEND", &[]);
         Self { width, height, bytes }
     }

@@ -86,16 +86,13 @@ pub(crate) struct Consistent {
 }
 
 impl Consistent {
-    /// For the points read: the given rows, or where there are none, all. `None` where no factorisation succeeds, or where
-    /// normals are not tied.
-    pub(crate) fn new(decoder: &Decoder, rows: Option<&[u32]>, weight: f64) -> Option<Self> {
+    /// `G` of the points read: the given rows, or where there are none, all.
+    pub(crate) fn gram_of(decoder: &Decoder, rows: Option<&[u32]>) -> Mat<f64> {
         let read = rows.map_or(decoder.points(), <[u32]>::len);
-        let share = decoder.positions() as f64 / read as f64;
-        let gram = sums::gram(decoder, rows, share);
-        Self::from_gram(decoder, rows, weight, gram)
+        sums::gram(decoder, rows, decoder.positions() as f64 / read as f64)
     }
 
-    /// As [`Self::new`], with what takes longest there: [`Self::gram`].
+    /// For the same points, with their [`Self::gram_of`]. `None` where no factorisation succeeds, or where normals are not tied.
     pub(crate) fn from_gram(decoder: &Decoder, rows: Option<&[u32]>, weight: f64, gram: Mat<f64>) -> Option<Self> {
         let neighbours = neighbours(decoder.tied_normals()?, decoder.positions());
         let (v, total) = (decoder.positions(), decoder.columns());
@@ -243,7 +240,7 @@ impl Consistent {
             .collect();
         for gradient in 0..GRADIENTS {
             let residuals: Vec<Vec<Point>> =
-                searches.iter().map(|s| s.as_ref().map_or(Vec::new(), state::Search::residual)).collect();
+                searches.iter().map(|s| active(s).map_or(Vec::new(), state::Search::residual)).collect();
             let better = state::products(self.preconditioner.as_ref(), &residuals, |x| x as f32, f64::from);
             for (search, better) in searches.iter_mut().zip(better) {
                 if let Some(search) = search {
@@ -254,7 +251,7 @@ impl Consistent {
                 break;
             }
             let moved: Vec<Vec<Point>> =
-                searches.iter().map(|s| s.as_ref().map_or(Vec::new(), |s| s.moved_values(tied))).collect();
+                searches.iter().map(|s| active(s).map_or(Vec::new(), |s| s.moved_values(tied))).collect();
             let products = state::products(self.curvature.as_ref(), &moved, |x| x as f32, f64::from);
             for (search, products) in searches.iter_mut().zip(products) {
                 if let Some(search) = search {
@@ -347,6 +344,11 @@ impl Consistent {
     fn pull_back(&self, frame: &Moving) -> Vec<Point> {
         self.shape_gradient(&frame.moved_by(&frame.cage))
     }
+}
+
+/// A search that goes on.
+fn active(search: &Option<state::Search>) -> Option<&state::Search> {
+    search.as_ref().filter(|search| !search.is_done())
 }
 
 /// Square, in single precision, with zero rows up to a whole tile.

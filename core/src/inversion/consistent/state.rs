@@ -186,19 +186,26 @@ pub(super) fn products<T: faer::traits::RealField + Copy>(
     to: impl Fn(f64) -> T,
     from: impl Fn(T) -> f64,
 ) -> Vec<Vec<Point>> {
-    let width = product_columns(frames.len());
+    let some: Vec<&Vec<Point>> = frames.iter().filter(|frame| !frame.is_empty()).collect();
+    if some.is_empty() {
+        return vec![Vec::new(); frames.len()];
+    }
+    let width = product_columns(some.len());
     let mut columns = Mat::<T>::zeros(a.ncols(), width);
-    for (f, frame) in frames.iter().enumerate() {
+    for (f, frame) in some.iter().enumerate() {
         for k in 0..3 {
-            for (to_entry, row) in columns.col_as_slice_mut(3 * f + k).iter_mut().zip(frame) {
+            for (to_entry, row) in columns.col_as_slice_mut(3 * f + k).iter_mut().zip(frame.iter()) {
                 *to_entry = to(row[k]);
             }
         }
     }
     let mut out = Mat::<T>::zeros(a.nrows(), width);
     crate::dense::multiply(out.as_mut(), a, columns.as_ref());
+    let mut place = 0..;
     let rows = |f: usize| (0..a.ncols()).map(|j| [0, 1, 2].map(|k| from(out[(j, 3 * f + k)]))).collect();
-    frames.iter().enumerate().map(|(f, frame)| if frame.is_empty() { Vec::new() } else { rows(f) }).collect()
+    let of_frame =
+        |frame: &Vec<Point>| if frame.is_empty() { Vec::new() } else { place.next().map_or(Vec::new(), rows) };
+    frames.iter().map(of_frame).collect()
 }
 
 pub(super) fn dot(a: Point, b: Point) -> f64 {
