@@ -8,6 +8,10 @@ use cager_core::regularize::{CageLaplacian, Reference, Regularizer, SparseMatrix
 use cager_core::synthetic::{Capture, Options};
 use faer::Mat;
 
+fn with(term: &dyn Term) -> Preparing<'_> {
+    Preparing { term: Some(term), ..Preparing::default() }
+}
+
 fn capture() -> (Capture, Cage) {
     let capture = Capture::new(&Options { points: 2_000, frames: 40, cage_vertices: 100 });
     let cage = Cage::new(capture.cage.clone()).unwrap();
@@ -41,14 +45,7 @@ fn every_term_minimises_its_energy() {
     for regularizer in [Regularizer::Laplacian, Regularizer::Differential, Regularizer::Temporal, Regularizer::Matrix] {
         let term: &dyn Term = regularizer.term().unwrap_or(&own);
         let options = SolverOptions { regularizer, spectrum: m, lambda, ..SolverOptions::PAPER };
-        let solver = Solver::prepare_with(
-            &MeanValue,
-            &cage,
-            &capture.rest.points,
-            options,
-            &Preparing { term: Some(term), ..Preparing::default() },
-        )
-        .unwrap();
+        let solver = Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, options, &with(term)).unwrap();
         let previous = solver.invert_after(None, &[&before]).remove(0);
         let found = as_matrix(&solver.invert_after(Some(&previous), &[&now])[0]);
         let rows = Mat::from_fn(m, m, |i, j| phi[(solver.handles()[i] as usize, j)]);
@@ -129,7 +126,7 @@ fn a_matrix_that_is_the_laplacian_does_what_the_laplacian_does() {
     let positions = frame(&capture, 8);
     let solve = |regularizer, term: &dyn Term| {
         let options = SolverOptions { regularizer, ..SolverOptions::PAPER };
-        let solver = Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, options, term).unwrap();
+        let solver = Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, options, &with(term)).unwrap();
         as_matrix(&solver.invert(&[&positions])[0])
     };
     let wanted = solve(Regularizer::Laplacian, &CageLaplacian);
@@ -150,13 +147,13 @@ fn a_matrix_that_does_not_fit_is_refused() {
         PrepareError::Term(TermError::Missing)
     );
     let narrow = SparseMatrix::new(4, m - 1, vec![(0, 0, 1.0)]).unwrap();
-    let error = Solver::prepare_with(&MeanValue, &cage, points, options, &narrow).unwrap_err();
+    let error = Solver::prepare_with(&MeanValue, &cage, points, options, &with(&narrow)).unwrap_err();
     assert_eq!(error, PrepareError::Term(TermError::Columns { columns: m - 1, vertices: m, unknowns: m }));
     for entries in [vec![(4, 0, 1.0)], vec![(0, m as u32, 1.0)], vec![(0, 0, f64::NAN)], vec![(0, 0, 1e101)]] {
         assert_eq!(SparseMatrix::new(4, m, entries), None);
     }
     let empty = SparseMatrix::new(0, m, Vec::new()).unwrap();
-    let solver = Solver::prepare_with(&MeanValue, &cage, points, options, &empty).unwrap();
+    let solver = Solver::prepare_with(&MeanValue, &cage, points, options, &with(&empty)).unwrap();
     let plain = SolverOptions { regularizer: Regularizer::None, ..options };
     let plain = Solver::prepare(&MeanValue, &cage, points, plain).unwrap();
     let positions = frame(&capture, 2);
@@ -300,7 +297,7 @@ fn terms_know_cages_with_normals() {
         let own = own_term(v);
         let term: &dyn Term = regularizer.term().unwrap_or(&own);
         let options = SolverOptions { regularizer, ..SolverOptions::PAPER };
-        let solver = Solver::prepare_with(&WithNormals, &cage, &capture.rest.points, options, term).unwrap();
+        let solver = Solver::prepare_with(&WithNormals, &cage, &capture.rest.points, options, &with(term)).unwrap();
         let found = solver.invert(&[&positions]);
         let error = solver.decoder().measure(&[&found[0]], &[&positions])[0];
         assert_eq!(solver.preparation().rank, v + f - 1, "the mean of all directions moves nothing");
