@@ -28,7 +28,7 @@ const LARGE_BLOCK_ROWS: usize = 1024;
 /// The blocks' Gram matrices are added up in a number of groups that follows from the shape alone, so that the sum does not
 /// depend on the threads. They take this much memory together, unless four already take more.
 const GRAM_BYTES: usize = 16 << 20;
-/// From this many columns on, the first round of swaps is hardly ever the last.
+/// From this many columns on, and up to [`MANY_COLUMNS`], the first round of swaps is hardly ever the last.
 const SEVERAL_ROUNDS: usize = 512;
 /// Pivots of LU above this fraction of the largest: far enough from dependent for single precision.
 const SINGLE_IS_SAFE: f64 = 1e-4;
@@ -127,7 +127,8 @@ fn search(phi: MatRef<'_, f64>, start: Vec<u32>, tolerance: f64) -> MaxVol {
         trace.extend(done);
         (inverse, log_volume) = dense::inverse(dense::rows_of(phi, &rows).as_ref());
         // A pass that is about to find more rows to swap need not be exact.
-        if swapped && (pass > 0 || phi.ncols() >= SEVERAL_ROUNDS) {
+        let several = (SEVERAL_ROUNDS..MANY_COLUMNS).contains(&phi.ncols());
+        if swapped && (pass > 0 || several) {
             row_max = row_maxima(phi, inverse.as_ref());
             if row_max.iter().any(|&x| x > (1.0 + tolerance) as f32) {
                 continue;

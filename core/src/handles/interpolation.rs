@@ -78,20 +78,29 @@ pub(crate) fn interpolated(samples: &Samples<'_>, drift: &Drift<'_>) -> Option<M
     let reach = samples.reach.max(1e-9 * diagonal(samples.points));
     let covariance = Covariance { inverse_support: 1.0 / (SUPPORT * reach) };
     let places: Vec<Point> = samples.rows.iter().map(|&i| samples.points[i as usize]).collect();
-    let mut omega = covariances(covariance, &places, &places);
-    for i in 0..k {
-        omega[(i, i)] += NUGGET;
+    let mut rest = covariances(covariance, &places[r..], &places);
+    for i in 0..p {
+        rest[(i, r + i)] += NUGGET;
     }
+    // A Ω₁: few samples are in each other's reach.
+    let with_first = |a: MatRef<'_, f64>| {
+        let mut product = with_all_points(covariance, &places[..r], &places, a.transpose());
+        for j in 0..r {
+            for i in 0..a.nrows() {
+                product[(i, j)] += NUGGET * a[(i, j)];
+            }
+        }
+        product
+    };
     let cross = with_all_points(covariance, samples.points, &places, drift.wide);
     let cross = drift.to_basis.map_or_else(|| cross.clone(), |t| dense::product(t.transpose(), cross.as_ref()));
 
-    let first = omega.as_ref().subrows(0, r);
     let unseen = |rows: Mat<f64>| {
         let (left, right) = (rows.as_ref().subcols(0, r), rows.as_ref().subcols(r, p));
         right - dense::product(left, drift.others.transpose())
     };
-    let seen = unseen(cross - dense::product(drift.gram, first));
-    let among = unseen(omega.as_ref().subrows(r, p) - dense::product(drift.others, first));
+    let seen = unseen(cross - with_first(drift.gram));
+    let among = unseen(rest - with_first(drift.others));
     let weights = dense::solve_definite(among, seen.transpose().to_owned())?;
     let mut map = Mat::zeros(r, k);
     map.as_mut().subcols_mut(0, r).copy_from(drift.gram - dense::product(weights.transpose(), drift.others));
