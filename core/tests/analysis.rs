@@ -3,7 +3,7 @@
 mod common;
 
 use cager_core::cage::Cage;
-use cager_core::coordinates::MeanValue;
+use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::inversion::{Analysis, Handles, PrepareError, Solver, SolverOptions};
 use cager_core::maxvol::{TOLERANCE, maxvol, maxvol_from};
 use cager_core::mesh::Point;
@@ -38,6 +38,40 @@ fn solvers_of_an_analysis_have_the_bits_of_those_prepared_alone() {
                 let (a, b) = (shared.preparation(), alone.preparation());
                 assert_eq!((a.rank, a.swaps, &a.singular_values), (b.rank, b.swaps, &b.singular_values));
                 assert_eq!(a.condition_handles, b.condition_handles);
+            }
+        }
+    }
+}
+
+#[test]
+fn methods_in_factors_give_the_cages_of_their_solvers() {
+    let (capture, cage) = capture();
+    let frames: Vec<Vec<f64>> = (2..5)
+        .map(|t| {
+            let mut frame = Vec::new();
+            capture.frame(t, &mut frame);
+            frame
+        })
+        .collect();
+    let frames: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
+    let systems: [&dyn CoordinateSystem; 3] = [&MeanValue, &Green::Free, &Green::Consistent];
+    for system in systems {
+        let analysis = Analysis::new(system, &cage, &capture.rest.points).unwrap();
+        let some = [Handles::Rectangular { count: None }, Handles::Spread { count: None }];
+        for handles in [Handles::MaxVol, Handles::All].into_iter().chain(some) {
+            let reading = analysis.reading(handles).unwrap();
+            let projected = reading.project(&frames);
+            for regularizer in Regularizer::ALL.into_iter().filter(|r| r.term().is_some()) {
+                let options = SolverOptions { handles, regularizer, spectrum: 7, lambda: 0.5 };
+                let method = reading.factored(options).unwrap();
+                let solver = analysis.solver(options).unwrap();
+                assert_eq!(method.follows_previous(), solver.follows_previous());
+                let found = reading.cages(&method, None, &projected, &frames);
+                let wanted = solver.invert_after(None, &frames);
+                let tolerance = if system.name() == "green" { 0.0 } else { 2e-6 };
+                for (a, b) in found.iter().flatten().zip(wanted.iter().flatten()) {
+                    assert!((a - b).abs() <= tolerance * (1.0 + b.abs()), "{} {options:?}: {a} {b}", system.name());
+                }
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Choices of rows, and what each is tried with: frames are projected once for all methods that read the same rows.
 
-use super::figures::draws;
+use super::figures::{DRAW_FRAMES, draws};
 use super::methods::{Method, methods};
 use super::sample::{Frame, Sample};
 use super::track::{Batch, Shape, Track};
@@ -97,6 +97,8 @@ pub(super) struct Choice<'a> {
     pub(super) tracks: Vec<(Subject, Track)>,
     is_tied: bool,
     is_draw: bool,
+    /// The frames measured.
+    sample: Sample,
 }
 
 impl<'a> Choice<'a> {
@@ -119,19 +121,15 @@ impl<'a> Choice<'a> {
         let mut methods: Vec<(SolverOptions, Arc<Factored>)> =
             first.iter().map(factored).collect::<Result<_, PrepareError>>()?;
         methods.extend(others.par_iter().map(factored).collect::<Result<Vec<_>, PrepareError>>()?);
+        let is_tied = analysis.decoder().tied_normals().is_some();
+        let sample = if is_tied && plan.is_draw() { sample.some(DRAW_FRAMES) } else { sample.clone() };
         let track = |subject: &Subject| {
             let (_, method) = methods.iter().find(|(of, _)| *of == subject.options())?;
-            let track = Track::new(method.clone(), matches!(subject, Subject::Noise(..)), sample);
+            let track = Track::new(method.clone(), matches!(subject, Subject::Noise(..)), &sample);
             Some((subject.clone(), track))
         };
         let tracks = plan.subjects.iter().filter_map(track).collect();
-        Ok(Self {
-            reading,
-            methods,
-            tracks,
-            is_tied: analysis.decoder().tied_normals().is_some(),
-            is_draw: plan.is_draw(),
-        })
+        Ok(Self { reading, methods, tracks, is_tied, is_draw: plan.is_draw(), sample })
     }
 
     pub(super) fn is_draw(&self) -> bool {
@@ -171,15 +169,27 @@ impl<'a> Choice<'a> {
         Ok(())
     }
 
-    /// Inverts and measures the frames that follow; `with_noise` are the same with noise.
-    pub(super) fn take(&mut self, batch: &[Frame], with_noise: &[Frame], sample: &Sample, shape: &Shape) {
+    /// Inverts and measures those of the frames that follow which are needed; `with_noise` are all of them with noise, for methods.
+    pub(super) fn take(&mut self, batch: &[Frame], with_noise: &[Frame], shape: &Shape) {
+        let needed = batch.iter().filter(|frame| self.sample.needed(frame.number));
+        let measured = |frame: &Frame| self.sample.position(frame.number).is_some();
+        let some: Vec<Frame>;
+        let batch = if self.is_draw {
+            some = needed.map(|frame| Frame { measured: measured(frame), ..frame.clone() }).collect();
+            some.as_slice()
+        } else {
+            batch
+        };
+        if batch.is_empty() {
+            return;
+        }
         let project = |of: &[Frame]| {
             let frames: Vec<&[f64]> = of.iter().map(|frame| frame.points.as_slice()).collect();
             self.reading.project(&frames)
         };
         let clean = project(batch);
         let noisy = self.reads_noise().then(|| project(with_noise));
-        let (reading, is_tied) = (&self.reading, self.is_tied);
+        let (reading, is_tied, sample) = (&self.reading, self.is_tied, &self.sample);
         self.tracks.par_iter_mut().for_each(|(_, track)| {
             let (frames, projected) = match &noisy {
                 Some(noisy) if track.noisy => (with_noise, noisy),

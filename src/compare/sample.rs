@@ -33,6 +33,12 @@ impl Sample {
         Self { measured, frames }
     }
 
+    /// Some of the frames measured, evenly spaced: `most` at the most.
+    pub(crate) fn some(&self, most: usize) -> Self {
+        let places = Self::new(self.measured.len(), most).measured;
+        Self { measured: places.into_iter().map(|place| self.measured[place]).collect(), frames: self.frames }
+    }
+
     /// The frames whose errors are measured.
     pub(crate) fn measured(&self) -> &[usize] {
         &self.measured
@@ -48,7 +54,8 @@ impl Sample {
         self.measured.binary_search(&frame).ok()
     }
 
-    fn needed(&self, frame: usize) -> bool {
+    /// Whether a frame is measured, or the neighbour of one that is.
+    pub(crate) fn needed(&self, frame: usize) -> bool {
         (frame.saturating_sub(1)..=frame + 1).any(|f| self.position(f).is_some())
     }
 
@@ -106,5 +113,15 @@ mod tests {
         let needed: Vec<usize> = (0..101).filter(|&f| sample.needed(f)).collect();
         assert_eq!(needed, [0, 1, 49, 50, 51, 99, 100]);
         assert_eq!((sample.to_read(), Sample::new(100, 1).to_read()), (101, 2));
+    }
+
+    #[test]
+    fn some_of_a_sample_are_among_it() {
+        let sample = Sample::new(1000, 50);
+        let some = sample.some(6);
+        assert_eq!(some.measured().len(), 6);
+        assert!(some.measured().iter().all(|&frame| sample.position(frame).is_some()));
+        assert_eq!((some.measured()[0], some.measured()[5]), (0, 999));
+        assert_eq!(Sample::new(4, 120).some(6), Sample::new(4, 120));
     }
 }

@@ -148,7 +148,7 @@ fn follow(
             true => batch.par_iter().map(|f| Frame { points: noisy(&f.points, f.number, radius), ..*f }).collect(),
             false => Vec::new(),
         };
-        choices.par_iter_mut().for_each(|choice| choice.take(&batch, &with_noise, sample, shape));
+        choices.par_iter_mut().for_each(|choice| choice.take(&batch, &with_noise, shape));
         tell(next);
     }
 }

@@ -45,6 +45,15 @@ fn a_capture_in_other_units_is_refused_unless_forced() {
 }
 
 #[test]
+fn a_comparison_refuses_what_an_encoding_refuses_unless_forced() {
+    let (dir, small) = Dir::with_capture();
+    dir.frames("frames.npy", &changed(&small, |p| p.map(|x| 100.0 * x)));
+    let line =
+        "compare --rest rest.obj --cage cage.obj --frames frames.npy -o out.html --coordinates mvc --frames-at-most 3";
+    refused_unless_forced(&dir, line, &["frames.npy", "rest.obj", "100 times larger", "units"]);
+}
+
+#[test]
 fn a_capture_with_its_points_in_another_order_is_refused_unless_forced() {
     let (dir, small) = Dir::with_capture();
     dir.frames("frames.npy", &shuffled(&small));

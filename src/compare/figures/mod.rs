@@ -6,7 +6,7 @@ mod summary;
 mod swaps;
 mod vectors;
 
-pub(crate) use random::{Draw, draws};
+pub(crate) use random::{DRAW_FRAMES, DRAWS, Draw, draws};
 pub(crate) use spectra::Spectra;
 pub(crate) use summary::{Choice, Claim, Recommendation, Smoothness, Verdict, claims, recommend};
 pub(crate) use swaps::{SwapTrace, Swaps};

@@ -7,6 +7,9 @@ use serde::Serialize;
 /// Draws at random.
 pub(crate) const DRAWS: u64 = 10;
 
+/// Frames at which draws are measured where every inversion iterates, each with its neighbours: there they would take most of the time.
+pub(crate) const DRAW_FRAMES: usize = 6;
+
 /// One choice of as many points as unknowns.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Draw {

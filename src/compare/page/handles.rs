@@ -2,7 +2,7 @@
 
 use super::Shown;
 use super::parts::{Html, Table, coloured, condition, number, percent};
-use crate::compare::figures::SwapTrace;
+use crate::compare::figures::{DRAW_FRAMES, SwapTrace};
 use crate::plot::{Axis, Chart, Cover, Mark, Series};
 use cager_core::inversion::Handles;
 use cager_core::regularize::Regularizer;
@@ -145,7 +145,7 @@ pub(super) fn random(html: &mut Html, systems: &[Shown<'_>]) {
     html.plots(
         &charts,
         "Ten draws of as many points as unknowns, the rows maxvol starts from, maxvol, and all points, each with sub-spectral regularisation at the usual threshold.",
-        "One dot for each choice of handles: to the right the less stable, upwards the less accurate ones. Points drawn at random often lie so close together that their rows are dependent; without regularisation they reconstruct nothing at all (last column). What a draw looks like is the first picture under “Errors of the reconstructed model”.",
+        &format!("One dot for each choice of handles: to the right the less stable, upwards the less accurate ones. Points drawn at random often lie so close together that their rows are dependent; without regularisation they reconstruct nothing at all (last column). What a draw looks like is the first picture under “Errors of the reconstructed model”. With green coordinates, where every inversion iterates, the draws and the start of maxvol are measured at {DRAW_FRAMES} frames only."),
         "Paper: Fig. 3.",
     );
     html.table(&table);
