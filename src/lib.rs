@@ -27,6 +27,7 @@ pub mod remote;
 pub mod report;
 pub mod service;
 mod session;
+mod speed;
 pub mod store;
 pub mod telemetry;
 pub mod timing;

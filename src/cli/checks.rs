@@ -126,24 +126,25 @@ pub(super) fn check_capture(files: &CaptureFiles, rest: (&Path, &Model), args: &
     refuse_or_warn(what, &format!("; {advice}"), args.force)
 }
 
-/// Whether a cage of other units or axes was given; asked where it leaves most points outside, or is far larger than the model.
+/// Whether a cage of other units or axes was given, or that of another model; asked where it leaves most points outside, or is far larger than the model.
 pub(super) fn check_cage(cage: (&Path, &TriMesh), rest: &Model, args: &CheckArgs) -> Result<()> {
     let missed = outside(cage.1, &rest.points).len();
     let most_outside = 2 * missed > rest.points.len();
     if !most_outside && diagonal(&cage.1.vertices) <= ROOMY * diagonal(&rest.points) {
         return Ok(());
     }
-    let Some(misfit) = misfit(cage.1, rest).filter(|found| most_outside || found.shift == [0.0; 3]) else {
-        return Ok(());
-    };
+    let misfit = misfit(cage.1, rest).filter(|found| most_outside || found.shift == [0.0; 3]);
+    let nearly_all = 10 * missed > 9 * rest.points.len();
     let path = cage.0.display();
-    let what = if most_outside {
-        format!("{path}: leaves {missed} of {} points of the rest pose outside, and {misfit}", rest.points.len())
-    } else {
-        format!(
+    let leaves = || format!("{path}: leaves {missed} of {} points of the rest pose outside", rest.points.len());
+    let what = match misfit {
+        Some(misfit) if most_outside => format!("{}, and {misfit}", leaves()),
+        Some(misfit) => format!(
             "{path}: is {:.0} times larger than the rest pose, and {misfit}",
             diagonal(&cage.1.vertices) / diagonal(&rest.points)
-        )
+        ),
+        None if nearly_all => format!("{}; it looks like the cage of another model", leaves()),
+        None => return Ok(()),
     };
     refuse_or_warn(what, "", args.force)
 }

@@ -54,7 +54,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     let expected = seconds(&job);
     let bar = progress::timed_steps();
     let plural = if systems.len() == 1 { "" } else { "s" };
-    bar.println(format!("about {} for {} coordinate system{plural}", duration(expected), systems.len()));
+    bar.println(format!("about {} for {} coordinate system{plural}", progress::duration(expected), systems.len()));
     let result = compare(&job, &mut Progress { tell: &mut |step, done| show(&bar, step, done, expected) });
     bar.finish_and_clear();
     let (figures, pictures) = result.map_err(|error| match error {
@@ -81,17 +81,8 @@ fn show(bar: &ProgressBar, step: &str, done: f64, expected: f64) {
     let by_now = bar.elapsed().as_secs_f64() / done.max(1e-3);
     let left = (1.0 - done) * (done * by_now + (1.0 - done) * expected);
     bar.set_message(step.to_owned());
-    bar.set_prefix(format!("about {} left", duration(left)));
+    bar.set_prefix(format!("about {} left", progress::duration(left)));
     bar.set_position((done * progress::STEPS as f64) as u64);
-}
-
-/// A rough time in words.
-fn duration(seconds: f64) -> String {
-    match seconds {
-        s if s < 90.0 => format!("{:.0} s", s.max(1.0)),
-        s if s < 5400.0 => format!("{:.0} min", s / 60.0),
-        s => format!("{:.1} h", s / 3600.0),
-    }
 }
 
 /// The systems asked for, each once; all where none is.

@@ -13,6 +13,7 @@ use crate::frames::CaptureFiles;
 use crate::memory::Memory;
 use crate::remote::{EncodedRemotely, FileFrames, RemoteCage, RemoteJob, RemoteProgress, encode_remotely};
 use crate::report::Report;
+use crate::speed::seconds_to_prepare;
 use crate::timing::counted_from_zero;
 use anyhow::{Context, Result, bail};
 use cager_cages::DesignOptions;
@@ -164,7 +165,8 @@ fn here(
     };
     let report_file = targets.begin_report()?;
 
-    let bar = progress::Prepared::new("encoding", frames.frames());
+    let bar = progress::Prepared::new("encoding", frames.frames())
+        .expecting(|| seconds_to_prepare(system, cage, rest.points.len()));
     let job = Job {
         rest,
         cage,

@@ -45,11 +45,19 @@ impl Prepared {
         if !clock.is_hidden() {
             clock.enable_steady_tick(Duration::from_millis(250));
         }
-        let clock = match ProgressStyle::with_template("{spinner} preparing: {msg}, {elapsed}") {
+        let clock = match ProgressStyle::with_template("{spinner} preparing: {msg}, {elapsed}{prefix}") {
             Ok(style) => clock.with_style(style),
             Err(_) => clock,
         };
         Self { what, total, clock, frames: OnceCell::new() }
+    }
+
+    /// Shows how many seconds preparing will take, about; they are asked for only where somebody sees them.
+    pub(crate) fn expecting(self, seconds: impl FnOnce() -> f64) -> Self {
+        if !self.clock.is_hidden() {
+            self.clock.set_prefix(format!(" of about {}", duration(seconds())));
+        }
+        self
     }
 
     pub(crate) fn preparing(&self, step: &'static str) {
@@ -70,6 +78,15 @@ impl Prepared {
         if let Some(bar) = self.frames.get() {
             bar.finish_and_clear();
         }
+    }
+}
+
+/// A rough time in words.
+pub(crate) fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 90.0 => format!("{:.0} s", s.max(1.0)),
+        s if s < 5400.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.1} h", s / 3600.0),
     }
 }
 

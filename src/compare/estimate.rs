@@ -3,14 +3,9 @@
 use super::Job;
 use super::figures::{DRAW_FRAMES, DRAWS};
 use super::sample::Sample;
+use crate::speed::seconds_per_multiplication;
 use cager_core::coordinates::CoordinateSystem;
-use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, Par};
-use std::time::Instant;
 
-/// Rows and columns of the product whose speed is measured, and how often it is.
-const SIZE: usize = 384;
-const REPEATS: usize = 10;
 /// Methods with and without noise and draws, about, and draws among them.
 const METHODS: f64 = 50.0;
 const DRAWN: f64 = 2.0 * (DRAWS + 1) as f64;
@@ -30,16 +25,8 @@ pub(super) fn work(job: &Job<'_>, system: &dyn CoordinateSystem) -> f64 {
 
 /// Seconds that a comparison will take, about.
 pub(crate) fn seconds(job: &Job<'_>) -> f64 {
-    let a = Mat::from_fn(SIZE, SIZE, |i, j| 1.0 / (1 + i + j) as f64);
-    let mut out = a.clone();
-    let product = |_| {
-        let clock = Instant::now();
-        matmul(out.as_mut(), Accum::Replace, a.as_ref(), a.as_ref(), 1.0, Par::Seq);
-        clock.elapsed().as_secs_f64()
-    };
-    let fastest = (0..REPEATS).map(product).fold(f64::INFINITY, f64::min);
     let total: f64 = job.systems.iter().map(|system| work(job, *system)).sum();
-    total * fastest / (SIZE as f64).powi(3)
+    total * seconds_per_multiplication()
 }
 
 #[cfg(test)]

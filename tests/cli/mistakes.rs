@@ -1,7 +1,7 @@
 //! Files that do not belong together, or are not what their names say: noticed before the work, with the likely cause.
 
 use crate::refused::assert_sentence;
-use crate::support::{Dir, ENCODE, Small, as_model, npy, npy_f64, polygons, read_frames};
+use crate::support::{Dir, ENCODE, Small, as_model, npy, npy_f64, polygons, quad_box, read_frames};
 use cager_core::mesh::{Model, Point, Polygons};
 
 /// Every point of every frame changed.
@@ -100,6 +100,14 @@ fn a_cage_in_other_units_or_axes_is_refused_with_what_would_make_it_fit() {
     let done = dir.cager(line).run();
     assert_eq!(done.status, Some(1), "{done:?}");
     assert_sentence(line, &done.stderr, &["cage.obj", "times larger than the rest pose", "scaled by 0.01", "--force"]);
+}
+
+#[test]
+fn the_cage_of_another_model_is_refused_unless_forced() {
+    let (dir, small) = Dir::with_capture();
+    let slab: Vec<Point> = small.rest.points.iter().map(|p| [0.02 * p[0] + 3.0, 0.5 * p[1], 0.9 * p[2]]).collect();
+    dir.model("cage.obj", &quad_box(&slab));
+    refused_unless_forced(&dir, ENCODE, &["cage.obj", "of the rest pose outside", "another model"]);
 }
 
 #[test]

@@ -1,0 +1,52 @@
+//! How fast this machine multiplies, for telling how long something will take.
+
+use cager_core::cage::Cage;
+use cager_core::coordinates::CoordinateSystem;
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, Par};
+use std::time::Instant;
+
+/// Rows and columns of the product that is timed, and how often it is.
+const SIZE: usize = 384;
+const REPEATS: usize = 10;
+
+/// Seconds that one thread takes for a multiplication in a matrix product.
+pub(crate) fn seconds_per_multiplication() -> f64 {
+    let a = Mat::from_fn(SIZE, SIZE, |i, j| 1.0 / (1 + i + j) as f64);
+    let mut out = a.clone();
+    let product = |_| {
+        let clock = Instant::now();
+        matmul(out.as_mut(), Accum::Replace, a.as_ref(), a.as_ref(), 1.0, Par::Seq);
+        clock.elapsed().as_secs_f64()
+    };
+    (0..REPEATS).map(product).fold(f64::INFINITY, f64::min) / (SIZE as f64).powi(3)
+}
+
+/// Seconds that preparing a solver will take, about; the factors were fitted to measured times.
+pub(crate) fn seconds_to_prepare(system: &dyn CoordinateSystem, cage: &Cage, points: usize) -> f64 {
+    /// Points that are analysed at the most, times unknowns, as the core has it.
+    const ANALYSED: f64 = (1u64 << 25) as f64;
+    let (n, m, faces) = (points as f64, system.unknowns(cage) as f64, cage.faces().len() as f64);
+    let of_points = n * faces * 400.0 + n.min((ANALYSED / m).max(8.0 * m)) * m * m * 3.0;
+    let of_cage = 17.0 * m.powi(3) + if system.by_point().is_none() { 2.2e5 * faces.powi(2) } else { 0.0 };
+    (of_points + of_cage) * seconds_per_multiplication() / rayon::current_num_threads() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cager_core::coordinates::MeanValue;
+    use cager_core::synthetic::{Capture, Options};
+
+    #[test]
+    fn larger_models_and_cages_take_longer() {
+        let seconds = |points, cage_vertices| {
+            let cage = Capture::new(&Options { points: 400, frames: 2, cage_vertices }).cage;
+            seconds_to_prepare(&MeanValue, &Cage::new(cage).expect("a cage"), points)
+        };
+        let speed = seconds_per_multiplication();
+        assert!(speed > 1e-13 && speed < 1e-6, "{speed}");
+        assert!(seconds(1_000_000, 300) > 5.0 * seconds(10_000, 300));
+        assert!(seconds(10_000, 1_200) > 3.0 * seconds(10_000, 300));
+    }
+}
