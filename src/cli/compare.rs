@@ -139,11 +139,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn durations_are_told_in_the_unit_that_fits() {
-        assert_eq!([0.2, 42.4, 150.0, 9000.0].map(duration), ["1 s", "42 s", "2 min", "2.5 h"]);
-    }
-
-    #[test]
     fn time_left_follows_what_was_expected_at_first_and_what_has_passed_at_the_end() {
         let bar = ProgressBar::hidden();
         show(&bar, "mvc: coordinates", 0.0, 60.0);

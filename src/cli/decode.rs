@@ -58,7 +58,6 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
         memory: args.memory,
     };
     let bar = progress::Prepared::new("decoding", taken);
-    bar.preparing("coordinates");
     let result = decode::decode(&args.input, &output, what, &mut |done| bar.done(done));
     bar.finish();
     let found = result?;

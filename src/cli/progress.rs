@@ -49,6 +49,7 @@ impl Prepared {
             Ok(style) => clock.with_style(style),
             Err(_) => clock,
         };
+        clock.set_message("coordinates");
         Self { what, total, clock, frames: OnceCell::new() }
     }
 
@@ -114,4 +115,14 @@ pub(crate) fn design(bar: &ProgressBar, told: &CageProgress) {
         Some(error) => format!("{stage}: {:.3} %", 100.0 * error),
         None => stage,
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn durations_are_told_in_the_unit_that_fits() {
+        assert_eq!([0.2, 42.4, 150.0, 9000.0].map(duration), ["1 s", "42 s", "2 min", "2.5 h"]);
+    }
 }
