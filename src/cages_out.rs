@@ -20,7 +20,7 @@ pub struct CagesWritten {
 }
 
 /// Writes the cages of a container, or a range of them, to `output` in any format of frames, and the rest cage with its faces
-/// beside them: see [`rest_cage_path`]. Both appear whole or not at all. A dry run reads and checks, and writes neither.
+/// beside them: see [`rest_cage_path`]. Each appears whole or not at all, the frames first. A dry run reads and checks, and writes neither.
 ///
 /// # Errors
 /// Damage; an output that refuses; another file in the place of the rest cage.

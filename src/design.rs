@@ -2,7 +2,6 @@
 
 use crate::encode::{EncodeError, sample_frames};
 use crate::frames::CaptureFiles;
-use crate::memory::Memory;
 use cager_cages::{Design, DesignOptions, Style};
 use cager_client::cage_messages::CageJob;
 use serde::{Deserialize, Serialize};
@@ -15,7 +14,7 @@ pub const FRAMES: usize = 160;
 /// # Errors
 /// Those of the reader, also where it ends before the frames it announced.
 pub fn read_frames(files: &CaptureFiles) -> Result<Vec<Vec<f64>>, EncodeError> {
-    sample_frames(files.open()?.as_mut(), FRAMES, false, Memory::half_of_free())
+    sample_frames(files.open()?.as_mut(), FRAMES, false)
 }
 
 /// How a cage was designed. Errors are least-squares errors over sampled points, root mean square, as fractions of the rest pose's

@@ -17,6 +17,9 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Instant;
 
+/// Frames that something is chosen by take at most this much memory; not what is free, since the choice must not depend on that.
+const SAMPLE_BYTES: usize = 640 << 20;
+
 /// Why encoding stopped; nothing was written.
 #[derive(Debug, thiserror::Error)]
 pub enum EncodeError {
@@ -96,10 +99,9 @@ pub fn sample_frames(
     frames: &mut dyn FrameReader,
     most: usize,
     first_ones: bool,
-    memory: Memory,
 ) -> Result<Vec<Vec<f64>>, EncodeError> {
     let total = frames.frames();
-    let count = memory.frames(24 * frames.points(), most.min(total));
+    let count = most.min(SAMPLE_BYTES / (24 * frames.points().max(1))).clamp(1, total.max(1));
     let mut samples = Vec::with_capacity(count);
     let mut at = 0;
     for k in 0..count {
@@ -167,19 +169,20 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
         svd: found.svd_seconds,
         ..Seconds::default()
     };
-    let size = frames_per_batch(job.memory, job.frames.points());
+    let keeps = solver.decoder().coordinates().is_some();
+    let Flow { size, at_once } = Flow::new(job.memory, job.frames.points(), keeps);
     let mut convergence = Vec::new();
     let mut worst = None;
     std::thread::scope(|scope| -> Result<(), EncodeError> {
-        let (full, batches) = sync_channel(rayon::current_num_threads());
-        let (empty, recycled) = sync_channel(2 * rayon::current_num_threads() + 2);
+        let (full, batches) = sync_channel(at_once);
+        let (empty, recycled) = sync_channel(2 * at_once + 2);
         let frames = job.frames;
         let reader = scope.spawn(move || read_batches(frames, size, &full, &recycled));
         let mut done = 0;
         let mut previous: Option<Vec<f32>> = None;
         while let Ok(first) = batches.recv() {
             let mut waiting = vec![first];
-            while waiting.len() < rayon::current_num_threads() {
+            while waiting.len() < at_once {
                 match batches.try_recv() {
                     Ok(batch) => waiting.push(batch),
                     Err(_) => break,
@@ -245,8 +248,9 @@ fn prepare(
 ) -> Result<(Solver, SolverOptions, Option<SpectrumChoice>), PrepareError> {
     let mut options = job.options;
     let points = &job.rest.points;
-    let batches = job.frames.frames().div_ceil(frames_per_batch(job.memory, points.len()));
-    let keeps_coordinates = job.memory.keeps(points.len(), job.system.columns(job.cage), batches);
+    let batches = job.frames.frames().div_ceil(Flow::new(job.memory, points.len(), false).size);
+    let passes = if job.choose.is_some() { usize::MAX } else { batches };
+    let keeps_coordinates = job.memory.keeps(points.len(), job.system.columns(job.cage), passes);
     let preparing = Preparing { term: job.term, keeps_coordinates, tell };
     let term = preparing.term(options)?;
     let chosen_by = job.choose.as_ref().filter(|choose| !choose.samples.is_empty());
@@ -264,9 +268,21 @@ fn prepare(
 
 type Batch = Vec<Vec<f64>>;
 
-fn frames_per_batch(memory: Memory, points: usize) -> usize {
-    let batches = 2 * rayon::current_num_threads() + 1;
-    memory.frames(24 * batches * points, BATCH)
+/// How frames are solved: batches of so many, so many at a time. As many again wait, and one is being read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Flow {
+    size: usize,
+    at_once: usize,
+}
+
+impl Flow {
+    /// Where coordinates are kept, a batch for each thread; otherwise one at a time, since each computes them anew with all threads.
+    fn new(memory: Memory, points: usize, keeps: bool) -> Self {
+        let most = if keeps { rayon::current_num_threads() } else { 1 };
+        let frames = memory.frames(24 * points, BATCH * (2 * most + 1));
+        let at_once = (frames.saturating_sub(1) / 2).clamp(1, most);
+        Self { size: (frames / (2 * at_once + 1)).max(1), at_once }
+    }
 }
 
 /// Reads all frames; returns the seconds that took, not counting the time it waited for the solver.
@@ -357,14 +373,26 @@ mod tests {
     }
 
     #[test]
+    fn frames_on_their_way_fit_into_memory_with_any_number_of_threads() {
+        for threads in [1, 2, 64] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            for (points, keeps) in [(100, true), (100, false), (1_000_000, true), (1_000_000, false)] {
+                let Flow { size, at_once } = pool.install(|| Flow::new(Memory::at_most(1 << 30), points, keeps));
+                let most = (24 * points * size * (2 * at_once + 1)) as u64;
+                assert!((1..=BATCH).contains(&size) && at_once >= 1 && most <= 1 << 28, "{threads} {points}: {most}");
+                assert!(points > 100 || size == BATCH && at_once == if keeps { threads } else { 1 });
+            }
+        }
+    }
+
+    #[test]
     fn a_reader_that_ends_early_is_told_and_no_sample_is_empty() {
-        let memory = Memory::at_most(1 << 30);
         for first_ones in [false, true] {
             for left in 0..10 {
-                let error = sample_frames(&mut Short { left }, 24, first_ones, memory).expect_err("too few frames");
+                let error = sample_frames(&mut Short { left }, 24, first_ones).expect_err("too few frames");
                 assert!(matches!(error, EncodeError::EndsEarly { found, announced: 10 } if found == left), "{error}");
             }
-            assert_eq!(sample_frames(&mut Short { left: 10 }, 24, first_ones, memory).expect("all").len(), 10);
+            assert_eq!(sample_frames(&mut Short { left: 10 }, 24, first_ones).expect("all").len(), 10);
         }
     }
 }

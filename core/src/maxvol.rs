@@ -16,7 +16,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Default tolerance τ: swaps end when no entry of B exceeds 1.01.
 pub const TOLERANCE: f64 = 0.01;
 /// From this many columns on swaps end at [`LOOSE`].
-const MANY_COLUMNS: usize = 1024;
+const MANY_COLUMNS: usize = 1536;
 /// Tolerance for many columns: each swap costs more there, and the rest of them change errors by less than a hundredth.
 const LOOSE: f64 = 1.0;
 /// Rows whose largest entry of B exceeds this take part in the swaps.
@@ -77,8 +77,8 @@ pub struct Dependent {
     pub smallest: f64,
 }
 
-/// The tolerance that handles of so many unknowns are searched with: [`TOLERANCE`], and for cages of more than a thousand unknowns
-/// a looser one.
+/// The tolerance that handles of so many unknowns are searched with: [`TOLERANCE`], and for cages of 1,536 unknowns and more a
+/// looser one.
 pub fn tolerance(unknowns: usize) -> f64 {
     if unknowns < MANY_COLUMNS { TOLERANCE } else { LOOSE }
 }

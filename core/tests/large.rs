@@ -100,3 +100,29 @@ fn normals_that_follow_are_found_from_a_sample() {
         assert!(error.l2 < 1e-2 * kept.diagonal(), "{}", error.l2);
     }
 }
+
+#[test]
+fn a_small_part_with_a_cage_of_its_own_is_as_well_determined_as_without_a_large_model_beside_it() {
+    let (mut model, cage) = capture(150_000, 250);
+    let far = |p: [f64; 3]| [p[0] + 40.0, p[1], p[2]];
+    let corners =
+        [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]];
+    let faces = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+    let mut mesh = cage.mesh().clone();
+    let first = mesh.vertices.len() as u32;
+    mesh.vertices.extend(corners.map(far));
+    mesh.triangles.extend(faces.map(|face| face.map(|v: u32| v + first)));
+    let both = Cage::new(mesh).unwrap();
+    // Twelve points where a sample takes every second one of the model's.
+    let part = corners.iter().flat_map(|c| [0.3, 0.5].map(|s| far([s * c[0] + 0.1, s * c[1] + 0.05, s * c[2]])));
+    model.rest.points.extend(part);
+    let solver = prepare(&MeanValue, &(model, both), Handles::default(), true);
+    let found = solver.preparation();
+    assert_eq!(found.rank, solver.decoder().unknowns());
+    assert!(
+        found.condition_full < 1e4 && found.condition_handles < 1e4,
+        "{} {}",
+        found.condition_full,
+        found.condition_handles
+    );
+}

@@ -98,8 +98,8 @@ pub(crate) struct EncodeArgs {
     #[command(flatten)]
     pub(crate) solver: SolverArgs,
 
-    /// Memory to take beside the model itself, such as 1GB; what does not fit is computed in parts, to the same result [default: half of
-    /// what is free].
+    /// Memory for frames and coordinates, such as 1GB; what does not fit is computed in parts, to the same result. The model itself and
+    /// its analysis, half a gigabyte at the most, come on top [default: half of what is free].
     #[arg(long, value_name = "SIZE", value_parser = memory, hide_default_value = true)]
     pub(crate) memory: Option<Memory>,
 
@@ -210,8 +210,8 @@ pub(crate) struct DecodeArgs {
     #[command(flatten)]
     pub(crate) timing: TimingArgs,
 
-    /// Memory to take beside the model itself, such as 1GB; what does not fit is computed in parts, to the same result [default: half of
-    /// what is free].
+    /// Memory for frames and coordinates, such as 1GB; what does not fit is computed in parts, to the same result [default: half of what
+    /// is free].
     #[arg(long, value_name = "SIZE", value_parser = memory, hide_default_value = true)]
     pub(crate) memory: Option<Memory>,
 

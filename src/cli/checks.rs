@@ -6,7 +6,6 @@ use super::warn;
 use crate::belong::{self, Mismatch, Up, mismatches};
 use crate::encode::{EncodeError, sample_frames};
 use crate::frames::CaptureFiles;
-use crate::memory::Memory;
 use crate::timing::Timing;
 use anyhow::{Result, bail};
 use cager_cages::doctor::{misfit, weld};
@@ -101,8 +100,7 @@ pub(super) fn capture_files(args: &CaptureArgs, path: &Path, rest: &mut Model) -
 /// Compares some frames of a capture with its rest pose.
 pub(super) fn check_capture(files: &CaptureFiles, rest: (&Path, &Model), args: &CheckArgs, turns: bool) -> Result<()> {
     let opened = files.open().map_err(EncodeError::from);
-    let frames =
-        opened.and_then(|mut reader| sample_frames(reader.as_mut(), belong::FRAMES, false, Memory::half_of_free()));
+    let frames = opened.and_then(|mut reader| sample_frames(reader.as_mut(), belong::FRAMES, false));
     let frames = frames.map_err(|error| explained(error, files, rest))?;
     let found = mismatches(rest.1, &frames);
     if found.is_empty() {

@@ -157,7 +157,7 @@ fn here(
             // What is wrong with the options is told before anything is read.
             check_options(rest.points.len(), system.unknowns(cage), options).map_err(|e| name_file(&e, args))?;
             let mut again = files.open()?;
-            let samples = choosing_frames(again.as_mut(), options.regularizer == Regularizer::Temporal, memory)
+            let samples = choosing_frames(again.as_mut(), options.regularizer == Regularizer::Temporal)
                 .map_err(|error| name_files(error, args))?;
             Some(ChooseSpectrum { samples, bound })
         }
@@ -190,12 +190,8 @@ fn here(
 }
 
 /// Frames to choose a spectrum threshold by: the first ones where cages follow their predecessors.
-fn choosing_frames(
-    frames: &mut dyn FrameReader,
-    first_ones: bool,
-    memory: Memory,
-) -> Result<Vec<Vec<f64>>, encode::EncodeError> {
-    sample_frames(frames, if first_ones { 96 } else { 24 }, first_ones, memory)
+fn choosing_frames(frames: &mut dyn FrameReader, first_ones: bool) -> Result<Vec<Vec<f64>>, encode::EncodeError> {
+    sample_frames(frames, if first_ones { 96 } else { 24 }, first_ones)
 }
 
 /// The files are read and the options checked here as well, so that what is wrong with them is told before anything is sent, in

@@ -56,7 +56,7 @@ impl Outputs {
         let target = self.target(path, place)?;
         if !self.overwrite && fs::read_dir(place).is_ok_and(|mut files| files.next().is_some()) {
             bail!(
-                "{}: is a folder that is not empty; name another, or give --overwrite to replace frames in it",
+                "{}: is a folder that is not empty; name another, or give --overwrite to replace it as a whole, where it holds only such frames",
                 path.display()
             );
         }

@@ -224,3 +224,15 @@ fn a_dry_run_refuses_what_the_work_would_refuse() {
     refused(&dir, "edit out.cager --dry-run --with-cages few.npy -o new.cager", &["few.npy", "vertices"]);
     refused(&dir, "cage --rest rest.obj --dry-run -o new.stl", &["new.stl"]);
 }
+
+#[cfg(unix)]
+#[test]
+fn a_folder_that_is_replaced_keeps_its_mode() {
+    use std::os::unix::fs::PermissionsExt;
+    let (dir, _) = Dir::with_encoded();
+    dir.cager("decode out.cager -o poses").succeeds();
+    std::fs::set_permissions(dir.path("poses"), std::fs::Permissions::from_mode(0o700)).expect("a mode");
+    dir.cager("decode out.cager -o poses --overwrite").succeeds();
+    let mode = std::fs::metadata(dir.path("poses")).expect("the folder").permissions().mode();
+    assert_eq!(mode & 0o777, 0o700);
+}

@@ -32,7 +32,7 @@ fn encoded(root: &Path) -> (Dir, Model, Vec<Vec<f64>>, f64) {
 /// What the program makes of another model, over the diagonal of the original's rest pose.
 fn error(dir: &Dir, rest: &Model, model: &Model, truth: &[Vec<f64>]) -> f64 {
     write_model(&dir.path("other.ply"), model).expect("a model");
-    dir.cager("decode walk.cager --model other.ply -o other.npy").succeeds();
+    dir.cager("decode walk.cager --model other.ply -o other.npy --overwrite").succeeds();
     let found = read_frames(&dir.path("other.npy"), model.points.len());
     mean(&measure(&model.points, truth, &found).l2) * diagonal(&model.points) / diagonal(&rest.points)
 }

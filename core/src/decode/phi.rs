@@ -81,7 +81,7 @@ pub(crate) fn in_parts(
     columns: usize,
     mut work: impl FnMut(usize, &Coordinates),
 ) {
-    let size = (PART_BYTES / (12 * columns)).next_multiple_of(BLOCK_ROWS);
+    let size = (PART_BYTES / (12 * columns)).max(1).next_multiple_of(BLOCK_ROWS);
     for (part, points) in points.chunks(size).enumerate() {
         work(part * size, &by_point(cage, points));
     }

@@ -6,14 +6,19 @@ use super::prepare::{coordinates_fit, outside, refuse_unreproduced, reproduction
 use crate::cage::Cage;
 use crate::coordinates::{ByPoint, CoordinateSystem, MeanValue, Refinement};
 use crate::decode::{Decoder, in_parts};
+use crate::handles::Handles;
 use crate::handles::farthest::along_curve;
 use crate::mesh::{Point, diagonal};
 use faer::Mat;
+use rayon::prelude::*;
 
 /// Entries of the largest `Φ` that is analysed as a whole, unless it has fewer than [`ROWS_PER_UNKNOWN`].
 const ENTRIES: usize = 1 << 25;
 /// Points that are analysed for each unknown at the least.
 const ROWS_PER_UNKNOWN: usize = 8;
+
+/// Points of the largest coordinates of each column that are analysed whatever else is.
+const NEAREST: usize = 8;
 
 /// What decoding and analysing begin with.
 pub(super) struct Found {
@@ -32,9 +37,15 @@ pub(super) struct Found {
     pub(super) refinement: Option<Refinement>,
 }
 
-/// As many points along a space-filling curve as are analysed of a model, where they are not all. They are as dense as its points are.
-fn sample(points: &[Point], unknowns: usize) -> Option<Vec<u32>> {
-    let count = (ENTRIES / unknowns).max(ROWS_PER_UNKNOWN * unknowns);
+/// As many points along a space-filling curve as are analysed of a model, where they are not all: at least those that are read. They are
+/// as dense as its points are.
+fn sample(points: &[Point], unknowns: usize, wanted: Wanted) -> Option<Vec<u32>> {
+    let read = match wanted {
+        Wanted::Everything => return None,
+        Wanted::For(Handles::All) => 0,
+        Wanted::For(handles) => handles.count(points.len(), unknowns),
+    };
+    let count = (ENTRIES / unknowns).max(ROWS_PER_UNKNOWN * unknowns).max(read);
     if points.len() <= count {
         return None;
     }
@@ -60,7 +71,7 @@ pub(super) fn coordinates(
         let gigabytes = (4 + 8 * copies) as f64 * 1e-9 * rows as f64 * columns as f64;
         PrepareError::OutOfMemory { points: points.len(), unknowns: m, gigabytes }
     };
-    let sampled = system.by_point().filter(|_| !everything).and_then(|by_point| Some((by_point, sample(points, m)?)));
+    let sampled = system.by_point().and_then(|by_point| Some((by_point, sample(points, m, wanted)?)));
     if let Some((by_point, sample)) = sampled {
         if !coordinates_fit(sample.len(), columns, copies) {
             return Err(too_large(sample.len()));
@@ -91,10 +102,11 @@ fn of_sample(
     by_point: ByPoint,
     cage: &Cage,
     points: &[Point],
-    sample: Vec<u32>,
+    mut sample: Vec<u32>,
     keeps: bool,
 ) -> Result<Found, PrepareError> {
     let (columns, mut rest) = (system.columns(cage), system.rest_values(cage));
+    let mut nearest: Vec<Vec<(f64, u32)>> = vec![Vec::new(); columns];
     let (mut worst, mut found_outside) = ((0, 0.0), Vec::new());
     in_parts(by_point, cage, points, columns, |first, part| {
         let here = &points[first..first + part.phi.nrows()];
@@ -103,7 +115,22 @@ fn of_sample(
             worst = (first + point, error);
         }
         found_outside.extend(part.outside.iter().map(|&i| first as u32 + i));
+        nearest.par_iter_mut().enumerate().for_each(|(j, nearest)| {
+            for (i, x) in part.phi.col(j).iter().enumerate() {
+                let least = nearest.last().map_or(0.0, |&(least, _)| least);
+                if nearest.len() == NEAREST && x.abs() <= least {
+                    continue;
+                }
+                let at = nearest.partition_point(|&(other, _)| other >= x.abs());
+                nearest.insert(at, (x.abs(), (first + i) as u32));
+                nearest.truncate(NEAREST);
+            }
+        });
     });
+    // Parts of the model with few points may have a part of the cage to themselves.
+    sample.extend(nearest.iter().flatten().map(|&(_, point)| point));
+    sample.sort_unstable();
+    sample.dedup();
     refuse_unreproduced(worst.0, worst.1, cage, diagonal(points))?;
     let decoder = if keeps { Decoder::keeping } else { Decoder::computing }(by_point, cage, points, columns);
     let decoder = decoder.with_tied_normals(system.tied_normals(cage));

@@ -7,7 +7,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::temporary::{self, Temporary};
-use super::{Place, hide_temporary, sync_folder};
+use super::{Place, hide_temporary, inherit, sync_folder};
 use crate::error::Error;
 
 /// A folder that takes its name once all its files are complete; dropped before [`AtomicDir::commit`] it leaves
@@ -86,12 +86,23 @@ impl AtomicDir {
             File::open(entry?.path())?.sync_all()?;
         }
         sync_folder(self.folder())?;
+        if cfg!(unix) && self.place.target.is_dir() {
+            inherit(&File::open(self.folder())?, &self.place.target)?;
+        }
         // Outlives the lock, which removing it takes.
         let mut old = None;
         {
             let (mut live, target) = (temporary::lock(), &self.place.target);
             if !self.replaced.is_empty() {
-                old = Some(live.begin(&self.place.folder, |aside| fs::rename(target, aside))?.1);
+                let aside = live.begin(&self.place.folder, |aside| fs::rename(target, aside))?.1;
+                // What came while the files were made durable.
+                let is_new =
+                    |entry: io::Result<fs::DirEntry>| entry.is_ok_and(|e| !self.replaced.contains(&e.file_name()));
+                if fs::read_dir(aside.path())?.any(is_new) {
+                    live.rename(&aside, target)?;
+                    return Err(io::ErrorKind::DirectoryNotEmpty.into());
+                }
+                old = Some(aside);
             } else if cfg!(not(unix)) && target.exists() {
                 fs::remove_dir(target)?;
             }
