@@ -236,7 +236,7 @@ pub(crate) struct InspectArgs {
 /// Compare ways to invert a capture, with the figures of the paper, in one HTML file.
 ///
 /// Every method is run on the capture: the report shows its errors, how calm its cages are, spectra, times and pictures, and
-/// which options the figures advise. On two cores, 120 frames of 20,000 points in a cage of 330 vertices take about 3 minutes with all
+/// which options the figures advise. On two cores, 120 frames of 20,000 points in a cage of 330 vertices take some minutes with all
 /// coordinates, and 10 seconds with --coordinates mvc. Example: cager compare --rest rest.obj --cage cage.obj --frames walk.npy -o walk.html
 #[derive(Args, Debug)]
 pub(crate) struct CompareArgs {
