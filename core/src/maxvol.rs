@@ -17,7 +17,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub const TOLERANCE: f64 = 0.01;
 /// From this many columns on swaps end at [`LOOSE`].
 const MANY_COLUMNS: usize = 1536;
-/// Tolerance for many columns: each swap costs more there, and the rest of them change errors by less than a hundredth.
+/// Tolerance for many columns: each swap costs more there, and a basis this well conditioned is enough to interpolate and decompose by.
 const LOOSE: f64 = 1.0;
 /// Rows whose largest entry of B exceeds this take part in the swaps.
 const CANDIDATE: f32 = 0.9;

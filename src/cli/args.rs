@@ -99,7 +99,7 @@ pub(crate) struct EncodeArgs {
     pub(crate) solver: SolverArgs,
 
     /// Memory for frames and coordinates, such as 1GB; what does not fit is computed in parts, to the same result. The model itself and
-    /// its analysis, half a gigabyte at the most, come on top [default: half of what is free].
+    /// its analysis, half a gigabyte with a cage of 350 vertices, come on top [default: half of what is free].
     #[arg(long, value_name = "SIZE", value_parser = memory, hide_default_value = true)]
     pub(crate) memory: Option<Memory>,
 

@@ -8,7 +8,7 @@ use faer::{Mat, MatRef};
 const STEPS: usize = 240;
 /// It ends when as many steps change the value by less than this fraction.
 const SETTLED: f64 = 1e-13;
-const CALM: usize = 4;
+const UNCHANGED: usize = 4;
 
 /// Largest and smallest singular value of `R A` from the upper triangular R, m × m, and from A, m × m, with its inverse.
 pub(crate) fn ends(factor: MatRef<'_, f64>, a: MatRef<'_, f64>, inverse: MatRef<'_, f64>) -> [f64; 2] {
@@ -48,7 +48,7 @@ fn largest(m: usize, apply: impl Fn(MatRef<'_, f64>) -> Mat<f64>) -> f64 {
     let norm = basis.col(0).norm_l2();
     basis.col_mut(0).iter_mut().for_each(|x| *x /= norm);
     let (mut diagonal, mut beside) = (Vec::new(), Vec::new());
-    let (mut value, mut calm) = (0.0, 0);
+    let (mut value, mut unchanged) = (0.0, 0);
     for k in 0..steps {
         let mut next = apply(basis.as_ref().subcols(k, 1));
         let known = basis.as_ref().subcols(0, k + 1);
@@ -61,10 +61,10 @@ fn largest(m: usize, apply: impl Fn(MatRef<'_, f64>) -> Mat<f64>) -> f64 {
             next -= dense::product(known, along.as_ref());
         }
         let now = largest_of_tridiagonal(&diagonal, &beside);
-        calm = if (now - value).abs() <= SETTLED * now { calm + 1 } else { 0 };
+        unchanged = if (now - value).abs() <= SETTLED * now { unchanged + 1 } else { 0 };
         value = now;
         let length = next.norm_l2();
-        if calm >= CALM || length.is_nan() || length <= f64::EPSILON * now {
+        if unchanged >= UNCHANGED || length.is_nan() || length <= f64::EPSILON * now {
             break;
         }
         beside.push(length);
