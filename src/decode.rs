@@ -7,7 +7,7 @@ use crate::timing::Timing;
 use cager_core::cage::{Cage, CageError};
 use cager_core::coordinates::CoordinatesError;
 use cager_core::decode::Decoder;
-use cager_core::inversion::{BATCH, coordinates_fit};
+use cager_core::inversion::{BATCH, PrepareError, coordinates_fit, refuse_far_points};
 use cager_core::mesh::{Model, Point};
 use cager_formats::{Action, FrameOptions, FrameRange, Target, create_frames};
 use cager_proto::container::{self, ContainerReader};
@@ -55,6 +55,14 @@ pub enum DecodeError {
         path: PathBuf,
         /// Why; part of the message, so not a source as well.
         cause: CoordinatesError,
+    },
+    /// A point of another model lies too far from the cage.
+    #[error("{}: {cause}", .path.display())]
+    Model {
+        /// The model.
+        path: PathBuf,
+        /// Which point, and how far; part of the message, so not a source as well.
+        cause: PrepareError,
     },
     /// The coordinates do not fit into memory.
     #[error("{}: its coordinates need {gigabytes:.0} GB of memory; decode it on a larger machine", .path.display())]
@@ -176,6 +184,10 @@ fn bind(
         return Err(unsupported(format!("it stores {} rows per frame", header.rows_per_frame)));
     }
     let columns = system.columns(&cage);
+    if other.is_some() {
+        refuse_far_points(&cage, &rest.points)
+            .map_err(|cause| DecodeError::Model { path: model_path.to_owned(), cause })?;
+    }
     if let Some(by_point) = system.by_point() {
         let keeps = keeps(rest.points.len(), columns);
         let decoder = if keeps { Decoder::keeping } else { Decoder::computing }(by_point, &cage, &rest.points, columns);

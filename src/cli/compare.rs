@@ -3,8 +3,8 @@
 use super::args::{CompareArgs, CoordinatesArg, UpArg};
 use super::checks::{check_cage, check_capture};
 use super::dry_run::{read_all, tell_would};
-use super::encode::{blame, read_cage};
 use super::outputs::Outputs;
+use super::solver_options::{blame, read_cage};
 use super::{human_bytes, plain, progress};
 use crate::compare::{CompareError, Figures, Job, Progress, Up, compare, page, seconds};
 use crate::coordinates;

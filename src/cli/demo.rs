@@ -1,7 +1,7 @@
 //! `cager demo`: the main job on a built-in capture, through a service.
 
 use super::args::DemoArgs;
-use super::encode::write_report;
+use super::encode_summary::write_report;
 use super::own_service::OwnService;
 use super::{grouped, human_bytes, interrupt, progress, tell};
 use crate::decode::{self, Decoding};

@@ -12,6 +12,8 @@ mod doctor;
 mod dry_run;
 mod edit;
 mod encode;
+mod encode_remote;
+mod encode_summary;
 mod health;
 mod inspect;
 mod interrupt;
@@ -21,6 +23,7 @@ mod outputs;
 mod own_service;
 mod progress;
 pub(crate) mod serve;
+mod solver_options;
 mod transfer_args;
 
 use args::{Cli, Command};

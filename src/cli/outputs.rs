@@ -2,6 +2,7 @@
 
 use super::{interrupt, manners};
 use anyhow::{Result, bail};
+use cager_formats::atomic::destination;
 use cager_formats::{AtomicFile, Target, frame_files, frames_path};
 use clap::Args;
 use std::fs;
@@ -54,6 +55,13 @@ impl Outputs {
         refuse_terminal(path, "walk.npy")?;
         let place = frames_path(path);
         let target = self.target(path, place)?;
+        let here = std::env::current_dir().and_then(|here| here.canonicalize());
+        if place.canonicalize().is_ok_and(|folder| here.is_ok_and(|here| here.starts_with(folder))) {
+            bail!(
+                "{}: is the folder that cager runs in, or holds it, and would be replaced as a whole; name another",
+                path.display()
+            );
+        }
         if !self.overwrite && fs::read_dir(place).is_ok_and(|mut files| files.next().is_some()) {
             bail!(
                 "{}: is a folder that is not empty; name another, or give --overwrite to replace it as a whole, where it holds only such frames",
@@ -71,7 +79,7 @@ impl Outputs {
             }
             return Ok(Target::standard_output());
         }
-        if let Some(at) = resolved(place) {
+        if let Ok(at) = destination(place) {
             if self.taken.contains(&at) {
                 bail!("{shown}: cannot hold two outputs; name two files");
             }
@@ -103,10 +111,4 @@ fn refuse_terminal(path: &Path, example: &str) -> Result<()> {
         bail!("-: standard output is a terminal; redirect it, as in -o - > {example}");
     }
     Ok(())
-}
-
-/// Where a file is, or will be.
-fn resolved(path: &Path) -> Option<PathBuf> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    path.canonicalize().ok().or_else(|| Some(folder.canonicalize().ok()?.join(path.file_name()?)))
 }

@@ -2,8 +2,9 @@
 
 use super::is_quiet;
 use cager_proto::cage_messages::CageProgress;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::cell::OnceCell;
+use std::fmt::Write;
 use std::io::IsTerminal;
 use std::time::Duration;
 
@@ -45,18 +46,15 @@ impl Prepared {
         if !clock.is_hidden() {
             clock.enable_steady_tick(Duration::from_millis(250));
         }
-        let clock = match ProgressStyle::with_template("{spinner} preparing: {msg}, {elapsed}{prefix}") {
-            Ok(style) => clock.with_style(style),
-            Err(_) => clock,
-        };
+        let clock = clock_of(clock, None);
         clock.set_message("coordinates");
         Self { what, total, clock, frames: OnceCell::new() }
     }
 
     /// Shows how many seconds preparing will take, about; they are asked for only where somebody sees them.
-    pub(crate) fn expecting(self, seconds: impl FnOnce() -> f64) -> Self {
+    pub(crate) fn expecting(mut self, seconds: impl FnOnce() -> f64) -> Self {
         if !self.clock.is_hidden() {
-            self.clock.set_prefix(format!(" of about {}", duration(seconds())));
+            self.clock = clock_of(self.clock, Some(seconds()));
         }
         self
     }
@@ -79,6 +77,18 @@ impl Prepared {
         if let Some(bar) = self.frames.get() {
             bar.finish_and_clear();
         }
+    }
+}
+
+/// Shows the time that preparing has taken, and the time expected until it is exceeded.
+fn clock_of(bar: ProgressBar, expected: Option<f64>) -> ProgressBar {
+    match ProgressStyle::with_template("{spinner} preparing: {msg}, {elapsed}{expected}") {
+        Ok(style) => bar.with_style(style.with_key("expected", move |state: &ProgressState, out: &mut dyn Write| {
+            if let Some(seconds) = expected.filter(|&seconds| state.elapsed().as_secs_f64() < seconds) {
+                let _ = write!(out, " of about {}", duration(seconds));
+            }
+        })),
+        Err(_) => bar,
     }
 }
 

@@ -10,6 +10,7 @@ use axum::body::Body;
 use axum::extract::{FromRequest, Multipart, Request};
 use bytes::Bytes;
 use cager_core::decode::Decoder;
+use cager_core::inversion::refuse_far_points;
 use futures_util::StreamExt as _;
 use futures_util::stream::{BoxStream, poll_fn};
 use std::sync::{Arc, Mutex};
@@ -149,6 +150,8 @@ pub(super) async fn bind(
         let _place = place;
         let model = read_part("model", &uploaded.name, &uploaded.bytes)?;
         let (cage, system) = (session.rest_cage()?, Choices::of(&session.meta.options)?.system);
+        refuse_far_points(&cage, &model.points)
+            .map_err(|error| ApiError::new(problem::INVALID_GEOMETRY, format!("model: {error}")))?;
         check_columns(model.points.len(), system.columns(&cage), service.config.max_prepare_bytes)?;
         let coordinates = service.solvers.pool().install(|| system.coordinates(&cage, &model.points));
         let found = coordinates.map_err(|error| ApiError::new(problem::INVALID_GEOMETRY, format!("model: {error}")))?;

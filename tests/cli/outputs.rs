@@ -236,3 +236,21 @@ fn a_folder_that_is_replaced_keeps_its_mode() {
     let mode = std::fs::metadata(dir.path("poses")).expect("the folder").permissions().mode();
     assert_eq!(mode & 0o777, 0o700);
 }
+
+#[cfg(unix)]
+#[test]
+fn a_link_to_a_file_yet_to_be_made_is_that_file() {
+    let dir = Dir::with_capture().0;
+    std::os::unix::fs::symlink("new.cager", dir.path("report.json")).expect("a link");
+    refused(&dir, &format!("{ENCODE_NEW} -o new.cager --report report.json"), &["report.json", "two outputs"]);
+}
+
+#[test]
+fn the_folder_that_the_program_runs_in_is_not_replaced() {
+    let dir = Dir::with_encoded().0;
+    dir.cager("decode out.cager -o poses").succeeds();
+    let line = format!("decode {} -o . --overwrite", dir.path("out.cager").display());
+    let done = dir.cager(&line).within(&dir.path("poses")).run();
+    assert_eq!(done.status, Some(1), "{}", done.stderr);
+    assert!(done.stderr.contains(".: is the folder that cager runs in"), "{}", done.stderr);
+}

@@ -138,6 +138,12 @@ impl TestCommand {
         self
     }
 
+    /// Runs it in another folder.
+    pub(crate) fn within(mut self, folder: &Path) -> Self {
+        self.0.current_dir(folder);
+        self
+    }
+
     /// Starts it and lets it work; what it says is lost.
     #[cfg(target_os = "linux")]
     pub(crate) fn spawn(mut self) -> std::process::Child {

@@ -84,6 +84,14 @@ fn points_outside_the_rest_cage_are_counted_and_refused_where_coordinates_need_t
     let line = "encode --rest rest.obj --cage cage.obj --frames frames.npy --coordinates harmonic -o harmonic.cager";
     dir.cager(line).succeeds();
     refused(&dir, "decode harmonic.cager --model two.obj -o h.npy", &["two.obj", "2 points lie outside", "0, 1"]);
+    let mut stray = with(0);
+    stray.points[5][1] = 1e7 * far;
+    dir.model("stray.obj", &stray);
+    refused(
+        &dir,
+        "decode out.cager --model stray.obj -o h.npy",
+        &["stray.obj", "point 5", "diagonals of the cage away"],
+    );
     refused(&dir, "decode out.cager --model missing.obj -o h.npy", &["missing.obj"]);
     refused(&dir, "decode out.cager --model two.obj -o two.obj", &["two.obj", "is an input"]);
 }

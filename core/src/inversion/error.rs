@@ -42,7 +42,7 @@ pub enum PrepareError {
     },
     /// A point so far from the cage that its coordinates outweigh those of all others.
     #[error(
-        "rest point {point} lies {distance:.1e} diagonals of the cage away from it; move the cage around the model or delete the point"
+        "point {point} lies {distance:.1e} diagonals of the cage away from it; move the cage around the model or delete the point"
     )]
     TooFar {
         /// The point, counted from 0.

@@ -23,7 +23,7 @@ pub use error::PrepareError;
 pub use factored::{Factored, Projected};
 pub use options::{SolverOptions, usual_spectrum};
 pub use parts::{SolverParts, TiedParts};
-pub use prepare::{Preparation, Preparing, check_options, coordinates_fit};
+pub use prepare::{Preparation, Preparing, check_options, coordinates_fit, refuse_far_points};
 pub use pull::Pull;
 pub use reading::Reading;
 pub use solve::{BATCH, Inverted, Solver};

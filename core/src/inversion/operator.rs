@@ -164,7 +164,15 @@ impl Decomposed {
                 (left, svd.sigma.clone(), svd.v.clone())
             }
         };
-        let condition = spectra.handles_ends[0] / spectra.handles_ends[1];
+        let [first, last] = match spectra.handles_ends {
+            // Not asked for when the decompositions were made.
+            [first, _] if first.is_nan() => {
+                let m = phi.ncols();
+                svd::ends(Mat::identity(m, m).as_ref(), basis.square.as_ref(), basis.handles.inverse.as_ref())
+            }
+            known => known,
+        };
+        let condition = first / last;
         Ok(Self { handles: basis.handles.rows.clone(), reads_all: true, left, sigma, rank, v, condition })
     }
 

@@ -126,7 +126,11 @@ impl<'a> Preparing<'a> {
     }
 }
 
-pub(super) fn refuse_far_points(cage: &Cage, points: &[Point]) -> Result<(), PrepareError> {
+/// Refuses points so far from the cage that their coordinates are rounding.
+///
+/// # Errors
+/// [`PrepareError::TooFar`].
+pub fn refuse_far_points(cage: &Cage, points: &[Point]) -> Result<(), PrepareError> {
     let [a, b, c] = cage.vertices()[0];
     for (point, p) in points.iter().enumerate() {
         let distance = norm([p[0] - a, p[1] - b, p[2] - c]) / cage.diagonal();

@@ -21,6 +21,16 @@ pub use temporary::remove_temporaries;
 
 use crate::error::Error;
 
+/// Where an output really goes: through symbolic links, also where there is no such file yet.
+///
+/// # Errors
+/// A path without a name, or in a folder that is not there.
+pub fn destination(path: &Path) -> Result<PathBuf, Error> {
+    let Place { folder, target } = Place::new(path)?;
+    let folder = folder.canonicalize().map_err(|cause| Error::write(path, cause))?;
+    Ok(target.file_name().map_or_else(|| folder.clone(), |name| folder.join(name)))
+}
+
 /// Where an output really goes: through symbolic links, so that those stay, and with its folder.
 #[derive(Debug)]
 struct Place {

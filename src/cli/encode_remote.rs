@@ -1,0 +1,105 @@
+//! `cager encode --server`.
+
+use super::args::{EncodeArgs, SolverArgs, SpectrumArg};
+use super::encode::{Targets, checked_solver, design_options, finish};
+use super::solver_options::{designed_spectrum, matrix, solver_for, spectrum_bound};
+use super::{plain, progress, tell, warn};
+use crate::frames::CaptureFiles;
+use crate::remote::{EncodedRemotely, FileFrames, RemoteCage, RemoteJob, RemoteProgress, encode_remotely};
+use crate::timing::counted_from_zero;
+use anyhow::{Context, Result, bail};
+use cager_client::FrameSource;
+use cager_client::messages::SessionOptions;
+use cager_core::cage::Cage;
+use cager_core::mesh::Model;
+use std::time::Instant;
+
+/// The files are read and the options checked here as well, so that what is wrong with them is told before anything is sent, in
+/// words that name them.
+pub(super) fn run(
+    args: &EncodeArgs,
+    targets: &Targets,
+    address: &str,
+    files: CaptureFiles,
+    rest: &Model,
+    cage: Option<&Cage>,
+    clock: Instant,
+) -> Result<()> {
+    let frames = FileFrames::open(files)?;
+    if !counted_from_zero(&frames.numbers()) {
+        warn(&["a service numbers frames from 0; encode here to keep the numbers of the files".to_owned()]);
+    }
+    let read_seconds = clock.elapsed().as_secs_f64();
+    let matrix = matrix(&args.solver)?;
+    spectrum_bound(&args.solver)?;
+    refuse_choosing(&args.solver)?;
+    let (system, options, spectrum) = match cage {
+        Some(cage) => {
+            let (system, options) = checked_solver(args, rest, cage, matrix.as_ref())?;
+            // Where there is a threshold it was checked; where there is none, none is used.
+            (system, options, Some(u32::try_from(options.spectrum).unwrap_or(u32::MAX)))
+        }
+        None => {
+            let (system, options) = solver_for(&args.solver, |_| 0)?;
+            (system, options, designed_spectrum(&args.solver)?)
+        }
+    };
+    let handle_count = args.solver.handle_count.map(u32::try_from).transpose();
+    let report_file = targets.begin_report()?;
+
+    let token = args.token.clone().or_else(|| std::env::var("CAGER_TOKEN").ok()).filter(|token| !token.is_empty());
+    let options = SessionOptions {
+        name: args
+            .output
+            .file_stem()
+            .filter(|&name| name != "-")
+            .map(|name| name.to_string_lossy().chars().take(200).collect()),
+        coordinates: Some(system.name().to_owned()),
+        handles: Some(options.handles.name().to_owned()),
+        handle_count: handle_count.context("--handle-count: is larger than any number of points")?,
+        regularizer: Some(options.regularizer.name().to_owned()),
+        spectrum,
+        lambda: Some(options.lambda),
+        flip_cage: args.flip_cage,
+        frame_rate: frames.frame_rate(),
+        ..SessionOptions::default()
+    };
+    let design = design_options(args, rest.points.len())?;
+    let bar = progress::frames("encoding", frames.frames().unwrap_or(0) as usize);
+    let job = RemoteJob {
+        address,
+        token: token.as_deref(),
+        rest: &args.rest,
+        cage: match &args.cage {
+            Some(path) => RemoteCage::File(path),
+            None => RemoteCage::Designed(&design),
+        },
+        matrix: args.solver.regularizer_matrix.as_deref(),
+        frames,
+        output: &targets.output,
+        options,
+    };
+    let designing = progress::steps();
+    let result = encode_remotely(job, &mut |told| match told {
+        RemoteProgress::Designing(told) => progress::design(&designing, told),
+        RemoteProgress::Frames(done) => {
+            designing.finish_and_clear();
+            bar.set_position(done as u64);
+        }
+    });
+    designing.finish_and_clear();
+    bar.finish_and_clear();
+    let EncodedRemotely { mut encoded, session, .. } = result?;
+    encoded.report.seconds.read += read_seconds;
+    finish(targets, encoded, report_file, clock)?;
+    tell(&format!("  service {}, session {}\n", plain(address), plain(&session)))
+}
+
+pub(super) fn refuse_choosing(args: &SolverArgs) -> Result<()> {
+    if args.spectrum == Some(SpectrumArg::Auto) {
+        bail!(
+            "--spectrum auto: a service prepares before it sees a frame to measure; give a number, or encode without --server"
+        );
+    }
+    Ok(())
+}

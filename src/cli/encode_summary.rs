@@ -1,0 +1,92 @@
+//! What `cager encode` tells: its summary and its report.
+
+use super::{grouped, human_bytes, is_verbose};
+use crate::report::Report;
+use anyhow::Result;
+use cager_formats::{AtomicFile, CompleteFile};
+use std::io::Write;
+use std::path::Path;
+
+pub(super) fn write_report(mut file: AtomicFile, report: &Report) -> Result<CompleteFile> {
+    let mut text = serde_json::to_vec_pretty(report)?;
+    text.push(b'\n');
+    file.write_all(&text)?;
+    Ok(file.complete()?)
+}
+
+pub(super) fn summary(report: &Report, output: &Path) -> String {
+    let chosen = report.spectrum_choice.as_ref().map_or_else(String::new, |choice| {
+        format!(
+            "  chosen  spectrum {}: L2 {:.2} % above that of 0 on {} frames, at most {:.2} % allowed\n",
+            report.spectrum,
+            100.0 * choice.extra,
+            choice.frames,
+            100.0 * choice.bound
+        )
+    });
+    let refined = report.refinement.as_ref().map_or_else(String::new, |refined| {
+        format!(
+            "  solved  on {} boundary elements, {} times refined; no coordinate changed by more than {:.1e} at last\n",
+            refined.elements, refined.refinements, refined.change
+        )
+    });
+    let worst = report.error.worst.map_or_else(String::new, |worst| {
+        let point = worst.point.map_or_else(String::new, |point| format!("point {point} of "));
+        format!(
+            "  worst   {point}frame {}: off by {} where the rest pose is {} across\n",
+            report.frame_numbers.get(worst.frame).copied().unwrap_or(worst.frame as f64),
+            significant(worst.distance),
+            significant(report.diagonal)
+        )
+    });
+    let s = &report.seconds;
+    let steps = if is_verbose() {
+        format!(
+            "  steps   read {:.3} s, coordinates {:.3} s, handles {:.3} s, SVD {:.3} s, inversion {:.3} s, errors {:.3} s, writing {:.3} s\n",
+            s.read, s.coordinates, s.maxvol, s.svd, s.invert, s.measure, s.write
+        )
+    } else {
+        String::new()
+    };
+    format!(
+        "{}: {} frames of {} points as cages of {} vertices\n\
+         \x20 size    {} from {}: {:.1} times smaller, {:.2} bits per point and frame\n\
+         \x20 error   L2 {:.4} % mean, {:.4} % max; L∞ {:.3} % mean, {:.3} % max (of the rest diagonal); KG {:.3} %\n{worst}\
+         \x20 system  condition {:.1} (all points {:.1}), rank {} of {}, affine reproduction {:.1e}\n\
+         {refined}{chosen}\x20 time    {:.3} s\n{steps}",
+        output.display(),
+        grouped(report.frames as u64),
+        grouped(report.points as u64),
+        grouped(report.cage_vertices as u64),
+        human_bytes(report.bytes.output),
+        human_bytes(report.bytes.capture),
+        report.bytes.ratio,
+        report.bytes.bits_per_vertex_per_frame,
+        100.0 * report.error.l2_mean,
+        100.0 * report.error.l2_max,
+        100.0 * report.error.linf_mean,
+        100.0 * report.error.linf_max,
+        report.error.kg_percent,
+        report.condition_number.handles,
+        report.condition_number.full,
+        report.rank,
+        report.unknowns,
+        report.affine_reproduction_error,
+        report.seconds.total,
+    )
+}
+
+/// A length to three digits.
+fn significant(length: f64) -> String {
+    if length == 0.0 || !length.is_finite() {
+        return length.to_string();
+    }
+    let digits = 2 - length.abs().log10().floor() as i32;
+    if (0..=8).contains(&digits) {
+        format!("{length:.*}", digits as usize)
+    } else if digits < 0 && digits > -8 {
+        format!("{length:.0}")
+    } else {
+        format!("{length:.2e}")
+    }
+}

@@ -1,0 +1,129 @@
+//! From arguments and files to a cage and the options of its solver.
+
+use super::args::{SolverArgs, SpectrumArg};
+use super::{grouped, warn};
+use crate::coordinates;
+use anyhow::{Context, Result, bail};
+use cager_cages::doctor::weld;
+use cager_core::cage::Cage;
+use cager_core::coordinates::CoordinateSystem;
+use cager_core::inversion::{PrepareError, SolverOptions, usual_spectrum};
+use cager_core::mesh::TriMesh;
+use cager_core::regularize::{Regularizer, SparseMatrix};
+use cager_formats::{read_matrix, read_model};
+use std::path::Path;
+
+pub(super) fn read_cage(path: &Path, flip: bool) -> Result<Cage> {
+    let mut model = read_model(path)?;
+    if model.faces.is_empty() {
+        bail!("{}: has no faces, and a cage is a closed mesh; export the cage with its faces", path.display());
+    }
+    if let Some(welded) = weld(&model) {
+        let places = grouped(welded.merged as u64);
+        warn(&[format!(
+            "{}: merged {places} vertices with others in the same place, as seams split them",
+            path.display()
+        )]);
+        model = welded.model;
+    }
+    let mesh = TriMesh::from(&model);
+    let cage = Cage::new(if flip { mesh.flipped() } else { mesh });
+    let polygon_of = model.faces.polygon_of_triangle();
+    cage.map_err(|error| error.renumbered(|triangle| polygon_of[triangle] as usize))
+        .with_context(|| path.display().to_string())
+}
+
+pub(super) fn solver(args: &SolverArgs, cage: &Cage) -> Result<(&'static dyn CoordinateSystem, SolverOptions)> {
+    solver_for(args, |system| system.unknowns(cage))
+}
+
+/// As [`solver`], for a cage of so many unknowns.
+pub(super) fn solver_for(
+    args: &SolverArgs,
+    unknowns: impl FnOnce(&'static dyn CoordinateSystem) -> usize,
+) -> Result<(&'static dyn CoordinateSystem, SolverOptions)> {
+    let name = args.coordinates.name();
+    let system = coordinates::by_name(name).with_context(|| format!("--coordinates: {name} is unknown"))?;
+    let unknowns = unknowns(system);
+    let options = SolverOptions {
+        handles: args
+            .handles
+            .handles(args.handle_count)
+            .context("--handle-count: maxvol and all read a number of points of their own; leave it out")?,
+        regularizer: args.regularizer.into(),
+        spectrum: match args.spectrum {
+            None => usual_spectrum(unknowns),
+            Some(SpectrumArg::Threshold(s)) => s,
+            Some(SpectrumArg::All) => unknowns,
+            Some(SpectrumArg::Auto) => 0,
+        },
+        lambda: args.lambda,
+    };
+    if matches!(args.spectrum, Some(SpectrumArg::Auto)) && !options.regularizer.has_threshold() {
+        bail!("--spectrum auto: {} has no threshold to choose; leave it out", options.regularizer.name());
+    }
+    Ok((system, options))
+}
+
+/// The threshold for a cage that is not known yet; none where the service chooses.
+pub(super) fn designed_spectrum(args: &SolverArgs) -> Result<Option<u32>> {
+    match args.spectrum {
+        Some(SpectrumArg::Threshold(s)) => Ok(Some(u32::try_from(s).unwrap_or(u32::MAX))),
+        Some(SpectrumArg::All) => {
+            bail!("--spectrum all: the cage is not known yet; give a number, or a cage with --cage")
+        }
+        Some(SpectrumArg::Auto) | None => Ok(None),
+    }
+}
+
+/// The matrix of `--regularizer matrix`.
+pub(super) fn matrix(args: &SolverArgs) -> Result<Option<SparseMatrix>> {
+    match (&args.regularizer_matrix, Regularizer::from(args.regularizer)) {
+        (Some(path), Regularizer::Matrix) => Ok(Some(read_matrix(path)?)),
+        (None, Regularizer::Matrix) => {
+            bail!("--regularizer matrix: needs a matrix; give --regularizer-matrix FILE.mtx")
+        }
+        (Some(_), other) => {
+            bail!("--regularizer-matrix: {} uses no matrix; give --regularizer matrix with it", other.name())
+        }
+        (None, _) => Ok(None),
+    }
+}
+
+pub(super) fn spectrum_bound(args: &SolverArgs) -> Result<f64> {
+    const USUAL: f64 = 0.05;
+    // Errors a hundred times as large are no encoding of the capture any more.
+    const MOST: f64 = 100.0;
+    match args.spectrum_bound {
+        Some(_) if args.spectrum != Some(SpectrumArg::Auto) => {
+            bail!("--spectrum-bound: only --spectrum auto looks at it; leave it out or choose automatically")
+        }
+        Some(bound) if !(bound.is_finite() && bound >= 0.0) => {
+            bail!("--spectrum-bound: is {bound}; give a finite fraction of at least 0")
+        }
+        Some(bound) if bound > MOST => {
+            bail!("--spectrum-bound: is {bound:e}; give a fraction of at most {MOST}, such as 0.05 for 5 %")
+        }
+        bound => Ok(bound.unwrap_or(USUAL)),
+    }
+}
+
+/// Names the file or the option that is to blame.
+pub(super) fn blame(error: &PrepareError, rest: &Path, cage: &Path) -> anyhow::Error {
+    let path = match error {
+        PrepareError::BadLambda { .. } => return anyhow::anyhow!("--lambda: {error}"),
+        PrepareError::SpectrumTooLarge { .. } => return anyhow::anyhow!("--spectrum: {error}"),
+        PrepareError::HandleCount { .. } | PrepareError::HandlesOutOfMemory { .. } => {
+            return anyhow::anyhow!("--handle-count: {error}");
+        }
+        PrepareError::NotFinite { .. }
+        | PrepareError::TooFewPoints { .. }
+        | PrepareError::NoExtent
+        | PrepareError::TooLarge
+        | PrepareError::NotReproduced { .. }
+        | PrepareError::TooFar { .. }
+        | PrepareError::OutOfMemory { .. } => rest,
+        _ => cage,
+    };
+    anyhow::anyhow!("{}: {error}", path.display())
+}
