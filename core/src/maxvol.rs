@@ -149,7 +149,10 @@ fn search(phi: MatRef<'_, f64>, start: Vec<u32>, tolerance: f64) -> MaxVol {
 
 /// Rows that LU with partial pivoting picks. Single precision decides the pivots as well as double does, in half the time,
 /// as long as the columns are far from dependent.
-fn start_rows(phi: MatRef<'_, f64>) -> Result<Vec<u32>, Dependent> {
+///
+/// # Errors
+/// [`Dependent`] where the columns are numerically dependent.
+pub fn start_rows(phi: MatRef<'_, f64>) -> Result<Vec<u32>, Dependent> {
     let single = dense::pivoted_rows(to_single(phi));
     if single.smallest > SINGLE_IS_SAFE {
         return Ok(single.rows);

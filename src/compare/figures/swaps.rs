@@ -2,13 +2,13 @@
 
 use crate::compare::noise::Random;
 use cager_core::inversion::Analysis;
-use cager_core::maxvol::{MaxVol, TOLERANCE, maxvol, maxvol_from};
+use cager_core::maxvol::{MaxVol, TOLERANCE, maxvol_from, start_rows};
 use faer::Mat;
 use rayon::prelude::*;
 use serde::Serialize;
 
 /// Condition numbers are computed after at most this many swaps, evenly spaced.
-const CONDITIONS: usize = 40;
+const CONDITIONS: usize = 24;
 /// From more coordinates than this, the search with a random start takes evenly spaced points: it needs many swaps.
 const MOST_ENTRIES: usize = 6_000_000;
 /// Points drawn for a random start, as multiples of the unknowns: among few there may be no independent ones, and all of them
@@ -64,7 +64,7 @@ fn from_random(analysis: &Analysis) -> Option<SwapTrace> {
     let found = DRAWN.iter().map(|times| times * m).take_while(|&count| count < rows.len()).find_map(|count| {
         let drawn = Random::new(0).choose(count, rows.len());
         let of_rows: Vec<u32> = drawn.iter().map(|&i| rows[i as usize]).collect();
-        let start = maxvol(rows_of(&of_rows).as_ref(), TOLERANCE).ok()?.start;
+        let start = start_rows(rows_of(&of_rows).as_ref()).ok()?;
         maxvol_from(some.as_ref(), start.iter().map(|&i| drawn[i as usize]).collect(), TOLERANCE).ok()
     })?;
     Some(SwapTrace::of(&found, analysis, &rows))
