@@ -100,6 +100,23 @@ pub struct Tenant {
     pub limits: TenantLimits,
 }
 
+/// What a token lets its bearer do, until it is revoked.
+#[derive(Clone, Debug)]
+pub struct Grant {
+    /// Whose requests its are.
+    pub tenant: Arc<Tenant>,
+    /// The token's name in the tokens file; empty in a service without tokens.
+    pub token: Arc<str>,
+    /// Cancelled when the token leaves the file or gets another tenant: ends what was begun with it.
+    pub revoked: CancellationToken,
+}
+
+impl PartialEq for Grant {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.tenant, &self.token) == (&other.tenant, &other.token)
+    }
+}
+
 /// Why a request is refused; to be answered with 401 and `WWW-Authenticate: Bearer`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Denied {
@@ -122,7 +139,7 @@ struct Inner {
     /// Without one, everybody is `local`.
     path: Option<PathBuf>,
     defaults: TenantLimits,
-    local: Arc<Tenant>,
+    local: Grant,
     entries: RwLock<Arc<Entries>>,
     seen: Mutex<Option<Stamp>>,
 }
@@ -139,7 +156,11 @@ impl Access {
         Ok(Self(Arc::new(Inner {
             path: path.map(Path::to_owned),
             defaults,
-            local: Arc::new(Tenant { name: LOCAL.to_owned(), priority: Priority::Normal, limits: defaults }),
+            local: Grant {
+                tenant: Arc::new(Tenant { name: LOCAL.to_owned(), priority: Priority::Normal, limits: defaults }),
+                token: "".into(),
+                revoked: CancellationToken::new(),
+            },
             entries: RwLock::new(Arc::new(entries)),
             seen: Mutex::new(seen),
         })))
@@ -154,9 +175,9 @@ impl Access {
     ///
     /// # Errors
     /// No token, a header that is not understood, or a token that nobody has.
-    pub fn authenticate(&self, headers: &HeaderMap) -> Result<Arc<Tenant>, Denied> {
+    pub fn authenticate(&self, headers: &HeaderMap) -> Result<Grant, Denied> {
         if self.0.path.is_none() {
-            return Ok(Arc::clone(&self.0.local));
+            return Ok(self.0.local.clone());
         }
         let mut values = headers.get_all(AUTHORIZATION).iter();
         let value = values.next().ok_or(Denied::Missing)?;
@@ -216,9 +237,16 @@ impl Access {
             // Also for a broken file, so that it is complained about once.
             *seen = stamp;
         }
-        let entries = Entries::read(path, self.0.defaults)?;
+        let mut entries = Entries::read(path, self.0.defaults)?;
         let count = entries.tenants().count();
+        let before = self.entries();
+        let revoked = entries.succeed(&before);
         *self.0.entries.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(entries);
+        // Not before nobody gets in with them any more.
+        for grant in revoked {
+            tracing::info!(token = %grant.token, tenant = %grant.tenant.name, "a token was revoked; what was begun with it ends");
+            grant.revoked.cancel();
+        }
         Ok(Some(count))
     }
 

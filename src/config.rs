@@ -13,6 +13,7 @@ pub use flags::ServeFlags;
 pub(crate) use layers::line_of;
 pub(crate) use settings::bytes;
 
+use crate::admission::Budget;
 use crate::auth::TenantLimits;
 use crate::http::listen::{Limits, Tls};
 use crate::telemetry::LogFormat;
@@ -20,6 +21,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 
 const KIB: u64 = 1 << 10;
@@ -55,6 +57,10 @@ pub struct ServeConfig {
     pub frame_bytes: u64,
     /// Bytes of rest poses and cages held in memory while sessions are created, all together.
     pub upload_bytes: u64,
+    /// Memory for downloads on their way to slow clients, in bytes.
+    pub download_bytes: u64,
+    /// Disk space for cages that wait to be decoded, in bytes.
+    pub spool_bytes: u64,
     /// Bytes of one rest pose or cage.
     pub max_rest_bytes: u64,
     /// Connections that are served; a few more get health and otherwise 503.
@@ -65,6 +71,10 @@ pub struct ServeConfig {
     pub max_streams: usize,
     /// Sessions prepared at the same time.
     pub max_preparing: usize,
+    /// Names by which a service without tokens may be asked, beside `localhost` and addresses.
+    pub allowed_hosts: Vec<String>,
+    /// Origins of pages that may ask, beside the service's own.
+    pub allowed_origins: Vec<String>,
     /// Memory that preparing one session may take, in bytes; larger ones are refused.
     pub max_prepare_bytes: u64,
     /// Sessions waiting to be prepared.
@@ -116,6 +126,8 @@ impl Default for ServeConfig {
             tokens: None,
             tls_certificate: None,
             tls_key: None,
+            allowed_hosts: Vec::new(),
+            allowed_origins: Vec::new(),
             log: LogFormat::Human,
             log_filter: "info".to_owned(),
             workers: 0,
@@ -123,6 +135,8 @@ impl Default for ServeConfig {
             prepared_disk_bytes: 20 * GIB,
             frame_bytes: 256 * MIB,
             upload_bytes: GIB,
+            download_bytes: 128 * MIB,
+            spool_bytes: 2 * GIB,
             max_rest_bytes: 512 * MIB,
             max_connections: 1024,
             max_requests: 512,
@@ -182,7 +196,9 @@ impl ServeConfig {
             return Err(ConfigError::Open { listen: self.listen });
         }
         let (upload_bytes, max_rest_bytes) = (self.upload_bytes, self.max_rest_bytes);
-        if upload_bytes < max_rest_bytes {
+        // Of what tenants share, one gets two thirds.
+        let share = if self.tokens.is_some() { upload_bytes / 3 * 2 } else { upload_bytes };
+        if share < max_rest_bytes {
             return Err(ConfigError::UploadRoom { upload_bytes, max_rest_bytes });
         }
         match (&self.tls_certificate, &self.tls_key) {
@@ -190,6 +206,11 @@ impl ServeConfig {
             (None, Some(_)) => Err(ConfigError::HalfTls { given: "tls_key", missing: "tls_certificate" }),
             _ => Ok(()),
         }
+    }
+
+    /// A budget of so much that tenants share: where tokens name them, none gets all of it.
+    pub(crate) fn budget(&self, total: u64) -> Arc<Budget> {
+        Budget::new(total, self.tokens.is_some())
     }
 
     /// The listener's limits.

@@ -1,5 +1,6 @@
 //! The `cager` program: the command line and the service over the crates that do the work.
 
+mod admission;
 pub mod auth;
 pub mod belong;
 #[doc(hidden)]

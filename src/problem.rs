@@ -34,6 +34,7 @@ macro_rules! kinds {
 kinds! {
     BAD_REQUEST BAD_REQUEST "bad-request" "The request cannot be understood";
     UNAUTHORIZED UNAUTHORIZED "unauthorized" "No valid token was given";
+    FORBIDDEN FORBIDDEN "forbidden" "The page or the name that was asked for is not allowed";
     NOT_FOUND NOT_FOUND "not-found" "There is nothing at this address";
     METHOD_NOT_ALLOWED METHOD_NOT_ALLOWED "method-not-allowed" "This address does not take that method";
     NOT_ACCEPTABLE NOT_ACCEPTABLE "not-acceptable" "None of the accepted media types is available";
@@ -57,6 +58,7 @@ kinds! {
     KEY_REUSED UNPROCESSABLE_ENTITY "idempotency-key-reused" "The idempotency key was used for another request";
     TOO_MANY_SESSIONS TOO_MANY_REQUESTS "too-many-sessions" "The tenant has as many sessions as it may";
     TOO_MANY_STREAMS TOO_MANY_REQUESTS "too-many-streams" "The tenant has as many streams open as it may";
+    SHARE_TAKEN TOO_MANY_REQUESTS "share-taken" "The tenant holds its share of what all tenants use";
     INTERNAL INTERNAL_SERVER_ERROR "internal" "The service failed";
     BUSY SERVICE_UNAVAILABLE "busy" "The service has too much to do";
     STOPPING SERVICE_UNAVAILABLE "stopping" "The service is stopping";

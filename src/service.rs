@@ -1,5 +1,6 @@
 //! The service put together: store, engine, caches, sessions, and how it starts and stops.
 
+use crate::admission::{Budget, Held};
 use crate::auth::{Access, Tenant};
 use crate::cage_job::registry::CageJobs;
 use crate::cage_job::{Designer, Designs, local_designer};
@@ -11,17 +12,21 @@ use crate::session::commit::Committer;
 use crate::session::prepared::Solvers;
 use crate::session::registry::Registry;
 use crate::store::{Disk, Store, StoreError};
-use std::collections::HashMap;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
 use std::time::Instant;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 
 /// Threads that write frame logs. Most of their time they wait for the disk.
 const COMMIT_THREADS: usize = 4;
 /// Threads that read new sessions' files at a time.
 const READING: usize = 2;
+/// Sessions that are completed at a time: each reads all its frames and keeps a processor busy.
+const COMPLETING: u64 = 2;
+
+/// Room for models is taken in pieces of this many bytes: small ones, so that hundreds of small models have room at the same time.
+const UPLOAD_PIECE: u64 = 64 << 10;
 
 /// How long a look at the disk counts.
 const PROBED_FOR: std::time::Duration = std::time::Duration::from_secs(1);
@@ -40,12 +45,19 @@ pub struct Service {
     pub(crate) cage_maker: CageMaker,
     /// Rest poses and cages of new sessions, and cages asked for, being read at a time: parsing keeps a processor busy.
     pub(crate) reading: Semaphore,
-    /// Memory for frames on their way, in KiB.
-    pub(crate) frame_memory: Memory,
-    /// Memory for rest poses and cages on their way, in KiB.
-    pub(crate) upload_memory: Memory,
-    streams: Arc<Semaphore>,
-    tenant_streams: Arc<Mutex<HashMap<String, u64>>>,
+    /// Requests being answered, streams aside.
+    pub(crate) requests: Arc<Budget>,
+    streams: Arc<Budget>,
+    /// Sessions being completed at a time.
+    pub(crate) completing: Arc<Budget>,
+    /// Memory for frames on their way, in bytes.
+    pub(crate) frame_memory: Arc<Budget>,
+    /// Memory for rest poses and cages on their way, in bytes.
+    pub(crate) upload_memory: Arc<Budget>,
+    /// Memory for downloads on their way, in bytes.
+    pub(crate) download_memory: Arc<Budget>,
+    /// Disk space for cages that wait to be decoded, in bytes.
+    pub(crate) spool_space: Arc<Budget>,
     stop: CancellationToken,
     resumed: AtomicBool,
     pub(crate) started: Instant,
@@ -65,40 +77,6 @@ pub enum StartError {
     /// Threads cannot be started.
     #[error("threads cannot be started: {0}; raise the limit of processes, or lower workers")]
     Threads(std::io::Error),
-}
-
-/// A budget of memory, in bytes outside and KiB inside.
-pub(crate) struct Memory {
-    permits: Arc<Semaphore>,
-    total_kib: u32,
-}
-
-impl Memory {
-    fn new(bytes: u64) -> Self {
-        let total_kib = (bytes / 1024).clamp(1, Semaphore::MAX_PERMITS.min(u32::MAX as usize) as u64) as u32;
-        Self { permits: Arc::new(Semaphore::new(total_kib as usize)), total_kib }
-    }
-
-    /// What is larger than everything takes everything.
-    fn kib(&self, bytes: u64) -> u32 {
-        u32::try_from(bytes.div_ceil(1024)).unwrap_or(u32::MAX).clamp(1, self.total_kib)
-    }
-
-    /// Waits until there is room.
-    pub(crate) async fn take(&self, bytes: u64) -> OwnedSemaphorePermit {
-        let permits = Arc::clone(&self.permits).acquire_many_owned(self.kib(bytes)).await;
-        permits.expect("the semaphore is never closed")
-    }
-
-    /// Room now, or none.
-    pub(crate) fn try_take(&self, bytes: u64) -> Option<OwnedSemaphorePermit> {
-        Arc::clone(&self.permits).try_acquire_many_owned(self.kib(bytes)).ok()
-    }
-
-    /// Bytes in use.
-    pub(crate) fn used(&self) -> u64 {
-        1024 * (u64::from(self.total_kib) - self.permits.available_permits() as u64)
-    }
 }
 
 impl Service {
@@ -138,12 +116,15 @@ impl Service {
             registry: Arc::default(),
             cage_jobs: CageJobs::default(),
             designs: Designs::new(&config, designer).map_err(StartError::Threads)?,
-            cage_maker: CageMaker::new(config.max_preparing.max(1)),
+            cage_maker: CageMaker::new(config.budget(config.max_preparing as u64)),
             reading: Semaphore::new(READING),
-            frame_memory: Memory::new(config.frame_bytes),
-            upload_memory: Memory::new(config.upload_bytes),
-            streams: Arc::new(Semaphore::new(config.max_streams)),
-            tenant_streams: Arc::default(),
+            requests: config.budget(config.max_requests as u64),
+            streams: config.budget(config.max_streams as u64),
+            completing: config.budget(COMPLETING),
+            frame_memory: config.budget(config.frame_bytes),
+            upload_memory: config.budget(config.upload_bytes),
+            download_memory: config.budget(config.download_bytes),
+            spool_space: config.budget(config.spool_bytes),
             stop: stop.clone(),
             resumed: AtomicBool::new(false),
             started: Instant::now(),
@@ -241,9 +222,8 @@ impl Service {
     ///
     /// # Errors
     /// All places are taken: 429 where the tenant has its share, 503 where the service has.
-    pub(crate) fn stream(&self, tenant: &Tenant) -> Result<StreamPlace, ApiError> {
-        let mut open = crate::session::lock(&self.tenant_streams);
-        let mine = open.get(&tenant.name).copied().unwrap_or(0);
+    pub(crate) fn stream(&self, tenant: &Tenant) -> Result<Held, ApiError> {
+        let mine = self.streams.held_by(&tenant.name);
         if mine >= tenant.limits.max_streams {
             self.rejected("tenant_streams");
             let detail = format!("you have {mine} streams open, as many as you may; wait for one to end");
@@ -251,39 +231,30 @@ impl Service {
                 .limit(tenant.limits.max_streams)
                 .retry_after(2));
         }
-        let waiting = self.engine.waiting();
-        let full = waiting >= self.config.max_queue_frames;
-        let place = Arc::clone(&self.streams).try_acquire_owned().ok().filter(|_| !full);
-        let Some(place) = place else {
-            self.rejected(if full { "queue" } else { "streams" });
-            let detail = "all streams are taken, or too many frames wait; try again in a moment";
+        if self.engine.waiting() >= self.config.max_queue_frames {
+            self.rejected("queue");
+            let detail = "too many frames wait; try again in a moment";
             return Err(ApiError::new(problem::BUSY, detail).retry_after(2));
-        };
-        *open.entry(tenant.name.clone()).or_insert(0) += 1;
-        Ok(StreamPlace { _place: place, tenant: tenant.name.clone(), open: Arc::clone(&self.tenant_streams) })
+        }
+        self.streams.try_take(&tenant.name, 1).map_err(|full| {
+            self.rejected("streams");
+            full.refusal("streams")
+        })
+    }
+
+    /// Makes the room of a model that is on its way large enough for so many bytes.
+    ///
+    /// # Errors
+    /// The tenant has its share of the memory for models, or all of it is taken.
+    pub(crate) fn make_room(&self, room: &mut Held, bytes: u64) -> Result<(), ApiError> {
+        room.reach(bytes, UPLOAD_PIECE).map_err(|full| {
+            self.rejected("upload_memory");
+            full.refusal("memory for models").retry_after(5)
+        })
     }
 
     /// Streams open now.
-    pub(crate) fn open_streams(&self) -> usize {
-        self.config.max_streams - self.streams.available_permits()
-    }
-}
-
-/// A place for a stream; free again when dropped.
-pub(crate) struct StreamPlace {
-    _place: OwnedSemaphorePermit,
-    tenant: String,
-    open: Arc<Mutex<HashMap<String, u64>>>,
-}
-
-impl Drop for StreamPlace {
-    fn drop(&mut self) {
-        let mut open = crate::session::lock(&self.open);
-        if let Some(count) = open.get_mut(&self.tenant) {
-            *count -= 1;
-            if *count == 0 {
-                open.remove(&self.tenant);
-            }
-        }
+    pub(crate) fn open_streams(&self) -> u64 {
+        self.streams.used()
     }
 }

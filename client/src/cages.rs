@@ -81,7 +81,7 @@ impl Client {
         self.fetch(Method::GET, &["v1", "cages", id], &[]).await
     }
 
-    /// All cage designs, oldest first, page after page.
+    /// All cage designs, newest first, page after page.
     ///
     /// # Errors
     /// Those of the connection.

@@ -21,7 +21,7 @@ impl Client {
         self.fetch(Method::GET, &["v1", "sessions", id], &[]).await
     }
 
-    /// All sessions, oldest first, page after page.
+    /// All sessions, newest first, page after page.
     ///
     /// # Errors
     /// Those of the connection.

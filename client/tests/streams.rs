@@ -19,7 +19,7 @@ fn cage(frame: u32) -> Vec<u8> {
 }
 
 fn completed(frames: u64) -> Session {
-    let frames = FrameCounts { received: frames, solved: frames, missing: Vec::new() };
+    let frames = FrameCounts { received: frames, solved: frames, missing: Vec::new(), missing_next: None };
     Session { frames, ..session(SessionState::Completed) }
 }
 

@@ -209,8 +209,12 @@ pub struct FrameCounts {
     pub received: u64,
     /// Frames that are solved and on disk.
     pub solved: u64,
-    /// Ranges `[a, b)` that are not solved, below the highest frame, or below the number declared at completion.
+    /// Ranges `[a, b)` that are not solved, below the highest frame, or below the number declared at completion; the first ones, where
+    /// there are many.
     pub missing: Vec<[u32; 2]>,
+    /// Where the ranges that follow begin, if `missing` has not all of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub missing_next: Option<u32>,
 }
 
 /// Times of a preparation; all zero where the solver was there already.

@@ -1,6 +1,6 @@
 //! The tokens file, and looking a token up in it.
 
-use super::{Priority, Tenant, TenantLimits};
+use super::{Grant, Priority, Tenant, TenantLimits};
 use crate::config::line_of;
 use serde::Deserialize;
 use std::collections::HashMap;
@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
 use subtle::{Choice, ConditionallySelectable as _, ConstantTimeEq as _};
+use tokio_util::sync::CancellationToken;
 use toml::Spanned;
 
 /// Why a tokens file cannot be used. Never quotes the file, which would show hashes.
@@ -61,7 +62,7 @@ type Hash = [u8; 32];
 
 /// All tokens, by their hashes.
 #[derive(Default)]
-pub(super) struct Entries(Vec<(Hash, Arc<Tenant>)>);
+pub(super) struct Entries(Vec<(Hash, Grant)>);
 
 impl Entries {
     pub(super) fn read(file: &Path, defaults: TenantLimits) -> Result<Self, AccessError> {
@@ -82,7 +83,7 @@ impl Entries {
             (error.span().map_or(0, |span| span.start), format!("{message}; see the documentation of tokens files"))
         })?;
         let mut names = HashMap::new();
-        let mut entries: Vec<(Hash, Arc<Tenant>)> = Vec::with_capacity(document.token.len());
+        let mut entries: Vec<(Hash, Grant)> = Vec::with_capacity(document.token.len());
         for token in document.token {
             for (word, text) in [("name", &token.name), ("tenant", &token.tenant)] {
                 if !is_name(text.as_ref()) {
@@ -110,13 +111,27 @@ impl Entries {
                 max_streams: token.max_streams.unwrap_or(defaults.max_streams),
             };
             let tenant = Tenant { name: token.tenant.into_inner(), priority: token.priority, limits };
-            entries.push((hash, Arc::new(tenant)));
+            let token = token.name.into_inner().into();
+            entries.push((hash, Grant { tenant: Arc::new(tenant), token, revoked: CancellationToken::new() }));
         }
         Ok(Self(entries))
     }
 
-    /// The tenant of a token. All entries are compared, all bytes of each, so that the time says nothing about the hashes.
-    pub(super) fn find(&self, hash: &Hash) -> Option<Arc<Tenant>> {
+    /// Goes on with the grants of the entries before; gives those that are there no more, or are another tenant's now.
+    pub(super) fn succeed(&mut self, before: &Self) -> Vec<Grant> {
+        let mut gone = Vec::new();
+        for (hash, old) in &before.0 {
+            let same = |(other, new): &&mut (Hash, Grant)| other == hash && new.tenant.name == old.tenant.name;
+            match self.0.iter_mut().find(same) {
+                Some((_, new)) => new.revoked = old.revoked.clone(),
+                None => gone.push(old.clone()),
+            }
+        }
+        gone
+    }
+
+    /// What a token grants. All entries are compared, all bytes of each, so that the time says nothing about the hashes.
+    pub(super) fn find(&self, hash: &Hash) -> Option<Grant> {
         let mut found = Choice::from(0);
         let mut place = 0_u64;
         for (index, (other, _)) in self.0.iter().enumerate() {
@@ -124,13 +139,13 @@ impl Entries {
             place.conditional_assign(&(index as u64), equal);
             found |= equal;
         }
-        let tenant = self.0.get(usize::try_from(place).ok()?).map(|(_, tenant)| Arc::clone(tenant));
-        tenant.filter(|_| bool::from(found))
+        let grant = self.0.get(usize::try_from(place).ok()?).map(|(_, grant)| grant.clone());
+        grant.filter(|_| bool::from(found))
     }
 
     /// The tenants of all tokens; some of them more than once.
     pub(super) fn tenants(&self) -> impl Iterator<Item = &Tenant> {
-        self.0.iter().map(|(_, tenant)| &**tenant)
+        self.0.iter().map(|(_, grant)| &*grant.tenant)
     }
 }
 

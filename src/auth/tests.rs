@@ -38,7 +38,7 @@ fn bearer(token: &str) -> HeaderMap {
 fn without_a_file_everyone_is_local() {
     let access = Access::open(None, DEFAULTS).unwrap();
     for headers in [HeaderMap::new(), bearer("whatever")] {
-        let tenant = access.authenticate(&headers).unwrap();
+        let tenant = access.authenticate(&headers).unwrap().tenant;
         assert_eq!((tenant.name.as_str(), tenant.limits), (LOCAL, DEFAULTS));
     }
 }
@@ -49,10 +49,10 @@ fn tokens_tell_tenants_with_their_priorities_and_limits() {
         + &entry("artist", "a", SECOND, "priority = \"high\"\nmax_bytes = 1");
     let (_folder, access) = open(&text);
     let access = access.unwrap();
-    let farm = access.authenticate(&bearer(FIRST)).unwrap();
+    let farm = access.authenticate(&bearer(FIRST)).unwrap().tenant;
     assert_eq!((farm.name.as_str(), farm.priority), ("a", Priority::Low));
     assert_eq!(farm.limits, TenantLimits { max_sessions: 3, max_age_s: 0, ..DEFAULTS });
-    let artist = access.authenticate(&with(&format!("bEaReR   {SECOND} "))).unwrap();
+    let artist = access.authenticate(&with(&format!("bEaReR   {SECOND} "))).unwrap().tenant;
     assert_eq!((artist.priority, artist.limits.max_bytes), (Priority::High, 1));
 
     let both = access.tenant("a");
@@ -101,7 +101,7 @@ fn the_place_of_an_entry_makes_no_difference() {
     let (_folder, access) = open(&text);
     let access = access.unwrap();
     for (i, token) in tokens.iter().enumerate() {
-        assert_eq!(access.authenticate(&bearer(token)).unwrap().name, format!("t{i}"));
+        assert_eq!(access.authenticate(&bearer(token)).unwrap().tenant.name, format!("t{i}"));
     }
     assert_eq!(access.authenticate(&bearer("0123456789abcdef-5")), Err(Denied::Unknown));
     let (_folder, empty) = open("");

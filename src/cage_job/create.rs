@@ -1,6 +1,7 @@
 //! Making, resuming and deleting cage jobs.
 
 use super::{CageJob, Finished, Outcome, Phase, samples, wish};
+use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::config::ServeConfig;
 use crate::idempotency::Repetition;
@@ -16,7 +17,6 @@ use cager_proto::cage_messages::CageOptions;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::{SystemTime, UNIX_EPOCH};
-use tokio::sync::OwnedSemaphorePermit;
 
 /// A request to design a cage.
 pub(crate) struct NewCageJob {
@@ -27,7 +27,7 @@ pub(crate) struct NewCageJob {
     pub(crate) options: CageOptions,
     pub(crate) idempotency_key: Option<String>,
     /// The room in memory that the rest pose takes.
-    pub(crate) room: Vec<OwnedSemaphorePermit>,
+    pub(crate) room: Held,
     /// The room on disk that both take.
     pub(crate) reserved: Reserved,
 }

@@ -50,13 +50,12 @@ impl CageJobs {
         })
     }
 
-    /// Up to `most` of a tenant's jobs that follow `after`, oldest first.
+    /// Up to `most` of a tenant's jobs that follow `after`, newest first.
     pub(crate) fn page(&self, tenant: &str, after: Option<&str>, most: usize) -> Vec<Arc<CageJob>> {
         use std::ops::Bound::{Excluded, Unbounded};
         let inner = lock(&self.inner);
-        let from = after.map_or(Unbounded, Excluded);
-        let later = inner.jobs.range::<str, _>((from, Unbounded)).map(|(_, job)| job);
-        later.filter(|job| job.meta.tenant == tenant).take(most).cloned().collect()
+        let older = inner.jobs.range::<str, _>((Unbounded, after.map_or(Unbounded, Excluded))).rev();
+        older.map(|(_, job)| job).filter(|job| job.meta.tenant == tenant).take(most).cloned().collect()
     }
 
     pub(crate) fn all(&self) -> Vec<Arc<CageJob>> {

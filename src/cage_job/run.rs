@@ -1,12 +1,12 @@
 //! Running designs: a few at a time, tenants in turn, on threads that give way to everything else.
 
 use super::{Best, CageJob, Finished, Outcome, Phase, samples, wish};
+use crate::admission::{Budget, Held};
 use crate::config::ServeConfig;
 use crate::engine::threads;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::create::blocking;
-use crate::session::places::{Place, Places};
 use crate::session::prepare::read_part;
 use crate::store::StoreError;
 use cager_cages::{Design, DesignError, DesignOptions, Progress, design};
@@ -40,7 +40,7 @@ pub(crate) fn local_designer() -> Arc<Designer> {
 
 /// Where designs run.
 pub(crate) struct Designs {
-    places: Arc<Places>,
+    places: Arc<Budget>,
     pool: Arc<rayon::ThreadPool>,
     designer: Arc<Designer>,
     /// Memory of sample frames.
@@ -54,7 +54,7 @@ impl Designs {
     /// The system's, where threads cannot be started.
     pub(crate) fn new(config: &ServeConfig, designer: Arc<Designer>) -> std::io::Result<Self> {
         let pool = Arc::new(threads::pool("design", config.workers, threads::GIVES_WAY_TO_ALL)?);
-        Ok(Self { places: Places::new(config.max_designs), pool, designer, bytes: AtomicU64::new(0) })
+        Ok(Self { places: config.budget(config.max_designs as u64), pool, designer, bytes: AtomicU64::new(0) })
     }
 
     /// Memory of the frames that designs look at.
@@ -105,7 +105,7 @@ impl Service {
     }
 
     /// A place to run in. None where another job of the same input has to be looked at again, or the job is over.
-    async fn turn_of(&self, job: &Arc<CageJob>) -> Option<Place> {
+    async fn turn_of(&self, job: &Arc<CageJob>) -> Option<Held> {
         let (tenant, id) = (&job.meta.tenant, Some(job.meta.id.as_str()));
         let twin = || self.cage_jobs.twin(tenant, &job.meta.key, id).filter(|twin| !Arc::ptr_eq(twin, job));
         let mut unreadable = false;
@@ -127,7 +127,7 @@ impl Service {
             }
         }
         let place = tokio::select! {
-            place = self.designs.places.take(tenant) => place,
+            place = self.designs.places.take(tenant, 1) => place,
             () = job.deleted().cancelled() => return None,
             () = self.stopping().cancelled() => return None,
         };
@@ -137,7 +137,7 @@ impl Service {
     }
 
     /// Designs the cage of a job. Blocks.
-    fn design(&self, job: &Arc<CageJob>, _place: Place) -> Ended {
+    fn design(&self, job: &Arc<CageJob>, _place: Held) -> Ended {
         let clock = Instant::now();
         let ended = match self.design_with(job, clock) {
             Ok(_) | Err(_) if job.deleted().is_cancelled() || self.stopping().is_cancelled() => Ended::Stopped,

@@ -87,7 +87,7 @@ pub enum ConfigError {
     },
     /// A model of the largest size would never find room.
     #[error(
-        "upload_bytes is {upload_bytes}, less than max_rest_bytes, which is {max_rest_bytes}; raise the one or lower the other"
+        "upload_bytes is {upload_bytes}, of which one of several tenants gets two thirds, so a model of max_rest_bytes, {max_rest_bytes}, would never find room; raise the one or lower the other"
     )]
     UploadRoom {
         /// Memory for uploads of models.

@@ -13,6 +13,7 @@ enum Kind {
     File,
     Format,
     Filter,
+    List,
     Number { least: u64, most: u64 },
     Bytes { least: u64, most: u64 },
 }
@@ -24,6 +25,8 @@ const SETTINGS: &[(&str, Kind)] = &[
     ("tokens", Kind::File),
     ("tls_certificate", Kind::File),
     ("tls_key", Kind::File),
+    ("allowed_hosts", Kind::List),
+    ("allowed_origins", Kind::List),
     ("log", Kind::Format),
     ("log_filter", Kind::Filter),
     ("workers", Kind::Number { least: 0, most: 4096 }),
@@ -31,6 +34,8 @@ const SETTINGS: &[(&str, Kind)] = &[
     ("prepared_disk_bytes", Kind::Bytes { least: 0, most: 1 << 50 }),
     ("frame_bytes", Kind::Bytes { least: MIB, most: 1 << 50 }),
     ("upload_bytes", Kind::Bytes { least: MIB, most: 1 << 50 }),
+    ("download_bytes", Kind::Bytes { least: MIB, most: 1 << 50 }),
+    ("spool_bytes", Kind::Bytes { least: MIB, most: 1 << 50 }),
     ("max_rest_bytes", Kind::Bytes { least: KIB, most: 16 * GIB }),
     ("max_connections", Kind::Number { least: 1, most: 1_000_000 }),
     ("max_requests", Kind::Number { least: 1, most: 1_000_000 }),
@@ -103,6 +108,15 @@ impl Kind {
                     Ok(_) => Ok(value.clone()),
                     Err(error) => Err(wrong(error.to_string())),
                 }
+            }
+            Self::List => {
+                let wrong = "write a list of texts, or one text with commas between them".to_owned();
+                let items: Option<Vec<String>> = match value.as_array() {
+                    Some(items) => items.iter().map(|item| item.as_str().map(str::to_owned)).collect(),
+                    None => text.map(|text| text.split(',').map(str::to_owned).collect()),
+                };
+                let items = items.ok_or(wrong)?.into_iter().map(|item| item.trim().to_owned());
+                Ok(Value::Array(items.filter(|item| !item.is_empty()).map(Value::String).collect()))
             }
             Self::Number { least, most } => {
                 let number = value.as_integer().or_else(|| text?.trim().parse().ok());

@@ -6,6 +6,7 @@ use super::openapi;
 use super::ranged::Immutable;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
+use crate::session::frames::RANGES;
 use crate::session::{Phase, Session};
 use axum::body::Body;
 use axum::extract::State;
@@ -109,8 +110,7 @@ pub(crate) async fn get(
     let count = query.count.map_or(there, u64::from);
     if count > there {
         let end = (u64::from(query.first) + count).min(u64::from(u32::MAX)) as u32;
-        let missing = session.frames().missing(Some(end));
-        let missing = missing.into_iter().map(|[a, b]| [a.max(query.first), b]).filter(|[a, b]| a < b).collect();
+        let missing = session.frames().missing(query.first, Some(end), RANGES).ranges;
         let detail = format!("of {count} frames from {} on, {there} are there; ask for fewer, or follow", query.first);
         return Err(ApiError::new(problem::FRAMES_MISSING, detail).missing(missing));
     }
@@ -128,6 +128,7 @@ pub(crate) async fn get(
         etag: format!("{}-{kind}{first}-{count}", digest.as_deref().unwrap_or("live")),
         media_type: form.media_type(),
         public: !service.access.is_guarded(),
+        room: service.download_memory.nothing(&tenant.name),
         read: Arc::new(read),
     };
     if digest.is_some() {
@@ -160,7 +161,7 @@ fn follow(
     form: Form,
     first: u64,
     last: u64,
-    place: crate::service::StreamPlace,
+    place: crate::admission::Held,
 ) -> impl futures_util::Stream<Item = io::Result<Bytes>> {
     let changes = session.changes();
     futures_util::stream::unfold((first, changes, place), move |(next, mut changes, place)| {

@@ -27,7 +27,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 )]
 pub(crate) async fn get(
     State(service): State<Arc<Service>>,
-    Found { session, .. }: Found,
+    Found { session, tenant }: Found,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let Phase::Completed(completion) = session.status().phase else {
@@ -49,6 +49,7 @@ pub(crate) async fn get(
         etag: completion.container_digest,
         media_type: "application/vnd.cager",
         public: !service.access.is_guarded(),
+        room: service.download_memory.nothing(&tenant.name),
         read: Arc::new(read),
     };
     let mut response = container.respond(&headers);

@@ -54,7 +54,7 @@ pub(crate) async fn handles(
 )]
 pub(crate) async fn get(
     State(service): State<Arc<Service>>,
-    Found { session, .. }: Found,
+    Found { session, tenant }: Found,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let facts = prepared(&service, &session).await?;
@@ -82,6 +82,7 @@ pub(crate) async fn get(
         etag: format!("{}-phi", session.meta.key),
         media_type: "application/octet-stream",
         public: !service.access.is_guarded(),
+        room: service.download_memory.nothing(&tenant.name),
         read: Arc::new(read),
     };
     let mut response = coordinates.respond(&headers);

@@ -3,10 +3,11 @@
 use super::extract::{Found, content_type};
 use super::frames::{body_error, prepared, stopping};
 use super::{openapi, other_model};
+use crate::admission::Held;
 use crate::engine::Lane;
 use crate::problem::{self, ApiError};
-use crate::service::{Service, StreamPlace};
-use crate::session::{Session, gone};
+use crate::service::Service;
+use crate::session::{Session, gone, lock};
 use axum::body::Body;
 use axum::extract::{Request, State};
 use axum::response::{IntoResponse, Response};
@@ -49,14 +50,15 @@ pub(crate) async fn post(
     let place = service.stream(&tenant)?;
     let facts = prepared(&service, &session).await?;
     let (model, cages) = if with_model {
-        let (model, cages) = other_model::read(&service, request).await?;
+        let (model, cages) = other_model::read(&service, &tenant, request).await?;
         (Some(model), cages)
     } else {
         let cages = request.into_body().into_data_stream().map(|piece| piece.map_err(|error| body_error(&error)));
         (None, cages.boxed())
     };
     // Before the model is bound: what the client sends meanwhile must not wait for it.
-    let spool = Arc::new(Spool::new(&service.config.data).map_err(|error| spool_error(&error))?);
+    let space = service.spool_space.nothing(&tenant.name);
+    let spool = Arc::new(Spool::new(&service.config.data, space).map_err(|error| spool_error(&error))?);
     let arrived = spool.arrived.subscribe();
     let limit = service.config.max_rest_bytes;
     tokio::spawn(spool_cages(Arc::clone(&spool), cages, limit, Arc::clone(&service), Arc::clone(&session)));
@@ -107,6 +109,8 @@ struct Job {
 /// The body as it arrives, on disk: a client that reads nothing before it has written all must not be held back.
 struct Spool {
     file: Mutex<File>,
+    /// The disk space that it takes.
+    space: Mutex<Held>,
     arrived: watch::Sender<Arrived>,
 }
 
@@ -118,18 +122,19 @@ struct Arrived {
 
 impl Spool {
     /// In the data folder: the only place where the service may write.
-    fn new(data: &Path) -> io::Result<Self> {
-        Ok(Self { file: Mutex::new(tempfile::tempfile_in(data.join("tmp"))?), arrived: watch::Sender::default() })
+    fn new(data: &Path, space: Held) -> io::Result<Self> {
+        let file = Mutex::new(tempfile::tempfile_in(data.join("tmp"))?);
+        Ok(Self { file, space: Mutex::new(space), arrived: watch::Sender::default() })
     }
 
     fn append(&self, at: u64, bytes: &[u8]) -> io::Result<()> {
-        let mut file = crate::session::lock(&self.file);
+        let mut file = lock(&self.file);
         file.seek(SeekFrom::Start(at))?;
         file.write_all(bytes)
     }
 
     fn read(&self, at: u64, length: usize) -> io::Result<Vec<u8>> {
-        let mut file = crate::session::lock(&self.file);
+        let mut file = lock(&self.file);
         file.seek(SeekFrom::Start(at))?;
         let mut bytes = vec![0; length];
         file.read_exact(&mut bytes)?;
@@ -162,6 +167,11 @@ async fn spool_cages(
             break Err(ApiError::new(problem::TOO_LARGE, detail).limit(limit));
         }
         let (writing, length) = (Arc::clone(&spool), chunk.len() as u64);
+        let grown = lock(&spool.space).grow(length);
+        if let Err(full) = grown {
+            service.rejected("spool_space");
+            break Err(full.refusal("disk space for cages to decode"));
+        }
         match tokio::task::spawn_blocking(move || writing.append(bytes, &chunk)).await {
             Ok(Ok(())) => bytes += length,
             Ok(Err(error)) => break Err(spool_error(&error)),
@@ -189,7 +199,7 @@ struct Decoding {
     session: Arc<Session>,
     frame_bytes: u64,
     next: u64,
-    _place: StreamPlace,
+    _place: Held,
 }
 
 impl Decoding {

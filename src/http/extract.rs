@@ -1,5 +1,7 @@
 //! What handlers take from a request: the tenant, the tenant's session, checked queries and bodies.
 
+use super::origin;
+use super::revocable::revocable;
 use crate::auth::Tenant;
 use crate::cage_job::CageJob;
 use crate::problem::{self, ApiError};
@@ -24,10 +26,24 @@ pub(crate) async fn authenticate(
     mut request: axum::extract::Request,
     next: Next,
 ) -> Response {
+    if !service.access.is_guarded() {
+        let (parts, body) = request.into_parts();
+        if let Err(refused) = origin::check(&parts, &service.config) {
+            service.rejected("origin");
+            return refused.into_response();
+        }
+        request = axum::extract::Request::from_parts(parts, body);
+    }
     match service.access.authenticate(request.headers()) {
-        Ok(tenant) => {
-            request.extensions_mut().insert(Caller(tenant));
-            next.run(request).await
+        Ok(grant) => {
+            let span = tracing::Span::current();
+            span.record("tenant", &*grant.tenant.name).record("token", &*grant.token);
+            request.extensions_mut().insert(Caller(grant.tenant));
+            if !service.access.is_guarded() {
+                return next.run(request).await;
+            }
+            let request = request.map(|body| revocable(body, &grant.revoked));
+            next.run(request).await.map(|body| revocable(body, &grant.revoked))
         }
         Err(denied) => {
             service.rejected("unauthorized");

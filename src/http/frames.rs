@@ -3,9 +3,10 @@
 use super::extract::{Accept, Found, Query, content_type};
 use super::frames_in::{FrameReader, Layout};
 use super::openapi;
+use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::problem::{self, ApiError};
-use crate::service::{Service, StreamPlace};
+use crate::service::Service;
 use crate::session::facts::Facts;
 use crate::session::upload::{FrameJob, Permits, Rows, Step, Upload};
 use crate::session::{LiveLane, Phase, Session, gone};
@@ -264,8 +265,9 @@ impl Reading {
                         let open = "it is never closed";
                         let unwritten = Arc::clone(&unwritten).acquire_owned().await.expect(open);
                         let place = Arc::clone(&places).acquire_owned().await.expect(open);
-                        let memory = self.service.frame_memory.take(frames.frame_bytes() as u64).await;
-                        Permits { _solving: [place, memory], writing: unwritten }
+                        let memory = &self.service.frame_memory;
+                        let memory = memory.take(&self.tenant.name, frames.frame_bytes() as u64).await;
+                        Permits { _solving: (place, memory), writing: unwritten }
                     };
                     permits = Some(tokio::select! {
                         error = &mut stopped => return Err(error),
@@ -305,7 +307,7 @@ struct Answering {
     upload: Arc<Upload>,
     /// Frames wait in the lane after the whole body has arrived, and a lane that is dropped forgets them.
     _live: Arc<LiveLane>,
-    _place: StreamPlace,
+    _place: Held,
 }
 
 impl Drop for Answering {

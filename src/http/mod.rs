@@ -14,13 +14,17 @@ mod frames_in;
 #[doc(hidden)]
 pub mod fuzzing;
 mod health;
+mod holding;
 pub mod listen;
+mod metered;
 mod multipart;
 pub mod openapi;
+mod origin;
 mod other_model;
 mod progress;
 mod ranged;
 mod respond;
+mod revocable;
 mod router;
 mod sessions;
 mod viewer;

@@ -1,18 +1,18 @@
 //! The multipart body that makes a session.
 
 use super::frames::body_error;
+use super::metered::Metered;
+use crate::admission::Held;
+use crate::auth::Tenant;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::cage_source::Uploaded;
 use crate::store::{CageFile, MatrixFile};
-use axum::body::Body;
 use axum::extract::multipart::{Field, MultipartError};
 use axum::extract::{FromRequest, Multipart, Request};
 use cager_proto::messages::SessionOptions;
-use futures_util::StreamExt as _;
 use serde::de::DeserializeOwned;
-use std::sync::{Arc, Mutex};
-use tokio::sync::OwnedSemaphorePermit;
+use std::sync::Arc;
 
 /// Bytes of a body beside rest pose and cage.
 pub(crate) const ENVELOPE_BYTES: u64 = 1 << 20;
@@ -20,84 +20,32 @@ const OPTIONS_BYTES: usize = 64 << 10;
 pub(super) const NAME_CHARACTERS: usize = 200;
 /// The part with the matrix of the regularizer of that name.
 const MATRIX: &str = "regularizer_matrix";
-/// Memory is asked for in pieces of this many bytes: small ones, so that hundreds of small models have room at the same time.
-pub(super) const PIECE: u64 = 64 << 10;
-
 /// What the parts hold, and the room they take until it is dropped.
 pub(crate) struct Parts {
     pub(crate) uploaded: Uploaded,
     pub(crate) options: SessionOptions,
-    pub(crate) room: Room,
+    pub(crate) room: Held,
 }
-
-/// Room for models.
-pub(crate) type Room = Vec<OwnedSemaphorePermit>;
 
 struct File {
     name: String,
     bytes: Vec<u8>,
 }
 
-/// A body whose bytes are counted as they come, before anyone looks for parts in them: until one is found, all that came is kept.
-struct Metered {
-    room: Room,
-    received: u64,
-    granted: u64,
-    /// Why no more was taken.
-    refused: Option<ApiError>,
-}
-
-impl Metered {
-    fn take(&mut self, service: &Service, bytes: usize) -> Result<(), ApiError> {
-        self.received += bytes as u64;
-        let limit = service.config.max_rest_bytes;
-        if self.received > limit.saturating_add(ENVELOPE_BYTES) {
-            service.rejected("body_too_large");
-            let detail = format!("rest pose and cage have more than {limit} bytes together, the most that is taken");
-            return Err(ApiError::new(problem::TOO_LARGE, detail).limit(limit));
-        }
-        while self.granted < self.received {
-            self.room.push(service.upload_memory.try_take(PIECE).ok_or_else(|| {
-                service.rejected("upload_memory");
-                let detail = "too many models are being uploaded at the moment; try again later";
-                ApiError::new(problem::BUSY, detail).retry_after(5)
-            })?);
-            self.granted += PIECE;
-        }
-        Ok(())
-    }
-}
-
 /// Reads all parts.
 ///
 /// # Errors
 /// Parts that are missing, twice there, unknown or too large; no room.
-pub(crate) async fn read(service: &Arc<Service>, request: Request) -> Result<Parts, ApiError> {
-    let metered = Arc::new(Mutex::new(Metered { room: Room::new(), received: 0, granted: 0, refused: None }));
-    let (counting, counted) = (Arc::clone(service), Arc::clone(&metered));
-    let request = request.map(|body| {
-        Body::from_stream(body.into_data_stream().map(move |piece| {
-            let piece = piece?;
-            let mut metered = crate::session::lock(&counted);
-            metered.take(&counting, piece.len()).map(|()| piece).map_err(|error| {
-                metered.refused = Some(error);
-                axum::Error::new("it was refused")
-            })
-        }))
-    });
+pub(crate) async fn read(service: &Arc<Service>, tenant: &Tenant, request: Request) -> Result<Parts, ApiError> {
+    let (metered, request) = Metered::new(service, tenant, request, "rest pose and cage have");
     let body = Multipart::from_request(request, &())
         .await
         .map_err(|error| bad(format!("the multipart body cannot be read: {}", error.body_text())))?;
-    let parts = read_parts(service, body).await;
-    let mut metered = crate::session::lock(&metered);
-    match (parts, metered.refused.take()) {
-        (_, Some(refused)) => Err(refused),
-        (Ok(parts), None) => Ok(Parts { room: std::mem::take(&mut metered.room), ..parts }),
-        (Err(error), None) => Err(error),
-    }
+    let ((uploaded, options), room) = metered.finish(read_parts(service, body).await)?;
+    Ok(Parts { uploaded, options, room })
 }
 
-async fn read_parts(service: &Service, mut body: Multipart) -> Result<Parts, ApiError> {
+async fn read_parts(service: &Service, mut body: Multipart) -> Result<(Uploaded, SessionOptions), ApiError> {
     let (mut rest, mut cage, mut matrix, mut options) = (None, None, None, None);
     let mut left = service.config.max_rest_bytes;
     while let Some(field) = body.next_field().await.map_err(|e| broken(&e))? {
@@ -131,7 +79,7 @@ async fn read_parts(service: &Service, mut body: Multipart) -> Result<Parts, Api
         cage: cage.map(|File { name, bytes }| CageFile { name, bytes }),
         matrix: matrix.map(|File { name, bytes }| MatrixFile { name, bytes }),
     };
-    Ok(Parts { uploaded, options: options.unwrap_or_default(), room: Room::new() })
+    Ok((uploaded, options.unwrap_or_default()))
 }
 
 async fn read_file(service: &Service, part: &str, mut field: Field<'_>, left: &mut u64) -> Result<File, ApiError> {

@@ -1,26 +1,28 @@
 //! Another model within a session's rest cage, to be moved by its cages: the parts of a `decode` body that brings one.
 
-use super::multipart::{ENVELOPE_BYTES, PIECE, Room, bad, broken, file_name};
+use super::metered::Metered;
+use super::multipart::{bad, broken, file_name};
+use crate::admission::Held;
+use crate::auth::Tenant;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
+use crate::session::Session;
 use crate::session::create::blocking;
 use crate::session::prepare::{Choices, check_columns, read_part};
-use crate::session::{Session, lock};
-use axum::body::Body;
 use axum::extract::{FromRequest, Multipart, Request};
 use bytes::Bytes;
 use cager_core::decode::Decoder;
 use cager_core::inversion::refuse_far_points;
 use futures_util::StreamExt as _;
 use futures_util::stream::{BoxStream, poll_fn};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use tokio::sync::mpsc;
 
 /// The file of a model, and the room that it takes until it is dropped.
 pub(super) struct Uploaded {
     name: String,
     bytes: Vec<u8>,
-    _room: Room,
+    _room: Held,
 }
 
 /// What turns cages into positions of another model.
@@ -36,32 +38,15 @@ pub(super) struct Bound {
 /// Parts that are missing, unknown or in another order; a model that is too large; no room.
 pub(super) async fn read(
     service: &Arc<Service>,
+    tenant: &Tenant,
     request: Request,
 ) -> Result<(Uploaded, BoxStream<'static, Result<Bytes, ApiError>>), ApiError> {
-    let metered =
-        Arc::new(Mutex::new(Metered { room: Room::new(), received: 0, granted: 0, refused: None, done: false }));
-    let (counting, counted) = (Arc::clone(service), Arc::clone(&metered));
-    let request = request.map(|body| {
-        Body::from_stream(body.into_data_stream().map(move |piece| {
-            let piece = piece?;
-            let mut metered = lock(&counted);
-            metered.take(&counting, piece.len()).map(|()| piece).map_err(|error| {
-                metered.refused = Some(error);
-                axum::Error::new("it was refused")
-            })
-        }))
-    });
+    let (metered, request) = Metered::new(service, tenant, request, "the model has");
     let mut body = Multipart::from_request(request, &())
         .await
         .map_err(|error| bad(format!("the multipart body cannot be read: {}", error.body_text())))?;
-    let model = read_model(&mut body).await;
-    let (name, bytes) = {
-        let mut metered = lock(&metered);
-        // The cages that follow wait on the disk, under a limit of their own.
-        metered.done = true;
-        metered.refused.take().map_or(model, Err)?
-    };
-    let room = std::mem::take(&mut lock(&metered).room);
+    // The cages that follow wait on the disk, under a limit of their own.
+    let ((name, bytes), room) = metered.finish(read_model(&mut body).await)?;
     let model = Uploaded { name, bytes, _room: room };
     let (send, mut receive) = mpsc::channel(1);
     tokio::spawn(async move {
@@ -71,40 +56,6 @@ pub(super) async fn read(
         }
     });
     Ok((model, poll_fn(move |context| receive.poll_recv(context)).boxed()))
-}
-
-/// The bytes of a body until the model is read, counted as they come: until a part is found, all that came is kept.
-struct Metered {
-    room: Room,
-    received: u64,
-    granted: u64,
-    /// Why no more was taken.
-    refused: Option<ApiError>,
-    done: bool,
-}
-
-impl Metered {
-    fn take(&mut self, service: &Service, bytes: usize) -> Result<(), ApiError> {
-        if self.done {
-            return Ok(());
-        }
-        self.received += bytes as u64;
-        let limit = service.config.max_rest_bytes;
-        if self.received > limit.saturating_add(ENVELOPE_BYTES) {
-            service.rejected("body_too_large");
-            let detail = format!("the model has more than {limit} bytes, the most that is taken; send a lighter one");
-            return Err(ApiError::new(problem::TOO_LARGE, detail).limit(limit));
-        }
-        while self.granted < self.received {
-            self.room.push(service.upload_memory.try_take(PIECE).ok_or_else(|| {
-                service.rejected("upload_memory");
-                let detail = "too many models are being uploaded at the moment; try again later";
-                ApiError::new(problem::BUSY, detail).retry_after(5)
-            })?);
-            self.granted += PIECE;
-        }
-        Ok(())
-    }
 }
 
 async fn read_model(body: &mut Multipart) -> Result<(String, Vec<u8>), ApiError> {

@@ -1,6 +1,7 @@
 //! Streams of server-sent events that tell where something stands.
 
-use crate::service::{Service, StreamPlace};
+use crate::admission::Held;
+use crate::service::Service;
 use axum::body::Body;
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
@@ -36,7 +37,7 @@ pub(super) struct Standing {
 }
 
 /// An event `progress` with each change, until nothing changes any more, it is deleted, or the service stops.
-pub(super) fn stream(service: Arc<Service>, place: StreamPlace, headers: &HeaderMap, followed: Followed) -> Response {
+pub(super) fn stream(service: Arc<Service>, place: Held, headers: &HeaderMap, followed: Followed) -> Response {
     let heard = headers.get("last-event-id").and_then(|id| id.to_str().ok()).map(str::to_owned);
     let stream = futures_util::stream::unfold(Some((heard, followed, place)), move |state| {
         let service = Arc::clone(&service);

@@ -1,5 +1,6 @@
 //! Immutable bytes with `ETag`, `Range` and conditions (RFC 9110, §13 and §14).
 
+use crate::admission::Held;
 use crate::problem::{self, ApiError};
 use axum::body::Body;
 use axum::response::{IntoResponse, Response};
@@ -20,13 +21,15 @@ pub(crate) struct Immutable {
     pub(crate) media_type: &'static str,
     /// Whether shared caches may keep it: not where tokens guard it.
     pub(crate) public: bool,
+    /// Room for the pieces that are on their way, none so far.
+    pub(crate) room: Held,
     /// Reads a range; blocks.
     pub(crate) read: Arc<dyn Fn(Range<u64>) -> io::Result<Bytes> + Send + Sync>,
 }
 
 impl Immutable {
-    /// The response to a request with these headers; 416 for a range that lies outside.
-    pub(crate) fn respond(self, headers: &HeaderMap) -> Response {
+    /// The response to a request with these headers; 416 for a range that lies outside, 429 or 503 where there is no room.
+    pub(crate) fn respond(mut self, headers: &HeaderMap) -> Response {
         let etag = format!("\"{}\"", self.etag);
         let scope = if self.public { "public" } else { "private" };
         let selection = match self.select(headers, &etag) {
@@ -37,6 +40,15 @@ impl Immutable {
                 return response;
             }
         };
+        let sent = match &selection {
+            Selection::All => self.length,
+            Selection::Part(range) => range.end - range.start,
+            Selection::NotModified => 0,
+        };
+        if let Err(full) = self.room.grow(sent.min(PIECE)) {
+            metrics::counter!("cager_rejections_total", "reason" => "download_memory").increment(1);
+            return full.refusal("memory for downloads").into_response();
+        }
         let mut response = match selection {
             Selection::NotModified => StatusCode::NOT_MODIFIED.into_response(),
             Selection::All => {
@@ -86,9 +98,12 @@ impl Immutable {
         }
     }
 
-    fn body(&self, range: Range<u64>) -> Body {
+    /// Its room is free again when the body is dropped.
+    fn body(&mut self, range: Range<u64>) -> Body {
         let read = Arc::clone(&self.read);
-        Body::from_stream(futures_util::stream::unfold(range, move |left| {
+        let nothing = self.room.nothing();
+        let room = std::mem::replace(&mut self.room, nothing);
+        Body::from_stream(futures_util::stream::unfold((range, room), move |(left, room)| {
             let read = Arc::clone(&read);
             async move {
                 if left.is_empty() {
@@ -97,7 +112,7 @@ impl Immutable {
                 let piece = left.start..left.end.min(left.start + PIECE);
                 let next = piece.end..left.end;
                 let bytes = tokio::task::spawn_blocking(move || read(piece)).await;
-                Some((bytes.map_err(io::Error::other).and_then(|bytes| bytes), next))
+                Some((bytes.map_err(io::Error::other).and_then(|bytes| bytes), (next, room)))
             }
         }))
     }

@@ -1,26 +1,29 @@
 //! Every route, in one flat list.
 
+use super::extract::Caller;
+use super::holding::holding;
 use super::respond::PROBLEM_JSON;
 use super::{
-    cage, cage_jobs, cages, container, coordinates, decode, errors, events, extract, frames, health, openapi, sessions,
-    viewer,
+    cage, cage_jobs, cages, container, coordinates, decode, errors, events, extract, frames, health, openapi, origin,
+    sessions, viewer,
 };
 use crate::problem::{self, ApiError, Kind};
 use crate::service::Service;
 use crate::telemetry::{RequestId, request_id};
 use axum::error_handling::HandleErrorLayer;
-use axum::extract::{DefaultBodyLimit, MatchedPath, Request};
+use axum::extract::{DefaultBodyLimit, MatchedPath, Request, State};
 use axum::middleware::{Next, from_fn, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::{BoxError, Router};
-use http::{StatusCode, Version, header};
+use cager_proto::messages::Problem;
+use http::{Extensions, HeaderMap, HeaderValue, StatusCode, Version, header};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use tower::limit::GlobalConcurrencyLimitLayer;
-use tower::load_shed::LoadShedLayer;
 use tower::timeout::TimeoutLayer;
 use tower::{ServiceBuilder, timeout};
 use tower_http::catch_panic::CatchPanicLayer;
+use tower_http::compression::CompressionLayer;
+use tower_http::decompression::RequestDecompressionLayer;
 use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
@@ -79,18 +82,15 @@ pub fn router(service: Arc<Service>) -> Router {
     let in_time = ServiceBuilder::new()
         .layer(HandleErrorLayer::new(async |error: BoxError| refused(&error)))
         .layer(TimeoutLayer::new(request_timeout));
-    let in_bounds = ServiceBuilder::new()
-        .layer(HandleErrorLayer::new(async |error: BoxError| refused(&error)))
-        .layer(LoadShedLayer::new())
-        .layer(GlobalConcurrencyLimitLayer::new(service.config.max_requests));
     let guarded = Router::from(quick())
         .layer(in_time)
         .merge(Router::from(completing()))
-        .layer(in_bounds)
+        .layer(from_fn_with_state(Arc::clone(&service), in_bounds))
         // Bounded by memory and by the tenant's streams instead: a slow body must not hold a place that all tenants share.
         .merge(Router::from(streaming()).layer(DefaultBodyLimit::disable()))
         .route_layer(from_fn_with_state(Arc::clone(&service), extract::authenticate));
-    Router::from(open())
+    let cors = origin::cors(&service.config);
+    let routes = Router::from(open())
         .merge(guarded)
         .merge(Router::from(described()))
         .fallback(|| async { ApiError::new(problem::NOT_FOUND, "the routes are listed in /openapi.json") })
@@ -101,8 +101,14 @@ pub fn router(service: Arc<Service>) -> Router {
             ApiError::internal(&format!("a request panicked: {text}")).into_response()
         }))
         .layer(from_fn(host))
+        .layer(RequestDecompressionLayer::new())
         .layer(from_fn(finish))
-        .layer(from_fn(request_id))
+        .layer(CompressionLayer::new().compress_when(is_worth_compressing))
+        .layer(from_fn(request_id));
+    match cors {
+        Some(cors) => routes.layer(cors),
+        None => routes,
+    }
 }
 
 /// The routes for connections beyond the limit: health, and "come back later" for everything else.
@@ -117,14 +123,36 @@ pub fn spare(service: Arc<Service>) -> Router {
         .layer(from_fn(request_id))
 }
 
+/// Texts of some length. Numbers hardly compress, and parts of them are asked for by their place.
+fn is_worth_compressing(_: StatusCode, _: Version, headers: &HeaderMap, _: &Extensions) -> bool {
+    const LEAST: u64 = 1024;
+    let text = |name| headers.get(name).and_then(|value: &HeaderValue| value.to_str().ok());
+    let media_type = text(header::CONTENT_TYPE).and_then(|value| value.split(';').next()).unwrap_or_default();
+    matches!(media_type, "application/json" | "text/html")
+        && text(header::CONTENT_LENGTH).and_then(|length| length.parse().ok()).is_none_or(|length: u64| length >= LEAST)
+}
+
+/// One of the places that requests have, until the answer is made; a large answer keeps it until it is read.
+async fn in_bounds(
+    State(service): State<Arc<Service>>,
+    Caller(tenant): Caller,
+    request: Request,
+    next: Next,
+) -> Result<Response, ApiError> {
+    let place = service.requests.try_take(&tenant.name, 1).map_err(|full| {
+        service.rejected("requests");
+        full.refusal("requests at a time").retry_after(1)
+    })?;
+    Ok(next.run(request).await.map(|body| holding(body, place)))
+}
+
 /// What a layer refused.
 fn refused(error: &BoxError) -> ApiError {
     if error.is::<timeout::error::Elapsed>() {
         metrics::counter!("cager_rejections_total", "reason" => "timeout").increment(1);
         return ApiError::new(problem::BUSY, "the request took too long; try again later").retry_after(5);
     }
-    metrics::counter!("cager_rejections_total", "reason" => "requests").increment(1);
-    ApiError::new(problem::BUSY, "too many requests are being worked on; try again in a moment").retry_after(1)
+    ApiError::internal(error)
 }
 
 /// HTTP/1.1 wants every request to name its host, once (RFC 9112, §3.2).
@@ -154,6 +182,8 @@ async fn finish(request: Request, next: Next) -> Response {
             None if is_problem(&response) => return response,
             None => ApiError::new(kind_of(status), status.canonical_reason().unwrap_or("error").to_owned()),
         };
+        let kind = &error.problem.kind;
+        tracing::Span::current().record("problem", kind.strip_prefix(Problem::TYPE_PREFIX).unwrap_or(kind));
         error.problem.request_id = id.map(|id| id.0.to_string());
         let kept = [header::ALLOW, header::CONTENT_RANGE].map(|name| (response.headers_mut().remove(&name), name));
         let mut problem = error.into_response();

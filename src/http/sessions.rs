@@ -18,6 +18,8 @@ use std::time::Duration;
 use tokio::time::timeout;
 
 pub(super) const PAGE: usize = 100;
+/// Ranges of missing frames that a list tells of each session.
+const LISTED_RANGES: usize = 10;
 
 /// Makes a session: parts `rest` and `cage` are files whose names carry their format, part `options` is JSON. Without a cage one is made
 /// from the rest pose, or taken from a design, as `options.cage` says. It is prepared in the background; frames may be posted at once
@@ -49,7 +51,7 @@ pub(crate) async fn create(
     let idempotency_key = idempotency_key(headers)?;
     let most = if declared > 0 { declared } else { limit };
     let patience = Duration::from_secs(service.config.body_timeout_s + most / SLOWEST_BYTES_PER_SECOND);
-    let parts = timeout(patience, multipart::read(&service, request)).await.map_err(|_| too_slow())??;
+    let parts = timeout(patience, multipart::read(&service, &tenant, request)).await.map_err(|_| too_slow())??;
     let new = NewSession { uploaded: parts.uploaded, options: parts.options, idempotency_key, room: parts.room };
     let session = service.create(&tenant, new).await?;
     let location = format!("/v1/sessions/{}", session.meta.id);
@@ -65,7 +67,7 @@ pub(crate) struct PageQuery {
     pub(super) after: Option<String>,
 }
 
-/// Lists the tenant's sessions, oldest first, a hundred at a time.
+/// Lists the tenant's sessions, newest first, a hundred at a time; of missing frames the first ranges.
 #[utoipa::path(get, path = "/v1/sessions", operation_id = "list_sessions", tag = "sessions", params(PageQuery), responses((status = 200, description = "A page of sessions", body = SessionList)))]
 pub(crate) async fn list(
     State(service): State<Arc<Service>>,
@@ -80,7 +82,7 @@ pub(crate) async fn list(
         let _ = session.ensure_loaded().await;
     }
     let next = page.last().filter(|_| more).map(|session| session.meta.id.clone());
-    Ok(Json(SessionList { sessions: page.iter().map(|session| session.view()).collect(), next }))
+    Ok(Json(SessionList { sessions: page.iter().map(|session| session.view_with(LISTED_RANGES)).collect(), next }))
 }
 
 /// A session.
@@ -106,9 +108,10 @@ pub(crate) async fn delete(
 )]
 pub(crate) async fn complete(
     State(service): State<Arc<Service>>,
-    Found { session, .. }: Found,
+    Found { session, tenant }: Found,
     Body(complete): Body<Complete>,
 ) -> JsonResult<Session> {
+    let _place = service.completing.take(&tenant.name, 1).await;
     service.complete(&session, complete).await?;
     Ok(Json(session.view()))
 }

@@ -2,8 +2,8 @@
 
 use super::create::blocking;
 use super::lock;
-use super::places::Places;
 use super::prepare::read_part;
+use crate::admission::Budget;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{CageFile, Content, ContentKey, MatrixFile};
@@ -33,7 +33,7 @@ pub(crate) struct Uploaded {
 
 /// Cages being made, and those made last.
 pub(crate) struct CageMaker {
-    places: Arc<Places>,
+    places: Arc<Budget>,
     /// Held while a cage is made, by the first byte of its digest.
     flights: [tokio::sync::Mutex<()>; 16],
     recent: Mutex<VecDeque<(ContentKey, CageFile)>>,
@@ -41,8 +41,8 @@ pub(crate) struct CageMaker {
 
 impl CageMaker {
     /// One that makes so many at a time.
-    pub(crate) fn new(places: usize) -> Self {
-        Self { places: Places::new(places), flights: Default::default(), recent: Mutex::default() }
+    pub(crate) fn new(places: Arc<Budget>) -> Self {
+        Self { places, flights: Default::default(), recent: Mutex::default() }
     }
 
     fn recent(&self, made: &ContentKey) -> Option<CageFile> {
@@ -125,7 +125,7 @@ impl Service {
                 return Ok((rest, cage, made));
             }
         }
-        let _place = self.cage_maker.places.take(tenant).await;
+        let _place = self.cage_maker.places.take(tenant, 1).await;
         let (pool, name) = (self.solvers.pool(), rest_name.to_owned());
         let (rest, cage) = blocking(move || {
             let cage = read_part("rest", &name, &rest).and_then(|model| pool.install(|| make(&model, vertices)));

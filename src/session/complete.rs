@@ -4,6 +4,7 @@ use super::create::blocking;
 use super::frames::Unsealed;
 use super::prepare::{self, Choices};
 use super::prepared::Prepared;
+use super::runs::Missing;
 use super::{Phase, Session};
 use crate::capture::{CaptureWriter, Encoding, StoredError};
 use crate::problem::{self, ApiError};
@@ -55,11 +56,12 @@ impl Service {
             // From here on no frame is answered that the container would lack.
             match known.seal_at(frames, wish.discard_beyond) {
                 Ok(()) => {}
-                Err(Unsealed::Missing(missing)) => {
-                    let count: u64 = missing.iter().map(|[a, b]| u64::from(b - a)).sum();
+                Err(Unsealed::Missing(Missing { ranges, next })) => {
+                    let count: u64 = ranges.iter().map(|[a, b]| u64::from(b - a)).sum();
+                    let more = if next.is_some() { " or more" } else { "" };
                     let detail =
-                        format!("{count} of {frames} frames are missing; post them, then complete the session");
-                    return Err(ApiError::new(problem::FRAMES_MISSING, detail).missing(missing));
+                        format!("{count}{more} of {frames} frames are missing; post them, then complete the session");
+                    return Err(ApiError::new(problem::FRAMES_MISSING, detail).missing(ranges));
                 }
                 Err(Unsealed::Beyond(frame)) => {
                     let detail = format!(

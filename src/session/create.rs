@@ -6,6 +6,7 @@ use super::prepare::{self, Choices, Geometry};
 use super::prepared::{Got, Prepared, Wanted};
 use super::upload::{self, FrameJob};
 use super::{LiveLane, Phase, Session, Status};
+use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::idempotency::Repetition;
 use crate::problem::{self, ApiError};
@@ -15,7 +16,6 @@ use cager_proto::messages::{CacheUse, PreparationSeconds, SessionOptions};
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
-use tokio::sync::OwnedSemaphorePermit;
 
 /// A request to make a session.
 pub(crate) struct NewSession {
@@ -23,7 +23,7 @@ pub(crate) struct NewSession {
     pub(crate) options: SessionOptions,
     pub(crate) idempotency_key: Option<String>,
     /// The room that the files take.
-    pub(crate) room: Vec<OwnedSemaphorePermit>,
+    pub(crate) room: Held,
 }
 
 /// A request whose options are right.

@@ -1,9 +1,13 @@
 //! Which frames of a session are there: solved and on disk, or being solved.
 
+use super::runs::{Missing, Runs};
 use super::upload::Upload;
 use crate::store::LogEntry;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
+
+/// Most missing ranges that are told at a time.
+pub(crate) const RANGES: usize = 1000;
 
 /// What a frame's bytes were, to recognise it when it is posted again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,6 +54,8 @@ pub(crate) enum Claim {
 #[derive(Default)]
 pub(crate) struct Frames {
     solved: BTreeMap<u32, LogEntry>,
+    /// Their numbers.
+    runs: Runs,
     pending: HashMap<u32, Pending>,
     /// Whether no frames are coming any more.
     sealed: bool,
@@ -58,8 +64,8 @@ pub(crate) struct Frames {
 /// Why a session cannot be sealed.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Unsealed {
-    /// These ranges are missing.
-    Missing(Vec<[u32; 2]>),
+    /// Frames are missing.
+    Missing(Missing),
     /// This frame lies beyond the end.
     Beyond(u32),
 }
@@ -68,11 +74,11 @@ impl Frames {
     #[cfg(test)]
     pub(crate) fn new(entries: Vec<LogEntry>) -> Self {
         // Of a frame that is there twice, the first counts.
-        let mut solved = BTreeMap::new();
+        let mut frames = Self::default();
         for entry in entries {
-            solved.entry(entry.frame).or_insert(entry);
+            frames.solved(entry);
         }
-        Self { solved, ..Self::default() }
+        frames
     }
 
     /// Decides about a frame that arrived.
@@ -101,8 +107,8 @@ impl Frames {
     /// # Errors
     /// Why that cannot be yet; nothing changed.
     pub(crate) fn seal_at(&mut self, frames: u32, discard: bool) -> Result<(), Unsealed> {
-        let missing = self.missing(Some(frames));
-        if !missing.is_empty() {
+        let missing = self.missing(0, Some(frames), RANGES);
+        if !missing.ranges.is_empty() {
             return Err(Unsealed::Missing(missing));
         }
         let on_its_way = self.pending.keys().copied().max();
@@ -119,6 +125,7 @@ impl Frames {
     /// Forgets solved frames from this number on.
     pub(crate) fn discard_from(&mut self, frames: u32) {
         self.solved.split_off(&frames);
+        self.runs.truncate(frames);
     }
 
     /// Takes no new frames from here on.
@@ -134,6 +141,7 @@ impl Frames {
     /// Enters a frame that is on disk; returns the uploads that wait for it.
     pub(crate) fn solved(&mut self, entry: LogEntry) -> Vec<Arc<Upload>> {
         self.solved.entry(entry.frame).or_insert(entry);
+        self.runs.insert(entry.frame);
         self.pending.remove(&entry.frame).map_or_else(Vec::new, |pending| pending.waiting)
     }
 
@@ -165,11 +173,7 @@ impl Frames {
 
     /// Number of consecutive solved frames from `first` on.
     pub(crate) fn run_length(&self, first: u32) -> u64 {
-        self.solved
-            .range(first..)
-            .zip(u64::from(first)..)
-            .take_while(|((frame, _), expected)| u64::from(**frame) == *expected)
-            .count() as u64
+        self.runs.length_from(first)
     }
 
     /// Number of solved frames.
@@ -187,21 +191,9 @@ impl Frames {
         self.solved.last_key_value().map(|(frame, _)| *frame)
     }
 
-    /// Ranges `[a, b)` below `end` that are not solved; below the highest solved frame where no end is known.
-    pub(crate) fn missing(&self, end: Option<u32>) -> Vec<[u32; 2]> {
-        let end = end.or(self.highest()).unwrap_or(0);
-        let mut missing = Vec::new();
-        let mut next = 0;
-        for &frame in self.solved.keys().take_while(|&&frame| frame < end) {
-            if frame > next {
-                missing.push([next, frame]);
-            }
-            next = frame + 1;
-        }
-        if next < end {
-            missing.push([next, end]);
-        }
-        missing
+    /// Ranges from `from` to `end` that are not solved, at most so many; below the highest solved frame where no end is known.
+    pub(crate) fn missing(&self, from: u32, end: Option<u32>, most: usize) -> Missing {
+        self.runs.missing(from, end.or(self.highest()).unwrap_or(0), most)
     }
 }
 
@@ -225,11 +217,11 @@ mod tests {
     #[test]
     fn missing_ranges_lie_between_the_frames_that_are_there() {
         let frames = Frames::new([3, 4, 7].map(entry).to_vec());
-        assert_eq!(frames.missing(None), [[0, 3], [5, 7]]);
-        assert_eq!(frames.missing(Some(10)), [[0, 3], [5, 7], [8, 10]]);
-        assert_eq!(frames.missing(Some(4)), [[0, 3]]);
-        assert_eq!(Frames::default().missing(Some(2)), [[0, 2]]);
-        assert!(Frames::default().missing(None).is_empty());
+        assert_eq!(frames.missing(0, None, 9).ranges, [[0, 3], [5, 7]]);
+        assert_eq!(frames.missing(0, Some(10), 9).ranges, [[0, 3], [5, 7], [8, 10]]);
+        assert_eq!(frames.missing(0, Some(4), 9).ranges, [[0, 3]]);
+        assert_eq!(Frames::default().missing(0, Some(2), 9).ranges, [[0, 2]]);
+        assert!(Frames::default().missing(0, None, 9).ranges.is_empty());
     }
 
     #[test]
@@ -262,9 +254,13 @@ mod tests {
         let upload = Arc::new(Upload::default());
         let same = Digests { handles: [1; 16], full: Some([2; 16]) };
         let mut frames = Frames::new([0, 2].map(entry).to_vec());
-        assert_eq!(frames.seal_at(3, false), Err(Unsealed::Missing(vec![[1, 2]])));
+        assert_eq!(frames.seal_at(3, false), Err(Unsealed::Missing(Missing { ranges: vec![[1, 2]], next: None })));
         assert_eq!(frames.claim(1, same, &upload), Claim::Solve);
-        assert_eq!(frames.seal_at(3, false), Err(Unsealed::Missing(vec![[1, 2]])), "it is not on disk yet");
+        assert_eq!(
+            frames.seal_at(3, false),
+            Err(Unsealed::Missing(Missing { ranges: vec![[1, 2]], next: None })),
+            "it is not on disk yet"
+        );
         frames.solved(entry(1));
         assert_eq!(frames.seal_at(2, false), Err(Unsealed::Beyond(2)));
         assert_eq!(frames.seal_at(2, true), Ok(()));

@@ -6,11 +6,11 @@ pub(crate) mod complete;
 pub(crate) mod create;
 pub(crate) mod facts;
 pub(crate) mod frames;
-pub(crate) mod places;
 pub(crate) mod prepare;
 pub(crate) mod prepared;
 pub(crate) mod registry;
 pub(crate) mod retention;
+mod runs;
 pub(crate) mod upload;
 
 use crate::engine::Lane;
@@ -20,7 +20,7 @@ use cager_core::regularize::Regularizer;
 use cager_proto::messages::{FrameCounts, Problem, Progress, Session as View, SessionState};
 use commit::{Committer, Waiting};
 use facts::Facts;
-use frames::Frames;
+use frames::{Frames, RANGES};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use tokio::sync::watch;
@@ -380,14 +380,21 @@ impl Session {
 
     /// The session as clients see it.
     pub(crate) fn view(&self) -> View {
+        self.view_with(RANGES)
+    }
+
+    /// As [`Self::view`], with at most so many ranges of missing frames.
+    pub(crate) fn view_with(&self, ranges: usize) -> View {
         let status = self.status();
         let (options, facts) = (&self.meta.options, status.facts.as_ref());
         let frames = {
             let frames = self.frames();
+            let missing = frames.missing(0, self.declared(), ranges);
             FrameCounts {
                 received: frames.received_count() + self.queued.load(Ordering::Relaxed),
                 solved: frames.solved_count(),
-                missing: frames.missing(self.declared()),
+                missing: missing.ranges,
+                missing_next: missing.next,
             }
         };
         let or = |given: &Option<String>, default: &str| given.clone().unwrap_or_else(|| default.to_owned());

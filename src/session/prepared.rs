@@ -1,7 +1,7 @@
 //! Prepared solvers by content: in memory up to a budget, on disk beyond, each prepared once however many ask.
 
-use super::places::{Place, Places};
 use super::prepare::{self, Choices, Geometry};
+use crate::admission::{Budget, Held};
 use crate::config::ServeConfig;
 use crate::engine::threads;
 use crate::problem::{self, ApiError};
@@ -54,7 +54,7 @@ pub(crate) struct Solvers {
     /// Memory that one preparation may take.
     most_bytes: u64,
     /// Solvers being prepared at a time.
-    places: Arc<Places>,
+    places: Arc<Budget>,
     /// Solvers being read from disk at a time.
     loads: Semaphore,
     pool: Arc<rayon::ThreadPool>,
@@ -92,15 +92,15 @@ impl Solvers {
             budget_bytes: config.cache_bytes,
             disk_budget_bytes: config.prepared_disk_bytes,
             most_bytes: config.max_prepare_bytes,
-            places: Places::new(config.max_preparing.max(1)),
+            places: config.budget(config.max_preparing as u64),
             loads: Semaphore::new(LOADS),
             pool: Arc::new(pool),
         })
     }
 
     /// A place among what may be prepared at a time.
-    pub(crate) async fn place(&self, tenant: &str) -> Place {
-        self.places.take(tenant).await
+    pub(crate) async fn place(&self, tenant: &str) -> Held {
+        self.places.take(tenant, 1).await
     }
 
     /// The threads that prepare.
@@ -215,7 +215,7 @@ impl Solvers {
             }
         }
         let place = tokio::select! {
-            place = self.places.take(&wanted.tenant) => place,
+            place = self.places.take(&wanted.tenant, 1) => place,
             () = landing.closed() => return None,
         };
         let queued = clock.elapsed().as_secs_f64();
@@ -254,7 +254,7 @@ impl Solvers {
         choices: &Choices,
         geometry: Option<Arc<Geometry>>,
         queued: f64,
-        _place: Place,
+        _place: Held,
     ) -> Result<Got, ApiError> {
         let clock = Instant::now();
         metrics::counter!("cager_cache_total", "result" => "miss").increment(1);

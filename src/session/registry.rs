@@ -98,13 +98,12 @@ impl Registry {
         })
     }
 
-    /// Up to `most` of a tenant's sessions that follow `after`, oldest first.
+    /// Up to `most` of a tenant's sessions that follow `after`, newest first.
     pub(crate) fn page(&self, tenant: &str, after: Option<&str>, most: usize) -> Vec<Arc<Session>> {
         use std::ops::Bound::{Excluded, Unbounded};
         let inner = super::lock(&self.inner);
-        let from = after.map_or(Unbounded, Excluded);
-        let later = inner.sessions.range::<str, _>((from, Unbounded)).map(|(_, session)| session);
-        later.filter(|session| session.meta.tenant == tenant).take(most).cloned().collect()
+        let older = inner.sessions.range::<str, _>((Unbounded, after.map_or(Unbounded, Excluded))).rev();
+        older.map(|(_, session)| session).filter(|session| session.meta.tenant == tenant).take(most).cloned().collect()
     }
 
     pub(crate) fn all(&self) -> Vec<Arc<Session>> {

@@ -4,6 +4,7 @@ use super::Session;
 use super::commit::Solved;
 use super::frames::{Claim, Digests};
 use super::prepared::Prepared;
+use crate::admission::Held;
 use crate::capture::StoredError;
 use crate::problem::{self, ApiError};
 use std::cell::RefCell;
@@ -144,7 +145,7 @@ pub(crate) struct FrameJob {
 /// What a frame takes of what there is for all.
 pub(crate) struct Permits {
     /// A place and memory, until it is solved.
-    pub(crate) _solving: [OwnedSemaphorePermit; 2],
+    pub(crate) _solving: (OwnedSemaphorePermit, Held),
     /// A place until it is on disk.
     pub(crate) writing: OwnedSemaphorePermit,
 }

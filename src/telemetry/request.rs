@@ -3,16 +3,18 @@
 //! Only method, path and outcome are logged. Queries, headers and bodies never are: they may hold tokens and captures.
 
 use axum::body::Body;
-use axum::extract::Request;
+use axum::extract::{ConnectInfo, Request};
 use axum::middleware::Next;
 use axum::response::Response;
 use bytes::Bytes;
 use http::{HeaderName, HeaderValue, StatusCode};
 use http_body::{Body as HttpBody, Frame, SizeHint};
+use std::net::SocketAddr;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll, ready};
 use std::time::{Duration, Instant};
+use tracing::field::Empty;
 use tracing::{Instrument as _, Span};
 
 const HEADER: HeaderName = HeaderName::from_static("x-request-id");
@@ -52,10 +54,13 @@ pub async fn request_id(mut request: Request, next: Next) -> Response {
     let path = path.get(..PATH_BYTES).unwrap_or(path);
     let method = request.method();
     let span = if quiet {
-        tracing::debug_span!("request", request_id = %id, %method, path)
+        tracing::debug_span!("request", request_id = %id, %method, path, peer = Empty, tenant = Empty, token = Empty, problem = Empty)
     } else {
-        tracing::info_span!("request", request_id = %id, %method, path)
+        tracing::info_span!("request", request_id = %id, %method, path, peer = Empty, tenant = Empty, token = Empty, problem = Empty)
     };
+    if let Some(ConnectInfo(peer)) = request.extensions().get::<ConnectInfo<SocketAddr>>() {
+        span.record("peer", tracing::field::display(peer));
+    }
     let mut log = Log { span: span.clone(), began: Instant::now(), quiet, answered: None, ended: false };
     let header = HeaderValue::from_str(&id.0);
     request.extensions_mut().insert(id);

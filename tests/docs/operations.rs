@@ -62,7 +62,7 @@ fn the_commands_for_tokens_make_a_file_that_is_accepted() {
     let access = cager::auth::Access::open(Some(&folder.path().join("tokens.toml")), limits).expect("a tokens file");
     let bearer = http::HeaderValue::from_static("Bearer 0123456789abcdef0123456789abcdef");
     let headers = http::HeaderMap::from_iter([(http::header::AUTHORIZATION, bearer)]);
-    assert_eq!(access.authenticate(&headers).expect("a tenant").name, "studio-a");
+    assert_eq!(access.authenticate(&headers).expect("a tenant").tenant.name, "studio-a");
 }
 
 #[test]

@@ -9,6 +9,7 @@ mod disk;
 mod gate;
 mod inside;
 mod limits;
+mod neighbours;
 mod overload;
 mod power;
 mod process;

@@ -10,14 +10,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use tokio::time::sleep;
 
-const LOUD: &str = "token-of-the-loud-tenant";
-const QUIET: &str = "token-of-the-quiet-tenant";
+pub(crate) const LOUD: &str = "token-of-the-loud-tenant";
+pub(crate) const QUIET: &str = "token-of-the-quiet-tenant";
 
 /// Streams that the loud tenant may have, and how many it wants.
 const STREAMS: usize = 12;
 const WANTED: usize = 10 * STREAMS;
 
-fn tokens() -> String {
+pub(crate) fn tokens() -> String {
     let entry = |name: &str, token: &str| {
         let hash: String = Sha256::digest(token).iter().map(|byte| format!("{byte:02x}")).collect();
         format!("[[token]]\nname = \"{name}\"\ntenant = \"{name}\"\nsha256 = \"{hash}\"\n")
@@ -26,15 +26,15 @@ fn tokens() -> String {
 }
 
 /// How long something took, again and again.
-struct Times(Vec<Duration>);
+pub(crate) struct Times(pub(crate) Vec<Duration>);
 
 impl Times {
-    fn at(&mut self, fraction: f64) -> Duration {
+    pub(crate) fn at(&mut self, fraction: f64) -> Duration {
         self.0.sort();
         self.0[((self.0.len() - 1) as f64 * fraction) as usize]
     }
 
-    fn show(&mut self) -> String {
+    pub(crate) fn show(&mut self) -> String {
         let (middle, high, highest) = (self.at(0.5), self.at(0.99), self.at(1.0));
         format!("{} times: {middle:.1?} in the middle, {high:.1?} at p99, {highest:.1?} at most", self.0.len())
     }
@@ -42,14 +42,14 @@ impl Times {
 
 /// Asks for health until it is told to stop, on a thread of its own: the load shares this process, and its waits are not the
 /// service's.
-fn watch_health(address: SocketAddr, stop: &AtomicBool) -> Times {
+pub(crate) fn watch_health(address: SocketAddr, stop: &AtomicBool) -> Times {
     let mut times = Vec::new();
     let mut stream = TcpStream::connect(address).expect("a connection");
     stream.set_nodelay(true).expect("a socket option");
     let mut answer = [0; 4096];
     while !stop.load(Ordering::Relaxed) {
         let clock = Instant::now();
-        stream.write_all(b"GET /healthz HTTP/1.1\r\nHost: h\r\n\r\n").expect("a request");
+        stream.write_all(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n").expect("a request");
         let count = stream.read(&mut answer).expect("an answer");
         times.push(clock.elapsed());
         assert!(answer[..count].starts_with(b"HTTP/1.1 200"), "{}", String::from_utf8_lossy(&answer[..count]));
@@ -62,7 +62,7 @@ fn watch_health(address: SocketAddr, stop: &AtomicBool) -> Times {
 fn watch_refusals(address: SocketAddr, path: &str, stop: &AtomicBool) -> Times {
     let mut times = Vec::new();
     let head = format!(
-        "POST {path} HTTP/1.1\r\nHost: h\r\nAuthorization: Bearer {LOUD}\r\nContent-Type: application/octet-stream\r\nContent-Length: 0\r\n\r\n"
+        "POST {path} HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {LOUD}\r\nContent-Type: application/octet-stream\r\nContent-Length: 0\r\n\r\n"
     );
     let mut answer = [0; 4096];
     'connect: while !stop.load(Ordering::Relaxed) {

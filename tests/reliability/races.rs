@@ -80,7 +80,7 @@ async fn a_client_that_leaves_while_its_session_is_deleted_leaves_none() {
     inside.post(&session.id, 0, SMALL.many(0..5)).await;
     inside.gate.close();
     let mut wire = Wire::connect(address(&inside)).await;
-    wire.send(format!("DELETE /v1/sessions/{} HTTP/1.1\r\nHost: h\r\n\r\n", session.id)).await;
+    wire.send(format!("DELETE /v1/sessions/{} HTTP/1.1\r\nHost: localhost\r\n\r\n", session.id)).await;
     until("a sync", async || inside.gate.waiting() > 0).await;
     drop(wire);
     sleep(ms(50)).await;

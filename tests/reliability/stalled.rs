@@ -63,7 +63,7 @@ async fn memory_stays_small_when_nobody_reads() {
     drop(wire);
 
     // One that asks for all cages and reads none, beside one that reads all.
-    let follow = format!("GET /v1/sessions/{}/cages?follow=true HTTP/1.1\r\nHost: h\r\n\r\n", session.id);
+    let follow = format!("GET /v1/sessions/{}/cages?follow=true HTTP/1.1\r\nHost: localhost\r\n\r\n", session.id);
     let mut stalled = Wire::connect(server.address).await;
     stalled.send(&follow).await;
     let mut reader = Wire::connect(server.address).await;
@@ -109,12 +109,12 @@ async fn slow_and_silent_clients_are_let_go() {
     };
     let half_a_header = async {
         let mut wire = connect().await;
-        wire.send("GET /v1/sessions HTTP/1.1\r\nHost: h\r\nX-Half").await;
+        wire.send("GET /v1/sessions HTTP/1.1\r\nHost: localhost\r\nX-Half").await;
         after(&wire.hear_all().await, ms(1000), "half a header");
     };
     let idle = async {
         let mut wire = connect().await;
-        wire.send("GET /healthz HTTP/1.1\r\nHost: h\r\n\r\n").await;
+        wire.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n").await;
         assert_eq!(wire.hear("\"status\":\"ok\"").await.status(), 200);
         after(&wire.hear_all().await, ms(2000), "idle");
     };

@@ -36,7 +36,7 @@ impl Wire {
 
     /// A header of a POST with more header lines, each with its end.
     pub(crate) async fn post(&mut self, path: &str, lines: &str) {
-        self.send(format!("POST {path} HTTP/1.1\r\nHost: h\r\n{lines}\r\n")).await;
+        self.send(format!("POST {path} HTTP/1.1\r\nHost: localhost\r\n{lines}\r\n")).await;
     }
 
     /// A chunk of a chunked body.

@@ -26,7 +26,11 @@ impl FrameSet {
         for &[first, end] in &counts.missing {
             missing += u64::from(end.checked_sub(first)?);
         }
-        let highest = u32::try_from(counts.solved.checked_add(missing)?).ok()?;
+        // Where not all ranges are told, nothing is known of the frames after them: posted again, they are recognised.
+        let highest = match counts.missing_next {
+            Some(next) => next,
+            None => u32::try_from(counts.solved.checked_add(missing)?).ok()?,
+        };
         let mut set = Self::default();
         let mut next = 0;
         for &[first, end] in &counts.missing {
@@ -135,7 +139,7 @@ mod tests {
             }
             let missing: Vec<[u32; 2]> =
                 expected.missing(Some(highest)).iter().map(|r| [r.first, r.end.unwrap_or(highest)]).collect();
-            let counts = FrameCounts { received: 0, solved: frames.len() as u64, missing };
+            let counts = FrameCounts { received: 0, solved: frames.len() as u64, missing, missing_next: None };
             prop_assert_eq!(FrameSet::solved(&counts), Some(expected));
         }
 
@@ -144,14 +148,14 @@ mod tests {
             solved in any::<u64>(),
             missing in prop::collection::vec(any::<[u32; 2]>(), 0..5),
         ) {
-            let _ = FrameSet::solved(&FrameCounts { received: 0, solved, missing });
+            let _ = FrameSet::solved(&FrameCounts { received: 0, solved, missing, missing_next: None });
         }
     }
 
     #[test]
     fn counts_that_contradict_themselves_are_noticed() {
         let solved = |solved, missing: &[[u32; 2]]| {
-            FrameSet::solved(&FrameCounts { received: 0, solved, missing: missing.to_vec() })
+            FrameSet::solved(&FrameCounts { received: 0, solved, missing: missing.to_vec(), missing_next: None })
         };
         assert_eq!(solved(u64::MAX, &[]), None);
         assert_eq!(solved(0, &[[5, 3]]), None);

@@ -85,7 +85,7 @@ impl Service {
         }
         let solved = state.solved.len() as u64;
         Session {
-            frames: FrameCounts { received: solved, solved, missing },
+            frames: FrameCounts { received: solved, solved, missing, missing_next: None },
             ..session(if state.completed.is_some() { SessionState::Completed } else { SessionState::Ready })
         }
     }

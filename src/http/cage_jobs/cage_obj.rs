@@ -25,7 +25,7 @@ use std::sync::Arc;
 )]
 pub(crate) async fn get(
     State(service): State<Arc<Service>>,
-    FoundJob { job, .. }: FoundJob,
+    FoundJob { job, tenant }: FoundJob,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let store = service.store.clone();
@@ -37,6 +37,7 @@ pub(crate) async fn get(
         etag: digest,
         media_type: "model/obj",
         public: !service.access.is_guarded(),
+        room: service.download_memory.nothing(&tenant.name),
         read: Arc::new(move |range| Ok(Bytes::slice(&obj, range.start as usize..range.end as usize))),
     };
     let mut response = bytes.respond(&headers);

@@ -11,7 +11,7 @@ use cager_proto::cage_messages::{CageJob, CageJobList};
 use http::StatusCode;
 use std::sync::Arc;
 
-/// Lists the tenant's cage designs, oldest first, a hundred at a time.
+/// Lists the tenant's cage designs, newest first, a hundred at a time.
 #[utoipa::path(get, path = "/v1/cages", operation_id = "list_cage_designs", tag = "cages", params(PageQuery), responses((status = 200, description = "A page of designs", body = CageJobList)))]
 pub(crate) async fn list(
     State(service): State<Arc<Service>>,

@@ -1,8 +1,9 @@
 //! The multipart body that asks for a cage: the rest pose goes to memory, frames to the disk as they come.
 
+use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::cage_job::create::{NewCageJob, check_options};
-use crate::http::multipart::{ENVELOPE_BYTES, NAME_CHARACTERS, PIECE, Room, bad, broken, file_name, read_options};
+use crate::http::multipart::{ENVELOPE_BYTES, NAME_CHARACTERS, bad, broken, file_name, read_options};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::commit::storage_error;
@@ -44,8 +45,7 @@ pub(in crate::http) async fn read(
         service,
         tenant,
         pace: Arc::clone(&pace),
-        room: Room::new(),
-        granted: 0,
+        room: service.upload_memory.nothing(&tenant.name),
         reserved: service.reserve(tenant, 0)?,
     };
     let read = receiver.read(body, idempotency_key).await;
@@ -57,8 +57,7 @@ struct Receiver<'a> {
     service: &'a Arc<Service>,
     tenant: &'a Arc<Tenant>,
     pace: Arc<Mutex<Pace>>,
-    room: Room,
-    granted: u64,
+    room: Held,
     reserved: Reserved,
 }
 
@@ -110,14 +109,7 @@ impl Receiver<'_> {
                     self.too_large(&format!("the rest pose is larger than {limit} bytes; send a lighter model"), limit)
                 );
             }
-            while self.granted < (bytes.len() + chunk.len()) as u64 {
-                self.room.push(self.service.upload_memory.try_take(PIECE).ok_or_else(|| {
-                    self.service.rejected("upload_memory");
-                    let detail = "too many models are being uploaded at the moment; try again later";
-                    ApiError::new(problem::BUSY, detail).retry_after(5)
-                })?);
-                self.granted += PIECE;
-            }
+            self.service.make_room(&mut self.room, (bytes.len() + chunk.len()) as u64)?;
             bytes.extend_from_slice(&chunk);
         }
         Ok((name, bytes))

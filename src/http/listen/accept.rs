@@ -2,8 +2,10 @@
 
 use super::Limits;
 use super::connection::Shared;
+use super::fresh::Fresh;
 use super::socket::Keep;
 use axum::Router;
+use socket2::TcpKeepalive;
 use std::io::{self, ErrorKind};
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -15,13 +17,16 @@ use tokio_rustls::TlsAcceptor;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
+/// How long a connection waits for the place of one that is being closed for it.
+const DISPLACED_WITHIN: Duration = Duration::from_secs(1);
+
 /// First and longest pause after an error of accepting, such as having no file descriptor left.
 const PAUSES: (Duration, Duration) = (Duration::from_millis(10), Duration::from_secs(1));
 
 /// Serves `app` on `listener` until `stop`, then lets open requests finish within the drain time.
 ///
-/// Connections beyond the limit get one answer of `spare`, which should know health and otherwise say 503; beyond the spare
-/// ones they are closed. On `stop` every connection is told at once; streams of the router that have no end of their own must
+/// Where all places are taken, the connection that has waited longest for its first request is closed. Where there is none, connections
+/// beyond the limit get one answer of `spare`, which should know health and otherwise say 503; beyond the spare ones they are closed. On `stop` every connection is told at once; streams of the router that have no end of their own must
 /// watch the same token. Requests carry their peer as [`axum::extract::ConnectInfo`].
 ///
 /// # Errors
@@ -45,6 +50,7 @@ pub async fn serve(
             tls: tls.map(TlsAcceptor::from),
             stop: stop.clone(),
             abort: CancellationToken::new(),
+            fresh: Arc::new(Fresh::default()),
         }),
         pause: PAUSES.0,
     };
@@ -74,25 +80,39 @@ struct Acceptor {
 impl Acceptor {
     fn admit(&mut self, stream: TcpStream, peer: SocketAddr) {
         self.pause = PAUSES.0;
-        let place = Arc::clone(&self.places).try_acquire_owned().ok();
-        let spare = place.is_none();
-        let Some(permit) = place.or_else(|| Arc::clone(&self.spare_places).try_acquire_owned().ok()) else {
+        let place = match Arc::clone(&self.places).try_acquire_owned() {
+            Ok(place) => Some(Admitted::Place(place)),
+            Err(_) if self.shared.fresh.displace() => Some(Admitted::Soon(Arc::clone(&self.places))),
+            Err(_) => Arc::clone(&self.spare_places).try_acquire_owned().ok().map(Admitted::Spare),
+        };
+        let Some(place) = place else {
             metrics::counter!("cager_connections_rejected_total", "reason" => "full").increment(1);
             return;
         };
-        if spare {
-            metrics::counter!("cager_connections_rejected_total", "reason" => "spare").increment(1);
-        }
         // Frames are small and answers are wanted at once. A socket that refuses is dead anyway.
         let _ = stream.set_nodelay(true);
-        let keep = Keep {
-            tracker: self.tracker.clone(),
-            abort: self.shared.abort.clone(),
-            place: Box::new(Place::new(permit)),
-        };
-        let shared = Arc::clone(&self.shared);
+        let _ = socket2::SockRef::from(&stream).set_tcp_keepalive(&keep_alive());
+        // A spare place is of no use to another connection.
+        let others = matches!(place, Admitted::Spare(_)).then(Arc::default);
+        let entry = Arc::new(others.as_ref().unwrap_or(&self.shared.fresh).enter());
+        let (tracker, shared) = (self.tracker.clone(), Arc::clone(&self.shared));
         self.tracker.spawn(async move {
-            let reason = shared.connection(stream, peer, spare, keep).await;
+            let (permit, spare) = match place {
+                Admitted::Place(permit) => (permit, false),
+                Admitted::Spare(permit) => (permit, true),
+                Admitted::Soon(places) => {
+                    let soon = timeout(DISPLACED_WITHIN, places.acquire_owned());
+                    match entry.displaced.run_until_cancelled(soon).await {
+                        Some(Ok(Ok(permit))) => (permit, false),
+                        _ => return,
+                    }
+                }
+            };
+            if spare {
+                metrics::counter!("cager_connections_rejected_total", "reason" => "spare").increment(1);
+            }
+            let keep = Keep { tracker, abort: shared.abort.clone(), place: Box::new(Place::new(permit)) };
+            let reason = shared.connection(stream, peer, spare, keep, entry).await;
             metrics::counter!("cager_connections_closed_total", "reason" => reason.label()).increment(1);
             tracing::trace!(%peer, reason = reason.label(), "connection closed");
         });
@@ -119,6 +139,21 @@ impl Acceptor {
             let _ = timeout(Duration::from_secs(1), self.tracker.wait()).await;
         }
     }
+}
+
+/// How a connection gets in.
+enum Admitted {
+    /// At once.
+    Place(OwnedSemaphorePermit),
+    /// With the place of one that is being closed.
+    Soon(Arc<Semaphore>),
+    /// For one answer.
+    Spare(OwnedSemaphorePermit),
+}
+
+/// The system asks idle peers whether they are still there, so that a follower whose machine is gone does not stay for ever.
+fn keep_alive() -> TcpKeepalive {
+    TcpKeepalive::new().with_time(Duration::from_secs(60)).with_interval(Duration::from_secs(15)).with_retries(4)
 }
 
 /// A connection's place, counted while it is held.

@@ -1,6 +1,7 @@
 //! The life of one connection.
 
 use super::Limits;
+use super::fresh::{Entry, Fresh};
 use super::service::Requests;
 use super::socket::{Keep, Socket};
 use super::state::{Reason, State};
@@ -32,6 +33,7 @@ pub(super) struct Shared {
     pub(super) tls: Option<TlsAcceptor>,
     pub(super) stop: CancellationToken,
     pub(super) abort: CancellationToken,
+    pub(super) fresh: Arc<Fresh>,
 }
 
 impl Shared {
@@ -59,21 +61,30 @@ impl Shared {
     }
 
     /// Serves a connection to its end; `spare` ones get one answer of the spare router.
-    pub(super) async fn connection(&self, stream: TcpStream, peer: SocketAddr, spare: bool, keep: Keep) -> Reason {
-        let Some(tls) = &self.tls else { return self.requests(stream, peer, spare, keep).await };
+    pub(super) async fn connection(
+        &self,
+        stream: TcpStream,
+        peer: SocketAddr,
+        spare: bool,
+        keep: Keep,
+        fresh: Arc<Entry>,
+    ) -> Reason {
+        let Some(tls) = &self.tls else { return self.requests(stream, peer, spare, keep, fresh).await };
         let handshake = timeout(self.limits.header_timeout, tls.accept(stream));
+        let handshake = fresh.displaced.run_until_cancelled(handshake);
         match self.stop.run_until_cancelled(handshake).await {
             None => Reason::Stop,
-            Some(Err(_)) => Reason::HeaderTimeout,
-            Some(Ok(Err(error))) => {
+            Some(None) => Reason::Displaced,
+            Some(Some(Err(_))) => Reason::HeaderTimeout,
+            Some(Some(Ok(Err(error)))) => {
                 tracing::debug!(%peer, %error, "TLS handshake failed");
                 Reason::Handshake
             }
-            Some(Ok(Ok(stream))) => self.requests(stream, peer, spare, keep).await,
+            Some(Some(Ok(Ok(stream)))) => self.requests(stream, peer, spare, keep, fresh).await,
         }
     }
 
-    async fn requests<S>(&self, stream: S, peer: SocketAddr, spare: bool, keep: Keep) -> Reason
+    async fn requests<S>(&self, stream: S, peer: SocketAddr, spare: bool, keep: Keep, fresh: Arc<Entry>) -> Reason
     where
         S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
     {
@@ -84,6 +95,7 @@ impl Shared {
             peer,
             limits: Arc::clone(&self.limits),
             state: Arc::clone(&state),
+            fresh: Arc::clone(&fresh),
             only_one: spare.then(|| Arc::clone(&begun)),
         };
         let builder = self.builder(spare);
@@ -105,8 +117,17 @@ impl Shared {
                     return Reason::Drain;
                 }
                 () = self.stop.cancelled(), if !matches!(closing, Some((Reason::Stop, _))) => Reason::Stop,
+                () = fresh.displaced.cancelled(), if state.is_fresh() => {
+                    // A request that has just come is answered.
+                    if !state.is_fresh() {
+                        continue;
+                    }
+                    state.abandon();
+                    return Reason::Displaced;
+                }
                 () = begun.notified(), if closing.is_none() => Reason::Spare,
                 _ = clock.tick() => {
+                    state.cut_stalled(self.limits.write_timeout);
                     let Some(reason) = overdue(&state, &self.limits, closing) else { continue };
                     if reason != Reason::Idle || closing.is_some() {
                         state.abandon();

@@ -7,6 +7,7 @@
 mod accept;
 mod body;
 mod connection;
+mod fresh;
 mod head;
 mod linger;
 mod service;

@@ -2,6 +2,7 @@
 
 use super::Limits;
 use super::body::{Reply, Upload};
+use super::fresh::Entry;
 use super::head::Head;
 use super::state::State;
 use axum::Router;
@@ -26,6 +27,8 @@ pub(super) struct Requests {
     pub(super) peer: SocketAddr,
     pub(super) limits: Arc<Limits>,
     pub(super) state: Arc<State>,
+    /// Left with the first request.
+    pub(super) fresh: Arc<Entry>,
     /// Told when a request has begun, where a connection gets only one.
     pub(super) only_one: Option<Arc<Notify>>,
 }
@@ -37,6 +40,7 @@ impl hyper::service::Service<Request<Incoming>> for Requests {
 
     fn call(&self, request: Request<Incoming>) -> Self::Future {
         let (head, in_flight) = self.state.begin();
+        self.fresh.leave();
         if let Some(only_one) = &self.only_one {
             only_one.notify_one();
         }

@@ -1,8 +1,9 @@
 //! What a connection is doing and since when: written by its socket and its requests, judged by its clock.
 
 use super::Limits;
+use super::body::Content;
 use super::head::{Head, HeadScanner, Scan};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::Duration;
 use tokio::time::Instant;
 
@@ -21,6 +22,8 @@ pub(super) enum Reason {
     Idle,
     /// The client read nothing for a while.
     WriteTimeout,
+    /// It had sent no request when places ran out.
+    Displaced,
     /// It was a spare connection and has had its answer.
     Spare,
     /// The service stopped and the connection's requests were done.
@@ -38,6 +41,7 @@ impl Reason {
             Self::HeaderTimeout => "header_timeout",
             Self::Idle => "idle",
             Self::WriteTimeout => "write_timeout",
+            Self::Displaced => "displaced",
             Self::Spare => "spare",
             Self::Stop => "stop",
             Self::Drain => "drain",
@@ -58,6 +62,8 @@ struct Facts {
     in_flight: usize,
     /// Responses that have given a piece to the protocol and were not asked for the next: the client has to read first.
     unread: usize,
+    /// The bodies of the responses on their way in HTTP/2.
+    replies: Vec<Weak<Mutex<Content>>>,
     /// Start of the connection, later the end of the last request.
     idle_since: Instant,
     /// First byte of a header that is not complete.
@@ -81,6 +87,7 @@ impl State {
             requests: 0,
             in_flight: 0,
             unread: 0,
+            replies: Vec::new(),
             idle_since: now,
             head_since: None,
             scanner: None,
@@ -185,6 +192,28 @@ impl State {
         let mut facts = self.facts();
         facts.unread = if unread { facts.unread + 1 } else { facts.unread.saturating_sub(1) };
         facts.progress = Instant::now();
+    }
+
+    /// A response in HTTP/2 begins, whose reader may stall while others go on.
+    pub(super) fn watch(&self, reply: &Arc<Mutex<Content>>) {
+        let mut facts = self.facts();
+        facts.replies.retain(|reply| reply.strong_count() > 0);
+        facts.replies.push(Arc::downgrade(reply));
+    }
+
+    /// Drops the bodies of responses that nobody has read from for so long, with all that they hold.
+    pub(super) fn cut_stalled(&self, limit: Duration) {
+        let replies: Vec<_> = self.facts().replies.iter().filter_map(Weak::upgrade).collect();
+        for reply in replies {
+            let cut = reply.lock().unwrap_or_else(PoisonError::into_inner).cut_if_stalled(limit);
+            // Outside the lock: what a body holds may be much.
+            drop(cut);
+        }
+    }
+
+    /// Whether no request has come yet.
+    pub(super) fn is_fresh(&self) -> bool {
+        self.facts().requests == 0
     }
 
     /// Whether no request is on its way.

@@ -25,7 +25,7 @@ fn pulse(address: SocketAddr, over: &AtomicBool) -> Vec<Duration> {
         if times.len() % 8 == 0 {
             kept = connect();
         }
-        kept.write_all(b"GET /healthz HTTP/1.1\r\nhost: test\r\n\r\n").expect("a request");
+        kept.write_all(b"GET /healthz HTTP/1.1\r\nhost: localhost\r\n\r\n").expect("a request");
         let mut answer = Vec::new();
         while !answer.ends_with(b"}") {
             let mut piece = [0; 1024];

@@ -47,7 +47,7 @@ impl Raw {
 
     /// Sends a request's head.
     pub(crate) async fn head(&mut self, method: &str, path: &str, headers: &[(&str, &str)]) {
-        let mut text = format!("{method} {path} HTTP/1.1\r\nhost: test\r\n");
+        let mut text = format!("{method} {path} HTTP/1.1\r\nhost: localhost\r\n");
         for (name, value) in headers {
             write!(text, "{name}: {value}\r\n").expect("a text");
         }

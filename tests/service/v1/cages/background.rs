@@ -18,7 +18,8 @@ async fn one_is_designed_at_a_time_and_the_queue_ends_somewhere() {
     let reply = app.design_with(cage_form(Capture::tiny(), &seeded(3)), None).await;
     reply.problem(503, "busy");
     assert!(reply.retry_after() > Duration::ZERO);
-    assert_eq!(slow.running.load(SeqCst), 1);
+    // Its frames are read after it is said to run.
+    eventually("it is designed", async || (slow.running.load(SeqCst) == 1).then_some(())).await;
     slow.release();
     for job in waiting {
         assert_eq!(app.designed(&job.id).await.state, CageState::Completed);

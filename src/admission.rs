@@ -1,0 +1,284 @@
+//! Budgets that tenants share: memory, disk space, requests, streams and preparations, each in its own unit.
+//!
+//! A tenant may hold at most twice what is left free, so that whoever comes next always finds room (the dynamic thresholds of Choudhury
+//! and Hahne 1998, with α = 2): one tenant alone gets two thirds, a second one two ninths beside it. Where there is one tenant only,
+//! it may hold everything.
+
+use crate::problem::{self, ApiError};
+use crate::session::lock;
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Arc, Mutex};
+use tokio::sync::oneshot;
+
+impl Full {
+    /// The answer to who asked for some of `what`: 429 where the tenant has its share, 503 where others have it.
+    pub(crate) fn refusal(self, what: &str) -> ApiError {
+        match self {
+            Self::Tenant => {
+                let detail = format!("you hold your share of the {what}; wait for what you have begun, then try again");
+                ApiError::new(problem::SHARE_TAKEN, detail).retry_after(2)
+            }
+            Self::Service => {
+                let detail = format!("all of the {what} is taken at the moment; try again later");
+                ApiError::new(problem::BUSY, detail).retry_after(2)
+            }
+        }
+    }
+}
+
+/// What all tenants may hold together.
+pub(crate) struct Budget {
+    total: u64,
+    /// Whether there may be more than one tenant.
+    shared: bool,
+    ledger: Mutex<Ledger>,
+}
+
+#[derive(Default)]
+struct Ledger {
+    used: u64,
+    clock: u64,
+    tenants: BTreeMap<String, Account>,
+}
+
+#[derive(Default)]
+struct Account {
+    holds: u64,
+    served: u64,
+    waiting: VecDeque<(u64, oneshot::Sender<Held>)>,
+}
+
+/// Part of a budget; free again when dropped.
+pub(crate) struct Held {
+    budget: Arc<Budget>,
+    tenant: String,
+    amount: u64,
+}
+
+/// Why there is no room.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Full {
+    /// The tenant holds its share.
+    Tenant,
+    /// All of it is taken.
+    Service,
+}
+
+impl Budget {
+    /// A budget of `total`; `shared` says whether there may be more than one tenant.
+    pub(crate) fn new(total: u64, shared: bool) -> Arc<Self> {
+        Arc::new(Self { total: total.max(1), shared, ledger: Mutex::default() })
+    }
+
+    /// Room now, or why there is none. Who wants more than everything gets everything.
+    pub(crate) fn try_take(self: &Arc<Self>, tenant: &str, amount: u64) -> Result<Held, Full> {
+        let amount = amount.min(self.total);
+        let mut ledger = lock(&self.ledger);
+        let holds = ledger.tenants.get(tenant).map_or(0, |account| account.holds);
+        if self.admits(ledger.used, holds, amount) {
+            return Ok(ledger.hold(self, tenant, amount));
+        }
+        let without = self.shared && self.admits(ledger.used - holds, 0, amount);
+        Err(if without { Full::Tenant } else { Full::Service })
+    }
+
+    /// None of it, which may grow.
+    pub(crate) fn nothing(self: &Arc<Self>, tenant: &str) -> Held {
+        lock(&self.ledger).hold(self, tenant, 0)
+    }
+
+    /// Waits for room. Of several tenants that wait, the one that holds the least comes next; among equals, the one that got something
+    /// longest ago. A tenant's own wishes are met in order. Who stops waiting gives up its turn.
+    pub(crate) async fn take(self: &Arc<Self>, tenant: &str, amount: u64) -> Held {
+        loop {
+            let (give, turn) = oneshot::channel();
+            let wish = (amount.min(self.total), give);
+            lock(&self.ledger).tenants.entry(tenant.to_owned()).or_default().waiting.push_back(wish);
+            self.hand_out();
+            // Nobody drops the sender of who still waits.
+            if let Ok(held) = turn.await {
+                return held;
+            }
+        }
+    }
+
+    /// What a tenant holds of it.
+    pub(crate) fn held_by(&self, tenant: &str) -> u64 {
+        lock(&self.ledger).tenants.get(tenant).map_or(0, |account| account.holds)
+    }
+
+    /// What is held of it.
+    pub(crate) fn used(&self) -> u64 {
+        lock(&self.ledger).used
+    }
+
+    fn admits(&self, used: u64, holds: u64, amount: u64) -> bool {
+        let Some(free) = self.total.checked_sub(used + amount) else { return false };
+        !self.shared || holds == 0 || holds + amount <= 2 * free
+    }
+
+    fn hand_out(self: &Arc<Self>) {
+        loop {
+            // Outside the lock: what nobody takes any more comes back at once.
+            let (give, held) = {
+                let mut ledger = lock(&self.ledger);
+                let Some((tenant, amount, give)) = ledger.next(self) else { return };
+                (give, ledger.hold(self, &tenant, amount))
+            };
+            drop(give.send(held));
+        }
+    }
+}
+
+impl Held {
+    /// Takes so much more, or says why there is no room.
+    pub(crate) fn grow(&mut self, by: u64) -> Result<(), Full> {
+        let mut more = self.budget.try_take(&self.tenant, by)?;
+        // It is given back as one.
+        self.amount += std::mem::take(&mut more.amount);
+        Ok(())
+    }
+
+    /// Takes what is missing to `amount`, in whole pieces.
+    pub(crate) fn reach(&mut self, amount: u64, piece: u64) -> Result<(), Full> {
+        match amount.saturating_sub(self.amount) {
+            0 => Ok(()),
+            missing => self.grow(missing.next_multiple_of(piece)),
+        }
+    }
+
+    /// None of the same budget, for the same tenant.
+    pub(crate) fn nothing(&self) -> Self {
+        self.budget.nothing(&self.tenant)
+    }
+}
+
+impl Ledger {
+    fn hold(&mut self, budget: &Arc<Budget>, tenant: &str, amount: u64) -> Held {
+        self.clock += 1;
+        self.used += amount;
+        let account = self.tenants.entry(tenant.to_owned()).or_default();
+        account.holds += amount;
+        account.served = self.clock;
+        Held { budget: Arc::clone(budget), tenant: tenant.to_owned(), amount }
+    }
+
+    /// Whose wish can be met now.
+    fn next(&mut self, budget: &Budget) -> Option<(String, u64, oneshot::Sender<Held>)> {
+        for account in self.tenants.values_mut() {
+            account.waiting.retain(|(_, give)| !give.is_closed());
+        }
+        // Who wants nothing is forgotten, and with it when it was last served: it has waited long enough to come first.
+        self.tenants.retain(|_, account| account.holds > 0 || !account.waiting.is_empty());
+        let used = self.used;
+        let may = |account: &Account| {
+            account.waiting.front().is_some_and(|&(amount, _)| budget.admits(used, account.holds, amount))
+        };
+        let waiting = self.tenants.iter_mut().filter(|(_, account)| may(account));
+        let (tenant, account) = waiting.min_by_key(|(_, account)| (account.holds, account.served))?;
+        let (amount, give) = account.waiting.pop_front()?;
+        Some((tenant.clone(), amount, give))
+    }
+}
+
+impl Drop for Held {
+    fn drop(&mut self) {
+        {
+            let mut ledger = lock(&self.budget.ledger);
+            ledger.used -= self.amount;
+            if let Some(account) = ledger.tenants.get_mut(&self.tenant) {
+                account.holds -= self.amount;
+                if account.holds == 0 && account.waiting.is_empty() {
+                    ledger.tenants.remove(&self.tenant);
+                }
+            }
+        }
+        self.budget.hand_out();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    /// Whether a wish is not met for a while.
+    async fn waits(budget: &Arc<Budget>, tenant: &str, amount: u64) -> bool {
+        tokio::time::timeout(Duration::from_millis(5), budget.take(tenant, amount)).await.is_err()
+    }
+
+    #[tokio::test]
+    async fn one_tenant_of_several_never_gets_everything() {
+        let budget = Budget::new(900, true);
+        let loud: Vec<Held> = std::iter::from_fn(|| budget.try_take("loud", 1).ok()).collect();
+        assert_eq!(loud.len(), 600);
+        assert_eq!(budget.try_take("loud", 1).err(), Some(Full::Tenant));
+        assert!(waits(&budget, "loud", 1).await);
+        let quiet: Vec<Held> = std::iter::from_fn(|| budget.try_take("quiet", 1).ok()).collect();
+        assert_eq!(quiet.len(), 200);
+        let all = budget.try_take("other", 300).err();
+        assert_eq!((all, budget.used()), (Some(Full::Service), 800));
+        drop((loud, quiet));
+        assert_eq!(budget.used(), 0);
+        assert!(lock(&budget.ledger).tenants.is_empty());
+    }
+
+    #[tokio::test]
+    async fn a_tenant_alone_gets_everything_and_what_is_larger_takes_everything() {
+        let budget = Budget::new(10, false);
+        let held = budget.try_take("a", 7).expect("room");
+        assert_eq!(budget.try_take("a", 4).err(), Some(Full::Service));
+        let rest = budget.try_take("a", 3).expect("room");
+        assert!(waits(&budget, "b", 1).await);
+        drop((held, rest));
+        let all = budget.take("a", 1000).await;
+        assert_eq!(budget.used(), 10);
+        drop(all);
+        assert_eq!(Budget::new(10, true).try_take("a", 1000).map(|held| held.amount).ok(), Some(10));
+    }
+
+    #[tokio::test]
+    async fn a_tenant_with_a_long_queue_does_not_hold_up_another() {
+        let budget = Budget::new(1, true);
+        let first = budget.take("loud", 1).await;
+        let order = Arc::new(Mutex::new(Vec::new()));
+        let mut waiting = Vec::new();
+        for (tenant, number) in [("loud", 0), ("loud", 1), ("loud", 2), ("quiet", 3), ("other", 4)] {
+            let (budget, order) = (Arc::clone(&budget), Arc::clone(&order));
+            waiting.push(tokio::spawn(async move {
+                let _place = budget.take(tenant, 1).await;
+                lock(&order).push(number);
+            }));
+            tokio::task::yield_now().await;
+        }
+        drop(first);
+        for task in waiting {
+            task.await.unwrap();
+        }
+        // Both come before the loud one's second; which of them is first does not matter.
+        let order = lock(&order).clone();
+        assert_eq!(order[..2].iter().sum::<i32>(), 7, "{order:?}");
+        assert_eq!(order[2..], [0, 1, 2]);
+    }
+
+    #[tokio::test]
+    async fn who_stops_waiting_takes_nothing() {
+        let budget = Budget::new(1, true);
+        let first = budget.take("a", 1).await;
+        assert!(waits(&budget, "b", 1).await);
+        drop(first);
+        let _place = tokio::time::timeout(Duration::from_secs(5), budget.take("a", 1)).await.expect("room");
+        assert!(waits(&budget, "b", 1).await);
+    }
+
+    #[tokio::test]
+    async fn one_of_two_places_is_left_to_others() {
+        let budget = Budget::new(2, true);
+        let one = budget.take("a", 1).await;
+        assert!(waits(&budget, "a", 1).await);
+        let other = tokio::time::timeout(Duration::from_secs(5), budget.take("b", 1)).await.expect("room");
+        drop(one);
+        let _again = tokio::time::timeout(Duration::from_secs(5), budget.take("a", 1)).await.expect("room");
+        drop(other);
+    }
+}

@@ -1,0 +1,82 @@
+//! Bodies whose bytes are counted and find room in memory as they come, before anyone looks for parts in them: until one is found, all
+//! that came is kept.
+
+use super::multipart::ENVELOPE_BYTES;
+use crate::admission::Held;
+use crate::auth::Tenant;
+use crate::problem::{self, ApiError};
+use crate::service::Service;
+use crate::session::lock;
+use axum::body::Body;
+use axum::extract::Request;
+use futures_util::StreamExt as _;
+use std::sync::{Arc, Mutex};
+
+/// A body that is counted.
+pub(super) struct Metered(Arc<Mutex<Counted>>);
+
+struct Counted {
+    room: Held,
+    received: u64,
+    /// What is too large, where it is.
+    what: &'static str,
+    /// Why no more was taken.
+    refused: Option<ApiError>,
+    done: bool,
+}
+
+impl Metered {
+    /// Counts the body of a request; `what` begins the sentence that refuses too much of it.
+    pub(super) fn new(
+        service: &Arc<Service>,
+        tenant: &Tenant,
+        request: Request,
+        what: &'static str,
+    ) -> (Self, Request) {
+        let counted = Counted {
+            room: service.upload_memory.nothing(&tenant.name),
+            received: 0,
+            what,
+            refused: None,
+            done: false,
+        };
+        let counted = Arc::new(Mutex::new(counted));
+        let (service, counting) = (Arc::clone(service), Arc::clone(&counted));
+        let request = request.map(|body| {
+            Body::from_stream(body.into_data_stream().map(move |piece| {
+                let piece = piece?;
+                let mut counted = lock(&counting);
+                counted.take(&service, piece.len()).map(|()| piece).map_err(|error| {
+                    counted.refused = Some(error);
+                    axum::Error::new("it was refused")
+                })
+            }))
+        });
+        (Self(counted), request)
+    }
+
+    /// What was read of it, with the room that it takes; what follows is not counted any more. Where the body was refused, why.
+    pub(super) fn finish<T>(&self, read: Result<T, ApiError>) -> Result<(T, Held), ApiError> {
+        let mut counted = lock(&self.0);
+        counted.done = true;
+        let read = counted.refused.take().map_or(read, Err)?;
+        let nothing = counted.room.nothing();
+        Ok((read, std::mem::replace(&mut counted.room, nothing)))
+    }
+}
+
+impl Counted {
+    fn take(&mut self, service: &Service, bytes: usize) -> Result<(), ApiError> {
+        if self.done {
+            return Ok(());
+        }
+        self.received += bytes as u64;
+        let limit = service.config.max_rest_bytes;
+        if self.received > limit.saturating_add(ENVELOPE_BYTES) {
+            service.rejected("body_too_large");
+            let detail = format!("{} more than {limit} bytes, the most that is taken; send a lighter model", self.what);
+            return Err(ApiError::new(problem::TOO_LARGE, detail).limit(limit));
+        }
+        service.make_room(&mut self.room, self.received)
+    }
+}

@@ -1,0 +1,115 @@
+//! Which pages may ask, and by which names.
+//!
+//! A service without tokens trusts whoever reaches it, and a browser reaches it for any page. A page elsewhere shows by its `Origin`,
+//! and one that has its own name resolved to this machine by its `Host`.
+
+use crate::config::ServeConfig;
+use crate::problem::{self, ApiError};
+use http::request::Parts;
+use http::{HeaderName, HeaderValue, Method, header};
+use std::net::IpAddr;
+use std::time::Duration;
+use tower_http::cors::CorsLayer;
+
+/// Refuses a request that only a browser under the control of another page would send.
+///
+/// # Errors
+/// 403, which says how to allow it.
+pub(super) fn check(parts: &Parts, config: &ServeConfig) -> Result<(), ApiError> {
+    let text = |name: HeaderName| parts.headers.get(name).and_then(|value| value.to_str().ok());
+    // In HTTP/2 it is part of the address.
+    let host =
+        parts.uri.authority().map(|authority| authority.as_str()).or_else(|| text(header::HOST)).unwrap_or_default();
+    if !is_known(host, &config.allowed_hosts) {
+        let detail =
+            format!("the service is not known as {host:?}; ask for localhost, or add the name to allowed_hosts");
+        return Err(ApiError::new(problem::FORBIDDEN, detail));
+    }
+    match text(header::ORIGIN) {
+        Some(origin) if !is_same(origin, host) && !config.allowed_origins.iter().any(|allowed| allowed == origin) => {
+            let detail = format!("pages of {origin} may not use this service; add the origin to allowed_origins");
+            Err(ApiError::new(problem::FORBIDDEN, detail))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Whether a name is this machine's for certain, or allowed.
+fn is_known(host: &str, allowed: &[String]) -> bool {
+    let name = match host.strip_prefix('[') {
+        Some(rest) => rest.split(']').next().unwrap_or_default(),
+        None => host.rsplit_once(':').map_or(host, |(name, _)| name),
+    };
+    name.eq_ignore_ascii_case("localhost")
+        || name.parse::<IpAddr>().is_ok()
+        || allowed.iter().any(|known| known.eq_ignore_ascii_case(name) || known.eq_ignore_ascii_case(host))
+}
+
+/// Whether a page is the service's own.
+fn is_same(origin: &str, host: &str) -> bool {
+    origin.split_once("://").is_some_and(|(_, of)| of.eq_ignore_ascii_case(host))
+}
+
+/// What browsers want to hear before pages of the allowed origins may ask; none where there are none.
+pub(super) fn cors(config: &ServeConfig) -> Option<CorsLayer> {
+    let origins: Vec<HeaderValue> = config.allowed_origins.iter().filter_map(|origin| origin.parse().ok()).collect();
+    let name = HeaderName::from_static;
+    let asked = [
+        header::ACCEPT,
+        header::AUTHORIZATION,
+        header::CONTENT_ENCODING,
+        header::CONTENT_TYPE,
+        header::IF_NONE_MATCH,
+        header::RANGE,
+        name("idempotency-key"),
+        name("last-event-id"),
+        name("x-request-id"),
+    ];
+    let shown = [
+        header::CONTENT_RANGE,
+        header::ETAG,
+        header::LOCATION,
+        header::RETRY_AFTER,
+        name("cager-outside"),
+        name("cager-rows"),
+        name("x-request-id"),
+    ];
+    let methods = [Method::GET, Method::HEAD, Method::POST, Method::DELETE];
+    let layer = CorsLayer::new().allow_methods(methods).allow_headers(asked).expose_headers(shown);
+    (!origins.is_empty()).then(|| layer.allow_origin(origins).max_age(Duration::from_secs(3600)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn allowed(host: &str, origin: Option<&str>, config: &ServeConfig) -> bool {
+        let mut request = http::Request::builder().uri("/v1/sessions").header(header::HOST, host);
+        if let Some(origin) = origin {
+            request = request.header(header::ORIGIN, origin);
+        }
+        check(&request.body(()).unwrap().into_parts().0, config).is_ok()
+    }
+
+    #[test]
+    fn other_pages_and_other_names_are_refused() {
+        let usual = ServeConfig::default();
+        for host in ["localhost", "localhost:8080", "LOCALHOST:1", "127.0.0.1:8080", "[::1]:8080", "10.0.0.7"] {
+            assert!(allowed(host, None, &usual), "{host}");
+            assert!(allowed(host, Some(&format!("http://{host}")), &usual), "{host}");
+        }
+        for host in ["evil.example", "localhost.evil.example:8080", "", "[::1", "127.0.0.1.evil.example"] {
+            assert_eq!(allowed(host, None, &usual), host == "[::1", "{host}");
+        }
+        for origin in ["http://evil.example", "null", "http://localhost:9", "https://localhost:8080.evil.example"] {
+            assert!(!allowed("localhost:8080", Some(origin), &usual), "{origin}");
+        }
+        let open = ServeConfig {
+            allowed_hosts: vec!["farm.studio".to_owned()],
+            allowed_origins: vec!["https://tools.studio".to_owned()],
+            ..ServeConfig::default()
+        };
+        assert!(allowed("farm.studio:443", Some("https://tools.studio"), &open));
+        assert!(!allowed("farm.studio", Some("https://other.studio"), &open));
+    }
+}

@@ -1,0 +1,284 @@
+//! One tenant does its worst; the other goes on as if nothing were.
+//!
+//! `CAGER_ATTACK_SECONDS` makes the attacks longer than the few seconds that tests have time for.
+
+use crate::capture::Reference;
+use crate::overload::{LOUD, QUIET, Times, tokens, watch_health};
+use crate::process::{HANG, Server, Setup};
+use crate::wire::Wire;
+use cager_client::messages::Session;
+use futures_util::future::join_all;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use tokio::task::JoinSet;
+use tokio::time::{sleep, timeout};
+
+const OCTETS: &str = "application/octet-stream";
+
+/// A service of two tenants, each with a session that is ready.
+struct House {
+    server: Server,
+    reference: Reference,
+    loud: Session,
+    quiet: Session,
+    http: reqwest::Client,
+    _folder: tempfile::TempDir,
+}
+
+fn attack_time() -> Duration {
+    let seconds = std::env::var("CAGER_ATTACK_SECONDS").ok().and_then(|text| text.parse().ok());
+    Duration::from_secs_f64(seconds.unwrap_or(2.5))
+}
+
+impl House {
+    async fn new(settings: &[&str]) -> Self {
+        let reference = Reference::new(2000, 60, 12);
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut setup = Setup::new(&folder.path().join("data"), settings);
+        let file = folder.path().join("tokens.toml");
+        std::fs::write(&file, tokens()).expect("tokens");
+        setup.tokens = Some(file);
+        let server = setup.start().await;
+        let make = async |token: &str| {
+            let client = server.client().with_token(token);
+            let session = client.create(&reference.session("house", None)).await.expect("a session");
+            client.wait_ready(&session.id, HANG).await.expect("a session that is ready")
+        };
+        let (loud, quiet) = (make(LOUD).await, make(QUIET).await);
+        let http = crate::inside::http().http1_only().build().expect("a client");
+        Self { server, reference, loud, quiet, http, _folder: folder }
+    }
+
+    fn path(&self, session: &Session, rest: &str) -> String {
+        format!("/v1/sessions/{}{rest}", session.id)
+    }
+
+    /// The quiet tenant looks at its session and posts frames; gives how long each round took.
+    async fn rounds(&self, time: Duration) -> Times {
+        let (mut times, clock) = (Times(Vec::new()), Instant::now());
+        while clock.elapsed() < time {
+            let round = Instant::now();
+            let view = self.http.get(self.server.url(&self.path(&self.quiet, ""))).bearer_auth(QUIET);
+            let view = timeout(HANG, view.send()).await.expect("the quiet tenant waits").expect("an answer");
+            assert_eq!(
+                view.status(),
+                200,
+                "the quiet tenant is turned away: {}",
+                view.text().await.unwrap_or_default()
+            );
+            let first = times.0.len() as u32 % self.reference.count();
+            let post = self.http.post(self.server.url(&self.path(&self.quiet, &format!("/frames?first={first}"))));
+            let post = post.bearer_auth(QUIET).header("content-type", OCTETS).body(self.reference.bytes(first));
+            let done = timeout(HANG, post.send()).await.expect("the quiet tenant waits").expect("an answer");
+            assert_eq!(
+                done.status(),
+                200,
+                "the quiet tenant is turned away: {}",
+                done.text().await.unwrap_or_default()
+            );
+            let text = done.text().await.expect("records");
+            assert_eq!(text.matches("\"linf\":").count(), 1, "{text}");
+            times.0.push(round.elapsed());
+            sleep(Duration::from_millis(10)).await;
+        }
+        times
+    }
+
+    /// What the quiet tenant and the operator see while an attack runs.
+    async fn goes_on(&self, attack: &str, most_mib: f64) {
+        let before = self.server.rss();
+        let stop = Arc::new(AtomicBool::new(false));
+        let (watching, address) = (Arc::clone(&stop), self.server.address);
+        let health = std::thread::spawn(move || watch_health(address, &watching));
+        let (mut rounds, mut highest) = (Times(Vec::new()), before);
+        let clock = Instant::now();
+        while clock.elapsed() < attack_time() {
+            rounds.0.extend(self.rounds(Duration::from_millis(250)).await.0);
+            highest = highest.max(self.server.rss());
+        }
+        stop.store(true, Ordering::Relaxed);
+        let mut health = tokio::task::spawn_blocking(|| health.join()).await.expect("a thread").expect("health");
+        println!("{attack}: the quiet tenant {}; health {}", rounds.show(), health.show());
+        println!("{attack}: {before:.0} MiB before, {highest:.0} MiB at most");
+        // The attacker shares the machine that tests run on: what is typical is held to the limits here.
+        assert!(health.at(0.5) < Duration::from_millis(50), "health: {}", health.show());
+        assert!(rounds.at(0.5) < Duration::from_millis(500), "the quiet tenant: {}", rounds.show());
+        assert!(highest < before.max(60.0) + most_mib, "memory grew from {before:.0} to {highest:.0} MiB");
+    }
+}
+
+/// A client of HTTP/2 that gives each response a window of so many bytes.
+fn h2(window: u32) -> reqwest::Client {
+    let client = crate::inside::http().http2_prior_knowledge().http2_initial_stream_window_size(window);
+    client.build().expect("a client")
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn waiting_for_a_preparation_takes_no_place_from_others() {
+    let house = House::new(&["max_requests=60", "max_preparing=1"]).await;
+    // Boundary elements of large cages: the second waits for the first.
+    let other = Reference::new(2000, 400, 1);
+    let client = house.server.client().with_token(LOUD);
+    let mut last = None;
+    for name in ["one", "two"] {
+        let mut new = other.session(name, Some(name));
+        new.options.coordinates = Some("harmonic".to_owned());
+        last = client.create(&new).await.ok();
+    }
+    let last = last.expect("a session");
+    let mut waiting = JoinSet::new();
+    for k in 0..200 {
+        let url = house.server.url(&house.path(&last, "/handles"));
+        let request = [h2(1 << 16), h2(1 << 16)][k % 2].get(url).bearer_auth(LOUD);
+        waiting.spawn(async move { request.send().await.map(|answer| answer.status().as_u16()).unwrap_or(0) });
+    }
+    sleep(Duration::from_millis(300)).await;
+    house.goes_on("waiting for a preparation", 200.0).await;
+    let mut refused = 0;
+    while let Some(status) = waiting.try_join_next() {
+        refused += usize::from(status.expect("a task") == 429);
+    }
+    assert!(refused > 100, "only {refused} of 200 were told to wait");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn dripping_uploads_take_no_memory_from_others() {
+    let house = House::new(&["frame_bytes=1 MiB"]).await;
+    let frame = house.reference.bytes(0).len();
+    assert!(60 * frame > 1 << 20, "{frame}");
+    let path = house.path(&house.loud, "/frames");
+    let lines = format!("Authorization: Bearer {LOUD}\r\nContent-Type: {OCTETS}\r\nContent-Length: {frame}\r\n");
+    let wires = join_all((0..60).map(|_| async {
+        let mut wire = Wire::connect(house.server.address).await;
+        wire.post(&path, &lines).await;
+        wire.send([0]).await;
+        wire
+    }));
+    let _wires = wires.await;
+    sleep(Duration::from_millis(200)).await;
+    house.goes_on("dripping uploads", 50.0).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn responses_that_nobody_reads_stay_within_their_memory() {
+    let house = House::new(&["download_bytes=16 MiB", "write_timeout_s=3"]).await;
+    let url = house.server.url(&house.path(&house.loud, "/coordinates"));
+    let clients: Vec<_> = (0..8).map(|_| h2(1)).collect();
+    let mut unread = Vec::new();
+    let mut refused = 0;
+    for k in 0..400 {
+        let answer = clients[k % clients.len()].get(&url).bearer_auth(LOUD).send().await.expect("an answer");
+        refused += usize::from(answer.status() == 429);
+        unread.push(answer);
+    }
+    assert!(refused > 100, "only {refused} of 400 were refused");
+    house.goes_on("responses that nobody reads", 60.0).await;
+    // Each is cut by itself, whatever else goes on along its connection, and gives back what it held.
+    sleep(Duration::from_secs(4)).await;
+    let again = clients[0].get(&url).bearer_auth(LOUD).send().await.expect("an answer");
+    assert_eq!(again.status(), 200);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn decodings_that_nobody_reads_stay_within_their_disk() {
+    let house = House::new(&["spool_bytes=8 MiB"]).await;
+    let path = house.path(&house.loud, "/decode");
+    let bytes = 4 << 20;
+    let lines = format!("Authorization: Bearer {LOUD}\r\nContent-Type: {OCTETS}\r\nContent-Length: {bytes}\r\n");
+    let cage = 12 * house.reference.unknowns;
+    let body = vec![0u8; bytes - bytes % cage];
+    let mut wires = Vec::new();
+    for _ in 0..4 {
+        let mut wire = Wire::connect(house.server.address).await;
+        wire.post(&path, &lines).await;
+        // The server may stop taking it.
+        let _ = timeout(Duration::from_millis(500), wire.send(&body)).await;
+        wires.push(wire);
+    }
+    house.goes_on("unread decodings", 60.0).await;
+    // What the quiet tenant decodes has room.
+    let post = house.http.post(house.server.url(&house.path(&house.quiet, "/decode"))).bearer_auth(QUIET);
+    let answer = post.header("content-type", OCTETS).body(vec![0u8; 20 * cage]).send().await.expect("an answer");
+    assert_eq!(answer.status(), 200);
+    assert_eq!(answer.bytes().await.expect("positions").len(), 20 * 12 * house.reference.points);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn large_preparations_leave_a_place_to_others() {
+    let house = House::new(&["max_preparing=2"]).await;
+    let (large, client) = (Reference::new(4000, 400, 1), house.server.client().with_token(LOUD));
+    for k in 0..4 {
+        let mut new = large.session(&format!("large {k}"), Some(&format!("large {k}")));
+        new.options.coordinates = Some("harmonic".to_owned());
+        client.create(&new).await.expect("a session");
+    }
+    let (small, quiet) = (Reference::new(1500, 40, 1), house.server.client().with_token(QUIET));
+    let clock = Instant::now();
+    let session = quiet.create(&small.session("small", Some("small"))).await.expect("a session");
+    quiet.wait_ready(&session.id, HANG).await.expect("a session that is ready");
+    println!("prepared beside large ones after {:.2?}", clock.elapsed());
+    assert!(clock.elapsed() < Duration::from_secs(4), "{:.2?}", clock.elapsed());
+    let large = client.sessions().await.expect("sessions");
+    let preparing = large.iter().filter(|s| s.state == cager_client::messages::SessionState::Preparing).count();
+    assert!(preparing > 0, "the large ones were over before the small one");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn many_completions_at_once_leave_the_service_alive() {
+    let house = House::new(&[]).await;
+    let client = house.server.client().with_token(LOUD);
+    let bodies = house.reference.many(0..house.reference.count());
+    let mut sessions = Vec::new();
+    for k in 0..40 {
+        let session = client.create(&house.reference.session(&format!("c{k}"), Some(&format!("c{k}")))).await;
+        let session = client.wait_ready(&session.expect("a session").id, HANG).await.expect("it is ready");
+        let url = house.server.url(&house.path(&session, "/frames"));
+        let post = house.http.post(url).bearer_auth(LOUD).header("content-type", OCTETS).body(bodies.clone());
+        assert_eq!(post.send().await.expect("an answer").text().await.expect("records").lines().count(), 12);
+        sessions.push(session);
+    }
+    let mut completing = JoinSet::new();
+    for session in sessions {
+        let client = client.clone();
+        completing.spawn(async move { client.complete(&session.id, 12).await.map(|_| ()) });
+    }
+    house.goes_on("completions", 200.0).await;
+    for done in completing.join_all().await {
+        done.expect("it is completed");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn idle_sockets_do_not_shut_others_out() {
+    let house = House::new(&["max_connections=40"]).await;
+    let mut idle = Vec::new();
+    for _ in 0..200 {
+        idle.push(Wire::connect(house.server.address).await);
+    }
+    house.goes_on("idle sockets", 50.0).await;
+    assert_eq!(house.server.get("/readyz").await, Some(200));
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn frames_with_gaps_do_not_make_answers_long() {
+    let house = House::new(&[]).await;
+    let mut body = Vec::new();
+    let rows = house.reference.handle_rows(0);
+    let client = house.server.client().with_token(LOUD);
+    for frame in (0..30_000).step_by(2) {
+        use cager_proto::record::{Kind, encode};
+        encode(Kind::HandleRows, frame, f32::NAN, f32::NAN, &rows, &mut body).expect("a record");
+    }
+    let url = house.server.url(&house.path(&house.loud, "/frames"));
+    let post = house.http.post(url).bearer_auth(LOUD).header("content-type", cager_proto::record::MEDIA_TYPE);
+    let text = post.body(body).send().await.expect("an answer").text().await.expect("records");
+    assert_eq!(text.lines().count(), 15_000);
+    let view = client.session(&house.loud.id).await.expect("the session");
+    assert_eq!((view.frames.solved, view.frames.missing.len()), (15_000, 1000));
+    assert_eq!((view.frames.missing[999], view.frames.missing_next), ([1999, 2000], Some(2001)));
+    let url = house.server.url(&house.path(&house.loud, ""));
+    let long = house.http.get(url).bearer_auth(LOUD).send().await.expect("an answer").bytes().await.expect("a view");
+    assert!(long.len() < 20_000, "{} bytes", long.len());
+    house.goes_on("frames with gaps", 50.0).await;
+}
