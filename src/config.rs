@@ -35,6 +35,9 @@ const GIB: u64 = 1 << 30;
 pub struct ServeConfig {
     /// Address and port to listen on. Other than loopback addresses need tokens.
     pub listen: SocketAddr,
+    /// Address and port for operators: on a loopback address what they see and do, elsewhere health and metrics. Without one, the port
+    /// after `listen`'s on 127.0.0.1, if it is free.
+    pub admin_listen: Option<SocketAddr>,
     /// Folder of sessions and prepared solvers; made if it is not there.
     pub data: PathBuf,
     /// File of access tokens; without one everyone on this machine is tenant `local`.
@@ -122,6 +125,7 @@ impl Default for ServeConfig {
     fn default() -> Self {
         Self {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
+            admin_listen: None,
             data: PathBuf::from("cager-data"),
             tokens: None,
             tls_certificate: None,

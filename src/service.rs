@@ -65,6 +65,17 @@ pub struct Service {
     probed: tokio::sync::Mutex<Option<Instant>>,
 }
 
+/// What a tenant holds of what all share.
+#[derive(serde::Serialize)]
+pub(crate) struct Holds {
+    requests: u64,
+    streams: u64,
+    frame_bytes: u64,
+    upload_bytes: u64,
+    download_bytes: u64,
+    spool_bytes: u64,
+}
+
 /// Why the service does not start.
 #[derive(Debug, thiserror::Error)]
 pub enum StartError {
@@ -251,6 +262,18 @@ impl Service {
             self.rejected("upload_memory");
             full.refusal("memory for models").retry_after(5)
         })
+    }
+
+    /// What a tenant holds of what all share.
+    pub(crate) fn holds(&self, tenant: &str) -> Holds {
+        Holds {
+            requests: self.requests.held_by(tenant),
+            streams: self.streams.held_by(tenant),
+            frame_bytes: self.frame_memory.held_by(tenant),
+            upload_bytes: self.upload_memory.held_by(tenant),
+            download_bytes: self.download_memory.held_by(tenant),
+            spool_bytes: self.spool_space.held_by(tenant),
+        }
     }
 
     /// Streams open now.

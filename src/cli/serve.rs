@@ -2,18 +2,21 @@
 
 use super::print;
 use crate::config::{ServeConfig, ServeFlags};
-use crate::http::listen::{serve, tls_config};
-use crate::http::{router, spare};
+use crate::http::listen::{Limits, serve, tls_config};
+use crate::http::{admin, router, spare};
 use crate::service::Service;
 use crate::store::LocalDisk;
 use crate::telemetry;
 use anyhow::{Context, Result};
 use std::io::Write;
-use std::net::SocketAddr;
+use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
+
+/// Connections of operators and their machines.
+const OPERATORS: usize = 64;
 
 pub(super) fn run(flags: &ServeFlags) -> Result<()> {
     let config = ServeConfig::load(flags.config.as_deref(), std::env::vars(), flags)?;
@@ -51,14 +54,41 @@ pub(crate) async fn run_until(
     let listener = TcpListener::bind(config.listen)
         .await
         .with_context(|| format!("{}: cannot be listened on; is it in use? give another --listen", config.listen))?;
+    let operators = admin_listener(&config).await?;
     let limits = config.limits();
     let service = Service::start(config, Arc::new(LocalDisk), stop.clone())?;
     let address = listener.local_addr()?;
     tracing::info!(%address, scheme, "listening");
+    if let Some(operators) = operators {
+        let address = operators.local_addr()?;
+        tracing::info!(%address, "listening for operators");
+        let limits = Limits { max_connections: OPERATORS, ..limits.clone() };
+        let (routes, spare) = (admin(Arc::clone(&service), address.ip().is_loopback()), spare(Arc::clone(&service)));
+        tokio::spawn(serve(operators, routes, spare, limits, None, stop.clone()));
+    }
     listening(address);
     serve(listener, router(Arc::clone(&service)), spare(service), limits, tls, stop).await?;
     tracing::info!("stopped");
     Ok(())
+}
+
+/// Where operators are listened to. A port that nobody asked for may be in use.
+async fn admin_listener(config: &ServeConfig) -> Result<Option<TcpListener>> {
+    if let Some(address) = config.admin_listen {
+        let listener = TcpListener::bind(address).await;
+        return Ok(Some(listener.with_context(|| {
+            format!("{address}: cannot be listened on for operators; is it in use? give another --admin-listen")
+        })?));
+    }
+    let Some(port) = config.listen.port().checked_add(1).filter(|&port| port > 1) else { return Ok(None) };
+    let address = SocketAddr::from((Ipv4Addr::LOCALHOST, port));
+    match TcpListener::bind(address).await {
+        Ok(listener) => Ok(Some(listener)),
+        Err(error) => {
+            tracing::warn!(%address, %error, "not listening for operators; give --admin-listen");
+            Ok(None)
+        }
+    }
 }
 
 /// Begins to stop at the first signal; the second one ends the process at once.

@@ -13,6 +13,10 @@ pub struct ServeFlags {
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub listen: Option<String>,
 
+    /// Address and port for operators: health, metrics, tenants, sessions of all [default: the port after --listen's on 127.0.0.1].
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    pub admin_listen: Option<String>,
+
     /// Folder of sessions and prepared solvers [default: cager-data].
     #[arg(long, value_name = "DIR")]
     pub data: Option<PathBuf>,
@@ -67,6 +71,7 @@ impl ServeFlags {
         let path = |path: &Option<PathBuf>| path.as_ref().map(|path| path.to_string_lossy().into_owned());
         let named = [
             ("listen", self.listen.clone()),
+            ("admin_listen", self.admin_listen.clone()),
             ("data", path(&self.data)),
             ("tokens", path(&self.tokens)),
             ("tls_certificate", path(&self.tls_certificate)),

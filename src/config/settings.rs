@@ -21,6 +21,7 @@ enum Kind {
 /// Every setting, in the order in which it is shown.
 const SETTINGS: &[(&str, Kind)] = &[
     ("listen", Kind::Address),
+    ("admin_listen", Kind::Address),
     ("data", Kind::File),
     ("tokens", Kind::File),
     ("tls_certificate", Kind::File),

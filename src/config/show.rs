@@ -34,7 +34,7 @@ pub(super) fn value(value: &Value) -> String {
         Value::Float(number) => number.to_string(),
         Value::Boolean(truth) => truth.to_string(),
         Value::Datetime(_) => "a date".to_owned(),
-        Value::Array(_) => "a list".to_owned(),
+        Value::Array(items) => format!("[{}]", items.iter().map(self::value).collect::<Vec<_>>().join(", ")),
         Value::Table(_) => "a table".to_owned(),
     }
 }

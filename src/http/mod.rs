@@ -1,5 +1,6 @@
 //! HTTP: routes, what they take and give, and the listener.
 
+mod admin;
 mod cage;
 mod cage_jobs;
 mod cages;
@@ -29,4 +30,5 @@ mod router;
 mod sessions;
 mod viewer;
 
+pub use admin::admin;
 pub use router::{document, router, spare};

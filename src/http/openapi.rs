@@ -155,9 +155,9 @@ pub(crate) fn finished(mut document: utoipa::openapi::OpenApi) -> Value {
     }
     for (path, item) in &mut document.paths.paths {
         let guarded = path.starts_with("/v1/");
-        for (method, operation) in operations(item) {
+        for operation in operations(item) {
             for (status, words) in &statuses {
-                if can_answer(*status, guarded, method, path, operation) {
+                if can_answer(*status, guarded, path, operation) {
                     let response = problem_response(words);
                     operation.responses.responses.entry(status.to_string()).or_insert(RefOr::T(response));
                 }
@@ -190,13 +190,12 @@ fn mend_ranges(value: &mut Value) {
     }
 }
 
-fn operations(item: &mut PathItem) -> impl Iterator<Item = (&'static str, &mut Operation)> {
-    let all = [("get", &mut item.get), ("post", &mut item.post), ("put", &mut item.put), ("delete", &mut item.delete)];
-    all.into_iter().filter_map(|(method, operation)| operation.as_mut().map(|operation| (method, operation)))
+fn operations(item: &mut PathItem) -> impl Iterator<Item = &mut Operation> {
+    [&mut item.get, &mut item.post, &mut item.put, &mut item.delete].into_iter().filter_map(Option::as_mut)
 }
 
 /// Whether a route can answer with a problem of this status.
-fn can_answer(status: u16, guarded: bool, method: &str, path: &str, operation: &Operation) -> bool {
+fn can_answer(status: u16, guarded: bool, path: &str, operation: &Operation) -> bool {
     let takes_body = operation.request_body.is_some();
     let in_session = path.contains("{id}");
     let forms = operation.responses.responses.values().filter_map(|response| match response {
@@ -209,14 +208,13 @@ fn can_answer(status: u16, guarded: bool, method: &str, path: &str, operation: &
         400 | 405 | 408 | 500 | 503 => true,
         507 => path == "/readyz" || takes_body,
         _ if !guarded => false,
-        401 => true,
+        401 | 403 | 429 => true,
         404 => in_session,
         406 => negotiates,
         409 => in_session || takes_body,
         410 => in_session,
         413 | 415 | 422 => takes_body,
         416 => takes(operation, "Range"),
-        429 => takes_body || method == "get" && in_session,
         _ => false,
     }
 }

@@ -61,7 +61,7 @@ fn streaming() -> OpenApiRouter<Arc<Service>> {
 }
 
 /// Routes for operators and browsers, outside all limits.
-fn open() -> OpenApiRouter<Arc<Service>> {
+pub(super) fn open() -> OpenApiRouter<Arc<Service>> {
     OpenApiRouter::new().routes(routes!(health::live)).routes(routes!(health::ready)).routes(routes!(health::metrics))
 }
 
@@ -94,7 +94,17 @@ pub fn router(service: Arc<Service>) -> Router {
         .merge(guarded)
         .merge(Router::from(described()))
         .fallback(|| async { ApiError::new(problem::NOT_FOUND, "the routes are listed in /openapi.json") })
-        .with_state(service)
+        .with_state(service);
+    let routes = finished(routes);
+    match cors {
+        Some(cors) => routes.layer(cors),
+        None => routes,
+    }
+}
+
+/// What all routes have: identifiers, problem details, content codings, and a log line.
+pub(super) fn finished(routes: Router) -> Router {
+    routes
         .layer(CatchPanicLayer::custom(|panic: Box<dyn std::any::Any + Send>| {
             let text = panic.downcast_ref::<&str>().map(|s| (*s).to_owned());
             let text = text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default();
@@ -104,11 +114,7 @@ pub fn router(service: Arc<Service>) -> Router {
         .layer(RequestDecompressionLayer::new())
         .layer(from_fn(finish))
         .layer(CompressionLayer::new().compress_when(is_worth_compressing))
-        .layer(from_fn(request_id));
-    match cors {
-        Some(cors) => routes.layer(cors),
-        None => routes,
-    }
+        .layer(from_fn(request_id))
 }
 
 /// The routes for connections beyond the limit: health, and "come back later" for everything else.

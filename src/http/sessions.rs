@@ -74,7 +74,7 @@ pub(crate) async fn list(
     Caller(tenant): Caller,
     Query(query): Query<PageQuery>,
 ) -> JsonResult<SessionList> {
-    let mut page = service.registry.page(&tenant.name, query.after.as_deref(), PAGE + 1);
+    let mut page = service.registry.page(Some(&tenant.name), query.after.as_deref(), PAGE + 1);
     let more = page.len() > PAGE;
     page.truncate(PAGE);
     for session in &page {

@@ -124,6 +124,14 @@ impl Solvers {
         self.store.has_prepared(key)
     }
 
+    /// Frees what is kept in memory; gives how many bytes that was.
+    pub(crate) fn evict(&self) -> u64 {
+        let mut inner = super::lock(&self.inner);
+        inner.kept.clear();
+        metrics::gauge!("cager_cache_bytes", "cache" => "solvers").set(0.0);
+        std::mem::take(&mut inner.bytes)
+    }
+
     /// Preparations that run or wait.
     pub(crate) fn in_flight(&self) -> usize {
         super::lock(&self.inner).flights.len()

@@ -98,12 +98,26 @@ impl Registry {
         })
     }
 
-    /// Up to `most` of a tenant's sessions that follow `after`, newest first.
-    pub(crate) fn page(&self, tenant: &str, after: Option<&str>, most: usize) -> Vec<Arc<Session>> {
+    /// A session, whosever it is.
+    ///
+    /// # Errors
+    /// 404 where there is none.
+    pub(crate) fn find_any(&self, id: &str) -> Result<Arc<Session>, ApiError> {
+        let found = super::lock(&self.inner).sessions.get(id).cloned();
+        found.ok_or_else(|| ApiError::new(problem::NOT_FOUND, "there is no session with this id"))
+    }
+
+    /// Up to `most` of a tenant's sessions that follow `after`, newest first; of all tenants where none is named.
+    pub(crate) fn page(&self, tenant: Option<&str>, after: Option<&str>, most: usize) -> Vec<Arc<Session>> {
         use std::ops::Bound::{Excluded, Unbounded};
         let inner = super::lock(&self.inner);
         let older = inner.sessions.range::<str, _>((Unbounded, after.map_or(Unbounded, Excluded))).rev();
-        older.map(|(_, session)| session).filter(|session| session.meta.tenant == tenant).take(most).cloned().collect()
+        older
+            .map(|(_, session)| session)
+            .filter(|session| tenant.is_none_or(|tenant| session.meta.tenant == tenant))
+            .take(most)
+            .cloned()
+            .collect()
     }
 
     pub(crate) fn all(&self) -> Vec<Arc<Session>> {

@@ -40,6 +40,8 @@ pub(crate) fn observe(service: &Service) {
     metrics::gauge!("cager_designing").set(service.cage_jobs.unfinished() as f64);
     metrics::gauge!("cager_memory_bytes", "use" => "designs").set(service.designs.bytes() as f64);
     metrics::gauge!("cager_memory_bytes", "use" => "frames").set(service.frame_memory.used() as f64);
+    metrics::gauge!("cager_memory_bytes", "use" => "downloads").set(service.download_memory.used() as f64);
+    metrics::gauge!("cager_disk_bytes", "use" => "spool").set(service.spool_space.used() as f64);
     metrics::gauge!("cager_memory_bytes", "use" => "uploads").set(service.upload_memory.used() as f64);
     metrics::gauge!("cager_disk_free_bytes").set(service.store.free_bytes() as f64);
     metrics::gauge!("cager_uptime_seconds").set(service.started.elapsed().as_secs_f64());
@@ -72,6 +74,8 @@ fn describe() {
         "Connections beyond the limit: spare (answered once) or full"
     );
     describe_counter!("cager_accept_errors_total", "Errors of accepting connections");
+    describe_counter!("cager_stalled_responses_total", "Responses of HTTP/2 that were cut because nobody read them");
+    describe_gauge!("cager_disk_bytes", Unit::Bytes, "Disk space taken by what is on its way");
     describe_counter!("cager_body_timeouts_total", "Request bodies that stopped arriving");
     describe_gauge!("cager_connections", "Open connections");
     describe_counter!("cager_cache_total", "Solvers asked for: memory, disk, joined (being prepared already) or miss");

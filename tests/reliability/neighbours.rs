@@ -282,3 +282,40 @@ async fn frames_with_gaps_do_not_make_answers_long() {
     assert!(long.len() < 20_000, "{} bytes", long.len());
     house.goes_on("frames with gaps", 50.0).await;
 }
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn operators_are_answered_when_every_connection_is_taken() {
+    let port = std::net::TcpListener::bind("127.0.0.1:0").and_then(|free| free.local_addr()).expect("a port").port();
+    let house = House::new(&["max_connections=2", &format!("admin_listen=127.0.0.1:{port}")]).await;
+    let at = |path: &str| format!("http://127.0.0.1:{port}{path}");
+    // Connections that are at work, so that none makes way: followers of a session, and the spare ones.
+    let follow = house.path(&house.loud, "/cages?follow=true");
+    let mut held = Vec::new();
+    for _ in 0..70 {
+        let mut wire = Wire::connect(house.server.address).await;
+        let token = format!("GET {follow} HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {LOUD}\r\n\r\n");
+        let _ = timeout(Duration::from_millis(200), wire.send(&token)).await;
+        held.push(wire);
+    }
+    for path in ["/healthz", "/readyz", "/metrics"] {
+        assert_eq!(house.http.get(at(path)).send().await.expect("an answer").status(), 200, "{path}");
+    }
+    let tenants: serde_json::Value = house.http.get(at("/admin/tenants")).send().await.unwrap().json().await.unwrap();
+    let loud = tenants.as_array().expect("a list").iter().find(|tenant| tenant["tenant"] == "loud").expect("loud");
+    assert_eq!((&loud["sessions"], loud["streams"].as_u64() > Some(0)), (&1.into(), true), "{tenants}");
+    let all: serde_json::Value = house.http.get(at("/admin/sessions")).send().await.unwrap().json().await.unwrap();
+    assert_eq!(all["sessions"].as_array().map(Vec::len), Some(2), "{all}");
+    // Not for pages of elsewhere.
+    let planted = house.http.post(at("/admin/drain")).header("origin", "https://evil.example").send().await.unwrap();
+    assert_eq!(planted.status(), 403);
+    let gone = house.http.delete(at(&format!("/admin/sessions/{}", house.loud.id))).send().await.unwrap();
+    assert_eq!(gone.status(), 204);
+    let evicted: serde_json::Value = house.http.post(at("/admin/evict")).send().await.unwrap().json().await.unwrap();
+    assert!(evicted["bytes"].as_u64() > Some(0), "{evicted}");
+    assert_eq!(house.http.post(at("/admin/drain")).send().await.unwrap().status(), 202);
+    let clock = Instant::now();
+    while house.http.get(at("/healthz")).send().await.is_ok() {
+        assert!(clock.elapsed() < HANG, "it does not stop");
+        sleep(Duration::from_millis(50)).await;
+    }
+}

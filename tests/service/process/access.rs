@@ -24,9 +24,14 @@ async fn lists_hold_a_tenants_own_sessions_only() {
         let list: SessionList = api.get(&format!("/v1/sessions{query}")).await.is(200);
         list.sessions.into_iter().map(|session| session.id).collect::<Vec<_>>()
     };
-    assert_eq!(list(&anna, "").await, annas);
+    assert_eq!(list(&anna, "").await, [annas[1].clone(), annas[0].clone()], "the newest is first");
+    assert_eq!(list(&anna, &format!("?after={}", annas[1])).await, annas[..1]);
     assert_eq!(list(&bert, "").await, berts);
-    assert_eq!(list(&bert, &format!("?after={}", annas[0])).await, berts, "a stranger's id is a place like any other");
+    assert_eq!(
+        list(&anna, &format!("?after={}", berts[0])).await.len(),
+        2,
+        "a stranger's id is a place like any other"
+    );
 }
 
 #[tokio::test]
@@ -75,6 +80,82 @@ async fn a_revoked_token_stops_working_and_a_new_one_begins() {
     tokio::time::sleep(Duration::from_millis(1500)).await;
     anna.get("/v1/sessions").await.expect(200);
     assert!(app.log().contains("not reloaded"));
+}
+
+#[tokio::test]
+async fn what_was_begun_with_a_revoked_token_ends() {
+    let app = guarded();
+    let (anna, bert) = (app.caller(Some(ANNA)), app.caller(Some(BERT)));
+    let capture = Capture::tiny();
+    let (annas, berts) = (anna.ready(capture).await, bert.ready(capture).await);
+    let path = |id: &str| format!("/v1/sessions/{id}/cages?follow=true");
+    let mut followed = bert.open(&path(&berts.id)).await;
+    let mut other = anna.open(&path(&annas.id)).await;
+    // An upload that is not over yet.
+    let mut upload = crate::support::Raw::connect(&app).await;
+    let token = format!("Bearer {BERT}");
+    let headers = [("authorization", token.as_str()), ("content-type", "application/octet-stream")];
+    upload.post_chunked(&format!("/v1/sessions/{}/frames", berts.id), &headers).await;
+    upload.write(&crate::support::chunked(&capture.raw(0..1))).await;
+    write_tokens(&app.tokens_file(), &[("anna", ANNA, "")]);
+    let end = crate::support::within("the end of the stream", Duration::from_secs(5), async {
+        loop {
+            match followed.chunk().await {
+                Ok(Some(_)) => {}
+                end => return end,
+            }
+        }
+    });
+    assert!(end.await.is_err(), "it is cut, not ended as if all had come");
+    crate::support::within("the end of the upload", Duration::from_secs(5), upload.reply()).await;
+    // The other tenant's goes on.
+    anna.upload(&annas.id, 0, capture.raw(0..1)).await;
+    let piece = crate::support::within("a cage", Duration::from_secs(5), other.chunk()).await;
+    assert!(piece.expect("the stream goes on").is_some());
+}
+
+#[tokio::test]
+async fn request_lines_say_who_did_what_and_how_it_ended() {
+    let app = guarded();
+    let anna = app.caller(Some(ANNA));
+    let session = anna.ready(Capture::tiny()).await;
+    anna.delete(&format!("/v1/sessions/{}", session.id)).await.expect(204);
+    anna.get(&format!("/v1/sessions/{}", session.id)).await.problem(404, "not-found");
+    let log = app.log();
+    let line = |words: &[&str]| log.lines().any(|line| words.iter().all(|word| line.contains(word)));
+    let (deleted, looked) = (["DELETE", &session.id, "204"], ["GET", &session.id, "404"]);
+    for (words, problem) in [(deleted, ""), (looked, "not-found")] {
+        let who = ["tenant", "anna", "token", "peer", "127.0.0.1", problem];
+        assert!(line(&[&words[..], &who[..]].concat()), "{words:?} in\n{log}");
+    }
+}
+
+#[tokio::test]
+async fn without_tokens_pages_of_other_origins_are_refused() {
+    let app = TestApp::with(&["allowed_origins=https://tools.studio", "allowed_hosts=farm.studio"]);
+    for (headers, status) in [
+        (&[("origin", "https://evil.example")][..], 403),
+        (&[("origin", "null")], 403),
+        (&[("host", "evil.example")], 403),
+        (&[("host", "farm.studio:80")], 200),
+        (&[("origin", "https://tools.studio")], 200),
+        (&[], 200),
+    ] {
+        let reply = app.get_with("/v1/sessions", headers).await;
+        assert_eq!(reply.status, status, "{headers:?}: {}", reply.text());
+        if status == 403 {
+            assert!(reply.problem(403, "forbidden").detail.contains("allowed_"), "{}", reply.text());
+        }
+    }
+    let form = crate::support::form(Capture::tiny(), &serde_json::json!({}));
+    let planted = app.request(http::Method::POST, "/v1/sessions").header("origin", "https://evil.example");
+    assert_eq!(app.send(planted.multipart(form)).await.status, 403);
+    let list: SessionList = app.get("/v1/sessions").await.is(200);
+    assert!(list.sessions.is_empty());
+    // A browser asks before a page of an allowed origin may.
+    let asked = app.request(http::Method::OPTIONS, "/v1/sessions").header("origin", "https://tools.studio");
+    let reply = app.send(asked.header("access-control-request-method", "POST")).await;
+    assert_eq!(reply.header("access-control-allow-origin"), "https://tools.studio");
 }
 
 #[tokio::test]

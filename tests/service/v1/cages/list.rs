@@ -10,7 +10,7 @@ const ANNA: &str = "anna-has-a-long-secret";
 const BERT: &str = "bert-has-a-long-secret";
 
 #[tokio::test]
-async fn designs_are_listed_oldest_first() {
+async fn designs_are_listed_newest_first() {
     let app = TestApp::start();
     let mut ids = Vec::new();
     for seed in 0..3 {
@@ -18,9 +18,9 @@ async fn designs_are_listed_oldest_first() {
         ids.push(app.design(Capture::tiny(), &options).await.id);
     }
     let list: CageJobList = app.get("/v1/cages").await.is(200);
-    assert_eq!(list.cages.iter().map(|job| &job.id).collect::<Vec<_>>(), ids.iter().collect::<Vec<_>>());
+    assert_eq!(list.cages.iter().map(|job| &job.id).collect::<Vec<_>>(), ids.iter().rev().collect::<Vec<_>>());
     assert_eq!(list.next, None);
-    let after: CageJobList = app.get(&format!("/v1/cages?after={}", ids[0])).await.is(200);
+    let after: CageJobList = app.get(&format!("/v1/cages?after={}", ids[2])).await.is(200);
     assert_eq!(after.cages.len(), 2);
 }
 

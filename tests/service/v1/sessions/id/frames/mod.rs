@@ -1,5 +1,6 @@
 mod any_order;
 mod duplex;
+mod encoded;
 mod in_order;
 mod refused;
 mod repeats;

@@ -1,0 +1,116 @@
+//! What operators see and do, on a listener of its own, outside every limit of the public one.
+//!
+//! On a loopback address, whoever can reach it is the operator. On any other address there are health and metrics alone.
+
+use super::extract::Query;
+use super::origin;
+use super::respond::JsonResult;
+use super::router::{finished, open};
+use super::sessions::{PAGE, PageQuery};
+use crate::problem::{self, ApiError};
+use crate::service::Service;
+use axum::extract::{Path, Request, State};
+use axum::middleware::{Next, from_fn_with_state};
+use axum::response::Response;
+use axum::routing::{delete, get, post};
+use axum::{Json, Router};
+use cager_proto::messages::Session;
+use http::StatusCode;
+use serde::Serialize;
+use std::sync::Arc;
+
+/// The routes; with `trusted` those that show and change what belongs to tenants.
+pub fn admin(service: Arc<Service>, trusted: bool) -> Router {
+    let mut routes = Router::from(open());
+    if trusted {
+        let guard = from_fn_with_state(Arc::clone(&service), own_pages);
+        let operated = Router::new()
+            .route("/admin/tenants", get(tenants))
+            .route("/admin/sessions", get(sessions))
+            .route("/admin/sessions/{id}", delete(delete_session))
+            .route("/admin/drain", post(drain))
+            .route("/admin/evict", post(evict));
+        routes = routes.merge(operated.route_layer(guard));
+    }
+    let routes = routes.fallback(|| async { ApiError::new(problem::NOT_FOUND, "see the documentation for operators") });
+    finished(routes.with_state(service))
+}
+
+/// A page in the operator's browser is no operator.
+async fn own_pages(State(service): State<Arc<Service>>, request: Request, next: Next) -> Result<Response, ApiError> {
+    let (parts, body) = request.into_parts();
+    origin::check(&parts, &service.config)?;
+    Ok(next.run(Request::from_parts(parts, body)).await)
+}
+
+/// What one tenant has and does.
+#[derive(Serialize)]
+struct TenantUse {
+    tenant: String,
+    /// Sessions on disk.
+    sessions: usize,
+    /// Bytes of these and of cage designs.
+    stored_bytes: u64,
+    /// Requests, streams and memory that it holds at the moment.
+    #[serde(flatten)]
+    holds: crate::service::Holds,
+}
+
+async fn tenants(State(service): State<Arc<Service>>) -> Json<Vec<TenantUse>> {
+    let usage = service.usage().into_iter();
+    let tenant = |(tenant, sessions, stored_bytes): (String, usize, u64)| {
+        let holds = service.holds(&tenant);
+        TenantUse { tenant, sessions, stored_bytes, holds }
+    };
+    Json(usage.map(tenant).collect())
+}
+
+#[derive(Serialize)]
+struct TenantSession {
+    tenant: String,
+    #[serde(flatten)]
+    session: Session,
+}
+
+#[derive(Serialize)]
+struct AllSessions {
+    sessions: Vec<TenantSession>,
+    next: Option<String>,
+}
+
+/// Sessions of all tenants, newest first, a hundred at a time.
+async fn sessions(State(service): State<Arc<Service>>, Query(query): Query<PageQuery>) -> JsonResult<AllSessions> {
+    let mut page = service.registry.page(None, query.after.as_deref(), PAGE + 1);
+    let more = page.len() > PAGE;
+    page.truncate(PAGE);
+    let next = page.last().filter(|_| more).map(|session| session.meta.id.clone());
+    let listed = |session: &Arc<crate::session::Session>| TenantSession {
+        tenant: session.meta.tenant.clone(),
+        session: session.view_with(0),
+    };
+    Ok(Json(AllSessions { sessions: page.iter().map(listed).collect(), next }))
+}
+
+async fn delete_session(State(service): State<Arc<Service>>, Path(id): Path<String>) -> Result<StatusCode, ApiError> {
+    let session = service.registry.find_any(&id)?;
+    tracing::info!(session = %id, tenant = %session.meta.tenant, "deleted by the operator");
+    service.delete(&session).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// Stops as a signal does: what runs may end within the drain time.
+async fn drain(State(service): State<Arc<Service>>) -> StatusCode {
+    tracing::info!("stopping, as the operator asked");
+    service.stopping().cancel();
+    StatusCode::ACCEPTED
+}
+
+#[derive(Serialize)]
+struct Evicted {
+    bytes: u64,
+}
+
+/// Frees the memory of prepared solvers; those in use stay until they are done, and all can be read from disk again.
+async fn evict(State(service): State<Arc<Service>>) -> Json<Evicted> {
+    Json(Evicted { bytes: service.solvers.evict() })
+}
