@@ -41,9 +41,7 @@ impl Unread {
 
     /// Keeps one from being read again meanwhile.
     pub(crate) async fn hold(&self, kind: Kind, id: &str) -> Option<MutexGuard<'_, ()>> {
-        if self.owner(kind, id).is_none() {
-            return None;
-        }
+        self.owner(kind, id)?;
         Some(self.reading.lock().await)
     }
 

@@ -19,7 +19,7 @@ pub(super) fn check(parts: &Parts, config: &ServeConfig) -> Result<(), ApiError>
     let text = |name: HeaderName| parts.headers.get(name).and_then(|value| value.to_str().ok());
     // In HTTP/2 it is part of the address.
     let host =
-        parts.uri.authority().map(|authority| authority.as_str()).or_else(|| text(header::HOST)).unwrap_or_default();
+        parts.uri.authority().map(http::uri::Authority::as_str).or_else(|| text(header::HOST)).unwrap_or_default();
     if !is_known(host, &config.allowed_hosts) {
         let detail =
             format!("the service is not known as {host:?}; ask for localhost, or add the name to allowed_hosts");
