@@ -1,7 +1,7 @@
 //! Budgets that tenants share: memory, disk space, requests, streams and preparations, each in its own unit.
 //!
-//! A tenant may hold at most twice what is left free, so that whoever comes next always finds room (the dynamic thresholds of Choudhury
-//! and Hahne 1998, with α = 2): one tenant alone gets two thirds, a second one two ninths beside it. Where there is one tenant only,
+//! A tenant may hold at most twice what is left free (the dynamic thresholds of Choudhury and Hahne 1998, with α = 2): one tenant alone
+//! gets two thirds, a second one two ninths beside it, so that something is left for whoever comes next. Where there is one tenant only,
 //! it may hold everything.
 
 use crate::problem::{self, ApiError};
@@ -78,8 +78,9 @@ impl Budget {
         if self.admits(ledger.used, holds, amount) {
             return Ok(ledger.hold(self, tenant, amount));
         }
-        let without = self.shared && self.admits(ledger.used - holds, 0, amount);
-        Err(if without { Full::Tenant } else { Full::Service })
+        // With all of it free of others, would there be room?
+        let alone = self.admits(holds, holds, amount);
+        Err(if alone { Full::Service } else { Full::Tenant })
     }
 
     /// None of it, which may grow.
@@ -100,6 +101,11 @@ impl Budget {
                 return held;
             }
         }
+    }
+
+    /// Tenants that hold some of it or wait for it.
+    pub(crate) fn tenants(&self) -> Vec<String> {
+        lock(&self.ledger).tenants.keys().cloned().collect()
     }
 
     /// What a tenant holds of it.
@@ -227,7 +233,7 @@ mod tests {
     async fn a_tenant_alone_gets_everything_and_what_is_larger_takes_everything() {
         let budget = Budget::new(10, false);
         let held = budget.try_take("a", 7).expect("room");
-        assert_eq!(budget.try_take("a", 4).err(), Some(Full::Service));
+        assert_eq!(budget.try_take("a", 4).err(), Some(Full::Tenant));
         let rest = budget.try_take("a", 3).expect("room");
         assert!(waits(&budget, "b", 1).await);
         drop((held, rest));

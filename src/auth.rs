@@ -9,6 +9,7 @@
 //! tenant = "studio-a"      # whose sessions it sees; several tokens may share a tenant
 //! sha256 = "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"
 //! priority = "normal"      # or high, low
+//! scope = "write"          # or read: look at sessions and decode, change nothing
 //! max_sessions = 100       # this and max_bytes, max_age_s, max_streams: where they differ from the service's settings
 //! ```
 //!
@@ -100,6 +101,17 @@ pub struct Tenant {
     pub limits: TenantLimits,
 }
 
+/// What the bearer of a token may do with its tenant's sessions and cage designs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Scope {
+    /// Look at them, and decode.
+    Read,
+    /// All of it.
+    #[default]
+    Write,
+}
+
 /// What a token lets its bearer do, until it is revoked.
 #[derive(Clone, Debug)]
 pub struct Grant {
@@ -107,13 +119,15 @@ pub struct Grant {
     pub tenant: Arc<Tenant>,
     /// The token's name in the tokens file; empty in a service without tokens.
     pub token: Arc<str>,
+    /// What may be done with it.
+    pub scope: Scope,
     /// Cancelled when the token leaves the file or gets another tenant: ends what was begun with it.
     pub revoked: CancellationToken,
 }
 
 impl PartialEq for Grant {
     fn eq(&self, other: &Self) -> bool {
-        (&self.tenant, &self.token) == (&other.tenant, &other.token)
+        (&self.tenant, &self.token, self.scope) == (&other.tenant, &other.token, other.scope)
     }
 }
 
@@ -159,6 +173,7 @@ impl Access {
             local: Grant {
                 tenant: Arc::new(Tenant { name: LOCAL.to_owned(), priority: Priority::Normal, limits: defaults }),
                 token: "".into(),
+                scope: Scope::Write,
                 revoked: CancellationToken::new(),
             },
             entries: RwLock::new(Arc::new(entries)),

@@ -28,6 +28,9 @@ const KIB: u64 = 1 << 10;
 const MIB: u64 = 1 << 20;
 const GIB: u64 = 1 << 30;
 
+/// Bytes of an upload beside rest pose and cage.
+pub(crate) const ENVELOPE_BYTES: u64 = MIB;
+
 /// Settings of the service. Names are those of the file's keys; in the environment they are in capitals after `CAGER_`.
 /// Sizes in a file or the environment may be numbers or texts such as `"512 MiB"`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -35,8 +38,7 @@ const GIB: u64 = 1 << 30;
 pub struct ServeConfig {
     /// Address and port to listen on. Other than loopback addresses need tokens.
     pub listen: SocketAddr,
-    /// Address and port for operators: on a loopback address what they see and do, elsewhere health and metrics. Without one, the port
-    /// after `listen`'s on 127.0.0.1, if it is free.
+    /// Address and port for operators: on a loopback address what they see and do, elsewhere health and metrics.
     pub admin_listen: Option<SocketAddr>,
     /// Folder of sessions and prepared solvers; made if it is not there.
     pub data: PathBuf,
@@ -201,8 +203,11 @@ impl ServeConfig {
         }
         let (upload_bytes, max_rest_bytes) = (self.upload_bytes, self.max_rest_bytes);
         // Of what tenants share, one gets two thirds.
-        let share = if self.tokens.is_some() { upload_bytes / 3 * 2 } else { upload_bytes };
-        if share < max_rest_bytes {
+        let fits = match self.tokens {
+            Some(_) => upload_bytes / 3 * 2 >= max_rest_bytes + ENVELOPE_BYTES,
+            None => upload_bytes >= max_rest_bytes,
+        };
+        if !fits {
             return Err(ConfigError::UploadRoom { upload_bytes, max_rest_bytes });
         }
         match (&self.tls_certificate, &self.tls_key) {

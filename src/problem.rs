@@ -34,7 +34,7 @@ macro_rules! kinds {
 kinds! {
     BAD_REQUEST BAD_REQUEST "bad-request" "The request cannot be understood";
     UNAUTHORIZED UNAUTHORIZED "unauthorized" "No valid token was given";
-    FORBIDDEN FORBIDDEN "forbidden" "The page or the name that was asked for is not allowed";
+    FORBIDDEN FORBIDDEN "forbidden" "The page, the name or the token is not allowed to do this";
     NOT_FOUND NOT_FOUND "not-found" "There is nothing at this address";
     METHOD_NOT_ALLOWED METHOD_NOT_ALLOWED "method-not-allowed" "This address does not take that method";
     NOT_ACCEPTABLE NOT_ACCEPTABLE "not-acceptable" "None of the accepted media types is available";

@@ -13,6 +13,7 @@ use crate::session::prepared::Solvers;
 use crate::session::registry::Registry;
 use crate::store::{Disk, Store, StoreError};
 use crate::unread::Unread;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -72,6 +73,8 @@ pub struct Service {
 pub(crate) struct Holds {
     requests: u64,
     streams: u64,
+    completing: u64,
+    preparing: usize,
     frame_bytes: u64,
     upload_bytes: u64,
     download_bytes: u64,
@@ -247,23 +250,26 @@ impl Service {
     /// # Errors
     /// All places are taken: 429 where the tenant has its share, 503 where the service has.
     pub(crate) fn stream(&self, tenant: &Tenant) -> Result<Held, ApiError> {
-        let mine = self.streams.held_by(&tenant.name);
-        if mine >= tenant.limits.max_streams {
+        let most = tenant.limits.max_streams;
+        let too_many = || {
             self.rejected("tenant_streams");
-            let detail = format!("you have {mine} streams open, as many as you may; wait for one to end");
-            return Err(ApiError::new(problem::TOO_MANY_STREAMS, detail)
-                .limit(tenant.limits.max_streams)
-                .retry_after(2));
+            let detail = format!("you have {most} streams open, as many as you may; wait for one to end");
+            ApiError::new(problem::TOO_MANY_STREAMS, detail).limit(most).retry_after(2)
+        };
+        if self.streams.held_by(&tenant.name) >= most {
+            return Err(too_many());
         }
         if self.engine.waiting() >= self.config.max_queue_frames {
             self.rejected("queue");
             let detail = "too many frames wait; try again in a moment";
             return Err(ApiError::new(problem::BUSY, detail).retry_after(2));
         }
-        self.streams.try_take(&tenant.name, 1).map_err(|full| {
+        let place = self.streams.try_take(&tenant.name, 1).map_err(|full| {
             self.rejected("streams");
             full.refusal("streams")
-        })
+        })?;
+        // Another may have come at the same moment.
+        if self.streams.held_by(&tenant.name) > most { Err(too_many()) } else { Ok(place) }
     }
 
     /// Makes the room of a model that is on its way large enough for so many bytes.
@@ -277,11 +283,20 @@ impl Service {
         })
     }
 
+    /// Tenants that hold some of what all share.
+    pub(crate) fn holders(&self) -> BTreeSet<String> {
+        let budgets = [&self.requests, &self.streams, &self.completing, &self.frame_memory, &self.upload_memory];
+        let more = [&self.download_memory, &self.spool_space];
+        budgets.into_iter().chain(more).flat_map(|budget| budget.tenants()).collect()
+    }
+
     /// What a tenant holds of what all share.
     pub(crate) fn holds(&self, tenant: &str) -> Holds {
         Holds {
             requests: self.requests.held_by(tenant),
             streams: self.streams.held_by(tenant),
+            completing: self.completing.held_by(tenant),
+            preparing: self.solvers.in_flight_of(tenant),
             frame_bytes: self.frame_memory.held_by(tenant),
             upload_bytes: self.upload_memory.held_by(tenant),
             download_bytes: self.download_memory.held_by(tenant),

@@ -7,21 +7,34 @@ use crate::session::lock;
 use crate::store::{CageJobMeta, Kind, SessionMeta, StoreError};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
+use std::time::Instant;
 use tokio::sync::MutexGuard;
 
 /// What could not be read.
 #[derive(Default)]
 pub(crate) struct Unread {
-    /// With the tenant, where that is known.
-    known: Mutex<BTreeMap<(Kind, String), Option<String>>>,
-    /// Held while one is read again or deleted.
-    reading: tokio::sync::Mutex<()>,
+    known: Mutex<BTreeMap<(Kind, String), Left>>,
+    /// Held while one is read again or deleted. Never waited for in a thread that blocks: the holder may need one.
+    reading: Arc<tokio::sync::Mutex<()>>,
+}
+
+/// One that could not be read.
+#[derive(Clone)]
+struct Left {
+    /// Where it is known.
+    tenant: Option<String>,
+    /// When reading it again began last.
+    tried: Option<Instant>,
 }
 
 impl Unread {
     /// Lists one more; the log has it once.
     pub(crate) fn add(&self, kind: Kind, id: &str, tenant: Option<&str>, why: &str) {
-        let before = lock(&self.known).insert((kind, id.to_owned()), tenant.map(str::to_owned));
+        let key = (kind, id.to_owned());
+        let mut known = lock(&self.known);
+        let tried = known.get(&key).and_then(|left| left.tried);
+        let before = known.insert(key, Left { tenant: tenant.map(str::to_owned), tried });
+        drop(known);
         if before.is_none() {
             tracing::error!(kind = kind.name(), id, why, "cannot be read, and is left where it is");
         }
@@ -41,12 +54,11 @@ impl Unread {
 
     /// Keeps one from being read again meanwhile.
     pub(crate) async fn hold(&self, kind: Kind, id: &str) -> Option<MutexGuard<'_, ()>> {
-        self.owner(kind, id)?;
+        self.left(kind, id)?;
         Some(self.reading.lock().await)
     }
 
-    /// The tenant of one that is listed, where that is known.
-    fn owner(&self, kind: Kind, id: &str) -> Option<Option<String>> {
+    fn left(&self, kind: Kind, id: &str) -> Option<Left> {
         lock(&self.known).get(&(kind, id.to_owned())).cloned()
     }
 
@@ -95,8 +107,8 @@ impl Service {
     /// # Errors
     /// It still cannot be read.
     pub(crate) async fn read_again(self: &Arc<Self>, kind: Kind, tenant: &str, id: &str) -> Result<(), ApiError> {
-        match self.unread.owner(kind, id) {
-            Some(owner) if owner.as_deref().is_none_or(|owner| owner == tenant) => {
+        match self.unread.left(kind, id) {
+            Some(left) if left.tenant.as_deref().is_none_or(|owner| owner == tenant) => {
                 self.read_now(kind, id.to_owned()).await
             }
             _ => Ok(()),
@@ -113,12 +125,20 @@ impl Service {
     }
 
     async fn read_now(self: &Arc<Self>, kind: Kind, id: String) -> Result<(), ApiError> {
+        let came = Instant::now();
+        let one = Arc::clone(&self.unread.reading).lock_owned().await;
+        match self.unread.left(kind, &id) {
+            None => return Ok(()),
+            // Somebody has read it since this was asked for.
+            Some(left) if left.tried.is_some_and(|tried| tried >= came) => return Err(problem(kind)),
+            Some(_) => {}
+        }
+        if let Some(left) = lock(&self.unread.known).get_mut(&(kind, id.clone())) {
+            left.tried = Some(Instant::now());
+        }
         let service = Arc::clone(self);
         blocking(move || {
-            let _one = service.unread.reading.blocking_lock();
-            if service.unread.owner(kind, &id).is_none() {
-                return Ok(());
-            }
+            let _one = one;
             let found = match kind {
                 Kind::Session => {
                     service.store.find_again(&id).map(|meta| meta.map(|meta| service.take_in_session(meta)))
@@ -129,14 +149,14 @@ impl Service {
             };
             if matches!(found, Ok(None)) {
                 service.unread.forget(kind, &id);
+                tracing::info!(kind = kind.name(), id, "is gone");
+                return Ok(());
             }
-            match service.unread.owner(kind, &id) {
-                Some(_) => Err(problem(kind)),
-                None => {
-                    tracing::info!(kind = kind.name(), id, gone = matches!(found, Ok(None)), "was read again");
-                    Ok(())
-                }
+            if service.unread.left(kind, &id).is_some() {
+                return Err(problem(kind));
             }
+            tracing::info!(kind = kind.name(), id, "was read again");
+            Ok(())
         })
         .await?
     }

@@ -144,7 +144,7 @@ pub struct CageJob {
     pub problem: Option<Problem>,
 }
 
-/// A page of designs, oldest first.
+/// A page of designs, newest first.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct CageJobList {

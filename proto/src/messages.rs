@@ -236,7 +236,7 @@ pub struct PreparationSeconds {
     pub total: f64,
 }
 
-/// A page of sessions, oldest first.
+/// A page of sessions, newest first.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct SessionList {

@@ -1,6 +1,6 @@
 //! The tokens file, and looking a token up in it.
 
-use super::{Grant, Priority, Tenant, TenantLimits};
+use super::{Grant, Priority, Scope, Tenant, TenantLimits};
 use crate::config::line_of;
 use serde::Deserialize;
 use std::collections::HashMap;
@@ -52,6 +52,8 @@ struct Written {
     sha256: Spanned<String>,
     #[serde(default)]
     priority: Priority,
+    #[serde(default)]
+    scope: Scope,
     max_sessions: Option<u64>,
     max_bytes: Option<u64>,
     max_age_s: Option<u64>,
@@ -111,17 +113,21 @@ impl Entries {
                 max_streams: token.max_streams.unwrap_or(defaults.max_streams),
             };
             let tenant = Tenant { name: token.tenant.into_inner(), priority: token.priority, limits };
-            let token = token.name.into_inner().into();
-            entries.push((hash, Grant { tenant: Arc::new(tenant), token, revoked: CancellationToken::new() }));
+            let (scope, token) = (token.scope, token.name.into_inner().into());
+            entries.push((hash, Grant { tenant: Arc::new(tenant), token, scope, revoked: CancellationToken::new() }));
         }
         Ok(Self(entries))
     }
 
-    /// Goes on with the grants of the entries before; gives those that are there no more, or are another tenant's now.
+    /// Goes on with the grants of the entries before; gives those that are there no more, are another tenant's now, or may do less.
     pub(super) fn succeed(&mut self, before: &Self) -> Vec<Grant> {
         let mut gone = Vec::new();
         for (hash, old) in &before.0 {
-            let same = |(other, new): &&mut (Hash, Grant)| other == hash && new.tenant.name == old.tenant.name;
+            let same = |(other, new): &&mut (Hash, Grant)| {
+                other == hash
+                    && new.tenant.name == old.tenant.name
+                    && (new.scope == old.scope || new.scope == Scope::Write)
+            };
             match self.0.iter_mut().find(same) {
                 Some((_, new)) => new.revoked = old.revoked.clone(),
                 None => gone.push(old.clone()),

@@ -9,7 +9,7 @@ use crate::store::LocalDisk;
 use crate::telemetry;
 use anyhow::{Context, Result};
 use std::io::Write;
-use std::net::{Ipv4Addr, SocketAddr};
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::net::TcpListener;
@@ -49,14 +49,21 @@ pub(crate) async fn run_until(
     listening: impl FnOnce(SocketAddr),
 ) -> Result<()> {
     telemetry::metrics::recorder();
+    tokio::spawn(telemetry::metrics::keep(stop.clone()));
     let tls = config.tls().map(|tls| tls_config(&tls)).transpose()?;
     let scheme = if tls.is_some() { "https" } else { "http" };
     let listener = TcpListener::bind(config.listen)
         .await
         .with_context(|| format!("{}: cannot be listened on; is it in use? give another --listen", config.listen))?;
-    let operators = admin_listener(&config).await?;
+    let operators = match config.admin_listen {
+        Some(address) => Some(TcpListener::bind(address).await.with_context(|| {
+            format!("{address}: cannot be listened on for operators; is it in use? give another --admin-listen")
+        })?),
+        None => None,
+    };
     let limits = config.limits();
     let service = Service::start(config, Arc::new(LocalDisk), stop.clone())?;
+    let drained = CancellationToken::new();
     let address = listener.local_addr()?;
     tracing::info!(%address, scheme, "listening");
     if let Some(operators) = operators {
@@ -64,31 +71,14 @@ pub(crate) async fn run_until(
         tracing::info!(%address, "listening for operators");
         let limits = Limits { max_connections: OPERATORS, ..limits.clone() };
         let (routes, spare) = (admin(Arc::clone(&service), address.ip().is_loopback()), spare(Arc::clone(&service)));
-        tokio::spawn(serve(operators, routes, spare, limits, None, stop.clone()));
+        tokio::spawn(serve(operators, routes, spare, limits, None, drained.clone()));
     }
     listening(address);
     serve(listener, router(Arc::clone(&service)), spare(service), limits, tls, stop).await?;
+    // Operators see the others out.
+    drained.cancel();
     tracing::info!("stopped");
     Ok(())
-}
-
-/// Where operators are listened to. A port that nobody asked for may be in use.
-async fn admin_listener(config: &ServeConfig) -> Result<Option<TcpListener>> {
-    if let Some(address) = config.admin_listen {
-        let listener = TcpListener::bind(address).await;
-        return Ok(Some(listener.with_context(|| {
-            format!("{address}: cannot be listened on for operators; is it in use? give another --admin-listen")
-        })?));
-    }
-    let Some(port) = config.listen.port().checked_add(1).filter(|&port| port > 1) else { return Ok(None) };
-    let address = SocketAddr::from((Ipv4Addr::LOCALHOST, port));
-    match TcpListener::bind(address).await {
-        Ok(listener) => Ok(Some(listener)),
-        Err(error) => {
-            tracing::warn!(%address, %error, "not listening for operators; give --admin-listen");
-            Ok(None)
-        }
-    }
 }
 
 /// Begins to stop at the first signal; the second one ends the process at once.

@@ -13,7 +13,7 @@ pub struct ServeFlags {
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub listen: Option<String>,
 
-    /// Address and port for operators: health, metrics, tenants, sessions of all [default: the port after --listen's on 127.0.0.1].
+    /// Address and port for operators: health, metrics, tenants, sessions of all [default: none].
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub admin_listen: Option<String>,
 

@@ -28,6 +28,7 @@ fn the_table_of_settings_and_the_struct_agree() {
         tokens: Some("a".into()),
         tls_certificate: Some("b".into()),
         tls_key: Some("c".into()),
+        admin_listen: Some(([127, 0, 0, 1], 8081).into()),
         ..ServeConfig::default()
     };
     let mut of_struct: Vec<_> = toml::Table::try_from(&all).unwrap().keys().cloned().collect();

@@ -10,37 +10,38 @@ use super::sessions::{PAGE, PageQuery};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use axum::extract::{Path, Request, State};
-use axum::middleware::{Next, from_fn_with_state};
+use axum::middleware::{Next, from_fn};
 use axum::response::Response;
 use axum::routing::{delete, get, post};
 use axum::{Json, Router};
 use cager_proto::messages::Session;
-use http::StatusCode;
+use http::{StatusCode, header};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// The routes; with `trusted` those that show and change what belongs to tenants.
 pub fn admin(service: Arc<Service>, trusted: bool) -> Router {
     let mut routes = Router::from(open());
     if trusted {
-        let guard = from_fn_with_state(Arc::clone(&service), own_pages);
         let operated = Router::new()
             .route("/admin/tenants", get(tenants))
             .route("/admin/sessions", get(sessions))
             .route("/admin/sessions/{id}", delete(delete_session))
             .route("/admin/drain", post(drain))
             .route("/admin/evict", post(evict));
-        routes = routes.merge(operated.route_layer(guard));
+        routes = routes.merge(operated.route_layer(from_fn(no_pages)));
     }
     let routes = routes.fallback(|| async { ApiError::new(problem::NOT_FOUND, "see the documentation for operators") });
     finished(routes.with_state(service))
 }
 
-/// A page in the operator's browser is no operator.
-async fn own_pages(State(service): State<Arc<Service>>, request: Request, next: Next) -> Result<Response, ApiError> {
-    let (parts, body) = request.into_parts();
-    origin::check(&parts, &service.config)?;
-    Ok(next.run(Request::from_parts(parts, body)).await)
+/// A page in the operator's browser is no operator, whichever it is.
+async fn no_pages(request: Request, next: Next) -> Result<Response, ApiError> {
+    if request.headers().contains_key(header::ORIGIN) || !origin::is_this_machine(&request) {
+        return Err(ApiError::new(problem::FORBIDDEN, "pages may not operate the service; use curl or a script"));
+    }
+    Ok(next.run(request).await)
 }
 
 /// What one tenant has and does.
@@ -57,12 +58,14 @@ struct TenantUse {
 }
 
 async fn tenants(State(service): State<Arc<Service>>) -> Json<Vec<TenantUse>> {
-    let usage = service.usage().into_iter();
-    let tenant = |(tenant, sessions, stored_bytes): (String, usize, u64)| {
+    let mut tenants: BTreeMap<String, (usize, u64)> =
+        service.holders().into_iter().map(|tenant| (tenant, (0, 0))).collect();
+    tenants.extend(service.usage().into_iter().map(|(tenant, sessions, bytes)| (tenant, (sessions, bytes))));
+    let tenant = |(tenant, (sessions, stored_bytes)): (String, (usize, u64))| {
         let holds = service.holds(&tenant);
         TenantUse { tenant, sessions, stored_bytes, holds }
     };
-    Json(usage.map(tenant).collect())
+    Json(tenants.into_iter().map(tenant).collect())
 }
 
 #[derive(Serialize)]

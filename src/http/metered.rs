@@ -1,9 +1,10 @@
 //! Bodies whose bytes are counted and find room in memory as they come, before anyone looks for parts in them: until one is found, all
 //! that came is kept.
 
-use super::multipart::ENVELOPE_BYTES;
+use super::frames::{SLOWEST_BYTES_PER_SECOND, too_slow};
 use crate::admission::Held;
 use crate::auth::Tenant;
+use crate::config::ENVELOPE_BYTES;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::lock;
@@ -11,6 +12,7 @@ use axum::body::Body;
 use axum::extract::Request;
 use futures_util::StreamExt as _;
 use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
 /// A body that is counted.
 pub(super) struct Metered(Arc<Mutex<Counted>>);
@@ -18,6 +20,7 @@ pub(super) struct Metered(Arc<Mutex<Counted>>);
 struct Counted {
     room: Held,
     received: u64,
+    began: Instant,
     /// What is too large, where it is.
     what: &'static str,
     /// Why no more was taken.
@@ -36,6 +39,7 @@ impl Metered {
         let counted = Counted {
             room: service.upload_memory.nothing(&tenant.name),
             received: 0,
+            began: Instant::now(),
             what,
             refused: None,
             done: false,
@@ -71,6 +75,12 @@ impl Counted {
             return Ok(());
         }
         self.received += bytes as u64;
+        // It keeps its memory from its first byte on.
+        let patience = Duration::from_secs(service.config.body_timeout_s);
+        let due = self.began.elapsed().saturating_sub(patience).as_secs() * SLOWEST_BYTES_PER_SECOND;
+        if self.received < due {
+            return Err(too_slow());
+        }
         let limit = service.config.max_rest_bytes;
         if self.received > limit.saturating_add(ENVELOPE_BYTES) {
             service.rejected("body_too_large");

@@ -7,6 +7,7 @@ mod cages;
 mod container;
 mod coordinates;
 mod decode;
+mod encoded;
 mod errors;
 mod events;
 mod extract;

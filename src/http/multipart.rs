@@ -14,8 +14,6 @@ use cager_proto::messages::SessionOptions;
 use serde::de::DeserializeOwned;
 use std::sync::Arc;
 
-/// Bytes of a body beside rest pose and cage.
-pub(crate) const ENVELOPE_BYTES: u64 = 1 << 20;
 const OPTIONS_BYTES: usize = 64 << 10;
 pub(super) const NAME_CHARACTERS: usize = 200;
 /// The part with the matrix of the regularizer of that name.

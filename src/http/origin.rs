@@ -5,7 +5,7 @@
 
 use crate::config::ServeConfig;
 use crate::problem::{self, ApiError};
-use http::request::Parts;
+use axum::extract::Request;
 use http::{HeaderName, HeaderValue, Method, header};
 use std::net::IpAddr;
 use std::time::Duration;
@@ -15,23 +15,35 @@ use tower_http::cors::CorsLayer;
 ///
 /// # Errors
 /// 403, which says how to allow it.
-pub(super) fn check(parts: &Parts, config: &ServeConfig) -> Result<(), ApiError> {
-    let text = |name: HeaderName| parts.headers.get(name).and_then(|value| value.to_str().ok());
-    // In HTTP/2 it is part of the address.
-    let host =
-        parts.uri.authority().map(http::uri::Authority::as_str).or_else(|| text(header::HOST)).unwrap_or_default();
+pub(super) fn check(request: &Request, config: &ServeConfig) -> Result<(), ApiError> {
+    let host = host_of(request);
     if !is_known(host, &config.allowed_hosts) {
         let detail =
             format!("the service is not known as {host:?}; ask for localhost, or add the name to allowed_hosts");
         return Err(ApiError::new(problem::FORBIDDEN, detail));
     }
-    match text(header::ORIGIN) {
+    match text(request, header::ORIGIN) {
         Some(origin) if !is_same(origin, host) && !config.allowed_origins.iter().any(|allowed| allowed == origin) => {
             let detail = format!("pages of {origin} may not use this service; add the origin to allowed_origins");
             Err(ApiError::new(problem::FORBIDDEN, detail))
         }
         _ => Ok(()),
     }
+}
+
+/// Whether this machine is asked by a name that is its own for certain.
+pub(super) fn is_this_machine(request: &Request) -> bool {
+    is_known(host_of(request), &[])
+}
+
+fn text(request: &Request, name: HeaderName) -> Option<&str> {
+    request.headers().get(name).and_then(|value| value.to_str().ok())
+}
+
+fn host_of(request: &Request) -> &str {
+    // In HTTP/2 it is part of the address.
+    let authority = request.uri().authority().map(http::uri::Authority::as_str);
+    authority.or_else(|| text(request, header::HOST)).unwrap_or_default()
 }
 
 /// Whether a name is this machine's for certain, or allowed.
@@ -60,16 +72,20 @@ pub(super) fn cors(config: &ServeConfig) -> Option<CorsLayer> {
         header::CONTENT_ENCODING,
         header::CONTENT_TYPE,
         header::IF_NONE_MATCH,
+        header::IF_RANGE,
         header::RANGE,
         name("idempotency-key"),
         name("last-event-id"),
         name("x-request-id"),
     ];
     let shown = [
+        header::CONTENT_DISPOSITION,
         header::CONTENT_RANGE,
         header::ETAG,
         header::LOCATION,
         header::RETRY_AFTER,
+        header::WWW_AUTHENTICATE,
+        name("cager-columns"),
         name("cager-outside"),
         name("cager-rows"),
         name("x-request-id"),
@@ -88,7 +104,7 @@ mod tests {
         if let Some(origin) = origin {
             request = request.header(header::ORIGIN, origin);
         }
-        check(&request.body(()).unwrap().into_parts().0, config).is_ok()
+        check(&request.body(axum::body::Body::empty()).unwrap(), config).is_ok()
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Every route, in one flat list.
 
+use super::encoded::decoded;
 use super::extract::Caller;
 use super::holding::holding;
 use super::respond::PROBLEM_JSON;
@@ -23,7 +24,6 @@ use tower::timeout::TimeoutLayer;
 use tower::{ServiceBuilder, timeout};
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::compression::CompressionLayer;
-use tower_http::decompression::RequestDecompressionLayer;
 use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
@@ -94,6 +94,7 @@ pub fn router(service: Arc<Service>) -> Router {
         .merge(guarded)
         .merge(Router::from(described()))
         .fallback(|| async { ApiError::new(problem::NOT_FOUND, "the routes are listed in /openapi.json") })
+        .layer(from_fn_with_state(Arc::clone(&service), asked_by_name))
         .with_state(service);
     let routes = finished(routes);
     match cors {
@@ -111,7 +112,7 @@ pub(super) fn finished(routes: Router) -> Router {
             ApiError::internal(&format!("a request panicked: {text}")).into_response()
         }))
         .layer(from_fn(host))
-        .layer(RequestDecompressionLayer::new())
+        .layer(from_fn(decoded))
         .layer(from_fn(finish))
         .layer(CompressionLayer::new().compress_when(is_worth_compressing))
         .layer(from_fn(request_id))
@@ -127,6 +128,18 @@ pub fn spare(service: Arc<Service>) -> Router {
         .with_state(service)
         .layer(from_fn(finish))
         .layer(from_fn(request_id))
+}
+
+/// Without tokens, only who asks by a known name and from a known page is answered; machines ask for health by any.
+async fn asked_by_name(
+    State(service): State<Arc<Service>>,
+    request: Request,
+    next: Next,
+) -> Result<Response, ApiError> {
+    if !service.access.is_guarded() && !matches!(request.uri().path(), "/healthz" | "/readyz") {
+        origin::check(&request, &service.config).inspect_err(|_| service.rejected("origin"))?;
+    }
+    Ok(next.run(request).await)
 }
 
 /// Texts of some length. Numbers hardly compress, and parts of them are asked for by their place.

@@ -43,7 +43,7 @@ pub(crate) async fn create(
     }
     let limit = service.config.max_rest_bytes;
     let declared = http_body::Body::size_hint(request.body()).lower();
-    if declared > limit.saturating_add(multipart::ENVELOPE_BYTES) {
+    if declared > limit.saturating_add(crate::config::ENVELOPE_BYTES) {
         service.rejected("body_too_large");
         let detail = format!("the body has {declared} bytes, but rest pose and cage may have {limit} together");
         return Err(ApiError::new(problem::TOO_LARGE, detail).limit(limit));
@@ -113,10 +113,9 @@ pub(crate) async fn delete(State(service): State<Arc<Service>>, Named(session): 
 )]
 pub(crate) async fn complete(
     State(service): State<Arc<Service>>,
-    Found { session, tenant }: Found,
+    Found { session, .. }: Found,
     Body(complete): Body<Complete>,
 ) -> JsonResult<Session> {
-    let _place = service.completing.take(&tenant.name, 1).await;
     service.complete(&session, complete).await?;
     Ok(Json(session.view()))
 }

@@ -23,8 +23,11 @@ const READ_FRAMES: usize = 64;
 impl Service {
     /// Says that a session has `frames` frames, and writes its container. Once begun, it goes on where the client gives up.
     pub(crate) async fn complete(self: &Arc<Self>, session: &Arc<Session>, wish: Complete) -> Result<(), ApiError> {
+        // Who gives up while it waits for its turn has not begun.
+        let place = self.completing.take(&session.meta.tenant, 1).await;
         let (service, session) = (Arc::clone(self), Arc::clone(session));
         let work = tokio::spawn(async move {
+            let _place = place;
             let _one = session.completing.lock().await;
             service.complete_alone(&session, wish).await
         });

@@ -5,11 +5,16 @@ use crate::store::Kind;
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
 use std::collections::BTreeMap;
 use std::sync::{Mutex, OnceLock, PoisonError};
+use std::time::Duration;
+use tokio_util::sync::CancellationToken;
 
 /// Buckets of times that are short on an idle machine, in seconds.
 const SHORT: &[f64] = &[1e-4, 2.5e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0];
 /// Buckets of preparations, in seconds.
 const LONG: &[f64] = &[0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0, 300.0];
+
+/// How often measured times are added up.
+const UPKEEP: Duration = Duration::from_secs(5);
 
 /// The process's recorder, installed with the first call.
 pub fn recorder() -> &'static PrometheusHandle {
@@ -31,6 +36,13 @@ pub fn recorder() -> &'static PrometheusHandle {
         describe();
         handle
     })
+}
+
+/// Keeps what was measured small until `stop`, also where nobody asks for it.
+pub async fn keep(stop: CancellationToken) {
+    while stop.run_until_cancelled(tokio::time::sleep(UPKEEP)).await.is_some() {
+        recorder().run_upkeep();
+    }
 }
 
 /// Sets the gauges that are looked up rather than counted.
@@ -58,7 +70,6 @@ pub(crate) fn observe(service: &Service) {
         metrics::gauge!("cager_sessions", "tenant" => tenant.clone()).set(*sessions as f64);
         metrics::gauge!("cager_stored_bytes", "tenant" => tenant.clone()).set(*bytes as f64);
     }
-    recorder().run_upkeep();
 }
 
 fn describe() {
@@ -79,7 +90,6 @@ fn describe() {
         "Connections beyond the limit: spare (answered once) or full"
     );
     describe_counter!("cager_accept_errors_total", "Errors of accepting connections");
-    describe_counter!("cager_stalled_responses_total", "Responses of HTTP/2 that were cut because nobody read them");
     describe_gauge!("cager_disk_bytes", Unit::Bytes, "Disk space taken by what is on its way");
     describe_counter!("cager_body_timeouts_total", "Request bodies that stopped arriving");
     describe_gauge!("cager_connections", "Open connections");

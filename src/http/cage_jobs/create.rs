@@ -3,7 +3,7 @@
 use super::parts;
 use crate::http::extract::{Caller, content_type, idempotency_key};
 use crate::http::frames::{SLOWEST_BYTES_PER_SECOND, too_slow};
-use crate::http::{multipart, openapi};
+use crate::http::openapi;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use axum::Json;
@@ -37,7 +37,7 @@ pub(crate) async fn create(
     }
     let limit = service.config.max_frames_bytes.saturating_add(service.config.max_rest_bytes);
     let declared = http_body::Body::size_hint(request.body()).lower();
-    if declared > limit.saturating_add(multipart::ENVELOPE_BYTES) {
+    if declared > limit.saturating_add(crate::config::ENVELOPE_BYTES) {
         service.rejected("body_too_large");
         let detail = format!(
             "the body has {declared} bytes, but rest pose and frames may have {limit} together; send fewer frames"

@@ -3,7 +3,8 @@
 use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::cage_job::create::{NewCageJob, check_options};
-use crate::http::multipart::{ENVELOPE_BYTES, NAME_CHARACTERS, bad, broken, file_name, read_options};
+use crate::config::ENVELOPE_BYTES;
+use crate::http::multipart::{NAME_CHARACTERS, bad, broken, file_name, read_options};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::commit::storage_error;

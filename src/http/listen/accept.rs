@@ -2,16 +2,19 @@
 
 use super::Limits;
 use super::connection::Shared;
-use super::fresh::Fresh;
 use super::socket::Keep;
+use super::waiting::Waiting;
 use axum::Router;
+use futures_util::FutureExt as _;
 use socket2::TcpKeepalive;
 use std::io::{self, ErrorKind};
 use std::net::SocketAddr;
+use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::task::unconstrained;
 use tokio::time::{sleep, timeout};
 use tokio_rustls::TlsAcceptor;
 use tokio_util::sync::CancellationToken;
@@ -25,8 +28,9 @@ const PAUSES: (Duration, Duration) = (Duration::from_millis(10), Duration::from_
 
 /// Serves `app` on `listener` until `stop`, then lets open requests finish within the drain time.
 ///
-/// Where all places are taken, the connection that has waited longest for its first request is closed. Where there is none, connections
-/// beyond the limit get one answer of `spare`, which should know health and otherwise say 503; beyond the spare ones they are closed. On `stop` every connection is told at once; streams of the router that have no end of their own must
+/// Where all places are taken, a connection without a request makes way for a new one, those that never sent one first. Where all are
+/// at work, connections beyond the limit get one answer of `spare`, which should know health and otherwise say 503; beyond the spare ones
+/// they are closed. On `stop` every connection is told at once; streams of the router that have no end of their own must
 /// watch the same token. Requests carry their peer as [`axum::extract::ConnectInfo`].
 ///
 /// # Errors
@@ -50,7 +54,7 @@ pub async fn serve(
             tls: tls.map(TlsAcceptor::from),
             stop: stop.clone(),
             abort: CancellationToken::new(),
-            fresh: Arc::new(Fresh::default()),
+            waiting: Default::default(),
         }),
         pause: PAUSES.0,
     };
@@ -80,33 +84,24 @@ struct Acceptor {
 impl Acceptor {
     fn admit(&mut self, stream: TcpStream, peer: SocketAddr) {
         self.pause = PAUSES.0;
-        let place = match Arc::clone(&self.places).try_acquire_owned() {
-            Ok(place) => Some(Admitted::Place(place)),
-            Err(_) if self.shared.fresh.displace() => Some(Admitted::Soon(Arc::clone(&self.places))),
-            Err(_) => Arc::clone(&self.spare_places).try_acquire_owned().ok().map(Admitted::Spare),
-        };
-        let Some(place) = place else {
+        let [waiting, spare_waiting] = &self.shared.waiting;
+        // In the order in which they came: a place that becomes free belongs to who was displaced for it.
+        let admitted = admit(&self.places, waiting).map(|turn| (turn, false, waiting));
+        let admitted = admitted.or_else(|| Some((admit(&self.spare_places, spare_waiting)?, true, spare_waiting)));
+        let Some((turn, spare, waiting)) = admitted else {
             metrics::counter!("cager_connections_rejected_total", "reason" => "full").increment(1);
             return;
         };
         // Frames are small and answers are wanted at once. A socket that refuses is dead anyway.
         let _ = stream.set_nodelay(true);
         let _ = socket2::SockRef::from(&stream).set_tcp_keepalive(&keep_alive());
-        // A spare place is of no use to another connection.
-        let others = matches!(place, Admitted::Spare(_)).then(Arc::default);
-        let entry = Arc::new(others.as_ref().unwrap_or(&self.shared.fresh).enter());
+        let entry = Arc::new(waiting.enter());
         let (tracker, shared) = (self.tracker.clone(), Arc::clone(&self.shared));
         self.tracker.spawn(async move {
-            let (permit, spare) = match place {
-                Admitted::Place(permit) => (permit, false),
-                Admitted::Spare(permit) => (permit, true),
-                Admitted::Soon(places) => {
-                    let soon = timeout(DISPLACED_WITHIN, places.acquire_owned());
-                    match entry.displaced.run_until_cancelled(soon).await {
-                        Some(Ok(Ok(permit))) => (permit, false),
-                        _ => return,
-                    }
-                }
+            let permit = entry.displaced.run_until_cancelled(timeout(DISPLACED_WITHIN, turn)).await;
+            let Some(Ok(permit)) = permit else {
+                metrics::counter!("cager_connections_rejected_total", "reason" => "full").increment(1);
+                return;
             };
             if spare {
                 metrics::counter!("cager_connections_rejected_total", "reason" => "spare").increment(1);
@@ -141,14 +136,18 @@ impl Acceptor {
     }
 }
 
-/// How a connection gets in.
-enum Admitted {
-    /// At once.
-    Place(OwnedSemaphorePermit),
-    /// With the place of one that is being closed.
-    Soon(Arc<Semaphore>),
-    /// For one answer.
-    Spare(OwnedSemaphorePermit),
+/// Its turn for a place.
+type Turn = Pin<Box<dyn Future<Output = OwnedSemaphorePermit> + Send>>;
+
+/// A turn for a place: now, or as soon as a connection that waits for its client has made way. None where all are at work.
+fn admit(places: &Arc<Semaphore>, waiting: &Waiting) -> Option<Turn> {
+    let mut turn = Box::pin(unconstrained(Arc::clone(places).acquire_owned()));
+    // Asked once, it has its place in the queue.
+    match turn.as_mut().now_or_never() {
+        Some(permit) => permit.ok().map(|permit| Box::pin(std::future::ready(permit)) as Turn),
+        None if waiting.displace() => Some(Box::pin(async move { turn.await.expect("the semaphore is never closed") })),
+        None => None,
+    }
 }
 
 /// The system asks idle peers whether they are still there, so that a follower whose machine is gone does not stay for ever.

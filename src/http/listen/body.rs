@@ -7,8 +7,8 @@ use hyper::body::Incoming;
 use std::error::Error;
 use std::fmt;
 use std::pin::Pin;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
 use tokio::time::{Instant, Sleep, sleep};
@@ -94,6 +94,9 @@ impl Body for Upload {
         };
         this.waiting = false;
         this.state.body_came();
+        if let Some(in_flight) = &this.in_flight {
+            in_flight.body_came();
+        }
         if frame.is_none() || this.inner.is_end_stream() {
             this.state.body_ended();
             this.in_flight = None;
@@ -120,75 +123,16 @@ impl Drop for Upload {
 
 /// A response body that says whether the client reads it.
 pub(super) struct Reply {
-    content: Arc<Mutex<Content>>,
-    state: Arc<State>,
-    _in_flight: Arc<InFlight>,
+    inner: axum::body::Body,
+    in_flight: Arc<InFlight>,
+    /// Rest of a large piece, for HTTP/2.
+    rest: Bytes,
     split: bool,
 }
 
-/// What is left of a response's body. Dropped early where the client does not read it.
-#[derive(Debug)]
-pub(super) struct Content {
-    inner: axum::body::Body,
-    /// Rest of a large piece, for HTTP/2.
-    rest: Bytes,
-    /// Since when a piece that was given waits to be sent.
-    unread_since: Option<Instant>,
-    was_cut: bool,
-}
-
-impl Content {
-    /// Takes the body away where its last piece has waited for so long.
-    pub(super) fn cut_if_stalled(&mut self, limit: Duration) -> Option<axum::body::Body> {
-        let stalled = !self.was_cut && self.unread_since.is_some_and(|since| since.elapsed() >= limit);
-        stalled.then(|| {
-            metrics::counter!("cager_stalled_responses_total").increment(1);
-            self.was_cut = true;
-            self.rest = Bytes::new();
-            std::mem::take(&mut self.inner)
-        })
-    }
-
-    fn poll(&mut self, cx: &mut Context<'_>, split: bool) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
-        if self.was_cut {
-            return Poll::Ready(Some(Err(axum::Error::new("the client stopped reading"))));
-        }
-        let mut data = std::mem::take(&mut self.rest);
-        if data.is_empty() {
-            match ready!(Pin::new(&mut self.inner).poll_frame(cx)) {
-                Some(Ok(frame)) => match frame.into_data() {
-                    Ok(bytes) => data = bytes,
-                    Err(frame) => return Poll::Ready(Some(Ok(frame))),
-                },
-                end => return Poll::Ready(end),
-            }
-        }
-        if split && data.len() > PIECE_BYTES {
-            self.rest = data.split_off(PIECE_BYTES);
-        }
-        Poll::Ready(Some(Ok(Frame::data(data))))
-    }
-}
-
 impl Reply {
-    pub(super) fn new(inner: axum::body::Body, state: Arc<State>, in_flight: Arc<InFlight>, split: bool) -> Self {
-        let content = Content { inner, rest: Bytes::new(), unread_since: None, was_cut: false };
-        let content = Arc::new(Mutex::new(content));
-        if split {
-            state.watch(&content);
-        }
-        Self { content, state, _in_flight: in_flight, split }
-    }
-
-    fn content(&self) -> MutexGuard<'_, Content> {
-        self.content.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn set_unread(&self, content: &mut Content, unread: bool) {
-        if content.unread_since.is_some() != unread {
-            content.unread_since = unread.then(Instant::now);
-            self.state.response_unread(unread);
-        }
+    pub(super) fn new(inner: axum::body::Body, in_flight: Arc<InFlight>, split: bool) -> Self {
+        Self { inner, in_flight, rest: Bytes::new(), split }
     }
 }
 
@@ -196,24 +140,32 @@ impl Body for Reply {
     type Data = Bytes;
     type Error = axum::Error;
 
-    fn poll_frame(self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
-        let mut content = self.content();
-        self.set_unread(&mut content, false);
-        let piece = ready!(content.poll(cx, self.split));
-        if matches!(&piece, Some(Ok(frame)) if frame.is_data()) {
-            self.set_unread(&mut content, true);
+    fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        let this = &mut *self;
+        this.in_flight.unread(false);
+        let mut data = std::mem::take(&mut this.rest);
+        if data.is_empty() {
+            match ready!(Pin::new(&mut this.inner).poll_frame(cx)) {
+                Some(Ok(frame)) => match frame.into_data() {
+                    Ok(bytes) => data = bytes,
+                    Err(frame) => return Poll::Ready(Some(Ok(frame))),
+                },
+                end => return Poll::Ready(end),
+            }
         }
-        Poll::Ready(piece)
+        if this.split && data.len() > PIECE_BYTES {
+            this.rest = data.split_off(PIECE_BYTES);
+        }
+        this.in_flight.unread(true);
+        Poll::Ready(Some(Ok(Frame::data(data))))
     }
 
     fn is_end_stream(&self) -> bool {
-        let content = self.content();
-        !content.was_cut && content.rest.is_empty() && content.inner.is_end_stream()
+        self.rest.is_empty() && self.inner.is_end_stream()
     }
 
     fn size_hint(&self) -> SizeHint {
-        let content = self.content();
-        let (inner, rest) = (content.inner.size_hint(), content.rest.len() as u64);
+        let (inner, rest) = (self.inner.size_hint(), self.rest.len() as u64);
         let mut hint = SizeHint::new();
         hint.set_lower(inner.lower() + rest);
         if let Some(upper) = inner.upper() {
@@ -225,7 +177,6 @@ impl Body for Reply {
 
 impl Drop for Reply {
     fn drop(&mut self) {
-        let mut content = self.content();
-        self.set_unread(&mut content, false);
+        self.in_flight.unread(false);
     }
 }

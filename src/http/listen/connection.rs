@@ -1,10 +1,10 @@
 //! The life of one connection.
 
 use super::Limits;
-use super::fresh::{Entry, Fresh};
 use super::service::Requests;
 use super::socket::{Keep, Socket};
 use super::state::{Reason, State};
+use super::waiting::{Entry, Waiting};
 use axum::Router;
 use hyper_util::rt::{TokioExecutor, TokioIo, TokioTimer};
 use hyper_util::server::conn::auto::Builder;
@@ -33,7 +33,8 @@ pub(super) struct Shared {
     pub(super) tls: Option<TlsAcceptor>,
     pub(super) stop: CancellationToken,
     pub(super) abort: CancellationToken,
-    pub(super) fresh: Arc<Fresh>,
+    /// Connections that wait for their client, and the spare ones among them.
+    pub(super) waiting: [Arc<Waiting>; 2],
 }
 
 impl Shared {
@@ -67,11 +68,11 @@ impl Shared {
         peer: SocketAddr,
         spare: bool,
         keep: Keep,
-        fresh: Arc<Entry>,
+        entry: Arc<Entry>,
     ) -> Reason {
-        let Some(tls) = &self.tls else { return self.requests(stream, peer, spare, keep, fresh).await };
+        let Some(tls) = &self.tls else { return self.requests(stream, peer, spare, keep, entry).await };
         let handshake = timeout(self.limits.header_timeout, tls.accept(stream));
-        let handshake = fresh.displaced.run_until_cancelled(handshake);
+        let handshake = entry.displaced.run_until_cancelled(handshake);
         match self.stop.run_until_cancelled(handshake).await {
             None => Reason::Stop,
             Some(None) => Reason::Displaced,
@@ -80,22 +81,21 @@ impl Shared {
                 tracing::debug!(%peer, %error, "TLS handshake failed");
                 Reason::Handshake
             }
-            Some(Some(Ok(Ok(stream)))) => self.requests(stream, peer, spare, keep, fresh).await,
+            Some(Some(Ok(Ok(stream)))) => self.requests(stream, peer, spare, keep, entry).await,
         }
     }
 
-    async fn requests<S>(&self, stream: S, peer: SocketAddr, spare: bool, keep: Keep, fresh: Arc<Entry>) -> Reason
+    async fn requests<S>(&self, stream: S, peer: SocketAddr, spare: bool, keep: Keep, entry: Arc<Entry>) -> Reason
     where
         S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
     {
-        let state = State::new();
+        let state = State::new(Arc::clone(&entry));
         let begun = Arc::new(Notify::new());
         let service = Requests {
             app: if spare { self.spare.clone() } else { self.app.clone() },
             peer,
             limits: Arc::clone(&self.limits),
             state: Arc::clone(&state),
-            fresh: Arc::clone(&fresh),
             only_one: spare.then(|| Arc::clone(&begun)),
         };
         let builder = self.builder(spare);
@@ -117,9 +117,9 @@ impl Shared {
                     return Reason::Drain;
                 }
                 () = self.stop.cancelled(), if !matches!(closing, Some((Reason::Stop, _))) => Reason::Stop,
-                () = fresh.displaced.cancelled(), if state.is_fresh() => {
+                () = entry.displaced.cancelled(), if state.is_idle() => {
                     // A request that has just come is answered.
-                    if !state.is_fresh() {
+                    if !state.is_idle() {
                         continue;
                     }
                     state.abandon();
@@ -127,7 +127,6 @@ impl Shared {
                 }
                 () = begun.notified(), if closing.is_none() => Reason::Spare,
                 _ = clock.tick() => {
-                    state.cut_stalled(self.limits.write_timeout);
                     let Some(reason) = overdue(&state, &self.limits, closing) else { continue };
                     if reason != Reason::Idle || closing.is_some() {
                         state.abandon();

@@ -7,13 +7,13 @@
 mod accept;
 mod body;
 mod connection;
-mod fresh;
 mod head;
 mod linger;
 mod service;
 mod socket;
 mod state;
 mod tls;
+mod waiting;
 
 pub use accept::serve;
 pub use body::{BodyTimeout, is_body_timeout};

@@ -2,7 +2,6 @@
 
 use super::Limits;
 use super::body::{Reply, Upload};
-use super::fresh::Entry;
 use super::head::Head;
 use super::state::State;
 use axum::Router;
@@ -27,8 +26,6 @@ pub(super) struct Requests {
     pub(super) peer: SocketAddr,
     pub(super) limits: Arc<Limits>,
     pub(super) state: Arc<State>,
-    /// Left with the first request.
-    pub(super) fresh: Arc<Entry>,
     /// Told when a request has begun, where a connection gets only one.
     pub(super) only_one: Option<Arc<Notify>>,
 }
@@ -40,7 +37,6 @@ impl hyper::service::Service<Request<Incoming>> for Requests {
 
     fn call(&self, request: Request<Incoming>) -> Self::Future {
         let (head, in_flight) = self.state.begin();
-        self.fresh.leave();
         if let Some(only_one) = &self.only_one {
             only_one.notify_one();
         }
@@ -61,7 +57,7 @@ impl hyper::service::Service<Request<Incoming>> for Requests {
                     (response, unfinished.load(Ordering::Acquire))
                 }
             };
-            let mut response = response.map(|body| Reply::new(body, this.state, in_flight, http2));
+            let mut response = response.map(|body| Reply::new(body, in_flight, http2));
             if close && !http2 {
                 response.headers_mut().insert(CONNECTION, HeaderValue::from_static("close"));
             }
@@ -107,16 +103,22 @@ fn too_large(detail: &str, limit: usize) -> Response<Body> {
 }
 
 fn problem(status: StatusCode, word: &str, title: &str, detail: &str, limit: Option<u64>) -> Response<Body> {
+    let id = uuid::Uuid::now_v7().simple().to_string();
+    tracing::info!(request_id = id, status = status.as_u16(), problem = word, "request refused before it was read");
     let problem = Problem {
         kind: format!("{}{word}", Problem::TYPE_PREFIX),
         title: title.to_owned(),
         status: status.as_u16(),
         detail: detail.to_owned(),
         limit,
+        request_id: Some(id.clone()),
         ..Problem::default()
     };
     let mut response = Response::new(Body::from(serde_json::to_vec(&problem).unwrap_or_default()));
     *response.status_mut() = status;
     response.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));
+    if let Ok(id) = HeaderValue::try_from(id) {
+        response.headers_mut().insert("x-request-id", id);
+    }
     response
 }

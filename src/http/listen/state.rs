@@ -1,8 +1,8 @@
 //! What a connection is doing and since when: written by its socket and its requests, judged by its clock.
 
 use super::Limits;
-use super::body::Content;
 use super::head::{Head, HeadScanner, Scan};
+use super::waiting::Entry;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::Duration;
 use tokio::time::Instant;
@@ -50,8 +50,11 @@ impl Reason {
 }
 
 /// State of one connection.
-#[derive(Debug)]
-pub(super) struct State(Mutex<Facts>);
+pub(super) struct State {
+    facts: Mutex<Facts>,
+    /// Listed while the connection waits for its client.
+    entry: Arc<Entry>,
+}
 
 #[derive(Debug)]
 struct Facts {
@@ -60,10 +63,8 @@ struct Facts {
     requests: u64,
     /// Requests whose body is still coming or whose response is still going.
     in_flight: usize,
-    /// Responses that have given a piece to the protocol and were not asked for the next: the client has to read first.
-    unread: usize,
-    /// The bodies of the responses on their way in HTTP/2.
-    replies: Vec<Weak<Mutex<Content>>>,
+    /// Requests at work.
+    open: Vec<Weak<InFlight>>,
     /// Start of the connection, later the end of the last request.
     idle_since: Instant,
     /// First byte of a header that is not complete.
@@ -80,14 +81,13 @@ struct Facts {
 }
 
 impl State {
-    pub(super) fn new() -> Arc<Self> {
+    pub(super) fn new(entry: Arc<Entry>) -> Arc<Self> {
         let now = Instant::now();
-        Arc::new(Self(Mutex::new(Facts {
+        let facts = Mutex::new(Facts {
             http2: false,
             requests: 0,
             in_flight: 0,
-            unread: 0,
-            replies: Vec::new(),
+            open: Vec::new(),
             idle_since: now,
             head_since: None,
             scanner: None,
@@ -95,11 +95,12 @@ impl State {
             blocked_since: None,
             progress: now,
             may_linger: false,
-        })))
+        });
+        Arc::new(Self { facts, entry })
     }
 
     fn facts(&self) -> MutexGuard<'_, Facts> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.facts.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The socket gave bytes; none is the end.
@@ -169,12 +170,16 @@ impl State {
     /// A request begins. Gives its header's scan, if it had one.
     pub(super) fn begin(self: &Arc<Self>) -> (Option<Head>, Arc<InFlight>) {
         let mut facts = self.facts();
+        self.entry.work();
         facts.requests += 1;
         facts.in_flight += 1;
         facts.head_since = None;
         facts.scanner = None;
         facts.progress = Instant::now();
-        (facts.head.take(), Arc::new(InFlight(Arc::clone(self))))
+        let in_flight = Arc::new(InFlight { state: Arc::clone(self), unread_since: Mutex::default() });
+        facts.open.retain(|open| open.strong_count() > 0);
+        facts.open.push(Arc::downgrade(&in_flight));
+        (facts.head.take(), in_flight)
     }
 
     /// A piece of a request body came.
@@ -187,35 +192,6 @@ impl State {
         self.facts().may_linger = false;
     }
 
-    /// A response is asked for its next piece (`false`) or has just given one (`true`).
-    pub(super) fn response_unread(&self, unread: bool) {
-        let mut facts = self.facts();
-        facts.unread = if unread { facts.unread + 1 } else { facts.unread.saturating_sub(1) };
-        facts.progress = Instant::now();
-    }
-
-    /// A response in HTTP/2 begins, whose reader may stall while others go on.
-    pub(super) fn watch(&self, reply: &Arc<Mutex<Content>>) {
-        let mut facts = self.facts();
-        facts.replies.retain(|reply| reply.strong_count() > 0);
-        facts.replies.push(Arc::downgrade(reply));
-    }
-
-    /// Drops the bodies of responses that nobody has read from for so long, with all that they hold.
-    pub(super) fn cut_stalled(&self, limit: Duration) {
-        let replies: Vec<_> = self.facts().replies.iter().filter_map(Weak::upgrade).collect();
-        for reply in replies {
-            let cut = reply.lock().unwrap_or_else(PoisonError::into_inner).cut_if_stalled(limit);
-            // Outside the lock: what a body holds may be much.
-            drop(cut);
-        }
-    }
-
-    /// Whether no request has come yet.
-    pub(super) fn is_fresh(&self) -> bool {
-        self.facts().requests == 0
-    }
-
     /// Whether no request is on its way.
     pub(super) fn is_idle(&self) -> bool {
         self.facts().in_flight == 0
@@ -226,10 +202,13 @@ impl State {
         let now = Instant::now();
         let past = |since: Instant, limit: Duration| now.saturating_duration_since(since) >= limit;
         let facts = self.facts();
-        // In HTTP/2, a stalled stream does not block the socket. One of several is left alone: it costs a buffer.
-        let all_unread = facts.in_flight > 0 && facts.unread >= facts.in_flight;
-        if let Some(since) = facts.blocked_since.or(all_unread.then_some(facts.progress)) {
-            return past(since.max(facts.progress), limits.write_timeout).then_some(Reason::WriteTimeout);
+        // In HTTP/2 a stalled response does not block the socket, and what it holds is free only when the connection is closed; that
+        // others get on says nothing of it. In HTTP/1.1 every byte that goes out is of the one response.
+        let unread = facts.open.iter().filter_map(|open| open.upgrade()?.unread_since());
+        let unread = unread.min().map(|since| if facts.http2 { since } else { since.max(facts.progress) });
+        let blocked = facts.blocked_since.map(|since| since.max(facts.progress));
+        if let Some(since) = blocked.into_iter().chain(unread).min() {
+            return past(since, limits.write_timeout).then_some(Reason::WriteTimeout);
         }
         if facts.in_flight > 0 {
             return None;
@@ -245,13 +224,42 @@ impl State {
 }
 
 /// Held by the two halves of a request: its body and its response.
-#[derive(Debug)]
-pub(super) struct InFlight(Arc<State>);
+pub(super) struct InFlight {
+    state: Arc<State>,
+    /// Since when the response has given a piece to the protocol and was not asked for the next: the client has to read first.
+    unread_since: Mutex<Option<Instant>>,
+}
+
+impl InFlight {
+    fn lock(&self) -> MutexGuard<'_, Option<Instant>> {
+        self.unread_since.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn unread_since(&self) -> Option<Instant> {
+        *self.lock()
+    }
+
+    /// The response is asked for its next piece (`false`) or has just given one (`true`).
+    pub(super) fn unread(&self, unread: bool) {
+        *self.lock() = unread.then(Instant::now);
+        self.state.facts().progress = Instant::now();
+    }
+
+    /// A piece of the request's body came: who still sends need not read.
+    pub(super) fn body_came(&self) {
+        if let Some(since) = &mut *self.lock() {
+            *since = Instant::now();
+        }
+    }
+}
 
 impl Drop for InFlight {
     fn drop(&mut self) {
-        let mut facts = self.0.facts();
+        let mut facts = self.state.facts();
         facts.in_flight -= 1;
         facts.idle_since = Instant::now();
+        if facts.in_flight == 0 {
+            self.state.entry.wait(true);
+        }
     }
 }

@@ -32,6 +32,7 @@ async fn a_header_just_below_the_limit_passes_and_one_above_does_not() {
     let answer = ask(&mut server.connect().await, &request(4097 - fixed)).await;
     assert!(answer.starts_with("HTTP/1.1 431 "), "{answer}");
     assert!(answer.contains("application/problem+json") && answer.contains("\"limit\":4096"), "{answer}");
+    assert!(answer.contains("\r\nx-request-id: ") && answer.contains("\"request_id\":"), "{answer}");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -115,6 +115,32 @@ async fn what_was_begun_with_a_revoked_token_ends() {
 }
 
 #[tokio::test]
+async fn a_token_that_may_read_looks_and_decodes_and_changes_nothing() {
+    const VIEWER: &str = "viewer-has-a-long-secret";
+    let app = TestApp::guarded(&[("anna", ANNA, "")]);
+    let hash: String =
+        <sha2::Sha256 as sha2::Digest>::digest(VIEWER).iter().map(|byte| format!("{byte:02x}")).collect();
+    let entry = format!("[[token]]\nname = \"viewer\"\ntenant = \"anna\"\nscope = \"read\"\nsha256 = \"{hash}\"\n");
+    let file = std::fs::read_to_string(app.tokens_file()).expect("tokens");
+    std::fs::write(app.tokens_file(), format!("{file}{entry}")).expect("tokens");
+    let (anna, viewer) = (app.caller(Some(ANNA)), app.caller(Some(VIEWER)));
+    crate::support::eventually("the token is known", async || {
+        (viewer.get("/v1/sessions").await.status == 200).then_some(())
+    })
+    .await;
+    let capture = Capture::tiny();
+    let session = anna.completed(capture, 3).await;
+    let path = |rest: &str| format!("/v1/sessions/{}{rest}", session.id);
+    viewer.get(&path("/capture.cager")).await.expect(200);
+    let cage = anna.cages(&session.id).await.slice(..12 * session.unknowns.expect("unknowns") as usize);
+    viewer.post(&path("/decode"), "application/octet-stream", cage).await.expect(200);
+    viewer.delete(&path("")).await.problem(403, "forbidden");
+    viewer.post(&path("/frames"), "application/octet-stream", capture.frame(0)).await.problem(403, "forbidden");
+    viewer.create_with(crate::support::form(capture, &serde_json::json!({})), None).await.problem(403, "forbidden");
+    anna.delete(&path("")).await.expect(204);
+}
+
+#[tokio::test]
 async fn request_lines_say_who_did_what_and_how_it_ended() {
     let app = guarded();
     let anna = app.caller(Some(ANNA));

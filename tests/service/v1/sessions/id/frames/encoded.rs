@@ -57,6 +57,21 @@ async fn a_small_body_that_unpacks_to_a_large_one_is_bounded() {
 }
 
 #[tokio::test]
+async fn a_window_that_is_too_large_is_refused() {
+    let app = TestApp::start();
+    let session = app.ready(Capture::tiny()).await;
+    let mut out = zstd::stream::write::Encoder::new(Vec::new(), 1).expect("an encoder");
+    out.set_parameter(zstd::zstd_safe::CParameter::WindowLog(27)).expect("a window");
+    for _ in 0..64 {
+        out.write_all(&vec![7; 1 << 20]).expect("compressed");
+    }
+    let bytes = out.finish().expect("compressed");
+    let post = app.request(Method::POST, &format!("/v1/sessions/{}/frames", session.id));
+    let reply = app.send(post.header("content-type", OCTETS).header("content-encoding", "zstd").body(bytes)).await;
+    reply.problem(400, "bad-request");
+}
+
+#[tokio::test]
 async fn texts_are_compressed_for_who_wants_it_and_numbers_are_not() {
     let app = TestApp::start();
     let session = app.completed(Capture::small(), 3).await;
