@@ -31,3 +31,4 @@ mod speed;
 pub mod store;
 pub mod telemetry;
 pub mod timing;
+mod unread;

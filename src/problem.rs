@@ -60,7 +60,7 @@ kinds! {
     INTERNAL INTERNAL_SERVER_ERROR "internal" "The service failed";
     BUSY SERVICE_UNAVAILABLE "busy" "The service has too much to do";
     STOPPING SERVICE_UNAVAILABLE "stopping" "The service is stopping";
-    STORAGE_FAILED SERVICE_UNAVAILABLE "storage-failed" "The service's disk does not take what is written";
+    STORAGE_FAILED SERVICE_UNAVAILABLE "storage-failed" "The service's disk cannot be read or written";
     STORAGE_FULL INSUFFICIENT_STORAGE "storage-full" "The service's disk is full";
     QUOTA_EXCEEDED INSUFFICIENT_STORAGE "quota-exceeded" "The tenant's storage quota is used up";
 }

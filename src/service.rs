@@ -11,6 +11,7 @@ use crate::session::commit::Committer;
 use crate::session::prepared::Solvers;
 use crate::session::registry::Registry;
 use crate::store::{Disk, Store, StoreError};
+use crate::unread::Unread;
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -36,6 +37,7 @@ pub struct Service {
     pub(crate) committer: Committer,
     pub(crate) registry: Arc<Registry>,
     pub(crate) cage_jobs: CageJobs,
+    pub(crate) unread: Unread,
     pub(crate) designs: Designs,
     pub(crate) cage_maker: CageMaker,
     /// Rest poses and cages of new sessions, and cages asked for, being read at a time: parsing keeps a processor busy.
@@ -127,6 +129,10 @@ impl Service {
             tracing::error!(name = %damaged.name, path = %damaged.path.display(), why = %damaged.why, "damaged, and put in quarantine");
             metrics::counter!("cager_quarantined_total").increment(1);
         }
+        let unread = Unread::default();
+        for left in &opened.unread {
+            unread.add(left.kind, &left.name, None, &format!("{}: {}", left.path.display(), left.why));
+        }
         let engine = Engine::new(config.workers).map_err(StartError::Threads)?;
         let solvers = Solvers::new(opened.store.clone(), &config).map_err(StartError::Threads)?;
         let service = Arc::new(Self {
@@ -137,6 +143,7 @@ impl Service {
             committer: Committer::start(COMMIT_THREADS).map_err(StartError::Threads)?,
             registry: Arc::default(),
             cage_jobs: CageJobs::default(),
+            unread,
             designs: Designs::new(&config, designer).map_err(StartError::Threads)?,
             cage_maker: CageMaker::new(config.max_preparing.max(1)),
             reading: Semaphore::new(READING),
@@ -152,15 +159,21 @@ impl Service {
         });
         let count = opened.sessions.len();
         for meta in opened.sessions {
-            service.resume(meta);
+            service.take_in_session(meta);
         }
         let cage_jobs = opened.cage_jobs.len();
         for meta in opened.cage_jobs {
-            service.resume_cage_job(meta);
+            service.take_in_cage_job(meta);
         }
         service.forget_orphans();
         service.resumed.store(true, Ordering::Release);
-        tracing::info!(sessions = count, cage_jobs, quarantined = opened.quarantined.len(), "sessions resumed");
+        tracing::info!(
+            sessions = count,
+            cage_jobs,
+            quarantined = opened.quarantined.len(),
+            unread = service.unread.summary(),
+            "sessions resumed"
+        );
         tokio::spawn(Arc::clone(&service).sweep(stop.clone()));
         tokio::spawn(Arc::clone(&service).check_logs(stop.clone()));
         let watching = Arc::clone(&service);
@@ -169,10 +182,10 @@ impl Service {
     }
 
     /// Removes rest poses and cages of no session: a crash between storing them and storing their session leaves them. Not where
-    /// something is in quarantine, which may be of use with its rest pose only.
+    /// something could not be read, which may need them, or is in quarantine, which may be of use with its rest pose only.
     fn forget_orphans(&self) {
         let forget = || -> Result<(), StoreError> {
-            if self.store.has_quarantined()? {
+            if !self.unread.is_empty() || self.store.has_quarantined()? {
                 return Ok(());
             }
             for key in self.store.contents()?.iter().filter(|key| !self.registry.uses_content(key)) {

@@ -11,7 +11,8 @@ use crate::session::commit::storage_error;
 use crate::session::create::blocking;
 use crate::session::prepare::read_part;
 use crate::session::registry::Reserved;
-use crate::store::{CageJobMeta, ContentKey, Idempotency, Spool, StoredPart};
+use crate::store::{CageJobMeta, ContentKey, Idempotency, Kind, Spool, StoreError, StoredPart};
+use crate::unread;
 use cager_proto::cage_messages::CageOptions;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -142,20 +143,25 @@ impl Service {
         Some(job)
     }
 
-    /// Goes on with a job found on disk: one that was not over begins anew.
-    pub(crate) fn resume_cage_job(self: &Arc<Self>, meta: CageJobMeta) {
+    /// Goes on with a job found on disk: one that was not over begins anew. One whose outcome cannot be read is known as failed, so that it
+    /// can be deleted, and comes up when this is called again.
+    ///
+    /// # Errors
+    /// What the system says of its files.
+    pub(crate) fn resume_cage_job(self: &Arc<Self>, meta: CageJobMeta) -> Result<(), StoreError> {
         let id = meta.id.clone();
-        let outcome: Option<Outcome> = self.store.cage_job_outcome(&id).unwrap_or_else(|error| {
-            tracing::warn!(job = %id, %error, "the outcome of a cage job is unreadable, so the cage is designed again");
-            None
-        });
-        let phase = match outcome {
-            Some(Outcome::Completed(found)) => Phase::Completed(found),
-            Some(Outcome::Failed(problem)) => Phase::Failed(problem),
-            None => Phase::Queued,
+        let (phase, error) = match self.store.cage_job_outcome(&id) {
+            Ok(Some(Outcome::Completed(found))) => (Phase::Completed(found), None),
+            Ok(Some(Outcome::Failed(problem))) => (Phase::Failed(problem), None),
+            Ok(None) => (Phase::Queued, None),
+            Err(error @ StoreError::Damaged { .. }) => {
+                tracing::warn!(job = %id, %error, "the outcome of a cage job is damaged, so the cage is designed again");
+                (Phase::Queued, None)
+            }
+            Err(error) => (Phase::Failed(unread::problem(Kind::CageJob).problem), Some(error)),
         };
         let unfinished = matches!(phase, Phase::Queued);
-        if !unfinished {
+        if !unfinished && error.is_none() {
             self.store.forget_cage_job_input(&id);
         }
         let job = Arc::new(CageJob::new(meta, phase, self.store.cage_job_bytes(&id)));
@@ -163,6 +169,7 @@ impl Service {
         if unfinished {
             tokio::spawn(Arc::clone(self).run_cage_job(job));
         }
+        error.map_or(Ok(()), Err)
     }
 
     /// Keeps the outcome of a job, then tells those who follow it.
@@ -207,7 +214,9 @@ impl Service {
         let (service, job) = (Arc::clone(self), Arc::clone(job));
         let work = tokio::spawn(async move {
             let (store, id) = (service.store.clone(), job.meta.id.clone());
+            let _unread = service.unread.hold(Kind::CageJob, &id).await;
             blocking(move || store.delete_cage_job(&id)).await?.map_err(|error| storage_error(&error))?;
+            service.unread.forget(Kind::CageJob, &job.meta.id);
             service.cage_jobs.remove(&job.meta.id);
             job.deleted.cancel();
             job.touch();

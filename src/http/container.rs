@@ -6,6 +6,8 @@ use super::ranged::Immutable;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::Phase;
+use crate::session::create::blocking;
+use crate::store::StoreError;
 use axum::extract::State;
 use axum::response::Response;
 use bytes::Bytes;
@@ -35,8 +37,8 @@ pub(crate) async fn get(
         return Err(ApiError::new(problem::NOT_COMPLETED, detail));
     };
     let path = service.store.container_path(&session.meta.id);
-    let opened = crate::session::create::blocking(move || File::open(path)).await?;
-    let file = Mutex::new(opened.map_err(|error| ApiError::internal(&error))?);
+    let opened = blocking(move || File::open(&path).map_err(|error| StoreError::of(&path, "open", error))).await?;
+    let file = Mutex::new(opened.map_err(|error| session.storage_error(&error))?);
     let read = move |range: Range<u64>| -> io::Result<Bytes> {
         let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
         let mut bytes = vec![0; (range.end - range.start) as usize];

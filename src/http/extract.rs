@@ -5,6 +5,7 @@ use crate::cage_job::CageJob;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::Session;
+use crate::store::Kind;
 use axum::extract::rejection::{JsonRejection, QueryRejection};
 use axum::extract::{FromRequestParts, Path, State};
 use axum::middleware::Next;
@@ -45,7 +46,27 @@ impl<S: Sync> FromRequestParts<S> for Caller {
     }
 }
 
-/// The caller's session of this address. Rejects with 404 where there is none, or it is another tenant's.
+/// The caller's session of this address, whatever the state of its files. Rejects with 404 where there is none, or it is another tenant's,
+/// and with 503 where not even that can be read.
+pub(crate) struct Named(pub(crate) Arc<Session>);
+
+impl FromRequestParts<Arc<Service>> for Named {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, service: &Arc<Service>) -> Result<Self, ApiError> {
+        let Caller(tenant) = Caller::from_request_parts(parts, service).await?;
+        let id = id(parts, service, "a session").await?;
+        let read = service.read_again(Kind::Session, &tenant.name, &id).await;
+        service.registry.find(&tenant.name, &id).or_else(|missing| read.and(Err(missing))).map(Self)
+    }
+}
+
+async fn id(parts: &mut Parts, service: &Arc<Service>, what: &str) -> Result<String, ApiError> {
+    let id = Path::<String>::from_request_parts(parts, service).await;
+    id.map(|Path(id)| id).map_err(|_| ApiError::new(problem::NOT_FOUND, format!("the id of {what} is missing")))
+}
+
+/// The caller's session of this address. Rejects as [`Named`], and where its files cannot be read.
 pub(crate) struct Found {
     pub(crate) tenant: Arc<Tenant>,
     pub(crate) session: Arc<Session>,
@@ -56,10 +77,8 @@ impl FromRequestParts<Arc<Service>> for Found {
 
     async fn from_request_parts(parts: &mut Parts, service: &Arc<Service>) -> Result<Self, ApiError> {
         let Caller(tenant) = Caller::from_request_parts(parts, service).await?;
-        let Path(id) = Path::<String>::from_request_parts(parts, service)
-            .await
-            .map_err(|_| ApiError::new(problem::NOT_FOUND, "the id of a session is missing"))?;
-        let session = service.registry.find(&tenant.name, &id)?;
+        let Named(session) = Named::from_request_parts(parts, service).await?;
+        service.read_again(Kind::Session, &tenant.name, &session.meta.id).await?;
         match session.ensure_loaded().await {
             // What can be known of it is that it failed, and why.
             Err(_) if session.has_failed() => {}
@@ -69,7 +88,21 @@ impl FromRequestParts<Arc<Service>> for Found {
     }
 }
 
-/// The caller's cage job of this address. Rejects with 404 where there is none, or it is another tenant's.
+/// The caller's cage job of this address, whatever the state of its files. Rejects as [`Named`].
+pub(crate) struct NamedJob(pub(crate) Arc<CageJob>);
+
+impl FromRequestParts<Arc<Service>> for NamedJob {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, service: &Arc<Service>) -> Result<Self, ApiError> {
+        let Caller(tenant) = Caller::from_request_parts(parts, service).await?;
+        let id = id(parts, service, "a cage design").await?;
+        let read = service.read_again(Kind::CageJob, &tenant.name, &id).await;
+        service.cage_jobs.find(&tenant.name, &id).or_else(|missing| read.and(Err(missing))).map(Self)
+    }
+}
+
+/// The caller's cage job of this address. Rejects as [`NamedJob`], and where its files cannot be read.
 pub(crate) struct FoundJob {
     pub(crate) tenant: Arc<Tenant>,
     pub(crate) job: Arc<CageJob>,
@@ -80,10 +113,8 @@ impl FromRequestParts<Arc<Service>> for FoundJob {
 
     async fn from_request_parts(parts: &mut Parts, service: &Arc<Service>) -> Result<Self, ApiError> {
         let Caller(tenant) = Caller::from_request_parts(parts, service).await?;
-        let Path(id) = Path::<String>::from_request_parts(parts, service)
-            .await
-            .map_err(|_| ApiError::new(problem::NOT_FOUND, "the id of a cage design is missing"))?;
-        let job = service.cage_jobs.find(&tenant.name, &id)?;
+        let NamedJob(job) = NamedJob::from_request_parts(parts, service).await?;
+        service.read_again(Kind::CageJob, &tenant.name, &job.meta.id).await?;
         Ok(Self { tenant, job })
     }
 }

@@ -107,6 +107,7 @@ pub(crate) async fn post(
     };
     let place = service.stream(&tenant)?;
     let facts = prepared(&service, &session).await?;
+    session.settled().await?;
     if rows == Rows::Handles && !facts.reads_handles_only {
         let detail =
             "this session reads every point (handles is all), so handle rows are not enough; post whole frames";

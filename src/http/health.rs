@@ -19,24 +19,27 @@ pub(crate) struct Health {
     version: &'static str,
     /// Seconds since it started.
     uptime_s: f64,
+    /// What an operator should look at although the service is ready: files that cannot be read.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    detail: Option<String>,
 }
 
-fn health(service: &Service) -> Json<Health> {
+fn health(service: &Service, detail: Option<String>) -> Json<Health> {
     let uptime_s = service.started.elapsed().as_secs_f64();
-    Json(Health { status: "ok", version: env!("CARGO_PKG_VERSION"), uptime_s })
+    Json(Health { status: "ok", version: env!("CARGO_PKG_VERSION"), uptime_s, detail })
 }
 
 /// Liveness: the process answers.
 #[utoipa::path(get, path = "/healthz", operation_id = "get_health", tag = "operation", security(()), responses((status = 200, description = "It is", body = Health)))]
 pub(crate) async fn live(State(service): State<Arc<Service>>) -> Json<Health> {
-    health(&service)
+    health(&service, None)
 }
 
 /// Readiness: sessions are resumed and the disk takes writes.
 #[utoipa::path(get, path = "/readyz", operation_id = "get_readiness", tag = "operation", security(()), responses((status = 200, description = "It is", body = Health)))]
 pub(crate) async fn ready(State(service): State<Arc<Service>>) -> Result<Json<Health>, ApiError> {
     service.ready().await?;
-    Ok(health(&service))
+    Ok(health(&service, service.unread.summary()))
 }
 
 /// Metrics in Prometheus' text format.

@@ -1,6 +1,6 @@
 //! `/v1/sessions`: making, listing, looking at, completing and deleting sessions.
 
-use super::extract::{Body, Caller, Found, Query, content_type, idempotency_key};
+use super::extract::{Body, Caller, Found, Named, Query, content_type, idempotency_key};
 use super::frames::{SLOWEST_BYTES_PER_SECOND, too_slow};
 use super::respond::JsonResult;
 use super::{multipart, openapi};
@@ -10,7 +10,7 @@ use crate::session::create::NewSession;
 use axum::Json;
 use axum::extract::{Request, State};
 use axum::response::{IntoResponse, Response};
-use cager_proto::messages::{Complete, Session, SessionList};
+use cager_proto::messages::{Complete, Session, SessionList, SessionState};
 use http::{StatusCode, header};
 use serde::Deserialize;
 use std::sync::Arc;
@@ -75,12 +75,20 @@ pub(crate) async fn list(
     let mut page = service.registry.page(&tenant.name, query.after.as_deref(), PAGE + 1);
     let more = page.len() > PAGE;
     page.truncate(PAGE);
+    let mut sessions = Vec::with_capacity(page.len());
     for session in &page {
+        let loaded = session.ensure_loaded().await;
+        let mut view = session.view();
         // One that cannot be read is listed as failed.
-        let _ = session.ensure_loaded().await;
+        if let Err(error) = loaded.as_ref()
+            && view.state != SessionState::Failed
+        {
+            (view.state, view.problem) = (SessionState::Failed, Some((*error.problem).clone()));
+        }
+        sessions.push(view);
     }
     let next = page.last().filter(|_| more).map(|session| session.meta.id.clone());
-    Ok(Json(SessionList { sessions: page.iter().map(|session| session.view()).collect(), next }))
+    Ok(Json(SessionList { sessions, next }))
 }
 
 /// A session.
@@ -91,10 +99,7 @@ pub(crate) async fn get(Found { session, .. }: Found) -> Json<Session> {
 
 /// Deletes a session with all that belongs to it; what runs for it stops.
 #[utoipa::path(delete, path = "/v1/sessions/{id}", operation_id = "delete_session", tag = "sessions", params(openapi::Id), responses((status = 204, description = "It is gone")))]
-pub(crate) async fn delete(
-    State(service): State<Arc<Service>>,
-    Found { session, .. }: Found,
-) -> Result<StatusCode, ApiError> {
+pub(crate) async fn delete(State(service): State<Arc<Service>>, Named(session): Named) -> Result<StatusCode, ApiError> {
     service.delete(&session).await?;
     Ok(StatusCode::NO_CONTENT)
 }

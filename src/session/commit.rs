@@ -107,7 +107,7 @@ impl Session {
         if solved.is_empty() {
             return;
         }
-        let records: Vec<LogRecord<'_>> = solved
+        let mut records: Vec<LogRecord<'_>> = solved
             .iter()
             .map(|s| LogRecord {
                 frame: s.frame,
@@ -128,7 +128,11 @@ impl Session {
             self.give_up(solved, &ApiError::new(problem::SESSION_FAILED, problem.detail));
             return;
         }
-        let outcome = self.open_log(&mut log).and_then(|log| log.append(&records));
+        let outcome = self.open_log(&mut log).and_then(|log| {
+            // Some were found in the log when it was opened; they are counted already.
+            records.retain(|record| self.frames().entry(record.frame).is_none());
+            log.append(&records)
+        });
         if outcome.is_err() {
             // Whether it can go on is found out by opening it again.
             *log = None;
@@ -136,11 +140,11 @@ impl Session {
         drop(log);
         match outcome {
             Ok(entries) => {
-                let measured = solved.iter().filter(|s| s.digests.full.is_some()).count();
+                let measured = entries.iter().filter(|entry| entry.full_digest.is_some()).count();
                 metrics::counter!("cager_frames_total", "tenant" => self.meta.tenant.clone(), "rows" => "all")
                     .increment(measured as u64);
                 metrics::counter!("cager_frames_total", "tenant" => self.meta.tenant.clone(), "rows" => "handles")
-                    .increment((solved.len() - measured) as u64);
+                    .increment((entries.len() - measured) as u64);
                 for entry in entries {
                     let uploads = self.frames().solved(entry);
                     uploads.iter().for_each(|upload| upload.answer(entry.frame));
@@ -199,6 +203,16 @@ pub(crate) fn storage_error(error: &StoreError) -> ApiError {
             "the service's disk is full; nothing that was answered is lost, so try again when the operator has made room",
         )
         .retry_after(60),
+        StoreError::Io { .. } => {
+            tracing::error!(%error, "a file of the store cannot be read or written");
+            let detail = "the service's disk failed to read or write what this needs; nothing that was answered is lost, so try again when the operator has looked at the disk";
+            ApiError::new(problem::STORAGE_FAILED, detail).retry_after(10)
+        }
+        StoreError::Damaged { .. } => {
+            tracing::error!(%error, "a file of the store is damaged");
+            let detail = "what the service stored for this is damaged; upload it again to a new session, or have the operator restore it from a backup";
+            ApiError::new(problem::SESSION_FAILED, detail)
+        }
         other => ApiError::internal(other),
     }
 }

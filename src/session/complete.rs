@@ -14,7 +14,7 @@ use cager_proto::container;
 use cager_proto::messages::Complete;
 use std::io::{self, BufWriter, Write};
 use std::sync::Arc;
-use std::sync::atomic::Ordering::Relaxed;
+use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
 
 /// Frames read from the log at a time.
 const READ_FRAMES: usize = 64;
@@ -31,6 +31,8 @@ impl Service {
     }
 
     async fn complete_alone(self: &Arc<Self>, session: &Arc<Session>, wish: Complete) -> Result<(), ApiError> {
+        let settling = Arc::clone(session);
+        blocking(move || settling.settle()).await??;
         let frames = wish.frames;
         match session.status().phase {
             Phase::Completed(completion) if completion.frames == frames => return Ok(()),
@@ -50,11 +52,11 @@ impl Service {
         if frames == 0 {
             return Err(ApiError::new(problem::INVALID_OPTIONS, "frames: a capture has at least one frame"));
         }
-        let entries: Vec<LogEntry> = {
+        let (before, entries) = {
             let mut known = session.frames();
             // From here on no frame is answered that the container would lack.
-            match known.seal_at(frames, wish.discard_beyond) {
-                Ok(()) => {}
+            let before = match known.seal_at(frames, wish.discard_beyond) {
+                Ok(before) => before,
                 Err(Unsealed::Missing(missing)) => {
                     let count: u64 = missing.iter().map(|[a, b]| u64::from(b - a)).sum();
                     let detail =
@@ -67,10 +69,10 @@ impl Service {
                     );
                     return Err(ApiError::new(problem::FRAME_CONFLICT, detail).frame(frame));
                 }
-            }
-            known.entries().take_while(|entry| entry.frame < frames).copied().collect()
+            };
+            (before, known.entries().take_while(|entry| entry.frame < frames).copied().collect::<Vec<LogEntry>>())
         };
-        let mut sealed = Sealed { session, kept: false };
+        let mut sealed = Sealed { session, kept: before };
         let prepared = self.solver(session).await?;
         let writing = Arc::clone(session);
         let written = blocking(move || write(&writing, &prepared, &entries, frames)).await?;
@@ -79,8 +81,7 @@ impl Service {
             Phase::Failed(problem) => ApiError::new(problem::SESSION_FAILED, problem.detail),
             _ => error,
         })?;
-        session.frames().discard_from(frames);
-        session.set_phase(Phase::Completed(completion));
+        session.completed(completion);
         sealed.kept = true;
         Ok(())
     }
@@ -94,23 +95,69 @@ struct Sealed<'a> {
 
 impl Drop for Sealed<'_> {
     fn drop(&mut self) {
-        if !self.kept {
+        if !self.kept && !self.session.unsettled.load(Acquire) {
             self.session.frames().unseal();
         }
     }
 }
 
 impl Session {
+    fn completed(&self, completion: Completion) {
+        self.frames().discard_from(completion.frames);
+        self.bytes.fetch_add(completion.container_bytes, Relaxed);
+        self.set_phase(Phase::Completed(completion));
+    }
+
+    /// Finds out what became of a mark of completion whose writing failed, if that is not known. The caller holds `completing`. Blocks.
+    ///
+    /// # Errors
+    /// It still cannot be known.
+    pub(crate) fn settle(&self) -> Result<(), ApiError> {
+        if !self.unsettled.load(Acquire) {
+            return Ok(());
+        }
+        match self.store.completion(&self.meta.id).map_err(|error| self.damaged_or(error))? {
+            Some(completion) => self.completed(completion),
+            None => self.frames().unseal(),
+        }
+        self.unsettled.store(false, Release);
+        Ok(())
+    }
+
+    /// As [`Self::settle`], for who does not complete it.
+    ///
+    /// # Errors
+    /// As [`Self::settle`].
+    pub(crate) async fn settled(self: &Arc<Self>) -> Result<(), ApiError> {
+        if !self.unsettled.load(Acquire) {
+            return Ok(());
+        }
+        let _one = self.completing.lock().await;
+        let session = Arc::clone(self);
+        blocking(move || session.settle()).await?
+    }
+
+    /// Marks the session complete. Where even the failure is not certain, it is unsettled from here on.
+    fn mark(&self, completion: &Completion) -> Result<(), StoreError> {
+        let Err(error) = self.store.complete(&self.meta.id, completion) else { return Ok(()) };
+        // It may be there, durable or not.
+        match self.store.completion(&self.meta.id) {
+            Ok(Some(found)) if found == *completion => Ok(()),
+            Ok(_) => Err(error),
+            Err(_) => {
+                self.unsettled.store(true, Release);
+                Err(error)
+            }
+        }
+    }
+
     fn content(&self) -> Result<Content, ApiError> {
         let content = self.store.content(&self.meta.key).map_err(|error| self.storage_error(&error))?;
         content.ok_or_else(|| self.content_is_gone())
     }
 
     fn content_is_gone(&self) -> ApiError {
-        match self.is_deleted() {
-            true => super::gone(),
-            false => ApiError::internal(&"the rest pose of a session is gone"),
-        }
+        self.content_or(super::gone())
     }
 
     /// Reads the rest cage again, and nothing of the rest pose. Blocks.
@@ -139,8 +186,7 @@ fn write(session: &Session, prepared: &Prepared, entries: &[LogEntry], frames: u
     let mut write = |out: &mut dyn Write| write_frames(session, &encoding, entries, out);
     let written = session.store.write_container(&session.meta.id, &mut write).map_err(stored)?;
     let completion = Completion { frames, container_bytes: written.bytes, container_digest: written.digest };
-    session.store.complete(&session.meta.id, &completion).map_err(stored)?;
-    session.bytes.fetch_add(completion.container_bytes, Relaxed);
+    session.mark(&completion).map_err(stored)?;
     Ok(completion)
 }
 

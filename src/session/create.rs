@@ -4,14 +4,16 @@ use super::cage_source::Uploaded;
 use super::facts::{Facts, Outcome};
 use super::prepare::{self, Choices, Geometry};
 use super::prepared::{Got, Prepared, Wanted};
+use super::resume::Mark;
 use super::upload::{self, FrameJob};
 use super::{LiveLane, Phase, Session, Status};
 use crate::auth::Tenant;
 use crate::idempotency::Repetition;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{Completion, Content, ContentKey, Idempotency, SessionMeta};
+use crate::store::{Content, ContentKey, Idempotency, Kind, SessionMeta};
 use cager_proto::messages::{CacheUse, PreparationSeconds, SessionOptions};
+use http::StatusCode;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
@@ -124,59 +126,9 @@ impl Service {
         match session.facts() {
             // It would be found prepared after a restart as well; this only says it sooner.
             Some(facts) => drop(self.keep_outcome(&session, Outcome::Ready(Box::new(facts)))),
-            None => drop(tokio::spawn(Arc::clone(self).prepare(Arc::clone(&session), choices, geometry))),
+            None => drop(tokio::spawn(Arc::clone(self).prepare(Arc::clone(&session), choices, geometry, Mark::None))),
         }
         Ok(session)
-    }
-
-    /// Goes on with a session found on disk.
-    pub(crate) fn resume(self: &Arc<Self>, meta: SessionMeta) {
-        let id = meta.id.clone();
-        let outcome: Option<Outcome> = self.store.note(&id, OUTCOME).unwrap_or_else(|error| {
-            tracing::warn!(session = %id, %error, "what preparing found is unreadable, so it is done again");
-            None
-        });
-        let completion = self.store.completion(&id).unwrap_or_else(|error| {
-            tracing::warn!(session = %id, %error, "the mark of completion is unreadable, so the session has to be completed again");
-            None
-        });
-        let old = (meta.solver_version != cager_core::SOLVER_VERSION).then(|| {
-            let detail = "the service was upgraded to another version of the computation while this session was open; upload the capture to a new one";
-            ApiError::new(problem::SESSION_FAILED, detail).problem
-        });
-        // A capture that is not all there is written again from the log, to the same bytes, when it is completed again.
-        let whole = |c: &Completion| {
-            let there = std::fs::metadata(self.store.container_path(&id)).map_or(0, |m| m.len());
-            if there != c.container_bytes {
-                tracing::error!(session = %id, there, expected = c.container_bytes, "the container is not whole; complete the session again");
-            }
-            there == c.container_bytes
-        };
-        let completion = completion.filter(whole);
-        let has_log = matches!(outcome, Some(Outcome::Ready(_)));
-        let status = match (outcome, completion) {
-            (Some(Outcome::Ready(facts)), Some(completion)) => {
-                Status { phase: Phase::Completed(completion), facts: Some(*facts) }
-            }
-            // Frames of two versions must not meet in one capture.
-            (_, None) if let Some(problem) = old => Status { phase: Phase::Failed(problem), facts: None },
-            (Some(Outcome::Ready(facts)), None) => Status { phase: Phase::Ready, facts: Some(*facts) },
-            (Some(Outcome::Failed(problem)), _) => Status { phase: Phase::Failed(problem), facts: None },
-            (None, _) => Status { phase: Phase::Preparing, facts: None },
-        };
-        let preparing = matches!(status.phase, Phase::Preparing);
-        let choices = Choices::of(&meta.options);
-        let session = Arc::new(Session::new(meta, self.store.clone(), self.committer.clone(), status, false));
-        let bytes = self.store.session_bytes(&session.meta.id) + self.store.content_bytes(&session.meta.key);
-        session.bytes.store(bytes, Relaxed);
-        session.has_log.store(has_log, Relaxed);
-        self.registry.insert(Arc::clone(&session));
-        if preparing {
-            match choices {
-                Ok(choices) => drop(tokio::spawn(Arc::clone(self).prepare(session, choices, None))),
-                Err(error) => session.set_phase(Phase::Failed(error.problem)),
-            }
-        }
     }
 
     /// Reads rest pose and cage, so that who sends bad ones hears it at once. Rest pose and cage come back where they will be
@@ -202,7 +154,13 @@ impl Service {
         Ok((content, soon.then_some(geometry)))
     }
 
-    async fn prepare(self: Arc<Self>, session: Arc<Session>, choices: Choices, mut geometry: Option<Arc<Geometry>>) {
+    pub(super) async fn prepare(
+        self: Arc<Self>,
+        session: Arc<Session>,
+        choices: Choices,
+        mut geometry: Option<Arc<Geometry>>,
+        mark: Mark,
+    ) {
         let clock = Instant::now();
         let mut again = true;
         let got = loop {
@@ -222,22 +180,19 @@ impl Service {
                 let facts = Facts::new(&prepared, cache, seconds);
                 session.set_status(Status { phase: Phase::Preparing, facts: Some(facts.clone()) });
                 self.keep_outcome(&session, Outcome::Ready(Box::new(facts.clone()))).await;
-                let completion = self.store.completion(&session.meta.id).ok().flatten();
-                let phase = completion.map_or(Phase::Ready, Phase::Completed);
                 // A process may have ended with frames in the log and no outcome on disk. Who hears that the session is ready
                 // finds them all.
                 if session.ensure_loaded().await.is_err() && session.has_failed() {
                     return;
                 }
-                if matches!(phase, Phase::Completed(_)) {
-                    session.frames().seal();
-                }
+                let phase = mark.phase(&mut session.frames());
                 session.set_status(Status { phase, facts: Some(facts) });
             }
             Err(error) => {
+                let error = session.content_or(error);
                 tracing::info!(session = %session.meta.id, detail = %error.problem.detail, "the session cannot be prepared");
                 // What may succeed another time is tried again after a restart.
-                if error.status().is_client_error() {
+                if error.status() == StatusCode::UNPROCESSABLE_ENTITY {
                     self.keep_outcome(&session, Outcome::Failed(error.problem.clone())).await;
                 }
                 session.set_phase(Phase::Failed(error.problem));
@@ -260,7 +215,8 @@ impl Service {
     /// The solver of a session that is ready.
     pub(crate) async fn solver(self: &Arc<Self>, session: &Session) -> Result<Arc<Prepared>, ApiError> {
         let choices = Choices::of(&session.meta.options)?;
-        Ok(self.solvers.get(wanted(session, choices, None)).await?.prepared)
+        let got = self.solvers.get(wanted(session, choices, None)).await;
+        Ok(got.map_err(|error| session.content_or(error))?.prepared)
     }
 
     /// The lane that takes a session's frames to the engine.
@@ -299,6 +255,7 @@ impl Service {
     async fn delete_alone(&self, session: &Arc<Session>) -> Result<(), ApiError> {
         let (store, id, key) = (self.store.clone(), session.meta.id.clone(), session.meta.key);
         let _content = self.registry.content_lock(&key).await;
+        let _unread = self.unread.hold(Kind::Session, &id).await;
         let removed = id.clone();
         session.set_deleting(true);
         let deleted = blocking({
@@ -309,9 +266,10 @@ impl Service {
             .await?
             .map_err(|error| super::commit::storage_error(&error))
             .inspect_err(|_| session.set_deleting(false))?;
-        self.registry.remove(&id);
-        session.mark_deleted();
-        if !self.registry.uses_content(&key) {
+        // It may have been read again since it was looked up.
+        self.registry.remove(&id).iter().chain([session]).for_each(|session| session.mark_deleted());
+        self.unread.forget(Kind::Session, &id);
+        if !self.registry.uses_content(&key) && self.unread.is_empty() {
             let gone = blocking(move || store.remove_content(&key)).await?;
             if let Err(error) = gone {
                 tracing::warn!(session = %id, %error, "the content of a deleted session still takes space");
@@ -326,7 +284,7 @@ fn wanted(session: &Session, choices: Choices, geometry: Option<Arc<Geometry>>) 
 }
 
 /// Name of the note that holds the [`Outcome`].
-const OUTCOME: &str = "outcome";
+pub(super) const OUTCOME: &str = "outcome";
 
 struct GiveUp<'a> {
     service: &'a Service,

@@ -15,6 +15,10 @@ pub(crate) struct Digests {
 }
 
 impl Digests {
+    fn of(entry: &LogEntry) -> Self {
+        Self { handles: entry.handle_digest, full: entry.full_digest }
+    }
+
     /// Whether both can be the same frame.
     pub(crate) fn agree(&self, other: &Self) -> bool {
         self.handles == other.handles
@@ -78,8 +82,7 @@ impl Frames {
     /// Decides about a frame that arrived.
     pub(crate) fn claim(&mut self, frame: u32, digests: Digests, upload: &Arc<Upload>) -> Claim {
         if let Some(entry) = self.solved.get(&frame) {
-            let known = Digests { handles: entry.handle_digest, full: entry.full_digest };
-            return if known.agree(&digests) { Claim::Known } else { Claim::Conflict };
+            return if Digests::of(entry).agree(&digests) { Claim::Known } else { Claim::Conflict };
         }
         if let Some(pending) = self.pending.get_mut(&frame) {
             if !pending.digests.agree(&digests) {
@@ -96,11 +99,11 @@ impl Frames {
     }
 
     /// Takes no new frames from here on, if all of `frames` are there and none is beyond or on its way there. With `discard` those
-    /// that are there already may be beyond.
+    /// that are there already may be beyond. Gives whether none were taken before.
     ///
     /// # Errors
     /// Why that cannot be yet; nothing changed.
-    pub(crate) fn seal_at(&mut self, frames: u32, discard: bool) -> Result<(), Unsealed> {
+    pub(crate) fn seal_at(&mut self, frames: u32, discard: bool) -> Result<bool, Unsealed> {
         let missing = self.missing(Some(frames));
         if !missing.is_empty() {
             return Err(Unsealed::Missing(missing));
@@ -109,10 +112,7 @@ impl Frames {
         let highest = self.highest().filter(|_| !discard);
         match highest.max(on_its_way).filter(|&highest| highest >= frames) {
             Some(highest) => Err(Unsealed::Beyond(highest)),
-            None => {
-                self.sealed = true;
-                Ok(())
-            }
+            None => Ok(std::mem::replace(&mut self.sealed, true)),
         }
     }
 
@@ -135,6 +135,11 @@ impl Frames {
     pub(crate) fn solved(&mut self, entry: LogEntry) -> Vec<Arc<Upload>> {
         self.solved.entry(entry.frame).or_insert(entry);
         self.pending.remove(&entry.frame).map_or_else(Vec::new, |pending| pending.waiting)
+    }
+
+    /// Whether a frame found in the log is the one that uploads wait for, if any do.
+    pub(crate) fn is_awaited(&self, entry: &LogEntry) -> bool {
+        self.pending.get(&entry.frame).is_none_or(|pending| pending.digests.agree(&Digests::of(entry)))
     }
 
     /// Gives up a frame that could not be solved or written; returns the uploads that wait for it.
@@ -267,13 +272,14 @@ mod tests {
         assert_eq!(frames.seal_at(3, false), Err(Unsealed::Missing(vec![[1, 2]])), "it is not on disk yet");
         frames.solved(entry(1));
         assert_eq!(frames.seal_at(2, false), Err(Unsealed::Beyond(2)));
-        assert_eq!(frames.seal_at(2, true), Ok(()));
+        assert_eq!(frames.seal_at(2, true), Ok(false));
         frames.unseal();
         assert_eq!(frames.claim(3, same, &upload), Claim::Solve);
         assert_eq!(frames.seal_at(3, false), Err(Unsealed::Beyond(3)), "its record will be sent");
         assert_eq!(frames.seal_at(3, true), Err(Unsealed::Beyond(3)), "its record will be sent");
         frames.gave_up(3);
-        assert_eq!(frames.seal_at(3, false), Ok(()));
+        assert_eq!(frames.seal_at(3, false), Ok(false));
+        assert_eq!(frames.seal_at(3, false), Ok(true));
         assert_eq!(frames.claim(3, same, &upload), Claim::Sealed);
         assert_eq!(frames.claim(2, same, &upload), Claim::Known);
         frames.unseal();

@@ -10,6 +10,7 @@ pub(crate) mod places;
 pub(crate) mod prepare;
 pub(crate) mod prepared;
 pub(crate) mod registry;
+mod resume;
 pub(crate) mod retention;
 pub(crate) mod upload;
 
@@ -50,6 +51,8 @@ pub(crate) struct Session {
     /// Held while the container is written, so that it is written once.
     pub(crate) completing: tokio::sync::Mutex<()>,
     version: watch::Sender<u64>,
+    /// Whether it is not known what became of its mark of completion; it takes no new frames until then.
+    unsettled: AtomicBool,
     /// Its files may be on their way to the trash.
     deleting: AtomicBool,
     deleted: CancellationToken,
@@ -120,6 +123,7 @@ impl Session {
             lane: Mutex::default(),
             completing: tokio::sync::Mutex::new(()),
             version: watch::Sender::new(0),
+            unsettled: AtomicBool::new(false),
             deleting: AtomicBool::new(false),
             deleted: CancellationToken::new(),
         }
@@ -252,7 +256,10 @@ impl Session {
         let mut frames = self.frames();
         let new: Vec<LogEntry> = entries.into_iter().filter(|e| frames.entry(e.frame).is_none()).collect();
         for entry in new {
-            frames.solved(entry).iter().for_each(|upload| upload.answer(entry.frame));
+            let same = frames.is_awaited(&entry);
+            for upload in frames.solved(entry) {
+                if same { upload.answer(entry.frame) } else { upload.fail(upload::conflict(entry.frame)) }
+            }
         }
         self.loaded.store(true, Ordering::Release);
         drop(frames);
@@ -332,6 +339,11 @@ impl Session {
 
     /// Writes what the disk may have lost of the log again, if it takes it now. Blocks.
     pub(crate) fn mend(&self) {
+        if let Ok(_one) = self.completing.try_lock()
+            && let Err(error) = self.settle()
+        {
+            tracing::warn!(session = %self.meta.id, detail = %error.problem.detail, "what became of its completion is not known yet");
+        }
         if self.has_failed() || !self.store.log_is_doubtful(&self.meta.id) {
             return;
         }
@@ -419,6 +431,17 @@ impl Session {
             warnings: facts.map_or_else(Vec::new, |f| f.warnings.clone()),
             problem,
         }
+    }
+}
+
+impl Session {
+    /// What a client hears of an error of preparing: that the session was deleted where it was, and else that its content is gone.
+    pub(crate) fn content_or(&self, error: ApiError) -> ApiError {
+        if error.problem.word() != problem::SESSION_DELETED.word || self.is_deleted() {
+            return error;
+        }
+        let detail = "the rest pose and cage of this session are missing on the service's disk; upload the same files as a new session, or have the operator restore them from a backup";
+        ApiError::new(problem::SESSION_FAILED, detail)
     }
 }
 

@@ -78,13 +78,13 @@ impl Registry {
         inner.sessions.insert(meta.id.clone(), session);
     }
 
-    pub(crate) fn remove(&self, id: &str) {
+    pub(crate) fn remove(&self, id: &str) -> Option<Arc<Session>> {
         let mut inner = super::lock(&self.inner);
-        if let Some(session) = inner.sessions.remove(id)
-            && let Some(idempotency) = &session.meta.idempotency
-        {
+        let session = inner.sessions.remove(id)?;
+        if let Some(idempotency) = &session.meta.idempotency {
             inner.requests.forget(&session.meta.tenant, idempotency);
         }
+        Some(session)
     }
 
     /// A tenant's session; another tenant's is not there.

@@ -91,6 +91,7 @@ impl Service {
 
     /// One round of [`Self::sweep`].
     pub(crate) async fn sweep_once(self: &Arc<Self>) {
+        self.read_all_again().await;
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_millis() as u64;
         let expired = |tenant: &str, created_ms: u64| {
             let most_s = self.access.tenant(tenant).limits.max_age_s;

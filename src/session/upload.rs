@@ -254,11 +254,8 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
                 job.fail(ApiError::new(problem::SESSION_COMPLETED, detail).frame(frame));
             }
             Claim::Conflict => {
-                let frame = job.frame;
-                let detail = format!(
-                    "frame {frame} was posted before with other content; what was posted first stays, so delete the session to start over"
-                );
-                job.fail(ApiError::new(problem::FRAME_CONFLICT, detail).frame(frame));
+                let error = conflict(job.frame);
+                job.fail(error);
             }
         }
     }
@@ -336,6 +333,14 @@ pub(crate) fn predecessor_missing(frame: u32) -> ApiError {
         "frame {frame} depends on frame {before} (the regularizer is temporal), which is not solved yet; post frames in order, frame {before} first"
     );
     ApiError::new(problem::FRAMES_MISSING, detail).frame(frame).missing(vec![[before, frame]])
+}
+
+/// What a client hears whose frame is there already with other content.
+pub(crate) fn conflict(frame: u32) -> ApiError {
+    let detail = format!(
+        "frame {frame} was posted before with other content; what was posted first stays, so delete the session to start over"
+    );
+    ApiError::new(problem::FRAME_CONFLICT, detail).frame(frame)
 }
 
 fn solve_alike(

@@ -1,13 +1,14 @@
 //! Cage jobs: what a cage is to be designed from, and the cage that came of it.
 
 use super::files::Files;
+use super::found::{Kind, Stored};
 use super::names::check_id;
-use super::sessions::find_in;
-use super::{ContentKey, Idempotency, Quarantined, Spool, Store, StoreError, StoredFile, is_session_id, meta};
+use super::{ContentKey, Idempotency, Spool, Store, StoreError, StoredFile, is_session_id, meta};
 use cager_proto::cage_messages::CageOptions;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::io;
+use std::path::PathBuf;
 
 /// What is known of a cage job from its creation on.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -43,6 +44,19 @@ pub struct StoredPart {
     pub bytes: u64,
     /// Its digest, BLAKE3, hexadecimal.
     pub blake3: String,
+}
+
+impl Stored for CageJobMeta {
+    const KIND: Kind = Kind::CageJob;
+    const FILE: &str = META;
+
+    fn id(&self) -> &str {
+        &self.id
+    }
+
+    fn all(files: &Files) -> PathBuf {
+        files.cages()
+    }
 }
 
 const META: &str = "job.json";
@@ -229,9 +243,4 @@ impl Store {
         }
         Ok(found)
     }
-}
-
-/// The jobs, and those set aside.
-pub(super) fn find(files: &Files) -> Result<(Vec<CageJobMeta>, Vec<Quarantined>), StoreError> {
-    find_in(files, &files.cages(), META, "cage job", |meta: &CageJobMeta| &meta.id)
 }

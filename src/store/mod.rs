@@ -28,6 +28,7 @@ mod error;
 #[doc(hidden)]
 pub mod faults;
 mod files;
+mod found;
 pub mod log;
 mod meta;
 mod names;
@@ -43,6 +44,7 @@ pub use cage_jobs::{CageJobMeta, StoredPart};
 pub use content::{CageFile, Content, MatrixFile};
 pub use disk::{Disk, LocalDisk};
 pub use error::StoreError;
+pub use found::{Kind, Unread};
 pub use log::{FrameLog, LogEntry, LogReader, LogRecord};
 pub use names::{ContentKey, is_session_id};
 pub use sessions::{Completion, Container, Idempotency, SessionMeta};
@@ -84,6 +86,8 @@ pub struct Opened {
     pub cage_jobs: Vec<CageJobMeta>,
     /// Sessions and cage jobs that are damaged and were moved out of the way.
     pub quarantined: Vec<Quarantined>,
+    /// Sessions and cage jobs that could not be read, and lie where they were.
+    pub unread: Vec<Unread>,
 }
 
 /// Something damaged.
@@ -99,7 +103,7 @@ pub struct Quarantined {
 
 impl Store {
     /// Opens the folder `root`, made where it is missing, for this process alone. Finishes interrupted deletions, removes
-    /// temporaries, and moves sessions with damaged metadata to `quarantine/`.
+    /// temporaries, and moves sessions with damaged metadata to `quarantine/`. What cannot be read stays where it is.
     ///
     /// # Errors
     /// [`StoreError::Locked`] where another process has it; else what the system says of the folder itself. Damaged sessions
@@ -131,14 +135,16 @@ impl Store {
                 tracing::warn!(%error, "something deleted still takes space");
             }
         }
-        let (mut sessions, mut quarantined) = sessions::find(&files)?;
-        let (mut cage_jobs, damaged) = cage_jobs::find(&files)?;
+        let found::Found { metas: mut sessions, mut quarantined, mut unread } = found::find::<SessionMeta>(&files)?;
+        let found::Found { metas: mut cage_jobs, quarantined: damaged, unread: more } =
+            found::find::<CageJobMeta>(&files)?;
         quarantined.extend(damaged);
+        unread.extend(more);
         sessions.sort_by(|a, b| (a.created_ms, &a.id).cmp(&(b.created_ms, &b.id)));
         cage_jobs.sort_by(|a, b| (a.created_ms, &a.id).cmp(&(b.created_ms, &b.id)));
         quarantined.sort_by(|a, b| a.name.cmp(&b.name));
         let inner = Inner { files, lock: Arc::new(lock), logs: Arc::default(), publishing: Mutex::new(()) };
-        Ok(Opened { store: Self { inner: Arc::new(inner) }, sessions, cage_jobs, quarantined })
+        Ok(Opened { store: Self { inner: Arc::new(inner) }, sessions, cage_jobs, quarantined, unread })
     }
 
     fn files(&self) -> &Files {

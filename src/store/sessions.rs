@@ -2,13 +2,14 @@
 
 use super::disk::DiskFile;
 use super::files::Files;
+use super::found::{Kind, Stored};
 use super::names::check_id;
-use super::{ContentKey, Quarantined, Store, StoreError, is_session_id, meta};
+use super::{ContentKey, Store, StoreError, is_session_id, meta};
 use cager_proto::messages::SessionOptions;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -62,6 +63,19 @@ pub struct Container {
     pub bytes: u64,
     /// Its digest, BLAKE3, hexadecimal.
     pub digest: String,
+}
+
+impl Stored for SessionMeta {
+    const KIND: Kind = Kind::Session;
+    const FILE: &str = META;
+
+    fn id(&self) -> &str {
+        &self.id
+    }
+
+    fn all(files: &Files) -> PathBuf {
+        files.sessions()
+    }
 }
 
 const META: &str = "session.json";
@@ -141,7 +155,7 @@ impl Store {
     /// The session's mark of completion; None where it has none. What this gives is durable.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`], [`StoreError::BadId`].
+    /// [`StoreError::Damaged`], [`StoreError::BadId`], or what the system says.
     pub fn completion(&self, id: &str) -> Result<Option<Completion>, StoreError> {
         check_id(id)?;
         let folder = self.files().session(id);
@@ -155,6 +169,19 @@ impl Store {
             }
         }
         Ok(found)
+    }
+
+    /// Length of the session's container; 0 where there is none.
+    ///
+    /// # Errors
+    /// [`StoreError::BadId`], or what the system says.
+    pub fn container_bytes(&self, id: &str) -> Result<u64, StoreError> {
+        check_id(id)?;
+        let path = self.container_path(id);
+        match self.files().disk.open(&path).and_then(|file| file.length()) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(0),
+            length => length.map_err(|e| StoreError::of(&path, "read", e)),
+        }
     }
 
     /// Keeps a note of what was found out about the session, replacing an earlier one of that name: whole or not at all, durable
@@ -190,47 +217,6 @@ impl Store {
         }
         self.files().disk.list(&self.files().session(id)).map_or(0, |all| all.iter().map(|e| e.bytes).sum())
     }
-}
-
-/// The sessions, and those set aside.
-pub(super) fn find(files: &Files) -> Result<(Vec<SessionMeta>, Vec<Quarantined>), StoreError> {
-    find_in(files, &files.sessions(), META, "session", |meta: &SessionMeta| &meta.id)
-}
-
-/// What lies in the folders of `place` by its metadata, a file of this `name` in each, and those folders that were set aside.
-pub(super) fn find_in<M: DeserializeOwned>(
-    files: &Files,
-    place: &Path,
-    name: &str,
-    kind: &str,
-    id: impl Fn(&M) -> &str,
-) -> Result<(Vec<M>, Vec<Quarantined>), StoreError> {
-    let (mut found, mut quarantined) = (Vec::new(), Vec::new());
-    for entry in files.list(place)? {
-        let folder = place.join(&entry.name);
-        let own_name = entry.name.to_string_lossy().into_owned();
-        let meta = if entry.is_dir && is_session_id(&own_name) {
-            meta::read::<M>(files, &folder.join(name), kind)
-        } else {
-            Err(StoreError::damaged(&folder, format!("it is not a {kind}'s folder")))
-        };
-        let error = match meta {
-            Ok(Some(meta)) if id(&meta) == own_name => {
-                found.push(meta);
-                continue;
-            }
-            Ok(Some(meta)) => StoreError::damaged(&folder, format!("its metadata is of the {kind} {}", id(&meta))),
-            Ok(None) => StoreError::damaged(&folder, format!("{name} is missing")),
-            Err(error) => error,
-        };
-        tracing::warn!(%error, kind, id = %own_name, "something stored is left out");
-        let why = error.to_string();
-        // What could not be read may be readable the next time, so it stays where it is.
-        let aside =
-            if matches!(error, StoreError::Damaged { .. }) { files.set_aside(&folder, &why).ok() } else { None };
-        quarantined.push(aside.unwrap_or(Quarantined { name: own_name, path: folder, why }));
-    }
-    Ok((found, quarantined))
 }
 
 /// Writes a file and computes its digest on the way.

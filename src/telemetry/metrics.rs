@@ -1,6 +1,7 @@
 //! Metrics for operators, in Prometheus' format. `docs/OPERATIONS.md` lists them.
 
 use crate::service::Service;
+use crate::store::Kind;
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
 use std::collections::BTreeMap;
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -41,6 +42,9 @@ pub(crate) fn observe(service: &Service) {
     metrics::gauge!("cager_memory_bytes", "use" => "designs").set(service.designs.bytes() as f64);
     metrics::gauge!("cager_memory_bytes", "use" => "frames").set(service.frame_memory.used() as f64);
     metrics::gauge!("cager_memory_bytes", "use" => "uploads").set(service.upload_memory.used() as f64);
+    for (kind, what) in [(Kind::Session, "sessions"), (Kind::CageJob, "cages")] {
+        metrics::gauge!("cager_unread", "what" => what).set(service.unread.count(kind) as f64);
+    }
     metrics::gauge!("cager_disk_free_bytes").set(service.store.free_bytes() as f64);
     metrics::gauge!("cager_uptime_seconds").set(service.started.elapsed().as_secs_f64());
     // A tenant whose last session is gone has none, rather than as many as before.
@@ -63,6 +67,7 @@ fn describe() {
     describe_counter!("cager_sessions_created_total", "Sessions made, by tenant");
     describe_counter!("cager_sessions_expired_total", "Sessions deleted because of their age");
     describe_counter!("cager_quarantined_total", "Damaged things put aside");
+    describe_gauge!("cager_unread", "Sessions and cage designs whose files cannot be read, left where they are");
     describe_counter!("cager_rejections_total", "Requests turned away, by reason");
     describe_counter!("cager_requests_total", "Requests, by status class");
     describe_counter!("cager_connections_total", "Connections accepted");

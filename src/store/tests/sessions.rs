@@ -45,7 +45,9 @@ fn a_session_that_cannot_be_read_now_is_left_where_it_is() {
     given.open().store.create_session(&meta("a")).unwrap();
     given.disk.fail(Some(Op::Read), 2, Fault::Error(EIO));
     let opened = given.open();
-    assert_eq!((opened.sessions.len(), opened.quarantined.len()), (0, 1));
+    assert_eq!((opened.sessions.len(), opened.quarantined.len(), opened.unread.len()), (0, 0, 1));
+    let left = &opened.unread[0];
+    assert!(left.path.ends_with("sessions/a") && left.path.exists() && left.why.contains("session.json"), "{left:?}");
     drop(opened);
     assert_eq!(given.open().sessions, [meta("a")]);
 }

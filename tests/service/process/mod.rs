@@ -4,3 +4,4 @@ mod overload;
 mod problems;
 mod restart;
 mod stop;
+mod unread;

@@ -1,0 +1,126 @@
+//! Going on with sessions found on disk.
+
+use super::create::OUTCOME;
+use super::facts::Outcome;
+use super::frames::Frames;
+use super::prepare::Choices;
+use super::{Phase, Session, Status};
+use crate::problem::{self, ApiError};
+use crate::service::Service;
+use crate::store::{Completion, Kind, SessionMeta, Store, StoreError};
+use crate::unread;
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
+
+/// What the mark of completion says.
+pub(super) enum Mark {
+    /// The session was not completed.
+    None,
+    /// It was, and its container is there.
+    Whole(Completion),
+    /// It was, and mark or container are damaged: it is written again from the log, to the same bytes, when it is completed again.
+    Damaged,
+}
+
+impl Mark {
+    fn read(store: &Store, id: &str) -> Result<Self, StoreError> {
+        let completion = match store.completion(id) {
+            Ok(None) => return Ok(Self::None),
+            Ok(Some(completion)) => completion,
+            Err(error @ StoreError::Damaged { .. }) => {
+                tracing::error!(session = %id, %error, "the mark of completion is damaged; complete the session again");
+                return Ok(Self::Damaged);
+            }
+            Err(error) => return Err(error),
+        };
+        let (there, expected) = (store.container_bytes(id)?, completion.container_bytes);
+        if there != expected {
+            tracing::error!(session = %id, there, expected, "the container is not whole; complete the session again");
+            return Ok(Self::Damaged);
+        }
+        Ok(Self::Whole(completion))
+    }
+
+    /// Where a prepared session stands, with this in its frames: one that was completed takes no new ones.
+    pub(super) fn phase(self, frames: &mut Frames) -> Phase {
+        match self {
+            Self::None => Phase::Ready,
+            Self::Damaged => {
+                frames.seal();
+                Phase::Ready
+            }
+            Self::Whole(completion) => {
+                frames.seal();
+                frames.discard_from(completion.frames);
+                Phase::Completed(completion)
+            }
+        }
+    }
+}
+
+impl Service {
+    /// Goes on with a session found on disk. One whose files cannot be read is known as failed, so that it can be deleted, and comes up
+    /// when this is called again.
+    ///
+    /// # Errors
+    /// What the system says of its files.
+    pub(crate) fn resume(self: &Arc<Self>, meta: SessionMeta) -> Result<(), StoreError> {
+        let outcome = match self.store.note(&meta.id, OUTCOME) {
+            Err(error @ StoreError::Damaged { .. }) => {
+                tracing::warn!(session = %meta.id, %error, "what preparing found is damaged, so it is done again");
+                Ok(None)
+            }
+            outcome => outcome,
+        };
+        match outcome.and_then(|outcome| Ok((outcome, Mark::read(&self.store, &meta.id)?))) {
+            Ok((outcome, mark)) => {
+                self.resume_with(meta, outcome, mark);
+                Ok(())
+            }
+            Err(error) => {
+                let problem = unread::problem(Kind::Session).problem;
+                self.registry.insert(self.found(meta, Status { phase: Phase::Failed(problem), facts: None }));
+                Err(error)
+            }
+        }
+    }
+
+    fn resume_with(self: &Arc<Self>, meta: SessionMeta, outcome: Option<Outcome>, mark: Mark) {
+        let old = meta.solver_version != cager_core::SOLVER_VERSION && !matches!(mark, Mark::Whole(_));
+        let failed = |problem| Status { phase: Phase::Failed(problem), facts: None };
+        let status = match outcome {
+            // Frames of two versions must not meet in one capture.
+            _ if old => {
+                let detail = "the service was upgraded to another version of the computation while this session was open; upload the capture to a new one";
+                failed(ApiError::new(problem::SESSION_FAILED, detail).problem)
+            }
+            Some(Outcome::Ready(facts)) => Status { phase: Phase::Ready, facts: Some(*facts) },
+            // Earlier versions kept that the rest pose was missing; it may be there again.
+            Some(Outcome::Failed(problem)) if problem.word() != problem::SESSION_DELETED.word => failed(problem),
+            Some(Outcome::Failed(_)) | None => match Choices::of(&meta.options) {
+                Ok(choices) => {
+                    let session = self.found(meta, Status { phase: Phase::Preparing, facts: None });
+                    self.registry.insert(Arc::clone(&session));
+                    tokio::spawn(Arc::clone(self).prepare(session, choices, None, mark));
+                    return;
+                }
+                Err(error) => failed(error.problem),
+            },
+        };
+        let ready = status.facts.is_some();
+        let session = self.found(meta, status);
+        if ready {
+            session.has_log.store(true, Relaxed);
+            let phase = mark.phase(&mut session.frames());
+            session.set_phase(phase);
+        }
+        self.registry.insert(session);
+    }
+
+    fn found(&self, meta: SessionMeta, status: Status) -> Arc<Session> {
+        let session = Session::new(meta, self.store.clone(), self.committer.clone(), status, false);
+        let bytes = self.store.session_bytes(&session.meta.id) + self.store.content_bytes(&session.meta.key);
+        session.bytes.store(bytes, Relaxed);
+        Arc::new(session)
+    }
+}

@@ -1,0 +1,143 @@
+//! Sessions and cage jobs whose files could not be read: left where they are, counted, and read again until they can be.
+
+use crate::problem::{self, ApiError};
+use crate::service::Service;
+use crate::session::create::blocking;
+use crate::session::lock;
+use crate::store::{CageJobMeta, Kind, SessionMeta, StoreError};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex};
+use tokio::sync::MutexGuard;
+
+/// What could not be read.
+#[derive(Default)]
+pub(crate) struct Unread {
+    /// With the tenant, where that is known.
+    known: Mutex<BTreeMap<(Kind, String), Option<String>>>,
+    /// Held while one is read again or deleted.
+    reading: tokio::sync::Mutex<()>,
+}
+
+impl Unread {
+    /// Lists one more; the log has it once.
+    pub(crate) fn add(&self, kind: Kind, id: &str, tenant: Option<&str>, why: &str) {
+        let before = lock(&self.known).insert((kind, id.to_owned()), tenant.map(str::to_owned));
+        if before.is_none() {
+            tracing::error!(kind = kind.name(), id, why, "cannot be read, and is left where it is");
+        }
+    }
+
+    pub(crate) fn forget(&self, kind: Kind, id: &str) {
+        lock(&self.known).remove(&(kind, id.to_owned()));
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        lock(&self.known).is_empty()
+    }
+
+    pub(crate) fn count(&self, kind: Kind) -> usize {
+        lock(&self.known).keys().filter(|(of, _)| *of == kind).count()
+    }
+
+    /// Keeps one from being read again meanwhile.
+    pub(crate) async fn hold(&self, kind: Kind, id: &str) -> Option<MutexGuard<'_, ()>> {
+        self.owner(kind, id)?;
+        Some(self.reading.lock().await)
+    }
+
+    /// The tenant of one that is listed, where that is known.
+    fn owner(&self, kind: Kind, id: &str) -> Option<Option<String>> {
+        lock(&self.known).get(&(kind, id.to_owned())).cloned()
+    }
+
+    /// What an operator should know; none where all could be read.
+    pub(crate) fn summary(&self) -> Option<String> {
+        let [sessions, jobs] = [Kind::Session, Kind::CageJob].map(|kind| self.count(kind));
+        (sessions + jobs > 0).then(|| {
+            format!(
+                "{sessions} sessions and {jobs} cage designs cannot be read and are left where they are; the log has their paths, and they are served when they can be read"
+            )
+        })
+    }
+}
+
+/// What a client hears of one.
+pub(crate) fn problem(kind: Kind) -> ApiError {
+    let kind = kind.name();
+    let detail = format!(
+        "the files of this {kind} cannot be read now; nothing of them was removed, so try again when the operator has looked at the disk"
+    );
+    ApiError::new(problem::STORAGE_FAILED, detail).retry_after(10)
+}
+
+impl Service {
+    /// Takes in a session found on disk.
+    pub(crate) fn take_in_session(self: &Arc<Self>, meta: SessionMeta) {
+        let (id, tenant) = (meta.id.clone(), meta.tenant.clone());
+        self.taken_in(Kind::Session, &id, &tenant, self.resume(meta));
+    }
+
+    /// Takes in a cage job found on disk.
+    pub(crate) fn take_in_cage_job(self: &Arc<Self>, meta: CageJobMeta) {
+        let (id, tenant) = (meta.id.clone(), meta.tenant.clone());
+        self.taken_in(Kind::CageJob, &id, &tenant, self.resume_cage_job(meta));
+    }
+
+    fn taken_in(&self, kind: Kind, id: &str, tenant: &str, outcome: Result<(), StoreError>) {
+        match outcome {
+            Ok(()) => self.unread.forget(kind, id),
+            Err(error) => self.unread.add(kind, id, Some(tenant), &error.to_string()),
+        }
+    }
+
+    /// Reads one again if it could not be read before and may be the tenant's.
+    ///
+    /// # Errors
+    /// It still cannot be read.
+    pub(crate) async fn read_again(self: &Arc<Self>, kind: Kind, tenant: &str, id: &str) -> Result<(), ApiError> {
+        match self.unread.owner(kind, id) {
+            Some(owner) if owner.as_deref().is_none_or(|owner| owner == tenant) => {
+                self.read_now(kind, id.to_owned()).await
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Reads all again that could not be read before.
+    pub(crate) async fn read_all_again(self: &Arc<Self>) {
+        let all: Vec<(Kind, String)> = lock(&self.unread.known).keys().cloned().collect();
+        for (kind, id) in all {
+            // The log has the reason since it was met.
+            let _ = self.read_now(kind, id).await;
+        }
+    }
+
+    async fn read_now(self: &Arc<Self>, kind: Kind, id: String) -> Result<(), ApiError> {
+        let service = Arc::clone(self);
+        blocking(move || {
+            let _one = service.unread.reading.blocking_lock();
+            if service.unread.owner(kind, &id).is_none() {
+                return Ok(());
+            }
+            let found = match kind {
+                Kind::Session => {
+                    service.store.find_again(&id).map(|meta| meta.map(|meta| service.take_in_session(meta)))
+                }
+                Kind::CageJob => {
+                    service.store.find_again(&id).map(|meta| meta.map(|meta| service.take_in_cage_job(meta)))
+                }
+            };
+            if matches!(found, Ok(None)) {
+                service.unread.forget(kind, &id);
+            }
+            match service.unread.owner(kind, &id) {
+                Some(_) => Err(problem(kind)),
+                None => {
+                    tracing::info!(kind = kind.name(), id, gone = matches!(found, Ok(None)), "was read again");
+                    Ok(())
+                }
+            }
+        })
+        .await?
+    }
+}
