@@ -9,7 +9,7 @@ BLENDER := target/blender/bin/python
 
 LINT := target/lint-deploy
 
-.PHONY: help demo test blender soak lint lint-deploy doc bench paper cages openapi schemathesis fuzz audit clean
+.PHONY: help demo test proxies blender soak lint lint-deploy doc bench paper cages openapi schemathesis fuzz audit clean
 
 help: ## list these commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
@@ -24,6 +24,9 @@ test: ## run every test
 	else \
 		$(CARGO) test --workspace --locked --lib --bins --tests; \
 	fi
+
+proxies: ## uploads through nginx, HAProxy and Caddy as docs/OPERATIONS.md has them; those that are not installed are left out
+	CAGER_PROXY_UPLOADS=30 $(CARGO) test --locked --test service proxies -- --nocapture --test-threads 1
 
 blender: $(BLENDER) ## the round trip through Blender itself; installs bpy, which needs Python 3.11
 	CAGER_BLENDER_PYTHON=$(abspath $(BLENDER)) $(CARGO) test --locked --test cli blender -- --nocapture

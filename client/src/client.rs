@@ -35,6 +35,8 @@ struct Shared {
     http: OnceCell<reqwest::Client>,
     /// Whether the service has ever answered.
     reached: AtomicBool,
+    /// Whether something in between was found to carry one direction at a time.
+    one_way: AtomicBool,
 }
 
 #[derive(Clone)]
@@ -85,12 +87,22 @@ impl Client {
     }
 
     fn assemble(address: Address, token: Token, options: ClientOptions) -> Self {
-        let (http, reached) = (OnceCell::new(), AtomicBool::new(false));
-        Self { shared: Arc::new(Shared { address, token, options, http, reached }) }
+        let (http, reached, one_way) = (OnceCell::new(), AtomicBool::new(false), AtomicBool::new(false));
+        Self { shared: Arc::new(Shared { address, token, options, http, reached, one_way }) }
     }
 
     pub(crate) fn options(&self) -> &ClientOptions {
         &self.shared.options
+    }
+
+    /// Whether connections carry both directions at once, as far as is known.
+    pub(crate) fn is_live(&self) -> bool {
+        !self.shared.one_way.load(Ordering::Relaxed)
+    }
+
+    /// From here on answers begin when the whole request has arrived.
+    pub(crate) fn give_up_live(&self) {
+        self.shared.one_way.store(true, Ordering::Relaxed);
     }
 
     pub(crate) fn backoff(&self) -> Backoff {
@@ -151,7 +163,11 @@ impl Client {
 
     /// Sends a request whose body adds its bytes to `sent`, and passes a success on.
     pub(crate) async fn send_counted(&self, request: RequestBuilder, sent: &AtomicU64) -> Result<Response, Failure> {
-        let answer = self.while_moving(sent, request.send()).await?;
+        self.accept(self.while_moving(sent, request.send()).await?).await
+    }
+
+    /// Passes a success on.
+    pub(crate) async fn accept(&self, answer: reqwest::Result<Response>) -> Result<Response, Failure> {
         let response = answer.map_err(|error| self.network(&error))?;
         self.shared.reached.store(true, Ordering::Relaxed);
         check(response).await

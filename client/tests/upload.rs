@@ -40,7 +40,7 @@ async fn an_undisturbed_upload_is_one_request() {
     let (service, address) = Service::start([]).await;
     let (uploaded, reported) = upload(&client(&address), 300).await;
     let uploaded = uploaded.expect("an upload");
-    assert_eq!(uploaded, Uploaded { frames: 300, sent_bytes: 300 * 12 * u64::from(POINTS), retries: 0 });
+    assert_eq!(uploaded, Uploaded { frames: 300, sent_bytes: 300 * (28 + 12 * u64::from(POINTS)), retries: 0 });
     assert_eq!(service.posts().len(), 1);
     assert_whole(&service, 300);
     assert_each_once(reported, 300);
@@ -96,7 +96,7 @@ async fn a_refusal_is_told_even_if_the_connection_breaks_over_it() {
 
 #[tokio::test]
 async fn a_bad_frame_is_named_and_those_before_it_are_solved() {
-    let (service, address) = Service::start([Fault::Problem(6, 422)]).await;
+    let (service, address) = Service::start([Fault::Problem(6, 422), Fault::Problem(0, 422)]).await;
     let (uploaded, reported) = upload(&client(&address), 20).await;
     assert_eq!(uploaded.expect_err("a bad frame").status(), Some(422));
     assert_eq!(service.state().solved.len(), 6);
@@ -143,6 +143,49 @@ async fn a_service_that_falls_silent_is_asked_again() {
     let (service, address) = Service::start([Fault::Silence]).await;
     upload(&client(&address), 12).await.0.expect("an upload");
     assert_whole(&service, 12);
+}
+
+#[tokio::test]
+async fn where_a_proxy_carries_one_direction_at_a_time_results_come_after_each_request() {
+    let (service, address) = Service::start([Fault::OneWay(7)]).await;
+    let client = client(&address);
+    let (uploaded, reported) = upload(&client, 200).await;
+    assert_eq!(uploaded.expect("an upload").retries, 1);
+    assert_whole(&service, 200);
+    assert_each_once(reported, 200);
+    let live: Vec<bool> = service.posts().iter().map(|post| post.contains("live=true")).collect();
+    assert_eq!(live, [true, false]);
+    // What was found out holds for the client's later uploads.
+    service.state().solved.clear();
+    upload(&client, 3).await.0.expect("an upload");
+    assert!(!service.posts()[2].contains("live"), "{:?}", service.posts());
+}
+
+#[tokio::test]
+async fn where_a_proxy_loses_bytes_of_a_live_request_they_are_sent_again_without() {
+    let (service, address) = Service::start([Fault::Problem(6, 422)]).await;
+    let client = client(&address);
+    assert_eq!(upload(&client, 20).await.0.expect("an upload").retries, 1);
+    assert_whole(&service, 20);
+    service.state().solved.clear();
+    upload(&client, 3).await.0.expect("an upload");
+    let live: Vec<bool> = service.posts().iter().map(|post| post.contains("live=true")).collect();
+    assert_eq!(live, [true, false, false]);
+}
+
+#[tokio::test]
+async fn a_source_that_takes_its_time_is_no_standstill() {
+    let (service, address) = Service::start([]).await;
+    let client = client(&address);
+    // Longer than a live request may stand still, and shorter than any may.
+    let pause = Duration::from_millis(1400);
+    let source = FnFrames::new(POINTS as usize, Some(3), move |number, out| {
+        std::thread::sleep(pause);
+        out.extend(frame(number));
+        Ok(true)
+    });
+    client.upload(&session(SessionState::Ready), source, UploadOptions::default()).await.expect("an upload");
+    assert_eq!(service.posts().len(), 1, "{:?}", service.posts());
 }
 
 #[tokio::test]

@@ -1,4 +1,4 @@
-//! `POST /v1/sessions/{id}/frames`: frames in, records out while the upload runs.
+//! `POST /v1/sessions/{id}/frames`: frames in, records out, while the upload runs where that is asked for.
 
 use super::extract::{Accept, Found, Query, content_type};
 use super::frames_in::{FrameReader, Layout};
@@ -59,6 +59,10 @@ pub(crate) struct UploadQuery {
     first: u32,
     /// `all` (the default): every point of each frame. `handles`: the handle rows only; errors are not measured then.
     rows: Option<RowsQuery>,
+    /// Begin the answer while the body still arrives. Only for connections that carry both directions at once: some proxies stop sending a
+    /// request whose answer has begun.
+    #[serde(default)]
+    live: bool,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize, utoipa::ToSchema)]
@@ -69,7 +73,8 @@ pub(crate) enum RowsQuery {
 }
 
 /// Posts frames. Any number of whole frames, back to back as little-endian f32, or frame records. The answer has one record
-/// for each frame as soon as it is solved and on disk, in the order of solving. An error after the first record ends NDJSON with a line
+/// for each frame that is solved and on disk, in the order of solving. It begins when the whole body has arrived; with `live=true`, with the
+/// first record. To watch an upload without it, follow `cages` or `events`. An error after the first record ends NDJSON with a line
 /// of problem details, and cuts a stream of frame records off.
 #[utoipa::path(
     post, path = "/v1/sessions/{id}/frames", operation_id = "post_frames", tag = "frames", params(openapi::Id, UploadQuery),
@@ -135,6 +140,9 @@ pub(crate) async fn post(
             drain(body).await;
         }
     });
+    if !query.live {
+        upload.closed().await;
+    }
     // An error before the first record still has a status of its own.
     let first = match tokio::time::timeout(HEAD_WITHIN, upload.next(ANSWERS)).await {
         Ok(Step::Failed(error)) => return Err(error),

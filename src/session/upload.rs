@@ -101,6 +101,13 @@ impl Upload {
         self.gone.is_cancelled()
     }
 
+    /// Waits until no more frames will be submitted. For one caller at a time.
+    pub(crate) async fn closed(&self) {
+        while !super::lock(&self.state).closed {
+            self.changed.notified().await;
+        }
+    }
+
     /// The next answers, at most `most`. For one caller at a time.
     pub(crate) async fn next(&self, most: usize) -> Step {
         loop {

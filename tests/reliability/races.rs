@@ -157,7 +157,7 @@ async fn who_waits_for_an_answer_hears_of_an_error_before_the_body_ends() {
     let inside = Inside::new().await;
     let session = inside.ready(&SMALL, "steps").await;
     let mut wire = Wire::connect(address(&inside)).await;
-    let path = format!("/v1/sessions/{}/frames", session.id);
+    let path = format!("/v1/sessions/{}/frames?live=true", session.id);
     wire.post(&path, "Content-Type: application/octet-stream\r\nTransfer-Encoding: chunked\r\n").await;
     wire.chunk(&SMALL.bytes(0)).await;
     wire.hear("\"frame\":0").await;

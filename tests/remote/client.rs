@@ -83,7 +83,7 @@ async fn handle_rows_give_the_same_cages_over_http1_too() {
     upload(&client, &whole, points, &values).await;
     let options = UploadOptions { rows: Rows::Handles, ..UploadOptions::default() };
     let uploaded = client.upload(&handles, MemoryFrames::new(points, values), options).await.expect("an upload");
-    assert_eq!(uploaded.sent_bytes, 20 * 12 * u64::from(handles.handle_count.expect("ready")));
+    assert_eq!(uploaded.sent_bytes, 20 * (28 + 12 * u64::from(handles.handle_count.expect("ready"))));
     let cages = |frames: Vec<CageFrame>| frames.into_iter().map(|c| c.values).collect::<Vec<_>>();
     let [a, b] = [whole, handles].map(|session| session.id);
     assert_eq!(

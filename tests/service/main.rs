@@ -3,5 +3,6 @@
 
 mod openapi;
 mod process;
+mod proxies;
 mod support;
 mod v1;

@@ -2,6 +2,7 @@
 
 mod answer;
 mod feed;
+mod live;
 mod pass;
 mod set;
 
@@ -54,7 +55,8 @@ pub struct Uploaded {
 impl Client {
     /// Uploads the frames that a session does not have yet, and returns when all of them are solved. Results come back while
     /// frames are sent; memory does not grow with their number. After a broken connection, a restart of the service or its
-    /// request for patience, it goes on with what is missing.
+    /// request for patience, it goes on with what is missing. Where a proxy in between stops sending a request whose answer has begun, this
+    /// and later uploads of the client have their results at the end of each request.
     ///
     /// `source` is read on a thread of its own, for which it is handed over.
     ///
@@ -85,6 +87,7 @@ impl Client {
             client: self.clone(),
             id: session.id.clone(),
             by_handles: handles.is_some(),
+            live: true,
             total: source.frames(),
             done: FrameSet::default(),
             reported: FrameSet::default(),
@@ -101,6 +104,8 @@ struct Upload<'a> {
     client: Client,
     id: String,
     by_handles: bool,
+    /// Whether results are asked for while frames are sent.
+    live: bool,
     /// Frames of the capture, where known.
     total: Option<u32>,
     /// Frames that the service has solved.
@@ -118,7 +123,13 @@ impl Upload<'_> {
         while !self.is_complete() {
             let before = self.done.len();
             let ranges = self.done.missing(self.total);
-            let Err(failure) = self.pass(feed, ranges, cautious).await else { continue };
+            let live = self.live;
+            let passed = self.pass(feed, ranges, cautious).await;
+            if !live && self.done.len() > before {
+                // What was refused with live results is taken without.
+                self.client.give_up_live();
+            }
+            let Err(failure) = passed else { continue };
             if self.done.len() > before {
                 backoff.progress();
             }

@@ -3,6 +3,7 @@
 use super::Upload;
 use super::answer::result;
 use super::feed::{Feed, Layout, Outcome, Reading};
+use super::live::{Sent, while_moving};
 use super::set::FrameRange;
 use crate::client::Client;
 use crate::error::{ClientError, Failure};
@@ -15,7 +16,7 @@ use reqwest::header::{ACCEPT, CONTENT_TYPE};
 use reqwest::{Body, Method, Response};
 use std::convert::Infallible;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 use tokio::sync::{oneshot, watch};
 
@@ -43,10 +44,15 @@ impl Upload<'_> {
     /// operating system throw its answer away. So the request after a broken one gives it time to be heard.
     pub(super) async fn pass(&mut self, feed: &Feed, ranges: Vec<FrameRange>, cautious: bool) -> Result<(), Failure> {
         let client = self.client.clone();
-        let layout = if ranges.len() == 1 { Layout::Raw } else { Layout::Records };
+        let live = self.live && client.is_live();
+        // Records have checksums: some proxies lose bytes of a request whose answer has begun.
+        let layout = if ranges.len() == 1 && !live { Layout::Raw } else { Layout::Records };
         let mut query = vec![("first", ranges.first().map_or(0, |range| range.first).to_string())];
         if self.by_handles {
             query.push(("rows", "handles".to_owned()));
+        }
+        if live {
+            query.push(("live", "true".to_owned()));
         }
         let request = client.request(Method::POST, &["v1", "sessions", &self.id, "frames"], &query).await?;
         let media_type = match layout {
@@ -55,20 +61,23 @@ impl Upload<'_> {
         };
         let Reading { pieces, mut outcome } = feed.read(ranges.clone(), layout, cautious)?;
         let (heard, hearing) = watch::channel(0);
-        let sending = Sending { pieces, sent: Arc::default(), caution: cautious.then_some((0, hearing)) };
-        let sent = sending.sent.clone();
+        let sent = Arc::new(Sent { live, ..Sent::default() });
+        let sending = Sending { pieces, sent: sent.clone(), caution: cautious.then_some((0, hearing)) };
         let request = request
             .header(CONTENT_TYPE, media_type)
             .header(ACCEPT, "application/x-ndjson")
             .body(Body::wrap_stream(stream::unfold(sending, Sending::next)));
-        let answer = match client.send_counted(request, &sent).await {
-            Ok(response) => {
-                heard.send_replace(HEAD);
-                self.take_in(&client, response, &ranges, &sent, &heard, &mut outcome).await
-            }
-            Err(failure) => Err(failure),
+        let answer = async {
+            let response = client.accept(while_moving(&client, &sent, request.send()).await?).await?;
+            heard.send_replace(HEAD);
+            self.take_in(&client, response, &ranges, &sent, &heard, &mut outcome).await
         };
-        self.sent_bytes += sent.load(Ordering::Relaxed);
+        let answer = answer.await;
+        self.sent_bytes += sent.bytes.load(Ordering::Relaxed);
+        let answer = match answer {
+            Err(failure) if live => Err(self.without_live(failure)),
+            answer => answer,
+        };
         // An answer that names a problem says more than the source, and the source more than a broken connection.
         if matches!(&answer, Err(failure) if failure.status().is_some()) {
             return answer;
@@ -82,7 +91,7 @@ impl Upload<'_> {
         client: &Client,
         mut response: Response,
         ranges: &[FrameRange],
-        sent: &AtomicU64,
+        sent: &Sent,
         heard: &watch::Sender<u8>,
         outcome: &mut oneshot::Receiver<Outcome>,
     ) -> Result<(), Failure> {
@@ -94,7 +103,7 @@ impl Upload<'_> {
                     _ => None,
                 }
             } else {
-                let piece = client.while_moving(sent, response.chunk()).await?;
+                let piece = while_moving(client, sent, response.chunk()).await?;
                 piece.map_err(|error| client.network(&error))?
             };
             let Some(piece) = piece else { break };
@@ -141,7 +150,7 @@ impl Upload<'_> {
 /// The body of the request.
 struct Sending {
     pieces: tokio::sync::mpsc::Receiver<Bytes>,
-    sent: Arc<AtomicU64>,
+    sent: Arc<Sent>,
     /// What the next piece waits for, and where it is heard.
     caution: Option<(u8, watch::Receiver<u8>)>,
 }
@@ -156,8 +165,11 @@ impl Sending {
             // Neither a silent service nor one that is gone keeps the rest back.
             let _ = tokio::time::timeout(patience, hearing.wait_for(|heard| *heard >= *stage)).await;
         }
-        let piece = self.pieces.recv().await?;
-        self.sent.fetch_add(piece.len() as u64, Ordering::Relaxed);
+        self.sent.starved.store(true, Ordering::Relaxed);
+        let piece = self.pieces.recv().await;
+        self.sent.starved.store(false, Ordering::Relaxed);
+        let piece = piece?;
+        self.sent.bytes.fetch_add(piece.len() as u64, Ordering::Relaxed);
         Some((Ok(piece), self))
     }
 }

@@ -42,7 +42,7 @@ impl<'a> Poster<'a> {
 
     /// One raw body, answered by lines. Broken connections are no error; wrong answers are.
     pub(super) async fn raw(&mut self, frames: Range<u32>) -> Result<(), String> {
-        let url = format!("{}?first={}", self.url, frames.start);
+        let url = format!("{}?first={}&live={}", self.url, frames.start, self.rng.bool());
         let body = self.reference.many(frames);
         let request = self.http.post(url).header(CONTENT_TYPE, "application/octet-stream");
         let mut text = Vec::new();
@@ -70,7 +70,8 @@ impl<'a> Poster<'a> {
             let rows = &self.reference.frames[frame as usize];
             record::encode(Kind::Positions, frame, f32::NAN, f32::NAN, rows, &mut body).expect("a record");
         }
-        let request = self.http.post(&self.url).header(CONTENT_TYPE, record::MEDIA_TYPE);
+        let request =
+            self.http.post(format!("{}?live={}", self.url, self.rng.bool())).header(CONTENT_TYPE, record::MEDIA_TYPE);
         let request = request.header(ACCEPT, record::MEDIA_TYPE);
         let (ledger, id, reference) = (self.ledger, self.id, self.reference);
         let mut bytes = Vec::new();

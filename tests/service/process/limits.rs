@@ -9,7 +9,7 @@ async fn hold(app: &TestApp, id: &str, count: usize) -> Vec<Raw> {
     let mut held = Vec::new();
     for k in 0..count {
         let mut raw = Raw::connect(app).await;
-        raw.post_chunked(&format!("/v1/sessions/{id}/frames?first={k}"), &[]).await;
+        raw.post_chunked(&format!("/v1/sessions/{id}/frames?first={k}&live=true"), &[]).await;
         raw.write(&chunked(&Capture::tiny().frame(k as u32))).await;
         raw.answer().await.expect(200);
         held.push(raw);

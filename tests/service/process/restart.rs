@@ -51,7 +51,7 @@ async fn no_frame_whose_record_was_sent_is_lost_when_the_process_is_killed() {
         let mut app = TestApp::start();
         let session = app.ready(capture).await;
         let mut raw = Raw::connect(&app).await;
-        raw.post_chunked(&format!("/v1/sessions/{}/frames?first=0", session.id), &[]).await;
+        raw.post_chunked(&format!("/v1/sessions/{}/frames?first=0&live=true", session.id), &[]).await;
         raw.write(&chunked(&capture.raw(0..30))).await;
         raw.answer().await.expect(200);
         let mut told = Vec::new();

@@ -14,7 +14,7 @@ async fn open_streams_are_told_at_once_and_the_process_ends() {
     let session = app.ready(capture).await;
     let at = |what: &str| format!("/v1/sessions/{}/{what}", session.id);
     let mut upload = Raw::connect(&app).await;
-    upload.post_chunked(&at("frames?first=0"), &[]).await;
+    upload.post_chunked(&at("frames?first=0&live=true"), &[]).await;
     upload.write(&chunked(&capture.frame(0))).await;
     upload.answer().await.expect(200);
     upload.piece().await.expect("a record");

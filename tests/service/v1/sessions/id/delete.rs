@@ -30,7 +30,7 @@ async fn deleting_ends_uploads_followers_and_events() {
     let session = app.ready(capture).await;
     let at = |what: &str| format!("/v1/sessions/{}{what}", session.id);
     let mut upload = Raw::connect(&app).await;
-    upload.post_chunked(&at("/frames?first=0"), &[]).await;
+    upload.post_chunked(&at("/frames?first=0&live=true"), &[]).await;
     upload.write(&chunked(&capture.frame(0))).await;
     upload.answer().await.expect(200);
     upload.piece().await.expect("a record");

@@ -1,12 +1,15 @@
 //! Records come back while the upload runs, and wait where nobody reads them.
 
-use crate::support::{Capture, HANG, OCTETS, RECORDS, Raw, Reply, TestApp, chunked, lines, piece, records, within};
+use crate::support::{
+    Capture, HANG, OCTETS, RECORDS, Raw, Reply, TestApp, chunked, eventually, lines, piece, records, within,
+};
 use bytes::Bytes;
 use cager_proto::messages::FrameResult;
 use http::Method;
 use reqwest::Body;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::convert::Infallible;
+use std::time::Duration;
 use tokio::sync::mpsc;
 
 /// A body that is sent piece by piece.
@@ -26,7 +29,7 @@ async fn the_first_record_comes_while_the_upload_is_open() {
         let session = app.ready(capture).await;
         let (send, body) = open_body();
         send.send(capture.frame(0)).expect("open");
-        let path = format!("/v1/sessions/{}/frames?first=0", session.id);
+        let path = format!("/v1/sessions/{}/frames?first=0&live=true", session.id);
         let request = api.request(Method::POST, &path).header("content-type", OCTETS).body(body);
         let mut response = within("an answer to half an upload", HANG, request.send()).await.expect("an answer");
         for frame in 0..5 {
@@ -49,7 +52,7 @@ async fn the_first_record_comes_over_a_plain_socket_too() {
     let capture = Capture::small();
     let session = app.ready(capture).await;
     let mut raw = Raw::connect(&app).await;
-    let path = format!("/v1/sessions/{}/frames?first=0", session.id);
+    let path = format!("/v1/sessions/{}/frames?first=0&live=true", session.id);
     raw.post_chunked(&path, &[("accept", RECORDS)]).await;
     for frame in 0..3 {
         raw.write(&chunked(&capture.frame(frame))).await;
@@ -64,6 +67,32 @@ async fn the_first_record_comes_over_a_plain_socket_too() {
     // The connection is as good as new.
     raw.head("GET", "/healthz", &[]).await;
     raw.reply().await.expect(200);
+}
+
+#[tokio::test]
+async fn an_answer_that_is_not_asked_for_earlier_begins_after_the_last_byte() {
+    let app = TestApp::start();
+    let capture = Capture::small();
+    for accept in ["application/x-ndjson", RECORDS] {
+        let session = app.ready(capture).await;
+        let mut raw = Raw::connect(&app).await;
+        let path = format!("/v1/sessions/{}/frames?first=0", session.id);
+        raw.post_chunked(&path, &[("accept", accept)]).await;
+        let mut events = app.open(&format!("/v1/sessions/{}/events", session.id)).await;
+        raw.write(&chunked(&capture.raw(0..30))).await;
+        // Frames are solved meanwhile, and can be watched.
+        eventually("frames are solved", async || (app.errors(&session.id).await.len() == 30).then_some(())).await;
+        piece("progress", &mut events).await.expect("a stream").expect("an event");
+        let early = tokio::time::timeout(Duration::from_millis(5500), raw.answer()).await;
+        assert!(early.is_err(), "{early:?}");
+        raw.write(&[chunked(&capture.raw(30..40)), b"0\r\n\r\n".to_vec()].concat()).await;
+        let reply = raw.reply().await.expect(200);
+        let frames: Vec<u32> = match accept {
+            RECORDS => records(&reply.body, session.unknowns.expect("known")).iter().map(|cage| cage.frame).collect(),
+            _ => lines(&reply.body).iter().map(|result| result.frame).collect(),
+        };
+        assert!(frames.into_iter().collect::<BTreeSet<_>>().into_iter().eq(0..40));
+    }
 }
 
 #[tokio::test]
