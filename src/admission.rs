@@ -78,9 +78,9 @@ impl Budget {
         if self.admits(ledger.used, holds, amount) {
             return Ok(ledger.hold(self, tenant, amount));
         }
-        // With all of it free of others, would there be room?
-        let alone = self.admits(holds, holds, amount);
-        Err(if alone { Full::Service } else { Full::Tenant })
+        // Were all of it free of others, would there be room?
+        let is_own_share = self.shared && !self.admits(holds, holds, amount);
+        Err(if is_own_share { Full::Tenant } else { Full::Service })
     }
 
     /// None of it, which may grow.
@@ -233,7 +233,7 @@ mod tests {
     async fn a_tenant_alone_gets_everything_and_what_is_larger_takes_everything() {
         let budget = Budget::new(10, false);
         let held = budget.try_take("a", 7).expect("room");
-        assert_eq!(budget.try_take("a", 4).err(), Some(Full::Tenant));
+        assert_eq!(budget.try_take("a", 4).err(), Some(Full::Service));
         let rest = budget.try_take("a", 3).expect("room");
         assert!(waits(&budget, "b", 1).await);
         drop((held, rest));

@@ -42,7 +42,12 @@ pub(crate) async fn authenticate(
                 return next.run(request).await;
             }
             let request = request.map(|body| revocable(body, &grant.revoked));
-            next.run(request).await.map(|body| revocable(body, &grant.revoked))
+            let response = next.run(request).await;
+            // What is whole already is sent.
+            match http_body::Body::size_hint(response.body()).exact() {
+                Some(_) => response,
+                None => response.map(|body| revocable(body, &grant.revoked)),
+            }
         }
         Err(denied) => {
             service.rejected("unauthorized");

@@ -269,6 +269,7 @@ async fn idle_sockets_do_not_shut_others_out() {
         wire.send("GET /nothing HTTP/1.1\r\nHost: localhost\r\n\r\n").await;
         idle.push(wire);
     }
+    sleep(Duration::from_millis(1200)).await;
     house.goes_on("idle sockets that have asked", 50.0).await;
     assert_eq!(house.server.get("/readyz").await, Some(200));
 }

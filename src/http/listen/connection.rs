@@ -117,13 +117,13 @@ impl Shared {
                     return Reason::Drain;
                 }
                 () = self.stop.cancelled(), if !matches!(closing, Some((Reason::Stop, _))) => Reason::Stop,
-                () = entry.displaced.cancelled(), if state.is_idle() => {
-                    // A request that has just come is answered.
-                    if !state.is_idle() {
-                        continue;
+                () = entry.displaced.cancelled(), if closing.is_none() => {
+                    if state.is_idle() {
+                        state.abandon();
+                        return Reason::Displaced;
                     }
-                    state.abandon();
-                    return Reason::Displaced;
+                    // A request has just come: its answer says that it is the last.
+                    Reason::Displaced
                 }
                 () = begun.notified(), if closing.is_none() => Reason::Spare,
                 _ = clock.tick() => {

@@ -1,9 +1,14 @@
 //! Connections that wait for their client: when places run out, one of them makes way. Those that have not sent any request go first, then
-//! those between two; the one that has waited longest before all others of its kind.
+//! those between two, unless the next may be on its way; the one that has waited longest before all others of its kind.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
+
+/// A connection between two requests is left alone for so long.
+const BETWEEN_REQUESTS: Duration = Duration::from_secs(1);
 
 /// Connections without a request, in the order in which they make way.
 #[derive(Default)]
@@ -13,7 +18,7 @@ pub(super) struct Waiting(Mutex<List>);
 struct List {
     next: u64,
     /// By whether they have sent a request before, and since when they wait.
-    connections: BTreeMap<(bool, u64), CancellationToken>,
+    connections: BTreeMap<(bool, u64), (Instant, CancellationToken)>,
 }
 
 /// A connection's entry; gone when dropped.
@@ -39,8 +44,14 @@ impl Waiting {
 
     /// Closes the first connection of the list; false where there is none.
     pub(super) fn displace(&self) -> bool {
-        let first = self.lock().connections.pop_first();
-        first.map(|(_, displaced)| displaced.cancel()).is_some()
+        let mut list = self.lock();
+        let Some(first) = list.connections.first_entry() else { return false };
+        let ((has_asked, _), (since, _)) = (*first.key(), first.get());
+        if has_asked && since.elapsed() < BETWEEN_REQUESTS {
+            return false;
+        }
+        first.remove().1.cancel();
+        true
     }
 }
 
@@ -54,7 +65,7 @@ impl Entry {
         let mut list = self.waiting.lock();
         let place = (has_asked, list.next);
         list.next += 1;
-        list.connections.insert(place, self.displaced.clone());
+        list.connections.insert(place, (Instant::now(), self.displaced.clone()));
         *self.place() = Some(place);
     }
 
