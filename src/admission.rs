@@ -70,7 +70,7 @@ impl Budget {
         Arc::new(Self { total: total.max(1), shared, ledger: Mutex::default() })
     }
 
-    /// Room now, or why there is none. Who wants more than everything gets everything.
+    /// Takes `amount` at once, or says why it cannot. An amount above the total takes the total.
     pub(crate) fn try_take(self: &Arc<Self>, tenant: &str, amount: u64) -> Result<Held, Full> {
         let amount = amount.min(self.total);
         let mut ledger = lock(&self.ledger);

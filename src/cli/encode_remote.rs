@@ -36,7 +36,7 @@ pub(super) fn run(
     let (system, options, spectrum) = match cage {
         Some(cage) => {
             let (system, options) = checked_solver(args, rest, cage, matrix.as_ref())?;
-            // Where there is a threshold it was checked; where there is none, none is used.
+            // The threshold was checked above; regularizers without one ignore it.
             (system, options, Some(u32::try_from(options.spectrum).unwrap_or(u32::MAX)))
         }
         None => {

@@ -62,7 +62,7 @@ fn is_same(origin: &str, host: &str) -> bool {
     origin.split_once("://").is_some_and(|(_, of)| of.eq_ignore_ascii_case(host))
 }
 
-/// What browsers want to hear before pages of the allowed origins may ask; none where there are none.
+/// CORS headers for the allowed origins; `None` if there are no allowed origins.
 pub(super) fn cors(config: &ServeConfig) -> Option<CorsLayer> {
     let origins: Vec<HeaderValue> = config.allowed_origins.iter().filter_map(|origin| origin.parse().ok()).collect();
     let name = HeaderName::from_static;

@@ -42,7 +42,7 @@ impl Waiting {
         entry
     }
 
-    /// Closes the first connection of the list; false where there is none.
+    /// Closes the first connection of the list; false if none can be closed.
     pub(super) fn displace(&self) -> bool {
         let mut list = self.lock();
         let Some(first) = list.connections.first_entry() else { return false };
