@@ -9,26 +9,30 @@
 //! tenant = "studio-a"      # whose sessions it sees; several tokens may share a tenant
 //! sha256 = "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"
 //! priority = "normal"      # or high, low
-//! scope = "write"          # or read: look at sessions and decode, change nothing
+//! scope = "write"          # or read: look at sessions and decode, change nothing; admin: and operate the service
 //! max_sessions = 100       # this and max_bytes, max_age_s, max_streams: where they differ from the service's settings
 //! ```
 //!
-//! Clients send `Authorization: Bearer TOKEN`.
+//! Clients send `Authorization: Bearer TOKEN`. Tokens of an OpenID Connect provider are taken where one is trusted, see [`Trust`].
 
 mod file;
+mod provider;
+mod signatures;
 #[cfg(test)]
 mod tests;
 
 pub use file::AccessError;
+pub use provider::Trust;
 
 use file::{Entries, Stamp};
 use http::HeaderMap;
 use http::header::AUTHORIZATION;
+use provider::Provider;
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio_util::sync::CancellationToken;
 
 /// Shortest token that is accepted, in bytes: shorter ones could be guessed.
@@ -102,7 +106,7 @@ pub struct Tenant {
 }
 
 /// What the bearer of a token may do with its tenant's sessions and cage designs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Scope {
     /// Look at them, and decode.
@@ -110,6 +114,8 @@ pub enum Scope {
     /// All of it.
     #[default]
     Write,
+    /// And what operators may: see and stop what all tenants do, on the operators' listener.
+    Admin,
 }
 
 /// What a token lets its bearer do, until it is revoked.
@@ -123,6 +129,8 @@ pub struct Grant {
     pub scope: Scope,
     /// Cancelled when the token leaves the file or gets another tenant: ends what was begun with it.
     pub revoked: CancellationToken,
+    /// When the token expires, which ends what was begun with it as well.
+    pub expires: Option<Instant>,
 }
 
 impl PartialEq for Grant {
@@ -143,13 +151,33 @@ pub enum Denied {
     /// The token is unknown or was revoked.
     #[error("the token is not valid (any more); ask the service's operator for another")]
     Unknown,
+    /// Its time is over.
+    #[error("the token has expired; sign in again for another")]
+    Expired,
+    /// It is of another provider, or for another service.
+    #[error("the token is not for this service: its iss or aud is another")]
+    NotForUs,
+    /// It names no tenant.
+    #[error(
+        "the token names no tenant, or one that is not 1 to 64 letters, digits or . _ -; the provider has to add the claim that the setting oidc_tenant names"
+    )]
+    NoTenant,
+    /// It allows nothing here.
+    #[error("the token's scope has none of cager:read, cager:write and cager:admin")]
+    NoScope,
+    /// The keys of the tokens' provider were never there to be fetched.
+    #[error("the keys of the tokens' provider cannot be fetched at the moment; try again soon")]
+    NoKeys,
 }
 
 /// Tells tenants by their tokens. Clones share their state.
 #[derive(Clone)]
-pub struct Access(Arc<Inner>);
+pub struct Access {
+    tokens: Arc<Tokens>,
+    provider: Option<Arc<Provider>>,
+}
 
-struct Inner {
+struct Tokens {
     /// Without one, everybody is `local`.
     path: Option<PathBuf>,
     defaults: TenantLimits,
@@ -167,7 +195,7 @@ impl Access {
         // Looked at first: a change while reading is then noticed later.
         let seen = path.and_then(Stamp::of);
         let entries = path.map(|path| Entries::read(path, defaults)).transpose()?.unwrap_or_default();
-        Ok(Self(Arc::new(Inner {
+        let tokens = Tokens {
             path: path.map(Path::to_owned),
             defaults,
             local: Grant {
@@ -175,35 +203,57 @@ impl Access {
                 token: "".into(),
                 scope: Scope::Write,
                 revoked: CancellationToken::new(),
+                expires: None,
             },
             entries: RwLock::new(Arc::new(entries)),
             seen: Mutex::new(seen),
-        })))
+        };
+        Ok(Self { tokens: Arc::new(tokens), provider: None })
+    }
+
+    /// Takes the tokens of this provider as well.
+    ///
+    /// # Errors
+    /// An address that is none, or not safe.
+    pub fn trusting(self, trust: Trust) -> Result<Self, AccessError> {
+        let provider = Provider::new(trust).map_err(AccessError::Provider)?;
+        Ok(Self { provider: Some(Arc::new(provider)), ..self })
     }
 
     /// Whether tokens are asked for.
     pub fn is_guarded(&self) -> bool {
-        self.0.path.is_some()
+        self.tokens.path.is_some() || self.provider.is_some()
     }
 
-    /// Finds out whose request it is.
+    /// Finds out whose request it is, by the tokens file and by the provider of tokens.
     ///
     /// # Errors
-    /// No token, a header that is not understood, or a token that nobody has.
+    /// As [`Self::authenticate`], and why a token of the provider is not to be believed.
+    pub async fn grant(&self, headers: &HeaderMap) -> Result<Grant, Denied> {
+        match (self.authenticate(headers), &self.provider) {
+            (Err(Denied::Unknown), Some(provider)) => {
+                let claimed = provider.claimed(bearer(headers)?).await?;
+                Ok(Grant {
+                    tenant: self.tenant(&claimed.tenant),
+                    token: claimed.name.into(),
+                    scope: claimed.scope,
+                    revoked: CancellationToken::new(),
+                    expires: Some(claimed.expires),
+                })
+            }
+            (known, _) => known,
+        }
+    }
+
+    /// Finds out whose request it is, by the tokens file.
+    ///
+    /// # Errors
+    /// No token, a header that is not understood, or a token that is not in the file.
     pub fn authenticate(&self, headers: &HeaderMap) -> Result<Grant, Denied> {
-        if self.0.path.is_none() {
-            return Ok(self.0.local.clone());
+        if !self.is_guarded() {
+            return Ok(self.tokens.local.clone());
         }
-        let mut values = headers.get_all(AUTHORIZATION).iter();
-        let value = values.next().ok_or(Denied::Missing)?;
-        if values.next().is_some() {
-            return Err(Denied::Malformed);
-        }
-        let (scheme, token) = value.to_str().ok().and_then(|text| text.split_once(' ')).ok_or(Denied::Malformed)?;
-        let token = token.trim_matches(' ');
-        if !scheme.eq_ignore_ascii_case("bearer") || token.is_empty() {
-            return Err(Denied::Malformed);
-        }
+        let token = bearer(headers)?;
         if !(MIN_TOKEN_BYTES..=MAX_TOKEN_BYTES).contains(&token.len()) {
             return Err(Denied::Unknown);
         }
@@ -220,14 +270,18 @@ impl Access {
                 limits: best.limits.most_generous(tenant.limits),
             })
         });
-        let default = || Tenant { name: name.to_owned(), priority: Priority::Normal, limits: self.0.defaults };
+        let default = || Tenant { name: name.to_owned(), priority: Priority::Normal, limits: self.tokens.defaults };
         Arc::new(of_tokens.unwrap_or_else(default))
     }
 
     /// Reads the file again whenever it changes, until `stop`. A removed entry stops working within a second; a file that
     /// cannot be used is logged, and the entries before stay.
     pub async fn watch(self, stop: CancellationToken) {
-        let Some(path) = self.0.path.clone() else { return };
+        if let Some(provider) = self.provider.clone() {
+            let stop = stop.clone();
+            tokio::spawn(async move { provider.watch(stop).await });
+        }
+        let Some(path) = self.tokens.path.clone() else { return };
         while stop.run_until_cancelled(tokio::time::sleep(LOOK_EVERY)).await.is_some() {
             let this = self.clone();
             let reloaded = tokio::task::spawn_blocking(move || this.reload_if_changed()).await;
@@ -242,21 +296,21 @@ impl Access {
 
     /// Reads the file if it is another than before. Gives the number of tokens if it was.
     fn reload_if_changed(&self) -> Result<Option<usize>, AccessError> {
-        let Some(path) = &self.0.path else { return Ok(None) };
+        let Some(path) = &self.tokens.path else { return Ok(None) };
         let stamp = Stamp::of(path);
         {
-            let mut seen = self.0.seen.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut seen = self.tokens.seen.lock().unwrap_or_else(PoisonError::into_inner);
             if *seen == stamp {
                 return Ok(None);
             }
             // Also for a broken file, so that it is complained about once.
             *seen = stamp;
         }
-        let mut entries = Entries::read(path, self.0.defaults)?;
+        let mut entries = Entries::read(path, self.tokens.defaults)?;
         let count = entries.tenants().count();
         let before = self.entries();
         let revoked = entries.succeed(&before);
-        *self.0.entries.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(entries);
+        *self.tokens.entries.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(entries);
         // Not before nobody gets in with them any more.
         for grant in revoked {
             tracing::info!(token = %grant.token, tenant = %grant.tenant.name, "a token was revoked; what was begun with it ends");
@@ -266,12 +320,30 @@ impl Access {
     }
 
     fn entries(&self) -> Arc<Entries> {
-        Arc::clone(&self.0.entries.read().unwrap_or_else(PoisonError::into_inner))
+        Arc::clone(&self.tokens.entries.read().unwrap_or_else(PoisonError::into_inner))
     }
+}
+
+/// The token of a request.
+fn bearer(headers: &HeaderMap) -> Result<&str, Denied> {
+    let mut values = headers.get_all(AUTHORIZATION).iter();
+    let value = values.next().ok_or(Denied::Missing)?;
+    if values.next().is_some() {
+        return Err(Denied::Malformed);
+    }
+    let (scheme, token) = value.to_str().ok().and_then(|text| text.split_once(' ')).ok_or(Denied::Malformed)?;
+    let token = token.trim_matches(' ');
+    if !scheme.eq_ignore_ascii_case("bearer") || token.is_empty() {
+        return Err(Denied::Malformed);
+    }
+    Ok(token)
 }
 
 impl std::fmt::Debug for Access {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Access").field("path", &self.0.path).field("entries", &self.entries()).finish_non_exhaustive()
+        f.debug_struct("Access")
+            .field("path", &self.tokens.path)
+            .field("entries", &self.entries())
+            .finish_non_exhaustive()
     }
 }

@@ -14,7 +14,7 @@ pub(crate) use layers::line_of;
 pub(crate) use settings::bytes;
 
 use crate::admission::Budget;
-use crate::auth::TenantLimits;
+use crate::auth::{TenantLimits, Trust};
 use crate::http::listen::{Limits, Tls};
 use crate::telemetry::LogFormat;
 use serde::{Deserialize, Serialize};
@@ -44,6 +44,16 @@ pub struct ServeConfig {
     pub data: PathBuf,
     /// File of access tokens; without one everyone on this machine is tenant `local`.
     pub tokens: Option<PathBuf>,
+    /// Address of an OpenID Connect provider whose tokens are taken as well.
+    pub oidc_issuer: Option<String>,
+    /// What the provider's tokens for this service have in `aud`.
+    pub oidc_audience: Option<String>,
+    /// Address of the provider's key set, where its description does not say it.
+    pub oidc_keys: Option<String>,
+    /// The claim of the provider's tokens that names the tenant.
+    pub oidc_tenant: String,
+    /// File of addresses that are told when sessions are completed or fail.
+    pub webhooks: Option<PathBuf>,
     /// PEM file of the certificate, for TLS.
     pub tls_certificate: Option<PathBuf>,
     /// PEM file of the certificate's private key.
@@ -130,6 +140,11 @@ impl Default for ServeConfig {
             admin_listen: None,
             data: PathBuf::from("cager-data"),
             tokens: None,
+            oidc_issuer: None,
+            oidc_audience: None,
+            oidc_keys: None,
+            oidc_tenant: "tenant".to_owned(),
+            webhooks: None,
             tls_certificate: None,
             tls_key: None,
             allowed_hosts: Vec::new(),
@@ -198,28 +213,52 @@ impl ServeConfig {
 
     /// Refuses combinations that cannot work or are not safe.
     fn check(&self) -> Result<(), ConfigError> {
-        if self.tokens.is_none() && !self.listen.ip().is_loopback() {
+        if !self.is_guarded() && !self.listen.ip().is_loopback() {
             return Err(ConfigError::Open { listen: self.listen });
         }
         let (upload_bytes, max_rest_bytes) = (self.upload_bytes, self.max_rest_bytes);
         // Of what tenants share, one gets two thirds.
-        let fits = match self.tokens {
-            Some(_) => upload_bytes / 3 * 2 >= max_rest_bytes + ENVELOPE_BYTES,
-            None => upload_bytes >= max_rest_bytes,
+        let fits = match self.is_guarded() {
+            true => upload_bytes / 3 * 2 >= max_rest_bytes + ENVELOPE_BYTES,
+            false => upload_bytes >= max_rest_bytes,
         };
         if !fits {
             return Err(ConfigError::UploadRoom { upload_bytes, max_rest_bytes });
         }
-        match (&self.tls_certificate, &self.tls_key) {
-            (Some(_), None) => Err(ConfigError::HalfTls { given: "tls_certificate", missing: "tls_key" }),
-            (None, Some(_)) => Err(ConfigError::HalfTls { given: "tls_key", missing: "tls_certificate" }),
-            _ => Ok(()),
+        let pairs = [
+            ("tls_certificate", self.tls_certificate.is_some(), "tls_key", self.tls_key.is_some()),
+            ("oidc_issuer", self.oidc_issuer.is_some(), "oidc_audience", self.oidc_audience.is_some()),
+        ];
+        for (a, has_a, b, has_b) in pairs {
+            if has_a != has_b {
+                let (given, missing) = if has_a { (a, b) } else { (b, a) };
+                return Err(ConfigError::Half { given, missing });
+            }
         }
+        if self.oidc_keys.is_some() && self.oidc_issuer.is_none() {
+            return Err(ConfigError::Half { given: "oidc_keys", missing: "oidc_issuer" });
+        }
+        Ok(())
+    }
+
+    /// Whether requests need tokens.
+    fn is_guarded(&self) -> bool {
+        self.tokens.is_some() || self.oidc_issuer.is_some()
+    }
+
+    /// The provider of tokens that is trusted, if one is.
+    pub fn trust(&self) -> Option<Trust> {
+        Some(Trust {
+            issuer: self.oidc_issuer.clone()?,
+            audience: self.oidc_audience.clone()?,
+            keys: self.oidc_keys.clone(),
+            tenant: self.oidc_tenant.clone(),
+        })
     }
 
     /// A budget of so much that tenants share: where tokens name them, none gets all of it.
     pub(crate) fn budget(&self, total: u64) -> Arc<Budget> {
-        Budget::new(total, self.tokens.is_some())
+        Budget::new(total, self.is_guarded())
     }
 
     /// The listener's limits.

@@ -13,6 +13,7 @@ use cager_formats::{Action, AtomicFile, CompleteFile, FrameReader, Target};
 use cager_proto::container;
 use rayon::prelude::*;
 use std::io::BufWriter;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Instant;
@@ -251,7 +252,11 @@ fn prepare(
     let batches = job.frames.frames().div_ceil(Flow::new(job.memory, points.len(), false).size);
     let passes = if job.choose.is_some() { usize::MAX } else { batches };
     let keeps_coordinates = job.memory.keeps(points.len(), job.system.columns(job.cage), passes);
-    let preparing = Preparing { term: job.term, keeps_coordinates, tell };
+    let next = |step| {
+        tell(step);
+        ControlFlow::Continue(())
+    };
+    let preparing = Preparing { term: job.term, keeps_coordinates, next: &next };
     let term = preparing.term(options)?;
     let chosen_by = job.choose.as_ref().filter(|choose| !choose.samples.is_empty());
     let Some(ChooseSpectrum { samples, bound }) = chosen_by else {

@@ -3,6 +3,7 @@
 use crate::problem::{self, ApiError};
 use crate::store::Idempotency;
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// Which keys belong to which requests, and what those made.
 #[derive(Default)]
@@ -17,11 +18,51 @@ struct Request {
 }
 
 /// What a repeated request meets.
-pub(crate) enum Repetition<T> {
+pub(crate) enum Repetition {
     /// It is the first of its kind.
     First,
-    /// It was done before; here is what it made.
-    Done(T),
+    /// It was done before, and made what has this id.
+    Done(String),
+}
+
+/// Keeps the keys of requests, and what those made.
+pub(crate) trait Keyed<T> {
+    /// Does something with the keys.
+    fn requests<R>(&self, work: impl FnOnce(&mut Requests) -> R) -> R;
+    /// What has this id.
+    fn made(&self, id: &str) -> Option<Arc<T>>;
+}
+
+/// Makes something, once for each key.
+///
+/// # Errors
+/// Those of `make`, and those of [`Requests::begin`]; what an earlier request made is gone.
+pub(crate) async fn once<T, Making: Future<Output = Result<Arc<T>, ApiError>>>(
+    registry: &impl Keyed<T>,
+    tenant: &str,
+    request: Option<Idempotency>,
+    make: impl FnOnce(Option<Idempotency>) -> Making,
+) -> Result<Arc<T>, ApiError> {
+    let Some(request) = request else { return make(None).await };
+    match registry.requests(|requests| requests.begin(tenant, &request.key, &request.fingerprint))? {
+        Repetition::Done(id) => registry.made(&id).ok_or_else(|| {
+            ApiError::new(problem::NOT_FOUND, "what this request made before was deleted; use a new key")
+        }),
+        Repetition::First => {
+            // Frees the key also after a panic.
+            let key = request.key.clone();
+            let _free = GiveUp(|| registry.requests(|requests| requests.give_up(tenant, &key)));
+            make(Some(request)).await
+        }
+    }
+}
+
+struct GiveUp<F: FnMut()>(F);
+
+impl<F: FnMut()> Drop for GiveUp<F> {
+    fn drop(&mut self) {
+        (self.0)();
+    }
 }
 
 impl Requests {
@@ -29,7 +70,7 @@ impl Requests {
     ///
     /// # Errors
     /// The key belongs to another request, or to one that is still being worked on.
-    pub(crate) fn begin(&mut self, tenant: &str, key: &str, fingerprint: &str) -> Result<Repetition<String>, ApiError> {
+    pub(crate) fn begin(&mut self, tenant: &str, key: &str, fingerprint: &str) -> Result<Repetition, ApiError> {
         let place = (tenant.to_owned(), key.to_owned());
         match self.known.get(&place) {
             None => {

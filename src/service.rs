@@ -9,10 +9,12 @@ use crate::engine::Engine;
 use crate::problem::{self, ApiError};
 use crate::session::cage_source::CageMaker;
 use crate::session::commit::Committer;
+use crate::session::create::blocking;
 use crate::session::prepared::Solvers;
 use crate::session::registry::Registry;
-use crate::store::{Disk, Store, StoreError};
+use crate::store::{ContentKey, Disk, Store, StoreError};
 use crate::unread::Unread;
+use crate::webhooks::{Webhooks, WebhooksError};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -41,6 +43,7 @@ pub struct Service {
     pub(crate) engine: Engine,
     pub(crate) solvers: Arc<Solvers>,
     pub(crate) committer: Committer,
+    pub(crate) webhooks: Arc<Webhooks>,
     pub(crate) registry: Arc<Registry>,
     pub(crate) cage_jobs: CageJobs,
     pub(crate) unread: Unread,
@@ -90,6 +93,9 @@ pub enum StartError {
     /// The tokens file cannot be used.
     #[error(transparent)]
     Access(#[from] crate::auth::AccessError),
+    /// The webhooks file cannot be used.
+    #[error(transparent)]
+    Webhooks(#[from] WebhooksError),
     /// Threads cannot be started.
     #[error("threads cannot be started: {0}; raise the limit of processes, or lower workers")]
     Threads(std::io::Error),
@@ -115,12 +121,16 @@ impl Service {
         designer: Arc<Designer>,
         stop: CancellationToken,
     ) -> Result<Arc<Self>, StartError> {
-        let access = Access::open(config.tokens.as_deref(), config.tenant_limits())?;
+        let mut access = Access::open(config.tokens.as_deref(), config.tenant_limits())?;
+        if let Some(trust) = config.trust() {
+            access = access.trusting(trust)?;
+        }
         let opened = Store::open(&config.data, disk)?;
         for damaged in &opened.quarantined {
             tracing::error!(name = %damaged.name, path = %damaged.path.display(), why = %damaged.why, "damaged, and put in quarantine");
             metrics::counter!("cager_quarantined_total").increment(1);
         }
+        let webhooks = Webhooks::open(config.webhooks.as_deref(), opened.store.clone(), stop.clone())?;
         let unread = Unread::default();
         for left in &opened.unread {
             unread.add(left.kind, &left.name, None, &format!("{}: {}", left.path.display(), left.why));
@@ -129,6 +139,7 @@ impl Service {
         let solvers = Solvers::new(opened.store.clone(), &config).map_err(StartError::Threads)?;
         let service = Arc::new(Self {
             access,
+            webhooks,
             store: opened.store,
             engine,
             solvers: Arc::new(solvers),
@@ -160,7 +171,7 @@ impl Service {
         for meta in opened.cage_jobs {
             service.take_in_cage_job(meta);
         }
-        service.forget_orphans();
+        service.orphans().iter().for_each(|key| service.forget_orphan(key));
         service.resumed.store(true, Ordering::Release);
         tracing::info!(
             sessions = count,
@@ -176,25 +187,42 @@ impl Service {
         Ok(service)
     }
 
-    /// Removes rest poses and cages of no session: a crash between storing them and storing their session leaves them. Not where
-    /// something could not be read, which may need them, or is in quarantine, which may be of use with its rest pose only.
-    fn forget_orphans(&self) {
-        let forget = || -> Result<(), StoreError> {
+    /// Rest poses and cages of no session: a crash between storing them and storing their session leaves them. None where something
+    /// could not be read, which may need them, or is in quarantine, which may be of use with its rest pose only. Blocks.
+    fn orphans(&self) -> Vec<ContentKey> {
+        let found = || -> Result<Vec<ContentKey>, StoreError> {
             if !self.unread.is_empty() || self.store.has_quarantined()? {
-                return Ok(());
+                return Ok(Vec::new());
             }
-            for key in self.store.contents()?.iter().filter(|key| !self.registry.uses_content(key)) {
-                self.store.remove_content(key)?;
-                tracing::info!(%key, "a rest pose and cage of no session are removed");
-            }
-            Ok(())
+            Ok(self.store.contents()?.into_iter().filter(|key| !self.registry.uses_content(key)).collect())
         };
-        if let Err(error) = forget() {
+        found().unwrap_or_else(|error| {
             tracing::warn!(%error, "rest poses and cages of no session may take space");
+            Vec::new()
+        })
+    }
+
+    /// Removes what [`Self::orphans`] finds, while the service runs.
+    pub(crate) async fn forget_orphans(self: &Arc<Self>) {
+        let service = Arc::clone(self);
+        for key in blocking(move || service.orphans()).await.unwrap_or_default() {
+            // Nobody makes a session of it meanwhile.
+            let _content = self.registry.content_lock(&key).await;
+            if !self.registry.uses_content(&key) {
+                let service = Arc::clone(self);
+                let _ = blocking(move || service.forget_orphan(&key)).await;
+            }
         }
     }
 
-    /// Reads the logs of all resumed sessions in the background, so that damage is found before somebody waits for it.
+    fn forget_orphan(&self, key: &ContentKey) {
+        match self.store.remove_content(key) {
+            Ok(()) => tracing::info!(%key, "a rest pose and cage of no session are removed"),
+            Err(error) => tracing::warn!(%error, "a rest pose and cage of no session take space"),
+        }
+    }
+
+    /// Reads logs and containers of all resumed sessions in the background, so that damage is found before somebody waits for it.
     async fn check_logs(self: Arc<Self>, stop: CancellationToken) {
         for session in self.registry.all() {
             if stop.is_cancelled() {
@@ -202,6 +230,12 @@ impl Service {
             }
             // What is wrong is in the log and in the session.
             let _ = session.ensure_loaded().await;
+            let (webhooks, found) = (Arc::clone(&self.webhooks), Arc::clone(&session));
+            let _ = blocking(move || {
+                found.check_container();
+                webhooks.tell_left(&found);
+            })
+            .await;
             session.rest_if_idle();
         }
     }
@@ -228,7 +262,7 @@ impl Service {
             return Ok(());
         }
         let store = self.store.clone();
-        let probe = crate::session::create::blocking(move || store.probe()).await?;
+        let probe = blocking(move || store.probe()).await?;
         *probed = probe.is_ok().then(Instant::now);
         probe.map_err(|error| match error {
             full @ StoreError::Full { .. } => crate::session::commit::storage_error(&full),

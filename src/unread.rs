@@ -2,10 +2,12 @@
 
 use crate::problem::{self, ApiError};
 use crate::service::Service;
+use crate::session::commit::storage_error;
 use crate::session::create::blocking;
 use crate::session::lock;
 use crate::store::{CageJobMeta, Kind, SessionMeta, StoreError};
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 use tokio::sync::MutexGuard;
@@ -16,6 +18,8 @@ pub(crate) struct Unread {
     known: Mutex<BTreeMap<(Kind, String), Left>>,
     /// Held while one is read again or deleted. Never waited for in a thread that blocks: the holder may need one.
     reading: Arc<tokio::sync::Mutex<()>>,
+    /// Whether rest poses and cages of no session may have been left for what could not be read.
+    spared: AtomicBool,
 }
 
 /// One that could not be read.
@@ -30,6 +34,7 @@ struct Left {
 impl Unread {
     /// Lists one more; the log has it once.
     pub(crate) fn add(&self, kind: Kind, id: &str, tenant: Option<&str>, why: &str) {
+        self.spared.store(true, Relaxed);
         let key = (kind, id.to_owned());
         let mut known = lock(&self.known);
         let tried = known.get(&key).and_then(|left| left.tried);
@@ -46,6 +51,11 @@ impl Unread {
 
     pub(crate) fn is_empty(&self) -> bool {
         lock(&self.known).is_empty()
+    }
+
+    /// Whether what was spared can go now. Says so once.
+    pub(crate) fn may_forget(&self) -> bool {
+        self.is_empty() && self.spared.swap(false, Relaxed)
     }
 
     pub(crate) fn count(&self, kind: Kind) -> usize {
@@ -113,6 +123,22 @@ impl Service {
             }
             _ => Ok(()),
         }
+    }
+
+    /// Deletes one that could not be read, if there is one of that name; its rest pose and cage go once nothing is unread.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub(crate) async fn delete_unread(self: &Arc<Self>, kind: Kind, id: &str) -> Result<bool, ApiError> {
+        let Some(_one) = self.unread.hold(kind, id).await else { return Ok(false) };
+        let (store, removed) = (self.store.clone(), id.to_owned());
+        let deleted = blocking(move || match kind {
+            Kind::Session => store.delete_session(&removed),
+            Kind::CageJob => store.delete_cage_job(&removed),
+        });
+        deleted.await?.map_err(|error| storage_error(&error))?;
+        self.unread.forget(kind, id);
+        Ok(true)
     }
 
     /// Reads all again that could not be read before.

@@ -106,6 +106,7 @@ fn refuse_not_finite(options: &SessionOptions) -> Result<(), ClientError> {
         cage: _,
         flip_cage: _,
         frame_rate,
+        frames: _,
     } = options;
     for (name, value) in [("lambda", lambda), ("max_error", max_error), ("frame_rate", frame_rate)] {
         if let Some(value) = value.filter(|value| !value.is_finite()) {

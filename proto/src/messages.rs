@@ -71,6 +71,11 @@ pub struct SessionOptions {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(exclusive_minimum = 0))]
     pub frame_rate: Option<f64>,
+    /// Number of frames of the capture, where it is known: a frame with this number or a higher one is then refused at once, instead of when
+    /// the session is completed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schema(minimum = 1))]
+    pub frames: Option<u32>,
 }
 
 /// A cage that is not sent. At most one of its fields is given.

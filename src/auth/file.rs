@@ -34,6 +34,9 @@ pub enum AccessError {
         /// What is wrong and what to do.
         why: String,
     },
+    /// The provider of tokens cannot be trusted as it is set.
+    #[error("{0}")]
+    Provider(String),
 }
 
 #[derive(Deserialize)]
@@ -114,7 +117,8 @@ impl Entries {
             };
             let tenant = Tenant { name: token.tenant.into_inner(), priority: token.priority, limits };
             let (scope, token) = (token.scope, token.name.into_inner().into());
-            entries.push((hash, Grant { tenant: Arc::new(tenant), token, scope, revoked: CancellationToken::new() }));
+            let revoked = CancellationToken::new();
+            entries.push((hash, Grant { tenant: Arc::new(tenant), token, scope, revoked, expires: None }));
         }
         Ok(Self(entries))
     }
@@ -124,9 +128,7 @@ impl Entries {
         let mut gone = Vec::new();
         for (hash, old) in &before.0 {
             let same = |(other, new): &&mut (Hash, Grant)| {
-                other == hash
-                    && new.tenant.name == old.tenant.name
-                    && (new.scope == old.scope || new.scope == Scope::Write)
+                other == hash && new.tenant.name == old.tenant.name && new.scope >= old.scope
             };
             match self.0.iter_mut().find(same) {
                 Some((_, new)) => new.revoked = old.revoked.clone(),
@@ -161,7 +163,7 @@ impl std::fmt::Debug for Entries {
     }
 }
 
-fn is_name(text: &str) -> bool {
+pub(super) fn is_name(text: &str) -> bool {
     (1..=64).contains(&text.len())
         && !text.starts_with('.')
         && text.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"._-".contains(&byte))

@@ -4,7 +4,7 @@ use super::{CageJob, Finished, Outcome, Phase, samples, wish};
 use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::config::ServeConfig;
-use crate::idempotency::Repetition;
+use crate::idempotency::once;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::cage_source::check_extent;
@@ -66,19 +66,10 @@ impl Service {
             .await?;
             (new, checked?)
         };
-        let Some(key) = new.idempotency_key.clone() else {
-            return self.create_new_cage_job(tenant, new, checked, None).await;
-        };
         let fingerprint = fingerprint(&checked.key, &new.options);
-        match self.cage_jobs.begin(&tenant.name, &key, &fingerprint)? {
-            Repetition::Done(job) => Ok(job),
-            Repetition::First => {
-                // Frees the key also after a panic.
-                let _free = GiveUp { service: self, tenant: &tenant.name, key: &key };
-                let idempotency = Idempotency { key: key.clone(), fingerprint };
-                self.create_new_cage_job(tenant, new, checked, Some(idempotency)).await
-            }
-        }
+        let request = new.idempotency_key.clone().map(|key| Idempotency { key, fingerprint });
+        let make = |request| self.create_new_cage_job(tenant, new, checked, request);
+        once(&self.cage_jobs, &tenant.name, request, make).await
     }
 
     async fn create_new_cage_job(
@@ -274,16 +265,4 @@ fn fingerprint(key: &ContentKey, options: &CageOptions) -> String {
     hasher.update(&key.0);
     hasher.update(&serde_json::to_vec(options).unwrap_or_default());
     hasher.finalize().to_hex().to_string()
-}
-
-struct GiveUp<'a> {
-    service: &'a Service,
-    tenant: &'a str,
-    key: &'a str,
-}
-
-impl Drop for GiveUp<'_> {
-    fn drop(&mut self) {
-        self.service.cage_jobs.give_up(self.tenant, self.key);
-    }
 }

@@ -1,7 +1,7 @@
 //! Which cage jobs there are, whose they are, and which requests made them.
 
 use super::{CageJob, Phase};
-use crate::idempotency::{Repetition, Requests};
+use crate::idempotency::{Keyed, Requests};
 use crate::problem::{self, ApiError};
 use crate::session::lock;
 use cager_proto::cage_messages::CageState;
@@ -93,28 +93,14 @@ impl CageJobs {
         let earlier = || same().find(|job| before.is_some_and(|id| *job.meta.id < *id) && !job.state().is_final());
         completed.or_else(earlier).cloned()
     }
+}
 
-    /// Announces a request with an idempotency key.
-    ///
-    /// # Errors
-    /// As [`Requests::begin`].
-    pub(super) fn begin(
-        &self,
-        tenant: &str,
-        key: &str,
-        fingerprint: &str,
-    ) -> Result<Repetition<Arc<CageJob>>, ApiError> {
-        let mut inner = lock(&self.inner);
-        match inner.requests.begin(tenant, key, fingerprint)? {
-            Repetition::First => Ok(Repetition::First),
-            Repetition::Done(id) => inner.jobs.get(&id).cloned().map(Repetition::Done).ok_or_else(|| {
-                ApiError::new(problem::NOT_FOUND, "the cage design of this request was deleted; use a new key")
-            }),
-        }
+impl Keyed<CageJob> for CageJobs {
+    fn requests<R>(&self, work: impl FnOnce(&mut Requests) -> R) -> R {
+        work(&mut lock(&self.inner).requests)
     }
 
-    /// Frees the key of a request that made nothing.
-    pub(super) fn give_up(&self, tenant: &str, key: &str) {
-        lock(&self.inner).requests.give_up(tenant, key);
+    fn made(&self, id: &str) -> Option<Arc<CageJob>> {
+        lock(&self.inner).jobs.get(id).cloned()
     }
 }

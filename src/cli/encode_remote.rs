@@ -62,6 +62,7 @@ pub(super) fn run(
         lambda: Some(options.lambda),
         flip_cage: args.flip_cage,
         frame_rate: frames.frame_rate(),
+        frames: frames.frames(),
         ..SessionOptions::default()
     };
     let design = design_options(args, rest.points.len())?;

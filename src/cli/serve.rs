@@ -26,6 +26,7 @@ pub(super) fn run(flags: &ServeFlags) -> Result<()> {
     telemetry::init_logging(config.log, &config.log_filter)?;
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().thread_name("serve").build()?;
     let outcome = runtime.block_on(async {
+        telemetry::traces::begin().map_err(|error| anyhow::anyhow!(error))?;
         let stop = CancellationToken::new();
         tokio::spawn(stop_on_signals(stop.clone()));
         run_until(config, stop, |address| {
@@ -34,6 +35,7 @@ pub(super) fn run(flags: &ServeFlags) -> Result<()> {
         })
         .await
     });
+    telemetry::traces::end();
     // Blocking work that is left is not waited for: what was answered is on disk.
     runtime.shutdown_timeout(Duration::from_secs(2));
     outcome

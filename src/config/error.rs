@@ -95,9 +95,9 @@ pub enum ConfigError {
         /// Largest model.
         max_rest_bytes: u64,
     },
-    /// One half of what TLS needs.
-    #[error("{given} is set but {missing} is not; TLS needs both")]
-    HalfTls {
+    /// One of two settings that need each other.
+    #[error("{given} is set but {missing} is not; set both or neither")]
+    Half {
         /// What is there.
         given: &'static str,
         /// What is not.

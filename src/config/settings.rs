@@ -11,6 +11,7 @@ const DAY: u64 = 86_400;
 enum Kind {
     Address,
     File,
+    Text,
     Format,
     Filter,
     List,
@@ -24,6 +25,11 @@ const SETTINGS: &[(&str, Kind)] = &[
     ("admin_listen", Kind::Address),
     ("data", Kind::File),
     ("tokens", Kind::File),
+    ("oidc_issuer", Kind::Text),
+    ("oidc_audience", Kind::Text),
+    ("oidc_keys", Kind::Text),
+    ("oidc_tenant", Kind::Text),
+    ("webhooks", Kind::File),
     ("tls_certificate", Kind::File),
     ("tls_key", Kind::File),
     ("allowed_hosts", Kind::List),
@@ -96,6 +102,10 @@ impl Kind {
             }
             Self::File => match text {
                 None | Some("") => Err("write the path of a file or folder, in quotation marks".to_owned()),
+                Some(text) => Ok(Value::String(text.to_owned())),
+            },
+            Self::Text => match text.map(str::trim) {
+                None | Some("") => Err("write a text, in quotation marks".to_owned()),
                 Some(text) => Ok(Value::String(text.to_owned())),
             },
             Self::Format => match text {

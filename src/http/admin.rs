@@ -1,16 +1,19 @@
 //! What operators see and do, on a listener of its own, outside every limit of the public one.
 //!
-//! On a loopback address, whoever can reach it is the operator. On any other address there are health and metrics alone.
+//! On a loopback address, whoever can reach it is the operator. On any other address it is who has a token with the scope `admin`;
+//! health and metrics are for everyone.
 
-use super::extract::Query;
+use super::extract::{Query, granted};
 use super::origin;
 use super::respond::JsonResult;
 use super::router::{finished, open};
 use super::sessions::{PAGE, PageQuery};
+use crate::auth::Scope;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
+use crate::store::Kind;
 use axum::extract::{Path, Request, State};
-use axum::middleware::{Next, from_fn};
+use axum::middleware::{Next, from_fn, from_fn_with_state};
 use axum::response::Response;
 use axum::routing::{delete, get, post};
 use axum::{Json, Router};
@@ -20,18 +23,19 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// The routes; with `trusted` those that show and change what belongs to tenants.
-pub fn admin(service: Arc<Service>, trusted: bool) -> Router {
-    let mut routes = Router::from(open());
-    if trusted {
-        let operated = Router::new()
-            .route("/admin/tenants", get(tenants))
-            .route("/admin/sessions", get(sessions))
-            .route("/admin/sessions/{id}", delete(delete_session))
-            .route("/admin/drain", post(drain))
-            .route("/admin/evict", post(evict));
-        routes = routes.merge(operated.route_layer(from_fn(no_pages)));
-    }
+/// The routes; where `open_to_all`, whoever asks is the operator.
+pub fn admin(service: Arc<Service>, open_to_all: bool) -> Router {
+    let operated = Router::new()
+        .route("/admin/tenants", get(tenants))
+        .route("/admin/sessions", get(sessions))
+        .route("/admin/sessions/{id}", delete(delete_session))
+        .route("/admin/drain", post(drain))
+        .route("/admin/evict", post(evict));
+    let operated = match open_to_all {
+        true => operated.route_layer(from_fn(no_pages)),
+        false => operated.route_layer(from_fn_with_state(Arc::clone(&service), with_scope)),
+    };
+    let routes = Router::from(open()).merge(operated);
     let routes = routes.fallback(|| async { ApiError::new(problem::NOT_FOUND, "see the documentation for operators") });
     finished(routes.with_state(service))
 }
@@ -40,6 +44,17 @@ pub fn admin(service: Arc<Service>, trusted: bool) -> Router {
 async fn no_pages(request: Request, next: Next) -> Result<Response, ApiError> {
     if request.headers().contains_key(header::ORIGIN) || !origin::is_this_machine(&request) {
         return Err(ApiError::new(problem::FORBIDDEN, "pages may not operate the service; use curl or a script"));
+    }
+    Ok(next.run(request).await)
+}
+
+/// Operators have tokens that say so. Without tokens nobody is one.
+async fn with_scope(State(service): State<Arc<Service>>, request: Request, next: Next) -> Result<Response, ApiError> {
+    let grant = granted(&service, request.headers()).await?;
+    if !service.access.is_guarded() || grant.scope < Scope::Admin {
+        service.rejected("scope");
+        let detail = "operating the service from another machine needs a token whose scope is admin";
+        return Err(ApiError::new(problem::FORBIDDEN, detail));
     }
     Ok(next.run(request).await)
 }
@@ -95,9 +110,18 @@ async fn sessions(State(service): State<Arc<Service>>, Query(query): Query<PageQ
 }
 
 async fn delete_session(State(service): State<Arc<Service>>, Path(id): Path<String>) -> Result<StatusCode, ApiError> {
-    let session = service.registry.find_any(&id)?;
-    tracing::info!(session = %id, tenant = %session.meta.tenant, "deleted by the operator");
-    service.delete(&session).await?;
+    match service.registry.find_any(&id) {
+        Ok(session) => {
+            tracing::info!(session = %id, tenant = %session.meta.tenant, "deleted by the operator");
+            service.delete(&session).await?;
+        }
+        Err(missing) => {
+            if !service.delete_unread(Kind::Session, &id).await? {
+                return Err(missing);
+            }
+            tracing::info!(session = %id, "deleted by the operator, unread");
+        }
+    }
     Ok(StatusCode::NO_CONTENT)
 }
 

@@ -1,7 +1,7 @@
 //! What handlers take from a request: the tenant, the tenant's session, checked queries and bodies.
 
-use super::revocable::revocable;
-use crate::auth::{Scope, Tenant};
+use super::guarded::revocable;
+use crate::auth::{Denied, Grant, Scope, Tenant};
 use crate::cage_job::CageJob;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
@@ -26,34 +26,41 @@ pub(crate) async fn authenticate(
     mut request: axum::extract::Request,
     next: Next,
 ) -> Response {
-    match service.access.authenticate(request.headers()) {
-        Ok(grant) => {
-            let span = tracing::Span::current();
-            span.record("tenant", &*grant.tenant.name).record("token", &*grant.token);
-            // Decoding computes and changes nothing.
-            let reads = request.method().is_safe() || request.uri().path().ends_with("/decode");
-            if grant.scope == Scope::Read && !reads {
-                service.rejected("scope");
-                let detail = "this token may look and decode, but change nothing; use one whose scope is write";
-                return ApiError::new(problem::FORBIDDEN, detail).into_response();
-            }
-            request.extensions_mut().insert(Caller(grant.tenant));
-            if !service.access.is_guarded() {
-                return next.run(request).await;
-            }
-            let request = request.map(|body| revocable(body, &grant.revoked));
-            let response = next.run(request).await;
-            // What is whole already is sent.
-            match http_body::Body::size_hint(response.body()).exact() {
-                Some(_) => response,
-                None => response.map(|body| revocable(body, &grant.revoked)),
-            }
-        }
-        Err(denied) => {
-            service.rejected("unauthorized");
-            ApiError::new(problem::UNAUTHORIZED, denied.to_string()).into_response()
-        }
+    let grant = match granted(&service, request.headers()).await {
+        Ok(grant) => grant,
+        Err(denied) => return denied.into_response(),
+    };
+    // Decoding computes and changes nothing.
+    let reads = request.method().is_safe() || request.uri().path().ends_with("/decode");
+    if grant.scope == Scope::Read && !reads {
+        service.rejected("scope");
+        let detail = "this token may look and decode, but change nothing; use one whose scope is write";
+        return ApiError::new(problem::FORBIDDEN, detail).into_response();
     }
+    request.extensions_mut().insert(Caller(Arc::clone(&grant.tenant)));
+    if !service.access.is_guarded() {
+        return next.run(request).await;
+    }
+    let request = request.map(|body| revocable(body, &grant));
+    let response = next.run(request).await;
+    // What is whole already is sent.
+    match http_body::Body::size_hint(response.body()).exact() {
+        Some(_) => response,
+        None => response.map(|body| revocable(body, &grant)),
+    }
+}
+
+/// What the request's token grants; the log line says whose it is.
+pub(super) async fn granted(service: &Service, headers: &HeaderMap) -> Result<Grant, ApiError> {
+    let grant = service.access.grant(headers).await.map_err(|denied| {
+        service.rejected("unauthorized");
+        match denied {
+            Denied::NoKeys => ApiError::new(problem::BUSY, denied.to_string()).retry_after(5),
+            denied => ApiError::new(problem::UNAUTHORIZED, denied.to_string()),
+        }
+    })?;
+    tracing::Span::current().record("tenant", &*grant.tenant.name).record("token", &*grant.token);
+    Ok(grant)
 }
 
 impl<S: Sync> FromRequestParts<S> for Caller {
@@ -65,24 +72,45 @@ impl<S: Sync> FromRequestParts<S> for Caller {
     }
 }
 
-/// The caller's session of this address, whatever the state of its files. Rejects with 404 where there is none, or it is another tenant's,
-/// and with 503 where not even that can be read.
-pub(crate) struct Named(pub(crate) Arc<Session>);
+/// What belongs to a tenant and has an address.
+pub(crate) trait Owned: Send + Sync + Sized {
+    const KIND: Kind;
 
-impl FromRequestParts<Arc<Service>> for Named {
+    /// The tenant's one of this name.
+    fn find(service: &Service, tenant: &str, id: &str) -> Result<Arc<Self>, ApiError>;
+}
+
+impl Owned for Session {
+    const KIND: Kind = Kind::Session;
+
+    fn find(service: &Service, tenant: &str, id: &str) -> Result<Arc<Self>, ApiError> {
+        service.registry.find(tenant, id)
+    }
+}
+
+impl Owned for CageJob {
+    const KIND: Kind = Kind::CageJob;
+
+    fn find(service: &Service, tenant: &str, id: &str) -> Result<Arc<Self>, ApiError> {
+        service.cage_jobs.find(tenant, id)
+    }
+}
+
+/// The caller's session or cage job of this address, whatever the state of its files. Rejects with 404 where there is none, or it is another
+/// tenant's, and with 503 where not even that can be read.
+pub(crate) struct Named<T>(pub(crate) Arc<T>);
+
+impl<T: Owned> FromRequestParts<Arc<Service>> for Named<T> {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, service: &Arc<Service>) -> Result<Self, ApiError> {
         let Caller(tenant) = Caller::from_request_parts(parts, service).await?;
-        let id = id(parts, service, "a session").await?;
-        let read = service.read_again(Kind::Session, &tenant.name, &id).await;
-        service.registry.find(&tenant.name, &id).or_else(|missing| read.and(Err(missing))).map(Self)
+        let id = Path::<String>::from_request_parts(parts, service).await;
+        let missing = || ApiError::new(problem::NOT_FOUND, format!("the id of the {} is missing", T::KIND.name()));
+        let Path(id) = id.map_err(|_| missing())?;
+        let read = service.read_again(T::KIND, &tenant.name, &id).await;
+        T::find(service, &tenant.name, &id).or_else(|missing| read.and(Err(missing))).map(Self)
     }
-}
-
-async fn id(parts: &mut Parts, service: &Arc<Service>, what: &str) -> Result<String, ApiError> {
-    let id = Path::<String>::from_request_parts(parts, service).await;
-    id.map(|Path(id)| id).map_err(|_| ApiError::new(problem::NOT_FOUND, format!("the id of {what} is missing")))
 }
 
 /// The caller's session of this address. Rejects as [`Named`], and where its files cannot be read.
@@ -96,7 +124,7 @@ impl FromRequestParts<Arc<Service>> for Found {
 
     async fn from_request_parts(parts: &mut Parts, service: &Arc<Service>) -> Result<Self, ApiError> {
         let Caller(tenant) = Caller::from_request_parts(parts, service).await?;
-        let Named(session) = Named::from_request_parts(parts, service).await?;
+        let Named(session) = Named::<Session>::from_request_parts(parts, service).await?;
         service.read_again(Kind::Session, &tenant.name, &session.meta.id).await?;
         match session.ensure_loaded().await {
             // What can be known of it is that it failed, and why.
@@ -107,21 +135,7 @@ impl FromRequestParts<Arc<Service>> for Found {
     }
 }
 
-/// The caller's cage job of this address, whatever the state of its files. Rejects as [`Named`].
-pub(crate) struct NamedJob(pub(crate) Arc<CageJob>);
-
-impl FromRequestParts<Arc<Service>> for NamedJob {
-    type Rejection = ApiError;
-
-    async fn from_request_parts(parts: &mut Parts, service: &Arc<Service>) -> Result<Self, ApiError> {
-        let Caller(tenant) = Caller::from_request_parts(parts, service).await?;
-        let id = id(parts, service, "a cage design").await?;
-        let read = service.read_again(Kind::CageJob, &tenant.name, &id).await;
-        service.cage_jobs.find(&tenant.name, &id).or_else(|missing| read.and(Err(missing))).map(Self)
-    }
-}
-
-/// The caller's cage job of this address. Rejects as [`NamedJob`], and where its files cannot be read.
+/// The caller's cage job of this address. Rejects as [`Named`], and where its files cannot be read.
 pub(crate) struct FoundJob {
     pub(crate) tenant: Arc<Tenant>,
     pub(crate) job: Arc<CageJob>,
@@ -132,7 +146,7 @@ impl FromRequestParts<Arc<Service>> for FoundJob {
 
     async fn from_request_parts(parts: &mut Parts, service: &Arc<Service>) -> Result<Self, ApiError> {
         let Caller(tenant) = Caller::from_request_parts(parts, service).await?;
-        let NamedJob(job) = NamedJob::from_request_parts(parts, service).await?;
+        let Named(job) = Named::<CageJob>::from_request_parts(parts, service).await?;
         service.read_again(Kind::CageJob, &tenant.name, &job.meta.id).await?;
         Ok(Self { tenant, job })
     }

@@ -291,6 +291,7 @@ impl Reading {
                 if let Some(frame) = frames.push(&mut input)?
                     && let Some(permits) = permits.take()
                 {
+                    self.is_expected(frame.frame)?;
                     let job = FrameJob::new(&self.session, &self.upload, frame.frame, frame.rows, frame.bytes, permits);
                     self.live.lane.push(job);
                     submitted += 1;
@@ -302,6 +303,19 @@ impl Reading {
         }
         tracing::debug!(session = %self.session.meta.id, received, "upload read");
         frames.finish()
+    }
+
+    /// Refuses a number beyond those that the session was made for: it would only be found out at the end.
+    fn is_expected(&self, frame: u32) -> Result<(), ApiError> {
+        match self.session.meta.options.frames {
+            Some(frames) if frame >= frames => {
+                let detail = format!(
+                    "frame {frame} is beyond the {frames} frames that the session was made for, which count from 0; check its number"
+                );
+                Err(ApiError::new(problem::INVALID_FRAME, detail).frame(frame))
+            }
+            _ => Ok(()),
+        }
     }
 
     fn no_room(&self) -> ApiError {

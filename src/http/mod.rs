@@ -15,8 +15,8 @@ mod frames;
 mod frames_in;
 #[doc(hidden)]
 pub mod fuzzing;
+mod guarded;
 mod health;
-mod holding;
 pub mod listen;
 mod metered;
 mod multipart;
@@ -26,7 +26,6 @@ mod other_model;
 mod progress;
 mod ranged;
 mod respond;
-mod revocable;
 mod router;
 mod sessions;
 mod viewer;

@@ -1,9 +1,11 @@
 //! The multipart body that makes a session.
 
-use super::frames::body_error;
+use super::extract::{content_type, idempotency_key};
+use super::frames::{SLOWEST_BYTES_PER_SECOND, body_error};
 use super::metered::Metered;
 use crate::admission::Held;
 use crate::auth::Tenant;
+use crate::config::ENVELOPE_BYTES;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::cage_source::Uploaded;
@@ -13,6 +15,7 @@ use axum::extract::{FromRequest, Multipart, Request};
 use cager_proto::messages::SessionOptions;
 use serde::de::DeserializeOwned;
 use std::sync::Arc;
+use std::time::Duration;
 
 const OPTIONS_BYTES: usize = 64 << 10;
 pub(super) const NAME_CHARACTERS: usize = 200;
@@ -28,6 +31,33 @@ pub(crate) struct Parts {
 struct File {
     name: String,
     bytes: Vec<u8>,
+}
+
+/// What a form says before it is read.
+pub(super) struct Announced {
+    pub(super) idempotency_key: Option<String>,
+    /// How long it may take to arrive.
+    pub(super) patience: Duration,
+}
+
+/// Looks at the header of a form with these parts; what is in it may have `limit` bytes.
+///
+/// # Errors
+/// No form, one that says it is too large, a key that is none.
+pub(super) fn announced(service: &Service, request: &Request, parts: &str, limit: u64) -> Result<Announced, ApiError> {
+    let headers = request.headers();
+    if content_type(headers).as_deref() != Some("multipart/form-data") {
+        return Err(ApiError::new(problem::MEDIA_TYPE, format!("send multipart/form-data with the parts {parts}")));
+    }
+    let declared = http_body::Body::size_hint(request.body()).lower();
+    if declared > limit.saturating_add(ENVELOPE_BYTES) {
+        service.rejected("body_too_large");
+        let detail = format!("the body has {declared} bytes, but the parts {parts} may have {limit} together");
+        return Err(ApiError::new(problem::TOO_LARGE, detail).limit(limit));
+    }
+    let most = if declared > 0 { declared } else { limit };
+    let patience = Duration::from_secs(service.config.body_timeout_s + most / SLOWEST_BYTES_PER_SECOND);
+    Ok(Announced { idempotency_key: idempotency_key(headers)?, patience })
 }
 
 /// Reads all parts.

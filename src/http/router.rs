@@ -2,7 +2,7 @@
 
 use super::encoded::decoded;
 use super::extract::Caller;
-use super::holding::holding;
+use super::guarded::holding;
 use super::respond::PROBLEM_JSON;
 use super::{
     cage, cage_jobs, cages, container, coordinates, decode, errors, events, extract, frames, health, openapi, origin,
@@ -10,7 +10,7 @@ use super::{
 };
 use crate::problem::{self, ApiError, Kind};
 use crate::service::Service;
-use crate::telemetry::{RequestId, request_id};
+use crate::telemetry::{RequestId, request_id, traces};
 use axum::error_handling::HandleErrorLayer;
 use axum::extract::{DefaultBodyLimit, MatchedPath, Request, State};
 use axum::middleware::{Next, from_fn, from_fn_with_state};
@@ -188,10 +188,12 @@ async fn host(request: Request, next: Next) -> Response {
 async fn finish(request: Request, next: Next) -> Response {
     let clock = Instant::now();
     let id = request.extensions().get::<RequestId>().cloned();
+    let method = request.method().clone();
     let route = request.extensions().get::<MatchedPath>().map(|path| path.as_str().to_owned());
     let mut response = next.run(request).await;
     let status = response.status();
     let route = response.extensions().get::<MatchedPath>().map(|p| p.as_str().to_owned()).or(route);
+    traces::name(method.as_str(), route.as_deref().unwrap_or("other"));
     metrics::counter!("cager_requests_total", "status" => status.as_u16().to_string()).increment(1);
     metrics::histogram!("cager_request_seconds", "route" => route.unwrap_or_else(|| "other".to_owned()))
         .record(clock.elapsed().as_secs_f64());

@@ -1,10 +1,11 @@
 //! `/v1/sessions`: making, listing, looking at, completing and deleting sessions.
 
-use super::extract::{Body, Caller, Found, Named, Query, content_type, idempotency_key};
-use super::frames::{SLOWEST_BYTES_PER_SECOND, too_slow};
+use super::extract::{Body, Caller, Found, Named, Query};
+use super::frames::too_slow;
+use super::multipart::Announced;
 use super::respond::JsonResult;
 use super::{multipart, openapi};
-use crate::problem::{self, ApiError};
+use crate::problem::ApiError;
 use crate::service::Service;
 use crate::session::create::NewSession;
 use axum::Json;
@@ -14,7 +15,6 @@ use cager_proto::messages::{Complete, Session, SessionList, SessionState};
 use http::{StatusCode, header};
 use serde::Deserialize;
 use std::sync::Arc;
-use std::time::Duration;
 use tokio::time::timeout;
 
 pub(super) const PAGE: usize = 100;
@@ -36,21 +36,9 @@ pub(crate) async fn create(
     Caller(tenant): Caller,
     request: Request,
 ) -> Result<Response, ApiError> {
-    let headers = request.headers();
-    if content_type(headers).as_deref() != Some("multipart/form-data") {
-        let detail = "send multipart/form-data with the parts rest, cage and options";
-        return Err(ApiError::new(problem::MEDIA_TYPE, detail));
-    }
     let limit = service.config.max_rest_bytes;
-    let declared = http_body::Body::size_hint(request.body()).lower();
-    if declared > limit.saturating_add(crate::config::ENVELOPE_BYTES) {
-        service.rejected("body_too_large");
-        let detail = format!("the body has {declared} bytes, but rest pose and cage may have {limit} together");
-        return Err(ApiError::new(problem::TOO_LARGE, detail).limit(limit));
-    }
-    let idempotency_key = idempotency_key(headers)?;
-    let most = if declared > 0 { declared } else { limit };
-    let patience = Duration::from_secs(service.config.body_timeout_s + most / SLOWEST_BYTES_PER_SECOND);
+    let Announced { idempotency_key, patience } =
+        multipart::announced(&service, &request, "rest, cage and options", limit)?;
     let parts = timeout(patience, multipart::read(&service, &tenant, request)).await.map_err(|_| too_slow())??;
     let new = NewSession { uploaded: parts.uploaded, options: parts.options, idempotency_key, room: parts.room };
     let session = service.create(&tenant, new).await?;
@@ -101,7 +89,10 @@ pub(crate) async fn get(Found { session, .. }: Found) -> Json<Session> {
 
 /// Deletes a session with all that belongs to it; what runs for it stops.
 #[utoipa::path(delete, path = "/v1/sessions/{id}", operation_id = "delete_session", tag = "sessions", params(openapi::Id), responses((status = 204, description = "It is gone")))]
-pub(crate) async fn delete(State(service): State<Arc<Service>>, Named(session): Named) -> Result<StatusCode, ApiError> {
+pub(crate) async fn delete(
+    State(service): State<Arc<Service>>,
+    Named(session): Named<crate::session::Session>,
+) -> Result<StatusCode, ApiError> {
     service.delete(&session).await?;
     Ok(StatusCode::NO_CONTENT)
 }

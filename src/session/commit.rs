@@ -130,7 +130,11 @@ impl Session {
         }
         let outcome = self.open_log(&mut log).and_then(|log| {
             // Some were found in the log when it was opened; they are counted already.
-            records.retain(|record| self.frames().entry(record.frame).is_none());
+            records.retain(|record| {
+                let frames = self.frames();
+                let known = frames.entry(record.frame);
+                known.is_none_or(|known| known.full_digest.is_none() && record.full_digest.is_some())
+            });
             log.append(&records)
         });
         if outcome.is_err() {

@@ -10,9 +10,13 @@ use crate::capture::{CaptureWriter, Encoding, StoredError};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{CageFile, Completion, Content, LogEntry, StoreError};
+use crate::telemetry::traces::Step;
+use crate::webhooks::{Due, Event, Webhooks};
 use cager_core::cage::Cage;
 use cager_proto::container;
 use cager_proto::messages::Complete;
+use opentelemetry::Context;
+use opentelemetry::trace::FutureExt as _;
 use std::io::{self, BufWriter, Write};
 use std::sync::Arc;
 use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
@@ -26,17 +30,27 @@ impl Service {
         // Who gives up while it waits for its turn has not begun.
         let place = self.completing.take(&session.meta.tenant, 1).await;
         let (service, session) = (Arc::clone(self), Arc::clone(session));
-        let work = tokio::spawn(async move {
+        let work = async move {
             let _place = place;
             let _one = session.completing.lock().await;
+            let _step = Step::begin("complete", &Context::current());
             service.complete_alone(&session, wish).await
-        });
+        };
+        let work = tokio::spawn(work.with_current_context());
         work.await.map_err(|error| ApiError::internal(&error))?
     }
 
     async fn complete_alone(self: &Arc<Self>, session: &Arc<Session>, wish: Complete) -> Result<(), ApiError> {
-        let settling = Arc::clone(session);
-        blocking(move || settling.settle()).await??;
+        let (settling, webhooks) = (Arc::clone(session), Arc::clone(&self.webhooks));
+        blocking(move || {
+            let unsettled = settling.unsettled.load(Acquire);
+            settling.settle()?;
+            if unsettled {
+                webhooks.tell_left(&settling);
+            }
+            Ok::<_, ApiError>(())
+        })
+        .await??;
         let frames = wish.frames;
         match session.status().phase {
             Phase::Completed(completion) if completion.frames == frames => return Ok(()),
@@ -79,15 +93,18 @@ impl Service {
         };
         let mut sealed = Sealed { session, kept: before };
         let prepared = self.solver(session).await?;
-        let writing = Arc::clone(session);
-        let written = blocking(move || write(&writing, &prepared, &entries, frames)).await?;
-        let completion = written.map_err(|error| match session.status().phase {
+        let (writing, webhooks) = (Arc::clone(session), Arc::clone(&self.webhooks));
+        let written = blocking(move || write(&writing, &prepared, &entries, frames, &webhooks)).await?;
+        let (completion, due) = written.map_err(|error| match session.status().phase {
             // What was to be written proved damaged.
             Phase::Failed(problem) => ApiError::new(problem::SESSION_FAILED, problem.detail),
             _ => error,
         })?;
         session.completed(completion);
         sealed.kept = true;
+        if let Some(due) = due {
+            self.webhooks.tell(session, due);
+        }
         Ok(())
     }
 }
@@ -176,7 +193,13 @@ impl Session {
     }
 }
 
-fn write(session: &Session, prepared: &Prepared, entries: &[LogEntry], frames: u32) -> Result<Completion, ApiError> {
+fn write(
+    session: &Session,
+    prepared: &Prepared,
+    entries: &[LogEntry],
+    frames: u32,
+    webhooks: &Webhooks,
+) -> Result<(Completion, Option<Due>), ApiError> {
     let stored = |error: StoreError| session.storage_error(&error);
     let choices = Choices::of(&session.meta.options)?;
     let geometry = prepare::read(&session.content()?, &choices)?;
@@ -191,8 +214,9 @@ fn write(session: &Session, prepared: &Prepared, entries: &[LogEntry], frames: u
     let mut write = |out: &mut dyn Write| write_frames(session, &encoding, entries, out);
     let written = session.store.write_container(&session.meta.id, &mut write).map_err(stored)?;
     let completion = Completion { frames, container_bytes: written.bytes, container_digest: written.digest };
+    let due = webhooks.keep(session, Event::Completed).map_err(stored)?;
     session.mark(&completion).map_err(stored)?;
-    Ok(completion)
+    Ok((completion, due))
 }
 
 fn write_frames(

@@ -9,12 +9,15 @@ use super::upload::{self, FrameJob};
 use super::{LiveLane, Phase, Session, Status};
 use crate::admission::Held;
 use crate::auth::Tenant;
-use crate::idempotency::Repetition;
+use crate::idempotency::once;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{Content, ContentKey, Idempotency, Kind, SessionMeta};
+use crate::webhooks::Event;
 use cager_proto::messages::{CacheUse, PreparationSeconds, SessionOptions};
 use http::StatusCode;
+use opentelemetry::Context;
+use opentelemetry::trace::FutureExt as _;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
@@ -46,7 +49,8 @@ impl Service {
         new: NewSession,
     ) -> Result<Arc<Session>, ApiError> {
         let (service, tenant) = (Arc::clone(self), Arc::clone(tenant));
-        let work = tokio::spawn(async move { service.create_for(&tenant, new).await });
+        let work = async move { service.create_for(&tenant, new).await };
+        let work = tokio::spawn(work.with_current_context());
         work.await.map_err(|error| ApiError::internal(&error))?
     }
 
@@ -59,19 +63,9 @@ impl Service {
             blocking(move || (content_key(&tenant, &content, &options, &choices), content)).await?
         };
         let fingerprint = fingerprint(&key, &options);
-        let Some(idempotency_key) = idempotency_key else {
-            return self.create_new(tenant, Checked { key, content, made_cage, options, choices }, None).await;
-        };
-        match self.registry.begin(&tenant.name, &idempotency_key, &fingerprint)? {
-            Repetition::Done(session) => Ok(session),
-            Repetition::First => {
-                // Frees the key also after a panic.
-                let _free = GiveUp { service: self, tenant: &tenant.name, key: &idempotency_key };
-                let idempotency = Idempotency { key: idempotency_key.clone(), fingerprint };
-                let checked = Checked { key, content, made_cage, options, choices };
-                self.create_new(tenant, checked, Some(idempotency)).await
-            }
-        }
+        let request = idempotency_key.map(|key| Idempotency { key, fingerprint });
+        let checked = Checked { key, content, made_cage, options, choices };
+        once(&self.registry, &tenant.name, request, |request| self.create_new(tenant, checked, request)).await
     }
 
     async fn create_new(
@@ -111,7 +105,7 @@ impl Service {
             }
             None => Status { phase: Phase::Preparing, facts: None },
         };
-        let session = Arc::new(Session::new(meta, self.store.clone(), self.committer.clone(), status, true));
+        let session = Arc::new(Session::new(meta, self, status, true));
         session.bytes.store(content.size_bytes(), Relaxed);
         {
             let _content = self.registry.content_lock(&key).await;
@@ -126,7 +120,10 @@ impl Service {
         match session.facts() {
             // It would be found prepared after a restart as well; this only says it sooner.
             Some(facts) => drop(self.keep_outcome(&session, Outcome::Ready(Box::new(facts)))),
-            None => drop(tokio::spawn(Arc::clone(self).prepare(Arc::clone(&session), choices, geometry, Mark::None))),
+            None => {
+                let preparing = Arc::clone(self).prepare(Arc::clone(&session), choices, geometry, Mark::None);
+                drop(tokio::spawn(preparing.with_current_context()));
+            }
         }
         Ok(session)
     }
@@ -195,7 +192,12 @@ impl Service {
                 if error.status() == StatusCode::UNPROCESSABLE_ENTITY {
                     self.keep_outcome(&session, Outcome::Failed(error.problem.clone())).await;
                 }
+                let (webhooks, ended) = (Arc::clone(&self.webhooks), Arc::clone(&session));
+                let due = blocking(move || webhooks.keep(&ended, Event::Failed)).await;
                 session.set_phase(Phase::Failed(error.problem));
+                if let Ok(Ok(Some(due))) = due {
+                    self.webhooks.tell(&session, due);
+                }
             }
         }
     }
@@ -280,23 +282,11 @@ impl Service {
 }
 
 fn wanted(session: &Session, choices: Choices, geometry: Option<Arc<Geometry>>) -> Wanted {
-    Wanted { key: session.meta.key, tenant: session.meta.tenant.clone(), choices, geometry }
+    Wanted { key: session.meta.key, tenant: session.meta.tenant.clone(), choices, geometry, trace: Context::current() }
 }
 
 /// Name of the note that holds the [`Outcome`].
 pub(super) const OUTCOME: &str = "outcome";
-
-struct GiveUp<'a> {
-    service: &'a Service,
-    tenant: &'a str,
-    key: &'a str,
-}
-
-impl Drop for GiveUp<'_> {
-    fn drop(&mut self) {
-        self.service.registry.give_up(self.tenant, self.key);
-    }
-}
 
 /// Digest of all that a solver depends on. The tenant is part of it: what one tenant uploaded is never a hit for another.
 fn content_key(tenant: &str, content: &Content, options: &SessionOptions, choices: &Choices) -> ContentKey {
@@ -306,6 +296,7 @@ fn content_key(tenant: &str, content: &Content, options: &SessionOptions, choice
     let solving = SessionOptions {
         name: None,
         frame_rate: None,
+        frames: None,
         // Its bytes count, wherever they came from.
         cage: None,
         coordinates: Some(choices.system.name().to_owned()),

@@ -44,6 +44,8 @@ struct Pending {
 pub(crate) enum Claim {
     /// Solve it.
     Solve,
+    /// Its cage is there, from its handle rows; measure it.
+    Measure,
     /// It is there already, the same.
     Known,
     /// The same is being solved; the upload hears of it.
@@ -87,8 +89,14 @@ impl Frames {
 
     /// Decides about a frame that arrived.
     pub(crate) fn claim(&mut self, frame: u32, digests: Digests, upload: &Arc<Upload>) -> Claim {
-        if let Some(entry) = self.solved.get(&frame) {
-            return if Digests::of(entry).agree(&digests) { Claim::Known } else { Claim::Conflict };
+        let known = self.solved.get(&frame).map(Digests::of);
+        if let Some(known) = known {
+            let measures = known.full.is_none() && digests.full.is_some() && !self.sealed;
+            match known.agree(&digests) {
+                false => return Claim::Conflict,
+                true if !measures => return Claim::Known,
+                true => {}
+            }
         }
         if let Some(pending) = self.pending.get_mut(&frame) {
             if !pending.digests.agree(&digests) {
@@ -101,7 +109,7 @@ impl Frames {
             return Claim::Sealed;
         }
         self.pending.insert(frame, Pending { digests, waiting: vec![Arc::clone(upload)] });
-        Claim::Solve
+        if known.is_some() { Claim::Measure } else { Claim::Solve }
     }
 
     /// Takes no new frames from here on, if all of `frames` are there and none is beyond or on its way there. With `discard` those
@@ -140,9 +148,16 @@ impl Frames {
 
     /// Enters a frame that is on disk; returns the uploads that wait for it.
     pub(crate) fn solved(&mut self, entry: LogEntry) -> Vec<Arc<Upload>> {
-        self.solved.entry(entry.frame).or_insert(entry);
+        if self.is_news(&entry) {
+            self.solved.insert(entry.frame, entry);
+        }
         self.runs.insert(entry.frame);
         self.pending.remove(&entry.frame).map_or_else(Vec::new, |pending| pending.waiting)
+    }
+
+    /// Whether it says more than what is known: a frame that is not there, or was not measured before.
+    pub(crate) fn is_news(&self, entry: &LogEntry) -> bool {
+        self.solved.get(&entry.frame).is_none_or(|known| known.full_digest.is_none() && entry.full_digest.is_some())
     }
 
     /// Whether a frame found in the log is the one that uploads wait for, if any do.
@@ -188,7 +203,7 @@ impl Frames {
 
     /// Number of frames that are solved or being solved.
     pub(crate) fn received_count(&self) -> u64 {
-        self.solved_count() + self.pending.len() as u64
+        self.solved_count() + self.pending.keys().filter(|frame| !self.solved.contains_key(frame)).count() as u64
     }
 
     /// The highest solved frame.
@@ -252,6 +267,26 @@ mod tests {
         assert_eq!(frames.claim(4, Digests { handles: [9; 16], ..same }, &upload), Claim::Conflict);
         assert_eq!(frames.solved(entry(4)).len(), 2);
         assert_eq!(frames.claim(4, same, &upload), Claim::Known);
+    }
+
+    #[test]
+    fn a_whole_frame_is_measured_after_its_handle_rows() {
+        let upload = Arc::new(Upload::default());
+        let mut frames = Frames::new(vec![LogEntry { full_digest: None, ..entry(3) }]);
+        let handles = Digests { handles: [1; 16], full: None };
+        let whole = Digests { full: Some([2; 16]), ..handles };
+        assert_eq!(frames.claim(3, handles, &upload), Claim::Known);
+        assert_eq!(frames.claim(3, Digests { handles: [9; 16], ..whole }, &upload), Claim::Conflict);
+        assert_eq!(frames.claim(3, whole, &upload), Claim::Measure);
+        assert_eq!((frames.solved_count(), frames.received_count()), (1, 1));
+        assert_eq!(frames.claim(3, whole, &upload), Claim::Waiting);
+        assert_eq!(frames.solved(LogEntry { offset: 77, ..entry(3) }).len(), 2);
+        assert_eq!(frames.entry(3).map(|entry| entry.offset), Some(77));
+        assert_eq!(frames.claim(3, whole, &upload), Claim::Known);
+        assert!(!frames.is_news(&LogEntry { full_digest: None, ..entry(3) }), "what was measured stays");
+        frames.solved(LogEntry { full_digest: None, ..entry(4) });
+        frames.seal();
+        assert_eq!(frames.claim(4, whole, &upload), Claim::Known, "the container must not change");
     }
 
     #[test]

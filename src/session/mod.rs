@@ -16,7 +16,10 @@ pub(crate) mod upload;
 
 use crate::engine::Lane;
 use crate::problem::{self, ApiError};
+use crate::service::Service;
 use crate::store::{Completion, FrameLog, LogEntry, LogReader, SessionMeta, Store, StoreError};
+use crate::webhooks::Webhooks;
+use cager_core::inversion::{Handles, SolverOptions};
 use cager_core::regularize::Regularizer;
 use cager_proto::messages::{FrameCounts, Problem, Progress, Session as View, SessionState};
 use commit::{Committer, Waiting};
@@ -33,6 +36,7 @@ pub(crate) struct Session {
     pub(crate) meta: SessionMeta,
     store: Store,
     committer: Committer,
+    webhooks: Arc<Webhooks>,
     status: Mutex<Status>,
     frames: Mutex<Frames>,
     /// Whether there is a log on disk. It is made before the session is known to be ready, so that one that is gone is missed.
@@ -101,15 +105,16 @@ impl LiveLane {
 }
 
 impl Session {
-    pub(crate) fn new(meta: SessionMeta, store: Store, committer: Committer, status: Status, is_new: bool) -> Self {
+    pub(crate) fn new(meta: SessionMeta, service: &Service, status: Status, is_new: bool) -> Self {
         let mut frames = Frames::default();
         if matches!(status.phase, Phase::Completed(_)) {
             frames.seal();
         }
         Self {
             meta,
-            store,
-            committer,
+            store: service.store.clone(),
+            committer: service.committer.clone(),
+            webhooks: Arc::clone(&service.webhooks),
             status: Mutex::new(status),
             frames: Mutex::new(frames),
             has_log: AtomicBool::new(false),
@@ -254,7 +259,7 @@ impl Session {
         *lock(&self.reader) = Some(log.reader());
         // Of a session that was loaded before, those that were written although the answer was an error: true all the same.
         let mut frames = self.frames();
-        let new: Vec<LogEntry> = entries.into_iter().filter(|e| frames.entry(e.frame).is_none()).collect();
+        let new: Vec<LogEntry> = entries.into_iter().filter(|e| frames.is_news(e)).collect();
         for entry in new {
             let same = frames.is_awaited(&entry);
             for upload in frames.solved(entry) {
@@ -289,6 +294,7 @@ impl Session {
         if let Err(error) = self.store.quarantine_session(&self.meta.id, what) {
             tracing::error!(session = %self.meta.id, %error, "it could not be moved");
         }
+        self.webhooks.tell_damaged(self);
         error
     }
 
@@ -425,10 +431,10 @@ impl Session {
             cage_vertices: facts.map(|f| f.cage_vertices),
             cage_faces: facts.map(|f| f.cage_faces),
             coordinates: or(&options.coordinates, "mvc"),
-            handles: or(&options.handles, "maxvol"),
-            regularizer: or(&options.regularizer, "laplacian"),
+            handles: or(&options.handles, Handles::default().name()),
+            regularizer: or(&options.regularizer, Regularizer::default().name()),
             spectrum: facts.map(|f| f.spectrum).or(options.spectrum),
-            lambda: options.lambda.unwrap_or(1.0),
+            lambda: options.lambda.unwrap_or(SolverOptions::default().lambda),
             condition_number: facts.map(|f| f.condition_number),
             rank: facts.map(|f| f.rank),
             affine_reproduction_error: facts.map(|f| f.affine_reproduction_error),

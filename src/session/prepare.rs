@@ -13,6 +13,7 @@ use cager_core::mesh::{Model, TriMesh};
 use cager_core::regularize::{Regularizer, SparseMatrix, Term};
 use cager_formats::{MeshFormat, read_matrix_bytes, read_model_bytes};
 use cager_proto::messages::SessionOptions;
+use std::ops::ControlFlow;
 use std::path::Path;
 
 /// Options that were checked, all but the spectrum's bound, which the cage gives.
@@ -43,6 +44,11 @@ impl Choices {
         }
         if options.frame_rate.is_some_and(|rate| !(rate.is_finite() && rate > 0.0)) {
             return refuse("frame_rate: give a positive number of frames per second".to_owned());
+        }
+        if options.frames == Some(0) {
+            return refuse(
+                "frames: a capture has at least one frame; leave it out where their number is not known".to_owned(),
+            );
         }
         let name = options.coordinates.as_deref().unwrap_or("mvc");
         let Some(system) = coordinates::by_name(name) else {
@@ -154,19 +160,27 @@ pub(crate) fn check(geometry: &Geometry, choices: &Choices, most_bytes: u64) -> 
     Ok(())
 }
 
-/// Prepares the solver.
+/// Prepares the solver. None where it ended because it was not `wanted` any more, which is asked before each step.
 ///
 /// # Errors
 /// Geometry or options that do not go together.
-pub(crate) fn prepare(geometry: &Geometry, choices: &Choices, most_bytes: u64) -> Result<Prepared, ApiError> {
+pub(crate) fn prepare(
+    geometry: &Geometry,
+    choices: &Choices,
+    most_bytes: u64,
+    wanted: &dyn Fn() -> bool,
+) -> Result<Option<Prepared>, ApiError> {
     let unknowns = choices.system.unknowns(&geometry.cage);
     let options = choices.solver_options(unknowns);
     check_memory(geometry, choices, options, most_bytes)?;
     let term = geometry.matrix.as_ref().map(|matrix| matrix as &dyn Term);
-    let preparing = Preparing { term, ..Preparing::default() };
-    let solver = Solver::prepare_with(choices.system, &geometry.cage, &geometry.rest.points, options, &preparing)
-        .map_err(|error| refused(&error))?;
-    Ok(with_solver(solver, &geometry.cage, options))
+    let next = |_| if wanted() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
+    let preparing = Preparing { term, next: &next, ..Preparing::default() };
+    match Solver::prepare_with(choices.system, &geometry.cage, &geometry.rest.points, options, &preparing) {
+        Ok(solver) => Ok(Some(with_solver(solver, &geometry.cage, options))),
+        Err(PrepareError::Stopped) => Ok(None),
+        Err(error) => Err(refused(&error)),
+    }
 }
 
 /// What a client hears of an error: which option it is about, or that it is the geometry.

@@ -6,8 +6,10 @@ use crate::config::ServeConfig;
 use crate::engine::threads;
 use crate::problem::{self, ApiError};
 use crate::store::{CageFile, Content, ContentKey, Store};
+use crate::telemetry::traces::Step;
 use cager_core::inversion::{Solver, SolverOptions};
 use cager_proto::messages::{CacheUse, PreparationSeconds};
+use opentelemetry::Context;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
@@ -40,6 +42,8 @@ pub(crate) struct Wanted {
     pub(crate) choices: Choices,
     /// Rest pose and cage where they have been read already.
     pub(crate) geometry: Option<Arc<Geometry>>,
+    /// The trace of who asks.
+    pub(crate) trace: Context,
 }
 
 /// Stored solvers read at a time: the disk decides how fast that is.
@@ -142,8 +146,8 @@ impl Solvers {
         super::lock(&self.inner).flights.values().filter(|flight| flight.tenant == tenant).count()
     }
 
-    /// The solver of a content: from memory, from disk, or prepared now. Where all give up before its turn has come, it is not
-    /// prepared.
+    /// The solver of a content: from memory, from disk, or prepared now. Where all give up, it is not prepared, or
+    /// only to the end of the step that is being computed.
     pub(crate) async fn get(self: &Arc<Self>, wanted: Wanted) -> Result<Got, ApiError> {
         if let Some(prepared) = self.at_hand(&wanted.key) {
             return Ok(Got { prepared, cache: CacheUse::Hit, seconds: PreparationSeconds::default() });
@@ -175,7 +179,7 @@ impl Solvers {
         (flight, true)
     }
 
-    async fn fly(self: Arc<Self>, wanted: Wanted, landing: &Landing) {
+    async fn fly(self: Arc<Self>, wanted: Wanted, landing: &Arc<Landing>) {
         let key = wanted.key;
         let result = loop {
             let flying = Arc::clone(&self).load_or_prepare(&wanted, landing);
@@ -210,7 +214,11 @@ impl Solvers {
     }
 
     /// None where nobody waits for it any more.
-    async fn load_or_prepare(self: Arc<Self>, wanted: &Wanted, landing: &Landing) -> Option<Result<Got, ApiError>> {
+    async fn load_or_prepare(
+        self: Arc<Self>,
+        wanted: &Wanted,
+        landing: &Arc<Landing>,
+    ) -> Option<Result<Got, ApiError>> {
         let clock = Instant::now();
         let (key, choices) = (wanted.key, wanted.choices);
         {
@@ -227,9 +235,11 @@ impl Solvers {
             () = landing.closed() => return None,
         };
         let queued = clock.elapsed().as_secs_f64();
+        let _step = Step::begin("prepare", &wanted.trace);
         let geometry = wanted.geometry.clone();
-        let work = move || self.prepare(&key, &choices, geometry, queued, place);
-        Some(tokio::task::spawn_blocking(work).await.unwrap_or_else(|e| Err(ApiError::internal(&e))))
+        let waited_for = Arc::clone(landing);
+        let work = move || self.prepare(&key, &choices, geometry, queued, place, &|| !waited_for.is_closed());
+        tokio::task::spawn_blocking(work).await.unwrap_or_else(|e| Err(ApiError::internal(&e))).transpose()
     }
 
     /// The stored solver of a content, if there is one. Blocks.
@@ -255,7 +265,7 @@ impl Solvers {
         Ok(Some(Got { prepared, cache: CacheUse::Hit, seconds }))
     }
 
-    /// Prepares the solver of a content. Blocks.
+    /// Prepares the solver of a content, or some of it where it is not `wanted` any more. Blocks.
     fn prepare(
         &self,
         key: &ContentKey,
@@ -263,7 +273,8 @@ impl Solvers {
         geometry: Option<Arc<Geometry>>,
         queued: f64,
         _place: Held,
-    ) -> Result<Got, ApiError> {
+        wanted: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Option<Got>, ApiError> {
         let clock = Instant::now();
         metrics::counter!("cager_cache_total", "result" => "miss").increment(1);
         let geometry = match geometry {
@@ -271,7 +282,8 @@ impl Solvers {
             None => Arc::new(prepare::read(&self.content(key)?, choices)?),
         };
         let read = clock.elapsed().as_secs_f64();
-        let prepared = self.pool.install(|| prepare::prepare(&geometry, choices, self.most_bytes))?;
+        let prepared = self.pool.install(|| prepare::prepare(&geometry, choices, self.most_bytes, wanted))?;
+        let Some(prepared) = prepared else { return Ok(None) };
         let found = prepared.solver.preparation();
         let seconds = PreparationSeconds {
             queued,
@@ -282,7 +294,7 @@ impl Solvers {
             total: queued + clock.elapsed().as_secs_f64(),
         };
         metrics::histogram!("cager_prepare_seconds").record(clock.elapsed().as_secs_f64());
-        Ok(Got { prepared: Arc::new(prepared), cache: CacheUse::Miss, seconds })
+        Ok(Some(Got { prepared: Arc::new(prepared), cache: CacheUse::Miss, seconds }))
     }
 
     fn content(&self, key: &ContentKey) -> Result<Content, ApiError> {

@@ -1,7 +1,7 @@
 //! Which sessions there are, whose they are, and which requests made them.
 
 use super::Session;
-use crate::idempotency::{Repetition, Requests};
+use crate::idempotency::{Keyed, Requests};
 use crate::problem::{self, ApiError};
 use crate::store::ContentKey;
 use std::collections::{BTreeMap, HashMap};
@@ -161,28 +161,14 @@ impl Registry {
     pub(crate) async fn content_lock(&self, key: &ContentKey) -> tokio::sync::MutexGuard<'_, ()> {
         self.contents[usize::from(key.0[0]) % self.contents.len()].lock().await
     }
+}
 
-    /// Announces a request with an idempotency key.
-    ///
-    /// # Errors
-    /// The key belongs to another request, or to one that is still being worked on.
-    pub(crate) fn begin(
-        &self,
-        tenant: &str,
-        key: &str,
-        fingerprint: &str,
-    ) -> Result<Repetition<Arc<Session>>, ApiError> {
-        let mut inner = super::lock(&self.inner);
-        match inner.requests.begin(tenant, key, fingerprint)? {
-            Repetition::First => Ok(Repetition::First),
-            Repetition::Done(id) => inner.sessions.get(&id).cloned().map(Repetition::Done).ok_or_else(|| {
-                ApiError::new(problem::NOT_FOUND, "the session that this request made was deleted; use a new key")
-            }),
-        }
+impl Keyed<Session> for Arc<Registry> {
+    fn requests<R>(&self, work: impl FnOnce(&mut Requests) -> R) -> R {
+        work(&mut super::lock(&self.inner).requests)
     }
 
-    /// Frees the key of a request that made nothing.
-    pub(crate) fn give_up(&self, tenant: &str, key: &str) {
-        super::lock(&self.inner).requests.give_up(tenant, key);
+    fn made(&self, id: &str) -> Option<Arc<Session>> {
+        super::lock(&self.inner).sessions.get(id).cloned()
     }
 }

@@ -58,6 +58,23 @@ impl Mark {
     }
 }
 
+impl Session {
+    /// Looks whether the container of a completed session still is what was written. One that is not is written again, to the same bytes,
+    /// when the session is completed again. Blocks.
+    pub(crate) fn check_container(&self) {
+        let Phase::Completed(completion) = self.status().phase else { return };
+        match self.store.container_is_whole(&self.meta.id, &completion) {
+            Ok(true) => {}
+            Ok(false) => {
+                tracing::error!(session = %self.meta.id, "the container is damaged; complete the session again");
+                let phase = Mark::Damaged.phase(&mut self.frames());
+                self.set_phase(phase);
+            }
+            Err(error) => tracing::warn!(session = %self.meta.id, %error, "the container could not be checked"),
+        }
+    }
+}
+
 impl Service {
     /// Goes on with a session found on disk. One whose files cannot be read is known as failed, so that it can be deleted, and comes up
     /// when this is called again.
@@ -118,7 +135,7 @@ impl Service {
     }
 
     fn found(&self, meta: SessionMeta, status: Status) -> Arc<Session> {
-        let session = Session::new(meta, self.store.clone(), self.committer.clone(), status, false);
+        let session = Session::new(meta, self, status, false);
         let bytes = self.store.session_bytes(&session.meta.id) + self.store.content_bytes(&session.meta.key);
         session.bytes.store(bytes, Relaxed);
         Arc::new(session)

@@ -92,6 +92,9 @@ impl Service {
     /// One round of [`Self::sweep`].
     pub(crate) async fn sweep_once(self: &Arc<Self>) {
         self.read_all_again().await;
+        if self.unread.may_forget() {
+            self.forget_orphans().await;
+        }
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_millis() as u64;
         let expired = |tenant: &str, created_ms: u64| {
             let most_s = self.access.tenant(tenant).limits.max_age_s;

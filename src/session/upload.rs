@@ -228,6 +228,7 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
     let clock = Instant::now();
     let mut whole = Vec::new();
     let mut handles = Vec::new();
+    let mut measured = Vec::new();
     for mut job in jobs {
         if job.upload.is_abandoned() || session.is_deleted() {
             continue;
@@ -249,6 +250,7 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
         match claim {
             Claim::Solve if job.rows == Rows::All => whole.push((job, digests)),
             Claim::Solve => handles.push((job, digests)),
+            Claim::Measure => measured.push((job, digests)),
             Claim::Waiting => job.settle(),
             Claim::Known => {
                 let (upload, frame) = (Arc::clone(&job.upload), job.frame);
@@ -267,6 +269,7 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
             }
         }
     }
+    measure(session, prepared, measured);
     if prepared.solver.follows_previous() {
         return solve_in_order(session, prepared, whole, handles);
     }
@@ -307,6 +310,26 @@ fn solve_in_order(
             Ok(previous) => solve_alike(session, prepared, rows, run, previous.as_deref(), own),
             Err(error) => fail_all(session, run, own, &error),
         }
+    }
+}
+
+/// Measures whole frames whose cages are there from their handle rows. The cages stay as they are.
+fn measure(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<(FrameJob, Digests)>) {
+    for (job, digests) in jobs {
+        let guard = GiveUp { session, frames: vec![job.frame] };
+        let mut bytes = Vec::new();
+        let entry = session.frames().entry(job.frame).copied();
+        let read = entry.map_or_else(|| Err(conflict(job.frame)), |entry| session.read_cages(&[entry], &mut bytes));
+        if let Err(error) = read {
+            fail_all(session, vec![(job, digests)], guard, &error);
+            continue;
+        }
+        let numbers =
+            |bytes: &[u8]| -> Vec<f32> { bytes.as_chunks().0.iter().map(|&b| f32::from_le_bytes(b)).collect() };
+        let (cage, points) = (numbers(&bytes), numbers(&job.bytes));
+        let errors = prepared.solver.decoder().measure(&[&cage], &[&points]);
+        let error = StoredError::new(&errors[0], prepared.solver.diagonal());
+        finish(session, vec![(job, digests)], vec![cage], vec![error], guard);
     }
 }
 
@@ -357,7 +380,7 @@ fn solve_alike(
     rows: Rows,
     jobs: Vec<(FrameJob, Digests)>,
     previous: Option<&[f32]>,
-    mut guard: GiveUp<'_>,
+    guard: GiveUp<'_>,
 ) {
     let mut numbers = NUMBERS.take();
     numbers.resize_with(numbers.len().max(jobs.len()), Vec::new);
@@ -379,15 +402,26 @@ fn solve_alike(
     if numbers.iter().map(Vec::capacity).sum::<usize>() <= KEPT_NUMBERS {
         NUMBERS.set(numbers);
     }
-    guard.frames.clear();
     if solver.follows_previous() {
         let last = jobs.last().zip(cages.last()).map(|((job, _), cage)| (job.frame, cage.clone()));
         *super::lock(&session.last_solved) = last.filter(|(_, cage)| cage.iter().all(|x| x.is_finite()));
     }
+    finish(session, jobs, cages, errors, guard);
+}
+
+/// Hands what was solved on to be written.
+fn finish(
+    session: &Arc<Session>,
+    jobs: Vec<(FrameJob, Digests)>,
+    cages: Vec<Vec<f32>>,
+    errors: Vec<StoredError>,
+    mut guard: GiveUp<'_>,
+) {
+    guard.frames.clear();
     let mut solved = Vec::with_capacity(jobs.len());
     for (((mut job, digests), cage), error) in jobs.into_iter().zip(cages).zip(errors) {
         let frame = job.frame;
-        let fits = cage.iter().all(|x| x.is_finite()) && (rows == Rows::Handles || error.linf.is_finite());
+        let fits = cage.iter().all(|x| x.is_finite()) && (job.rows == Rows::Handles || error.linf.is_finite());
         if !fits {
             let detail =
                 format!("frame {frame}: its numbers are too large for single precision; scale the capture down");

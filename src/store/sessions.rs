@@ -184,6 +184,28 @@ impl Store {
         }
     }
 
+    /// Whether the session's container is the one that was written: its length and digest. Reads all of it.
+    ///
+    /// # Errors
+    /// [`StoreError::BadId`], or what the system says.
+    pub fn container_is_whole(&self, id: &str, completion: &Completion) -> Result<bool, StoreError> {
+        check_id(id)?;
+        let path = self.container_path(id);
+        let failed = |e| StoreError::of(&path, "read", e);
+        let file = self.files().disk.open(&path).map_err(failed)?;
+        let (mut digest, mut buffer, mut offset) = (blake3::Hasher::new(), vec![0; BUFFER_BYTES], 0);
+        loop {
+            let read = file.read_at(&mut buffer, offset).map_err(failed)?;
+            if read == 0 {
+                break;
+            }
+            digest.update(&buffer[..read]);
+            offset += read as u64;
+        }
+        let digest = digest.finalize().to_hex();
+        Ok(offset == completion.container_bytes && digest.as_str() == completion.container_digest)
+    }
+
     /// Keeps a note of what was found out about the session, replacing an earlier one of that name: whole or not at all, durable
     /// on Ok. `name` is one of the program's own.
     ///

@@ -3,6 +3,7 @@
 use crate::service::Service;
 use crate::store::Kind;
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
+use metrics_process::Collector;
 use std::collections::BTreeMap;
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;
@@ -34,6 +35,8 @@ pub fn recorder() -> &'static PrometheusHandle {
             tracing::warn!("another metrics recorder is installed");
         }
         describe();
+        Collector::default().describe();
+        metrics::gauge!("cager_build_info", "version" => env!("CAGER_VERSION")).set(1.0);
         handle
     })
 }
@@ -47,6 +50,7 @@ pub async fn keep(stop: CancellationToken) {
 
 /// Sets the gauges that are looked up rather than counted.
 pub(crate) fn observe(service: &Service) {
+    Collector::default().collect();
     metrics::gauge!("cager_queue_frames").set(service.engine.waiting() as f64);
     metrics::gauge!("cager_streams").set(service.open_streams() as f64);
     metrics::gauge!("cager_preparing").set(service.solvers.in_flight() as f64);
@@ -81,6 +85,8 @@ fn describe() {
     describe_counter!("cager_sessions_expired_total", "Sessions deleted because of their age");
     describe_counter!("cager_quarantined_total", "Damaged things put aside");
     describe_gauge!("cager_unread", "Sessions and cage designs whose files cannot be read, left where they are");
+    describe_gauge!("cager_build_info", "Always 1; version and commit of the program");
+    describe_counter!("cager_webhooks_total", "Messages to webhooks, by result: delivered, given_up, gone");
     describe_counter!("cager_rejections_total", "Requests turned away, by reason");
     describe_counter!("cager_requests_total", "Requests, by status class");
     describe_counter!("cager_connections_total", "Connections accepted");

@@ -2,6 +2,7 @@
 //!
 //! Only method, path and outcome are logged. Queries, headers and bodies never are: they may hold tokens and captures.
 
+use super::traces;
 use axum::body::Body;
 use axum::extract::{ConnectInfo, Request};
 use axum::middleware::Next;
@@ -9,6 +10,7 @@ use axum::response::Response;
 use bytes::Bytes;
 use http::{HeaderName, HeaderValue, StatusCode};
 use http_body::{Body as HttpBody, Frame, SizeHint};
+use opentelemetry::trace::FutureExt as _;
 use std::net::SocketAddr;
 use std::pin::Pin;
 use std::sync::Arc;
@@ -54,17 +56,22 @@ pub async fn request_id(mut request: Request, next: Next) -> Response {
     let path = path.get(..PATH_BYTES).unwrap_or(path);
     let method = request.method();
     let span = if quiet {
-        tracing::debug_span!("request", request_id = %id, %method, path, peer = Empty, tenant = Empty, token = Empty, problem = Empty)
+        tracing::debug_span!("request", request_id = %id, %method, path, peer = Empty, tenant = Empty, token = Empty, problem = Empty, trace_id = Empty)
     } else {
-        tracing::info_span!("request", request_id = %id, %method, path, peer = Empty, tenant = Empty, token = Empty, problem = Empty)
+        tracing::info_span!("request", request_id = %id, %method, path, peer = Empty, tenant = Empty, token = Empty, problem = Empty, trace_id = Empty)
     };
     if let Some(ConnectInfo(peer)) = request.extensions().get::<ConnectInfo<SocketAddr>>() {
         span.record("peer", tracing::field::display(peer));
     }
-    let mut log = Log { span: span.clone(), began: Instant::now(), quiet, answered: None, ended: false };
+    let trace = traces::request(&request);
+    if let Some(id) = traces::trace_id(&trace) {
+        span.record("trace_id", id);
+    }
+    let mut log =
+        Log { trace: trace.clone(), span: span.clone(), began: Instant::now(), quiet, answered: None, ended: false };
     let header = HeaderValue::from_str(&id.0);
     request.extensions_mut().insert(id);
-    let mut response = next.run(request).instrument(span).await;
+    let mut response = next.run(request).with_context(trace).instrument(span).await;
     if let Ok(header) = header {
         response.headers_mut().insert(HEADER, header);
     }
@@ -76,6 +83,7 @@ pub async fn request_id(mut request: Request, next: Next) -> Response {
 
 /// Writes the request's line when it is dropped: at the end of the response, or when the client has gone.
 struct Log {
+    trace: opentelemetry::Context,
     span: Span,
     began: Instant,
     quiet: bool,
@@ -87,6 +95,7 @@ struct Log {
 
 impl Drop for Log {
     fn drop(&mut self) {
+        traces::ended(&self.trace, self.answered.map(|(status, _)| status));
         let total_ms = self.began.elapsed().as_secs_f64() * 1e3;
         let _entered = self.span.enter();
         let Some((status, latency)) = self.answered else {

@@ -76,13 +76,13 @@ impl Analysis {
         let (m, diagonal) = (system.unknowns(cage), diagonal(points));
         let clock = Instant::now();
         refuse_far_points(cage, points)?;
-        (preparing.tell)("coordinates");
+        preparing.next("coordinates")?;
         let Found { phi, sample, decoder, rest, error, outside: (outside, outside_distance), refinement } =
             coordinates(system, cage, points, wanted, preparing.keeps_coordinates)?;
         let coordinates_seconds = clock.elapsed().as_secs_f64();
 
         let clock = Instant::now();
-        (preparing.tell)("handles");
+        preparing.next("handles")?;
         let no_handles = PrepareError::NoSolution { what: "choice of handles" };
         let mut basis = row_basis(phi.as_ref()).ok_or(no_handles.clone())?;
         let maxvol_seconds = clock.elapsed().as_secs_f64();
@@ -90,7 +90,7 @@ impl Analysis {
         let decoder = decoder.unwrap_or_else(|| Decoder::new(phi.as_ref(), cage.vertices().len()));
 
         let clock = Instant::now();
-        (preparing.tell)("singular values");
+        preparing.next("singular values")?;
         let mut spectra = Spectra::of(&basis, wanted)?;
         if basis.rank == m && spectra.full_ends[2] <= RANK_TOLERANCE * spectra.full_ends[0] {
             basis = deficient_basis(phi.as_ref()).ok_or(no_handles)?;

@@ -6,6 +6,9 @@ use crate::regularize::TermError;
 /// Why a solver cannot be prepared.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PrepareError {
+    /// The caller wants it no more.
+    #[error("the preparation was stopped")]
+    Stopped,
     /// NaN or infinity in the rest pose.
     #[error("rest point {point} is not finite; export the rest pose again")]
     NotFinite {

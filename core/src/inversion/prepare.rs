@@ -8,6 +8,7 @@ use crate::mesh::{Point, diagonal, distance_to_surface, norm, winding_number};
 use crate::regularize::{Term, TermError};
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
+use std::ops::ControlFlow;
 
 /// Beyond this affine reproduction error, over the diagonal, coordinates are of no use.
 const NOT_REPRODUCED: f64 = 1e-6;
@@ -93,7 +94,7 @@ impl Solver {
         // Known before anything is computed.
         term.delta(cage, system.unknowns(cage))?;
         let analysis = Analysis::for_options(system, cage, points, options, preparing)?;
-        (preparing.tell)("operator");
+        preparing.next("operator")?;
         analysis.reading(options.handles)?.solver_with(options, term)
     }
 }
@@ -106,13 +107,13 @@ pub struct Preparing<'a> {
     /// Whether the decoder of a model of very many points keeps their coordinates, which takes four bytes for each point and column, or
     /// computes them anew whenever it is used.
     pub keeps_coordinates: bool,
-    /// Told what is computed next.
-    pub tell: &'a dyn Fn(&'static str),
+    /// Told what is computed next; ends the preparation there with [`PrepareError::Stopped`] by a break.
+    pub next: &'a dyn Fn(&'static str) -> ControlFlow<()>,
 }
 
 impl Default for Preparing<'_> {
     fn default() -> Self {
-        Self { term: None, keeps_coordinates: true, tell: &|_| {} }
+        Self { term: None, keeps_coordinates: true, next: &|_| ControlFlow::Continue(()) }
     }
 }
 
@@ -123,6 +124,13 @@ impl<'a> Preparing<'a> {
     /// [`TermError::Missing`] where it would be the caller's own.
     pub fn term(&self, options: SolverOptions) -> Result<&'a dyn Term, TermError> {
         self.term.or_else(|| options.regularizer.term()).ok_or(TermError::Missing)
+    }
+
+    pub(super) fn next(&self, step: &'static str) -> Result<(), PrepareError> {
+        match (self.next)(step) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(PrepareError::Stopped),
+        }
     }
 }
 

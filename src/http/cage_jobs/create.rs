@@ -1,10 +1,11 @@
 //! `POST /v1/cages`: a cage is to be designed.
 
 use super::parts;
-use crate::http::extract::{Caller, content_type, idempotency_key};
-use crate::http::frames::{SLOWEST_BYTES_PER_SECOND, too_slow};
+use crate::http::extract::Caller;
+use crate::http::frames::too_slow;
+use crate::http::multipart::{self, Announced};
 use crate::http::openapi;
-use crate::problem::{self, ApiError};
+use crate::problem::ApiError;
 use crate::service::Service;
 use axum::Json;
 use axum::extract::{Request, State};
@@ -12,7 +13,6 @@ use axum::response::{IntoResponse, Response};
 use cager_proto::cage_messages::CageJob;
 use http::{StatusCode, header};
 use std::sync::Arc;
-use std::time::Duration;
 use tokio::time::timeout;
 
 /// Designs a cage by example: part `rest` is the rest pose, part `frames` frames of its motion, part `options` JSON. The design runs in the
@@ -30,24 +30,10 @@ pub(crate) async fn create(
     Caller(tenant): Caller,
     request: Request,
 ) -> Result<Response, ApiError> {
-    let headers = request.headers();
-    if content_type(headers).as_deref() != Some("multipart/form-data") {
-        let detail = "send multipart/form-data with the parts rest, frames and options";
-        return Err(ApiError::new(problem::MEDIA_TYPE, detail));
-    }
     let limit = service.config.max_frames_bytes.saturating_add(service.config.max_rest_bytes);
-    let declared = http_body::Body::size_hint(request.body()).lower();
-    if declared > limit.saturating_add(crate::config::ENVELOPE_BYTES) {
-        service.rejected("body_too_large");
-        let detail = format!(
-            "the body has {declared} bytes, but rest pose and frames may have {limit} together; send fewer frames"
-        );
-        return Err(ApiError::new(problem::TOO_LARGE, detail).limit(limit));
-    }
-    let idempotency_key = idempotency_key(headers)?;
+    let form = multipart::announced(&service, &request, "rest, frames and options", limit)?;
+    let Announced { idempotency_key, patience } = form;
     let _place = service.stream(&tenant)?;
-    let most = if declared > 0 { declared } else { limit };
-    let patience = Duration::from_secs(service.config.body_timeout_s + most / SLOWEST_BYTES_PER_SECOND);
     let reading = parts::read(&service, &tenant, request, idempotency_key);
     let new = timeout(patience, reading).await.map_err(|_| too_slow())??;
     let job = service.create_cage_job(&tenant, new).await?;

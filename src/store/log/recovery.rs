@@ -4,7 +4,7 @@ use super::format::{BLOCK_BYTES, DATA_START, Layout};
 use super::{LogEntry, StoreError};
 use crate::store::disk::DiskFile;
 use crate::store::files::{Files, parent};
-use std::collections::HashSet;
+use std::collections::HashMap;
 use std::path::Path;
 
 /// Read at once, in bytes.
@@ -36,7 +36,7 @@ pub(super) fn recover(
     layout.check_first_block(&block).map_err(|what| StoreError::damaged(path, what))?;
     let (marked, mut marks) = layout.marked(&block);
 
-    let Scan { mut entries, end, claimed } = scan(file, length, layout).map_err(failed)?;
+    let Scan { entries, end, claimed } = scan(file, length, layout).map_err(failed)?;
     let claimed = claimed.max(marked).max(DATA_START);
     if claimed > end {
         let what = if length < claimed && end + layout.stride() > length {
@@ -73,8 +73,17 @@ pub(super) fn recover(
             tracing::debug!(%error, path = %path.display(), "a frame log's length was not marked");
         }
     }
-    let mut seen = HashSet::with_capacity(entries.len());
-    entries.retain(|entry| seen.insert(entry.frame));
+    let mut known: HashMap<u32, usize> = HashMap::with_capacity(entries.len());
+    let mut kept: Vec<LogEntry> = Vec::with_capacity(entries.len());
+    for entry in entries {
+        let place = *known.entry(entry.frame).or_insert(kept.len());
+        match kept.get_mut(place) {
+            None => kept.push(entry),
+            Some(first) if first.full_digest.is_none() && entry.full_digest.is_some() => *first = entry,
+            Some(_) => {}
+        }
+    }
+    let entries = kept;
     Ok(Recovered { entries, durable: end, tail, marks })
 }
 

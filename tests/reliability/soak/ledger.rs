@@ -6,6 +6,7 @@ use cager_client::{Client, messages::SessionState};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 use tokio::time::timeout;
 
 /// What runs when a process is killed.
@@ -121,16 +122,28 @@ impl Ledger {
         self.sessions.lock().unwrap().get(id).cloned()
     }
 
+    /// The sessions that are known, and not being deleted.
+    pub(crate) fn ids(&self) -> Vec<String> {
+        self.sessions.lock().unwrap().keys().cloned().collect()
+    }
+
     /// Whether all that was said still holds.
     pub(crate) async fn check(&self, server: &Server) {
+        self.check_but(server, None).await;
+    }
+
+    /// As [`Self::check`], where one session is `hurt`: it may fail.
+    pub(crate) async fn check_but(&self, server: &Server, hurt: Option<&str>) {
         let client = server.client();
         let deleted = self.deleted.lock().unwrap().clone();
-        let ids: Vec<String> = self.sessions.lock().unwrap().keys().cloned().collect();
+        let ids = self.ids();
         let listed = match timeout(HANG, client.sessions()).await {
             Ok(Ok(listed)) => listed,
             other => return self.violation(format!("the sessions are not listed: {:?}", other.map(|r| r.map(drop)))),
         };
         let mut names = BTreeSet::new();
+        let is_hurt = |id: &str| hurt == Some(id);
+        let failed = |id: &str| listed.iter().any(|s| s.id == id && s.state == SessionState::Failed);
         for session in &listed {
             let name = session.name.clone().unwrap_or_default();
             if !self.names.lock().unwrap().contains(&name) {
@@ -142,14 +155,22 @@ impl Ledger {
             if !names.insert(name.clone()) {
                 self.violation(format!("{}: {name} was made twice", session.id));
             }
-            if session.state == SessionState::Failed {
+            if session.state == SessionState::Failed && !is_hurt(&session.id) {
                 self.violation(format!("{} failed: {:?}", session.id, session.problem));
             }
         }
         for id in ids {
             // What was answered before the look is there afterwards.
             let Some(known) = self.known(&id) else { continue };
-            if let Err(error) = self.check_session(&client, server, &id, &known).await {
+            // It says that it is damaged, or is not listed because not even its name can be read.
+            if is_hurt(&id) && (failed(&id) || listed.iter().all(|session| session.id != id)) {
+                continue;
+            }
+            let checked = match is_hurt(&id) {
+                true => self.check_hurt(&client, server, &id, &known).await,
+                false => self.check_session(&client, server, &id, &known).await,
+            };
+            if let Err(error) = checked {
                 // It may have been deleted meanwhile.
                 if self.known(&id).is_some() {
                     self.violation(format!("{id}: {error}"));
@@ -159,14 +180,56 @@ impl Ledger {
     }
 
     async fn check_session(&self, client: &Client, server: &Server, id: &str, known: &Known) -> Result<(), String> {
+        let state = self.check_frames(client, id, known).await?;
+        if !known.completed {
+            return Ok(());
+        }
+        if state != SessionState::Completed {
+            return Err(format!("it was completed and is {state:?}"));
+        }
+        self.check_container(server, id, known).await
+    }
+
+    /// What a session whose files are not as they should be says, it has to say rightly; it may say that it cannot.
+    async fn check_hurt(&self, client: &Client, server: &Server, id: &str, known: &Known) -> Result<(), String> {
+        let path = format!("/v1/sessions/{id}");
+        let first = known.answered.keys().next().map(|frame| format!("{path}/cages?first={frame}&count=1"));
+        for path in [path.clone(), format!("{path}/errors")].into_iter().chain(first) {
+            match server.get(&path).await {
+                Some(200) => {}
+                Some(404 | 410) => return Err(format!("{path} is not there although nothing was deleted")),
+                _ => return Ok(()),
+            }
+        }
+        self.check_frames(client, id, known).await?;
+        if !known.completed {
+            return Ok(());
+        }
+        // A container that is damaged is noticed some time after the start, and written again from the log.
+        let (clock, frames) = (Instant::now(), known.reference.count());
+        let wish = serde_json::json!({ "frames": frames });
+        loop {
+            let completed =
+                reqwest::Client::new().post(server.url(&format!("{path}/complete"))).json(&wish).send().await;
+            match completed.map_err(|error| error.to_string())?.status().as_u16() {
+                200 => {}
+                503 => return Ok(()),
+                status => return Err(format!("it was completed, and completing it again answers {status}")),
+            }
+            match self.check_container(server, id, known).await {
+                Err(error) if clock.elapsed() > HANG => return Err(error),
+                Err(_) => tokio::time::sleep(Duration::from_millis(50)).await,
+                Ok(()) => return Ok(()),
+            }
+        }
+    }
+
+    async fn check_frames(&self, client: &Client, id: &str, known: &Known) -> Result<SessionState, String> {
         let text = |error: cager_client::ClientError| error.to_string();
         let session = client.session(id).await.map_err(text)?;
         let missing = &session.frames.missing;
         if let Some(lost) = known.answered.keys().find(|&&f| missing.iter().any(|[a, b]| (*a..*b).contains(&f))) {
             return Err(format!("frame {lost} was answered and is missing now"));
-        }
-        if known.completed && session.state != SessionState::Completed {
-            return Err(format!("it was completed and is {:?}", session.state));
         }
         if !known.answered.is_empty() && session.state != SessionState::Preparing {
             let bits = |x: Option<f32>| x.map(f32::to_bits);
@@ -181,10 +244,7 @@ impl Ledger {
             self.frames_checked.fetch_add(known.answered.len(), Ordering::Relaxed);
             self.check_cages(client, id, known).await?;
         }
-        if known.completed {
-            self.check_container(server, id, known).await?;
-        }
-        Ok(())
+        Ok(session.state)
     }
 
     async fn check_cages(&self, client: &Client, id: &str, known: &Known) -> Result<(), String> {

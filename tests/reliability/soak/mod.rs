@@ -1,5 +1,6 @@
 //! A service that is killed again and again while clients of every kind use it. `make soak` kills it a hundred times.
 
+mod faults;
 mod ledger;
 mod posts;
 mod workers;
@@ -67,6 +68,7 @@ async fn soak(kills: u64, seed: u64) {
 
     let mut slowest = Duration::ZERO;
     let mut during = BTreeMap::<Phase, u64>::new();
+    let mut faults = faults::Done::new();
     for kill in 0..kills {
         // Every phase is waited for in turn; a moment later the process ends.
         let phase = PHASES[kill as usize % PHASES.len()];
@@ -75,6 +77,9 @@ async fn soak(kills: u64, seed: u64) {
         tokio::time::sleep(Duration::from_micros(rng.u64(..longest))).await;
         ledger.active().for_each(|phase| *during.entry(phase).or_default() += 1);
         server.kill();
+        if kill % 2 == 1 {
+            faults::check(&data, &ledger, &mut rng, &mut faults).await;
+        }
         server = setup.start().await;
         slowest = slowest.max(server.ready);
         if server.ready > READY {
@@ -97,6 +102,7 @@ async fn soak(kills: u64, seed: u64) {
     println!(
         "soak: {kills} kills in {:.1} s, at work then: {during:?}\n\
          soak: {} answers, {} of them and {} cages checked after restarts, {} containers the same, {} sessions deleted\n\
+         soak: files that could not be read, were gone or damaged: {faults:?}\n\
          soak: ready after {} ms at most; losses and other violations: {}",
         clock.elapsed().as_secs_f64(),
         count(&ledger.answers),

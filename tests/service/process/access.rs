@@ -253,3 +253,24 @@ fn a_port_in_use_is_named() {
     let said = refused(&["--listen", &address]);
     assert!(said.contains(&address), "{said}");
 }
+
+#[tokio::test]
+async fn from_another_machine_the_operator_has_a_token_that_says_so() {
+    // Only its address tells a listener on all interfaces from one on this machine.
+    let tokens = folder();
+    let (file, root) = (tokens.path().join("tokens.toml"), "root-has-a-long-secret");
+    write_tokens(&file, &[("anna", ANNA, ""), ("ops", root, "scope = \"admin\"")]);
+    let port = std::net::TcpListener::bind("127.0.0.1:0").and_then(|l| l.local_addr()).expect("a port").port();
+    let app = TestApp::with(&[&format!("tokens={}", file.display()), &format!("admin_listen=0.0.0.0:{port}")]);
+    let session = app.caller(Some(ANNA)).ready(Capture::tiny()).await;
+    let address = std::net::SocketAddr::from(([127, 0, 0, 1], port));
+    let operator = |token: Option<&str>| crate::support::Api::new(address, token.map(str::to_owned), false);
+    operator(None).get("/healthz").await.expect(200);
+    let path = format!("/admin/sessions/{}", session.id);
+    operator(None).delete(&path).await.problem(401, "unauthorized");
+    operator(Some(ANNA)).delete(&path).await.problem(403, "forbidden");
+    operator(Some(ANNA)).get("/admin/sessions").await.problem(403, "forbidden");
+    assert!(operator(Some(root)).get("/admin/sessions").await.expect(200).text().contains(&session.id));
+    operator(Some(root)).delete(&path).await.expect(204);
+    app.caller(Some(ANNA)).get(&format!("/v1/sessions/{}", session.id)).await.problem(404, "not-found");
+}

@@ -2,6 +2,7 @@
 
 mod api;
 mod capture;
+mod elsewhere;
 mod inside;
 mod raw;
 
@@ -9,6 +10,7 @@ pub(crate) use api::{
     Api, OCTETS, RECORDS, Reply, cage_form, cage_form_of, cages_of, file, form, form_of, lines, piece, records, text,
 };
 pub(crate) use capture::{Capture, Mesh};
+pub(crate) use elsewhere::{Elsewhere, Heard};
 pub(crate) use inside::{Inside, SlowDesigns};
 pub(crate) use raw::{Raw, chunked};
 
@@ -33,6 +35,7 @@ pub(crate) struct TestApp {
     pub(crate) address: SocketAddr,
     place: Arc<TempDir>,
     flags: Vec<String>,
+    environment: Vec<(String, String)>,
     api: Api,
 }
 
@@ -63,7 +66,13 @@ impl TestApp {
     /// Starts a service with these settings, each `KEY=VALUE`.
     pub(crate) fn with(settings: &[&str]) -> Self {
         let flags = settings.iter().flat_map(|setting| ["--set".to_owned(), (*setting).to_owned()]).collect();
-        Self::launch(Arc::new(folder()), flags, None)
+        Self::launch(Arc::new(folder()), flags, Vec::new(), None)
+    }
+
+    /// Starts a service with default settings and these variables.
+    pub(crate) fn with_environment(variables: &[(&str, &str)]) -> Self {
+        let variables = variables.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
+        Self::launch(Arc::new(folder()), Vec::new(), variables, None)
     }
 
     /// Starts a service with a tokens file. Each entry is a tenant, its token and further keys of the file.
@@ -72,15 +81,21 @@ impl TestApp {
         let file = place.path().join("tokens.toml");
         write_tokens(&file, tokens);
         let flags = vec!["--tokens".to_owned(), file.display().to_string()];
-        Self::launch(Arc::new(place), flags, tokens.first().map(|(_, token, _)| (*token).to_owned()))
+        Self::launch(Arc::new(place), flags, Vec::new(), tokens.first().map(|(_, token, _)| (*token).to_owned()))
     }
 
-    fn launch(place: Arc<TempDir>, flags: Vec<String>, token: Option<String>) -> Self {
+    fn launch(
+        place: Arc<TempDir>,
+        flags: Vec<String>,
+        environment: Vec<(String, String)>,
+        token: Option<String>,
+    ) -> Self {
         let log = std::fs::OpenOptions::new().create(true).append(true).open(place.path().join("log"));
         let mut process = service()
             .args(["--listen", "127.0.0.1:0", "--data"])
             .arg(place.path().join("data"))
             .args(&flags)
+            .envs(environment.iter().map(|(name, value)| (name, value)))
             .stdout(Stdio::piped())
             .stderr(log.expect("a log"))
             .spawn()
@@ -94,7 +109,7 @@ impl TestApp {
         };
         let address: SocketAddr = address.parse().expect("an address");
         let api = Api::new(address, token, false);
-        Self { process, _stdout: stdout, address, place, flags, api }
+        Self { process, _stdout: stdout, address, place, flags, environment, api }
     }
 
     /// The same over HTTP/2.
@@ -167,7 +182,7 @@ impl TestApp {
 
     /// Starts the service again, on the same folder with the same settings.
     pub(crate) fn again(&self) -> Self {
-        Self::launch(Arc::clone(&self.place), self.flags.clone(), self.api.token.clone())
+        Self::launch(Arc::clone(&self.place), self.flags.clone(), self.environment.clone(), self.api.token.clone())
     }
 }
 
@@ -184,7 +199,7 @@ impl Drop for TestApp {
 /// `cager serve` without settings from the environment of the tests.
 pub(crate) fn service() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_cager"));
-    for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("CAGER_")) {
+    for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("CAGER_") || name.starts_with("OTEL_")) {
         command.env_remove(name);
     }
     command.arg("serve").stdin(Stdio::null());

@@ -122,3 +122,20 @@ async fn an_error_after_the_first_record_cuts_a_stream_of_records_off() {
         }
     }
 }
+
+#[tokio::test]
+async fn numbers_beyond_the_declared_frames_are_refused_at_once() {
+    let app = TestApp::start();
+    let capture = Capture::tiny();
+    let form = |frames: u32| crate::support::form(capture, &serde_json::json!({ "frames": frames }));
+    let none = app.create_with(form(0), None).await.problem(422, "invalid-options");
+    assert!(none.detail.contains("at least one frame"), "{}", none.detail);
+    let session: cager_proto::messages::Session = app.create_with(form(3), None).await.is(201);
+    app.settled(&session.id).await;
+    app.upload(&session.id, 0, capture.raw(0..3)).await;
+    let path = format!("/v1/sessions/{}/frames?first=4000000", session.id);
+    let problem = app.post(&path, OCTETS, capture.frame(1)).await.problem(422, "invalid-frame");
+    assert_eq!(problem.frame, Some(4_000_000));
+    assert!(problem.detail.contains("the 3 frames"), "{}", problem.detail);
+    app.complete(&session.id, 3).await.expect(200);
+}

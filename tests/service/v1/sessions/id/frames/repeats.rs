@@ -64,6 +64,41 @@ async fn other_bytes_are_a_conflict_and_nothing_changes() {
 }
 
 #[tokio::test]
+async fn whole_frames_after_their_handle_rows_are_measured() {
+    let mut app = TestApp::start();
+    let capture = Capture::small();
+    let (session, whole) = (app.ready(capture).await, app.ready(capture).await);
+    let measured = app.upload(&whole.id, 0, capture.raw(0..6)).await;
+    let handles = app.handles(&session.id).await;
+    let rows = format!("/v1/sessions/{}/frames?first=0&rows=handles", session.id);
+    let unmeasured = lines(&app.post(&rows, OCTETS, capture.handle_rows(0..6, &handles)).await.expect(200).body);
+    assert!(unmeasured.iter().all(|result| result.l2.is_none()));
+    let cages = app.cages(&session.id).await;
+    assert_eq!(app.upload(&session.id, 0, capture.raw(0..4)).await, measured[..4]);
+    let expected = [&measured[..4], &unmeasured[4..]].concat();
+    for again in [false, true] {
+        if again {
+            app.kill();
+            app = app.again();
+        }
+        assert_eq!(app.errors(&session.id).await, expected, "restarted: {again}");
+        let counts = app.session(&session.id).await.frames;
+        assert_eq!((counts.solved, counts.received), (6, 6));
+    }
+    assert!(app.cages(&session.id).await.len() == cages.len());
+    let unknowns = session.unknowns.expect("it is ready");
+    assert_eq!(
+        crate::support::cages_of(&app.cages(&session.id).await, unknowns),
+        crate::support::cages_of(&cages, unknowns)
+    );
+    let path = format!("/v1/sessions/{}/frames?first=5", session.id);
+    app.post(&path, OCTETS, capture.frame(7)).await.problem(409, "frame-conflict");
+    app.complete(&session.id, 6).await.expect(200);
+    // What was completed does not change.
+    assert_eq!(app.upload(&session.id, 4, capture.frame(4)).await, unmeasured[4..5]);
+}
+
+#[tokio::test]
 async fn a_conflict_within_an_upload_ends_it_with_the_reason() {
     let app = TestApp::start();
     let capture = Capture::small();

@@ -1,0 +1,63 @@
+//! Bodies that end when the token they were begun with is no longer valid, and bodies that keep a place until they are read or dropped.
+
+use crate::admission::Held;
+use crate::auth::Grant;
+use axum::body::Body;
+use bytes::Bytes;
+use http_body::{Frame, SizeHint};
+use std::pin::Pin;
+use std::task::{Context, Poll};
+
+/// Smaller bodies leave for the connection's buffers at once.
+const SMALL: u64 = 16 << 10;
+
+struct Guarded {
+    body: Body,
+    /// Ends the body with an error.
+    over: Option<Pin<Box<dyn Future<Output = ()> + Send>>>,
+    _place: Option<Held>,
+}
+
+/// The body, which fails as soon as the token is revoked or expires.
+pub(super) fn revocable(body: Body, grant: &Grant) -> Body {
+    if http_body::Body::is_end_stream(&body) {
+        return body;
+    }
+    let (revoked, expires) = (grant.revoked.clone(), grant.expires);
+    let over = async move {
+        match expires {
+            Some(expires) => drop(tokio::time::timeout_at(expires.into(), revoked.cancelled()).await),
+            None => revoked.cancelled().await,
+        }
+    };
+    Body::new(Guarded { body, over: Some(Box::pin(over)), _place: None })
+}
+
+/// Keeps the place of a request with its answer's body, where that is a large one in memory; a stream has a place of its own.
+pub(super) fn holding(body: Body, place: Held) -> Body {
+    match http_body::Body::size_hint(&body).exact() {
+        Some(bytes) if bytes > SMALL => Body::new(Guarded { body, over: None, _place: Some(place) }),
+        _ => body,
+    }
+}
+
+impl http_body::Body for Guarded {
+    type Data = Bytes;
+    type Error = axum::Error;
+
+    fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        if self.over.as_mut().is_some_and(|over| over.as_mut().poll(cx).is_ready()) {
+            self.over = Some(Box::pin(std::future::ready(())));
+            return Poll::Ready(Some(Err(axum::Error::new("the token was revoked or has expired"))));
+        }
+        Pin::new(&mut self.body).poll_frame(cx)
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
+    }
+}

@@ -1,0 +1,140 @@
+//! Traces in OpenTelemetry's form: a span for each request, with what it makes the service compute below it. Sent by OTLP over HTTP where
+//! the environment names a collector, `OTEL_EXPORTER_OTLP_ENDPOINT`; the other variables of that standard (headers, sampler, service name)
+//! count as well. Without one nothing is recorded.
+
+use async_trait::async_trait;
+use axum::extract::Request;
+use bytes::Bytes;
+use http::StatusCode;
+use opentelemetry::propagation::TextMapPropagator as _;
+use opentelemetry::trace::{SpanKind, Status, TraceContextExt as _, Tracer as _};
+use opentelemetry::{Context, KeyValue, global};
+use opentelemetry_http::{HeaderExtractor, HttpClient, HttpError};
+use opentelemetry_otlp::{SpanExporter, WithHttpConfig as _};
+use opentelemetry_sdk::Resource;
+use opentelemetry_sdk::propagation::TraceContextPropagator;
+use opentelemetry_sdk::trace::SdkTracerProvider;
+use std::sync::OnceLock;
+use tokio::runtime::Handle;
+
+const COLLECTORS: [&str; 2] = ["OTEL_EXPORTER_OTLP_TRACES_ENDPOINT", "OTEL_EXPORTER_OTLP_ENDPOINT"];
+const SCOPE: &str = "cager";
+
+static PROVIDER: OnceLock<SdkTracerProvider> = OnceLock::new();
+
+/// Begins to send spans, if the environment says where to. Within a tokio runtime, once per process.
+///
+/// # Errors
+/// What the environment says cannot be followed.
+pub fn begin() -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
+    let Some(name) = COLLECTORS.into_iter().find(|name| std::env::var_os(name).is_some_and(|value| !value.is_empty()))
+    else {
+        return Ok(());
+    };
+    let sender = Sender { client: crate::outgoing::client()?, runtime: Handle::current() };
+    let exporter = SpanExporter::builder().with_http().with_http_client(sender).build();
+    let exporter = exporter.map_err(|error| format!("{name}: {error}"))?;
+    let mut resource = Resource::builder().with_attribute(KeyValue::new("service.version", env!("CARGO_PKG_VERSION")));
+    if std::env::var_os("OTEL_SERVICE_NAME").is_none() {
+        resource = resource.with_service_name(SCOPE);
+    }
+    let provider = SdkTracerProvider::builder().with_batch_exporter(exporter).with_resource(resource.build()).build();
+    global::set_tracer_provider(provider.clone());
+    let _ = PROVIDER.set(provider);
+    tracing::info!(by = name, "traces are sent");
+    Ok(())
+}
+
+/// Sends what is left. Blocks for some seconds at most.
+pub fn end() {
+    if let Some(provider) = PROVIDER.get()
+        && let Err(error) = provider.shutdown()
+    {
+        tracing::warn!(%error, "the last traces could not be sent");
+    }
+}
+
+fn are_sent() -> bool {
+    PROVIDER.get().is_some()
+}
+
+/// Sends for the exporter, whose own thread has no runtime.
+#[derive(Debug)]
+struct Sender {
+    client: reqwest::Client,
+    runtime: Handle,
+}
+
+#[async_trait]
+impl HttpClient for Sender {
+    async fn send_bytes(&self, request: Request<Bytes>) -> Result<http::Response<Bytes>, HttpError> {
+        let client = self.client.clone();
+        let sent = self.runtime.spawn(async move {
+            let answer = client.execute(request.try_into()?).await?;
+            let mut response = http::Response::new(Bytes::new());
+            *response.status_mut() = answer.status();
+            *response.headers_mut() = answer.headers().clone();
+            Ok::<_, reqwest::Error>(response)
+        });
+        Ok(sent.await??)
+    }
+}
+
+/// The span of a request, below that of the client where its `traceparent` says so.
+pub(super) fn request(request: &Request) -> Context {
+    if !are_sent() {
+        return Context::new();
+    }
+    let parent = TraceContextPropagator::new().extract(&HeaderExtractor(request.headers()));
+    let method = request.method().as_str().to_owned();
+    let span = global::tracer(SCOPE).span_builder(method.clone()).with_kind(SpanKind::Server);
+    let span = span.with_attributes([KeyValue::new("http.request.method", method)]);
+    let span = span.start_with_context(&global::tracer(SCOPE), &parent);
+    parent.with_span(span)
+}
+
+/// The identifier by which a request's trace is found, if it is recorded.
+pub(super) fn trace_id(request: &Context) -> Option<String> {
+    let span = request.span();
+    span.is_recording().then(|| span.span_context().trace_id().to_string())
+}
+
+/// Names the span of the request at work after its route.
+pub(crate) fn name(method: &str, route: &str) {
+    if are_sent() {
+        let context = Context::current();
+        context.span().update_name(format!("{method} {route}"));
+        context.span().set_attribute(KeyValue::new("http.route", route.to_owned()));
+    }
+}
+
+/// Ends the span of a request; without a status the client went before it.
+pub(super) fn ended(request: &Context, status: Option<StatusCode>) {
+    let span = request.span();
+    if let Some(status) = status {
+        span.set_attribute(KeyValue::new("http.response.status_code", i64::from(status.as_u16())));
+        if status.is_server_error() {
+            span.set_status(Status::error(status.to_string()));
+        }
+    }
+    span.end();
+}
+
+/// Something that takes a while, below `parent`, until this is dropped.
+pub(crate) struct Step(Context);
+
+impl Step {
+    /// Begins it.
+    pub(crate) fn begin(name: &'static str, parent: &Context) -> Self {
+        if !are_sent() {
+            return Self(Context::new());
+        }
+        Self(parent.with_span(global::tracer(SCOPE).start_with_context(name, parent)))
+    }
+}
+
+impl Drop for Step {
+    fn drop(&mut self) {
+        self.0.span().end();
+    }
+}

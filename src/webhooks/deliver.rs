@@ -1,0 +1,118 @@
+//! Sending a message until it arrives.
+
+use super::file::Hook;
+use super::{Due, Event, NOTE};
+use crate::store::Store;
+use base64::Engine as _;
+use base64::prelude::BASE64_STANDARD;
+use bytes::Bytes;
+use http::StatusCode;
+use reqwest::{Client, header};
+use ring::hmac;
+use std::sync::atomic::Ordering::Relaxed;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, SystemTime};
+
+const MINUTE: u64 = 60;
+const HOUR: u64 = 60 * MINUTE;
+/// Pauses after attempts that failed, in seconds; after the last of them the message is given up.
+const PAUSES: [u64; 10] = [2, 15, MINUTE, 5 * MINUTE, 30 * MINUTE, 2 * HOUR, 6 * HOUR, 12 * HOUR, 24 * HOUR, 24 * HOUR];
+
+/// A message to one receiver.
+pub(super) struct Message {
+    /// The session that it is about.
+    pub(super) session: String,
+    pub(super) body: Bytes,
+    pub(super) store: Store,
+    /// Who was not told yet, shared by the messages about one session.
+    pub(super) left: Arc<Mutex<Due>>,
+}
+
+impl Message {
+    /// Sends it until it arrives, or it is given up.
+    pub(super) async fn deliver(self, hook: &Hook, client: &Client) {
+        let id = self.id();
+        let mut pauses = PAUSES.iter();
+        let result = loop {
+            if hook.gone.load(Relaxed) {
+                break "gone";
+            }
+            let why = match self.send(&id, hook, client).await {
+                Ok(status) if status.is_success() => break "delivered",
+                Ok(StatusCode::GONE) => {
+                    hook.gone.store(true, Relaxed);
+                    break "gone";
+                }
+                Ok(status) => format!("it answered {status}"),
+                Err(error) => error.without_url().to_string(),
+            };
+            // Only the host: the path may be a secret of the receiver.
+            let host = hook.url.host_str();
+            let Some(pause) = pauses.next() else {
+                tracing::error!(host, id, why, "a webhook's message is given up");
+                break "given_up";
+            };
+            tracing::warn!(host, id, why, again_in_s = pause, "a webhook's message did not arrive");
+            tokio::time::sleep(Duration::from_secs(*pause)).await;
+        };
+        metrics::counter!("cager_webhooks_total", "result" => result).increment(1);
+        let told = hook.id.clone();
+        let noted = tokio::task::spawn_blocking(move || {
+            let mut due = self.due();
+            due.left.retain(|hook| *hook != told);
+            self.store.put_note(&self.session, NOTE, &*due)
+        });
+        // Then it is told again after a restart, with the same id. A session that is gone has no notes.
+        if let Ok(Err(error)) = noted.await {
+            tracing::debug!(%error, "that a webhook's message arrived could not be kept");
+        }
+    }
+
+    fn due(&self) -> MutexGuard<'_, Due> {
+        self.left.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The same whenever it is sent.
+    fn id(&self) -> String {
+        let what = match self.due().event {
+            Event::Completed => "completed",
+            Event::Failed => "failed",
+        };
+        format!("{}.{what}", self.session)
+    }
+
+    async fn send(&self, id: &str, hook: &Hook, client: &Client) -> reqwest::Result<StatusCode> {
+        let _one_of_few = hook.places.acquire().await;
+        let seconds = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_secs();
+        let request = client
+            .post(hook.url.clone())
+            .header(header::CONTENT_TYPE, "application/json")
+            .header("webhook-id", id)
+            .header("webhook-timestamp", seconds)
+            .header("webhook-signature", signature(&hook.key, id, seconds, &self.body))
+            .body(self.body.clone());
+        request.send().await.map(|answer| answer.status())
+    }
+}
+
+/// `v1,` and the HMAC-SHA-256 of identifier, time and body with points between them, in base64.
+fn signature(key: &hmac::Key, id: &str, seconds: u64, body: &[u8]) -> String {
+    let mut context = hmac::Context::with_key(key);
+    context.update(format!("{id}.{seconds}.").as_bytes());
+    context.update(body);
+    format!("v1,{}", BASE64_STANDARD.encode(context.sign()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn signatures_are_those_of_the_standard() {
+        // Computed with Python's hmac and base64 modules.
+        let secret = BASE64_STANDARD.decode("MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw").unwrap();
+        let key = hmac::Key::new(hmac::HMAC_SHA256, &secret);
+        let signed = signature(&key, "msg_p5jXN8AQM9LWM0D4loKWxJek", 1_614_265_330, br#"{"test": 2432232314}"#);
+        assert_eq!(signed, "v1,g0hM9SsE+OTPJTGt/tmIKtSyZlE3uFJELVlNIOLJ1OE=");
+    }
+}

@@ -1,0 +1,165 @@
+//! The webhooks file.
+//!
+//! ```toml
+//! [[webhook]]
+//! url = "https://pipeline.example/hooks/cager"
+//! secret = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw"   # of 24 to 64 bytes, base64; the receiver has the same
+//! # tenant = "studio-a"              # whose sessions are told of; without it, those of all
+//! # events = ["session.completed"]   # without it, session.failed as well
+//! ```
+
+use super::Event;
+use crate::config::line_of;
+use base64::Engine as _;
+use base64::prelude::{BASE64_STANDARD, BASE64_URL_SAFE_NO_PAD};
+use reqwest::Url;
+use ring::digest;
+use ring::hmac::{HMAC_SHA256, Key};
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+use tokio::sync::Semaphore;
+use toml::Spanned;
+
+/// Messages on their way to one receiver at a time.
+const AT_A_TIME: usize = 4;
+const SECRET_PREFIX: &str = "whsec_";
+
+/// Why a webhooks file cannot be used. Never quotes secrets.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum WebhooksError {
+    /// It cannot be read.
+    #[error("{}: cannot be read: {source}", file.display())]
+    Read {
+        /// The file.
+        file: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// An entry is wrong.
+    #[error("{}: line {line}: {why}", file.display())]
+    Entry {
+        /// The file.
+        file: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong and what to do.
+        why: String,
+    },
+    /// Nothing can be sent.
+    #[error("webhooks cannot be sent: {0}")]
+    Client(reqwest::Error),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Document {
+    #[serde(default)]
+    webhook: Vec<Written>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    url: Spanned<String>,
+    secret: Spanned<String>,
+    tenant: Option<String>,
+    events: Option<Vec<Event>>,
+}
+
+/// One that is told.
+pub(super) struct Hook {
+    /// Stands for its address and tenant in notes.
+    pub(super) id: String,
+    pub(super) url: Url,
+    pub(super) key: Key,
+    tenant: Option<String>,
+    events: Option<Vec<Event>>,
+    pub(super) places: Semaphore,
+    /// It answered that it is there no more (410).
+    pub(super) gone: AtomicBool,
+}
+
+impl Hook {
+    pub(super) fn wants(&self, tenant: &str, event: Event) -> bool {
+        self.tenant.as_deref().is_none_or(|wanted| wanted == tenant)
+            && self.events.as_ref().is_none_or(|events| events.contains(&event))
+    }
+}
+
+pub(super) fn read(file: &Path) -> Result<Vec<Hook>, WebhooksError> {
+    let text = std::fs::read_to_string(file).map_err(|source| WebhooksError::Read { file: file.to_owned(), source })?;
+    parse(&text).map_err(|(offset, why)| WebhooksError::Entry {
+        file: file.to_owned(),
+        line: line_of(&text, offset),
+        why,
+    })
+}
+
+/// Reads entries; errors have their place in the text.
+fn parse(text: &str) -> Result<Vec<Hook>, (usize, String)> {
+    let document: Document = toml::from_str(text).map_err(|error: toml::de::Error| {
+        // Some messages quote the value at fault, which may be a secret.
+        let message = error.message().split(['`', '"']).step_by(2).collect::<Vec<_>>().join("…");
+        (error.span().map_or(0, |span| span.start), format!("{message}; see the documentation of webhooks files"))
+    })?;
+    document.webhook.into_iter().map(hook).collect()
+}
+
+fn hook(written: Written) -> Result<Hook, (usize, String)> {
+    let url = crate::outgoing::address(written.url.as_ref()).map_err(|why| (written.url.span().start, why))?;
+    let secret = written.secret.as_ref().strip_prefix(SECRET_PREFIX).and_then(|text| BASE64_STANDARD.decode(text).ok());
+    let secret = secret.filter(|secret| (24..=64).contains(&secret.len())).ok_or_else(|| {
+        let why = "secret must be whsec_ and 24 to 64 bytes in base64: echo whsec_$(openssl rand -base64 32)";
+        (written.secret.span().start, why.to_owned())
+    })?;
+    let named = format!("{url} {}", written.tenant.as_deref().unwrap_or_default());
+    Ok(Hook {
+        id: BASE64_URL_SAFE_NO_PAD.encode(&digest::digest(&digest::SHA256, named.as_bytes()).as_ref()[..12]),
+        url,
+        key: Key::new(HMAC_SHA256, &secret),
+        tenant: written.tenant,
+        events: written.events,
+        places: Semaphore::new(AT_A_TIME),
+        gone: AtomicBool::new(false),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECRET: &str = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw";
+
+    #[test]
+    fn entries_say_who_is_told_of_what() {
+        let hooks = parse(&format!(
+            "[[webhook]]\nurl = \"https://a.example/x\"\nsecret = \"{SECRET}\"\n\
+             [[webhook]]\nurl = \"https://a.example/x\"\nsecret = \"{SECRET}\"\ntenant = \"a\"\nevents = [\"session.failed\"]\n"
+        ));
+        let hooks = hooks.map_err(|(_, why)| why).unwrap();
+        assert!(hooks[0].wants("a", Event::Completed) && hooks[0].wants("b", Event::Failed));
+        assert!(hooks[1].wants("a", Event::Failed) && !hooks[1].wants("a", Event::Completed));
+        assert!(!hooks[1].wants("b", Event::Failed));
+        assert_ne!(hooks[0].id, hooks[1].id);
+    }
+
+    #[test]
+    fn wrong_entries_are_named_by_line_and_never_quote_secrets() {
+        let good = ("https://a.example/x", SECRET, "");
+        for (url, secret, more, line, word) in [
+            ("http://a.example/x", good.1, "", 2, "https"),
+            ("nowhere", good.1, "", 2, "no address"),
+            (good.0, "whsec_c2VjcmV0", "", 3, "24 to 64 bytes"),
+            (good.0, "c2VjcmV0c2VjcmV0c2VjcmV0c2VjcmV0", "", 3, "whsec_"),
+            (good.0, good.1, "events = [\"session.begun\"]", 4, "unknown variant"),
+            (good.0, good.1, "tenants = \"a\"", 4, "unknown field"),
+        ] {
+            let text = format!("[[webhook]]\nurl = \"{url}\"\nsecret = \"{secret}\"\n{more}\n");
+            let (offset, why) = parse(&text).err().unwrap();
+            assert_eq!((line_of(&text, offset), why.contains(word)), (line, true), "{why}");
+            assert!(!why.contains("c2Vj"), "{why}");
+        }
+    }
+}
