@@ -87,7 +87,7 @@ impl Place {
                 "tenant": "studio-a", "scope": "openid cager:write" })
     }
 
-    fn with(&self, changed: Value) -> Value {
+    fn with(&self, changed: &Value) -> Value {
         let mut claims = self.claims();
         for (name, value) in changed.as_object().expect("an object") {
             claims[name] = value.clone();
@@ -106,11 +106,11 @@ async fn the_claims_say_which_tenant_it_is_and_what_it_may_do() {
     let anna = place.app.caller(Some(&place.key.sign(&place.claims())));
     let session = anna.ready(Capture::tiny()).await;
     let same =
-        place.key.sign(&place.with(json!({ "sub": "user-8", "scope": "cager:read", "aud": ["other", "cager"] })));
+        place.key.sign(&place.with(&json!({ "sub": "user-8", "scope": "cager:read", "aud": ["other", "cager"] })));
     let reader = place.app.caller(Some(&same));
     assert_eq!(reader.session(&session.id).await.id, session.id, "the same tenant");
     reader.delete(&format!("/v1/sessions/{}", session.id)).await.problem(403, "forbidden");
-    let other = place.key.sign(&place.with(json!({ "tenant": "studio-b", "scp": ["cager:admin"], "scope": null })));
+    let other = place.key.sign(&place.with(&json!({ "tenant": "studio-b", "scp": ["cager:admin"], "scope": null })));
     place.app.caller(Some(&other)).get(&format!("/v1/sessions/{}", session.id)).await.problem(404, "not-found");
     assert!(place.app.log().contains("user-7") && place.app.log().contains("studio-a"), "the log says who it was");
 }
@@ -129,7 +129,7 @@ async fn tokens_that_are_not_to_be_believed_are_refused() {
         format!("{message}.{}", encoded(ring::hmac::sign(&key, message.as_bytes())))
     };
     let good = place.key.sign(&place.claims());
-    let other_claims = place.with(json!({ "tenant": "studio-b" }));
+    let other_claims = place.with(&json!({ "tenant": "studio-b" }));
     let parts: Vec<&str> = good.split('.').collect();
     let changed = format!("{}.{}.{}", parts[0], encoded(other_claims.to_string()), parts[2]);
     for (what, token, why) in [
@@ -143,14 +143,14 @@ async fn tokens_that_are_not_to_be_believed_are_refused() {
             place.key.sign_as(&json!({ "alg": "EdDSA", "kid": "first" }), &place.claims()),
             "not valid",
         ),
-        ("expired", place.key.sign(&place.with(json!({ "exp": now() - 120 }))), "expired"),
-        ("no expiry", place.key.sign(&place.with(json!({ "exp": null }))), "not"),
-        ("not yet", place.key.sign(&place.with(json!({ "nbf": now() + 300 }))), "not valid"),
-        ("another service", place.key.sign(&place.with(json!({ "aud": "render" }))), "iss or aud"),
-        ("another provider", place.key.sign(&place.with(json!({ "iss": "https://elsewhere.example" }))), "iss or aud"),
-        ("no tenant", place.key.sign(&place.with(json!({ "tenant": null }))), "tenant"),
-        ("a tenant that is a path", place.key.sign(&place.with(json!({ "tenant": "../b" }))), "tenant"),
-        ("no scope", place.key.sign(&place.with(json!({ "scope": "openid" }))), "scope"),
+        ("expired", place.key.sign(&place.with(&json!({ "exp": now() - 120 }))), "expired"),
+        ("no expiry", place.key.sign(&place.with(&json!({ "exp": null }))), "not"),
+        ("not yet", place.key.sign(&place.with(&json!({ "nbf": now() + 300 }))), "not valid"),
+        ("another service", place.key.sign(&place.with(&json!({ "aud": "render" }))), "iss or aud"),
+        ("another provider", place.key.sign(&place.with(&json!({ "iss": "https://elsewhere.example" }))), "iss or aud"),
+        ("no tenant", place.key.sign(&place.with(&json!({ "tenant": null }))), "tenant"),
+        ("a tenant that is a path", place.key.sign(&place.with(&json!({ "tenant": "../b" }))), "tenant"),
+        ("no scope", place.key.sign(&place.with(&json!({ "scope": "openid" }))), "scope"),
     ] {
         let problem = place.app.caller(Some(&token)).get("/v1/sessions").await.problem(401, "unauthorized");
         assert!(problem.detail.contains(why), "{what}: {}", problem.detail);
@@ -176,7 +176,7 @@ async fn what_was_begun_with_a_token_ends_when_it_expires() {
     let place = Place::new(&[]).await;
     let session = place.app.caller(Some(&place.key.sign(&place.claims()))).ready(Capture::tiny()).await;
     // Clocks may differ by a minute.
-    let token = place.key.sign(&place.with(json!({ "exp": now() - 57 })));
+    let token = place.key.sign(&place.with(&json!({ "exp": now() - 57 })));
     let mut followed =
         place.app.caller(Some(&token)).open(&format!("/v1/sessions/{}/cages?follow=true", session.id)).await;
     let end = within("the end of the stream", Duration::from_secs(10), async {
