@@ -5,7 +5,7 @@ use super::frames::too_slow;
 use super::multipart::Announced;
 use super::respond::JsonResult;
 use super::{multipart, openapi};
-use crate::problem::ApiError;
+use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::create::NewSession;
 use axum::Json;
@@ -69,11 +69,14 @@ pub(crate) async fn list(
     for session in &page {
         let loaded = session.ensure_loaded().await;
         let mut view = session.view_with(LISTED_RANGES);
-        // One that cannot be read is listed as failed.
-        if let Err(error) = loaded.as_ref()
-            && view.state != SessionState::Failed
-        {
-            (view.state, view.problem) = (SessionState::Failed, Some((*error.problem).clone()));
+        match loaded {
+            // It is being deleted just now.
+            Err(error) if error.problem.word() == problem::SESSION_DELETED.word => continue,
+            // One that cannot be read is listed as failed.
+            Err(error) if view.state != SessionState::Failed => {
+                (view.state, view.problem) = (SessionState::Failed, Some(*error.problem));
+            }
+            _ => {}
         }
         sessions.push(view);
     }

@@ -7,7 +7,7 @@ use cager_client::messages::Session;
 use fastrand::Rng;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// What is done to a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -22,6 +22,9 @@ pub(crate) enum Fault {
 
 const FAULTS: [Fault; 3] = [Fault::Unreadable, Fault::Gone, Fault::Damaged];
 
+/// A check that takes longer is told of.
+const LONG: Duration = Duration::from_secs(3);
+
 /// How often what was done to which file.
 pub(crate) type Done = BTreeMap<(String, Fault), u64>;
 
@@ -29,7 +32,7 @@ pub(crate) type Done = BTreeMap<(String, Fault), u64>;
 /// session that the file belongs to: it may say that it is damaged, and may not say that it is whole and lack what was answered. A file
 /// that could not be read is put back, and then everything has to hold.
 pub(crate) async fn check(data: &Path, ledger: &Ledger, rng: &mut Rng, done: &mut Done) {
-    let folder = tempfile::tempdir().expect("a folder");
+    let (clock, folder) = (Instant::now(), tempfile::tempdir().expect("a folder"));
     let copy = folder.path().join("data");
     copied(data, &copy);
     let Some((path, session)) = chosen(&copy, ledger, rng) else { return };
@@ -64,8 +67,11 @@ pub(crate) async fn check(data: &Path, ledger: &Ledger, rng: &mut Rng, done: &mu
         std::fs::rename(&aside, &path).expect("a file");
         if let Some(id) = &session {
             readable_again(&server, id).await;
+            ledger.check_one(&server, id).await;
         }
-        ledger.check(&server).await;
+    }
+    if clock.elapsed() > LONG {
+        println!("soak: {:.1} s with a {} that was {fault:?}", clock.elapsed().as_secs_f64(), path.display());
     }
     if ledger.violations().len() > before {
         ledger.violation(format!("these on a copy whose {} was {fault:?}", path.display()));
@@ -84,7 +90,7 @@ async fn readable_again(server: &Server, id: &str) {
             }
         }
         assert!(clock.elapsed() < HANG, "{id} is not served again");
-        tokio::time::sleep(std::time::Duration::from_millis(20)).await;
+        tokio::time::sleep(Duration::from_millis(20)).await;
     }
 }
 

@@ -166,16 +166,26 @@ impl Ledger {
             if is_hurt(&id) && (failed(&id) || listed.iter().all(|session| session.id != id)) {
                 continue;
             }
-            let checked = match is_hurt(&id) {
-                true => self.check_hurt(&client, server, &id, &known).await,
-                false => self.check_session(&client, server, &id, &known).await,
-            };
-            if let Err(error) = checked {
-                // It may have been deleted meanwhile.
-                if self.known(&id).is_some() {
-                    self.violation(format!("{id}: {error}"));
-                }
+            match is_hurt(&id) {
+                true => self.told(&id, self.check_hurt(&client, server, &id, &known).await),
+                false => self.told(&id, self.check_session(&client, server, &id, &known).await),
             }
+        }
+    }
+
+    /// As [`Self::check`], of one session.
+    pub(crate) async fn check_one(&self, server: &Server, id: &str) {
+        if let Some(known) = self.known(id) {
+            self.told(id, self.check_session(&server.client(), server, id, &known).await);
+        }
+    }
+
+    fn told(&self, id: &str, checked: Result<(), String>) {
+        // It may have been deleted meanwhile.
+        if let Err(error) = checked
+            && self.known(id).is_some()
+        {
+            self.violation(format!("{id}: {error}"));
         }
     }
 

@@ -77,7 +77,7 @@ async fn soak(kills: u64, seed: u64) {
         tokio::time::sleep(Duration::from_micros(rng.u64(..longest))).await;
         ledger.active().for_each(|phase| *during.entry(phase).or_default() += 1);
         server.kill();
-        if kill % 2 == 1 {
+        if kill % 4 == 1 {
             faults::check(&data, &ledger, &mut rng, &mut faults).await;
         }
         server = setup.start().await;
