@@ -3,7 +3,7 @@
 use crate::report::{Bytes, Condition, Errors, FrameError, MaxVol, Report, Seconds, WorstError};
 use crate::timing::counted_from_zero;
 use cager_core::cage::Cage;
-use cager_core::coordinates::CoordinateSystem;
+use cager_core::coordinates::{CoordinateSystem, DEFINITION};
 use cager_core::inversion::{Solver, SolverOptions};
 use cager_core::mesh::Model;
 use cager_core::regularize::{Regularizer, WEAK};
@@ -239,7 +239,7 @@ fn far_away(frame: usize, diagonals: f64) -> Option<String> {
 
 fn header(encoding: &Encoding<'_>) -> Header {
     Header {
-        solver_version: cager_core::SOLVER_VERSION,
+        coordinates_definition: DEFINITION,
         coordinates: encoding.system.name().to_owned(),
         handles: encoding.options.handles.name().to_owned(),
         regularizer: encoding.options.regularizer.name().to_owned(),

@@ -5,7 +5,7 @@ use crate::edited::EditedCages;
 use crate::memory::Memory;
 use crate::timing::Timing;
 use cager_core::cage::{Cage, CageError};
-use cager_core::coordinates::CoordinatesError;
+use cager_core::coordinates::{CoordinatesError, knows_definition};
 use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, PrepareError, coordinates_fit, refuse_far_points};
 use cager_core::mesh::{Model, Point};
@@ -170,8 +170,8 @@ fn bind(
     let Some(system) = coordinates::by_name(&header.coordinates) else {
         return Err(unsupported(format!("its coordinates are {:?}", header.coordinates)));
     };
-    if header.solver_version != cager_core::SOLVER_VERSION {
-        return Err(unsupported(format!("its coordinates are of version {}", header.solver_version)));
+    if !knows_definition(header.coordinates_definition) {
+        return Err(unsupported(format!("its coordinates are of definition {}", header.coordinates_definition)));
     }
     let own = container.rest().map_err(fail)?;
     let (model_path, rest) = other.map_or_else(|| (path, own), |(path, model)| (path, model.clone()));

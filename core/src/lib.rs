@@ -15,5 +15,6 @@ pub mod svd;
 pub mod synthetic;
 mod wide;
 
-/// Version of the computation of coordinates and cages: containers name it, since their readers compute the coordinates anew.
+/// Version of the computation of solvers: one that was stored by another version is computed anew. What a container needs to be decoded
+/// is [`coordinates::DEFINITION`] alone.
 pub const SOLVER_VERSION: u32 = 3;

@@ -29,6 +29,10 @@ fn the_table_of_settings_and_the_struct_agree() {
         tls_certificate: Some("b".into()),
         tls_key: Some("c".into()),
         admin_listen: Some(([127, 0, 0, 1], 8081).into()),
+        oidc_issuer: Some("d".into()),
+        oidc_audience: Some("e".into()),
+        oidc_keys: Some("f".into()),
+        webhooks: Some("g".into()),
         ..ServeConfig::default()
     };
     let mut of_struct: Vec<_> = toml::Table::try_from(&all).unwrap().keys().cloned().collect();

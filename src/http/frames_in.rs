@@ -167,6 +167,7 @@ mod tests {
     fn facts() -> Facts {
         Facts {
             points: 5,
+            handles_digest: String::new(),
             unknowns: 4,
             handle_count: 4,
             reads_handles_only: true,

@@ -59,6 +59,7 @@ impl Frames {
 fn facts(points: u32, handle_count: u32) -> Facts {
     Facts {
         points,
+        handles_digest: String::new(),
         unknowns: handle_count,
         handle_count,
         reads_handles_only: true,

@@ -218,7 +218,9 @@ impl Service {
     pub(crate) async fn solver(self: &Arc<Self>, session: &Session) -> Result<Arc<Prepared>, ApiError> {
         let choices = Choices::of(&session.meta.options)?;
         let got = self.solvers.get(wanted(session, choices, None)).await;
-        Ok(got.map_err(|error| session.content_or(error))?.prepared)
+        let prepared = got.map_err(|error| session.content_or(error))?.prepared;
+        session.check_handles(&prepared)?;
+        Ok(prepared)
     }
 
     /// The lane that takes a session's frames to the engine.

@@ -10,6 +10,9 @@ pub(crate) struct Facts {
     pub(crate) points: u32,
     pub(crate) unknowns: u32,
     pub(crate) handle_count: u32,
+    /// Digest of their numbers, BLAKE3, hexadecimal; empty where an earlier version of the program did not keep it.
+    #[serde(default)]
+    pub(crate) handles_digest: String,
     /// Whether handle rows are enough to invert a frame.
     pub(crate) reads_handles_only: bool,
     pub(crate) cage_vertices: u32,
@@ -41,6 +44,7 @@ impl Facts {
             points: solver.decoder().points() as u32,
             unknowns: solver.decoder().unknowns() as u32,
             handle_count: solver.handles().len() as u32,
+            handles_digest: prepared.handles_digest.clone(),
             reads_handles_only: !solver.reads_all(),
             cage_vertices: prepared.cage_vertices,
             cage_faces: prepared.cage_faces,

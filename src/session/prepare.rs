@@ -198,7 +198,9 @@ fn refused(error: &PrepareError) -> ApiError {
 /// A solver with what goes with it.
 pub(crate) fn with_solver(solver: Solver, cage: &Cage, options: SolverOptions) -> Prepared {
     let warnings = preparation_warnings(options, &solver);
+    let handles: Vec<u8> = solver.handles().iter().flat_map(|handle| handle.to_le_bytes()).collect();
     Prepared {
+        handles_digest: blake3::hash(&handles).to_hex().to_string(),
         solver,
         options,
         cage_vertices: cage.vertices().len() as u32,

@@ -19,6 +19,7 @@ use tokio::sync::{Semaphore, watch};
 pub(crate) struct Prepared {
     pub(crate) solver: Solver,
     pub(crate) options: SolverOptions,
+    pub(crate) handles_digest: String,
     pub(crate) cage_vertices: u32,
     pub(crate) cage_faces: u32,
     pub(crate) warnings: Vec<String>,

@@ -4,6 +4,7 @@ use super::create::OUTCOME;
 use super::facts::Outcome;
 use super::frames::Frames;
 use super::prepare::Choices;
+use super::prepared::Prepared;
 use super::{Phase, Session, Status};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
@@ -75,6 +76,26 @@ impl Session {
     }
 }
 
+impl Session {
+    /// Refuses a solver that reads other points than the one that the session began with, which clients may have sent the rows of: another
+    /// version of the program may choose others where it has to prepare anew. What was answered stays.
+    ///
+    /// # Errors
+    /// What to do.
+    pub(crate) fn check_handles(&self, prepared: &Prepared) -> Result<(), ApiError> {
+        let Some(facts) = self.facts() else { return Ok(()) };
+        let same = match facts.handles_digest.as_str() {
+            "" => self.meta.solver_version == cager_core::SOLVER_VERSION,
+            digest => digest == prepared.handles_digest,
+        };
+        if same {
+            return Ok(());
+        }
+        let detail = "the service was upgraded while this session was open, and reads other points of the model now; its frames can be downloaded, and the rest has to be uploaded to a new session";
+        Err(ApiError::new(problem::SESSION_FAILED, detail))
+    }
+}
+
 impl Service {
     /// Goes on with a session found on disk. One whose files cannot be read is known as failed, so that it can be deleted, and comes up
     /// when this is called again.
@@ -103,14 +124,8 @@ impl Service {
     }
 
     fn resume_with(self: &Arc<Self>, meta: SessionMeta, outcome: Option<Outcome>, mark: Mark) {
-        let old = meta.solver_version != cager_core::SOLVER_VERSION && !matches!(mark, Mark::Whole(_));
         let failed = |problem| Status { phase: Phase::Failed(problem), facts: None };
         let status = match outcome {
-            // Frames of two versions must not meet in one capture.
-            _ if old => {
-                let detail = "the service was upgraded to another version of the computation while this session was open; upload the capture to a new one";
-                failed(ApiError::new(problem::SESSION_FAILED, detail).problem)
-            }
             Some(Outcome::Ready(facts)) => Status { phase: Phase::Ready, facts: Some(*facts) },
             // Earlier versions kept that the rest pose was missing; it may be there again.
             Some(Outcome::Failed(problem)) if problem.word() != problem::SESSION_DELETED.word => failed(problem),

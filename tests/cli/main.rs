@@ -10,6 +10,7 @@ mod demo;
 mod encode;
 #[cfg(unix)]
 mod full_disk;
+mod golden;
 mod green;
 mod harmonic;
 mod inspect;

@@ -2,6 +2,7 @@
 
 mod clients;
 mod deploy;
+mod format;
 mod operations;
 mod support;
 #[cfg(target_os = "linux")]

@@ -31,6 +31,16 @@ pub struct Coordinates {
     pub refinement: Option<Refinement>,
 }
 
+/// The definition of the coordinate systems by which containers are written, which compute their coordinates anew when they are decoded.
+/// A change of a system that moves a decoded point by more than 1e-7 of the diagonal is another definition, and the old one stays known.
+pub const DEFINITION: u32 = 3;
+
+/// Whether coordinates of this definition can be computed: all that there ever were. 1 to 3 are the same one; programs that wrote 1 and 2
+/// counted changes of the solver here as well.
+pub fn knows_definition(definition: u32) -> bool {
+    (1..=DEFINITION).contains(&definition)
+}
+
 /// How a numerical solution was refined.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Refinement {

@@ -47,7 +47,7 @@ fn seeds() -> Vec<Vec<u8>> {
     faces.push(&[0, 1, 2, 3]);
     let rest = Model { points: cage.vertices.iter().map(|p| p.map(|x| 0.1 + x / 3.0)).collect(), faces };
     let header = Header {
-        solver_version: 1,
+        coordinates_definition: 1,
         coordinates: "mvc".to_owned(),
         handles: "maxvol".to_owned(),
         regularizer: "laplacian".to_owned(),

@@ -26,8 +26,8 @@ pub const CHUNK_FRAMES: usize = 16;
 /// What a decoder must know. Stored as bincode of fixed-width integers, see [`crate::wire`].
 #[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
 pub struct Header {
-    /// Version of the coordinate computation: decoders recompute `Φ`.
-    pub solver_version: u32,
+    /// Definition of the coordinate systems by which decoders compute `Φ` anew.
+    pub coordinates_definition: u32,
     /// Coordinate system: `mvc`, `harmonic`, `green` or `green-free`.
     pub coordinates: String,
     /// Points the inversion read: `maxvol`, `spread` or `all`.

@@ -30,7 +30,7 @@ pub fn small_model() -> Model {
 
 pub fn header(rows: u32) -> Header {
     Header {
-        solver_version: 1,
+        coordinates_definition: 1,
         coordinates: "mvc".to_owned(),
         handles: "maxvol".to_owned(),
         regularizer: "laplacian".to_owned(),

@@ -129,14 +129,22 @@ impl Ledger {
 
     /// Whether all that was said still holds.
     pub(crate) async fn check(&self, server: &Server) {
-        self.check_but(server, None).await;
+        self.check_some(server, None, usize::MAX).await;
     }
 
-    /// As [`Self::check`], where one session is `hurt`: it may fail.
-    pub(crate) async fn check_but(&self, server: &Server, hurt: Option<&str>) {
+    /// As [`Self::check`], of at most so many sessions: the newest, on which somebody may have been at work, and some others. One may be
+    /// `hurt`: it may fail.
+    pub(crate) async fn check_some(&self, server: &Server, hurt: Option<&str>, most: usize) {
         let client = server.client();
         let deleted = self.deleted.lock().unwrap().clone();
-        let ids = self.ids();
+        let mut ids = self.ids();
+        // Their ids are in the order of time.
+        ids.sort_unstable_by(|a, b| b.cmp(a));
+        if let Some(older) = ids.get_mut(most / 2..) {
+            fastrand::shuffle(older);
+        }
+        ids.truncate(most);
+        ids.extend(hurt.map(str::to_owned));
         let listed = match timeout(HANG, client.sessions()).await {
             Ok(Ok(listed)) => listed,
             other => return self.violation(format!("the sessions are not listed: {:?}", other.map(|r| r.map(drop)))),

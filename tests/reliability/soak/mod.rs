@@ -19,6 +19,9 @@ use workers::{Style, Worker};
 /// Longest time until a restarted service is ready.
 const READY: Duration = Duration::from_secs(2);
 
+/// Sessions that are checked after each kill; after the last one, all are.
+const CHECKED: usize = 30;
+
 fn number(name: &str) -> Option<u64> {
     std::env::var(name).ok().map(|text| text.parse().unwrap_or_else(|_| panic!("{name} is no number: {text}")))
 }
@@ -85,7 +88,7 @@ async fn soak(kills: u64, seed: u64) {
         if server.ready > READY {
             ledger.violation(format!("it took {:?} to be ready", server.ready));
         }
-        ledger.check(&server).await;
+        ledger.check_some(&server, None, CHECKED).await;
         let aside = std::fs::read_dir(data.join("quarantine")).expect("quarantine").count();
         if aside > 0 {
             ledger.violation(format!("{aside} files are in quarantine"));

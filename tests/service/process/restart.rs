@@ -1,7 +1,9 @@
 //! After a restart, however it came, the service goes on where it was.
 
-use crate::support::{Capture, Raw, TestApp, chunked, lines};
+use crate::support::{Capture, OCTETS, Raw, TestApp, chunked, lines};
 use cager_proto::messages::{CacheUse, SessionState};
+use serde_json::Value;
+use std::path::Path;
 
 #[tokio::test]
 async fn a_session_goes_on_after_a_restart_and_ends_in_the_same_container() {
@@ -93,4 +95,57 @@ async fn a_rest_pose_that_a_crash_left_without_a_session_is_removed() {
     let app = app.again();
     app.prepared(&kept.id).await;
     assert_eq!(count(), 1);
+}
+
+/// Writes a small file of the data folder anew, with its digest, after a change to what it says.
+fn rewrite(file: &Path, change: impl FnOnce(&mut Value)) {
+    let mut whole: Value = serde_json::from_slice(&std::fs::read(file).expect("a file")).expect("JSON");
+    change(&mut whole["body"]);
+    let (kind, body) = (whole["kind"].as_str().expect("a kind"), whole["body"].to_string());
+    let digest = blake3::hash(body.as_bytes()).to_hex();
+    let text = format!("{{\"format\":1,\"kind\":\"{kind}\",\"blake3\":\"{digest}\",\"body\":{body}}}\n");
+    std::fs::write(file, text).expect("a file");
+}
+
+/// As after an upgrade: the session was made by an older version, and the solvers that it prepared are gone.
+fn age(app: &TestApp, id: &str) {
+    rewrite(&app.session_file(id, "session.json"), |body| body["solver_version"] = 1.into());
+    for solver in std::fs::read_dir(app.session_file(id, "../../prepared")).expect("a folder") {
+        std::fs::remove_file(solver.expect("a file").path()).expect("a file");
+    }
+}
+
+#[tokio::test]
+async fn an_open_session_goes_on_after_an_upgrade() {
+    let mut app = TestApp::start();
+    let capture = Capture::small();
+    let session = app.ready(capture).await;
+    let first = app.upload(&session.id, 0, capture.raw(0..10)).await;
+    app.kill();
+    age(&app, &session.id);
+    let app = app.again();
+    assert_eq!(app.session(&session.id).await.state, SessionState::Ready);
+    assert_eq!(app.errors(&session.id).await, first);
+    app.upload(&session.id, 10, capture.raw(10..20)).await;
+    app.complete(&session.id, 20).await.expect(200);
+    assert!(app.container(&session.id).await == capture.encoded(20));
+}
+
+#[tokio::test]
+async fn a_session_whose_handles_are_others_after_an_upgrade_says_so_and_keeps_its_frames() {
+    let mut app = TestApp::start();
+    let capture = Capture::small();
+    let session = app.ready(capture).await;
+    app.upload(&session.id, 0, capture.raw(0..10)).await;
+    let cages = app.cages(&session.id).await;
+    app.kill();
+    age(&app, &session.id);
+    rewrite(&app.session_file(&session.id, "outcome.json"), |body| {
+        body["ready"]["handles_digest"] = blake3::hash(b"others").to_hex().to_string().into();
+    });
+    let app = app.again();
+    let path = format!("/v1/sessions/{}/frames?first=10", session.id);
+    let problem = app.post(&path, OCTETS, capture.raw(10..11)).await.problem(409, "session-failed");
+    assert!(problem.detail.contains("upgraded"), "{}", problem.detail);
+    assert!(app.cages(&session.id).await == cages, "what was answered stays");
 }
