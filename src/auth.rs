@@ -22,6 +22,7 @@ mod signatures;
 mod tests;
 
 pub use file::AccessError;
+pub(crate) use file::is_name;
 pub use provider::Trust;
 
 use file::{Entries, Stamp};
@@ -154,6 +155,9 @@ pub enum Denied {
     /// Its time is over.
     #[error("the token has expired; sign in again for another")]
     Expired,
+    /// It would never expire.
+    #[error("the token does not say when it expires: its exp is missing or no time")]
+    NoExpiry,
     /// It is of another provider, or for another service.
     #[error("the token is not for this service: its iss or aud is another")]
     NotForUs,
@@ -279,7 +283,7 @@ impl Access {
     pub async fn watch(self, stop: CancellationToken) {
         if let Some(provider) = self.provider.clone() {
             let stop = stop.clone();
-            tokio::spawn(async move { provider.watch(stop).await });
+            tokio::spawn(provider.watch(stop));
         }
         let Some(path) = self.tokens.path.clone() else { return };
         while stop.run_until_cancelled(tokio::time::sleep(LOOK_EVERY)).await.is_some() {

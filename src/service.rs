@@ -230,12 +230,8 @@ impl Service {
             }
             // What is wrong is in the log and in the session.
             let _ = session.ensure_loaded().await;
-            let (webhooks, found) = (Arc::clone(&self.webhooks), Arc::clone(&session));
-            let _ = blocking(move || {
-                found.check_container();
-                webhooks.tell_left(&found);
-            })
-            .await;
+            let found = Arc::clone(&session);
+            let _ = blocking(move || found.check_container()).await;
             session.rest_if_idle();
         }
     }

@@ -131,6 +131,10 @@ impl Service {
     /// What the system says.
     pub(crate) async fn delete_unread(self: &Arc<Self>, kind: Kind, id: &str) -> Result<bool, ApiError> {
         let Some(_one) = self.unread.hold(kind, id).await else { return Ok(false) };
+        // It may have been read while this waited.
+        if self.unread.left(kind, id).is_none() {
+            return Ok(false);
+        }
         let (store, removed) = (self.store.clone(), id.to_owned());
         let deleted = blocking(move || match kind {
             Kind::Session => store.delete_session(&removed),

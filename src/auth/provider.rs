@@ -6,15 +6,17 @@
 use super::file::is_name;
 use super::signatures::{self, ALGORITHMS};
 use super::{Denied, Scope};
+use crate::outgoing::Client;
+use crate::session::lock;
 use jsonwebtoken::errors::ErrorKind;
-use jsonwebtoken::jwk::{Jwk, JwkSet, PublicKeyUse};
+use jsonwebtoken::jwk::{Jwk, KeyOperations, PublicKeyUse};
 use jsonwebtoken::{Algorithm, DecodingKey, Validation, decode, decode_header};
-use reqwest::{Client, Url};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
-use std::sync::{Arc, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
 use std::time::{Duration, Instant, SystemTime};
+use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 
 /// Longest token that is looked at, in bytes.
@@ -24,8 +26,10 @@ const MAX_ANSWER_BYTES: usize = 1 << 20;
 /// How often the keys are fetched, and how soon again where that failed.
 const REFRESH_EVERY: Duration = Duration::from_secs(300);
 const RETRY_AFTER: Duration = Duration::from_secs(10);
-/// Shortest time between two fetches for tokens with keys that are not known.
+/// Shortest time from the end of a fetch to the next one for tokens with keys that are not known.
 const UNKNOWN_KEY_EVERY: Duration = Duration::from_secs(5);
+/// How long a request waits for a fetch.
+const FETCHED_WITHIN: Duration = Duration::from_secs(2);
 /// Longest name of a bearer in the log, in characters.
 const NAME_CHARACTERS: usize = 64;
 
@@ -56,8 +60,16 @@ pub(super) struct Provider {
     trust: Trust,
     client: Client,
     keys: RwLock<Arc<Keys>>,
-    /// When they were last asked for; held while they are.
-    fetching: tokio::sync::Mutex<Option<Instant>>,
+    fetching: Mutex<Fetching>,
+}
+
+/// One fetch at a time, which goes on whoever waits for it.
+#[derive(Default)]
+struct Fetching {
+    /// Closed when the one that runs ends.
+    runs: Option<watch::Receiver<()>>,
+    ended: Option<Instant>,
+    failed: bool,
 }
 
 type Keys = Option<Vec<Key>>;
@@ -70,6 +82,11 @@ struct Key {
 }
 
 #[derive(Deserialize)]
+struct KeySet {
+    keys: Vec<Value>,
+}
+
+#[derive(Deserialize)]
 struct Description {
     issuer: String,
     jwks_uri: String,
@@ -78,48 +95,86 @@ struct Description {
 impl Provider {
     pub(super) fn new(trust: Trust) -> Result<Self, String> {
         signatures::install();
-        let client = crate::outgoing::client().map_err(|error| error.to_string())?;
+        let client = Client::new().map_err(|error| error.to_string())?;
         for (setting, address) in [("oidc_issuer", Some(&trust.issuer)), ("oidc_keys", trust.keys.as_ref())] {
             if let Some(address) = address {
                 crate::outgoing::address(address).map_err(|why| format!("{setting}: {why}"))?;
             }
         }
-        Ok(Self { trust, client, keys: RwLock::default(), fetching: tokio::sync::Mutex::default() })
+        Ok(Self { trust, client, keys: RwLock::default(), fetching: Mutex::default() })
     }
 
     /// Fetches the keys now and then, until `stop`.
-    pub(super) async fn watch(&self, stop: CancellationToken) {
+    pub(super) async fn watch(self: Arc<Self>, stop: CancellationToken) {
         loop {
-            let wait = match self.refresh(Duration::ZERO).await {
-                Ok(()) => REFRESH_EVERY,
-                Err(why) => {
-                    tracing::error!(%why, "the keys of the tokens' provider cannot be fetched; those known stay");
-                    RETRY_AFTER
-                }
-            };
+            if let Some(mut fetch) = self.fetch_unless_within(Duration::ZERO) {
+                let _ = fetch.changed().await;
+            }
+            let wait = if lock(&self.fetching).failed { RETRY_AFTER } else { REFRESH_EVERY };
             if stop.run_until_cancelled(tokio::time::sleep(wait)).await.is_none() {
                 return;
             }
         }
     }
 
+    /// The fetch that runs, or one that is begun now; none where the last one ended within this time. It is over when the channel is closed.
+    fn fetch_unless_within(self: &Arc<Self>, within: Duration) -> Option<watch::Receiver<()>> {
+        let mut fetching = lock(&self.fetching);
+        if let Some(runs) = &fetching.runs {
+            return Some(runs.clone());
+        }
+        if fetching.ended.is_some_and(|ended| ended.elapsed() < within) {
+            return None;
+        }
+        let (over, runs) = watch::channel(());
+        fetching.runs = Some(runs.clone());
+        drop(fetching);
+        let provider = Arc::clone(self);
+        tokio::spawn(async move {
+            let fetched = match provider.fetch().await {
+                Ok(keys) if keys.is_empty() => {
+                    Err("the key set has no key that signatures can be checked with".to_owned())
+                }
+                fetched => fetched,
+            };
+            let failed = fetched.is_err();
+            match fetched {
+                Ok(keys) => *provider.keys.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(Some(keys)),
+                Err(why) => {
+                    tracing::error!(%why, "the keys of the tokens' provider cannot be fetched; those known stay");
+                }
+            }
+            *lock(&provider.fetching) = Fetching { runs: None, ended: Some(Instant::now()), failed };
+            drop(over);
+        });
+        Some(runs)
+    }
+
     /// What a token says, if it is to be believed.
-    pub(super) async fn claimed(&self, token: &str) -> Result<Claimed, Denied> {
+    pub(super) async fn claimed(self: &Arc<Self>, token: &str) -> Result<Claimed, Denied> {
         if token.len() > MAX_TOKEN_BYTES {
             return Err(Denied::Unknown);
         }
         let header = decode_header(token).map_err(|_| Denied::Unknown)?;
-        if !ALGORITHMS.contains(&header.alg) {
+        // What `crit` names has to be understood (RFC 7515, §4.1.11), and nothing that can be named is.
+        if !ALGORITHMS.contains(&header.alg) || header.crit.is_some() {
             return Err(Denied::Unknown);
         }
         let id = header.kid.as_deref();
         let mut keys = self.fitting(id, header.alg);
-        if keys.as_ref().is_none_or(Vec::is_empty) {
+        if keys.as_ref().is_none_or(Vec::is_empty) && !self.has(id) {
             // The provider may have changed its keys since.
-            let _ = self.refresh(UNKNOWN_KEY_EVERY).await;
+            if let Some(mut fetch) = self.fetch_unless_within(UNKNOWN_KEY_EVERY) {
+                let _ = tokio::time::timeout(FETCHED_WITHIN, fetch.changed()).await;
+            }
             keys = self.fitting(id, header.alg);
+            let fetching = lock(&self.fetching);
+            let recent = fetching.ended.is_some_and(|ended| ended.elapsed() < FETCHED_WITHIN);
+            if keys.as_ref().is_none_or(Vec::is_empty) && (fetching.runs.is_some() || fetching.failed || !recent) {
+                return Err(Denied::NoKeys);
+            }
         }
-        let mut denied = if keys.is_some() { Denied::Unknown } else { Denied::NoKeys };
+        let mut denied = Denied::Unknown;
         for key in keys.unwrap_or_default() {
             match self.check(token, &key, header.alg) {
                 // The signature is another key's; one of the others may fit.
@@ -129,6 +184,12 @@ impl Provider {
             }
         }
         Err(denied)
+    }
+
+    /// Whether there is a key of this name.
+    fn has(&self, id: Option<&str>) -> bool {
+        let keys = Arc::clone(&self.keys.read().unwrap_or_else(PoisonError::into_inner));
+        id.is_some() && keys.as_ref().as_ref().is_some_and(|keys| keys.iter().any(|key| key.id.as_deref() == id))
     }
 
     /// The keys that a token with such a header may be signed with; `None` before there were any.
@@ -150,6 +211,7 @@ impl Provider {
         validation.validate_nbf = true;
         let claims = decode::<Map<String, Value>>(token, key, &validation).map_err(|error| match error.kind() {
             ErrorKind::ExpiredSignature => Denied::Expired,
+            ErrorKind::MissingRequiredClaim(claim) if claim == "exp" => Denied::NoExpiry,
             ErrorKind::InvalidIssuer | ErrorKind::InvalidAudience | ErrorKind::MissingRequiredClaim(_) => {
                 Denied::NotForUs
             }
@@ -157,6 +219,10 @@ impl Provider {
         })?;
         let claims = claims.claims;
         let text = |name: &str| claims.get(name).and_then(Value::as_str);
+        // Taken from a list, `iss` would be one of several.
+        if text("iss") != Some(&self.trust.issuer) {
+            return Err(Denied::NotForUs);
+        }
         let tenant = text(&self.trust.tenant).filter(|name| is_name(name)).ok_or(Denied::NoTenant)?.to_owned();
         let scope = scope(&claims).ok_or(Denied::NoScope)?;
         let name = text("sub").or_else(|| text("client_id")).unwrap_or_default();
@@ -168,21 +234,6 @@ impl Provider {
         let expires =
             Instant::now().checked_add(left.min(Duration::from_secs(u32::MAX.into()))).ok_or(Denied::Unknown)?;
         Ok(Claimed { tenant, name, scope, expires })
-    }
-
-    /// Fetches the keys, unless that was done within `within`.
-    async fn refresh(&self, within: Duration) -> Result<(), String> {
-        let mut asked = self.fetching.lock().await;
-        if asked.is_some_and(|asked| asked.elapsed() < within) {
-            return Ok(());
-        }
-        *asked = Some(Instant::now());
-        let keys = self.fetch().await?;
-        if keys.is_empty() {
-            return Err("the key set has no key that signatures can be checked with".to_owned());
-        }
-        *self.keys.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(Some(keys));
-        Ok(())
     }
 
     async fn fetch(&self) -> Result<Vec<Key>, String> {
@@ -198,14 +249,15 @@ impl Provider {
                 description.jwks_uri
             }
         };
-        let set: JwkSet = self.get(&address).await?;
-        Ok(set.keys.iter().filter_map(key).collect())
+        let set: KeySet = self.get(&address).await?;
+        // What is not understood is left out (RFC 7517, §5).
+        Ok(set.keys.into_iter().filter_map(|jwk| key(&serde_json::from_value(jwk).ok()?)).collect())
     }
 
     async fn get<T: DeserializeOwned>(&self, address: &str) -> Result<T, String> {
-        let url: Url = crate::outgoing::address(address)?;
+        let url = crate::outgoing::address(address)?;
         let failed = |error: reqwest::Error| format!("{address}: {error}");
-        let answer = self.client.get(url).send().await.and_then(reqwest::Response::error_for_status);
+        let answer = self.client.get(&url).send().await.and_then(reqwest::Response::error_for_status);
         let mut answer = answer.map_err(failed)?;
         let mut bytes = Vec::new();
         while let Some(chunk) = answer.chunk().await.map_err(failed)? {
@@ -221,6 +273,9 @@ impl Provider {
 /// A key of the set, if signatures can be checked with it.
 fn key(jwk: &Jwk) -> Option<Key> {
     if jwk.common.public_key_use.as_ref().is_some_and(|purpose| *purpose != PublicKeyUse::Signature) {
+        return None;
+    }
+    if jwk.common.key_operations.as_ref().is_some_and(|uses| !uses.contains(&KeyOperations::Verify)) {
         return None;
     }
     let algorithm = jwk.common.key_algorithm.map(|algorithm| algorithm.to_string().parse().ok());

@@ -86,8 +86,8 @@ pub(crate) async fn run_until(
 /// Begins to stop at the first signal; the second one ends the process at once.
 async fn stop_on_signals(stop: CancellationToken) {
     if signal().await.is_ok() {
-        tracing::info!("stopping; a second signal ends it at once");
         stop.cancel();
+        tracing::info!("stopping; a second signal ends it at once");
         if signal().await.is_ok() {
             std::process::exit(130);
         }

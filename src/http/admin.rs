@@ -110,18 +110,13 @@ async fn sessions(State(service): State<Arc<Service>>, Query(query): Query<PageQ
 }
 
 async fn delete_session(State(service): State<Arc<Service>>, Path(id): Path<String>) -> Result<StatusCode, ApiError> {
-    match service.registry.find_any(&id) {
-        Ok(session) => {
-            tracing::info!(session = %id, tenant = %session.meta.tenant, "deleted by the operator");
-            service.delete(&session).await?;
-        }
-        Err(missing) => {
-            if !service.delete_unread(Kind::Session, &id).await? {
-                return Err(missing);
-            }
-            tracing::info!(session = %id, "deleted by the operator, unread");
-        }
+    if service.registry.find_any(&id).is_err() && service.delete_unread(Kind::Session, &id).await? {
+        tracing::info!(session = %id, "deleted by the operator, unread");
+        return Ok(StatusCode::NO_CONTENT);
     }
+    let session = service.registry.find_any(&id)?;
+    tracing::info!(session = %id, tenant = %session.meta.tenant, "deleted by the operator");
+    service.delete(&session).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

@@ -20,7 +20,11 @@ use opentelemetry::trace::FutureExt as _;
 use std::io::{self, BufWriter, Write};
 use std::sync::Arc;
 use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
+use std::time::Duration;
+use tokio::time::timeout;
 
+/// How long a change is waited for, before it is looked again whether frames are still being measured.
+const MEASURED_WITHIN: Duration = Duration::from_secs(1);
 /// Frames read from the log at a time.
 const READ_FRAMES: usize = 64;
 
@@ -41,16 +45,8 @@ impl Service {
     }
 
     async fn complete_alone(self: &Arc<Self>, session: &Arc<Session>, wish: Complete) -> Result<(), ApiError> {
-        let (settling, webhooks) = (Arc::clone(session), Arc::clone(&self.webhooks));
-        blocking(move || {
-            let unsettled = settling.unsettled.load(Acquire);
-            settling.settle()?;
-            if unsettled {
-                webhooks.tell_left(&settling);
-            }
-            Ok::<_, ApiError>(())
-        })
-        .await??;
+        let settling = Arc::clone(session);
+        blocking(move || settling.settle()).await??;
         let frames = wish.frames;
         match session.status().phase {
             Phase::Completed(completion) if completion.frames == frames => return Ok(()),
@@ -70,37 +66,28 @@ impl Service {
         if frames == 0 {
             return Err(ApiError::new(problem::INVALID_OPTIONS, "frames: a capture has at least one frame"));
         }
-        let (before, entries) = {
-            let mut known = session.frames();
-            // From here on no frame is answered that the container would lack.
-            let before = match known.seal_at(frames, wish.discard_beyond) {
-                Ok(before) => before,
-                Err(Unsealed::Missing(Missing { ranges, next })) => {
-                    let count: u64 = ranges.iter().map(|[a, b]| u64::from(b - a)).sum();
-                    let more = if next.is_some() { " or more" } else { "" };
-                    let detail =
-                        format!("{count}{more} of {frames} frames are missing; post them, then complete the session");
-                    return Err(ApiError::new(problem::FRAMES_MISSING, detail).missing(ranges));
-                }
-                Err(Unsealed::Beyond(frame)) => {
-                    let detail = format!(
-                        "frame {frame} was posted, so the capture has more than {frames} frames; say discard_beyond to leave it out"
-                    );
-                    return Err(ApiError::new(problem::FRAME_CONFLICT, detail).frame(frame));
-                }
-            };
-            (before, known.entries().take_while(|entry| entry.frame < frames).copied().collect::<Vec<LogEntry>>())
+        let expected = session.meta.options.frames;
+        if expected.is_some_and(|expected| frames > expected) {
+            let detail = format!("frames: is {frames}, and the session was made for {}", expected.unwrap_or_default());
+            return Err(ApiError::new(problem::INVALID_OPTIONS, detail));
+        }
+        let (before, entries) = loop {
+            let mut changes = session.changes();
+            if let Some(sealed) = session.seal_at(frames, wish.discard_beyond)? {
+                break sealed;
+            }
+            let _ = timeout(MEASURED_WITHIN, changes.changed()).await;
         };
         let mut sealed = Sealed { session, kept: before };
         let prepared = self.solver(session).await?;
         let (writing, webhooks) = (Arc::clone(session), Arc::clone(&self.webhooks));
         let written = blocking(move || write(&writing, &prepared, &entries, frames, &webhooks)).await?;
-        let (completion, due) = written.map_err(|error| match session.status().phase {
+        let Written { completion, replaced, due } = written.map_err(|error| match session.status().phase {
             // What was to be written proved damaged.
             Phase::Failed(problem) => ApiError::new(problem::SESSION_FAILED, problem.detail),
             _ => error,
         })?;
-        session.completed(completion);
+        session.completed(completion, replaced);
         sealed.kept = true;
         if let Some(due) = due {
             self.webhooks.tell(session, due);
@@ -124,9 +111,40 @@ impl Drop for Sealed<'_> {
 }
 
 impl Session {
-    fn completed(&self, completion: Completion) {
+    /// Takes no new frames from here on, so that none is answered that the container would lack. Gives whether none were taken before, and
+    /// what the container holds; None while frames of it are being measured.
+    ///
+    /// # Errors
+    /// Frames that are missing, or beyond the end.
+    fn seal_at(&self, frames: u32, discard_beyond: bool) -> Result<Option<(bool, Vec<LogEntry>)>, ApiError> {
+        let mut known = self.frames();
+        match known.seal_at(frames, discard_beyond) {
+            Ok(before) => {
+                let entries = known.entries().take_while(|entry| entry.frame < frames).copied().collect();
+                Ok(Some((before, entries)))
+            }
+            Err(Unsealed::Measuring) => Ok(None),
+            Err(Unsealed::Missing(Missing { ranges, next })) => {
+                let count: u64 = ranges.iter().map(|[a, b]| u64::from(b - a)).sum();
+                let more = if next.is_some() { " or more" } else { "" };
+                let detail =
+                    format!("{count}{more} of {frames} frames are missing; post them, then complete the session");
+                Err(ApiError::new(problem::FRAMES_MISSING, detail).missing(ranges))
+            }
+            Err(Unsealed::Beyond(frame)) => {
+                let detail = format!(
+                    "frame {frame} was posted, so the capture has more than {frames} frames; say discard_beyond to leave it out"
+                );
+                Err(ApiError::new(problem::FRAME_CONFLICT, detail).frame(frame))
+            }
+        }
+    }
+
+    /// It is completed; its container took the place of one of so many bytes.
+    fn completed(&self, completion: Completion, replaced: u64) {
         self.frames().discard_from(completion.frames);
         self.bytes.fetch_add(completion.container_bytes, Relaxed);
+        self.bytes.fetch_sub(replaced, Relaxed);
         self.set_phase(Phase::Completed(completion));
     }
 
@@ -139,7 +157,10 @@ impl Session {
             return Ok(());
         }
         match self.store.completion(&self.meta.id).map_err(|error| self.damaged_or(error))? {
-            Some(completion) => self.completed(completion),
+            Some(completion) => {
+                self.completed(completion, 0);
+                self.webhooks.tell_left(self);
+            }
             None => self.frames().unseal(),
         }
         self.unsettled.store(false, Release);
@@ -193,13 +214,22 @@ impl Session {
     }
 }
 
+/// A container that was written, and its session marked.
+struct Written {
+    completion: Completion,
+    /// Bytes of the one before.
+    replaced: u64,
+    /// Who has to be told.
+    due: Option<Due>,
+}
+
 fn write(
     session: &Session,
     prepared: &Prepared,
     entries: &[LogEntry],
     frames: u32,
     webhooks: &Webhooks,
-) -> Result<(Completion, Option<Due>), ApiError> {
+) -> Result<Written, ApiError> {
     let stored = |error: StoreError| session.storage_error(&error);
     let choices = Choices::of(&session.meta.options)?;
     let geometry = prepare::read(&session.content()?, &choices)?;
@@ -212,11 +242,13 @@ fn write(
         frame_rate: session.meta.options.frame_rate,
     };
     let mut write = |out: &mut dyn Write| write_frames(session, &encoding, entries, out);
+    // Of a container that was damaged, which counts already.
+    let replaced = session.store.container_bytes(&session.meta.id).unwrap_or(0);
     let written = session.store.write_container(&session.meta.id, &mut write).map_err(stored)?;
     let completion = Completion { frames, container_bytes: written.bytes, container_digest: written.digest };
     let due = webhooks.keep(session, Event::Completed).map_err(stored)?;
     session.mark(&completion).map_err(stored)?;
-    Ok((completion, due))
+    Ok(Written { completion, replaced, due })
 }
 
 fn write_frames(

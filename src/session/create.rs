@@ -184,6 +184,8 @@ impl Service {
                 }
                 let phase = mark.phase(&mut session.frames());
                 session.set_status(Status { phase, facts: Some(facts) });
+                let webhooks = Arc::clone(&self.webhooks);
+                let _ = blocking(move || webhooks.tell_left(&session)).await;
             }
             Err(error) => {
                 let error = session.content_or(error);
@@ -195,8 +197,10 @@ impl Service {
                 let (webhooks, ended) = (Arc::clone(&self.webhooks), Arc::clone(&session));
                 let due = blocking(move || webhooks.keep(&ended, Event::Failed)).await;
                 session.set_phase(Phase::Failed(error.problem));
-                if let Ok(Ok(Some(due))) = due {
-                    self.webhooks.tell(&session, due);
+                match due {
+                    Ok(Ok(None)) => {}
+                    Ok(Ok(Some(due))) => self.webhooks.tell(&session, due),
+                    Ok(Err(_)) | Err(_) => self.webhooks.tell_unkept(&session),
                 }
             }
         }

@@ -74,6 +74,8 @@ pub(crate) enum Unsealed {
     Missing(Missing),
     /// This frame lies beyond the end.
     Beyond(u32),
+    /// Frames whose cages are there are being measured, which the container will have.
+    Measuring,
 }
 
 impl Frames {
@@ -121,6 +123,9 @@ impl Frames {
         let missing = self.missing(0, Some(frames), RANGES);
         if !missing.ranges.is_empty() {
             return Err(Unsealed::Missing(missing));
+        }
+        if self.pending.keys().any(|frame| *frame < frames && self.solved.contains_key(frame)) {
+            return Err(Unsealed::Measuring);
         }
         let on_its_way = self.pending.keys().copied().max();
         let highest = self.highest().filter(|_| !discard);
@@ -285,6 +290,14 @@ mod tests {
         assert_eq!(frames.claim(3, whole, &upload), Claim::Known);
         assert!(!frames.is_news(&LogEntry { full_digest: None, ..entry(3) }), "what was measured stays");
         frames.solved(LogEntry { full_digest: None, ..entry(4) });
+        for frame in 0..3 {
+            frames.solved(LogEntry { full_digest: None, ..entry(frame) });
+        }
+        assert_eq!(frames.claim(2, whole, &upload), Claim::Measure);
+        assert_eq!(frames.seal_at(5, false), Err(Unsealed::Measuring), "its answer has to be in the container");
+        frames.solved(entry(2));
+        assert_eq!(frames.seal_at(5, false), Ok(false));
+        frames.unseal();
         frames.seal();
         assert_eq!(frames.claim(4, whole, &upload), Claim::Known, "the container must not change");
     }

@@ -294,7 +294,7 @@ impl Session {
         if let Err(error) = self.store.quarantine_session(&self.meta.id, what) {
             tracing::error!(session = %self.meta.id, %error, "it could not be moved");
         }
-        self.webhooks.tell_damaged(self);
+        self.webhooks.tell_unkept(self);
         error
     }
 

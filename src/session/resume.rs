@@ -146,7 +146,8 @@ impl Service {
             let phase = mark.phase(&mut session.frames());
             session.set_phase(phase);
         }
-        self.registry.insert(session);
+        self.registry.insert(Arc::clone(&session));
+        self.webhooks.tell_left(&session);
     }
 
     fn found(&self, meta: SessionMeta, status: Status) -> Arc<Session> {

@@ -269,11 +269,16 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
             }
         }
     }
-    measure(session, prepared, measured);
-    if prepared.solver.follows_previous() {
-        return solve_in_order(session, prepared, whole, handles);
-    }
     // A panic must not leave these frames claimed for ever.
+    let claimed = |(job, digests): (FrameJob, Digests)| {
+        let guard = GiveUp { session, frames: vec![job.frame] };
+        (job, digests, guard)
+    };
+    let measured: Vec<_> = measured.into_iter().map(claimed).collect();
+    if prepared.solver.follows_previous() {
+        solve_in_order(session, prepared, whole, handles);
+        return measure(session, prepared, measured);
+    }
     let batches = [(Rows::All, whole), (Rows::Handles, handles)].map(|(rows, jobs)| {
         let guard = GiveUp { session, frames: jobs.iter().map(|(job, _)| job.frame).collect() };
         (rows, jobs, guard)
@@ -283,6 +288,7 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
             solve_alike(session, prepared, rows, jobs, None, guard);
         }
     }
+    measure(session, prepared, measured);
     metrics::histogram!("cager_solve_seconds").record(clock.elapsed().as_secs_f64());
 }
 
@@ -314,9 +320,8 @@ fn solve_in_order(
 }
 
 /// Measures whole frames whose cages are there from their handle rows. The cages stay as they are.
-fn measure(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<(FrameJob, Digests)>) {
-    for (job, digests) in jobs {
-        let guard = GiveUp { session, frames: vec![job.frame] };
+fn measure(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<(FrameJob, Digests, GiveUp<'_>)>) {
+    for (job, digests, guard) in jobs {
         let mut bytes = Vec::new();
         let entry = session.frames().entry(job.frame).copied();
         let read = entry.map_or_else(|| Err(conflict(job.frame)), |entry| session.read_cages(&[entry], &mut bytes));

@@ -1,7 +1,8 @@
 //! Traces in OpenTelemetry's form: a span for each request, with what it makes the service compute below it. Sent by OTLP over HTTP where
-//! the environment names a collector, `OTEL_EXPORTER_OTLP_ENDPOINT`; the other variables of that standard (headers, sampler, service name)
-//! count as well. Without one nothing is recorded.
+//! the environment names a collector, `OTEL_EXPORTER_OTLP_ENDPOINT`; headers, sampler, service name and resource attributes are taken from
+//! the variables of that standard as well. Without a collector nothing is recorded.
 
+use crate::outgoing::Client;
 use async_trait::async_trait;
 use axum::extract::Request;
 use bytes::Bytes;
@@ -14,11 +15,13 @@ use opentelemetry_otlp::{SpanExporter, WithHttpConfig as _};
 use opentelemetry_sdk::Resource;
 use opentelemetry_sdk::propagation::TraceContextPropagator;
 use opentelemetry_sdk::trace::SdkTracerProvider;
-use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::{Arc, OnceLock};
 use tokio::runtime::Handle;
 
 const COLLECTORS: [&str; 2] = ["OTEL_EXPORTER_OTLP_TRACES_ENDPOINT", "OTEL_EXPORTER_OTLP_ENDPOINT"];
 const SCOPE: &str = "cager";
+const PROTOCOL: &str = "http/protobuf";
 
 static PROVIDER: OnceLock<SdkTracerProvider> = OnceLock::new();
 
@@ -27,15 +30,22 @@ static PROVIDER: OnceLock<SdkTracerProvider> = OnceLock::new();
 /// # Errors
 /// What the environment says cannot be followed.
 pub fn begin() -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
-    let Some(name) = COLLECTORS.into_iter().find(|name| std::env::var_os(name).is_some_and(|value| !value.is_empty()))
-    else {
+    let variable = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
+    let Some(name) = COLLECTORS.into_iter().find(|name| variable(name).is_some()) else { return Ok(()) };
+    let disabled = variable("OTEL_SDK_DISABLED").is_some_and(|value| value.eq_ignore_ascii_case("true"));
+    if disabled || variable("OTEL_TRACES_EXPORTER").is_some_and(|value| value == "none") {
         return Ok(());
-    };
-    let sender = Sender { client: crate::outgoing::client()?, runtime: Handle::current() };
+    }
+    let protocol = variable("OTEL_EXPORTER_OTLP_TRACES_PROTOCOL").or_else(|| variable("OTEL_EXPORTER_OTLP_PROTOCOL"));
+    if let Some(protocol) = protocol.filter(|protocol| protocol != PROTOCOL) {
+        tracing::warn!(%protocol, "traces are sent as {PROTOCOL}, the only protocol that this program has");
+    }
+    let sender = Sender { client: Client::new()?, runtime: Handle::current(), failing: Arc::default() };
     let exporter = SpanExporter::builder().with_http().with_http_client(sender).build();
     let exporter = exporter.map_err(|error| format!("{name}: {error}"))?;
     let mut resource = Resource::builder().with_attribute(KeyValue::new("service.version", env!("CARGO_PKG_VERSION")));
-    if std::env::var_os("OTEL_SERVICE_NAME").is_none() {
+    let attributes = variable("OTEL_RESOURCE_ATTRIBUTES").unwrap_or_default();
+    if variable("OTEL_SERVICE_NAME").is_none() && !attributes.contains("service.name=") {
         resource = resource.with_service_name(SCOPE);
     }
     let provider = SdkTracerProvider::builder().with_batch_exporter(exporter).with_resource(resource.build()).build();
@@ -61,8 +71,10 @@ fn are_sent() -> bool {
 /// Sends for the exporter, whose own thread has no runtime.
 #[derive(Debug)]
 struct Sender {
-    client: reqwest::Client,
+    client: Client,
     runtime: Handle,
+    /// Whether the last attempt failed, so that the log has the change and not each of them.
+    failing: Arc<AtomicBool>,
 }
 
 #[async_trait]
@@ -70,13 +82,25 @@ impl HttpClient for Sender {
     async fn send_bytes(&self, request: Request<Bytes>) -> Result<http::Response<Bytes>, HttpError> {
         let client = self.client.clone();
         let sent = self.runtime.spawn(async move {
-            let answer = client.execute(request.try_into()?).await?;
+            let request: reqwest::Request = request.try_into()?;
+            let answer = client.of(request.url()).execute(request).await?;
             let mut response = http::Response::new(Bytes::new());
             *response.status_mut() = answer.status();
             *response.headers_mut() = answer.headers().clone();
             Ok::<_, reqwest::Error>(response)
         });
-        Ok(sent.await??)
+        let sent = sent.await?;
+        let why = match &sent {
+            Ok(response) if response.status().is_success() => None,
+            Ok(response) => Some(format!("the collector answered {}", response.status())),
+            Err(error) => Some(error.to_string()),
+        };
+        match (&why, self.failing.swap(why.is_some(), Relaxed)) {
+            (Some(why), false) => tracing::warn!(why, "traces cannot be sent"),
+            (None, true) => tracing::info!("traces are sent again"),
+            _ => {}
+        }
+        Ok(sent?)
     }
 }
 

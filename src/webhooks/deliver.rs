@@ -2,12 +2,13 @@
 
 use super::file::Hook;
 use super::{Due, Event, NOTE};
+use crate::outgoing::Client;
 use crate::store::Store;
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use bytes::Bytes;
 use http::StatusCode;
-use reqwest::{Client, header};
+use reqwest::header;
 use ring::hmac;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -46,13 +47,13 @@ impl Message {
                 Ok(status) => format!("it answered {status}"),
                 Err(error) => error.without_url().to_string(),
             };
-            // Only the host: the path may be a secret of the receiver.
-            let host = hook.url.host_str();
+            metrics::counter!("cager_webhooks_total", "result" => "failed_attempt").increment(1);
+            let line = hook.line;
             let Some(pause) = pauses.next() else {
-                tracing::error!(host, id, why, "a webhook's message is given up");
+                tracing::error!(line, id, why, "a webhook's message is given up");
                 break "given_up";
             };
-            tracing::warn!(host, id, why, again_in_s = pause, "a webhook's message did not arrive");
+            tracing::warn!(line, id, why, again_in_s = pause, "a webhook's message did not arrive");
             tokio::time::sleep(Duration::from_secs(*pause)).await;
         };
         metrics::counter!("cager_webhooks_total", "result" => result).increment(1);
@@ -85,7 +86,7 @@ impl Message {
         let _one_of_few = hook.places.acquire().await;
         let seconds = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_secs();
         let request = client
-            .post(hook.url.clone())
+            .post(&hook.url)
             .header(header::CONTENT_TYPE, "application/json")
             .header("webhook-id", id)
             .header("webhook-timestamp", seconds)

@@ -9,6 +9,7 @@
 //! ```
 
 use super::Event;
+use crate::auth::is_name;
 use crate::config::line_of;
 use base64::Engine as _;
 use base64::prelude::{BASE64_STANDARD, BASE64_URL_SAFE_NO_PAD};
@@ -73,6 +74,8 @@ pub(super) struct Hook {
     /// Stands for its address and tenant in notes.
     pub(super) id: String,
     pub(super) url: Url,
+    /// Its line in the file, which stands for it in the log: its address may be a secret.
+    pub(super) line: usize,
     pub(super) key: Key,
     tenant: Option<String>,
     events: Option<Vec<Event>>,
@@ -104,20 +107,35 @@ fn parse(text: &str) -> Result<Vec<Hook>, (usize, String)> {
         let message = error.message().split(['`', '"']).step_by(2).collect::<Vec<_>>().join("…");
         (error.span().map_or(0, |span| span.start), format!("{message}; see the documentation of webhooks files"))
     })?;
-    document.webhook.into_iter().map(hook).collect()
+    let mut hooks: Vec<Hook> = Vec::with_capacity(document.webhook.len());
+    for written in document.webhook {
+        let place = written.url.span().start;
+        let hook = hook(written, line_of(text, place))?;
+        if let Some(other) = hooks.iter().find(|other| other.id == hook.id) {
+            let why =
+                format!("the entry in line {} has the same url and tenant; put their events together", other.line);
+            return Err((place, why));
+        }
+        hooks.push(hook);
+    }
+    Ok(hooks)
 }
 
-fn hook(written: Written) -> Result<Hook, (usize, String)> {
+fn hook(written: Written, line: usize) -> Result<Hook, (usize, String)> {
     let url = crate::outgoing::address(written.url.as_ref()).map_err(|why| (written.url.span().start, why))?;
     let secret = written.secret.as_ref().strip_prefix(SECRET_PREFIX).and_then(|text| BASE64_STANDARD.decode(text).ok());
     let secret = secret.filter(|secret| (24..=64).contains(&secret.len())).ok_or_else(|| {
         let why = "secret must be whsec_ and 24 to 64 bytes in base64: echo whsec_$(openssl rand -base64 32)";
         (written.secret.span().start, why.to_owned())
     })?;
+    if let Some(tenant) = written.tenant.as_deref().filter(|tenant| !is_name(tenant)) {
+        return Err((written.url.span().start, format!("tenant: {tenant:?} can be no tenant's name")));
+    }
     let named = format!("{url} {}", written.tenant.as_deref().unwrap_or_default());
     Ok(Hook {
         id: BASE64_URL_SAFE_NO_PAD.encode(&digest::digest(&digest::SHA256, named.as_bytes()).as_ref()[..12]),
         url,
+        line,
         key: Key::new(HMAC_SHA256, &secret),
         tenant: written.tenant,
         events: written.events,
@@ -135,7 +153,7 @@ mod tests {
     #[test]
     fn entries_say_who_is_told_of_what() {
         let hooks = parse(&format!(
-            "[[webhook]]\nurl = \"https://a.example/x\"\nsecret = \"{SECRET}\"\n\
+            "[[webhook]]\nurl = \"https://a.example/all\"\nsecret = \"{SECRET}\"\n\
              [[webhook]]\nurl = \"https://a.example/x\"\nsecret = \"{SECRET}\"\ntenant = \"a\"\nevents = [\"session.failed\"]\n"
         ));
         let hooks = hooks.map_err(|(_, why)| why).unwrap();
@@ -154,6 +172,14 @@ mod tests {
             (good.0, "whsec_c2VjcmV0", "", 3, "24 to 64 bytes"),
             (good.0, "c2VjcmV0c2VjcmV0c2VjcmV0c2VjcmV0", "", 3, "whsec_"),
             (good.0, good.1, "events = [\"session.begun\"]", 4, "unknown variant"),
+            (good.0, good.1, "tenant = \"a/b\"", 2, "no tenant's name"),
+            (
+                good.0,
+                good.1,
+                "[[webhook]]\nurl = \"https://a.example/x\"\nsecret = \"whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw\"",
+                5,
+                "line 2",
+            ),
             (good.0, good.1, "tenants = \"a\"", 4, "unknown field"),
         ] {
             let text = format!("[[webhook]]\nurl = \"{url}\"\nsecret = \"{secret}\"\n{more}\n");

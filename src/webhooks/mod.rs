@@ -9,11 +9,11 @@ mod file;
 
 pub use file::WebhooksError;
 
+use crate::outgoing::Client;
 use crate::session::{Phase, Session};
 use crate::store::{Store, StoreError};
 use deliver::Message;
 use file::Hook;
-use reqwest::Client;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
@@ -61,7 +61,7 @@ impl Webhooks {
     /// A file that cannot be read, or an entry that is wrong, with its line.
     pub(crate) fn open(path: Option<&Path>, store: Store, stop: CancellationToken) -> Result<Arc<Self>, WebhooksError> {
         let hooks = path.map(file::read).transpose()?.unwrap_or_default();
-        let client = crate::outgoing::client().map_err(WebhooksError::Client)?;
+        let client = Client::new().map_err(WebhooksError::Client)?;
         let hooks = hooks.into_iter().map(Arc::new).collect();
         Ok(Arc::new(Self { hooks, client, store, runtime: Handle::current(), stop }))
     }
@@ -99,12 +99,14 @@ impl Webhooks {
             Event::Failed => session.has_failed(),
         };
         if let Some(due) = due.filter(ended) {
+            // Its frames are told of as well; where they cannot be read, the log says why.
+            let _ = session.load();
             self.tell(session, due);
         }
     }
 
-    /// Tells that a session failed whose files are damaged, and hold no notes.
-    pub(crate) fn tell_damaged(&self, session: &Session) {
+    /// Tells that a session failed with whose files nothing can be kept, because they are damaged or the disk takes nothing.
+    pub(crate) fn tell_unkept(&self, session: &Session) {
         if let Some(due) = self.due(session, Event::Failed) {
             self.tell(session, due);
         }
@@ -124,7 +126,8 @@ impl Webhooks {
                 return tracing::error!(session = %session.meta.id, %error, "a webhook's message cannot be written");
             }
         };
-        let wanted: Vec<Arc<Hook>> = self.hooks.iter().filter(|hook| due.left.contains(&hook.id)).cloned().collect();
+        let told = |hook: &&Arc<Hook>| due.left.contains(&hook.id) && hook.wants(&session.meta.tenant, due.event);
+        let wanted: Vec<Arc<Hook>> = self.hooks.iter().filter(told).cloned().collect();
         let left = Arc::new(Mutex::new(due));
         for hook in wanted {
             let message = Message {
@@ -133,8 +136,12 @@ impl Webhooks {
                 store: self.store.clone(),
                 left: Arc::clone(&left),
             };
-            let (client, stop) = (self.client.clone(), self.stop.clone());
-            self.runtime.spawn(async move { stop.run_until_cancelled(message.deliver(&hook, &client)).await });
+            let (client, stop, deleted) = (self.client.clone(), self.stop.clone(), session.deleted().clone());
+            self.runtime.spawn(async move {
+                // Of a session that was deleted nothing more is told.
+                let delivered = deleted.run_until_cancelled(message.deliver(&hook, &client));
+                stop.run_until_cancelled(delivered).await
+            });
         }
     }
 }

@@ -25,6 +25,8 @@ struct House {
     http: reqwest::Client,
     /// Memory before anything happens, in MiB.
     before: f64,
+    /// The quiet tenant's times before anything happens.
+    undisturbed: String,
     _folder: tempfile::TempDir,
 }
 
@@ -50,7 +52,15 @@ impl House {
         let (loud, quiet) = (make(LOUD).await, make(QUIET).await);
         let http = crate::inside::http().http1_only().build().expect("a client");
         let before = server.rss();
-        Self { server, reference, loud, quiet, http, before, _folder: folder }
+        let undisturbed = String::new();
+        Self { server, reference, loud, quiet, http, before, undisturbed, _folder: folder }
+    }
+
+    /// As [`Self::new`], where the quiet tenant's times are known.
+    async fn measured(settings: &[&str]) -> Self {
+        let mut house = Self::new(settings).await;
+        house.undisturbed = house.rounds(Duration::from_millis(700)).await.show();
+        house
     }
 
     fn path(&self, session: &Session, rest: &str) -> String {
@@ -102,7 +112,8 @@ impl House {
         }
         stop.store(true, Ordering::Relaxed);
         let mut health = tokio::task::spawn_blocking(|| health.join()).await.expect("a thread").expect("health");
-        println!("{attack}: the quiet tenant {}; health {}", rounds.show(), health.show());
+        let undisturbed = &self.undisturbed;
+        println!("{attack}: the quiet tenant {}, undisturbed {undisturbed}; health {}", rounds.show(), health.show());
         println!("{attack}: {before:.0} MiB before, {highest:.0} MiB at most");
         // The attacker shares the machine that tests run on: what is typical is held to the limits here.
         assert!(health.at(0.5) < Duration::from_millis(50), "health: {}", health.show());
@@ -120,7 +131,7 @@ fn h2(window: u32) -> reqwest::Client {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn waiting_for_a_preparation_takes_no_place_from_others() {
-    let house = House::new(&["max_requests=60", "max_preparing=1"]).await;
+    let house = House::measured(&["max_requests=60", "max_preparing=1"]).await;
     // Boundary elements of large cages: the second waits for the first.
     let other = Reference::new(2000, 400, 1);
     let client = house.server.client().with_token(LOUD);
@@ -148,7 +159,7 @@ async fn waiting_for_a_preparation_takes_no_place_from_others() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn dripping_uploads_take_no_memory_from_others() {
-    let house = House::new(&["frame_bytes=1 MiB"]).await;
+    let house = House::measured(&["frame_bytes=1 MiB"]).await;
     let frame = house.reference.bytes(0).len();
     assert!(60 * frame > 1 << 20, "{frame}");
     let path = house.path(&house.loud, "/frames");
@@ -166,7 +177,7 @@ async fn dripping_uploads_take_no_memory_from_others() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn responses_that_nobody_reads_stay_within_their_memory() {
-    let house = House::new(&["download_bytes=16 MiB", "write_timeout_s=3"]).await;
+    let house = House::measured(&["download_bytes=16 MiB", "write_timeout_s=3"]).await;
     let url = house.server.url(&house.path(&house.loud, "/coordinates"));
     let clients: Vec<_> = (0..8).map(|_| h2(1)).collect();
     let mut unread = Vec::new();
@@ -188,7 +199,7 @@ async fn responses_that_nobody_reads_stay_within_their_memory() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn decodings_that_nobody_reads_stay_within_their_disk() {
-    let house = House::new(&["spool_bytes=8 MiB"]).await;
+    let house = House::measured(&["spool_bytes=8 MiB"]).await;
     let path = house.path(&house.loud, "/decode");
     let bytes = 4 << 20;
     let lines = format!("Authorization: Bearer {LOUD}\r\nContent-Type: {OCTETS}\r\nContent-Length: {bytes}\r\n");
@@ -232,7 +243,7 @@ async fn large_preparations_leave_a_place_to_others() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn many_completions_at_once_leave_the_service_alive() {
-    let house = House::new(&[]).await;
+    let house = House::measured(&[]).await;
     let client = house.server.client().with_token(LOUD);
     let bodies = house.reference.many(0..house.reference.count());
     let mut sessions = Vec::new();
@@ -257,7 +268,7 @@ async fn many_completions_at_once_leave_the_service_alive() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn idle_sockets_do_not_shut_others_out() {
-    let house = House::new(&["max_connections=40"]).await;
+    let house = House::measured(&["max_connections=40"]).await;
     let mut idle = Vec::new();
     for _ in 0..200 {
         idle.push(Wire::connect(house.server.address).await);
@@ -276,7 +287,7 @@ async fn idle_sockets_do_not_shut_others_out() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn frames_with_gaps_do_not_make_answers_long() {
-    let house = House::new(&[]).await;
+    let house = House::measured(&[]).await;
     let mut body = Vec::new();
     let rows = house.reference.handle_rows(0);
     let client = house.server.client().with_token(LOUD);

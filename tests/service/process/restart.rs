@@ -97,6 +97,30 @@ async fn a_rest_pose_that_a_crash_left_without_a_session_is_removed() {
     assert_eq!(count(), 1);
 }
 
+#[tokio::test]
+async fn a_damaged_container_is_found_written_again_and_counted_once() {
+    let mut app = TestApp::start();
+    let capture = Capture::small();
+    let session = app.completed(capture, 40).await;
+    let expected = app.container(&session.id).await;
+    let stored = "cager_stored_bytes{tenant=\"local\"}";
+    app.kill();
+    app = app.again();
+    let before = app.metric(stored).await;
+    app.kill();
+    let file = app.session_file(&session.id, "capture.cager");
+    let mut bytes = std::fs::read(&file).expect("a container");
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(&file, bytes).expect("a container");
+    let app = app.again();
+    let found = async || (app.session(&session.id).await.state == SessionState::Ready).then_some(());
+    crate::support::eventually("that the damage is found", found).await;
+    app.complete(&session.id, 40).await.expect(200);
+    assert!(app.container(&session.id).await == expected, "the same bytes");
+    assert_eq!(app.metric(stored).await, before);
+}
+
 /// Writes a small file of the data folder anew, with its digest, after a change to what it says.
 fn rewrite(file: &Path, change: impl FnOnce(&mut Value)) {
     let mut whole: Value = serde_json::from_slice(&std::fs::read(file).expect("a file")).expect("JSON");

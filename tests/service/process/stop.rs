@@ -2,6 +2,8 @@
 
 use crate::support::{Capture, HANG, Raw, TestApp, chunked, piece, within};
 use cager_proto::messages::Problem;
+use std::io::{BufRead as _, BufReader};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 /// Generous against the second that is promised: the machine may be busy.
@@ -86,4 +88,25 @@ async fn an_idle_service_ends_at_once_and_accepts_nobody() {
     let (status, _) = app.ended().await;
     assert!(status.success() && clock.elapsed() < SOON, "{status} after {:?}", clock.elapsed());
     assert!(within("a refusal", HANG, tokio::net::TcpStream::connect(app.address)).await.is_err());
+}
+
+#[tokio::test]
+async fn a_service_whose_log_nobody_reads_any_more_goes_on_and_stops() {
+    let place = crate::support::folder();
+    let mut command = crate::support::service();
+    command.args(["--listen", "127.0.0.1:0", "--data"]).arg(place.path().join("data"));
+    let mut process = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
+    let mut line = String::new();
+    BufReader::new(process.stdout.take().expect("its output")).read_line(&mut line).expect("its first line");
+    let address = line.trim().strip_prefix("listening on ").expect("an address").parse().expect("an address");
+    drop(process.stderr.take());
+    let api = crate::support::Api::new(address, None, false);
+    for _ in 0..3 {
+        api.get("/v1/sessions").await.expect(200);
+    }
+    let pid = rustix::process::Pid::from_child(&process);
+    rustix::process::kill_process(pid, rustix::process::Signal::TERM).expect("it is there");
+    let ended =
+        crate::support::eventually("its end", || std::future::ready(process.try_wait().expect("its status"))).await;
+    assert!(ended.success(), "{ended}");
 }

@@ -81,6 +81,18 @@ async fn what_was_not_delivered_is_told_after_a_restart() {
 }
 
 #[tokio::test]
+async fn what_is_found_completed_only_after_preparing_again_is_told_as_well() {
+    let receiver = Elsewhere::with(&[503]).await;
+    let (_place, mut app) = telling(&receiver, "");
+    let session = app.completed(Capture::tiny(), 2).await;
+    let first = receiver.next().await;
+    app.kill();
+    std::fs::remove_file(app.session_file(&session.id, "outcome.json")).expect("a file");
+    let _app = app.again();
+    assert_eq!(receiver.next().await.header("webhook-id"), first.header("webhook-id"));
+}
+
+#[tokio::test]
 async fn a_session_that_cannot_be_prepared_is_told_of_with_its_reason() {
     let receiver = Elsewhere::with(&[]).await;
     let (_place, mut app) = telling(&receiver, "events = [\"session.failed\"]");
