@@ -218,7 +218,7 @@ impl Access {
     /// Takes the tokens of this provider as well.
     ///
     /// # Errors
-    /// An address that is none, or not safe.
+    /// An address that cannot be read, or that is not safe to send to.
     pub fn trusting(self, trust: Trust) -> Result<Self, AccessError> {
         let provider = Provider::new(trust).map_err(AccessError::Provider)?;
         Ok(Self { provider: Some(Arc::new(provider)), ..self })

@@ -1,5 +1,6 @@
 //! The service's settings: defaults, then a file, then the environment, then flags, each overriding the one before.
 
+pub(crate) mod entries;
 mod error;
 mod flags;
 mod layers;
@@ -8,6 +9,7 @@ mod show;
 #[cfg(test)]
 mod tests;
 
+pub use entries::EntriesError;
 pub use error::{ConfigError, Origin};
 pub use flags::ServeFlags;
 pub(crate) use layers::line_of;

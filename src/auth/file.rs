@@ -1,11 +1,11 @@
 //! The tokens file, and looking a token up in it.
 
 use super::{Grant, Priority, Scope, Tenant, TenantLimits};
-use crate::config::line_of;
+use crate::config::{EntriesError, entries, entries::Wrong, line_of};
 use serde::Deserialize;
 use std::collections::HashMap;
 use std::os::unix::fs::MetadataExt as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::SystemTime;
 use subtle::{Choice, ConditionallySelectable as _, ConstantTimeEq as _};
@@ -16,24 +16,9 @@ use toml::Spanned;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum AccessError {
-    /// It cannot be read.
-    #[error("{}: cannot be read: {source}", file.display())]
-    Read {
-        /// The file.
-        file: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// An entry is wrong.
-    #[error("{}: line {line}: {why}", file.display())]
-    Entry {
-        /// The file.
-        file: PathBuf,
-        /// The line, from 1.
-        line: usize,
-        /// What is wrong and what to do.
-        why: String,
-    },
+    /// It cannot be read, or an entry is wrong.
+    #[error(transparent)]
+    Entries(#[from] EntriesError),
     /// The provider of tokens cannot be trusted as it is set.
     #[error("{0}")]
     Provider(String),
@@ -71,22 +56,12 @@ pub(super) struct Entries(Vec<(Hash, Grant)>);
 
 impl Entries {
     pub(super) fn read(file: &Path, defaults: TenantLimits) -> Result<Self, AccessError> {
-        let read = |source| AccessError::Read { file: file.to_owned(), source };
-        let text = std::fs::read_to_string(file).map_err(read)?;
-        Self::parse(&text, defaults).map_err(|(offset, why)| AccessError::Entry {
-            file: file.to_owned(),
-            line: line_of(&text, offset),
-            why,
-        })
+        Ok(entries::read(file, |text| Self::parse(text, defaults))?)
     }
 
     /// Reads entries; errors have their place in the text.
-    fn parse(text: &str, defaults: TenantLimits) -> Result<Self, (usize, String)> {
-        let document: Document = toml::from_str(text).map_err(|error: toml::de::Error| {
-            // Some messages quote the value at fault, which may be a hash.
-            let message = error.message().split(['`', '"']).step_by(2).collect::<Vec<_>>().join("…");
-            (error.span().map_or(0, |span| span.start), format!("{message}; see the documentation of tokens files"))
-        })?;
+    fn parse(text: &str, defaults: TenantLimits) -> Result<Self, Wrong> {
+        let document: Document = entries::document(text, "tokens")?;
         let mut names = HashMap::new();
         let mut entries: Vec<(Hash, Grant)> = Vec::with_capacity(document.token.len());
         for token in document.token {

@@ -96,8 +96,8 @@ impl Owned for CageJob {
     }
 }
 
-/// The caller's session or cage job of this address, whatever the state of its files. Rejects with 404 where there is none, or it is another
-/// tenant's, and with 503 where not even that can be read.
+/// The caller's session or cage job named in the path, even if its files cannot all be read. Rejects with 404 if it does not exist or belongs
+/// to another tenant, and with 503 if its files do not say whose it is.
 pub(crate) struct Named<T>(pub(crate) Arc<T>);
 
 impl<T: Owned> FromRequestParts<Arc<Service>> for Named<T> {

@@ -43,7 +43,7 @@ pub(super) struct Announced {
 /// Looks at the header of a form with these parts; what is in it may have `limit` bytes.
 ///
 /// # Errors
-/// No form, one that says it is too large, a key that is none.
+/// The body is not multipart, it is too large, or its idempotency key is malformed.
 pub(super) fn announced(service: &Service, request: &Request, parts: &str, limit: u64) -> Result<Announced, ApiError> {
     let headers = request.headers();
     if content_type(headers).as_deref() != Some("multipart/form-data") {

@@ -177,7 +177,7 @@ impl Session {
         let (written, orphans) = solved.split_at(orphan.unwrap_or(solved.len()));
         if let Some(first) = orphans.first() {
             self.bytes.fetch_sub(stored_bytes(orphans), Relaxed);
-            self.give_up(orphans, &super::upload::predecessor_missing(first.frame));
+            self.give_up(orphans, &super::solve::predecessor_missing(first.frame));
         }
         written
     }

@@ -5,7 +5,8 @@ use super::facts::{Facts, Outcome};
 use super::prepare::{self, Choices, Geometry};
 use super::prepared::{Got, Prepared, Wanted};
 use super::resume::Mark;
-use super::upload::{self, FrameJob};
+use super::solve;
+use super::upload::FrameJob;
 use super::{LiveLane, Phase, Session, Status};
 use crate::admission::Held;
 use crate::auth::Tenant;
@@ -241,7 +242,7 @@ impl Service {
             let (weak, solver) = (Arc::downgrade(session), prepared);
             let run = move |jobs: Vec<FrameJob>| {
                 if let Some(session) = weak.upgrade() {
-                    upload::solve(&session, &solver, jobs);
+                    solve::solve(&session, &solver, jobs);
                 }
             };
             let (name, weight) = (&tenant.name, tenant.priority.weight());

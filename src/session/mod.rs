@@ -12,6 +12,7 @@ pub(crate) mod registry;
 mod resume;
 pub(crate) mod retention;
 mod runs;
+pub(crate) mod solve;
 pub(crate) mod upload;
 
 use crate::engine::Lane;
@@ -263,7 +264,7 @@ impl Session {
         for entry in new {
             let same = frames.is_awaited(&entry);
             for upload in frames.solved(entry) {
-                if same { upload.answer(entry.frame) } else { upload.fail(upload::conflict(entry.frame)) }
+                if same { upload.answer(entry.frame) } else { upload.fail(solve::conflict(entry.frame)) }
             }
         }
         self.loaded.store(true, Ordering::Release);

@@ -10,14 +10,14 @@
 
 use super::Event;
 use crate::auth::is_name;
-use crate::config::line_of;
+use crate::config::{EntriesError, entries, entries::Wrong, line_of};
 use base64::Engine as _;
 use base64::prelude::{BASE64_STANDARD, BASE64_URL_SAFE_NO_PAD};
 use reqwest::Url;
 use ring::digest;
 use ring::hmac::{HMAC_SHA256, Key};
 use serde::Deserialize;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use tokio::sync::Semaphore;
 use toml::Spanned;
@@ -30,24 +30,9 @@ const SECRET_PREFIX: &str = "whsec_";
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WebhooksError {
-    /// It cannot be read.
-    #[error("{}: cannot be read: {source}", file.display())]
-    Read {
-        /// The file.
-        file: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// An entry is wrong.
-    #[error("{}: line {line}: {why}", file.display())]
-    Entry {
-        /// The file.
-        file: PathBuf,
-        /// The line, from 1.
-        line: usize,
-        /// What is wrong and what to do.
-        why: String,
-    },
+    /// It cannot be read, or an entry is wrong.
+    #[error(transparent)]
+    Entries(#[from] EntriesError),
     /// Nothing can be sent.
     #[error("webhooks cannot be sent: {0}")]
     Client(reqwest::Error),
@@ -92,21 +77,12 @@ impl Hook {
 }
 
 pub(super) fn read(file: &Path) -> Result<Vec<Hook>, WebhooksError> {
-    let text = std::fs::read_to_string(file).map_err(|source| WebhooksError::Read { file: file.to_owned(), source })?;
-    parse(&text).map_err(|(offset, why)| WebhooksError::Entry {
-        file: file.to_owned(),
-        line: line_of(&text, offset),
-        why,
-    })
+    Ok(entries::read(file, parse)?)
 }
 
 /// Reads entries; errors have their place in the text.
-fn parse(text: &str) -> Result<Vec<Hook>, (usize, String)> {
-    let document: Document = toml::from_str(text).map_err(|error: toml::de::Error| {
-        // Some messages quote the value at fault, which may be a secret.
-        let message = error.message().split(['`', '"']).step_by(2).collect::<Vec<_>>().join("…");
-        (error.span().map_or(0, |span| span.start), format!("{message}; see the documentation of webhooks files"))
-    })?;
+fn parse(text: &str) -> Result<Vec<Hook>, Wrong> {
+    let document: Document = entries::document(text, "webhooks")?;
     let mut hooks: Vec<Hook> = Vec::with_capacity(document.webhook.len());
     for written in document.webhook {
         let place = written.url.span().start;
@@ -121,7 +97,7 @@ fn parse(text: &str) -> Result<Vec<Hook>, (usize, String)> {
     Ok(hooks)
 }
 
-fn hook(written: Written, line: usize) -> Result<Hook, (usize, String)> {
+fn hook(written: Written, line: usize) -> Result<Hook, Wrong> {
     let url = crate::outgoing::address(written.url.as_ref()).map_err(|why| (written.url.span().start, why))?;
     let secret = written.secret.as_ref().strip_prefix(SECRET_PREFIX).and_then(|text| BASE64_STANDARD.decode(text).ok());
     let secret = secret.filter(|secret| (24..=64).contains(&secret.len())).ok_or_else(|| {

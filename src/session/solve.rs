@@ -1,0 +1,299 @@
+//! Solving what uploads post: batches of frames in, cages and errors out, handed on to be written.
+
+use super::Session;
+use super::commit::Solved;
+use super::frames::{Claim, Digests};
+use super::prepared::Prepared;
+use super::upload::{FrameJob, Rows};
+use crate::capture::StoredError;
+use crate::problem::{self, ApiError};
+use std::cell::RefCell;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Numbers that a thread keeps room for: frames of models beyond that are rare.
+const KEPT_NUMBERS: usize = 4 << 20;
+
+thread_local! {
+    /// Frames as numbers: big, so kept. Taken out while in use, as a thread may start a batch while it waits within another.
+    static NUMBERS: RefCell<Vec<Vec<f32>>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Solves a batch and hands it on to be written.
+pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<FrameJob>) {
+    if let Some(oldest) = jobs.iter().map(|job| job.arrived).min() {
+        metrics::histogram!("cager_queue_seconds").record(oldest.elapsed().as_secs_f64());
+    }
+    let clock = Instant::now();
+    let mut whole = Vec::new();
+    let mut handles = Vec::new();
+    let mut measured = Vec::new();
+    for mut job in jobs {
+        if job.upload.is_abandoned() || session.is_deleted() {
+            continue;
+        }
+        if let Some(row) = first_not_finite(&job.bytes) {
+            let what = if job.rows == Rows::All { "point" } else { "handle" };
+            let (frame, detail) =
+                (job.frame, format!("frame {}: {what} {row} is not finite; export this frame again", job.frame));
+            job.fail(ApiError::new(problem::INVALID_FRAME, detail).frame(frame));
+            continue;
+        }
+        let digests = digests(prepared, &job);
+        let claim = {
+            let mut frames = session.frames();
+            // At once, so that no frame counts twice.
+            job.leave_queue();
+            frames.claim(job.frame, digests, &job.upload)
+        };
+        match claim {
+            Claim::Solve if job.rows == Rows::All => whole.push((job, digests)),
+            Claim::Solve => handles.push((job, digests)),
+            Claim::Measure => measured.push((job, digests)),
+            Claim::Waiting => job.settle(),
+            Claim::Known => {
+                let (upload, frame) = (Arc::clone(&job.upload), job.frame);
+                job.settle();
+                upload.answer(frame);
+            }
+            Claim::Sealed => {
+                let frame = job.frame;
+                let detail =
+                    format!("frame {frame} comes after the session was completed; make a new session for more");
+                job.fail(ApiError::new(problem::SESSION_COMPLETED, detail).frame(frame));
+            }
+            Claim::Conflict => {
+                let error = conflict(job.frame);
+                job.fail(error);
+            }
+        }
+    }
+    // A panic must not leave these frames claimed for ever.
+    let claimed = |(job, digests): (FrameJob, Digests)| {
+        let guard = GiveUp { session, frames: vec![job.frame] };
+        (job, digests, guard)
+    };
+    let measured: Vec<_> = measured.into_iter().map(claimed).collect();
+    if prepared.solver.follows_previous() {
+        solve_in_order(session, prepared, whole, handles);
+        return measure(session, prepared, measured);
+    }
+    let batches = [(Rows::All, whole), (Rows::Handles, handles)].map(|(rows, jobs)| {
+        let guard = GiveUp { session, frames: jobs.iter().map(|(job, _)| job.frame).collect() };
+        (rows, jobs, guard)
+    });
+    for (rows, jobs, guard) in batches {
+        if !jobs.is_empty() {
+            solve_alike(session, prepared, rows, jobs, None, guard);
+        }
+    }
+    measure(session, prepared, measured);
+    metrics::histogram!("cager_solve_seconds").record(clock.elapsed().as_secs_f64());
+}
+
+/// Solves frames of which each depends on the one before: runs of consecutive frames, each after its predecessor's cage. Of a
+/// session's batches only one runs at a time.
+fn solve_in_order(
+    session: &Arc<Session>,
+    prepared: &Prepared,
+    whole: Vec<(FrameJob, Digests)>,
+    handles: Vec<(FrameJob, Digests)>,
+) {
+    let mut jobs: Vec<(FrameJob, Digests)> = whole.into_iter().chain(handles).collect();
+    jobs.sort_by_key(|(job, _)| job.frame);
+    let mut guard = GiveUp { session, frames: jobs.iter().map(|(job, _)| job.frame).collect() };
+    let mut jobs = jobs.into_iter().peekable();
+    while let Some(first) = jobs.next() {
+        let (frame, rows) = (first.0.frame, first.0.rows);
+        let mut run = vec![first];
+        while let Some(next) = jobs.next_if(|(job, _)| job.rows == rows && job.frame == frame + run.len() as u32) {
+            run.push(next);
+        }
+        guard.frames.drain(..run.len());
+        let own = GiveUp { session, frames: run.iter().map(|(job, _)| job.frame).collect() };
+        match predecessor(session, frame) {
+            Ok(previous) => solve_alike(session, prepared, rows, run, previous.as_deref(), own),
+            Err(error) => fail_all(session, run, own, &error),
+        }
+    }
+}
+
+/// Measures whole frames whose cages are there from their handle rows. The cages stay as they are.
+fn measure(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<(FrameJob, Digests, GiveUp<'_>)>) {
+    for (job, digests, guard) in jobs {
+        let mut bytes = Vec::new();
+        let entry = session.frames().entry(job.frame).copied();
+        let read = entry.map_or_else(|| Err(conflict(job.frame)), |entry| session.read_cages(&[entry], &mut bytes));
+        if let Err(error) = read {
+            fail_all(session, vec![(job, digests)], guard, &error);
+            continue;
+        }
+        let numbers =
+            |bytes: &[u8]| -> Vec<f32> { bytes.as_chunks().0.iter().map(|&b| f32::from_le_bytes(b)).collect() };
+        let (cage, points) = (numbers(&bytes), numbers(&job.bytes));
+        let errors = prepared.solver.decoder().measure(&[&cage], &[&points]);
+        let error = StoredError::new(&errors[0], prepared.solver.diagonal());
+        finish(session, vec![(job, digests)], vec![cage], vec![error], guard);
+    }
+}
+
+fn fail_all(session: &Session, run: Vec<(FrameJob, Digests)>, mut guard: GiveUp<'_>, error: &ApiError) {
+    guard.frames.clear();
+    for (job, _) in run {
+        for upload in session.frames().gave_up(job.frame) {
+            upload.fail(error.clone());
+        }
+        job.settle();
+    }
+}
+
+/// The cage of the frame before, where there is one.
+fn predecessor(session: &Session, frame: u32) -> Result<Option<Vec<f32>>, ApiError> {
+    let Some(before) = frame.checked_sub(1) else { return Ok(None) };
+    if let Some((last, cage)) = &*super::lock(&session.last_solved)
+        && *last == before
+    {
+        return Ok(Some(cage.clone()));
+    }
+    let Some(entry) = session.frames().entry(before).copied() else { return Err(predecessor_missing(frame)) };
+    let mut bytes = Vec::new();
+    session.read_cages(&[entry], &mut bytes)?;
+    Ok(Some(bytes.as_chunks().0.iter().map(|&b| f32::from_le_bytes(b)).collect()))
+}
+
+/// What a client hears whose frame comes before the one that it depends on.
+pub(crate) fn predecessor_missing(frame: u32) -> ApiError {
+    let before = frame.saturating_sub(1);
+    let detail = format!(
+        "frame {frame} depends on frame {before} (the regularizer is temporal), which is not solved yet; post frames in order, frame {before} first"
+    );
+    ApiError::new(problem::FRAMES_MISSING, detail).frame(frame).missing(vec![[before, frame]])
+}
+
+/// What a client hears whose frame is there already with other content.
+pub(crate) fn conflict(frame: u32) -> ApiError {
+    let detail = format!(
+        "frame {frame} was posted before with other content; what was posted first stays, so delete the session to start over"
+    );
+    ApiError::new(problem::FRAME_CONFLICT, detail).frame(frame)
+}
+
+fn solve_alike(
+    session: &Arc<Session>,
+    prepared: &Prepared,
+    rows: Rows,
+    jobs: Vec<(FrameJob, Digests)>,
+    previous: Option<&[f32]>,
+    guard: GiveUp<'_>,
+) {
+    let mut numbers = NUMBERS.take();
+    numbers.resize_with(numbers.len().max(jobs.len()), Vec::new);
+    for ((job, _), numbers) in jobs.iter().zip(&mut numbers) {
+        numbers.clear();
+        numbers.extend(job.bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])));
+    }
+    let views: Vec<&[f32]> = numbers[..jobs.len()].iter().map(Vec::as_slice).collect();
+    let solver = &prepared.solver;
+    let (cages, errors) = match rows {
+        Rows::All => {
+            let cages = solver.invert_after(previous, &views);
+            let cage_views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
+            let errors = solver.decoder().measure(&cage_views, &views);
+            (cages, errors.iter().map(|e| StoredError::new(e, solver.diagonal())).collect())
+        }
+        Rows::Handles => (solver.invert_handles_after(previous, &views), vec![StoredError::NOT_MEASURED; jobs.len()]),
+    };
+    if numbers.iter().map(Vec::capacity).sum::<usize>() <= KEPT_NUMBERS {
+        NUMBERS.set(numbers);
+    }
+    if solver.follows_previous() {
+        let last = jobs.last().zip(cages.last()).map(|((job, _), cage)| (job.frame, cage.clone()));
+        *super::lock(&session.last_solved) = last.filter(|(_, cage)| cage.iter().all(|x| x.is_finite()));
+    }
+    finish(session, jobs, cages, errors, guard);
+}
+
+/// Hands what was solved on to be written.
+fn finish(
+    session: &Arc<Session>,
+    jobs: Vec<(FrameJob, Digests)>,
+    cages: Vec<Vec<f32>>,
+    errors: Vec<StoredError>,
+    mut guard: GiveUp<'_>,
+) {
+    guard.frames.clear();
+    let mut solved = Vec::with_capacity(jobs.len());
+    for (((mut job, digests), cage), error) in jobs.into_iter().zip(cages).zip(errors) {
+        let frame = job.frame;
+        let fits = cage.iter().all(|x| x.is_finite()) && (job.rows == Rows::Handles || error.linf.is_finite());
+        if !fits {
+            let detail =
+                format!("frame {frame}: its numbers are too large for single precision; scale the capture down");
+            for upload in session.frames().gave_up(frame) {
+                upload.fail(ApiError::new(problem::INVALID_FRAME, detail.clone()).frame(frame));
+            }
+        } else {
+            let permit = job.permits.take().map(|permits| permits.writing);
+            solved.push(Solved { frame, digests, error, cage, _permit: permit });
+        }
+        job.settle();
+    }
+    session.commit(solved);
+}
+
+/// Frees claimed frames when a batch does not come to its end.
+struct GiveUp<'a> {
+    session: &'a Session,
+    frames: Vec<u32>,
+}
+
+impl Drop for GiveUp<'_> {
+    fn drop(&mut self) {
+        for &frame in &self.frames {
+            // The jobs tell their own uploads; those that waited with them hear it here.
+            for upload in self.session.frames().gave_up(frame).into_iter().skip(1) {
+                upload.fail(ApiError::internal(&"a batch of frames panicked"));
+            }
+        }
+    }
+}
+
+fn first_not_finite(bytes: &[u8]) -> Option<usize> {
+    // The exponent of NaN and infinity is all ones; without a branch this runs at the speed of memory.
+    let suspicious = |b: &[u8]| u8::from(b[3] & 0x7f == 0x7f && b[2] & 0x80 == 0x80);
+    if bytes.chunks_exact(4).fold(0, |any, b| any | suspicious(b)) == 0 {
+        return None;
+    }
+    bytes.chunks_exact(4).position(|b| suspicious(b) == 1).map(|k| k / 3)
+}
+
+fn digests(prepared: &Prepared, job: &FrameJob) -> Digests {
+    let short = |hash: blake3::Hash| {
+        let mut digest = [0; 16];
+        digest.copy_from_slice(&hash.as_bytes()[..16]);
+        digest
+    };
+    match job.rows {
+        Rows::Handles => Digests { handles: short(blake3::hash(&job.bytes)), full: None },
+        Rows::All => {
+            let mut rows = Vec::with_capacity(12 * prepared.solver.handles().len());
+            for &point in prepared.solver.handles() {
+                rows.extend_from_slice(&job.bytes[12 * point as usize..][..12]);
+            }
+            Digests { handles: short(blake3::hash(&rows)), full: Some(short(blake3::hash(&job.bytes))) }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_that_are_not_finite_are_found() {
+        let bytes = |values: &[f32]| values.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+        assert_eq!(first_not_finite(&bytes(&[0.0, -1.5, f32::MAX, f32::MIN_POSITIVE, 1e-45, f32::MIN])), None);
+        assert_eq!(first_not_finite(&bytes(&[0.0, 0.0, 0.0, 1.0, f32::NAN, 0.0])), Some(1));
+        assert_eq!(first_not_finite(&bytes(&[f32::NEG_INFINITY, 0.0, 0.0])), Some(0));
+    }
+}
