@@ -203,10 +203,11 @@ pub fn preparation_warnings(options: SolverOptions, solver: &Solver) -> Vec<Stri
     let weak = unknowns - strong;
     if weak > 0 {
         let consequence = match options.regularizer {
-            Regularizer::Laplacian | Regularizer::Global if options.lambda > 0.0 => "it is smoothed there".to_owned(),
-            Regularizer::Differential if options.lambda > 0.0 => "it keeps the shape of the rest cage there".to_owned(),
-            Regularizer::Temporal if options.lambda > 0.0 => "it keeps the previous frame's shape there".to_owned(),
-            Regularizer::Matrix if options.lambda > 0.0 => "it follows the matrix there".to_owned(),
+            Regularizer::Laplacian => "it is smoothed there".to_owned(),
+            Regularizer::Global if options.lambda > 0.0 => "it is smoothed there".to_owned(),
+            Regularizer::Differential => "it keeps the shape of the rest cage there".to_owned(),
+            Regularizer::Temporal => "it keeps the previous frame's shape there".to_owned(),
+            Regularizer::Matrix => "it follows the matrix there".to_owned(),
             Regularizer::Tikhonov => "what they leave open is damped".to_owned(),
             Regularizer::TruncatedSvd if options.spectrum >= weak => "what they leave open is dropped".to_owned(),
             _ => format!(

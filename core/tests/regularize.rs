@@ -42,28 +42,65 @@ fn every_term_minimises_its_energy() {
     let own = own_term(m);
     let (before, now) = (frame(&capture, 11), frame(&capture, 14));
     let lambda = 0.3;
-    for regularizer in [Regularizer::Laplacian, Regularizer::Differential, Regularizer::Temporal, Regularizer::Matrix] {
+    let terms = [Regularizer::Laplacian, Regularizer::Differential, Regularizer::Temporal, Regularizer::Matrix];
+    for (regularizer, handles) in terms.into_iter().flat_map(|t| [(t, Handles::MaxVol), (t, Handles::All)]) {
         let term: &dyn Term = regularizer.term().unwrap_or(&own);
-        let options = SolverOptions { regularizer, spectrum: m, lambda, ..SolverOptions::PAPER };
+        let options = SolverOptions { regularizer, handles, spectrum: m, lambda };
         let solver = Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, options, &with(term)).unwrap();
         let previous = solver.invert_after(None, &[&before]).remove(0);
         let found = as_matrix(&solver.invert_after(Some(&previous), &[&now])[0]);
-        let rows = Mat::from_fn(m, m, |i, j| phi[(solver.handles()[i] as usize, j)]);
-        let wanted = Mat::from_fn(m, 3, |i, k| now[3 * solver.handles()[i] as usize + k]);
+        let read: Vec<usize> = match handles {
+            Handles::All => (0..phi.nrows()).collect(),
+            _ => solver.handles().iter().map(|&row| row as usize).collect(),
+        };
+        let rows = Mat::from_fn(read.len(), m, |i, j| phi[(read[i], j)]);
+        let target = Mat::from_fn(read.len(), 3, |i, k| now[3 * read[i] + k]);
         let delta = term.delta(&cage, m).unwrap();
         let reference = match term.reference() {
             Reference::Origin => Mat::zeros(m, 3),
             Reference::RestCage => Mat::from_fn(m, 3, |i, k| cage.vertices()[i][k]),
             Reference::PreviousCage => as_matrix(&previous),
         };
-        let data = rows.transpose() * (&rows * &found - &wanted);
-        let bent = delta.transpose() * (&delta * (&found - &reference)) * lambda;
-        // A term that knows nothing of translations is the exception: cages follow them all the same.
+        let share = m as f64 / read.len() as f64;
+        let data = rows.transpose() * (&rows * &found - &target) * share;
+        let shape = delta.transpose() * (&delta * (&found - &reference)) * lambda;
+        // Cages follow translations whatever the term: its rows have to sum to zero here.
         let sum: f64 = (0..m).map(|j| delta[(0, j)]).sum();
         assert!(sum.abs() < 1e-12);
-        let gradient = &data + &bent;
-        assert!(data.norm_max() > 1e-4, "{regularizer:?}: the term has a say");
-        assert!(gradient.norm_max() < 2e-6, "{regularizer:?}: {:e} of {:e}", gradient.norm_max(), data.norm_max());
+        let gradient = &data + &shape;
+        assert!(data.norm_max() > 1e-4, "{regularizer:?} {handles:?}: the term has an influence");
+        assert!(gradient.norm_max() < 2e-6, "{regularizer:?} {handles:?}: {:e}", gradient.norm_max());
+    }
+}
+
+#[test]
+fn a_weight_means_the_same_however_densely_the_model_is_sampled() {
+    let (capture, cage) = capture();
+    let twice = |points: &[f64]| -> Vec<f64> { [points, points].concat() };
+    let rest: Vec<Point> = capture.rest.points.iter().chain(&capture.rest.points).copied().collect();
+    let now = frame(&capture, 14);
+    for regularizer in [Regularizer::Differential, Regularizer::Global, Regularizer::Tikhonov] {
+        let options = SolverOptions { regularizer, handles: Handles::All, spectrum: 20, lambda: 0.3 };
+        let cages = |rest: &[Point], frame: &[f64]| {
+            as_matrix(&Solver::prepare(&MeanValue, &cage, rest, options).unwrap().invert(&[frame])[0])
+        };
+        let apart = cages(&rest, &twice(&now)) - cages(&capture.rest.points, &now);
+        assert!(apart.norm_max() < 2e-6, "{regularizer:?}: {:e}", apart.norm_max());
+    }
+}
+
+#[test]
+fn no_weight_is_no_threshold() {
+    let (capture, cage) = capture();
+    let now = frame(&capture, 14);
+    for handles in [Handles::MaxVol, Handles::Spread { count: None }, Handles::All] {
+        for regularizer in [Regularizer::Laplacian, Regularizer::Differential, Regularizer::Temporal] {
+            let cage = |spectrum, lambda| {
+                let options = SolverOptions { handles, regularizer, spectrum, lambda };
+                Solver::prepare(&MeanValue, &cage, &capture.rest.points, options).unwrap().invert(&[&now])
+            };
+            assert_eq!(cage(20, 0.0), cage(0, 1.0), "{handles:?} {regularizer:?}");
+        }
     }
 }
 

@@ -185,7 +185,8 @@ pub(crate) struct SolverArgs {
     #[arg(long, value_name = "F", allow_negative_numbers = true)]
     pub(crate) spectrum_bound: Option<f64>,
 
-    /// Weight of the regularisation (the damping α for tikhonov).
+    /// Weight of the regularisation beside the mean square error of the points, whichever points are read; 0 is the same as --spectrum 0
+    /// (for tikhonov it is the damping α).
     #[arg(long, value_name = "L", default_value_t = 1.0, allow_negative_numbers = true)]
     pub(crate) lambda: f64,
 }

@@ -92,6 +92,8 @@ pub(super) struct Decomposed {
     /// The rows read; those of maximum volume where every point is.
     pub(super) handles: Vec<u32>,
     pub(super) reads_all: bool,
+    /// Rows of the inverted matrix: the points over which least squares sums, which for interpolated handles are all that are analysed.
+    pub(super) rows: usize,
     left: Left,
     /// Singular values of the inverted matrix, descending; the first r count.
     pub(super) sigma: Vec<f64>,
@@ -150,7 +152,7 @@ impl Decomposed {
         let Svd { u, sigma, v } = svd;
         let condition = sigma[0] / sigma[rank - 1];
         let left = Left::Rows(u.subcols(0, rank).to_owned());
-        Self { handles, reads_all: false, left, sigma, rank, v, condition }
+        Self { rows: handles.len(), handles, reads_all: false, left, sigma, rank, v, condition }
     }
 
     fn of_all(phi: MatRef<'_, f64>, basis: &RowBasis, spectra: &Spectra) -> Result<Self, PrepareError> {
@@ -173,7 +175,8 @@ impl Decomposed {
             known => known,
         };
         let condition = first / last;
-        Ok(Self { handles: basis.handles.rows.clone(), reads_all: true, left, sigma, rank, v, condition })
+        let (handles, rows) = (basis.handles.rows.clone(), phi.nrows());
+        Ok(Self { handles, reads_all: true, rows, left, sigma, rank, v, condition })
     }
 
     /// Reads samples and inverts the frame interpolated from them.
@@ -211,7 +214,7 @@ impl Decomposed {
         let condition = condition_of(phi, &handles, others.as_ref(), basis)
             .ok_or(failed("singular value decomposition of the rows"))?;
         let left = Left::Rows(map.ok_or(failed("interpolation between the handles"))?.transpose().to_owned());
-        Ok(Self { handles, reads_all: false, left, sigma: svd.sigma, rank, v: svd.v, condition })
+        Ok(Self { handles, reads_all: false, rows: phi.nrows(), left, sigma: svd.sigma, rank, v: svd.v, condition })
     }
 
     /// `Rᵀ`, one row per row read × m, for `q = data · Uᵀ H`.

@@ -46,7 +46,9 @@ impl<'a> Reading<'a> {
         &self.decomposed.sigma
     }
 
-    /// The solver with these options; the handles among them are not looked at.
+    /// The solver with these options; the handles among them are not looked at. The weight λ is relative to the mean square error of the
+    /// points in the data term, so that it means the same whichever points are read: λ · K/m multiplies the regularisation of a
+    /// sum over K points, for m unknowns. For maximum-volume handles K = m, the paper's own setting.
     ///
     /// # Errors
     /// As [`Solver::prepare`].
@@ -114,6 +116,7 @@ impl<'a> Reading<'a> {
         let analysis = self.analysis;
         let m = analysis.phi.ncols();
         check_options(analysis.phi.nrows(), m, options)?;
+        let options = without_idle_term(options);
         let tied = analysis.decoder.tied_normals().is_some();
         // Where steps follow, the points alone decide by way of them: from a calm start, since a wild one leads to a worse minimum.
         let calm = tied && follows_points_alone(options);
@@ -153,13 +156,16 @@ impl<'a> Reading<'a> {
         lambda: f64,
     ) -> Result<SpectralMap, PrepareError> {
         let found = &self.decomposed;
+        let unknowns = found.v.ncols();
         let spectrum = Spectrum {
             sigma: &found.sigma[..found.rank],
             v: found.v.as_ref(),
             delta: bent.delta.as_ref(),
             reference: bent.reference,
         };
-        spectral_map(&spectrum, regularizer, s, lambda).ok_or(failed("regularised solve"))
+        let squared = if regularizer == Regularizer::Tikhonov { lambda * lambda } else { lambda };
+        let weight = squared * found.rows as f64 / unknowns as f64;
+        spectral_map(&spectrum, regularizer, s, weight).ok_or(failed("regularised solve"))
     }
 
     /// What pulls the cages: towards the rest cage a constant, towards the previous one a matrix.
@@ -179,6 +185,19 @@ impl<'a> Reading<'a> {
 
 /// Singular values below this fraction of the largest are of directions that the points hardly determine.
 const WILD: f64 = 1e-2;
+
+/// A weight of zero is the same as a threshold of zero.
+fn without_idle_term(options: SolverOptions) -> SolverOptions {
+    if options.lambda > 0.0 {
+        return options;
+    }
+    let usual = SolverOptions { spectrum: 0, lambda: SolverOptions::default().lambda, ..options };
+    match options.regularizer {
+        Regularizer::Global => SolverOptions { regularizer: Regularizer::None, ..usual },
+        regularizer if regularizer.is_sub_spectral() => usual,
+        _ => options,
+    }
+}
 
 /// Whether no term and no damping takes part.
 fn follows_points_alone(options: SolverOptions) -> bool {

@@ -24,15 +24,16 @@ pub(crate) struct SpectralMap {
     pub(crate) pull: Option<Mat<f64>>,
 }
 
-/// The map for a threshold s. Directions the data says nothing about are always placed by Δ, but for the two baselines that have
-/// no term; with a term, those it says next to nothing about as well.
+/// The map for a threshold s. `weight` multiplies the term beside a sum over all rows of A; for Tikhonov it is what is added to the
+/// squared singular values. Directions outside the row space of A are always placed by Δ, except by the two baselines without a term; the
+/// terms also place those with a singular value below [`WEAK`] of the largest.
 ///
 /// `None` where a factorisation fails.
 pub(crate) fn spectral_map(
     spectrum: &Spectrum<'_>,
     regularizer: Regularizer,
     s: usize,
-    lambda: f64,
+    weight: f64,
 ) -> Option<SpectralMap> {
     let (m, r) = (spectrum.v.ncols(), spectrum.sigma.len());
     let dead = m - r;
@@ -42,9 +43,9 @@ pub(crate) fn spectral_map(
     };
     match regularizer {
         Regularizer::TruncatedSvd => Some(diagonal(&|k, sigma| if k < m - s { 1.0 / sigma } else { 0.0 })),
-        Regularizer::Tikhonov => Some(diagonal(&|_, sigma| sigma / (sigma * sigma + lambda * lambda))),
-        Regularizer::Global => sub_spectral(spectrum, m, lambda),
-        _ if regularizer.is_sub_spectral() && lambda > 0.0 => sub_spectral(spectrum, s.max(weak(spectrum)), lambda),
+        Regularizer::Tikhonov => Some(diagonal(&|_, sigma| sigma / (sigma * sigma + weight))),
+        Regularizer::Global => sub_spectral(spectrum, m, weight),
+        _ if regularizer.is_sub_spectral() => sub_spectral(spectrum, s.max(weak(spectrum)), weight),
         _ => sub_spectral(spectrum, dead, 1.0),
     }
 }
@@ -54,8 +55,8 @@ fn weak(spectrum: &Spectrum<'_>) -> usize {
     spectrum.v.ncols() - spectrum.sigma.iter().filter(|&&x| x >= WEAK * spectrum.sigma[0]).count()
 }
 
-/// Directions from m − s on minimise `λ‖Δ V_high q_high + Δ V_low q_low − Δ C₀‖² + ‖Σ_high q_high − U_highᵀ H‖²`.
-fn sub_spectral(spectrum: &Spectrum<'_>, s: usize, lambda: f64) -> Option<SpectralMap> {
+/// Directions from m − s on minimise `w‖Δ V_high q_high + Δ V_low q_low − Δ C₀‖² + ‖Σ_high q_high − U_highᵀ H‖²`.
+fn sub_spectral(spectrum: &Spectrum<'_>, s: usize, weight: f64) -> Option<SpectralMap> {
     let (m, r) = (spectrum.v.ncols(), spectrum.sigma.len());
     let low = m - s;
     let mut data = Mat::zeros(m, r);
@@ -69,17 +70,17 @@ fn sub_spectral(spectrum: &Spectrum<'_>, s: usize, lambda: f64) -> Option<Spectr
     let (bent_low, bent_high) = (bent.as_ref().subcols(0, low), bent.as_ref().subcols(low, s));
     let mut system = dense::product(bent_high.transpose(), bent_high);
     // What rounding leaves of a direction that Δ does not know.
-    let nothing = lambda * (1e-14 * spectrum.delta.norm_l2()).powi(2);
+    let nothing = weight * (1e-14 * spectrum.delta.norm_l2()).powi(2);
     let coupling = dense::product(bent_high.transpose(), bent_low);
     // The right-hand sides of the data, and after them those of the reference.
     let pulled = if spectrum.reference == Reference::Origin { 0 } else { m };
     let mut right = Mat::zeros(s, r + pulled);
     for i in 0..s {
         for j in 0..s {
-            system[(i, j)] *= lambda;
+            system[(i, j)] *= weight;
         }
         for k in 0..low {
-            right[(i, k)] = -lambda * coupling[(i, k)] / spectrum.sigma[k];
+            right[(i, k)] = -weight * coupling[(i, k)] / spectrum.sigma[k];
         }
         if low + i < r {
             let sigma = spectrum.sigma[low + i];
@@ -90,7 +91,7 @@ fn sub_spectral(spectrum: &Spectrum<'_>, s: usize, lambda: f64) -> Option<Spectr
     if pulled > 0 {
         let pull = dense::product(bent_high.transpose(), spectrum.delta);
         for (i, j) in (0..m).flat_map(|j| (0..s).map(move |i| (i, j))) {
-            right[(i, r + j)] = lambda * pull[(i, j)];
+            right[(i, r + j)] = weight * pull[(i, j)];
         }
     }
     let high = match dense::solve_determined(system.clone(), right.clone(), 1e-13, nothing) {
