@@ -9,7 +9,7 @@ BLENDER := target/blender/bin/python
 
 LINT := target/lint-deploy
 
-.PHONY: help demo test proxies blender soak lint lint-deploy doc bench paper cages openapi schemathesis fuzz audit clean
+.PHONY: help demo test captures proxies blender soak lint lint-deploy doc bench paper cages openapi schemathesis fuzz audit clean
 
 help: ## list these commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
@@ -17,12 +17,22 @@ help: ## list these commands
 demo: ## encode and decode the built-in capture; results in cager-demo/
 	$(CARGO) run --release --locked --quiet --bin cager -- demo
 
-test: ## run every test
+CAPTURES := $(or $(CAGER_CAPTURES),../shared/data)
+
+test: ## run every test; those on real captures where these are at hand
 	@$(CARGO) test --workspace --locked --doc --quiet
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
 		$(CARGO) nextest run --workspace --locked; \
 	else \
 		$(CARGO) test --workspace --locked --lib --bins --tests; \
+	fi
+	@if [ -d "$(CAPTURES)" ]; then $(MAKE) --no-print-directory captures; fi
+
+captures: ## run the tests that need the real captures in CAGER_CAPTURES (../shared/data)
+	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
+		$(CARGO) nextest run --workspace --locked --run-ignored only; \
+	else \
+		$(CARGO) test --workspace --locked --tests -- --ignored; \
 	fi
 
 proxies: ## uploads through nginx, HAProxy and Caddy as docs/OPERATIONS.md has them; those that are not installed are left out
@@ -74,11 +84,11 @@ $(PEERS): benches/peers/requirements.txt
 	benches/.venv/bin/pip install --quiet --requirement benches/peers/requirements.txt
 	@touch $@
 
-paper: ## run the paper's comparisons on the captures in CAGER_DATA and write the tables of docs/PAPER.md; reports in out/paper/
+paper: ## run the paper's comparisons on the captures in CAGER_CAPTURES and write the tables of docs/PAPER.md; reports in out/paper/
 	$(CARGO) build --release --locked --bin cager
 	$(PYTHON) benches/paper.py
 
-cages: ## make and design cages for the captures in CAGER_DATA and write their tables in docs/PAPER.md; cages in out/cages/
+cages: ## make and design cages for the captures in CAGER_CAPTURES and write their tables in docs/PAPER.md; cages in out/cages/
 	$(CARGO) build --release --locked --bin cager
 	$(PYTHON) benches/cages.py
 

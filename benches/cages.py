@@ -1,7 +1,7 @@
 """Makes and designs cages for the real captures and writes their tables in docs/PAPER.md.
 
 Standard library only. `make cages` builds the program and calls this. The captures are not part of the project: they are looked for
-in CAGER_DATA (default ../shared/data). Cages, reports and pictures stay in the folder given as argument (default out/cages); what is
+in CAGER_CAPTURES (default ../shared/data). Cages, reports and pictures stay in the folder given as argument (default out/cages); what is
 there already is not made again.
 """
 
@@ -13,7 +13,7 @@ import subprocess
 import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-DATA = os.environ.get("CAGER_DATA", os.path.join(ROOT, "..", "shared", "data"))
+DATA = os.environ.get("CAGER_CAPTURES", os.path.join(ROOT, "..", "shared", "data"))
 TARGET = os.environ.get("CARGO_TARGET_DIR", os.path.join(ROOT, "target"))
 CAGER = os.environ.get("CAGER", os.path.join(TARGET, "release", "cager"))
 PAGE = os.path.join(ROOT, "docs", "PAPER.md")

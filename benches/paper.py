@@ -1,7 +1,7 @@
 """Runs `cager compare` on the real captures and writes the tables of docs/PAPER.md.
 
 Standard library only. `make paper` builds the program and calls this. The captures are not part of the project: they are looked for
-in CAGER_DATA (default ../shared/data). Reports and figures stay in the folder given as argument (default out/paper).
+in CAGER_CAPTURES (default ../shared/data). Reports and figures stay in the folder given as argument (default out/paper).
 """
 
 import json
@@ -10,7 +10,7 @@ import subprocess
 import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-DATA = os.environ.get("CAGER_DATA", os.path.join(ROOT, "..", "shared", "data"))
+DATA = os.environ.get("CAGER_CAPTURES", os.path.join(ROOT, "..", "shared", "data"))
 TARGET = os.environ.get("CARGO_TARGET_DIR", os.path.join(ROOT, "target"))
 CAGER = os.path.join(TARGET, "release", "cager")
 PAGE = os.path.join(ROOT, "docs", "PAPER.md")

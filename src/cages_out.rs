@@ -42,8 +42,8 @@ pub fn write_cages(
     let mut faces = Polygons::new();
     mesh.triangles.iter().for_each(|triangle| faces.push(triangle));
     let cage = Model { points: mesh.vertices, faces };
-    let rest = (!output.is_standard_output()).then(|| rest_cage_path(output.path()));
-    let rest_file = match &rest {
+    let rest = (*output != Target::StandardOutput).then(|| rest_cage_path(output.path()));
+    let mut rest_file = match &rest {
         Some(path) => rest_file(path, output.replaces(), &obj_bytes(&cage))?,
         None => None,
     };
@@ -61,7 +61,7 @@ pub fn write_cages(
     }
     if !dry_run {
         // Complete before the frames have their name, so that a full disk leaves neither.
-        let rest_file = rest_file.map(AtomicFile::complete).transpose()?;
+        rest_file.as_mut().map(AtomicFile::complete).transpose()?;
         writer.finish()?;
         commit_together(rest_file.into_iter().collect())?;
     }
@@ -94,7 +94,7 @@ fn rest_file(path: &Path, replaces: bool, bytes: &[u8]) -> Result<Option<AtomicF
             Err(cager_formats::Error::Target { path: path.to_owned(), what: what.to_owned() }.into())
         }
         _ => {
-            let target = if replaces { Target::replacing(path) } else { Target::new(path) };
+            let target = if replaces { Target::Replacing(path.to_owned()) } else { Target::New(path.to_owned()) };
             let mut file = AtomicFile::create(target)?;
             file.write_all(bytes).map_err(|cause| cager_formats::Error::Io {
                 path: path.to_owned(),

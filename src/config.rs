@@ -13,6 +13,7 @@ pub use entries::EntriesError;
 pub use error::{ConfigError, Origin};
 pub use flags::ServeFlags;
 pub(crate) use layers::line_of;
+use settings::Kind;
 pub(crate) use settings::bytes;
 
 use crate::admission::Budget;
@@ -29,164 +30,129 @@ use std::time::Duration;
 const KIB: u64 = 1 << 10;
 const MIB: u64 = 1 << 20;
 const GIB: u64 = 1 << 30;
+const DAY: u64 = 86_400;
 
 /// Bytes of an upload beside rest pose and cage.
 pub(crate) const ENVELOPE_BYTES: u64 = MIB;
 
-/// Settings of the service. Names are those of the file's keys; in the environment they are in capitals after `CAGER_`.
-/// Sizes in a file or the environment may be numbers or texts such as `"512 MiB"`.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ServeConfig {
-    /// Address and port to listen on. Other than loopback addresses need tokens.
-    pub listen: SocketAddr,
-    /// Address and port for operators: on a loopback address what they see and do, elsewhere health and metrics.
-    pub admin_listen: Option<SocketAddr>,
-    /// Folder of sessions and prepared solvers; made if it is not there.
-    pub data: PathBuf,
-    /// File of access tokens; without one everyone on this machine is tenant `local`.
-    pub tokens: Option<PathBuf>,
-    /// Address of an OpenID Connect provider whose tokens are taken as well.
-    pub oidc_issuer: Option<String>,
-    /// What the provider's tokens for this service have in `aud`.
-    pub oidc_audience: Option<String>,
-    /// Address of the provider's key set, where its description does not say it.
-    pub oidc_keys: Option<String>,
-    /// The claim of the provider's tokens that names the tenant.
-    pub oidc_tenant: String,
-    /// File of addresses that are told when sessions are completed or fail.
-    pub webhooks: Option<PathBuf>,
-    /// PEM file of the certificate, for TLS.
-    pub tls_certificate: Option<PathBuf>,
-    /// PEM file of the certificate's private key.
-    pub tls_key: Option<PathBuf>,
-    /// Form of log lines: `human` or `json`.
-    pub log: LogFormat,
-    /// Which log lines appear: a level, or levels by module such as `info,cager::http=debug`.
-    pub log_filter: String,
-    /// Threads that solve; 0 for one per processor.
-    pub workers: usize,
-    /// Bytes of prepared solvers kept in memory.
-    pub cache_bytes: u64,
-    /// Bytes of prepared solvers kept on disk.
-    pub prepared_disk_bytes: u64,
-    /// Bytes of frames held in memory between arrival and disk, all streams together.
-    pub frame_bytes: u64,
-    /// Bytes of rest poses and cages held in memory while sessions are created, all together.
-    pub upload_bytes: u64,
-    /// Memory for downloads on their way to slow clients, in bytes.
-    pub download_bytes: u64,
-    /// Disk space for cages that wait to be decoded, in bytes.
-    pub spool_bytes: u64,
-    /// Bytes of one rest pose or cage.
-    pub max_rest_bytes: u64,
-    /// Connections that are served; a few more get health and otherwise 503.
-    pub max_connections: usize,
-    /// Requests at work.
-    pub max_requests: usize,
-    /// Frame, cage, event and decode streams at work.
-    pub max_streams: usize,
-    /// Sessions prepared at the same time.
-    pub max_preparing: usize,
-    /// Names by which a service without tokens may be asked, beside `localhost` and addresses.
-    pub allowed_hosts: Vec<String>,
-    /// Origins of pages that may ask, beside the service's own.
-    pub allowed_origins: Vec<String>,
-    /// Memory that preparing one session may take, in bytes; larger ones are refused.
-    pub max_prepare_bytes: u64,
-    /// Sessions waiting to be prepared.
-    pub max_prepare_queue: usize,
-    /// Cages designed at the same time.
-    pub max_designs: usize,
-    /// Cage designs of a tenant waiting for their turn.
-    pub max_design_queue: usize,
-    /// Seconds that a design may take; then the best cage so far is the result.
-    pub max_design_seconds: u64,
-    /// Memory that the frames of one design may take, in bytes: so many of those that were sent are looked at.
-    pub max_design_bytes: u64,
-    /// Bytes of the frames that a cage is designed from.
-    pub max_frames_bytes: u64,
-    /// Frames waiting to be solved.
-    pub max_queue_frames: usize,
-    /// Seconds for a request's header to arrive.
-    pub header_timeout_s: u64,
-    /// Seconds that a request body may pause.
-    pub body_timeout_s: u64,
-    /// Seconds that a connection without requests stays open.
-    pub idle_timeout_s: u64,
-    /// Seconds in which a response's reader may take nothing.
-    pub write_timeout_s: u64,
-    /// Seconds for a request that is not a stream.
-    pub request_timeout_s: u64,
-    /// Seconds for open requests after a stop signal.
-    pub drain_timeout_s: u64,
-    /// Bytes of a request's header.
-    pub max_header_bytes: usize,
-    /// Sessions of a tenant, where its token says nothing else.
-    pub tenant_max_sessions: u64,
-    /// Bytes of a tenant's sessions on disk, where its token says nothing else.
-    pub tenant_max_bytes: u64,
-    /// Seconds after which a tenant's sessions are deleted, where its token says nothing else; 0 for never.
-    pub tenant_max_age_s: u64,
-    /// Streams of a tenant at work, where its token says nothing else.
-    pub tenant_max_streams: u64,
-    /// Where each setting that is not a default came from.
-    #[serde(skip)]
-    pub origins: BTreeMap<String, Origin>,
+/// Makes the settings' struct, defaults and bounds of one list.
+macro_rules! settings {
+    ($($(#[$doc:meta])* $name:ident: $type:ty = $default:expr, $kind:expr;)*) => {
+        /// Settings of the service. Names are those of the file's keys; in the environment they are in capitals after `CAGER_`.
+        /// Sizes in a file or the environment may be numbers or texts such as `"512 MiB"`.
+        #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct ServeConfig {
+            $($(#[$doc])* pub $name: $type,)*
+            /// Where each setting that is not a default came from.
+            #[serde(skip)]
+            pub origins: BTreeMap<String, Origin>,
+        }
+
+        impl Default for ServeConfig {
+            fn default() -> Self {
+                Self { $($name: $default,)* origins: BTreeMap::new() }
+            }
+        }
+
+        /// What each setting may be, in the order in which they are shown.
+        const SETTINGS: &[(&str, Kind)] = &[$((stringify!($name), $kind),)*];
+    };
 }
 
-impl Default for ServeConfig {
-    fn default() -> Self {
-        Self {
-            listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
-            admin_listen: None,
-            data: PathBuf::from("cager-data"),
-            tokens: None,
-            oidc_issuer: None,
-            oidc_audience: None,
-            oidc_keys: None,
-            oidc_tenant: "tenant".to_owned(),
-            webhooks: None,
-            tls_certificate: None,
-            tls_key: None,
-            allowed_hosts: Vec::new(),
-            allowed_origins: Vec::new(),
-            log: LogFormat::Human,
-            log_filter: "info".to_owned(),
-            workers: 0,
-            cache_bytes: 2 * GIB,
-            prepared_disk_bytes: 20 * GIB,
-            frame_bytes: 256 * MIB,
-            upload_bytes: GIB,
-            download_bytes: 128 * MIB,
-            spool_bytes: 2 * GIB,
-            max_rest_bytes: 512 * MIB,
-            max_connections: 1024,
-            max_requests: 512,
-            max_streams: 256,
-            max_preparing: 2,
-            max_prepare_bytes: 8 * GIB,
-            max_prepare_queue: 64,
-            max_designs: 1,
-            max_design_queue: 16,
-            max_design_seconds: 120,
-            max_design_bytes: 512 * MIB,
-            max_frames_bytes: 4 * GIB,
-            max_queue_frames: 4096,
-            header_timeout_s: 10,
-            body_timeout_s: 30,
-            idle_timeout_s: 75,
-            write_timeout_s: 300,
-            request_timeout_s: 60,
-            drain_timeout_s: 20,
-            max_header_bytes: 32 << 10,
-            tenant_max_sessions: 1000,
-            tenant_max_bytes: 100 * GIB,
-            tenant_max_age_s: 0,
-            tenant_max_streams: 64,
-            origins: BTreeMap::new(),
-        }
-    }
+settings! {
+    /// Address and port to listen on. Other than loopback addresses need tokens.
+    listen: SocketAddr = SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)), Kind::Address;
+    /// Address and port for operators: on a loopback address what they see and do, elsewhere health and metrics.
+    admin_listen: Option<SocketAddr> = None, Kind::Address;
+    /// Folder of sessions and prepared solvers; made if it is not there.
+    data: PathBuf = PathBuf::from("cager-data"), Kind::File;
+    /// File of access tokens; without one everyone on this machine is tenant `local`.
+    tokens: Option<PathBuf> = None, Kind::File;
+    /// Address of an OpenID Connect provider whose tokens are taken as well.
+    oidc_issuer: Option<String> = None, Kind::Text;
+    /// What the provider's tokens for this service have in `aud`.
+    oidc_audience: Option<String> = None, Kind::Text;
+    /// Address of the provider's key set, where its description does not say it.
+    oidc_keys: Option<String> = None, Kind::Text;
+    /// The claim of the provider's tokens that names the tenant.
+    oidc_tenant: String = "tenant".to_owned(), Kind::Text;
+    /// File of addresses that are told when sessions are completed or fail.
+    webhooks: Option<PathBuf> = None, Kind::File;
+    /// PEM file of the certificate, for TLS.
+    tls_certificate: Option<PathBuf> = None, Kind::File;
+    /// PEM file of the certificate's private key.
+    tls_key: Option<PathBuf> = None, Kind::File;
+    /// Names by which a service without tokens may be asked, beside `localhost` and addresses.
+    allowed_hosts: Vec<String> = Vec::new(), Kind::List;
+    /// Origins of pages that may ask, beside the service's own.
+    allowed_origins: Vec<String> = Vec::new(), Kind::List;
+    /// Form of log lines: `human` or `json`.
+    log: LogFormat = LogFormat::Human, Kind::Format;
+    /// Which log lines appear: a level, or levels by module such as `info,cager::http=debug`.
+    log_filter: String = "info".to_owned(), Kind::Filter;
+    /// Threads that solve; 0 for one per processor.
+    workers: usize = 0, Kind::Number { least: 0, most: 4096 };
+    /// Bytes of prepared solvers kept in memory.
+    cache_bytes: u64 = 2 * GIB, Kind::Bytes { least: 0, most: 1 << 50 };
+    /// Bytes of prepared solvers kept on disk.
+    prepared_disk_bytes: u64 = 20 * GIB, Kind::Bytes { least: 0, most: 1 << 50 };
+    /// Bytes of frames held in memory between arrival and disk, all streams together.
+    frame_bytes: u64 = 256 * MIB, Kind::Bytes { least: MIB, most: 1 << 50 };
+    /// Bytes of rest poses and cages held in memory while sessions are created, all together.
+    upload_bytes: u64 = GIB, Kind::Bytes { least: MIB, most: 1 << 50 };
+    /// Memory for downloads on their way to slow clients, in bytes.
+    download_bytes: u64 = 128 * MIB, Kind::Bytes { least: MIB, most: 1 << 50 };
+    /// Disk space for cages that wait to be decoded, in bytes.
+    spool_bytes: u64 = 2 * GIB, Kind::Bytes { least: MIB, most: 1 << 50 };
+    /// Bytes of one rest pose or cage.
+    max_rest_bytes: u64 = 512 * MIB, Kind::Bytes { least: KIB, most: 16 * GIB };
+    /// Connections that are served; a few more get health and otherwise 503.
+    max_connections: usize = 1024, Kind::Number { least: 1, most: 1_000_000 };
+    /// Requests at work.
+    max_requests: usize = 512, Kind::Number { least: 1, most: 1_000_000 };
+    /// Frame, cage, event and decode streams at work.
+    max_streams: usize = 256, Kind::Number { least: 1, most: 1_000_000 };
+    /// Sessions prepared at the same time.
+    max_preparing: usize = 2, Kind::Number { least: 1, most: 4096 };
+    /// Memory that preparing one session may take, in bytes; larger ones are refused.
+    max_prepare_bytes: u64 = 8 * GIB, Kind::Bytes { least: MIB, most: 1 << 50 };
+    /// Sessions waiting to be prepared.
+    max_prepare_queue: usize = 64, Kind::Number { least: 0, most: 1_000_000 };
+    /// Cages designed at the same time.
+    max_designs: usize = 1, Kind::Number { least: 1, most: 4096 };
+    /// Cage designs of a tenant waiting for their turn.
+    max_design_queue: usize = 16, Kind::Number { least: 0, most: 1_000_000 };
+    /// Seconds that a design may take; then the best cage so far is the result.
+    max_design_seconds: u64 = 120, Kind::Number { least: 1, most: DAY };
+    /// Memory that the frames of one design may take, in bytes: so many of those that were sent are looked at.
+    max_design_bytes: u64 = 512 * MIB, Kind::Bytes { least: MIB, most: 1 << 50 };
+    /// Bytes of the frames that a cage is designed from.
+    max_frames_bytes: u64 = 4 * GIB, Kind::Bytes { least: KIB, most: 1 << 50 };
+    /// Frames waiting to be solved.
+    max_queue_frames: usize = 4096, Kind::Number { least: 16, most: 1 << 30 };
+    /// Seconds for a request's header to arrive.
+    header_timeout_s: u64 = 10, Kind::Number { least: 1, most: DAY };
+    /// Seconds that a request body may pause.
+    body_timeout_s: u64 = 30, Kind::Number { least: 1, most: DAY };
+    /// Seconds that a connection without requests stays open.
+    idle_timeout_s: u64 = 75, Kind::Number { least: 1, most: DAY };
+    /// Seconds in which a response's reader may take nothing.
+    write_timeout_s: u64 = 300, Kind::Number { least: 1, most: DAY };
+    /// Seconds for a request that is not a stream.
+    request_timeout_s: u64 = 60, Kind::Number { least: 1, most: DAY };
+    /// Seconds for open requests after a stop signal.
+    drain_timeout_s: u64 = 20, Kind::Number { least: 0, most: DAY };
+    /// Bytes of a request's header.
+    max_header_bytes: usize = 32 << 10, Kind::Bytes { least: KIB, most: MIB };
+    /// Sessions of a tenant, where its token says nothing else.
+    tenant_max_sessions: u64 = 1000, Kind::Number { least: 1, most: 1 << 40 };
+    /// Bytes of a tenant's sessions on disk, where its token says nothing else.
+    tenant_max_bytes: u64 = 100 * GIB, Kind::Bytes { least: MIB, most: 1 << 60 };
+    /// Seconds after which a tenant's sessions are deleted, where its token says nothing else; 0 for never.
+    tenant_max_age_s: u64 = 0, Kind::Number { least: 0, most: 1 << 40 };
+    /// Streams of a tenant at work, where its token says nothing else.
+    tenant_max_streams: u64 = 64, Kind::Number { least: 1, most: 1_000_000 };
 }
 
 impl ServeConfig {

@@ -3,7 +3,7 @@
 use crate::decode::{Container, DecodeError};
 use crate::edited::EditedCages;
 use crate::timing::counted_from_zero;
-use cager_formats::{Action, AtomicFile, CompleteFile, Target};
+use cager_formats::{Action, AtomicFile, Target};
 use cager_proto::container::{self, ContainerWriter, ErrorSummary, FrameError, Summary};
 use std::io::BufWriter;
 use std::path::Path;
@@ -18,7 +18,7 @@ pub struct Edited {
     /// Frames whose cage is another than in the container it came from, or has no counterpart there.
     pub changed: usize,
     /// The container, complete but for its name.
-    pub container: CompleteFile,
+    pub container: AtomicFile,
 }
 
 /// Writes the container at `input` again, with edited cages. A frame whose cage is the same keeps its errors; of the others they
@@ -66,8 +66,9 @@ pub fn edit(
         writer.add_frame_numbers(&numbers).map_err(refused)?;
     }
     let buffered = writer.finish(summary.as_ref()).map_err(refused)?;
-    let file = buffered.into_inner().map_err(|error| refused(error.into_error().into()))?;
-    Ok(Edited { frames, changed, container: file.complete()? })
+    let mut container = buffered.into_inner().map_err(|error| refused(error.into_error().into()))?;
+    container.complete()?;
+    Ok(Edited { frames, changed, container })
 }
 
 /// What is still true of the encoding.

@@ -9,7 +9,7 @@ use cager_core::decode::FrameError;
 use cager_core::inversion::{Analysis, BATCH, Convergence, PrepareError, Preparing, Solver, SolverOptions};
 use cager_core::mesh::Model;
 use cager_core::regularize::Term;
-use cager_formats::{Action, AtomicFile, CompleteFile, FrameReader, Target};
+use cager_formats::{Action, AtomicFile, FrameReader, Target};
 use cager_proto::container;
 use rayon::prelude::*;
 use std::io::BufWriter;
@@ -131,7 +131,7 @@ pub struct Encoded {
     pub report: Report,
     /// The container, complete but for its name, so that a report can take its name together with it: see
     /// [`cager_formats::commit_together`].
-    pub container: CompleteFile,
+    pub container: AtomicFile,
 }
 
 /// How far an encoding is.
@@ -232,9 +232,8 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
     report.spectrum_choice = choice;
     report.consistency = Consistency::new(&convergence);
     report.error.worst = worst;
-    let file = buffered.into_inner().map_err(|e| fail(container::Error::from(e.into_error())))?;
-    let container = file.complete()?;
-    report.bytes.output = container.length();
+    let mut container = buffered.into_inner().map_err(|e| fail(container::Error::from(e.into_error())))?;
+    report.bytes.output = container.complete()?;
     report.bytes.ratio = report.bytes.capture as f64 / report.bytes.output as f64;
     report.bytes.bits_per_vertex_per_frame = 8.0 * report.bytes.output as f64 / (report.points * report.frames) as f64;
     seconds.write += clock_write.elapsed().as_secs_f64();

@@ -191,12 +191,12 @@ async fn run(
     steps.complete = clock_complete.elapsed();
     let clock_download = Instant::now();
     client.download(session, &mut file).await.map_err(name_output)?;
-    let container = file.complete()?;
+    let length = file.complete()?;
     // Nothing that is no container takes the name of one.
-    let report = report(BufReader::new(container.reader()?)).map_err(RemoteError::Container)?;
+    let report = report(BufReader::new(file.reader()?)).map_err(RemoteError::Container)?;
     steps.download = clock_download.elapsed();
     let times = Times { preparation: ready.seconds, steps, total: clock.elapsed() };
-    Ok((Encoded { report: report.finish(container.length(), &times), container }, steps))
+    Ok((Encoded { report: report.finish(length, &times), container: file }, steps))
 }
 
 /// What `AtomicFile` passes through `io::Write` has the path in it already.

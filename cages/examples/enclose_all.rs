@@ -10,7 +10,7 @@ use std::fmt::Write;
 use std::time::Instant;
 
 fn main() {
-    let Some(data) = common::data() else { return };
+    let data = common::data();
     let mut arguments = std::env::args().skip(1);
     let name_part = arguments.next().unwrap_or_default();
     let mut counts: Vec<usize> = arguments.filter_map(|a| a.parse().ok()).collect();

@@ -126,8 +126,9 @@ fn no_input_is_too_broken() {
 }
 
 #[test]
+#[ignore = "needs the captures: make captures"]
 fn cages_of_the_data_are_judged_and_repaired() {
-    let Some(data) = common::data() else { return };
+    let data = common::data();
     for (folder, cage, mesh, usable) in [
         ("invalid/pgc_elephant", "cage.obj", "mesh.obj", false),
         ("invalid/deepcage_tpose", "cage.obj", "mesh.obj", true),

@@ -129,8 +129,9 @@ fn what_cannot_be_enclosed_is_named() {
 }
 
 #[test]
+#[ignore = "needs the captures: make captures"]
 fn every_model_of_the_data_gets_a_valid_cage() {
-    let Some(data) = common::data() else { return };
+    let data = common::data();
     for (name, model) in common::models(&data) {
         assert_enclosed(&name, &model, &[150]);
     }

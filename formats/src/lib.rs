@@ -11,7 +11,7 @@ pub mod mesh;
 mod natural;
 mod text;
 
-pub use atomic::{AtomicDir, AtomicFile, CompleteFile, ScratchDir, Target, commit_together, remove_temporaries};
+pub use atomic::{AtomicDir, AtomicFile, ScratchDir, Target, commit_together, remove_temporaries};
 pub use error::{Action, Error};
 pub use frames::{
     CacheFormat, FrameOptions, FrameRange, FrameReader, FrameWriter, create_frames, frame_files, frames_path,

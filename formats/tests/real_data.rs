@@ -1,19 +1,13 @@
-//! Real captures, where they are at hand: `CAGER_DATA` or `shared/data` beside the repository.
+//! Real captures, where they are at hand: `CAGER_CAPTURES` or `shared/data` beside the repository.
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
 
 use cager_formats::{FrameOptions, create_frames, open_frames, read_model, write_model};
 
-fn data() -> Option<PathBuf> {
-    let folder = std::env::var_os("CAGER_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    eprintln!("skipped: {} is not there; set CAGER_DATA to the folder with captures", folder.display());
-    None
+fn data() -> PathBuf {
+    std::env::var_os("CAGER_CAPTURES")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from)
 }
 
 fn obj_files(folder: &Path, found: &mut Vec<PathBuf>) {
@@ -28,8 +22,9 @@ fn obj_files(folder: &Path, found: &mut Vec<PathBuf>) {
 }
 
 #[test]
+#[ignore = "needs the captures: make captures"]
 fn every_capture_is_read_to_its_last_frame() {
-    let Some(data) = data() else { return };
+    let data = data();
     let captures = [
         ("horse-gallop", 8431, 48),
         ("samba", 9971, 175),
@@ -52,8 +47,9 @@ fn every_capture_is_read_to_its_last_frame() {
 }
 
 #[test]
+#[ignore = "needs the captures: make captures"]
 fn every_mesh_keeps_its_counts_and_survives_every_format() {
-    let Some(data) = data() else { return };
+    let data = data();
     let folder = tempfile::tempdir().unwrap();
     let mut files = Vec::new();
     obj_files(&data, &mut files);
@@ -72,8 +68,9 @@ fn every_mesh_keeps_its_counts_and_survives_every_format() {
 }
 
 #[test]
+#[ignore = "needs the captures: make captures"]
 fn captures_survive_every_format_of_frames() {
-    let Some(data) = data() else { return };
+    let data = data();
     let folder = tempfile::tempdir().unwrap();
     let rest = read_model(&data.join("supercages-arm/rest.obj")).unwrap();
     let source = data.join("supercages-arm/frames.npy");
@@ -94,29 +91,4 @@ fn captures_survive_every_format_of_frames() {
             assert!(copied.iter().zip(&frame).all(|(a, b)| *a as f32 == *b as f32), "{name}");
         }
     }
-}
-
-/// `cargo test --release -p cager-formats --test real_data -- --ignored --nocapture`
-#[test]
-#[ignore = "a measurement"]
-fn reading_speed() {
-    let Some(data) = data() else { return };
-    let best = |run: &mut dyn FnMut()| -> Duration {
-        (0..20)
-            .map(|_| {
-                let start = Instant::now();
-                run();
-                start.elapsed()
-            })
-            .min()
-            .unwrap()
-    };
-    let rest = data.join("samba/rest.obj");
-    eprintln!("samba/rest.obj: {:?}", best(&mut || drop(read_model(&rest).unwrap())));
-    let mut frame = Vec::new();
-    let all = best(&mut || {
-        let mut reader = open_frames(data.join("samba/frames.npy"), 9971).unwrap();
-        while reader.read_next(&mut frame).unwrap() {}
-    });
-    eprintln!("samba/frames.npy: {all:?} for 175 frames of 9,971 points");
 }

@@ -5,9 +5,10 @@ mod support;
 use std::fs;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use cager_core::mesh::Model;
-use cager_formats::{AtomicDir, AtomicFile, Error, read_model, write_model};
+use cager_formats::{AtomicDir, AtomicFile, Error, ScratchDir, Target, commit_together, read_model, write_model};
 use proptest::prelude::*;
 use support::*;
 use tempfile::tempdir;
@@ -107,6 +108,99 @@ fn a_file_replaces_the_old_one_only_when_committed() {
     assert_eq!((fs::read(&path).unwrap(), names(folder.path())), (b"New file".to_vec(), vec!["out".to_owned()]));
 }
 
+fn begin(target: impl Into<Target>) -> AtomicFile {
+    let mut file = AtomicFile::create(target).unwrap();
+    file.write_all(b"new").unwrap();
+    file
+}
+
+/// Files in a folder, hidden ones too, with their contents; those of folders are empty.
+fn contents(folder: &Path) -> Vec<(String, String)> {
+    let read = |name: String| (fs::read_to_string(folder.join(&name)).unwrap_or_default(), name);
+    names(folder).into_iter().map(read).map(|(text, name)| (name, text)).collect()
+}
+
+fn expected(files: &[(&str, &str)]) -> Vec<(String, String)> {
+    files.iter().map(|&(name, text)| (name.to_owned(), text.to_owned())).collect()
+}
+
+#[test]
+fn files_take_their_names_together_over_old_ones_and_beside_them() {
+    for old in [false, true] {
+        let folder = tempdir().unwrap();
+        let [a, b] = ["a", "b"].map(|name| folder.path().join(name));
+        if old {
+            fs::write(&a, "old").unwrap();
+            fs::write(&b, "old").unwrap();
+        }
+        let mut files = vec![begin(&a), begin(&b)];
+        assert_eq!((files[0].path().to_owned(), files[0].complete().unwrap()), (a, 3));
+        commit_together(files).unwrap();
+        assert_eq!(contents(folder.path()), expected(&[("a", "new"), ("b", "new")]), "{old}");
+    }
+}
+
+#[test]
+fn where_one_file_cannot_have_its_name_all_is_as_before() {
+    for old in [false, true] {
+        let folder = tempdir().unwrap();
+        let [a, b] = ["a", "b"].map(|name| folder.path().join(name));
+        if old {
+            fs::write(&a, "old").unwrap();
+        }
+        let files = vec![begin(&a), begin(&b)];
+        // Someone takes the second name for what no file replaces.
+        fs::create_dir(&b).unwrap();
+        let error = commit_together(files).unwrap_err().to_string();
+        assert!(error.starts_with(&format!("{}: cannot be written (", b.display())), "{error}");
+        assert!(!error.contains(".cager-"), "{error}");
+        let before: &[_] = if old { &[("a", "old"), ("b", "")] } else { &[("b", "")] };
+        assert_eq!(contents(folder.path()), expected(before), "{old}");
+    }
+}
+
+#[test]
+fn a_new_file_takes_the_name_of_none_that_appeared_meanwhile() {
+    let folder = tempdir().unwrap();
+    let [a, b, c] = ["a", "b", "c"].map(|name| folder.path().join(name));
+    begin(Target::New(a.clone())).commit().unwrap();
+    assert_eq!(contents(folder.path()), expected(&[("a", "new")]));
+    let files = vec![begin(Target::New(b)), begin(Target::New(c.clone()))];
+    fs::write(c, "theirs").unwrap();
+    let error = commit_together(files).unwrap_err().to_string();
+    assert!(error.ends_with("c: is there already; name another file"), "{error}");
+    assert_eq!(contents(folder.path()), expected(&[("a", "new"), ("c", "theirs")]));
+    let error = AtomicFile::create(Target::New(a)).unwrap_err();
+    assert!(matches!(error, Error::Target { .. }), "{error}");
+}
+
+#[test]
+fn a_scratch_folder_goes_although_others_still_write_into_it() {
+    let around = tempdir().unwrap();
+    let scratch = ScratchDir::create(around.path()).unwrap();
+    let inner = scratch.path().join("inner");
+    fs::create_dir(&inner).unwrap();
+    let stop = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            let mut k = 0;
+            while !stop.load(Ordering::Relaxed) {
+                // Fails from the moment on in which the folder is on its way out.
+                let _ = fs::write(inner.join(k.to_string()), "x");
+                k += 1;
+            }
+        });
+        while names(&inner).len() < 20 {}
+        drop(scratch);
+        stop.store(true, Ordering::Relaxed);
+    });
+    assert!(names(around.path()).is_empty());
+
+    let missing = around.path().join("missing");
+    let error = ScratchDir::create(&missing).unwrap_err().to_string();
+    assert!(error.starts_with(&missing.display().to_string()), "{error}");
+}
+
 #[cfg(unix)]
 #[test]
 fn files_and_folders_have_the_permissions_of_any_new_one() {
@@ -117,22 +211,27 @@ fn files_and_folders_have_the_permissions_of_any_new_one() {
     AtomicFile::create(folder.path().join("ours")).unwrap().commit().unwrap();
     assert_eq!(mode("ours"), mode("plain"));
     fs::create_dir(folder.path().join("plain dir")).unwrap();
-    AtomicDir::create(folder.path().join("our dir")).unwrap().commit().unwrap();
+    AtomicDir::create(folder.path().join("our dir"), |_| false).unwrap().commit().unwrap();
     assert_eq!(mode("our dir"), mode("plain dir"));
 }
 
 #[cfg(unix)]
 #[test]
-fn a_symbolic_link_stays_and_its_file_is_replaced() {
+fn a_file_that_replaces_another_keeps_its_mode_and_its_links() {
+    use std::os::unix::fs::{PermissionsExt, symlink};
     let folder = tempdir().unwrap();
-    let link = folder.path().join("link");
-    fs::write(folder.path().join("real"), "old").unwrap();
-    std::os::unix::fs::symlink("real", &link).unwrap();
-    let mut file = AtomicFile::create(&link).unwrap();
-    file.write_all(b"new").unwrap();
-    file.commit().unwrap();
-    assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
-    assert_eq!(fs::read(folder.path().join("real")).unwrap(), b"new");
+    let [old, link, dangling] = ["old", "link", "dangling"].map(|name| folder.path().join(name));
+    fs::write(&old, "old").unwrap();
+    fs::set_permissions(&old, fs::Permissions::from_mode(0o640)).unwrap();
+    symlink("old", &link).unwrap();
+    symlink("made", &dangling).unwrap();
+    commit_together(vec![begin(&link), begin(&dangling)]).unwrap();
+    assert_eq!(fs::metadata(&old).unwrap().permissions().mode() & 0o777, 0o640);
+    assert!(fs::symlink_metadata(&link).unwrap().is_symlink() && fs::symlink_metadata(&dangling).unwrap().is_symlink());
+    assert_eq!(
+        (fs::read(&old).unwrap(), fs::read(folder.path().join("made")).unwrap()),
+        (b"new".into(), b"new".into())
+    );
 }
 
 #[cfg(unix)]
@@ -184,24 +283,24 @@ fn a_file_system_that_takes_no_files_is_an_error_that_names_the_output() {
 fn a_folder_appears_only_when_committed_and_never_over_files() {
     let folder = tempdir().unwrap();
     let path = folder.path().join("frames");
-    let dir = AtomicDir::create(&path).unwrap();
+    let dir = AtomicDir::create(&path, |_| false).unwrap();
     fs::write(dir.folder().join("a"), "1").unwrap();
     drop(dir);
     assert!(names(folder.path()).is_empty());
 
     fs::create_dir(&path).unwrap();
-    let dir = AtomicDir::create(&path).unwrap();
+    let dir = AtomicDir::create(&path, |_| false).unwrap();
     fs::write(dir.folder().join("a"), "1").unwrap();
     assert!(names(&path).is_empty());
     dir.commit().unwrap();
     assert_eq!((names(&path), names(folder.path())), (vec!["a".to_owned()], vec!["frames".to_owned()]));
 
-    let error = AtomicDir::create(&path).unwrap_err();
+    let error = AtomicDir::create(&path, |_| false).unwrap_err();
     assert!(
         error.to_string().ends_with("is a folder that is not empty, as it holds a; empty it or name another"),
         "{error}"
     );
-    let error = AtomicDir::create(path.join("a")).unwrap_err();
+    let error = AtomicDir::create(path.join("a"), |_| false).unwrap_err();
     assert!(error.to_string().contains("is a file; name a folder"), "{error}");
 }
 
@@ -209,7 +308,7 @@ fn a_folder_appears_only_when_committed_and_never_over_files() {
 fn files_that_others_put_in_the_folder_meanwhile_are_kept() {
     let folder = tempdir().unwrap();
     let path = folder.path().join("frames");
-    let dir = AtomicDir::create(&path).unwrap();
+    let dir = AtomicDir::create(&path, |_| false).unwrap();
     fs::create_dir(&path).unwrap();
     fs::write(path.join("theirs"), "1").unwrap();
     assert!(matches!(dir.commit(), Err(Error::Target { .. })));
@@ -220,7 +319,7 @@ fn files_that_others_put_in_the_folder_meanwhile_are_kept() {
 fn a_folder_of_files_that_may_be_replaced_is_replaced_as_a_whole() {
     let folder = tempdir().unwrap();
     let path = folder.path().join("frames");
-    let begin = || AtomicDir::create_over(&path, |name| name.ends_with(".obj"));
+    let begin = || AtomicDir::create(&path, |name| name.ends_with(".obj"));
     fs::create_dir(&path).unwrap();
     for name in ["a.obj", "b.obj"] {
         fs::write(path.join(name), "old").unwrap();

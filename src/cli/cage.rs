@@ -14,7 +14,7 @@ use crate::picture;
 use anyhow::{Result, bail};
 use cager_cages::{DesignOptions, EncloseError, EncloseOptions, General, Style, enclose, general};
 use cager_core::mesh::{Model, Polygons, TriMesh};
-use cager_formats::{AtomicFile, CompleteFile, Target, commit_together, model_bytes, obj_bytes, read_model};
+use cager_formats::{AtomicFile, Target, commit_together, model_bytes, obj_bytes, read_model};
 use serde::Serialize;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -118,7 +118,7 @@ impl Targets {
         &self,
         report: &impl Serialize,
         picture: impl FnOnce() -> Vec<u8>,
-    ) -> Result<Vec<CompleteFile>> {
+    ) -> Result<Vec<AtomicFile>> {
         let mut files = Vec::new();
         if let Some(target) = &self.report {
             let mut text = serde_json::to_vec_pretty(report)?;
@@ -217,7 +217,7 @@ fn finish(
 
 /// A cage as a mesh file of its target's name; standard output has none and gets `.obj`.
 pub(super) fn cage_bytes(target: &Target, cage: &Model) -> Result<Vec<u8>> {
-    if target.is_standard_output() {
+    if *target == Target::StandardOutput {
         return Ok(obj_bytes(cage));
     }
     Ok(model_bytes(target.path(), cage)?)
@@ -233,10 +233,10 @@ pub(super) fn picture_of(args: &CageArgs, model: &TriMesh, cage: &TriMesh) -> Ve
     picture::of_cage(model, cage, up)
 }
 
-pub(super) fn whole(target: &Target, bytes: &[u8]) -> Result<CompleteFile> {
+pub(super) fn whole(target: &Target, bytes: &[u8]) -> Result<AtomicFile> {
     let mut file = AtomicFile::create(target)?;
     file.write_all(bytes)?;
-    Ok(file.complete()?)
+    Ok(file)
 }
 
 fn together(models: &[Model]) -> TriMesh {

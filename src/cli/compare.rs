@@ -63,14 +63,13 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     })?;
 
     report.write_all(page(&figures, &pictures).as_bytes())?;
-    let report = report.complete()?;
-    let bytes = report.length();
+    let bytes = report.complete()?;
     let mut outputs = vec![report];
     if let Some(mut file) = json {
         let mut text = serde_json::to_vec_pretty(&figures)?;
         text.push(b'\n');
         file.write_all(&text)?;
-        outputs.insert(0, file.complete()?);
+        outputs.insert(0, file);
     }
     commit_together(outputs)?;
     super::tell(&summary(&figures, output.path(), bytes, clock.elapsed().as_secs_f64())?)

@@ -37,7 +37,7 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
             warn(&[format!("the {} normals of each cage are left out: they are no positions", found.normals)]);
         }
         if dry_run {
-            let rest = found.rest.map(Target::replacing);
+            let rest = found.rest.map(Target::Replacing);
             return tell_would(&output, &size(found.frames, found.vertices as usize, "vertices"), &[rest]);
         }
         let rest =

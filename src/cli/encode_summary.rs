@@ -3,15 +3,15 @@
 use super::{grouped, human_bytes, is_verbose};
 use crate::report::Report;
 use anyhow::Result;
-use cager_formats::{AtomicFile, CompleteFile};
+use cager_formats::AtomicFile;
 use std::io::Write;
 use std::path::Path;
 
-pub(super) fn write_report(mut file: AtomicFile, report: &Report) -> Result<CompleteFile> {
+pub(super) fn write_report(mut file: AtomicFile, report: &Report) -> Result<AtomicFile> {
     let mut text = serde_json::to_vec_pretty(report)?;
     text.push(b'\n');
     file.write_all(&text)?;
-    Ok(file.complete()?)
+    Ok(file)
 }
 
 pub(super) fn summary(report: &Report, output: &Path) -> String {

@@ -18,7 +18,7 @@ pub(super) fn run(args: &ManArgs) -> Result<()> {
         let mut page = Vec::new();
         clap_mangen::Man::new(command).render(&mut page)?;
         file.write_all(&page)?;
-        pages.push(file.complete()?);
+        pages.push(file);
     }
     let count = pages.len();
     commit_together(pages)?;

@@ -77,7 +77,7 @@ impl Outputs {
             if !manners::take_stdout() {
                 bail!("-: standard output cannot hold two outputs; name a file for one of them");
             }
-            return Ok(Target::standard_output());
+            return Ok(Target::StandardOutput);
         }
         if let Ok(at) = destination(place) {
             if self.taken.contains(&at) {
@@ -102,7 +102,7 @@ impl Outputs {
             }
             _ => {}
         }
-        Ok(if self.overwrite { Target::replacing(path) } else { Target::new(path) })
+        Ok(if self.overwrite { Target::Replacing(path.to_owned()) } else { Target::New(path.to_owned()) })
     }
 }
 

@@ -1,14 +1,12 @@
 //! What each setting may be.
 
-use super::{GIB, KIB, MIB};
+use super::{GIB, KIB, MIB, SETTINGS};
 use std::net::SocketAddr;
 use toml::Value;
 
-const DAY: u64 = 86_400;
-
 /// What a setting may be.
 #[derive(Clone, Copy, Debug)]
-enum Kind {
+pub(super) enum Kind {
     Address,
     File,
     Text,
@@ -18,56 +16,6 @@ enum Kind {
     Number { least: u64, most: u64 },
     Bytes { least: u64, most: u64 },
 }
-
-/// Every setting, in the order in which it is shown.
-const SETTINGS: &[(&str, Kind)] = &[
-    ("listen", Kind::Address),
-    ("admin_listen", Kind::Address),
-    ("data", Kind::File),
-    ("tokens", Kind::File),
-    ("oidc_issuer", Kind::Text),
-    ("oidc_audience", Kind::Text),
-    ("oidc_keys", Kind::Text),
-    ("oidc_tenant", Kind::Text),
-    ("webhooks", Kind::File),
-    ("tls_certificate", Kind::File),
-    ("tls_key", Kind::File),
-    ("allowed_hosts", Kind::List),
-    ("allowed_origins", Kind::List),
-    ("log", Kind::Format),
-    ("log_filter", Kind::Filter),
-    ("workers", Kind::Number { least: 0, most: 4096 }),
-    ("cache_bytes", Kind::Bytes { least: 0, most: 1 << 50 }),
-    ("prepared_disk_bytes", Kind::Bytes { least: 0, most: 1 << 50 }),
-    ("frame_bytes", Kind::Bytes { least: MIB, most: 1 << 50 }),
-    ("upload_bytes", Kind::Bytes { least: MIB, most: 1 << 50 }),
-    ("download_bytes", Kind::Bytes { least: MIB, most: 1 << 50 }),
-    ("spool_bytes", Kind::Bytes { least: MIB, most: 1 << 50 }),
-    ("max_rest_bytes", Kind::Bytes { least: KIB, most: 16 * GIB }),
-    ("max_connections", Kind::Number { least: 1, most: 1_000_000 }),
-    ("max_requests", Kind::Number { least: 1, most: 1_000_000 }),
-    ("max_streams", Kind::Number { least: 1, most: 1_000_000 }),
-    ("max_preparing", Kind::Number { least: 1, most: 4096 }),
-    ("max_prepare_bytes", Kind::Bytes { least: MIB, most: 1 << 50 }),
-    ("max_prepare_queue", Kind::Number { least: 0, most: 1_000_000 }),
-    ("max_designs", Kind::Number { least: 1, most: 4096 }),
-    ("max_design_queue", Kind::Number { least: 0, most: 1_000_000 }),
-    ("max_design_seconds", Kind::Number { least: 1, most: DAY }),
-    ("max_design_bytes", Kind::Bytes { least: MIB, most: 1 << 50 }),
-    ("max_frames_bytes", Kind::Bytes { least: KIB, most: 1 << 50 }),
-    ("max_queue_frames", Kind::Number { least: 16, most: 1 << 30 }),
-    ("header_timeout_s", Kind::Number { least: 1, most: DAY }),
-    ("body_timeout_s", Kind::Number { least: 1, most: DAY }),
-    ("idle_timeout_s", Kind::Number { least: 1, most: DAY }),
-    ("write_timeout_s", Kind::Number { least: 1, most: DAY }),
-    ("request_timeout_s", Kind::Number { least: 1, most: DAY }),
-    ("drain_timeout_s", Kind::Number { least: 0, most: DAY }),
-    ("max_header_bytes", Kind::Bytes { least: KIB, most: MIB }),
-    ("tenant_max_sessions", Kind::Number { least: 1, most: 1 << 40 }),
-    ("tenant_max_bytes", Kind::Bytes { least: MIB, most: 1 << 60 }),
-    ("tenant_max_age_s", Kind::Number { least: 0, most: 1 << 40 }),
-    ("tenant_max_streams", Kind::Number { least: 1, most: 1_000_000 }),
-];
 
 /// Names of all settings, in the order in which they are shown.
 pub(super) fn names() -> impl Iterator<Item = &'static str> {

@@ -23,25 +23,8 @@ fn load(file: &str, env: &[(&str, &str)], line: &str) -> Result<ServeConfig, Str
 }
 
 #[test]
-fn the_table_of_settings_and_the_struct_agree() {
-    let all = ServeConfig {
-        tokens: Some("a".into()),
-        tls_certificate: Some("b".into()),
-        tls_key: Some("c".into()),
-        admin_listen: Some(([127, 0, 0, 1], 8081).into()),
-        oidc_issuer: Some("d".into()),
-        oidc_audience: Some("e".into()),
-        oidc_keys: Some("f".into()),
-        webhooks: Some("g".into()),
-        ..ServeConfig::default()
-    };
-    let mut of_struct: Vec<_> = toml::Table::try_from(&all).unwrap().keys().cloned().collect();
-    let mut of_table: Vec<_> = settings::names().map(str::to_owned).collect();
-    of_struct.sort();
-    of_table.sort();
-    assert_eq!(of_struct, of_table);
-    // Every default is possible.
-    for (name, value) in &toml::Table::try_from(&all).unwrap() {
+fn every_default_is_possible() {
+    for (name, value) in &toml::Table::try_from(ServeConfig::default()).unwrap() {
         settings::read(name, value).unwrap().unwrap();
     }
 }

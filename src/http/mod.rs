@@ -13,7 +13,7 @@ mod events;
 mod extract;
 mod frames;
 mod frames_in;
-#[doc(hidden)]
+#[cfg(feature = "fuzzing")]
 pub mod fuzzing;
 mod guarded;
 mod health;

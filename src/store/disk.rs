@@ -1,4 +1,4 @@
-//! The file layer below the store: few operations, so that each of them can be made to fail in a test.
+//! The file layer below the store: few operations, so that each of them can be made to fail in a test (`tests/faults/`).
 
 use std::ffi::OsString;
 use std::fmt::Debug;

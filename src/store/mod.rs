@@ -25,8 +25,9 @@ mod cage_jobs;
 mod content;
 pub mod disk;
 mod error;
-#[doc(hidden)]
-pub mod faults;
+#[cfg(test)]
+#[path = "../../tests/faults/mod.rs"]
+mod faults;
 mod files;
 mod found;
 pub mod log;

@@ -1,6 +1,6 @@
 //! Prepared solvers by the digest of what they were prepared from: a cache that outlives the process.
 
-use super::solver_file::{self, Found};
+use super::solver_file;
 use super::{ContentKey, Store, StoreError};
 use cager_core::inversion::Solver;
 use std::io;
@@ -57,13 +57,15 @@ impl Store {
             Err(error) => return Err(StoreError::of(&place, "open", error)),
         };
         let found = match solver_file::read(&*file, key) {
-            Ok(Found::Solver(solver)) => Ok(*solver),
-            Ok(Found::Other(version)) => {
-                tracing::debug!(%key, version, "a stored solver is of another version of the format and is prepared anew");
+            Ok(Some(solver)) => Ok(solver),
+            Ok(None) => {
+                tracing::debug!(%key, "a stored solver is of another version of the format and is prepared anew");
                 self.forget_prepared(&place)?;
                 return Ok(None);
             }
-            Ok(Found::Damage(what)) => Err(StoreError::damaged(&place, what)),
+            Err(error) if error.kind() == io::ErrorKind::InvalidData => {
+                Err(StoreError::damaged(&place, error.to_string()))
+            }
             Err(error) => Err(StoreError::of(&place, "read", error)),
         };
         match self.set_aside_if_damaged(&place, found) {

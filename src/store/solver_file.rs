@@ -1,65 +1,23 @@
-//! A prepared solver as a file: a header with all lengths and its own checksum, then raw little-endian arrays, then the
-//! checksum of everything. Converted in pieces that stay in the cache, so that loading runs at the speed of memory.
+//! A prepared solver as a file in the safetensors format: each array by its name, a matrix as the list of its columns, and last the
+//! CRC-32C of all that comes before. Converted a column at a time, which stays in the cache, so that loading runs at the speed of
+//! memory.
 
 use super::ContentKey;
 use super::disk::DiskFile;
 use cager_core::coordinates::{Refinement, TiedNormals};
 use cager_core::inversion::{Preparation, Pull, Solver, SolverParts, TiedParts};
-use faer::{Mat, MatRef};
+use faer::traits::ComplexField;
+use faer::{ColRef, Mat, MatRef};
+use safetensors::Dtype;
+use safetensors::tensor::{Metadata, TensorInfo};
+use std::collections::HashMap;
 use std::io;
 
-/// A name, and the version of the format.
-const MAGIC: [u8; 8] = *b"CGRSOLV\x04";
-const COUNTS: usize = 15;
-const NUMBERS: usize = 12;
-/// Magic, key, counts, numbers, checksum.
-const HEADER_BYTES: usize = 8 + 32 + 8 * COUNTS + 8 * NUMBERS + 4;
-const PIECE_BYTES: usize = 1 << 18;
-
-/// What is added to `R · H`, one of the counts.
-const NO_PULL: u64 = 0;
-const CONSTANT: u64 = 1;
-const PREVIOUS: u64 = 2;
-/// Its place.
-const PULL_PLACE: usize = 11;
-
-/// What a file turned out to be.
-pub(super) enum Found {
-    Solver(Box<Solver>),
-    /// Of another version of the format, as an older or newer program writes it; the version is given.
-    Other(u8),
-    Damage(String),
-}
-
-/// Length of the file that has these counts, where one can have it.
-fn file_bytes(counts: &[u64; COUNTS]) -> Option<u64> {
-    let [points, unknowns, handles, reads_all, values, outside, _, _, _, columns, faces, pull, ..] = *counts;
-    // A matrix's columns are padded in memory: only tall ones take about what their file does. A cage of v vertices has fewer than
-    // v² faces.
-    if unknowns > points || columns > points.checked_mul(points)? || reads_all > 1 || handles > points {
-        return None;
-    }
-    let tied = match faces {
-        0 => 0,
-        _ => faces.checked_mul(36)?.checked_add(columns.checked_mul(columns)?.checked_mul(8)?)?,
-    };
-    let pull = match pull {
-        NO_PULL => 0,
-        CONSTANT => unknowns.checked_mul(24)?,
-        PREVIOUS => unknowns.checked_mul(unknowns.checked_mul(8)?.checked_add(12)?)?,
-        _ => return None,
-    };
-    let read = if reads_all == 1 { points } else { handles };
-    let phi = points.checked_mul(columns)?.checked_mul(4)?;
-    let operator = read.checked_mul(unknowns)?.checked_mul(8)?;
-    let small = handles.checked_add(outside)?.checked_mul(4)?.checked_add(values.checked_mul(8)?)?;
-    (HEADER_BYTES as u64 + 4)
-        .checked_add(phi)?
-        .checked_add(operator)?
-        .checked_add(small)?
-        .checked_add(pull)?
-        .checked_add(tied)
-}
+/// Version of the format; those up to 4 were of another kind.
+const VERSION: &str = "5";
+const OLD_FORMAT: &[u8] = b"CGRSOLV";
+const HEADER_BYTES: u64 = 1 << 16;
+const CHECKSUM: &str = "crc32c";
 
 pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> io::Result<()> {
     // Named one by one, so that a new field is not forgotten here.
@@ -82,214 +40,241 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
     let decoder = solver.decoder();
     let no_coordinates = || io::Error::new(io::ErrorKind::InvalidInput, "a solver without its coordinates");
     let phi = decoder.coordinates().ok_or_else(no_coordinates)?;
-    let (operator, tied) = (solver.operator(), solver.tied());
-    let mut header = Vec::with_capacity(HEADER_BYTES);
-    header.extend_from_slice(&MAGIC);
-    header.extend_from_slice(&key.0);
-    let counts: [usize; COUNTS] = [
-        decoder.points(),
-        decoder.unknowns(),
-        solver.handles().len(),
-        usize::from(solver.reads_all()),
-        singular_values.len(),
-        outside.len(),
-        decoder.positions(),
-        *rank,
-        *swaps,
-        decoder.columns(),
-        decoder.tied_normals().map_or(0, |normals| normals.faces().len()),
-        match solver.pull() {
-            Pull::None => NO_PULL,
-            Pull::Constant(_) => CONSTANT,
-            Pull::Previous { .. } => PREVIOUS,
-        } as usize,
-        usize::from(refinement.is_some()),
-        refinement.map_or(0, |refined| refined.elements),
-        refinement.map_or(0, |refined| refined.refinements),
-    ];
-    header.extend(counts.iter().flat_map(|&count| (count as u64).to_le_bytes()));
-    let numbers: [f64; NUMBERS] = [
+    // Counts are exact as doubles.
+    let numbers = [
+        decoder.positions() as f64,
+        f64::from(u8::from(solver.reads_all())),
         solver.diagonal(),
+        *rank as f64,
         *affine_reproduction_error,
         *condition_full,
         *condition_handles,
+        *swaps as f64,
         *log_volume,
         *max_entry,
         *outside_distance,
         *coordinates_seconds,
         *maxvol_seconds,
         *svd_seconds,
-        tied.map_or(0.0, |(_, _, weight)| weight),
-        refinement.map_or(0.0, |refined| refined.change),
     ];
-    header.extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
-    header.extend_from_slice(&crc32c::crc32c(&header).to_le_bytes());
-
-    let mut out = Out { file, piece: header, offset: 0, crc: 0 };
-    out.put(solver.handles().iter().map(|x| x.to_le_bytes()))?;
-    out.put(outside.iter().map(|x| x.to_le_bytes()))?;
-    out.put(singular_values.iter().map(|x| x.to_le_bytes()))?;
-    for j in 0..operator.ncols() {
-        out.put(operator.col(j).iter().map(|x| x.to_le_bytes()))?;
-    }
-    let mut put_matrix = |matrix: MatRef<'_, f64>| {
-        (0..matrix.ncols()).try_for_each(|j| out.put(matrix.col(j).iter().map(|x| x.to_le_bytes())))
-    };
+    let refinement = refinement.as_ref().map(|found| [found.elements as f64, found.refinements as f64, found.change]);
+    let tied = solver.tied();
+    let mut arrays = vec![
+        Array::new("numbers", column(&numbers)),
+        Array::new("handles", column(solver.handles())),
+        Array::new("outside", column(outside)),
+        Array::new("singular_values", column(singular_values)),
+        Array::new("operator", solver.operator()),
+    ];
+    arrays.extend(refinement.as_ref().map(|numbers| Array::new("refinement", column(numbers))));
     match solver.pull() {
         Pull::None => {}
-        Pull::Constant(offset) => put_matrix(offset.as_ref())?,
+        Pull::Constant(offset) => arrays.push(Array::new("constant", offset.as_ref())),
         Pull::Previous { operator, first } => {
-            put_matrix(operator.as_ref())?;
-            out.put(first.iter().map(|x| x.to_le_bytes()))?;
+            arrays.extend([Array::new("previous", operator.as_ref()), Array::new("first", column(first))]);
         }
     }
-    if let Some((normals, gram, _)) = tied {
-        out.put(normals.faces().iter().flatten().map(|x| x.to_le_bytes()))?;
-        out.put(normals.weights().iter().flatten().map(|x| x.to_le_bytes()))?;
-        (0..gram.ncols()).try_for_each(|j| out.put(gram.col(j).iter().map(|x| x.to_le_bytes())))?;
+    if let Some((normals, gram, weight)) = &tied {
+        arrays.extend([
+            Array::new("normal_faces", column(normals.faces().as_flattened())),
+            Array::new("normal_weights", column(normals.weights().as_flattened())),
+            Array::new("gram", *gram),
+            Array::new("start_weight", column(std::slice::from_ref(weight))),
+        ]);
     }
-    for j in 0..phi.ncols() {
-        out.put(phi.col(j).iter().map(|x| x.to_le_bytes()))?;
-    }
+    arrays.push(Array::new("phi", phi));
+
+    let mut out = Out { file, piece: header(key, &arrays)?, offset: 0, crc: 0 };
     out.flush()?;
-    let crc = out.crc.to_le_bytes();
-    out.piece.extend_from_slice(&crc);
-    out.flush()
+    arrays.iter().try_for_each(|array| (array.put)(&mut out))?;
+    let crc = out.crc;
+    out.put([crc].into_iter())
 }
 
-/// Reads a solver. Nothing is allocated before the lengths are known to be the file's.
-pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Found> {
-    let bytes = file.length()?;
-    let damage = |what: &str| Ok(Found::Damage(what.into()));
-    let mut magic = [0; MAGIC.len()];
-    if bytes >= magic.len() as u64 {
-        file.read_exact_at(&mut magic, 0)?;
-    }
-    // Before anything else: other versions have headers of other lengths.
-    let ([name @ .., version], [our_name @ .., our_version]) = (&magic, &MAGIC);
-    if name == our_name && version != our_version {
-        return Ok(Found::Other(*version));
-    }
-    if bytes < HEADER_BYTES as u64 + 4 {
-        return damage("it is too short");
-    }
-    let mut header = [0; HEADER_BYTES];
-    file.read_exact_at(&mut header, 0)?;
-    let (body, crc) = header.split_at(HEADER_BYTES - 4);
-    if crc != crc32c::crc32c(body).to_le_bytes() {
-        return damage("its header does not match its checksum");
-    }
-    if body[..8] != MAGIC {
-        return damage("it is not a solver");
-    }
-    if body[8..40] != key.0 {
-        return damage("it is of other content");
-    }
-    let mut words = body[40..].chunks_exact(8).map(|b| u64::from_le_bytes([0, 1, 2, 3, 4, 5, 6, 7].map(|i| b[i])));
-    let mut word = || words.next().unwrap_or_default();
-    let counts: [u64; COUNTS] = std::array::from_fn(|_| word());
-    let numbers: [f64; NUMBERS] = std::array::from_fn(|_| f64::from_bits(word()));
-    if file_bytes(&counts) != Some(bytes) {
-        return damage("its length is not what its header says");
-    }
-    let [
-        points,
-        unknowns,
-        handle_count,
-        reads_all,
-        values,
-        outside_count,
-        positions,
-        rank,
-        swaps,
-        columns,
-        faces,
-        _,
-        refined,
-        elements,
-        refinements,
-    ] = counts.map(|count| count as usize);
-
-    let mut source = In { file, piece: Vec::new(), at: 0, offset: HEADER_BYTES as u64, end: bytes, crc: 0 };
-    source.crc = crc32c::crc32c(&header);
-    let mut handles = vec![0; handle_count];
-    source.fill(&mut handles, u32::from_le_bytes)?;
-    let mut outside = vec![0; outside_count];
-    source.fill(&mut outside, u32::from_le_bytes)?;
-    let mut singular_values = vec![0.0; values];
-    source.fill(&mut singular_values, f64::from_le_bytes)?;
-    let operator = source.matrix(if reads_all == 1 { points } else { handle_count }, unknowns)?;
-    let pull = match counts[PULL_PLACE] {
-        CONSTANT => Pull::Constant(source.matrix(unknowns, 3)?),
-        PREVIOUS => {
-            let operator = source.matrix(unknowns, unknowns)?;
-            let mut first = vec![0.0; 3 * unknowns];
-            source.fill(&mut first, f32::from_le_bytes)?;
-            Pull::Previous { operator, first }
-        }
-        _ => Pull::None,
+/// The length of what follows and the names, types, shapes and places of the arrays, the checksum included.
+fn header(key: &ContentKey, arrays: &[Array<'_>]) -> io::Result<Vec<u8>> {
+    let (checksum, mut end) = (Array::new(CHECKSUM, column(&[0_u32])), 0);
+    let place = |array: &Array<'_>| {
+        let start = end;
+        end += array.shape[0] * array.shape[1] * array.dtype.bitsize() / 8;
+        let info = TensorInfo { dtype: array.dtype, shape: array.shape.to_vec(), data_offsets: (start, end) };
+        (array.name.to_owned(), info)
     };
-    let [.., weight, change] = numbers;
-    let mut tied = None;
-    if faces > 0 {
-        let (mut corners, mut weights) = (vec![[0; 3]; faces], vec![[0.0; 3]; faces]);
-        source.fill(corners.as_flattened_mut(), u32::from_le_bytes)?;
-        source.fill(weights.as_flattened_mut(), f64::from_le_bytes)?;
-        let gram = source.matrix(columns, columns)?;
-        let Some(normals) = TiedNormals::from_parts(corners, weights, positions) else {
-            return damage("its normals do not fit its cage");
+    let tensors = arrays.iter().chain([&checksum]).map(place).collect();
+    let said = [("solver", VERSION.to_owned()), ("key", key.to_string())];
+    let said: HashMap<_, _> = said.map(|(name, value)| (name.to_owned(), value)).into();
+    let metadata = Metadata::new(Some(said), tensors).map_err(io::Error::other)?;
+    let mut text = serde_json::to_vec(&metadata)?;
+    text.resize(text.len().next_multiple_of(8), b' ');
+    Ok([&(text.len() as u64).to_le_bytes(), text.as_slice()].concat())
+}
+
+/// Reads a solver; None where the file is of another version of the format. Nothing is allocated before the lengths are known to
+/// be the file's.
+///
+/// # Errors
+/// What the system says; `InvalidData` for damage.
+pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Option<Solver>> {
+    let bytes = file.length()?;
+    let mut length = [0; 8];
+    if bytes < length.len() as u64 {
+        return Err(damage("it is too short"));
+    }
+    file.read_exact_at(&mut length, 0)?;
+    if length.starts_with(OLD_FORMAT) {
+        return Ok(None);
+    }
+    let header_bytes = u64::from_le_bytes(length);
+    if header_bytes > HEADER_BYTES.min(bytes - 8) {
+        return Err(damage("it has no header"));
+    }
+    let mut header = length.to_vec();
+    header.resize(8 + header_bytes as usize, 0);
+    file.read_exact_at(&mut header[8..], 8)?;
+    let metadata: Metadata =
+        serde_json::from_slice(&header[8..]).map_err(|_| damage("its header is no list of arrays"))?;
+    let said = |name: &str| metadata.metadata().as_ref()?.get(name).map(String::as_str);
+    if said("solver") != Some(VERSION) {
+        return Ok(None);
+    }
+    if said("key") != Some(&key.to_string()) {
+        return Err(damage("it is of other content"));
+    }
+    if (header.len() as u64).checked_add(metadata.data_len() as u64) != Some(bytes) {
+        return Err(damage("its length is not what its header says"));
+    }
+
+    let (start, crc) = (header.len() as u64, crc32c::crc32c(&header));
+    let mut source = In { file, metadata, start, offset: start, piece: Vec::new(), crc };
+    let numbers: Vec<f64> = source.vector("numbers")?;
+    let handles = source.vector("handles")?;
+    let outside = source.vector("outside")?;
+    let singular_values = source.vector("singular_values")?;
+    let operator = source.matrix("operator")?;
+    let refinement =
+        match source.has("refinement") {
+            true => source.vector::<f64>("refinement")?.first_chunk().map(|&[elements, refinements, change]| {
+                Refinement { elements: elements as usize, refinements: refinements as usize, change }
+            }),
+            false => None,
         };
+    let pull = if source.has("constant") {
+        Pull::Constant(source.matrix("constant")?)
+    } else if source.has("previous") {
+        Pull::Previous { operator: source.matrix("previous")?, first: source.vector("first")? }
+    } else {
+        Pull::None
+    };
+    let no_fit = || damage("its parts do not fit together");
+    let Ok(
+        [
+            positions,
+            reads_all,
+            diagonal,
+            rank,
+            affine_reproduction_error,
+            condition_full,
+            condition_handles,
+            swaps,
+            log_volume,
+            max_entry,
+            outside_distance,
+            coordinates_seconds,
+            maxvol_seconds,
+            svd_seconds,
+        ],
+    ) = <[f64; 14]>::try_from(numbers)
+    else {
+        return Err(no_fit());
+    };
+    let mut tied = None;
+    if source.has("gram") {
+        let (faces, weights): (Vec<u32>, Vec<f64>) = (source.vector("normal_faces")?, source.vector("normal_weights")?);
+        let (faces, weights) = (faces.as_chunks().0.to_vec(), weights.as_chunks().0.to_vec());
+        let gram = source.matrix("gram")?;
+        let weight = source.vector("start_weight")?.first().copied().unwrap_or_default();
+        let normals = TiedNormals::from_parts(faces, weights, positions as usize).ok_or_else(no_fit)?;
         tied = Some(TiedParts { normals, gram, weight });
     }
-    let mut phi = Mat::<f32>::zeros(points, columns);
-    for j in 0..columns {
-        source.fill(phi.col_as_slice_mut(j), f32::from_le_bytes)?;
-    }
+    let phi = source.matrix("phi")?;
     let crc = source.crc;
-    let mut stored = [0];
-    source.fill(&mut stored, u32::from_le_bytes)?;
-    if stored[0] != crc {
-        return damage("its content does not match its checksum");
+    if source.vector::<u32>(CHECKSUM)? != [crc] {
+        return Err(damage("its content does not match its checksum"));
     }
-
-    let [
-        diagonal,
-        affine_reproduction_error,
-        condition_full,
-        condition_handles,
-        log_volume,
-        max_entry,
-        outside_distance,
-        coordinates_seconds,
-        maxvol_seconds,
-        svd_seconds,
-        ..,
-    ] = numbers;
     let preparation = Preparation {
-        rank,
+        rank: rank as usize,
         affine_reproduction_error,
         condition_full,
         condition_handles,
         singular_values,
-        swaps,
+        swaps: swaps as usize,
         log_volume,
         max_entry,
         outside,
         outside_distance,
-        refinement: (refined != 0).then_some(Refinement { elements, refinements, change }),
+        refinement,
         coordinates_seconds,
         maxvol_seconds,
         svd_seconds,
     };
-    let parts =
-        SolverParts { handles, reads_all: reads_all == 1, operator, pull, phi, positions, tied, diagonal, preparation };
-    match Solver::from_parts(parts) {
-        Some(solver) => Ok(Found::Solver(Box::new(solver))),
-        None => damage("its parts do not fit together"),
+    let (reads_all, positions) = (reads_all != 0.0, positions as usize);
+    let parts = SolverParts { handles, reads_all, operator, pull, phi, positions, tied, diagonal, preparation };
+    Solver::from_parts(parts).ok_or_else(no_fit).map(Some)
+}
+
+fn damage(what: &str) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, what)
+}
+
+/// A number as it stands in the file, little-endian.
+trait Number: Copy + Default + 'static {
+    const TYPE: Dtype;
+    fn append(self, bytes: &mut Vec<u8>);
+    fn of(bytes: &[u8]) -> Self;
+}
+
+macro_rules! numbers {
+    ($($number:ty: $dtype:ident),*) => {$(
+        impl Number for $number {
+            const TYPE: Dtype = Dtype::$dtype;
+
+            fn append(self, bytes: &mut Vec<u8>) {
+                bytes.extend_from_slice(&self.to_le_bytes());
+            }
+
+            fn of(bytes: &[u8]) -> Self {
+                bytes.try_into().map(Self::from_le_bytes).unwrap_or_default()
+            }
+        }
+    )*};
+}
+
+numbers!(u32: U32, f32: F32, f64: F64);
+
+type Put<'a> = Box<dyn Fn(&mut Out<'_>) -> io::Result<()> + 'a>;
+
+/// An array to be written.
+struct Array<'a> {
+    name: &'static str,
+    dtype: Dtype,
+    /// Columns, rows.
+    shape: [usize; 2],
+    put: Put<'a>,
+}
+
+impl<'a> Array<'a> {
+    fn new<T: Number>(name: &'static str, matrix: MatRef<'a, T>) -> Self {
+        let shape = [matrix.ncols(), matrix.nrows()];
+        let put = move |out: &mut Out<'_>| (0..shape[0]).try_for_each(|j| out.put(matrix.col(j).iter().copied()));
+        Self { name, dtype: T::TYPE, shape, put: Box::new(put) }
     }
 }
 
-/// Gathers pieces, checksums and writes them.
+fn column<T>(values: &[T]) -> MatRef<'_, T> {
+    ColRef::from_slice(values).as_mat()
+}
+
+/// Checksums and writes, a column at a time.
 struct Out<'a> {
     file: &'a dyn DiskFile,
     piece: Vec<u8>,
@@ -298,71 +283,66 @@ struct Out<'a> {
 }
 
 impl Out<'_> {
-    fn put<const N: usize>(&mut self, values: impl Iterator<Item = [u8; N]>) -> io::Result<()> {
-        for value in values {
-            self.piece.extend_from_slice(&value);
-            if self.piece.len() >= PIECE_BYTES {
-                self.flush()?;
-            }
-        }
-        Ok(())
+    fn put<T: Number>(&mut self, values: impl Iterator<Item = T>) -> io::Result<()> {
+        self.piece.clear();
+        values.for_each(|value| value.append(&mut self.piece));
+        self.flush()
     }
 
     fn flush(&mut self) -> io::Result<()> {
         self.crc = crc32c::crc32c_append(self.crc, &self.piece);
         self.file.write_all_at(&self.piece, self.offset)?;
         self.offset += self.piece.len() as u64;
-        self.piece.clear();
         Ok(())
     }
 }
 
-/// Reads pieces and checksums what is taken from them.
+/// Reads, in the order of the arrays, a column at a time, and checksums what it reads.
 struct In<'a> {
     file: &'a dyn DiskFile,
-    piece: Vec<u8>,
-    at: usize,
+    metadata: Metadata,
+    /// Of the first array.
+    start: u64,
     offset: u64,
-    end: u64,
+    piece: Vec<u8>,
     crc: u32,
 }
 
 impl In<'_> {
-    fn matrix(&mut self, rows: usize, columns: usize) -> io::Result<Mat<f64>> {
-        let mut matrix = Mat::<f64>::zeros(rows, columns);
-        (0..columns).try_for_each(|j| self.fill(matrix.col_as_slice_mut(j), f64::from_le_bytes))?;
+    fn has(&self, name: &str) -> bool {
+        self.metadata.info(name).is_some()
+    }
+
+    /// Columns and rows of the array, which comes next.
+    fn shape<T: Number>(&self, name: &str) -> io::Result<[usize; 2]> {
+        let is_next = |info: &&TensorInfo| info.data_offsets.0 as u64 == self.offset - self.start;
+        let info = self.metadata.info(name).filter(|info| info.dtype == T::TYPE).filter(is_next);
+        info.and_then(|info| info.shape.first_chunk().copied())
+            .ok_or_else(|| damage("an array is not what it should be"))
+    }
+
+    fn vector<T: Number>(&mut self, name: &str) -> io::Result<Vec<T>> {
+        let [columns, rows] = self.shape::<T>(name)?;
+        let mut values = vec![T::default(); columns * rows];
+        self.fill(&mut values)?;
+        Ok(values)
+    }
+
+    fn matrix<T: Number + ComplexField>(&mut self, name: &str) -> io::Result<Mat<T>> {
+        let [columns, rows] = self.shape::<T>(name)?;
+        let mut matrix = Mat::zeros(rows, columns);
+        (0..columns).try_for_each(|j| self.fill(matrix.col_as_slice_mut(j)))?;
         Ok(matrix)
     }
 
-    fn fill<T, const N: usize>(&mut self, mut values: &mut [T], value: fn([u8; N]) -> T) -> io::Result<()> {
-        while !values.is_empty() {
-            if self.piece.len() - self.at < N {
-                self.refill()?;
-            }
-            let (now, later) = values.split_at_mut(values.len().min((self.piece.len() - self.at) / N));
-            let bytes = &self.piece[self.at..][..N * now.len()];
-            self.crc = crc32c::crc32c_append(self.crc, bytes);
-            for (to, from) in now.iter_mut().zip(bytes.as_chunks::<N>().0) {
-                *to = value(*from);
-            }
-            self.at += bytes.len();
-            values = later;
+    fn fill<T: Number>(&mut self, values: &mut [T]) -> io::Result<()> {
+        self.piece.resize(size_of_val(values), 0);
+        self.file.read_exact_at(&mut self.piece, self.offset)?;
+        self.offset += self.piece.len() as u64;
+        self.crc = crc32c::crc32c_append(self.crc, &self.piece);
+        for (value, bytes) in values.iter_mut().zip(self.piece.chunks_exact(size_of::<T>())) {
+            *value = T::of(bytes);
         }
-        Ok(())
-    }
-
-    /// Moves on; what of the piece is left comes first.
-    fn refill(&mut self) -> io::Result<()> {
-        self.piece.drain(..self.at);
-        self.at = 0;
-        let left = self.piece.len();
-        let more = (PIECE_BYTES - left).min(usize::try_from(self.end - self.offset).unwrap_or(PIECE_BYTES));
-        if more == 0 {
-            return Err(io::ErrorKind::UnexpectedEof.into());
-        }
-        self.piece.resize(left + more, 0);
-        self.file.read_exact_at(&mut self.piece[left..], self.offset)?;
-        self.offset += more as u64;
         Ok(())
     }
 }

@@ -39,8 +39,9 @@ fn a_frame_that_equals_the_rest_pose_gives_the_rest_cage() {
 
 /// With the cages that artists made.
 #[test]
+#[ignore = "needs the captures: make captures"]
 fn a_rest_pose_of_the_pairs_gives_its_cage() {
-    let Some(root) = data() else { return };
+    let root = data();
     let mut compared = 0;
     for pair in ["cagelabweb_armadillo", "pgc_hand", "pgc_octopus", "qmvc_beast", "qmvc_ogre"] {
         let folder = root.join("pairs").join(pair);

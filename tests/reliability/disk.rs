@@ -1,9 +1,9 @@
 //! Disks that are full or broken, seen over HTTP.
 
 use crate::capture::Reference;
+use crate::faults::{Fault, Loss, Op};
 use crate::inside::Inside;
 use crate::process::HANG;
-use cager::store::faults::{Fault, Loss, Op};
 use cager_client::ClientError;
 use cager_client::messages::SessionState;
 use std::sync::LazyLock;

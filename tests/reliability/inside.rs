@@ -1,13 +1,13 @@
 //! The service within this process, on a disk that fails on demand.
 
 use crate::capture::{Errors, Reference};
+use crate::faults::{FaultyDisk, Loss};
 use crate::gate::{Gate, GatedDisk};
 use crate::process::{HANG, client};
 use cager::config::ServeConfig;
 use cager::http::listen::serve;
 use cager::http::{router, spare};
 use cager::service::{Service, StartError};
-use cager::store::faults::{FaultyDisk, Loss};
 use cager::store::{Disk, StoreError};
 use cager_client::messages::{FrameResult, Problem, Session};
 use cager_client::{Client, ClientOptions};

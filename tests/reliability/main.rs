@@ -6,6 +6,7 @@
 mod capture;
 mod client_gone;
 mod disk;
+mod faults;
 mod gate;
 mod inside;
 mod limits;

@@ -1,8 +1,8 @@
 //! Power cuts at any operation of the disk: what was answered is there afterwards.
 
 use crate::capture::Reference;
+use crate::faults::{Fault, Loss};
 use crate::inside::Inside;
-use cager::store::faults::{Fault, Loss};
 use fastrand::Rng;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;

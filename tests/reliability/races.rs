@@ -1,10 +1,10 @@
 //! Things that happen at the same time, or in an unlucky order.
 
 use crate::capture::Reference;
+use crate::faults::Loss;
 use crate::inside::Inside;
 use crate::process::HANG;
 use crate::wire::Wire;
-use cager::store::faults::Loss;
 use cager_client::messages::SessionState;
 use std::net::SocketAddr;
 use std::sync::LazyLock;

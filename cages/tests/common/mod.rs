@@ -8,15 +8,10 @@ use parry3d_f64::shape::{TriMesh as ParryMesh, TriMeshFlags};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// The folder with captures, if it is at hand.
-pub fn data() -> Option<PathBuf> {
-    let folder = std::env::var_os("CAGER_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    eprintln!("skipped: {} is not there; set CAGER_DATA to the folder with captures", folder.display());
-    None
+/// The folder with captures, `CAGER_CAPTURES` or `shared/data` beside the repository.
+pub fn data() -> PathBuf {
+    std::env::var_os("CAGER_CAPTURES")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from)
 }
 
 /// Every model of the data, by name.

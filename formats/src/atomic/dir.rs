@@ -13,8 +13,7 @@ use crate::error::Error;
 /// A folder that takes its name once all its files are complete; dropped before [`AtomicDir::commit`] it leaves
 /// nothing.
 ///
-/// A folder cannot be without a name, so a process that is killed leaves it under a temporary one, beginning with
-/// `.cager-`; on a signal that can be caught, [`remove_temporaries`](super::remove_temporaries) removes it.
+/// A killed process leaves it under a hidden name, as with [`AtomicFile`](super::AtomicFile).
 #[derive(Debug)]
 pub struct AtomicDir {
     path: PathBuf,
@@ -25,21 +24,13 @@ pub struct AtomicDir {
 }
 
 impl AtomicDir {
-    /// Begins a folder at `path`, where there must be nothing or an empty folder; the folder around it must exist.
+    /// Begins a folder at `path`, where there must be nothing, or a folder with nothing but files that may be replaced by
+    /// their names. They go when the new folder takes the name. The folder around it must exist.
     ///
     /// # Errors
-    /// [`Error::Target`] where `path` is a file or a folder with something in it, [`Error::Io`] where the folder around
+    /// [`Error::Target`] where `path` is a file or a folder with something else in it, [`Error::Io`] where the folder around
     /// it is missing or closed to writing.
-    pub fn create(path: impl AsRef<Path>) -> Result<Self, Error> {
-        Self::create_over(path, |_| false)
-    }
-
-    /// Begins a folder as [`AtomicDir::create`] does, also where there is one with files that may all be replaced by
-    /// their names. They go when the new folder takes the name.
-    ///
-    /// # Errors
-    /// Those of [`AtomicDir::create`].
-    pub fn create_over(path: impl AsRef<Path>, may_replace: impl Fn(&str) -> bool) -> Result<Self, Error> {
+    pub fn create(path: impl AsRef<Path>, may_replace: impl Fn(&str) -> bool) -> Result<Self, Error> {
         let path = path.as_ref();
         let place = Place::new(path)?;
         let replaced = check_free(path, &place.target, |name| name.to_str().is_some_and(&may_replace))?;
@@ -48,14 +39,9 @@ impl AtomicDir {
         Ok(Self { path: path.to_owned(), place, folder, replaced })
     }
 
-    /// The path as it was given to [`AtomicDir::create`].
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
     /// The folder to write the files into, under its temporary name.
     pub fn folder(&self) -> &Path {
-        self.folder.path()
+        &self.folder.0
     }
 
     /// Begins a file in the folder; interruption is no error here, unlike for a file begun by its path.
@@ -64,7 +50,7 @@ impl AtomicDir {
     /// Those of [`File::create`].
     pub fn create_file(&self, name: &str) -> io::Result<File> {
         // Not between the removal of the folder and the end of the process.
-        let _live = temporary::lock();
+        let _names = temporary::lock();
         File::create(self.folder().join(name))
     }
 
@@ -74,47 +60,40 @@ impl AtomicDir {
     /// [`Error::Target`] where someone else has put files there meanwhile, [`Error::Io`]; the folder is then not
     /// created, unless it is its name alone that could not be made durable.
     pub fn commit(self) -> Result<(), Error> {
-        check_free(&self.path, &self.place.target, |name| self.replaced.contains(name))?;
-        self.put_in_place().map_err(|cause| match cause.kind() {
-            io::ErrorKind::DirectoryNotEmpty | io::ErrorKind::AlreadyExists => not_empty(&self.path, "files".as_ref()),
-            _ => hide_temporary(&self.path, &cause),
-        })
+        let failed = |cause| hide_temporary(&self.path, &cause);
+        self.make_durable().map_err(failed)?;
+        // Outlives the lock, which removing it takes.
+        let mut old = None;
+        let (mut names, target) = (temporary::lock(), &self.place.target);
+        if target.exists() {
+            let aside = names.begin(&self.place.folder, |aside| fs::rename(target, aside)).map_err(failed)?.1;
+            let aside = old.insert(aside);
+            // Where nobody adds to it any more.
+            let free = check_free(&self.path, &aside.0, |name| self.replaced.contains(name));
+            if let Err(error) = free {
+                fs::rename(&aside.0, target).map_err(failed)?;
+                return Err(error);
+            }
+        }
+        if let Err(cause) = fs::rename(&self.folder.0, target) {
+            if let Some(aside) = &old {
+                fs::rename(&aside.0, target).map_err(failed)?;
+            }
+            return Err(failed(cause));
+        }
+        drop(names);
+        drop(old);
+        sync_folder(&self.place.folder).map_err(failed)
     }
 
-    fn put_in_place(&self) -> io::Result<()> {
+    fn make_durable(&self) -> io::Result<()> {
         for entry in fs::read_dir(self.folder())? {
             File::open(entry?.path())?.sync_all()?;
         }
-        sync_folder(self.folder())?;
-        if cfg!(unix) && self.place.target.is_dir() {
+        if cfg!(unix) {
             inherit(&File::open(self.folder())?, &self.place.target)?;
         }
-        // Outlives the lock, which removing it takes.
-        let mut old = None;
-        {
-            let (mut live, target) = (temporary::lock(), &self.place.target);
-            if !self.replaced.is_empty() {
-                let aside = live.begin(&self.place.folder, |aside| fs::rename(target, aside))?.1;
-                // What came while the files were made durable.
-                let is_new =
-                    |entry: io::Result<fs::DirEntry>| entry.is_ok_and(|e| !self.replaced.contains(&e.file_name()));
-                if fs::read_dir(aside.path())?.any(is_new) {
-                    live.rename(&aside, target)?;
-                    return Err(io::ErrorKind::DirectoryNotEmpty.into());
-                }
-                old = Some(aside);
-            } else if cfg!(not(unix)) && target.exists() {
-                fs::remove_dir(target)?;
-            }
-            if let Err(cause) = live.rename(&self.folder, target) {
-                if let Some(old) = &old {
-                    live.rename(old, target)?;
-                }
-                return Err(cause);
-            }
-        }
-        drop(old);
-        self.place.sync_folder()
+        sync_folder(self.folder())
     }
 }
 

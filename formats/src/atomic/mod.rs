@@ -1,10 +1,7 @@
-//! Files and folders that appear whole or not at all.
+//! Files and folders that appear whole or not at all: written under a temporary name, synced, then renamed.
 
-mod anonymous;
-mod complete;
 mod dir;
 mod file;
-mod scratch;
 mod target;
 mod temporary;
 
@@ -12,12 +9,10 @@ use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
-pub use complete::{CompleteFile, commit_together};
 pub use dir::AtomicDir;
-pub use file::AtomicFile;
-pub use scratch::ScratchDir;
+pub use file::{AtomicFile, commit_together};
 pub use target::Target;
-pub use temporary::remove_temporaries;
+pub use temporary::{ScratchDir, remove_temporaries};
 
 use crate::error::Error;
 
@@ -31,7 +26,7 @@ pub fn destination(path: &Path) -> Result<PathBuf, Error> {
     Ok(target.file_name().map_or_else(|| folder.clone(), |name| folder.join(name)))
 }
 
-/// Where an output really goes: through symbolic links, so that those stay, and with its folder.
+/// Where an output really goes, through symbolic links, so that those stay; and the folder around it.
 #[derive(Debug)]
 struct Place {
     folder: PathBuf,
@@ -41,9 +36,8 @@ struct Place {
 impl Place {
     fn new(path: &Path) -> Result<Self, Error> {
         let target = match fs::canonicalize(path) {
-            Ok(target) => target,
             Err(cause) if cause.kind() == io::ErrorKind::NotFound => behind_links(path),
-            Err(cause) => return Err(Error::write(path, cause)),
+            found => found.map_err(|cause| Error::write(path, cause))?,
         };
         if target.file_name().is_none() {
             return Err(Error::target(path, "does not end in a name; name the output"));
@@ -57,10 +51,6 @@ impl Place {
             Ok(_) => Err(Error::write(path, io::ErrorKind::NotADirectory.into())),
             Err(cause) => Err(Error::write(path, cause)),
         }
-    }
-
-    fn sync_folder(&self) -> io::Result<()> {
-        sync_folder(&self.folder)
     }
 }
 
@@ -76,7 +66,7 @@ fn behind_links(path: &Path) -> PathBuf {
     path
 }
 
-/// Gives a new file the mode and, where it is allowed to, the owner of the one that it replaces.
+/// Gives a new file or folder the mode and, where it is allowed to, the owner of the one that it replaces.
 fn inherit(file: &File, old: &Path) -> io::Result<()> {
     let Ok(found) = fs::metadata(old) else { return Ok(()) };
     #[cfg(unix)]
@@ -97,11 +87,6 @@ fn sync_folder(folder: &Path) -> io::Result<()> {
         Err(cause) if matches!(cause.kind(), io::ErrorKind::InvalidInput | io::ErrorKind::Unsupported) => Ok(()),
         result => result,
     }
-}
-
-/// The error of an output where there was to be nothing.
-fn occupied(path: &Path) -> Error {
-    Error::target(path, "is there already; name another file")
 }
 
 /// The error of a temporary file under the name of the final one.

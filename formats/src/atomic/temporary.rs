@@ -6,15 +6,17 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-static LIVE: Mutex<Live> = Mutex::new(Live(BTreeSet::new()));
+use crate::error::Error;
+
+static NAMES: Mutex<Names> = Mutex::new(Names(BTreeSet::new()));
 
 /// The temporary names of this process. Whoever makes, renames or removes one holds the lock, so that none is missing
 /// here and several outputs that belong together take their names in one step.
-pub(super) struct Live(BTreeSet<PathBuf>);
+pub(super) struct Names(BTreeSet<PathBuf>);
 
-pub(super) fn lock() -> MutexGuard<'static, Live> {
+pub(super) fn lock() -> MutexGuard<'static, Names> {
     // A panic elsewhere leaves the set as good as it was.
-    LIVE.lock().unwrap_or_else(PoisonError::into_inner)
+    NAMES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Removes the temporary files and folders of this process, for one that ends without dropping its outputs, as on a
@@ -23,15 +25,12 @@ pub(super) fn lock() -> MutexGuard<'static, Live> {
 /// From then on no output can be begun, given its name or dropped: a thread that tries waits until the process has
 /// ended, which is to follow at once. So no thread reports the missing files as an error of its own.
 pub fn remove_temporaries() {
-    let live = lock();
-    for path in &live.0 {
-        // Nobody is left to be told of what cannot be removed.
-        let _ = remove(path);
-    }
-    std::mem::forget(live);
+    let names = lock();
+    names.0.iter().for_each(|path| remove(path));
+    std::mem::forget(names);
 }
 
-impl Live {
+impl Names {
     /// Has `make` make something under a new name in `folder`, a name that says whose leftover it is, should the process
     /// be killed.
     pub(super) fn begin<T>(
@@ -44,62 +43,61 @@ impl Live {
         self.0.insert(path.clone());
         Ok((made, Temporary(path)))
     }
-
-    /// Gives a temporary its name for good, in place of a file or an empty folder that had it.
-    pub(super) fn rename(&mut self, temporary: &Temporary, target: &Path) -> io::Result<()> {
-        fs::rename(&temporary.0, target)?;
-        self.0.remove(&temporary.0);
-        Ok(())
-    }
-
-    /// Gives a temporary file its name for good, where nothing has it; the temporary name goes when it is dropped.
-    pub(super) fn name_new(&mut self, temporary: &Temporary, target: &Path) -> io::Result<()> {
-        match fs::hard_link(&temporary.0, target) {
-            Err(cause) if cause.kind() != io::ErrorKind::AlreadyExists => {
-                // A file system without second names: it is looked just before.
-                if target.exists() { Err(io::ErrorKind::AlreadyExists.into()) } else { self.rename(temporary, target) }
-            }
-            linked => linked,
-        }
-    }
 }
 
 /// A temporary file or folder, removed when dropped unless it has been renamed. Dropping takes the lock.
 #[derive(Debug)]
-pub(super) struct Temporary(PathBuf);
-
-impl Temporary {
-    pub(super) fn path(&self) -> &Path {
-        &self.0
-    }
-}
+pub(super) struct Temporary(pub(super) PathBuf);
 
 impl Drop for Temporary {
     fn drop(&mut self) {
         // Held while removing, so that a signal does not end the process halfway through a folder.
-        let mut live = lock();
-        if live.0.remove(&self.0) {
-            let _ = remove(&self.0);
-        }
+        let mut names = lock();
+        remove(&self.0);
+        names.0.remove(&self.0);
     }
 }
 
-fn remove(path: &Path) -> io::Result<()> {
-    if fs::symlink_metadata(path)?.is_dir() { remove_dir(path) } else { fs::remove_file(path) }
+/// Removes a file, or a folder that other threads may still write into: under another name they do not find it any
+/// more. Nobody is left to be told of what cannot be removed.
+fn remove(path: &Path) {
+    let gone = path.with_extension("gone.tmp");
+    while fs::symlink_metadata(path).is_ok_and(|found| found.is_dir()) {
+        // Not all systems rename folders with open files in them.
+        let renamed = fs::rename(path, &gone);
+        let removed = fs::remove_dir_all(if renamed.is_ok() { &gone } else { path });
+        if renamed.is_err() || removed.is_err() {
+            return;
+        }
+        // Again, where someone was just about to make what was missing.
+    }
+    let _ = fs::remove_file(path);
 }
 
-/// Removes a folder that other threads may still write into: under another name they do not find it any more.
-fn remove_dir(path: &Path) -> io::Result<()> {
-    let gone = path.with_extension("gone.tmp");
-    loop {
-        match fs::rename(path, &gone) {
-            Ok(()) => fs::remove_dir_all(&gone)?,
-            // Systems that do not rename folders with open files in them.
-            Err(_) => return fs::remove_dir_all(path),
-        }
-        // Someone was just about to make what was missing.
-        if !path.exists() {
-            return Ok(());
-        }
+/// A folder of a temporary name, removed with all that is in it when dropped, or by [`remove_temporaries`] on a signal.
+#[derive(Debug)]
+pub struct ScratchDir(Temporary);
+
+impl ScratchDir {
+    /// Makes one in `folder`, which must exist.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where the folder is missing or closed to writing.
+    pub fn create(folder: impl AsRef<Path>) -> Result<Self, Error> {
+        let folder = folder.as_ref();
+        let begun = lock().begin(folder, |path| fs::create_dir(path));
+        begun.map(|((), made)| Self(made)).map_err(|cause| Error::write(folder, cause))
+    }
+
+    /// Runs what may make the folder anew where it is missing: [`remove_temporaries`] waits for it, so it should be short.
+    /// It must not begin, name or drop an output.
+    pub fn undisturbed<T>(&self, work: impl FnOnce() -> T) -> T {
+        let _names = lock();
+        work()
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.0.0
     }
 }

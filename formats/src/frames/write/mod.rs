@@ -92,7 +92,7 @@ pub fn create_frames(
     let (path, pattern) = (frames_path(given), mesh_pattern(given));
     let announced = Announced { path: path.to_owned(), points, frames, written: 0 };
     announced.check(options).map_err(|fault| fault.at(path))?;
-    if target.is_standard_output() {
+    if target == Target::StandardOutput {
         return Ok(Box::new(CacheWriter::create(announced, &target, CacheFormat::Npy, options)?));
     }
     if let Some(names) = Numbered::of(given) {

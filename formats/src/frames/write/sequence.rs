@@ -41,7 +41,7 @@ impl SequenceWriter {
             ))
             .at(&announced.path));
         }
-        let folder = AtomicDir::create_over(&announced.path, |name| target.replaces() && names.number(name).is_some())?;
+        let folder = AtomicDir::create(&announced.path, |name| target.replaces() && names.number(name).is_some())?;
         let format = if names.extension_is("ply") {
             Format::Ply(Model { points: Vec::new(), faces: faces.clone() })
         } else {

@@ -1,5 +1,7 @@
 //! A disk that fails on demand, for tests: errors of single operations, short writes, syncs that lose what they should keep,
-//! processes that stop anywhere, and power cuts.
+//! processes that stop anywhere, and power cuts. The tests of the store and those of the whole service share it.
+
+#![allow(dead_code, unreachable_pub, reason = "each of them uses a part")]
 
 use super::disk::DiskFile;
 use files::FaultyFile;

@@ -1,8 +1,8 @@
 //! The operations of a faulty disk: admitted or not, done, noted in the shadow.
 
+use super::super::disk::{Disk, DiskFile, Entry, LocalDisk};
 use super::shadow::Shadow;
 use super::{FaultyDisk, Op, State, Verdict, stopped};
-use crate::store::disk::{Disk, DiskFile, Entry, LocalDisk};
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};

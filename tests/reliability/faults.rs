@@ -1,0 +1,8 @@
+//! The disk that fails, which the store's own tests use too.
+
+use cager::store::disk;
+
+#[path = "../faults/mod.rs"]
+mod shared;
+
+pub(crate) use shared::{Fault, FaultyDisk, Loss, Op};
