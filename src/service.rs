@@ -5,7 +5,7 @@ use crate::auth::{Access, Tenant};
 use crate::cage_job::registry::CageJobs;
 use crate::cage_job::{Designer, Designs, local_designer};
 use crate::config::ServeConfig;
-use crate::engine::Engine;
+use crate::engine::{Engine, threads};
 use crate::problem::{self, ApiError};
 use crate::session::cage_source::CageMaker;
 use crate::session::commit::Committer;
@@ -56,6 +56,8 @@ pub struct Service {
     streams: Arc<Budget>,
     /// Sessions being completed at a time.
     pub(crate) completing: Arc<Budget>,
+    /// Threads that write containers.
+    pub(crate) container_writers: Arc<rayon::ThreadPool>,
     /// Memory for frames on their way, in bytes.
     pub(crate) frame_memory: Arc<Budget>,
     /// Memory for rest poses and cages on their way, in bytes.
@@ -137,6 +139,7 @@ impl Service {
         }
         let engine = Engine::new(config.workers).map_err(StartError::Threads)?;
         let solvers = Solvers::new(opened.store.clone(), &config).map_err(StartError::Threads)?;
+        let container_writers = threads::pool("complete", COMPLETING as usize, threads::GIVES_WAY_TO_ALL);
         let service = Arc::new(Self {
             access,
             webhooks,
@@ -153,6 +156,7 @@ impl Service {
             requests: config.budget(config.max_requests as u64),
             streams: config.budget(config.max_streams as u64),
             completing: config.budget(COMPLETING),
+            container_writers: Arc::new(container_writers.map_err(StartError::Threads)?),
             frame_memory: config.budget(config.frame_bytes),
             upload_memory: config.budget(config.upload_bytes),
             download_memory: config.budget(config.download_bytes),

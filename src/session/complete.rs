@@ -81,7 +81,9 @@ impl Service {
         let mut sealed = Sealed { session, kept: before };
         let prepared = self.solver(session).await?;
         let (writing, webhooks) = (Arc::clone(session), Arc::clone(&self.webhooks));
-        let written = blocking(move || write(&writing, &prepared, &entries, frames, &webhooks)).await?;
+        let writers = Arc::clone(&self.container_writers);
+        let work = move || writers.install(|| write(&writing, &prepared, &entries, frames, &webhooks));
+        let written = blocking(work).await?;
         let Written { completion, replaced, due } = written.map_err(|error| match session.status().phase {
             // What was to be written proved damaged.
             Phase::Failed(problem) => ApiError::new(problem::SESSION_FAILED, problem.detail),
