@@ -17,4 +17,4 @@ mod wide;
 
 /// Version of the computation of solvers: one that was stored by another version is computed anew. What a container needs to be decoded
 /// is [`coordinates::DEFINITION`] alone.
-pub const SOLVER_VERSION: u32 = 3;
+pub const SOLVER_VERSION: u32 = 4;
