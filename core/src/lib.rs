@@ -13,7 +13,6 @@ mod simd;
 mod spectrum;
 pub mod svd;
 pub mod synthetic;
-mod wide;
 
 /// Version of the computation of solvers: one that was stored by another version is computed anew. What a container needs to be decoded
 /// is [`coordinates::DEFINITION`] alone.

@@ -168,7 +168,7 @@ fn distance2_to_segment(p: Point, q: Point, x: Point) -> f64 {
     dot(r, r)
 }
 
-fn sub(a: Point, b: Point) -> Point {
+pub(crate) fn sub(a: Point, b: Point) -> Point {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 

@@ -56,26 +56,6 @@ impl Lanes {
     }
 }
 
-/// Lane groups as the numbers they hold.
-#[inline(always)]
-pub(crate) fn flat(lanes: &[Lanes]) -> &[f64] {
-    // SAFETY: a lane group is an array of eight numbers, without padding, and aligned for more than one of them.
-    #[allow(unsafe_code)]
-    unsafe {
-        std::slice::from_raw_parts(lanes.as_ptr().cast(), lanes.len() * LANES)
-    }
-}
-
-/// As [`flat`], to be written to.
-#[inline(always)]
-pub(crate) fn flat_mut(lanes: &mut [Lanes]) -> &mut [f64] {
-    // SAFETY: as above; every bit pattern is a number.
-    #[allow(unsafe_code)]
-    unsafe {
-        std::slice::from_raw_parts_mut(lanes.as_mut_ptr().cast(), lanes.len() * LANES)
-    }
-}
-
 /// Zeros, n × m, whose memory the threads of the current rayon pool touch first, each a share: the system hands out new memory
 /// page by page, which takes one thread longer than most steps of a preparation.
 pub(crate) fn zeros<T: Copy + Default + Send>(n: usize, m: usize) -> Mat<T> {

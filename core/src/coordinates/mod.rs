@@ -1,8 +1,6 @@
 //! Cage coordinates: every point as a fixed combination of values that a cage has, `P = Φ·Y`: its vertices, and for some systems
 //! its face normals.
 
-mod careful;
-mod doubt;
 mod error;
 mod green;
 mod harmonic;

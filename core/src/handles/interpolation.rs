@@ -19,7 +19,7 @@
 use super::farthest::along_curve;
 use crate::dense;
 use crate::mesh::{Point, bounds, diagonal};
-use crate::simd::{LANES, Lanes, flat_mut, multiversion};
+use crate::simd::{LANES, Lanes, multiversion};
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
@@ -164,7 +164,9 @@ fn covariances(covariance: Covariance, points: &[Point], samples: &[Point]) -> M
     let mut column = vec![Lanes::ZERO; places.len()];
     for (j, sample) in samples.iter().enumerate() {
         fill(&places, sample, covariance.inverse_support, &mut column);
-        out.col_as_slice_mut(j).copy_from_slice(&flat_mut(&mut column)[..points.len()]);
+        for (out, value) in out.col_as_slice_mut(j).iter_mut().zip(column.iter().flat_map(|group| &group.0)) {
+            *out = *value;
+        }
     }
     out
 }

@@ -1,8 +1,6 @@
 //! Cages and random numbers for the tests of this crate.
 #![allow(dead_code)]
 
-pub(crate) mod golden;
-
 use cager_core::cage::Cage;
 use cager_core::mesh::{Point, TriMesh};
 use cager_core::synthetic::{Capture, Options};

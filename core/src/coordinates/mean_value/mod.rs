@@ -4,14 +4,14 @@
 //! Its mean vector is `m = ½ Σ θ_i n_i` over its three edges: `θ_i` the angle an edge is seen under and `n_i` the unit
 //! normal of the plane through `x` and the edge. The weights are the solution of `Σ w_i d_i u_i = m`. Each edge term enters
 //! two faces with opposite signs, so the mean vectors of a closed cage add up to zero whatever the rounding of the terms, and
-//! affine reproduction depends only on the three-by-three solves. What rounding leaves too little of is computed again in
-//! 192 bits.
+//! affine reproduction depends only on the three-by-three solves. These cancel where a face is seen edge-on and where a point lies outside
+//! a thin cage or far outside: there the weights are integrated, see `integral.rs`.
 
 mod gradient;
+mod integral;
 
-use super::doubt::{Mended, TOLERANCE, is_kept, is_unreliable, mend_thin};
-use super::{ByPoint, CoordinateSystem, Coordinates, CoordinatesError, careful};
-use crate::cage::{Cage, Edge};
+use super::{ByPoint, CoordinateSystem, Coordinates, CoordinatesError};
+use crate::cage::{Cage, Edge, Face};
 use crate::mesh::{self, Point};
 use crate::simd::{LANES, Lanes, angle, cross, dot, multiversion, zeros};
 use faer::MatMut;
@@ -21,10 +21,16 @@ use rayon::prelude::*;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MeanValue;
 
-/// Closer to a vertex than this fraction of the cage's diagonal, a point is looked at closely.
+/// Closer to a vertex than this fraction of the cage's diagonal, a point has the coordinates of the vertex.
 const VERTEX_TOLERANCE: f64 = 1e-13;
-/// So is one that sees an edge under an angle whose sine is below this, from between its ends.
+/// A point that sees an edge under an angle whose sine is below this, from between its ends, lies on the edge.
 const EDGE_TOLERANCE: f64 = 1e-11;
+/// Estimated error of an entry from which the weights of a face are integrated.
+const ENTRY_TOLERANCE: f64 = 1e-11;
+/// Length of a face's mean vector from which a point is so near to the face that the plain formula does not cancel.
+const LARGE: f64 = 0.1;
+/// What takes the place of 1/0 where a point lies on a face.
+const HUGE: f64 = 1e100;
 /// Points one parallel task computes: a few lane groups.
 const TASK_POINTS: usize = 8 * LANES;
 
@@ -68,15 +74,14 @@ fn coordinates(cage: &Cage, points: &[Point]) -> Coordinates {
 }
 
 /// Working memory of one task; every entry holds one lane group.
-pub(super) struct Scratch {
+struct Scratch {
     /// Unit vectors from the points to each cage vertex.
-    pub(super) directions: Vec<[Lanes; 3]>,
+    directions: Vec<[Lanes; 3]>,
     /// Reciprocal distances to each cage vertex.
-    pub(super) nearness: Vec<Lanes>,
+    nearness: Vec<Lanes>,
     /// Per edge: half mean-vector term `½ θ n`, and the factor that turns it into `u_a × u_b`.
-    pub(super) edges: Vec<[Lanes; 4]>,
-    pub(super) weights: Vec<Lanes>,
-    pub(super) mended: Mended,
+    edges: Vec<[Lanes; 4]>,
+    weights: Vec<Lanes>,
 }
 
 impl Scratch {
@@ -87,7 +92,6 @@ impl Scratch {
             nearness: vec![Lanes::ZERO; m],
             edges: vec![[Lanes::ZERO; 4]; cage.edges().len()],
             weights: vec![Lanes::ZERO; m],
-            mended: Mended::default(),
         }
     }
 }
@@ -113,7 +117,12 @@ fn task_coordinates(
                 x[k].0[l] = at(l)[k];
             }
         }
-        let Sums { total, on, suspect } = group_weights(cage, x, scratch);
+        let Sums { mut total, on, inaccurate } = group_weights(cage, x, scratch);
+        for l in 0..filled {
+            if inaccurate[l] && matches!(on[l], On::Nothing) {
+                total.0[l] = accurate_weights(cage, scratch, at(l), l, total.0[l]);
+            }
+        }
         let scale = total.map(|t| 1.0 / t);
         for (j, &weight) in scratch.weights.iter().enumerate() {
             let values = (weight * scale).0;
@@ -122,30 +131,14 @@ fn task_coordinates(
             }
         }
         for l in 0..filled {
-            let careful = match on[l] {
-                On::Nothing => suspect[l] && is_unreliable(cage, scratch, l, total.0[l]),
-                On::Vertex(vertex) if at(l) == cage.vertices()[vertex] => {
-                    set_row(&mut rows, start + l, &[(vertex, 1.0)]);
-                    continue;
-                }
-                On::Edge([a, b]) if careful::is_on_edge(cage.vertices()[a], cage.vertices()[b], at(l)) => {
-                    let [to_a, to_b] = [a, b].map(|v| distance(at(l), cage.vertices()[v]));
+            match on[l] {
+                On::Nothing if total.0[l] <= 0.0 => outsiders.push((first + start + l) as u32),
+                On::Nothing => {}
+                On::Vertex(vertex) => set_row(&mut rows, start + l, &[(vertex, 1.0)]),
+                On::Edge([a, b]) => {
+                    let [to_a, to_b] = [a, b].map(|v| mesh::norm(mesh::sub(at(l), cage.vertices()[v])));
                     set_row(&mut rows, start + l, &[(a, to_b / (to_a + to_b)), (b, to_a / (to_a + to_b))]);
-                    continue;
                 }
-                On::Vertex(_) | On::Edge(_) => true,
-            };
-            let outside = if careful && at(l).iter().all(|c| c.is_finite()) {
-                let row = careful::row(cage, at(l));
-                for (j, &value) in row.values.iter().enumerate() {
-                    rows[(start + l, j)] = value;
-                }
-                row.outside
-            } else {
-                total.0[l] <= 0.0
-            };
-            if outside {
-                outsiders.push((first + start + l) as u32);
             }
         }
         start += filled;
@@ -153,7 +146,7 @@ fn task_coordinates(
     outsiders
 }
 
-/// What of the cage a point may lie on, where the weights have no finite limit.
+/// What of the cage a point lies on, where the weights have no finite limit.
 #[derive(Clone, Copy)]
 enum On {
     Nothing,
@@ -165,8 +158,8 @@ enum On {
 struct Sums {
     total: Lanes,
     on: [On; LANES],
-    /// Rows whose entries may be off by more than [`TOLERANCE`].
-    suspect: [bool; LANES],
+    /// Rows whose entries may be off by more than [`ENTRY_TOLERANCE`].
+    inaccurate: [bool; LANES],
 }
 
 fn set_row(rows: &mut MatMut<'_, f64>, row: usize, entries: &[(usize, f64)]) {
@@ -178,8 +171,48 @@ fn set_row(rows: &mut MatMut<'_, f64>, row: usize, entries: &[(usize, f64)]) {
     }
 }
 
-fn distance(a: Point, b: Point) -> f64 {
-    mesh::norm([a[0] - b[0], a[1] - b[1], a[2] - b[2]])
+/// Computes the weights of one lane's point anew, integrated for faces whose rounding matters, where all weights add up to about
+/// `total`; returns their sum.
+#[cold]
+fn accurate_weights(cage: &Cage, scratch: &mut Scratch, x: Point, l: usize, total: f64) -> f64 {
+    for weight in &mut scratch.weights {
+        weight.0[l] = 0.0;
+    }
+    for face in cage.faces() {
+        let nearness = face.vertices.map(|v| scratch.nearness[v as usize].0[l]);
+        let weights = face_weights(cage, scratch, face, x, l, total);
+        for i in 0..3 {
+            scratch.weights[face.vertices[i] as usize].0[l] += weights[i] * nearness[i];
+        }
+    }
+    scratch.weights.iter().map(|w| w.0[l]).sum()
+}
+
+/// Weights of one face times the distances of its corners.
+fn face_weights(cage: &Cage, scratch: &Scratch, face: &Face, x: Point, l: usize, total: f64) -> [f64; 3] {
+    let vertices = face.vertices.map(|v| v as usize);
+    let edges = face.edges.map(|e| scratch.edges[e as usize].map(|c| c.0[l]));
+    let g = [0, 1, 2].map(|i| [0, 1, 2].map(|k| face.signs[i] * edges[i][k]));
+    let mean = [0, 1, 2].map(|k| g[0][k] + g[1][k] + g[2][k]);
+    let det = mesh::dot(scratch.directions[vertices[0]].map(|c| c.0[l]), g[0]) * edges[0][3];
+    let nearness = vertices.map(|v| scratch.nearness[v].0[l]);
+    let loss2 = (mesh::dot(g[0], g[0]) + mesh::dot(g[1], g[1])) / (det * det);
+    let nearest = nearness.iter().copied().fold(0.0, f64::max);
+    if mesh::norm(mean) < LARGE && is_inaccurate(loss2, nearest, total) {
+        let weights = integral::face_weights(vertices.map(|v| cage.vertices()[v]), x);
+        return [0, 1, 2].map(|i| weights[i] / nearness[i]);
+    }
+    let numerators = [0, 1, 2].map(|i| mesh::dot(mean, g[i]) * edges[i][3]);
+    let weights = numerators.map(|n| n / det);
+    // On the face itself, only the ratios of the weights count.
+    if weights.iter().all(|w| w.is_finite()) { weights } else { numerators.map(|n| n * HUGE) }
+}
+
+/// Whether rounding may change entries by more than [`ENTRY_TOLERANCE`], from the square of what a face's determinant amplifies it by, the
+/// reciprocal distance of the nearest vertex and the sum of all weights.
+fn is_inaccurate(loss2: f64, nearest: f64, total: f64) -> bool {
+    let error = f64::EPSILON * loss2.sqrt() * nearest / total.abs();
+    error.is_nan() || error > ENTRY_TOLERANCE
 }
 
 multiversion! {
@@ -190,7 +223,6 @@ multiversion! {
 #[inline(always)]
 fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> Sums {
     let mut on = [On::Nothing; LANES];
-    scratch.mended = Mended::default();
     let near_vertex = VERTEX_TOLERANCE * cage.diagonal();
     for (j, v) in cage.vertices().iter().enumerate() {
         let r = [Lanes::splat(v[0]) - x[0], Lanes::splat(v[1]) - x[1], Lanes::splat(v[2]) - x[2]];
@@ -228,8 +260,8 @@ fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> S
             note_edge(&mut on, edge, &s, &t);
         }
     }
-    // The largest square of what a face loses, over the distances.
-    let mut worst = Lanes::ZERO;
+    // The largest square of what the determinant of a face amplifies rounding by.
+    let mut loss2 = Lanes::splat(1.0);
     for face in cage.faces() {
         let [e0, e1, e2] = face.edges.map(|e| &scratch.edges[e as usize]);
         let [s0, s1, s2] = face.signs;
@@ -241,36 +273,22 @@ fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> S
         let [v0, v1, v2] = face.vertices.map(|v| v as usize);
         let det = dot(&scratch.directions[v0], &g0) * back0;
         let inverse = det.map(|d| 1.0 / d);
-        let mut w = [dot(&m, &g0) * back0 * inverse, dot(&m, &g1) * back1 * inverse, dot(&m, &g2) * back2 * inverse];
-        let inverse2 = inverse * inverse;
-        let width2 = dot(&g0, &g0) + dot(&g1, &g1);
-        let thinness = width2 * inverse2;
-        // What rounding does to the sine of the face's height, it does to all three weights.
-        let mut loss = thinness + dot(&w, &w) * inverse2;
-        if thinness.any(thinness, |q, _| !is_kept(q)) {
-            mend_thin(cage, scratch, face, x, thinness, &m, &mut loss, &mut w);
-        }
-        worst = worst.zip(loss, |a, b| if a < b { b } else { a });
+        let w = [dot(&m, &g0) * back0 * inverse, dot(&m, &g1) * back1 * inverse, dot(&m, &g2) * back2 * inverse];
+        let own = (dot(&g0, &g0) + dot(&g1, &g1)) * inverse * inverse;
+        loss2 = loss2.zip(own, |a, b| if a < b { b } else { a });
         scratch.weights[v0] = scratch.weights[v0] + w[0];
         scratch.weights[v1] = scratch.weights[v1] + w[1];
         scratch.weights[v2] = scratch.weights[v2] + w[2];
     }
     let mut total = Lanes::ZERO;
     let mut nearest = Lanes::ZERO;
-    let mut largest = Lanes::ZERO;
     for (weight, &nearness) in scratch.weights.iter_mut().zip(&scratch.nearness) {
         *weight = *weight * nearness;
         total = total + *weight;
         nearest = nearest.zip(nearness, |a, b| if a < b { b } else { a });
-        largest = largest.zip(*weight, |a, b| if a < b.abs() { b.abs() } else { a });
     }
-    let mut suspect = [false; LANES];
-    for l in 0..LANES {
-        let error = f64::EPSILON * (worst.0[l].sqrt() * nearest.0[l] + largest.0[l]);
-        let relative = error / total.0[l].abs();
-        suspect[l] = relative.is_nan() || relative > TOLERANCE;
-    }
-    Sums { total, on, suspect }
+    let inaccurate = std::array::from_fn(|l| is_inaccurate(loss2.0[l], nearest.0[l], total.0[l]));
+    Sums { total, on, inaccurate }
 }
 
 // Kept out of the loops: the compiler would otherwise split the lanes as these few entries ask for, and the roots with them.
