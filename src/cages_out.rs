@@ -36,8 +36,7 @@ pub fn write_cages(
     let range = range.unwrap_or(FrameRange::all(container.frames()));
     let there = container.frames();
     range.check(there, input)?;
-    container.errors().map_err(fail)?;
-    container.summary().map_err(fail)?;
+    container.report().map_err(fail)?;
     let mesh = container.cage().map_err(fail)?;
     let mut faces = Polygons::new();
     mesh.triangles.iter().for_each(|triangle| faces.push(triangle));

@@ -1,14 +1,17 @@
 //! From solved frames to a container and its report: what `encode` and the service share, so that both write the same bytes.
 
-use crate::report::{Bytes, Condition, Errors, FrameError, MaxVol, Report, Seconds, WorstError};
-use crate::timing::counted_from_zero;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, DEFINITION};
 use cager_core::inversion::{Solver, SolverOptions};
 use cager_core::mesh::Model;
 use cager_core::regularize::{Regularizer, WEAK};
-use cager_proto::container::{self, ContainerWriter, Header, Summary};
+use cager_proto::container::{self, ContainerWriter, Header, counted_from_zero};
+
+use cager_proto::report::{ConditionNumber, FrameError, MaxVol, Report};
 use std::io::Write;
+
+/// What containers and reports say they were written by.
+pub(crate) const GENERATOR: &str = concat!("cager ", env!("CARGO_PKG_VERSION"));
 
 /// What an encoding is made with, besides its frames.
 #[derive(Clone, Copy)]
@@ -58,8 +61,6 @@ pub struct CaptureWriter<W: Write> {
     squared: f64,
     spread: f64,
     diagonal: f64,
-    /// Numbers of the frames; none where they are 0, 1, 2, …
-    numbers: Vec<f64>,
     /// Frame whose cage lies farthest from the origin, and how far.
     farthest: (usize, f64),
 }
@@ -71,15 +72,15 @@ impl<W: Write> CaptureWriter<W> {
     /// An output that refuses; sizes beyond the format.
     pub fn new(out: W, encoding: &Encoding<'_>) -> Result<Self, container::Error> {
         let writer = ContainerWriter::new(out, &header(encoding), encoding.rest, encoding.cage.mesh())?;
-        let report = begin_report(encoding);
+        let report = begin_report(writer.header(), encoding);
         let diagonal = encoding.solver.diagonal();
-        Ok(Self { writer, report, squared: 0.0, spread: 0.0, diagonal, numbers: Vec::new(), farthest: (0, 0.0) })
+        Ok(Self { writer, report, squared: 0.0, spread: 0.0, diagonal, farthest: (0, 0.0) })
     }
 
     /// Says which numbers the frames have, one for each that is going to be written.
     pub fn number_frames(&mut self, numbers: Vec<f64>) {
         if !counted_from_zero(&numbers) {
-            self.numbers = numbers;
+            self.report.frame_numbers = numbers;
         }
     }
 
@@ -99,7 +100,7 @@ impl<W: Write> CaptureWriter<W> {
         self.writer.write_frame(cage, error.l2, error.linf)
     }
 
-    /// Writes what comes after the frames. The sizes and times of the report are left to the caller.
+    /// Writes what comes after the frames. Sizes, times and the worst point of the report are left to the caller.
     ///
     /// # Errors
     /// An output that refuses.
@@ -114,62 +115,30 @@ impl<W: Write> CaptureWriter<W> {
         let error = &mut self.report.error;
         (error.l2_mean, error.l2_max, error.linf_mean, error.linf_max) = (l2_mean, l2_max, linf_mean, linf_max);
         error.kg_percent = kg_percent;
-        error.worst = WorstError::of_frames(&error.per_frame, self.diagonal);
-        self.report.bytes.capture =
-            self.report.bytes.capture * 4 + 12 * (self.report.points as u64) * (self.report.frames as u64);
-        if !self.numbers.is_empty() {
-            self.writer.add_frame_numbers(&self.numbers)?;
+        self.report.bytes.capture = self.writer.header().capture_bytes(self.report.frames);
+        if !self.report.frame_numbers.is_empty() {
+            self.writer.add_frame_numbers(&self.report.frame_numbers)?;
         }
-        self.report.frame_numbers = self.numbers;
-        let summary = summary(&self.report);
-        Ok((self.writer.finish(Some(&summary))?, self.report))
+        Ok((self.writer.finish(Some(&self.report))?, self.report))
     }
 }
 
-fn begin_report(encoding: &Encoding<'_>) -> Report {
+fn begin_report(header: &Header, encoding: &Encoding<'_>) -> Report {
     let solver = encoding.solver;
     let found = solver.preparation();
     Report {
-        points: encoding.rest.points.len(),
+        generator: GENERATOR.to_owned(),
         triangles: encoding.rest.faces.arities().iter().map(|&a| (a as usize).saturating_sub(2)).sum(),
-        frames: 0,
         diagonal: solver.diagonal(),
-        frame_numbers: Vec::new(),
-        unknowns: solver.decoder().unknowns(),
-        cage_vertices: encoding.cage.vertices().len(),
-        cage_faces: encoding.cage.faces().len(),
-        coordinates: encoding.system.name().to_owned(),
-        handles: encoding.options.handles.name().to_owned(),
-        regularizer: encoding.options.regularizer.name().to_owned(),
-        spectrum: encoding.options.spectrum,
-        spectrum_choice: None,
-        lambda: encoding.options.lambda,
-        design: None,
-        consistency: None,
         refinement: found.refinement.map(Into::into),
         affine_reproduction_error: found.affine_reproduction_error,
-        condition_number: Condition { full: found.condition_full, handles: found.condition_handles },
+        condition_number: ConditionNumber { full: found.condition_full, handles: found.condition_handles },
         rank: found.rank,
         singular_values: found.singular_values.clone(),
         maxvol: MaxVol { swaps: found.swaps, log_volume: found.log_volume, max_entry: found.max_entry },
         handle_indices: solver.handles().to_vec(),
-        error: Errors {
-            l2_mean: 0.0,
-            l2_max: 0.0,
-            linf_mean: 0.0,
-            linf_max: 0.0,
-            kg_percent: 0.0,
-            worst: None,
-            per_frame: Vec::new(),
-        },
-        bytes: Bytes {
-            capture: encoding.rest.faces.indices().len() as u64,
-            output: 0,
-            ratio: 0.0,
-            bits_per_vertex_per_frame: 0.0,
-        },
-        seconds: Seconds::default(),
         warnings: preparation_warnings(encoding.options, solver),
+        ..Report::new(header)
     }
 }
 
@@ -250,34 +219,5 @@ fn header(encoding: &Encoding<'_>) -> Header {
         rows_per_frame: encoding.solver.decoder().unknowns() as u32,
         frame_rate: encoding.frame_rate,
         ..Header::default()
-    }
-}
-
-fn summary(report: &Report) -> Summary {
-    Summary {
-        generator: concat!("cager ", env!("CARGO_PKG_VERSION")).to_owned(),
-        triangles: report.triangles as u64,
-        affine_reproduction_error: report.affine_reproduction_error,
-        condition_number: container::ConditionNumber {
-            full: report.condition_number.full,
-            handles: report.condition_number.handles,
-        },
-        rank: report.rank as u64,
-        singular_values: report.singular_values.clone(),
-        maxvol: container::MaxVolSummary {
-            swaps: report.maxvol.swaps as u64,
-            log_volume: report.maxvol.log_volume,
-            max_entry: report.maxvol.max_entry,
-        },
-        handle_indices: report.handle_indices.clone(),
-        error: container::ErrorSummary {
-            l2_mean: report.error.l2_mean,
-            l2_max: report.error.l2_max,
-            linf_mean: report.error.linf_mean,
-            linf_max: report.error.linf_max,
-            kg_percent: report.error.kg_percent,
-        },
-        capture_bytes: report.bytes.capture,
-        warnings: report.warnings.clone(),
     }
 }

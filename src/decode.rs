@@ -246,9 +246,8 @@ pub fn decode(
     let taken = range.unwrap_or(FrameRange::all(there));
     let frames = if there == 0 { 0 } else { taken.count() };
     let options = frame_options(&mut container, there, taken, timing).map_err(fail)?;
-    // Decoding needs neither, but a damaged file is refused wherever the damage is.
-    container.errors().map_err(fail)?;
-    container.summary().map_err(fail)?;
+    // Decoding does not need it, but a damaged file is refused wherever the damage is.
+    container.report().map_err(fail)?;
     let batch = |points: usize| memory.frames(12 * points, BATCH);
     let keeps = |points: usize, columns: usize| memory.keeps(points, columns, frames.div_ceil(batch(points)));
     let Bound { rest, decoder, outside } = bind(&mut container, input, model, keeps)?;

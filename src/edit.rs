@@ -1,14 +1,15 @@
 //! Containers with edited cages in the place of their own.
 
+use crate::capture::GENERATOR;
 use crate::decode::{Container, DecodeError};
 use crate::edited::EditedCages;
-use crate::timing::counted_from_zero;
 use cager_formats::{Action, AtomicFile, Target};
-use cager_proto::container::{self, ContainerWriter, ErrorSummary, FrameError, Summary};
+use cager_proto::container::{self, ContainerWriter};
+use cager_proto::report::{Errors, Report};
 use std::io::BufWriter;
 use std::path::Path;
 
-/// What a summary says of errors that are not known.
+/// What a report says of errors that are not known.
 const NOT_MEASURED: &str = "the cages were edited: their errors are not measured";
 
 /// What [`edit`] gives.
@@ -36,51 +37,50 @@ pub fn edit(
     let fail = |cause| DecodeError::container(input, cause);
     let refused = |cause: container::Error| written(output.path(), cause);
     let (rest, cage) = (container.rest().map_err(fail)?, container.cage().map_err(fail)?);
-    let errors = container.errors().map_err(fail)?;
-    let summary = container.summary().map_err(fail)?;
-    let corners = rest.faces.indices().len() as u64;
+    let report = container.report().map_err(fail)?;
     let file = BufWriter::with_capacity(1 << 20, AtomicFile::create(output)?);
     let mut writer = ContainerWriter::new(file, container.header(), &rest, &cage).map_err(refused)?;
     let (frames, mut changed) = (edited.frames(), 0);
     let (mut old, mut new) = (Vec::new(), Vec::new());
     for frame in 0..frames {
         edited.read_frame(frame, &mut new)?;
-        let mut error = FrameError { l2: f32::NAN, linf: f32::NAN };
+        let mut error = (f32::NAN, f32::NAN);
         if frame < container.frames() {
             container.read_frame(frame, &mut old).map_err(fail)?;
             if old == new {
-                error = errors[frame];
+                let known = report.error.per_frame[frame];
+                error = (known.l2 as f32, known.linf as f32);
             }
         }
         changed += usize::from(old != new || frame >= container.frames());
-        writer.write_frame(&new, error.l2, error.linf).map_err(refused)?;
+        writer.write_frame(&new, error.0, error.1).map_err(refused)?;
         progress(frame + 1);
     }
     let same = changed == 0 && frames == container.frames();
-    let summary = summary.map(|summary| if same { summary } else { after_editing(summary) }).map(|summary| Summary {
-        capture_bytes: 4 * corners + 12 * rest.points.len() as u64 * frames as u64,
-        ..summary
-    });
-    let numbers = container.frame_numbers().map_err(fail)?;
-    if frames == container.frames() && !counted_from_zero(&numbers) {
-        writer.add_frame_numbers(&numbers).map_err(refused)?;
+    if frames == container.frames() {
+        writer.add_frame_numbers(&container.frame_numbers().map_err(fail)?).map_err(refused)?;
     }
-    let buffered = writer.finish(summary.as_ref()).map_err(refused)?;
+    let report = if same { report } else { after_editing(report) };
+    let buffered = writer.finish(Some(&report)).map_err(refused)?;
     let mut container = buffered.into_inner().map_err(|error| refused(error.into_error().into()))?;
     container.complete()?;
     Ok(Edited { frames, changed, container })
 }
 
 /// What is still true of the encoding.
-fn after_editing(summary: Summary) -> Summary {
-    let unknown = f64::NAN;
-    let error =
-        ErrorSummary { l2_mean: unknown, l2_max: unknown, linf_mean: unknown, linf_max: unknown, kg_percent: unknown };
-    let mut warnings = summary.warnings;
+fn after_editing(report: Report) -> Report {
+    let (unknown, mut warnings) = (f64::NAN, report.warnings);
     warnings.retain(|warning| warning != NOT_MEASURED);
     warnings.push(NOT_MEASURED.to_owned());
-    let generator = concat!("cager ", env!("CARGO_PKG_VERSION")).to_owned();
-    Summary { generator, error, warnings, ..summary }
+    let error = Errors {
+        l2_mean: unknown,
+        l2_max: unknown,
+        linf_mean: unknown,
+        linf_max: unknown,
+        kg_percent: unknown,
+        ..Errors::default()
+    };
+    Report { generator: GENERATOR.to_owned(), error, warnings, ..report }
 }
 
 fn written(output: &Path, cause: container::Error) -> DecodeError {

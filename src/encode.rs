@@ -2,7 +2,6 @@
 
 use crate::capture::{CaptureWriter, Encoding, StoredError};
 use crate::memory::Memory;
-use crate::report::{Consistency, Report, Seconds, SpectrumChoice, WorstError};
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::decode::FrameError;
@@ -11,6 +10,7 @@ use cager_core::mesh::Model;
 use cager_core::regularize::Term;
 use cager_formats::{Action, AtomicFile, FrameReader, Target};
 use cager_proto::container;
+use cager_proto::report::{Consistency, Report, Seconds, SpectrumChoice, WorstError};
 use rayon::prelude::*;
 use std::io::BufWriter;
 use std::ops::ControlFlow;
@@ -233,9 +233,7 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
     report.consistency = Consistency::new(&convergence);
     report.error.worst = worst;
     let mut container = buffered.into_inner().map_err(|e| fail(container::Error::from(e.into_error())))?;
-    report.bytes.output = container.complete()?;
-    report.bytes.ratio = report.bytes.capture as f64 / report.bytes.output as f64;
-    report.bytes.bits_per_vertex_per_frame = 8.0 * report.bytes.output as f64 / (report.points * report.frames) as f64;
+    report.set_output(container.complete()?);
     seconds.write += clock_write.elapsed().as_secs_f64();
     report.seconds = Seconds { total: clock.elapsed().as_secs_f64(), ..seconds };
     Ok(Encoded { report, container })

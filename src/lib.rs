@@ -26,7 +26,6 @@ mod picture;
 mod plot;
 pub mod problem;
 pub mod remote;
-pub mod report;
 pub mod service;
 mod session;
 mod speed;

@@ -2,19 +2,18 @@
 
 mod cage;
 mod frames;
-mod report;
 
 pub use cage::RemoteCage;
 pub use frames::FileFrames;
 
-use crate::design::DesignReport;
+use crate::design;
 use crate::encode::Encoded;
 use cager_client::cage_messages::CageProgress;
-use cager_client::messages::{CageSource, FrameResult, SessionOptions};
+use cager_client::messages::{CageSource, FrameResult, PreparationSeconds, SessionOptions};
 use cager_client::{Client, ClientError, ClientOptions, FrameSource, MeshFile, NewSession, UploadOptions};
 use cager_formats::{Action, AtomicFile, Target};
-use cager_proto::container;
-use report::{Times, report};
+use cager_proto::container::{self, ContainerReader};
+use cager_proto::report::Seconds;
 use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -141,7 +140,7 @@ async fn encode<F: FrameSource + 'static>(
             let created = client.create(&new).await;
             // The session has a cage of its own now.
             clean_up(&client, async |client| client.delete_cage(&design.id).await).await;
-            designed = Some((DesignReport::of_job(&design, options), design.warnings));
+            designed = Some((design::report_of_job(&design, options), design.warnings));
             created?.id
         }
     };
@@ -191,12 +190,27 @@ async fn run(
     steps.complete = clock_complete.elapsed();
     let clock_download = Instant::now();
     client.download(session, &mut file).await.map_err(name_output)?;
-    let length = file.complete()?;
+    file.complete()?;
     // Nothing that is no container takes the name of one.
-    let report = report(BufReader::new(file.reader()?)).map_err(RemoteError::Container)?;
+    let mut reader = ContainerReader::open(BufReader::new(file.reader()?)).map_err(RemoteError::Container)?;
+    reader.verify().map_err(RemoteError::Container)?;
+    let mut report = reader.report().map_err(RemoteError::Container)?;
     steps.download = clock_download.elapsed();
-    let times = Times { preparation: ready.seconds, steps, total: clock.elapsed() };
-    Ok((Encoded { report: report.finish(length, &times), container: file }, steps))
+    report.seconds = seconds(&ready.seconds, &steps, clock.elapsed());
+    Ok((Encoded { report, container: file }, steps))
+}
+
+fn seconds(preparation: &PreparationSeconds, steps: &Steps, total: Duration) -> Seconds {
+    Seconds {
+        read: preparation.read,
+        coordinates: preparation.coordinates,
+        maxvol: preparation.maxvol,
+        svd: preparation.svd,
+        invert: steps.upload.as_secs_f64(),
+        measure: 0.0,
+        write: (steps.complete + steps.download).as_secs_f64(),
+        total: total.as_secs_f64(),
+    }
 }
 
 /// What `AtomicFile` passes through `io::Write` has the path in it already.

@@ -18,8 +18,3 @@ impl Timing {
         found
     }
 }
-
-/// Whether numbers are 0, 1, 2, …, as they are where nobody says otherwise.
-pub fn counted_from_zero(numbers: &[f64]) -> bool {
-    numbers.iter().enumerate().all(|(frame, &number)| number == frame as f64)
-}

@@ -4,6 +4,7 @@
 //! * [`container`]: the `.cager` file: a rest pose, its cage and one solved cage per frame, with random access.
 //! * [`messages`]: the JSON bodies of the service.
 //! * [`record`]: the frame record, `application/vnd.cager.frames`: one frame with its number and its error.
+//! * [`report`]: what is told of an encoding, in `report.json` and in a container.
 //! * [`wire`]: small structured values to and from bytes; the one module that knows bincode.
 //!
 //! The binary ones are little-endian with fixed-width integers. `README.md` of this crate has the frame record byte by byte,
@@ -14,4 +15,5 @@ pub mod container;
 mod le;
 pub mod messages;
 pub mod record;
+pub mod report;
 pub mod wire;

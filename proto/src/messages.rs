@@ -2,6 +2,7 @@
 //!
 //! Lengths are fractions of the rest pose's bounding-box diagonal, times are seconds.
 
+pub use crate::report::ConditionNumber;
 use serde::{Deserialize, Serialize};
 
 /// What a session is doing.
@@ -183,16 +184,6 @@ pub struct RestCage {
     pub vertices: Vec<[f64; 3]>,
     /// Its triangles, counter-clockwise seen from outside.
     pub faces: Vec<[u32; 3]>,
-}
-
-/// Condition numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
-pub struct ConditionNumber {
-    /// Of `Φ`.
-    pub full: f64,
-    /// Of the handles' rows.
-    pub handles: f64,
 }
 
 /// Where the solver of a session came from.

@@ -3,7 +3,8 @@
 mod support;
 
 use cager_core::mesh::{Model, Polygons, TriMesh};
-use cager_proto::container::{CHUNK_FRAMES, ContainerReader, ContainerWriter, Error, FrameError, Summary};
+use cager_proto::container::{CHUNK_FRAMES, ContainerReader, ContainerWriter, Error};
+use cager_proto::report::{FrameError, Refinement, Report};
 use proptest::prelude::*;
 use proptest::test_runner::Config;
 use std::io::Cursor;
@@ -127,7 +128,7 @@ fn positions_take_single_precision_only_where_it_is_exact() {
 fn errors_and_header_come_back_with_the_counts_of_the_meshes() {
     let bytes = support::write(&small_model(), &tetrahedron(), 20, None);
     let mut reader = open(&bytes).unwrap();
-    let expected: Vec<FrameError> = (0..20).map(|k| FrameError { l2: k as f32, linf: 2.0 * k as f32 }).collect();
+    let expected: Vec<FrameError> = (0..20).map(|k| FrameError { l2: f64::from(k), linf: f64::from(2 * k) }).collect();
     assert_eq!(reader.errors().unwrap(), expected);
     let found = reader.header();
     assert_eq!((found.points, found.rest_faces, found.rest_corners), (4, 4, 12));
@@ -136,47 +137,78 @@ fn errors_and_header_come_back_with_the_counts_of_the_meshes() {
 }
 
 #[test]
-fn summary_comes_back_or_is_absent() {
-    let summary = Summary {
+fn report_comes_back_with_what_the_other_sections_say() {
+    let mut written = Report {
         generator: "cager 9".to_owned(),
+        triangles: 4,
+        refinement: Some(Refinement { elements: 100, refinements: 2, change: 1e-4 }),
         singular_values: vec![1.0, 0.1, 1e-17],
         handle_indices: vec![3, 0, u32::MAX],
         warnings: vec!["ünïcode".to_owned()],
-        ..Summary::default()
+        ..Report::default()
     };
-    let bytes = support::write(&small_model(), &tetrahedron(), 1, Some(&summary));
-    assert_eq!(open(&bytes).unwrap().summary().unwrap(), Some(summary));
-    let bytes = support::write(&small_model(), &tetrahedron(), 1, None);
-    assert_eq!(open(&bytes).unwrap().summary().unwrap(), None);
+    // Times differ from run to run, and the file would with them.
+    written.seconds.total = 5.0;
+    let bytes = support::write(&small_model(), &tetrahedron(), 2, Some(&written));
+    let mut reader = open(&bytes).unwrap();
+    let found = reader.report().unwrap();
+    let told = [(0.0, 0.0), (1.0, 2.0)].map(|(l2, linf)| FrameError { l2, linf });
+    assert_eq!(found.error.per_frame, told);
+    assert_eq!(found.error.worst.map(|worst| (worst.frame, worst.distance)), Some((1, 2.0 * found.diagonal)));
+    assert_eq!((found.points, found.cage_faces, found.frames), (4, 4, 2));
+    // 12 corners of 4 bytes; two frames of four points.
+    assert_eq!((found.bytes.capture, found.bytes.output), (48 + 2 * 4 * 12, bytes.len() as u64));
+    let expected = Report {
+        generator: written.generator,
+        triangles: written.triangles,
+        refinement: written.refinement,
+        singular_values: written.singular_values,
+        handle_indices: written.handle_indices,
+        warnings: written.warnings,
+        frames: 2,
+        diagonal: found.diagonal,
+        error: found.error.clone(),
+        bytes: found.bytes,
+        ..Report::new(reader.header())
+    };
+    assert_eq!(found, expected);
 }
 
 #[test]
-fn summary_with_figures_that_are_not_finite_can_be_read() {
+fn report_of_a_file_without_one_is_what_the_other_sections_say() {
+    let bytes = support::write(&small_model(), &tetrahedron(), 1, None);
+    let found = open(&bytes).unwrap().report().unwrap();
+    assert_eq!((found.points, found.frames, found.rank, found.generator.as_str()), (4, 1, 0, ""));
+}
+
+#[test]
+fn report_with_figures_that_are_not_finite_can_be_read() {
     // A capture that stands still has no spread to divide by, and a cage may have an infinite condition number.
-    let mut summary = Summary::default();
-    summary.error.kg_percent = f64::NAN;
-    summary.condition_number.full = f64::INFINITY;
-    let bytes = support::write(&small_model(), &tetrahedron(), 1, Some(&summary));
+    let mut report = Report::default();
+    report.error.kg_percent = f64::NAN;
+    report.condition_number.full = f64::INFINITY;
+    let bytes = support::write(&small_model(), &tetrahedron(), 1, Some(&report));
     let mut reader = open(&bytes).unwrap();
     reader.verify().unwrap();
-    let found = reader.summary().unwrap().unwrap();
+    let found = reader.report().unwrap();
     assert!(found.error.kg_percent.is_nan() && found.condition_number.full.is_nan());
     assert_eq!(found.error.l2_max, 0.0);
 }
 
 #[test]
-fn summary_of_another_version_can_be_read() {
+fn report_of_another_version_can_be_read() {
     let mut parts = take_apart(&small_container());
     parts.retain(|p| p.tag != *b"summ");
-    parts.push(Part::raw(*b"summ", 1, br#"{"generator":"later","new":[1],"error":{"l2_max":0.5}}"#));
-    let summary = open(&put_together(&parts)).unwrap().summary().unwrap().unwrap();
-    assert_eq!((summary.generator.as_str(), summary.error.l2_max, summary.rank), ("later", 0.5, 0));
+    let text = br#"{"generator":"another","new":[1],"capture_bytes":7,"error":{"l2_max":0.5}}"#;
+    parts.push(Part::raw(*b"summ", 1, text));
+    let report = open(&put_together(&parts)).unwrap().report().unwrap();
+    assert_eq!((report.generator.as_str(), report.error.l2_max, report.rank), ("another", 0.5, 0));
 }
 
 #[test]
 fn same_input_gives_the_same_bytes() {
-    let summary = Summary { singular_values: vec![0.1; 30], ..Summary::default() };
-    let write = || support::write(&small_model(), &tetrahedron(), 40, Some(&summary));
+    let report = Report { singular_values: vec![0.1; 30], ..Report::default() };
+    let write = || support::write(&small_model(), &tetrahedron(), 40, Some(&report));
     assert_eq!(write(), write());
 }
 
@@ -236,15 +268,6 @@ fn unknown_optional_section_is_skipped() {
     let mut parts = take_apart(&bytes);
     parts.iter_mut().find(|p| p.tag == *b"note").unwrap().codec = 99;
     open(&put_together(&parts)).unwrap().verify().unwrap();
-}
-
-#[test]
-fn optional_section_must_have_a_free_tag_with_a_small_letter() {
-    let mut writer = ContainerWriter::new(Vec::new(), &header(4), &small_model(), &tetrahedron()).unwrap();
-    for tag in [*b"NOTE", *b"summ", *b"1abc", *b"a bc", *b"HEAD"] {
-        assert!(writer.add_optional(tag, &[]).is_err(), "{}", String::from_utf8_lossy(&tag));
-    }
-    writer.add_optional(*b"nOTE", &[]).unwrap();
 }
 
 #[test]

@@ -8,13 +8,14 @@ use super::dry_run::{read_files, tell_would};
 use super::outputs::Outputs;
 use super::{grouped, tell, warn};
 use crate::compare::render::Up;
-use crate::design::{DesignReport, read_frames};
+use crate::design::{read_frames, report as design_report};
 use crate::frames::CaptureFiles;
 use crate::picture;
 use anyhow::{Result, bail};
 use cager_cages::{DesignOptions, EncloseError, EncloseOptions, General, Style, enclose, general};
 use cager_core::mesh::{Model, Polygons, TriMesh};
 use cager_formats::{AtomicFile, Target, commit_together, model_bytes, obj_bytes, read_model};
+use cager_proto::report::DesignReport;
 use serde::Serialize;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -170,7 +171,7 @@ fn designed(
     let mesh = start.as_ref().map(|(_, model)| TriMesh::from(model));
     let start_mesh = start.as_ref().zip(mesh.as_ref()).map(|((path, _), mesh)| (path.as_path(), mesh));
     let found = design::design((&args.rest[0], rest), (frames_path, &frames), start_mesh, &options)?;
-    let report = DesignReport::new(&found, &options, frames.len());
+    let report = design_report(&found, &options, frames.len());
     warnings.extend(found.warnings);
     // An artist's cage keeps its quads.
     let cage = match start {

@@ -7,7 +7,7 @@ use super::encode_summary::{summary, write_report};
 use super::outputs::Outputs;
 use super::solver_options::{blame, designed_spectrum, matrix, read_cage, solver, solver_for, spectrum_bound};
 use super::{design, encode_remote, grouped, progress, tell, warn};
-use crate::design::{DesignReport, read_frames};
+use crate::design::{read_frames, report as design_report};
 use crate::encode::{self, ChooseSpectrum, EncodeProgress, Encoded, Job, sample_frames};
 use crate::frames::CaptureFiles;
 use crate::memory::Memory;
@@ -20,6 +20,7 @@ use cager_core::inversion::{PrepareError, Solver, SolverOptions, check_options};
 use cager_core::mesh::Model;
 use cager_core::regularize::{Regularizer, SparseMatrix, Term};
 use cager_formats::{AtomicFile, FrameReader, Target, commit_together, read_model};
+use cager_proto::report::DesignReport;
 use std::time::{Duration, Instant};
 
 pub(super) fn run(args: &EncodeArgs) -> Result<()> {
@@ -125,7 +126,7 @@ fn designed(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<(Ca
     let frames = read_frames(files).map_err(|error| name_files(error, args))?;
     let design = design::design((&args.rest, rest), (&args.frames, &frames), None, &options)?;
     warn(&design.warnings);
-    let report = DesignReport::new(&design, &options, frames.len());
+    let report = design_report(&design, &options, frames.len());
     let cage = Cage::new(design.cage).with_context(|| args.rest.display().to_string())?;
     Ok((cage, report))
 }

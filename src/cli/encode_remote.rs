@@ -6,12 +6,12 @@ use super::solver_options::{designed_spectrum, matrix, solver_for, spectrum_boun
 use super::{plain, progress, tell, warn};
 use crate::frames::CaptureFiles;
 use crate::remote::{EncodedRemotely, FileFrames, RemoteCage, RemoteJob, RemoteProgress, encode_remotely};
-use crate::timing::counted_from_zero;
 use anyhow::{Context, Result, bail};
 use cager_client::FrameSource;
 use cager_client::messages::SessionOptions;
 use cager_core::cage::Cage;
 use cager_core::mesh::Model;
+use cager_proto::container::counted_from_zero;
 use std::time::Instant;
 
 /// The files are read and the options checked here as well, so that what is wrong with them is told before anything is sent, in

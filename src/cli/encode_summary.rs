@@ -1,9 +1,9 @@
 //! What `cager encode` tells: its summary and its report.
 
 use super::{grouped, human_bytes, is_verbose};
-use crate::report::Report;
 use anyhow::Result;
 use cager_formats::AtomicFile;
+use cager_proto::report::{Errors, Report};
 use std::io::Write;
 use std::path::Path;
 
@@ -51,7 +51,7 @@ pub(super) fn summary(report: &Report, output: &Path) -> String {
     format!(
         "{}: {} frames of {} points as cages of {} vertices\n\
          \x20 size    {} from {}: {:.1} times smaller, {:.2} bits per point and frame\n\
-         \x20 error   L2 {:.4} % mean, {:.4} % max; L∞ {:.3} % mean, {:.3} % max (of the rest diagonal); KG {:.3} %\n{worst}\
+         \x20 error   {}\n{worst}\
          \x20 system  condition {:.1} (all points {:.1}), rank {} of {}, affine reproduction {:.1e}\n\
          {refined}{chosen}\x20 time    {:.3} s\n{steps}",
         output.display(),
@@ -62,17 +62,25 @@ pub(super) fn summary(report: &Report, output: &Path) -> String {
         human_bytes(report.bytes.capture),
         report.bytes.ratio,
         report.bytes.bits_per_vertex_per_frame,
-        100.0 * report.error.l2_mean,
-        100.0 * report.error.l2_max,
-        100.0 * report.error.linf_mean,
-        100.0 * report.error.linf_max,
-        report.error.kg_percent,
+        errors(&report.error),
         report.condition_number.handles,
         report.condition_number.full,
         report.rank,
         report.unknowns,
         report.affine_reproduction_error,
         report.seconds.total,
+    )
+}
+
+/// The errors of a capture in one line.
+pub(super) fn errors(e: &Errors) -> String {
+    format!(
+        "L2 {:.4} % mean, {:.4} % max; L∞ {:.3} % mean, {:.3} % max (of the rest diagonal); KG {:.3} %",
+        100.0 * e.l2_mean,
+        100.0 * e.l2_max,
+        100.0 * e.linf_mean,
+        100.0 * e.linf_max,
+        e.kg_percent
     )
 }
 

@@ -67,7 +67,7 @@ fn report_has_exactly_the_keys_and_types_of_the_contract() {
     let mut found = BTreeMap::new();
     shape("", &dir.json("report.json"), &mut found);
     let integers = ["points", "triangles", "frames", "unknowns", "cage_vertices", "cage_faces", "spectrum", "rank"];
-    let texts = ["coordinates", "handles", "regularizer"];
+    let texts = ["generator", "coordinates", "handles", "regularizer"];
     let numbers = [
         "diagonal",
         "lambda",

@@ -4,7 +4,8 @@
 use super::{byte, mend, u64_at};
 use crate::Target;
 use cager_core::mesh::{Model, Polygons, TriMesh};
-use cager_proto::container::{ContainerReader, ContainerWriter, Header, Summary};
+use cager_proto::container::{ContainerReader, ContainerWriter, Header};
+use cager_proto::report::Report;
 use std::io::Cursor;
 
 pub(super) const CONTAINER: Target = Target {
@@ -55,21 +56,15 @@ fn seeds() -> Vec<Vec<u8>> {
         frame_rate: Some(24.0),
         ..Header::default()
     };
-    let file = |frames: u8, summary: bool| {
+    let file = |frames: u8, report: bool| {
         let mut writer = ContainerWriter::new(Vec::new(), &header, &rest, &cage).expect("a header");
         for k in 0..frames {
             let frame: Vec<f32> = (0..12_u8).map(|i| f32::from(i) * 0.25 + f32::from(k)).collect();
             writer.write_frame(&frame, 0.5, 1.5).expect("a frame");
         }
-        if summary {
-            writer.add_optional(*b"note", b"of no importance").expect("a note");
-        }
-        let summary = summary.then(|| Summary {
-            generator: "test".to_owned(),
-            singular_values: vec![1.0; 9],
-            ..Summary::default()
-        });
-        let mut file = writer.finish(summary.as_ref()).expect("a container");
+        let report =
+            report.then(|| Report { generator: "test".to_owned(), singular_values: vec![1.0; 9], ..Report::default() });
+        let mut file = writer.finish(report.as_ref()).expect("a container");
         file.insert(0, 1);
         file
     };

@@ -9,10 +9,10 @@ mod section;
 mod writer;
 
 pub use error::Error;
-pub use reader::{ContainerReader, FrameError, SectionInfo};
+pub use reader::{ContainerReader, SectionInfo};
 pub use writer::ContainerWriter;
 
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 
 /// First bytes of every container. Like PNG's they show damage by text-mode transfers.
 pub const MAGIC: [u8; 8] = *b"\x89CGR\r\n\x1a\n";
@@ -54,86 +54,16 @@ pub struct Header {
     pub frame_rate: Option<f64>,
 }
 
-/// What the encoder found out, for people and reports; a decoder does not need it. Stored as JSON.
-#[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
-#[serde(default)]
-pub struct Summary {
-    /// Program and version that wrote the file.
-    pub generator: String,
-    /// Triangles of the model.
-    pub triangles: u64,
-    /// `max_i |Φ C_R − P_R|_i` over the rest diagonal.
-    #[serde(deserialize_with = "number_or_null")]
-    pub affine_reproduction_error: f64,
-    /// Condition numbers.
-    pub condition_number: ConditionNumber,
-    /// Numerical rank of `Φ`.
-    pub rank: u64,
-    /// Singular values of the inverted matrix, descending.
-    pub singular_values: Vec<f64>,
-    /// How the handles of maximum volume were found.
-    pub maxvol: MaxVolSummary,
-    /// Rows read, in their order: those of maximum volume first. Where every point is read, only those.
-    pub handle_indices: Vec<u32>,
-    /// Errors of the capture over the rest diagonal.
-    pub error: ErrorSummary,
-    /// f32 positions of all frames and one connectivity.
-    pub capture_bytes: u64,
-    /// What a user should know.
-    pub warnings: Vec<String>,
+impl Header {
+    /// Bytes of the f32 positions of so many frames and of one connectivity: what a container is smaller than.
+    pub fn capture_bytes(&self, frames: usize) -> u64 {
+        4 * self.rest_corners + 12 * self.points * frames as u64
+    }
 }
 
-/// Condition numbers over the numerical rank.
-#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
-#[serde(default)]
-pub struct ConditionNumber {
-    /// Of `Φ`.
-    #[serde(deserialize_with = "number_or_null")]
-    pub full: f64,
-    /// Of the handles' rows.
-    #[serde(deserialize_with = "number_or_null")]
-    pub handles: f64,
-}
-
-/// How the handles were found.
-#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
-#[serde(default)]
-pub struct MaxVolSummary {
-    /// Swaps after the start by pivoted LU.
-    pub swaps: u64,
-    /// `ln |det Φ□|`.
-    #[serde(deserialize_with = "number_or_null")]
-    pub log_volume: f64,
-    /// Largest `|B_ij|` at the end.
-    #[serde(deserialize_with = "number_or_null")]
-    pub max_entry: f64,
-}
-
-/// Errors of the capture over the rest diagonal.
-#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
-#[serde(default)]
-pub struct ErrorSummary {
-    /// Mean over frames of the L2 error.
-    #[serde(deserialize_with = "number_or_null")]
-    pub l2_mean: f64,
-    /// Largest L2 error of a frame.
-    #[serde(deserialize_with = "number_or_null")]
-    pub l2_max: f64,
-    /// Mean over frames of the L∞ error.
-    #[serde(deserialize_with = "number_or_null")]
-    pub linf_mean: f64,
-    /// Largest L∞ error of a frame.
-    #[serde(deserialize_with = "number_or_null")]
-    pub linf_max: f64,
-    /// `100 · ‖A − Â‖_F / ‖A − E(A)‖_F`.
-    #[serde(deserialize_with = "number_or_null")]
-    pub kg_percent: f64,
-}
-
-/// JSON has no infinity and no NaN, and serde_json writes null for them: a capture that stands still has such figures, and
-/// its file must open.
-fn number_or_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
+/// Whether numbers are 0, 1, 2, …, as they are where nobody says otherwise.
+pub fn counted_from_zero(numbers: &[f64]) -> bool {
+    numbers.iter().enumerate().all(|(frame, &number)| number == frame as f64)
 }
 
 /// Numbers of frames are finite and ascend.
@@ -152,7 +82,7 @@ pub(crate) mod tag {
     pub(crate) const ERRORS: [u8; 4] = *b"ERRS";
     pub(crate) const CONTENTS: [u8; 4] = *b"TOC_";
     pub(crate) const NUMBERS: [u8; 4] = *b"fnum";
-    pub(crate) const SUMMARY: [u8; 4] = *b"summ";
+    pub(crate) const REPORT: [u8; 4] = *b"summ";
     pub(crate) const KNOWN: [[u8; 4]; 10] =
-        [HEADER, REST_POINTS, REST_FACES, CAGE_VERTICES, CAGE_FACES, FRAMES, ERRORS, CONTENTS, NUMBERS, SUMMARY];
+        [HEADER, REST_POINTS, REST_FACES, CAGE_VERTICES, CAGE_FACES, FRAMES, ERRORS, CONTENTS, NUMBERS, REPORT];
 }

@@ -2,23 +2,15 @@
 
 use super::codec;
 use super::section::{self, FOOTER_BYTES, HEADER_BYTES, PRELUDE_BYTES, SectionHeader};
-use super::{Error, HEADER_LIMIT, Header, Summary, tag};
+use super::{Error, HEADER_LIMIT, Header, counted_from_zero, tag};
 use crate::le::{self, f32_at, u32_at, u64_at};
+use crate::report::{FrameError, Report, WorstError};
 use crate::wire;
-use cager_core::mesh::{Model, Point, Polygons, TriMesh};
+use cager_core::mesh::{Model, Point, Polygons, TriMesh, diagonal};
 use std::io::{Read, Seek, SeekFrom};
 
 /// Bytes of one entry of the table of contents: an offset and the section's header but for its checksums.
 const ENTRY_BYTES: usize = 40;
-
-/// Errors of one frame over the rest diagonal.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FrameError {
-    /// `sqrt(mean |e|²)`.
-    pub l2: f32,
-    /// `max |e|`.
-    pub linf: f32,
-}
 
 /// One section, for listings.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -172,7 +164,8 @@ impl<R: Read + Seek> ContainerReader<R> {
     pub fn errors(&mut self) -> Result<Vec<FrameError>, Error> {
         let entry = self.entry(tag::ERRORS)?;
         let raw = self.raw(entry)?;
-        Ok(raw.chunks_exact(8).map(|b| FrameError { l2: f32_at(b, 0), linf: f32_at(b, 4) }).collect())
+        let error = |b: &[u8]| FrameError { l2: f32_at(b, 0).into(), linf: f32_at(b, 4).into() };
+        Ok(raw.chunks_exact(8).map(error).collect())
     }
 
     /// The numbers that the frames have where they come from, such as those of their files; 0, 1, 2, … where the file has none.
@@ -192,16 +185,28 @@ impl<R: Read + Seek> ContainerReader<R> {
         }
     }
 
-    /// What the encoder found out, where it said so.
+    /// The report of the encoding, without its times. What only the encoder can tell is empty where the file has nothing of it.
     ///
     /// # Errors
     /// Damage.
-    pub fn summary(&mut self) -> Result<Option<Summary>, Error> {
-        let Some(&entry) = self.entries.iter().find(|e| e.header.tag == tag::SUMMARY) else { return Ok(None) };
-        let raw = self.raw(entry)?;
-        serde_json::from_slice(&raw)
-            .map(Some)
-            .map_err(|e| Error::corrupt(entry.offset, format!("the summary cannot be read ({e})")))
+    pub fn report(&mut self) -> Result<Report, Error> {
+        let mut report = match self.entries.iter().find(|e| e.header.tag == tag::REPORT) {
+            Some(&entry) => serde_json::from_slice(&self.raw(entry)?)
+                .map_err(|e| Error::corrupt(entry.offset, format!("the report cannot be read ({e})")))?,
+            None => Report::default(),
+        };
+        report.set_header(&self.header);
+        report.frames = self.frames;
+        report.diagonal = diagonal(&self.rest()?.points);
+        report.frame_numbers = self.frame_numbers()?;
+        if counted_from_zero(&report.frame_numbers) {
+            report.frame_numbers = Vec::new();
+        }
+        report.error.per_frame = self.errors()?;
+        report.error.worst = WorstError::of_frames(&report.error.per_frame, report.diagonal);
+        report.bytes.capture = self.header.capture_bytes(self.frames);
+        report.set_output(self.file_bytes);
+        Ok(report)
     }
 
     /// The sections, in the order of the file.
@@ -220,11 +225,8 @@ impl<R: Read + Seek> ContainerReader<R> {
     /// # Errors
     /// The first damage found.
     pub fn verify(&mut self) -> Result<(), Error> {
-        self.rest()?;
         self.cage()?;
-        self.errors()?;
-        self.frame_numbers()?;
-        self.summary()?;
+        self.report()?;
         let mut cage = Vec::new();
         for frame in 0..self.frames {
             self.read_frame(frame, &mut cage)?;
@@ -314,7 +316,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         for (tag, least, most) in [
             (tag::REST_FACES, most_faces, most_faces),
             (tag::NUMBERS, 0, 1),
-            (tag::SUMMARY, 0, 1),
+            (tag::REPORT, 0, 1),
             (tag::CONTENTS, 0, 0),
         ] {
             let count = self.entries.iter().filter(|e| e.header.tag == tag).count();

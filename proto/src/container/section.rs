@@ -65,7 +65,7 @@ impl SectionHeader {
         let (times, more) = match tag {
             tag::HEADER => return HEADER_LIMIT as u64,
             // Two bytes of JSON may become an empty text of 24 bytes.
-            tag::SUMMARY => (16, 4 << 20),
+            tag::REPORT => (16, 4 << 20),
             _ => (48, 12 << 20),
         };
         file_bytes.saturating_mul(times).saturating_add(more)

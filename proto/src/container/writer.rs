@@ -2,7 +2,8 @@
 
 use super::codec::{self, DIFFERENCE, PLANES, RAW};
 use super::section::{self, SectionHeader};
-use super::{CHUNK_FRAMES, Error, HEADER_LIMIT, Header, Summary, tag};
+use super::{CHUNK_FRAMES, Error, HEADER_LIMIT, Header, counted_from_zero, tag};
+use crate::report::Report;
 use crate::wire;
 use cager_core::mesh::{Model, Point, TriMesh};
 use std::io::Write;
@@ -13,7 +14,7 @@ use std::io::Write;
 pub struct ContainerWriter<W: Write> {
     out: W,
     offset: u64,
-    rows: usize,
+    header: Header,
     /// Frames not yet written, their numbers as little-endian bytes back to back.
     pending: Vec<u8>,
     pending_frames: usize,
@@ -39,14 +40,14 @@ impl<W: Write> ContainerWriter<W> {
         let mut writer = Self {
             out,
             offset: 0,
-            rows: header.rows_per_frame as usize,
+            header,
             pending: Vec::new(),
             pending_frames: 0,
             errors: Vec::new(),
             contents: Vec::new(),
         };
         writer.put(&section::prelude())?;
-        let encoded = wire::encode::<_, HEADER_LIMIT>(&header).map_err(|e| Error::TooLarge(e.to_string()))?;
+        let encoded = wire::encode::<_, HEADER_LIMIT>(&writer.header).map_err(|e| Error::TooLarge(e.to_string()))?;
         writer.section(tag::HEADER, RAW, 1, 0, &encoded)?;
         writer.positions(tag::REST_POINTS, &rest.points)?;
         if !rest.faces.is_empty() {
@@ -60,17 +61,20 @@ impl<W: Write> ContainerWriter<W> {
         Ok(writer)
     }
 
+    /// The header, with the counts of the meshes.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
     /// Adds the cage of the next frame, rows × 3, and its errors over the rest diagonal.
     ///
     /// # Errors
     /// A cage of another size or with a value that is not finite; an output that refuses.
     pub fn write_frame(&mut self, cage: &[f32], l2: f32, linf: f32) -> Result<(), Error> {
         let frame = self.errors.len() / 8;
-        if cage.len() != 3 * self.rows {
-            return Err(Error::BadFrame {
-                frame,
-                what: format!("it has {} numbers, not 3 × {}", cage.len(), self.rows),
-            });
+        let rows = self.header.rows_per_frame as usize;
+        if cage.len() != 3 * rows {
+            return Err(Error::BadFrame { frame, what: format!("it has {} numbers, not 3 × {rows}", cage.len()) });
         }
         if let Some(k) = cage.iter().position(|x| !x.is_finite()) {
             return Err(Error::BadFrame { frame, what: format!("cage vertex {} is not finite", k / 3) });
@@ -85,21 +89,7 @@ impl<W: Write> ContainerWriter<W> {
         if self.pending_frames == CHUNK_FRAMES { self.flush_chunk() } else { Ok(()) }
     }
 
-    /// Adds a section that readers may skip; its tag begins with a small letter.
-    ///
-    /// # Errors
-    /// A tag that is not of that form or belongs to this format; an output that refuses.
-    pub fn add_optional(&mut self, tag: [u8; 4], bytes: &[u8]) -> Result<(), Error> {
-        if SectionHeader::is_required(tag) || !tag.iter().all(u8::is_ascii_graphic) || tag::KNOWN.contains(&tag) {
-            return Err(Error::TooLarge(format!(
-                "{:?} is no tag of an optional section",
-                String::from_utf8_lossy(&tag)
-            )));
-        }
-        self.section(tag, PLANES, 1, 0, bytes)
-    }
-
-    /// Adds the numbers that the frames have where they come from, ascending; left out they are 0, 1, 2, …
+    /// Adds the numbers that the frames have where they come from, ascending; 0, 1, 2, … take no place.
     ///
     /// # Errors
     /// Numbers that readers would refuse; an output that refuses.
@@ -107,21 +97,25 @@ impl<W: Write> ContainerWriter<W> {
         if numbers.len() != self.errors.len() / 8 || !super::are_frame_numbers(numbers) {
             return Err(Error::TooLarge("frame numbers that are not one for each frame, ascending".to_owned()));
         }
+        if counted_from_zero(numbers) {
+            return Ok(());
+        }
         let raw: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
         self.section(tag::NUMBERS, PLANES, 8, 0, &raw)
     }
 
-    /// Writes what comes after the frames and gives back the output, which the caller flushes.
+    /// Writes what comes after the frames and gives back the output, which the caller flushes. Of the report it takes what no other
+    /// section says and what is the same each time.
     ///
     /// # Errors
     /// An output that refuses.
-    pub fn finish(mut self, summary: Option<&Summary>) -> Result<W, Error> {
+    pub fn finish(mut self, report: Option<&Report>) -> Result<W, Error> {
         self.flush_chunk()?;
         let errors = std::mem::take(&mut self.errors);
         self.section(tag::ERRORS, PLANES, 4, 0, &errors)?;
-        if let Some(summary) = summary {
-            let text = serde_json::to_vec(summary).map_err(|e| Error::TooLarge(e.to_string()))?;
-            self.section(tag::SUMMARY, PLANES, 1, 0, &text)?;
+        if let Some(report) = report {
+            let text = report.stored().map_err(|e| Error::TooLarge(e.to_string()))?;
+            self.section(tag::REPORT, PLANES, 1, 0, &text)?;
         }
         let contents_offset = self.offset;
         let contents = std::mem::take(&mut self.contents);
@@ -138,7 +132,7 @@ impl<W: Write> ContainerWriter<W> {
         let raw = std::mem::take(&mut self.pending);
         let count = std::mem::take(&mut self.pending_frames) as u32;
         let first = (self.errors.len() / 8) as u32 - count;
-        self.chunk(tag::FRAMES, DIFFERENCE, 4, 3 * self.rows, &raw, (first, count))?;
+        self.chunk(tag::FRAMES, DIFFERENCE, 4, 3 * self.header.rows_per_frame as usize, &raw, (first, count))?;
         self.pending = raw;
         self.pending.clear();
         Ok(())

@@ -3,7 +3,8 @@
 #![allow(dead_code, unreachable_pub)] // Each test file uses a part of it.
 
 use cager_core::mesh::{Model, Polygons, TriMesh};
-use cager_proto::container::{ContainerReader, ContainerWriter, Error, Header, Summary};
+use cager_proto::container::{ContainerReader, ContainerWriter, Error, Header};
+use cager_proto::report::Report;
 use std::io::Cursor;
 
 pub const PRELUDE: usize = 16;
@@ -46,23 +47,25 @@ pub fn frame(k: usize, rows: usize) -> Vec<f32> {
     (0..3 * rows).map(|i| (i as f32).mul_add(0.25, (k as f32 * 0.37).sin())).collect()
 }
 
-pub fn write(rest: &Model, cage: &TriMesh, frames: usize, summary: Option<&Summary>) -> Vec<u8> {
+pub fn write(rest: &Model, cage: &TriMesh, frames: usize, report: Option<&Report>) -> Vec<u8> {
     let rows = cage.vertices.len();
     let mut writer = ContainerWriter::new(Vec::new(), &header(rows as u32), rest, cage).unwrap();
     for k in 0..frames {
         writer.write_frame(&frame(k, rows), k as f32, 2.0 * k as f32).unwrap();
     }
-    writer.finish(summary).unwrap()
+    writer.finish(report).unwrap()
 }
 
-/// A container of three frames with a summary and an optional section that no program knows.
+/// A container of three frames with a report and an optional section that no program knows.
 pub fn small_container() -> Vec<u8> {
     let mut writer = ContainerWriter::new(Vec::new(), &header(4), &small_model(), &tetrahedron()).unwrap();
     for k in 0..3 {
         writer.write_frame(&frame(k, 4), 0.5, 1.5).unwrap();
     }
-    writer.add_optional(*b"note", b"of no importance").unwrap();
-    writer.finish(Some(&Summary { generator: "test".to_owned(), ..Summary::default() })).unwrap()
+    let bytes = writer.finish(Some(&Report { generator: "test".to_owned(), ..Report::default() })).unwrap();
+    let mut parts = take_apart(&bytes);
+    parts.insert(parts.len() - 1, Part::raw(*b"note", 1, b"of no importance"));
+    put_together(&parts)
 }
 
 /// Everything that a program reads of a container.

@@ -1,23 +1,31 @@
-//! `report.json`: what encoding found out, for programs and people.
+//! The report of an encoding: what `cager encode` writes as JSON, what a container keeps of it, and what `cager inspect` shows.
+//!
+//! Errors are fractions of the rest pose's bounding-box diagonal, times are seconds.
 
-use crate::design::DesignReport;
-use cager_core::inversion::{Convergence, Outcome};
-use serde::{Deserialize, Serialize};
+use crate::container::Header;
+use cager_core::inversion::{Convergence, Outcome, Threshold};
+use serde::{Deserialize, Deserializer, Serialize};
 
-/// The report of one encoding. Lengths are fractions of the rest pose's bounding-box diagonal.
-#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
+/// The report of one encoding. Keys that are missing read as zero or empty.
+#[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
+#[serde(default)]
 pub struct Report {
+    /// Program and version that wrote the container.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub generator: String,
     /// Points of the model, n.
     pub points: usize,
     /// Triangles of the model; 0 for a point cloud.
     pub triangles: usize,
     /// Frames of the capture.
     pub frames: usize,
+    /// Frames per second, where known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frame_rate: Option<f64>,
     /// Diagonal of the rest pose's bounding box, in the unit of its file: what errors are fractions of.
-    #[serde(default)]
     pub diagonal: f64,
     /// The number of each frame where it comes from, as in the names of its files; absent where they are 0, 1, 2, …
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub frame_numbers: Vec<f64>,
     /// Unknowns per frame, m.
     pub unknowns: usize,
@@ -34,23 +42,24 @@ pub struct Report {
     /// Spectrum threshold s.
     pub spectrum: usize,
     /// Why this threshold, where it was chosen by measuring.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub spectrum_choice: Option<SpectrumChoice>,
     /// Weight λ.
     pub lambda: f64,
     /// How the cage was designed, where none was given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub design: Option<DesignReport>,
     /// How the iteration went, for coordinates whose inversion is one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub consistency: Option<Consistency>,
     /// How the coordinates were refined, where they are a numerical solution.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub refinement: Option<Refinement>,
     /// `max_i |Φ C_R − P_R|_i`.
+    #[serde(deserialize_with = "number_or_null")]
     pub affine_reproduction_error: f64,
     /// Condition numbers over the numerical rank.
-    pub condition_number: Condition,
+    pub condition_number: ConditionNumber,
     /// Numerical rank of `Φ`.
     pub rank: usize,
     /// Singular values of the inverted matrix, descending.
@@ -63,10 +72,71 @@ pub struct Report {
     pub error: Errors,
     /// Sizes.
     pub bytes: Bytes,
-    /// Times. Reading, inverting and measuring overlap, so `total` is less than the sum on several processors.
+    /// Times. Reading, inverting and measuring overlap, so `total` is less than the sum on several processors. Absent where they are all
+    /// zero, as of a container.
+    #[serde(skip_serializing_if = "Seconds::are_zero")]
     pub seconds: Seconds,
     /// What a user should know but that did not stop the work.
     pub warnings: Vec<String>,
+}
+
+impl Report {
+    /// What the header of a container says.
+    pub fn new(header: &Header) -> Self {
+        let mut report = Self::default();
+        report.set_header(header);
+        report
+    }
+
+    pub(crate) fn set_header(&mut self, header: &Header) {
+        self.points = header.points as usize;
+        self.frame_rate = header.frame_rate;
+        self.unknowns = header.rows_per_frame as usize;
+        self.cage_vertices = header.cage_vertices as usize;
+        self.cage_faces = header.cage_faces as usize;
+        self.coordinates.clone_from(&header.coordinates);
+        self.handles.clone_from(&header.handles);
+        self.regularizer.clone_from(&header.regularizer);
+        self.spectrum = header.spectrum as usize;
+        self.lambda = header.lambda;
+    }
+
+    /// Says how many bytes the written file has, once the frames are counted and the size of the capture is known.
+    pub fn set_output(&mut self, output: u64) {
+        let bytes = &mut self.bytes;
+        bytes.output = output;
+        bytes.ratio = bytes.capture as f64 / output as f64;
+        bytes.bits_per_vertex_per_frame = 8.0 * output as f64 / (self.points * self.frames) as f64;
+    }
+
+    /// The JSON that a container stores: without what its other sections say and what differs from run to run.
+    pub(crate) fn stored(&self) -> serde_json::Result<Vec<u8>> {
+        const ELSEWHERE: [&str; 15] = [
+            "points",
+            "frames",
+            "frame_rate",
+            "diagonal",
+            "frame_numbers",
+            "unknowns",
+            "cage_vertices",
+            "cage_faces",
+            "coordinates",
+            "handles",
+            "regularizer",
+            "spectrum",
+            "lambda",
+            "bytes",
+            "seconds",
+        ];
+        let mut value = serde_json::to_value(self)?;
+        if let Some(report) = value.as_object_mut() {
+            report.retain(|key, _| !ELSEWHERE.contains(&key.as_str()));
+        }
+        if let Some(error) = value["error"].as_object_mut() {
+            error.retain(|key, _| key != "worst" && key != "per_frame");
+        }
+        serde_json::to_vec(&value)
+    }
 }
 
 /// How a numerical solution for the coordinates was refined.
@@ -77,6 +147,7 @@ pub struct Refinement {
     /// Solutions after the first.
     pub refinements: usize,
     /// Most that the last refinement changed a coordinate of a point by; at most 1e-3 but where a warning says otherwise.
+    #[serde(deserialize_with = "number_or_null")]
     pub change: f64,
 }
 
@@ -87,11 +158,17 @@ impl From<cager_core::coordinates::Refinement> for Refinement {
 }
 
 /// Condition numbers.
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
-pub struct Condition {
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(default)]
+pub struct ConditionNumber {
     /// Of `Φ`.
+    #[cfg_attr(feature = "schema", schema(required = true))]
+    #[serde(deserialize_with = "number_or_null")]
     pub full: f64,
     /// Of the handles' rows.
+    #[cfg_attr(feature = "schema", schema(required = true))]
+    #[serde(deserialize_with = "number_or_null")]
     pub handles: f64,
 }
 
@@ -120,10 +197,49 @@ pub struct TriedSpectrum {
 
 impl SpectrumChoice {
     /// What choosing within a bound found.
-    pub fn new(found: &cager_core::inversion::Threshold, bound: f64) -> Self {
+    pub fn new(found: &Threshold, bound: f64) -> Self {
         let tried = found.tried.iter().map(|&(spectrum, l2_mean)| TriedSpectrum { spectrum, l2_mean }).collect();
         Self { bound, extra: found.extra(), frames: found.frames, tried }
     }
+}
+
+/// How a cage was designed. Errors are least-squares errors over sampled points, root mean square.
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
+pub struct DesignReport {
+    /// `free` or `editable`.
+    pub style: String,
+    /// Seed of what was drawn at random.
+    pub seed: u64,
+    /// Vertices of the cage.
+    pub vertices: usize,
+    /// Frames that the design saw, and as many or one less that it was judged by.
+    pub frames: usize,
+    /// Error on the frames that the design saw.
+    pub designed_error: f64,
+    /// Error on those that it did not see.
+    pub held_back_error: f64,
+    /// Whether the time limit ended it.
+    pub timed_out: bool,
+    /// What each stage brought.
+    pub stages: Vec<StageReport>,
+}
+
+/// What one stage of a design brought.
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
+pub struct StageReport {
+    /// What was done.
+    pub name: String,
+    /// Vertices after it.
+    pub vertices: usize,
+    /// Error after it on frames that the design sees.
+    pub designed_error: f64,
+    /// Error after it on frames that it does not see.
+    pub held_back_error: f64,
+    /// Condition number of the coordinates after it; absent where it is beyond all bounds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition_number: Option<f64>,
+    /// Seconds since the design began.
+    pub seconds: f64,
 }
 
 /// How the inversion of coordinates went whose normals follow from the vertices: it starts from a linear one and improves its
@@ -167,31 +283,40 @@ impl Consistency {
 }
 
 /// How the handles were found.
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
+#[serde(default)]
 pub struct MaxVol {
     /// Swaps after the start by pivoted LU.
     pub swaps: usize,
     /// `ln |det Φ□|`.
+    #[serde(deserialize_with = "number_or_null")]
     pub log_volume: f64,
     /// Largest `|B_ij|` at the end.
+    #[serde(deserialize_with = "number_or_null")]
     pub max_entry: f64,
 }
 
-/// Errors of the decoded capture.
-#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
+/// Errors of the decoded capture; NaN where they were not measured.
+#[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
+#[serde(default)]
 pub struct Errors {
     /// Mean over frames of the L2 error.
+    #[serde(deserialize_with = "number_or_null")]
     pub l2_mean: f64,
     /// Largest L2 error of a frame.
+    #[serde(deserialize_with = "number_or_null")]
     pub l2_max: f64,
     /// Mean over frames of the L∞ error.
+    #[serde(deserialize_with = "number_or_null")]
     pub linf_mean: f64,
     /// Largest L∞ error of a frame.
+    #[serde(deserialize_with = "number_or_null")]
     pub linf_max: f64,
     /// `100 · ‖A − Â‖_F / ‖A − E(A)‖_F` (Karni and Gotsman 2004).
+    #[serde(deserialize_with = "number_or_null")]
     pub kg_percent: f64,
     /// Where it is largest, if that was measured.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub worst: Option<WorstError>,
     /// Every frame.
     pub per_frame: Vec<FrameError>,
@@ -211,24 +336,27 @@ pub struct WorstError {
 
 impl WorstError {
     /// The frame of the largest error, over a rest pose of this diagonal; none where nothing was measured.
-    pub fn of_frames(frames: &[FrameError], diagonal: f64) -> Option<Self> {
+    pub(crate) fn of_frames(frames: &[FrameError], diagonal: f64) -> Option<Self> {
         let measured = frames.iter().enumerate().filter(|(_, error)| error.linf.is_finite());
         let (frame, error) = measured.reduce(|a, b| if b.1.linf > a.1.linf { b } else { a })?;
         Some(Self { frame, point: None, distance: error.linf * diagonal })
     }
 }
 
-/// Errors of one frame.
+/// Errors of one frame; NaN where they were not measured.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
 pub struct FrameError {
     /// `sqrt(mean |e|²)`.
+    #[serde(deserialize_with = "number_or_null")]
     pub l2: f64,
     /// `max |e|`.
+    #[serde(deserialize_with = "number_or_null")]
     pub linf: f64,
 }
 
 /// Sizes.
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
+#[serde(default)]
 pub struct Bytes {
     /// f32 positions of all frames and one connectivity.
     pub capture: u64,
@@ -237,11 +365,13 @@ pub struct Bytes {
     /// `capture / output`.
     pub ratio: f64,
     /// Bits of the file per point and frame.
+    #[serde(deserialize_with = "number_or_null")]
     pub bits_per_vertex_per_frame: f64,
 }
 
-/// Times in seconds, each added up over the threads that worked on it.
+/// Times, each added up over the threads that worked on it.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
+#[serde(default)]
 pub struct Seconds {
     /// Reading rest pose, cage and frames.
     pub read: f64,
@@ -259,4 +389,16 @@ pub struct Seconds {
     pub write: f64,
     /// Wall-clock time of it all.
     pub total: f64,
+}
+
+impl Seconds {
+    fn are_zero(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// JSON has no infinity and no NaN, and serde_json writes null for them: a capture that stands still has such figures, and
+/// its file must open.
+fn number_or_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
