@@ -255,18 +255,12 @@ impl fmt::Display for Mismatch {
                 f,
                 "its points come in another order: edges of the rest pose are {ratio:.0} times longer in frame 0"
             ),
-            Self::Units(ratio) if ratio > 1.0 => {
-                write!(
-                    f,
-                    "frame 0 is {} times larger than the rest pose, and so are the others, as with other units",
-                    Factor(ratio)
-                )
-            }
             Self::Units(ratio) => {
+                let (times, how) = if ratio > 1.0 { (ratio, "larger") } else { (1.0 / ratio, "smaller") };
+                let times = factor(times);
                 write!(
                     f,
-                    "frame 0 is {} times smaller than the rest pose, and so are the others, as with other units",
-                    Factor(1.0 / ratio)
+                    "frame 0 is {times} times {how} than the rest pose, and so are the others, as with other units"
                 )
             }
             Self::Axes(Up::Y) => f.write_str("its axes y and z look exchanged: y is up where z is in the rest pose"),
@@ -277,16 +271,11 @@ impl fmt::Display for Mismatch {
 }
 
 /// A ratio as people write it: that of two usual units where it is near to one, as motion changes edges a little.
-struct Factor(f64);
-
-impl fmt::Display for Factor {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        const UNITS: [f64; 9] = [2.54, 3.28, 10.0, 12.0, 25.4, 30.48, 39.37, 100.0, 1000.0];
-        let near = UNITS.into_iter().find(|unit| (self.0 / unit - 1.0).abs() < 0.05);
-        match near {
-            Some(unit) => write!(f, "about {unit}"),
-            None => write!(f, "{:.1}", self.0),
-        }
+fn factor(ratio: f64) -> String {
+    const UNITS: [f64; 9] = [2.54, 3.28, 10.0, 12.0, 25.4, 30.48, 39.37, 100.0, 1000.0];
+    match UNITS.into_iter().find(|unit| (ratio / unit - 1.0).abs() < 0.05) {
+        Some(unit) => format!("about {unit}"),
+        None => format!("{ratio:.1}"),
     }
 }
 

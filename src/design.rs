@@ -57,6 +57,13 @@ fn of_stages(stages: Vec<StageReport>, options: &DesignOptions, frames: usize, t
     }
 }
 
+pub(crate) const STYLES: [Style; 2] = [Style::Free, Style::Editable];
+
+/// The style with this name.
+pub(crate) fn style_by_name(name: &str) -> Option<Style> {
+    STYLES.into_iter().find(|&style| style_name(style) == name)
+}
+
 /// The name of a style on the command line and in reports.
 pub fn style_name(style: Style) -> &'static str {
     match style {

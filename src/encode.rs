@@ -190,21 +190,15 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
                 }
             }
             let solved: Vec<SolvedBatch> = if solver.follows_previous() {
-                let mut in_order = Vec::with_capacity(waiting.len());
-                for batch in &waiting {
+                let in_order = waiting.iter().map(|batch| {
                     let solved = solve(&solver, batch, previous.as_deref());
                     previous = solved.cages.last().cloned();
-                    in_order.push(solved);
-                }
-                in_order
+                    solved
+                });
+                in_order.collect()
             } else {
                 waiting.par_iter().map(|batch| solve(&solver, batch, None)).collect()
             };
-            let mut first = done;
-            for (batch, solved) in waiting.iter().zip(&solved) {
-                look_for_worst(&mut worst, first, &solved.errors);
-                first += batch.len();
-            }
             for batch in waiting {
                 // The reader may have stopped already.
                 let _ = empty.send(batch);
@@ -215,6 +209,9 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
                 seconds.measure += batch.measure_seconds;
                 convergence.extend(batch.convergence);
                 for (cage, error) in batch.cages.iter().zip(&batch.errors) {
+                    if worst.is_none_or(|worst: WorstError| error.linf > worst.distance) {
+                        worst = Some(WorstError { frame: done, point: Some(error.worst), distance: error.linf });
+                    }
                     writer.write_frame(cage, &StoredError::new(error, solver.diagonal())).map_err(fail)?;
                     done += 1;
                 }
@@ -323,15 +320,6 @@ struct SolvedBatch {
     convergence: Vec<Convergence>,
     invert_seconds: f64,
     measure_seconds: f64,
-}
-
-/// Keeps the largest error so far; frames of a batch count from `first` on.
-fn look_for_worst(worst: &mut Option<WorstError>, first: usize, errors: &[FrameError]) {
-    for (k, error) in errors.iter().enumerate() {
-        if worst.is_none_or(|worst| error.linf > worst.distance) {
-            *worst = Some(WorstError { frame: first + k, point: Some(error.worst), distance: error.linf });
-        }
-    }
 }
 
 /// Solves a batch whose first frame comes after the one with the cage `previous`, where that matters.

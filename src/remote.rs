@@ -1,4 +1,5 @@
-//! Encoding by a service: the same files in and the same container out as [`crate::encode`], but another machine computes.
+//! Encoding by a service: another machine computes, from frames in single precision, the container that [`crate::encode`]
+//! gives of such frames.
 
 mod cage;
 mod frames;

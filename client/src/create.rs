@@ -102,13 +102,12 @@ fn refuse_not_finite(options: &SessionOptions) -> Result<(), ClientError> {
         regularizer: _,
         spectrum: _,
         lambda,
-        max_error,
         cage: _,
         flip_cage: _,
         frame_rate,
         frames: _,
     } = options;
-    for (name, value) in [("lambda", lambda), ("max_error", max_error), ("frame_rate", frame_rate)] {
+    for (name, value) in [("lambda", lambda), ("frame_rate", frame_rate)] {
         if let Some(value) = value.filter(|value| !value.is_finite()) {
             return Err(ClientError::Mismatch(format!("{name}: is {value}; give a finite number, or leave it out")));
         }

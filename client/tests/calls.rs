@@ -42,7 +42,6 @@ async fn options_that_are_not_finite_are_refused_and_nothing_is_sent() {
     for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         for (name, set) in [
             ("lambda", (|new, x| new.options.lambda = Some(x)) as fn(&mut NewSession, f64)),
-            ("max_error", |new, x| new.options.max_error = Some(x)),
             ("frame_rate", |new, x| new.options.frame_rate = Some(x)),
         ] {
             let mut bad = good.clone();

@@ -59,9 +59,6 @@ pub struct SessionOptions {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(minimum = 0))]
     pub lambda: Option<f64>,
-    /// Bound on every vertex's error. Not available yet: a session that asks for it is refused.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub max_error: Option<f64>,
     /// Where the cage comes from if none is sent as a part; made from the rest pose where this is left out as well.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cage: Option<CageSource>,

@@ -2,14 +2,18 @@
 
 use super::cage_args::CageArgs;
 use super::checks::{CaptureArgs, CheckArgs, TimingArgs};
+use super::names;
 use super::outputs::OutputArgs;
 use super::transfer_args::{EditArgs, TransferArgs};
+use crate::compare::Up;
 use crate::config::{ServeFlags, bytes};
 use crate::memory::Memory;
+use cager_cages::Style;
+use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::Handles;
 use cager_core::regularize::Regularizer;
 use cager_formats::FrameRange;
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
@@ -18,7 +22,7 @@ use std::path::PathBuf;
 /// A capture is the same mesh in every frame; a cage is a coarse closed mesh around its rest pose. `encode` recovers the
 /// cage of every frame and writes one small .cager file; `decode` turns it back into positions. Try `cager demo` first: it
 /// needs no files.
-#[derive(Debug, Parser)]
+#[derive(Parser)]
 #[command(name = "cager", version = env!("CAGER_VERSION"), max_term_width = 100, arg_required_else_help = true)]
 pub(crate) struct Cli {
     #[command(flatten)]
@@ -44,7 +48,7 @@ pub(crate) struct Manners {
     pub(crate) verbose: bool,
 }
 
-#[derive(Debug, Subcommand)]
+#[derive(Subcommand)]
 pub(crate) enum Command {
     Encode(Box<EncodeArgs>),
     Decode(DecodeArgs),
@@ -63,7 +67,7 @@ pub(crate) enum Command {
 ///
 /// Without --cage, a cage is designed from the capture first.
 /// Example: cager encode --rest rest.obj --frames 'walk/*.obj' -o walk.cager
-#[derive(Args, Debug)]
+#[derive(Args)]
 pub(crate) struct EncodeArgs {
     /// Model in its rest pose: .obj .ply .off .stl .glb; a point cloud will do.
     #[arg(long, value_name = "REST")]
@@ -111,7 +115,7 @@ pub(crate) struct EncodeArgs {
     #[arg(long, requires = "cage")]
     pub(crate) flip_cage: bool,
 
-    /// Have a service compute: its address, such as http://127.0.0.1:8080.
+    /// Have a service compute: its address, such as http://127.0.0.1:8080. Frames are sent in single precision and numbered from 0.
     #[arg(long, value_name = "URL")]
     pub(crate) server: Option<String>,
 
@@ -131,9 +135,9 @@ pub(crate) struct DesignArgs {
     #[arg(long, value_name = "E", conflicts_with = "cage", allow_negative_numbers = true)]
     pub(crate) mean_error: Option<f64>,
 
-    /// What the designed cage is for [default: free].
-    #[arg(long, value_enum, value_name = "STYLE", conflicts_with = "cage")]
-    pub(crate) style: Option<StyleArg>,
+    /// What the designed cage is for [default: free with mean value coordinates, editable with others].
+    #[arg(long, value_parser = names::style(), value_name = "STYLE", conflicts_with = "cage")]
+    pub(crate) style: Option<Style>,
 
     /// Seed of what a design draws at random: the same seed gives the same cage [default: 0].
     #[arg(long, value_name = "SEED", conflicts_with = "cage")]
@@ -144,23 +148,15 @@ pub(crate) struct DesignArgs {
     pub(crate) time_limit: Option<u32>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum StyleArg {
-    /// For compression and viewing: the lowest error; the cage may cut itself.
-    Free,
-    /// For editing by hand: closed, free of self-intersection, enclosing, smooth.
-    Editable,
-}
-
-#[derive(Args, Debug)]
+#[derive(Args)]
 pub(crate) struct SolverArgs {
     /// Cage coordinates that bind the points to the cage.
-    #[arg(long, value_enum, default_value_t = CoordinatesArg::Mvc)]
-    pub(crate) coordinates: CoordinatesArg,
+    #[arg(long, value_parser = names::coordinates(), default_value = "mvc")]
+    pub(crate) coordinates: &'static dyn CoordinateSystem,
 
     /// Points the inversion reads.
-    #[arg(long, value_enum, default_value_t = HandlesArg::Spread)]
-    pub(crate) handles: HandlesArg,
+    #[arg(long, value_parser = names::handles(), default_value = Handles::default().name())]
+    pub(crate) handles: Handles,
 
     /// How many points rectangular and spread read: from the number of the cage's unknowns to that of the model's points
     /// [default: twice the unknowns].
@@ -168,8 +164,8 @@ pub(crate) struct SolverArgs {
     pub(crate) handle_count: Option<usize>,
 
     /// Treatment of the unstable end of the spectrum.
-    #[arg(long, value_enum, default_value_t = RegularizerArg::Differential)]
-    pub(crate) regularizer: RegularizerArg,
+    #[arg(long, value_parser = names::regularizer(), default_value = Regularizer::default().name())]
+    pub(crate) regularizer: Regularizer,
 
     /// The matrix of --regularizer matrix: sparse, in the Matrix Market format (coordinate), one column per vertex of the cage
     /// in its order.
@@ -229,17 +225,17 @@ pub(crate) struct InspectArgs {
     #[arg(value_name = "IN.cager")]
     pub(crate) input: PathBuf,
 
-    /// Print JSON with the keys of the encode report.
+    /// Print JSON with the keys of the encode report, without its times.
     #[arg(long)]
     pub(crate) json: bool,
 }
 
 /// Compare ways to invert a capture, with the figures of the paper, in one HTML file.
 ///
-/// Every method is run on the capture: the report shows its errors, how calm its cages are, spectra, times and pictures, and
+/// Every method is run on the capture: the report shows its errors, how smoothly its cages move, spectra, times and pictures, and
 /// which options the figures advise. On two cores, 120 frames of 20,000 points in a cage of 330 vertices take some minutes with all
 /// coordinates, and 10 seconds with --coordinates mvc. Example: cager compare --rest rest.obj --cage cage.obj --frames walk.npy -o walk.html
-#[derive(Args, Debug)]
+#[derive(Args)]
 pub(crate) struct CompareArgs {
     /// Model in its rest pose: .obj .ply .off .stl .glb; a point cloud will do.
     #[arg(long, value_name = "REST")]
@@ -249,8 +245,7 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: PathBuf,
 
-    /// Capture, points in the order of the rest pose: a folder or quoted glob of mesh files (2.obj comes before 10.obj), .npy
-    /// (frames × points × 3), .pc2 or .mdd.
+    /// Capture, points in the order of the rest pose, as for encode: a folder or quoted glob of mesh files, .npy, .npz, .pc2 or .mdd.
     #[arg(long, value_name = "FRAMES")]
     pub(crate) frames: PathBuf,
 
@@ -267,8 +262,8 @@ pub(crate) struct CompareArgs {
     pub(crate) json: Option<PathBuf>,
 
     /// Cage coordinates to compare, separated by commas [default: all].
-    #[arg(long, value_enum, value_delimiter = ',', hide_default_value = true)]
-    pub(crate) coordinates: Vec<CoordinatesArg>,
+    #[arg(long, value_parser = names::coordinates(), value_delimiter = ',', hide_default_value = true)]
+    pub(crate) coordinates: Vec<&'static dyn CoordinateSystem>,
 
     /// Frames to measure at the most: evenly spaced ones, each with its neighbours.
     #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
@@ -279,7 +274,7 @@ pub(crate) struct CompareArgs {
 
     /// Axis that points up in the pictures [default: y, or z where the model stands along it].
     #[arg(long, value_enum)]
-    pub(crate) up: Option<UpArg>,
+    pub(crate) up: Option<Up>,
 
     /// Turn all faces of the cage around: for cages whose normals point inwards.
     #[arg(long)]
@@ -356,65 +351,6 @@ fn memory(text: &str) -> Result<Memory, String> {
     }
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum CoordinatesArg {
-    /// Mean value coordinates: defined everywhere, fast.
-    Mvc,
-    /// Harmonic coordinates: never negative, and felt through the inside of the cage only, where all points must be; seconds to
-    /// prepare.
-    Harmonic,
-    /// Green coordinates: the model keeps its angles better; normals of the cage follow from its vertices, found by iterating.
-    Green,
-    /// Green coordinates whose normals are unknowns of their own: the lowest errors, by cages with spikes.
-    GreenFree,
-}
-
-impl CoordinatesArg {
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Mvc => "mvc",
-            Self::Harmonic => "harmonic",
-            Self::Green => "green",
-            Self::GreenFree => "green-free",
-        }
-    }
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum UpArg {
-    /// The first coordinate.
-    X,
-    /// The second, as in most modelling programs.
-    Y,
-    /// The third.
-    Z,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum HandlesArg {
-    /// As many as the cage has unknowns, of maximum volume: stable and fast.
-    Maxvol,
-    /// Those and the points of the largest leverage beside them: for comparison.
-    Rectangular,
-    /// Those and points spread over the model, between which frames are interpolated: nearly the error of all.
-    Spread,
-    /// Every point: least squares, the lowest error.
-    All,
-}
-
-impl HandlesArg {
-    /// These handles, where they can read so many rows.
-    pub(crate) fn handles(self, count: Option<usize>) -> Option<Handles> {
-        let name = match self {
-            Self::Maxvol => "maxvol",
-            Self::Rectangular => "rectangular",
-            Self::Spread => "spread",
-            Self::All => "all",
-        };
-        Handles::by_name(name, count)
-    }
-}
-
 /// What can be given as the spectrum threshold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum SpectrumArg {
@@ -434,40 +370,5 @@ fn spectrum(text: &str) -> Result<SpectrumArg, String> {
             .parse()
             .map(SpectrumArg::Threshold)
             .map_err(|_| "give a whole number of at least 0, all, or auto".to_owned()),
-    }
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum RegularizerArg {
-    /// Smooth the last S singular directions by the cage's Laplacian.
-    Laplacian,
-    /// Give the last S singular directions the shape of the rest cage.
-    Differential,
-    /// Give the last S singular directions the shape of the previous frame's cage; frames are inverted in order.
-    Temporal,
-    /// Make the product of the matrix in --regularizer-matrix and the cage small in the last S singular directions.
-    Matrix,
-    /// Follow the data alone.
-    None,
-    /// Drop the last S singular directions.
-    TruncatedSvd,
-    /// Damp every direction, with α = L.
-    Tikhonov,
-    /// Smooth the whole spectrum by the cage's Laplacian (for other terms: --spectrum all).
-    Global,
-}
-
-impl From<RegularizerArg> for Regularizer {
-    fn from(arg: RegularizerArg) -> Self {
-        match arg {
-            RegularizerArg::Laplacian => Self::Laplacian,
-            RegularizerArg::Differential => Self::Differential,
-            RegularizerArg::Temporal => Self::Temporal,
-            RegularizerArg::Matrix => Self::Matrix,
-            RegularizerArg::None => Self::None,
-            RegularizerArg::TruncatedSvd => Self::TruncatedSvd,
-            RegularizerArg::Tikhonov => Self::Tikhonov,
-            RegularizerArg::Global => Self::Global,
-        }
     }
 }

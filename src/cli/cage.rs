@@ -1,13 +1,11 @@
 //! `cager cage`: cages made, designed, improved.
 
-use super::args::UpArg;
 use super::cage_args::{CageArgs, GeneralArg};
 use super::checks::check_capture;
 use super::design::{self, usual_vertices};
 use super::dry_run::{read_files, tell_would};
 use super::outputs::Outputs;
 use super::{grouped, tell, warn};
-use crate::compare::render::Up;
 use crate::design::{read_frames, report as design_report};
 use crate::frames::CaptureFiles;
 use crate::picture;
@@ -146,7 +144,7 @@ impl<'a> Motion<'a> {
         let start = args.improve.as_ref().map(|path| read_model(path).map(|model| (path, model))).transpose()?;
         let options = DesignOptions {
             goal: design::goal(args.vertices, args.mean_error, rest.points.len())?,
-            style: args.style.map_or(Style::Editable, Into::into),
+            style: args.style.unwrap_or(Style::Editable),
             seed: args.seed,
             time_limit: args.time_limit.map(|s| Duration::from_secs(s.into())),
             keep_connectivity: start.is_some(),
@@ -226,12 +224,7 @@ pub(super) fn cage_bytes(target: &Target, cage: &Model) -> Result<Vec<u8>> {
 
 /// A picture of models in a cage, or beside it.
 pub(super) fn picture_of(args: &CageArgs, model: &TriMesh, cage: &TriMesh) -> Vec<u8> {
-    let up = args.up.map(|up| match up {
-        UpArg::X => Up::X,
-        UpArg::Y => Up::Y,
-        UpArg::Z => Up::Z,
-    });
-    picture::of_cage(model, cage, up)
+    picture::of_cage(model, cage, args.up)
 }
 
 pub(super) fn whole(target: &Target, bytes: &[u8]) -> Result<AtomicFile> {
@@ -259,12 +252,8 @@ fn name_file(error: &EncloseError, args: &CageArgs) -> anyhow::Error {
 }
 
 fn summary(report: &CageReport, output: &Path) -> String {
-    let mut text = format!(
-        "{}: {} vertices, {} triangles\n",
-        output.display(),
-        grouped(report.vertices as u64),
-        grouped(report.faces as u64)
-    );
+    let mut text =
+        format!("{}: {} vertices, {} triangles\n", output.display(), grouped(report.vertices), grouped(report.faces));
     if let Some(design) = &report.design {
         let first = design.stages.first().map_or(design.held_back_error, |stage| stage.held_back_error);
         text += &format!(
@@ -276,12 +265,10 @@ fn summary(report: &CageReport, output: &Path) -> String {
     }
     let tidy = match (report.points_outside, report.self_intersections) {
         (0, 0) => "encloses every point and does not cut itself".to_owned(),
-        (0, cuts) => format!("encloses every point; {} pairs of faces cut each other", grouped(cuts as u64)),
-        (outside, cuts) => format!(
-            "{} points lie outside; {} pairs of faces cut each other",
-            grouped(outside as u64),
-            grouped(cuts as u64)
-        ),
+        (0, cuts) => format!("encloses every point; {} pairs of faces cut each other", grouped(cuts)),
+        (outside, cuts) => {
+            format!("{} points lie outside; {} pairs of faces cut each other", grouped(outside), grouped(cuts))
+        }
     };
     text + &format!("  shape   {tidy}\n  time    {:.3} s\n", report.seconds)
 }

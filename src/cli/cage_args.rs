@@ -1,8 +1,10 @@
 //! What can be typed after `cager cage`.
 
-use super::args::{StyleArg, UpArg};
 use super::checks::CheckArgs;
+use super::names;
 use super::outputs::OutputArgs;
+use crate::compare::Up;
+use cager_cages::Style;
 use clap::{ArgGroup, Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -38,8 +40,8 @@ pub(crate) struct CageArgs {
     pub(crate) mean_error: Option<f64>,
 
     /// What the designed cage is for; needs --frames [default: editable].
-    #[arg(long, value_enum, value_name = "STYLE", requires = "frames")]
-    pub(crate) style: Option<StyleArg>,
+    #[arg(long, value_parser = names::style(), value_name = "STYLE", requires = "frames")]
+    pub(crate) style: Option<Style>,
 
     /// Least distance of the model's points to the cage, as a fraction of the rest pose's diagonal [default: chosen].
     #[arg(long, value_name = "D", conflicts_with = "frames", allow_negative_numbers = true)]
@@ -67,7 +69,7 @@ pub(crate) struct CageArgs {
 
     /// Keep the improved cage symmetric across the plane of this axis.
     #[arg(long, value_enum, value_name = "AXIS", requires = "improve")]
-    pub(crate) symmetry: Option<UpArg>,
+    pub(crate) symmetry: Option<Up>,
 
     /// Seed of what a design draws at random: the same seed gives the same cage.
     #[arg(long, value_name = "SEED", default_value_t = 0)]
@@ -83,7 +85,7 @@ pub(crate) struct CageArgs {
 
     /// Axis that points up in the picture [default: y, or z where the model stands along it].
     #[arg(long, value_enum, requires = "picture")]
-    pub(crate) up: Option<UpArg>,
+    pub(crate) up: Option<Up>,
 
     /// Write what was found out as JSON.
     #[arg(long, value_name = "REPORT.json")]

@@ -1,7 +1,6 @@
 //! What is checked before an encoding or a design: that rest pose, cage and capture belong together. A mistake ends the work, unless
 //! --force turns it into a warning.
 
-use super::args::UpArg;
 use super::warn;
 use crate::belong::{self, Mismatch, Up, mismatches};
 use crate::encode::{EncodeError, sample_frames};
@@ -25,7 +24,7 @@ pub(crate) struct CaptureArgs {
 
     /// Axis that points up in the capture, where another one does in the rest pose: frames are turned to the rest pose's axes.
     #[arg(long = "up", id = "capture_up", value_name = "AXIS", value_parser = up)]
-    pub(super) up: Option<UpArg>,
+    pub(super) up: Option<Up>,
 
     /// Merge the points of the rest pose that seams split (flat shading, UVs); frames are read split or merged.
     #[arg(long)]
@@ -59,10 +58,10 @@ pub(crate) struct TimingArgs {
     pub(super) start: Option<f64>,
 }
 
-fn up(text: &str) -> Result<UpArg, String> {
+fn up(text: &str) -> Result<Up, String> {
     match text {
-        "y" => Ok(UpArg::Y),
-        "z" => Ok(UpArg::Z),
+        "y" => Ok(Up::Y),
+        "z" => Ok(Up::Z),
         _ => Err("give y or z".to_owned()),
     }
 }
@@ -88,7 +87,7 @@ pub(super) fn capture_files(args: &CaptureArgs, path: &Path, rest: &mut Model) -
     let mut files = CaptureFiles::new(path, rest.points.len());
     files.allow_gaps = args.checks.allow_gaps;
     files.timing = (&args.timing).into();
-    files.up = args.up.map(|up| if matches!(up, UpArg::Z) { Up::Z } else { Up::Y });
+    files.up = args.up;
     if let Some(welded) = args.weld.then(|| weld(rest)).flatten() {
         *rest = welded.model;
         files.points = rest.points.len();

@@ -1,15 +1,15 @@
 //! `cager compare`.
 
-use super::args::{CompareArgs, CoordinatesArg, UpArg};
+use super::args::CompareArgs;
 use super::checks::{check_cage, check_capture};
 use super::dry_run::{read_all, tell_would};
 use super::outputs::Outputs;
 use super::solver_options::{blame, read_cage};
 use super::{human_bytes, plain, progress};
-use crate::compare::{CompareError, Figures, Job, Progress, Up, compare, page, seconds};
+use crate::compare::{CompareError, Figures, Job, Progress, compare, page, seconds};
 use crate::coordinates;
 use crate::frames::CaptureFiles;
-use anyhow::{Context, Result};
+use anyhow::Result;
 use cager_core::coordinates::CoordinateSystem;
 use cager_formats::{AtomicFile, commit_together, read_model};
 use indicatif::ProgressBar;
@@ -31,7 +31,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     check_cage((&args.cage, cage.mesh()), &rest, &args.checks)?;
     let open = || files.open();
     let frames = open()?.frames();
-    let systems = systems(&args.coordinates)?;
+    let systems = systems(&args.coordinates);
     if args.outputs.dry_run {
         let frames = read_all(open()?.as_mut())?;
         let what = format!("a comparison on at most {} of {frames} frames", args.frames_at_most.min(frames as u32));
@@ -85,18 +85,17 @@ fn show(bar: &ProgressBar, step: &str, done: f64, expected: f64) {
 }
 
 /// The systems asked for, each once; all where none is.
-fn systems(names: &[CoordinatesArg]) -> Result<Vec<&'static dyn CoordinateSystem>> {
-    if names.is_empty() {
-        return Ok(coordinates::ALL.to_vec());
+fn systems(given: &[&'static dyn CoordinateSystem]) -> Vec<&'static dyn CoordinateSystem> {
+    if given.is_empty() {
+        return coordinates::ALL.to_vec();
     }
     let mut systems: Vec<&'static dyn CoordinateSystem> = Vec::new();
-    for name in names.iter().map(|name| name.name()) {
-        let system = coordinates::by_name(name).with_context(|| format!("--coordinates: {name} is unknown"))?;
-        if systems.iter().all(|known| known.name() != name) {
+    for &system in given {
+        if systems.iter().all(|known| known.name() != system.name()) {
             systems.push(system);
         }
     }
-    Ok(systems)
+    systems
 }
 
 fn summary(figures: &Figures, output: &Path, bytes: u64, seconds: f64) -> Result<String> {
@@ -113,7 +112,8 @@ fn summary(figures: &Figures, output: &Path, bytes: u64, seconds: f64) -> Result
             writeln!(out, "  {:<12}not compared: {}", system.name, plain(reason))?;
         }
     }
-    for (name, choice) in [("calmest", &figures.recommendation.editing), ("closest", &figures.recommendation.accuracy)]
+    for (name, choice) in
+        [("smoothest", &figures.recommendation.editing), ("closest", &figures.recommendation.accuracy)]
     {
         if let Some(choice) = choice {
             writeln!(out, "  {name:<12}{}   (mean L2 {:.4} %)", choice.flags, 100.0 * choice.l2_mean)?;
@@ -121,16 +121,6 @@ fn summary(figures: &Figures, output: &Path, bytes: u64, seconds: f64) -> Result
     }
     writeln!(out, "  time        {seconds:.1} s")?;
     Ok(out)
-}
-
-impl From<UpArg> for Up {
-    fn from(arg: UpArg) -> Self {
-        match arg {
-            UpArg::X => Self::X,
-            UpArg::Y => Self::Y,
-            UpArg::Z => Self::Z,
-        }
-    }
 }
 
 #[cfg(test)]

@@ -45,7 +45,7 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
         return tell(&format!(
             "{}: {} cages of {} vertices{rest}\n",
             output.path().display(),
-            grouped(found.frames as u64),
+            grouped(found.frames),
             grouped(found.vertices),
         ));
     }
@@ -71,8 +71,8 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     tell(&format!(
         "{}: {} frames of {} points in {:.3} s\n",
         output.path().display(),
-        grouped(found.frames as u64),
-        grouped(found.points as u64),
+        grouped(found.frames),
+        grouped(found.points),
         clock.elapsed().as_secs_f64()
     ))
 }
@@ -86,7 +86,7 @@ fn outside(path: &Path, outside: usize, points: usize) -> String {
     format!(
         "{}: {} of {} points lie outside the rest cage; {advice}",
         path.display(),
-        grouped(outside as u64),
-        grouped(points as u64)
+        grouped(outside),
+        grouped(points)
     )
 }

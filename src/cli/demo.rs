@@ -70,11 +70,8 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
     compare(&capture, &decoded, &report)?;
 
     let (l2, linf): (Vec<f64>, Vec<f64>) = report.error.per_frame.iter().map(|e| (e.l2, e.linf)).unzip();
-    let title = format!(
-        "Built-in capture: {} points, cage of {} vertices",
-        grouped(report.points as u64),
-        report.cage_vertices
-    );
+    let title =
+        format!("Built-in capture: {} points, cage of {} vertices", grouped(report.points), report.cage_vertices);
     let mut plot = AtomicFile::create(folder.join("errors.svg"))?;
     plot.write_all(error_plot(&title, &l2, &linf).as_bytes())?;
     plot.commit()?;
@@ -132,7 +129,7 @@ fn table(report: &Report, steps: &Steps, decode_seconds: f64, folder: &Path) -> 
     let seconds = |s: f64| format!("{s:.3} s");
     let mut out = String::new();
     let mut row = |name: &str, value: String, note: &str| writeln!(out, "  {name:<24}{value:>14}   {note}");
-    row("points × frames", format!("{} × {}", grouped(report.points as u64), report.frames), "")?;
+    row("points × frames", format!("{} × {}", grouped(report.points), report.frames), "")?;
     row("cage vertices / faces", format!("{} / {}", report.cage_vertices, report.cage_faces), "")?;
     row("capture", human_bytes(report.bytes.capture), "positions as f32 and one connectivity")?;
     row("capture.cager", human_bytes(report.bytes.output), "rest pose and cage included")?;

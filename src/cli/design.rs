@@ -1,9 +1,8 @@
 //! Designing a cage while a bar shows how its error falls: what `cager cage` and `cager encode` share.
 
-use super::args::StyleArg;
 use super::progress;
 use anyhow::{Result, bail};
-use cager_cages::{Design, DesignError, DesignOptions, Goal, Progress, Style};
+use cager_cages::{Design, DesignError, DesignOptions, Goal, Progress};
 use cager_core::mesh::{Model, TriMesh};
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -11,15 +10,6 @@ use std::path::Path;
 /// Vertices of a cage where no number is given: fewer for a model whose points could not determine so many.
 pub(super) fn usual_vertices(points: usize) -> usize {
     350.min(points / 2).max(4)
-}
-
-impl From<StyleArg> for Style {
-    fn from(arg: StyleArg) -> Self {
-        match arg {
-            StyleArg::Free => Self::Free,
-            StyleArg::Editable => Self::Editable,
-        }
-    }
 }
 
 /// What the number of vertices of a cage around so many points follows from.

@@ -42,5 +42,5 @@ pub(super) fn tell_would(output: &Target, what: &str, others: &[Option<Target>])
 /// `20 frames of 600 points, about 144.0 kB`: what frames take in single precision.
 pub(super) fn size(frames: usize, rows: usize, of: &str) -> String {
     let bytes = 12 * frames as u64 * rows as u64;
-    format!("{} frames of {} {of}, about {}", grouped(frames as u64), grouped(rows as u64), human_bytes(bytes))
+    format!("{} frames of {} {of}, about {}", grouped(frames), grouped(rows), human_bytes(bytes))
 }

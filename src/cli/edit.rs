@@ -25,7 +25,7 @@ pub(super) fn run(args: &EditArgs) -> Result<()> {
     tell(&format!(
         "{}: {} frames, {} of them with another cage; errors of these are not measured\n",
         output.path().display(),
-        grouped(found.frames as u64),
-        grouped(found.changed as u64)
+        grouped(found.frames),
+        grouped(found.changed)
     ))
 }

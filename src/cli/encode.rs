@@ -1,6 +1,6 @@
 //! `cager encode`: here, and what is the same where a service encodes.
 
-use super::args::{CoordinatesArg, EncodeArgs, SpectrumArg, StyleArg};
+use super::args::{EncodeArgs, SpectrumArg};
 use super::checks::{capture_files, check_cage, check_capture};
 use super::dry_run::{read_files, size, tell_would};
 use super::encode_summary::{summary, write_report};
@@ -13,9 +13,9 @@ use crate::frames::CaptureFiles;
 use crate::memory::Memory;
 use crate::speed::seconds_to_prepare;
 use anyhow::{Context, Result, bail};
-use cager_cages::DesignOptions;
+use cager_cages::{DesignOptions, Style};
 use cager_core::cage::Cage;
-use cager_core::coordinates::CoordinateSystem;
+use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::{PrepareError, Solver, SolverOptions, check_options};
 use cager_core::mesh::Model;
 use cager_core::regularize::{Regularizer, SparseMatrix, Term};
@@ -94,7 +94,7 @@ fn dry_run(
             if args.server.is_some() {
                 designed_spectrum(&args.solver)?;
             }
-            format!("{} frames; a cage would be designed from them first", grouped(read_files(files)? as u64))
+            format!("{} frames; a cage would be designed from them first", grouped(read_files(files)?))
         }
     };
     tell_would(&targets.output, &what, std::slice::from_ref(&targets.report))
@@ -102,18 +102,15 @@ fn dry_run(
 
 /// How a cage is designed. Mean value coordinates do without a tidy one; the others want all points inside.
 pub(super) fn design_options(args: &EncodeArgs, points: usize) -> Result<DesignOptions> {
-    let usual = match args.solver.coordinates {
-        CoordinatesArg::Mvc => StyleArg::Free,
-        _ => StyleArg::Editable,
-    };
-    if args.design.mean_error.is_some() && !matches!(args.solver.coordinates, CoordinatesArg::Mvc) {
+    let mean_value = args.solver.coordinates.name() == MeanValue.name();
+    if args.design.mean_error.is_some() && !mean_value {
         bail!(
             "--mean-error: is measured with mean value coordinates; give --cage-vertices, or leave --coordinates out"
         );
     }
     Ok(DesignOptions {
         goal: design::goal(args.design.cage_vertices, args.design.mean_error, points)?,
-        style: args.design.style.unwrap_or(usual).into(),
+        style: args.design.style.unwrap_or(if mean_value { Style::Free } else { Style::Editable }),
         seed: args.design.seed.unwrap_or(0),
         time_limit: args.design.time_limit.map(|s| Duration::from_secs(s.into())),
         ..DesignOptions::default()

@@ -55,9 +55,9 @@ pub(super) fn summary(report: &Report, output: &Path) -> String {
          \x20 system  condition {:.1} (all points {:.1}), rank {} of {}, affine reproduction {:.1e}\n\
          {refined}{chosen}\x20 time    {:.3} s\n{steps}",
         output.display(),
-        grouped(report.frames as u64),
-        grouped(report.points as u64),
-        grouped(report.cage_vertices as u64),
+        grouped(report.frames),
+        grouped(report.points),
+        grouped(report.cage_vertices),
         human_bytes(report.bytes.output),
         human_bytes(report.bytes.capture),
         report.bytes.ratio,

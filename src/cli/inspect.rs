@@ -59,10 +59,10 @@ fn sections(container: &Container) -> Vec<Section> {
 fn as_text(name: &str, report: &Report, sections: &[Section]) -> Result<String> {
     let mut out = String::new();
     writeln!(out, "{name}: {}, every checksum matches", human_bytes(report.bytes.output))?;
-    let (frames, points) = (grouped(report.frames as u64), grouped(report.points as u64));
+    let (frames, points) = (grouped(report.frames), grouped(report.points));
     writeln!(out, "  capture   {frames} frames of {points} points")?;
     numbers(&mut out, report)?;
-    let (vertices, faces) = (grouped(report.cage_vertices as u64), grouped(report.cage_faces as u64));
+    let (vertices, faces) = (grouped(report.cage_vertices), grouped(report.cage_faces));
     writeln!(out, "  cage      {vertices} vertices, {faces} faces")?;
     // How many are read is known where not every point is.
     let read = match report.handle_indices.len() {

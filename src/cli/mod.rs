@@ -19,6 +19,7 @@ mod inspect;
 mod interrupt;
 mod manners;
 mod manual;
+mod names;
 mod outputs;
 mod own_service;
 mod progress;
@@ -26,6 +27,7 @@ pub(crate) mod serve;
 mod solver_options;
 mod transfer_args;
 
+use crate::plot::grouped;
 use args::{Cli, Command};
 use clap::{CommandFactory, Parser};
 pub(crate) use manners::{is_quiet, is_verbose, tell};
@@ -113,19 +115,6 @@ fn warn(warnings: &[String]) {
 /// Text of a file's own, without what would move a terminal's cursor or change its colours.
 fn plain(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
-}
-
-/// `1234567` as `1,234,567`.
-fn grouped(n: u64) -> String {
-    let digits = n.to_string();
-    let mut out = String::with_capacity(digits.len() * 4 / 3);
-    for (k, c) in digits.chars().enumerate() {
-        if k > 0 && (digits.len() - k).is_multiple_of(3) {
-            out.push(',');
-        }
-        out.push(c);
-    }
-    out
 }
 
 /// A number of bytes with a unit people read.

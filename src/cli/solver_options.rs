@@ -2,12 +2,11 @@
 
 use super::args::{SolverArgs, SpectrumArg};
 use super::{grouped, warn};
-use crate::coordinates;
 use anyhow::{Context, Result, bail};
 use cager_cages::doctor::weld;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{PrepareError, SolverOptions, usual_spectrum};
+use cager_core::inversion::{Handles, PrepareError, SolverOptions, usual_spectrum};
 use cager_core::mesh::TriMesh;
 use cager_core::regularize::{Regularizer, SparseMatrix};
 use cager_formats::{read_matrix, read_model};
@@ -19,7 +18,7 @@ pub(super) fn read_cage(path: &Path, flip: bool) -> Result<Cage> {
         bail!("{}: has no faces, and a cage is a closed mesh; export the cage with its faces", path.display());
     }
     if let Some(welded) = weld(&model) {
-        let places = grouped(welded.merged as u64);
+        let places = grouped(welded.merged);
         warn(&[format!(
             "{}: merged {places} vertices with others in the same place, as seams split them",
             path.display()
@@ -42,15 +41,12 @@ pub(super) fn solver_for(
     args: &SolverArgs,
     unknowns: impl FnOnce(&'static dyn CoordinateSystem) -> usize,
 ) -> Result<(&'static dyn CoordinateSystem, SolverOptions)> {
-    let name = args.coordinates.name();
-    let system = coordinates::by_name(name).with_context(|| format!("--coordinates: {name} is unknown"))?;
+    let system = args.coordinates;
     let unknowns = unknowns(system);
     let options = SolverOptions {
-        handles: args
-            .handles
-            .handles(args.handle_count)
+        handles: Handles::by_name(args.handles.name(), args.handle_count)
             .context("--handle-count: maxvol and all read a number of points of their own; leave it out")?,
-        regularizer: args.regularizer.into(),
+        regularizer: args.regularizer,
         spectrum: match args.spectrum {
             None => usual_spectrum(unknowns),
             Some(SpectrumArg::Threshold(s)) => s,
@@ -78,7 +74,7 @@ pub(super) fn designed_spectrum(args: &SolverArgs) -> Result<Option<u32>> {
 
 /// The matrix of `--regularizer matrix`.
 pub(super) fn matrix(args: &SolverArgs) -> Result<Option<SparseMatrix>> {
-    match (&args.regularizer_matrix, Regularizer::from(args.regularizer)) {
+    match (&args.regularizer_matrix, args.regularizer) {
         (Some(path), Regularizer::Matrix) => Ok(Some(read_matrix(path)?)),
         (None, Regularizer::Matrix) => {
             bail!("--regularizer matrix: needs a matrix; give --regularizer-matrix FILE.mtx")

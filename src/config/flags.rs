@@ -6,7 +6,9 @@ use crate::telemetry::LogFormat;
 use std::path::PathBuf;
 use toml::Value;
 
-/// Flags of `cager serve`.
+/// Run the service: the jobs of this program over HTTP, for several users and programs at once.
+///
+/// Without access tokens it listens to this machine alone. Example: cager serve --data /srv/cager
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct ServeFlags {
     /// Address and port to listen on [default: 127.0.0.1:8080].

@@ -11,7 +11,7 @@ use cager_proto::messages::{
     CageSource, FrameErrors, FrameResult, Problem, RestCage, Session, SessionList, SessionOptions,
 };
 use http::header;
-use serde_json::{Value, json};
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 use utoipa::openapi::encoding::EncodingBuilder;
@@ -172,8 +172,6 @@ pub(crate) fn finished(mut document: utoipa::openapi::OpenApi) -> Value {
     for form in ["NewSessionForm", "NewCageForm", "OtherModelForm"] {
         schemas[form]["additionalProperties"] = false.into();
     }
-    let refused = &mut schemas["SessionOptions"]["properties"]["max_error"];
-    *refused = json!({ "type": "null", "description": refused["description"] });
     document
 }
 

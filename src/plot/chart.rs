@@ -8,7 +8,7 @@ use super::text::{escaped, short};
 use std::fmt::Write;
 
 /// Sizes in pixels of the drawing.
-const WIDTH: f64 = 520.0;
+pub(super) const WIDTH: f64 = 520.0;
 const LEFT: f64 = 62.0;
 const RIGHT: f64 = 508.0;
 const PANEL: f64 = 214.0;
@@ -86,8 +86,17 @@ pub(crate) struct Chart {
 }
 
 impl Chart {
-    /// The `svg` element.
+    /// The `svg` element, for a page with a style sheet.
     pub(crate) fn svg(&self) -> String {
+        let (drawing, height) = self.drawing();
+        let title = escaped(&self.title);
+        format!(
+            "<svg class=\"chart\" viewBox=\"0 0 {WIDTH} {height}\" role=\"img\" aria-label=\"{title}\">\n{drawing}</svg>\n"
+        )
+    }
+
+    /// What is in the `svg` element, and how high it is.
+    pub(super) fn drawing(&self) -> (String, f64) {
         let all = |f: fn(&(f64, f64)) -> f64| -> Vec<f64> {
             self.series.iter().flat_map(|s| s.points.iter().map(f)).collect()
         };
@@ -96,13 +105,7 @@ impl Chart {
         let (legend, rows) = self.legend(top_of_legend);
         let top = top_of_legend + LEGEND_ROW * rows as f64 + 8.0;
         let place = Place { x, y, top };
-        let height = top + PANEL + 42.0;
         let mut svg = String::new();
-        let _ = writeln!(
-            svg,
-            r#"<svg class="chart" viewBox="0 0 {WIDTH} {height}" role="img" aria-label="{}">"#,
-            escaped(&self.title)
-        );
         if !self.title.is_empty() {
             let _ = writeln!(svg, r#"<text class="t" x="{LEFT}" y="15">{}</text>"#, escaped(&self.title));
         }
@@ -111,8 +114,7 @@ impl Chart {
         for series in &self.series {
             draw(&mut svg, series, &place);
         }
-        svg.push_str("</svg>\n");
-        svg
+        (svg, top + PANEL + 42.0)
     }
 
     /// The legend, and its number of rows.
@@ -210,18 +212,18 @@ fn draw(svg: &mut String, series: &Series, place: &Place) {
         Mark::Line | Mark::Dashes => {
             let dashes = if series.mark == Mark::Dashes { r#" stroke-dasharray="5 3""# } else { "" };
             let finite = |p: &(f64, f64)| p.0.is_finite() && p.1.is_finite();
-            let mut path = String::new();
+            let few = series.mark == Mark::Line && series.points.len() <= DOTS;
+            let (mut path, mut dots) = (String::new(), String::new());
             for run in series.points.split(|p| !finite(p)) {
+                // A line of one point would not be seen.
+                for &(x, y) in run.iter().filter(|_| few || run.len() == 1) {
+                    dot(&mut dots, place.x_of(x), place.y_of(y), 2.4);
+                }
                 for (i, &(x, y)) in thinned(run).iter().enumerate() {
                     let _ = write!(path, "{}{:.1} {:.1}", if i == 0 { 'M' } else { 'L' }, place.x_of(x), place.y_of(y));
                 }
             }
-            let _ = write!(svg, r#"<path class="c" d="{path}"{dashes}/>"#);
-            if series.points.len() <= DOTS {
-                for &(x, y) in series.points.iter().filter(|p| finite(p)) {
-                    dot(svg, place.x_of(x), place.y_of(y), 2.4);
-                }
-            }
+            let _ = write!(svg, r#"<path class="c" d="{path}"{dashes}/>{dots}"#);
         }
         Mark::Dots | Mark::Diamonds => {
             for &(x, y) in series.points.iter().filter(|p| p.0.is_finite() && p.1.is_finite()) {

@@ -1,7 +1,5 @@
 //! Axes: which values they span, and where their ticks are.
 
-/// An axis whose values span more than this factor is logarithmic.
-const LINEAR_SPAN: f64 = 1000.0;
 /// Decades a logarithmic axis shows at most; below are rounding errors and zeros.
 const DECADES: f64 = 15.0;
 
@@ -64,26 +62,6 @@ impl Scale {
         }
     }
 
-    /// The axis from zero for values that are not negative, or the logarithmic one where they differ too much.
-    pub(crate) fn over(values: &[f64]) -> Self {
-        let positive = || values.iter().copied().filter(|value| value.is_finite() && *value > 0.0);
-        let largest = positive().fold(0.0, f64::max);
-        if largest < f64::MIN_POSITIVE {
-            return Self { logarithmic: false, low: 0.0, high: 1.0 };
-        }
-        let least = positive().fold(largest, f64::min);
-        if largest / least > LINEAR_SPAN {
-            let high = largest.log10().ceil();
-            let low = least.log10().floor().max(high - DECADES);
-            return Self { logarithmic: true, low: 10_f64.powf(low), high: 10_f64.powf(high) };
-        }
-        // Headroom, so that no curve runs along the panel's upper edge; none where it would overflow.
-        let reach = if largest < f64::MAX / 100.0 { 1.04 * largest } else { largest };
-        let step = nice_step(reach, 4.0);
-        let high = (step * (reach / step).ceil()).min(f64::MAX);
-        Self { logarithmic: false, low: 0.0, high }
-    }
-
     /// Height of a value within the panel: 0 at the bottom, 1 at the top.
     pub(crate) fn position(&self, value: f64) -> f64 {
         let position = if self.logarithmic {
@@ -117,7 +95,7 @@ impl Scale {
 }
 
 /// The least of 1, 2 and 5 times a power of ten that divides `span` into no more than `parts`.
-pub(crate) fn nice_step(span: f64, parts: f64) -> f64 {
+fn nice_step(span: f64, parts: f64) -> f64 {
     if span <= 0.0 {
         return 1.0;
     }

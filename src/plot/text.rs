@@ -1,6 +1,4 @@
-//! Words, numbers and strokes of an SVG document.
-
-use std::fmt::Write;
+//! Words and numbers of an SVG document.
 
 /// Text that may stand between tags; characters XML forbids become spaces.
 pub(crate) fn escaped(text: &str) -> String {
@@ -20,16 +18,8 @@ pub(crate) fn escaped(text: &str) -> String {
     out
 }
 
-pub(crate) fn text(svg: &mut String, x: f64, y: f64, anchor: &str, colour: &str, content: &str) {
-    let _ = writeln!(svg, r#"<text x="{x:.1}" y="{y:.1}" text-anchor="{anchor}" fill="{colour}">{content}</text>"#);
-}
-
-pub(crate) fn line(svg: &mut String, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2], style: &str) {
-    let _ = writeln!(svg, r#"<line x1="{x1:.1}" y1="{y1:.1}" x2="{x2:.1}" y2="{y2:.1}" {style}/>"#);
-}
-
-/// Digits in groups of three.
-pub(crate) fn grouped(number: usize) -> String {
+/// A whole number with its digits in groups of three, `1,234,567`.
+pub(crate) fn grouped(number: impl ToString) -> String {
     let digits = number.to_string();
     let mut out = String::new();
     for (i, digit) in digits.chars().enumerate() {

@@ -39,9 +39,6 @@ impl Choices {
         if options.name.as_ref().is_some_and(|name| name.chars().count() > NAME_CHARACTERS) {
             return refuse(format!("name: is longer than {NAME_CHARACTERS} characters; shorten it"));
         }
-        if options.max_error.is_some() {
-            return refuse("max_error: is not available yet; leave it out".to_owned());
-        }
         if options.frame_rate.is_some_and(|rate| !(rate.is_finite() && rate > 0.0)) {
             return refuse("frame_rate: give a positive number of frames per second".to_owned());
         }

@@ -1,7 +1,7 @@
 //! `cager encode --server`.
 
 use crate::server::{Server, capture};
-use crate::support::{Dir, ENCODE, Small};
+use crate::support::{Dir, ENCODE, Small, npy_f64, read_frames};
 use serde_json::Value;
 
 /// A token and its SHA-256.
@@ -25,6 +25,9 @@ fn a_service_gives_the_bytes_and_the_report_that_this_machine_gives() {
         " --regularizer differential --spectrum all",
         " --regularizer temporal",
         " --regularizer matrix --regularizer-matrix d.mtx",
+        " --coordinates harmonic",
+        " --coordinates green --handles maxvol",
+        " --coordinates green-free",
     ] {
         dir.cager(&format!("{ENCODE} --report here.json{options}")).succeeds();
         let here = dir.read("out.cager");
@@ -38,10 +41,26 @@ fn a_service_gives_the_bytes_and_the_report_that_this_machine_gives() {
             // A service knows the worst frame, but has not kept the point.
             assert!(report["error"]["worst"]["frame"].is_u64(), "{report}");
             report["error"]["worst"] = Value::Null;
+            // Nor how the iteration of each frame went.
+            report["consistency"] = Value::Null;
         }
         assert_eq!(here, there, "{options}");
         assert!(said.stdout.contains("20 frames of") && said.stdout.contains(&server.address()), "{}", said.stdout);
     }
+}
+
+#[test]
+fn a_capture_in_doubles_is_sent_in_singles() {
+    let (dir, ..) = capture();
+    let server = Server::start(&dir);
+    let singles = read_frames(&dir.path("frames.npy"), Small::new().rest.points.len());
+    let doubles: Vec<Vec<f64>> = singles.iter().map(|frame| frame.iter().map(|x| x * (1.0 + 1e-9)).collect()).collect();
+    assert_ne!(doubles, singles);
+    dir.cager(ENCODE).succeeds();
+    let rounded = dir.read("out.cager");
+    dir.write("frames.npy", npy_f64(&doubles));
+    dir.cager(&format!("{ENCODE} --server {}", server.address())).succeeds();
+    assert!(dir.read("out.cager") == rounded, "other bytes than those of the rounded capture");
 }
 
 #[test]

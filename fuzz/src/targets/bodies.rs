@@ -170,7 +170,7 @@ pub(super) const NEW_SESSION: Target = Target {
             |cut: &str, rest: String| format!("{cut}multipart/form-data; boundary=B\n{rest}--B--\r\n").into_bytes();
         vec![
             body("\u{7}", files.clone() + &part("options", "", options)),
-            body("\u{7f}", part("options", "", "{\"max_error\":0.1}") + &files),
+            body("\u{7f}", part("options", "", "{\"no_such_option\":0.1}") + &files),
             body("\u{1}", files.clone()),
             body(
                 "\u{3}",
@@ -198,7 +198,6 @@ pub(super) const NEW_SESSION: Target = Target {
         "regularizer_matrix",
         "\"lambda\":",
         "\"cage_vertices\":",
-        "\"max_error\":",
         "\"flip_cage\":",
         "\"frame_rate\":",
         "1e400",

@@ -11,7 +11,7 @@ use cager_core::regularize::Regularizer;
 /// Spikes and edges, per method and threshold.
 pub(super) fn section(html: &mut Html, figures: &Figures, systems: &[Shown<'_>]) {
     html.section("cages", "Stability of the cages");
-    html.paragraph("A good cage moves as calmly as the model. The second difference in time, |C(t+1) − 2 C(t) + C(t−1)|, is what the eye sees as shaking: its mean over vertices and frames measures how restless a cage is, its largest value the worst spike. The change of the cage's edges against the rest cage measures how far it has lost its shape.");
+    html.paragraph("A good cage moves as smoothly as the model. The second difference in time, |C(t+1) − 2 C(t) + C(t−1)|, is what the eye sees as shaking: its mean over vertices and frames measures how restless a cage is, its largest value the worst spike. The change of the cage's edges against the rest cage measures how far it has lost its shape.");
     for (name, found, shots) in systems {
         html.heading(name);
         html.plots(
@@ -22,7 +22,7 @@ pub(super) fn section(html: &mut Html, figures: &Figures, systems: &[Shown<'_>])
                 trade(name, found, figures.capture.motion_mean),
                 over_time(name, found, &figures.capture.measured),
             ],
-            "How calm the cages are, and what it costs.",
+            "How smoothly the cages move, and what it costs.",
             "The first three over the spectrum threshold s, for every choice of points read; global regularisation has no threshold and is a level line. Then every method by its error and its restlessness, both better towards the lower left corner, with the model's own mean as a line; and the largest spike of every frame. Axes need not begin at zero.",
             "Paper: Figs. 8, 12, 13, 19 and 20.",
         );

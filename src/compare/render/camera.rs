@@ -11,13 +11,13 @@ const MARGIN: f64 = 0.06;
 const STANDING: f64 = 1.8;
 
 /// The axis that points up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum Up {
-    /// x.
+    /// The first coordinate.
     X,
-    /// y, as most modelling programs have it.
+    /// The second, as in most modelling programs.
     Y,
-    /// z.
+    /// The third.
     Z,
 }
 

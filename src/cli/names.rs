@@ -1,0 +1,100 @@
+//! Values of options that are named as the library names them, each with its help.
+
+use crate::coordinates;
+use crate::design::style_by_name;
+use cager_cages::Style;
+use cager_core::coordinates::CoordinateSystem;
+use cager_core::inversion::Handles;
+use cager_core::regularize::Regularizer;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+
+/// A name and what it means.
+type Names = [(&'static str, &'static str)];
+
+const COORDINATES: &Names = &[
+    ("mvc", "Mean value coordinates: defined everywhere, fast"),
+    (
+        "harmonic",
+        "Harmonic coordinates: never negative, and felt through the inside of the cage only, where all points must be; seconds to prepare",
+    ),
+    (
+        "green",
+        "Green coordinates: the model keeps its angles better; normals of the cage follow from its vertices, found by iterating",
+    ),
+    (
+        "green-free",
+        "Green coordinates whose normals are unknowns of their own: the lowest errors, by cages with spikes",
+    ),
+];
+
+const HANDLES: &Names = &[
+    ("maxvol", "As many as the cage has unknowns, of maximum volume: stable and fast"),
+    ("rectangular", "Those and the points of the largest leverage beside them: for comparison"),
+    (
+        "spread",
+        "Those and points spread over the model, between which frames are interpolated: nearly the error of all",
+    ),
+    ("all", "Every point: least squares, the lowest error"),
+];
+
+const REGULARIZERS: &Names = &[
+    ("laplacian", "Smooth the last S singular directions by the cage's Laplacian"),
+    ("differential", "Give the last S singular directions the shape of the rest cage"),
+    (
+        "temporal",
+        "Give the last S singular directions the shape of the previous frame's cage; frames are inverted in order",
+    ),
+    (
+        "matrix",
+        "Make the product of the matrix in --regularizer-matrix and the cage small in the last S singular directions",
+    ),
+    ("none", "Follow the data alone"),
+    ("truncated-svd", "Drop the last S singular directions"),
+    ("tikhonov", "Damp every direction, with α = L"),
+    ("global", "Smooth the whole spectrum by the cage's Laplacian (for other terms: --spectrum all)"),
+];
+
+const STYLES: &Names = &[
+    ("free", "For compression and viewing: the lowest error; the cage may cut itself"),
+    ("editable", "For editing by hand: closed, free of self-intersection, enclosing, smooth"),
+];
+
+pub(super) fn coordinates() -> impl TypedValueParser<Value = &'static dyn CoordinateSystem> {
+    named(COORDINATES, coordinates::by_name)
+}
+
+/// Handles without a count of their own.
+pub(super) fn handles() -> impl TypedValueParser<Value = Handles> {
+    named(HANDLES, |name| Handles::by_name(name, None))
+}
+
+pub(super) fn regularizer() -> impl TypedValueParser<Value = Regularizer> {
+    named(REGULARIZERS, Regularizer::by_name)
+}
+
+pub(super) fn style() -> impl TypedValueParser<Value = Style> {
+    named(STYLES, style_by_name)
+}
+
+fn named<T: Clone + Send + Sync + 'static>(
+    names: &Names,
+    by_name: fn(&str) -> Option<T>,
+) -> impl TypedValueParser<Value = T> + use<T> {
+    PossibleValuesParser::new(names.iter().map(|&(name, help)| PossibleValue::new(name).help(help)))
+        .try_map(move |name| by_name(&name).ok_or("this program has none of that name"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::{STYLES as ALL_STYLES, style_name};
+
+    #[test]
+    fn every_name_of_the_library_can_be_given_and_no_other() {
+        let names = |names: &Names| names.iter().map(|&(name, _)| name).collect::<Vec<_>>();
+        assert_eq!(names(COORDINATES), coordinates::ALL.map(CoordinateSystem::name));
+        assert_eq!(names(HANDLES), Handles::NAMES);
+        assert_eq!(names(REGULARIZERS), Regularizer::ALL.map(Regularizer::name));
+        assert_eq!(names(STYLES), ALL_STYLES.map(style_name));
+    }
+}
