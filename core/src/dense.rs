@@ -143,12 +143,12 @@ pub(crate) fn solve_definite(a: Mat<f64>, b: Mat<f64>) -> Option<Mat<f64>> {
     solve_determined(a, b, 0.0, 0.0)
 }
 
-/// As [`solve_definite`]; `None` also where a pivot is no more than rounding: the fraction `lost` of its diagonal entry, or a diagonal
-/// entry no larger than `nothing`.
-pub(crate) fn solve_determined(a: Mat<f64>, mut b: Mat<f64>, lost: f64, nothing: f64) -> Option<Mat<f64>> {
+/// As [`solve_definite`]; `None` also where a pivot is no more than rounding: the fraction `relative` of its diagonal entry, or a
+/// diagonal entry no larger than `absolute`.
+pub(crate) fn solve_determined(a: Mat<f64>, mut b: Mat<f64>, relative: f64, absolute: f64) -> Option<Mat<f64>> {
     let diagonal: Vec<f64> = (0..a.nrows()).map(|i| a[(i, i)]).collect();
     let l = cholesky(a)?;
-    if diagonal.iter().enumerate().any(|(i, &d)| l[(i, i)] * l[(i, i)] <= lost * d || d <= nothing) {
+    if diagonal.iter().enumerate().any(|(i, &d)| l[(i, i)] * l[(i, i)] <= relative * d || d <= absolute) {
         return None;
     }
     in_column_blocks(b.as_mut(), 2 * l.nrows() * l.nrows(), |mut columns| {

@@ -282,7 +282,7 @@ fn swap_among(
     let width = phi.ncols();
     let mut work = Working::gather(phi, candidates, rows, inverse);
     // Rounding of the updates must not end the swaps just above the tolerance.
-    let enough = (1.0 + 0.2 * tolerance) as f32;
+    let target = (1.0 + 0.2 * tolerance) as f32;
     // Each swap multiplies the volume by more than 1 + τ, and Hadamard's inequality bounds the volume.
     let limit = 100 * width + 1000;
     let mut swaps = Vec::new();
@@ -293,7 +293,7 @@ fn swap_among(
                 best = (i, max);
             }
         }
-        if best.1 <= enough {
+        if best.1 <= target {
             break;
         }
         let row = &work.entries[best.0 * width..][..width];

@@ -130,10 +130,7 @@ pub fn diagonal(points: &[Point]) -> f64 {
 pub fn winding_number(vertices: &[Point], triangles: &[[u32; 3]], x: Point) -> f64 {
     let mut angle = 0.0;
     for triangle in triangles {
-        let [a, b, c] = triangle.map(|v| {
-            let p = vertices[v as usize];
-            [p[0] - x[0], p[1] - x[1], p[2] - x[2]]
-        });
+        let [a, b, c] = triangle.map(|v| sub(vertices[v as usize], x));
         let (la, lb, lc) = (norm(a), norm(b), norm(c));
         let volume = dot(a, cross(b, c));
         angle += 2.0 * volume.atan2(la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);

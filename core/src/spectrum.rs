@@ -40,13 +40,13 @@ pub(crate) fn deficient_basis(phi: MatRef<'_, f64>) -> Option<RowBasis> {
     let Svd { sigma, v, .. } = dense::right_singular(phi.to_owned())?;
     let mut rank = sigma.iter().filter(|&&s| s > RANK_TOLERANCE * sigma[0]).count();
     loop {
-        // Directions the points do feel, of full rank; one fewer each time a borderline singular value still spoils it.
-        let alive = v.as_ref().subcols(0, rank);
-        let felt = crate::inversion::tall_product(phi, alive);
-        match maxvol::maxvol(felt.as_ref(), maxvol::tolerance(rank)) {
+        // Coordinates in the right singular vectors of the rank, one fewer each time a borderline singular value is still too small.
+        let range = v.as_ref().subcols(0, rank);
+        let projected = crate::inversion::tall_product(phi, range);
+        match maxvol::maxvol(projected.as_ref(), maxvol::tolerance(rank)) {
             Ok(handles) => {
                 let square = dense::rows_of(phi, &handles.rows);
-                let to_basis = dense::product(alive, handles.inverse.as_ref());
+                let to_basis = dense::product(range, handles.inverse.as_ref());
                 return Some(RowBasis { handles, square, rank, to_basis });
             }
             Err(_) if rank > 1 => rank -= 1,

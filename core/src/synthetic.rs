@@ -135,11 +135,11 @@ impl Motion {
         // Sway: a wave that travels up the spine.
         let x = x + 0.07 * (self.phase - 4.0 * h).sin();
         let y = y + 0.05 * (2.0 * self.phase - 3.0 * h).cos();
-        self.bent([x, y, z])
+        self.curved([x, y, z])
     }
 
     /// Bends the vertical axis into a circular arc, heights becoming arc lengths.
-    fn bent(&self, [x, y, z]: Point) -> Point {
+    fn curved(&self, [x, y, z]: Point) -> Point {
         let [dx, dy] = self.towards;
         let (along, across) = (dx * x + dy * y, dx * y - dy * x);
         let angle = self.curvature * z;
@@ -267,28 +267,7 @@ mod tests {
     use std::collections::HashMap;
 
     use super::*;
-
-    fn sub(a: Point, b: Point) -> Point {
-        [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-    }
-
-    fn cross(a: Point, b: Point) -> Point {
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    }
-
-    fn dot(a: Point, b: Point) -> f64 {
-        a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-    }
-
-    fn winding_number(point: Point, mesh: &TriMesh) -> f64 {
-        let solid_angle = |&triangle: &[u32; 3]| {
-            let [a, b, c] = triangle.map(|i| sub(mesh.vertices[i as usize], point));
-            let [la, lb, lc] = [a, b, c].map(|q| dot(q, q).sqrt());
-            let over = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
-            2.0 * dot(a, cross(b, c)).atan2(over)
-        };
-        mesh.triangles.iter().map(solid_angle).sum::<f64>() / (2.0 * TAU)
-    }
+    use crate::mesh::{cross, dot, sub, winding_number};
 
     fn capture(points: usize, cage_vertices: usize) -> Capture {
         Capture::new(&Options { points, frames: 12, cage_vertices })
@@ -311,7 +290,7 @@ mod tests {
         for (points, vertices) in [(500, 60), (20_000, 330), (4_000, 2_000), (500, 2_000), (200, 32)] {
             let capture = capture(points, vertices);
             for &point in &capture.rest.points {
-                let winding = winding_number(point, &capture.cage);
+                let winding = winding_number(&capture.cage.vertices, &capture.cage.triangles, point);
                 assert!((winding - 1.0).abs() < 1e-9, "{point:?} has winding number {winding}");
             }
         }
@@ -361,7 +340,7 @@ mod tests {
         assert_eq!(triangles.len(), 2 * rest.points.len() - 4);
         let mesh = TriMesh { vertices: rest.points, triangles };
         let heart = [spine(1.2)[0], spine(1.2)[1], 1.2];
-        assert!((winding_number(heart, &mesh) - 1.0).abs() < 1e-9);
+        assert!((winding_number(&mesh.vertices, &mesh.triangles, heart) - 1.0).abs() < 1e-9);
     }
 
     #[test]
@@ -387,7 +366,10 @@ mod tests {
             capture.frame(t, &mut frame);
             let cage = TriMesh { vertices: capture.deformed_cage(t), triangles: capture.cage.triangles.clone() };
             // Ripples may cut through the cage in places; the body as a whole may not leave it.
-            let inside = frame.chunks_exact(3).filter(|p| winding_number([p[0], p[1], p[2]], &cage) > 0.5).count();
+            let inside = frame
+                .chunks_exact(3)
+                .filter(|p| winding_number(&cage.vertices, &cage.triangles, [p[0], p[1], p[2]]) > 0.5)
+                .count();
             assert!(inside * 100 >= 98 * capture.rest.points.len(), "{inside} points inside in frame {t}");
         }
     }

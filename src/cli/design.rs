@@ -3,6 +3,7 @@
 use super::progress;
 use anyhow::{Result, bail};
 use cager_cages::{Design, DesignError, DesignOptions, Goal, Progress};
+use cager_core::cage::CageError;
 use cager_core::mesh::{Model, TriMesh};
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -51,7 +52,7 @@ pub(super) fn design(
         let path = match &error {
             DesignError::TooManyVertices { .. } if start.is_none() => return anyhow::anyhow!("--vertices: {error}"),
             DesignError::Enclose(_) => rest.0,
-            DesignError::Start(error) if error.is_inward() => {
+            DesignError::Start(CageError::Inward { .. }) => {
                 let path = start.map_or(rest.0, |(path, _)| path).display();
                 return anyhow::anyhow!(
                     "{path}: the faces of the cage point inwards; turn them with `cager cage --repair {path}` first"

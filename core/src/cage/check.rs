@@ -1,7 +1,7 @@
 //! What makes a mesh a cage: closed, manifold along edges, consistently oriented, outwards, without degenerate faces.
 
 use super::{Edge, Face};
-use crate::mesh::{Point, TriMesh, winding_number};
+use crate::mesh::{Point, TriMesh, cross, dot, norm, sub, winding_number};
 use std::collections::HashMap;
 use std::fmt::Write;
 
@@ -113,11 +113,6 @@ impl CageError {
         }
         self
     }
-
-    /// Whether turning every face around would mend it.
-    pub fn is_inward(&self) -> bool {
-        matches!(self, Self::Inward { .. })
-    }
 }
 
 fn edge_count(n: usize) -> String {
@@ -201,12 +196,9 @@ fn check_faces(mesh: &TriMesh) -> Result<(), CageError> {
 }
 
 fn is_flat([a, b, c]: [Point; 3]) -> bool {
-    let e = |p: Point, q: Point| [q[0] - p[0], q[1] - p[1], q[2] - p[2]];
-    let len2 = |v: Point| v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-    let (u, v, w) = (e(a, b), e(a, c), e(b, c));
-    let longest2 = len2(u).max(len2(v)).max(len2(w));
-    let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-    let height = len2(n).sqrt() / longest2;
+    let (u, v, w) = (sub(b, a), sub(c, a), sub(c, b));
+    let longest2 = dot(u, u).max(dot(v, v)).max(dot(w, w));
+    let height = norm(cross(u, v)) / longest2;
     // NaN, from coordinates that overflow, counts as flat.
     height.is_nan() || height <= FLAT
 }
@@ -288,18 +280,12 @@ fn shells(faces: &[Face], edges: usize) -> Vec<Vec<usize>> {
 fn volume(mesh: &TriMesh, shell: &[usize]) -> f64 {
     // Relative to a vertex of the shell, so that a cage far from the origin keeps its digits.
     let o = mesh.vertices[mesh.triangles[shell[0]][0] as usize];
-    let at = |v: u32| {
-        let p = mesh.vertices[v as usize];
-        [p[0] - o[0], p[1] - o[1], p[2] - o[2]]
-    };
+    let at = |v: u32| sub(mesh.vertices[v as usize], o);
     shell
         .iter()
         .map(|&f| {
             let [a, b, c] = mesh.triangles[f].map(at);
-            (a[0] * (b[1] * c[2] - b[2] * c[1])
-                + a[1] * (b[2] * c[0] - b[0] * c[2])
-                + a[2] * (b[0] * c[1] - b[1] * c[0]))
-                / 6.0
+            dot(a, cross(b, c)) / 6.0
         })
         .sum()
 }

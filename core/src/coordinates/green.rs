@@ -28,8 +28,8 @@ pub enum Green {
     Free,
 }
 
-/// Rows that sum to one within this are left alone.
-const WHOLE: f64 = 1e-13;
+/// Rows that sum to one within this need no completion.
+const COMPLETE: f64 = 1e-13;
 /// Faces whose distances differ by less than this fraction, as they do at a common edge, are equally near.
 const EQUALLY_NEAR: f64 = 1e-9;
 /// So are faces within this fraction of the cage's size.
@@ -121,7 +121,7 @@ fn rows_of(
         let total = scratch.double.iter().fold(Lanes::ZERO, |sum, &w| sum + w) * layer::INVERSE_4PI;
         for l in 0..LANES.min(count - start) {
             let missing = 1.0 - total.0[l];
-            if missing.abs() <= WHOLE {
+            if missing.abs() <= COMPLETE {
                 continue;
             }
             for (f, share) in nearest_faces(layers, x.map(|c| c.0[l]), missing) {
@@ -143,7 +143,7 @@ fn rows_of(
 /// The point seen from a face's first corner.
 fn from_corner(layers: &Layers, face: &Frame, x: Point) -> Point {
     let corner = layers.vertices()[face.vertices[0] as usize];
-    [0, 1, 2].map(|k| x[k] - corner[k])
+    mesh::sub(x, corner)
 }
 
 /// The faces nearest to the point, those that share the nearest edge or vertex, and the share of each. Shares fall with the angle

@@ -13,9 +13,8 @@
 
 use crate::cage::{Cage, Face};
 use crate::mesh::{self, Point};
-use crate::simd::{LANES, Lanes, angle, dot, ln_ratio, multiversion, zeros};
-use faer::{Mat, MatMut};
-use rayon::prelude::*;
+use crate::simd::{LANES, Lanes, angle, dot, ln_ratio, multiversion};
+use faer::MatMut;
 
 /// Closer to the plane of a face than this fraction of its longest edge, a point lies in it.
 const IN_PLANE: f64 = 1e-13;
@@ -57,10 +56,7 @@ pub(super) struct Frame {
 
 impl Frame {
     fn new(vertices: &[Point], face: &Face) -> Self {
-        let between = |a: u32, b: u32| {
-            let (a, b) = (vertices[a as usize], vertices[b as usize]);
-            [b[0] - a[0], b[1] - a[1], b[2] - a[2]]
-        };
+        let between = |a: u32, b: u32| mesh::sub(vertices[b as usize], vertices[a as usize]);
         let side = |i: usize| between(face.vertices[(i + 1) % 3], face.vertices[(i + 2) % 3]);
         let lengths = [0, 1, 2].map(|i| mesh::norm(side(i)));
         let top = (0..3).fold(0, |a, b| if lengths[b] > lengths[a] { b } else { a });
@@ -123,10 +119,7 @@ impl Layers {
         let scale = 2f64.powi(-(cage.diagonal().log2() as i32).clamp(-1000, 1000));
         let vertices: Vec<Point> = cage.vertices().iter().map(|v| v.map(|c| c * scale)).collect();
         let faces = cage.faces().iter().map(|face| Frame::new(&vertices, face)).collect();
-        let length = |ends: [u32; 2]| {
-            let [a, b] = ends.map(|v| vertices[v as usize]);
-            mesh::norm([b[0] - a[0], b[1] - a[1], b[2] - a[2]])
-        };
+        let length = |[a, b]: [u32; 2]| mesh::norm(mesh::sub(vertices[b as usize], vertices[a as usize]));
         let edges = cage.edges().iter().map(|e| (e.vertices, length(e.vertices))).collect();
         Self { vertices, scale, edges, faces, triangles: cage.mesh().triangles.clone() }
     }
@@ -175,31 +168,6 @@ impl Layers {
             }
         }
         x
-    }
-
-    /// `φ`, n × v, and `ψ`, n × f, of the mesh at these points, in parallel; the result does not depend on the threads.
-    ///
-    /// A point within 1e-13 of the plane of a face gets its principal value: nothing of that face's solid angle.
-    #[allow(dead_code)]
-    pub(crate) fn potentials(&self, points: &[Point]) -> (Mat<f64>, Mat<f64>) {
-        let mut phi = zeros(points.len(), self.vertices.len());
-        let mut psi = zeros(points.len(), self.faces.len());
-        let single = INVERSE_4PI / self.scale;
-        phi.as_mut()
-            .par_row_chunks_mut(TASK_POINTS)
-            .zip(psi.as_mut().par_row_chunks_mut(TASK_POINTS))
-            .enumerate()
-            .for_each_init(
-                || self.scratch(),
-                |scratch, (task, (mut phi, mut psi))| {
-                    for start in (0..phi.nrows()).step_by(LANES) {
-                        group_potentials(self, &self.group(points, task * TASK_POINTS + start), scratch);
-                        write_group(phi.as_mut(), start, &scratch.double, INVERSE_4PI);
-                        write_group(psi.as_mut(), start, &scratch.single, single);
-                    }
-                },
-            );
-        (phi, psi)
     }
 }
 
@@ -293,6 +261,20 @@ fn group_potentials_generic(layers: &Layers, x: &[Lanes; 3], scratch: &mut Scrat
 mod tests {
     use super::*;
     use crate::mesh::TriMesh;
+    use faer::Mat;
+
+    /// `φ`, n × v, and `ψ`, n × f.
+    fn potentials(layers: &Layers, points: &[Point]) -> (Mat<f64>, Mat<f64>) {
+        let mut phi = Mat::zeros(points.len(), layers.vertices.len());
+        let mut psi = Mat::zeros(points.len(), layers.faces.len());
+        let mut scratch = layers.scratch();
+        for start in (0..points.len()).step_by(LANES) {
+            group_potentials(layers, &layers.group(points, start), &mut scratch);
+            write_group(phi.as_mut(), start, &scratch.double, INVERSE_4PI);
+            write_group(psi.as_mut(), start, &scratch.single, INVERSE_4PI / layers.scale);
+        }
+        (phi, psi)
+    }
 
     /// Integrates over a face by the centroids of 4^depth equal parts.
     fn integrate([a, b, c]: [Point; 3], depth: u32, f: &mut impl FnMut(Point)) {
@@ -313,24 +295,24 @@ mod tests {
         let triangles = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
         let cage = Cage::new(TriMesh { vertices, triangles }).unwrap();
         let points = [[0.9, 0.7, 0.5], [-1.0, 3.0, 2.0], [5.0, -0.3, 0.4]];
-        let (phi, psi) = Layers::new(&cage).potentials(&points);
+        let (phi, psi) = potentials(&Layers::new(&cage), &points);
         for (i, x) in points.iter().enumerate() {
             let mut double = [0.0; 4];
             for (f, face) in cage.faces().iter().enumerate() {
                 let corners = face.vertices.map(|v| cage.vertices()[v as usize]);
                 let [a, b, c] = corners;
-                let sides = [b, c].map(|p| [0, 1, 2].map(|k| p[k] - a[k]));
+                let sides = [b, c].map(|p| mesh::sub(p, a));
                 let normal = mesh::cross(sides[0], sides[1]);
                 let (double_area, parts) = (mesh::norm(normal), f64::from(4u32.pow(8)));
                 let mut single = 0.0;
                 integrate(corners, 8, &mut |y| {
-                    let r = [0, 1, 2].map(|k| y[k] - x[k]);
+                    let r = mesh::sub(y, *x);
                     let share = INVERSE_4PI / mesh::norm(r) * 0.5 * double_area / parts;
                     single += share;
                     let seen = share * mesh::dot(r, normal) / double_area / mesh::dot(r, r);
                     for (i, &v) in face.vertices.iter().enumerate() {
-                        let across = [0, 1, 2].map(|k| corners[(i + 2) % 3][k] - corners[(i + 1) % 3][k]);
-                        let from = [0, 1, 2].map(|k| y[k] - corners[(i + 1) % 3][k]);
+                        let across = mesh::sub(corners[(i + 2) % 3], corners[(i + 1) % 3]);
+                        let from = mesh::sub(y, corners[(i + 1) % 3]);
                         let hat = mesh::dot(mesh::cross(across, from), normal) / (double_area * double_area);
                         double[v as usize] += hat * seen;
                     }

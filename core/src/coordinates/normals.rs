@@ -6,7 +6,7 @@
 //! face is stretched. A face that has collapsed to a line or a point has no normal: zero takes its place.
 
 use crate::cage::Cage;
-use crate::mesh::{Point, cross, dot, norm};
+use crate::mesh::{Point, cross, dot, norm, sub};
 
 /// What ties the normals of a cage to its vertices.
 #[derive(Clone, Debug, PartialEq)]
@@ -95,7 +95,7 @@ impl TiedNormals {
 
 fn edges(face: [u32; 3], vertex: impl Fn(u32) -> Point) -> [Point; 2] {
     let [a, b, c] = face.map(vertex);
-    [[0, 1, 2].map(|k| b[k] - a[k]), [0, 1, 2].map(|k| c[k] - a[k])]
+    [sub(b, a), sub(c, a)]
 }
 
 fn length2([a, b, c]: &[f64; 3], u: Point, v: Point) -> f64 {
@@ -147,15 +147,15 @@ mod tests {
     fn derivatives_are_those_of_the_normals() {
         let cage = cage();
         let tied = TiedNormals::new(&cage, 0.4);
-        let bent: Vec<Point> =
+        let deformed: Vec<Point> =
             cage.vertices().iter().map(|p| [p[0] + 0.2 * p[1] * p[2], 0.7 * p[1] - 0.1 * p[0] * p[0], p[2]]).collect();
-        let derivatives = tied.derivatives(&bent);
+        let derivatives = tied.derivatives(&deformed);
         const STEP: f64 = 1e-6;
         for (f, face) in tied.faces().iter().enumerate() {
             for (side, &corner) in face[1..].iter().enumerate() {
                 for k in 0..3 {
                     let moved = |by: f64| {
-                        let mut vertices = bent.clone();
+                        let mut vertices = deformed.clone();
                         vertices[corner as usize][k] += by;
                         of(&tied, &vertices)[f]
                     };

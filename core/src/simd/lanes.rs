@@ -1,0 +1,84 @@
+//! A value for each of eight points, and their arithmetic.
+
+/// Points or entries that one lane group holds.
+pub(crate) const LANES: usize = 8;
+
+/// One value for each point or entry of a lane group.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(crate) struct Lanes(pub(crate) [f64; LANES]);
+
+impl Lanes {
+    pub(crate) const ZERO: Self = Self([0.0; LANES]);
+
+    #[inline(always)]
+    pub(crate) fn splat(value: f64) -> Self {
+        Self([value; LANES])
+    }
+
+    #[inline(always)]
+    pub(crate) fn map(self, f: impl Fn(f64) -> f64) -> Self {
+        let mut out = [0.0; LANES];
+        for l in 0..LANES {
+            out[l] = f(self.0[l]);
+        }
+        Self(out)
+    }
+
+    #[inline(always)]
+    pub(crate) fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        let mut out = [0.0; LANES];
+        for l in 0..LANES {
+            out[l] = f(self.0[l], other.0[l]);
+        }
+        Self(out)
+    }
+
+    #[inline(always)]
+    pub(crate) fn sqrt(self) -> Self {
+        self.map(f64::sqrt)
+    }
+
+    /// Whether `f` holds for any pair of lanes.
+    #[inline(always)]
+    pub(crate) fn any(self, other: Self, f: impl Fn(f64, f64) -> bool) -> bool {
+        let mut found = false;
+        for l in 0..LANES {
+            found |= f(self.0[l], other.0[l]);
+        }
+        found
+    }
+}
+
+macro_rules! lanewise {
+    ($trait:ident, $method:ident, $op:tt) => {
+        impl std::ops::$trait for Lanes {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                self.zip(other, |a, b| a $op b)
+            }
+        }
+        impl std::ops::$trait<f64> for Lanes {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: f64) -> Self {
+                self.map(|a| a $op other)
+            }
+        }
+    };
+}
+lanewise!(Add, add, +);
+lanewise!(Sub, sub, -);
+lanewise!(Mul, mul, *);
+lanewise!(Div, div, /);
+
+#[inline(always)]
+pub(crate) fn dot(a: &[Lanes; 3], b: &[Lanes; 3]) -> Lanes {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline(always)]
+pub(crate) fn cross(a: &[Lanes; 3], b: &[Lanes; 3]) -> [Lanes; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}

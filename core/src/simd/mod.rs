@@ -1,0 +1,15 @@
+//! Eight-wide arithmetic, over points or over entries of a column, compiled once per instruction set and chosen at run time.
+//!
+//! Nothing here uses fused multiply-add: the same source then gives the same bits on every machine, with or without AVX.
+
+mod angle;
+mod dispatch;
+mod lanes;
+mod logarithm;
+mod zeros;
+
+pub(crate) use angle::angle;
+pub(crate) use dispatch::multiversion;
+pub(crate) use lanes::{LANES, Lanes, cross, dot};
+pub(crate) use logarithm::ln_ratio;
+pub(crate) use zeros::zeros;
