@@ -142,13 +142,12 @@ impl NearPairs {
         Self { pairs, around }
     }
 
-    /// The elements near this one, itself among them, each with the entries, whose rows belong to the larger of both, and whether
-    /// that is the other one.
-    pub(super) fn of(&self, element: usize) -> impl Iterator<Item = (usize, MatRef<'_, f64>, bool)> {
+    /// The elements near this one, itself among them, each with the entries: rows belong to this element, columns to the other.
+    pub(super) fn of(&self, element: usize) -> impl Iterator<Item = (usize, MatRef<'_, f64>)> {
         self.around[element].iter().map(move |&place| {
             let (a, b, entries) = &self.pairs[place as usize];
             let (a, b) = (*a as usize, *b as usize);
-            if a == element { (b, entries.as_ref(), false) } else { (a, entries.as_ref(), true) }
+            if a == element { (b, entries.as_ref()) } else { (a, entries.transpose()) }
         })
     }
 }
