@@ -359,8 +359,8 @@ fn memory(text: &str) -> Result<Memory, String> {
 pub(crate) enum CoordinatesArg {
     /// Mean value coordinates: defined everywhere, fast.
     Mvc,
-    /// Harmonic coordinates: never negative, and felt through the inside of the cage only, where all points must be; seconds to
-    /// prepare.
+    /// Harmonic coordinates: from 0 to 1 but for some 1e-3, and felt through the inside of the cage only, where all points must be;
+    /// seconds to prepare.
     Harmonic,
     /// Green coordinates: the model keeps its angles better; normals of the cage follow from its vertices, found by iterating.
     Green,

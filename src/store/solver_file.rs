@@ -3,14 +3,14 @@
 
 use super::ContentKey;
 use super::disk::DiskFile;
-use cager_core::coordinates::{Refinement, TiedNormals};
+use cager_core::coordinates::{ElementPlan, Refinement, TiedNormals};
 use cager_core::inversion::{Preparation, Pull, Solver, SolverParts, TiedParts};
 use faer::{Mat, MatRef};
 use std::io;
 
 /// A name, and the version of the format.
-const MAGIC: [u8; 8] = *b"CGRSOLV\x04";
-const COUNTS: usize = 15;
+const MAGIC: [u8; 8] = *b"CGRSOLV\x05";
+const COUNTS: usize = 16;
 const NUMBERS: usize = 12;
 /// Magic, key, counts, numbers, checksum.
 const HEADER_BYTES: usize = 8 + 32 + 8 * COUNTS + 8 * NUMBERS + 4;
@@ -33,7 +33,7 @@ pub(super) enum Found {
 
 /// Length of the file that has these counts, where one can have it.
 fn file_bytes(counts: &[u64; COUNTS]) -> Option<u64> {
-    let [points, unknowns, handles, reads_all, values, outside, _, _, _, columns, faces, pull, ..] = *counts;
+    let [points, unknowns, handles, reads_all, values, outside, _, _, _, columns, faces, pull, _, _, _, plan] = *counts;
     // A matrix's columns are padded in memory: only tall ones take about what their file does. A cage of v vertices has fewer than
     // v² faces.
     if unknowns > points || columns > points.checked_mul(points)? || reads_all > 1 || handles > points {
@@ -54,6 +54,7 @@ fn file_bytes(counts: &[u64; COUNTS]) -> Option<u64> {
     let operator = read.checked_mul(unknowns)?.checked_mul(8)?;
     let small = handles.checked_add(outside)?.checked_mul(4)?.checked_add(values.checked_mul(8)?)?;
     (HEADER_BYTES as u64 + 4)
+        .checked_add(plan)?
         .checked_add(phi)?
         .checked_add(operator)?
         .checked_add(small)?
@@ -75,6 +76,7 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
         outside,
         outside_distance,
         refinement,
+        plan,
         coordinates_seconds,
         maxvol_seconds,
         svd_seconds,
@@ -106,6 +108,7 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
         usize::from(refinement.is_some()),
         refinement.map_or(0, |refined| refined.elements),
         refinement.map_or(0, |refined| refined.refinements),
+        plan.as_ref().map_or(0, |plan| plan.as_bytes().len()),
     ];
     header.extend(counts.iter().flat_map(|&count| (count as u64).to_le_bytes()));
     let numbers: [f64; NUMBERS] = [
@@ -129,6 +132,7 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
     out.put(solver.handles().iter().map(|x| x.to_le_bytes()))?;
     out.put(outside.iter().map(|x| x.to_le_bytes()))?;
     out.put(singular_values.iter().map(|x| x.to_le_bytes()))?;
+    out.put(plan.iter().flat_map(|plan| plan.as_bytes()).map(|x| x.to_le_bytes()))?;
     for j in 0..operator.ncols() {
         out.put(operator.col(j).iter().map(|x| x.to_le_bytes()))?;
     }
@@ -208,6 +212,7 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Found> {
         refined,
         elements,
         refinements,
+        plan,
     ] = counts.map(|count| count as usize);
 
     let mut source = In { file, piece: Vec::new(), at: 0, offset: HEADER_BYTES as u64, end: bytes, crc: 0 };
@@ -218,6 +223,8 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Found> {
     source.fill(&mut outside, u32::from_le_bytes)?;
     let mut singular_values = vec![0.0; values];
     source.fill(&mut singular_values, f64::from_le_bytes)?;
+    let mut plan = vec![0; plan];
+    source.fill(&mut plan, u8::from_le_bytes)?;
     let operator = source.matrix(if reads_all == 1 { points } else { handle_count }, unknowns)?;
     let pull = match counts[PULL_PLACE] {
         CONSTANT => Pull::Constant(source.matrix(unknowns, 3)?),
@@ -277,6 +284,7 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Found> {
         outside,
         outside_distance,
         refinement: (refined != 0).then_some(Refinement { elements, refinements, change }),
+        plan: (!plan.is_empty()).then(|| ElementPlan::from_bytes(plan)),
         coordinates_seconds,
         maxvol_seconds,
         svd_seconds,

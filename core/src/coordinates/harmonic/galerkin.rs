@@ -161,7 +161,7 @@ pub(super) struct Operator {
 }
 
 /// Whether the high unknowns of two elements feel each other and the other's low ones.
-fn is_near(a: &Element, b: &Element) -> bool {
+pub(super) fn is_near(a: &Element, b: &Element) -> bool {
     let apart = mesh::norm([0, 1, 2].map(|k| a.triangle.centre[k] - b.triangle.centre[k]));
     apart < APART * (a.triangle.radius + b.triangle.radius)
 }

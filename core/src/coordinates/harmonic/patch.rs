@@ -8,7 +8,7 @@ use faer::linalg::{cholesky::llt, triangular_solve};
 use faer::{Mat, MatMut, MatRef, Par};
 
 /// Unknowns of a patch at most.
-const PATCH: usize = 1600;
+pub(super) const PATCH: usize = 1600;
 /// Where the entries of thin elements are not exact enough to be definite, diagonals grow by these parts, one after the other.
 pub(super) const DAMPING: [f64; 5] = [0.0, 1e-4, 1e-3, 1e-2, 1e-1];
 
@@ -17,6 +17,12 @@ pub(super) fn damp(mut a: MatMut<'_, f64>, part: f64) {
     for k in 0..a.nrows() {
         a[(k, k)] *= 1.0 + part;
     }
+}
+
+/// The first of [`DAMPING`] with which a factorisation succeeds, or the given one if it does.
+pub(super) fn least_damping(given: Option<u8>, mut succeeds: impl FnMut(f64) -> bool) -> Option<u8> {
+    let mut steps = given.map_or(0..=DAMPING.len() as u8 - 1, |given| given..=given);
+    steps.find(|&step| succeeds(DAMPING[usize::from(step)]))
 }
 
 /// Lower Cholesky factor in place.
@@ -36,6 +42,8 @@ pub(super) fn zeroed(memory: &mut Vec<f64>, rows: usize, columns: usize) -> MatM
 /// The elements on which one vertex's hat function has high unknowns, ascending, each with the vertex's column there.
 pub(super) struct Patch {
     pub(super) places: Vec<(u32, u32)>,
+    /// Which of [`DAMPING`] its matrix takes, where that is known.
+    pub(super) damping: Option<u8>,
 }
 
 /// Chooses the elements of each of `m` vertices' patches among the candidates, by the residuals that the low unknowns leave there.
@@ -70,6 +78,8 @@ pub(super) struct Step {
     pub(super) high: Vec<f64>,
     /// What the highest degrees change of all unknowns there.
     pub(super) change: Vec<f64>,
+    /// Which of [`DAMPING`] its matrix took.
+    pub(super) damping: u8,
 }
 
 /// Where the unknowns of a patch are in its matrix: first the low ones of all elements, then the others but for the highest degree, then
@@ -113,14 +123,14 @@ pub(super) fn solve(
 ) -> Option<Step> {
     let low = equations.unknowns.low;
     let layout = Layout::new(patch, equations.unknowns);
-    let definite = |&part: &f64| {
+    let definite = |part: f64| {
         let mut matrix = zeroed(memory, layout.count, layout.count);
         fill_low(matrix.as_mut(), equations, patch);
         fill_near(matrix.as_mut(), equations, patch, &layout);
         damp(matrix.as_mut(), part);
         factor(matrix, Par::Seq).is_some()
     };
-    DAMPING.iter().any(definite).then_some(())?;
+    let damping = least_damping(patch.damping, definite)?;
     let factor = MatRef::from_column_major_slice(memory, layout.count, layout.count);
     // The solution, and what the highest degrees contribute to it.
     let mut x = Mat::<f64>::zeros(layout.count, 2);
@@ -136,6 +146,7 @@ pub(super) fn solve(
     Some(Step {
         high: layout.rows.iter().flat_map(|rows| rows[low..].iter().map(|&row| x[(row, 0)])).collect(),
         change: layout.rows.iter().flatten().map(|&row| x[(row, 1)]).collect(),
+        damping,
     })
 }
 

@@ -10,14 +10,14 @@ use super::galerkin::{NearPairs, Operator, RightHandSides};
 use super::patch::{self, DAMPING, Patch, damp, factor, zeroed};
 use faer::linalg::{matmul::matmul, triangular_solve};
 use faer::prelude::IntoConst;
-use faer::{Accum, Mat, MatMut, MatRef, Par};
+use faer::{Accum, ColRef, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
 /// An element belongs to a vertex's patch where the residual of the low unknowns is above this, as a value on the boundary; the iteration
 /// ends where all residuals are below.
 pub(super) const RESIDUAL: f64 = 3e-4;
 /// Turns at most.
-const TURNS: usize = 6;
+pub(super) const TURNS: u8 = 6;
 
 /// Densities on one element.
 pub(super) struct Part {
@@ -25,7 +25,7 @@ pub(super) struct Part {
     pub(super) vertices: Vec<u32>,
     /// Those unknowns, by vertex.
     pub(super) high: Vec<f64>,
-    /// What the highest degree changes of all unknowns, by vertex.
+    /// What the highest degree changes of all unknowns, by vertex; empty where nobody asks.
     pub(super) change: Vec<f64>,
 }
 
@@ -67,30 +67,56 @@ impl High {
     }
 }
 
-/// Solves for all densities; `None` where the equations are not definite.
+/// What solving decided: solving again by the same steps gives the same bits.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Steps {
+    /// Which of [`DAMPING`] the matrix of the low unknowns took, and that of each vertex's patch.
+    pub(super) damping: u8,
+    pub(super) patch_damping: Vec<u8>,
+    /// Turns of the iteration.
+    pub(super) turns: u8,
+    /// Elements of each vertex's patch, ascending.
+    pub(super) patches: Vec<Vec<u32>>,
+}
+
+/// Densities, and how they were found.
+pub(super) struct Solved {
+    pub(super) densities: Densities,
+    pub(super) steps: Steps,
+    /// The largest residual of all equations, damped ones and those of unknowns that were left out among them, as a value on the
+    /// boundary: harmonic functions being largest there, about as much as a coordinate can be off for it. Zero where it is not measured.
+    pub(super) remainder: f64,
+}
+
+/// Solves for all densities, by these steps where they are given, and `measures` what that leaves; `None` where the equations are not definite.
 pub(super) fn solve(
     operator: Operator,
     b: &RightHandSides,
     unknowns: &Unknowns,
     faces: &[[u32; 3]],
-) -> Option<Densities> {
+    given: Option<&Steps>,
+    measures: bool,
+) -> Option<Solved> {
     // The factor takes the place of the matrix, of which the patches need entries between elements that are not near, those on and
     // below the diagonal.
     let far = single_from(operator.low.as_ref(), |j| j - j % unknowns.low);
-    let low_system = LowSystem::new(operator.low, &far)?;
+    let low_system = LowSystem::new(operator.low, &far, given.map(|steps| steps.damping))?;
     let equations = Equations { near: &operator.near, far: &far, b, unknowns };
     let mut low = low_system.solve(b.low.clone());
-    let candidates = candidates(&operator.near, unknowns, faces);
-    let nothing: Vec<High> =
-        candidates.iter().map(|_| High { vertices: Vec::new(), values: Mat::zeros(0, 0) }).collect();
-    let residuals = equations.residuals(low.as_ref(), &nothing, &candidates);
-    let elements = patch::choose(unknowns, &candidates, &residuals, b.low.ncols());
-    let (patches, mut high) = patches(unknowns, &elements);
+    let candidates = if given.is_none() || measures { candidates(&operator.near, unknowns, faces) } else { Vec::new() };
+    let (mut patches, mut high) = match given {
+        Some(steps) => patches(unknowns, &steps.patches),
+        None => patches(unknowns, &equations.choose_patches(low.as_ref(), &candidates)),
+    };
+    let vertices: Vec<Vec<u32>> = high.iter().map(|high| high.vertices.clone()).collect();
+    for (k, patch) in patches.iter_mut().enumerate() {
+        patch.damping = given.map(|steps| steps.patch_damping[k]);
+    }
     let mut changes = Vec::new();
-    for turn in 0..TURNS {
-        let vertices: Vec<Vec<u32>> = high.iter().map(|high| high.vertices.clone()).collect();
+    let mut turns = 0;
+    while turns < given.map_or(TURNS, |steps| steps.turns) {
         let residuals = equations.residuals(low.as_ref(), &high, &vertices);
-        if turn > 0 && largest(unknowns, &residuals) < RESIDUAL {
+        if given.is_none() && turns > 0 && largest(unknowns, &residuals) < RESIDUAL {
             break;
         }
         let found: Option<Vec<patch::Step>> = patches
@@ -99,32 +125,46 @@ pub(super) fn solve(
             .collect();
         let found = found?;
         add_steps(&mut high, &patches, &found);
-        if turn == 0 {
+        for (patch, step) in patches.iter_mut().zip(&found) {
+            patch.damping = Some(step.damping);
+        }
+        if turns == 0 && given.is_none() {
             changes = found.into_iter().map(|step| step.change).collect();
         }
         low = low_system.solve(equations.low_sides(&high));
+        turns += 1;
     }
-    Some(Densities { low, parts: parts(unknowns, high, &patches, &changes) })
+    let damping = DAMPING[usize::from(low_system.damping)];
+    let remainder = if measures { equations.remainder(low.as_ref(), &high, &candidates, damping) } else { 0.0 };
+    let steps = Steps {
+        damping: low_system.damping,
+        patch_damping: patches.iter().map(|patch| patch.damping.unwrap_or_default()).collect(),
+        turns,
+        patches: patches.iter().map(|patch| patch.places.iter().map(|place| place.0).collect()).collect(),
+    };
+    Some(Solved { densities: Densities { low, parts: parts(unknowns, high, &patches, &changes) }, steps, remainder })
 }
 
 /// The equations of the low unknowns, factored.
 struct LowSystem {
     /// Lower Cholesky factor.
     factor: Mat<f64>,
+    /// Which of [`DAMPING`] it took.
+    damping: u8,
 }
 
 impl LowSystem {
     /// Factors the lower triangle of a matrix; `far` is the same in single precision.
-    fn new(mut matrix: Mat<f64>, far: &Mat<f32>) -> Option<Self> {
-        let definite = |&part: &f64| {
+    fn new(mut matrix: Mat<f64>, far: &Mat<f32>, given: Option<u8>) -> Option<Self> {
+        let definite = |part: f64| {
             if part > 0.0 {
                 restore(matrix.as_mut(), far);
                 damp(matrix.as_mut(), part);
             }
             factor(matrix.as_mut(), Par::rayon(0)).is_some()
         };
-        DAMPING.iter().any(definite).then_some(())?;
-        Some(Self { factor: matrix })
+        let damping = patch::least_damping(given, definite)?;
+        Some(Self { factor: matrix, damping })
     }
 
     fn solve(&self, mut b: Mat<f64>) -> Mat<f64> {
@@ -163,7 +203,7 @@ fn patches(unknowns: &Unknowns, elements: &[Vec<u32>]) -> (Vec<Patch>, Vec<High>
             vertices[e as usize].push(v as u32);
             (e, vertices[e as usize].len() as u32 - 1)
         };
-        patches.push(Patch { places: elements.iter().map(place).collect() });
+        patches.push(Patch { places: elements.iter().map(place).collect(), damping: None });
     }
     let high = vertices.into_iter().enumerate().map(|(e, vertices)| High::zero(unknowns, e, vertices)).collect();
     (patches, high)
@@ -183,7 +223,8 @@ fn add_steps(high: &mut [High], patches: &[Patch], steps: &[patch::Step]) {
 fn parts(unknowns: &Unknowns, high: Vec<High>, patches: &[Patch], changes: &[Vec<f64>]) -> Vec<Part> {
     let part = |(e, high): (usize, High)| {
         let values = high.values.col_iter().flat_map(|column| column.iter().copied()).collect();
-        let change = vec![0.0; high.vertices.len() * functions(unknowns.elements[e].degree)];
+        let asked = if changes.is_empty() { 0 } else { high.vertices.len() };
+        let change = vec![0.0; asked * functions(unknowns.elements[e].degree)];
         Part { high: values, vertices: high.vertices, change }
     };
     let mut parts: Vec<Part> = high.into_iter().enumerate().map(part).collect();
@@ -217,6 +258,30 @@ pub(super) struct Equations<'a> {
 }
 
 impl Equations<'_> {
+    /// The elements of each vertex's patch, by what the low unknowns alone leave.
+    fn choose_patches(&self, low: MatRef<'_, f64>, candidates: &[Vec<u32>]) -> Vec<Vec<u32>> {
+        let nothing = |e: usize| High::zero(self.unknowns, e, Vec::new());
+        let high: Vec<High> = (0..candidates.len()).map(nothing).collect();
+        patch::choose(self.unknowns, candidates, &self.residuals(low, &high, candidates), low.ncols())
+    }
+
+    /// The largest residual, see [`Solved::remainder`]; the low unknowns were solved for with diagonals larger by the part `damping`.
+    fn remainder(&self, low: MatRef<'_, f64>, high: &[High], candidates: &[Vec<u32>], damping: f64) -> f64 {
+        let l = self.unknowns.low;
+        let residuals = self.residuals(low, high, candidates);
+        let of = |(e, residual): (usize, &Mat<f64>)| {
+            let inflated = |c: usize, k: usize| {
+                damping * f64::from(self.far[(e * l + k, e * l + k)]) * low[(e * l + k, candidates[e][c] as usize)]
+            };
+            let squared = |(c, residual): (usize, ColRef<'_, f64>)| {
+                residual.squared_norm_l2() + (0..l).map(|k| inflated(c, k).powi(2)).sum::<f64>()
+            };
+            let largest = residual.col_iter().enumerate().map(squared).fold(0.0, f64::max);
+            largest.sqrt() / self.unknowns.elements[e].triangle.area
+        };
+        residuals.iter().enumerate().map(of).fold(0.0, f64::max)
+    }
+
     /// What the equations of the high unknowns leave: for every element, its high unknowns × the vertices that are asked for, ascending.
     fn residuals(&self, low: MatRef<'_, f64>, high: &[High], vertices: &[Vec<u32>]) -> Vec<Mat<f64>> {
         let (unknowns, b) = (self.unknowns, self.b);
