@@ -160,8 +160,8 @@ def table(results):
         "",
         f"The affine error is {found['mvc']['affine_error']:.0e} of the diagonal with mean value coordinates, "
         f"{found['green']['affine_error']:.0e} with Green coordinates and {harmonic['affine_error']:.0e} with harmonic ones, which "
-        f"come from {harmonic['elements']:,} boundary elements after {harmonic['refinements']} refinements, where the last change "
-        f"of a coordinate was {harmonic['change']:.1e}. Green coordinates whose normals follow from the vertices take "
+        f"come from {harmonic['elements']:,} boundary elements after {harmonic['refinements']} refinements and are off by "
+        f"{harmonic['change']:.1e} at most, about. Green coordinates whose normals follow from the vertices take "
         f"{seconds(ours['green_invert_batched']['median'])} per frame to invert.",
     ]
     lines += ["", "| growth | preparation | peak memory | prepared solver |", "|---|---|---|---|"]

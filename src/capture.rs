@@ -71,7 +71,10 @@ impl<W: Write> CaptureWriter<W> {
     /// # Errors
     /// An output that refuses; sizes beyond the format.
     pub fn new(out: W, encoding: &Encoding<'_>) -> Result<Self, container::Error> {
-        let writer = ContainerWriter::new(out, &header(encoding), encoding.rest, encoding.cage.mesh())?;
+        let mut writer = ContainerWriter::new(out, &header(encoding), encoding.rest, encoding.cage.mesh())?;
+        if let Some(plan) = &encoding.solver.preparation().plan {
+            writer.add_elements(plan.as_bytes())?;
+        }
         let report = begin_report(writer.header(), encoding);
         let diagonal = encoding.solver.diagonal();
         Ok(Self { writer, report, squared: 0.0, spread: 0.0, diagonal, farthest: (0, 0.0) })
@@ -161,7 +164,7 @@ pub fn preparation_warnings(options: SolverOptions, solver: &Solver) -> Vec<Stri
     }
     if let Some(refined) = found.refinement.filter(|refined| !refined.reached()) {
         warnings.push(format!(
-            "the coordinates still change by {:.1e} after {} refinements to {} boundary elements, more than the {:.0e} aimed at, as happens in cages much thinner than wide and where points are very near to a cage's long edges; make the cage roomier, or use mean value coordinates (mvc)",
+            "the coordinates may be off by {:.1e} after {} refinements to {} boundary elements, more than the {:.0e} aimed at, as happens in cages much thinner than wide and where points are very near to a cage's long edges; make the cage roomier, or use mean value coordinates (mvc)",
             refined.change,
             refined.refinements,
             refined.elements,

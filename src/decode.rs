@@ -5,7 +5,7 @@ use crate::edited::EditedCages;
 use crate::memory::Memory;
 use crate::timing::Timing;
 use cager_core::cage::{Cage, CageError};
-use cager_core::coordinates::{CoordinatesError, knows_definition};
+use cager_core::coordinates::{CoordinatesError, ElementPlan, knows_definition};
 use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, PrepareError, coordinates_fit, refuse_far_points};
 use cager_core::mesh::{Model, Point};
@@ -188,7 +188,8 @@ fn bind(
         refuse_far_points(&cage, &rest.points)
             .map_err(|cause| DecodeError::Model { path: model_path.to_owned(), cause })?;
     }
-    if let Some(by_point) = system.by_point() {
+    let plan = container.elements().map_err(fail)?.map(ElementPlan::from_bytes);
+    if let Some(by_point) = system.by_point().filter(|_| plan.is_none()) {
         let keeps = keeps(rest.points.len(), columns);
         let decoder = if keeps { Decoder::keeping } else { Decoder::computing }(by_point, &cage, &rest.points, columns);
         let decoder = decoder.with_tied_normals(system.tied_normals(&cage));
@@ -201,7 +202,10 @@ fn bind(
         let gigabytes = 12e-9 * rest.points.len() as f64 * columns as f64;
         return Err(DecodeError::Memory { path: model_path.to_owned(), gigabytes });
     }
-    let coordinates = system.coordinates(&cage, &rest.points);
+    let coordinates = match &plan {
+        Some(plan) => system.coordinates_by_plan(&cage, &rest.points, plan),
+        None => system.coordinates(&cage, &rest.points),
+    };
     let found = coordinates.map_err(|cause| DecodeError::Coordinates { path: model_path.to_owned(), cause })?;
     let decoder = Decoder::new(found.phi.as_ref(), cage.vertices().len()).with_tied_normals(system.tied_normals(&cage));
     Ok(Bound { rest, decoder, outside: found.outside.len() })

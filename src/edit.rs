@@ -40,6 +40,9 @@ pub fn edit(
     let report = container.report().map_err(fail)?;
     let file = BufWriter::with_capacity(1 << 20, AtomicFile::create(output)?);
     let mut writer = ContainerWriter::new(file, container.header(), &rest, &cage).map_err(refused)?;
+    if let Some(elements) = container.elements().map_err(fail)? {
+        writer.add_elements(&elements).map_err(refused)?;
+    }
     let (frames, mut changed) = (edited.frames(), 0);
     let (mut old, mut new) = (Vec::new(), Vec::new());
     for frame in 0..frames {

@@ -9,7 +9,7 @@ mod common;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Coordinates, CoordinatesError, Green, Harmonic, MeanValue};
 use cager_core::mesh::{Point, diagonal, distance_to_surface, winding_number};
-use common::{Random, cages, thin_cages};
+use common::{Random, cages, cages_of, thin_cages};
 use faer::Mat;
 
 #[test]
@@ -22,6 +22,9 @@ fn mean_value_coordinates_conform() {
             barycentric_on_faces: true,
             continuous_outside: true,
             order: 1e-7,
+            stride: 1,
+            detail: 120,
+            exponents: &[-6, -3, 3, 6],
         },
     );
 }
@@ -37,6 +40,9 @@ fn green_coordinates_conform() {
             barycentric_on_faces: false,
             continuous_outside: false,
             order: 1e-7,
+            stride: 1,
+            detail: 120,
+            exponents: &[-6, -3, 3, 6],
         },
     );
 }
@@ -52,6 +58,10 @@ fn harmonic_coordinates_conform() {
             continuous_outside: false,
             // Densities meet the points in single precision, and in the order of the elements: up to 4e-7 was seen.
             order: 1e-5,
+            stride: 9,
+            detail: 32,
+            // Thin cages are scaled by both.
+            exponents: &[-6],
         },
     );
 }
@@ -113,6 +123,13 @@ struct Promises {
     continuous_outside: bool,
     /// How far a coordinate may differ when vertices and faces come in another order.
     order: f64,
+    /// Every so many points are enough to see that scale, order and rigid motions do not matter: what is solved numerically takes seconds
+    /// each time, and more for more points.
+    stride: usize,
+    /// Vertices of the most detailed cage.
+    detail: usize,
+    /// Powers of ten by which cages are scaled.
+    exponents: &'static [i32],
 }
 
 fn suite(system: &dyn CoordinateSystem, promises: Promises) {
@@ -121,22 +138,58 @@ fn suite(system: &dyn CoordinateSystem, promises: Promises) {
             conforms_or_refuses(system, promises, name, &cage);
             continue;
         }
-        reproduces_affine_functions_everywhere(system, promises, name, &cage);
-        does_not_depend_on_the_order_of_vertices_and_faces(system, promises, name, &cage);
+        reproduces_affine_functions_at_any_scale(system, promises, name, &cage);
+        let some = probes(promises, &cage);
+        let found = system.coordinates(&cage, &some).unwrap();
+        does_not_depend_on_the_order_of_vertices_and_faces(promises, name, &cage, &found, &some, system);
+        let (probes, on_faces) = (probes(promises, &cage), points_on_faces(&cage));
+        let [probes, on_faces] = solved(system, &cage, [probes, on_faces]);
+        reproduces_affine_functions(system, name, &cage, &probes);
         if promises.barycentric_on_faces {
-            is_barycentric_on_faces(system, name, &cage);
+            is_barycentric_on_faces(name, &cage, &on_faces);
         }
     }
-    for (name, cage) in cages() {
-        reproduces_affine_functions_everywhere(system, promises, name, &cage);
-        does_not_depend_on_the_order_of_vertices_and_faces(system, promises, name, &cage);
-        follows_rigid_motions(system, promises, name, &cage);
+    for (name, cage) in cages_of(promises.detail) {
+        reproduces_affine_functions_at_any_scale(system, promises, name, &cage);
+        let near = some(promises, probes(promises, &cage));
+        let points = [&near[..], &anywhere(promises, &cage)].concat();
+        let found = system.coordinates(&cage, &points).unwrap();
+        does_not_depend_on_the_order_of_vertices_and_faces(promises, name, &cage, &found, &points, system);
+        follows_rigid_motions(name, &cage, &found, &points, near.len(), system);
+        let (at_cage, across) = (places_at_the_cage(promises, &cage), places_in_planes(promises, &cage));
+        // Together: of all these points at once, a numerical solution is computed once.
+        let points = [probes(promises, &cage), points_on_faces(&cage), at_cage.concat(), across.concat()];
+        let [probes, on_faces, beside, in_planes] = solved(system, &cage, points);
+        reproduces_affine_functions(system, name, &cage, &probes);
         if promises.barycentric_on_faces {
-            is_barycentric_on_faces(system, name, &cage);
+            is_barycentric_on_faces(name, &cage, &on_faces);
         }
-        is_continuous_at_the_cage(system, promises, name, &cage);
-        is_continuous_across_planes_of_far_faces(system, promises, name, &cage);
+        is_continuous_at_the_cage(name, &at_cage, &beside);
+        is_continuous_across_planes_of_far_faces(promises, name, &across, &in_planes);
     }
+}
+
+/// Points with their rows of `Φ`, and which of them are outside.
+struct Solved {
+    points: Vec<Point>,
+    phi: Mat<f64>,
+    outside: Vec<u32>,
+}
+
+/// Coordinates of several sets of points, computed together.
+fn solved<const N: usize>(system: &dyn CoordinateSystem, cage: &Cage, sets: [Vec<Point>; N]) -> [Solved; N] {
+    let Coordinates { phi, outside, .. } = system.coordinates(cage, &sets.concat()).unwrap();
+    let mut first = 0;
+    sets.map(|points| {
+        let here = first..first + points.len();
+        first = here.end;
+        let inside = outside.iter().filter(|&&i| here.contains(&(i as usize)));
+        Solved {
+            phi: phi.get(here.clone(), ..).to_owned(),
+            outside: inside.map(|i| i - here.start as u32).collect(),
+            points,
+        }
+    })
 }
 
 /// Those points at which the system promises coordinates. Points within 1e-9 of the cage lie on it.
@@ -149,19 +202,23 @@ fn defined(promises: Promises, cage: &Cage, mut points: Vec<Point>) -> Vec<Point
 
 /// Of a thin cage, what is promised of others, or a sentence that says what to do.
 fn conforms_or_refuses(system: &dyn CoordinateSystem, promises: Promises, name: &str, cage: &Cage) {
-    let mut random = Random::new(23);
-    let points = defined(promises, cage, probes(cage, &mut random));
-    let scaled = |factor: f64| -> Vec<Point> { points.iter().map(|p| p.map(|c| c * factor)).collect() };
-    let outcomes = [1e-6, 1e6].map(|scale| {
-        let points = scaled(scale);
+    let points = some(promises, probes(promises, cage));
+    // The blade takes as long as all others.
+    let scales: &[f64] = if name == "blade" { &[1e6] } else { &[1e-6, 1e6] };
+    let outcome = |&scale: &f64| {
         let cage = common::mapped(cage, |p| p.map(|c| c * scale));
-        match system.coordinates(&cage, &points) {
+        let scaled: Vec<Point> = points.iter().map(|p| p.map(|c| c * scale)).collect();
+        let all = [&scaled[..], &points_on_faces(&cage)].concat();
+        match system.coordinates(&cage, &all) {
             Ok(found) => {
-                let (unknowns, size) = (system.rest_values(&cage), diagonal(&points));
-                for (i, p) in points.iter().enumerate() {
-                    assert_reproduced(name, &row(&found.phi, i), cage.vertices().len(), &unknowns, *p, size);
-                }
-                is_barycentric_on_faces(system, name, &cage);
+                let rows = |from: usize, points: &[Point]| Solved {
+                    points: points.to_vec(),
+                    phi: found.phi.get(from..from + points.len(), ..).to_owned(),
+                    outside: Vec::new(),
+                };
+                let (probes, on_faces) = all.split_at(scaled.len());
+                reproduces_affine_functions(system, name, &cage, &rows(0, probes));
+                is_barycentric_on_faces(name, &cage, &rows(probes.len(), on_faces));
                 true
             }
             Err(error @ CoordinatesError::NotComputed { .. }) => {
@@ -171,12 +228,19 @@ fn conforms_or_refuses(system: &dyn CoordinateSystem, promises: Promises, name: 
             }
             Err(error) => panic!("{name}: {error}"),
         }
-    });
+    };
+    let outcomes: Vec<bool> = scales.iter().map(outcome).collect();
     assert!(outcomes.iter().all(|&done| done == outcomes[0]), "{name}: scaling changes what is computed");
 }
 
+/// As many of the points as a system needs.
+fn some(promises: Promises, points: Vec<Point>) -> Vec<Point> {
+    points.into_iter().step_by(promises.stride).collect()
+}
+
 /// Points with a distance to some part of the cage that goes down to zero, and points anywhere.
-fn probes(cage: &Cage, random: &mut Random) -> Vec<Point> {
+fn probes(promises: Promises, cage: &Cage) -> Vec<Point> {
+    let random = &mut Random::new(7);
     let vertices = cage.vertices();
     let size = cage.diagonal();
     let mut points = Vec::new();
@@ -200,45 +264,47 @@ fn probes(cage: &Cage, random: &mut Random) -> Vec<Point> {
         }
     }
     points.extend_from_slice(vertices);
-    points
+    defined(promises, cage, points)
 }
 
-fn reproduces_affine_functions_everywhere(system: &dyn CoordinateSystem, promises: Promises, name: &str, cage: &Cage) {
-    let mut random = Random::new(7);
-    let points = defined(promises, cage, probes(cage, &mut random));
-    // What is solved numerically takes seconds each time.
-    let exponents: &[i32] = if promises.in_thin_cages { &[-6, -3, 0, 3, 6] } else { &[-6, 6] };
-    for &exponent in exponents {
-        let scale = 10f64.powi(exponent);
-        let scaled = common::mapped(cage, |p| p.map(|c| c * scale));
-        let points: Vec<Point> = points.iter().map(|p| p.map(|c| c * scale)).collect();
-        let found = system.coordinates(&scaled, &points).unwrap_or_else(|error| panic!("{name} × {scale:e}: {error}"));
-        let phi = found.phi;
-        let unknowns = system.rest_values(&scaled);
-        let size = diagonal(&points);
-        for (i, p) in points.iter().enumerate() {
-            let name = format!("{name} × {scale:e}");
-            assert_reproduced(&name, &row(&phi, i), cage.vertices().len(), &unknowns, *p, size);
-        }
+fn reproduces_affine_functions(system: &dyn CoordinateSystem, name: &str, cage: &Cage, found: &Solved) {
+    let (unknowns, size) = (system.rest_values(cage), diagonal(&found.points));
+    for (i, p) in found.points.iter().enumerate() {
+        assert_reproduced(name, &row(&found.phi, i), cage.vertices().len(), &unknowns, *p, size);
     }
 }
 
-fn does_not_depend_on_the_order_of_vertices_and_faces(
+fn reproduces_affine_functions_at_any_scale(
     system: &dyn CoordinateSystem,
     promises: Promises,
     name: &str,
     cage: &Cage,
 ) {
-    let mut random = Random::new(11);
-    let points = defined(promises, cage, probes(cage, &mut random));
-    let (shuffled, order) = common::shuffled(cage, &mut random);
-    let a = system.coordinates(cage, &points).unwrap();
-    let b = system.coordinates(&shuffled, &points).unwrap();
+    let points = some(promises, probes(promises, cage));
+    for &exponent in promises.exponents {
+        let scale = 10f64.powi(exponent);
+        let scaled = common::mapped(cage, |p| p.map(|c| c * scale));
+        let points = points.iter().map(|p| p.map(|c| c * scale)).collect();
+        let [found] = solved(system, &scaled, [points]);
+        reproduces_affine_functions(system, &format!("{name} × {scale:e}"), &scaled, &found);
+    }
+}
+
+fn does_not_depend_on_the_order_of_vertices_and_faces(
+    promises: Promises,
+    name: &str,
+    cage: &Cage,
+    found: &Coordinates,
+    points: &[Point],
+    system: &dyn CoordinateSystem,
+) {
+    let (shuffled, order) = common::shuffled(cage, &mut Random::new(11));
+    let other = system.coordinates(&shuffled, points).unwrap();
     // Points within rounding of an edge may be taken for points on it in one order and not in the other.
     let vertices = cage.vertices();
     for i in 0..points.len() {
         for (new, &old) in order.iter().enumerate() {
-            let difference = (a.phi[(i, old)] - b.phi[(i, new)]).abs();
+            let difference = (found.phi[(i, old)] - other.phi[(i, new)]).abs();
             assert!(
                 difference < promises.order,
                 "{name}: point {i} {:?} vertex {old} {:?} differs by {difference:e}",
@@ -249,10 +315,22 @@ fn does_not_depend_on_the_order_of_vertices_and_faces(
     }
 }
 
-fn follows_rigid_motions(system: &dyn CoordinateSystem, promises: Promises, name: &str, cage: &Cage) {
+/// Points anywhere, most of them apart from the cage.
+fn anywhere(promises: Promises, cage: &Cage) -> Vec<Point> {
     let mut random = Random::new(13);
-    let points: Vec<Point> = (0..200).map(|_| [0, 1, 2].map(|_| cage.diagonal() * (random.uniform() - 0.5))).collect();
-    let points = defined(promises, cage, points);
+    let points = (0..200).map(|_| [0, 1, 2].map(|_| cage.diagonal() * (random.uniform() - 0.5))).collect();
+    some(promises, defined(promises, cage, points))
+}
+
+/// Of the points from `first` on.
+fn follows_rigid_motions(
+    name: &str,
+    cage: &Cage,
+    found: &Coordinates,
+    points: &[Point],
+    first: usize,
+    system: &dyn CoordinateSystem,
+) {
     let motion = |p: Point| {
         let (s, c) = 0.7f64.sin_cos();
         let q = [c * p[0] - s * p[1], s * p[0] + c * p[1], p[2]];
@@ -260,26 +338,30 @@ fn follows_rigid_motions(system: &dyn CoordinateSystem, promises: Promises, name
         [q[0] + 3.0, c * q[1] - s * q[2] - 2.0, s * q[1] + c * q[2] + 1.0]
     };
     let moved: Vec<Point> = points.iter().map(|&p| motion(p)).collect();
-    let a = system.coordinates(cage, &points).unwrap();
-    let b = system.coordinates(&common::mapped(cage, motion), &moved).unwrap();
-    for i in 0..points.len() {
-        for j in 0..a.phi.ncols() {
-            let difference = (a.phi[(i, j)] - b.phi[(i, j)]).abs();
+    let other = system.coordinates(&common::mapped(cage, motion), &moved).unwrap();
+    for i in first..points.len() {
+        for j in 0..found.phi.ncols() {
+            let difference = (found.phi[(i, j)] - other.phi[(i, j)]).abs();
             assert!(difference < 1e-8, "{name}: point {i} changes by {difference:e} under a rigid motion");
         }
     }
-    assert_eq!(a.outside, b.outside, "{name}: what is outside changes under a rigid motion");
+    let outside =
+        |found: &Coordinates| -> Vec<u32> { found.outside.iter().copied().filter(|&i| i as usize >= first).collect() };
+    assert_eq!(outside(found), outside(&other), "{name}: what is outside changes under a rigid motion");
 }
 
-fn is_barycentric_on_faces(system: &dyn CoordinateSystem, name: &str, cage: &Cage) {
-    let weights = [0.2, 0.3, 0.5];
-    let on = |corners: [Point; 3]| [0, 1, 2].map(|c| (0..3).map(|i| weights[i] * corners[i][c]).sum::<f64>());
-    let points: Vec<Point> =
-        cage.faces().iter().map(|face| on(face.vertices.map(|v| cage.vertices()[v as usize]))).collect();
-    let phi = system.coordinates(cage, &points).unwrap().phi;
+const WEIGHTS: [f64; 3] = [0.2, 0.3, 0.5];
+
+/// A point on each face.
+fn points_on_faces(cage: &Cage) -> Vec<Point> {
+    let on = |corners: [Point; 3]| [0, 1, 2].map(|c| (0..3).map(|i| WEIGHTS[i] * corners[i][c]).sum::<f64>());
+    cage.faces().iter().map(|face| on(face.vertices.map(|v| cage.vertices()[v as usize]))).collect()
+}
+
+fn is_barycentric_on_faces(name: &str, cage: &Cage, Solved { phi, .. }: &Solved) {
     for (f, face) in cage.faces().iter().enumerate() {
         for j in 0..cage.vertices().len() {
-            let expected = face.vertices.iter().position(|&v| v as usize == j).map_or(0.0, |i| weights[i]);
+            let expected = face.vertices.iter().position(|&v| v as usize == j).map_or(0.0, |i| WEIGHTS[i]);
             assert!(
                 (phi[(f, j)] - expected).abs() < 1e-9,
                 "{name}: {} at vertex {j} of face {:?}, not {expected}",
@@ -290,10 +372,10 @@ fn is_barycentric_on_faces(system: &dyn CoordinateSystem, name: &str, cage: &Cag
     }
 }
 
-fn is_continuous_at_the_cage(system: &dyn CoordinateSystem, promises: Promises, name: &str, cage: &Cage) {
+/// Places on the cage, each with points beside it.
+fn places_at_the_cage(promises: Promises, cage: &Cage) -> Vec<Vec<Point>> {
     let mut random = Random::new(19);
     let vertices = cage.vertices();
-    // Places on the cage, each with points beside it.
     let mut places: Vec<Vec<Point>> = Vec::new();
     for face in cage.faces() {
         let [a, b, c] = face.vertices.map(|v| vertices[v as usize]);
@@ -309,9 +391,12 @@ fn is_continuous_at_the_cage(system: &dyn CoordinateSystem, promises: Promises, 
             places.push(defined(promises, cage, points));
         }
     }
-    let phi = system.coordinates(cage, &places.concat()).unwrap().phi;
+    places
+}
+
+fn is_continuous_at_the_cage(name: &str, places: &[Vec<Point>], Solved { phi, .. }: &Solved) {
     let mut first = 0;
-    for points in &places {
+    for points in places {
         for i in 1..points.len() {
             for j in 0..phi.ncols() {
                 let jump = (phi[(first + i, j)] - phi[(first, j)]).abs();
@@ -322,13 +407,8 @@ fn is_continuous_at_the_cage(system: &dyn CoordinateSystem, promises: Promises, 
     }
 }
 
-fn is_continuous_across_planes_of_far_faces(
-    system: &dyn CoordinateSystem,
-    promises: Promises,
-    name: &str,
-    cage: &Cage,
-) {
-    // Places in the plane of a face, each with points above and below.
+/// Places in the plane of a face, each with points above and below.
+fn places_in_planes(promises: Promises, cage: &Cage) -> Vec<Vec<Point>> {
     let mut places: Vec<Vec<Point>> = Vec::new();
     for face in cage.faces().iter().take(60) {
         let [a, b, c] = face.vertices.map(|v| cage.vertices()[v as usize]);
@@ -346,9 +426,13 @@ fn is_continuous_across_planes_of_far_faces(
             }
         }
     }
-    let Coordinates { phi, outside, .. } = system.coordinates(cage, &places.concat()).unwrap();
+    places
+}
+
+fn is_continuous_across_planes_of_far_faces(promises: Promises, name: &str, places: &[Vec<Point>], found: &Solved) {
+    let Solved { phi, outside, .. } = found;
     let mut first = 0;
-    for points in &places {
+    for points in places {
         let here = first..first + points.len();
         first = here.end;
         if !promises.continuous_outside && outside.iter().any(|&i| here.contains(&(i as usize))) {

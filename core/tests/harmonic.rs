@@ -3,7 +3,9 @@
 mod common;
 
 use cager_core::cage::Cage;
-use cager_core::coordinates::{CoordinateSystem, Coordinates, CoordinatesError, Harmonic, Refinement};
+use cager_core::coordinates::{
+    CoordinateSystem, Coordinates, CoordinatesError, ElementPlan, Green, Harmonic, Refinement,
+};
 use cager_core::mesh::{Point, TriMesh, bounds, distance_to_surface, winding_number};
 use common::{Random, cages, octahedron};
 
@@ -183,6 +185,157 @@ fn values_stay_between_zero_and_one_everywhere_and_meet_the_faces() {
             }
         }
     }
+}
+
+/// Largest difference that the two independent truths below allow.
+const TRUTH: f64 = 1e-4;
+
+/// Points inside that are at least so far from the cage.
+fn points_well_inside(cage: &Cage, count: usize, seed: u64, apart: f64) -> Vec<Point> {
+    let mut points = points_inside(cage, 20 * count, seed);
+    points.retain(|&x| distance_to_surface(cage.vertices(), &cage.mesh().triangles, x) > apart);
+    points.truncate(count);
+    points
+}
+
+#[test]
+fn coordinates_are_the_fourier_series_of_a_box() {
+    // A vertex in the middle of the lid, which four triangles meet at: its hat function is Σ 8/(nπ)² sin(nπx/a) sin(nπy/b) over odd n.
+    let [a, b, c] = [1.3, 0.9, 0.7];
+    let mut vertices: Vec<Point> = Vec::new();
+    for z in [0.0, c] {
+        vertices.extend([[0.0, 0.0, z], [a, 0.0, z], [a, b, z], [0.0, b, z]]);
+    }
+    vertices.push([0.5 * a, 0.5 * b, c]);
+    let mut triangles = vec![[0, 2, 1], [0, 3, 2]];
+    for i in 0..4 {
+        let j = (i + 1) % 4;
+        triangles.extend([[i, j, j + 4], [i, j + 4, i + 4], [i + 4, j + 4, 8]]);
+    }
+    let cage = Cage::new(TriMesh { vertices, triangles }).expect("a cage");
+    let points = points_well_inside(&cage, 300, 47, 0.1);
+    let found = of(&cage, &points);
+    let (half, ends) = quartered(cage.mesh());
+    let finer = of(&Cage::new(half).expect("a cage"), &points);
+    let pi = std::f64::consts::PI;
+    let (mut worst, mut worst_finer) = (0.0f64, 0.0f64);
+    for (i, &[x, y, z]) in points.iter().enumerate() {
+        let term = |n: f64| {
+            let decay = n * pi * (1.0 / (a * a) + 1.0 / (b * b)).sqrt();
+            let height = ((decay * (z - c)).exp() - (-decay * (z + c)).exp()) / (1.0 - (-2.0 * decay * c).exp());
+            8.0 / (n * pi).powi(2) * (n * pi * x / a).sin() * (n * pi * y / b).sin() * height
+        };
+        let exact: f64 = (0..100).map(|k| term(f64::from(2 * k + 1))).sum();
+        worst = worst.max((found.phi[(i, 8)] - exact).abs());
+        worst_finer = worst_finer.max((of_coarse_vertices(&finer, i, &ends)[8] - exact).abs());
+    }
+    assert!(worst < refined(&found).change, "off by {worst:.1e}, {:?}", refined(&found));
+    assert!(worst_finer < TRUTH, "off by {worst_finer:.1e}, {:?}", refined(&finer));
+}
+
+/// A row of a cage from that of the cage with divided faces: a hat function is one half of what it is at either end in the middle of an
+/// edge.
+fn of_coarse_vertices(fine: &Coordinates, point: usize, ends: &[[u32; 2]]) -> Vec<f64> {
+    let mut row: Vec<f64> = (0..fine.phi.ncols()).map(|v| fine.phi[(point, v)]).collect();
+    for [a, b] in ends.iter().rev() {
+        let half = 0.5 * row.pop().expect("a vertex");
+        row[*a as usize] += half;
+        row[*b as usize] += half;
+    }
+    row
+}
+
+/// The same faces, each cut into four; and for each new vertex the ends of the edge that it halves.
+fn quartered(mesh: &TriMesh) -> (TriMesh, Vec<[u32; 2]>) {
+    let (mut out, mut ends) = (TriMesh { vertices: mesh.vertices.clone(), triangles: Vec::new() }, Vec::new());
+    let mut middles = std::collections::HashMap::new();
+    for &[a, b, c] in &mesh.triangles {
+        let [d, e, f] = [[a, b], [b, c], [c, a]].map(|[a, b]| {
+            *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                let [p, q] = [a, b].map(|v| mesh.vertices[v as usize]);
+                out.vertices.push([0, 1, 2].map(|k| 0.5 * (p[k] + q[k])));
+                ends.push([a, b]);
+                out.vertices.len() as u32 - 1
+            })
+        });
+        out.triangles.extend([[a, d, f], [d, b, e], [f, e, c], [d, e, f]]);
+    }
+    (out, ends)
+}
+
+#[test]
+fn coordinates_are_those_of_far_more_elements() {
+    for name in ["octahedron", "box with split sides", "L-shaped prism"] {
+        let cage = named(name);
+        let points = points_well_inside(&cage, 150, 53, 0.15);
+        let (half, first_ends) = quartered(cage.mesh());
+        let (quarter, second_ends) = quartered(&half);
+        let [found, finer, finest] =
+            [cage.mesh().clone(), half, quarter].map(|mesh| of(&Cage::new(mesh).expect("a cage"), &points));
+        let all_ends = [first_ends.clone(), second_ends].concat();
+        let (mut worst, mut worst_finer) = (0.0f64, 0.0f64);
+        for i in 0..points.len() {
+            let finer = of_coarse_vertices(&finer, i, &first_ends);
+            for (v, exact) in of_coarse_vertices(&finest, i, &all_ends).into_iter().enumerate() {
+                worst = worst.max((found.phi[(i, v)] - exact).abs());
+                worst_finer = worst_finer.max((finer[v] - exact).abs());
+            }
+        }
+        // What is reported holds everywhere. Near an edge that points inwards densities grow without bound, so that it takes many elements.
+        assert!(worst < refined(&found).change, "{name}: off by {worst:.1e}, {:?}", refined(&found));
+        let most = if name == "L-shaped prism" { 3.0 * TRUTH } else { TRUTH };
+        assert!(worst_finer < most, "{name}: off by {worst_finer:.1e}, {:?}", refined(&finer));
+    }
+}
+
+#[test]
+fn a_plan_gives_the_same_bits_again_and_coordinates_of_other_points() {
+    for name in ["L-shaped prism", "needle", "octahedron"] {
+        let cage = named(name);
+        let points = points_inside(&cage, 150, 59);
+        let found = of(&cage, &points);
+        let plan = found.plan.expect("a plan");
+        let again = Harmonic.coordinates_by_plan(&cage, &points, &plan).expect("coordinates");
+        let same = |v: usize| (0..points.len()).all(|i| found.phi[(i, v)].to_bits() == again.phi[(i, v)].to_bits());
+        assert!((0..found.phi.ncols()).all(same), "{name}: other bits");
+        let few = Harmonic.coordinates_by_plan(&cage, &points[7..9], &plan).expect("coordinates");
+        for v in 0..found.phi.ncols() {
+            for i in 0..2 {
+                // Products of other sizes round otherwise, in single precision.
+                let error = (few.phi[(i, v)] - found.phi[(i + 7, v)]).abs();
+                assert!(error < 1e-6, "{name}: point {i}, vertex {v} is off by {error:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn plans_of_other_cages_and_of_any_bytes_are_refused_in_one_sentence() {
+    let (cage, other) = (named("octahedron"), named("L-shaped prism"));
+    let points = points_inside(&cage, 40, 61);
+    let plan = of(&cage, &points).plan.expect("a plan");
+    let refused = |cage: &Cage, points: &[Point], bytes: &[u8]| {
+        let plan = ElementPlan::from_bytes(bytes.to_vec());
+        let error = Harmonic.coordinates_by_plan(cage, points, &plan).expect_err("a wrong plan");
+        let text = error.to_string();
+        assert!(text.starts_with("the boundary elements of harmonic coordinates do not fit the cage: "), "{text}");
+    };
+    refused(&other, &points_inside(&other, 10, 67), plan.as_bytes());
+    for length in [0, 3, 9, plan.as_bytes().len() - 1] {
+        refused(&cage, &points, &plan.as_bytes()[..length]);
+    }
+    refused(&cage, &points, &[&plan.as_bytes()[..3], &[0; 1 << 20]].concat());
+    refused(&cage, &points, &[255; 1 << 20]);
+    // Elements without any extent: an error or finite numbers, and no panic.
+    let mut deep = plan.as_bytes()[..3].to_vec();
+    deep.extend([0; 1100]);
+    deep.extend(vec![3; 1100 + cage.faces().len()]);
+    let elements = 1100 + cage.faces().len();
+    deep.extend(vec![0; cage.vertices().len() + (elements * cage.vertices().len()).div_ceil(8)]);
+    let found = Harmonic.coordinates_by_plan(&cage, &points, &ElementPlan::from_bytes(deep));
+    assert!(found.is_err(), "elements without area");
+    let wrong = Green::Free.coordinates_by_plan(&cage, &points, &plan).expect_err("no such system");
+    assert!(wrong.to_string().contains("green-free"), "{wrong}");
 }
 
 #[test]

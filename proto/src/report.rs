@@ -146,7 +146,8 @@ pub struct Refinement {
     pub elements: usize,
     /// Solutions after the first.
     pub refinements: usize,
-    /// Most that the last refinement changed a coordinate of a point by; at most 1e-3 but where a warning says otherwise.
+    /// About how far a coordinate may be off: by what refining last changed, or by what the solution leaves of its equations; at most
+    /// 1e-3 but where a warning says otherwise.
     #[serde(deserialize_with = "number_or_null")]
     pub change: f64,
 }

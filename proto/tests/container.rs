@@ -137,6 +137,21 @@ fn errors_and_header_come_back_with_the_counts_of_the_meshes() {
 }
 
 #[test]
+fn boundary_elements_come_back_or_are_absent_and_are_there_once() {
+    let bytes = small_container();
+    assert_eq!(open(&bytes).unwrap().elements().unwrap().as_deref(), Some(&support::ELEMENTS[..]));
+    let without = support::write(&small_model(), &tetrahedron(), 2, None);
+    assert_eq!(open(&without).unwrap().elements().unwrap(), None);
+    let mut parts = take_apart(&bytes);
+    let place = parts.iter().position(|p| p.tag == *b"ELEM").unwrap();
+    parts.insert(place, parts[place].clone());
+    assert!(matches!(open(&put_together(&parts)), Err(Error::Corrupt { .. })));
+    parts.remove(place);
+    parts[place].width = 4;
+    assert!(matches!(open(&put_together(&parts)), Err(Error::Corrupt { .. })));
+}
+
+#[test]
 fn report_comes_back_with_what_the_other_sections_say() {
     let mut written = Report {
         generator: "cager 9".to_owned(),

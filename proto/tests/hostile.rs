@@ -154,6 +154,7 @@ fn section_as_large_as_allowed_stays_within_the_declared_memory() {
         faces.clone(),
         Part { tag: *b"CVTX", ..points.clone() },
         Part { tag: *b"CTRI", ..faces.clone() },
+        Part { tag: *b"ELEM", width: 1, ..points.clone() },
         Part { tag: *b"FRAM", frames: (0, 1), ..faces.clone() },
         Part { tag: *b"FRAM", frames: (1, 1), ..faces },
         Part::raw(*b"ERRS", 4, &[0; 16]),

@@ -26,7 +26,7 @@ pub(super) fn summary(report: &Report, output: &Path) -> String {
     });
     let refined = report.refinement.as_ref().map_or_else(String::new, |refined| {
         format!(
-            "  solved  on {} boundary elements, {} times refined; no coordinate changed by more than {:.1e} at last\n",
+            "  solved  on {} boundary elements, {} times refined; coordinates are off by {:.1e} at most, about\n",
             refined.elements, refined.refinements, refined.change
         )
     });

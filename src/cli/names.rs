@@ -15,7 +15,7 @@ const COORDINATES: &Names = &[
     ("mvc", "Mean value coordinates: defined everywhere, fast"),
     (
         "harmonic",
-        "Harmonic coordinates: never negative, and felt through the inside of the cage only, where all points must be; seconds to prepare",
+        "Harmonic coordinates: between 0 and 1 up to about 1e-3, with influence through the inside of the cage only, where all points must be; seconds to prepare",
     ),
     (
         "green",

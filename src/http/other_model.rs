@@ -8,7 +8,7 @@ use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::Session;
 use crate::session::create::blocking;
-use crate::session::prepare::{Choices, check_columns, read_part};
+use crate::session::prepare::{Choices, check_model, read_part};
 use axum::extract::{FromRequest, Multipart, Request};
 use bytes::Bytes;
 use cager_core::decode::Decoder;
@@ -95,6 +95,7 @@ pub(super) async fn bind(
     tenant: &str,
     uploaded: Uploaded,
 ) -> Result<Bound, ApiError> {
+    let prepared = service.solver(session).await?;
     let place = service.solvers.place(tenant).await;
     let (service, session) = (Arc::clone(service), Arc::clone(session));
     blocking(move || {
@@ -103,8 +104,12 @@ pub(super) async fn bind(
         let (cage, system) = (session.rest_cage()?, Choices::of(&session.meta.options)?.system);
         refuse_far_points(&cage, &model.points)
             .map_err(|error| ApiError::new(problem::INVALID_GEOMETRY, format!("model: {error}")))?;
-        check_columns(model.points.len(), system.columns(&cage), service.config.max_prepare_bytes)?;
-        let coordinates = service.solvers.pool().install(|| system.coordinates(&cage, &model.points));
+        check_model(model.points.len(), system, &cage, service.config.max_prepare_bytes)?;
+        // On the elements of the session's own coordinates, where it has any, as in its container.
+        let coordinates = service.solvers.pool().install(|| match &prepared.solver.preparation().plan {
+            Some(plan) => system.coordinates_by_plan(&cage, &model.points, plan),
+            None => system.coordinates(&cage, &model.points),
+        });
         let found = coordinates.map_err(|error| ApiError::new(problem::INVALID_GEOMETRY, format!("model: {error}")))?;
         let decoder = Decoder::new(found.phi.as_ref(), cage.vertices().len());
         Ok(Bound { decoder: decoder.with_tied_normals(system.tied_normals(&cage)), outside: found.outside.len() })

@@ -225,29 +225,45 @@ fn check_memory(
     let columns = choices.system.columns(&geometry.cage) as u64;
     // What an iteration takes beside them: their Gram matrix, and in single precision.
     let iterated = if columns > unknowns as u64 { 12 * columns * columns } else { 0 };
+    let elements = choices.system.working_bytes(&geometry.cage);
     // Two matrices of all points and columns in double precision and one in single, at their peak.
-    let needed = (20 * points as u64 * columns).saturating_add(handles).saturating_add(iterated);
+    let needed =
+        (20 * points as u64 * columns).saturating_add(handles).saturating_add(iterated).saturating_add(elements);
     if needed > most_bytes {
         let detail = format!(
-            "{points} points times {columns} values of the cage need {needed} bytes to be prepared, and this service allows {most_bytes}; use a coarser cage or a lighter model"
+            "{points} points times {columns} values of the cage{} need {needed} bytes to be prepared, and this service allows {most_bytes}; use a coarser cage or a lighter model{}",
+            with_elements(elements),
+            if elements > 0 { ", or mean value coordinates (mvc)" } else { "" }
         );
         return Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(most_bytes));
     }
     Ok(())
 }
 
-/// Refuses coordinates of so many points and columns that this service does not allow.
+/// What boundary elements add to a size, in words.
+fn with_elements(bytes: u64) -> String {
+    if bytes > 0 { format!(" and its boundary elements, up to {bytes} bytes,") } else { String::new() }
+}
+
+/// Refuses another model of so many points, whose coordinates this service does not allow.
 ///
 /// # Errors
 /// More than `most_bytes` at their peak.
-pub(crate) fn check_columns(points: usize, columns: usize, most_bytes: u64) -> Result<(), ApiError> {
+pub(crate) fn check_model(
+    points: usize,
+    system: &dyn CoordinateSystem,
+    cage: &Cage,
+    most_bytes: u64,
+) -> Result<(), ApiError> {
+    let (columns, elements) = (system.columns(cage), system.working_bytes(cage));
     // One matrix in double precision, what it is solved with, and one in single precision.
-    let needed = 20 * points as u64 * columns as u64;
+    let needed = (20 * points as u64 * columns as u64).saturating_add(elements);
     if needed <= most_bytes {
         return Ok(());
     }
     let detail = format!(
-        "model: {points} points times {columns} values of the cage need {needed} bytes, and this service allows {most_bytes}; send a lighter model"
+        "model: {points} points times {columns} values of the cage{} need {needed} bytes, and this service allows {most_bytes}; send a lighter model",
+        with_elements(elements)
     );
     Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(most_bytes))
 }
@@ -264,4 +280,32 @@ pub(crate) fn read_part(part: &str, name: &str, bytes: &[u8]) -> Result<Model, A
 
 fn geometry(detail: String) -> ApiError {
     ApiError::new(problem::INVALID_GEOMETRY, detail)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cager_core::synthetic::{Capture, Options};
+
+    #[test]
+    fn boundary_elements_count_as_memory_before_anything_is_prepared() {
+        let Capture { rest, cage, .. } = Capture::new(&Options { points: 2000, frames: 1, cage_vertices: 300 });
+        let geometry = Geometry { rest, cage: Cage::new(cage).expect("a cage"), matrix: None };
+        let checked = |system: &str, most_bytes: u64| {
+            let options = SessionOptions { coordinates: Some(system.to_owned()), ..SessionOptions::default() };
+            let choices = Choices::of(&options).expect("options");
+            let columns = choices.solver_options(choices.system.unknowns(&geometry.cage));
+            let other = check_model(2000, choices.system, &geometry.cage, most_bytes);
+            (check_memory(&geometry, &choices, columns, most_bytes), other)
+        };
+        let (own, other) = checked("harmonic", 512 << 20);
+        for refused in [own.expect_err("too little"), other.expect_err("too little")] {
+            assert_eq!(refused.problem.status, problem::INVALID_GEOMETRY.status);
+            assert!(refused.problem.detail.contains("boundary elements"), "{}", refused.problem.detail);
+        }
+        let (own, other) = checked("harmonic", 4 << 30);
+        assert!(own.is_ok() && other.is_ok());
+        let (own, other) = checked("mvc", 512 << 20);
+        assert!(own.is_ok() && other.is_ok());
+    }
 }

@@ -4,7 +4,7 @@
 
 use super::ContentKey;
 use super::disk::DiskFile;
-use cager_core::coordinates::{Refinement, TiedNormals};
+use cager_core::coordinates::{ElementPlan, Refinement, TiedNormals};
 use cager_core::inversion::{Preparation, Pull, Solver, SolverParts, TiedParts};
 use faer::traits::ComplexField;
 use faer::{ColRef, Mat, MatRef};
@@ -33,6 +33,7 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
         outside,
         outside_distance,
         refinement,
+        plan,
         coordinates_seconds,
         maxvol_seconds,
         svd_seconds,
@@ -67,6 +68,7 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
         Array::new("operator", solver.operator()),
     ];
     arrays.extend(refinement.as_ref().map(|numbers| Array::new("refinement", column(numbers))));
+    arrays.extend(plan.as_ref().map(|plan| Array::new("elements", column(plan.as_bytes()))));
     match solver.pull() {
         Pull::None => {}
         Pull::Constant(offset) => arrays.push(Array::new("constant", offset.as_ref())),
@@ -158,6 +160,10 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Option<S
             }),
             false => None,
         };
+    let mut plan = None;
+    if source.has("elements") {
+        plan = Some(ElementPlan::from_bytes(source.vector("elements")?));
+    }
     let pull = if source.has("constant") {
         Pull::Constant(source.matrix("constant")?)
     } else if source.has("previous") {
@@ -213,6 +219,7 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Option<S
         outside,
         outside_distance,
         refinement,
+        plan,
         coordinates_seconds,
         maxvol_seconds,
         svd_seconds,
@@ -249,7 +256,7 @@ macro_rules! numbers {
     )*};
 }
 
-numbers!(u32: U32, f32: F32, f64: F64);
+numbers!(u8: U8, u32: U32, f32: F32, f64: F64);
 
 type Put<'a> = Box<dyn Fn(&mut Out<'_>) -> io::Result<()> + 'a>;
 

@@ -1,7 +1,7 @@
 //! Files that earlier versions of the program wrote, with the positions that they decoded to: they decode to the same for ever.
 //!
 //! `tests/golden/definitionN-SYSTEM.cager` was written by a program whose coordinates are of definition N, and the array beside it by its
-//! `cager decode`. The model has 120 points in a cage of 26 vertices, and three frames.
+//! `cager decode`; `-elements` is with the boundary elements in the file. The model has 120 points in a cage of 26 vertices, and three frames.
 
 use crate::support::Dir;
 use std::path::{Path, PathBuf};
@@ -33,6 +33,7 @@ fn files_of_every_version_decode_to_what_they_always_did() {
         let name = format!("definition{}-{system}", cager_core::coordinates::DEFINITION);
         assert!(files.iter().any(|file| file.file_stem().is_some_and(|stem| *stem == *name)), "{name} is missing");
     }
+    assert!(files.iter().any(|file| file.file_stem().is_some_and(|stem| *stem == *"definition3-harmonic-elements")));
     let dir = Dir::new();
     for file in files {
         let out = dir.path("out.npy");

@@ -2,6 +2,8 @@
 
 use crate::refused::assert_sentence;
 use crate::support::{Dir, as_model, close, largest, mean, measure, read_cages, read_frames};
+use cager_proto::container::{ContainerReader, ContainerWriter};
+use std::io::Cursor;
 
 const ENCODE_HARMONIC: &str = "encode --rest rest.obj --cage cage.obj --frames frames.npy -o out.cager --overwrite --report report.json --coordinates harmonic";
 
@@ -29,6 +31,56 @@ fn captures_come_back_with_the_errors_that_were_reported() {
         assert!(number("l2_max") < 0.05, "{handles}: {}", number("l2_max"));
         let text = dir.cager("inspect out.cager").succeeds().stdout;
         assert!(text.contains("harmonic"), "{text}");
+    }
+}
+
+/// The container with other boundary elements in it.
+fn with_elements(dir: &Dir, output: &str, elements: Option<&[u8]>) {
+    let mut from = ContainerReader::open(Cursor::new(dir.read("out.cager"))).expect("a container");
+    let (rest, cage) = (from.rest().expect("a model"), from.cage().expect("a cage"));
+    let mut to = ContainerWriter::new(Vec::new(), from.header(), &rest, &cage).expect("a header");
+    if let Some(elements) = elements {
+        to.add_elements(elements).expect("elements");
+    }
+    let mut rows = Vec::new();
+    for frame in 0..from.frames() {
+        from.read_frame(frame, &mut rows).expect("a frame");
+        to.write_frame(&rows, 0.0, 0.0).expect("a frame");
+    }
+    std::fs::write(dir.path(output), to.finish(None).expect("a container")).expect("a file");
+}
+
+#[test]
+fn containers_keep_the_boundary_elements_that_decoding_follows() {
+    let (dir, small) = Dir::with_capture();
+    dir.cager(ENCODE_HARMONIC).succeeds();
+    let elements = ContainerReader::open(Cursor::new(dir.read("out.cager"))).expect("a container").elements();
+    let elements = elements.expect("no damage").expect("elements");
+    dir.cager("decode out.cager -o back.npy").succeeds();
+    dir.cager("decode out.cager -o model.npy --model rest.obj").succeeds();
+    assert!(dir.read("back.npy") == dir.read("model.npy"), "another model is decoded with other elements");
+    // Files from before the section choose the same elements anew.
+    with_elements(&dir, "old.cager", None);
+    dir.cager("decode old.cager -o old.npy").succeeds();
+    let n = small.rest.points.len();
+    let errors =
+        measure(&small.rest.points, &read_frames(&dir.path("back.npy"), n), &read_frames(&dir.path("old.npy"), n));
+    assert!(largest(&errors.linf) < 1e-6, "{}", largest(&errors.linf));
+    // Fewer turns of the iteration give other positions: the file decides, and nothing else.
+    let mut fewer = elements.clone();
+    assert!(fewer[2] > 1, "{} turns", fewer[2]);
+    fewer[2] = 1;
+    with_elements(&dir, "fewer.cager", Some(&fewer));
+    dir.cager("decode fewer.cager -o fewer.npy").succeeds();
+    assert!(dir.read("fewer.npy") != dir.read("back.npy"), "the elements of the file are not followed");
+    for wrong in
+        [&elements[..elements.len() - 1], &[], &[2, 0, 1, 9], &[0; 50_000], &[elements.as_slice(), &[0]].concat()]
+    {
+        with_elements(&dir, "wrong.cager", Some(wrong));
+        let command = "decode wrong.cager -o wrong.npy";
+        let done = dir.cager(command).run();
+        assert_eq!(done.status, Some(1), "{}", done.stderr);
+        assert_sentence(command, &done.stderr, &["wrong.cager", "boundary elements", "get the file again"]);
     }
 }
 

@@ -19,6 +19,14 @@ pub enum CoordinatesError {
         /// What happened.
         reason: String,
     },
+    /// A plan of boundary elements that is not one of this cage.
+    #[error("the boundary elements of {system} coordinates do not fit the cage: {reason}; get the file again")]
+    BadPlan {
+        /// The system's name.
+        system: &'static str,
+        /// What is wrong with it.
+        reason: &'static str,
+    },
 }
 
 fn counted(points: &[u32]) -> String {

@@ -93,7 +93,7 @@ fn coordinates(cage: &Cage, points: &[Point]) -> Coordinates {
             a.extend(b);
             a
         });
-    Coordinates { phi, outside, refinement: None }
+    Coordinates { phi, outside, refinement: None, plan: None }
 }
 
 /// Length of the normals, in the unit of the layers.

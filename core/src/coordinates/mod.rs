@@ -10,7 +10,7 @@ mod normals;
 
 pub use error::CoordinatesError;
 pub use green::Green;
-pub use harmonic::Harmonic;
+pub use harmonic::{ElementPlan, Harmonic};
 pub use mean_value::MeanValue;
 pub use normals::TiedNormals;
 
@@ -27,6 +27,8 @@ pub struct Coordinates {
     pub outside: Vec<u32>,
     /// How the solution was refined, for coordinates that are a numerical one.
     pub refinement: Option<Refinement>,
+    /// What they were solved on, for coordinates that are a numerical solution.
+    pub plan: Option<ElementPlan>,
 }
 
 /// The definition of the coordinate systems by which containers are written, which compute their coordinates anew when they are decoded.
@@ -46,8 +48,9 @@ pub struct Refinement {
     pub elements: usize,
     /// Solutions after the first.
     pub refinements: usize,
-    /// Most that a coordinate of a point differs from the solution before the last, or was corrected by to make linear functions
-    /// exact.
+    /// An estimate of how far a coordinate of a point is from the limit, the largest of: what the highest degrees of the elements change of
+    /// one; what one was corrected by to make linear functions exact; and the residual that the iteration left of the equations on the
+    /// cage, those of unknowns that it left out and of damped ones as well.
     pub change: f64,
 }
 
@@ -85,6 +88,11 @@ pub trait CoordinateSystem: Sync {
         None
     }
 
+    /// Bytes that computing takes beside `Φ`, at the most, for any points in this cage.
+    fn working_bytes(&self, _cage: &Cage) -> u64 {
+        0
+    }
+
     /// What [`Self::coordinates`] would refuse before it computes much.
     ///
     /// # Errors
@@ -104,4 +112,18 @@ pub trait CoordinateSystem: Sync {
     /// # Errors
     /// A cage or points for which the system is not defined.
     fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError>;
+
+    /// The same, where they are a numerical solution on the elements of an earlier one instead of elements chosen for these points. With
+    /// the earlier points the bits are the same.
+    ///
+    /// # Errors
+    /// As [`Self::coordinates`]; a plan that is not of this cage or of no such system.
+    fn coordinates_by_plan(
+        &self,
+        _cage: &Cage,
+        _points: &[Point],
+        _plan: &ElementPlan,
+    ) -> Result<Coordinates, CoordinatesError> {
+        Err(CoordinatesError::BadPlan { system: self.name(), reason: "they have none" })
+    }
 }

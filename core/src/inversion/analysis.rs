@@ -77,7 +77,7 @@ impl Analysis {
         let clock = Instant::now();
         refuse_far_points(cage, points)?;
         preparing.next("coordinates")?;
-        let Found { phi, sample, decoder, rest, error, outside: (outside, outside_distance), refinement } =
+        let Found { phi, sample, decoder, rest, error, outside: (outside, outside_distance), refinement, plan } =
             coordinates(system, cage, points, wanted, preparing.keeps_coordinates)?;
         let coordinates_seconds = clock.elapsed().as_secs_f64();
 
@@ -109,6 +109,7 @@ impl Analysis {
             outside,
             outside_distance,
             refinement,
+            plan,
             coordinates_seconds,
             maxvol_seconds,
             svd_seconds: clock.elapsed().as_secs_f64(),

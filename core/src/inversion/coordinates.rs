@@ -4,7 +4,7 @@ use super::PrepareError;
 use super::operator::Wanted;
 use super::prepare::{coordinates_fit, outside, refuse_unreproduced, reproduction_error};
 use crate::cage::Cage;
-use crate::coordinates::{ByPoint, CoordinateSystem, MeanValue, Refinement};
+use crate::coordinates::{ByPoint, CoordinateSystem, ElementPlan, MeanValue, Refinement};
 use crate::decode::{Decoder, in_parts};
 use crate::handles::Handles;
 use crate::handles::farthest::along_curve;
@@ -35,6 +35,7 @@ pub(super) struct Found {
     /// Points outside, and the largest distance of one over the diagonal.
     pub(super) outside: (Vec<u32>, f64),
     pub(super) refinement: Option<Refinement>,
+    pub(super) plan: Option<ElementPlan>,
 }
 
 /// As many points along a space-filling curve as are analysed of a model, where they are not all: at least those that are read. They are
@@ -94,7 +95,8 @@ pub(super) fn coordinates(
         rest.truncate(m);
     }
     let outside = outside(cage, points, &found.outside, diagonal(points));
-    Ok(Found { phi, sample: None, decoder, rest, error: worst.1, outside, refinement: found.refinement })
+    let (refinement, plan) = (found.refinement, found.plan);
+    Ok(Found { phi, sample: None, decoder, rest, error: worst.1, outside, refinement, plan })
 }
 
 fn of_sample(
@@ -150,5 +152,6 @@ fn of_sample(
         error: worst.1,
         outside,
         refinement: None,
+        plan: None,
     })
 }

@@ -3,7 +3,7 @@
 use super::operator::tall_product;
 use super::{Analysis, Handles, PrepareError, Solver, SolverOptions};
 use crate::cage::Cage;
-use crate::coordinates::{CoordinateSystem, Refinement};
+use crate::coordinates::{CoordinateSystem, ElementPlan, Refinement};
 use crate::mesh::{Point, diagonal, distance_to_surface, norm, winding_number};
 use crate::regularize::{Term, TermError};
 use faer::{Mat, MatRef};
@@ -42,6 +42,8 @@ pub struct Preparation {
     pub outside_distance: f64,
     /// How the coordinates were refined, where they are a numerical solution.
     pub refinement: Option<Refinement>,
+    /// What they were solved on then.
+    pub plan: Option<ElementPlan>,
     /// Seconds for the coordinates.
     pub coordinates_seconds: f64,
     /// Seconds for maxvol.

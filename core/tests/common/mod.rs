@@ -33,7 +33,12 @@ impl Random {
 }
 
 pub(crate) fn cages() -> Vec<(&'static str, Cage)> {
-    let detailed = Capture::new(&Options { points: 500, frames: 1, cage_vertices: 120 }).cage;
+    cages_of(120)
+}
+
+/// Cages, the detailed one of so many vertices.
+pub(crate) fn cages_of(vertices: usize) -> Vec<(&'static str, Cage)> {
+    let detailed = Capture::new(&Options { points: 500, frames: 1, cage_vertices: vertices }).cage;
     vec![
         (
             "box with split sides",

@@ -78,11 +78,23 @@ pub(crate) mod tag {
     pub(crate) const REST_FACES: [u8; 4] = *b"RFAC";
     pub(crate) const CAGE_VERTICES: [u8; 4] = *b"CVTX";
     pub(crate) const CAGE_FACES: [u8; 4] = *b"CTRI";
+    pub(crate) const ELEMENTS: [u8; 4] = *b"ELEM";
     pub(crate) const FRAMES: [u8; 4] = *b"FRAM";
     pub(crate) const ERRORS: [u8; 4] = *b"ERRS";
     pub(crate) const CONTENTS: [u8; 4] = *b"TOC_";
     pub(crate) const NUMBERS: [u8; 4] = *b"fnum";
     pub(crate) const REPORT: [u8; 4] = *b"summ";
-    pub(crate) const KNOWN: [[u8; 4]; 10] =
-        [HEADER, REST_POINTS, REST_FACES, CAGE_VERTICES, CAGE_FACES, FRAMES, ERRORS, CONTENTS, NUMBERS, REPORT];
+    pub(crate) const KNOWN: [[u8; 4]; 11] = [
+        HEADER,
+        REST_POINTS,
+        REST_FACES,
+        CAGE_VERTICES,
+        CAGE_FACES,
+        ELEMENTS,
+        FRAMES,
+        ERRORS,
+        CONTENTS,
+        NUMBERS,
+        REPORT,
+    ];
 }

@@ -131,6 +131,15 @@ impl<R: Read + Seek> ContainerReader<R> {
         Ok(TriMesh { vertices, triangles: numbers.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect() })
     }
 
+    /// The boundary elements that the coordinates were solved on, where the file has any: bytes for the coordinate system to check.
+    ///
+    /// # Errors
+    /// Damage.
+    pub fn elements(&mut self) -> Result<Option<Vec<u8>>, Error> {
+        let entry = self.entries.iter().find(|e| e.header.tag == tag::ELEMENTS).copied();
+        entry.map(|entry| self.raw(entry)).transpose()
+    }
+
     /// The stored rows of one frame, rows × 3. Any order will do; neighbours are fastest one after another.
     ///
     /// # Errors
@@ -226,6 +235,7 @@ impl<R: Read + Seek> ContainerReader<R> {
     /// The first damage found.
     pub fn verify(&mut self) -> Result<(), Error> {
         self.cage()?;
+        self.elements()?;
         self.report()?;
         let mut cage = Vec::new();
         for frame in 0..self.frames {
@@ -315,6 +325,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         let most_faces = usize::from(self.header.rest_faces > 0);
         for (tag, least, most) in [
             (tag::REST_FACES, most_faces, most_faces),
+            (tag::ELEMENTS, 0, 1),
             (tag::NUMBERS, 0, 1),
             (tag::REPORT, 0, 1),
             (tag::CONTENTS, 0, 0),
@@ -342,6 +353,7 @@ impl<R: Read + Seek> ContainerReader<R> {
                 tag::REST_POINTS | tag::CAGE_VERTICES => s.width == 4 || s.width == 8,
                 tag::REST_FACES | tag::CAGE_FACES | tag::FRAMES | tag::ERRORS => s.width == 4,
                 tag::NUMBERS => s.width == 8,
+                tag::ELEMENTS => s.width == 1,
                 _ => s.width > 0,
             };
             if expected != Some(s.raw_bytes) || !width_fits {

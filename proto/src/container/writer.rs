@@ -66,6 +66,14 @@ impl<W: Write> ContainerWriter<W> {
         &self.header
     }
 
+    /// Adds the boundary elements that the coordinates were solved on.
+    ///
+    /// # Errors
+    /// An output that refuses.
+    pub fn add_elements(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        self.section(tag::ELEMENTS, PLANES, 1, 0, bytes)
+    }
+
     /// Adds the cage of the next frame, rows × 3, and its errors over the rest diagonal.
     ///
     /// # Errors

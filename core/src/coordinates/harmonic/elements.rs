@@ -14,28 +14,45 @@ pub(super) struct Element {
     pub(super) face: u32,
     /// Degree of its density; one less in the coarse space.
     pub(super) degree: usize,
+    /// Cuts of the face that come before this element where its division is written in preorder, as in a [plan](super::plan).
+    pub(super) cuts: Vec<u8>,
 }
 
+/// The cut into four parts; smaller numbers are those of the corner from which a cut goes to the middle of the opposite side.
+pub(super) const QUARTERS: u8 = 7;
+
 impl Element {
-    /// Both halves, cut across the longest side; none where there is no single longest one.
-    fn halves(&self) -> Option<[Self; 2]> {
+    /// A face as a whole.
+    pub(super) fn face(face: usize, corners: [Point; 3]) -> Self {
+        Self { triangle: Triangle::new(corners), face: face as u32, degree: 0, cuts: Vec::new() }
+    }
+
+    /// The parts that a cut gives.
+    pub(super) fn parts(&self, cut: u8) -> Vec<Self> {
+        let middle = |p: Point, q: Point| [0, 1, 2].map(|k| 0.5 * (p[k] + q[k]));
+        let corner = |i: usize| self.triangle.corners[(usize::from(cut) % QUARTERS as usize + i) % 3];
+        let [a, b, c] = [0, 1, 2].map(corner);
+        let triangles = if cut == QUARTERS {
+            let (d, e, f) = (middle(a, b), middle(b, c), middle(c, a));
+            vec![[a, d, f], [d, b, e], [f, e, c], [d, e, f]]
+        } else {
+            let d = middle(b, c);
+            vec![[a, b, d], [a, d, c]]
+        };
+        let part = |corners| Self { triangle: Triangle::new(corners), cuts: Vec::new(), ..*self };
+        let mut parts: Vec<Self> = triangles.into_iter().map(part).collect();
+        parts[0].cuts = [self.cuts.as_slice(), &[cut]].concat();
+        parts
+    }
+
+    /// The cut across the longest side; none where there is no single longest one.
+    fn halving(&self) -> Option<u8> {
         let corners = self.triangle.corners;
         let length2 = |i: usize| -> f64 {
             let (a, b) = (corners[(i + 1) % 3], corners[(i + 2) % 3]);
             (0..3).map(|k| (a[k] - b[k]).powi(2)).sum()
         };
-        let top = (0..3).find(|&i| (1..3).all(|j| length2(i) > TIE * length2((i + j) % 3)))?;
-        let [a, b, c] = [top, (top + 1) % 3, (top + 2) % 3].map(|i| corners[i]);
-        let middle = [0, 1, 2].map(|k| 0.5 * (b[k] + c[k]));
-        Some([[a, b, middle], [a, middle, c]].map(|corners| Self { triangle: Triangle::new(corners), ..*self }))
-    }
-
-    /// All four parts, cut between the middles of the sides.
-    fn quarters(&self) -> [Self; 4] {
-        let [a, b, c] = self.triangle.corners;
-        let middle = |p: Point, q: Point| [0, 1, 2].map(|k| 0.5 * (p[k] + q[k]));
-        let (d, e, f) = (middle(a, b), middle(b, c), middle(c, a));
-        [[a, d, f], [d, b, e], [f, e, c], [d, e, f]].map(|corners| Self { triangle: Triangle::new(corners), ..*self })
+        (0..3).find(|&i| (1..3).all(|j| length2(i) > TIE * length2((i + j) % 3))).map(|top| top as u8)
     }
 
     /// Highest degree that a triangle of this shape is given: polynomials of high degree nearly depend on each other in thin ones.
@@ -94,42 +111,44 @@ const ON: f64 = 0.01;
 /// Ratio of length to height below which a triangle may have each degree,
 const MOST: [(f64, usize); 3] = [(4.0, 6), (8.0, 5), (14.0, 4)];
 /// and what any may have.
-const LEAST: usize = 3;
+const LEAST: usize = super::LEAST_DEGREE;
 /// Sides are of different length when their squares differ by more than this factor: cages with symmetries are divided alike,
 /// however their vertices are ordered.
 const TIE: f64 = 1.0 + 1e-9;
 /// No elements are divided for the sake of their shape once there are so many.
-const MANY: usize = 1200;
+pub(super) const MANY: usize = 1200;
 
-/// The faces of a cage, divided where points are near.
+/// The faces of a cage, in their order, divided where points are near.
 pub(super) fn elements(faces: &[[Point; 3]], points: &[Point]) -> Vec<Element> {
     let points = grouped(points);
-    let mut waiting: Vec<Element> = faces
-        .iter()
-        .enumerate()
-        .map(|(face, &corners)| Element { triangle: Triangle::new(corners), face: face as u32, degree: 0 })
-        .collect();
-    let mut done: Vec<Element> = Vec::new();
-    while !waiting.is_empty() {
-        let divide = done.len() + 2 * waiting.len() <= MANY;
-        let judged: Vec<Vec<Element>> = waiting
-            .into_par_iter()
-            .map(|element| {
-                let nearness = element.nearness(&points);
-                let wanted = ENOUGH.iter().find(|(least, _)| nearness >= *least).map_or(usize::MAX, |e| e.1);
-                let most = element.most();
-                match element.halves() {
-                    Some(halves) if wanted > most && divide => halves.to_vec(),
-                    _ => vec![Element { degree: wanted.min(most), ..element }],
-                }
-            })
-            .collect();
-        waiting = Vec::new();
-        for mut part in judged {
-            if part.len() == 1 { done.append(&mut part) } else { waiting.append(&mut part) }
+    let mut elements: Vec<Element> =
+        faces.iter().enumerate().map(|(face, &corners)| Element::face(face, corners)).collect();
+    loop {
+        // Those without a degree have to be looked at.
+        let waiting = elements.iter().filter(|element| element.degree == 0).count();
+        if waiting == 0 {
+            return elements;
         }
+        let divide = elements.len() + waiting <= MANY;
+        let judge = |mut element: Element| {
+            if element.degree > 0 {
+                return vec![element];
+            }
+            let nearness = element.nearness(&points);
+            let wanted = ENOUGH.iter().find(|(least, _)| nearness >= *least).map_or(usize::MAX, |e| e.1);
+            let most = element.most();
+            if wanted > most
+                && divide
+                && let Some(cut) = element.halving()
+            {
+                return element.parts(cut);
+            }
+            element.degree = wanted.min(most);
+            vec![element]
+        };
+        let judged: Vec<Vec<Element>> = elements.into_par_iter().map(judge).collect();
+        elements = judged.into_iter().flatten().collect();
     }
-    done
 }
 
 /// Marks the thinnest elements too, where they are what makes the equations inexact.
@@ -149,10 +168,8 @@ pub(super) fn refined(elements: &[Element], marked: &[bool]) -> Vec<Element> {
             out.push(element.clone());
         } else if element.degree < element.most() {
             out.push(Element { degree: element.degree + 1, ..element.clone() });
-        } else if let Some(halves) = element.halves() {
-            out.extend(halves);
         } else {
-            out.extend(element.quarters());
+            out.extend(element.parts(element.halving().unwrap_or(QUARTERS)));
         }
     }
     out

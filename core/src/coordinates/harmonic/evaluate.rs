@@ -37,7 +37,7 @@ pub(super) struct Solution<'a> {
 /// Coordinates, and how far they are from final.
 pub(super) struct Evaluated {
     pub(super) phi: Mat<f64>,
-    /// Largest change of an entry by the highest degrees.
+    /// Largest change of an entry by the highest degrees; 0 where nobody asked for it.
     pub(super) change: f64,
     /// Elements that changes above the tolerance mostly come from.
     pub(super) marked: Vec<bool>,
@@ -234,11 +234,13 @@ fn add_part_generic(
 ) {
     let felt = if near { all } else { low };
     for (c, &v) in part.vertices.iter().enumerate() {
-        let mut sum = Lanes::ZERO;
-        for (potential, &density) in potentials[..felt].iter().zip(&part.change[c * all..]) {
-            sum = sum + *potential * density;
+        if !part.change.is_empty() {
+            let mut sum = Lanes::ZERO;
+            for (potential, &density) in potentials[..felt].iter().zip(&part.change[c * all..]) {
+                sum = sum + *potential * density;
+            }
+            change[v as usize] = change[v as usize] + sum;
         }
-        change[v as usize] = change[v as usize] + sum;
         if near {
             let mut sum = Lanes::ZERO;
             for (potential, &density) in potentials[low..all].iter().zip(&part.high[c * (all - low)..]) {

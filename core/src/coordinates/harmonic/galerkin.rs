@@ -142,13 +142,12 @@ impl NearPairs {
         Self { pairs, around }
     }
 
-    /// The elements near this one, itself among them, each with the entries, whose rows belong to the larger of both, and whether
-    /// that is the other one.
-    pub(super) fn of(&self, element: usize) -> impl Iterator<Item = (usize, MatRef<'_, f64>, bool)> {
+    /// The elements near this one, itself among them, each with the entries: rows belong to this element, columns to the other.
+    pub(super) fn of(&self, element: usize) -> impl Iterator<Item = (usize, MatRef<'_, f64>)> {
         self.around[element].iter().map(move |&place| {
             let (a, b, entries) = &self.pairs[place as usize];
             let (a, b) = (*a as usize, *b as usize);
-            if a == element { (b, entries.as_ref(), false) } else { (a, entries.as_ref(), true) }
+            if a == element { (b, entries.as_ref()) } else { (a, entries.transpose()) }
         })
     }
 }
@@ -162,7 +161,7 @@ pub(super) struct Operator {
 }
 
 /// Whether the high unknowns of two elements feel each other and the other's low ones.
-fn is_near(a: &Element, b: &Element) -> bool {
+pub(super) fn is_near(a: &Element, b: &Element) -> bool {
     let apart = mesh::norm([0, 1, 2].map(|k| a.triangle.centre[k] - b.triangle.centre[k]));
     apart < APART * (a.triangle.radius + b.triangle.radius)
 }

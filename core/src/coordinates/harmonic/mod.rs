@@ -18,8 +18,10 @@ mod closed_form;
 mod elements;
 mod evaluate;
 mod galerkin;
+mod memory;
 mod near;
 mod patch;
+mod plan;
 mod potential;
 mod quadrature;
 mod solve;
@@ -32,6 +34,9 @@ use crate::cage::Cage;
 use crate::mesh::Point;
 use elements::Unknowns;
 use evaluate::{Evaluated, Solution};
+use faer::Mat;
+pub use plan::ElementPlan;
+use solve::Steps;
 use surface::{Foot, Side, Surface};
 
 /// Harmonic coordinates: one unknown per cage vertex, defined inside the cage and on it.
@@ -45,6 +50,8 @@ const REFINEMENTS: usize = 8;
 const ELEMENTS: usize = 2500;
 /// Elements up to which all have so many low degrees: the equations of low unknowns are dense.
 const LOW_DEGREES: [(usize, usize); 3] = [(1300, 2), (3000, 1), (10_000, 0)];
+/// Least degree that refining gives an element.
+const LEAST_DEGREE: usize = 3;
 /// Linear functions that are missed by more than this say that nothing was solved.
 const MISSED: f64 = 0.1;
 
@@ -61,23 +68,54 @@ impl CoordinateSystem for Harmonic {
         cage.vertices().to_vec()
     }
 
+    fn working_bytes(&self, cage: &Cage) -> u64 {
+        let corners = |t: &[u32; 3]| t.map(|v| cage.vertices()[v as usize]);
+        let faces: Vec<[Point; 3]> = cage.mesh().triangles.iter().map(corners).collect();
+        memory::at_most(&faces, cage.vertices().len())
+    }
+
     fn check(&self, cage: &Cage, points: &[Point]) -> Result<(), CoordinatesError> {
         check_inside(&Surface::new(cage.vertices(), cage).feet(points), cage.diagonal())
     }
 
     fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError> {
-        if let Some(point) = points.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
-            return Err(not_computed(format!("point {point} is not finite")));
-        }
-        let layers = Layers::new(cage);
-        let points: Vec<Point> = points.iter().map(|p| p.map(|c| c * layers.scale())).collect();
-        let surface = Surface::new(layers.vertices(), cage);
-        let feet = surface.feet(&points);
-        check_inside(&feet, cage.diagonal() * layers.scale())?;
-        let (found, refinement) =
-            refine(&Problem { layers: &layers, surface: &surface, points: &points, feet: &feet })?;
-        Ok(Coordinates { phi: found.phi, outside: Vec::new(), refinement: Some(refinement) })
+        solve_for(cage, points, refine)
     }
+
+    fn coordinates_by_plan(
+        &self,
+        cage: &Cage,
+        points: &[Point],
+        plan: &ElementPlan,
+    ) -> Result<Coordinates, CoordinatesError> {
+        solve_for(cage, points, |problem| follow(problem, plan))
+    }
+}
+
+/// Coordinates by a way to solve the problem that a cage and points pose.
+fn solve_for(
+    cage: &Cage,
+    points: &[Point],
+    solve: impl FnOnce(&Problem<'_>) -> Result<Coordinates, CoordinatesError>,
+) -> Result<Coordinates, CoordinatesError> {
+    if let Some(point) = points.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
+        return Err(not_computed(format!("point {point} is not finite")));
+    }
+    let layers = Layers::new(cage);
+    let points: Vec<Point> = points.iter().map(|p| p.map(|c| c * layers.scale())).collect();
+    let surface = Surface::new(layers.vertices(), cage);
+    let feet = surface.feet(&points);
+    check_inside(&feet, cage.diagonal() * layers.scale())?;
+    let problem = Problem {
+        tables: potential::Tables::new(),
+        affine: affine::AffineFit::new(layers.vertices()),
+        corners: layers.triangles().iter().map(|t| t.map(|v| layers.vertices()[v as usize])).collect(),
+        layers: &layers,
+        surface: &surface,
+        points: &points,
+        feet: &feet,
+    };
+    solve(&problem)
 }
 
 fn not_computed(reason: String) -> CoordinatesError {
@@ -96,6 +134,10 @@ fn check_inside(feet: &[Foot], diagonal: f64) -> Result<(), CoordinatesError> {
 
 /// What is to be solved, in the unit of the layers.
 struct Problem<'a> {
+    tables: potential::Tables,
+    affine: affine::AffineFit,
+    /// Corners of the faces.
+    corners: Vec<[Point; 3]>,
     layers: &'a Layers,
     surface: &'a Surface<'a>,
     points: &'a [Point],
@@ -103,15 +145,11 @@ struct Problem<'a> {
 }
 
 /// Solves on finer and finer elements until that changes nothing more, or no more of them are allowed.
-fn refine(problem: &Problem<'_>) -> Result<(Evaluated, Refinement), CoordinatesError> {
-    let Problem { layers, points, feet, .. } = problem;
-    let tables = potential::Tables::new();
-    let affine = affine::AffineFit::new(layers.vertices());
-    let corners: Vec<[Point; 3]> =
-        layers.triangles().iter().map(|t| t.map(|v| layers.vertices()[v as usize])).collect();
+fn refine(problem: &Problem<'_>) -> Result<Coordinates, CoordinatesError> {
+    let Problem { corners, points, feet, .. } = problem;
     let inside = feet.iter().zip(*points).filter(|(foot, _)| foot.side == Side::Inside);
     let inside: Vec<Point> = inside.map(|(_, &x)| x).collect();
-    let mut elements = elements::elements(&corners, &inside);
+    let mut elements = elements::elements(corners, &inside);
     let mut degree = low_degree(elements.len()).ok_or_else(|| {
         not_computed(format!("it would take {} boundary elements, more than {}", elements.len(), LOW_DEGREES[2].0))
     })?;
@@ -119,11 +157,16 @@ fn refine(problem: &Problem<'_>) -> Result<(Evaluated, Refinement), CoordinatesE
     let mut refinements = 0;
     loop {
         let unknowns = Unknowns::new(elements, degree);
-        let mut found = solve_on(problem, &tables, &affine, &unknowns)?;
+        let (mut found, steps, remainder) = solve_on(problem, &unknowns, None, true)?;
         let change = found.change.max(found.correction);
-        let refinement = Refinement { elements: unknowns.elements.len(), refinements, change };
-        if refinement.reached() || refinements == REFINEMENTS {
-            return Ok((found, refinement));
+        let solution = |phi: Mat<f64>| {
+            let refinement =
+                Refinement { elements: unknowns.elements.len(), refinements, change: change.max(remainder) };
+            let plan = Some(ElementPlan::new(&unknowns, &steps));
+            Coordinates { phi, outside: Vec::new(), refinement: Some(refinement), plan }
+        };
+        if change <= Refinement::TOLERANCE || refinements == REFINEMENTS {
+            return Ok(solution(found.phi));
         }
         if found.correction > Refinement::TOLERANCE {
             elements::mark_thin(&unknowns.elements, &mut found.marked);
@@ -131,11 +174,20 @@ fn refine(problem: &Problem<'_>) -> Result<(Evaluated, Refinement), CoordinatesE
         elements = elements::refined(&unknowns.elements, &found.marked);
         let more = elements.len() <= most && found.marked.contains(&true);
         let Some(next) = low_degree(elements.len()).filter(|_| more) else {
-            return Ok((found, refinement));
+            return Ok(solution(found.phi));
         };
         degree = next;
         refinements += 1;
     }
+}
+
+/// Solves on the elements of a plan, by its steps.
+fn follow(problem: &Problem<'_>, plan: &ElementPlan) -> Result<Coordinates, CoordinatesError> {
+    let (unknowns, steps) = plan
+        .read(&problem.corners, problem.layers.vertices().len())
+        .map_err(|reason| CoordinatesError::BadPlan { system: NAME, reason })?;
+    let (found, ..) = solve_on(problem, &unknowns, Some(&steps), false)?;
+    Ok(Coordinates { phi: found.phi, outside: Vec::new(), refinement: None, plan: Some(plan.clone()) })
 }
 
 /// Highest degree of the polynomials that all of so many elements have; `None` for too many.
@@ -143,19 +195,25 @@ fn low_degree(elements: usize) -> Option<usize> {
     LOW_DEGREES.iter().find(|(most, _)| elements <= *most).map(|(_, degree)| *degree)
 }
 
-/// Coordinates with these elements.
+/// Coordinates with these elements, the steps of the solution, and what it left of the equations.
 fn solve_on(
     problem: &Problem<'_>,
-    tables: &potential::Tables,
-    affine: &affine::AffineFit,
     unknowns: &Unknowns,
-) -> Result<Evaluated, CoordinatesError> {
-    let Problem { layers, surface, points, feet } = problem;
+    given: Option<&Steps>,
+    measures: bool,
+) -> Result<(Evaluated, Steps, f64), CoordinatesError> {
+    let Problem { tables, affine, layers, surface, points, feet, .. } = problem;
+    let bytes = memory::needed(unknowns, layers.vertices().len());
+    if bytes > memory::MOST_BYTES {
+        let gigabytes = 1e-9 * bytes as f64;
+        return Err(not_computed(format!("its boundary elements would take {gigabytes:.0} GB of memory")));
+    }
     let outer = galerkin::Outer::new(tables);
     let operator = galerkin::operator(tables, &outer, unknowns);
     let sides = galerkin::right_hand_sides(&outer, layers, unknowns);
-    let densities = solve::solve(operator, &sides, unknowns, layers.triangles())
-        .ok_or_else(|| not_computed("the equations on its faces are singular in double precision".to_owned()))?;
+    let solve::Solved { densities, steps, remainder } =
+        solve::solve(operator, &sides, unknowns, layers.triangles(), given, measures)
+            .ok_or_else(|| not_computed("the equations on its faces are singular in double precision".to_owned()))?;
     let solution = Solution { tables, layers, surface, affine, unknowns, densities: &densities };
     let found = evaluate::evaluate(&solution, points, feet, Refinement::TOLERANCE);
     // Written so that NaN is an error.
@@ -165,5 +223,77 @@ fn solve_on(
             found.correction
         )));
     }
-    Ok(found)
+    Ok((found, steps, remainder))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synthetic::{Capture, Options};
+
+    /// The problem of a small cage, with points of the model in it, solved on its faces.
+    fn solved<T>(work: impl FnOnce(&Problem<'_>, &Unknowns, (Evaluated, Steps, f64)) -> T) -> T {
+        let Capture { cage, rest, .. } = Capture::new(&Options { points: 300, frames: 1, cage_vertices: 30 });
+        let cage = Cage::new(cage).expect("a cage");
+        let mut value = None;
+        let kept = solve_for(&cage, &rest.points, |problem| {
+            let elements = elements::elements(&problem.corners, &[]);
+            let unknowns = Unknowns::new(elements, 1);
+            let found = solve_on(problem, &unknowns, None, true)?;
+            value = Some(work(problem, &unknowns, found));
+            Ok(Coordinates { phi: Mat::zeros(0, 0), outside: Vec::new(), refinement: None, plan: None })
+        });
+        kept.expect("coordinates");
+        value.expect("a value")
+    }
+
+    /// That steps which leave more of the equations say so, by no less than coordinates are off for it.
+    fn shows_in_the_remainder(change: impl FnOnce(&mut Steps)) {
+        solved(|problem, unknowns, (found, mut steps, remainder)| {
+            assert!(remainder > 0.0 && remainder < 1e-3, "{remainder:e}");
+            change(&mut steps);
+            let (other, _, left) = solve_on(problem, unknowns, Some(&steps), true).expect("a solution");
+            let mut worst = 0.0f64;
+            for v in 0..found.phi.ncols() {
+                for i in 0..found.phi.nrows() {
+                    worst = worst.max((other.phi[(i, v)] - found.phi[(i, v)]).abs());
+                }
+            }
+            assert!(left > remainder && worst <= left + remainder, "{left:e} after {remainder:e}, off by {worst:e}");
+        });
+    }
+
+    #[test]
+    fn an_iteration_that_ends_early_shows_in_what_is_left() {
+        shows_in_the_remainder(|steps| steps.turns = 0);
+    }
+
+    #[test]
+    fn unknowns_that_are_left_out_show_in_what_is_left() {
+        shows_in_the_remainder(|steps| steps.patches.iter_mut().for_each(|patch| patch.truncate(patch.len() / 2)));
+    }
+
+    #[test]
+    fn larger_diagonals_show_in_what_is_left() {
+        shows_in_the_remainder(|steps| steps.damping = 3);
+        shows_in_the_remainder(|steps| {
+            steps.patch_damping.fill(4);
+            steps.turns = 1;
+        });
+    }
+
+    #[test]
+    fn what_is_left_is_part_of_the_change_that_is_reported() {
+        let Capture { cage, rest, .. } = Capture::new(&Options { points: 300, frames: 1, cage_vertices: 30 });
+        let cage = Cage::new(cage).expect("a cage");
+        let found = Harmonic.coordinates(&cage, &rest.points).expect("coordinates");
+        let (plan, change) = (found.plan.expect("a plan"), found.refinement.expect("a numerical solution").change);
+        let left = solve_for(&cage, &rest.points, |problem| {
+            let (unknowns, steps) = plan.read(&problem.corners, cage.vertices().len()).expect("its own plan");
+            let (_, _, left) = solve_on(problem, &unknowns, Some(&steps), true)?;
+            assert!(change >= left && left > 0.0, "{change:e} with {left:e} left");
+            Ok(Coordinates { phi: Mat::zeros(0, 0), outside: Vec::new(), refinement: None, plan: None })
+        });
+        left.expect("coordinates");
+    }
 }

@@ -1,15 +1,14 @@
 //! The high unknowns of one vertex's hat function, together with the low ones of the elements where they matter.
 
-use super::basis::{MAX_FUNCTIONS, functions};
+use super::basis::functions;
 use super::elements::Unknowns;
-use super::galerkin::NearPairs;
-use super::solve::{Active, FELT};
+use super::solve::{Equations, RESIDUAL};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::{cholesky::llt, triangular_solve};
 use faer::{Mat, MatMut, MatRef, Par};
 
 /// Unknowns of a patch at most.
-const PATCH: usize = 1600;
+pub(super) const PATCH: usize = 1600;
 /// Where the entries of thin elements are not exact enough to be definite, diagonals grow by these parts, one after the other.
 pub(super) const DAMPING: [f64; 5] = [0.0, 1e-4, 1e-3, 1e-2, 1e-1];
 
@@ -18,6 +17,12 @@ pub(super) fn damp(mut a: MatMut<'_, f64>, part: f64) {
     for k in 0..a.nrows() {
         a[(k, k)] *= 1.0 + part;
     }
+}
+
+/// The first of [`DAMPING`] with which a factorisation succeeds, or the given one if it does.
+pub(super) fn least_damping(given: Option<u8>, mut succeeds: impl FnMut(f64) -> bool) -> Option<u8> {
+    let mut steps = given.map_or(0..=DAMPING.len() as u8 - 1, |given| given..=given);
+    steps.find(|&step| succeeds(DAMPING[usize::from(step)]))
 }
 
 /// Lower Cholesky factor in place.
@@ -34,153 +39,144 @@ pub(super) fn zeroed(memory: &mut Vec<f64>, rows: usize, columns: usize) -> MatM
     MatMut::from_column_major_slice_mut(memory, rows, columns)
 }
 
-/// An element of a patch and the column of the patch's vertex in it.
-pub(super) type Place = (u32, u32);
+/// The elements on which one vertex's hat function has high unknowns, ascending, each with the vertex's column there.
+pub(super) struct Patch {
+    pub(super) places: Vec<(u32, u32)>,
+    /// Which of [`DAMPING`] its matrix takes, where that is known.
+    pub(super) damping: Option<u8>,
+}
 
-/// For every vertex the elements where its high unknowns matter. Drops the other candidates.
-pub(super) fn patches(
-    unknowns: &Unknowns,
-    high: &mut [Active],
-    residuals: &mut [Mat<f64>],
-    m: usize,
-) -> Vec<Vec<Place>> {
+/// Chooses the elements of each of `m` vertices' patches among the candidates, by the residuals that the low unknowns leave there.
+pub(super) fn choose(unknowns: &Unknowns, candidates: &[Vec<u32>], residuals: &[Mat<f64>], m: usize) -> Vec<Vec<u32>> {
     let mut sizes: Vec<Vec<(f64, u32)>> = vec![Vec::new(); m];
-    for (e, (active, residual)) in high.iter().zip(residuals.iter()).enumerate() {
-        let area = unknowns.elements[e].triangle.area;
-        for (c, &v) in active.vertices.iter().enumerate() {
+    for (e, (vertices, residual)) in candidates.iter().zip(residuals).enumerate() {
+        for (&v, residual) in vertices.iter().zip(residual.col_iter()) {
             // The norm of orthonormal polynomials does not depend on the order of corners.
-            let size = residual.col(c).norm_l2() / area;
-            if size > FELT {
+            let size = residual.norm_l2() / unknowns.elements[e].triangle.area;
+            if size > RESIDUAL {
                 sizes[v as usize].push((size, e as u32));
             }
         }
     }
-    let mut kept: Vec<Vec<u32>> = vec![Vec::new(); high.len()];
-    for (v, sizes) in sizes.iter_mut().enumerate() {
+    let largest = |mut sizes: Vec<(f64, u32)>| {
         sizes.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         let mut count = 0;
-        for &(_, e) in sizes.iter() {
+        let fits = |&(_, e): &(f64, u32)| {
             count += functions(unknowns.elements[e as usize].degree);
-            if count > PATCH {
-                break;
-            }
-            kept[e as usize].push(v as u32);
-        }
-    }
-    let mut patches = vec![Vec::new(); m];
-    for (e, kept) in kept.into_iter().enumerate() {
-        let old = &high[e].vertices;
-        let columns: Vec<usize> = kept.iter().filter_map(|v| old.binary_search(v).ok()).collect();
-        let rows = residuals[e].nrows();
-        residuals[e] = Mat::from_fn(rows, columns.len(), |k, c| residuals[e][(k, columns[c])]);
-        for (c, &v) in kept.iter().enumerate() {
-            patches[v as usize].push((e as u32, c as u32));
-        }
-        high[e] = Active { values: Mat::zeros(rows, kept.len()), vertices: kept };
-    }
-    patches
+            count <= PATCH
+        };
+        let mut elements: Vec<u32> = sizes.into_iter().take_while(fits).map(|size| size.1).collect();
+        elements.sort_unstable();
+        elements
+    };
+    sizes.into_iter().map(largest).collect()
 }
 
-/// High unknowns of a patch, by element, and what the highest degrees change of all unknowns there.
-pub(super) fn solve_patch(
-    near: &NearPairs,
-    far: &Mat<f32>,
-    unknowns: &Unknowns,
-    patch: &[Place],
+/// What solving a patch gives, by element.
+pub(super) struct Step {
+    /// What is added to its high unknowns.
+    pub(super) high: Vec<f64>,
+    /// What the highest degrees change of all unknowns there.
+    pub(super) change: Vec<f64>,
+    /// Which of [`DAMPING`] its matrix took.
+    pub(super) damping: u8,
+}
+
+/// Where the unknowns of a patch are in its matrix: first the low ones of all elements, then the others but for the highest degree, then
+/// those. The highest degrees are last, so that the solution without them is that of the leading parts of the factor.
+struct Layout {
+    /// For each element the row of each of its unknowns.
+    rows: Vec<Vec<usize>>,
+    /// Unknowns below the highest degree, and all.
+    coarse: usize,
+    count: usize,
+}
+
+impl Layout {
+    fn new(patch: &Patch, unknowns: &Unknowns) -> Self {
+        let degrees: Vec<usize> = patch.places.iter().map(|&(e, _)| unknowns.elements[e as usize].degree).collect();
+        let mut layout = Self { rows: vec![Vec::new(); degrees.len()], coarse: 0, count: 0 };
+        let coarse = |degree: usize| functions(degree - 1).max(unknowns.low);
+        layout.append(degrees.iter().map(|_| unknowns.low));
+        layout.append(degrees.iter().map(|&degree| coarse(degree)));
+        layout.coarse = layout.count;
+        layout.append(degrees.iter().map(|&degree| functions(degree)));
+        layout
+    }
+
+    /// Appends the unknowns of each element up to a number of them.
+    fn append(&mut self, up_to: impl Iterator<Item = usize>) {
+        for (rows, up_to) in self.rows.iter_mut().zip(up_to) {
+            let more = up_to - rows.len();
+            rows.extend(self.count..self.count + more);
+            self.count += more;
+        }
+    }
+}
+
+/// Solves the equations of a patch with these residuals; `None` where they are not definite.
+pub(super) fn solve(
+    equations: &Equations<'_>,
+    patch: &Patch,
     residuals: &[Mat<f64>],
     memory: &mut Vec<f64>,
-) -> Option<(Vec<f64>, Vec<f64>)> {
-    let l = unknowns.low;
-    // Places in the patch's matrix: low ones of all elements, then the others but the highest degree, then this.
-    let middle = |e: usize| functions(unknowns.elements[e].degree - 1).max(l);
-    let mut places: Vec<[usize; 2]> = Vec::with_capacity(patch.len());
-    let mut count = l * patch.len();
-    for &(e, _) in patch {
-        places.push([count, 0]);
-        count += middle(e as usize) - l;
-    }
-    let coarse = count;
-    for (place, &(e, _)) in places.iter_mut().zip(patch) {
-        place[1] = count;
-        count += functions(unknowns.elements[e as usize].degree) - middle(e as usize);
-    }
-    let place = |i: usize, k: usize| {
-        let middle = middle(patch[i].0 as usize);
-        if k < l {
-            i * l + k
-        } else if k < middle {
-            places[i][0] + k - l
-        } else {
-            places[i][1] + k - middle
-        }
+) -> Option<Step> {
+    let low = equations.unknowns.low;
+    let layout = Layout::new(patch, equations.unknowns);
+    let definite = |part: f64| {
+        let mut matrix = zeroed(memory, layout.count, layout.count);
+        fill_low(matrix.as_mut(), equations, patch);
+        fill_near(matrix.as_mut(), equations, patch, &layout);
+        damp(matrix.as_mut(), part);
+        factor(matrix, Par::Seq).is_some()
     };
-    let mut index = vec![usize::MAX; unknowns.elements.len()];
-    let mut rows = vec![[0; MAX_FUNCTIONS]; patch.len()];
-    for (i, (&(e, _), rows)) in patch.iter().zip(&mut rows).enumerate() {
-        index[e as usize] = i;
-        rows[..functions(unknowns.elements[e as usize].degree)]
-            .iter_mut()
-            .enumerate()
-            .for_each(|(k, r)| *r = place(i, k));
+    let damping = least_damping(patch.damping, definite)?;
+    let factor = MatRef::from_column_major_slice(memory, layout.count, layout.count);
+    // The solution, and what the highest degrees contribute to it.
+    let mut x = Mat::<f64>::zeros(layout.count, 2);
+    for (&(e, column), rows) in patch.places.iter().zip(&layout.rows) {
+        let residual = residuals[e as usize].col(column as usize);
+        residual.iter().zip(&rows[low..]).for_each(|(&value, &row)| x[(row, 0)] = value);
     }
-    // The lower triangle, by columns. High unknowns of elements that are not near do not feel each other.
-    let fill = |a: &mut [f64]| {
-        a.fill(0.0);
-        for (j, &(f, _)) in patch.iter().enumerate() {
-            let f = f as usize;
-            for c in 0..l {
-                let from = far.col_as_slice(f * l + c);
-                let column = &mut a[(j * l + c) * count..][..count];
-                for (&(e, _), to) in patch.iter().zip(column.chunks_exact_mut(l)).skip(j) {
-                    let entries = &from[e as usize * l..][..l];
-                    to.iter_mut().zip(entries).for_each(|(to, entry)| *to = f64::from(*entry));
-                }
+    triangular_solve::solve_lower_triangular_in_place(factor, x.as_mut().subcols_mut(0, 1), Par::Seq);
+    for row in layout.coarse..layout.count {
+        x[(row, 1)] = x[(row, 0)];
+    }
+    triangular_solve::solve_upper_triangular_in_place(factor.transpose(), x.as_mut(), Par::Seq);
+    Some(Step {
+        high: layout.rows.iter().flat_map(|rows| rows[low..].iter().map(|&row| x[(row, 0)])).collect(),
+        change: layout.rows.iter().flatten().map(|&row| x[(row, 1)]).collect(),
+        damping,
+    })
+}
+
+/// Writes the entries of all low unknowns with each other, on and below the diagonal.
+fn fill_low(mut matrix: MatMut<'_, f64>, equations: &Equations<'_>, patch: &Patch) {
+    let low = equations.unknowns.low;
+    for (j, &(f, _)) in patch.places.iter().enumerate() {
+        for c in 0..low {
+            let from = equations.far.col_as_slice(f as usize * low + c);
+            let mut to = matrix.as_mut().col_mut(j * low + c);
+            for (i, &(e, _)) in patch.places.iter().enumerate().skip(j) {
+                let entries = &from[e as usize * low..][..low];
+                to.as_mut().subrows_mut(i * low, low).iter_mut().zip(entries).for_each(|(to, &x)| *to = f64::from(x));
             }
-            for (other, entries, transposed) in near.of(f) {
-                // Every pair once, as a column of its lower element.
-                let i = index[other];
-                if i == usize::MAX || other < f {
-                    continue;
-                }
-                let entries = if transposed { entries } else { entries.transpose() };
-                for (c, entries) in entries.col_iter().enumerate() {
-                    for (entry, row) in entries.iter().zip(&rows[i]) {
-                        let (row, column) = (*row, rows[j][c]);
-                        a[row.max(column) + count * row.min(column)] = *entry;
-                    }
+        }
+    }
+}
+
+/// Writes all entries of elements that are near each other, below the diagonal; high unknowns of others do not act on each other.
+fn fill_near(mut matrix: MatMut<'_, f64>, equations: &Equations<'_>, patch: &Patch, layout: &Layout) {
+    let place_of = |element: usize| patch.places.binary_search_by_key(&(element as u32), |place| place.0).ok();
+    for (&(e, _), columns) in patch.places.iter().zip(&layout.rows) {
+        // Every pair once, with its lower element.
+        for (other, entries) in equations.near.of(e as usize).filter(|(other, _)| *other >= e as usize) {
+            let Some(place) = place_of(other) else { continue };
+            for (entries, &column) in entries.row_iter().zip(columns) {
+                for (&entry, &row) in entries.iter().zip(&layout.rows[place]) {
+                    matrix[(row.max(column), row.min(column))] = entry;
                 }
             }
         }
-    };
-    memory.resize(count * count, 0.0);
-    let definite = DAMPING.iter().any(|&part| {
-        fill(memory);
-        let mut a = MatMut::from_column_major_slice_mut(memory, count, count);
-        damp(a.as_mut(), part);
-        factor(a, Par::Seq).is_some()
-    });
-    if !definite {
-        return None;
     }
-    let a = MatRef::from_column_major_slice(memory, count, count);
-    let mut x = Mat::<f64>::zeros(count, 2);
-    for (i, &(e, column)) in patch.iter().enumerate() {
-        for (k, &value) in residuals[e as usize].col(column as usize).iter().enumerate() {
-            x[(place(i, l + k), 0)] = value;
-        }
-    }
-    triangular_solve::solve_lower_triangular_in_place(a, x.as_mut().subcols_mut(0, 1), Par::Seq);
-    // The coarse unknowns are those of the leading parts of the factor and of this vector; the difference comes of the rest.
-    for i in coarse..count {
-        x[(i, 1)] = x[(i, 0)];
-    }
-    triangular_solve::solve_upper_triangular_in_place(a.transpose(), x.as_mut(), Par::Seq);
-    let mut high = Vec::new();
-    let mut change = Vec::new();
-    for (i, &(e, _)) in patch.iter().enumerate() {
-        let all = functions(unknowns.elements[e as usize].degree);
-        high.extend((l..all).map(|k| x[(place(i, k), 0)]));
-        change.extend((0..all).map(|k| x[(place(i, k), 1)]));
-    }
-    Some((high, change))
 }

@@ -1,4 +1,4 @@
-//! Densities: low unknowns of all elements together, high ones in a patch around each vertex, in turn.
+//! Densities of all hat functions: low unknowns of all elements together, high ones in a patch around each vertex, in turn.
 //!
 //! The density of a hat function is smooth away from its star, so that its high unknowns count on a few elements only. Solving for all
 //! low unknowns, then for all unknowns of the patch with the residual that is left, then for the low ones again is a
@@ -7,15 +7,17 @@
 use super::basis::functions;
 use super::elements::Unknowns;
 use super::galerkin::{NearPairs, Operator, RightHandSides};
-use super::patch::{DAMPING, damp, factor, patches, solve_patch, zeroed};
+use super::patch::{self, DAMPING, Patch, damp, factor, zeroed};
 use faer::linalg::{matmul::matmul, triangular_solve};
-use faer::{Accum, Mat, MatRef, Par};
+use faer::prelude::IntoConst;
+use faer::{Accum, ColRef, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
-/// High unknowns count where the residual of the low ones is above this, as a value on the boundary.
-pub(super) const FELT: f64 = 3e-4;
+/// An element belongs to a vertex's patch where the residual of the low unknowns is above this, as a value on the boundary; the iteration
+/// ends where all residuals are below.
+pub(super) const RESIDUAL: f64 = 3e-4;
 /// Turns at most.
-const TURNS: usize = 6;
+pub(super) const TURNS: u8 = 6;
 
 /// Densities on one element.
 pub(super) struct Part {
@@ -23,7 +25,7 @@ pub(super) struct Part {
     pub(super) vertices: Vec<u32>,
     /// Those unknowns, by vertex.
     pub(super) high: Vec<f64>,
-    /// What the highest degree changes of all unknowns, by vertex.
+    /// What the highest degree changes of all unknowns, by vertex; empty where nobody asks.
     pub(super) change: Vec<f64>,
 }
 
@@ -50,152 +52,192 @@ fn single_from(a: MatRef<'_, f64>, first: impl Fn(usize) -> usize + Sync) -> Mat
     out
 }
 
-/// High unknowns of one element for the vertices whose hat functions have any there.
-pub(super) struct Active {
+/// High unknowns of one element, for the vertices whose patches it belongs to.
+pub(super) struct High {
+    /// Ascending.
     pub(super) vertices: Vec<u32>,
     /// Unknowns × vertices.
     pub(super) values: Mat<f64>,
 }
 
-/// Solves for all densities; `None` where the equations are not definite.
+impl High {
+    /// Nothing yet.
+    fn zero(unknowns: &Unknowns, element: usize, vertices: Vec<u32>) -> Self {
+        Self { values: Mat::zeros(unknowns.high(element).len(), vertices.len()), vertices }
+    }
+}
+
+/// What solving decided: solving again by the same steps gives the same bits.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Steps {
+    /// Which of [`DAMPING`] the matrix of the low unknowns took, and that of each vertex's patch.
+    pub(super) damping: u8,
+    pub(super) patch_damping: Vec<u8>,
+    /// Turns of the iteration.
+    pub(super) turns: u8,
+    /// Elements of each vertex's patch, ascending.
+    pub(super) patches: Vec<Vec<u32>>,
+}
+
+/// Densities, and how they were found.
+pub(super) struct Solved {
+    pub(super) densities: Densities,
+    pub(super) steps: Steps,
+    /// The largest residual of all equations, damped ones and those of unknowns that were left out among them, as a value on the
+    /// boundary: harmonic functions being largest there, about as much as a coordinate can be off for it. Zero where it is not measured.
+    pub(super) remainder: f64,
+}
+
+/// Solves for all densities, by these steps where they are given, and `measures` what that leaves; `None` where the equations are not definite.
 pub(super) fn solve(
     operator: Operator,
     b: &RightHandSides,
     unknowns: &Unknowns,
     faces: &[[u32; 3]],
-) -> Option<Densities> {
-    let par = Par::rayon(0);
-    let m = b.low.ncols();
+    given: Option<&Steps>,
+    measures: bool,
+) -> Option<Solved> {
     // The factor takes the place of the matrix, of which the patches need entries between elements that are not near, those on and
     // below the diagonal.
     let far = single_from(operator.low.as_ref(), |j| j - j % unknowns.low);
-    let mut lower = operator.low;
-    let damped = |part: &f64| {
-        if *part > 0.0 {
-            lower.as_mut().par_col_iter_mut().zip(far.par_col_iter()).for_each(|(lower, far)| {
-                faer::zip!(lower, far).for_each(|faer::unzip!(lower, far)| *lower = f64::from(*far));
-            });
-            damp(lower.as_mut(), *part);
-        }
-        factor(lower.as_mut(), par).is_some()
+    let low_system = LowSystem::new(operator.low, &far, given.map(|steps| steps.damping))?;
+    let equations = Equations { near: &operator.near, far: &far, b, unknowns };
+    let mut low = low_system.solve(b.low.clone());
+    let candidates = if given.is_none() || measures { candidates(&operator.near, unknowns, faces) } else { Vec::new() };
+    let (mut patches, mut high) = match given {
+        Some(steps) => patches(unknowns, &steps.patches),
+        None => patches(unknowns, &equations.choose_patches(low.as_ref(), &candidates)),
     };
-    if !DAMPING.iter().any(damped) {
-        return None;
+    let vertices: Vec<Vec<u32>> = high.iter().map(|high| high.vertices.clone()).collect();
+    for (k, patch) in patches.iter_mut().enumerate() {
+        patch.damping = given.map(|steps| steps.patch_damping[k]);
     }
-    let near = operator.near;
-    let global = |mut x: Mat<f64>| {
-        triangular_solve::solve_lower_triangular_in_place(lower.as_ref(), x.as_mut(), par);
-        triangular_solve::solve_upper_triangular_in_place(lower.transpose(), x.as_mut(), par);
-        x
-    };
-    let mut low = global(b.low.clone());
-    let mut high: Vec<Active> = candidates(&near, unknowns, faces);
-    let mut residuals = residual(&near, b, unknowns, low.as_ref(), &high);
-    let patches = patches(unknowns, &mut high, &mut residuals, m);
-    let mut changes: Vec<Vec<f64>> = Vec::new();
-    for turn in 0..TURNS {
-        if turn > 0 {
-            residuals = residual(&near, b, unknowns, low.as_ref(), &high);
-            if largest(unknowns, &residuals) < FELT {
-                break;
-            }
+    let mut changes = Vec::new();
+    let mut turns = 0;
+    while turns < given.map_or(TURNS, |steps| steps.turns) {
+        let residuals = equations.residuals(low.as_ref(), &high, &vertices);
+        if given.is_none() && turns > 0 && largest(unknowns, &residuals) < RESIDUAL {
+            break;
         }
-        let found: Option<Vec<(Vec<f64>, Vec<f64>)>> = patches
+        let found: Option<Vec<patch::Step>> = patches
             .par_iter()
-            .map_init(Vec::new, |memory, patch| solve_patch(&near, &far, unknowns, patch, &residuals, memory))
+            .map_init(Vec::new, |memory, patch| patch::solve(&equations, patch, &residuals, memory))
             .collect();
         let found = found?;
-        for (patch, (step, _)) in patches.iter().zip(&found) {
-            let mut values = step.iter();
-            for &(e, column) in patch {
-                let active = high[e as usize].values.col_mut(column as usize);
-                active.iter_mut().zip(&mut values).for_each(|(a, b)| *a += b);
+        add_steps(&mut high, &patches, &found);
+        for (patch, step) in patches.iter_mut().zip(&found) {
+            patch.damping = Some(step.damping);
+        }
+        if turns == 0 && given.is_none() {
+            changes = found.into_iter().map(|step| step.change).collect();
+        }
+        low = low_system.solve(equations.low_sides(&high));
+        turns += 1;
+    }
+    let damping = DAMPING[usize::from(low_system.damping)];
+    let remainder = if measures { equations.remainder(low.as_ref(), &high, &candidates, damping) } else { 0.0 };
+    let steps = Steps {
+        damping: low_system.damping,
+        patch_damping: patches.iter().map(|patch| patch.damping.unwrap_or_default()).collect(),
+        turns,
+        patches: patches.iter().map(|patch| patch.places.iter().map(|place| place.0).collect()).collect(),
+    };
+    Some(Solved { densities: Densities { low, parts: parts(unknowns, high, &patches, &changes) }, steps, remainder })
+}
+
+/// The equations of the low unknowns, factored.
+struct LowSystem {
+    /// Lower Cholesky factor.
+    factor: Mat<f64>,
+    /// Which of [`DAMPING`] it took.
+    damping: u8,
+}
+
+impl LowSystem {
+    /// Factors the lower triangle of a matrix; `far` is the same in single precision.
+    fn new(mut matrix: Mat<f64>, far: &Mat<f32>, given: Option<u8>) -> Option<Self> {
+        let definite = |part: f64| {
+            if part > 0.0 {
+                restore(matrix.as_mut(), far);
+                damp(matrix.as_mut(), part);
             }
-        }
-        if turn == 0 {
-            changes = found.into_iter().map(|f| f.1).collect();
-        }
-        // The low unknowns with these high ones.
-        let mut x = b.low.clone();
-        subtract_high(&near, unknowns, &high, &mut x);
-        low = global(x);
+            factor(matrix.as_mut(), Par::rayon(0)).is_some()
+        };
+        let damping = patch::least_damping(given, definite)?;
+        Some(Self { factor: matrix, damping })
     }
-    let mut parts: Vec<Part> = high
-        .into_iter()
-        .map(|active| {
-            let columns = (0..active.values.ncols()).flat_map(|c| active.values.col(c).iter().copied());
-            Part { high: columns.collect(), vertices: active.vertices, change: Vec::new() }
-        })
-        .collect();
-    for (e, part) in parts.iter_mut().enumerate() {
-        part.change = vec![0.0; part.vertices.len() * functions(unknowns.elements[e].degree)];
+
+    fn solve(&self, mut b: Mat<f64>) -> Mat<f64> {
+        let par = Par::rayon(0);
+        triangular_solve::solve_lower_triangular_in_place(self.factor.as_ref(), b.as_mut(), par);
+        triangular_solve::solve_upper_triangular_in_place(self.factor.transpose(), b.as_mut(), par);
+        b
     }
-    for (patch, change) in patches.iter().zip(&changes) {
+}
+
+/// Undoes a factorisation in place.
+fn restore(mut matrix: MatMut<'_, f64>, from: &Mat<f32>) {
+    matrix.as_mut().par_col_iter_mut().zip(from.par_col_iter()).for_each(|(to, from)| {
+        faer::zip!(to, from).for_each(|faer::unzip!(to, from)| *to = f64::from(*from));
+    });
+}
+
+/// For every element the vertices with a star that is near it.
+fn candidates(near: &NearPairs, unknowns: &Unknowns, faces: &[[u32; 3]]) -> Vec<Vec<u32>> {
+    let of = |e: usize| {
+        let others = near.of(e).map(|(other, _)| unknowns.elements[other].face as usize);
+        let mut vertices: Vec<u32> = others.flat_map(|face| faces[face]).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        vertices
+    };
+    (0..unknowns.elements.len()).into_par_iter().map(of).collect()
+}
+
+/// The patches of these elements for each vertex, and the high unknowns of each element for these vertices, zero.
+fn patches(unknowns: &Unknowns, elements: &[Vec<u32>]) -> (Vec<Patch>, Vec<High>) {
+    let mut vertices: Vec<Vec<u32>> = vec![Vec::new(); unknowns.elements.len()];
+    let mut patches = Vec::with_capacity(elements.len());
+    for (v, elements) in elements.iter().enumerate() {
+        let place = |&e: &u32| {
+            vertices[e as usize].push(v as u32);
+            (e, vertices[e as usize].len() as u32 - 1)
+        };
+        patches.push(Patch { places: elements.iter().map(place).collect(), damping: None });
+    }
+    let high = vertices.into_iter().enumerate().map(|(e, vertices)| High::zero(unknowns, e, vertices)).collect();
+    (patches, high)
+}
+
+fn add_steps(high: &mut [High], patches: &[Patch], steps: &[patch::Step]) {
+    for (patch, step) in patches.iter().zip(steps) {
+        let mut values = step.high.iter();
+        for &(e, column) in &patch.places {
+            let to = high[e as usize].values.col_mut(column as usize);
+            to.iter_mut().zip(&mut values).for_each(|(to, by)| *to += by);
+        }
+    }
+}
+
+/// The high unknowns, and what the highest degree changes in each patch, by element.
+fn parts(unknowns: &Unknowns, high: Vec<High>, patches: &[Patch], changes: &[Vec<f64>]) -> Vec<Part> {
+    let part = |(e, high): (usize, High)| {
+        let values = high.values.col_iter().flat_map(|column| column.iter().copied()).collect();
+        let asked = if changes.is_empty() { 0 } else { high.vertices.len() };
+        let change = vec![0.0; asked * functions(unknowns.elements[e].degree)];
+        Part { high: values, vertices: high.vertices, change }
+    };
+    let mut parts: Vec<Part> = high.into_iter().enumerate().map(part).collect();
+    for (patch, change) in patches.iter().zip(changes) {
         let mut rest = change.as_slice();
-        for &(e, column) in patch {
+        for &(e, column) in &patch.places {
             let all = functions(unknowns.elements[e as usize].degree);
             let (mine, others) = rest.split_at(all);
             parts[e as usize].change[column as usize * all..][..all].copy_from_slice(mine);
             rest = others;
         }
     }
-    Some(Densities { low, parts })
-}
-
-/// For every element the vertices with a star that is near it; no values yet.
-fn candidates(near: &NearPairs, unknowns: &Unknowns, faces: &[[u32; 3]]) -> Vec<Active> {
-    (0..unknowns.elements.len())
-        .into_par_iter()
-        .map(|e| {
-            let others = near.of(e).map(|(other, _, _)| unknowns.elements[other].face as usize);
-            let mut vertices: Vec<u32> = others.flat_map(|face| faces[face]).collect();
-            vertices.sort_unstable();
-            vertices.dedup();
-            let values = Mat::zeros(unknowns.high(e).len(), vertices.len());
-            Active { vertices, values }
-        })
-        .collect()
-}
-
-/// What the equations of the high unknowns leave, in the form of those.
-fn residual(
-    near: &NearPairs,
-    b: &RightHandSides,
-    unknowns: &Unknowns,
-    low: MatRef<'_, f64>,
-    high: &[Active],
-) -> Vec<Mat<f64>> {
-    let l = unknowns.low;
-    (0..unknowns.elements.len())
-        .into_par_iter()
-        .map_init(Vec::new, |memory, e| {
-            let mine = unknowns.high(e);
-            let vertices = &high[e].vertices;
-            let mut r = Mat::from_fn(mine.len(), vertices.len(), |k, c| b.high[(mine.start + k, vertices[c] as usize)]);
-            for (other, entries, transposed) in near.of(e) {
-                let all = functions(unknowns.elements[other].degree);
-                let entries = if transposed { entries.transpose() } else { entries };
-                let theirs = &high[other];
-                let mut x = zeroed(memory, all, vertices.len());
-                let mut at = 0;
-                for (&v, mut x) in vertices.iter().zip(x.as_mut().col_iter_mut()) {
-                    for k in 0..l {
-                        x[k] = low[(other * l + k, v as usize)];
-                    }
-                    while at < theirs.vertices.len() && theirs.vertices[at] < v {
-                        at += 1;
-                    }
-                    if theirs.vertices.get(at) == Some(&v) {
-                        for k in l..all {
-                            x[k] = theirs.values[(k - l, at)];
-                        }
-                    }
-                }
-                matmul(r.as_mut(), Accum::Add, entries.subrows(l, mine.len()), x.as_ref(), -1.0, Par::Seq);
-            }
-            r
-        })
-        .collect()
+    parts
 }
 
 /// The largest residual, as a value on the boundary.
@@ -206,21 +248,95 @@ fn largest(unknowns: &Unknowns, residuals: &[Mat<f64>]) -> f64 {
     residuals.iter().enumerate().map(of).fold(0.0, f64::max)
 }
 
-/// Takes what the high unknowns do from the equations of the low ones.
-fn subtract_high(near: &NearPairs, unknowns: &Unknowns, high: &[Active], x: &mut Mat<f64>) {
-    let l = unknowns.low;
-    x.as_mut().par_row_chunks_mut(l).enumerate().for_each(|(e, mut rows)| {
-        for (other, entries, transposed) in near.of(e) {
-            let entries = if transposed { entries.transpose() } else { entries };
-            let theirs = &high[other];
-            let mut product = Mat::<f64>::zeros(l, theirs.vertices.len());
-            let part = entries.subrows(0, l).subcols(l, theirs.values.nrows());
-            matmul(product.as_mut(), Accum::Replace, part, theirs.values.as_ref(), 1.0, Par::Seq);
-            for (c, &v) in theirs.vertices.iter().enumerate() {
-                for k in 0..l {
-                    rows[(k, v as usize)] -= product[(k, c)];
-                }
+/// The equations of all unknowns.
+pub(super) struct Equations<'a> {
+    pub(super) near: &'a NearPairs,
+    /// The low unknowns with each other, the lower triangle.
+    pub(super) far: &'a Mat<f32>,
+    b: &'a RightHandSides,
+    pub(super) unknowns: &'a Unknowns,
+}
+
+impl Equations<'_> {
+    /// The elements of each vertex's patch, by what the low unknowns alone leave.
+    fn choose_patches(&self, low: MatRef<'_, f64>, candidates: &[Vec<u32>]) -> Vec<Vec<u32>> {
+        let nothing = |e: usize| High::zero(self.unknowns, e, Vec::new());
+        let high: Vec<High> = (0..candidates.len()).map(nothing).collect();
+        patch::choose(self.unknowns, candidates, &self.residuals(low, &high, candidates), low.ncols())
+    }
+
+    /// The largest residual, see [`Solved::remainder`]; the low unknowns were solved for with diagonals larger by the part `damping`.
+    fn remainder(&self, low: MatRef<'_, f64>, high: &[High], candidates: &[Vec<u32>], damping: f64) -> f64 {
+        let l = self.unknowns.low;
+        let residuals = self.residuals(low, high, candidates);
+        let of = |(e, residual): (usize, &Mat<f64>)| {
+            let inflated = |c: usize, k: usize| {
+                damping * f64::from(self.far[(e * l + k, e * l + k)]) * low[(e * l + k, candidates[e][c] as usize)]
+            };
+            let squared = |(c, residual): (usize, ColRef<'_, f64>)| {
+                residual.squared_norm_l2() + (0..l).map(|k| inflated(c, k).powi(2)).sum::<f64>()
+            };
+            let largest = residual.col_iter().enumerate().map(squared).fold(0.0, f64::max);
+            largest.sqrt() / self.unknowns.elements[e].triangle.area
+        };
+        residuals.iter().enumerate().map(of).fold(0.0, f64::max)
+    }
+
+    /// What the equations of the high unknowns leave: for every element, its high unknowns × the vertices that are asked for, ascending.
+    fn residuals(&self, low: MatRef<'_, f64>, high: &[High], vertices: &[Vec<u32>]) -> Vec<Mat<f64>> {
+        let (unknowns, b) = (self.unknowns, self.b);
+        let of = |memory: &mut Vec<f64>, e: usize| {
+            let (mine, vertices) = (unknowns.high(e), &vertices[e]);
+            let mut r = Mat::from_fn(mine.len(), vertices.len(), |k, c| b.high[(mine.start + k, vertices[c] as usize)]);
+            for (other, entries) in self.near.of(e) {
+                let x = self.density(memory, low, &high[other], other, vertices);
+                matmul(r.as_mut(), Accum::Add, entries.subrows(unknowns.low, mine.len()), x, -1.0, Par::Seq);
+            }
+            r
+        };
+        (0..unknowns.elements.len()).into_par_iter().map_init(Vec::new, of).collect()
+    }
+
+    /// All unknowns of one element × some vertices.
+    fn density<'m>(
+        &self,
+        memory: &'m mut Vec<f64>,
+        low: MatRef<'_, f64>,
+        high: &High,
+        element: usize,
+        vertices: &[u32],
+    ) -> MatRef<'m, f64> {
+        let l = self.unknowns.low;
+        let mut x = zeroed(memory, functions(self.unknowns.elements[element].degree), vertices.len());
+        let mut at = 0;
+        for (&v, mut x) in vertices.iter().zip(x.as_mut().col_iter_mut()) {
+            for k in 0..l {
+                x[k] = low[(element * l + k, v as usize)];
+            }
+            while high.vertices.get(at).is_some_and(|&other| other < v) {
+                at += 1;
+            }
+            if high.vertices.get(at) == Some(&v) {
+                x.subrows_mut(l, high.values.nrows()).copy_from(high.values.col(at));
             }
         }
-    });
+        x.into_const()
+    }
+
+    /// Right-hand sides of the low unknowns, less what these high unknowns do there.
+    fn low_sides(&self, high: &[High]) -> Mat<f64> {
+        let (l, mut sides) = (self.unknowns.low, self.b.low.clone());
+        sides.as_mut().par_row_chunks_mut(l).enumerate().for_each(|(e, mut rows)| {
+            for (other, entries) in self.near.of(e) {
+                let theirs = &high[other];
+                let mut product = Mat::<f64>::zeros(l, theirs.vertices.len());
+                let entries = entries.subrows(0, l).subcols(l, theirs.values.nrows());
+                matmul(product.as_mut(), Accum::Replace, entries, theirs.values.as_ref(), 1.0, Par::Seq);
+                for (product, &v) in product.col_iter().zip(&theirs.vertices) {
+                    rows.as_mut().col_mut(v as usize).iter_mut().zip(product.iter()).for_each(|(to, by)| *to -= by);
+                }
+            }
+        });
+        sides
+    }
 }

@@ -70,7 +70,7 @@ fn coordinates(cage: &Cage, points: &[Point]) -> Coordinates {
             a.extend(b);
             a
         });
-    Coordinates { phi, outside, refinement: None }
+    Coordinates { phi, outside, refinement: None, plan: None }
 }
 
 /// Working memory of one task; every entry holds one lane group.
