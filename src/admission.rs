@@ -1,8 +1,8 @@
-//! Budgets that tenants share: memory, disk space, requests, streams and preparations, each in its own unit.
+//! Admission control: budgets shared by tenants, for memory, disk space, requests, streams and preparations, each in its own unit.
 //!
-//! A tenant may hold at most twice what is left free (the dynamic thresholds of Choudhury and Hahne 1998, with α = 2): one tenant alone
-//! gets two thirds, a second one two ninths beside it, so that something is left for whoever comes next. Where there is one tenant only,
-//! it may hold everything.
+//! A tenant may hold at most twice the free remainder (the dynamic thresholds of Choudhury and Hahne 1998 with α = 2): a single active
+//! tenant gets two thirds, a second one beside it two ninths, so that something is left for further tenants. A budget that is not shared
+//! has no such limit.
 
 use crate::problem::{self, ApiError};
 use crate::session::lock;
@@ -10,8 +10,8 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex};
 use tokio::sync::oneshot;
 
-impl Full {
-    /// The answer to who asked for some of `what`: 429 where the tenant has its share, 503 where others have it.
+impl Exhausted {
+    /// The response to a refused request for `what`: 429 if the tenant has its share, 503 if others hold the rest.
     pub(crate) fn refusal(self, what: &str) -> ApiError {
         match self {
             Self::Tenant => {
@@ -26,10 +26,10 @@ impl Full {
     }
 }
 
-/// What all tenants may hold together.
+/// A limited amount of a resource, shared by all tenants.
 pub(crate) struct Budget {
     total: u64,
-    /// Whether there may be more than one tenant.
+    /// Whether several tenants are possible.
     shared: bool,
     ledger: Mutex<Ledger>,
 }
@@ -48,72 +48,72 @@ struct Account {
     waiting: VecDeque<(u64, oneshot::Sender<Held>)>,
 }
 
-/// Part of a budget; free again when dropped.
+/// An amount of a budget, released on drop.
 pub(crate) struct Held {
     budget: Arc<Budget>,
     tenant: String,
     amount: u64,
 }
 
-/// Why there is no room.
+/// Why a budget refuses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Full {
-    /// The tenant holds its share.
+pub(crate) enum Exhausted {
+    /// The tenant has its share.
     Tenant,
-    /// All of it is taken.
+    /// The budget is exhausted.
     Service,
 }
 
 impl Budget {
-    /// A budget of `total`; `shared` says whether there may be more than one tenant.
+    /// A budget of `total`; `shared` if several tenants are possible.
     pub(crate) fn new(total: u64, shared: bool) -> Arc<Self> {
         Arc::new(Self { total: total.max(1), shared, ledger: Mutex::default() })
     }
 
-    /// Takes `amount` at once, or says why it cannot. An amount above the total takes the total.
-    pub(crate) fn try_take(self: &Arc<Self>, tenant: &str, amount: u64) -> Result<Held, Full> {
+    /// Takes `amount` without waiting. An amount above the total is reduced to the total.
+    pub(crate) fn try_take(self: &Arc<Self>, tenant: &str, amount: u64) -> Result<Held, Exhausted> {
         let amount = amount.min(self.total);
         let mut ledger = lock(&self.ledger);
         let holds = ledger.tenants.get(tenant).map_or(0, |account| account.holds);
         if self.admits(ledger.used, holds, amount) {
             return Ok(ledger.hold(self, tenant, amount));
         }
-        // Were all of it free of others, would there be room?
+        // Would it fit if no other tenant held anything?
         let is_own_share = self.shared && !self.admits(holds, holds, amount);
-        Err(if is_own_share { Full::Tenant } else { Full::Service })
+        Err(if is_own_share { Exhausted::Tenant } else { Exhausted::Service })
     }
 
-    /// None of it, which may grow.
+    /// A permit of amount 0, to be grown later.
     pub(crate) fn nothing(self: &Arc<Self>, tenant: &str) -> Held {
         lock(&self.ledger).hold(self, tenant, 0)
     }
 
-    /// Waits for room. Of several tenants that wait, the one that holds the least comes next; among equals, the one that got something
-    /// longest ago. A tenant's own wishes are met in order. Who stops waiting gives up its turn.
+    /// Waits for `amount`. Among waiting tenants the one with the smallest amount is served first, then the one served longest ago;
+    /// requests of one tenant are served in order. Dropping the future leaves the queue.
     pub(crate) async fn take(self: &Arc<Self>, tenant: &str, amount: u64) -> Held {
         loop {
             let (give, turn) = oneshot::channel();
-            let wish = (amount.min(self.total), give);
-            lock(&self.ledger).tenants.entry(tenant.to_owned()).or_default().waiting.push_back(wish);
-            self.hand_out();
-            // Nobody drops the sender of who still waits.
+            let request = (amount.min(self.total), give);
+            lock(&self.ledger).tenants.entry(tenant.to_owned()).or_default().waiting.push_back(request);
+            self.serve_waiters();
+            // The sender is dropped only together with its receiver.
             if let Ok(held) = turn.await {
                 return held;
             }
         }
     }
 
-    /// Tenants that hold some of it or wait for it.
+    /// Tenants that hold or wait for some of it.
     pub(crate) fn tenants(&self) -> Vec<String> {
         lock(&self.ledger).tenants.keys().cloned().collect()
     }
 
-    /// What a tenant holds of it.
+    /// The amount that a tenant holds.
     pub(crate) fn held_by(&self, tenant: &str) -> u64 {
         lock(&self.ledger).tenants.get(tenant).map_or(0, |account| account.holds)
     }
 
-    /// What is held of it.
+    /// The amount in use.
     pub(crate) fn used(&self) -> u64 {
         lock(&self.ledger).used
     }
@@ -123,9 +123,9 @@ impl Budget {
         !self.shared || holds == 0 || holds + amount <= 2 * free
     }
 
-    fn hand_out(self: &Arc<Self>) {
+    fn serve_waiters(self: &Arc<Self>) {
         loop {
-            // Outside the lock: what nobody takes any more comes back at once.
+            // Sent outside the lock: if the receiver is gone, dropping the permit locks again.
             let (give, held) = {
                 let mut ledger = lock(&self.ledger);
                 let Some((tenant, amount, give)) = ledger.next(self) else { return };
@@ -137,23 +137,23 @@ impl Budget {
 }
 
 impl Held {
-    /// Takes so much more, or says why there is no room.
-    pub(crate) fn grow(&mut self, by: u64) -> Result<(), Full> {
+    /// Takes `by` more without waiting.
+    pub(crate) fn grow(&mut self, by: u64) -> Result<(), Exhausted> {
         let mut more = self.budget.try_take(&self.tenant, by)?;
-        // It is given back as one.
+        // Merged into one permit.
         self.amount += std::mem::take(&mut more.amount);
         Ok(())
     }
 
-    /// Takes what is missing to `amount`, in whole pieces.
-    pub(crate) fn reach(&mut self, amount: u64, piece: u64) -> Result<(), Full> {
+    /// Grows to at least `amount`, in multiples of `piece`.
+    pub(crate) fn grow_to(&mut self, amount: u64, piece: u64) -> Result<(), Exhausted> {
         match amount.saturating_sub(self.amount) {
             0 => Ok(()),
             missing => self.grow(missing.next_multiple_of(piece)),
         }
     }
 
-    /// None of the same budget, for the same tenant.
+    /// A permit of amount 0 of the same budget and tenant.
     pub(crate) fn nothing(&self) -> Self {
         self.budget.nothing(&self.tenant)
     }
@@ -169,12 +169,12 @@ impl Ledger {
         Held { budget: Arc::clone(budget), tenant: tenant.to_owned(), amount }
     }
 
-    /// Whose wish can be met now.
+    /// The next request that can be served.
     fn next(&mut self, budget: &Budget) -> Option<(String, u64, oneshot::Sender<Held>)> {
         for account in self.tenants.values_mut() {
             account.waiting.retain(|(_, give)| !give.is_closed());
         }
-        // Who wants nothing is forgotten, and with it when it was last served: it has waited long enough to come first.
+        // Idle tenants are forgotten, with the time of their last service: they come first when they return.
         self.tenants.retain(|_, account| account.holds > 0 || !account.waiting.is_empty());
         let used = self.used;
         let may = |account: &Account| {
@@ -199,7 +199,7 @@ impl Drop for Held {
                 }
             }
         }
-        self.budget.hand_out();
+        self.budget.serve_waiters();
     }
 }
 
@@ -208,7 +208,7 @@ mod tests {
     use super::*;
     use std::time::Duration;
 
-    /// Whether a wish is not met for a while.
+    /// Whether a request is not met for a while.
     async fn waits(budget: &Arc<Budget>, tenant: &str, amount: u64) -> bool {
         tokio::time::timeout(Duration::from_millis(5), budget.take(tenant, amount)).await.is_err()
     }
@@ -218,12 +218,12 @@ mod tests {
         let budget = Budget::new(900, true);
         let loud: Vec<Held> = std::iter::from_fn(|| budget.try_take("loud", 1).ok()).collect();
         assert_eq!(loud.len(), 600);
-        assert_eq!(budget.try_take("loud", 1).err(), Some(Full::Tenant));
+        assert_eq!(budget.try_take("loud", 1).err(), Some(Exhausted::Tenant));
         assert!(waits(&budget, "loud", 1).await);
         let quiet: Vec<Held> = std::iter::from_fn(|| budget.try_take("quiet", 1).ok()).collect();
         assert_eq!(quiet.len(), 200);
         let all = budget.try_take("other", 300).err();
-        assert_eq!((all, budget.used()), (Some(Full::Service), 800));
+        assert_eq!((all, budget.used()), (Some(Exhausted::Service), 800));
         drop((loud, quiet));
         assert_eq!(budget.used(), 0);
         assert!(lock(&budget.ledger).tenants.is_empty());
@@ -233,7 +233,7 @@ mod tests {
     async fn a_tenant_alone_gets_everything_and_what_is_larger_takes_everything() {
         let budget = Budget::new(10, false);
         let held = budget.try_take("a", 7).expect("room");
-        assert_eq!(budget.try_take("a", 4).err(), Some(Full::Service));
+        assert_eq!(budget.try_take("a", 4).err(), Some(Exhausted::Service));
         let rest = budget.try_take("a", 3).expect("room");
         assert!(waits(&budget, "b", 1).await);
         drop((held, rest));

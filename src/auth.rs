@@ -1,4 +1,4 @@
-//! Who may use the service: access tokens, tenants and their limits.
+//! Authentication and authorisation: access tokens, tenants and their limits.
 //!
 //! A tokens file holds the SHA-256 of each token, never the token:
 //!
@@ -13,7 +13,7 @@
 //! max_sessions = 100       # this and max_bytes, max_age_s, max_streams: where they differ from the service's settings
 //! ```
 //!
-//! Clients send `Authorization: Bearer TOKEN`. Tokens of an OpenID Connect provider are taken where one is trusted, see [`Trust`].
+//! Clients send `Authorization: Bearer TOKEN`. Tokens of an OpenID Connect provider are accepted if one is configured, see [`OidcSettings`].
 
 mod file;
 mod provider;
@@ -23,7 +23,7 @@ mod tests;
 
 pub use file::AccessError;
 pub(crate) use file::is_name;
-pub use provider::Trust;
+pub use provider::OidcSettings;
 
 use file::{Entries, Stamp};
 use http::HeaderMap;
@@ -38,14 +38,14 @@ use tokio_util::sync::CancellationToken;
 
 /// Shortest token that is accepted, in bytes: shorter ones could be guessed.
 pub const MIN_TOKEN_BYTES: usize = 16;
-/// Longest token that is looked at, in bytes.
+/// Longest token accepted, in bytes.
 const MAX_TOKEN_BYTES: usize = 1024;
-/// Name of the tenant of a service without tokens.
+/// Name of the only tenant of a service without tokens.
 pub const LOCAL: &str = "local";
-/// How often the tokens file is looked at.
-const LOOK_EVERY: Duration = Duration::from_secs(1);
+/// Interval at which the tokens file is checked for changes.
+const POLL_INTERVAL: Duration = Duration::from_secs(1);
 
-/// The share of the solving threads where several tenants wait.
+/// Share of the solving threads relative to other waiting tenants.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Priority {
@@ -59,7 +59,7 @@ pub enum Priority {
 }
 
 impl Priority {
-    /// Share of the solving threads against other tenants that wait.
+    /// Weight in the scheduler.
     pub fn weight(self) -> f64 {
         match self {
             Self::Low => 0.25,
@@ -69,7 +69,7 @@ impl Priority {
     }
 }
 
-/// What a tenant may use.
+/// Resource limits of a tenant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TenantLimits {
     /// Sessions at a time.
@@ -78,12 +78,12 @@ pub struct TenantLimits {
     pub max_bytes: u64,
     /// Age in seconds at which sessions are deleted; 0 for never.
     pub max_age_s: u64,
-    /// Streams at work.
+    /// Concurrent streams.
     pub max_streams: u64,
 }
 
 impl TenantLimits {
-    /// The larger of each.
+    /// The larger limit of each kind.
     fn most_generous(self, other: Self) -> Self {
         let for_ever = self.max_age_s == 0 || other.max_age_s == 0;
         Self {
@@ -95,42 +95,42 @@ impl TenantLimits {
     }
 }
 
-/// Whose request it is.
+/// The owner of sessions and cage jobs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tenant {
     /// Name, fit for a file name.
     pub name: String,
-    /// The share of the solving threads where several tenants wait.
+    /// Share of the solving threads relative to other waiting tenants.
     pub priority: Priority,
-    /// What it may use.
+    /// Resource limits.
     pub limits: TenantLimits,
 }
 
-/// What the bearer of a token may do with its tenant's sessions and cage designs.
+/// Permissions of a token.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Scope {
-    /// Look at them, and decode.
+    /// Read and decode.
     Read,
-    /// All of it.
+    /// Read and write.
     #[default]
     Write,
-    /// And what operators may: see and stop what all tenants do, on the operators' listener.
+    /// Also use the operators' listener, for all tenants.
     Admin,
 }
 
-/// What a token lets its bearer do, until it is revoked.
+/// Tenant and permissions of an authenticated request.
 #[derive(Clone, Debug)]
 pub struct Grant {
-    /// Whose requests its are.
+    /// Tenant that the token belongs to.
     pub tenant: Arc<Tenant>,
     /// The token's name in the tokens file; empty in a service without tokens.
     pub token: Arc<str>,
-    /// What may be done with it.
+    /// Permissions.
     pub scope: Scope,
-    /// Cancelled when the token leaves the file or gets another tenant: ends what was begun with it.
+    /// Cancelled when the token is removed from the file or moved to another tenant; ends requests in progress.
     pub revoked: CancellationToken,
-    /// When the token expires, which ends what was begun with it as well.
+    /// When the token expires, which also ends requests in progress.
     pub expires: Option<Instant>,
 }
 
@@ -140,41 +140,41 @@ impl PartialEq for Grant {
     }
 }
 
-/// Why a request is refused; to be answered with 401 and `WWW-Authenticate: Bearer`.
+/// Why authentication failed; the response is 401 with `WWW-Authenticate: Bearer`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Denied {
     /// There is no `Authorization` header.
     #[error("this service needs a token: send the header Authorization: Bearer TOKEN")]
     Missing,
-    /// The header is not what it should be, or there are several.
+    /// The header is malformed or repeated.
     #[error("the Authorization header must be Bearer and a token, once")]
     Malformed,
     /// The token is unknown or was revoked.
     #[error("the token is not valid (any more); ask the service's operator for another")]
     Unknown,
-    /// Its time is over.
+    /// The token has expired.
     #[error("the token has expired; sign in again for another")]
     Expired,
-    /// It would never expire.
+    /// The token has no expiry time.
     #[error("the token does not say when it expires: its exp is missing or no time")]
     NoExpiry,
-    /// It is of another provider, or for another service.
+    /// Its issuer or audience is another.
     #[error("the token is not for this service: its iss or aud is another")]
-    NotForUs,
-    /// It names no tenant.
+    WrongIssuerOrAudience,
+    /// It has no valid tenant claim.
     #[error(
         "the token names no tenant, or one that is not 1 to 64 letters, digits or . _ -; the provider has to add the claim that the setting oidc_tenant names"
     )]
     NoTenant,
-    /// It allows nothing here.
+    /// It has no scope of this service.
     #[error("the token's scope has none of cager:read, cager:write and cager:admin")]
     NoScope,
-    /// The keys of the tokens' provider were never there to be fetched.
-    #[error("the keys of the tokens' provider cannot be fetched at the moment; try again soon")]
+    /// The provider's key set has never been fetched successfully.
+    #[error("the keys of the OpenID Connect provider cannot be fetched at the moment; try again soon")]
     NoKeys,
 }
 
-/// Tells tenants by their tokens. Clones share their state.
+/// Authenticates requests. Clones share their state.
 #[derive(Clone)]
 pub struct Access {
     tokens: Arc<Tokens>,
@@ -182,7 +182,7 @@ pub struct Access {
 }
 
 struct Tokens {
-    /// Without one, everybody is `local`.
+    /// Without a file, all requests belong to the tenant `local`.
     path: Option<PathBuf>,
     defaults: TenantLimits,
     local: Grant,
@@ -196,7 +196,7 @@ impl Access {
     /// # Errors
     /// A file that cannot be read, or has an entry that is wrong, with its line.
     pub fn open(path: Option<&Path>, defaults: TenantLimits) -> Result<Self, AccessError> {
-        // Looked at first: a change while reading is then noticed later.
+        // Before reading, so that a concurrent change is noticed later.
         let seen = path.and_then(Stamp::of);
         let entries = path.map(|path| Entries::read(path, defaults)).transpose()?.unwrap_or_default();
         let tokens = Tokens {
@@ -215,41 +215,41 @@ impl Access {
         Ok(Self { tokens: Arc::new(tokens), provider: None })
     }
 
-    /// Takes the tokens of this provider as well.
+    /// Also accepts the tokens of this OpenID Connect provider.
     ///
     /// # Errors
     /// An address that cannot be read, or that is not safe to send to.
-    pub fn trusting(self, trust: Trust) -> Result<Self, AccessError> {
+    pub fn with_provider(self, trust: OidcSettings) -> Result<Self, AccessError> {
         let provider = Provider::new(trust).map_err(AccessError::Provider)?;
         Ok(Self { provider: Some(Arc::new(provider)), ..self })
     }
 
-    /// Whether tokens are asked for.
+    /// Whether requests need a token.
     pub fn is_guarded(&self) -> bool {
         self.tokens.path.is_some() || self.provider.is_some()
     }
 
-    /// Finds out whose request it is, by the tokens file and by the provider of tokens.
+    /// Authenticates a request by the tokens file, then by the OpenID Connect provider.
     ///
     /// # Errors
-    /// As [`Self::authenticate`], and why a token of the provider is not to be believed.
+    /// As [`Self::authenticate`], or why the provider's token was refused.
     pub async fn grant(&self, headers: &HeaderMap) -> Result<Grant, Denied> {
         match (self.authenticate(headers), &self.provider) {
             (Err(Denied::Unknown), Some(provider)) => {
-                let claimed = provider.claimed(bearer(headers)?).await?;
+                let verified = provider.verified(bearer(headers)?).await?;
                 Ok(Grant {
-                    tenant: self.tenant(&claimed.tenant),
-                    token: claimed.name.into(),
-                    scope: claimed.scope,
+                    tenant: self.tenant(&verified.tenant),
+                    token: verified.name.into(),
+                    scope: verified.scope,
                     revoked: CancellationToken::new(),
-                    expires: Some(claimed.expires),
+                    expires: Some(verified.expires),
                 })
             }
             (known, _) => known,
         }
     }
 
-    /// Finds out whose request it is, by the tokens file.
+    /// Authenticates a request by the tokens file.
     ///
     /// # Errors
     /// No token, a header that is not understood, or a token that is not in the file.
@@ -264,7 +264,7 @@ impl Access {
         self.entries().find(&Sha256::digest(token).into()).ok_or(Denied::Unknown)
     }
 
-    /// A tenant by name, for sessions that were there before a restart: the most generous of its tokens, or the defaults.
+    /// A tenant by name, for sessions resumed from disk: the most generous limits of its tokens, or the defaults.
     pub fn tenant(&self, name: &str) -> Arc<Tenant> {
         let of_tokens = self.entries().tenants().filter(|tenant| tenant.name == name).fold(None, |best, tenant| {
             let best: &Tenant = best.as_ref().unwrap_or(tenant);
@@ -286,7 +286,7 @@ impl Access {
             tokio::spawn(provider.watch(stop));
         }
         let Some(path) = self.tokens.path.clone() else { return };
-        while stop.run_until_cancelled(tokio::time::sleep(LOOK_EVERY)).await.is_some() {
+        while stop.run_until_cancelled(tokio::time::sleep(POLL_INTERVAL)).await.is_some() {
             let this = self.clone();
             let reloaded = tokio::task::spawn_blocking(move || this.reload_if_changed()).await;
             match reloaded {
@@ -298,7 +298,7 @@ impl Access {
         }
     }
 
-    /// Reads the file if it is another than before. Gives the number of tokens if it was.
+    /// Reads the file if it has changed; returns the number of tokens if so.
     fn reload_if_changed(&self) -> Result<Option<usize>, AccessError> {
         let Some(path) = &self.tokens.path else { return Ok(None) };
         let stamp = Stamp::of(path);
@@ -307,17 +307,17 @@ impl Access {
             if *seen == stamp {
                 return Ok(None);
             }
-            // Also for a broken file, so that it is complained about once.
+            // Recorded even if the file is broken, so that it is reported once.
             *seen = stamp;
         }
         let mut entries = Entries::read(path, self.tokens.defaults)?;
         let count = entries.tenants().count();
         let before = self.entries();
-        let revoked = entries.succeed(&before);
+        let revoked = entries.inherit_revocations(&before);
         *self.tokens.entries.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(entries);
-        // Not before nobody gets in with them any more.
+        // Only after the old tokens are refused.
         for grant in revoked {
-            tracing::info!(token = %grant.token, tenant = %grant.tenant.name, "a token was revoked; what was begun with it ends");
+            tracing::info!(token = %grant.token, tenant = %grant.tenant.name, "a token was revoked; its requests in progress are ended");
             grant.revoked.cancel();
         }
         Ok(Some(count))

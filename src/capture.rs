@@ -1,10 +1,10 @@
-//! From solved frames to a container and its report: what `encode` and the service share, so that both write the same bytes.
+//! Writes solved frames to a container and computes the report; shared by `encode` and the service, so that both produce the same bytes.
 
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, DEFINITION};
 use cager_core::inversion::{Solver, SolverOptions};
 use cager_core::mesh::Model;
-use cager_core::regularize::{Regularizer, WEAK};
+use cager_core::regularize::{Regularizer, WEAK_SINGULAR_VALUE};
 use cager_proto::container::{self, ContainerWriter, Header, counted_from_zero};
 
 use cager_proto::report::{ConditionNumber, FrameError, MaxVol, Report};
@@ -44,7 +44,7 @@ pub struct StoredError {
 }
 
 impl StoredError {
-    /// Of a frame whose other points than the handles are not known.
+    /// Of a frame of which only handle rows are known.
     pub const NOT_MEASURED: Self = Self { l2: f32::NAN, linf: f32::NAN, squared: f64::NAN, spread: f64::NAN };
 
     /// Of a measured frame.
@@ -54,7 +54,7 @@ impl StoredError {
     }
 }
 
-/// Writes the container of a capture, frame by frame.
+/// Writes the container of a capture frame by frame, and collects its report.
 pub struct CaptureWriter<W: Write> {
     writer: ContainerWriter<W>,
     report: Report,
@@ -66,7 +66,7 @@ pub struct CaptureWriter<W: Write> {
 }
 
 impl<W: Write> CaptureWriter<W> {
-    /// Writes what comes before the frames.
+    /// Writes the header, the rest pose and the cage.
     ///
     /// # Errors
     /// An output that refuses; sizes beyond the format.
@@ -80,7 +80,7 @@ impl<W: Write> CaptureWriter<W> {
         Ok(Self { writer, report, squared: 0.0, spread: 0.0, diagonal, farthest: (0, 0.0) })
     }
 
-    /// Says which numbers the frames have, one for each that is going to be written.
+    /// Sets the frame numbers, one for each frame to be written.
     pub fn number_frames(&mut self, numbers: Vec<f64>) {
         if !counted_from_zero(&numbers) {
             self.report.frame_numbers = numbers;
@@ -145,7 +145,7 @@ fn begin_report(header: &Header, encoding: &Encoding<'_>) -> Report {
     }
 }
 
-/// What a user should know after the preparation.
+/// Warnings that follow from the preparation.
 pub fn preparation_warnings(options: SolverOptions, solver: &Solver) -> Vec<String> {
     let found = solver.preparation();
     let unknowns = solver.decoder().unknowns();
@@ -171,7 +171,7 @@ pub fn preparation_warnings(options: SolverOptions, solver: &Solver) -> Vec<Stri
             cager_core::coordinates::Refinement::TOLERANCE
         ));
     }
-    let strong = found.singular_values.iter().filter(|&&s| s >= WEAK * found.singular_values[0]).count();
+    let strong = found.singular_values.iter().filter(|&&s| s >= WEAK_SINGULAR_VALUE * found.singular_values[0]).count();
     let weak = unknowns - strong;
     if weak > 0 {
         let consequence = match options.regularizer {
@@ -199,7 +199,7 @@ pub fn preparation_warnings(options: SolverOptions, solver: &Solver) -> Vec<Stri
     warnings
 }
 
-/// Cages are stored as positions in single precision; far from the origin little of it is left for the shape.
+/// Cages are stored in single precision, which loses resolution far from the origin.
 fn far_away(frame: usize, diagonals: f64) -> Option<String> {
     const LOST: f64 = 100.0;
     (diagonals > LOST).then(|| {
@@ -216,7 +216,7 @@ fn header(encoding: &Encoding<'_>) -> Header {
         coordinates: encoding.system.name().to_owned(),
         handles: encoding.options.handles.name().to_owned(),
         regularizer: encoding.options.regularizer.name().to_owned(),
-        // Larger ones come only with what has no threshold.
+        // Larger values occur only with methods that have no threshold.
         spectrum: u32::try_from(encoding.options.spectrum).unwrap_or(u32::MAX),
         lambda: encoding.options.lambda,
         rows_per_frame: encoding.solver.decoder().unknowns() as u32,

@@ -17,7 +17,7 @@ use settings::Kind;
 pub(crate) use settings::bytes;
 
 use crate::admission::Budget;
-use crate::auth::{TenantLimits, Trust};
+use crate::auth::{OidcSettings, TenantLimits};
 use crate::http::listen::{Limits, Tls};
 use crate::telemetry::LogFormat;
 use serde::{Deserialize, Serialize};
@@ -33,7 +33,7 @@ const GIB: u64 = 1 << 30;
 const DAY: u64 = 86_400;
 
 /// Bytes of an upload beside rest pose and cage.
-pub(crate) const ENVELOPE_BYTES: u64 = MIB;
+pub(crate) const MULTIPART_OVERHEAD_BYTES: u64 = MIB;
 
 /// Makes the settings' struct, defaults and bounds of one list.
 macro_rules! settings {
@@ -187,7 +187,7 @@ impl ServeConfig {
         let (upload_bytes, max_rest_bytes) = (self.upload_bytes, self.max_rest_bytes);
         // Of what tenants share, one gets two thirds.
         let fits = match self.is_guarded() {
-            true => upload_bytes / 3 * 2 >= max_rest_bytes + ENVELOPE_BYTES,
+            true => upload_bytes / 3 * 2 >= max_rest_bytes + MULTIPART_OVERHEAD_BYTES,
             false => upload_bytes >= max_rest_bytes,
         };
         if !fits {
@@ -215,8 +215,8 @@ impl ServeConfig {
     }
 
     /// The provider of tokens that is trusted, if one is.
-    pub fn trust(&self) -> Option<Trust> {
-        Some(Trust {
+    pub fn trust(&self) -> Option<OidcSettings> {
+        Some(OidcSettings {
             issuer: self.oidc_issuer.clone()?,
             audience: self.oidc_audience.clone()?,
             keys: self.oidc_keys.clone(),

@@ -1,13 +1,13 @@
-//! Containers back to positions.
+//! Decodes containers to positions.
 
 use crate::coordinates;
 use crate::edited::EditedCages;
 use crate::memory::Memory;
 use crate::timing::Timing;
 use cager_core::cage::{Cage, CageError};
-use cager_core::coordinates::{CoordinatesError, ElementPlan, knows_definition};
+use cager_core::coordinates::{CoordinatesError, ElementPlan, supports_definition};
 use cager_core::decode::Decoder;
-use cager_core::inversion::{BATCH, PrepareError, coordinates_fit, refuse_far_points};
+use cager_core::inversion::{BATCH, PrepareError, coordinates_fit, reject_far_points};
 use cager_core::mesh::{Model, Point};
 use cager_formats::{Action, FrameOptions, FrameRange, Target, create_frames};
 use cager_proto::container::{self, ContainerReader};
@@ -32,7 +32,7 @@ pub enum DecodeError {
         /// The container.
         path: PathBuf,
     },
-    /// The container holds a cage that is none.
+    /// The cage in the container is invalid.
     #[error("{}: {cause}", .path.display())]
     Cage {
         /// The container.
@@ -40,7 +40,7 @@ pub enum DecodeError {
         /// What is wrong with it; part of the message, so not a source as well.
         cause: CageError,
     },
-    /// The container needs what this program cannot do.
+    /// The container needs a feature that this version lacks.
     #[error("{}: {what}; use a newer cager", .path.display())]
     Unsupported {
         /// The container.
@@ -104,7 +104,7 @@ pub type Container = ContainerReader<BufReader<File>>;
 /// A file that cannot be read or is no container; the path is named.
 pub fn open(path: &Path) -> Result<Container, DecodeError> {
     let fail = |cause| DecodeError::container(path, cause);
-    // Opening a pipe would wait for somebody to write to it.
+    // Opening a pipe would block until another process writes to it.
     if std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
         return Err(DecodeError::NotAFile { path: path.to_owned() });
     }
@@ -115,7 +115,7 @@ pub fn open(path: &Path) -> Result<Container, DecodeError> {
     ContainerReader::open(BufReader::new(file)).map_err(fail)
 }
 
-/// What is decoded, where it is not every frame of a container's own model and cages.
+/// What to decode, if not all frames of the container with its own model and cages.
 #[derive(Default)]
 pub struct Decoding<'a> {
     /// Another model within the rest cage, and the file that it comes from.
@@ -126,13 +126,13 @@ pub struct Decoding<'a> {
     pub range: Option<FrameRange>,
     /// Frame rate and number of the first frame, where they are given.
     pub timing: Timing,
-    /// Whether all is read and checked, and nothing written.
+    /// Whether to read and validate only.
     pub dry_run: bool,
-    /// What decoding may hold in memory: half of what is free, where nothing is said.
+    /// Memory limit; by default half of the free memory.
     pub memory: Option<Memory>,
 }
 
-/// What was decoded.
+/// Result of [`decode`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Decoded {
     /// Points of every frame.
@@ -143,18 +143,18 @@ pub struct Decoded {
     pub outside: usize,
 }
 
-/// A model in its rest pose, what turns cages into its positions, and how many of its points lie outside the rest cage.
-struct Bound {
+/// A model in its rest pose with its decoder, and the number of its points outside the rest cage.
+struct BoundModel {
     rest: Model,
     decoder: Decoder,
     outside: usize,
 }
 
-/// Coordinates that are computed at a time to find the points outside.
+/// Entries of `Φ` computed at a time to find the points outside.
 const OUTSIDE_ENTRIES: usize = 1 << 23;
 
-/// Binds the container's model, or another, to the container's cage; `keeps` is asked whether to keep coordinates of so many points and
-/// columns.
+/// Computes the coordinates of the container's model, or of another, in the container's cage; `keeps(points, columns)` decides whether to
+/// keep them in memory.
 ///
 /// # Errors
 /// Damage, or coordinates that this program does not compute.
@@ -163,20 +163,23 @@ fn bind(
     path: &Path,
     other: Option<(&Path, &Model)>,
     keeps: impl FnOnce(usize, usize) -> bool,
-) -> Result<Bound, DecodeError> {
+) -> Result<BoundModel, DecodeError> {
     let fail = |cause| DecodeError::container(path, cause);
     let unsupported = |what| DecodeError::Unsupported { path: path.to_owned(), what };
     let header = container.header().clone();
     let Some(system) = coordinates::by_name(&header.coordinates) else {
         return Err(unsupported(format!("its coordinates are {:?}", header.coordinates)));
     };
-    if !knows_definition(header.coordinates_definition) {
+    if !supports_definition(header.coordinates_definition) {
         return Err(unsupported(format!("its coordinates are of definition {}", header.coordinates_definition)));
     }
     let own = container.rest().map_err(fail)?;
     let (model_path, rest) = other.map_or_else(|| (path, own), |(path, model)| (path, model.clone()));
     if let Some(face) = rest.faces.arities().iter().position(|&corners| corners < 3) {
-        return Err(fail(container::Error::Corrupt { offset: 0, what: format!("face {face} of the model is none") }));
+        return Err(fail(container::Error::Corrupt {
+            offset: 0,
+            what: format!("face {face} of the model has fewer than three vertices"),
+        }));
     }
     let mesh = container.cage().map_err(fail)?;
     let cage = Cage::new(mesh).map_err(|cause| DecodeError::Cage { path: path.to_owned(), cause })?;
@@ -185,18 +188,23 @@ fn bind(
     }
     let columns = system.columns(&cage);
     if other.is_some() {
-        refuse_far_points(&cage, &rest.points)
+        reject_far_points(&cage, &rest.points)
             .map_err(|cause| DecodeError::Model { path: model_path.to_owned(), cause })?;
     }
     let plan = container.elements().map_err(fail)?.map(ElementPlan::from_bytes);
-    if let Some(by_point) = system.by_point().filter(|_| plan.is_none()) {
+    if let Some(pointwise) = system.pointwise().filter(|_| plan.is_none()) {
         let keeps = keeps(rest.points.len(), columns);
-        let decoder = if keeps { Decoder::keeping } else { Decoder::computing }(by_point, &cage, &rest.points, columns);
+        let decoder = if keeps { Decoder::with_stored_coordinates } else { Decoder::with_recomputed_coordinates }(
+            pointwise,
+            &cage,
+            &rest.points,
+            columns,
+        );
         let decoder = decoder.with_tied_normals(system.tied_normals(&cage));
         let some = (OUTSIDE_ENTRIES / columns).max(1);
-        let outside = |points: &[Point]| by_point(&cage, points).outside.len();
+        let outside = |points: &[Point]| pointwise(&cage, points).outside.len();
         let outside = other.map_or(0, |_| rest.points.chunks(some).map(outside).sum());
-        return Ok(Bound { rest, decoder, outside });
+        return Ok(BoundModel { rest, decoder, outside });
     }
     if !coordinates_fit(rest.points.len(), columns, 2) {
         let gigabytes = 12e-9 * rest.points.len() as f64 * columns as f64;
@@ -208,10 +216,10 @@ fn bind(
     };
     let found = coordinates.map_err(|cause| DecodeError::Coordinates { path: model_path.to_owned(), cause })?;
     let decoder = Decoder::new(found.phi.as_ref(), cage.vertices().len()).with_tied_normals(system.tied_normals(&cage));
-    Ok(Bound { rest, decoder, outside: found.outside.len() })
+    Ok(BoundModel { rest, decoder, outside: found.outside.len() })
 }
 
-/// Times and numbers of `there` frames in the outputs of a container, or of some of them; `timing` goes before what the container tells.
+/// Frame rate and frame numbers of the output; `timing` overrides the container's.
 ///
 /// # Errors
 /// Damage.
@@ -254,7 +262,7 @@ pub fn decode(
     container.report().map_err(fail)?;
     let batch = |points: usize| memory.frames(12 * points, BATCH);
     let keeps = |points: usize, columns: usize| memory.keeps(points, columns, frames.div_ceil(batch(points)));
-    let Bound { rest, decoder, outside } = bind(&mut container, input, model, keeps)?;
+    let BoundModel { rest, decoder, outside } = bind(&mut container, input, model, keeps)?;
     let batch = batch(rest.points.len());
     let mut writer = create_frames(output, rest.points.len(), frames, &rest.faces, &options)?;
     // Both keep their allocations from batch to batch.

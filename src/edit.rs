@@ -1,4 +1,4 @@
-//! Containers with edited cages in the place of their own.
+//! Writes containers with edited cages.
 
 use crate::capture::GENERATOR;
 use crate::decode::{Container, DecodeError};
@@ -22,8 +22,8 @@ pub struct Edited {
     pub container: AtomicFile,
 }
 
-/// Writes the container at `input` again, with edited cages. A frame whose cage is the same keeps its errors; of the others they
-/// are not measured, as the capture is not there.
+/// Writes the container at `input` again with edited cages. Unchanged frames keep their errors; those of changed frames are not measured,
+/// since the capture is not available.
 ///
 /// # Errors
 /// Damage; edited cages that cannot be read; an output that refuses.
@@ -70,7 +70,7 @@ pub fn edit(
     Ok(Edited { frames, changed, container })
 }
 
-/// What is still true of the encoding.
+/// The parts of the summary that are still valid.
 fn after_editing(report: Report) -> Report {
     let (unknown, mut warnings) = (f64::NAN, report.warnings);
     warnings.retain(|warning| warning != NOT_MEASURED);
@@ -88,7 +88,7 @@ fn after_editing(report: Report) -> Report {
 
 fn written(output: &Path, cause: container::Error) -> DecodeError {
     match cause {
-        // What `AtomicFile` passes through `io::Write` has the path in it already.
+        // Errors of `AtomicFile` that pass through `io::Write` contain the path already.
         container::Error::Io(io) => match io.downcast() {
             Ok(named) => DecodeError::Formats(named),
             Err(cause) => cager_formats::Error::Io { path: output.to_owned(), action: Action::Write, cause }.into(),

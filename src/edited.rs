@@ -1,4 +1,4 @@
-//! Cages that were edited outside the program, in the place of those in a container.
+//! Reading cages that were edited in another program.
 
 use crate::decode::{Container, DecodeError};
 use cager_formats::{Error, FrameReader, open_frames};
@@ -40,7 +40,7 @@ impl EditedCages {
         self.reader.frames()
     }
 
-    /// Reads the cage of one frame, vertices × 3. Neighbours are fastest one after another.
+    /// Reads the cage of a frame, vertices × 3. Reading in ascending order is fastest.
     ///
     /// # Errors
     /// Damage, another number of vertices, and coordinates beyond single precision.
@@ -74,7 +74,7 @@ impl EditedCages {
     }
 }
 
-/// Says of a wrong number of points that a cage is expected, and what came instead.
+/// Rewrites a point-count error in terms of the cage.
 fn named(error: Error, vertices: usize, points: u64) -> DecodeError {
     let Error::PointCount { path, frame, found, .. } = error else { return error.into() };
     let place = frame.map_or_else(String::new, |frame| format!("frame {frame} "));

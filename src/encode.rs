@@ -1,4 +1,4 @@
-//! The main job: frames in, one cage per frame out, measured as a decoder will see it.
+//! Encoding: solves one cage per frame and measures the errors that a decoder will produce.
 
 use crate::capture::{CaptureWriter, Encoding, StoredError};
 use crate::memory::Memory;
@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Instant;
 
-/// Frames that something is chosen by take at most this much memory; not what is free, since the choice must not depend on that.
+/// Largest memory of sampled frames, in bytes; constant, because the choice that depends on them must be reproducible.
 const SAMPLE_BYTES: usize = 640 << 20;
 
 /// Why encoding stopped; nothing was written.
@@ -78,13 +78,13 @@ pub struct Job<'a> {
     pub options: SolverOptions,
     /// The user's own term, for [`Regularizer::Matrix`](cager_core::regularize::Regularizer::Matrix).
     pub term: Option<&'a dyn Term>,
-    /// Frames to choose the spectrum threshold by; that of the options counts where there are none.
+    /// Selects the spectrum threshold; without it that of the options is used.
     pub choose: Option<ChooseSpectrum>,
     /// What the encoding may hold in memory.
     pub memory: Memory,
 }
 
-/// What a spectrum threshold is chosen by.
+/// How to select a spectrum threshold.
 pub struct ChooseSpectrum {
     /// Some frames of the capture, at least one: see [`sample_frames`].
     pub samples: Vec<Vec<f64>>,
@@ -92,7 +92,7 @@ pub struct ChooseSpectrum {
     pub bound: f64,
 }
 
-/// At most so many frames of a capture, evenly spaced or the first ones; fewer where they are short of memory or there are no more.
+/// Reads at most `most` frames, evenly spaced or the first ones; fewer if memory is limited.
 ///
 /// # Errors
 /// Those of the reader, also where it ends before the frames it announced.
@@ -124,17 +124,17 @@ pub fn sample_frames(
     Ok(samples)
 }
 
-/// What an encoding gives.
+/// Result of an encoding.
 #[derive(Debug)]
 pub struct Encoded {
-    /// What was found out.
+    /// Report of the encoding.
     pub report: Report,
     /// The container, complete but for its name, so that a report can take its name together with it: see
     /// [`cager_formats::commit_together`].
     pub container: AtomicFile,
 }
 
-/// How far an encoding is.
+/// Progress of an encoding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EncodeProgress {
     /// What is prepared next.
@@ -150,7 +150,7 @@ pub enum EncodeProgress {
 pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded, EncodeError> {
     let clock = Instant::now();
     let fail = |cause| EncodeError::container(job.output.path(), cause);
-    // Before the work, so that an unwritable place costs no waiting.
+    // First, so that an unwritable output fails before the work.
     let file = AtomicFile::create(job.output)?;
     let (solver, options, choice) = prepare(&job, &|step| progress(EncodeProgress::Preparing(step)))?;
     let encoding = Encoding {
@@ -171,19 +171,19 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
         ..Seconds::default()
     };
     let keeps = solver.decoder().coordinates().is_some();
-    let Flow { size, at_once } = Flow::new(job.memory, job.frames.points(), keeps);
+    let BatchPlan { size, concurrent } = BatchPlan::new(job.memory, job.frames.points(), keeps);
     let mut convergence = Vec::new();
     let mut worst = None;
     std::thread::scope(|scope| -> Result<(), EncodeError> {
-        let (full, batches) = sync_channel(at_once);
-        let (empty, recycled) = sync_channel(2 * at_once + 2);
+        let (full, batches) = sync_channel(concurrent);
+        let (empty, recycled) = sync_channel(2 * concurrent + 2);
         let frames = job.frames;
         let reader = scope.spawn(move || read_batches(frames, size, &full, &recycled));
         let mut done = 0;
         let mut previous: Option<Vec<f32>> = None;
         while let Ok(first) = batches.recv() {
             let mut waiting = vec![first];
-            while waiting.len() < at_once {
+            while waiting.len() < concurrent {
                 match batches.try_recv() {
                     Ok(batch) => waiting.push(batch),
                     Err(_) => break,
@@ -236,21 +236,21 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
     Ok(Encoded { report, container })
 }
 
-/// The solver, the options it has, and how its threshold was chosen.
+/// The solver, its options, and how the spectrum threshold was selected.
 fn prepare(
     job: &Job<'_>,
     tell: &dyn Fn(&'static str),
 ) -> Result<(Solver, SolverOptions, Option<SpectrumChoice>), PrepareError> {
     let mut options = job.options;
     let points = &job.rest.points;
-    let batches = job.frames.frames().div_ceil(Flow::new(job.memory, points.len(), false).size);
+    let batches = job.frames.frames().div_ceil(BatchPlan::new(job.memory, points.len(), false).size);
     let passes = if job.choose.is_some() { usize::MAX } else { batches };
-    let keeps_coordinates = job.memory.keeps(points.len(), job.system.columns(job.cage), passes);
+    let stores_coordinates = job.memory.keeps(points.len(), job.system.columns(job.cage), passes);
     let next = |step| {
         tell(step);
         ControlFlow::Continue(())
     };
-    let preparing = Preparing { term: job.term, keeps_coordinates, next: &next };
+    let preparing = Preparing { term: job.term, stores_coordinates, next: &next };
     let term = preparing.term(options)?;
     let chosen_by = job.choose.as_ref().filter(|choose| !choose.samples.is_empty());
     let Some(ChooseSpectrum { samples, bound }) = chosen_by else {
@@ -259,32 +259,32 @@ fn prepare(
     term.delta(job.cage, job.system.unknowns(job.cage))?;
     let analysis = Analysis::for_options(job.system, job.cage, points, options, &preparing)?;
     tell("threshold");
-    let reading = analysis.reading(options.handles)?;
-    let found = reading.choose_threshold(options, term, samples, *bound)?;
+    let handle_system = analysis.handle_system(options.handles)?;
+    let found = handle_system.choose_threshold(options, term, samples, *bound)?;
     options.spectrum = found.spectrum;
-    Ok((reading.solver_with(options, term)?, options, Some(SpectrumChoice::new(&found, *bound))))
+    Ok((handle_system.solver_with(options, term)?, options, Some(SpectrumChoice::new(&found, *bound))))
 }
 
 type Batch = Vec<Vec<f64>>;
 
-/// How frames are solved: batches of so many, so many at a time. As many again wait, and one is being read.
+/// Batch size and number of batches solved concurrently. As many again are queued, and one is being read.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Flow {
+struct BatchPlan {
     size: usize,
-    at_once: usize,
+    concurrent: usize,
 }
 
-impl Flow {
-    /// Where coordinates are kept, a batch for each thread; otherwise one at a time, since each computes them anew with all threads.
+impl BatchPlan {
+    /// With coordinates in memory, one batch per thread; otherwise one batch, since computing coordinates uses all threads.
     fn new(memory: Memory, points: usize, keeps: bool) -> Self {
         let most = if keeps { rayon::current_num_threads() } else { 1 };
         let frames = memory.frames(24 * points, BATCH * (2 * most + 1));
-        let at_once = (frames.saturating_sub(1) / 2).clamp(1, most);
-        Self { size: (frames / (2 * at_once + 1)).max(1), at_once }
+        let concurrent = (frames.saturating_sub(1) / 2).clamp(1, most);
+        Self { size: (frames / (2 * concurrent + 1)).max(1), concurrent }
     }
 }
 
-/// Reads all frames; returns the seconds that took, not counting the time it waited for the solver.
+/// Reads all frames; returns the seconds spent handle_system, without waiting for the solver.
 fn read_batches(
     frames: &mut dyn FrameReader,
     size: usize,
@@ -322,11 +322,11 @@ struct SolvedBatch {
     measure_seconds: f64,
 }
 
-/// Solves a batch whose first frame comes after the one with the cage `previous`, where that matters.
+/// Solves a batch; `previous` is the cage of the frame before its first.
 fn solve(solver: &Solver, batch: &Batch, previous: Option<&[f32]>) -> SolvedBatch {
     let frames: Vec<&[f64]> = batch.iter().map(Vec::as_slice).collect();
     let clock = Instant::now();
-    let inverted = solver.invert_reporting(previous, &frames);
+    let inverted = solver.invert_with_convergence(previous, &frames);
     let invert_seconds = clock.elapsed().as_secs_f64();
     let convergence = inverted.iter().filter_map(|inverted| inverted.convergence).collect();
     let cages: Vec<Vec<f32>> = inverted.into_iter().map(|inverted| inverted.cage).collect();
@@ -367,10 +367,14 @@ mod tests {
         for threads in [1, 2, 64] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
             for (points, keeps) in [(100, true), (100, false), (1_000_000, true), (1_000_000, false)] {
-                let Flow { size, at_once } = pool.install(|| Flow::new(Memory::at_most(1 << 30), points, keeps));
-                let most = (24 * points * size * (2 * at_once + 1)) as u64;
-                assert!((1..=BATCH).contains(&size) && at_once >= 1 && most <= 1 << 28, "{threads} {points}: {most}");
-                assert!(points > 100 || size == BATCH && at_once == if keeps { threads } else { 1 });
+                let BatchPlan { size, concurrent } =
+                    pool.install(|| BatchPlan::new(Memory::at_most(1 << 30), points, keeps));
+                let most = (24 * points * size * (2 * concurrent + 1)) as u64;
+                assert!(
+                    (1..=BATCH).contains(&size) && concurrent >= 1 && most <= 1 << 28,
+                    "{threads} {points}: {most}"
+                );
+                assert!(points > 100 || size == BATCH && concurrent == if keeps { threads } else { 1 });
             }
         }
     }

@@ -1,11 +1,11 @@
-//! The files of a capture as they are to be read: gaps allowed or not, turned, welded, with times of their own.
+//! Opening a capture's files: checks for gaps, and adapts axes, welded points, frame rate and frame numbers.
 
-use crate::belong::Up;
+use crate::mismatch::Up;
 use crate::timing::Timing;
 use cager_formats::{Error, FrameRange, FrameReader, missing_frames, open_frames, open_frames_range};
 use std::path::PathBuf;
 
-/// The files of a capture, and what is to be done with what they hold.
+/// The files of a capture, and how to adapt them.
 #[derive(Clone, Debug, Default)]
 pub struct CaptureFiles {
     /// A folder or pattern of mesh files, or a point cache: see [`open_frames`].
@@ -14,11 +14,11 @@ pub struct CaptureFiles {
     pub points: usize,
     /// The frames that are taken; all where none is given.
     pub range: Option<FrameRange>,
-    /// Whether numbers may be missing from the files' names.
+    /// Whether gaps in the numbers of the files are allowed.
     pub allow_gaps: bool,
-    /// The axis that points up in the frames, where another one does in the rest pose.
+    /// The up axis of the frames, if it differs from that of the rest pose.
     pub up: Option<Up>,
-    /// For each point of a rest pose before it was welded, the point that it became.
+    /// If the rest pose was welded: for each original point, its index after welding.
     pub weld: Option<Vec<u32>>,
     /// Frame rate and number of the first frame, where they are given.
     pub timing: Timing,
@@ -57,10 +57,10 @@ impl CaptureFiles {
         }))
     }
 
-    /// The reader, and for each welded point the first point that became it, where the frames are split as the rest pose was.
+    /// The reader; and if the frames have unwelded points, for each welded point its first original point.
     fn open_welded(&self) -> Result<Welded, Error> {
         let Some(weld) = &self.weld else { return Ok((self.open_with(self.points)?, None)) };
-        // Files of a sequence tell their points only when they are read.
+        // The number of points in a file sequence is known only after reading a file.
         let split = open_frames(&self.path, weld.len()).and_then(|mut reader| reader.read_next(&mut Vec::new()));
         if let Err(Error::PointCount { .. }) = split {
             return Ok((self.open_with(self.points)?, None));
@@ -77,10 +77,10 @@ impl CaptureFiles {
     }
 }
 
-/// A reader, and for each welded point the first point that became it, where its frames are to be welded.
+/// As returned by `open_welded`.
 type Welded = (Box<dyn FrameReader>, Option<Vec<u32>>);
 
-/// A reader whose frames are brought to the rest pose's points and axes, and are small enough for a container.
+/// Converts frames to the points and axes of the rest pose, and checks that they fit single precision.
 struct Adapted {
     inner: Box<dyn FrameReader>,
     files: CaptureFiles,

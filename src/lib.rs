@@ -2,10 +2,9 @@
 
 mod admission;
 pub mod auth;
-pub mod belong;
+pub mod cage_export;
 #[doc(hidden)]
 pub mod cage_job;
-pub mod cages_out;
 pub mod capture;
 pub mod cli;
 mod compare;
@@ -19,9 +18,10 @@ pub mod encode;
 pub mod engine;
 pub mod frames;
 pub mod http;
+mod http_client;
 mod idempotency;
 pub mod memory;
-mod outgoing;
+pub mod mismatch;
 mod picture;
 mod plot;
 pub mod problem;
@@ -32,5 +32,5 @@ mod speed;
 pub mod store;
 pub mod telemetry;
 pub mod timing;
-mod unread;
+mod unreadable;
 pub mod webhooks;

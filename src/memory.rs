@@ -1,23 +1,23 @@
-//! How much memory a job may take for what grows with the model.
+//! Memory limits for encoding and decoding.
 
-/// A limit for what a job holds beside the model itself. What does not fit is computed in parts, with the same result.
+/// Limit of the memory used in addition to the model. What does not fit is computed in parts, with the same result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Memory {
     bytes: u64,
 }
 
-/// Where the system does not tell what is free.
+/// Limit where the system does not report its free memory, in bytes.
 const UNKNOWN: u64 = 4 << 30;
-/// Frames on their way take at most this much, unless a single one already takes more.
+/// Largest memory of buffered frames, in bytes, unless a single frame is larger.
 const FRAMES_BYTES: u64 = 640 << 20;
 
 impl Memory {
-    /// At most so many bytes.
+    /// A limit in bytes.
     pub fn at_most(bytes: u64) -> Self {
         Self { bytes }
     }
 
-    /// Half of what is free, in the container that the process runs in as well.
+    /// Half of the free memory, also within the limits of a cgroup.
     pub fn half_of_free() -> Self {
         let read = |path: &str| std::fs::read_to_string(path).ok();
         let number = |path: &str| read(path)?.trim().parse::<u64>().ok();
@@ -28,19 +28,19 @@ impl Memory {
         Self { bytes: machine.into_iter().chain(container).min().unwrap_or(2 * UNKNOWN) / 2 }
     }
 
-    /// Frames of so many bytes that are on their way together, at most as many as asked for.
+    /// Number of frames of `bytes` bytes to buffer, at most `most`.
     pub(crate) fn frames(self, bytes: usize, most: usize) -> usize {
         let room = FRAMES_BYTES.min(self.bytes / 4) as usize;
         (room / bytes.max(1)).clamp(1, most.max(1))
     }
 
-    /// Whether to keep `Φ` in single precision for so many batches of frames: where it fits, and more than one needs it.
+    /// Whether to keep `Φ` in single precision: if it fits and more than one batch needs it.
     pub(crate) fn keeps(self, points: usize, columns: usize, batches: usize) -> bool {
         batches > 1 && 4 * (points as u64).saturating_mul(columns as u64) <= self.bytes / 2
     }
 }
 
-/// Bytes that are available, as Linux tells them.
+/// `MemAvailable` of `/proc/meminfo`, in bytes.
 fn available(meminfo: &str) -> Option<u64> {
     let line = meminfo.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
     line.trim().strip_suffix(" kB")?.parse::<u64>().ok()?.checked_mul(1024)

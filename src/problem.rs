@@ -3,16 +3,16 @@
 use cager_proto::messages::Problem;
 use http::StatusCode;
 
-/// An error as a client gets it.
+/// An error response.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ApiError {
     /// The body.
     pub problem: Box<Problem>,
-    /// Seconds after which trying again makes sense.
+    /// Value of `Retry-After`, in seconds.
     pub retry_after: Option<u32>,
 }
 
-/// A kind of error. Its word is part of the contract.
+/// A kind of error. Its word is part of the API.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kind {
     /// Last part of the problem's type.
@@ -86,31 +86,31 @@ impl ApiError {
         Self { problem: Box::new(problem), retry_after: None }
     }
 
-    /// An error that is nobody's business but the log's.
+    /// An internal error: the cause is logged, not returned.
     pub fn internal(cause: &dyn std::fmt::Display) -> Self {
         tracing::error!(%cause, "internal error");
         Self::new(INTERNAL, "something went wrong in the service; the log of the request has more")
     }
 
-    /// Says when trying again makes sense.
+    /// Sets `Retry-After`.
     pub fn retry_after(mut self, seconds: u32) -> Self {
         self.retry_after = Some(seconds);
         self
     }
 
-    /// Names the frame.
+    /// Sets the frame at fault.
     pub fn frame(mut self, frame: u32) -> Self {
         self.problem.frame = Some(frame);
         self
     }
 
-    /// Lists missing frames.
+    /// Sets the missing ranges.
     pub fn missing(mut self, missing: Vec<[u32; 2]>) -> Self {
         self.problem.missing = Some(missing);
         self
     }
 
-    /// Names the limit.
+    /// Sets the limit that was exceeded.
     pub fn limit(mut self, limit: u64) -> Self {
         self.problem.limit = Some(limit);
         self

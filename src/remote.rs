@@ -20,10 +20,10 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// Longest wait for a session to be prepared.
-const READY_WITHIN: Duration = Duration::from_secs(3600);
+const READY_TIMEOUT: Duration = Duration::from_secs(3600);
 
-/// Longest wait for a service to clean up after a failure; it does so by itself in time.
-const CLEAN_UP_WITHIN: Duration = Duration::from_secs(5);
+/// Longest wait for cleaning up on the service after a failure.
+const CLEAN_UP_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Why encoding by a service stopped; nothing was written.
 #[derive(Debug, thiserror::Error)]
@@ -34,12 +34,12 @@ pub enum RemoteError {
     /// A file cannot be read or written.
     #[error(transparent)]
     Formats(#[from] cager_formats::Error),
-    /// What the service sent is no container.
+    /// What the service sent is not a container.
     #[error(
         "the container from the service cannot be read ({0}); encode again, and look at the service's log if that gives the same"
     )]
     Container(container::Error),
-    /// The system gives no means to connect.
+    /// The network runtime cannot be started.
     #[error("the network cannot be used ({0}); free some memory or files and try again")]
     Runtime(io::Error),
 }
@@ -54,7 +54,7 @@ pub struct RemoteJob<'a, F> {
     pub rest: &'a Path,
     /// The cage around it.
     pub cage: RemoteCage<'a>,
-    /// File with the matrix of the regularizer of that name.
+    /// File with the matrix of the regularizer `matrix`.
     pub matrix: Option<&'a Path>,
     /// The capture.
     pub frames: F,
@@ -98,7 +98,7 @@ pub struct Steps {
     pub download: Duration,
 }
 
-/// Has a service encode a capture, and design its cage where there is none.
+/// Encodes a capture on a service, which also designs the cage if there is none.
 ///
 /// # Errors
 /// See [`RemoteError`]; the session is then deleted, where the service can still be reached.
@@ -106,7 +106,7 @@ pub fn encode_remotely<F: FrameSource + 'static>(
     job: RemoteJob<'_, F>,
     progress: &mut (dyn FnMut(RemoteProgress<'_>) + Send),
 ) -> Result<EncodedRemotely, RemoteError> {
-    // One thread moves bytes; frames are read on another.
+    // One thread for the network; frames are read on another.
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(RemoteError::Runtime)?;
     runtime.block_on(encode(job, progress))
 }
@@ -120,7 +120,7 @@ async fn encode<F: FrameSource + 'static>(
     if let Some(token) = job.token {
         client = client.with_token(token);
     }
-    // Before the work, so that an unwritable place costs no waiting.
+    // First, so that an unwritable output fails before the work.
     let file = AtomicFile::create(job.output)?;
     let mut new = NewSession {
         rest: mesh_file(job.rest)?,
@@ -139,7 +139,7 @@ async fn encode<F: FrameSource + 'static>(
             let design = cage::design(&client, &new.rest, &mut job.frames, options, progress).await?;
             new.options.cage = Some(CageSource { id: Some(design.id.clone()), ..CageSource::default() });
             let created = client.create(&new).await;
-            // The session has a cage of its own now.
+            // The session has its own copy of the cage.
             clean_up(&client, async |client| client.delete_cage(&design.id).await).await;
             designed = Some((design::report_of_job(&design, options), design.warnings));
             created?.id
@@ -160,10 +160,10 @@ async fn encode<F: FrameSource + 'static>(
     }
 }
 
-/// Removes what is of no more use on the service, if that is quickly done.
+/// Removes an object from the service, within a short time and without retries.
 async fn clean_up(client: &Client, remove: impl AsyncFnOnce(Client) -> Result<(), ClientError>) {
     let hasty = client.clone().with_options(ClientOptions { retries: 0, ..ClientOptions::default() });
-    let _ = tokio::time::timeout(CLEAN_UP_WITHIN, remove(hasty)).await;
+    let _ = tokio::time::timeout(CLEAN_UP_TIMEOUT, remove(hasty)).await;
 }
 
 async fn run(
@@ -174,7 +174,7 @@ async fn run(
     clock: Instant,
     progress: &mut (dyn FnMut(RemoteProgress<'_>) + Send),
 ) -> Result<(Encoded, Steps), RemoteError> {
-    let ready = client.wait_ready(session, READY_WITHIN).await?;
+    let ready = client.wait_ready(session, READY_TIMEOUT).await?;
     let mut steps = Steps { prepare: clock.elapsed(), ..Steps::default() };
     let clock_upload = Instant::now();
     let mut done = 0;
@@ -192,7 +192,7 @@ async fn run(
     let clock_download = Instant::now();
     client.download(session, &mut file).await.map_err(name_output)?;
     file.complete()?;
-    // Nothing that is no container takes the name of one.
+    // Validated before it gets its name.
     let mut reader = ContainerReader::open(BufReader::new(file.reader()?)).map_err(RemoteError::Container)?;
     reader.verify().map_err(RemoteError::Container)?;
     let mut report = reader.report().map_err(RemoteError::Container)?;
@@ -214,7 +214,7 @@ fn seconds(preparation: &PreparationSeconds, steps: &Steps, total: Duration) -> 
     }
 }
 
-/// What `AtomicFile` passes through `io::Write` has the path in it already.
+/// Errors of `AtomicFile` that pass through `io::Write` contain the path already.
 fn name_output(error: ClientError) -> RemoteError {
     match error {
         ClientError::Output(cause) => match cause.downcast() {

@@ -1,19 +1,19 @@
-//! The service put together: store, engine, caches, sessions, and how it starts and stops.
+//! The service: store, engine, caches, registries and background tasks; startup and shutdown.
 
 use crate::admission::{Budget, Held};
 use crate::auth::{Access, Tenant};
 use crate::cage_job::registry::CageJobs;
-use crate::cage_job::{Designer, Designs, local_designer};
+use crate::cage_job::{DesignPool, Designer, local_designer};
 use crate::config::ServeConfig;
 use crate::engine::{Engine, threads};
 use crate::problem::{self, ApiError};
 use crate::session::cage_source::CageMaker;
 use crate::session::commit::Committer;
 use crate::session::create::blocking;
-use crate::session::prepared::Solvers;
 use crate::session::registry::Registry;
+use crate::session::solver_cache::Solvers;
 use crate::store::{ContentKey, Disk, Store, StoreError};
-use crate::unread::Unread;
+use crate::unreadable::UnreadableFiles;
 use crate::webhooks::{Webhooks, WebhooksError};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -22,20 +22,20 @@ use std::time::Instant;
 use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 
-/// Threads that write frame logs. Most of their time they wait for the disk.
+/// Threads that write frame logs; they mostly wait for the disk.
 const COMMIT_THREADS: usize = 4;
-/// Threads that read new sessions' files at a time.
-const READING: usize = 2;
-/// Sessions that are completed at a time: each reads all its frames and keeps a processor busy.
-const COMPLETING: u64 = 2;
+/// New sessions and cage jobs whose files are parsed at a time.
+const MAX_CONCURRENT_PARSING: usize = 2;
+/// Sessions completed at a time: each reads all its frames and keeps a processor busy.
+const MAX_CONCURRENT_COMPLETIONS: u64 = 2;
 
-/// Room for models is taken in pieces of this many bytes: small ones, so that hundreds of small models have room at the same time.
+/// Step in which the memory permit of an upload grows, in bytes; small, so that hundreds of small models fit.
 const UPLOAD_PIECE: u64 = 64 << 10;
 
-/// How long a look at the disk counts.
-const PROBED_FOR: std::time::Duration = std::time::Duration::from_secs(1);
+/// How long the result of a disk probe is valid.
+const PROBE_VALIDITY: std::time::Duration = std::time::Duration::from_secs(1);
 
-/// Everything the routes work with.
+/// State shared by all request handlers.
 pub struct Service {
     pub(crate) config: ServeConfig,
     pub(crate) access: Access,
@@ -46,36 +46,36 @@ pub struct Service {
     pub(crate) webhooks: Arc<Webhooks>,
     pub(crate) registry: Arc<Registry>,
     pub(crate) cage_jobs: CageJobs,
-    pub(crate) unread: Unread,
-    pub(crate) designs: Designs,
+    pub(crate) unread: UnreadableFiles,
+    pub(crate) designs: DesignPool,
     pub(crate) cage_maker: CageMaker,
-    /// Rest poses and cages of new sessions, and cages asked for, being read at a time: parsing keeps a processor busy.
+    /// Limits concurrent parsing of uploaded files, which keeps a processor busy.
     pub(crate) reading: Semaphore,
-    /// Requests being answered, streams aside.
+    /// Requests in progress, without streams.
     pub(crate) requests: Arc<Budget>,
     streams: Arc<Budget>,
-    /// Sessions being completed at a time.
+    /// Sessions being completed.
     pub(crate) completing: Arc<Budget>,
     /// Threads that write containers.
     pub(crate) container_writers: Arc<rayon::ThreadPool>,
-    /// Memory for frames on their way, in bytes.
+    /// Memory for frames between arrival and solving, in bytes.
     pub(crate) frame_memory: Arc<Budget>,
-    /// Memory for rest poses and cages on their way, in bytes.
+    /// Memory for uploaded rest poses and cages, in bytes.
     pub(crate) upload_memory: Arc<Budget>,
-    /// Memory for downloads on their way, in bytes.
+    /// Memory for downloads being sent, in bytes.
     pub(crate) download_memory: Arc<Budget>,
     /// Disk space for cages that wait to be decoded, in bytes.
     pub(crate) spool_space: Arc<Budget>,
     stop: CancellationToken,
     resumed: AtomicBool,
     pub(crate) started: Instant,
-    /// When the disk took a write, to see whether it does.
+    /// Time of the last successful disk probe.
     probed: tokio::sync::Mutex<Option<Instant>>,
 }
 
-/// What a tenant holds of what all share.
+/// Shared resources that a tenant uses.
 #[derive(serde::Serialize)]
-pub(crate) struct Holds {
+pub(crate) struct ResourceUse {
     requests: u64,
     streams: u64,
     completing: u64,
@@ -104,7 +104,7 @@ pub enum StartError {
 }
 
 impl Service {
-    /// Opens the data folder and goes on with the sessions in it. Within a tokio runtime.
+    /// Opens the data folder and resumes its sessions and cage jobs. Call within a tokio runtime.
     ///
     /// # Errors
     /// See [`StartError`].
@@ -112,7 +112,7 @@ impl Service {
         Self::start_with(config, disk, local_designer(), stop)
     }
 
-    /// As [`Self::start`], with another way to design cages.
+    /// As [`Self::start`], with another cage designer.
     ///
     /// # Errors
     /// See [`StartError`].
@@ -125,21 +125,22 @@ impl Service {
     ) -> Result<Arc<Self>, StartError> {
         let mut access = Access::open(config.tokens.as_deref(), config.tenant_limits())?;
         if let Some(trust) = config.trust() {
-            access = access.trusting(trust)?;
+            access = access.with_provider(trust)?;
         }
         let opened = Store::open(&config.data, disk)?;
         for damaged in &opened.quarantined {
-            tracing::error!(name = %damaged.name, path = %damaged.path.display(), why = %damaged.why, "damaged, and put in quarantine");
+            tracing::error!(name = %damaged.name, path = %damaged.path.display(), why = %damaged.why, "damaged; moved to quarantine");
             metrics::counter!("cager_quarantined_total").increment(1);
         }
         let webhooks = Webhooks::open(config.webhooks.as_deref(), opened.store.clone(), stop.clone())?;
-        let unread = Unread::default();
+        let unread = UnreadableFiles::default();
         for left in &opened.unread {
             unread.add(left.kind, &left.name, None, &format!("{}: {}", left.path.display(), left.why));
         }
         let engine = Engine::new(config.workers).map_err(StartError::Threads)?;
         let solvers = Solvers::new(opened.store.clone(), &config).map_err(StartError::Threads)?;
-        let container_writers = threads::pool("complete", COMPLETING as usize, threads::GIVES_WAY_TO_ALL);
+        let container_writers =
+            threads::pool("complete", MAX_CONCURRENT_COMPLETIONS as usize, threads::NICE_BACKGROUND);
         let service = Arc::new(Self {
             access,
             webhooks,
@@ -150,12 +151,12 @@ impl Service {
             registry: Arc::default(),
             cage_jobs: CageJobs::default(),
             unread,
-            designs: Designs::new(&config, designer).map_err(StartError::Threads)?,
+            designs: DesignPool::new(&config, designer).map_err(StartError::Threads)?,
             cage_maker: CageMaker::new(config.budget(config.max_preparing as u64)),
-            reading: Semaphore::new(READING),
+            reading: Semaphore::new(MAX_CONCURRENT_PARSING),
             requests: config.budget(config.max_requests as u64),
             streams: config.budget(config.max_streams as u64),
-            completing: config.budget(COMPLETING),
+            completing: config.budget(MAX_CONCURRENT_COMPLETIONS),
             container_writers: Arc::new(container_writers.map_err(StartError::Threads)?),
             frame_memory: config.budget(config.frame_bytes),
             upload_memory: config.budget(config.upload_bytes),
@@ -169,11 +170,11 @@ impl Service {
         });
         let count = opened.sessions.len();
         for meta in opened.sessions {
-            service.take_in_session(meta);
+            service.resume_and_track_session(meta);
         }
         let cage_jobs = opened.cage_jobs.len();
         for meta in opened.cage_jobs {
-            service.take_in_cage_job(meta);
+            service.resume_and_track_cage_job(meta);
         }
         service.orphans().iter().for_each(|key| service.forget_orphan(key));
         service.resumed.store(true, Ordering::Release);
@@ -191,8 +192,8 @@ impl Service {
         Ok(service)
     }
 
-    /// Rest poses and cages of no session: a crash between storing them and storing their session leaves them. None where something
-    /// could not be read, which may need them, or is in quarantine, which may be of use with its rest pose only. Blocks.
+    /// Stored content that no session uses, left by a crash between storing content and session. Empty while unreadable or quarantined
+    /// sessions may need it. Blocks.
     fn orphans(&self) -> Vec<ContentKey> {
         let found = || -> Result<Vec<ContentKey>, StoreError> {
             if !self.unread.is_empty() || self.store.has_quarantined()? {
@@ -206,11 +207,11 @@ impl Service {
         })
     }
 
-    /// Removes what [`Self::orphans`] finds, while the service runs.
+    /// Removes orphaned content while the service runs.
     pub(crate) async fn forget_orphans(self: &Arc<Self>) {
         let service = Arc::clone(self);
         for key in blocking(move || service.orphans()).await.unwrap_or_default() {
-            // Nobody makes a session of it meanwhile.
+            // The lock keeps new sessions from using it meanwhile.
             let _content = self.registry.content_lock(&key).await;
             if !self.registry.uses_content(&key) {
                 let service = Arc::clone(self);
@@ -226,17 +227,17 @@ impl Service {
         }
     }
 
-    /// Reads logs and containers of all resumed sessions in the background, so that damage is found before somebody waits for it.
+    /// Verifies the logs and containers of all resumed sessions in the background, so that damage is found before a client needs them.
     async fn check_logs(self: Arc<Self>, stop: CancellationToken) {
         for session in self.registry.all() {
             if stop.is_cancelled() {
                 return;
             }
-            // What is wrong is in the log and in the session.
+            // Errors are logged and recorded in the session.
             let _ = session.ensure_loaded().await;
             let found = Arc::clone(&session);
             let _ = blocking(move || found.check_container()).await;
-            session.rest_if_idle();
+            session.close_files_if_idle();
         }
     }
 
@@ -256,9 +257,9 @@ impl Service {
         if !self.resumed.load(Ordering::Acquire) {
             return Err(ApiError::new(problem::BUSY, "sessions are being resumed").retry_after(1));
         }
-        // One look at the disk answers all who ask within a second.
+        // One probe serves all requests within a second.
         let mut probed = self.probed.lock().await;
-        if probed.is_some_and(|then| then.elapsed() < PROBED_FOR) {
+        if probed.is_some_and(|then| then.elapsed() < PROBE_VALIDITY) {
             return Ok(());
         }
         let store = self.store.clone();
@@ -279,7 +280,7 @@ impl Service {
         metrics::counter!("cager_rejections_total", "reason" => reason).increment(1);
     }
 
-    /// A place for one more stream of a tenant.
+    /// A permit for one more stream of a tenant.
     ///
     /// # Errors
     /// All places are taken: 429 where the tenant has its share, 503 where the service has.
@@ -302,31 +303,31 @@ impl Service {
             self.rejected("streams");
             full.refusal("streams")
         })?;
-        // Another may have come at the same moment.
+        // A concurrent request may have exceeded the limit.
         if self.streams.held_by(&tenant.name) > most { Err(too_many()) } else { Ok(place) }
     }
 
-    /// Makes the room of a model that is on its way large enough for so many bytes.
+    /// Grows the memory permit of an upload to `bytes` bytes.
     ///
     /// # Errors
-    /// The tenant has its share of the memory for models, or all of it is taken.
+    /// 429 if the tenant has its share, 503 if the memory is exhausted.
     pub(crate) fn make_room(&self, room: &mut Held, bytes: u64) -> Result<(), ApiError> {
-        room.reach(bytes, UPLOAD_PIECE).map_err(|full| {
+        room.grow_to(bytes, UPLOAD_PIECE).map_err(|full| {
             self.rejected("upload_memory");
             full.refusal("memory for models").retry_after(5)
         })
     }
 
-    /// Tenants that hold some of what all share.
-    pub(crate) fn holders(&self) -> BTreeSet<String> {
+    /// Tenants that use shared resources.
+    pub(crate) fn tenants_in_use(&self) -> BTreeSet<String> {
         let budgets = [&self.requests, &self.streams, &self.completing, &self.frame_memory, &self.upload_memory];
         let more = [&self.download_memory, &self.spool_space];
         budgets.into_iter().chain(more).flat_map(|budget| budget.tenants()).collect()
     }
 
-    /// What a tenant holds of what all share.
-    pub(crate) fn holds(&self, tenant: &str) -> Holds {
-        Holds {
+    /// Shared resources that a tenant uses.
+    pub(crate) fn holds(&self, tenant: &str) -> ResourceUse {
+        ResourceUse {
             requests: self.requests.held_by(tenant),
             streams: self.streams.held_by(tenant),
             completing: self.completing.held_by(tenant),
@@ -338,7 +339,7 @@ impl Service {
         }
     }
 
-    /// Streams open now.
+    /// Number of open streams.
     pub(crate) fn open_streams(&self) -> u64 {
         self.streams.used()
     }

@@ -1,4 +1,4 @@
-//! How fast this machine multiplies, for telling how long something will take.
+//! Estimates of how long preparations take, from the measured speed of matrix products.
 
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
@@ -6,11 +6,11 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use std::time::Instant;
 
-/// Rows and columns of the product that is timed, and how often it is.
+/// Size of the timed matrix product, and number of repetitions.
 const SIZE: usize = 384;
 const REPEATS: usize = 10;
 
-/// Seconds that one thread takes for a multiplication in a matrix product.
+/// Seconds per multiply-add in a single-threaded matrix product.
 pub(crate) fn seconds_per_multiplication() -> f64 {
     let a = Mat::from_fn(SIZE, SIZE, |i, j| 1.0 / (1 + i + j) as f64);
     let mut out = a.clone();
@@ -22,13 +22,13 @@ pub(crate) fn seconds_per_multiplication() -> f64 {
     (0..REPEATS).map(product).fold(f64::INFINITY, f64::min) / (SIZE as f64).powi(3)
 }
 
-/// Seconds that preparing a solver will take, about; the factors were fitted to measured times.
+/// Estimated seconds to prepare a solver; the factors are fitted to measurements.
 pub(crate) fn seconds_to_prepare(system: &dyn CoordinateSystem, cage: &Cage, points: usize) -> f64 {
     /// Points that are analysed at the most, times unknowns, as the core has it.
     const ANALYSED: f64 = (1u64 << 25) as f64;
     let (n, m, faces) = (points as f64, system.unknowns(cage) as f64, cage.faces().len() as f64);
     let of_points = n * faces * 400.0 + n.min((ANALYSED / m).max(8.0 * m)) * m * m * 3.0;
-    let of_cage = 17.0 * m.powi(3) + if system.by_point().is_none() { 2.2e5 * faces.powi(2) } else { 0.0 };
+    let of_cage = 17.0 * m.powi(3) + if system.pointwise().is_none() { 2.2e5 * faces.powi(2) } else { 0.0 };
     (of_points + of_cage) * seconds_per_multiplication() / rayon::current_num_threads() as f64
 }
 

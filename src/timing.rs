@@ -1,6 +1,6 @@
-//! Frame rate and frame numbers that a user gives in place of those that files tell.
+//! Frame rate and frame numbers given by the user, which override those of the files.
 
-/// What is given; the rest is as it was found.
+/// Overrides; `None` keeps the value of the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Timing {
     /// Frames per second.
@@ -10,7 +10,7 @@ pub struct Timing {
 }
 
 impl Timing {
-    /// The numbers found, moved so that they begin with the one that is given.
+    /// Shifts frame numbers so that they begin with `start`.
     pub fn numbers(&self, mut found: Vec<f64>) -> Vec<f64> {
         if let (Some(start), Some(&first)) = (self.start, found.first()) {
             found.iter_mut().for_each(|number| *number += start - first);

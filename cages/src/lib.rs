@@ -1,7 +1,7 @@
-//! Cages: made around a model, checked, repaired, and designed from its motion. Plain data in, plain data out; no files, no async.
+//! Cages: generated around a model, checked, repaired, and designed from its motion. Plain data in, plain data out; no files, no async.
 
 mod design;
-pub mod doctor;
+pub mod diagnosis;
 mod enclose;
 mod general;
 pub mod geometry;

@@ -68,7 +68,8 @@ fn encoded(cage: &TriMesh, rest: &Model, frames: &[Vec<f64>]) -> f64 {
     let frames: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
     let mut errors = Vec::new();
     for frames in frames.chunks(BATCH) {
-        let cages: Vec<Vec<f32>> = solver.invert_reporting(None, frames).into_iter().map(|found| found.cage).collect();
+        let cages: Vec<Vec<f32>> =
+            solver.invert_with_convergence(None, frames).into_iter().map(|found| found.cage).collect();
         let cages: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
         errors.extend(solver.decoder().measure(&cages, frames));
     }

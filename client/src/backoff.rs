@@ -6,10 +6,10 @@ use std::time::{Duration, SystemTime};
 /// The first wait, doubled from attempt to attempt.
 const FIRST: Duration = Duration::from_millis(100);
 
-/// A service may ask for a longer pause than the back-off would make; nobody waits longer than this for it.
+/// Upper bound of a pause requested by the service.
 const LONGEST_RETRY_AFTER: Duration = Duration::from_secs(600);
 
-/// Counts attempts without progress.
+/// Retry state of one call: counts failures without progress.
 #[derive(Debug)]
 pub(crate) struct Backoff {
     failures: u32,
@@ -19,17 +19,17 @@ pub(crate) struct Backoff {
 }
 
 impl Backoff {
-    /// Gives up at the failure after `retries` failures in a row; waits at most `max` of its own accord.
+    /// Gives up after `retries` consecutive failures; `max` limits its own waits, not those that the service asks for.
     pub(crate) fn new(retries: u32, max: Duration) -> Self {
         Self { failures: 0, retries, max, total: 0 }
     }
 
-    /// Something was achieved: the count starts again.
+    /// Resets the failure count after progress.
     pub(crate) fn progress(&mut self) {
         self.failures = 0;
     }
 
-    /// Attempts that failed, all in all.
+    /// Total number of failed attempts.
     pub(crate) fn total(&self) -> u32 {
         self.total
     }
@@ -37,7 +37,7 @@ impl Backoff {
     /// The wait before the next attempt.
     ///
     /// # Errors
-    /// What to report, where no other attempt is to be made.
+    /// The error to report, if there is no further attempt.
     pub(crate) fn failed(&mut self, failure: Failure) -> Result<Duration, ClientError> {
         let (error, retry_after) = match failure {
             Failure::Final(error) => return Err(error),
@@ -59,14 +59,14 @@ impl Backoff {
         })
     }
 
-    /// Waits before the next attempt, or says what to report.
+    /// Sleeps before the next attempt, or returns the error to report.
     pub(crate) async fn wait_after(&mut self, failure: Failure) -> Result<(), ClientError> {
         let wait = self.failed(failure)?;
         tokio::time::sleep(wait).await;
         Ok(())
     }
 
-    /// Between half and all of the doubled wait, so that clients that broke off together do not come back together.
+    /// Doubled wait with jitter: between half and all of it.
     fn next_wait(&self) -> Duration {
         let doubled = FIRST.saturating_mul(1 << (self.failures - 1).min(20)).min(self.max);
         doubled.mul_f64(0.5 + 0.5 * fastrand::f64())

@@ -1,4 +1,4 @@
-//! Reading answers that may be too long, too short or never end.
+//! Reading response bodies with limits on length and idle time.
 
 use crate::client::Client;
 use crate::error::Failure;
@@ -9,35 +9,35 @@ use serde::de::DeserializeOwned;
 /// Longest JSON body: the errors of half a million frames are shorter.
 const JSON_BYTES: u64 = 64 << 20;
 
-/// Room made for a body on the word of its sender alone.
+/// Largest allocation made from `Content-Length` alone.
 const TRUSTED_BYTES: u64 = 1 << 20;
 
-/// What came of waiting for the next part of a body.
-pub(crate) enum Heard {
+/// Result of waiting for the next chunk of a body.
+pub(crate) enum BodyEvent {
     /// The part.
     Piece(Bytes),
     /// The body is over.
     End,
     /// Nothing within the idle time-out.
-    Silence,
+    Idle,
 }
 
-/// Waits for the next part of a body that may be silent for long.
-pub(crate) async fn listen(client: &Client, response: &mut Response) -> Result<Heard, Failure> {
+/// Waits for the next chunk of a body that may be idle for long.
+pub(crate) async fn listen(client: &Client, response: &mut Response) -> Result<BodyEvent, Failure> {
     match tokio::time::timeout(client.options().idle_timeout, response.chunk()).await {
-        Ok(Ok(Some(piece))) => Ok(Heard::Piece(piece)),
-        Ok(Ok(None)) => Ok(Heard::End),
+        Ok(Ok(Some(piece))) => Ok(BodyEvent::Piece(piece)),
+        Ok(Ok(None)) => Ok(BodyEvent::End),
         Ok(Err(error)) => Err(client.network(&error)),
-        Err(_) => Ok(Heard::Silence),
+        Err(_) => Ok(BodyEvent::Idle),
     }
 }
 
-/// The next part of a body; `None` at its end.
+/// The next chunk of a body; `None` at its end.
 pub(crate) async fn next(client: &Client, response: &mut Response) -> Result<Option<Bytes>, Failure> {
     match listen(client, response).await? {
-        Heard::Piece(piece) => Ok(Some(piece)),
-        Heard::End => Ok(None),
-        Heard::Silence => Err(client.stalled()),
+        BodyEvent::Piece(piece) => Ok(Some(piece)),
+        BodyEvent::End => Ok(None),
+        BodyEvent::Idle => Err(client.stalled()),
     }
 }
 
@@ -65,7 +65,7 @@ pub(crate) async fn json<T: DeserializeOwned>(client: &Client, response: Respons
         .map_err(|error| Failure::protocol(format!("its JSON is not what was asked for: {error}")))
 }
 
-/// Little-endian bytes as numbers of four bytes each.
+/// Parses little-endian numbers of N bytes each.
 pub(crate) fn numbers<T, const N: usize>(bytes: &[u8], read: fn([u8; N]) -> T) -> Result<Vec<T>, Failure> {
     let (numbers, rest) = bytes.as_chunks::<N>();
     if rest.is_empty() {

@@ -1,10 +1,10 @@
-//! Cages designed by example: asking for one, following it, fetching it.
+//! Cage designs: requesting, following and downloading.
 
 use crate::body::json;
 use crate::client::Client;
 use crate::create::{MeshFile, part, random_key};
 use crate::error::{ClientError, Failure};
-use crate::events::{Events, Place};
+use crate::events::{Events, EventsOf};
 use bytes::Bytes;
 use cager_proto::cage_messages::{CageJob, CageJobList, CageOptions, CageProgress, CageState};
 use cager_proto::messages::Problem;
@@ -15,7 +15,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// Pauses between two looks at a design.
+/// Polling intervals of [`Client::wait_cage`].
 const FIRST_PAUSE: Duration = Duration::from_millis(50);
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 
@@ -29,7 +29,7 @@ pub struct NewCage {
     pub frames: MeshFile,
     /// Choices; what is left out has the service's default.
     pub options: CageOptions,
-    /// Names this wish, so that asking twice begins one design; a random one where none is given.
+    /// Makes the request idempotent; random if not given.
     pub idempotency_key: Option<String>,
 }
 
@@ -41,8 +41,8 @@ impl NewCage {
 }
 
 impl Client {
-    /// Has a cage designed. It is designed in the background, see [`Client::wait_cage`] and [`Client::cage_events`]; a session then takes it
-    /// by [`SessionOptions::cage`](cager_proto::messages::SessionOptions::cage).
+    /// Requests a cage design. It runs in the background, see [`Client::wait_cage`] and [`Client::cage_events`]; a session uses the cage by
+    /// [`SessionOptions::cage`](cager_proto::messages::SessionOptions::cage).
     ///
     /// # Errors
     /// [`ClientError::Mismatch`] for an option that is NaN or infinite, [`ClientError::Refused`] for bad input, and those of the
@@ -94,7 +94,7 @@ impl Client {
             all.extend(page.cages);
             match page.next {
                 None => return Ok(all),
-                // An empty page that names a next one would go on for ever.
+                // An empty page with a `next` would loop for ever.
                 Some(_) if !grew => return Err(ClientError::Protocol("its list of cages has no end".to_owned())),
                 Some(next) => query = vec![("after", next)],
             }
@@ -107,7 +107,7 @@ impl Client {
     /// An error, such as [`ClientError::Refused`] for a design that was deleted, ends the stream.
     pub fn cage_events(&self, id: &str) -> BoxStream<'static, Result<CageProgress, ClientError>> {
         let is_last = |progress: &CageProgress| progress.state.is_final();
-        Events::stream(self, Place { resource: "cages", id: id.to_owned() }, is_last)
+        Events::stream(self, EventsOf { resource: "cages", id: id.to_owned() }, is_last)
     }
 
     /// Waits until a cage is designed.

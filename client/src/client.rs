@@ -16,13 +16,13 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 use tokio::sync::OnceCell;
 
-/// Longest wait for the answer that tells whether a server speaks HTTP/2.
-const PROBE_PATIENCE: Duration = Duration::from_secs(5);
+/// Timeout of the request that detects HTTP/2.
+const PROBE_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// A client of one service. Clones share their connections.
 ///
-/// Every call is tried again where that is safe and may help, see [`ClientOptions`]; only before the service has answered
-/// for the first time, an address where nobody listens is an error at once.
+/// Every call is retried where that is safe and useful, see [`ClientOptions`]. Before the first response, a refused connection is an error
+/// at once.
 #[derive(Clone)]
 pub struct Client {
     shared: Arc<Shared>,
@@ -33,9 +33,9 @@ struct Shared {
     token: Token,
     options: ClientOptions,
     http: OnceCell<reqwest::Client>,
-    /// Whether the service has ever answered.
+    /// Whether the service has ever responded.
     reached: AtomicBool,
-    /// Whether something in between was found to carry one direction at a time.
+    /// Whether a proxy was found that does not carry both directions at once.
     one_way: AtomicBool,
 }
 
@@ -43,7 +43,7 @@ struct Shared {
 enum Token {
     None,
     Bearer(HeaderValue),
-    /// What was given cannot be sent.
+    /// Contains characters that a header cannot have.
     Unusable,
 }
 
@@ -80,7 +80,7 @@ impl Client {
         Self::assemble(self.shared.address.clone(), token, self.shared.options.clone())
     }
 
-    /// Connects in this way, and with this patience.
+    /// Replaces the options.
     #[must_use]
     pub fn with_options(self, options: ClientOptions) -> Self {
         Self::assemble(self.shared.address.clone(), self.shared.token.clone(), options)
@@ -95,13 +95,13 @@ impl Client {
         &self.shared.options
     }
 
-    /// Whether connections carry both directions at once, as far as is known.
+    /// Whether full-duplex requests are assumed to work.
     pub(crate) fn is_live(&self) -> bool {
         !self.shared.one_way.load(Ordering::Relaxed)
     }
 
-    /// From here on answers begin when the whole request has arrived.
-    pub(crate) fn give_up_live(&self) {
+    /// Stops using full-duplex requests.
+    pub(crate) fn disable_live(&self) {
         self.shared.one_way.store(true, Ordering::Relaxed);
     }
 
@@ -109,7 +109,7 @@ impl Client {
         Backoff::new(self.options().retries, self.options().max_backoff)
     }
 
-    /// Runs `attempt` until it succeeds, fails for good, or the patience is spent.
+    /// Runs `attempt` until it succeeds, fails permanently, or the retries are exhausted.
     pub(crate) async fn retrying<T, F: Future<Output = Result<T, Failure>>>(
         &self,
         mut attempt: impl FnMut() -> F,
@@ -123,7 +123,7 @@ impl Client {
         }
     }
 
-    /// A small JSON answer, from a request that is safe to repeat.
+    /// Sends an idempotent request and parses its JSON response.
     pub(crate) async fn fetch<T: DeserializeOwned>(
         &self,
         method: Method,
@@ -156,25 +156,29 @@ impl Client {
         }
     }
 
-    /// Sends a small request and passes a success on.
+    /// Sends a small request; a response other than 2xx is a failure.
     pub(crate) async fn send(&self, request: RequestBuilder) -> Result<Response, Failure> {
         self.send_counted(request, &AtomicU64::new(0)).await
     }
 
-    /// Sends a request whose body adds its bytes to `sent`, and passes a success on.
+    /// Sends a request whose body counts its bytes in `sent`; a response other than 2xx is a failure.
     pub(crate) async fn send_counted(&self, request: RequestBuilder, sent: &AtomicU64) -> Result<Response, Failure> {
-        self.accept(self.while_moving(sent, request.send()).await?).await
+        self.accept(self.with_idle_timeout(sent, request.send()).await?).await
     }
 
-    /// Passes a success on.
+    /// Converts a network error or a response other than 2xx into a failure.
     pub(crate) async fn accept(&self, answer: reqwest::Result<Response>) -> Result<Response, Failure> {
         let response = answer.map_err(|error| self.network(&error))?;
         self.shared.reached.store(true, Ordering::Relaxed);
         check(response).await
     }
 
-    /// Waits for something as long as `moved` changes at least once per idle time-out.
-    pub(crate) async fn while_moving<T>(&self, moved: &AtomicU64, what: impl Future<Output = T>) -> Result<T, Failure> {
+    /// Awaits `what` as long as `moved` changes at least once per idle time-out.
+    pub(crate) async fn with_idle_timeout<T>(
+        &self,
+        moved: &AtomicU64,
+        what: impl Future<Output = T>,
+    ) -> Result<T, Failure> {
         let mut what = pin!(what);
         let mut before = moved.load(Ordering::Relaxed);
         loop {
@@ -189,18 +193,18 @@ impl Client {
         }
     }
 
-    /// Nothing moved for too long.
+    /// The failure after an idle time-out.
     pub(crate) fn stalled(&self) -> Failure {
         self.broken(format!("nothing moved for {:.0?}", self.options().idle_timeout))
     }
 
-    /// The connection did not last.
+    /// The failure of a broken connection.
     pub(crate) fn broken(&self, cause: impl Into<String>) -> Failure {
         let (address, cause) = (self.shared.address.to_string(), cause.into());
         Failure::transient(ClientError::Broken { address, cause })
     }
 
-    /// What the network said.
+    /// Classifies a network error.
     pub(crate) fn network(&self, error: &reqwest::Error) -> Failure {
         let cause =
             if error.is_timeout() && !error.is_connect() { "no answer in time".to_owned() } else { innermost(error) };
@@ -218,8 +222,8 @@ impl Client {
         self.shared.http.get_or_try_init(|| self.negotiate()).await
     }
 
-    /// A server behind `http://` cannot be asked for its protocols, so HTTP/2 is tried on a small request: a proxy that
-    /// knows only HTTP/1.1 must not need an option.
+    /// A server behind `http://` cannot negotiate, so HTTP/2 with prior knowledge is tried on a small request first: proxies that speak
+    /// only HTTP/1.1 then need no option.
     async fn negotiate(&self) -> Result<reqwest::Client, Failure> {
         if self.shared.address.is_https() {
             return self.build(!self.options().http2, false);
@@ -229,7 +233,7 @@ impl Client {
         }
         let modern = self.build(false, true)?;
         let url = self.shared.address.join(&["healthz"], &[])?;
-        let probe = |client: &reqwest::Client| client.get(url.clone()).timeout(PROBE_PATIENCE).send();
+        let probe = |client: &reqwest::Client| client.get(url.clone()).timeout(PROBE_TIMEOUT).send();
         let Err(refused) = probe(&modern).await else { return Ok(modern) };
         if refused.is_connect() && refused.source().is_some_and(|cause| !innermost(cause).contains("http2")) {
             return Err(self.network(&refused));
@@ -242,7 +246,7 @@ impl Client {
     }
 
     fn build(&self, only_http1: bool, only_http2: bool) -> Result<reqwest::Client, Failure> {
-        // Fails where the program has chosen its own, which is as good.
+        // Fails if the program has installed another provider, which serves as well.
         #[cfg(feature = "tls")]
         let _ = rustls::crypto::ring::default_provider().install_default();
         let options = self.options();
@@ -251,13 +255,13 @@ impl Client {
             .connect_timeout(options.connect_timeout)
             .tcp_nodelay(true)
             .tcp_keepalive(Duration::from_secs(30))
-            // A peer that vanished without a word is noticed on a busy connection before the idle time-out.
+            // Detects a vanished peer on a busy connection before the idle time-out.
             .http2_keep_alive_interval(Duration::from_secs(20))
             .http2_keep_alive_timeout(Duration::from_secs(20))
             // A redirect would turn an upload into a GET, or carry the token elsewhere; its target is reported instead.
             .redirect(reqwest::redirect::Policy::none());
         if self.shared.address.is_loopback() {
-            // A proxy's loopback is another machine's.
+            // A proxy's loopback address is not this machine.
             builder = builder.no_proxy();
         }
         if only_http1 {
@@ -273,7 +277,7 @@ impl Client {
     }
 }
 
-/// The cause of all causes: the layers above it repeat each other.
+/// The root cause of an error; the outer ones repeat it.
 fn innermost(error: &dyn std::error::Error) -> String {
     let mut innermost = error;
     while let Some(cause) = innermost.source() {

@@ -42,8 +42,7 @@ pub struct NewSession {
     pub regularizer_matrix: Option<MeshFile>,
     /// Choices; what is left out has the service's default.
     pub options: SessionOptions,
-    /// Names this wish, so that asking twice creates one session; a random one where none is given. Give one that outlives
-    /// the program to make even a restarted program find its session again.
+    /// Makes the request idempotent; random if not given. A key stored by the caller lets a restarted program find its session again.
     pub idempotency_key: Option<String>,
 }
 
@@ -92,7 +91,7 @@ impl Client {
     }
 }
 
-/// JSON has no such numbers: they would be sent as left out, and the service would take its default.
+/// JSON cannot represent them: they would be sent as `null`, and the service would use its default.
 fn refuse_not_finite(options: &SessionOptions) -> Result<(), ClientError> {
     let SessionOptions {
         name: _,

@@ -1,4 +1,4 @@
-//! What can go wrong, sorted by what a caller can do about it.
+//! Errors, one variant per reaction of the caller.
 
 use cager_proto::messages::Problem;
 use std::io;
@@ -35,7 +35,7 @@ pub enum ClientError {
     /// The service answered with an error: its detail says what to do.
     #[error("{}", said(.0))]
     Refused(Box<Problem>),
-    /// The session failed: its problem says what to mend before a new one is created.
+    /// The session failed: its problem says what to correct before creating a new one.
     #[error("the session failed: {}", said(.0))]
     Failed(Box<Problem>),
     /// The session was not ready within the time allowed: wait longer.
@@ -46,7 +46,7 @@ pub enum ClientError {
         /// How long it was waited for.
         waited: Duration,
     },
-    /// No cage could be designed: its problem says what to mend before asking for another.
+    /// No cage could be designed: its problem says what to correct before requesting another.
     #[error("no cage could be designed: {}", said(.0))]
     NoCage(Box<Problem>),
     /// The cage was not designed within the time allowed: wait longer.
@@ -62,10 +62,10 @@ pub enum ClientError {
         "the answer is not that of a CageR service ({0}); check the address, and that client and service are of the same version"
     )]
     Protocol(String),
-    /// What was handed in does not fit the session: pair the right data.
+    /// The data does not fit the session.
     #[error("{0}")]
     Mismatch(String),
-    /// The frames to upload could not be read: mend the source.
+    /// The frames to upload could not be read.
     #[error("{cause}")]
     Source {
         /// The frame that was being read.
@@ -76,12 +76,12 @@ pub enum ClientError {
     /// The download could not be written: free some space or choose another place.
     #[error("the download cannot be written ({0}); free some space or choose another place")]
     Output(io::Error),
-    /// Nothing came of several attempts in a row: what the last one met is told.
+    /// Several attempts in a row failed without progress.
     #[error("gave up after {attempts} attempts in a row without progress; the last one: {last}")]
     GaveUp {
         /// Attempts since the last progress.
         attempts: u32,
-        /// What the last one met; part of the message, so not a source as well.
+        /// Error of the last attempt; part of the message, so not a source as well.
         last: Box<ClientError>,
     },
 }
@@ -102,7 +102,7 @@ impl ClientError {
     }
 }
 
-/// What a person reads of a problem.
+/// Text of a problem for error messages.
 fn said(problem: &Problem) -> String {
     let text = if problem.detail.is_empty() { &problem.title } else { &problem.detail };
     match &problem.request_id {
@@ -111,7 +111,7 @@ fn said(problem: &Problem) -> String {
     }
 }
 
-/// A failed attempt: whether another one makes sense.
+/// A failed attempt, classified by whether to retry.
 #[derive(Debug)]
 pub(crate) enum Failure {
     /// It may go away by itself.

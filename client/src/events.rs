@@ -1,7 +1,7 @@
 //! Progress of a session as it happens.
 
 use crate::backoff::Backoff;
-use crate::body::{Heard, listen};
+use crate::body::{BodyEvent, listen};
 use crate::client::Client;
 use crate::error::{ClientError, Failure};
 use crate::sse::SseParser;
@@ -27,19 +27,19 @@ impl Client {
     /// An error, such as [`ClientError::Refused`] for a session that was deleted, ends the stream.
     pub fn events(&self, id: &str) -> BoxStream<'static, Result<Progress, ClientError>> {
         let is_last = |progress: &Progress| matches!(progress.state, SessionState::Completed | SessionState::Failed);
-        Events::stream(self, Place { resource: "sessions", id: id.to_owned() }, is_last)
+        Events::stream(self, EventsOf { resource: "sessions", id: id.to_owned() }, is_last)
     }
 }
 
-/// Whose events.
-pub(crate) struct Place {
+/// The object whose events are streamed.
+pub(crate) struct EventsOf {
     pub(crate) resource: &'static str,
     pub(crate) id: String,
 }
 
 pub(crate) struct Events<T> {
     client: Client,
-    place: Place,
+    place: EventsOf,
     /// Whether nothing follows.
     is_last: fn(&T) -> bool,
     backoff: Backoff,
@@ -53,7 +53,7 @@ pub(crate) struct Events<T> {
 impl<T: DeserializeOwned + Send + 'static> Events<T> {
     pub(crate) fn stream(
         client: &Client,
-        place: Place,
+        place: EventsOf,
         is_last: fn(&T) -> bool,
     ) -> BoxStream<'static, Result<T, ClientError>> {
         let events = Self {
@@ -100,9 +100,9 @@ impl<T: DeserializeOwned + Send + 'static> Events<T> {
                 self.connection.insert((response, SseParser::default()))
             }
         };
-        let Heard::Piece(piece) = listen(&self.client, response).await? else {
-            // Servers and proxies end long answers, and there may be nothing to tell for long; that is no failure, but no
-            // reason to hurry either.
+        let BodyEvent::Piece(piece) = listen(&self.client, response).await? else {
+            // Servers and proxies end long responses, and there may be no events for long. This is no failure, but there is no hurry to
+            // reconnect either.
             self.connection = None;
             tokio::time::sleep(self.pause).await;
             return Ok(());
@@ -133,7 +133,7 @@ impl<T: DeserializeOwned + Send + 'static> Events<T> {
             request = request.header("Last-Event-ID", id);
         }
         let response = self.client.send(request).await?;
-        // The way to say that there will be no more events.
+        // 204 means that there will be no more events.
         Ok((response.status() != StatusCode::NO_CONTENT).then_some(response))
     }
 }

@@ -1,7 +1,7 @@
-//! Solved cages as a stream that outlives its connections.
+//! Solved cages as a stream that reconnects.
 
 use crate::backoff::Backoff;
-use crate::body::{Heard, listen};
+use crate::body::{BodyEvent, listen};
 use crate::client::Client;
 use crate::error::{ClientError, Failure};
 use crate::records::{CageFrame, CageRecords};
@@ -63,7 +63,7 @@ struct Cages {
     backoff: Backoff,
 }
 
-/// What one look at the stream gave.
+/// Result of one poll of the stream.
 enum Step {
     Cage(CageFrame),
     End,
@@ -101,23 +101,23 @@ impl Cages {
         match records.next() {
             Ok(Some(cage)) => return self.check(cage).map(Step::Cage),
             Ok(None) => {}
-            // Damage on the way; the next copy may be whole.
+            // Corrupted in transit; request it again.
             Err(error @ RecordError::Checksum { .. }) => return Err(self.client.broken(error.to_string())),
             Err(error) => return Err(Failure::protocol(error.to_string())),
         }
         match listen(&self.client, response).await? {
-            Heard::Piece(piece) => {
+            BodyEvent::Piece(piece) => {
                 records.push(&piece);
                 Ok(Step::Wait)
             }
-            Heard::End if records.pending() > 0 => Err(self.client.broken("the stream ended within a frame")),
-            Heard::End => self.ended().await,
-            // Who follows may wait long for the next frame, but not for ever on a connection that may be dead.
-            Heard::Silence if self.until == Until::Completed && records.pending() == 0 => {
+            BodyEvent::End if records.pending() > 0 => Err(self.client.broken("the stream ended within a frame")),
+            BodyEvent::End => self.ended().await,
+            // A follower may wait long for the next frame, but not on a connection that may be dead.
+            BodyEvent::Idle if self.until == Until::Completed && records.pending() == 0 => {
                 self.connection = None;
                 Ok(Step::Wait)
             }
-            Heard::Silence => Err(self.client.stalled()),
+            BodyEvent::Idle => Err(self.client.stalled()),
         }
     }
 
@@ -149,7 +149,7 @@ impl Cages {
         Ok((response, CageRecords::new(rows)))
     }
 
-    /// The stream ended without an error: whether there is more to come.
+    /// The stream ended without an error; finds out whether more frames will follow.
     async fn ended(&mut self) -> Result<Step, Failure> {
         self.connection = None;
         if self.until != Until::Completed {

@@ -1,4 +1,4 @@
-//! Lines out of a stream of bytes that comes in any pieces.
+//! Splits a chunked byte stream into lines.
 
 /// Longest line: a problem with many missing ranges is shorter.
 pub(crate) const LINE_BYTES: usize = 1 << 20;

@@ -1,4 +1,4 @@
-//! Positions from cages on the reader's own processors.
+//! Decoding cages to positions locally.
 
 use crate::client::Client;
 use crate::error::ClientError;
@@ -10,9 +10,9 @@ use cager_core::inversion::BATCH;
 use cager_core::mesh::TriMesh;
 use cager_proto::messages::RestCage;
 
-/// Turns cages into positions without asking the service for each: its coordinates `Φ` are fetched once.
+/// Decodes cages to positions locally, with the coordinates `Φ` fetched once.
 ///
-/// The arithmetic is that of the service's own decoder, so the positions are those that its errors were measured on.
+/// The arithmetic is that of the service's decoder, so the measured errors apply to these positions.
 #[derive(Clone, Debug)]
 pub struct LocalDecoder {
     decoder: Decoder,
@@ -26,7 +26,7 @@ impl LocalDecoder {
     pub async fn fetch(client: &Client, id: &str) -> Result<Self, ClientError> {
         let session = client.session(id).await?;
         let coordinates = client.coordinates(id).await?;
-        // Columns beyond the cage's vertices are of directions, as Green coordinates have them.
+        // Columns beyond the cage's vertices belong to face normals, as in Green coordinates.
         let positions = session.cage_vertices.map_or(coordinates.columns, |vertices| vertices as usize);
         let decoder = Self::new(&coordinates, positions)?;
         if session.unknowns.is_none_or(|unknowns| unknowns as usize == coordinates.columns) {
@@ -35,8 +35,8 @@ impl LocalDecoder {
         decoder.with_tied_normals(&client.cage(id).await?)
     }
 
-    /// A decoder for cages whose face normals follow from their vertices, as they do where a session has fewer unknowns than
-    /// coordinates have columns; it takes the rest cage.
+    /// A decoder for cages whose face normals are computed from their vertices, which is the case if a session has fewer unknowns than
+    /// coordinates have columns.
     ///
     /// # Errors
     /// [`ClientError::Protocol`] where the cage is none, or does not fit the coordinates.
@@ -51,8 +51,8 @@ impl LocalDecoder {
         Ok(Self { decoder: self.decoder.with_tied_normals(Green::Consistent.tied_normals(&cage)) })
     }
 
-    /// A decoder from coordinates whose first `positions` columns are of positions, and whose other columns are of unknowns as
-    /// well; see [`Self::with_tied_normals`] where they are not.
+    /// A decoder from coordinates whose first `positions` columns belong to vertices and whose other columns belong to further unknowns;
+    /// see [`Self::with_tied_normals`] for computed normals.
     ///
     /// # Errors
     /// [`ClientError::Protocol`] where the numbers do not fit each other.

@@ -1,21 +1,20 @@
-//! How a client connects and how patient it is.
+//! Connection options, time-outs and retries.
 
 use std::time::Duration;
 
-/// How a client connects and how patient it is.
+/// Connection options, time-outs and retries.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ClientOptions {
     /// Longest wait for a connection.
     pub connect_timeout: Duration,
-    /// Longest time in which neither side moves a byte, before the connection counts as broken. It does not limit how long
-    /// a transfer takes.
+    /// Time without any transfer after which a connection counts as broken. It does not limit the duration of a transfer.
     pub idle_timeout: Duration,
-    /// Attempts after a first one, in a row and without progress, before a call gives up.
+    /// Consecutive retries without progress before a call gives up.
     pub retries: u32,
     /// Longest wait between attempts, unless the service asks for a longer one.
     pub max_backoff: Duration,
-    /// HTTP/2 with prior knowledge on `http://` addresses, where the server speaks it; on `https://` both sides agree anyway.
-    /// Over HTTP/1.1 a server that refuses a large body early is often not heard.
+    /// Use HTTP/2 with prior knowledge on `http://` addresses if the server supports it; `https://` negotiates anyway. Over HTTP/1.1 an
+    /// early refusal of a large body is often lost.
     pub http2: bool,
 }
 

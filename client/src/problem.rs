@@ -1,4 +1,4 @@
-//! Answers that are no success, as problems.
+//! Converts error responses into problems.
 
 use crate::backoff::retry_after;
 use crate::error::{ClientError, Failure};
@@ -7,16 +7,16 @@ use reqwest::header::{CONTENT_TYPE, LOCATION, RETRY_AFTER};
 use reqwest::{Response, StatusCode};
 use std::time::{Duration, SystemTime};
 
-/// Of the body of a refusal no more than this is read.
+/// Bytes read from the body of an error response.
 const PROBLEM_BYTES: usize = 64 << 10;
 
-/// Of a body that is no problem, so many characters are shown.
+/// Characters shown of a body that is not a problem.
 const SHOWN_CHARS: usize = 200;
 
-/// A refusal is worth this wait at most; by then its head alone is reported.
-const BODY_PATIENCE: Duration = Duration::from_secs(5);
+/// Longest wait for the body of an error response; after that only its status is reported.
+const BODY_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Passes a success on and makes anything else a failure.
+/// Returns a 2xx response, and converts any other into a failure.
 pub(crate) async fn check(response: Response) -> Result<Response, Failure> {
     if response.status().is_success() {
         return Ok(response);
@@ -30,11 +30,11 @@ pub(crate) async fn check(response: Response) -> Result<Response, Failure> {
     Err(classify(problem, wait))
 }
 
-/// Whether it makes sense to try again after this problem.
+/// Whether to retry after this problem.
 pub(crate) fn classify(problem: Problem, retry_after: Option<Duration>) -> Failure {
     let transient = match problem.status {
         408 | 425 | 429 | 500 | 502..=504 | 520..=599 => true,
-        // Work that is under way; every other conflict stays one.
+        // Conflicts that resolve by themselves.
         409 => retry_after.is_some() || matches!(problem.word(), "not-ready" | "idempotency-key-in-use"),
         _ => false,
     };
@@ -57,7 +57,7 @@ async fn read_problem(mut response: Response) -> Problem {
         }
     };
     // The head of the answer is worth reporting even if the rest never comes.
-    let _ = tokio::time::timeout(BODY_PATIENCE, read).await;
+    let _ = tokio::time::timeout(BODY_TIMEOUT, read).await;
     parse(status, is_json, place.as_deref(), &body)
 }
 
@@ -65,7 +65,7 @@ fn header(response: &Response, name: &str) -> Option<String> {
     Some(response.headers().get(name)?.to_str().ok()?.to_ascii_lowercase())
 }
 
-/// The problem in the body of an answer, or one made from what a proxy or another server wrote.
+/// Parses a problem, or makes one from the page of a proxy or another server.
 fn parse(status: StatusCode, is_json: bool, place: Option<&str>, body: &[u8]) -> Problem {
     if is_json && let Ok(problem) = serde_json::from_slice::<Problem>(body) {
         // The status of the answer is what counts; a problem's own is only for information (RFC 9457, 3.1.2).
@@ -84,7 +84,7 @@ fn parse(status: StatusCode, is_json: bool, place: Option<&str>, body: &[u8]) ->
     } else if text.is_empty() {
         detail.push_str(" without saying why; look at its log, or at a proxy's before it");
     } else {
-        detail.push_str(&format!(", not in the words of a CageR service: {text}"));
+        detail.push_str(&format!(", which is not an error of a CageR service: {text}"));
     }
     Problem {
         kind: "about:blank".to_owned(),
@@ -95,7 +95,7 @@ fn parse(status: StatusCode, is_json: bool, place: Option<&str>, body: &[u8]) ->
     }
 }
 
-/// What a browser would show of a page, on one line and cut.
+/// The visible text of an HTML page, on one line and truncated.
 fn visible_text(page: &str) -> String {
     let mut text = String::new();
     let mut in_tag = false;
@@ -117,7 +117,7 @@ fn visible_text(page: &str) -> String {
     }
 }
 
-/// Text from the network, without what would move a terminal's cursor or change its colours.
+/// Replaces control characters, which could manipulate a terminal.
 fn printable(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
 }

@@ -1,4 +1,4 @@
-//! Frame records out of a stream of bytes that comes in any pieces.
+//! Splits a chunked byte stream into frame records.
 
 use bytes::{Buf, BytesMut};
 use cager_proto::record::{self, Kind, RecordError};
@@ -16,7 +16,7 @@ pub struct CageFrame {
     pub values: Vec<f32>,
 }
 
-/// Takes a stream apart into the cages of one session. No more than one record and one piece of the stream wait in it.
+/// Incremental parser of a stream of cage records. Buffers at most one record and one chunk.
 #[derive(Debug)]
 pub(crate) struct CageRecords {
     /// Unknowns per frame, m: a record of another size is none of this session's.

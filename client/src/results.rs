@@ -1,4 +1,4 @@
-//! What preparing and solving found, in one piece each.
+//! Downloading the results of preparing and solving.
 
 use crate::body::{numbers, whole};
 use crate::client::Client;
@@ -8,8 +8,8 @@ use cager_proto::messages::{FrameErrors, FrameResult, RestCage};
 use reqwest::header::{ACCEPT, HeaderMap};
 use reqwest::{Method, Response};
 
-/// Bytes of all indices that can be: four for each of a session's points.
-const MOST_HANDLE_BYTES: u64 = 4 * u32::MAX as u64;
+/// Largest possible body of handle indices, in bytes.
+const MAX_HANDLE_BYTES: u64 = 4 * u32::MAX as u64;
 
 /// The coordinates `Φ` of a session.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,7 +40,7 @@ impl Client {
     pub async fn handles(&self, id: &str) -> Result<Vec<u32>, ClientError> {
         self.retrying(|| async {
             let response = self.octets(&["v1", "sessions", id, "handles"]).await?;
-            numbers(&whole(self, response, MOST_HANDLE_BYTES).await?, u32::from_le_bytes)
+            numbers(&whole(self, response, MAX_HANDLE_BYTES).await?, u32::from_le_bytes)
         })
         .await
     }
@@ -144,7 +144,7 @@ fn number(headers: &HeaderMap, name: &str) -> Result<u32, Failure> {
     value.ok_or_else(|| Failure::protocol(format!("the header {name} is missing or no number")))
 }
 
-/// A product of numbers that a service may have made up.
+/// Product of sizes claimed by the service, checked for overflow.
 fn bytes_of(factors: [u64; 3]) -> Result<u64, Failure> {
     let bytes = factors.into_iter().try_fold(1u64, u64::checked_mul);
     bytes.ok_or_else(|| Failure::protocol("it says that it has more numbers than there can be"))

@@ -1,4 +1,4 @@
-//! Looking at sessions, waiting for them, finishing and deleting them.
+//! Reading, awaiting, completing and deleting sessions.
 
 use crate::body::json;
 use crate::client::Client;
@@ -8,7 +8,7 @@ use reqwest::Method;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Pauses between two looks at a session that prepares.
+/// Polling intervals of [`Client::wait_ready`].
 const FIRST_PAUSE: Duration = Duration::from_millis(20);
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 
@@ -34,7 +34,7 @@ impl Client {
             all.extend(page.sessions);
             match page.next {
                 None => return Ok(all),
-                // An empty page that names a next one would go on for ever.
+                // An empty page with a `next` would loop for ever.
                 Some(_) if !grew => return Err(ClientError::Protocol("its list of sessions has no end".to_owned())),
                 Some(next) => query = vec![("after", next)],
             }
@@ -83,7 +83,7 @@ impl Client {
         }
     }
 
-    /// Says that no more than `frames` frames are coming. The session is then complete and its container written.
+    /// Declares that the capture has `frames` frames, which completes the session and writes its container.
     ///
     /// # Errors
     /// [`ClientError::Refused`] with status 409 and the missing ranges where frames are missing, and those of the

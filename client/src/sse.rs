@@ -1,4 +1,4 @@
-//! Server-sent events out of a stream of bytes that comes in any pieces (WHATWG HTML, 9.2).
+//! Incremental parser of server-sent events (WHATWG HTML, §9.2).
 
 use crate::lines::{LINE_BYTES, Lines, TooLong};
 use std::time::Duration;
@@ -12,7 +12,7 @@ pub(crate) struct SseEvent {
     pub(crate) data: String,
 }
 
-/// Takes a stream of events apart.
+/// Incremental parser of server-sent events.
 #[derive(Debug, Default)]
 pub(crate) struct SseParser {
     lines: Lines,

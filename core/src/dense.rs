@@ -1,8 +1,7 @@
-//! The few dense factorisations the method needs, on top of faer.
+//! Dense products, factorisations and solves, on top of faer.
 //!
-//! Large products and solves are split into blocks of columns that the threads of the current rayon pool share. The blocks follow
-//! from the shape alone, so that the bits do not depend on the threads; everything else here runs sequentially unless it says
-//! otherwise.
+//! Large products and solves are distributed over the current rayon pool in blocks of columns that depend on the shape alone, so that results are
+//! bit-identical for any number of threads; everything else is sequential unless noted.
 
 use crate::svd::{Svd, svd};
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -13,8 +12,8 @@ use rayon::prelude::*;
 
 /// Columns that one task computes of a large product or solve.
 const BLOCK_COLUMNS: usize = 192;
-/// Multiplications below which a product or solve is one task's.
-const WORTH_TASKS: usize = 1 << 26;
+/// Products and solves with fewer multiplications run as a single task.
+const PARALLEL_THRESHOLD: usize = 1 << 26;
 
 /// Pivoted rows of a tall matrix.
 pub(crate) struct PivotedRows {
@@ -24,8 +23,8 @@ pub(crate) struct PivotedRows {
     pub(crate) smallest: f64,
 }
 
-/// LU with partial pivoting of an n × m matrix, n ≥ m, done in place; keeps which rows were picked. Uses the rayon pool: its
-/// result is the same bits for any number of threads.
+/// LU with partial pivoting of an n × m matrix, n ≥ m, done in place; returns the rows chosen as pivots. Runs on the rayon pool, with bit-identical
+/// results for any number of threads.
 pub(crate) fn pivoted_rows<T: faer::traits::RealField + Copy + Into<f64>>(mut a: Mat<T>) -> PivotedRows {
     let (n, m) = a.shape();
     let mut forward = vec![0usize; n];
@@ -70,7 +69,7 @@ pub(crate) fn inverse(a: MatRef<'_, f64>) -> (Mat<f64>, f64) {
     );
     let log_volume = (0..m).map(|j| factors[(j, j)].abs().ln()).sum();
     let mut result = Mat::zeros(m, m);
-    if m * m * m < WORTH_TASKS {
+    if m * m * m < PARALLEL_THRESHOLD {
         let mut memory = MemBuffer::new(lu::partial_pivoting::inverse::inverse_scratch::<usize, f64>(m, Par::Seq));
         let factors = factors.as_ref();
         let stack = MemStack::new(&mut memory);
@@ -92,10 +91,9 @@ pub(crate) fn inverse(a: MatRef<'_, f64>) -> (Mat<f64>, f64) {
     (result, log_volume)
 }
 
-/// Calls `work` for blocks of columns that follow from the shape alone; one block where `each`, the multiplications that a column
-/// takes, are few in all.
+/// Calls `work` for blocks of columns that depend on the shape alone; a single block where the multiplications, `each` per column, are few.
 fn in_column_blocks(a: MatMut<'_, f64>, each: usize, work: impl Fn(MatMut<'_, f64>) + Send + Sync) {
-    if a.ncols().saturating_mul(each) < WORTH_TASKS || a.ncols() <= BLOCK_COLUMNS {
+    if a.ncols().saturating_mul(each) < PARALLEL_THRESHOLD || a.ncols() <= BLOCK_COLUMNS {
         return work(a);
     }
     a.par_col_chunks_mut(BLOCK_COLUMNS).for_each(work);
@@ -140,12 +138,12 @@ pub(crate) fn cholesky(mut a: Mat<f64>) -> Option<Mat<f64>> {
 
 /// Solves `A X = B` for symmetric positive definite A. `None` where A is not definite.
 pub(crate) fn solve_definite(a: Mat<f64>, b: Mat<f64>) -> Option<Mat<f64>> {
-    solve_determined(a, b, 0.0, 0.0)
+    solve_definite_within(a, b, 0.0, 0.0)
 }
 
 /// As [`solve_definite`]; `None` also where a pivot is no more than rounding: the fraction `relative` of its diagonal entry, or a
 /// diagonal entry no larger than `absolute`.
-pub(crate) fn solve_determined(a: Mat<f64>, mut b: Mat<f64>, relative: f64, absolute: f64) -> Option<Mat<f64>> {
+pub(crate) fn solve_definite_within(a: Mat<f64>, mut b: Mat<f64>, relative: f64, absolute: f64) -> Option<Mat<f64>> {
     let diagonal: Vec<f64> = (0..a.nrows()).map(|i| a[(i, i)]).collect();
     let l = cholesky(a)?;
     if diagonal.iter().enumerate().any(|(i, &d)| l[(i, i)] * l[(i, i)] <= relative * d || d <= absolute) {
@@ -168,7 +166,7 @@ pub(crate) fn solve_upper(r: MatRef<'_, f64>, x: &mut Mat<f64>) {
 /// `A · B`.
 pub(crate) fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     let mut out = Mat::zeros(a.nrows(), b.ncols());
-    if a.nrows() * a.ncols() * b.ncols() < WORTH_TASKS || b.ncols() <= BLOCK_COLUMNS {
+    if a.nrows() * a.ncols() * b.ncols() < PARALLEL_THRESHOLD || b.ncols() <= BLOCK_COLUMNS {
         multiply(out.as_mut(), a, b);
         return out;
     }
@@ -189,9 +187,9 @@ pub(crate) fn rows_of<T: Copy>(a: MatRef<'_, T>, rows: &[u32]) -> Mat<T> {
     Mat::from_fn(rows.len(), a.ncols(), |i, j| a[(rows[i] as usize, j)])
 }
 
-/// Rows of a product whose bits must not depend on its width are a multiple of this: kernels sum in another order at the
-/// edges of small matrices.
-pub(crate) const WHOLE_ROWS: usize = 16;
+/// Rows of products whose results must not depend on the width are padded to a multiple of this: at the edges of small matrices the kernels sum in
+/// another order.
+pub(crate) const TILE_ROWS: usize = 16;
 
 #[cfg(test)]
 mod tests {
@@ -209,7 +207,7 @@ mod tests {
     fn products_have_the_same_bits_at_every_width_of_a_batch() {
         use crate::inversion::{BATCH, product_columns};
         for unknowns in [4, 7, 37, 130, 332, 700, 1500] {
-            for rows in [1, 2, 3, 5, 9, 21, 64].map(|tiles| tiles * WHOLE_ROWS) {
+            for rows in [1, 2, 3, 5, 9, 21, 64].map(|tiles| tiles * TILE_ROWS) {
                 let (a, b) = (noise(rows, unknowns), noise(unknowns, 3 * BATCH));
                 let single = |m: &Mat<f64>| Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] as f32);
                 let (a32, b32, at) = (single(&a), single(&b), a.transpose().to_owned());

@@ -14,6 +14,6 @@ mod spectrum;
 pub mod svd;
 pub mod synthetic;
 
-/// Version of the computation of solvers: one that was stored by another version is computed anew. What a container needs to be decoded
-/// is [`coordinates::DEFINITION`] alone.
+/// Version of the preparation of solvers: stored solvers of another version are recomputed. Decoding a container depends on
+/// [`coordinates::DEFINITION`] alone.
 pub const SOLVER_VERSION: u32 = 4;

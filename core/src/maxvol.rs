@@ -1,9 +1,8 @@
 //! Rows of maximum volume: the handles (Goreinov, Oseledets, Savostyanov, Tyrtyshnikov and Zamarashkin 2010).
 //!
-//! With `B = Φ Φ□⁻¹`, swapping row i of `Φ` in for handle j multiplies the volume of `Φ□` by `|B_ij|`. Swaps go on until no
-//! entry exceeds 1 + τ. Almost all rows of `B` stay far below one throughout, so the swaps run on the few rows that could
-//! ever matter; a pass over all of `Φ` with a fresh factorisation then confirms the result or widens the choice. While more
-//! swaps are to be expected that pass is in single precision; the one that confirms is in double.
+//! With `B = Φ Φ□⁻¹`, replacing handle j by row i of `Φ` multiplies the volume of `Φ□` by `|B_ij|`. Rows are swapped until no entry exceeds 1 + τ.
+//! The swaps run in single precision on the candidate rows, which have an entry near one or above; a pass over all of `Φ` in double precision with a
+//! fresh factorisation then confirms the result or finds further candidates.
 
 use crate::dense;
 use crate::simd::{self, multiversion};
@@ -15,10 +14,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Default tolerance τ: swaps end when no entry of B exceeds 1.01.
 pub const TOLERANCE: f64 = 0.01;
-/// From this many columns on swaps end at [`LOOSE`].
+/// From this many columns on swaps end at [`LOOSE_TOLERANCE`].
 const MANY_COLUMNS: usize = 1536;
 /// Tolerance for many columns: each swap costs more there, and a basis this well conditioned is enough to interpolate and decompose by.
-const LOOSE: f64 = 1.0;
+const LOOSE_TOLERANCE: f64 = 1.0;
 /// Rows whose largest entry of B exceeds this take part in the swaps.
 const CANDIDATE: f32 = 0.9;
 /// Rows of one block of `B`: small enough to share the work evenly, large enough for products at full speed.
@@ -32,7 +31,7 @@ const GRAM_BYTES: usize = 16 << 20;
 const SEVERAL_ROUNDS: usize = 512;
 /// Pivots of LU above this fraction of the largest: far enough from dependent for single precision.
 const SINGLE_IS_SAFE: f64 = 1e-4;
-/// Every confirming pass either ends the search or has found rows to swap; the volume bounds their number far below this.
+/// Bound on confirming passes; the growth of the volume keeps their number far below it.
 const MAX_PASSES: usize = 64;
 
 /// One exchange: the row of the matrix that became a handle, and which handle it replaced.
@@ -72,15 +71,14 @@ pub struct MaxVol {
 /// The matrix has no m linearly independent rows to the working precision.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("the coordinate matrix has dependent columns (smallest pivot {smallest:.1e} of the largest)")]
-pub struct Dependent {
+pub struct DependentColumns {
     /// Smallest pivot of the LU factorisation, relative to the largest.
     pub smallest: f64,
 }
 
-/// The tolerance that handles of so many unknowns are searched with: [`TOLERANCE`], and for cages of 1,536 unknowns and more a
-/// looser one.
+/// Tolerance τ for a cage of so many unknowns: [`TOLERANCE`], and a looser one from 1,536 unknowns on.
 pub fn tolerance(unknowns: usize) -> f64 {
-    if unknowns < MANY_COLUMNS { TOLERANCE } else { LOOSE }
+    if unknowns < MANY_COLUMNS { TOLERANCE } else { LOOSE_TOLERANCE }
 }
 
 fn block_rows(columns: usize) -> usize {
@@ -92,22 +90,22 @@ fn block_rows(columns: usize) -> usize {
 /// Deterministic: ties go to the smallest row, then the smallest column, and the threads of the pool do not matter.
 ///
 /// # Errors
-/// [`Dependent`] where the columns are numerically dependent.
-pub fn maxvol(phi: MatRef<'_, f64>, tolerance: f64) -> Result<MaxVol, Dependent> {
+/// [`DependentColumns`] where the columns are numerically dependent.
+pub fn maxvol(phi: MatRef<'_, f64>, tolerance: f64) -> Result<MaxVol, DependentColumns> {
     Ok(search(phi, start_rows(phi)?, tolerance))
 }
 
 /// As [`maxvol`], from m given rows instead of those of pivoted LU.
 ///
 /// # Errors
-/// [`Dependent`] where these rows are dependent, or so close to it that swaps in single precision would follow rounding.
+/// [`DependentColumns`] where these rows are dependent, or so close to it that swaps in single precision would follow rounding.
 ///
 /// # Panics
 /// Where there are not as many rows as columns.
-pub fn maxvol_from(phi: MatRef<'_, f64>, start: Vec<u32>, tolerance: f64) -> Result<MaxVol, Dependent> {
+pub fn maxvol_from(phi: MatRef<'_, f64>, start: Vec<u32>, tolerance: f64) -> Result<MaxVol, DependentColumns> {
     assert_eq!(start.len(), phi.ncols(), "as many rows as columns");
     let smallest = dense::pivoted_rows(dense::rows_of(phi, &start)).smallest;
-    if smallest > SINGLE_IS_SAFE { Ok(search(phi, start, tolerance)) } else { Err(Dependent { smallest }) }
+    if smallest > SINGLE_IS_SAFE { Ok(search(phi, start, tolerance)) } else { Err(DependentColumns { smallest }) }
 }
 
 fn search(phi: MatRef<'_, f64>, start: Vec<u32>, tolerance: f64) -> MaxVol {
@@ -141,7 +139,7 @@ fn search(phi: MatRef<'_, f64>, start: Vec<u32>, tolerance: f64) -> MaxVol {
         }
         row_max = maxima.iter().map(|&x| x as f32).collect();
     }
-    // Reports say what was reached.
+    // Not converged: reports show the largest entry.
     let (maxima, gram) = maxima_and_gram(phi, inverse.as_ref(), f64::INFINITY);
     let max_entry = maxima.iter().copied().fold(0.0, f64::max);
     found(rows, trace, log_volume, max_entry, gram, inverse)
@@ -151,8 +149,8 @@ fn search(phi: MatRef<'_, f64>, start: Vec<u32>, tolerance: f64) -> MaxVol {
 /// as long as the columns are far from dependent.
 ///
 /// # Errors
-/// [`Dependent`] where the columns are numerically dependent.
-pub fn start_rows(phi: MatRef<'_, f64>) -> Result<Vec<u32>, Dependent> {
+/// [`DependentColumns`] where the columns are numerically dependent.
+pub fn start_rows(phi: MatRef<'_, f64>) -> Result<Vec<u32>, DependentColumns> {
     let single = dense::pivoted_rows(to_single(phi));
     if single.smallest > SINGLE_IS_SAFE {
         return Ok(single.rows);
@@ -161,7 +159,7 @@ pub fn start_rows(phi: MatRef<'_, f64>) -> Result<Vec<u32>, Dependent> {
     if double.smallest > RANK_TOLERANCE {
         return Ok(double.rows);
     }
-    Err(Dependent { smallest: double.smallest })
+    Err(DependentColumns { smallest: double.smallest })
 }
 
 fn to_single(phi: MatRef<'_, f64>) -> Mat<f32> {
@@ -265,7 +263,7 @@ fn add_gram(gram: &mut Mat<f64>, b: MatRef<'_, f64>) {
 }
 
 /// Rows of B that take part in the swaps, row-major. Single precision: the pass that follows is in double.
-struct Working {
+struct CandidateRows {
     width: usize,
     entries: Vec<f32>,
     row_max: Vec<f32>,
@@ -280,7 +278,7 @@ fn swap_among(
     rows: &mut [u32],
 ) -> Vec<Swap> {
     let width = phi.ncols();
-    let mut work = Working::gather(phi, candidates, rows, inverse);
+    let mut work = CandidateRows::gather(phi, candidates, rows, inverse);
     // Rounding of the updates must not end the swaps just above the tolerance.
     let target = (1.0 + 0.2 * tolerance) as f32;
     // Each swap multiplies the volume by more than 1 + τ, and Hadamard's inequality bounds the volume.
@@ -305,7 +303,7 @@ fn swap_among(
     swaps
 }
 
-impl Working {
+impl CandidateRows {
     /// B at the candidates, for the handles `picked`, whose inverse is given.
     fn gather(phi: MatRef<'_, f64>, candidates: &[u32], picked: &[u32], inverse: MatRef<'_, f64>) -> Self {
         let width = phi.ncols();

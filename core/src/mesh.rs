@@ -91,7 +91,7 @@ pub struct TriMesh {
 }
 
 impl TriMesh {
-    /// The same surface with every face turned around.
+    /// The same surface with the orientation of every face reversed.
     #[must_use]
     pub fn flipped(mut self) -> Self {
         for triangle in &mut self.triangles {

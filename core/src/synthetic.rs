@@ -1,4 +1,4 @@
-//! A capture made of formulas: a dancer in a pleated dress, with a cage that fits.
+//! A procedural capture: a dancer in a pleated dress, with a cage that fits.
 //!
 //! Every horizontal slice of the body is star-shaped about a spine, and the cage is a grid over height and angle about that
 //! same spine. That makes "inside" a comparison of two radii, and rules out self-intersections of the cage for any radii.

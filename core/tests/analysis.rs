@@ -59,14 +59,14 @@ fn methods_in_factors_give_the_cages_of_their_solvers() {
         let analysis = Analysis::new(system, &cage, &capture.rest.points).unwrap();
         let some = [Handles::Rectangular { count: None }, Handles::Spread { count: None }];
         for handles in [Handles::MaxVol, Handles::All].into_iter().chain(some) {
-            let reading = analysis.reading(handles).unwrap();
-            let projected = reading.project(&frames);
+            let handle_system = analysis.handle_system(handles).unwrap();
+            let projected = handle_system.project(&frames);
             for regularizer in Regularizer::ALL.into_iter().filter(|r| r.term().is_some()) {
                 let options = SolverOptions { handles, regularizer, spectrum: 7, lambda: 0.5 };
-                let method = reading.factored(options).unwrap();
+                let method = handle_system.factored(options).unwrap();
                 let solver = analysis.solver(options).unwrap();
                 assert_eq!(method.follows_previous(), solver.follows_previous());
-                let found = reading.cages(&method, None, &projected, &frames);
+                let found = handle_system.cages(&method, None, &projected, &frames);
                 let wanted = solver.invert_after(None, &frames);
                 let tolerance = if system.name() == "green" { 0.0 } else { 2e-6 };
                 for (a, b) in found.iter().flatten().zip(wanted.iter().flatten()) {
@@ -105,7 +105,7 @@ fn rows_given_to_an_analysis_are_followed_exactly_where_they_determine_the_cage(
     let analysis = Analysis::new(&MeanValue, &cage, &capture.rest.points).unwrap();
     let options = SolverOptions { regularizer: Regularizer::None, spectrum: 0, ..SolverOptions::PAPER };
     let rows = analysis.handles().rows.clone();
-    let (given, own) = (analysis.solver_reading(&rows, options).unwrap(), analysis.solver(options).unwrap());
+    let (given, own) = (analysis.solver_of_rows(&rows, options).unwrap(), analysis.solver(options).unwrap());
     let mut frame = Vec::new();
     capture.frame(3, &mut frame);
     let (a, b) = (given.invert(&[frame.as_slice()]), own.invert(&[frame.as_slice()]));
@@ -114,10 +114,10 @@ fn rows_given_to_an_analysis_are_followed_exactly_where_they_determine_the_cage(
     let more: Vec<u32> = (0..capture.rest.points.len() as u32).collect();
     let all = analysis.solver(SolverOptions { handles: Handles::All, ..options }).unwrap();
     let (a, b) =
-        (analysis.solver_reading(&more, options).unwrap().invert(&[frame.as_slice()]), all.invert(&[frame.as_slice()]));
+        (analysis.solver_of_rows(&more, options).unwrap().invert(&[frame.as_slice()]), all.invert(&[frame.as_slice()]));
     assert!(a[0].iter().zip(&b[0]).all(|(x, y)| (x - y).abs() < 1e-4));
     // The same row many times determines nothing but one direction, and the Laplacian places the rest.
-    let poor = analysis.solver_reading(&vec![5; rows.len()], options).unwrap();
+    let poor = analysis.solver_of_rows(&vec![5; rows.len()], options).unwrap();
     let sigma = &poor.preparation().singular_values;
     assert_eq!(sigma.iter().filter(|&&x| x > 1e-11 * sigma[0]).count(), 1);
     assert!(poor.invert(&[frame.as_slice()])[0].iter().all(|x| x.is_finite()));
@@ -131,7 +131,7 @@ fn thresholds_beyond_the_unknowns_are_refused_by_an_analysis_too() {
     let options = SolverOptions { spectrum: unknowns + 1, ..SolverOptions::PAPER };
     let refused = PrepareError::SpectrumTooLarge { spectrum: unknowns + 1, unknowns };
     assert_eq!(analysis.solver(options).unwrap_err(), refused);
-    assert_eq!(analysis.solver_reading(&analysis.handles().rows, options).unwrap_err(), refused);
+    assert_eq!(analysis.solver_of_rows(&analysis.handles().rows, options).unwrap_err(), refused);
 }
 
 #[test]

@@ -62,7 +62,7 @@ fn similar_poses_of_the_rest_cage_pose_the_model_alike_and_come_back() {
         let solver = prepare(&capture, &cage, SolverOptions { handles, spectrum: 0, ..SolverOptions::PAPER });
         let posed = solver.decoder().measure(&[&single(&truth)], &[&positions])[0];
         assert!(posed.linf < 1e-5 * solver.diagonal(), "{handles:?}: {}", posed.linf);
-        let found = solver.invert_reporting(None, &[&positions]).remove(0);
+        let found = solver.invert_with_convergence(None, &[&positions]).remove(0);
         assert!(farthest(&found.cage, &truth) < 1e-4 * solver.diagonal(), "{handles:?}");
         assert_eq!(found.convergence.unwrap().outcome, Outcome::Converged);
     }
@@ -77,7 +77,7 @@ fn models_posed_by_a_cage_are_explained_by_one() {
         for t in [0, 13, 39] {
             let mut posed = vec![Vec::new()];
             solver.decoder().decode(&[&single(&capture.deformed_cage(t))], &mut posed);
-            let found = solver.invert_reporting(None, &[&posed[0]]).remove(0);
+            let found = solver.invert_with_convergence(None, &[&posed[0]]).remove(0);
             let convergence = found.convergence.unwrap();
             let error = solver.decoder().measure(&[&found.cage], &[&posed[0]])[0].l2 / solver.diagonal();
             assert!(error < 1e-3, "{handles:?}, frame {t}: {error:e} {convergence:?}");
@@ -95,7 +95,7 @@ fn the_points_read_are_never_worse_than_where_the_iteration_starts() {
             let solver = prepare(&capture, &cage, options);
             let frames: Vec<Vec<f64>> = [5, 20, 35].map(|t| frame(&capture, t)).to_vec();
             let views: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
-            for found in solver.invert_reporting(None, &views) {
+            for found in solver.invert_with_convergence(None, &views) {
                 let convergence = found.convergence.unwrap();
                 assert!(convergence.residual <= convergence.start, "{handles:?} {regularizer:?}: {convergence:?}");
                 assert!(convergence.steps > 0 || convergence.outcome != Outcome::StepLimit);
@@ -160,7 +160,7 @@ fn a_solver_put_together_again_gives_the_same_bits() {
             handles: solver.handles().to_vec(),
             reads_all: solver.reads_all(),
             operator: solver.operator().to_owned(),
-            pull: solver.pull().clone(),
+            target: solver.regularization_target().clone(),
             phi: solver.decoder().coordinates().unwrap().to_owned(),
             positions: solver.decoder().positions(),
             tied: Some(TiedParts { normals: normals.clone(), gram: gram.to_owned(), weight }),
@@ -202,7 +202,7 @@ fn free_normals_follow_translations_and_explain_what_a_consistent_cage_poses() {
         let solver = Solver::prepare(&Green::Free, &cage, &capture.rest.points, options).unwrap();
         let mut posed = vec![Vec::new()];
         consistent.decoder().decode(&[&single(&capture.deformed_cage(17))], &mut posed);
-        let found = solver.invert_reporting(None, &[&posed[0]]).remove(0);
+        let found = solver.invert_with_convergence(None, &[&posed[0]]).remove(0);
         assert_eq!(found.convergence, None, "it is linear");
         let error = solver.decoder().measure(&[&found.cage], &[&posed[0]])[0].linf / solver.diagonal();
         assert!(error < 1e-3, "{handles:?}: {error}");

@@ -31,7 +31,7 @@ fn errors(solver: &Solver, frames: &[Vec<f64>]) -> (Vec<Vec<f32>>, Vec<FrameErro
 
 fn prepare(system: &dyn CoordinateSystem, (capture, cage): &(Capture, Cage), handles: Handles, keeps: bool) -> Solver {
     let options = SolverOptions { handles, ..SolverOptions::default() };
-    let preparing = Preparing { keeps_coordinates: keeps, ..Preparing::default() };
+    let preparing = Preparing { stores_coordinates: keeps, ..Preparing::default() };
     Solver::prepare_with(system, cage, &capture.rest.points, options, &preparing).unwrap()
 }
 
@@ -41,12 +41,12 @@ fn decoders_that_compute_their_coordinates_have_the_bits_of_those_that_keep_them
     let (capture, cage) = capture(70_001, 200);
     let points = &capture.rest.points;
     for system in [&MeanValue as &dyn CoordinateSystem, &Green::Consistent] {
-        let (by_point, columns) = (system.by_point().unwrap(), system.columns(&cage));
+        let (pointwise, columns) = (system.pointwise().unwrap(), system.columns(&cage));
         let phi = system.coordinates(&cage, points).unwrap().phi;
         let decoders = [
             Decoder::new(phi.as_ref(), cage.vertices().len()),
-            Decoder::keeping(by_point, &cage, points, columns),
-            Decoder::computing(by_point, &cage, points, columns),
+            Decoder::with_stored_coordinates(pointwise, &cage, points, columns),
+            Decoder::with_recomputed_coordinates(pointwise, &cage, points, columns),
         ];
         assert!(decoders[1].size_bytes() > 0 && decoders[2].size_bytes() == 0);
         let decoders = decoders.map(|decoder| decoder.with_tied_normals(system.tied_normals(&cage)));

@@ -210,7 +210,7 @@ fn the_chosen_threshold_is_the_largest_within_the_bound() {
         for regularizer in [Regularizer::Laplacian, Regularizer::Differential, Regularizer::TruncatedSvd] {
             let options = SolverOptions { handles, regularizer, lambda: 0.001, ..SolverOptions::PAPER };
             let term = regularizer.term().unwrap();
-            let reading = analysis.reading(handles).unwrap();
+            let handle_system = analysis.handle_system(handles).unwrap();
             let measured = |spectrum| {
                 let solver = analysis.solver(SolverOptions { spectrum, ..options }).unwrap();
                 let l2 = |frame: &Vec<f64>| {
@@ -219,7 +219,7 @@ fn the_chosen_threshold_is_the_largest_within_the_bound() {
                 };
                 samples.iter().map(l2).sum::<f64>() / samples.len() as f64
             };
-            let found = reading.choose_threshold(options, term, &samples, 0.05).unwrap();
+            let found = handle_system.choose_threshold(options, term, &samples, 0.05).unwrap();
             for &(s, l2) in &found.tried {
                 assert!((l2 / measured(s) - 1.0).abs() < 1e-4, "{handles:?} {regularizer:?} {s}: {l2} {}", measured(s));
             }
@@ -236,8 +236,8 @@ fn the_chosen_threshold_is_the_largest_within_the_bound() {
         }
     }
     let options = SolverOptions::PAPER;
-    let reading = analysis.reading(options.handles).unwrap();
-    let at = |bound| reading.choose_threshold(options, &CageLaplacian, &samples, bound).unwrap().spectrum;
+    let handle_system = analysis.handle_system(options.handles).unwrap();
+    let at = |bound| handle_system.choose_threshold(options, &CageLaplacian, &samples, bound).unwrap().spectrum;
     assert!(at(0.0) <= at(0.2) && at(0.2) < at(2.0), "{} {} {}", at(0.0), at(0.2), at(2.0));
     assert_eq!(at(1e9), m);
 }
@@ -248,9 +248,9 @@ fn a_threshold_for_frames_that_follow_each_other_is_measured_in_their_order() {
     let analysis = Analysis::new(&MeanValue, &cage, &capture.rest.points).unwrap();
     let options = SolverOptions { regularizer: Regularizer::Temporal, ..SolverOptions::PAPER };
     let samples: Vec<Vec<f64>> = (0..20).map(|t| frame(&capture, t)).collect();
-    let reading = analysis.reading(options.handles).unwrap();
+    let handle_system = analysis.handle_system(options.handles).unwrap();
     let term = options.regularizer.term().unwrap();
-    let found = reading.choose_threshold(options, term, &samples, 0.05).unwrap();
+    let found = handle_system.choose_threshold(options, term, &samples, 0.05).unwrap();
     for &(spectrum, l2) in &found.tried {
         let solver = analysis.solver(SolverOptions { spectrum, ..options }).unwrap();
         let mut previous: Option<Vec<f32>> = None;
@@ -272,8 +272,8 @@ fn a_threshold_for_normals_that_follow_is_measured_on_the_cages_that_are_found()
     let analysis = Analysis::new(&Green::Consistent, &cage, &capture.rest.points).unwrap();
     let samples: Vec<Vec<f64>> = (0..4).map(|k| frame(&capture, 9 * k)).collect();
     let options = SolverOptions::PAPER;
-    let reading = analysis.reading(options.handles).unwrap();
-    let found = reading.choose_threshold(options, &CageLaplacian, &samples, 0.2).unwrap();
+    let handle_system = analysis.handle_system(options.handles).unwrap();
+    let found = handle_system.choose_threshold(options, &CageLaplacian, &samples, 0.2).unwrap();
     for &(spectrum, l2) in found.tried.iter().step_by(4) {
         let solver = analysis.solver(SolverOptions { spectrum, ..options }).unwrap();
         let error = |frame: &Vec<f64>| {

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The operating system refused: mend the path, the permissions or the disk, and try again.
+    /// The operating system refused: correct the path, the permissions or the disk, and try again.
     #[error("{}: cannot be {action} ({cause}); {}", .path.display(), advice(*action, cause))]
     Io {
         /// The file as the caller named it.
@@ -129,7 +129,7 @@ impl Error {
         Self::Target { path: path.to_owned(), what: what.into() }
     }
 
-    /// Puts the frame in front of what went wrong in one file of a sequence.
+    /// Prefixes the message with the frame, for errors in one file of a sequence.
     pub(crate) fn in_frame(mut self, frame: usize) -> Self {
         match &mut self {
             Self::Damaged { what, .. } | Self::Unsupported { what, .. } | Self::Invalid { what, .. } => {

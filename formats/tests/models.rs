@@ -284,7 +284,7 @@ fn a_web_page_or_utf_16_given_as_a_mesh_is_called_that() {
     for name in ["a.obj", "a.ply", "a.off", "a.stl", "a.glb"] {
         for page in ["<!DOCTYPE html>\n<html></html>", "\n  <HTML lang=en>"] {
             assert!(
-                message(read(name, page)).contains("is a web page and no mesh; download the file itself"),
+                message(read(name, page)).contains("is a web page, not a mesh; download the file itself"),
                 "{name}"
             );
         }

@@ -98,8 +98,9 @@ impl Entries {
         Ok(Self(entries))
     }
 
-    /// Goes on with the grants of the entries before; gives those that are there no more, are another tenant's now, or may do less.
-    pub(super) fn succeed(&mut self, before: &Self) -> Vec<Grant> {
+    /// Carries the revocation tokens of the previous entries over; returns the grants that were removed, moved to another tenant or
+    /// restricted.
+    pub(super) fn inherit_revocations(&mut self, before: &Self) -> Vec<Grant> {
         let mut gone = Vec::new();
         for (hash, old) in &before.0 {
             let same = |(other, new): &&mut (Hash, Grant)| {
@@ -113,7 +114,7 @@ impl Entries {
         gone
     }
 
-    /// What a token grants. All entries are compared, all bytes of each, so that the time says nothing about the hashes.
+    /// The grant of a token. All entries are compared in constant time, so that timing reveals nothing about the hashes.
     pub(super) fn find(&self, hash: &Hash) -> Option<Grant> {
         let mut found = Choice::from(0);
         let mut place = 0_u64;
@@ -157,7 +158,7 @@ fn parse_hash(text: &str) -> Option<Hash> {
     Some(hash)
 }
 
-/// Tells a file from a changed one.
+/// File attributes by which a change is detected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Stamp {
     modified: Option<SystemTime>,

@@ -1,12 +1,12 @@
 //! Access tokens of an OpenID Connect provider: JSON Web Tokens (RFC 7519, RFC 9068), checked against the provider's key set (RFC 7517).
 //!
-//! Taken are tokens that the provider signed for this service's audience and that have not expired. A claim names the tenant, and `scope`
-//! (a text with spaces, or a list; `scp` as well) what may be done: `cager:read`, `cager:write` or `cager:admin`.
+//! A token is accepted if the provider signed it for this service's audience and it has not expired. A claim names the tenant, and `scope`
+//! (a string separated by spaces, or a list; also `scp`) the permissions: `cager:read`, `cager:write` or `cager:admin`.
 
 use super::file::is_name;
 use super::signatures::{self, ALGORITHMS};
 use super::{Denied, Scope};
-use crate::outgoing::Client;
+use crate::http_client::Client;
 use crate::session::lock;
 use jsonwebtoken::errors::ErrorKind;
 use jsonwebtoken::jwk::{Jwk, KeyOperations, PublicKeyUse};
@@ -19,35 +19,35 @@ use std::time::{Duration, Instant, SystemTime};
 use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 
-/// Longest token that is looked at, in bytes.
+/// Longest token accepted, in bytes.
 const MAX_TOKEN_BYTES: usize = 16 << 10;
-/// Longest answer of the provider, in bytes.
+/// Longest response of the provider, in bytes.
 const MAX_ANSWER_BYTES: usize = 1 << 20;
-/// How often the keys are fetched, and how soon again where that failed.
-const REFRESH_EVERY: Duration = Duration::from_secs(300);
+/// Interval between fetches of the key set, and the retry interval after a failure.
+const REFRESH_INTERVAL: Duration = Duration::from_secs(300);
 const RETRY_AFTER: Duration = Duration::from_secs(10);
-/// Shortest time from the end of a fetch to the next one for tokens with keys that are not known.
-const UNKNOWN_KEY_EVERY: Duration = Duration::from_secs(5);
+/// Shortest interval between fetches caused by unknown keys.
+const UNKNOWN_KEY_INTERVAL: Duration = Duration::from_secs(5);
 /// How long a request waits for a fetch.
-const FETCHED_WITHIN: Duration = Duration::from_secs(2);
-/// Longest name of a bearer in the log, in characters.
+const FETCH_TIMEOUT: Duration = Duration::from_secs(2);
+/// Longest token name in the log, in characters.
 const NAME_CHARACTERS: usize = 64;
 
-/// Which provider is trusted, and how its tokens are read.
+/// A trusted OpenID Connect provider, and how its tokens are interpreted.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Trust {
+pub struct OidcSettings {
     /// The provider: what its tokens have as `iss`.
     pub issuer: String,
     /// What tokens for this service have in `aud`.
     pub audience: String,
-    /// Address of the key set; without one the provider's own description says it.
+    /// Address of the key set; by default taken from the provider's discovery document.
     pub keys: Option<String>,
     /// The claim that names the tenant.
     pub tenant: String,
 }
 
-/// What a token said.
-pub(super) struct Claimed {
+/// The claims of a verified token.
+pub(super) struct VerifiedClaims {
     pub(super) tenant: String,
     pub(super) name: String,
     pub(super) scope: Scope,
@@ -55,18 +55,18 @@ pub(super) struct Claimed {
     pub(super) expires: Instant,
 }
 
-/// A trusted provider with the keys that it has at the moment.
+/// A trusted provider with its current keys.
 pub(super) struct Provider {
-    trust: Trust,
+    trust: OidcSettings,
     client: Client,
     keys: RwLock<Arc<Keys>>,
     fetching: Mutex<Fetching>,
 }
 
-/// One fetch at a time, which goes on whoever waits for it.
+/// State of fetching the key set: one fetch at a time, shared by all who wait.
 #[derive(Default)]
 struct Fetching {
-    /// Closed when the one that runs ends.
+    /// Closed when the running fetch ends.
     runs: Option<watch::Receiver<()>>,
     ended: Option<Instant>,
     failed: bool,
@@ -76,7 +76,7 @@ type Keys = Option<Vec<Key>>;
 
 struct Key {
     id: Option<String>,
-    /// Where the key says so, the only algorithm it is for.
+    /// If the key restricts its use to one algorithm, that one.
     algorithm: Option<Algorithm>,
     key: DecodingKey,
 }
@@ -93,31 +93,31 @@ struct Description {
 }
 
 impl Provider {
-    pub(super) fn new(trust: Trust) -> Result<Self, String> {
+    pub(super) fn new(trust: OidcSettings) -> Result<Self, String> {
         signatures::install();
         let client = Client::new().map_err(|error| error.to_string())?;
         for (setting, address) in [("oidc_issuer", Some(&trust.issuer)), ("oidc_keys", trust.keys.as_ref())] {
             if let Some(address) = address {
-                crate::outgoing::address(address).map_err(|why| format!("{setting}: {why}"))?;
+                crate::http_client::address(address).map_err(|why| format!("{setting}: {why}"))?;
             }
         }
         Ok(Self { trust, client, keys: RwLock::default(), fetching: Mutex::default() })
     }
 
-    /// Fetches the keys now and then, until `stop`.
+    /// Fetches the key set periodically until `stop`.
     pub(super) async fn watch(self: Arc<Self>, stop: CancellationToken) {
         loop {
             if let Some(mut fetch) = self.fetch_unless_within(Duration::ZERO) {
                 let _ = fetch.changed().await;
             }
-            let wait = if lock(&self.fetching).failed { RETRY_AFTER } else { REFRESH_EVERY };
+            let wait = if lock(&self.fetching).failed { RETRY_AFTER } else { REFRESH_INTERVAL };
             if stop.run_until_cancelled(tokio::time::sleep(wait)).await.is_none() {
                 return;
             }
         }
     }
 
-    /// The fetch that runs, or one that is begun now; none where the last one ended within this time. It is over when the channel is closed.
+    /// The running fetch, or a new one; `None` if the last one ended within this time. The channel closes when the fetch ends.
     fn fetch_unless_within(self: &Arc<Self>, within: Duration) -> Option<watch::Receiver<()>> {
         let mut fetching = lock(&self.fetching);
         if let Some(runs) = &fetching.runs {
@@ -141,7 +141,7 @@ impl Provider {
             match fetched {
                 Ok(keys) => *provider.keys.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(Some(keys)),
                 Err(why) => {
-                    tracing::error!(%why, "the keys of the tokens' provider cannot be fetched; those known stay");
+                    tracing::error!(%why, "the key set of the OpenID Connect provider cannot be fetched; the known keys stay valid");
                 }
             }
             *lock(&provider.fetching) = Fetching { runs: None, ended: Some(Instant::now()), failed };
@@ -150,26 +150,26 @@ impl Provider {
         Some(runs)
     }
 
-    /// What a token says, if it is to be believed.
-    pub(super) async fn claimed(self: &Arc<Self>, token: &str) -> Result<Claimed, Denied> {
+    /// Verifies a token and returns its claims.
+    pub(super) async fn verified(self: &Arc<Self>, token: &str) -> Result<VerifiedClaims, Denied> {
         if token.len() > MAX_TOKEN_BYTES {
             return Err(Denied::Unknown);
         }
         let header = decode_header(token).map_err(|_| Denied::Unknown)?;
-        // What `crit` names has to be understood (RFC 7515, §4.1.11), and nothing that can be named is.
+        // Critical header parameters must be understood (RFC 7515, §4.1.11); none are supported.
         if !ALGORITHMS.contains(&header.alg) || header.crit.is_some() {
             return Err(Denied::Unknown);
         }
         let id = header.kid.as_deref();
-        let mut keys = self.fitting(id, header.alg);
+        let mut keys = self.candidate_keys(id, header.alg);
         if keys.as_ref().is_none_or(Vec::is_empty) && !self.has(id) {
-            // The provider may have changed its keys since.
-            if let Some(mut fetch) = self.fetch_unless_within(UNKNOWN_KEY_EVERY) {
-                let _ = tokio::time::timeout(FETCHED_WITHIN, fetch.changed()).await;
+            // The provider may have rotated its keys.
+            if let Some(mut fetch) = self.fetch_unless_within(UNKNOWN_KEY_INTERVAL) {
+                let _ = tokio::time::timeout(FETCH_TIMEOUT, fetch.changed()).await;
             }
-            keys = self.fitting(id, header.alg);
+            keys = self.candidate_keys(id, header.alg);
             let fetching = lock(&self.fetching);
-            let recent = fetching.ended.is_some_and(|ended| ended.elapsed() < FETCHED_WITHIN);
+            let recent = fetching.ended.is_some_and(|ended| ended.elapsed() < FETCH_TIMEOUT);
             if keys.as_ref().is_none_or(Vec::is_empty) && (fetching.runs.is_some() || fetching.failed || !recent) {
                 return Err(Denied::NoKeys);
             }
@@ -177,23 +177,23 @@ impl Provider {
         let mut denied = Denied::Unknown;
         for key in keys.unwrap_or_default() {
             match self.check(token, &key, header.alg) {
-                // The signature is another key's; one of the others may fit.
+                // Signed with another key; try the next.
                 Err(Denied::Unknown) => {}
                 Err(why) => denied = why,
-                Ok(claimed) => return Ok(claimed),
+                Ok(verified) => return Ok(verified),
             }
         }
         Err(denied)
     }
 
-    /// Whether there is a key of this name.
+    /// Whether a key with this id is known.
     fn has(&self, id: Option<&str>) -> bool {
         let keys = Arc::clone(&self.keys.read().unwrap_or_else(PoisonError::into_inner));
         id.is_some() && keys.as_ref().as_ref().is_some_and(|keys| keys.iter().any(|key| key.id.as_deref() == id))
     }
 
-    /// The keys that a token with such a header may be signed with; `None` before there were any.
-    fn fitting(&self, id: Option<&str>, algorithm: Algorithm) -> Option<Vec<DecodingKey>> {
+    /// The known keys that fit a token's header; `None` before the first fetch.
+    fn candidate_keys(&self, id: Option<&str>, algorithm: Algorithm) -> Option<Vec<DecodingKey>> {
         let keys = Arc::clone(&self.keys.read().unwrap_or_else(PoisonError::into_inner));
         let fits = |key: &&Key| {
             (id.is_none() || key.id.as_deref() == id)
@@ -203,7 +203,7 @@ impl Provider {
         Some(keys.as_ref().as_ref()?.iter().filter(fits).map(|key| key.key.clone()).collect())
     }
 
-    fn check(&self, token: &str, key: &DecodingKey, algorithm: Algorithm) -> Result<Claimed, Denied> {
+    fn check(&self, token: &str, key: &DecodingKey, algorithm: Algorithm) -> Result<VerifiedClaims, Denied> {
         let mut validation = Validation::new(algorithm);
         validation.set_required_spec_claims(&["exp", "iss", "aud"]);
         validation.set_issuer(&[&self.trust.issuer]);
@@ -213,15 +213,15 @@ impl Provider {
             ErrorKind::ExpiredSignature => Denied::Expired,
             ErrorKind::MissingRequiredClaim(claim) if claim == "exp" => Denied::NoExpiry,
             ErrorKind::InvalidIssuer | ErrorKind::InvalidAudience | ErrorKind::MissingRequiredClaim(_) => {
-                Denied::NotForUs
+                Denied::WrongIssuerOrAudience
             }
             _ => Denied::Unknown,
         })?;
         let claims = claims.claims;
         let text = |name: &str| claims.get(name).and_then(Value::as_str);
-        // Taken from a list, `iss` would be one of several.
+        // The validation would accept a list of issuers.
         if text("iss") != Some(&self.trust.issuer) {
-            return Err(Denied::NotForUs);
+            return Err(Denied::WrongIssuerOrAudience);
         }
         let tenant = text(&self.trust.tenant).filter(|name| is_name(name)).ok_or(Denied::NoTenant)?.to_owned();
         let scope = scope(&claims).ok_or(Denied::NoScope)?;
@@ -230,10 +230,10 @@ impl Provider {
         let expires = claims.get("exp").and_then(Value::as_f64).unwrap_or_default();
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_secs_f64();
         let left = Duration::try_from_secs_f64(expires + validation.leeway as f64 - now).unwrap_or_default();
-        // Centuries ahead is as good as never.
+        // Bounds expiry times that are centuries away.
         let expires =
             Instant::now().checked_add(left.min(Duration::from_secs(u32::MAX.into()))).ok_or(Denied::Unknown)?;
-        Ok(Claimed { tenant, name, scope, expires })
+        Ok(VerifiedClaims { tenant, name, scope, expires })
     }
 
     async fn fetch(&self) -> Result<Vec<Key>, String> {
@@ -250,12 +250,12 @@ impl Provider {
             }
         };
         let set: KeySet = self.get(&address).await?;
-        // What is not understood is left out (RFC 7517, §5).
+        // Keys that cannot be parsed are ignored (RFC 7517, §5).
         Ok(set.keys.into_iter().filter_map(|jwk| key(&serde_json::from_value(jwk).ok()?)).collect())
     }
 
     async fn get<T: DeserializeOwned>(&self, address: &str) -> Result<T, String> {
-        let url = crate::outgoing::address(address)?;
+        let url = crate::http_client::address(address)?;
         let failed = |error: reqwest::Error| format!("{address}: {error}");
         let answer = self.client.get(&url).send().await.and_then(reqwest::Response::error_for_status);
         let mut answer = answer.map_err(failed)?;
@@ -270,7 +270,7 @@ impl Provider {
     }
 }
 
-/// A key of the set, if signatures can be checked with it.
+/// A key of the set, if it can verify signatures.
 fn key(jwk: &Jwk) -> Option<Key> {
     if jwk.common.public_key_use.as_ref().is_some_and(|purpose| *purpose != PublicKeyUse::Signature) {
         return None;
@@ -280,7 +280,7 @@ fn key(jwk: &Jwk) -> Option<Key> {
     }
     let algorithm = jwk.common.key_algorithm.map(|algorithm| algorithm.to_string().parse().ok());
     let key = DecodingKey::from_jwk(jwk).ok()?;
-    // One that says its algorithm, and that is not known here.
+    // An unknown algorithm excludes the key.
     let algorithm = match algorithm {
         Some(None) => return None,
         Some(known) => known,
@@ -290,7 +290,7 @@ fn key(jwk: &Jwk) -> Option<Key> {
     usable.then(|| Key { id: jwk.common.key_id.clone(), algorithm, key })
 }
 
-/// The widest of the scopes that a token has.
+/// The most powerful scope of a token.
 fn scope(claims: &Map<String, Value>) -> Option<Scope> {
     let words = ["scope", "scp"].into_iter().filter_map(|name| claims.get(name)).flat_map(|value| match value {
         Value::String(text) => text.split(' ').collect::<Vec<_>>(),

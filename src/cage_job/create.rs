@@ -1,6 +1,6 @@
-//! Making, resuming and deleting cage jobs.
+//! Creating, resuming and deleting cage jobs.
 
-use super::{CageJob, Finished, Outcome, Phase, samples, wish};
+use super::{CageJob, Finished, Outcome, Phase, options, samples};
 use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::config::ServeConfig;
@@ -13,7 +13,7 @@ use crate::session::create::blocking;
 use crate::session::prepare::read_part;
 use crate::session::registry::Reserved;
 use crate::store::{CageJobMeta, ContentKey, Idempotency, Kind, Spool, StoreError, StoredPart};
-use crate::unread;
+use crate::unreadable;
 use cager_proto::cage_messages::CageOptions;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -27,13 +27,13 @@ pub(crate) struct NewCageJob {
     pub(crate) frames: Spool,
     pub(crate) options: CageOptions,
     pub(crate) idempotency_key: Option<String>,
-    /// The room in memory that the rest pose takes.
+    /// Permit for the memory of the rest pose.
     pub(crate) room: Held,
-    /// The room on disk that both take.
+    /// Quota reserved for rest pose and frames.
     pub(crate) reserved: Reserved,
 }
 
-/// What was found out about the input.
+/// Results of validating the input.
 struct Checked {
     key: ContentKey,
     points: u32,
@@ -41,10 +41,10 @@ struct Checked {
 }
 
 impl Service {
-    /// Makes a job and queues it. What comes back is on disk. Once begun, it goes on where the client gives up.
+    /// Creates a job, durably, and queues it. Runs to the end even if the client disconnects.
     ///
     /// # Errors
-    /// Input that cannot be used, a quota or a queue that is full, and those of the disk.
+    /// Input that cannot be used, a quota or a queue that is full, and storage errors.
     pub(crate) async fn create_cage_job(
         self: &Arc<Self>,
         tenant: &Arc<Tenant>,
@@ -97,8 +97,8 @@ impl Service {
             frames: part(frames_name, frames.bytes(), frames.digest()),
             idempotency,
         };
-        if let Some(twin) = self.cage_jobs.twin(&tenant.name, &meta.key, None)
-            && let Some(job) = self.create_finished(&meta, &twin).await
+        if let Some(duplicate) = self.cage_jobs.duplicate(&tenant.name, &meta.key, None)
+            && let Some(job) = self.create_finished(&meta, &duplicate).await
         {
             return Ok(job);
         }
@@ -119,12 +119,13 @@ impl Service {
         Ok(job)
     }
 
-    /// A job whose outcome a completed one has; none where that cannot be read.
-    async fn create_finished(self: &Arc<Self>, meta: &CageJobMeta, twin: &Arc<CageJob>) -> Option<Arc<CageJob>> {
-        let Phase::Completed(found) = twin.phase() else { return None };
-        let (store, twin, kept, finished) = (self.store.clone(), Arc::clone(twin), meta.clone(), found.clone());
+    /// Creates a job with the outcome of a completed one of the same input; `None` if that cannot be read.
+    async fn create_finished(self: &Arc<Self>, meta: &CageJobMeta, duplicate: &Arc<CageJob>) -> Option<Arc<CageJob>> {
+        let Phase::Completed(found) = duplicate.phase() else { return None };
+        let (store, duplicate, kept, finished) =
+            (self.store.clone(), Arc::clone(duplicate), meta.clone(), found.clone());
         let stored = blocking(move || {
-            let cage = twin.completed_cage(&store).ok()?;
+            let cage = duplicate.completed_cage(&store).ok()?;
             store.create_finished_cage_job(&kept, &Outcome::Completed(finished), &cage).ok()
         });
         stored.await.ok()??;
@@ -134,11 +135,11 @@ impl Service {
         Some(job)
     }
 
-    /// Goes on with a job found on disk: one that was not over begins anew. One whose outcome cannot be read is known as failed, so that it
-    /// can be deleted, and comes up when this is called again.
+    /// Resumes a job found on disk; one without outcome is designed from the start. If its outcome cannot be read, it is registered as
+    /// failed so that it can be deleted, and resumed when this is called again.
     ///
     /// # Errors
-    /// What the system says of its files.
+    /// I/O errors of its files.
     pub(crate) fn resume_cage_job(self: &Arc<Self>, meta: CageJobMeta) -> Result<(), StoreError> {
         let id = meta.id.clone();
         let (phase, error) = match self.store.cage_job_outcome(&id) {
@@ -149,7 +150,7 @@ impl Service {
                 tracing::warn!(job = %id, %error, "the outcome of a cage job is damaged, so the cage is designed again");
                 (Phase::Queued, None)
             }
-            Err(error) => (Phase::Failed(unread::problem(Kind::CageJob).problem), Some(error)),
+            Err(error) => (Phase::Failed(unreadable::problem(Kind::CageJob).problem), Some(error)),
         };
         let unfinished = matches!(phase, Phase::Queued);
         if !unfinished && error.is_none() {
@@ -163,7 +164,7 @@ impl Service {
         error.map_or(Ok(()), Err)
     }
 
-    /// Keeps the outcome of a job, then tells those who follow it.
+    /// Stores the outcome of a job, then notifies its followers.
     pub(super) async fn finish_cage_job(&self, job: &Arc<CageJob>, outcome: Outcome, cage: Option<Vec<u8>>) {
         let (store, id, kept) = (self.store.clone(), job.meta.id.clone(), outcome.clone());
         let stored = blocking(move || {
@@ -189,18 +190,23 @@ impl Service {
         job.set_phase(phase);
     }
 
-    /// Takes over the outcome of a job of the same input; false where that cannot be read.
-    pub(super) async fn adopt_outcome(&self, job: &Arc<CageJob>, twin: &Arc<CageJob>, found: Box<Finished>) -> bool {
-        let (store, twin) = (self.store.clone(), Arc::clone(twin));
-        let Ok(Ok(cage)) = blocking(move || twin.completed_cage(&store)).await else { return false };
+    /// Copies the outcome of a job of the same input; false if it cannot be read.
+    pub(super) async fn copy_outcome(
+        &self,
+        job: &Arc<CageJob>,
+        duplicate: &Arc<CageJob>,
+        found: Box<Finished>,
+    ) -> bool {
+        let (store, duplicate) = (self.store.clone(), Arc::clone(duplicate));
+        let Ok(Ok(cage)) = blocking(move || duplicate.completed_cage(&store)).await else { return false };
         self.finish_cage_job(job, Outcome::Completed(found), Some(cage.to_vec())).await;
         true
     }
 
-    /// Deletes a job; its design stops. Once begun, it goes on where the client gives up.
+    /// Deletes a job and stops its design. Runs to the end even if the client disconnects.
     ///
     /// # Errors
-    /// Those of the disk.
+    /// Storage errors.
     pub(crate) async fn delete_cage_job(self: &Arc<Self>, job: &Arc<CageJob>) -> Result<(), ApiError> {
         let (service, job) = (Arc::clone(self), Arc::clone(job));
         let work = tokio::spawn(async move {
@@ -222,12 +228,12 @@ impl Service {
 /// # Errors
 /// An option that is out of range, not available, or contradicts another.
 pub(crate) fn check_options(options: &CageOptions, config: &ServeConfig) -> Result<(), ApiError> {
-    wish::design_options(options, config.max_design_seconds).map(|_| ())
+    options::design_options(options, config.max_design_seconds).map(|_| ())
 }
 
-/// Reads rest pose and sample frames, so that who sends bad ones hears it at once. Blocks.
-fn check(new: &NewCageJob, tenant: &str, most_seconds: u64, most_bytes: u64) -> Result<Checked, ApiError> {
-    let design = wish::design_options(&new.options, most_seconds)?;
+/// Validates rest pose and sampled frames, so that errors are reported in the response. Blocks.
+fn check(new: &NewCageJob, tenant: &str, max_seconds: u64, max_bytes: u64) -> Result<Checked, ApiError> {
+    let design = options::design_options(&new.options, max_seconds)?;
     let rest = read_part("rest", &new.rest_name, &new.rest)?;
     check_extent(&rest)?;
     let points = rest.points.len();
@@ -236,12 +242,12 @@ fn check(new: &NewCageJob, tenant: &str, most_seconds: u64, most_bytes: u64) -> 
     let mut reader = samples::open(&new.frames_name, frames.stored(), frames.bytes(), points, new.options.frames)?;
     let frame_count = u32::try_from(reader.frames())
         .map_err(|_| ApiError::new(problem::INVALID_FRAME, "frames: there are more than 4294967295; send fewer"))?;
-    let count = samples::sampled(reader.frames(), points, most_bytes);
+    let count = samples::sampled(reader.frames(), points, max_bytes);
     if count < reader.frames().min(2) {
         let detail = format!(
-            "two frames of {points} points take more memory than the {most_bytes} bytes that a design may; use a lighter model"
+            "two frames of {points} points take more memory than the {max_bytes} bytes that a design may; use a lighter model"
         );
-        return Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(most_bytes));
+        return Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(max_bytes));
     }
     samples::read(&mut *reader, count, |_| ())?;
     let mut hasher = blake3::Hasher::new();

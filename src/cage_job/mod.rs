@@ -1,14 +1,14 @@
-//! Cage jobs: cages designed by example in the background, below everything that somebody waits for. A job is queued, running, completed
-//! or failed; what it is designed from lies in the store until it is over, so that a restart begins anew. Nothing about HTTP.
+//! Cage jobs, independent of HTTP: cages designed in the background from example frames, at the lowest priority. A job is queued, running,
+//! completed or failed; its input is stored until it has ended, so that a restart can begin it again.
 
 pub(crate) mod create;
+mod options;
 pub(crate) mod registry;
 mod run;
 mod samples;
-mod wish;
 
 pub use run::Designer;
-pub(crate) use run::{Designs, local_designer};
+pub(crate) use run::{DesignPool, local_designer};
 
 use crate::problem::{self, ApiError};
 use crate::session::lock;
@@ -25,7 +25,7 @@ use std::time::Instant;
 use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 
-/// A job as long as the service runs.
+/// A cage job in memory.
 pub(crate) struct CageJob {
     pub(crate) meta: CageJobMeta,
     status: Mutex<Status>,
@@ -35,15 +35,15 @@ pub(crate) struct CageJob {
     deleted: CancellationToken,
 }
 
-/// Where a job stands.
+/// State and progress of a job.
 #[derive(Default)]
 struct Status {
     phase: Phase,
     stage: Option<&'static str>,
     fraction: f64,
-    /// On held-back frames.
+    /// Error on the held-back frames.
     error: Option<f64>,
-    /// Frames that the design looks at.
+    /// Number of frames sampled.
     sampled: u32,
     best: Option<Best>,
     began: Option<Instant>,
@@ -58,7 +58,7 @@ enum Phase {
     Failed(Box<Problem>),
 }
 
-/// The best cage of a design that runs.
+/// The best cage so far of a running design.
 #[derive(Clone)]
 struct Best {
     obj: Bytes,
@@ -75,7 +75,7 @@ impl Best {
     }
 }
 
-/// How a job ended, as it is stored.
+/// The stored outcome of a job.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Outcome {
@@ -83,7 +83,7 @@ enum Outcome {
     Failed(Box<Problem>),
 }
 
-/// What came of a completed job, beside the cage.
+/// Results of a completed job, without the cage itself.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 struct Finished {
     vertices: u32,
@@ -98,9 +98,9 @@ struct Finished {
     cage_digest: String,
 }
 
-/// A cage that can be fetched.
+/// The cage of a job.
 pub(crate) enum Cage {
-    /// The best so far; another one may follow.
+    /// The best so far; a better one may follow.
     SoFar { obj: Bytes, digest: String },
     /// The result.
     Final { obj: Bytes, digest: String },
@@ -117,12 +117,12 @@ impl CageJob {
         }
     }
 
-    /// Changes with everything that happens to the job.
+    /// A counter that changes with every change of the job.
     pub(crate) fn changes(&self) -> watch::Receiver<u64> {
         self.version.subscribe()
     }
 
-    /// Becomes true when the job is deleted.
+    /// Cancelled when the job is deleted.
     pub(crate) fn deleted(&self) -> &CancellationToken {
         &self.deleted
     }
@@ -148,7 +148,7 @@ impl CageJob {
         lock(&self.status).phase.clone()
     }
 
-    /// What it is doing.
+    /// State of the job.
     pub(crate) fn state(&self) -> CageState {
         state_of(&lock(&self.status).phase)
     }
@@ -157,7 +157,7 @@ impl CageJob {
         lock(&self.status).sampled = sampled as u32;
     }
 
-    /// Takes over what a design tells of itself.
+    /// Takes over the progress that a design reports.
     fn progressed(&self, told: &DesignProgress<'_>) {
         let better = told.better.map(Best::new);
         {
@@ -170,7 +170,7 @@ impl CageJob {
         self.touch();
     }
 
-    /// Where it stands, for server-sent events.
+    /// State and progress, for server-sent events.
     pub(crate) fn progress(&self) -> CageProgress {
         let view = self.view();
         CageProgress {
@@ -182,7 +182,7 @@ impl CageJob {
         }
     }
 
-    /// The job as clients see it.
+    /// The job as returned by the API.
     pub(crate) fn view(&self) -> View {
         let status = lock(&self.status);
         let mut view = View {
@@ -218,10 +218,10 @@ impl CageJob {
         view
     }
 
-    /// The cage of the completed job. Blocks.
+    /// The cage of a completed job. Blocks.
     ///
     /// # Errors
-    /// A job that is not completed; damage, after which the job has failed and is out of the way.
+    /// `CAGE_NOT_READY`, `CAGE_FAILED`; damage, after which the job has failed and is in quarantine.
     pub(crate) fn completed_cage(&self, store: &Store) -> Result<Bytes, ApiError> {
         match self.cage(store)? {
             Cage::Final { obj, .. } => Ok(obj),
@@ -234,24 +234,24 @@ impl CageJob {
     /// The best cage there is. Blocks.
     ///
     /// # Errors
-    /// No cage, yet or ever; damage, after which the job has failed and is out of the way.
+    /// `CAGE_NOT_READY`, `CAGE_FAILED`; damage, after which the job has failed and is in quarantine.
     pub(crate) fn cage(&self, store: &Store) -> Result<Cage, ApiError> {
         let best = lock(&self.status).best.clone();
         match self.phase() {
             Phase::Completed(found) => {
                 let obj = store.cage_job_cage(&self.meta.id, found.cage_bytes, &found.cage_digest);
-                let obj = obj.map_err(|error| self.damaged_or(store, &error))?;
+                let obj = obj.map_err(|error| self.fail_if_damaged(store, &error))?;
                 Ok(Cage::Final { obj: obj.into(), digest: found.cage_digest })
             }
             Phase::Failed(problem) => Err(ApiError::new(problem::CAGE_FAILED, problem.detail)),
             Phase::Queued | Phase::Running => best
                 .map(|Best { obj, digest, .. }| Cage::SoFar { obj, digest })
-                .ok_or_else(|| not_ready("there is no cage yet; the design has not come to its first one")),
+                .ok_or_else(|| not_ready("there is no cage yet; wait for the first one of the design")),
         }
     }
 
-    /// What a client hears when the store refuses; damage puts the job aside.
-    fn damaged_or(&self, store: &Store, error: &StoreError) -> ApiError {
+    /// The response for a storage error; damage fails the job and quarantines it.
+    fn fail_if_damaged(&self, store: &Store, error: &StoreError) -> ApiError {
         if self.deleted.is_cancelled() {
             return ApiError::new(problem::NOT_FOUND, "the cage design was deleted");
         }
@@ -260,7 +260,7 @@ impl CageJob {
         };
         let failed = ApiError::new(
             problem::CAGE_FAILED,
-            "what is stored of this design is damaged; the operator finds it in quarantine, and the cage has to be designed again",
+            "stored data of this design is damaged and was moved to quarantine; request the design again",
         );
         tracing::error!(job = %self.meta.id, %error, "a cage job is damaged and put in quarantine");
         metrics::counter!("cager_quarantined_total").increment(1);

@@ -1,4 +1,4 @@
-//! Which cage jobs there are, whose they are, and which requests made them.
+//! All cage jobs by id and tenant, and the idempotency keys that created them.
 
 use super::{CageJob, Phase};
 use crate::idempotency::{Keyed, Requests};
@@ -39,7 +39,7 @@ impl CageJobs {
         }
     }
 
-    /// A tenant's job; another tenant's is not there.
+    /// A tenant's job; jobs of other tenants are not found.
     ///
     /// # Errors
     /// 404 where there is none.
@@ -69,19 +69,19 @@ impl CageJobs {
         mine.fold((0, 0), |(count, bytes), job| (count + 1, bytes + job.bytes.load(Relaxed)))
     }
 
-    /// Jobs that run or wait.
+    /// Number of jobs that run or wait.
     pub(crate) fn unfinished(&self) -> usize {
         lock(&self.inner).jobs.values().filter(|job| !job.state().is_final()).count()
     }
 
-    /// A tenant's jobs that wait.
+    /// Number of a tenant's jobs that wait.
     pub(crate) fn waiting_of(&self, tenant: &str) -> usize {
         let inner = lock(&self.inner);
         inner.jobs.values().filter(|job| job.meta.tenant == tenant && job.state() == CageState::Queued).count()
     }
 
-    /// A job of the same input: a completed one, or else one that comes before this and is not over yet.
-    pub(super) fn twin(
+    /// A job of the same input: a completed one, or else an unfinished one created before the job `before`.
+    pub(super) fn duplicate(
         &self,
         tenant: &str,
         key: &crate::store::ContentKey,

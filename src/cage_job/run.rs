@@ -1,6 +1,6 @@
-//! Running designs: a few at a time, tenants in turn, on threads that give way to everything else.
+//! Running designs: a limited number at a time, tenants in turn, on threads of the lowest priority.
 
-use super::{Best, CageJob, Finished, Outcome, Phase, samples, wish};
+use super::{Best, CageJob, Finished, Outcome, Phase, options, samples};
 use crate::admission::{Budget, Held};
 use crate::config::ServeConfig;
 use crate::engine::threads;
@@ -17,13 +17,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
-/// A design that does not keep to its time limit is stopped after so much more.
+/// How long after its time limit a design is stopped.
 const GRACE: Duration = Duration::from_secs(5);
 
-/// Beginnings of a design that never came to an end, after which it is given up: it may be what ends the process.
-const MOST_ATTEMPTS: u32 = 5;
+/// Number of attempts after which a design is given up, since it may be what crashes the process.
+const MAX_ATTEMPTS: u32 = 5;
 
-/// What designs cages; tests have others.
+/// Function that designs cages; tests replace it.
 pub type Designer = dyn Fn(
         &Model,
         &[Vec<f64>],
@@ -38,44 +38,44 @@ pub(crate) fn local_designer() -> Arc<Designer> {
     Arc::new(|rest, frames, options, watch| design(rest, frames, None, options, watch))
 }
 
-/// Where designs run.
-pub(crate) struct Designs {
+/// Threads and limits of designs.
+pub(crate) struct DesignPool {
     places: Arc<Budget>,
     pool: Arc<rayon::ThreadPool>,
     designer: Arc<Designer>,
-    /// Memory of sample frames.
+    /// Memory of sampled frames, in bytes.
     bytes: AtomicU64,
 }
 
-impl Designs {
+impl DesignPool {
     /// Starts the threads that design.
     ///
     /// # Errors
-    /// The system's, where threads cannot be started.
+    /// Threads cannot be started.
     pub(crate) fn new(config: &ServeConfig, designer: Arc<Designer>) -> std::io::Result<Self> {
-        let pool = Arc::new(threads::pool("design", config.workers, threads::GIVES_WAY_TO_ALL)?);
+        let pool = Arc::new(threads::pool("design", config.workers, threads::NICE_BACKGROUND)?);
         Ok(Self { places: config.budget(config.max_designs as u64), pool, designer, bytes: AtomicU64::new(0) })
     }
 
-    /// Memory of the frames that designs look at.
+    /// Memory of the frames of running designs, in bytes.
     pub(crate) fn bytes(&self) -> u64 {
         self.bytes.load(Relaxed)
     }
 }
 
-/// How a run ended.
-enum Ended {
+/// Result of a run.
+enum RunOutcome {
     Designed(Box<Finished>, Vec<u8>),
     Failed(ApiError),
-    /// The job was deleted, or the service stops: nothing is to be kept.
+    /// The job was deleted or the service is stopping; nothing is stored.
     Stopped,
 }
 
 impl Service {
-    /// Waits for the job's turn, designs its cage and keeps the outcome.
+    /// Waits for the job's turn, designs its cage and stores the outcome.
     pub(super) async fn run_cage_job(self: Arc<Self>, job: Arc<CageJob>) {
         let place = loop {
-            if let Some(place) = self.turn_of(&job).await {
+            if let Some(place) = self.wait_for_turn(&job).await {
                 break place;
             }
             if job.state().is_final() || job.deleted().is_cancelled() || self.stopping().is_cancelled() {
@@ -84,41 +84,42 @@ impl Service {
         };
         job.set_phase(Phase::Running);
         let (service, running) = (Arc::clone(&self), Arc::clone(&job));
-        let ended = blocking(move || service.design(&running, place)).await.unwrap_or_else(Ended::Failed);
+        let ended = blocking(move || service.design(&running, place)).await.unwrap_or_else(RunOutcome::Failed);
         match ended {
-            // An orderly end says nothing about the design.
-            Ended::Stopped => {
-                if let Err(error) = self.store.forget_beginning(&job.meta.id) {
+            // An orderly stop does not count as an attempt.
+            RunOutcome::Stopped => {
+                if let Err(error) = self.store.uncount_cage_job_attempt(&job.meta.id) {
                     tracing::debug!(job = %job.meta.id, %error, "the count of its beginnings stays");
                 }
             }
-            Ended::Designed(found, cage) => {
+            RunOutcome::Designed(found, cage) => {
                 self.finish_cage_job(&job, Outcome::Completed(found), Some(cage)).await;
             }
-            Ended::Failed(error) if error.status().is_client_error() => {
+            RunOutcome::Failed(error) if error.status().is_client_error() => {
                 tracing::info!(job = %job.meta.id, detail = %error.problem.detail, "no cage can be designed");
                 self.finish_cage_job(&job, Outcome::Failed(error.problem), None).await;
             }
-            // What may succeed another time is tried again after a restart.
-            Ended::Failed(error) => job.set_phase(Phase::Failed(error.problem)),
+            // Errors that may be temporary are retried after a restart.
+            RunOutcome::Failed(error) => job.set_phase(Phase::Failed(error.problem)),
         }
     }
 
-    /// A place to run in. None where another job of the same input has to be looked at again, or the job is over.
-    async fn turn_of(&self, job: &Arc<CageJob>) -> Option<Held> {
+    /// A permit to run; `None` if a job of the same input has to be looked at again, or the job has ended.
+    async fn wait_for_turn(&self, job: &Arc<CageJob>) -> Option<Held> {
         let (tenant, id) = (&job.meta.tenant, Some(job.meta.id.as_str()));
-        let twin = || self.cage_jobs.twin(tenant, &job.meta.key, id).filter(|twin| !Arc::ptr_eq(twin, job));
+        let duplicate =
+            || self.cage_jobs.duplicate(tenant, &job.meta.key, id).filter(|duplicate| !Arc::ptr_eq(duplicate, job));
         let mut unreadable = false;
-        if let Some(twin) = twin() {
-            let mut changes = twin.changes();
-            match twin.phase() {
-                Phase::Completed(found) if self.adopt_outcome(job, &twin, found.clone()).await => return None,
-                // It cannot be read, and has failed by now.
+        if let Some(duplicate) = duplicate() {
+            let mut changes = duplicate.changes();
+            match duplicate.phase() {
+                Phase::Completed(found) if self.copy_outcome(job, &duplicate, found.clone()).await => return None,
+                // Its cage could not be read, and it has failed by now.
                 Phase::Completed(_) | Phase::Failed(_) => unreadable = true,
                 Phase::Queued | Phase::Running => {
                     tokio::select! {
                         _ = changes.changed() => {}
-                        () = twin.deleted().cancelled() => {}
+                        () = duplicate.deleted().cancelled() => {}
                         () = job.deleted().cancelled() => {}
                         () = self.stopping().cancelled() => {}
                     }
@@ -131,18 +132,18 @@ impl Service {
             () = job.deleted().cancelled() => return None,
             () = self.stopping().cancelled() => return None,
         };
-        // One may have been completed meanwhile, and is looked at; one that could not be read is not looked at again.
-        let completed = |twin: &Arc<CageJob>| matches!(twin.phase(), Phase::Completed(_));
-        if !unreadable && twin().as_ref().is_some_and(completed) { None } else { Some(place) }
+        // A job of the same input may have been completed meanwhile; one that could not be read is not tried again.
+        let completed = |duplicate: &Arc<CageJob>| matches!(duplicate.phase(), Phase::Completed(_));
+        if !unreadable && duplicate().as_ref().is_some_and(completed) { None } else { Some(place) }
     }
 
-    /// Designs the cage of a job. Blocks.
-    fn design(&self, job: &Arc<CageJob>, _place: Held) -> Ended {
+    /// Runs the design of a job. Blocks.
+    fn design(&self, job: &Arc<CageJob>, _place: Held) -> RunOutcome {
         let clock = Instant::now();
         let ended = match self.design_with(job, clock) {
-            Ok(_) | Err(_) if job.deleted().is_cancelled() || self.stopping().is_cancelled() => Ended::Stopped,
-            Ok((found, cage)) => Ended::Designed(Box::new(found), cage),
-            Err(error) => Ended::Failed(error),
+            Ok(_) | Err(_) if job.deleted().is_cancelled() || self.stopping().is_cancelled() => RunOutcome::Stopped,
+            Ok((found, cage)) => RunOutcome::Designed(Box::new(found), cage),
+            Err(error) => RunOutcome::Failed(error),
         };
         metrics::histogram!("cager_design_seconds").record(clock.elapsed().as_secs_f64());
         ended
@@ -150,20 +151,20 @@ impl Service {
 
     fn design_with(&self, job: &Arc<CageJob>, clock: Instant) -> Result<(Finished, Vec<u8>), ApiError> {
         let meta = &job.meta;
-        let damaged = |error: StoreError| job.damaged_or(&self.store, &error);
-        if self.store.begin_cage_job(&meta.id).map_err(damaged)? > MOST_ATTEMPTS {
+        let damaged = |error: StoreError| job.fail_if_damaged(&self.store, &error);
+        if self.store.count_cage_job_attempt(&meta.id).map_err(damaged)? > MAX_ATTEMPTS {
             let detail = format!(
-                "the service ended {MOST_ATTEMPTS} times while this cage was designed, so it is given up; try a lighter model, or fewer frames"
+                "the service ended {MAX_ATTEMPTS} times while this cage was designed, so it is given up; try a lighter model, or fewer frames"
             );
             return Err(ApiError::new(problem::INVALID_GEOMETRY, detail));
         }
-        let options = wish::design_options(&meta.options, self.config.max_design_seconds.max(1))?;
+        let options = options::design_options(&meta.options, self.config.max_design_seconds.max(1))?;
         let rest = read_part("rest", &meta.rest.name, &self.store.cage_job_rest(meta).map_err(damaged)?)?;
         let frames = self.store.cage_job_frames(meta).map_err(damaged)?;
         let bytes = frames.bytes();
         let mut reader = samples::open(&meta.frames.name, frames, bytes, meta.points as usize, meta.options.frames)?;
         let count = samples::sampled(reader.frames(), rest.points.len(), self.config.max_design_bytes);
-        let taken = Taken::new(&self.designs.bytes, 24 * count as u64 * u64::from(meta.points));
+        let taken = TrackedMemory::new(&self.designs.bytes, 24 * count as u64 * u64::from(meta.points));
         let mut frames = Vec::with_capacity(count);
         samples::read(&mut *reader, count, |frame| frames.push(frame.to_vec()))?;
         drop(reader);
@@ -211,7 +212,7 @@ fn finished(designed: &Design, best: &Best, sampled: usize, told: Option<f64>, c
     }
 }
 
-/// What a client hears of a design that came to nothing.
+/// The response for a failed design.
 fn refused(error: &DesignError) -> ApiError {
     use cager_cages::EncloseError::TooFewVertices;
     match error {
@@ -226,20 +227,20 @@ fn refused(error: &DesignError) -> ApiError {
     }
 }
 
-/// Memory in use, until it is dropped.
-struct Taken<'a> {
+/// Counts memory in use until it is dropped.
+struct TrackedMemory<'a> {
     all: &'a AtomicU64,
     bytes: u64,
 }
 
-impl<'a> Taken<'a> {
+impl<'a> TrackedMemory<'a> {
     fn new(all: &'a AtomicU64, bytes: u64) -> Self {
         all.fetch_add(bytes, Relaxed);
         Self { all, bytes }
     }
 }
 
-impl Drop for Taken<'_> {
+impl Drop for TrackedMemory<'_> {
     fn drop(&mut self) {
         self.all.fetch_sub(self.bytes, Relaxed);
     }

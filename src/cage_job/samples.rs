@@ -1,21 +1,21 @@
-//! The frames that a design looks at: evenly spaced ones of those that were sent, one read at a time.
+//! Sampling evenly spaced frames of an uploaded capture, one read at a time.
 
 use crate::problem::{self, ApiError};
 use cager_formats::{CacheFormat, Error, FrameReader, open_frames_in};
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// A design looks at no more frames: beyond these it gains little and takes longer.
-const MOST_FRAMES: usize = 160;
+/// Most frames that a design samples; more hardly improve it.
+const MAX_SAMPLED_FRAMES: usize = 160;
 
-/// How many of so many frames are looked at where they may take `most_bytes` of memory; 0 where not even one fits.
-pub(super) fn sampled(frames: usize, points: usize, most_bytes: u64) -> usize {
-    let room = most_bytes / (24 * points.max(1) as u64);
-    frames.min(MOST_FRAMES).min(usize::try_from(room).unwrap_or(usize::MAX))
+/// Number of frames to sample within `max_bytes` of memory; 0 if not even one fits.
+pub(super) fn sampled(frames: usize, points: usize, max_bytes: u64) -> usize {
+    let room = max_bytes / (24 * points.max(1) as u64);
+    frames.min(MAX_SAMPLED_FRAMES).min(usize::try_from(room).unwrap_or(usize::MAX))
 }
 
-/// Opens frames that were sent under a file name: a point cache where its ending says so, else raw little-endian f32, which need their
-/// number.
+/// Opens uploaded frames: a point cache if the file name's extension says so, otherwise raw little-endian f32, which need the option
+/// `frames`.
 ///
 /// # Errors
 /// A length or a number of points that does not match.
@@ -50,7 +50,7 @@ pub(super) fn open<'a>(
     Ok(Box::new(RawFrames { path: path.to_owned(), source, points, frames: frames as usize, next: 0 }))
 }
 
-/// Reads `count` evenly spaced frames, the first and the last among them, and hands each over.
+/// Reads `count` evenly spaced frames, including the first and the last, and passes each to `each`.
 ///
 /// # Errors
 /// A frame that cannot be read, or has a coordinate that is NaN or infinite.

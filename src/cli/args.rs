@@ -1,4 +1,4 @@
-//! What can be typed: one definition gives parsing, help and shell completions.
+//! Command-line arguments: one definition gives parsing, help and shell completions.
 
 use super::cage_args::CageArgs;
 use super::checks::{CaptureArgs, CheckArgs, TimingArgs};
@@ -26,15 +26,15 @@ use std::path::PathBuf;
 #[command(name = "cager", version = env!("CAGER_VERSION"), max_term_width = 100, arg_required_else_help = true)]
 pub(crate) struct Cli {
     #[command(flatten)]
-    pub(crate) manners: Manners,
+    pub(crate) global_args: GlobalArgs,
 
     #[command(subcommand)]
     pub(crate) command: Command,
 }
 
-/// How every command works and what it says.
+/// Options of every command.
 #[derive(Args, Debug)]
-pub(crate) struct Manners {
+pub(crate) struct GlobalArgs {
     /// Threads to work on [default: one for each processor].
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
@@ -283,7 +283,7 @@ pub(crate) struct CompareArgs {
 
 /// Ask a service on this machine whether it is ready: exit status 0, or 1 with the reason.
 ///
-/// For containers and scripts that have no curl. Of a service with TLS it sees only that it lives.
+/// For containers and scripts that have no curl. For a service with TLS it reports only whether it is alive.
 /// Example: cager health --address 127.0.0.1:8080
 #[derive(Args, Debug)]
 pub(crate) struct HealthArgs {
@@ -291,7 +291,7 @@ pub(crate) struct HealthArgs {
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub(crate) address: Option<SocketAddr>,
 
-    /// Ask only whether it lives, not whether it is ready.
+    /// Ask only whether it is alive, not whether it is ready.
     #[arg(long)]
     pub(crate) live: bool,
 

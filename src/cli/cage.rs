@@ -1,9 +1,9 @@
-//! `cager cage`: cages made, designed, improved.
+//! `cager cage`: generates, designs and improves cages.
 
 use super::cage_args::{CageArgs, GeneralArg};
 use super::checks::check_capture;
-use super::design::{self, usual_vertices};
-use super::dry_run::{read_files, tell_would};
+use super::design::{self, default_vertices};
+use super::dry_run::{read_files, tell_dry_run};
 use super::outputs::Outputs;
 use super::{grouped, tell, warn};
 use crate::design::{read_frames, report as design_report};
@@ -54,7 +54,7 @@ pub(super) fn run(args: &CageArgs) -> Result<()> {
         );
     }
     if args.check.is_some() || args.repair.is_some() {
-        return super::doctor::run(args, &targets, rest);
+        return super::diagnosis::run(args, &targets, rest);
     }
     if let Some(clearance) = args.clearance
         && !(0.0..=MOST_CLEARANCE).contains(&clearance)
@@ -66,9 +66,9 @@ pub(super) fn run(args: &CageArgs) -> Result<()> {
         if let Some(frames) = &args.frames {
             read_files(&Motion::new(args, rest, frames)?.files)?;
         }
-        return tell_would(output, "a cage", &[targets.report.clone(), targets.picture.clone()]);
+        return tell_dry_run(output, "a cage", &[targets.report.clone(), targets.picture.clone()]);
     }
-    let vertices = args.vertices.map_or(usual_vertices(rest.points.len()), |n| n as usize);
+    let vertices = args.vertices.map_or(default_vertices(rest.points.len()), |n| n as usize);
     let mut warnings = Vec::new();
     let (cage, report) = match (&args.frames, args.general) {
         (Some(frames), None) => designed(args, rest, frames, &mut warnings)?,
@@ -102,7 +102,7 @@ impl Targets {
         let mut outputs = Outputs::new(args.outputs, inputs)?;
         let output = args.output.as_ref().map(|path| outputs.text(path)).transpose()?;
         if let Some(output) = &output {
-            // Any model will do to learn whether its name is one of a mesh that is written.
+            // Fails early for an extension that is not written; any model will do.
             cage_bytes(output, &Model { points: vec![[0.0; 3]], faces: Polygons::new() })?;
         }
         Ok(Self {
@@ -122,10 +122,10 @@ impl Targets {
         if let Some(target) = &self.report {
             let mut text = serde_json::to_vec_pretty(report)?;
             text.push(b'\n');
-            files.push(whole(target, &text)?);
+            files.push(complete_file(target, &text)?);
         }
         if let Some(target) = &self.picture {
-            files.push(whole(target, &picture())?);
+            files.push(complete_file(target, &picture())?);
         }
         Ok(files)
     }
@@ -207,7 +207,7 @@ fn finish(
         seconds: clock.elapsed().as_secs_f64(),
         warnings,
     };
-    let mut complete = vec![whole(output, &cage_bytes(output, cage)?)?];
+    let mut complete = vec![complete_file(output, &cage_bytes(output, cage)?)?];
     complete.extend(targets.complete(&report, || picture_of(args, &together(models), &mesh))?);
     commit_together(complete)?;
     warn(&report.warnings);
@@ -227,7 +227,7 @@ pub(super) fn picture_of(args: &CageArgs, model: &TriMesh, cage: &TriMesh) -> Ve
     picture::of_cage(model, cage, args.up)
 }
 
-pub(super) fn whole(target: &Target, bytes: &[u8]) -> Result<AtomicFile> {
+pub(super) fn complete_file(target: &Target, bytes: &[u8]) -> Result<AtomicFile> {
     let mut file = AtomicFile::create(target)?;
     file.write_all(bytes)?;
     Ok(file)

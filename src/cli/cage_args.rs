@@ -1,4 +1,4 @@
-//! What can be typed after `cager cage`.
+//! Arguments of `cager cage`.
 
 use super::checks::CheckArgs;
 use super::names;

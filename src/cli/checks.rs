@@ -1,19 +1,18 @@
-//! What is checked before an encoding or a design: that rest pose, cage and capture belong together. A mistake ends the work, unless
-//! --force turns it into a warning.
+//! Checks before an encoding or a design that rest pose, cage and capture match. A mismatch is an error, or a warning with --force.
 
 use super::warn;
-use crate::belong::{self, Mismatch, Up, mismatches};
 use crate::encode::{EncodeError, sample_frames};
 use crate::frames::CaptureFiles;
+use crate::mismatch::{self, Mismatch, Up, mismatches};
 use crate::timing::Timing;
 use anyhow::{Result, bail};
-use cager_cages::doctor::{misfit, weld};
+use cager_cages::diagnosis::{alignment, weld};
 use cager_cages::geometry::outside;
 use cager_core::mesh::{Model, TriMesh, diagonal};
 use clap::Args;
 use std::path::Path;
 
-/// A cage so many times larger than its model is looked at more closely.
+/// A cage larger than its model by this factor is checked for other units.
 const ROOMY: f64 = 5.0;
 
 /// How a capture is read, where its files do not tell.
@@ -99,7 +98,7 @@ pub(super) fn capture_files(args: &CaptureArgs, path: &Path, rest: &mut Model) -
 /// Compares some frames of a capture with its rest pose.
 pub(super) fn check_capture(files: &CaptureFiles, rest: (&Path, &Model), args: &CheckArgs, turns: bool) -> Result<()> {
     let opened = files.open().map_err(EncodeError::from);
-    let frames = opened.and_then(|mut reader| sample_frames(reader.as_mut(), belong::FRAMES, false));
+    let frames = opened.and_then(|mut reader| sample_frames(reader.as_mut(), mismatch::FRAMES, false));
     let frames = frames.map_err(|error| explained(error, files, rest))?;
     let found = mismatches(rest.1, &frames);
     if found.is_empty() {
@@ -123,21 +122,21 @@ pub(super) fn check_capture(files: &CaptureFiles, rest: (&Path, &Model), args: &
     refuse_or_warn(what, &format!("; {advice}"), args.force)
 }
 
-/// Whether a cage of other units or axes was given, or that of another model; asked where it leaves most points outside, or is far larger than the model.
+/// Checks a cage that leaves most points outside, or is far larger than the model, for other units or axes and for belonging to another model.
 pub(super) fn check_cage(cage: (&Path, &TriMesh), rest: &Model, args: &CheckArgs) -> Result<()> {
     let missed = outside(cage.1, &rest.points).len();
     let most_outside = 2 * missed > rest.points.len();
     if !most_outside && diagonal(&cage.1.vertices) <= ROOMY * diagonal(&rest.points) {
         return Ok(());
     }
-    let misfit = misfit(cage.1, rest).filter(|found| most_outside || found.shift == [0.0; 3]);
+    let alignment = alignment(cage.1, rest).filter(|found| most_outside || found.shift == [0.0; 3]);
     let nearly_all = 10 * missed > 9 * rest.points.len();
     let path = cage.0.display();
     let leaves = || format!("{path}: leaves {missed} of {} points of the rest pose outside", rest.points.len());
-    let what = match misfit {
-        Some(misfit) if most_outside => format!("{}, and {misfit}", leaves()),
-        Some(misfit) => format!(
-            "{path}: is {:.0} times larger than the rest pose, and {misfit}",
+    let what = match alignment {
+        Some(alignment) if most_outside => format!("{}, and {alignment}", leaves()),
+        Some(alignment) => format!(
+            "{path}: is {:.0} times larger than the rest pose, and {alignment}",
             diagonal(&cage.1.vertices) / diagonal(&rest.points)
         ),
         None if nearly_all => format!("{}; it looks like the cage of another model", leaves()),
@@ -154,7 +153,7 @@ fn refuse_or_warn(what: String, advice: &str, force: bool) -> Result<()> {
     Ok(())
 }
 
-/// Numbers of points that differ by what seams split are told as that.
+/// Explains a wrong number of points where welding seams would make it right.
 fn explained(error: EncodeError, files: &CaptureFiles, (path, rest): (&Path, &Model)) -> anyhow::Error {
     use cager_formats::Error::PointCount;
     match error {

@@ -2,9 +2,9 @@
 
 use super::args::CompareArgs;
 use super::checks::{check_cage, check_capture};
-use super::dry_run::{read_all, tell_would};
+use super::dry_run::{read_all, tell_dry_run};
 use super::outputs::Outputs;
-use super::solver_options::{blame, read_cage};
+use super::solver_options::{read_cage, with_input_name};
 use super::{human_bytes, plain, progress};
 use crate::compare::{CompareError, Figures, Job, Progress, compare, page, seconds};
 use crate::coordinates;
@@ -35,7 +35,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     if args.outputs.dry_run {
         let frames = read_all(open()?.as_mut())?;
         let what = format!("a comparison on at most {} of {frames} frames", args.frames_at_most.min(frames as u32));
-        return tell_would(&output, &what, &[json]);
+        return tell_dry_run(&output, &what, &[json]);
     }
     let mut report = AtomicFile::create(&output)?;
     let json = json.as_ref().map(AtomicFile::create).transpose()?;
@@ -58,7 +58,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     let result = compare(&job, &mut Progress { tell: &mut |step, done| show(&bar, step, done, expected) });
     bar.finish_and_clear();
     let (figures, pictures) = result.map_err(|error| match error {
-        CompareError::Prepare(error) => blame(&error, &args.rest, &args.cage),
+        CompareError::Prepare(error) => with_input_name(&error, &args.rest, &args.cage),
         CompareError::Formats(error) => error.into(),
     })?;
 

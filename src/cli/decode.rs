@@ -1,10 +1,10 @@
 //! `cager decode`.
 
 use super::args::DecodeArgs;
-use super::dry_run::{size, tell_would};
+use super::dry_run::{size, tell_dry_run};
 use super::outputs::Outputs;
 use super::{grouped, progress, tell, warn};
-use crate::cages_out::write_cages;
+use crate::cage_export::write_cages;
 use crate::decode::{self, Decoding};
 use crate::edited::EditedCages;
 use anyhow::Result;
@@ -38,7 +38,7 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
         }
         if dry_run {
             let rest = found.rest.map(Target::Replacing);
-            return tell_would(&output, &size(found.frames, found.vertices as usize, "vertices"), &[rest]);
+            return tell_dry_run(&output, &size(found.frames, found.vertices as usize, "vertices"), &[rest]);
         }
         let rest =
             found.rest.map_or_else(String::new, |path| format!("; the rest cage with its faces is {}", path.display()));
@@ -57,16 +57,16 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
         dry_run,
         memory: args.memory,
     };
-    let bar = progress::Prepared::new("decoding", taken);
+    let bar = progress::PreparationBar::new("decoding", taken);
     let result = decode::decode(&args.input, &output, what, &mut |done| bar.done(done));
     bar.finish();
     let found = result?;
-    // Of the file's own model, the encoding said so.
+    // For the file's own model, encoding has warned already.
     if let (Some(path), true) = (&transfer.model, found.outside > 0) {
         warn(&[outside(path, found.outside, found.points)]);
     }
     if dry_run {
-        return tell_would(&output, &size(found.frames, found.points, "points"), &[]);
+        return tell_dry_run(&output, &size(found.frames, found.points, "points"), &[]);
     }
     tell(&format!(
         "{}: {} frames of {} points in {:.3} s\n",

@@ -2,7 +2,7 @@
 
 use super::args::DemoArgs;
 use super::encode_summary::write_report;
-use super::own_service::OwnService;
+use super::local_service::LocalService;
 use super::{grouped, human_bytes, interrupt, progress, tell};
 use crate::decode::{self, Decoding};
 use crate::encode::Encoded;
@@ -30,14 +30,14 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
     }));
     let cage = Cage::new(capture.cage.clone()).context("the built-in cage")?;
     let folder = &args.output;
-    interrupt::leaves_nothing()?;
+    interrupt::remove_temporaries_on_signal()?;
     std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     let (rest_file, cage_file) = (folder.join("rest.obj"), folder.join("cage.obj"));
     write_model(&rest_file, &capture.rest)?;
     write_model(&cage_file, &as_model(&cage))?;
 
     // There rather than in the system's folder for temporaries, which may be small, or memory.
-    let service = OwnService::start(folder)?;
+    let service = LocalService::start(folder)?;
     let output = folder.join("capture.cager");
     let job = RemoteJob {
         address: service.address(),

@@ -1,4 +1,4 @@
-//! Designing a cage while a bar shows how its error falls: what `cager cage` and `cager encode` share.
+//! Cage design with a progress bar, for `cager cage` and `cager encode`.
 
 use super::progress;
 use anyhow::{Result, bail};
@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 /// Vertices of a cage where no number is given: fewer for a model whose points could not determine so many.
-pub(super) fn usual_vertices(points: usize) -> usize {
+pub(super) fn default_vertices(points: usize) -> usize {
     350.min(points / 2).max(4)
 }
 
@@ -25,11 +25,11 @@ pub(super) fn goal(vertices: Option<u32>, mean_error: Option<f64>, points: usize
             bail!("--mean-error: is {error}; give a fraction of the rest pose's diagonal above 0, such as 0.001")
         }
         Some(error) => Ok(Goal::MeanError(error)),
-        None => Ok(Goal::Vertices(vertices.map_or(usual_vertices(points), |n| n as usize))),
+        None => Ok(Goal::Vertices(vertices.map_or(default_vertices(points), |n| n as usize))),
     }
 }
 
-/// Designs a cage; errors name the file that is to blame.
+/// Designs a cage; errors name the file that caused them.
 pub(super) fn design(
     rest: (&Path, &Model),
     frames: (&Path, &[Vec<f64>]),

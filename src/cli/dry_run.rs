@@ -1,4 +1,4 @@
-//! `--dry-run`: what is checked, and what is said, where nothing is written.
+//! `--dry-run`: checks and reports without writing anything.
 
 use super::{grouped, human_bytes, progress, tell};
 use crate::encode::EncodeError;
@@ -31,7 +31,7 @@ pub(super) fn read_files(files: &CaptureFiles) -> Result<usize> {
 }
 
 /// Says what would be written: what the main output holds, and which others there are.
-pub(super) fn tell_would(output: &Target, what: &str, others: &[Option<Target>]) -> Result<()> {
+pub(super) fn tell_dry_run(output: &Target, what: &str, others: &[Option<Target>]) -> Result<()> {
     let mut text = format!("{}: would be written: {what}\n", output.path().display());
     for target in others.iter().flatten() {
         text += &format!("{}: would be written\n", target.path().display());

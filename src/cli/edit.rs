@@ -1,6 +1,6 @@
 //! `cager edit`.
 
-use super::dry_run::{size, tell_would};
+use super::dry_run::{size, tell_dry_run};
 use super::outputs::Outputs;
 use super::transfer_args::EditArgs;
 use super::{grouped, progress, tell};
@@ -19,7 +19,7 @@ pub(super) fn run(args: &EditArgs) -> Result<()> {
     bar.finish_and_clear();
     let found = result?;
     if args.outputs.dry_run {
-        return tell_would(&output, &size(found.frames, rows, "vertices"), &[]);
+        return tell_dry_run(&output, &size(found.frames, rows, "vertices"), &[]);
     }
     commit_together(vec![found.container])?;
     tell(&format!(

@@ -2,10 +2,12 @@
 
 use super::args::{EncodeArgs, SpectrumArg};
 use super::checks::{capture_files, check_cage, check_capture};
-use super::dry_run::{read_files, size, tell_would};
+use super::dry_run::{read_files, size, tell_dry_run};
 use super::encode_summary::{summary, write_report};
 use super::outputs::Outputs;
-use super::solver_options::{blame, designed_spectrum, matrix, read_cage, solver, solver_for, spectrum_bound};
+use super::solver_options::{
+    designed_spectrum, matrix, read_cage, solver, solver_for, spectrum_bound, with_input_name,
+};
 use super::{design, encode_remote, grouped, progress, tell, warn};
 use crate::design::{read_frames, report as design_report};
 use crate::encode::{self, ChooseSpectrum, EncodeProgress, Encoded, Job, sample_frames};
@@ -41,10 +43,10 @@ pub(super) fn run(args: &EncodeArgs) -> Result<()> {
         return dry_run(args, &targets, &files, &rest, cage.as_ref());
     }
     match (&args.server, &cage) {
-        (None, Some(cage)) => here(args, &targets, &files, &rest, cage, None, clock),
+        (None, Some(cage)) => encode_locally(args, &targets, &files, &rest, cage, None, clock),
         (None, None) => {
             let (cage, report) = designed(args, &files, &rest)?;
-            here(args, &targets, &files, &rest, &cage, Some(report), clock)
+            encode_locally(args, &targets, &files, &rest, &cage, Some(report), clock)
         }
         (Some(address), cage) => encode_remote::run(args, &targets, address, files, &rest, cage.as_ref(), clock),
     }
@@ -97,7 +99,7 @@ fn dry_run(
             format!("{} frames; a cage would be designed from them first", grouped(read_files(files)?))
         }
     };
-    tell_would(&targets.output, &what, std::slice::from_ref(&targets.report))
+    tell_dry_run(&targets.output, &what, std::slice::from_ref(&targets.report))
 }
 
 /// How a cage is designed. Mean value coordinates do without a tidy one; the others want all points inside.
@@ -128,7 +130,7 @@ fn designed(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<(Ca
     Ok((cage, report))
 }
 
-fn here(
+fn encode_locally(
     args: &EncodeArgs,
     targets: &Targets,
     files: &CaptureFiles,
@@ -155,7 +157,7 @@ fn here(
     };
     let report_file = targets.begin_report()?;
 
-    let bar = progress::Prepared::new("encoding", frames.frames())
+    let bar = progress::PreparationBar::new("encoding", frames.frames())
         .expecting(|| seconds_to_prepare(system, cage, rest.points.len()));
     let job = Job {
         rest,
@@ -216,7 +218,7 @@ pub(super) fn finish(
     tell(&summary(&report, targets.output.path()))
 }
 
-/// Errors of the mathematics know vertices and points; the user knows files.
+/// Errors of `core` know vertices and points; the user needs the file.
 fn name_files(error: encode::EncodeError, args: &EncodeArgs) -> anyhow::Error {
     match error {
         encode::EncodeError::Prepare(inner) => name_file(&inner, args),
@@ -228,6 +230,6 @@ fn name_files(error: encode::EncodeError, args: &EncodeArgs) -> anyhow::Error {
 fn name_file(error: &PrepareError, args: &EncodeArgs) -> anyhow::Error {
     match (error, &args.solver.regularizer_matrix) {
         (PrepareError::Term(_), Some(matrix)) => anyhow::anyhow!("{}: {error}", matrix.display()),
-        _ => blame(error, &args.rest, args.cage.as_deref().unwrap_or(&args.rest)),
+        _ => with_input_name(error, &args.rest, args.cage.as_deref().unwrap_or(&args.rest)),
     }
 }

@@ -1,4 +1,4 @@
-//! What `cager encode` tells: its summary and its report.
+//! Summary and report of `cager encode`.
 
 use super::{grouped, human_bytes, is_verbose};
 use anyhow::Result;

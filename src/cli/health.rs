@@ -43,7 +43,7 @@ pub(super) fn run(args: &HealthArgs) -> Result<()> {
     }
 }
 
-/// What listens on all addresses is asked at the machine's own.
+/// Replaces an unspecified listening address by the loopback address.
 fn reachable(address: SocketAddr) -> SocketAddr {
     let ip = match address.ip() {
         IpAddr::V4(Ipv4Addr::UNSPECIFIED) => Ipv4Addr::LOCALHOST.into(),

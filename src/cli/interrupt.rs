@@ -1,4 +1,4 @@
-//! Ctrl-C and its like, while there are outputs that are not complete.
+//! Handling of SIGINT and similar signals while outputs are incomplete.
 
 use anyhow::Result;
 
@@ -10,7 +10,7 @@ use anyhow::Result;
 ///
 /// # Errors
 /// No thread or handler for signals to be had.
-pub(super) fn leaves_nothing() -> Result<()> {
+pub(super) fn remove_temporaries_on_signal() -> Result<()> {
     #[cfg(unix)]
     unix::install()?;
     // On Windows, Ctrl-C leaves what it always did: a temporary file or folder that begins with `.cager-`.

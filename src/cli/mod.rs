@@ -8,20 +8,20 @@ mod compare;
 mod decode;
 mod demo;
 mod design;
-mod doctor;
+mod diagnosis;
 mod dry_run;
 mod edit;
 mod encode;
 mod encode_remote;
 mod encode_summary;
+mod global_args;
 mod health;
 mod inspect;
 mod interrupt;
-mod manners;
+mod local_service;
 mod manual;
 mod names;
 mod outputs;
-mod own_service;
 mod progress;
 pub(crate) mod serve;
 mod solver_options;
@@ -30,17 +30,17 @@ mod transfer_args;
 use crate::plot::grouped;
 use args::{Cli, Command};
 use clap::{CommandFactory, Parser};
-pub(crate) use manners::{is_quiet, is_verbose, tell};
+pub(crate) use global_args::{is_quiet, is_verbose, tell};
 use std::io::Write;
 use std::process::ExitCode;
 
 /// Runs the command given to this process. Exit status 0 done, 1 failed, 2 wrong usage.
 pub fn run() -> ExitCode {
-    let Cli { manners, command } = match Cli::try_parse() {
+    let Cli { global_args, command } = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => return refused(&error),
     };
-    if let Err(error) = manners.adopt() {
+    if let Err(error) = global_args.apply() {
         let _ = writeln!(std::io::stderr(), "cager: {error:#}");
         return ExitCode::FAILURE;
     }
@@ -92,7 +92,7 @@ fn refused(error: &clap::Error) -> ExitCode {
 
 /// Writes to stdout, or to stderr where stdout holds an output; a reader that has seen enough, as `head` has, is no failure.
 fn print(text: &str) -> anyhow::Result<()> {
-    if manners::stdout_is_taken() {
+    if global_args::stdout_is_taken() {
         // As for errors, nowhere is left to report a closed stderr to.
         let _ = std::io::stderr().write_all(text.as_bytes());
         return Ok(());
@@ -112,7 +112,7 @@ fn warn(warnings: &[String]) {
     }
 }
 
-/// Text of a file's own, without what would move a terminal's cursor or change its colours.
+/// Untrusted text with control characters replaced, so that it cannot control the terminal.
 fn plain(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
 }

@@ -1,6 +1,6 @@
-//! Where outputs go, and where they may not.
+//! Validation of output paths.
 
-use super::{interrupt, manners};
+use super::{global_args, interrupt};
 use anyhow::{Result, bail};
 use cager_formats::atomic::destination;
 use cager_formats::{AtomicFile, Target, frame_files, frames_path};
@@ -31,7 +31,7 @@ pub(super) struct Outputs {
 impl Outputs {
     /// Outputs that may not be in place of these inputs, files or captures.
     pub(super) fn new<'a>(args: OutputArgs, inputs: impl IntoIterator<Item = &'a PathBuf>) -> Result<Self> {
-        interrupt::leaves_nothing()?;
+        interrupt::remove_temporaries_on_signal()?;
         let inputs = inputs.into_iter().flat_map(frame_files).filter_map(|path| path.canonicalize().ok()).collect();
         Ok(Self { overwrite: args.overwrite, inputs, taken: Vec::new() })
     }
@@ -44,7 +44,7 @@ impl Outputs {
         Ok(target)
     }
 
-    /// A file that is nothing for a terminal, called like `example`.
+    /// A binary file, refused on a terminal with a hint to redirect it as in `example`.
     pub(super) fn binary(&mut self, path: &Path, example: &str) -> Result<Target> {
         refuse_terminal(path, example)?;
         self.text(path)
@@ -74,7 +74,7 @@ impl Outputs {
     fn target(&mut self, path: &Path, place: &Path) -> Result<Target> {
         let shown = path.display();
         if path.as_os_str() == "-" {
-            if !manners::take_stdout() {
+            if !global_args::take_stdout() {
                 bail!("-: standard output cannot hold two outputs; name a file for one of them");
             }
             return Ok(Target::StandardOutput);

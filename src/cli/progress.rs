@@ -1,4 +1,4 @@
-//! Progress on terminals, silence in pipes.
+//! Progress bars on terminals; nothing in pipes.
 
 use super::is_quiet;
 use cager_proto::cage_messages::CageProgress;
@@ -33,14 +33,14 @@ pub(crate) fn steps() -> ProgressBar {
 }
 
 /// What is being prepared, with a clock that ticks; then a bar over frames.
-pub(crate) struct Prepared {
+pub(crate) struct PreparationBar {
     what: &'static str,
     total: usize,
     clock: ProgressBar,
     frames: OnceCell<ProgressBar>,
 }
 
-impl Prepared {
+impl PreparationBar {
     pub(crate) fn new(what: &'static str, total: usize) -> Self {
         let clock = steps();
         if !clock.is_hidden() {

@@ -77,7 +77,7 @@ pub(crate) async fn run_until(
     }
     listening(address);
     serve(listener, router(Arc::clone(&service)), spare(service), limits, tls, stop).await?;
-    // Operators see the others out.
+    // The operators' listener closes last.
     drained.cancel();
     tracing::info!("stopped");
     Ok(())

@@ -3,10 +3,10 @@
 use super::args::{SolverArgs, SpectrumArg};
 use super::{grouped, warn};
 use anyhow::{Context, Result, bail};
-use cager_cages::doctor::weld;
+use cager_cages::diagnosis::weld;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{Handles, PrepareError, SolverOptions, usual_spectrum};
+use cager_core::inversion::{Handles, PrepareError, SolverOptions, default_spectrum};
 use cager_core::mesh::TriMesh;
 use cager_core::regularize::{Regularizer, SparseMatrix};
 use cager_formats::{read_matrix, read_model};
@@ -48,7 +48,7 @@ pub(super) fn solver_for(
             .context("--handle-count: maxvol and all read a number of points of their own; leave it out")?,
         regularizer: args.regularizer,
         spectrum: match args.spectrum {
-            None => usual_spectrum(unknowns),
+            None => default_spectrum(unknowns),
             Some(SpectrumArg::Threshold(s)) => s,
             Some(SpectrumArg::All) => unknowns,
             Some(SpectrumArg::Auto) => 0,
@@ -88,7 +88,7 @@ pub(super) fn matrix(args: &SolverArgs) -> Result<Option<SparseMatrix>> {
 
 pub(super) fn spectrum_bound(args: &SolverArgs) -> Result<f64> {
     const USUAL: f64 = 0.05;
-    // Errors a hundred times as large are no encoding of the capture any more.
+    // Errors a hundred times as large make no useful encoding.
     const MOST: f64 = 100.0;
     match args.spectrum_bound {
         Some(_) if args.spectrum != Some(SpectrumArg::Auto) => {
@@ -104,8 +104,8 @@ pub(super) fn spectrum_bound(args: &SolverArgs) -> Result<f64> {
     }
 }
 
-/// Names the file or the option that is to blame.
-pub(super) fn blame(error: &PrepareError, rest: &Path, cage: &Path) -> anyhow::Error {
+/// Prefixes an error with the file or option that caused it.
+pub(super) fn with_input_name(error: &PrepareError, rest: &Path, cage: &Path) -> anyhow::Error {
     let path = match error {
         PrepareError::BadLambda { .. } => return anyhow::anyhow!("--lambda: {error}"),
         PrepareError::SpectrumTooLarge { .. } => return anyhow::anyhow!("--spectrum: {error}"),

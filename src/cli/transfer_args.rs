@@ -1,4 +1,4 @@
-//! What can be typed after `cager decode` beside its files, and after `cager edit`.
+//! Arguments of `cager decode` other than its files, and of `cager edit`.
 
 use super::outputs::OutputArgs;
 use cager_formats::FrameRange;

@@ -1,11 +1,12 @@
-//! `cager compare`: the comparisons of the paper on one capture, as figures and as a page to read.
+//! `cager compare`: the paper's comparisons on one capture, as data and as a report.
 //!
-//! A system's analysis is computed once, and each choice of rows is decomposed once. All methods go through the capture together, a
-//! batch of frames at a time, which is projected once for all methods that read the same rows.
+//! The analysis of a coordinate system is computed once, and each choice of rows is decomposed once. Frames are processed in batches, each projected
+//! once for all methods that read the same rows.
 
-mod choices;
 mod estimate;
+mod evaluation;
 mod figures;
+mod method_groups;
 mod methods;
 mod noise;
 mod page;
@@ -13,7 +14,6 @@ mod pictures;
 pub(crate) mod render;
 mod sample;
 mod system;
-mod track;
 
 pub(crate) use estimate::seconds;
 pub(crate) use figures::Figures;
@@ -26,10 +26,10 @@ use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{Analysis, PrepareError};
 use cager_core::mesh::{Model, Point, TriMesh};
 use cager_formats::FrameReader;
+use evaluation::Shape;
 use figures::{System, claims, recommend};
-use pictures::{Looks, Painter};
+use pictures::{Painter, PictureInput};
 use sample::{Frame, Sample};
-use track::Shape;
 
 /// Why there is no comparison.
 #[derive(Debug, thiserror::Error)]
@@ -64,9 +64,9 @@ pub(crate) struct Job<'a> {
     pub(crate) names: [String; 3],
 }
 
-/// What is going on: a step, and how much of it is done.
+/// Receiver of progress reports.
 pub(crate) struct Progress<'a> {
-    /// Told the name of the step, and which fraction of all is done.
+    /// Called with the name of the step and the fraction of all work that is done.
     pub(crate) tell: &'a mut dyn FnMut(&str, f64),
 }
 
@@ -82,7 +82,7 @@ pub(crate) fn compare(job: &Job<'_>, progress: &mut Progress<'_>) -> Result<(Fig
     let mut systems = Vec::new();
     let mut pictures = Vec::new();
     let mut refused = None;
-    let mut stage: Option<Painter<'_>> = None;
+    let mut painter: Option<Painter<'_>> = None;
     let mut motion = [f64::NAN; 2];
     let works: Vec<f64> = job.systems.iter().map(|system| estimate::work(job, *system)).collect();
     let all_work: f64 = works.iter().sum();
@@ -102,27 +102,27 @@ pub(crate) fn compare(job: &Job<'_>, progress: &mut Progress<'_>) -> Result<(Fig
                 continue;
             }
         };
-        let studied = match system::study(job, name, &analysis, &sample, &shape, &mut Progress { tell: &mut tell }) {
-            Ok(studied) => studied,
+        let study = match system::study(job, name, &analysis, &sample, &shape, &mut Progress { tell: &mut tell }) {
+            Ok(study) => study,
             Err(CompareError::Prepare(error)) => {
                 refuse(error);
                 continue;
             }
             Err(error) => return Err(error),
         };
-        if stage.is_none() {
-            motion = studied.motion;
-            let looks = Looks { mesh: &mesh, cage: job.cage, up: job.up };
-            stage = Some(Painter::new(looks, job.open, &sample, &studied.figures)?);
+        if painter.is_none() {
+            motion = study.motion;
+            let input = PictureInput { mesh: &mesh, cage: job.cage, up: job.up };
+            painter = Some(Painter::new(input, job.open, &sample, &study.figures)?);
         }
-        if let Some(stage) = &stage {
+        if let Some(painter) = &painter {
             tell(&format!("{name}: pictures"), 0.9);
-            pictures.push(stage.paint(&studied)?);
+            pictures.push(painter.paint(&study)?);
         }
-        let figures = Some(Box::new(studied.figures));
+        let figures = Some(Box::new(study.figures));
         systems.push(System { name: name.to_owned(), refused: None, figures });
     }
-    let Some(stage) = stage else {
+    let Some(painter) = painter else {
         return Err(refused.unwrap_or(PrepareError::NoSolution { what: "choice of coordinates" }).into());
     };
     let capture = figures::Capture {
@@ -139,7 +139,7 @@ pub(crate) fn compare(job: &Job<'_>, progress: &mut Progress<'_>) -> Result<(Fig
         diagonal: shape.diagonal,
         motion_mean: motion[0],
         motion_max: motion[1],
-        shown: stage.shown(),
+        shown: painter.shown(),
         noise_radius: noise::RADIUS,
     };
     let (recommendation, claims) = (recommend(&systems), claims(&systems));

@@ -1,12 +1,12 @@
-//! The pictures of a report: what they show, and on which scale.
+//! The pictures of a report.
 
-use super::choices::data_alone;
+use super::evaluation::second_differences;
 use super::figures::SystemFigures;
+use super::method_groups::data_alone;
 use super::methods::Method;
 use super::render::{Camera, Mesh, Png, Ramp, Scene, Shade, Up, diverging};
 use super::sample::{Frame, Sample};
-use super::system::Studied;
-use super::track::second_differences;
+use super::system::SystemStudy;
 use super::{CompareError, as_points, frames_of};
 use cager_core::cage::Cage;
 use cager_core::decode::Decoder;
@@ -18,9 +18,9 @@ use rayon::prelude::*;
 /// Pixels of a picture, about, and of that of the handles.
 const PIXELS: f64 = 420.0 * 420.0;
 const HANDLES_PIXELS: f64 = 4.0 * PIXELS;
-/// A reconstruction farther off than this, over the diagonal, has a view of its own.
+/// A reconstruction with a larger error, over the diagonal, gets a separate view.
 const LOST: f64 = 0.5;
-/// A singular vector on fewer unknowns than this is marked where it lives.
+/// Singular vectors with a smaller participation number are marked by discs.
 const FEW: f64 = 12.0;
 /// Width over height that pictures keep to.
 const ASPECT: [f64; 2] = [0.6, 1.7];
@@ -60,8 +60,8 @@ pub(crate) struct Pictures {
     pub(crate) vectors: Vec<Picture>,
 }
 
-/// What is painted.
-pub(super) struct Looks<'a> {
+/// What the pictures show.
+pub(super) struct PictureInput<'a> {
     /// Model in its rest pose.
     pub(super) mesh: &'a TriMesh,
     /// Its cage.
@@ -72,7 +72,7 @@ pub(super) struct Looks<'a> {
 
 /// Paints the same frames for every system.
 pub(super) struct Painter<'a> {
-    looks: Looks<'a>,
+    input: PictureInput<'a>,
     up: Up,
     edges: Vec<[u32; 2]>,
     /// Diagonal of the rest pose's bounding box.
@@ -85,12 +85,12 @@ pub(super) struct Painter<'a> {
 impl<'a> Painter<'a> {
     /// Chooses the frame to show, and reads it and the row's frames.
     pub(super) fn new(
-        looks: Looks<'a>,
+        input: PictureInput<'a>,
         open: &dyn Fn() -> Result<Box<dyn FrameReader>, cager_formats::Error>,
         sample: &Sample,
         figures: &SystemFigures,
     ) -> Result<Self, CompareError> {
-        let shown = sample.measured()[most_spiky(figures)];
+        let shown = sample.measured()[frame_of_largest_spike(figures)];
         let measured = sample.measured();
         let count = measured.len().min(ROW);
         let row: Vec<usize> = (0..count).map(|k| measured[k * (measured.len() - 1) / (count - 1).max(1)]).collect();
@@ -98,10 +98,10 @@ impl<'a> Painter<'a> {
         wanted.sort_unstable();
         wanted.dedup();
         let frames = frames_of(open()?.as_mut(), &wanted)?;
-        let up = looks.up.unwrap_or_else(|| Up::guess(&looks.mesh.vertices));
-        let edges = looks.cage.edges().iter().map(|edge| edge.vertices).collect();
-        let diagonal = cager_core::mesh::diagonal(&looks.mesh.vertices);
-        Ok(Self { looks, up, edges, diagonal, shown, frames, row })
+        let up = input.up.unwrap_or_else(|| Up::guess(&input.mesh.vertices));
+        let edges = input.cage.edges().iter().map(|edge| edge.vertices).collect();
+        let diagonal = cager_core::mesh::diagonal(&input.mesh.vertices);
+        Ok(Self { input, up, edges, diagonal, shown, frames, row })
     }
 
     /// The frame that cages and errors are shown of.
@@ -110,22 +110,22 @@ impl<'a> Painter<'a> {
     }
 
     /// Paints a system.
-    pub(super) fn paint(&self, studied: &Studied<'_>) -> Result<Pictures, CompareError> {
-        let figures = &studied.figures;
-        let (cages, cages_top) = self.cages(studied);
-        let (models, models_top) = self.models(studied)?;
+    pub(super) fn paint(&self, study: &SystemStudy<'_>) -> Result<Pictures, CompareError> {
+        let figures = &study.figures;
+        let (cages, cages_top) = self.cages(study);
+        let (models, models_top) = self.models(study)?;
         let row = match figures.method(|m| m.is_cager() && m.curve) {
-            Some(usual) => self.row(studied, usual.method.options()),
+            Some(usual) => self.row(study, usual.method.options()),
             None => Vec::new(),
         };
         Ok(Pictures {
-            handles: self.handles(studied),
+            handles: self.handles(study),
             row,
             cages,
             cages_top,
             models,
             models_top,
-            vectors: self.vectors(studied),
+            vectors: self.vectors(study),
         })
     }
 
@@ -135,7 +135,7 @@ impl<'a> Painter<'a> {
 
     /// A camera on these points, and the size of its pictures.
     fn camera(&self, points: &[Point], pixels: f64) -> (Camera, usize, usize) {
-        let rest = &self.looks.mesh.vertices;
+        let rest = &self.input.mesh.vertices;
         let square = Camera::fitting(points, rest, self.up, 1.0);
         let seen: Vec<Point> = points.iter().map(|p| square.project(*p, [1000, 1000])).collect();
         let (low, high) = cager_core::mesh::bounds(&seen);
@@ -145,14 +145,14 @@ impl<'a> Painter<'a> {
         (Camera::fitting(points, rest, self.up, width as f64 / height as f64), width, height)
     }
 
-    fn handles(&self, studied: &Studied<'_>) -> Picture {
-        let (mesh, cage) = (self.looks.mesh, self.looks.cage);
+    fn handles(&self, study: &SystemStudy<'_>) -> Picture {
+        let (mesh, cage) = (self.input.mesh, self.input.cage);
         let both: Vec<Point> = mesh.vertices.iter().chain(cage.vertices()).copied().collect();
         let (camera, width, height) = self.camera(&both, HANDLES_PIXELS);
         let mut scene = Scene::new(camera, width, height);
         scene.surface(model(&mesh.vertices, mesh), Shade::Plain(MODEL), true);
         scene.lines(cage.vertices(), &self.edges, CAGE);
-        let handles = &studied.analysis.handles().rows;
+        let handles = &study.analysis.handles().rows;
         for &row in handles {
             scene.dot(mesh.vertices[row as usize], HANDLES, 4.5, false);
         }
@@ -163,14 +163,14 @@ impl<'a> Painter<'a> {
         }
     }
 
-    fn row(&self, studied: &Studied<'_>, usual: SolverOptions) -> Vec<Picture> {
-        let mesh = self.looks.mesh;
-        let decoder = studied.analysis.decoder();
+    fn row(&self, study: &SystemStudy<'_>, usual: SolverOptions) -> Vec<Picture> {
+        let mesh = self.input.mesh;
+        let decoder = study.analysis.decoder();
         let shots: Vec<(usize, Vec<Point>, Vec<Point>)> = self
             .row
             .iter()
             .filter_map(|&number| {
-                let cage = studied.invert(usual, &[self.frame(number)?.points.as_slice()])?.pop()?;
+                let cage = study.invert(usual, &[self.frame(number)?.points.as_slice()])?.pop()?;
                 let decoded = decode(decoder, &cage);
                 Some((number, as_points(&cage[..3 * decoder.positions()]), as_points(&decoded)))
             })
@@ -189,40 +189,43 @@ impl<'a> Painter<'a> {
     }
 
     /// Cages of the shown frame by the methods whose cages the paper shows.
-    fn cages(&self, studied: &Studied<'_>) -> (Vec<Picture>, f64) {
+    fn cages(&self, study: &SystemStudy<'_>) -> (Vec<Picture>, f64) {
         let Some(frame) = self.frame(self.shown) else { return (Vec::new(), 1.0) };
         let three = [self.shown.checked_sub(1), Some(self.shown), Some(self.shown + 1)];
         let three: Option<Vec<&[f64]>> =
             three.map(|number| Some(self.frame(number?)?.points.as_slice())).into_iter().collect();
         let mut shots = Vec::new();
-        for found in studied.figures.methods.iter().filter(|found| shows_cage(&found.method, &studied.figures)) {
-            let count = studied.analysis.decoder().positions();
+        for found in study.figures.methods.iter().filter(|found| shows_cage(&found.method, &study.figures)) {
+            let count = study.analysis.decoder().positions();
             let frames = three.clone().unwrap_or_else(|| vec![frame.points.as_slice()]);
-            let Some(mut cages) = studied.invert(found.method.options(), &frames) else { continue };
-            let bends = match &cages[..] {
+            let Some(mut cages) = study.invert(found.method.options(), &frames) else { continue };
+            let differences = match &cages[..] {
                 [a, b, c] => second_differences([a, b, c], count).iter().map(|x| x / self.diagonal).collect(),
                 _ => vec![0.0; count],
             };
             let cage = cages.swap_remove(cages.len() / 2);
-            shots.push((found.method.name(), as_points(&cage[..3 * count]), bends));
+            shots.push((found.method.name(), as_points(&cage[..3 * count]), differences));
         }
-        let all: Vec<f64> = shots.iter().flat_map(|(_, _, bends): &(_, _, Vec<f64>)| bends).copied().collect();
+        let all: Vec<f64> =
+            shots.iter().flat_map(|(_, _, differences): &(_, _, Vec<f64>)| differences).copied().collect();
         let ramp = Ramp::over(all.iter());
         let model_points = as_points(&frame.points);
         // Spikes may leave the picture; the cages of the paper's own method do not.
-        let calm = shots.last().map_or(&[][..], |shot| &shot.1);
-        let fitted: Vec<Point> = model_points.iter().chain(calm).copied().collect();
+        let reference_cage = shots.last().map_or(&[][..], |shot| &shot.1);
+        let fitted: Vec<Point> = model_points.iter().chain(reference_cage).copied().collect();
         let (camera, width, height) = self.camera(&fitted, PIXELS);
-        let faces: Vec<[u32; 3]> = self.looks.cage.mesh().triangles.clone();
+        let faces: Vec<[u32; 3]> = self.input.cage.mesh().triangles.clone();
         let pictures = shots
             .par_iter()
-            .map(|(title, points, bends)| {
-                let colours: Vec<[f32; 3]> = bends.iter().map(|x| ramp.colour(*x)).collect();
+            .map(|(title, points, differences)| {
+                let colours: Vec<[f32; 3]> = differences.iter().map(|x| ramp.colour(*x)).collect();
                 let mut scene = Scene::new(camera, width, height);
                 scene.surface(Mesh { points, triangles: &faces }, Shade::PerPoint(&colours), false);
                 scene.lines(points, &self.edges, EDGES);
-                let (mean, max) =
-                    (bends.iter().sum::<f64>() / bends.len() as f64, bends.iter().copied().fold(0.0, f64::max));
+                let (mean, max) = (
+                    differences.iter().sum::<f64>() / differences.len() as f64,
+                    differences.iter().copied().fold(0.0, f64::max),
+                );
                 let note = format!("mean {:.3} %, largest {:.2} %", 100.0 * mean, 100.0 * max);
                 Picture { title: title.clone(), note, png: scene.png() }
             })
@@ -231,20 +234,20 @@ impl<'a> Painter<'a> {
     }
 
     /// The shown frame as the methods reconstruct it.
-    fn models(&self, studied: &Studied<'_>) -> Result<(Vec<Picture>, f64), CompareError> {
+    fn models(&self, study: &SystemStudy<'_>) -> Result<(Vec<Picture>, f64), CompareError> {
         let Some(frame) = self.frame(self.shown) else { return Ok((Vec::new(), 1.0)) };
         let frames = [frame.points.as_slice()];
-        let decoder = studied.analysis.decoder();
+        let decoder = study.analysis.decoder();
         let mut cages = Vec::new();
-        if let Some((name, rows)) = &studied.middling {
-            let usual = studied.figures.method(|m| m.is_cager() && m.curve).map(|m| m.method.options());
-            let reading = studied.analysis.reading_of(rows)?;
-            let method = reading.factored(usual.unwrap_or_else(data_alone))?;
-            let found = reading.cages(&method, None, &reading.project(&frames), &frames);
+        if let Some((name, rows)) = &study.median_draw {
+            let usual = study.figures.method(|m| m.is_cager() && m.curve).map(|m| m.method.options());
+            let handle_system = study.analysis.handle_system_of(rows)?;
+            let method = handle_system.factored(usual.unwrap_or_else(data_alone))?;
+            let found = handle_system.cages(&method, None, &handle_system.project(&frames), &frames);
             cages.extend(found.into_iter().map(|cage| (format!("{name}, sub-spectral"), cage)));
         }
-        for found in studied.figures.methods.iter().filter(|found| shows_model(&found.method)) {
-            let inverted = studied.invert(found.method.options(), &frames).unwrap_or_default();
+        for found in study.figures.methods.iter().filter(|found| shows_model(&found.method)) {
+            let inverted = study.invert(found.method.options(), &frames).unwrap_or_default();
             cages.extend(inverted.into_iter().map(|cage| (found.method.name(), cage)));
         }
         let shots: Vec<(String, Vec<Point>, Vec<f64>)> = cages
@@ -257,7 +260,7 @@ impl<'a> Painter<'a> {
                 (title, decoded, errors)
             })
             .collect();
-        // What the random draw does would leave the others without colour.
+        // Without the random draw, whose errors would dominate the scale.
         let ramp = Ramp::over(shots.iter().skip(usize::from(shots.len() > 1)).flat_map(|shot| &shot.2));
         let (camera, width, height) = self.camera(&as_points(&frame.points), PIXELS);
         let pictures = shots
@@ -265,10 +268,10 @@ impl<'a> Painter<'a> {
             .map(|(title, points, errors)| {
                 let colours: Vec<[f32; 3]> = errors.iter().map(|x| ramp.colour(*x)).collect();
                 let linf = errors.iter().copied().fold(0.0, f64::max);
-                // Of a lost one, the triangles would hide each other.
+                // Points alone where the reconstruction fails: its triangles would hide each other.
                 let (view, mesh) = match linf > LOST {
                     true => (self.camera(&most(points), PIXELS), Mesh { points, triangles: &[] }),
-                    false => ((camera, width, height), model(points, self.looks.mesh)),
+                    false => ((camera, width, height), model(points, self.input.mesh)),
                 };
                 let mut scene = Scene::new(view.0, view.1, view.2);
                 scene.surface(mesh, Shade::PerPoint(&colours), true);
@@ -280,11 +283,11 @@ impl<'a> Painter<'a> {
         Ok((pictures, ramp.top))
     }
 
-    fn vectors(&self, studied: &Studied<'_>) -> Vec<Picture> {
-        let cage = self.looks.cage;
+    fn vectors(&self, study: &SystemStudy<'_>) -> Vec<Picture> {
+        let cage = self.input.cage;
         let (camera, width, height) = self.camera(cage.vertices(), PIXELS);
-        let (v, sigma) = (studied.analysis.handle_vectors(), studied.analysis.handle_spectrum());
-        let painted = &studied.figures.vectors.painted;
+        let (v, sigma) = (study.analysis.handle_vectors(), study.analysis.handle_spectrum());
+        let painted = &study.figures.vectors.painted;
         painted
             .par_iter()
             .map(|&k| {
@@ -298,7 +301,7 @@ impl<'a> Painter<'a> {
                     false,
                 );
                 scene.lines(cage.vertices(), &self.edges, EDGES);
-                if studied.figures.vectors.spread[k] < FEW {
+                if study.figures.vectors.spread[k] < FEW {
                     for (j, vertex) in cage.vertices().iter().enumerate().filter(|(j, _)| values[*j].abs() > 0.25 * top)
                     {
                         scene.dot(*vertex, colours[j], 6.0, true);
@@ -306,7 +309,7 @@ impl<'a> Painter<'a> {
                 }
                 let note = match sigma.get(k) {
                     Some(sigma) => {
-                        format!("singular value {sigma:.3}, on {:.0} unknowns", studied.figures.vectors.spread[k])
+                        format!("singular value {sigma:.3}, on {:.0} unknowns", study.figures.vectors.spread[k])
                     }
                     None => "no singular value: beyond the rank".to_owned(),
                 };
@@ -317,7 +320,7 @@ impl<'a> Painter<'a> {
 }
 
 /// Position of the frame where full least squares spikes most; where nothing spikes, of its largest error.
-fn most_spiky(figures: &SystemFigures) -> usize {
+fn frame_of_largest_spike(figures: &SystemFigures) -> usize {
     let Some(full) = figures.method(Method::is_full_least_squares) else { return 0 };
     let largest = |values: &[f64]| {
         (0..values.len())
@@ -327,7 +330,7 @@ fn most_spiky(figures: &SystemFigures) -> usize {
     largest(&full.per_frame.spike_max).or_else(|| largest(&full.per_frame.linf)).unwrap_or(0)
 }
 
-/// Without the outermost fiftieth in every direction.
+/// The points between the 2nd and 98th percentile along every axis.
 fn most(points: &[Point]) -> Vec<Point> {
     let ends = [0, 1, 2].map(|k| {
         let mut sorted: Vec<f64> = points.iter().map(|p| p[k]).collect();

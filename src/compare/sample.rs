@@ -16,7 +16,7 @@ pub(crate) struct Sample {
 pub(crate) struct Frame {
     /// Its number, from 0.
     pub(crate) number: usize,
-    /// Whether its error is measured, or it is there for its neighbours' sake.
+    /// Whether its error is measured; otherwise it only serves for differences in time.
     pub(crate) measured: bool,
     /// Points, n × 3 interleaved.
     pub(crate) points: Vec<f64>,
@@ -45,7 +45,7 @@ impl Sample {
     }
 
     /// Whether every frame is measured.
-    pub(crate) fn is_whole(&self) -> bool {
+    pub(crate) fn is_complete(&self) -> bool {
         self.measured.len() == self.frames
     }
 
@@ -64,7 +64,7 @@ impl Sample {
         self.measured.last().map_or(0, |last| (last + 2).min(self.frames))
     }
 
-    /// Fills `batch` with up to `size` needed frames that follow; none are left where it stays empty. `next` is the number of
+    /// Fills `batch` with up to `size` of the next needed frames; it stays empty at the end. `next` is the number of
     /// the reader's next frame.
     pub(crate) fn fill(
         &self,

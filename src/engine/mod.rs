@@ -1,7 +1,7 @@
 //! The engine: a bounded pool of solving threads, away from the threads that serve connections.
 //!
-//! Work arrives in lanes, one per session. What waits in a lane is taken together, up to [`BATCH`] frames, as one matrix
-//! product. Who comes next is the choice of `schedule`; what a batch does is the lane's.
+//! Jobs are queued in lanes, one per session. Up to [`BATCH`] queued jobs of a lane run together, so that frames become the columns of one
+//! matrix product. `schedule` chooses the next lane; the lane's closure processes the batch.
 
 mod schedule;
 pub(crate) mod threads;
@@ -19,17 +19,17 @@ pub struct Engine {
 }
 
 struct Shared {
-    state: Mutex<Schedule<Arc<dyn Batches>>>,
+    state: Mutex<Schedule<Arc<dyn ErasedLane>>>,
     changed: Condvar,
     pool: rayon::ThreadPool,
 }
 
-/// A lane without its type of job.
-trait Batches: Send + Sync {
+/// A lane with its job type erased.
+trait ErasedLane: Send + Sync {
     fn run(&self, count: usize);
 }
 
-/// A queue of one session's jobs, in order of arrival. Dropping it forgets what waits.
+/// The FIFO queue of one session's jobs. Dropping it discards queued jobs.
 pub struct Lane<J: Send + 'static> {
     engine: Weak<Shared>,
     id: u64,
@@ -45,9 +45,9 @@ impl Engine {
     /// Starts `workers` solving threads; 0 means one per processor.
     ///
     /// # Errors
-    /// The system's, where threads cannot be started.
+    /// Threads cannot be started.
     pub fn new(workers: usize) -> std::io::Result<Self> {
-        let pool = threads::pool("solve", workers, threads::GIVES_WAY)?;
+        let pool = threads::pool("solve", workers, threads::NICE_COMPUTE)?;
         let slots = pool.current_num_threads();
         let shared = Arc::new(Shared { state: Mutex::new(Schedule::new(slots)), changed: Condvar::new(), pool });
         let dispatching = Arc::clone(&shared);
@@ -55,8 +55,8 @@ impl Engine {
         Ok(Self { shared })
     }
 
-    /// Opens a lane. `weight` is its tenant's share of the pool when all are busy; `cost` is what a job costs in any unit that is the
-    /// same for all lanes. `run` gets up to [`BATCH`] jobs at once on a solving thread.
+    /// Opens a lane. `weight` is its tenant's share of the pool under load; `cost` is the relative cost of a job, in a unit common to all
+    /// lanes. `run` processes up to [`BATCH`] jobs on a pool thread.
     pub fn lane<J: Send + 'static>(
         &self,
         tenant: &str,
@@ -65,11 +65,11 @@ impl Engine {
         run: impl Fn(Vec<J>) + Send + Sync + 'static,
     ) -> Lane<J> {
         let work = Arc::new(LaneWork { waiting: Mutex::new(VecDeque::new()), run: Box::new(run) });
-        let id = lock(&self.shared.state).add(tenant, weight, cost, Arc::clone(&work) as Arc<dyn Batches>);
+        let id = lock(&self.shared.state).add(tenant, weight, cost, Arc::clone(&work) as Arc<dyn ErasedLane>);
         Lane { engine: Arc::downgrade(&self.shared), id, work }
     }
 
-    /// As [`Self::lane`], whose batches run one after another, in order of arrival.
+    /// As [`Self::lane`], but its batches run one at a time, in order of arrival.
     pub fn lane_in_order<J: Send + 'static>(
         &self,
         tenant: &str,
@@ -82,12 +82,12 @@ impl Engine {
         lane
     }
 
-    /// Jobs that wait in all lanes.
+    /// Number of queued jobs in all lanes.
     pub fn waiting(&self) -> usize {
         lock(&self.shared.state).waiting()
     }
 
-    /// Solving threads.
+    /// Number of pool threads.
     pub fn workers(&self) -> usize {
         self.shared.pool.current_num_threads()
     }
@@ -101,7 +101,7 @@ impl Drop for Engine {
 }
 
 impl<J: Send + 'static> Lane<J> {
-    /// Adds a job at the end.
+    /// Enqueues a job.
     pub fn push(&self, job: J) {
         lock(&self.work.waiting).push_back(job);
         if let Some(engine) = self.engine.upgrade() {
@@ -110,7 +110,7 @@ impl<J: Send + 'static> Lane<J> {
         }
     }
 
-    /// Says whether more jobs are on their way. While they are, a part of a batch waits a moment for company.
+    /// Sets whether more jobs are about to arrive. If so, an incomplete batch is delayed a little to fill up.
     pub fn expect_more(&self, more: bool) {
         if let Some(engine) = self.engine.upgrade() {
             lock(&engine.state).expect_more(self.id, more);
@@ -129,7 +129,7 @@ impl<J: Send + 'static> Drop for Lane<J> {
     }
 }
 
-impl<J: Send> Batches for LaneWork<J> {
+impl<J: Send> ErasedLane for LaneWork<J> {
     fn run(&self, count: usize) {
         let jobs: Vec<J> = {
             let mut waiting = lock(&self.waiting);
@@ -142,7 +142,7 @@ impl<J: Send> Batches for LaneWork<J> {
     }
 }
 
-/// Hands batches to the pool for as long as the engine lives.
+/// Passes batches to the pool until the engine is dropped.
 fn dispatch(shared: &Arc<Shared>) {
     let mut state = lock(&shared.state);
     loop {
@@ -150,7 +150,7 @@ fn dispatch(shared: &Arc<Shared>) {
             Next::Batch { lane, count, work } => {
                 let done = Arc::clone(shared);
                 shared.pool.spawn(move || {
-                    // Jobs that a panic drops tell their owners themselves.
+                    // Jobs dropped by a panic notify their uploads.
                     if catch_unwind(AssertUnwindSafe(|| work.run(count))).is_err() {
                         tracing::error!("a batch of frames panicked");
                     }
@@ -168,7 +168,7 @@ fn dispatch(shared: &Arc<Shared>) {
     }
 }
 
-/// Nothing is left half-done where a thread panics with one of these locks.
+/// Locks, ignoring poisoning: a panic while locked leaves no half-finished update.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

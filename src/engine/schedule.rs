@@ -1,27 +1,27 @@
-//! Who is solved next: tenants by their share, a tenant's lanes in turn.
+//! Weighted fair scheduling: tenants by stride scheduling (Waldspurger and Weihl 1995), the lanes of a tenant in round-robin order.
 //!
-//! Tenants are served by stride scheduling (Waldspurger and Weihl 1995): each has a virtual time that grows by the cost of its
-//! batches over its weight, and the one that is furthest behind comes next.
+//! Each tenant has a pass value that grows by the cost of its batches divided by its weight; the tenant with the smallest pass is served
+//! next.
 
 use std::collections::{BTreeMap, HashMap};
 use std::time::{Duration, Instant};
 
-/// How long a part of a batch waits for company while more frames arrive.
-const LINGER: Duration = Duration::from_millis(2);
-/// A lane that was busy less than this ago is in the middle of an upload; one that was not is answered at once.
-const BUSY: Duration = Duration::from_millis(20);
+/// How long an incomplete batch waits for more frames of a running upload.
+const BATCH_DELAY: Duration = Duration::from_millis(2);
+/// A lane whose last batch ended less than this ago belongs to a running upload; other lanes are served at once.
+const BUSY_WINDOW: Duration = Duration::from_millis(20);
 
-/// What to do next.
+/// The next step of the dispatcher.
 pub(super) enum Next<W> {
     /// Run this many jobs of a lane.
     Batch { lane: u64, count: usize, work: W },
-    /// Nothing, until something changes or the time is over.
+    /// Nothing is ready; wait for a change, or for this long.
     Wait(Option<Duration>),
-    /// Nothing any more.
+    /// The engine was stopped.
     Stopped,
 }
 
-/// Lanes, what waits in them and what runs.
+/// Queued and running jobs by lane and tenant. It counts jobs only; the lanes hold them.
 pub(super) struct Schedule<W> {
     lanes: HashMap<u64, LaneState<W>>,
     tenants: BTreeMap<String, Tenant>,
@@ -29,7 +29,7 @@ pub(super) struct Schedule<W> {
     slots: usize,
     running: usize,
     waiting: usize,
-    /// Highest virtual time of all that were served.
+    /// Largest pass value of any tenant so far.
     time: f64,
     stopped: bool,
 }
@@ -45,7 +45,7 @@ struct LaneState<W> {
     more: bool,
     /// Whether its batches run one after another.
     in_order: bool,
-    /// Turn at which it was last served.
+    /// The tenant's turn at which it was last served, for round-robin order.
     served: u64,
 }
 
@@ -106,7 +106,7 @@ impl<W: Clone> Schedule<W> {
             tenant.waiting -= lane.waiting;
             tenant.lanes.retain(|&other| other != id);
         }
-        // Who is ahead of all others stays known, lest it begin anew with every short upload.
+        // A tenant ahead of the virtual time keeps its pass, so that short uploads cannot reset it.
         let time = self.time;
         self.tenants.retain(|_, tenant| !tenant.lanes.is_empty() || tenant.pass > time);
     }
@@ -118,7 +118,8 @@ impl<W: Clone> Schedule<W> {
         }
         lane.waiting += 1;
         self.waiting += 1;
-        // Time spent without work earns no claim on those who wait, nor, where nobody does at the moment, on those who worked.
+        // A tenant that was idle starts at the smallest pass of the waiting tenants, or at the virtual time if none waits: idle time earns
+        // no credit.
         let behind = self.tenants.values().filter(|t| t.waiting > 0).map(|t| t.pass).reduce(f64::min);
         if let Some(tenant) = self.tenants.get_mut(&lane.tenant) {
             if tenant.waiting == 0 {
@@ -128,7 +129,7 @@ impl<W: Clone> Schedule<W> {
         }
     }
 
-    /// Has a lane's batches run one after another.
+    /// Runs a lane's batches one at a time.
     pub(super) fn keep_order(&mut self, id: u64) {
         if let Some(lane) = self.lanes.get_mut(&id) {
             lane.in_order = true;
@@ -169,7 +170,7 @@ impl<W: Clone> Schedule<W> {
         for tenant in self.tenants.values().filter(|t| t.waiting > 0) {
             for &id in &tenant.lanes {
                 let lane = &self.lanes[&id];
-                match lane.waits_for(now, most) {
+                match lane.time_until_ready(now, most) {
                     None => {}
                     Some(Duration::ZERO) => {
                         let place = (tenant.pass, lane.served, id);
@@ -200,8 +201,8 @@ impl<W: Clone> Schedule<W> {
 }
 
 impl<W> LaneState<W> {
-    /// How long until a batch should start: zero now; `None` where something must happen first.
-    fn waits_for(&self, now: Instant, most: usize) -> Option<Duration> {
+    /// Time until a batch should start, zero for now; `None` if something has to change first.
+    fn time_until_ready(&self, now: Instant, most: usize) -> Option<Duration> {
         if self.waiting == 0 || (self.in_order && self.running > 0) {
             return None;
         }
@@ -211,11 +212,11 @@ impl<W> LaneState<W> {
         if self.running > 0 {
             return None;
         }
-        let busy = self.last_finished.is_some_and(|then| now.saturating_duration_since(then) < BUSY);
+        let busy = self.last_finished.is_some_and(|then| now.saturating_duration_since(then) < BUSY_WINDOW);
         if !(self.more && busy) {
             return Some(Duration::ZERO);
         }
-        Some(LINGER.saturating_sub(now.saturating_duration_since(self.oldest)))
+        Some(BATCH_DELAY.saturating_sub(now.saturating_duration_since(self.oldest)))
     }
 }
 
@@ -311,7 +312,7 @@ mod tests {
         assert!(matches!(schedule.next(now, 16), Next::Wait(None)), "one part of a batch at a time");
         schedule.finished(lane, now);
         assert!(matches!(schedule.next(now, 16), Next::Wait(Some(_))));
-        assert!(matches!(schedule.next(now + LINGER, 16), Next::Batch { count: 1, .. }));
+        assert!(matches!(schedule.next(now + BATCH_DELAY, 16), Next::Batch { count: 1, .. }));
         schedule.finished(lane, now);
         schedule.pushed(lane, now);
         schedule.expect_more(lane, false);

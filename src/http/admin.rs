@@ -1,7 +1,7 @@
-//! What operators see and do, on a listener of its own, outside every limit of the public one.
+//! Routes for operators, on a separate listener without the limits of the public one.
 //!
-//! On a loopback address, whoever can reach it is the operator. On any other address it is who has a token with the scope `admin`;
-//! health and metrics are for everyone.
+//! On a loopback address every client is an operator. On other addresses a token with the scope `admin` is needed, except for health and
+//! metrics.
 
 use super::extract::{Query, granted};
 use super::origin;
@@ -23,7 +23,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// The routes; where `open_to_all`, whoever asks is the operator.
+/// The router; with `open_to_all` no token is needed.
 pub fn admin(service: Arc<Service>, open_to_all: bool) -> Router {
     let operated = Router::new()
         .route("/admin/tenants", get(tenants))
@@ -32,24 +32,28 @@ pub fn admin(service: Arc<Service>, open_to_all: bool) -> Router {
         .route("/admin/drain", post(drain))
         .route("/admin/evict", post(evict));
     let operated = match open_to_all {
-        true => operated.route_layer(from_fn(no_pages)),
-        false => operated.route_layer(from_fn_with_state(Arc::clone(&service), with_scope)),
+        true => operated.route_layer(from_fn(refuse_web_pages)),
+        false => operated.route_layer(from_fn_with_state(Arc::clone(&service), require_admin)),
     };
     let routes = Router::from(open()).merge(operated);
     let routes = routes.fallback(|| async { ApiError::new(problem::NOT_FOUND, "see the documentation for operators") });
     finished(routes.with_state(service))
 }
 
-/// A page in the operator's browser is no operator, whichever it is.
-async fn no_pages(request: Request, next: Next) -> Result<Response, ApiError> {
+/// Refuses requests from web pages in the operator's browser.
+async fn refuse_web_pages(request: Request, next: Next) -> Result<Response, ApiError> {
     if request.headers().contains_key(header::ORIGIN) || !origin::is_this_machine(&request) {
         return Err(ApiError::new(problem::FORBIDDEN, "pages may not operate the service; use curl or a script"));
     }
     Ok(next.run(request).await)
 }
 
-/// Operators have tokens that say so. Without tokens nobody is one.
-async fn with_scope(State(service): State<Arc<Service>>, request: Request, next: Next) -> Result<Response, ApiError> {
+/// Refuses requests without a token of the scope `admin`, and all requests of a service without tokens.
+async fn require_admin(
+    State(service): State<Arc<Service>>,
+    request: Request,
+    next: Next,
+) -> Result<Response, ApiError> {
     let grant = granted(&service, request.headers()).await?;
     if !service.access.is_guarded() || grant.scope < Scope::Admin {
         service.rejected("scope");
@@ -59,22 +63,22 @@ async fn with_scope(State(service): State<Arc<Service>>, request: Request, next:
     Ok(next.run(request).await)
 }
 
-/// What one tenant has and does.
+/// Resource usage of a tenant.
 #[derive(Serialize)]
 struct TenantUse {
     tenant: String,
     /// Sessions on disk.
     sessions: usize,
-    /// Bytes of these and of cage designs.
+    /// Bytes on disk of sessions and cage jobs.
     stored_bytes: u64,
-    /// Requests, streams and memory that it holds at the moment.
+    /// Requests, streams and memory in use.
     #[serde(flatten)]
-    holds: crate::service::Holds,
+    holds: crate::service::ResourceUse,
 }
 
 async fn tenants(State(service): State<Arc<Service>>) -> Json<Vec<TenantUse>> {
     let mut tenants: BTreeMap<String, (usize, u64)> =
-        service.holders().into_iter().map(|tenant| (tenant, (0, 0))).collect();
+        service.tenants_in_use().into_iter().map(|tenant| (tenant, (0, 0))).collect();
     tenants.extend(service.usage().into_iter().map(|(tenant, sessions, bytes)| (tenant, (sessions, bytes))));
     let tenant = |(tenant, (sessions, stored_bytes)): (String, (usize, u64))| {
         let holds = service.holds(&tenant);
@@ -120,7 +124,7 @@ async fn delete_session(State(service): State<Arc<Service>>, Path(id): Path<Stri
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Stops as a signal does: what runs may end within the drain time.
+/// Stops the service like a signal: running requests may finish within the drain time.
 async fn drain(State(service): State<Arc<Service>>) -> StatusCode {
     tracing::info!("stopping, as the operator asked");
     service.stopping().cancel();
@@ -132,7 +136,7 @@ struct Evicted {
     bytes: u64,
 }
 
-/// Frees the memory of prepared solvers; those in use stay until they are done, and all can be read from disk again.
+/// Drops cached solvers from memory; solvers in use stay until they are released, and all can be loaded from disk again.
 async fn evict(State(service): State<Arc<Service>>) -> Json<Evicted> {
     Json(Evicted { bytes: service.solvers.evict() })
 }

@@ -1,6 +1,6 @@
 //! `GET …/cage`: the rest cage, which decoders need where a cage's normals follow from its vertices.
 
-use super::extract::{Accept, Found};
+use super::extract::{Accept, RequestedSession};
 use super::frames::{not_acceptable, prepared};
 use super::openapi;
 use crate::problem::ApiError;
@@ -24,7 +24,7 @@ use std::sync::Arc;
 )]
 pub(crate) async fn get(
     State(service): State<Arc<Service>>,
-    Found { session, .. }: Found,
+    RequestedSession { session, .. }: RequestedSession,
     accept: Accept,
 ) -> Result<Response, ApiError> {
     prepared(&service, &session).await?;

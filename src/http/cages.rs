@@ -1,6 +1,6 @@
-//! `GET /v1/sessions/{id}/cages`: solved cages, as they are or as they come.
+//! `GET /v1/sessions/{id}/cages`: solved cages, as a download or as a live stream.
 
-use super::extract::{Accept, Found, Query};
+use super::extract::{Accept, Query, RequestedSession};
 use super::frames::{not_acceptable, prepared, records_of};
 use super::openapi;
 use super::ranged::Immutable;
@@ -19,7 +19,7 @@ use std::io;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Frames sent at a time.
+/// Frames read and sent at a time.
 const PIECE_FRAMES: usize = 64;
 
 /// Which cages.
@@ -37,7 +37,7 @@ pub(crate) struct CagesQuery {
     follow: bool,
 }
 
-/// How cages are put into bytes.
+/// Encoding of the response body.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Form {
     Raw,
@@ -56,7 +56,7 @@ impl Form {
         12 * u64::from(unknowns) + if self == Self::Records { record::HEADER_BYTES as u64 } else { 0 }
     }
 
-    /// The cages of consecutive frames, as far as they are there. Blocks.
+    /// Encoded cages of consecutive frames from `first` on, at most `most`, up to the first gap. Blocks.
     fn read(self, session: &Session, first: u32, most: usize) -> io::Result<Bytes> {
         let entries = session.frames().run(first, most);
         if self == Self::Records {
@@ -79,12 +79,12 @@ impl Form {
         (status = 206, description = "The range asked for", content(
             (Vec<u8> = "application/octet-stream"), (Vec<u8> = "application/vnd.cager.frames"),
         )),
-        (status = 304, description = "What the client has is still right"),
+        (status = 304, description = "The client's copy is current"),
     ),
 )]
 pub(crate) async fn get(
     State(service): State<Arc<Service>>,
-    Found { session, tenant }: Found,
+    RequestedSession { session, tenant }: RequestedSession,
     Query(query): Query<CagesQuery>,
     accept: Accept,
     headers: HeaderMap,
@@ -111,7 +111,10 @@ pub(crate) async fn get(
     if count > there {
         let end = (u64::from(query.first) + count).min(u64::from(u32::MAX)) as u32;
         let missing = session.frames().missing(query.first, Some(end), RANGES).ranges;
-        let detail = format!("of {count} frames from {} on, {there} are there; ask for fewer, or follow", query.first);
+        let detail = format!(
+            "{there} of the {count} frames from {} on are solved; request fewer, or use follow=true",
+            query.first
+        );
         return Err(ApiError::new(problem::FRAMES_MISSING, detail).missing(missing));
     }
     let stride = form.stride(facts.unknowns);
@@ -134,7 +137,7 @@ pub(crate) async fn get(
     if digest.is_some() {
         return Ok(cages.respond(&headers));
     }
-    // More may come, so nothing is promised about it.
+    // More frames may follow, so the response is not cacheable.
     let mut response = cages.respond(&HeaderMap::new());
     for name in [header::ETAG, header::ACCEPT_RANGES, header::CACHE_CONTROL] {
         response.headers_mut().remove(name);
@@ -143,14 +146,14 @@ pub(crate) async fn get(
     Ok(response)
 }
 
-/// Any bytes of the cages from frame `first` on, `stride` bytes each. Blocks.
+/// A byte range of the encoded cages from frame `first` on, `stride` bytes each. Blocks.
 fn read_range(session: &Session, form: Form, first: u32, stride: u64, range: Range<u64>) -> io::Result<Bytes> {
     let (begin, end) = (range.start / stride, range.end.div_ceil(stride));
     let frames = form.read(session, first + begin as u32, (end - begin) as usize)?;
     let from = (range.start - begin * stride) as usize;
     let to = from + (range.end - range.start) as usize;
     if frames.len() < to {
-        return Err(io::Error::other("frames that were there are gone"));
+        return Err(io::Error::other("a frame was removed during the download"));
     }
     Ok(frames.slice(from..to))
 }
@@ -169,7 +172,7 @@ fn follow(
         async move {
             loop {
                 changes.mark_unchanged();
-                // Looked at before the frames: what comes after it is not missed.
+                // Read before the frames, so that no frame is missed.
                 let phase = session.status().phase;
                 let end = match &phase {
                     Phase::Completed(completion) => last.min(u64::from(completion.frames)),

@@ -1,6 +1,6 @@
 //! `GET /v1/sessions/{id}/capture.cager`: the container.
 
-use super::extract::Found;
+use super::extract::RequestedSession;
 use super::openapi;
 use super::ranged::Immutable;
 use crate::problem::{self, ApiError};
@@ -24,12 +24,12 @@ use std::sync::{Arc, Mutex, PoisonError};
     responses(
         (status = 200, description = "The container", content_type = "application/vnd.cager", body = Vec<u8>),
         (status = 206, description = "The range asked for", content_type = "application/vnd.cager", body = Vec<u8>),
-        (status = 304, description = "What the client has is still right"),
+        (status = 304, description = "The client's copy is current"),
     ),
 )]
 pub(crate) async fn get(
     State(service): State<Arc<Service>>,
-    Found { session, tenant }: Found,
+    RequestedSession { session, tenant }: RequestedSession,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let Phase::Completed(completion) = session.status().phase else {

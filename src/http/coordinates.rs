@@ -1,6 +1,6 @@
-//! `GET …/handles` and `GET …/coordinates`: what a client needs to send less and to decode by itself.
+//! `GET …/handles` and `GET …/coordinates`: handle indices for uploading handle rows, and `Φ` for decoding on the client.
 
-use super::extract::{Accept, Found};
+use super::extract::{Accept, RequestedSession};
 use super::frames::{not_acceptable, prepared};
 use super::openapi;
 use super::ranged::Immutable;
@@ -24,7 +24,7 @@ use std::sync::Arc;
 )]
 pub(crate) async fn handles(
     State(service): State<Arc<Service>>,
-    Found { session, .. }: Found,
+    RequestedSession { session, .. }: RequestedSession,
     accept: Accept,
 ) -> Result<Response, ApiError> {
     prepared(&service, &session).await?;
@@ -49,12 +49,12 @@ pub(crate) async fn handles(
         (status = 200, description = "Φ", content_type = "application/octet-stream", body = Vec<u8>,
             headers(("Cager-Rows" = u32, description = "Points n"), ("Cager-Columns" = u32, description = "Values of a cage: its unknowns m, and its face normals where they follow from them"))),
         (status = 206, description = "The range asked for", content_type = "application/octet-stream", body = Vec<u8>),
-        (status = 304, description = "What the client has is still right"),
+        (status = 304, description = "The client's copy is current"),
     ),
 )]
 pub(crate) async fn get(
     State(service): State<Arc<Service>>,
-    Found { session, tenant }: Found,
+    RequestedSession { session, tenant }: RequestedSession,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let facts = prepared(&service, &session).await?;

@@ -1,6 +1,6 @@
 //! `POST /v1/sessions/{id}/decode`: cages in, positions out.
 
-use super::extract::{Found, content_type};
+use super::extract::{RequestedSession, content_type};
 use super::frames::{body_error, prepared, stopping};
 use super::{openapi, other_model};
 use crate::admission::Held;
@@ -35,7 +35,7 @@ use tokio::sync::{oneshot, watch};
 )]
 pub(crate) async fn post(
     State(service): State<Arc<Service>>,
-    Found { session, tenant }: Found,
+    RequestedSession { session, tenant }: RequestedSession,
     request: Request,
 ) -> Result<Response, ApiError> {
     let media_type = content_type(request.headers());
@@ -56,7 +56,7 @@ pub(crate) async fn post(
         let cages = request.into_body().into_data_stream().map(|piece| piece.map_err(|error| body_error(&error)));
         (None, cages.boxed())
     };
-    // Before the model is bound: what the client sends meanwhile must not wait for it.
+    // The body is spooled before the model is bound, so that the client can keep sending meanwhile.
     let space = service.spool_space.nothing(&tenant.name);
     let spool = Arc::new(Spool::new(&service.config.data, space).map_err(|error| spool_error(&error))?);
     let arrived = spool.arrived.subscribe();
@@ -83,7 +83,7 @@ pub(crate) async fn post(
     });
     let mut decoding =
         Decoding { spool, arrived, lane, session, frame_bytes: 12 * u64::from(facts.unknowns), next: 0, _place: place };
-    // The first is waited for, so that its error still has a status.
+    // Wait for the first result, so that its error can have an HTTP status.
     let first = decoding.next().await?;
     let rest = futures_util::stream::unfold(decoding, |mut decoding| async {
         match decoding.next().await {
@@ -106,10 +106,10 @@ struct Job {
     reply: oneshot::Sender<Bytes>,
 }
 
-/// The body as it arrives, on disk: a client that reads nothing before it has written all must not be held back.
+/// The request body on disk: a client that reads the response only after sending the whole body must not block.
 struct Spool {
     file: Mutex<File>,
-    /// The disk space that it takes.
+    /// Permit for its disk space.
     space: Mutex<Held>,
     arrived: watch::Sender<Arrived>,
 }
@@ -121,7 +121,7 @@ struct Arrived {
 }
 
 impl Spool {
-    /// In the data folder: the only place where the service may write.
+    /// In the data folder, the only place that the service may write to.
     fn new(data: &Path, space: Held) -> io::Result<Self> {
         let file = Mutex::new(tempfile::tempfile_in(data.join("tmp"))?);
         Ok(Self { file, space: Mutex::new(space), arrived: watch::Sender::default() })
@@ -191,7 +191,7 @@ fn spool_error(error: &io::Error) -> ApiError {
     }
 }
 
-/// The half that answers.
+/// Produces the response body.
 struct Decoding {
     spool: Arc<Spool>,
     arrived: watch::Receiver<Arrived>,
@@ -203,7 +203,7 @@ struct Decoding {
 }
 
 impl Decoding {
-    /// Positions of the next cages.
+    /// Positions of the next few cages; `None` at the end of the body.
     async fn next(&mut self) -> Result<Option<Bytes>, ApiError> {
         const AT_A_TIME: u64 = 4;
         let at = self.next * self.frame_bytes;

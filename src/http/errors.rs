@@ -1,6 +1,6 @@
 //! `GET /v1/sessions/{id}/errors`: errors of every solved frame.
 
-use super::extract::Found;
+use super::extract::RequestedSession;
 use super::frames::result_of;
 use super::openapi;
 use crate::problem::ApiError;
@@ -11,7 +11,7 @@ use http::header::CONTENT_TYPE;
 
 /// Errors of all solved frames, ascending, as fractions of the rest diagonal.
 #[utoipa::path(get, path = "/v1/sessions/{id}/errors", operation_id = "get_errors", tag = "results", params(openapi::Id), responses((status = 200, description = "The errors", body = FrameErrors)))]
-pub(crate) async fn get(Found { session, .. }: Found) -> Result<Response, ApiError> {
+pub(crate) async fn get(RequestedSession { session, .. }: RequestedSession) -> Result<Response, ApiError> {
     // Of a long capture that is work for another thread than those that answer.
     let body = blocking(move || {
         let frames: Vec<_> = session.frames().entries().map(result_of).collect();

@@ -1,8 +1,8 @@
 //! `GET /v1/sessions/{id}/events`: progress as server-sent events.
 
-use super::extract::Found;
+use super::extract::RequestedSession;
 use super::openapi;
-use super::progress::{self, Followed, Standing};
+use super::progress::{self, ProgressEvent, ProgressSource};
 use crate::problem::ApiError;
 use crate::service::Service;
 use axum::extract::State;
@@ -17,35 +17,35 @@ use std::sync::Arc;
 pub(crate) struct Event {
     /// `progress`; as the last one also `deleted`, or `stopping` where the service stops.
     event: Option<String>,
-    /// What it tells, for `Last-Event-ID`.
+    /// Identifies its content, for `Last-Event-ID`.
     id: Option<String>,
-    /// JSON: `{"state": …, "received": …, "solved": …}` with the state and the frames of the session; `{}` of the two others.
+    /// JSON: `{"state": …, "received": …, "solved": …}` with the state and the numbers of frames; `{}` for the other two types.
     data: Option<String>,
 }
 
-/// Progress of the session: an event `progress` with each change, until it is completed, failed or deleted, or the service stops. An event's id says what it tells, so
-/// that `Last-Event-ID` keeps a client that comes back from hearing the same again.
+/// Progress of the session: an event `progress` after each change, until the session is completed, failed or deleted, or the service stops.
+/// Equal progress has equal event ids, so a client that reconnects with `Last-Event-ID` does not receive the last event again.
 #[utoipa::path(
     get, path = "/v1/sessions/{id}/events", operation_id = "get_events", tag = "sessions",
-    params(openapi::Id, ("Last-Event-ID" = Option<String>, Header, description = "The last event heard")),
+    params(openapi::Id, ("Last-Event-ID" = Option<String>, Header, description = "Id of the last event received")),
     responses((status = 200, description = "Events whose data is JSON", content_type = "text/event-stream", body = Event)),
 )]
 pub(crate) async fn get(
     State(service): State<Arc<Service>>,
-    Found { session, tenant }: Found,
+    RequestedSession { session, tenant }: RequestedSession,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let place = service.stream(&tenant)?;
     let (changes, deleted) = (session.changes(), session.deleted().clone());
     let look = move || {
         let progress = session.progress();
-        Standing {
+        ProgressEvent {
             id: id_of(&progress),
             data: serde_json::to_string(&progress).unwrap_or_default(),
             last: matches!(progress.state, SessionState::Completed | SessionState::Failed),
         }
     };
-    Ok(progress::stream(service, place, &headers, Followed { changes, deleted, look: Box::new(look) }))
+    Ok(progress::stream(service, place, &headers, ProgressSource { changes, deleted, look: Box::new(look) }))
 }
 
 fn id_of(progress: &Progress) -> String {

@@ -1,4 +1,4 @@
-//! What handlers take from a request: the tenant, the tenant's session, checked queries and bodies.
+//! Extractors: the tenant, the tenant's session or cage job, validated queries and bodies.
 
 use super::guarded::revocable;
 use crate::auth::{Denied, Grant, Scope, Tenant};
@@ -16,11 +16,11 @@ use http::{HeaderMap, header};
 use std::convert::Infallible;
 use std::sync::Arc;
 
-/// Who asks. Rejects with 401 where the middleware did not run or found no valid token.
+/// The authenticated tenant. Rejects with 401 if the middleware did not run or found no valid token.
 #[derive(Clone)]
 pub(crate) struct Caller(pub(crate) Arc<Tenant>);
 
-/// Finds out who asks, before anything else of the request is looked at.
+/// Authenticates the request before anything else of it is processed.
 pub(crate) async fn authenticate(
     State(service): State<Arc<Service>>,
     mut request: axum::extract::Request,
@@ -30,7 +30,7 @@ pub(crate) async fn authenticate(
         Ok(grant) => grant,
         Err(denied) => return denied.into_response(),
     };
-    // Decoding computes and changes nothing.
+    // Decoding changes nothing, although it is a POST.
     let reads = request.method().is_safe() || request.uri().path().ends_with("/decode");
     if grant.scope == Scope::Read && !reads {
         service.rejected("scope");
@@ -43,14 +43,14 @@ pub(crate) async fn authenticate(
     }
     let request = request.map(|body| revocable(body, &grant));
     let response = next.run(request).await;
-    // What is whole already is sent.
+    // Bodies in memory are sent completely; streams end when the token is revoked.
     match http_body::Body::size_hint(response.body()).exact() {
         Some(_) => response,
         None => response.map(|body| revocable(body, &grant)),
     }
 }
 
-/// What the request's token grants; the log line says whose it is.
+/// Authenticates the request and records tenant and token in the log.
 pub(super) async fn granted(service: &Service, headers: &HeaderMap) -> Result<Grant, ApiError> {
     let grant = service.access.grant(headers).await.map_err(|denied| {
         service.rejected("unauthorized");
@@ -72,15 +72,15 @@ impl<S: Sync> FromRequestParts<S> for Caller {
     }
 }
 
-/// What belongs to a tenant and has an address.
-pub(crate) trait Owned: Send + Sync + Sized {
+/// A resource that belongs to a tenant.
+pub(crate) trait TenantResource: Send + Sync + Sized {
     const KIND: Kind;
 
-    /// The tenant's one of this name.
+    /// The tenant's resource with this id.
     fn find(service: &Service, tenant: &str, id: &str) -> Result<Arc<Self>, ApiError>;
 }
 
-impl Owned for Session {
+impl TenantResource for Session {
     const KIND: Kind = Kind::Session;
 
     fn find(service: &Service, tenant: &str, id: &str) -> Result<Arc<Self>, ApiError> {
@@ -88,7 +88,7 @@ impl Owned for Session {
     }
 }
 
-impl Owned for CageJob {
+impl TenantResource for CageJob {
     const KIND: Kind = Kind::CageJob;
 
     fn find(service: &Service, tenant: &str, id: &str) -> Result<Arc<Self>, ApiError> {
@@ -96,11 +96,11 @@ impl Owned for CageJob {
     }
 }
 
-/// The caller's session or cage job named in the path, even if its files cannot all be read. Rejects with 404 if it does not exist or belongs
-/// to another tenant, and with 503 if its files do not say whose it is.
-pub(crate) struct Named<T>(pub(crate) Arc<T>);
+/// The tenant's session or cage job named in the path, whether or not its files can be read. Rejects with 404 if it does not exist or
+/// belongs to another tenant, and with 503 if its owner cannot be read.
+pub(crate) struct Requested<T>(pub(crate) Arc<T>);
 
-impl<T: Owned> FromRequestParts<Arc<Service>> for Named<T> {
+impl<T: TenantResource> FromRequestParts<Arc<Service>> for Requested<T> {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, service: &Arc<Service>) -> Result<Self, ApiError> {
@@ -108,26 +108,26 @@ impl<T: Owned> FromRequestParts<Arc<Service>> for Named<T> {
         let id = Path::<String>::from_request_parts(parts, service).await;
         let missing = || ApiError::new(problem::NOT_FOUND, format!("the id of the {} is missing", T::KIND.name()));
         let Path(id) = id.map_err(|_| missing())?;
-        let read = service.read_again(T::KIND, &tenant.name, &id).await;
+        let read = service.retry_unreadable(T::KIND, &tenant.name, &id).await;
         T::find(service, &tenant.name, &id).or_else(|missing| read.and(Err(missing))).map(Self)
     }
 }
 
-/// The caller's session of this address. Rejects as [`Named`], and where its files cannot be read.
-pub(crate) struct Found {
+/// The tenant's session named in the path, with its frames loaded. Rejects as [`Requested`], and with 503 if its files cannot be read.
+pub(crate) struct RequestedSession {
     pub(crate) tenant: Arc<Tenant>,
     pub(crate) session: Arc<Session>,
 }
 
-impl FromRequestParts<Arc<Service>> for Found {
+impl FromRequestParts<Arc<Service>> for RequestedSession {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, service: &Arc<Service>) -> Result<Self, ApiError> {
         let Caller(tenant) = Caller::from_request_parts(parts, service).await?;
-        let Named(session) = Named::<Session>::from_request_parts(parts, service).await?;
-        service.read_again(Kind::Session, &tenant.name, &session.meta.id).await?;
+        let Requested(session) = Requested::<Session>::from_request_parts(parts, service).await?;
+        service.retry_unreadable(Kind::Session, &tenant.name, &session.meta.id).await?;
         match session.ensure_loaded().await {
-            // What can be known of it is that it failed, and why.
+            // For a failed session the failure is all there is to know.
             Err(_) if session.has_failed() => {}
             loaded => loaded?,
         }
@@ -135,24 +135,24 @@ impl FromRequestParts<Arc<Service>> for Found {
     }
 }
 
-/// The caller's cage job of this address. Rejects as [`Named`], and where its files cannot be read.
-pub(crate) struct FoundJob {
+/// The tenant's cage job named in the path. Rejects as [`Requested`], and with 503 if its files cannot be read.
+pub(crate) struct RequestedCageJob {
     pub(crate) tenant: Arc<Tenant>,
     pub(crate) job: Arc<CageJob>,
 }
 
-impl FromRequestParts<Arc<Service>> for FoundJob {
+impl FromRequestParts<Arc<Service>> for RequestedCageJob {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, service: &Arc<Service>) -> Result<Self, ApiError> {
         let Caller(tenant) = Caller::from_request_parts(parts, service).await?;
-        let Named(job) = Named::<CageJob>::from_request_parts(parts, service).await?;
-        service.read_again(Kind::CageJob, &tenant.name, &job.meta.id).await?;
+        let Requested(job) = Requested::<CageJob>::from_request_parts(parts, service).await?;
+        service.retry_unreadable(Kind::CageJob, &tenant.name, &job.meta.id).await?;
         Ok(Self { tenant, job })
     }
 }
 
-/// A query string. Rejects with 400 where it does not fit.
+/// A parsed query string. Rejects with 400.
 pub(crate) struct Query<T>(pub(crate) T);
 
 impl<S: Sync + Send, T: serde::de::DeserializeOwned> FromRequestParts<S> for Query<T> {
@@ -200,7 +200,7 @@ impl<S: Sync + Send, T: serde::de::DeserializeOwned> axum::extract::FromRequest<
     }
 }
 
-/// What the client would like to get.
+/// The response format that the client prefers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Accept {
     /// Nothing in particular.
@@ -211,12 +211,12 @@ pub(crate) enum Accept {
     /// Newline-delimited JSON.
     Ndjson,
     Binary,
-    /// Something that no route has.
+    /// No format that any route offers.
     Other,
 }
 
 impl Accept {
-    /// The known type of the header with the greatest weight (RFC 9110, §12.5.1); the first of equals.
+    /// The supported media type with the greatest weight (RFC 9110, §12.5.1); among equals the first.
     pub(crate) fn of(headers: &HeaderMap) -> Self {
         let Some(accept) = headers.get(header::ACCEPT).and_then(|value| value.to_str().ok()) else {
             return Self::Anything;
@@ -241,7 +241,7 @@ impl Accept {
     }
 }
 
-/// The weight `q` of one part of the header; 1 where there is none, or none that can be read.
+/// The weight `q` of a media range; 1 if absent or malformed.
 fn weight(part: &str) -> f32 {
     let weights =
         part.split(';').skip(1).filter_map(|parameter| parameter.trim().strip_prefix(['q', 'Q'])?.strip_prefix('='));
@@ -259,10 +259,10 @@ impl<S: Sync> FromRequestParts<S> for Accept {
 /// Most characters of an idempotency key.
 const KEY_CHARACTERS: usize = 255;
 
-/// The client's name for its request.
+/// The value of `Idempotency-Key`.
 ///
 /// # Errors
-/// One that is empty, too long or not ASCII.
+/// A key that is empty, too long or not ASCII.
 pub(crate) fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, ApiError> {
     match headers.get("idempotency-key").map(|value| value.to_str()) {
         None => Ok(None),
@@ -274,7 +274,7 @@ pub(crate) fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, Api
     }
 }
 
-/// The media type of a body without its parameters, in small letters.
+/// The media type of a body in lower case, without parameters.
 pub(crate) fn content_type(headers: &HeaderMap) -> Option<String> {
     let value = headers.get(header::CONTENT_TYPE)?.to_str().ok()?;
     Some(value.split(';').next().unwrap_or_default().trim().to_ascii_lowercase())

@@ -1,14 +1,14 @@
-//! `POST /v1/sessions/{id}/frames`: frames in, records out, while the upload runs where that is asked for.
+//! `POST /v1/sessions/{id}/frames`: receives frames and responds with one record per frame, optionally while the upload runs.
 
-use super::extract::{Accept, Found, Query, content_type};
-use super::frames_in::{FrameReader, Layout};
+use super::extract::{Accept, Query, RequestedSession, content_type};
+use super::frame_parser::{FrameReader, Layout};
 use super::openapi;
 use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::facts::Facts;
-use crate::session::upload::{FrameJob, Permits, Rows, Step, Upload};
+use crate::session::upload::{FrameJob, Permits, Rows, Upload, UploadEvent};
 use crate::session::{LiveLane, Phase, Session, gone};
 use crate::store::LogEntry;
 use crate::telemetry::RequestId;
@@ -28,26 +28,25 @@ use std::time::Duration;
 use tokio::sync::Semaphore;
 use tokio::time::{Instant, sleep_until};
 
-/// Frames of one upload that wait or are solved at a time: enough that the pool never waits for it.
-const IN_FLIGHT: usize = 64;
-/// Frames after which the tenant's quota is looked at again: a body need not say how long it is.
-const QUOTA_EVERY: u64 = 64;
-/// Frames of one upload that are not on disk yet: enough that a slow sync holds nothing up, and a bound where the disk hangs.
-const NOT_WRITTEN: usize = 512;
-/// Answers sent at a time.
+/// Frames of one upload that are queued or being solved: enough to keep the pool busy.
+const MAX_IN_FLIGHT: usize = 64;
+/// Frames between checks of the tenant's quota, since the body's length may be unknown.
+const QUOTA_CHECK_FRAMES: u64 = 64;
+/// Frames of one upload that are not on disk yet: enough to bridge a slow sync, and a bound if the disk hangs.
+const MAX_UNWRITTEN: usize = 512;
+/// Records sent at a time.
 const ANSWERS: usize = 64;
-/// How long the answer's header waits for the first record: some clients give up on a server that says nothing.
-const HEAD_WITHIN: Duration = Duration::from_secs(5);
-/// How much of a refused body is thrown away, and for how long.
-const DRAINED_BYTES: usize = 64 << 20;
-const DRAINED_WITHIN: Duration = Duration::from_secs(5);
+/// Longest delay of the response header until the first record; some clients time out on a silent server.
+const FIRST_RECORD_TIMEOUT: Duration = Duration::from_secs(5);
+/// How much of a refused body is read and discarded, and for how long.
+const MAX_DRAIN_BYTES: usize = 64 << 20;
+const DRAIN_TIMEOUT: Duration = Duration::from_secs(5);
 /// How long a frame waits for memory.
-const ROOM_WITHIN: Duration = Duration::from_secs(30);
-/// A frame keeps its memory from its first byte on, so that it has to come faster than this, after the pause that any body may
-/// make.
+const MEMORY_TIMEOUT: Duration = Duration::from_secs(30);
+/// Slowest transfer accepted, after an initial pause of `body_timeout_s`: an incomplete frame occupies memory from its first byte on.
 pub(crate) const SLOWEST_BYTES_PER_SECOND: u64 = 16 << 10;
-/// How long an upload waits for its session to be prepared.
-const PREPARED_WITHIN: Duration = Duration::from_secs(50);
+/// How long a request waits for its session to be prepared.
+const PREPARE_TIMEOUT: Duration = Duration::from_secs(50);
 
 /// The query of an upload.
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
@@ -87,7 +86,7 @@ pub(crate) enum RowsQuery {
 )]
 pub(crate) async fn post(
     State(service): State<Arc<Service>>,
-    Found { tenant, session }: Found,
+    RequestedSession { tenant, session }: RequestedSession,
     Query(query): Query<UploadQuery>,
     accept: Accept,
     request_id: Option<Extension<RequestId>>,
@@ -113,7 +112,7 @@ pub(crate) async fn post(
     };
     let place = service.stream(&tenant)?;
     let facts = prepared(&service, &session).await?;
-    session.settled().await?;
+    session.completion_resolved().await?;
     if rows == Rows::Handles && !facts.reads_handles_only {
         let detail =
             "this session reads every point (handles is all), so handle rows are not enough; post whole frames";
@@ -126,15 +125,15 @@ pub(crate) async fn post(
     let solver = service.solver(&session).await?;
     let live = service.lane(&session, solver, &tenant);
     let upload = Arc::new(Upload::default());
-    let answering = Answering { upload: Arc::clone(&upload), _live: Arc::clone(&live), _place: place };
-    let reading = Reading { service, tenant, session: Arc::clone(&session), live, upload: Arc::clone(&upload) };
+    let answering = UploadResponder { upload: Arc::clone(&upload), _live: Arc::clone(&live), _place: place };
+    let reading = UploadReader { service, tenant, session: Arc::clone(&session), live, upload: Arc::clone(&upload) };
     let frames = FrameReader::new(layout, &facts);
     tokio::spawn(async move {
         reading.live.upload_begins();
         let mut body = body;
         let outcome = reading.read(&mut body, frames).await;
         reading.live.upload_ends();
-        let refused = outcome.is_err() || reading.upload.is_pointless();
+        let refused = outcome.is_err() || reading.upload.is_aborted();
         reading.upload.close(outcome.err());
         if refused && !reading.upload.is_abandoned() {
             drain(body).await;
@@ -143,9 +142,9 @@ pub(crate) async fn post(
     if !query.live {
         upload.closed().await;
     }
-    // An error before the first record still has a status of its own.
-    let first = match tokio::time::timeout(HEAD_WITHIN, upload.next(ANSWERS)).await {
-        Ok(Step::Failed(error)) => return Err(error),
+    // An error before the first record can still have an HTTP status.
+    let first = match tokio::time::timeout(FIRST_RECORD_TIMEOUT, upload.next(ANSWERS)).await {
+        Ok(UploadEvent::Failed(error)) => return Err(error),
         Ok(step) => Some(step),
         Err(_) => None,
     };
@@ -159,10 +158,10 @@ pub(crate) fn not_acceptable(available: &str) -> ApiError {
     ApiError::new(problem::NOT_ACCEPTABLE, format!("accept {available}"))
 }
 
-/// The facts of a session that is ready; waits for one that is being prepared.
+/// Waits until the session is ready and returns the results of its preparation.
 pub(crate) async fn prepared(service: &Service, session: &Arc<Session>) -> Result<Facts, ApiError> {
     let mut changes = session.changes();
-    let deadline = Instant::now() + PREPARED_WITHIN;
+    let deadline = Instant::now() + PREPARE_TIMEOUT;
     loop {
         changes.mark_unchanged();
         let status = session.status();
@@ -173,7 +172,7 @@ pub(crate) async fn prepared(service: &Service, session: &Arc<Session>) -> Resul
             }
             (Phase::Preparing, _) | (_, None) => {}
             (_, Some(facts)) => {
-                // It may have become ready since the request came.
+                // It may have become ready since the request arrived.
                 session.ensure_loaded().await?;
                 return Ok(facts);
             }
@@ -195,10 +194,10 @@ pub(crate) fn stopping() -> ApiError {
     ApiError::new(problem::STOPPING, detail).retry_after(5)
 }
 
-/// Throws a refused body away for a while: many clients look at the answer only when they have written all.
+/// Reads and discards a refused body for a while: many clients read the response only after sending the whole body.
 async fn drain(mut body: Body) {
     let take = async {
-        let mut left = DRAINED_BYTES;
+        let mut left = MAX_DRAIN_BYTES;
         while let Some(Ok(frame)) = body.frame().await {
             left = left.saturating_sub(frame.data_ref().map_or(0, Bytes::len));
             if left == 0 {
@@ -206,15 +205,15 @@ async fn drain(mut body: Body) {
             }
         }
     };
-    // Whether it comes to an end does not matter.
-    let _ = tokio::time::timeout(DRAINED_WITHIN, take).await;
+    // A timeout is not an error here.
+    let _ = tokio::time::timeout(DRAIN_TIMEOUT, take).await;
 }
 
 pub(crate) fn too_slow() -> ApiError {
     ApiError::new(problem::REQUEST_TIMEOUT, "the body comes too slowly; send the rest again over a faster connection")
 }
 
-/// What a broken body means.
+/// The response for an error while reading a body.
 pub(crate) fn body_error(error: &(dyn std::error::Error + 'static)) -> ApiError {
     if super::listen::is_body_timeout(error) {
         return ApiError::new(problem::REQUEST_TIMEOUT, "the body stopped arriving; send the rest again");
@@ -222,8 +221,8 @@ pub(crate) fn body_error(error: &(dyn std::error::Error + 'static)) -> ApiError 
     ApiError::new(problem::BAD_REQUEST, format!("the body broke off ({error}); send the rest again"))
 }
 
-/// The half of an upload that reads its body.
-struct Reading {
+/// The half of an upload that reads the body.
+struct UploadReader {
     service: Arc<Service>,
     tenant: Arc<Tenant>,
     session: Arc<Session>,
@@ -231,10 +230,10 @@ struct Reading {
     upload: Arc<Upload>,
 }
 
-impl Reading {
+impl UploadReader {
     async fn read(&self, body: &mut Body, mut frames: FrameReader) -> Result<(), ApiError> {
-        let places = Arc::new(Semaphore::new(IN_FLIGHT));
-        let unwritten = Arc::new(Semaphore::new(NOT_WRITTEN));
+        let places = Arc::new(Semaphore::new(MAX_IN_FLIGHT));
+        let unwritten = Arc::new(Semaphore::new(MAX_UNWRITTEN));
         let mut permits = None;
         let mut received = 0u64;
         let mut submitted = 0u64;
@@ -252,8 +251,8 @@ impl Reading {
             let next = tokio::select! {
                 biased;
                 error = &mut stopped => return Err(error),
-                // A client that waits for an answer before it sends on must hear of an error all the same.
-                () = self.upload.pointless() => return Ok(()),
+                // Without this, a client that waits for a response before it sends more would never see an error.
+                () = self.upload.aborted() => return Ok(()),
                 next = body.frame() => next,
                 () = sleep_until(late), if permits.is_some() => return Err(too_slow()),
             };
@@ -266,7 +265,7 @@ impl Reading {
             counter.increment(chunk.len() as u64);
             let mut input = &chunk[..];
             while !input.is_empty() {
-                if self.upload.is_pointless() {
+                if self.upload.is_aborted() {
                     return Ok(());
                 }
                 if frames.is_between_frames() && permits.is_none() {
@@ -280,9 +279,9 @@ impl Reading {
                     };
                     permits = Some(tokio::select! {
                         error = &mut stopped => return Err(error),
-                        () = self.upload.pointless() => return Ok(()),
+                        () = self.upload.aborted() => return Ok(()),
                         permits = room => permits,
-                        () = tokio::time::sleep(ROOM_WITHIN) => return Err(self.no_room()),
+                        () = tokio::time::sleep(MEMORY_TIMEOUT) => return Err(self.no_room()),
                     });
                     late = Instant::now()
                         + patience
@@ -295,7 +294,7 @@ impl Reading {
                     let job = FrameJob::new(&self.session, &self.upload, frame.frame, frame.rows, frame.bytes, permits);
                     self.live.lane.push(job);
                     submitted += 1;
-                    if submitted.is_multiple_of(QUOTA_EVERY) {
+                    if submitted.is_multiple_of(QUOTA_CHECK_FRAMES) {
                         self.service.check_bytes(&self.tenant, 0)?;
                     }
                 }
@@ -305,7 +304,7 @@ impl Reading {
         frames.finish()
     }
 
-    /// Refuses a number beyond those that the session was made for: it would only be found out at the end.
+    /// Refuses frame numbers beyond the declared number of frames early, not only at completion.
     fn is_expected(&self, frame: u32) -> Result<(), ApiError> {
         match self.session.meta.options.frames {
             Some(frames) if frame >= frames => {
@@ -325,24 +324,24 @@ impl Reading {
     }
 }
 
-/// The half of an upload that answers. Dropped when the client is gone.
-struct Answering {
+/// The half of an upload that responds. Dropped when the client disconnects.
+struct UploadResponder {
     upload: Arc<Upload>,
-    /// Frames wait in the lane after the whole body has arrived, and a lane that is dropped forgets them.
+    /// Keeps the lane open: frames may still be queued after the whole body has arrived.
     _live: Arc<LiveLane>,
     _place: Held,
 }
 
-impl Drop for Answering {
+impl Drop for UploadResponder {
     fn drop(&mut self) {
         self.upload.abandon();
     }
 }
 
 fn answers(
-    answering: Answering,
+    answering: UploadResponder,
     session: Arc<Session>,
-    first: Option<Step>,
+    first: Option<UploadEvent>,
     records: bool,
     request_id: Option<String>,
 ) -> impl futures_util::Stream<Item = io::Result<Bytes>> {
@@ -354,17 +353,17 @@ fn answers(
                 None => answering.upload.next(ANSWERS).await,
             };
             let item = match step {
-                Step::Done => return None,
-                Step::Frames(frames) => {
+                UploadEvent::Done => return None,
+                UploadEvent::Frames(frames) => {
                     let entries: Vec<LogEntry> = {
                         let known = session.frames();
                         frames.iter().filter_map(|&frame| known.entry(frame).copied()).collect()
                     };
                     if records { as_records(session, entries).await } else { Ok(as_lines(&entries)) }
                 }
-                // What follows an error is the end.
-                Step::Failed(error) if records => Err(error.into()),
-                Step::Failed(mut error) => {
+                // An error ends the stream.
+                UploadEvent::Failed(error) if records => Err(error.into()),
+                UploadEvent::Failed(mut error) => {
                     error.problem.request_id = request_id;
                     let mut line = serde_json::to_vec(&error.problem).unwrap_or_default();
                     line.push(b'\n');
@@ -396,7 +395,7 @@ pub(crate) async fn as_records(session: Arc<Session>, entries: Vec<LogEntry>) ->
     tokio::task::spawn_blocking(move || records_of(&session, &entries)).await.map_err(io::Error::other)?
 }
 
-/// As [`as_records`]. Blocks.
+/// As [`as_records`], blocking.
 pub(crate) fn records_of(session: &Session, entries: &[LogEntry]) -> io::Result<Bytes> {
     let rows = session.facts().map_or(0, |facts| facts.unknowns);
     let mut cages = Vec::with_capacity(entries.len() * 12 * rows as usize);

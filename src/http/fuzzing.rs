@@ -1,7 +1,7 @@
-//! Doors for the fuzz targets to what reads requests. They panic where a promise is broken.
+//! Entry points for fuzz targets into request parsing. They panic if an invariant is violated.
 
 use super::cage_jobs;
-use super::frames_in::{FrameReader, Layout};
+use super::frame_parser::{FrameReader, Layout};
 use super::multipart;
 use super::ranged::Immutable;
 use crate::problem::ApiError;
@@ -21,7 +21,7 @@ use std::sync::Arc;
 /// Number of a frame, whether it has handle rows only, and its bytes.
 pub type Frame = (u32, bool, Vec<u8>);
 
-/// How frames come in.
+/// Layout of the frames in a body.
 #[derive(Clone, Copy, Debug)]
 pub struct Frames {
     /// Number of the first raw frame; None where they are records.
@@ -35,7 +35,7 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// Every frame of a body that comes in pieces, and what the client would hear of its end.
+    /// All frames of a body given in pieces, and the error that would end the response.
     pub fn read<'a>(self, pieces: impl Iterator<Item = &'a [u8]>) -> (Vec<Frame>, Result<(), ApiError>) {
         let rows = if self.handle_rows { Rows::Handles } else { Rows::All };
         let layout = self.first.map_or(Layout::Records, |first| Layout::Raw { first, rows });

@@ -1,4 +1,4 @@
-//! Bodies that end when the token they were begun with is no longer valid, and bodies that keep a place until they are read or dropped.
+//! Bodies that end when their token is revoked or expires, and response bodies that keep a request's permit until they are sent.
 
 use crate::admission::Held;
 use crate::auth::Grant;
@@ -8,17 +8,17 @@ use http_body::{Frame, SizeHint};
 use std::pin::Pin;
 use std::task::{Context, Poll};
 
-/// Smaller bodies leave for the connection's buffers at once.
+/// Smaller bodies are copied to the connection's buffers at once.
 const SMALL: u64 = 16 << 10;
 
-struct Guarded {
+struct GuardedBody {
     body: Body,
-    /// Ends the body with an error.
+    /// Ends the body with an error when it completes.
     over: Option<Pin<Box<dyn Future<Output = ()> + Send>>>,
     _place: Option<Held>,
 }
 
-/// The body, which fails as soon as the token is revoked or expires.
+/// Fails the body when its token is revoked or expires.
 pub(super) fn revocable(body: Body, grant: &Grant) -> Body {
     if http_body::Body::is_end_stream(&body) {
         return body;
@@ -30,18 +30,18 @@ pub(super) fn revocable(body: Body, grant: &Grant) -> Body {
             None => revoked.cancelled().await,
         }
     };
-    Body::new(Guarded { body, over: Some(Box::pin(over)), _place: None })
+    Body::new(GuardedBody { body, over: Some(Box::pin(over)), _place: None })
 }
 
-/// Keeps the place of a request with its answer's body, where that is a large one in memory; a stream has a place of its own.
-pub(super) fn holding(body: Body, place: Held) -> Body {
+/// Keeps a request's permit until the body is sent, if the body is large and in memory; streams have permits of their own.
+pub(super) fn with_permit(body: Body, place: Held) -> Body {
     match http_body::Body::size_hint(&body).exact() {
-        Some(bytes) if bytes > SMALL => Body::new(Guarded { body, over: None, _place: Some(place) }),
+        Some(bytes) if bytes > SMALL => Body::new(GuardedBody { body, over: None, _place: Some(place) }),
         _ => body,
     }
 }
 
-impl http_body::Body for Guarded {
+impl http_body::Body for GuardedBody {
     type Data = Bytes;
     type Error = axum::Error;
 

@@ -10,7 +10,7 @@ use http::header;
 use serde::Serialize;
 use std::sync::Arc;
 
-/// That the service lives.
+/// Health of the service.
 #[derive(Serialize, utoipa::ToSchema)]
 pub(crate) struct Health {
     /// `ok`.
@@ -19,7 +19,7 @@ pub(crate) struct Health {
     version: &'static str,
     /// Seconds since it started.
     uptime_s: f64,
-    /// What an operator should look at although the service is ready: files that cannot be read.
+    /// What needs the operator's attention although the service is ready: files that cannot be read.
     #[serde(skip_serializing_if = "Option::is_none")]
     detail: Option<String>,
 }
@@ -30,13 +30,13 @@ fn health(service: &Service, detail: Option<String>) -> Json<Health> {
 }
 
 /// Liveness: the process answers.
-#[utoipa::path(get, path = "/healthz", operation_id = "get_health", tag = "operation", security(()), responses((status = 200, description = "It is", body = Health)))]
+#[utoipa::path(get, path = "/healthz", operation_id = "get_health", tag = "operation", security(()), responses((status = 200, description = "The process is running", body = Health)))]
 pub(crate) async fn live(State(service): State<Arc<Service>>) -> Json<Health> {
     health(&service, None)
 }
 
 /// Readiness: sessions are resumed and the disk takes writes.
-#[utoipa::path(get, path = "/readyz", operation_id = "get_readiness", tag = "operation", security(()), responses((status = 200, description = "It is", body = Health)))]
+#[utoipa::path(get, path = "/readyz", operation_id = "get_readiness", tag = "operation", security(()), responses((status = 200, description = "The service is ready", body = Health)))]
 pub(crate) async fn ready(State(service): State<Arc<Service>>) -> Result<Json<Health>, ApiError> {
     service.ready().await?;
     Ok(health(&service, service.unread.summary()))

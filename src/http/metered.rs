@@ -1,10 +1,9 @@
-//! Bodies whose bytes are counted and find room in memory as they come, before anyone looks for parts in them: until one is found, all
-//! that came is kept.
+//! Request bodies whose bytes are counted and admitted to the memory budget as they arrive, before the multipart parser buffers them.
 
 use super::frames::{SLOWEST_BYTES_PER_SECOND, too_slow};
 use crate::admission::Held;
 use crate::auth::Tenant;
-use crate::config::ENVELOPE_BYTES;
+use crate::config::MULTIPART_OVERHEAD_BYTES;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::lock;
@@ -15,28 +14,28 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// A body that is counted.
-pub(super) struct Metered(Arc<Mutex<Counted>>);
+pub(super) struct Metered(Arc<Mutex<MeterState>>);
 
-struct Counted {
+struct MeterState {
     room: Held,
     received: u64,
     began: Instant,
-    /// What is too large, where it is.
+    /// Subject of the error message for a body that is too large.
     what: &'static str,
-    /// Why no more was taken.
+    /// The error that ended the body.
     refused: Option<ApiError>,
     done: bool,
 }
 
 impl Metered {
-    /// Counts the body of a request; `what` begins the sentence that refuses too much of it.
+    /// Counts the body of a request; `what` is the subject of the error message for a body that is too large.
     pub(super) fn new(
         service: &Arc<Service>,
         tenant: &Tenant,
         request: Request,
         what: &'static str,
     ) -> (Self, Request) {
-        let counted = Counted {
+        let counted = MeterState {
             room: service.upload_memory.nothing(&tenant.name),
             received: 0,
             began: Instant::now(),
@@ -59,7 +58,7 @@ impl Metered {
         (Self(counted), request)
     }
 
-    /// What was read of it, with the room that it takes; what follows is not counted any more. Where the body was refused, why.
+    /// Ends counting; returns `read` with its memory permit, or the error that ended the body.
     pub(super) fn finish<T>(&self, read: Result<T, ApiError>) -> Result<(T, Held), ApiError> {
         let mut counted = lock(&self.0);
         counted.done = true;
@@ -69,20 +68,20 @@ impl Metered {
     }
 }
 
-impl Counted {
+impl MeterState {
     fn take(&mut self, service: &Service, bytes: usize) -> Result<(), ApiError> {
         if self.done {
             return Ok(());
         }
         self.received += bytes as u64;
-        // It keeps its memory from its first byte on.
+        // The body occupies memory from its first byte on, so it must not be too slow.
         let patience = Duration::from_secs(service.config.body_timeout_s);
         let due = self.began.elapsed().saturating_sub(patience).as_secs() * SLOWEST_BYTES_PER_SECOND;
         if self.received < due {
             return Err(too_slow());
         }
         let limit = service.config.max_rest_bytes;
-        if self.received > limit.saturating_add(ENVELOPE_BYTES) {
+        if self.received > limit.saturating_add(MULTIPART_OVERHEAD_BYTES) {
             service.rejected("body_too_large");
             let detail = format!("{} more than {limit} bytes, the most that is taken; send a lighter model", self.what);
             return Err(ApiError::new(problem::TOO_LARGE, detail).limit(limit));

@@ -5,14 +5,14 @@ mod cage;
 mod cage_jobs;
 mod cages;
 mod container;
+mod content_encoding;
 mod coordinates;
 mod decode;
-mod encoded;
 mod errors;
 mod events;
 mod extract;
+mod frame_parser;
 mod frames;
-mod frames_in;
 #[cfg(feature = "fuzzing")]
 pub mod fuzzing;
 mod guarded;

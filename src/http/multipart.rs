@@ -1,11 +1,11 @@
-//! The multipart body that makes a session.
+//! Parses the multipart body that creates a session.
 
 use super::extract::{content_type, idempotency_key};
 use super::frames::{SLOWEST_BYTES_PER_SECOND, body_error};
 use super::metered::Metered;
 use crate::admission::Held;
 use crate::auth::Tenant;
-use crate::config::ENVELOPE_BYTES;
+use crate::config::MULTIPART_OVERHEAD_BYTES;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::cage_source::Uploaded;
@@ -19,9 +19,9 @@ use std::time::Duration;
 
 const OPTIONS_BYTES: usize = 64 << 10;
 pub(super) const NAME_CHARACTERS: usize = 200;
-/// The part with the matrix of the regularizer of that name.
+/// Name of the part with the matrix of the regularizer `matrix`.
 const MATRIX: &str = "regularizer_matrix";
-/// What the parts hold, and the room they take until it is dropped.
+/// Parsed parts, with the permit for their memory.
 pub(crate) struct Parts {
     pub(crate) uploaded: Uploaded,
     pub(crate) options: SessionOptions,
@@ -33,31 +33,36 @@ struct File {
     bytes: Vec<u8>,
 }
 
-/// What a form says before it is read.
-pub(super) struct Announced {
+/// What the headers of a form say.
+pub(super) struct FormHeader {
     pub(super) idempotency_key: Option<String>,
-    /// How long it may take to arrive.
+    /// Longest time for the body to arrive.
     pub(super) patience: Duration,
 }
 
-/// Looks at the header of a form with these parts; what is in it may have `limit` bytes.
+/// Checks the headers of a form with these parts, whose content may have `limit` bytes.
 ///
 /// # Errors
 /// The body is not multipart, it is too large, or its idempotency key is malformed.
-pub(super) fn announced(service: &Service, request: &Request, parts: &str, limit: u64) -> Result<Announced, ApiError> {
+pub(super) fn check_form_header(
+    service: &Service,
+    request: &Request,
+    parts: &str,
+    limit: u64,
+) -> Result<FormHeader, ApiError> {
     let headers = request.headers();
     if content_type(headers).as_deref() != Some("multipart/form-data") {
         return Err(ApiError::new(problem::MEDIA_TYPE, format!("send multipart/form-data with the parts {parts}")));
     }
     let declared = http_body::Body::size_hint(request.body()).lower();
-    if declared > limit.saturating_add(ENVELOPE_BYTES) {
+    if declared > limit.saturating_add(MULTIPART_OVERHEAD_BYTES) {
         service.rejected("body_too_large");
         let detail = format!("the body has {declared} bytes, but the parts {parts} may have {limit} together");
         return Err(ApiError::new(problem::TOO_LARGE, detail).limit(limit));
     }
     let most = if declared > 0 { declared } else { limit };
     let patience = Duration::from_secs(service.config.body_timeout_s + most / SLOWEST_BYTES_PER_SECOND);
-    Ok(Announced { idempotency_key: idempotency_key(headers)?, patience })
+    Ok(FormHeader { idempotency_key: idempotency_key(headers)?, patience })
 }
 
 /// Reads all parts.
@@ -131,16 +136,16 @@ async fn read_file(service: &Service, part: &str, mut field: Field<'_>, left: &m
     Ok(File { name, bytes })
 }
 
-/// The name that the part's file was sent under. Some clients send a path; only the name and its extension matter.
+/// The file name of a part, without folders and control characters.
 pub(super) fn file_name(field: &Field<'_>) -> String {
     let name = field.file_name().unwrap_or_default();
     name.rsplit(['/', '\\']).next().unwrap_or_default().chars().filter(|c| !c.is_control()).collect()
 }
 
-/// Reads a part of JSON.
+/// Parses a part as JSON.
 ///
 /// # Errors
-/// More than options need; what does not fit.
+/// More than 64 KiB; invalid JSON or options.
 pub(super) async fn read_options<T: DeserializeOwned>(mut field: Field<'_>) -> Result<T, ApiError> {
     let mut bytes = Vec::new();
     while let Some(chunk) = field.chunk().await.map_err(|e| broken(&e))? {

@@ -1,4 +1,4 @@
-//! The OpenAPI document, made from the routes.
+//! The OpenAPI document, generated from the routes.
 
 use super::events::Event;
 use super::frames::RowsQuery;
@@ -41,7 +41,7 @@ pub(crate) struct CageId {
     id: String,
 }
 
-/// The parts that ask for a cage.
+/// The parts of a request for a cage design.
 #[derive(ToSchema)]
 #[allow(dead_code, reason = "it only describes")]
 pub(crate) struct NewCageForm {
@@ -57,7 +57,7 @@ pub(crate) struct NewCageForm {
     options: CageOptions,
 }
 
-/// The parts that have another model moved by cages.
+/// The parts of a request that decodes cages for another model.
 #[derive(ToSchema)]
 #[allow(dead_code, reason = "it only describes")]
 pub(crate) struct OtherModelForm {
@@ -69,7 +69,7 @@ pub(crate) struct OtherModelForm {
     cages: Vec<u8>,
 }
 
-/// The parts that make a session.
+/// The parts of a request that creates a session.
 #[derive(ToSchema)]
 #[allow(dead_code, reason = "it only describes")]
 pub(crate) struct NewSessionForm {
@@ -136,13 +136,13 @@ pub(crate) async fn get() -> impl IntoResponse {
 #[into_params(parameter_in = Header)]
 #[allow(dead_code, reason = "it only describes")]
 pub(crate) struct Conditions {
-    /// One range of bytes, for example `bytes=0-1023`; what is no single range is ignored.
+    /// One range of bytes, for example `bytes=0-1023`; anything else is ignored.
     #[param(rename = "Range")]
     range: Option<String>,
-    /// The range holds only for this `ETag`; otherwise everything comes.
+    /// The range applies only to this `ETag`; otherwise the full content is sent.
     #[param(rename = "If-Range")]
     if_range: Option<String>,
-    /// `ETag`s that the client has: 304 where one of them is right.
+    /// `ETag`s of the client's copies: 304 if one of them is current.
     #[param(rename = "If-None-Match")]
     if_none_match: Option<String>,
 }
@@ -167,7 +167,7 @@ pub(crate) fn finished(mut document: utoipa::openapi::OpenApi) -> Value {
         }
     }
     let mut document = serde_json::to_value(&document).unwrap_or_default();
-    mend_ranges(&mut document);
+    fix_u32_ranges(&mut document);
     let schemas = &mut document["components"]["schemas"];
     for form in ["NewSessionForm", "NewCageForm", "OtherModelForm"] {
         schemas[form]["additionalProperties"] = false.into();
@@ -175,15 +175,15 @@ pub(crate) fn finished(mut document: utoipa::openapi::OpenApi) -> Value {
     document
 }
 
-/// Integers with the range that they have: `int32` ends at half of what a u32 holds.
-fn mend_ranges(value: &mut Value) {
+/// Corrects the range of u32 fields, which are declared as `int32`.
+fn fix_u32_ranges(value: &mut Value) {
     if value["format"] == "int32" && value["minimum"].as_u64().is_some() {
         value["format"] = "int64".into();
         value["maximum"] = u32::MAX.into();
     }
     match value {
-        Value::Object(fields) => fields.values_mut().for_each(mend_ranges),
-        Value::Array(items) => items.iter_mut().for_each(mend_ranges),
+        Value::Object(fields) => fields.values_mut().for_each(fix_u32_ranges),
+        Value::Array(items) => items.iter_mut().for_each(fix_u32_ranges),
         _ => {}
     }
 }
@@ -222,7 +222,7 @@ fn takes(operation: &Operation, parameter: &str) -> bool {
     parameters.into_iter().any(|known| matches!(known, RefOr::T(known) if known.name == parameter))
 }
 
-/// Bodies of bytes are described as such, not as lists of numbers.
+/// Declares binary bodies as binary strings rather than arrays of numbers.
 fn describe_bytes(operation: &mut Operation) {
     for response in operation.responses.responses.values_mut() {
         if let RefOr::T(response) = response {
@@ -277,7 +277,7 @@ fn describe_headers(operation: &mut Operation) {
         .name("x-request-id")
         .parameter_in(ParameterIn::Header)
         .description(Some(
-            "An identifier for the log, 1 to 64 letters, digits, or . _ -; another is made where it is none",
+            "Request identifier for the log, 1 to 64 letters, digits, or . _ -; anything else is replaced by a generated one",
         ))
         .schema(Some(text()));
     operation.parameters.get_or_insert_default().push(RefOr::T(id.build()));
@@ -293,15 +293,15 @@ fn describe_headers(operation: &mut Operation) {
             "401" => add("WWW-Authenticate", text(), "`Bearer`"),
             "405" => add("Allow", text(), "Methods that the address takes"),
             "409" | "429" | "503" | "507" => {
-                add("Retry-After", whole_number(), "Seconds after which trying again makes sense");
+                add("Retry-After", whole_number(), "Seconds after which to try again");
             }
             "200" | "206" | "304" if has_range => {
-                add("ETag", text(), "Names these bytes, which never change; of a session that is completed");
+                add("ETag", text(), "Identifies the content, which never changes; only for completed sessions");
                 add("Accept-Ranges", text(), "`bytes`, where `Range` is taken");
-                add("Cache-Control", text(), "How long they may be kept");
-                add("Vary", text(), "Headers of the request that they depend on");
+                add("Cache-Control", text(), "How long the response may be cached");
+                add("Vary", text(), "Request headers that select the response");
                 if status == "206" {
-                    add("Content-Range", text(), "The range that came, and the length of everything");
+                    add("Content-Range", text(), "The range in the response, and the full length");
                 }
             }
             _ => {}

@@ -1,7 +1,7 @@
-//! Which pages may ask, and by which names.
+//! Protection against requests from other web pages, and CORS.
 //!
-//! A service without tokens trusts whoever reaches it, and a browser reaches it for any page. A page elsewhere shows by its `Origin`,
-//! and one that has its own name resolved to this machine by its `Host`.
+//! A service without tokens trusts every client that reaches it, and a browser reaches it for any page. Pages of other sites are recognised
+//! by `Origin`, and DNS rebinding by `Host`.
 
 use crate::config::ServeConfig;
 use crate::problem::{self, ApiError};
@@ -11,7 +11,7 @@ use std::net::IpAddr;
 use std::time::Duration;
 use tower_http::cors::CorsLayer;
 
-/// Refuses a request that only a browser under the control of another page would send.
+/// Refuses requests that a browser sends for a page of another site.
 ///
 /// # Errors
 /// 403, which says how to allow it.
@@ -31,7 +31,7 @@ pub(super) fn check(request: &Request, config: &ServeConfig) -> Result<(), ApiEr
     }
 }
 
-/// Whether this machine is asked by a name that is its own for certain.
+/// Whether `Host` is `localhost` or an IP address.
 pub(super) fn is_this_machine(request: &Request) -> bool {
     is_known(host_of(request), &[])
 }
@@ -41,12 +41,12 @@ fn text(request: &Request, name: HeaderName) -> Option<&str> {
 }
 
 fn host_of(request: &Request) -> &str {
-    // In HTTP/2 it is part of the address.
+    // In HTTP/2 the host is part of the URI.
     let authority = request.uri().authority().map(http::uri::Authority::as_str);
     authority.or_else(|| text(request, header::HOST)).unwrap_or_default()
 }
 
-/// Whether a name is this machine's for certain, or allowed.
+/// Whether a host is `localhost`, an IP address, or allowed.
 fn is_known(host: &str, allowed: &[String]) -> bool {
     let name = match host.strip_prefix('[') {
         Some(rest) => rest.split(']').next().unwrap_or_default(),
@@ -57,7 +57,7 @@ fn is_known(host: &str, allowed: &[String]) -> bool {
         || allowed.iter().any(|known| known.eq_ignore_ascii_case(name) || known.eq_ignore_ascii_case(host))
 }
 
-/// Whether a page is the service's own.
+/// Whether the origin is that of the service itself.
 fn is_same(origin: &str, host: &str) -> bool {
     origin.split_once("://").is_some_and(|(_, of)| of.eq_ignore_ascii_case(host))
 }

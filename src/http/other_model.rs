@@ -12,7 +12,7 @@ use crate::session::prepare::{Choices, check_model, read_part};
 use axum::extract::{FromRequest, Multipart, Request};
 use bytes::Bytes;
 use cager_core::decode::Decoder;
-use cager_core::inversion::refuse_far_points;
+use cager_core::inversion::reject_far_points;
 use futures_util::StreamExt as _;
 use futures_util::stream::{BoxStream, poll_fn};
 use std::sync::Arc;
@@ -102,7 +102,7 @@ pub(super) async fn bind(
         let _place = place;
         let model = read_part("model", &uploaded.name, &uploaded.bytes)?;
         let (cage, system) = (session.rest_cage()?, Choices::of(&session.meta.options)?.system);
-        refuse_far_points(&cage, &model.points)
+        reject_far_points(&cage, &model.points)
             .map_err(|error| ApiError::new(problem::INVALID_GEOMETRY, format!("model: {error}")))?;
         check_model(model.points.len(), system, &cage, service.config.max_prepare_bytes)?;
         // On the elements of the session's own coordinates, where it has any, as in its container.

@@ -1,4 +1,4 @@
-//! Streams of server-sent events that tell where something stands.
+//! Server-sent events that report progress.
 
 use crate::admission::Held;
 use crate::service::Service;
@@ -12,32 +12,32 @@ use std::time::Duration;
 use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 
-/// Changes closer together than this are one event.
-const AT_MOST_EVERY: Duration = Duration::from_millis(100);
-/// Without changes, a comment keeps proxies from closing the connection.
+/// Shortest interval between events.
+const MIN_EVENT_INTERVAL: Duration = Duration::from_millis(100);
+/// Interval of comments that keep proxies from closing an idle connection.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 
-/// What is followed.
-pub(super) struct Followed {
-    /// Changes whenever something does.
+/// The source of progress events.
+pub(super) struct ProgressSource {
+    /// Notifies of changes.
     pub(super) changes: watch::Receiver<u64>,
     pub(super) deleted: CancellationToken,
-    /// Where it stands.
-    pub(super) look: Box<dyn Fn() -> Standing + Send + Sync>,
+    /// The current state.
+    pub(super) look: Box<dyn Fn() -> ProgressEvent + Send + Sync>,
 }
 
-/// Where something stands.
-pub(super) struct Standing {
-    /// Says what is told, so that it is not told again to who knows it.
+/// An event.
+pub(super) struct ProgressEvent {
+    /// Event id; the same for the same data, so that a reconnecting client does not receive it again.
     pub(super) id: String,
     /// JSON.
     pub(super) data: String,
-    /// Whether nothing changes any more.
+    /// Whether the state is final.
     pub(super) last: bool,
 }
 
-/// An event `progress` with each change, until nothing changes any more, it is deleted, or the service stops.
-pub(super) fn stream(service: Arc<Service>, place: Held, headers: &HeaderMap, followed: Followed) -> Response {
+/// Streams an event `progress` after each change, until the state is final, the object is deleted, or the service stops.
+pub(super) fn stream(service: Arc<Service>, place: Held, headers: &HeaderMap, followed: ProgressSource) -> Response {
     let heard = headers.get("last-event-id").and_then(|id| id.to_str().ok()).map(str::to_owned);
     let stream = futures_util::stream::unfold(Some((heard, followed, place)), move |state| {
         let service = Arc::clone(&service);
@@ -48,12 +48,12 @@ pub(super) fn stream(service: Arc<Service>, place: Held, headers: &HeaderMap, fo
                 if followed.deleted.is_cancelled() {
                     return Some((Ok(Bytes::from_static(b"event: deleted\ndata: {}\n\n")), None));
                 }
-                let Standing { id, last, .. } = (followed.look)();
+                let ProgressEvent { id, last, .. } = (followed.look)();
                 if heard.as_deref() != Some(id.as_str()) {
                     if heard.is_some() {
-                        tokio::time::sleep(AT_MOST_EVERY).await;
+                        tokio::time::sleep(MIN_EVENT_INTERVAL).await;
                     }
-                    let Standing { id, data, .. } = (followed.look)();
+                    let ProgressEvent { id, data, .. } = (followed.look)();
                     let event = format!("event: progress\nid: {id}\ndata: {data}\n\n");
                     let rest = (!last).then_some((Some(id), followed, place));
                     return Some((Ok::<_, io::Error>(Bytes::from(event)), rest));

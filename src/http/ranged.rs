@@ -1,4 +1,4 @@
-//! Immutable bytes with `ETag`, `Range` and conditions (RFC 9110, §13 and §14).
+//! Responses with immutable content: `ETag`, `Range` and conditional requests (RFC 9110, §13 and §14).
 
 use crate::admission::Held;
 use crate::problem::{self, ApiError};
@@ -13,22 +13,22 @@ use std::sync::Arc;
 /// Bytes read and sent at a time.
 const PIECE: u64 = 512 << 10;
 
-/// Bytes that never change.
+/// Content that never changes.
 pub(crate) struct Immutable {
     pub(crate) length: u64,
     /// Without the quotes.
     pub(crate) etag: String,
     pub(crate) media_type: &'static str,
-    /// Whether shared caches may keep it: not where tokens guard it.
+    /// Whether shared caches may store it; not if tokens are required.
     pub(crate) public: bool,
-    /// Room for the pieces that are on their way, none so far.
+    /// Memory permit for the chunks being sent, empty at first.
     pub(crate) room: Held,
     /// Reads a range; blocks.
     pub(crate) read: Arc<dyn Fn(Range<u64>) -> io::Result<Bytes> + Send + Sync>,
 }
 
 impl Immutable {
-    /// The response to a request with these headers; 416 for a range that lies outside, 429 or 503 where there is no room.
+    /// The response to a request with these headers; 416 for a range outside the content, 429 or 503 without memory.
     pub(crate) fn respond(mut self, headers: &HeaderMap) -> Response {
         let etag = format!("\"{}\"", self.etag);
         let scope = if self.public { "public" } else { "private" };
@@ -98,7 +98,7 @@ impl Immutable {
         }
     }
 
-    /// Its room is free again when the body is dropped.
+    /// The memory permit is released when the body is dropped.
     fn body(&mut self, range: Range<u64>) -> Body {
         let read = Arc::clone(&self.read);
         let nothing = self.room.nothing();
@@ -124,7 +124,7 @@ enum Selection {
     NotModified,
 }
 
-/// The one range of a header: `None` where it is to be ignored, `Some(None)` where it lies outside.
+/// Parses a single range: `None` if the header is to be ignored, `Some(None)` if the range is not satisfiable.
 fn parse_range(text: &str, length: u64) -> Option<Option<Range<u64>>> {
     let (first, last) = text.trim().strip_prefix("bytes=")?.split_once('-')?;
     let (first, last) = (first.trim(), last.trim());

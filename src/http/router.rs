@@ -1,8 +1,8 @@
-//! Every route, in one flat list.
+//! All routes of the service, and their middleware.
 
-use super::encoded::decoded;
+use super::content_encoding::decoded;
 use super::extract::Caller;
-use super::guarded::holding;
+use super::guarded::with_permit;
 use super::respond::PROBLEM_JSON;
 use super::{
     cage, cage_jobs, cages, container, coordinates, decode, errors, events, extract, frames, health, openapi, origin,
@@ -51,7 +51,7 @@ fn completing() -> OpenApiRouter<Arc<Service>> {
     OpenApiRouter::new().routes(routes!(sessions::complete))
 }
 
-/// Routes that take as long as their bodies, which they read piece by piece.
+/// Routes that stream their request bodies.
 fn streaming() -> OpenApiRouter<Arc<Service>> {
     OpenApiRouter::new()
         .routes(routes!(sessions::create))
@@ -60,12 +60,12 @@ fn streaming() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(cage_jobs::create::create))
 }
 
-/// Routes for operators and browsers, outside all limits.
+/// Routes without authentication and limits, for probes.
 pub(super) fn open() -> OpenApiRouter<Arc<Service>> {
     OpenApiRouter::new().routes(routes!(health::live)).routes(routes!(health::ready)).routes(routes!(health::metrics))
 }
 
-/// What describes the service, to people and programs.
+/// The list page and the OpenAPI document.
 fn described() -> OpenApiRouter<Arc<Service>> {
     OpenApiRouter::new().routes(routes!(viewer::page)).routes(routes!(openapi::get))
 }
@@ -85,8 +85,9 @@ pub fn router(service: Arc<Service>) -> Router {
     let guarded = Router::from(quick())
         .layer(in_time)
         .merge(Router::from(completing()))
-        .layer(from_fn_with_state(Arc::clone(&service), in_bounds))
-        // Bounded by memory and by the tenant's streams instead: a slow body must not hold a place that all tenants share.
+        .layer(from_fn_with_state(Arc::clone(&service), limit_requests))
+        // Limited by memory and by the tenant's streams instead, so that slow bodies do not occupy the request slots that all tenants
+        // share.
         .merge(Router::from(streaming()).layer(DefaultBodyLimit::disable()))
         .route_layer(from_fn_with_state(Arc::clone(&service), extract::authenticate));
     let cors = origin::cors(&service.config);
@@ -94,7 +95,7 @@ pub fn router(service: Arc<Service>) -> Router {
         .merge(guarded)
         .merge(Router::from(described()))
         .fallback(|| async { ApiError::new(problem::NOT_FOUND, "the routes are listed in /openapi.json") })
-        .layer(from_fn_with_state(Arc::clone(&service), asked_by_name))
+        .layer(from_fn_with_state(Arc::clone(&service), check_host_and_origin))
         .with_state(service);
     let routes = finished(routes);
     match cors {
@@ -103,7 +104,7 @@ pub fn router(service: Arc<Service>) -> Router {
     }
 }
 
-/// What all routes have: identifiers, problem details, content codings, and a log line.
+/// Adds the middleware common to all routes: request ids, logging, problem details and content codings.
 pub(super) fn finished(routes: Router) -> Router {
     routes
         .layer(CatchPanicLayer::custom(|panic: Box<dyn std::any::Any + Send>| {
@@ -118,7 +119,7 @@ pub(super) fn finished(routes: Router) -> Router {
         .layer(from_fn(request_id))
 }
 
-/// The routes for connections beyond the limit: health, and "come back later" for everything else.
+/// The router for connections beyond the limit: health, and 503 for everything else.
 pub fn spare(service: Arc<Service>) -> Router {
     Router::from(open())
         .fallback(|| async {
@@ -130,8 +131,8 @@ pub fn spare(service: Arc<Service>) -> Router {
         .layer(from_fn(request_id))
 }
 
-/// Without tokens, only who asks by a known name and from a known page is answered; machines ask for health by any.
-async fn asked_by_name(
+/// Without tokens, checks `Host` and `Origin`, except for probes.
+async fn check_host_and_origin(
     State(service): State<Arc<Service>>,
     request: Request,
     next: Next,
@@ -142,7 +143,7 @@ async fn asked_by_name(
     Ok(next.run(request).await)
 }
 
-/// Texts of some length. Numbers hardly compress, and parts of them are asked for by their place.
+/// Whether to compress a response: text of 1 KiB or more. Binary numbers compress badly and are requested by range.
 fn is_worth_compressing(_: StatusCode, _: Version, headers: &HeaderMap, _: &Extensions) -> bool {
     const LEAST: u64 = 1024;
     let text = |name| headers.get(name).and_then(|value: &HeaderValue| value.to_str().ok());
@@ -151,8 +152,8 @@ fn is_worth_compressing(_: StatusCode, _: Version, headers: &HeaderMap, _: &Exte
         && text(header::CONTENT_LENGTH).and_then(|length| length.parse().ok()).is_none_or(|length: u64| length >= LEAST)
 }
 
-/// One of the places that requests have, until the answer is made; a large answer keeps it until it is read.
-async fn in_bounds(
+/// Takes a request permit until the response is complete; a large response keeps it until it is sent.
+async fn limit_requests(
     State(service): State<Arc<Service>>,
     Caller(tenant): Caller,
     request: Request,
@@ -162,10 +163,10 @@ async fn in_bounds(
         service.rejected("requests");
         full.refusal("requests at a time").retry_after(1)
     })?;
-    Ok(next.run(request).await.map(|body| holding(body, place)))
+    Ok(next.run(request).await.map(|body| with_permit(body, place)))
 }
 
-/// What a layer refused.
+/// The response for an error of a middleware layer.
 fn refused(error: &BoxError) -> ApiError {
     if error.is::<timeout::error::Elapsed>() {
         metrics::counter!("cager_rejections_total", "reason" => "timeout").increment(1);
@@ -174,7 +175,7 @@ fn refused(error: &BoxError) -> ApiError {
     ApiError::internal(error)
 }
 
-/// HTTP/1.1 wants every request to name its host, once (RFC 9112, §3.2).
+/// HTTP/1.1 requires exactly one `Host` header (RFC 9112, §3.2).
 async fn host(request: Request, next: Next) -> Response {
     let named = request.headers().get_all(header::HOST).iter().count();
     if request.version() == Version::HTTP_11 && named != 1 {
@@ -184,7 +185,7 @@ async fn host(request: Request, next: Next) -> Response {
     next.run(request).await
 }
 
-/// Makes every error a problem with the request's id, and counts the request.
+/// Converts every error into problem details with the request id, and counts the request.
 async fn finish(request: Request, next: Next) -> Response {
     let clock = Instant::now();
     let id = request.extensions().get::<RequestId>().cloned();
@@ -223,7 +224,7 @@ fn is_problem(response: &Response) -> bool {
     response.headers().get(header::CONTENT_TYPE).is_some_and(|value| value == PROBLEM_JSON)
 }
 
-/// The kind of an error that did not come from a handler.
+/// The problem kind of an error response that did not come from a handler.
 fn kind_of(status: StatusCode) -> Kind {
     match status {
         StatusCode::METHOD_NOT_ALLOWED => problem::METHOD_NOT_ALLOWED,

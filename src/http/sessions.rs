@@ -1,8 +1,8 @@
-//! `/v1/sessions`: making, listing, looking at, completing and deleting sessions.
+//! `/v1/sessions`: creating, listing, reading, completing and deleting sessions.
 
-use super::extract::{Body, Caller, Found, Named, Query};
+use super::extract::{Body, Caller, Query, Requested, RequestedSession};
 use super::frames::too_slow;
-use super::multipart::Announced;
+use super::multipart::FormHeader;
 use super::respond::JsonResult;
 use super::{multipart, openapi};
 use crate::problem::{self, ApiError};
@@ -18,7 +18,7 @@ use std::sync::Arc;
 use tokio::time::timeout;
 
 pub(super) const PAGE: usize = 100;
-/// Ranges of missing frames that a list tells of each session.
+/// Most missing ranges per session in a list.
 const LISTED_RANGES: usize = 10;
 
 /// Makes a session: parts `rest` and `cage` are files whose names carry their format, part `options` is JSON. Without a cage one is made
@@ -37,8 +37,8 @@ pub(crate) async fn create(
     request: Request,
 ) -> Result<Response, ApiError> {
     let limit = service.config.max_rest_bytes;
-    let Announced { idempotency_key, patience } =
-        multipart::announced(&service, &request, "rest, cage and options", limit)?;
+    let FormHeader { idempotency_key, patience } =
+        multipart::check_form_header(&service, &request, "rest, cage and options", limit)?;
     let parts = timeout(patience, multipart::read(&service, &tenant, request)).await.map_err(|_| too_slow())??;
     let new = NewSession { uploaded: parts.uploaded, options: parts.options, idempotency_key, room: parts.room };
     let session = service.create(&tenant, new).await?;
@@ -70,9 +70,9 @@ pub(crate) async fn list(
         let loaded = session.ensure_loaded().await;
         let mut view = session.view_with(LISTED_RANGES);
         match loaded {
-            // It is being deleted just now.
+            // It is being deleted.
             Err(error) if error.problem.word() == problem::SESSION_DELETED.word => continue,
-            // One that cannot be read is listed as failed.
+            // An unreadable session is listed as failed.
             Err(error) if view.state != SessionState::Failed => {
                 (view.state, view.problem) = (SessionState::Failed, Some(*error.problem));
             }
@@ -86,7 +86,7 @@ pub(crate) async fn list(
 
 /// A session.
 #[utoipa::path(get, path = "/v1/sessions/{id}", operation_id = "get_session", tag = "sessions", params(openapi::Id), responses((status = 200, description = "The session", body = Session)))]
-pub(crate) async fn get(Found { session, .. }: Found) -> Json<Session> {
+pub(crate) async fn get(RequestedSession { session, .. }: RequestedSession) -> Json<Session> {
     Json(session.view())
 }
 
@@ -94,7 +94,7 @@ pub(crate) async fn get(Found { session, .. }: Found) -> Json<Session> {
 #[utoipa::path(delete, path = "/v1/sessions/{id}", operation_id = "delete_session", tag = "sessions", params(openapi::Id), responses((status = 204, description = "It is gone")))]
 pub(crate) async fn delete(
     State(service): State<Arc<Service>>,
-    Named(session): Named<crate::session::Session>,
+    Requested(session): Requested<crate::session::Session>,
 ) -> Result<StatusCode, ApiError> {
     service.delete(&session).await?;
     Ok(StatusCode::NO_CONTENT)
@@ -107,7 +107,7 @@ pub(crate) async fn delete(
 )]
 pub(crate) async fn complete(
     State(service): State<Arc<Service>>,
-    Found { session, .. }: Found,
+    RequestedSession { session, .. }: RequestedSession,
     Body(complete): Body<Complete>,
 ) -> JsonResult<Session> {
     service.complete(&session, complete).await?;

@@ -1,9 +1,9 @@
 //! Curves and dots over two axes, as SVG that takes its colours from the page it stands in.
 //!
-//! A series names a class of the page's style sheet and draws in `currentColor`, so that one method has one colour
-//! everywhere, by day and by night.
+//! A series names a class of the page's style sheet and draws in `currentColor`, so that a method has the same colour everywhere, in light and dark
+//! mode.
 
-use super::scale::{Cover, Scale};
+use super::scale::{AxisRange, Scale};
 use super::text::{escaped, short};
 use std::fmt::Write;
 
@@ -29,20 +29,20 @@ pub(crate) struct Axis {
     /// What is measured, and its unit.
     pub(crate) label: String,
     /// How it covers the values.
-    pub(crate) cover: Cover,
-    /// Whether values are numbers of something, which have no fractions.
+    pub(crate) cover: AxisRange,
+    /// Whether ticks are at whole numbers only.
     pub(crate) whole: bool,
 }
 
 impl Axis {
     /// An axis of measures.
-    pub(crate) fn new(label: impl Into<String>, cover: Cover) -> Self {
+    pub(crate) fn new(label: impl Into<String>, cover: AxisRange) -> Self {
         Self { label: label.into(), cover, whole: false }
     }
 
     /// An axis of frames, indices and the like.
     pub(crate) fn counting(label: impl Into<String>) -> Self {
-        Self { label: label.into(), cover: Cover::Exactly, whole: true }
+        Self { label: label.into(), cover: AxisRange::Exactly, whole: true }
     }
 }
 
@@ -104,7 +104,7 @@ impl Chart {
         let top_of_legend = if self.title.is_empty() { NO_TITLE } else { TITLE };
         let (legend, rows) = self.legend(top_of_legend);
         let top = top_of_legend + LEGEND_ROW * rows as f64 + 8.0;
-        let place = Place { x, y, top };
+        let place = PlotArea { x, y, top };
         let mut svg = String::new();
         if !self.title.is_empty() {
             let _ = writeln!(svg, r#"<text class="t" x="{LEFT}" y="15">{}</text>"#, escaped(&self.title));
@@ -146,7 +146,7 @@ impl Chart {
         (svg, if any { row + 1 } else { 0 })
     }
 
-    fn grid(&self, svg: &mut String, place: &Place) {
+    fn grid(&self, svg: &mut String, place: &PlotArea) {
         let bottom = place.top + PANEL;
         let whole = |tick: &f64| tick.fract() == 0.0;
         for tick in place.y.ticks().into_iter().filter(|t| !self.y.whole || whole(t)) {
@@ -190,13 +190,13 @@ impl Chart {
 }
 
 /// From values to pixels.
-struct Place {
+struct PlotArea {
     x: Scale,
     y: Scale,
     top: f64,
 }
 
-impl Place {
+impl PlotArea {
     fn x_of(&self, value: f64) -> f64 {
         LEFT + (RIGHT - LEFT) * self.x.position(value)
     }
@@ -206,7 +206,7 @@ impl Place {
     }
 }
 
-fn draw(svg: &mut String, series: &Series, place: &Place) {
+fn draw(svg: &mut String, series: &Series, place: &PlotArea) {
     let _ = write!(svg, r#"<g class="{}">"#, series.class);
     match series.mark {
         Mark::Line | Mark::Dashes => {
@@ -269,7 +269,7 @@ fn diamond(svg: &mut String, x: f64, y: f64) {
 mod tests {
     use super::*;
 
-    fn chart(points: &[(f64, f64)], cover: Cover) -> Chart {
+    fn chart(points: &[(f64, f64)], cover: AxisRange) -> Chart {
         let series =
             |label: &str, mark| Series { label: label.to_owned(), class: "k-all", mark, points: points.to_vec() };
         Chart {
@@ -297,7 +297,7 @@ mod tests {
             vec![(0.0, 1.0), (1.0, f64::NAN), (2.0, 1.0)],
         ];
         for points in cases {
-            for cover in [Cover::FromZero, Cover::Around, Cover::Exactly, Cover::Factors] {
+            for cover in [AxisRange::FromZero, AxisRange::Around, AxisRange::Exactly, AxisRange::Logarithmic] {
                 let svg = chart(&points, cover).svg();
                 assert!(!svg.contains("NaN") && !svg.contains("inf"), "{cover:?} {svg}");
                 assert!(svg.contains("a&lt;b"));
@@ -317,7 +317,7 @@ mod tests {
 
     #[test]
     fn a_gap_in_the_points_is_a_gap_in_the_line() {
-        let svg = chart(&[(0.0, 1.0), (1.0, 2.0), (2.0, f64::NAN), (3.0, 2.0), (4.0, 1.0)], Cover::FromZero).svg();
+        let svg = chart(&[(0.0, 1.0), (1.0, 2.0), (2.0, f64::NAN), (3.0, 2.0), (4.0, 1.0)], AxisRange::FromZero).svg();
         let path = svg.split("class=\"c\" d=\"").nth(3).and_then(|rest| rest.split('"').next());
         assert_eq!(path.map(|path| path.matches('M').count()), Some(2), "{svg}");
     }
@@ -332,11 +332,12 @@ mod tests {
 
     #[test]
     fn logarithmic_axes_have_round_ticks() {
-        let ticks =
-            |values: &[f64]| Scale::covering(Cover::Factors, values).ticks().into_iter().map(short).collect::<Vec<_>>();
+        let ticks = |values: &[f64]| {
+            Scale::covering(AxisRange::Logarithmic, values).ticks().into_iter().map(short).collect::<Vec<_>>()
+        };
         assert_eq!(ticks(&[1.5, 30.0]), ["1", "2", "5", "10", "20"]);
         assert_eq!(ticks(&[1e-6, 1.0]).len(), 5);
-        let around = Scale::covering(Cover::Around, &[-399.0, -350.0]);
+        let around = Scale::covering(AxisRange::Around, &[-399.0, -350.0]);
         assert_eq!(around.ticks(), [-400.0, -380.0, -360.0, -340.0]);
     }
 }

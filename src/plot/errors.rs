@@ -1,7 +1,7 @@
 //! The errors of every frame as one self-contained SVG document.
 
 use super::chart::{Axis, Chart, Mark, Series, WIDTH};
-use super::scale::Cover;
+use super::scale::AxisRange;
 use super::text::{escaped, short};
 
 /// Errors that differ by more than this factor get a logarithmic axis.
@@ -45,7 +45,7 @@ fn chart(title: &str, label: &str, class: &'static str, errors: &[f64]) -> Chart
     let measured: Vec<f64> = percent().filter(|error| error.is_finite()).collect();
     let positive = || measured.iter().copied().filter(|&error| error > 0.0);
     let span = positive().fold(0.0, f64::max) / positive().fold(f64::INFINITY, f64::min);
-    let cover = if span > LINEAR_SPAN { Cover::Factors } else { Cover::FromZero };
+    let cover = if span > LINEAR_SPAN { AxisRange::Logarithmic } else { AxisRange::FromZero };
     let points = percent().enumerate().map(|(frame, error)| (frame as f64, error)).collect();
     let curve = Series { label: label.to_owned(), class, mark: Mark::Line, points };
     let (last, mean) = ((errors.len().max(1) - 1) as f64, measured.iter().sum::<f64>() / measured.len() as f64);

@@ -7,5 +7,5 @@ mod text;
 
 pub(crate) use chart::{Axis, Chart, Mark, Series};
 pub(crate) use errors::error_plot;
-pub(crate) use scale::Cover;
+pub(crate) use scale::AxisRange;
 pub(crate) use text::{escaped, grouped};

@@ -5,7 +5,7 @@ const DECADES: f64 = 15.0;
 
 /// An axis of values.
 pub(crate) struct Scale {
-    /// Whether equal steps are equal factors.
+    /// Whether the axis is logarithmic.
     pub(crate) logarithmic: bool,
     /// Lower end.
     pub(crate) low: f64,
@@ -15,7 +15,7 @@ pub(crate) struct Scale {
 
 /// How an axis covers its values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Cover {
+pub(crate) enum AxisRange {
     /// Linear from zero.
     FromZero,
     /// Linear around the values.
@@ -23,30 +23,30 @@ pub(crate) enum Cover {
     /// Linear from the least to the largest value exactly: frames, indices.
     Exactly,
     /// Logarithmic.
-    Factors,
+    Logarithmic,
 }
 
 impl Scale {
     /// The axis for these values; those that are not finite do not count.
-    pub(crate) fn covering(cover: Cover, values: &[f64]) -> Self {
+    pub(crate) fn covering(cover: AxisRange, values: &[f64]) -> Self {
         let finite = || values.iter().copied().filter(|value| value.is_finite());
         let low = finite().fold(f64::INFINITY, f64::min);
         let high = finite().fold(f64::NEG_INFINITY, f64::max);
         match cover {
             _ if low > high => Self { logarithmic: false, low: 0.0, high: 1.0 },
-            Cover::FromZero => {
+            AxisRange::FromZero => {
                 let top = if high > 0.0 { 1.04 * high } else { 1.0 };
                 let step = nice_step(top, 4.0);
                 Self { logarithmic: false, low: 0.0, high: (step * (top / step).ceil()).min(f64::MAX) }
             }
-            Cover::Exactly if high > low => Self { logarithmic: false, low, high },
-            Cover::Around | Cover::Exactly => {
+            AxisRange::Exactly if high > low => Self { logarithmic: false, low, high },
+            AxisRange::Around | AxisRange::Exactly => {
                 let span = if high > low { high - low } else { 0.1 * high.abs().max(1.0) };
                 let step = nice_step(span, 4.0);
                 let (low, high) = (step * (low / step).floor(), step * (high / step).ceil());
                 Self { logarithmic: false, low, high: if high > low { high } else { low + step } }
             }
-            Cover::Factors => {
+            AxisRange::Logarithmic => {
                 let positive = || finite().filter(|value| *value >= f64::MIN_POSITIVE);
                 let high = positive().fold(0.0, f64::max);
                 if high == 0.0 {

@@ -1,4 +1,4 @@
-//! A cage designed by the service from evenly spaced frames of a capture that is on this machine.
+//! Has a service design a cage from evenly spaced frames of a local capture.
 
 use super::{RemoteError, RemoteProgress};
 use cager_cages::{DesignOptions, Goal, Style};
@@ -8,12 +8,12 @@ use futures_util::StreamExt as _;
 use std::io;
 use std::time::Duration;
 
-/// Frames sent at most: a design looks at no more.
-const MOST_FRAMES: u32 = 160;
-/// Bytes of frames sent at most, unless two take more.
-const MOST_BYTES: usize = 512 << 20;
+/// Most frames sent; a design samples no more.
+const MAX_SAMPLED_FRAMES: u32 = 160;
+/// Most bytes of frames sent, unless two frames are larger.
+const MAX_SAMPLE_BYTES: usize = 512 << 20;
 /// Longest wait for a design, its turn included.
-const DESIGNED_WITHIN: Duration = Duration::from_secs(3600);
+const DESIGN_TIMEOUT: Duration = Duration::from_secs(3600);
 
 /// Where the cage of a capture comes from.
 #[derive(Clone, Copy, Debug)]
@@ -24,7 +24,7 @@ pub enum RemoteCage<'a> {
     Designed(&'a DesignOptions),
 }
 
-/// Has the service design a cage; gives the finished design, which stays on the service. `frames` is read from its beginning.
+/// Has the service design a cage; returns the finished design, which stays on the service. Reads `frames` from the beginning.
 pub(super) async fn design(
     client: &Client,
     rest: &MeshFile,
@@ -75,14 +75,14 @@ async fn follow(
             break;
         }
     }
-    // Over: what came of it, and why where it failed, is told in whole here.
-    Ok(client.wait_cage(id, DESIGNED_WITHIN).await?)
+    // The final state, with the reason if the design failed.
+    Ok(client.wait_cage(id, DESIGN_TIMEOUT).await?)
 }
 
-/// Evenly spaced frames, the first and the last among them, back to back as they are sent; and their number.
+/// Number and bytes of evenly spaced frames, including the first and the last.
 fn sample(frames: &mut impl FrameSource) -> Result<(u32, Vec<u8>), ClientError> {
     let frame_bytes = 12 * frames.points().max(1);
-    let most = u32::try_from(MOST_BYTES / frame_bytes).unwrap_or(u32::MAX).clamp(2, MOST_FRAMES);
+    let most = u32::try_from(MAX_SAMPLE_BYTES / frame_bytes).unwrap_or(u32::MAX).clamp(2, MAX_SAMPLED_FRAMES);
     let all = match frames.frames() {
         Some(all) => all,
         None => counted(frames)?,
@@ -105,7 +105,7 @@ fn sample(frames: &mut impl FrameSource) -> Result<(u32, Vec<u8>), ClientError> 
     Ok((count, bytes))
 }
 
-/// The number of frames of a source that does not know it.
+/// Counts the frames of a source of unknown length by reading it.
 fn counted(frames: &mut impl FrameSource) -> Result<u32, ClientError> {
     let (mut frame, mut values) = (0, Vec::new());
     frames.seek(0).map_err(|cause| ClientError::Source { frame, cause })?;

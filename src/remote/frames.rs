@@ -1,4 +1,4 @@
-//! Frames of a capture on disk, as a service takes them.
+//! Frames of a capture on disk as a source for uploads.
 
 use crate::frames::CaptureFiles;
 use cager_client::FrameSource;
@@ -31,12 +31,12 @@ impl FileFrames {
         Ok(Self { files, frames, frame_rate, reader, next: 0, wide: Vec::new() })
     }
 
-    /// Frames per second, where the files tell.
+    /// Frames per second, if the files contain it.
     pub fn frame_rate(&self) -> Option<f64> {
         self.frame_rate
     }
 
-    /// The number of each frame where it comes from.
+    /// The original frame numbers.
     pub fn numbers(&self) -> Vec<f64> {
         (0..self.reader.frames()).map(|frame| self.reader.number(frame)).collect()
     }

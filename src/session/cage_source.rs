@@ -14,16 +14,16 @@ use std::collections::VecDeque;
 use std::ops::RangeInclusive;
 use std::sync::{Arc, Mutex};
 
-/// Vertices of a cage where nothing is said of them.
-const USUAL_VERTICES: usize = 350;
-/// How many vertices may be asked for: no closed surface has fewer, and no cage of a model more.
+/// Default number of cage vertices.
+const DEFAULT_VERTICES: usize = 350;
+/// Allowed numbers of cage vertices: a closed surface has at least 4.
 pub(crate) const VERTICES: RangeInclusive<u32> = 4..=cager_cages::MOST_VERTICES as u32;
-/// Cages made last that are kept, so that sessions created at once share one.
-const KEPT: usize = 16;
+/// Number of recently made cages kept in memory, so that sessions created at the same time share one.
+const RECENT_CAGES: usize = 16;
 /// File name of a cage that was not sent.
 const NAME: &str = "cage.obj";
 
-/// What a request brought.
+/// The files of a request that creates a session.
 pub(crate) struct Uploaded {
     pub(crate) rest_name: String,
     pub(crate) rest: Vec<u8>,
@@ -31,18 +31,18 @@ pub(crate) struct Uploaded {
     pub(crate) matrix: Option<MatrixFile>,
 }
 
-/// Cages being made, and those made last.
+/// Makes cages around rest poses, each once however many requests ask for it, and remembers the latest.
 pub(crate) struct CageMaker {
     places: Arc<Budget>,
-    /// Held while a cage is made, by the first byte of its digest.
-    flights: [tokio::sync::Mutex<()>; 16],
+    /// One lock per shard of digests (first byte modulo 16), taken while a cage is made.
+    locks: [tokio::sync::Mutex<()>; 16],
     recent: Mutex<VecDeque<(ContentKey, CageFile)>>,
 }
 
 impl CageMaker {
-    /// One that makes so many at a time.
+    /// Makes at most as many cages at a time as `places` has permits.
     pub(crate) fn new(places: Arc<Budget>) -> Self {
-        Self { places, flights: Default::default(), recent: Mutex::default() }
+        Self { places, locks: Default::default(), recent: Mutex::default() }
     }
 
     fn recent(&self, made: &ContentKey) -> Option<CageFile> {
@@ -52,16 +52,16 @@ impl CageMaker {
     fn keep(&self, made: ContentKey, cage: CageFile) {
         let mut recent = lock(&self.recent);
         recent.push_front((made, cage));
-        recent.truncate(KEPT);
+        recent.truncate(RECENT_CAGES);
     }
 }
 
 impl Service {
-    /// The content of a new session, and the digest of what its cage was made from where it was made here.
+    /// The content of a new session with its cage; and, where the cage was made here, the digest of the inputs that it was made from.
     ///
     /// # Errors
     /// Options that contradict each other or the cage, a design that is unknown or not completed, a rest pose that cannot be enclosed.
-    pub(crate) async fn with_cage(
+    pub(crate) async fn resolve_cage(
         &self,
         tenant: &str,
         uploaded: Uploaded,
@@ -95,7 +95,7 @@ impl Service {
         Ok(CageFile { name: NAME.to_owned(), bytes: bytes.to_vec() })
     }
 
-    /// A cage around the rest pose, made now unless a session or a request just before has the same.
+    /// A cage enclosing the rest pose: from the recent ones, from a session of the same tenant with the same inputs, or made now.
     async fn made_cage(
         &self,
         tenant: &str,
@@ -114,13 +114,13 @@ impl Service {
             })
             .await?
         };
-        let _one_of_its_kind = self.cage_maker.flights[usize::from(made.0[0]) % 16].lock().await;
+        let _one_of_its_kind = self.cage_maker.locks[usize::from(made.0[0]) % 16].lock().await;
         if let Some(cage) = self.cage_maker.recent(&made) {
             return Ok((rest, cage, made));
         }
         if let Some(key) = self.registry.made_cage(tenant, &made) {
             let store = self.store.clone();
-            // Where it cannot be read it is made again.
+            // An unreadable cage is made again.
             if let Ok(Some(cage)) = blocking(move || store.content_cage(&key)).await? {
                 return Ok((rest, cage, made));
             }
@@ -140,8 +140,8 @@ impl Service {
 
 fn make(rest: &Model, vertices: Option<u32>) -> Result<TriMesh, ApiError> {
     check_extent(rest)?;
-    // A cage of more vertices than the model has points could not be told from them.
-    let usual = USUAL_VERTICES.min(rest.points.len() / 2).max(*VERTICES.start() as usize);
+    // With more vertices than half the points, the data could not determine the cage.
+    let usual = DEFAULT_VERTICES.min(rest.points.len() / 2).max(*VERTICES.start() as usize);
     let vertices = vertices.map_or(usual, |vertices| vertices as usize);
     enclose(rest, &EncloseOptions { vertices, ..EncloseOptions::default() }).map_err(|error| match error {
         EncloseError::TooFewVertices { .. } => refuse(&format!("vertices: {error}")),
@@ -149,10 +149,10 @@ fn make(rest: &Model, vertices: Option<u32>) -> Result<TriMesh, ApiError> {
     })
 }
 
-/// Refuses a model without points, or with all of them in one place.
+/// Refuses a model that has no points, or whose bounding box has no extent.
 ///
 /// # Errors
-/// Which of them it is.
+/// `INVALID_GEOMETRY`.
 pub(crate) fn check_extent(rest: &Model) -> Result<(), ApiError> {
     let error = if rest.points.is_empty() {
         EncloseError::Empty
@@ -173,7 +173,7 @@ pub(crate) fn obj_of(mesh: &TriMesh) -> Vec<u8> {
     cager_formats::obj_bytes(&Model { points: mesh.vertices.clone(), faces })
 }
 
-/// What is said of a number of vertices that no cage can have.
+/// Error detail for a vertex count outside the allowed range.
 pub(crate) fn vertices_detail(vertices: u32) -> String {
     format!("vertices: is {vertices}; give a number from {} to {}", VERTICES.start(), VERTICES.end())
 }
@@ -186,7 +186,7 @@ fn shortened(id: &str) -> String {
     id.chars().take(80).collect()
 }
 
-/// What a made cage depends on, and whose it is: what one tenant uploaded is never known to another.
+/// BLAKE3 digest of everything that a made cage depends on. It includes the tenant, so that one tenant cannot detect another's uploads.
 fn digest(tenant: &str, rest_name: &str, rest: &[u8], vertices: Option<u32>) -> ContentKey {
     let extension = rest_name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
     let mut hasher = blake3::Hasher::new();

@@ -1,4 +1,4 @@
-//! Writing solved frames: what waits for a session is written together and synced once, then its uploads hear of it.
+//! Group commit of solved frames: everything queued for a session is appended and synced once, then its uploads are notified.
 
 use super::frames::Digests;
 use super::{Phase, Session};
@@ -11,41 +11,41 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use tokio::sync::OwnedSemaphorePermit;
 
-/// What the log adds to a cage, about.
+/// Approximate size of a log record without its cage, in bytes.
 const RECORD_BYTES: usize = 96;
 
 /// A solved frame that is not on disk yet.
-pub(crate) struct Solved {
+pub(crate) struct SolvedFrame {
     pub(crate) frame: u32,
     pub(crate) digests: Digests,
     pub(crate) error: StoredError,
     pub(crate) cage: Vec<f32>,
-    /// Its place among the upload's frames that are not on disk.
+    /// Counts against the upload's limit of frames that are not on disk yet.
     pub(crate) _permit: Option<OwnedSemaphorePermit>,
 }
 
-/// What waits to be written, and whether a thread is at it.
+/// Frames queued for writing, and whether a commit thread is working on the session.
 #[derive(Default)]
-pub(crate) struct Waiting {
-    solved: Vec<Solved>,
+pub(crate) struct CommitQueue {
+    solved: Vec<SolvedFrame>,
     busy: bool,
 }
 
-impl Waiting {
-    /// Whether something is being written or will be.
+impl CommitQueue {
+    /// Whether frames are being written or queued.
     pub(crate) fn is_busy(&self) -> bool {
         self.busy
     }
 }
 
-/// Threads that write and sync.
+/// Handle to the threads that append to frame logs and sync them.
 #[derive(Clone)]
 pub(crate) struct Committer {
     sessions: Sender<Arc<Session>>,
 }
 
 impl Committer {
-    /// Starts `threads` of them. They end when the last clone is dropped.
+    /// Starts `threads` threads. They end when the last clone is dropped.
     pub(crate) fn start(threads: usize) -> std::io::Result<Self> {
         let (sessions, queue) = channel();
         let queue = Arc::new(Mutex::new(queue));
@@ -57,8 +57,8 @@ impl Committer {
     }
 }
 
-/// What frames take in the log, about.
-fn stored_bytes(solved: &[Solved]) -> u64 {
+/// Approximate size of frames in the log, in bytes.
+fn stored_bytes(solved: &[SolvedFrame]) -> u64 {
     solved.iter().map(|s| (RECORD_BYTES + 4 * s.cage.len()) as u64).sum()
 }
 
@@ -81,11 +81,11 @@ fn run(queue: &Mutex<Receiver<Arc<Session>>>) {
 
 impl Session {
     /// Takes over solved frames, to be written soon.
-    pub(crate) fn commit(self: &Arc<Self>, solved: Vec<Solved>) {
+    pub(crate) fn commit(self: &Arc<Self>, solved: Vec<SolvedFrame>) {
         if solved.is_empty() {
             return;
         }
-        // Counted before they are written, so that a quota holds however slow the disk is.
+        // Counted before writing, so that a slow disk cannot let a tenant exceed its quota.
         self.bytes.fetch_add(stored_bytes(&solved), Relaxed);
         let mut waiting = super::lock(&self.waiting);
         waiting.solved.extend(solved);
@@ -97,13 +97,13 @@ impl Session {
     }
 
     fn enqueue(self: &Arc<Self>) {
-        // The threads live as long as any session.
+        // The threads run as long as any session exists.
         let _ = self.committer.sessions.send(Arc::clone(self));
     }
 
-    /// Writes frames, syncs them and tells their uploads.
-    fn write(&self, solved: &[Solved]) {
-        let solved = self.written_after_their_predecessors(solved);
+    /// Appends frames, syncs the log and notifies their uploads.
+    fn write(&self, solved: &[SolvedFrame]) {
+        let solved = self.before_first_orphan(solved);
         if solved.is_empty() {
             return;
         }
@@ -122,14 +122,14 @@ impl Session {
             .collect();
         let mut log = super::lock(&self.log);
         if let Phase::Failed(problem) = self.status().phase {
-            // Its files are in quarantine.
+            // The session's files are in quarantine.
             drop(log);
             self.bytes.fetch_sub(stored_bytes(solved), Relaxed);
             self.give_up(solved, &ApiError::new(problem::SESSION_FAILED, problem.detail));
             return;
         }
         let outcome = self.open_log(&mut log).and_then(|log| {
-            // Some were found in the log when it was opened; they are counted already.
+            // Opening the log may have found some of these frames; they are counted already.
             records.retain(|record| {
                 let frames = self.frames();
                 let known = frames.entry(record.frame);
@@ -138,7 +138,7 @@ impl Session {
             log.append(&records)
         });
         if outcome.is_err() {
-            // Whether it can go on is found out by opening it again.
+            // Opening the log again determines whether it is usable.
             *log = None;
         }
         drop(log);
@@ -157,20 +157,20 @@ impl Session {
             Err(error) => {
                 self.bytes.fetch_sub(stored_bytes(solved), Relaxed);
                 tracing::warn!(session = %self.meta.id, %error, "frames could not be written");
-                let error = self.damaged_or(error);
+                let error = self.fail_if_damaged(error);
                 self.give_up(solved, &error);
             }
         }
         self.touch();
     }
 
-    /// Where frames depend on those before them, gives up the ones whose predecessor could not be written: what is on disk must
-    /// come from what is on disk.
-    fn written_after_their_predecessors<'a>(&self, solved: &'a [Solved]) -> &'a [Solved] {
+    /// In sessions whose frames depend on their predecessors, returns the frames up to the first one whose predecessor is not written, and
+    /// fails the rest: frames on disk must be computed from frames on disk.
+    fn before_first_orphan<'a>(&self, solved: &'a [SolvedFrame]) -> &'a [SolvedFrame] {
         if !self.follows_previous() {
             return solved;
         }
-        let there = |frame: u32, before: &[Solved]| {
+        let there = |frame: u32, before: &[SolvedFrame]| {
             before.iter().any(|s| s.frame == frame) || self.frames().entry(frame).is_some()
         };
         let orphan = (0..solved.len()).find(|&k| solved[k].frame > 0 && !there(solved[k].frame - 1, &solved[..k]));
@@ -182,15 +182,15 @@ impl Session {
         written
     }
 
-    /// Tells the uploads of frames that are not written why.
-    fn give_up(&self, solved: &[Solved], error: &ApiError) {
+    /// Fails the uploads that wait for these frames.
+    fn give_up(&self, solved: &[SolvedFrame], error: &ApiError) {
         for s in solved {
-            let uploads = self.frames().gave_up(s.frame);
+            let uploads = self.frames().release_claim(s.frame);
             uploads.iter().for_each(|upload| upload.fail(error.clone().frame(s.frame)));
         }
     }
 
-    /// The log, opened if it is not. What it holds that is not known yet becomes known.
+    /// The open log. Opening it adds frames found in it to the session's frames.
     fn open_log<'a>(&self, log: &'a mut Option<FrameLog>) -> Result<&'a mut FrameLog, StoreError> {
         if log.is_none() {
             *log = Some(self.load_log()?);
@@ -199,22 +199,22 @@ impl Session {
     }
 }
 
-/// What a client hears when the store refuses.
+/// The response for a storage error.
 pub(crate) fn storage_error(error: &StoreError) -> ApiError {
     match error {
         StoreError::Full { .. } => ApiError::new(
             problem::STORAGE_FULL,
-            "the service's disk is full; nothing that was answered is lost, so try again when the operator has made room",
+            "the service's disk is full; no acknowledged frame is lost, so try again when the operator has freed space",
         )
         .retry_after(60),
         StoreError::Io { .. } => {
             tracing::error!(%error, "a file of the store cannot be read or written");
-            let detail = "the service's disk failed to read or write what this needs; nothing that was answered is lost, so try again when the operator has looked at the disk";
+            let detail = "the service's disk failed to read or write; no acknowledged frame is lost, so try again when the operator has checked the disk";
             ApiError::new(problem::STORAGE_FAILED, detail).retry_after(10)
         }
         StoreError::Damaged { .. } => {
             tracing::error!(%error, "a file of the store is damaged");
-            let detail = "what the service stored for this is damaged; upload it again to a new session, or have the operator restore it from a backup";
+            let detail = "stored data of this session is damaged; upload the capture to a new session, or ask the operator to restore it from a backup";
             ApiError::new(problem::SESSION_FAILED, detail)
         }
         other => ApiError::internal(other),

@@ -1,17 +1,17 @@
-//! Completing a session: its container is written once and never changes.
+//! Completing a session: writes its container once; from then on the session does not change.
 
 use super::create::blocking;
-use super::frames::Unsealed;
+use super::frames::SealError;
+use super::intervals::Missing;
 use super::prepare::{self, Choices};
-use super::prepared::Prepared;
-use super::runs::Missing;
+use super::solver_cache::Prepared;
 use super::{Phase, Session};
 use crate::capture::{CaptureWriter, Encoding, StoredError};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{CageFile, Completion, Content, LogEntry, StoreError};
-use crate::telemetry::traces::Step;
-use crate::webhooks::{Due, Event, Webhooks};
+use crate::telemetry::traces::TraceSpan;
+use crate::webhooks::{Event, PendingMessage, Webhooks};
 use cager_core::cage::Cage;
 use cager_proto::container;
 use cager_proto::messages::Complete;
@@ -23,31 +23,31 @@ use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
 use std::time::Duration;
 use tokio::time::timeout;
 
-/// How long a change is waited for, before it is looked again whether frames are still being measured.
-const MEASURED_WITHIN: Duration = Duration::from_secs(1);
+/// Longest wait for a change notification before checking again whether frames are still being measured.
+const MEASURING_POLL_INTERVAL: Duration = Duration::from_secs(1);
 /// Frames read from the log at a time.
 const READ_FRAMES: usize = 64;
 
 impl Service {
-    /// Says that a session has `frames` frames, and writes its container. Once begun, it goes on where the client gives up.
-    pub(crate) async fn complete(self: &Arc<Self>, session: &Arc<Session>, wish: Complete) -> Result<(), ApiError> {
-        // Who gives up while it waits for its turn has not begun.
+    /// Declares that the session has `frames` frames, and writes its container. Runs to the end even if the client disconnects.
+    pub(crate) async fn complete(self: &Arc<Self>, session: &Arc<Session>, request: Complete) -> Result<(), ApiError> {
+        // A client that disconnects while queued has not started the work.
         let place = self.completing.take(&session.meta.tenant, 1).await;
         let (service, session) = (Arc::clone(self), Arc::clone(session));
         let work = async move {
             let _place = place;
             let _one = session.completing.lock().await;
-            let _step = Step::begin("complete", &Context::current());
-            service.complete_alone(&session, wish).await
+            let _step = TraceSpan::begin("complete", &Context::current());
+            service.complete_alone(&session, request).await
         };
         let work = tokio::spawn(work.with_current_context());
         work.await.map_err(|error| ApiError::internal(&error))?
     }
 
-    async fn complete_alone(self: &Arc<Self>, session: &Arc<Session>, wish: Complete) -> Result<(), ApiError> {
-        let settling = Arc::clone(session);
-        blocking(move || settling.settle()).await??;
-        let frames = wish.frames;
+    async fn complete_alone(self: &Arc<Self>, session: &Arc<Session>, request: Complete) -> Result<(), ApiError> {
+        let resolving = Arc::clone(session);
+        blocking(move || resolving.resolve_completion()).await??;
+        let frames = request.frames;
         match session.status().phase {
             Phase::Completed(completion) if completion.frames == frames => return Ok(()),
             Phase::Completed(completion) => {
@@ -68,24 +68,25 @@ impl Service {
         }
         let expected = session.meta.options.frames;
         if expected.is_some_and(|expected| frames > expected) {
-            let detail = format!("frames: is {frames}, and the session was made for {}", expected.unwrap_or_default());
+            let detail =
+                format!("frames: is {frames}, and the session was created for {}", expected.unwrap_or_default());
             return Err(ApiError::new(problem::INVALID_OPTIONS, detail));
         }
         let (before, entries) = loop {
             let mut changes = session.changes();
-            if let Some(sealed) = session.seal_at(frames, wish.discard_beyond)? {
+            if let Some(sealed) = session.seal_at(frames, request.discard_beyond)? {
                 break sealed;
             }
-            let _ = timeout(MEASURED_WITHIN, changes.changed()).await;
+            let _ = timeout(MEASURING_POLL_INTERVAL, changes.changed()).await;
         };
-        let mut sealed = Sealed { session, kept: before };
+        let mut sealed = UnsealOnFailure { session, kept: before };
         let prepared = self.solver(session).await?;
         let (writing, webhooks) = (Arc::clone(session), Arc::clone(&self.webhooks));
         let writers = Arc::clone(&self.container_writers);
         let work = move || writers.install(|| write(&writing, &prepared, &entries, frames, &webhooks));
         let written = blocking(work).await?;
         let Written { completion, replaced, due } = written.map_err(|error| match session.status().phase {
-            // What was to be written proved damaged.
+            // The log or the content turned out to be damaged.
             Phase::Failed(problem) => ApiError::new(problem::SESSION_FAILED, problem.detail),
             _ => error,
         })?;
@@ -98,26 +99,26 @@ impl Service {
     }
 }
 
-/// Lets a session take frames again where its completion fails.
-struct Sealed<'a> {
+/// Lets the session accept frames again if its completion fails.
+struct UnsealOnFailure<'a> {
     session: &'a Session,
     kept: bool,
 }
 
-impl Drop for Sealed<'_> {
+impl Drop for UnsealOnFailure<'_> {
     fn drop(&mut self) {
-        if !self.kept && !self.session.unsettled.load(Acquire) {
+        if !self.kept && !self.session.completion_unknown.load(Acquire) {
             self.session.frames().unseal();
         }
     }
 }
 
 impl Session {
-    /// Takes no new frames from here on, so that none is answered that the container would lack. Gives whether none were taken before, and
-    /// what the container holds; None while frames of it are being measured.
+    /// Stops accepting new frames, so that no acknowledged frame is missing from the container. Returns whether the session was sealed
+    /// before, and the frames of the container; `None` while some of them are still being measured.
     ///
     /// # Errors
-    /// Frames that are missing, or beyond the end.
+    /// `FRAMES_MISSING`; `FRAME_CONFLICT` for a frame beyond the end.
     fn seal_at(&self, frames: u32, discard_beyond: bool) -> Result<Option<(bool, Vec<LogEntry>)>, ApiError> {
         let mut known = self.frames();
         match known.seal_at(frames, discard_beyond) {
@@ -125,24 +126,24 @@ impl Session {
                 let entries = known.entries().take_while(|entry| entry.frame < frames).copied().collect();
                 Ok(Some((before, entries)))
             }
-            Err(Unsealed::Measuring) => Ok(None),
-            Err(Unsealed::Missing(Missing { ranges, next })) => {
+            Err(SealError::Measuring) => Ok(None),
+            Err(SealError::Missing(Missing { ranges, next })) => {
                 let count: u64 = ranges.iter().map(|[a, b]| u64::from(b - a)).sum();
                 let more = if next.is_some() { " or more" } else { "" };
                 let detail =
                     format!("{count}{more} of {frames} frames are missing; post them, then complete the session");
                 Err(ApiError::new(problem::FRAMES_MISSING, detail).missing(ranges))
             }
-            Err(Unsealed::Beyond(frame)) => {
+            Err(SealError::Beyond(frame)) => {
                 let detail = format!(
-                    "frame {frame} was posted, so the capture has more than {frames} frames; say discard_beyond to leave it out"
+                    "frame {frame} was posted, so the capture has more than {frames} frames; set discard_beyond to leave it out"
                 );
                 Err(ApiError::new(problem::FRAME_CONFLICT, detail).frame(frame))
             }
         }
     }
 
-    /// It is completed; its container took the place of one of so many bytes.
+    /// Records the completion; the container replaced one of `replaced` bytes.
     fn completed(&self, completion: Completion, replaced: u64) {
         self.frames().discard_from(completion.frames);
         self.bytes.fetch_add(completion.container_bytes, Relaxed);
@@ -150,47 +151,47 @@ impl Session {
         self.set_phase(Phase::Completed(completion));
     }
 
-    /// Finds out what became of a mark of completion whose writing failed, if that is not known. The caller holds `completing`. Blocks.
+    /// If writing the completion mark failed, reads back whether it is on disk. The caller holds `completing`. Blocks.
     ///
     /// # Errors
-    /// It still cannot be known.
-    pub(crate) fn settle(&self) -> Result<(), ApiError> {
-        if !self.unsettled.load(Acquire) {
+    /// The mark still cannot be read.
+    pub(crate) fn resolve_completion(&self) -> Result<(), ApiError> {
+        if !self.completion_unknown.load(Acquire) {
             return Ok(());
         }
-        match self.store.completion(&self.meta.id).map_err(|error| self.damaged_or(error))? {
+        match self.store.completion(&self.meta.id).map_err(|error| self.fail_if_damaged(error))? {
             Some(completion) => {
                 self.completed(completion, 0);
-                self.webhooks.tell_left(self);
+                self.webhooks.resend_undelivered(self);
             }
             None => self.frames().unseal(),
         }
-        self.unsettled.store(false, Release);
+        self.completion_unknown.store(false, Release);
         Ok(())
     }
 
-    /// As [`Self::settle`], for who does not complete it.
+    /// As [`Self::resolve_completion`], for callers that do not hold `completing`.
     ///
     /// # Errors
-    /// As [`Self::settle`].
-    pub(crate) async fn settled(self: &Arc<Self>) -> Result<(), ApiError> {
-        if !self.unsettled.load(Acquire) {
+    /// As [`Self::resolve_completion`].
+    pub(crate) async fn completion_resolved(self: &Arc<Self>) -> Result<(), ApiError> {
+        if !self.completion_unknown.load(Acquire) {
             return Ok(());
         }
         let _one = self.completing.lock().await;
         let session = Arc::clone(self);
-        blocking(move || session.settle()).await?
+        blocking(move || session.resolve_completion()).await?
     }
 
-    /// Marks the session complete. Where even the failure is not certain, it is unsettled from here on.
+    /// Writes the completion mark. If it fails and cannot be read back, whether the session is complete is unknown until [`Self::resolve_completion`].
     fn mark(&self, completion: &Completion) -> Result<(), StoreError> {
         let Err(error) = self.store.complete(&self.meta.id, completion) else { return Ok(()) };
-        // It may be there, durable or not.
+        // The mark may be in place although writing it failed.
         match self.store.completion(&self.meta.id) {
             Ok(Some(found)) if found == *completion => Ok(()),
             Ok(_) => Err(error),
             Err(_) => {
-                self.unsettled.store(true, Release);
+                self.completion_unknown.store(true, Release);
                 Err(error)
             }
         }
@@ -198,31 +199,31 @@ impl Session {
 
     fn content(&self) -> Result<Content, ApiError> {
         let content = self.store.content(&self.meta.key).map_err(|error| self.storage_error(&error))?;
-        content.ok_or_else(|| self.content_is_gone())
+        content.ok_or_else(|| self.missing_content_error())
     }
 
-    fn content_is_gone(&self) -> ApiError {
-        self.content_or(super::gone())
+    fn missing_content_error(&self) -> ApiError {
+        self.explain_missing_content(super::gone())
     }
 
-    /// Reads the rest cage again, and nothing of the rest pose. Blocks.
+    /// Reads the rest cage again without the rest pose. Blocks.
     ///
     /// # Errors
-    /// Those of the disk; a session that was deleted.
+    /// Storage errors; `SESSION_DELETED`.
     pub(crate) fn rest_cage(&self) -> Result<Cage, ApiError> {
         let file = self.store.content_cage(&self.meta.key).map_err(|error| self.storage_error(&error))?;
-        let CageFile { name, bytes } = file.ok_or_else(|| self.content_is_gone())?;
+        let CageFile { name, bytes } = file.ok_or_else(|| self.missing_content_error())?;
         prepare::read_cage(&name, &bytes, &Choices::of(&self.meta.options)?)
     }
 }
 
-/// A container that was written, and its session marked.
+/// The result of writing a container and the completion mark.
 struct Written {
     completion: Completion,
-    /// Bytes of the one before.
+    /// Length of the container that it replaced, in bytes.
     replaced: u64,
-    /// Who has to be told.
-    due: Option<Due>,
+    /// The webhook message to send.
+    due: Option<PendingMessage>,
 }
 
 fn write(
@@ -244,7 +245,7 @@ fn write(
         frame_rate: session.meta.options.frame_rate,
     };
     let mut write = |out: &mut dyn Write| write_frames(session, &encoding, entries, out);
-    // Of a container that was damaged, which counts already.
+    // A damaged container that is replaced is already counted.
     let replaced = session.store.container_bytes(&session.meta.id).unwrap_or(0);
     let written = session.store.write_container(&session.meta.id, &mut write).map_err(stored)?;
     let completion = Completion { frames, container_bytes: written.bytes, container_digest: written.digest };

@@ -1,11 +1,11 @@
-//! Making, preparing and deleting sessions.
+//! Creating, preparing and deleting sessions.
 
 use super::cage_source::Uploaded;
 use super::facts::{Facts, Outcome};
 use super::prepare::{self, Choices, Geometry};
-use super::prepared::{Got, Prepared, Wanted};
-use super::resume::Mark;
+use super::resume::CompletionState;
 use super::solve;
+use super::solver_cache::{Prepared, SolverRequest, SolverResponse};
 use super::upload::FrameJob;
 use super::{LiveLane, Phase, Session, Status};
 use crate::admission::Held;
@@ -23,16 +23,16 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
-/// A request to make a session.
+/// A request to create a session.
 pub(crate) struct NewSession {
     pub(crate) uploaded: Uploaded,
     pub(crate) options: SessionOptions,
     pub(crate) idempotency_key: Option<String>,
-    /// The room that the files take.
+    /// Permit for the memory that the uploaded files take.
     pub(crate) room: Held,
 }
 
-/// A request whose options are right.
+/// A request whose options have been validated.
 struct Checked {
     key: ContentKey,
     content: Content,
@@ -42,8 +42,8 @@ struct Checked {
 }
 
 impl Service {
-    /// Makes a session and begins to prepare it. What comes back is on disk. Once begun, it goes on where the client gives up:
-    /// a session that is on disk and not known would come up at the next start only, beside the one that the client made instead.
+    /// Creates a session, durably, and starts preparing it. Runs to the end even if the client disconnects: otherwise a session that is on
+    /// disk but not registered would appear only after a restart, beside the one that the client created instead.
     pub(crate) async fn create(
         self: &Arc<Self>,
         tenant: &Arc<Tenant>,
@@ -58,7 +58,7 @@ impl Service {
     async fn create_for(self: &Arc<Self>, tenant: &Tenant, new: NewSession) -> Result<Arc<Session>, ApiError> {
         let NewSession { uploaded, options, idempotency_key, room: _room } = new;
         let choices = Choices::of(&options)?;
-        let (content, made_cage) = self.with_cage(&tenant.name, uploaded, &options).await?;
+        let (content, made_cage) = self.resolve_cage(&tenant.name, uploaded, &options).await?;
         let (key, content) = {
             let (tenant, options) = (tenant.name.clone(), options.clone());
             blocking(move || (content_key(&tenant, &content, &options, &choices), content)).await?
@@ -77,14 +77,14 @@ impl Service {
     ) -> Result<Arc<Session>, ApiError> {
         let Checked { key, content, made_cage, options, choices } = checked;
         let room = self.reserve(tenant, content.size_bytes())?;
-        let at_hand = self.solvers.at_hand(&key);
+        let in_memory = self.solvers.in_memory(&key);
         let most = self.config.max_preparing + self.config.max_prepare_queue;
-        if at_hand.is_none() && self.solvers.in_flight_of(&tenant.name) >= most {
+        if in_memory.is_none() && self.solvers.in_flight_of(&tenant.name) >= most {
             self.rejected("prepare_queue");
-            let detail = format!("{most} of your sessions are being prepared or wait for it; try again later");
+            let detail = format!("{most} of your sessions are being prepared or queued for it; try again later");
             return Err(ApiError::new(problem::BUSY, detail).limit(most as u64).retry_after(5));
         }
-        let (content, geometry) = match at_hand {
+        let (content, geometry) = match in_memory {
             Some(_) => (content, None),
             None => self.read_geometry(&key, content, choices).await?,
         };
@@ -99,7 +99,7 @@ impl Service {
             made_cage,
             idempotency,
         };
-        let status = match &at_hand {
+        let status = match &in_memory {
             Some(prepared) => {
                 let facts = Facts::new(prepared, CacheUse::Hit, PreparationSeconds::default());
                 Status { phase: Phase::Ready, facts: Some(facts) }
@@ -119,18 +119,19 @@ impl Service {
         }
         metrics::counter!("cager_sessions_created_total", "tenant" => tenant.name.clone()).increment(1);
         match session.facts() {
-            // It would be found prepared after a restart as well; this only says it sooner.
+            // After a restart the solver would be found in the cache; storing the outcome only saves that lookup.
             Some(facts) => drop(self.keep_outcome(&session, Outcome::Ready(Box::new(facts)))),
             None => {
-                let preparing = Arc::clone(self).prepare(Arc::clone(&session), choices, geometry, Mark::None);
+                let preparing =
+                    Arc::clone(self).prepare(Arc::clone(&session), choices, geometry, CompletionState::None);
                 drop(tokio::spawn(preparing.with_current_context()));
             }
         }
         Ok(session)
     }
 
-    /// Reads rest pose and cage, so that who sends bad ones hears it at once. Rest pose and cage come back where they will be
-    /// prepared without much waiting; else they would only take memory.
+    /// Parses rest pose and cage, so that errors are reported in the response. Returns them only if preparation starts soon; otherwise they
+    /// would occupy memory while queued.
     async fn read_geometry(
         &self,
         key: &ContentKey,
@@ -157,7 +158,7 @@ impl Service {
         session: Arc<Session>,
         choices: Choices,
         mut geometry: Option<Arc<Geometry>>,
-        mark: Mark,
+        mark: CompletionState,
     ) {
         let clock = Instant::now();
         let mut again = true;
@@ -166,32 +167,32 @@ impl Service {
                 got = self.solvers.get(wanted(&session, choices, geometry.take())) => got,
                 () = session.deleted().cancelled() => return,
             };
-            // It may have come along with the preparation of a session that was deleted meanwhile, content and all.
+            // This request may have joined the preparation of a session that was deleted meanwhile together with its content.
             match got {
                 Err(error) if again && error.problem.word() == problem::SESSION_DELETED.word => again = false,
                 got => break got,
             }
         };
         match got {
-            Ok(Got { prepared, cache, mut seconds }) => {
+            Ok(SolverResponse { prepared, cache, mut seconds }) => {
                 seconds.total = clock.elapsed().as_secs_f64();
                 let facts = Facts::new(&prepared, cache, seconds);
                 session.set_status(Status { phase: Phase::Preparing, facts: Some(facts.clone()) });
                 self.keep_outcome(&session, Outcome::Ready(Box::new(facts.clone()))).await;
-                // A process may have ended with frames in the log and no outcome on disk. Who hears that the session is ready
-                // finds them all.
+                // The previous process may have ended after writing frames but before storing the outcome. They are loaded before clients
+                // see the state `ready`.
                 if session.ensure_loaded().await.is_err() && session.has_failed() {
                     return;
                 }
                 let phase = mark.phase(&mut session.frames());
                 session.set_status(Status { phase, facts: Some(facts) });
                 let webhooks = Arc::clone(&self.webhooks);
-                let _ = blocking(move || webhooks.tell_left(&session)).await;
+                let _ = blocking(move || webhooks.resend_undelivered(&session)).await;
             }
             Err(error) => {
-                let error = session.content_or(error);
+                let error = session.explain_missing_content(error);
                 tracing::info!(session = %session.meta.id, detail = %error.problem.detail, "the session cannot be prepared");
-                // What may succeed another time is tried again after a restart.
+                // Errors that may be temporary are retried after a restart.
                 if error.status() == StatusCode::UNPROCESSABLE_ENTITY {
                     self.keep_outcome(&session, Outcome::Failed(error.problem.clone())).await;
                 }
@@ -201,7 +202,7 @@ impl Service {
                 match due {
                     Ok(Ok(None)) => {}
                     Ok(Ok(Some(due))) => self.webhooks.tell(&session, due),
-                    Ok(Err(_)) | Err(_) => self.webhooks.tell_unkept(&session),
+                    Ok(Err(_)) | Err(_) => self.webhooks.send_unrecorded(&session),
                 }
             }
         }
@@ -210,10 +211,10 @@ impl Service {
     fn keep_outcome(&self, session: &Arc<Session>, outcome: Outcome) -> impl Future<Output = ()> + use<> {
         let (store, id, session) = (self.store.clone(), session.meta.id.clone(), Arc::clone(session));
         let done = tokio::task::spawn_blocking(move || {
-            // A ready session has a log; one without is damaged.
+            // Every ready session has a log; a missing one means damage.
             let log = if matches!(outcome, Outcome::Ready(_)) { session.make_log() } else { Ok(()) };
             if let Err(error) = log.and_then(|()| store.put_note(&id, OUTCOME, &outcome)) {
-                tracing::warn!(session = %id, %error, "what preparing found could not be kept; it is found again after a restart");
+                tracing::warn!(session = %id, %error, "the outcome of the preparation could not be stored; a restart prepares the session again");
             }
         });
         async move { drop(done.await) }
@@ -223,18 +224,18 @@ impl Service {
     pub(crate) async fn solver(self: &Arc<Self>, session: &Session) -> Result<Arc<Prepared>, ApiError> {
         let choices = Choices::of(&session.meta.options)?;
         let got = self.solvers.get(wanted(session, choices, None)).await;
-        let prepared = got.map_err(|error| session.content_or(error))?.prepared;
+        let prepared = got.map_err(|error| session.explain_missing_content(error))?.prepared;
         session.check_handles(&prepared)?;
         Ok(prepared)
     }
 
-    /// The lane that takes a session's frames to the engine.
+    /// The engine lane of a session's frames, opened if no upload holds one.
     pub(crate) fn lane(&self, session: &Arc<Session>, prepared: Arc<Prepared>, tenant: &Tenant) -> Arc<LiveLane> {
         session.live_lane(|| {
             let cost = {
                 let decoder = prepared.solver.decoder();
                 let (points, columns) = (decoder.points() as f64, decoder.columns() as f64);
-                // An iteration multiplies a square matrix so many times.
+                // The iteration for tied normals multiplies by a square matrix about this many times.
                 let products = if decoder.tied_normals().is_some() { 40.0 } else { 0.0 };
                 points * columns + products * columns * columns
             };
@@ -253,8 +254,8 @@ impl Service {
         })
     }
 
-    /// Deletes a session; what runs for it stops. Once begun, it goes on where the client gives up: a session that is gone from
-    /// the disk must not stay known, and take frames that a restart would forget.
+    /// Deletes a session and stops work for it. Runs to the end even if the client disconnects: a session whose files are gone must not
+    /// stay registered and accept frames that a restart would lose.
     pub(crate) async fn delete(self: &Arc<Self>, session: &Arc<Session>) -> Result<(), ApiError> {
         let (service, session) = (Arc::clone(self), Arc::clone(session));
         let work = tokio::spawn(async move { service.delete_alone(&session).await });
@@ -275,7 +276,7 @@ impl Service {
             .await?
             .map_err(|error| super::commit::storage_error(&error))
             .inspect_err(|_| session.set_deleting(false))?;
-        // It may have been read again since it was looked up.
+        // It may have been registered again since it was looked up.
         self.registry.remove(&id).iter().chain([session]).for_each(|session| session.mark_deleted());
         self.unread.forget(Kind::Session, &id);
         if !self.registry.uses_content(&key) && self.unread.is_empty() {
@@ -288,23 +289,29 @@ impl Service {
     }
 }
 
-fn wanted(session: &Session, choices: Choices, geometry: Option<Arc<Geometry>>) -> Wanted {
-    Wanted { key: session.meta.key, tenant: session.meta.tenant.clone(), choices, geometry, trace: Context::current() }
+fn wanted(session: &Session, choices: Choices, geometry: Option<Arc<Geometry>>) -> SolverRequest {
+    SolverRequest {
+        key: session.meta.key,
+        tenant: session.meta.tenant.clone(),
+        choices,
+        geometry,
+        trace: Context::current(),
+    }
 }
 
-/// Name of the note that holds the [`Outcome`].
+/// Name of the note that stores the [`Outcome`].
 pub(super) const OUTCOME: &str = "outcome";
 
-/// Digest of all that a solver depends on. The tenant is part of it: what one tenant uploaded is never a hit for another.
+/// BLAKE3 digest of everything a solver depends on. It includes the tenant, so that one tenant's upload is never a cache hit for another.
 fn content_key(tenant: &str, content: &Content, options: &SessionOptions, choices: &Choices) -> ContentKey {
     let mut hasher = blake3::Hasher::new();
     let extension = |name: &str| name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
-    // What is chosen where nothing is said is the same as when it is said.
+    // Defaults are written out, so that an omitted option and its default give the same key.
     let solving = SessionOptions {
         name: None,
         frame_rate: None,
         frames: None,
-        // Its bytes count, wherever they came from.
+        // The cage's bytes are hashed below, whatever their source.
         cage: None,
         coordinates: Some(choices.system.name().to_owned()),
         handles: Some(choices.handles.name().to_owned()),
@@ -338,7 +345,7 @@ fn fingerprint(key: &ContentKey, options: &SessionOptions) -> String {
     hasher.finalize().to_hex().to_string()
 }
 
-/// Runs what blocks away from the async threads.
+/// Runs a blocking closure on tokio's blocking pool.
 pub(crate) async fn blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, ApiError> {
     tokio::task::spawn_blocking(work).await.map_err(|error| ApiError::internal(&error))
 }

@@ -1,16 +1,16 @@
-//! What preparing found out about a session, kept beside it so that it is known after a restart without the solver.
+//! Sizes and diagnostics of a prepared session, stored beside it so that they are known after a restart without loading the solver.
 
-use super::prepared::Prepared;
+use super::solver_cache::Prepared;
 use cager_proto::messages::{CacheUse, ConditionNumber, PreparationSeconds, Problem};
 use serde::{Deserialize, Serialize};
 
-/// Numbers of a prepared session.
+/// Sizes and diagnostics of a prepared session.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub(crate) struct Facts {
     pub(crate) points: u32,
     pub(crate) unknowns: u32,
     pub(crate) handle_count: u32,
-    /// Digest of their numbers, BLAKE3, hexadecimal; empty where an earlier version of the program did not keep it.
+    /// BLAKE3 digest of the handle indices, hexadecimal; empty in notes of earlier versions.
     #[serde(default)]
     pub(crate) handles_digest: String,
     /// Whether handle rows are enough to invert a frame.
@@ -32,7 +32,7 @@ pub(crate) struct Facts {
 pub(crate) enum Outcome {
     /// The session takes frames.
     Ready(Box<Facts>),
-    /// It never will.
+    /// Preparation failed for good.
     Failed(Box<Problem>),
 }
 

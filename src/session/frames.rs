@@ -1,20 +1,20 @@
-//! Which frames of a session are there: solved and on disk, or being solved.
+//! The frames of a session: those on disk and those being solved.
 
-use super::runs::{Missing, Runs};
+use super::intervals::{IntervalSet, Missing};
 use super::upload::Upload;
 use crate::store::LogEntry;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
-/// Most missing ranges that are told at a time.
+/// Longest list of missing ranges in a response.
 pub(crate) const RANGES: usize = 1000;
 
-/// What a frame's bytes were, to recognise it when it is posted again.
+/// Digests of a frame's rows, by which a frame posted again is recognised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Digests {
-    /// Of its handle rows.
+    /// Of the handle rows.
     pub(crate) handles: [u8; 16],
-    /// Of all its rows, where all were sent.
+    /// Of all rows; `None` if only handle rows were sent.
     pub(crate) full: Option<[u8; 16]>,
 }
 
@@ -23,7 +23,7 @@ impl Digests {
         Self { handles: entry.handle_digest, full: entry.full_digest }
     }
 
-    /// Whether both can be the same frame.
+    /// Whether both can be digests of the same frame.
     pub(crate) fn agree(&self, other: &Self) -> bool {
         self.handles == other.handles
             && match (self.full, other.full) {
@@ -33,7 +33,7 @@ impl Digests {
     }
 }
 
-/// A frame that is being solved or written, and who wants to know.
+/// A frame that is being solved or written, with the uploads waiting for it.
 struct Pending {
     digests: Digests,
     waiting: Vec<Arc<Upload>>,
@@ -44,15 +44,15 @@ struct Pending {
 pub(crate) enum Claim {
     /// Solve it.
     Solve,
-    /// Its cage is there, from its handle rows; measure it.
+    /// Its cage was solved from handle rows; now that all rows are known, measure its errors.
     Measure,
-    /// It is there already, the same.
+    /// It is on disk with the same content.
     Known,
-    /// The same is being solved; the upload hears of it.
+    /// The same frame is being solved; the upload is notified when that is done.
     Waiting,
-    /// It was there before, but different.
+    /// It was posted before with other content.
     Conflict,
-    /// It is new, and the session takes no new ones.
+    /// It is new, and the session is sealed.
     Sealed,
 }
 
@@ -60,21 +60,21 @@ pub(crate) enum Claim {
 #[derive(Default)]
 pub(crate) struct Frames {
     solved: BTreeMap<u32, LogEntry>,
-    /// Their numbers.
-    runs: Runs,
+    /// The numbers of `solved`.
+    runs: IntervalSet,
     pending: HashMap<u32, Pending>,
-    /// Whether no frames are coming any more.
+    /// Whether new frames are refused.
     sealed: bool,
 }
 
 /// Why a session cannot be sealed.
 #[derive(Debug, PartialEq, Eq)]
-pub(crate) enum Unsealed {
+pub(crate) enum SealError {
     /// Frames are missing.
     Missing(Missing),
     /// This frame lies beyond the end.
     Beyond(u32),
-    /// Frames whose cages are there are being measured, which the container will have.
+    /// Frames that belong into the container are still being measured.
     Measuring,
 }
 
@@ -114,64 +114,64 @@ impl Frames {
         if known.is_some() { Claim::Measure } else { Claim::Solve }
     }
 
-    /// Takes no new frames from here on, if all of `frames` are there and none is beyond or on its way there. With `discard` those
-    /// that are there already may be beyond. Gives whether none were taken before.
+    /// Refuses new frames from here on, provided all frames below `frames` are solved and none beyond is solved or pending; with `discard`,
+    /// solved frames beyond are allowed. Returns whether it was sealed before.
     ///
     /// # Errors
-    /// Why that cannot be yet; nothing changed.
-    pub(crate) fn seal_at(&mut self, frames: u32, discard: bool) -> Result<bool, Unsealed> {
+    /// [`SealError`]; nothing has changed.
+    pub(crate) fn seal_at(&mut self, frames: u32, discard: bool) -> Result<bool, SealError> {
         let missing = self.missing(0, Some(frames), RANGES);
         if !missing.ranges.is_empty() {
-            return Err(Unsealed::Missing(missing));
+            return Err(SealError::Missing(missing));
         }
         if self.pending.keys().any(|frame| *frame < frames && self.solved.contains_key(frame)) {
-            return Err(Unsealed::Measuring);
+            return Err(SealError::Measuring);
         }
         let on_its_way = self.pending.keys().copied().max();
         let highest = self.highest().filter(|_| !discard);
         match highest.max(on_its_way).filter(|&highest| highest >= frames) {
-            Some(highest) => Err(Unsealed::Beyond(highest)),
+            Some(highest) => Err(SealError::Beyond(highest)),
             None => Ok(std::mem::replace(&mut self.sealed, true)),
         }
     }
 
-    /// Forgets solved frames from this number on.
+    /// Removes solved frames numbered `frames` and above.
     pub(crate) fn discard_from(&mut self, frames: u32) {
         self.solved.split_off(&frames);
         self.runs.truncate(frames);
     }
 
-    /// Takes no new frames from here on.
+    /// Refuses new frames from here on.
     pub(crate) fn seal(&mut self) {
         self.sealed = true;
     }
 
-    /// Takes new frames again.
+    /// Accepts new frames again.
     pub(crate) fn unseal(&mut self) {
         self.sealed = false;
     }
 
-    /// Enters a frame that is on disk; returns the uploads that wait for it.
+    /// Adds a frame that is on disk; returns the uploads that wait for it.
     pub(crate) fn solved(&mut self, entry: LogEntry) -> Vec<Arc<Upload>> {
-        if self.is_news(&entry) {
+        if self.adds_information(&entry) {
             self.solved.insert(entry.frame, entry);
         }
         self.runs.insert(entry.frame);
         self.pending.remove(&entry.frame).map_or_else(Vec::new, |pending| pending.waiting)
     }
 
-    /// Whether it says more than what is known: a frame that is not there, or was not measured before.
-    pub(crate) fn is_news(&self, entry: &LogEntry) -> bool {
+    /// Whether the entry adds to what is known: a new frame, or the errors of one that was not measured.
+    pub(crate) fn adds_information(&self, entry: &LogEntry) -> bool {
         self.solved.get(&entry.frame).is_none_or(|known| known.full_digest.is_none() && entry.full_digest.is_some())
     }
 
-    /// Whether a frame found in the log is the one that uploads wait for, if any do.
-    pub(crate) fn is_awaited(&self, entry: &LogEntry) -> bool {
+    /// Whether a frame found in the log has the content that pending uploads sent; true if none is pending.
+    pub(crate) fn matches_pending(&self, entry: &LogEntry) -> bool {
         self.pending.get(&entry.frame).is_none_or(|pending| pending.digests.agree(&Digests::of(entry)))
     }
 
-    /// Gives up a frame that could not be solved or written; returns the uploads that wait for it.
-    pub(crate) fn gave_up(&mut self, frame: u32) -> Vec<Arc<Upload>> {
+    /// Removes a pending frame that could not be solved or written; returns the uploads that wait for it.
+    pub(crate) fn release_claim(&mut self, frame: u32) -> Vec<Arc<Upload>> {
         self.pending.remove(&frame).map_or_else(Vec::new, |pending| pending.waiting)
     }
 
@@ -216,7 +216,7 @@ impl Frames {
         self.solved.last_key_value().map(|(frame, _)| *frame)
     }
 
-    /// Ranges from `from` to `end` that are not solved, at most so many; below the highest solved frame where no end is known.
+    /// At most `most` ranges of unsolved frames in `from..end`; `end` defaults to the highest solved frame.
     pub(crate) fn missing(&self, from: u32, end: Option<u32>, most: usize) -> Missing {
         self.runs.missing(from, end.or(self.highest()).unwrap_or(0), most)
     }
@@ -288,13 +288,13 @@ mod tests {
         assert_eq!(frames.solved(LogEntry { offset: 77, ..entry(3) }).len(), 2);
         assert_eq!(frames.entry(3).map(|entry| entry.offset), Some(77));
         assert_eq!(frames.claim(3, whole, &upload), Claim::Known);
-        assert!(!frames.is_news(&LogEntry { full_digest: None, ..entry(3) }), "what was measured stays");
+        assert!(!frames.adds_information(&LogEntry { full_digest: None, ..entry(3) }), "what was measured stays");
         frames.solved(LogEntry { full_digest: None, ..entry(4) });
         for frame in 0..3 {
             frames.solved(LogEntry { full_digest: None, ..entry(frame) });
         }
         assert_eq!(frames.claim(2, whole, &upload), Claim::Measure);
-        assert_eq!(frames.seal_at(5, false), Err(Unsealed::Measuring), "its answer has to be in the container");
+        assert_eq!(frames.seal_at(5, false), Err(SealError::Measuring), "its answer has to be in the container");
         frames.solved(entry(2));
         assert_eq!(frames.seal_at(5, false), Ok(false));
         frames.unseal();
@@ -307,21 +307,21 @@ mod tests {
         let upload = Arc::new(Upload::default());
         let same = Digests { handles: [1; 16], full: Some([2; 16]) };
         let mut frames = Frames::new([0, 2].map(entry).to_vec());
-        assert_eq!(frames.seal_at(3, false), Err(Unsealed::Missing(Missing { ranges: vec![[1, 2]], next: None })));
+        assert_eq!(frames.seal_at(3, false), Err(SealError::Missing(Missing { ranges: vec![[1, 2]], next: None })));
         assert_eq!(frames.claim(1, same, &upload), Claim::Solve);
         assert_eq!(
             frames.seal_at(3, false),
-            Err(Unsealed::Missing(Missing { ranges: vec![[1, 2]], next: None })),
+            Err(SealError::Missing(Missing { ranges: vec![[1, 2]], next: None })),
             "it is not on disk yet"
         );
         frames.solved(entry(1));
-        assert_eq!(frames.seal_at(2, false), Err(Unsealed::Beyond(2)));
+        assert_eq!(frames.seal_at(2, false), Err(SealError::Beyond(2)));
         assert_eq!(frames.seal_at(2, true), Ok(false));
         frames.unseal();
         assert_eq!(frames.claim(3, same, &upload), Claim::Solve);
-        assert_eq!(frames.seal_at(3, false), Err(Unsealed::Beyond(3)), "its record will be sent");
-        assert_eq!(frames.seal_at(3, true), Err(Unsealed::Beyond(3)), "its record will be sent");
-        frames.gave_up(3);
+        assert_eq!(frames.seal_at(3, false), Err(SealError::Beyond(3)), "its record will be sent");
+        assert_eq!(frames.seal_at(3, true), Err(SealError::Beyond(3)), "its record will be sent");
+        frames.release_claim(3);
         assert_eq!(frames.seal_at(3, false), Ok(false));
         assert_eq!(frames.seal_at(3, false), Ok(true));
         assert_eq!(frames.claim(3, same, &upload), Claim::Sealed);

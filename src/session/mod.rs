@@ -1,4 +1,4 @@
-//! What a session is: a rest pose with its cage, being prepared, ready for frames, completed or failed. Nothing about HTTP.
+//! Sessions, independent of HTTP: a rest pose with its cage that is being prepared, ready for frames, completed or failed.
 
 pub(crate) mod cage_source;
 pub(crate) mod commit;
@@ -6,13 +6,13 @@ pub(crate) mod complete;
 pub(crate) mod create;
 pub(crate) mod facts;
 pub(crate) mod frames;
+mod intervals;
 pub(crate) mod prepare;
-pub(crate) mod prepared;
 pub(crate) mod registry;
 mod resume;
 pub(crate) mod retention;
-mod runs;
 pub(crate) mod solve;
+pub(crate) mod solver_cache;
 pub(crate) mod upload;
 
 use crate::engine::Lane;
@@ -23,7 +23,7 @@ use crate::webhooks::Webhooks;
 use cager_core::inversion::{Handles, SolverOptions};
 use cager_core::regularize::Regularizer;
 use cager_proto::messages::{FrameCounts, Problem, Progress, Session as View, SessionState};
-use commit::{Committer, Waiting};
+use commit::{CommitQueue, Committer};
 use facts::Facts;
 use frames::{Frames, RANGES};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -32,7 +32,7 @@ use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 use upload::FrameJob;
 
-/// A session as long as the service runs.
+/// A session in memory.
 pub(crate) struct Session {
     pub(crate) meta: SessionMeta,
     store: Store,
@@ -40,37 +40,37 @@ pub(crate) struct Session {
     webhooks: Arc<Webhooks>,
     status: Mutex<Status>,
     frames: Mutex<Frames>,
-    /// Whether there is a log on disk. It is made before the session is known to be ready, so that one that is gone is missed.
+    /// Whether the log exists on disk. It is created before the session becomes ready, so that a missing log is recognised as damage.
     pub(crate) has_log: AtomicBool,
-    /// Whether what the log holds is in `frames`.
+    /// Whether the frames in the log have been added to `frames`.
     loaded: AtomicBool,
     queued: Arc<AtomicU64>,
-    /// Bytes of its files, of its content, and of frames about to be written.
+    /// Bytes of its files and content on disk, and of frames queued for writing.
     pub(crate) bytes: AtomicU64,
-    waiting: Mutex<Waiting>,
-    /// The last solved frame with its cage, where the next depends on it.
+    waiting: Mutex<CommitQueue>,
+    /// The last solved frame and its cage, in sessions whose frames depend on their predecessors.
     last_solved: Mutex<Option<(u32, Vec<f32>)>>,
     log: Mutex<Option<FrameLog>>,
     reader: Mutex<Option<LogReader>>,
     lane: Mutex<Weak<LiveLane>>,
-    /// Held while the container is written, so that it is written once.
+    /// Taken while the container is written, so that it is written once.
     pub(crate) completing: tokio::sync::Mutex<()>,
     version: watch::Sender<u64>,
-    /// Whether it is not known what became of its mark of completion; it takes no new frames until then.
-    unsettled: AtomicBool,
-    /// Its files may be on their way to the trash.
+    /// Whether writing the completion mark failed in a way that leaves its state on disk unknown; no frames are accepted meanwhile.
+    completion_unknown: AtomicBool,
+    /// Deletion has begun, so missing files are not damage.
     deleting: AtomicBool,
     deleted: CancellationToken,
 }
 
-/// What is known of a session, and where it stands.
+/// State of a session, with the results of its preparation.
 #[derive(Clone, Debug)]
 pub(crate) struct Status {
     pub(crate) phase: Phase,
     pub(crate) facts: Option<Facts>,
 }
 
-/// Where a session stands.
+/// State of a session.
 #[derive(Clone, Debug)]
 pub(crate) enum Phase {
     Preparing,
@@ -79,8 +79,8 @@ pub(crate) enum Phase {
     Failed(Box<Problem>),
 }
 
-/// A session's lane to the engine with the solver its frames need. It lives as long as an upload runs, so that the solver of a
-/// session nobody uses can leave the memory.
+/// A session's queue in the engine, together with the prepared solver. It exists while uploads run, so that the solvers of idle sessions
+/// can be evicted.
 pub(crate) struct LiveLane {
     pub(crate) lane: Lane<FrameJob>,
     uploads: AtomicU64,
@@ -91,7 +91,7 @@ impl LiveLane {
         Self { lane, uploads: AtomicU64::new(0) }
     }
 
-    /// Counts the uploads whose bodies still arrive.
+    /// Counts an upload whose body is still arriving.
     pub(crate) fn upload_begins(&self) {
         if self.uploads.fetch_add(1, Ordering::Relaxed) == 0 {
             self.lane.expect_more(true);
@@ -129,7 +129,7 @@ impl Session {
             lane: Mutex::default(),
             completing: tokio::sync::Mutex::new(()),
             version: watch::Sender::new(0),
-            unsettled: AtomicBool::new(false),
+            completion_unknown: AtomicBool::new(false),
             deleting: AtomicBool::new(false),
             deleted: CancellationToken::new(),
         }
@@ -164,17 +164,17 @@ impl Session {
         lock(&self.frames)
     }
 
-    /// Tells everyone who follows that something changed.
+    /// Notifies all followers of a change.
     pub(crate) fn touch(&self) {
         self.version.send_modify(|version| *version += 1);
     }
 
-    /// Changes with everything that happens to the session.
+    /// A counter that changes with every change of the session.
     pub(crate) fn changes(&self) -> watch::Receiver<u64> {
         self.version.subscribe()
     }
 
-    /// Becomes true when the session is deleted.
+    /// Cancelled when the session is deleted.
     pub(crate) fn deleted(&self) -> &CancellationToken {
         &self.deleted
     }
@@ -183,28 +183,28 @@ impl Session {
         self.deleted.is_cancelled()
     }
 
-    /// Says whether its files are being deleted, so that nobody takes their absence for a fault.
+    /// Sets whether its files are being deleted, so that their absence is not taken for damage.
     pub(crate) fn set_deleting(&self, deleting: bool) {
         self.deleting.store(deleting, Ordering::SeqCst);
     }
 
-    /// What a client hears when the store refuses.
+    /// The response for a storage error.
     pub(crate) fn storage_error(&self, error: &StoreError) -> ApiError {
         if self.deleting.load(Ordering::SeqCst) || self.is_deleted() { gone() } else { commit::storage_error(error) }
     }
 
-    /// Reads what the log holds, if that did not happen yet. Blocks.
+    /// Reads the frames in the log, once. Blocks.
     ///
     /// # Errors
-    /// A damaged log, after which the session is failed and out of the way; what the system says.
+    /// A damaged log, after which the session has failed and is in quarantine; I/O errors.
     pub(crate) fn load(&self) -> Result<(), ApiError> {
         if self.loaded.load(Ordering::Acquire) {
             return Ok(());
         }
         match self.status() {
-            // Loaded before anyone hears that it is ready.
+            // The log is loaded before the session becomes ready.
             Status { facts: None, .. } => return Ok(()),
-            // In quarantine, where it has said why; what there is to know is that it failed.
+            // The session is in quarantine; only its failure is known.
             Status { phase: Phase::Failed(_), .. } => return Ok(()),
             _ => {}
         }
@@ -214,13 +214,13 @@ impl Session {
             false => Ok(()),
         };
         drop(log);
-        opened.map_err(|error| self.damaged_or(error))
+        opened.map_err(|error| self.fail_if_damaged(error))
     }
 
-    /// Makes the log of a session that has none yet. Blocks.
+    /// Creates the log if it is missing. Blocks.
     ///
     /// # Errors
-    /// What the store says.
+    /// Storage errors.
     pub(crate) fn make_log(&self) -> Result<(), StoreError> {
         let mut log = lock(&self.log);
         if log.is_none() && !self.is_deleted() {
@@ -229,7 +229,7 @@ impl Session {
         Ok(())
     }
 
-    /// As [`Self::load`], off the async threads.
+    /// As [`Self::load`], on the blocking pool.
     pub(crate) async fn ensure_loaded(self: &Arc<Self>) -> Result<(), ApiError> {
         if self.loaded.load(Ordering::Acquire) {
             return Ok(());
@@ -238,7 +238,7 @@ impl Session {
         tokio::task::spawn_blocking(move || session.load()).await.map_err(|e| ApiError::internal(&e))?
     }
 
-    /// Opens the log; what it holds that is not known yet becomes known. The caller holds the place it goes to.
+    /// Opens the log and adds the frames found in it to `frames`. The caller holds the lock of `log`.
     fn load_log(&self) -> Result<FrameLog, StoreError> {
         let rows = self.facts().map_or(0, |facts| facts.unknowns);
         if self.has_log.load(Ordering::Acquire) && !self.store.has_log(&self.meta.id)? {
@@ -248,7 +248,7 @@ impl Session {
         let (log, mut entries) = self.store.open_log(&self.meta.id, rows)?;
         self.has_log.store(true, Ordering::Release);
         if let Some(frames) = self.declared() {
-            // Those beyond were discarded at completion.
+            // Frames beyond the declared number were discarded at completion.
             entries.retain(|entry| entry.frame < frames);
         }
         if let Some(frames) = self.declared()
@@ -258,11 +258,11 @@ impl Session {
             return Err(StoreError::Damaged { path: self.store.log_path(&self.meta.id), what });
         }
         *lock(&self.reader) = Some(log.reader());
-        // Of a session that was loaded before, those that were written although the answer was an error: true all the same.
+        // In a log that was loaded before, new entries are frames that reached the disk although their append reported an error.
         let mut frames = self.frames();
-        let new: Vec<LogEntry> = entries.into_iter().filter(|e| frames.is_news(e)).collect();
+        let new: Vec<LogEntry> = entries.into_iter().filter(|e| frames.adds_information(e)).collect();
         for entry in new {
-            let same = frames.is_awaited(&entry);
+            let same = frames.matches_pending(&entry);
             for upload in frames.solved(entry) {
                 if same { upload.answer(entry.frame) } else { upload.fail(solve::conflict(entry.frame)) }
             }
@@ -272,42 +272,42 @@ impl Session {
         Ok(log)
     }
 
-    /// Puts a damaged session aside, so that others are not disturbed. The caller holds none of its locks.
+    /// Marks the session as failed and moves its files to quarantine. The caller holds none of its locks.
     fn quarantine(&self, path: &std::path::Path, what: &str) -> ApiError {
         let error = ApiError::new(
             problem::SESSION_FAILED,
-            "stored frames of this session are damaged; the operator finds it in quarantine, and the capture has to be uploaded to a new session",
+            "stored frames of this session are damaged, and its files were moved to quarantine; upload the capture to a new session",
         );
         {
             let mut status = lock(&self.status);
             if matches!(status.phase, Phase::Failed(_)) {
-                // Another reader met the damage first.
+                // Another thread has handled the damage.
                 return error;
             }
             status.phase = Phase::Failed(error.problem.clone());
         }
         self.touch();
-        // Nothing is appended, and so nothing answered, from here on.
+        // From here on nothing is appended, so nothing is acknowledged.
         *lock(&self.log) = None;
         *lock(&self.reader) = None;
-        tracing::error!(session = %self.meta.id, path = %path.display(), what, "the frame log is damaged; the session is put in quarantine");
+        tracing::error!(session = %self.meta.id, path = %path.display(), what, "the frame log is damaged; the session is moved to quarantine");
         metrics::counter!("cager_quarantined_total").increment(1);
         if let Err(error) = self.store.quarantine_session(&self.meta.id, what) {
             tracing::error!(session = %self.meta.id, %error, "it could not be moved");
         }
-        self.webhooks.tell_unkept(self);
+        self.webhooks.send_unrecorded(self);
         error
     }
 
-    /// Reads the cages of these frames, m × 12 bytes each, one after another. Blocks.
+    /// Appends the cages of these frames to `out`, m × 12 bytes each. Blocks.
     ///
     /// # Errors
-    /// A damaged log, after which the session is failed and out of the way; what the system says.
+    /// A damaged log, after which the session has failed and is in quarantine; I/O errors.
     pub(crate) fn read_cages(&self, entries: &[LogEntry], out: &mut Vec<u8>) -> Result<(), ApiError> {
-        self.reader().and_then(|reader| reader.read_cages(entries, out)).map_err(|error| self.damaged_or(error))
+        self.reader().and_then(|reader| reader.read_cages(entries, out)).map_err(|error| self.fail_if_damaged(error))
     }
 
-    /// Reads the log, opened again if nobody used it for a while. What it holds is known, so it is not looked through again.
+    /// A reader of the log, reopened without scanning if it was closed while idle.
     fn reader(&self) -> Result<LogReader, StoreError> {
         let mut kept = lock(&self.reader);
         if let Some(reader) = &*kept {
@@ -318,10 +318,10 @@ impl Session {
         Ok(kept.insert(reader).clone())
     }
 
-    /// What a client hears when the store refuses; damage puts the session aside.
-    pub(crate) fn damaged_or(&self, error: StoreError) -> ApiError {
+    /// The response for a storage error; damage fails the session and quarantines it.
+    pub(crate) fn fail_if_damaged(&self, error: StoreError) -> ApiError {
         match error {
-            // Files on their way to the trash are not damaged.
+            // During deletion, missing files are not damage.
             StoreError::Damaged { path, what } if !self.deleting.load(Ordering::SeqCst) && !self.is_deleted() => {
                 self.quarantine(&path, &what)
             }
@@ -329,12 +329,12 @@ impl Session {
         }
     }
 
-    /// Whether every frame depends on the one before, so that they have to come in order.
+    /// Whether every frame depends on the previous one, so that frames must arrive in order.
     pub(crate) fn follows_previous(&self) -> bool {
         self.meta.options.regularizer.as_deref() == Some(Regularizer::Temporal.name())
     }
 
-    /// The lane of running uploads, if there is one.
+    /// The lane shared by running uploads, created if there is none.
     pub(crate) fn live_lane(&self, make: impl FnOnce() -> LiveLane) -> Arc<LiveLane> {
         let mut lane = lock(&self.lane);
         lane.upgrade().unwrap_or_else(|| {
@@ -344,14 +344,14 @@ impl Session {
         })
     }
 
-    /// Writes what the disk may have lost of the log again, if it takes it now. Blocks.
-    pub(crate) fn mend(&self) {
+    /// Retries what failed before: determining the completion state, and rewriting log blocks that a failed sync may have lost. Blocks.
+    pub(crate) fn retry_failed_writes(&self) {
         if let Ok(_one) = self.completing.try_lock()
-            && let Err(error) = self.settle()
+            && let Err(error) = self.resolve_completion()
         {
-            tracing::warn!(session = %self.meta.id, detail = %error.problem.detail, "what became of its completion is not known yet");
+            tracing::warn!(session = %self.meta.id, detail = %error.problem.detail, "whether the session is complete cannot be determined yet");
         }
-        if self.has_failed() || !self.store.log_is_doubtful(&self.meta.id) {
+        if self.has_failed() || !self.store.log_needs_rewrite(&self.meta.id) {
             return;
         }
         let mut log = lock(&self.log);
@@ -364,7 +364,7 @@ impl Session {
     }
 
     /// Closes files of a session that nobody uses.
-    pub(crate) fn rest_if_idle(&self) {
+    pub(crate) fn close_files_if_idle(&self) {
         let idle = lock(&self.lane).strong_count() == 0 && !lock(&self.waiting).is_busy();
         if idle && let Ok(mut log) = self.log.try_lock() {
             *lock(&self.reader) = None;
@@ -372,7 +372,7 @@ impl Session {
         }
     }
 
-    /// Ends everything that runs for the session.
+    /// Stops all work for the session.
     pub(crate) fn mark_deleted(&self) {
         self.deleted.cancel();
         self.touch();
@@ -386,7 +386,7 @@ impl Session {
         }
     }
 
-    /// Where it stands, for server-sent events.
+    /// State and frame counts, for server-sent events.
     pub(crate) fn progress(&self) -> Progress {
         let state = state_of(&lock(&self.status).phase);
         let frames = self.frames();
@@ -397,7 +397,7 @@ impl Session {
         }
     }
 
-    /// The session as clients see it.
+    /// The session as returned by the API.
     pub(crate) fn view(&self) -> View {
         self.view_with(RANGES)
     }
@@ -449,8 +449,8 @@ impl Session {
 }
 
 impl Session {
-    /// What a client hears of an error of preparing: that the session was deleted where it was, and else that its content is gone.
-    pub(crate) fn content_or(&self, error: ApiError) -> ApiError {
+    /// Replaces `SESSION_DELETED` by the error for missing content if the session itself still exists.
+    pub(crate) fn explain_missing_content(&self, error: ApiError) -> ApiError {
         if error.problem.word() != problem::SESSION_DELETED.word || self.is_deleted() {
             return error;
         }
@@ -459,7 +459,7 @@ impl Session {
     }
 }
 
-/// What ends all that runs for a session that was deleted.
+/// The error that ends requests to a deleted session.
 pub(crate) fn gone() -> ApiError {
     ApiError::new(problem::SESSION_DELETED, "the session was deleted")
 }
@@ -473,7 +473,7 @@ fn state_of(phase: &Phase) -> SessionState {
     }
 }
 
-/// Nothing is left half-done where a thread panics with one of these locks.
+/// Locks, ignoring poisoning: a panic while locked leaves no half-finished update.
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

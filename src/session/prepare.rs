@@ -1,14 +1,14 @@
-//! From uploaded bytes to a solver: reading, checking, preparing. Blocks.
+//! From uploaded files to a prepared solver: parsing, validation, preparation. All functions block.
 
-use super::prepared::Prepared;
+use super::solver_cache::Prepared;
 use crate::capture::preparation_warnings;
 use crate::coordinates;
 use crate::problem::{self, ApiError};
 use crate::store::Content;
-use cager_cages::doctor::weld;
+use cager_cages::diagnosis::weld;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{Handles, PrepareError, Preparing, Solver, SolverOptions, check_options, usual_spectrum};
+use cager_core::inversion::{Handles, PrepareError, Preparing, Solver, SolverOptions, check_options, default_spectrum};
 use cager_core::mesh::{Model, TriMesh};
 use cager_core::regularize::{Regularizer, SparseMatrix, Term};
 use cager_formats::{MeshFormat, read_matrix_bytes, read_model_bytes};
@@ -16,7 +16,7 @@ use cager_proto::messages::SessionOptions;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-/// Options that were checked, all but the spectrum's bound, which the cage gives.
+/// Validated options, except the upper bound of `spectrum`, which depends on the cage.
 #[derive(Clone, Copy)]
 pub(crate) struct Choices {
     pub(crate) system: &'static dyn CoordinateSystem,
@@ -30,7 +30,7 @@ pub(crate) struct Choices {
 const NAME_CHARACTERS: usize = 200;
 
 impl Choices {
-    /// Checks what can be checked without the cage.
+    /// Validates what does not depend on the cage.
     ///
     /// # Errors
     /// An option that is unknown, out of range or not available.
@@ -58,7 +58,7 @@ impl Choices {
             return refuse(format!("handles: {wanted:?} is not available; give one of {names}"));
         }
         let Some(handles) = Handles::by_name(wanted, options.handle_count.map(|count| count as usize)) else {
-            return refuse(format!("handle_count: {wanted} reads a number of points of its own; leave it out"));
+            return refuse(format!("handle_count: {wanted} has a fixed number of handles; leave it out"));
         };
         let wanted = options.regularizer.as_deref().unwrap_or(Regularizer::default().name());
         let Some(regularizer) = Regularizer::by_name(wanted) else {
@@ -77,7 +77,7 @@ impl Choices {
         SolverOptions {
             handles: self.handles,
             regularizer: self.regularizer,
-            spectrum: self.spectrum.map_or_else(|| usual_spectrum(unknowns), |s| s as usize),
+            spectrum: self.spectrum.map_or_else(|| default_spectrum(unknowns), |s| s as usize),
             lambda: self.lambda,
         }
     }
@@ -87,7 +87,7 @@ impl Choices {
 pub(crate) struct Geometry {
     pub(crate) rest: Model,
     pub(crate) cage: Cage,
-    /// The matrix of the regularizer of that name.
+    /// The matrix of the regularizer `matrix`.
     pub(crate) matrix: Option<SparseMatrix>,
 }
 
@@ -136,40 +136,40 @@ pub(crate) fn read_cage(name: &str, bytes: &[u8], choices: &Choices) -> Result<C
     })
 }
 
-/// Checks what is wrong of rest pose, cage and options together without computing much.
+/// Validates rest pose, cage and options together, without expensive computation.
 ///
 /// # Errors
-/// Geometry or options that do not go together.
-pub(crate) fn check(geometry: &Geometry, choices: &Choices, most_bytes: u64) -> Result<(), ApiError> {
+/// `INVALID_GEOMETRY`, `INVALID_OPTIONS`.
+pub(crate) fn check(geometry: &Geometry, choices: &Choices, max_bytes: u64) -> Result<(), ApiError> {
     let unknowns = choices.system.unknowns(&geometry.cage);
     let options = choices.solver_options(unknowns);
-    // Too many handles are wrong before they are too large. Where there are too few points, it is not the options' fault.
+    // Report a handle count beyond the points before one beyond the memory. With too few points the options are not at fault.
     if geometry.rest.points.len() >= unknowns {
         match check_options(geometry.rest.points.len(), unknowns, options) {
             Ok(()) | Err(PrepareError::HandlesOutOfMemory { .. }) => {}
             Err(error) => return Err(refused(&error)),
         }
     }
-    check_memory(geometry, choices, options, most_bytes)?;
+    check_memory(geometry, choices, options, max_bytes)?;
     Solver::check(choices.system, &geometry.cage, &geometry.rest.points, options).map_err(|error| refused(&error))?;
     let Some(matrix) = &geometry.matrix else { return Ok(()) };
     matrix.delta(&geometry.cage, unknowns).map_err(|error| refused(&error.into()))?;
     Ok(())
 }
 
-/// Prepares the solver. None where it ended because it was not `wanted` any more, which is asked before each step.
+/// Prepares the solver. `wanted` is called before each step; returns `None` once it is false.
 ///
 /// # Errors
-/// Geometry or options that do not go together.
+/// `INVALID_GEOMETRY`, `INVALID_OPTIONS`.
 pub(crate) fn prepare(
     geometry: &Geometry,
     choices: &Choices,
-    most_bytes: u64,
+    max_bytes: u64,
     wanted: &dyn Fn() -> bool,
 ) -> Result<Option<Prepared>, ApiError> {
     let unknowns = choices.system.unknowns(&geometry.cage);
     let options = choices.solver_options(unknowns);
-    check_memory(geometry, choices, options, most_bytes)?;
+    check_memory(geometry, choices, options, max_bytes)?;
     let term = geometry.matrix.as_ref().map(|matrix| matrix as &dyn Term);
     let next = |_| if wanted() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
     let preparing = Preparing { term, next: &next, ..Preparing::default() };
@@ -180,7 +180,7 @@ pub(crate) fn prepare(
     }
 }
 
-/// What a client hears of an error: which option it is about, or that it is the geometry.
+/// The response for a preparation error; it names the option at fault, or the geometry.
 fn refused(error: &PrepareError) -> ApiError {
     let option = match error {
         PrepareError::SpectrumTooLarge { .. } => "spectrum",
@@ -192,7 +192,7 @@ fn refused(error: &PrepareError) -> ApiError {
     ApiError::new(problem::INVALID_OPTIONS, format!("{option}: {error}"))
 }
 
-/// A solver with what goes with it.
+/// A prepared solver with its warnings, cage sizes and the digest of its handles.
 pub(crate) fn with_solver(solver: Solver, cage: &Cage, options: SolverOptions) -> Prepared {
     let warnings = preparation_warnings(options, &solver);
     let handles: Vec<u8> = solver.handles().iter().flat_map(|handle| handle.to_le_bytes()).collect();
@@ -210,12 +210,12 @@ fn check_memory(
     geometry: &Geometry,
     choices: &Choices,
     options: SolverOptions,
-    most_bytes: u64,
+    max_bytes: u64,
 ) -> Result<(), ApiError> {
     let points = geometry.rest.points.len();
     let unknowns = choices.system.unknowns(&geometry.cage);
     let handles = match options.handles {
-        // The covariance of the handles, its factor, and what is solved with it.
+        // Covariance of the handles, its Cholesky factor, and the solution.
         Handles::Spread { .. } => {
             let count = options.handles.count(points, unknowns) as u64;
             count.saturating_mul(16 * (count + unknowns as u64))
@@ -223,19 +223,19 @@ fn check_memory(
         _ => 0,
     };
     let columns = choices.system.columns(&geometry.cage) as u64;
-    // What an iteration takes beside them: their Gram matrix, and in single precision.
+    // The Gram matrix of the iteration, in double and in single precision.
     let iterated = if columns > unknowns as u64 { 12 * columns * columns } else { 0 };
     let elements = choices.system.working_bytes(&geometry.cage);
-    // Two matrices of all points and columns in double precision and one in single, at their peak.
+    // Peak memory: two matrices of points × columns in double precision and one in single.
     let needed =
         (20 * points as u64 * columns).saturating_add(handles).saturating_add(iterated).saturating_add(elements);
-    if needed > most_bytes {
+    if needed > max_bytes {
         let detail = format!(
-            "{points} points times {columns} values of the cage{} need {needed} bytes to be prepared, and this service allows {most_bytes}; use a coarser cage or a lighter model{}",
+            "{points} points times {columns} values of the cage{} need {needed} bytes to be prepared, and this service allows {max_bytes}; use a coarser cage or a lighter model{}",
             with_elements(elements),
             if elements > 0 { ", or mean value coordinates (mvc)" } else { "" }
         );
-        return Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(most_bytes));
+        return Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(max_bytes));
     }
     Ok(())
 }
@@ -248,27 +248,27 @@ fn with_elements(bytes: u64) -> String {
 /// Refuses another model of so many points, whose coordinates this service does not allow.
 ///
 /// # Errors
-/// More than `most_bytes` at their peak.
+/// More than `max_bytes` at their peak.
 pub(crate) fn check_model(
     points: usize,
     system: &dyn CoordinateSystem,
     cage: &Cage,
-    most_bytes: u64,
+    max_bytes: u64,
 ) -> Result<(), ApiError> {
     let (columns, elements) = (system.columns(cage), system.working_bytes(cage));
-    // One matrix in double precision, what it is solved with, and one in single precision.
+    // Peak memory: one matrix in double precision, the work space of the solve, and one matrix in single precision.
     let needed = (20 * points as u64 * columns as u64).saturating_add(elements);
-    if needed <= most_bytes {
+    if needed <= max_bytes {
         return Ok(());
     }
     let detail = format!(
-        "model: {points} points times {columns} values of the cage{} need {needed} bytes, and this service allows {most_bytes}; send a lighter model",
+        "model: {points} points times {columns} values of the cage{} need {needed} bytes, and this service allows {max_bytes}; send a lighter model",
         with_elements(elements)
     );
-    Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(most_bytes))
+    Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(max_bytes))
 }
 
-/// Reads the bytes of a mesh file, the part of this name.
+/// Parses a mesh file; `part` names it in errors.
 ///
 /// # Errors
 /// Bytes that cannot be read.
@@ -291,12 +291,12 @@ mod tests {
     fn boundary_elements_count_as_memory_before_anything_is_prepared() {
         let Capture { rest, cage, .. } = Capture::new(&Options { points: 2000, frames: 1, cage_vertices: 300 });
         let geometry = Geometry { rest, cage: Cage::new(cage).expect("a cage"), matrix: None };
-        let checked = |system: &str, most_bytes: u64| {
+        let checked = |system: &str, max_bytes: u64| {
             let options = SessionOptions { coordinates: Some(system.to_owned()), ..SessionOptions::default() };
             let choices = Choices::of(&options).expect("options");
             let columns = choices.solver_options(choices.system.unknowns(&geometry.cage));
-            let other = check_model(2000, choices.system, &geometry.cage, most_bytes);
-            (check_memory(&geometry, &choices, columns, most_bytes), other)
+            let other = check_model(2000, choices.system, &geometry.cage, max_bytes);
+            (check_memory(&geometry, &choices, columns, max_bytes), other)
         };
         let (own, other) = checked("harmonic", 512 << 20);
         for refused in [own.expect_err("too little"), other.expect_err("too little")] {

@@ -1,4 +1,4 @@
-//! Which sessions there are, whose they are, and which requests made them.
+//! All sessions by id and tenant, the idempotency keys that created them, and storage usage.
 
 use super::Session;
 use crate::idempotency::{Keyed, Requests};
@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex};
 #[derive(Default)]
 pub(crate) struct Registry {
     inner: Mutex<Inner>,
-    /// Held while a content is stored or removed, by its first byte: a removal must not meet a creation.
+    /// One lock per shard of content keys, taken while content is stored or removed: a removal must not race with a creation.
     contents: [tokio::sync::Mutex<()>; 16],
 }
 
@@ -20,7 +20,7 @@ pub(crate) struct Registry {
 struct Inner {
     sessions: BTreeMap<String, Arc<Session>>,
     requests: Requests,
-    /// Sessions that are being made, and their bytes, by tenant.
+    /// Number and bytes of sessions being created, by tenant.
     reserved: HashMap<String, (u64, u64)>,
 }
 
@@ -32,7 +32,7 @@ impl Inner {
     }
 }
 
-/// Room for a session or a cage job that is being made; free again when dropped.
+/// Quota reserved for a session or cage job that is being created; released on drop.
 pub(crate) struct Reserved {
     registry: Arc<Registry>,
     tenant: String,
@@ -40,10 +40,10 @@ pub(crate) struct Reserved {
 }
 
 impl Reserved {
-    /// Keeps room for so many bytes more, as [`Registry::reserve`].
+    /// Reserves more bytes, as [`Registry::reserve`].
     ///
     /// # Errors
-    /// What `allowed` says.
+    /// Those of `allowed`.
     pub(crate) fn extend<E>(&mut self, bytes: u64, allowed: impl FnOnce((u64, u64)) -> Result<(), E>) -> Result<(), E> {
         let mut inner = super::lock(&self.registry.inner);
         allowed(inner.usage_of(&self.tenant))?;
@@ -87,7 +87,7 @@ impl Registry {
         Some(session)
     }
 
-    /// A tenant's session; another tenant's is not there.
+    /// A tenant's session; sessions of other tenants are not found.
     ///
     /// # Errors
     /// 404 where there is none.
@@ -98,7 +98,7 @@ impl Registry {
         })
     }
 
-    /// A session, whosever it is.
+    /// A session of any tenant.
     ///
     /// # Errors
     /// 404 where there is none.
@@ -107,7 +107,7 @@ impl Registry {
         found.ok_or_else(|| ApiError::new(problem::NOT_FOUND, "there is no session with this id"))
     }
 
-    /// Up to `most` of a tenant's sessions that follow `after`, newest first; of all tenants where none is named.
+    /// At most `most` sessions that follow the id `after`, newest first; of all tenants if `tenant` is `None`.
     pub(crate) fn page(&self, tenant: Option<&str>, after: Option<&str>, most: usize) -> Vec<Arc<Session>> {
         use std::ops::Bound::{Excluded, Unbounded};
         let inner = super::lock(&self.inner);
@@ -124,15 +124,15 @@ impl Registry {
         super::lock(&self.inner).sessions.values().cloned().collect()
     }
 
-    /// Number of a tenant's sessions, and the bytes they take; those that are being made count.
+    /// Number of a tenant's sessions and their bytes, including those being created.
     pub(crate) fn usage_of(&self, tenant: &str) -> (u64, u64) {
         super::lock(&self.inner).usage_of(tenant)
     }
 
-    /// Keeps room for a session of so many bytes if `allowed` says so of what there is. Nobody else takes it meanwhile.
+    /// Atomically reserves quota for a session of `bytes` bytes if `allowed` accepts the usage so far (count, bytes).
     ///
     /// # Errors
-    /// What `allowed` says.
+    /// Those of `allowed`.
     pub(crate) fn reserve<E>(
         self: &Arc<Self>,
         tenant: &str,
@@ -146,7 +146,7 @@ impl Registry {
         Ok(Reserved { registry: Arc::clone(self), tenant: tenant.to_owned(), bytes })
     }
 
-    /// A content of the tenant's whose cage was made from this.
+    /// Key of one of the tenant's contents whose cage was made from inputs with this digest.
     pub(crate) fn made_cage(&self, tenant: &str, made: &ContentKey) -> Option<ContentKey> {
         let inner = super::lock(&self.inner);
         let mut mine = inner.sessions.values().filter(|session| session.meta.tenant == tenant);
@@ -157,7 +157,7 @@ impl Registry {
         super::lock(&self.inner).sessions.values().any(|session| session.meta.key == *key)
     }
 
-    /// Held while a content is stored or removed.
+    /// Taken while content is stored or removed.
     pub(crate) async fn content_lock(&self, key: &ContentKey) -> tokio::sync::MutexGuard<'_, ()> {
         self.contents[usize::from(key.0[0]) % self.contents.len()].lock().await
     }

@@ -1,29 +1,29 @@
-//! Going on with sessions found on disk.
+//! Resuming sessions found on disk.
 
 use super::create::OUTCOME;
 use super::facts::Outcome;
 use super::frames::Frames;
 use super::prepare::Choices;
-use super::prepared::Prepared;
+use super::solver_cache::Prepared;
 use super::{Phase, Session, Status};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{Completion, Kind, SessionMeta, Store, StoreError};
-use crate::unread;
+use crate::unreadable;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
-/// What the mark of completion says.
-pub(super) enum Mark {
+/// Whether the session was completed, from its completion mark and container.
+pub(super) enum CompletionState {
     /// The session was not completed.
     None,
-    /// It was, and its container is there.
-    Whole(Completion),
-    /// It was, and mark or container are damaged: it is written again from the log, to the same bytes, when it is completed again.
+    /// It was completed, and its container has the recorded length.
+    Intact(Completion),
+    /// It was completed, but the mark or the container is damaged. Completing it again rewrites the same bytes from the log.
     Damaged,
 }
 
-impl Mark {
+impl CompletionState {
     fn read(store: &Store, id: &str) -> Result<Self, StoreError> {
         let completion = match store.completion(id) {
             Ok(None) => return Ok(Self::None),
@@ -36,13 +36,13 @@ impl Mark {
         };
         let (there, expected) = (store.container_bytes(id)?, completion.container_bytes);
         if there != expected {
-            tracing::error!(session = %id, there, expected, "the container is not whole; complete the session again");
+            tracing::error!(session = %id, there, expected, "the container is incomplete; complete the session again");
             return Ok(Self::Damaged);
         }
-        Ok(Self::Whole(completion))
+        Ok(Self::Intact(completion))
     }
 
-    /// Where a prepared session stands, with this in its frames: one that was completed takes no new ones.
+    /// State of a prepared session with this mark; seals `frames` if it was completed.
     pub(super) fn phase(self, frames: &mut Frames) -> Phase {
         match self {
             Self::None => Phase::Ready,
@@ -50,7 +50,7 @@ impl Mark {
                 frames.seal();
                 Phase::Ready
             }
-            Self::Whole(completion) => {
+            Self::Intact(completion) => {
                 frames.seal();
                 frames.discard_from(completion.frames);
                 Phase::Completed(completion)
@@ -60,15 +60,15 @@ impl Mark {
 }
 
 impl Session {
-    /// Looks whether the container of a completed session still is what was written. One that is not is written again, to the same bytes,
-    /// when the session is completed again. Blocks.
+    /// Verifies length and digest of a completed session's container. A damaged one is written again, byte for byte the same, when the
+    /// session is completed again. Blocks.
     pub(crate) fn check_container(&self) {
         let Phase::Completed(completion) = self.status().phase else { return };
         match self.store.container_is_whole(&self.meta.id, &completion) {
             Ok(true) => {}
             Ok(false) => {
                 tracing::error!(session = %self.meta.id, "the container is damaged; complete the session again");
-                let phase = Mark::Damaged.phase(&mut self.frames());
+                let phase = CompletionState::Damaged.phase(&mut self.frames());
                 self.set_phase(phase);
             }
             Err(error) => tracing::warn!(session = %self.meta.id, %error, "the container could not be checked"),
@@ -77,11 +77,11 @@ impl Session {
 }
 
 impl Session {
-    /// Refuses a solver that reads other points than the one that the session began with, which clients may have sent the rows of: another
-    /// version of the program may choose others where it has to prepare anew. What was answered stays.
+    /// Refuses a solver whose handles differ from those that the session started with, since clients may have sent rows of the old ones;
+    /// another version of the program may choose other handles when it prepares again. Acknowledged frames stay.
     ///
     /// # Errors
-    /// What to do.
+    /// `SESSION_FAILED`.
     pub(crate) fn check_handles(&self, prepared: &Prepared) -> Result<(), ApiError> {
         let Some(facts) = self.facts() else { return Ok(()) };
         let same = match facts.handles_digest.as_str() {
@@ -91,43 +91,43 @@ impl Session {
         if same {
             return Ok(());
         }
-        let detail = "the service was upgraded while this session was open, and reads other points of the model now; its frames can be downloaded, and the rest has to be uploaded to a new session";
+        let detail = "the service was upgraded while this session was open, and its solver now uses other handles; download the solved frames, and upload the remaining ones to a new session";
         Err(ApiError::new(problem::SESSION_FAILED, detail))
     }
 }
 
 impl Service {
-    /// Goes on with a session found on disk. One whose files cannot be read is known as failed, so that it can be deleted, and comes up
-    /// when this is called again.
+    /// Resumes a session found on disk. If its files cannot be read, it is registered as failed so that it can be deleted, and resumed when
+    /// this is called again.
     ///
     /// # Errors
-    /// What the system says of its files.
+    /// I/O errors.
     pub(crate) fn resume(self: &Arc<Self>, meta: SessionMeta) -> Result<(), StoreError> {
         let outcome = match self.store.note(&meta.id, OUTCOME) {
             Err(error @ StoreError::Damaged { .. }) => {
-                tracing::warn!(session = %meta.id, %error, "what preparing found is damaged, so it is done again");
+                tracing::warn!(session = %meta.id, %error, "the outcome of the preparation is damaged; the session is prepared again");
                 Ok(None)
             }
             outcome => outcome,
         };
-        match outcome.and_then(|outcome| Ok((outcome, Mark::read(&self.store, &meta.id)?))) {
+        match outcome.and_then(|outcome| Ok((outcome, CompletionState::read(&self.store, &meta.id)?))) {
             Ok((outcome, mark)) => {
                 self.resume_with(meta, outcome, mark);
                 Ok(())
             }
             Err(error) => {
-                let problem = unread::problem(Kind::Session).problem;
+                let problem = unreadable::problem(Kind::Session).problem;
                 self.registry.insert(self.found(meta, Status { phase: Phase::Failed(problem), facts: None }));
                 Err(error)
             }
         }
     }
 
-    fn resume_with(self: &Arc<Self>, meta: SessionMeta, outcome: Option<Outcome>, mark: Mark) {
+    fn resume_with(self: &Arc<Self>, meta: SessionMeta, outcome: Option<Outcome>, mark: CompletionState) {
         let failed = |problem| Status { phase: Phase::Failed(problem), facts: None };
         let status = match outcome {
             Some(Outcome::Ready(facts)) => Status { phase: Phase::Ready, facts: Some(*facts) },
-            // Earlier versions kept that the rest pose was missing; it may be there again.
+            // Earlier versions stored missing content as a failure; the content may have been restored.
             Some(Outcome::Failed(problem)) if problem.word() != problem::SESSION_DELETED.word => failed(problem),
             Some(Outcome::Failed(_)) | None => match Choices::of(&meta.options) {
                 Ok(choices) => {
@@ -147,7 +147,7 @@ impl Service {
             session.set_phase(phase);
         }
         self.registry.insert(Arc::clone(&session));
-        self.webhooks.tell_left(&session);
+        self.webhooks.resend_undelivered(&session);
     }
 
     fn found(&self, meta: SessionMeta, status: Status) -> Arc<Session> {

@@ -1,4 +1,4 @@
-//! How much a tenant may keep and for how long.
+//! Storage quotas of tenants and deletion of expired sessions and cage jobs.
 
 use super::create::blocking;
 use super::registry::Reserved;
@@ -10,10 +10,10 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use tokio_util::sync::CancellationToken;
 
-const SWEEP_EVERY: Duration = Duration::from_secs(20);
+const SWEEP_INTERVAL: Duration = Duration::from_secs(20);
 
 impl Service {
-    /// Sessions, and bytes of these and of cage jobs, of every tenant that has any.
+    /// For every tenant that stores anything: number of sessions, and bytes of sessions and cage jobs.
     pub(crate) fn usage(&self) -> Vec<(String, usize, u64)> {
         let mut usage = std::collections::BTreeMap::<String, (usize, u64)>::new();
         for session in self.registry.all() {
@@ -27,7 +27,7 @@ impl Service {
         usage.into_iter().map(|(tenant, (sessions, bytes))| (tenant, sessions, bytes)).collect()
     }
 
-    /// Room for one more session or cage job of so many bytes.
+    /// Reserves quota for one more session or cage job of `bytes` bytes.
     ///
     /// # Errors
     /// A quota that is used up.
@@ -44,7 +44,7 @@ impl Service {
         })
     }
 
-    /// Room for so many bytes more of something that is being made.
+    /// Reserves quota for `bytes` more bytes of something that is being created.
     ///
     /// # Errors
     /// As [`Self::reserve`].
@@ -57,7 +57,7 @@ impl Service {
         (count + jobs, used + theirs)
     }
 
-    /// Whether a tenant may store so many bytes more.
+    /// Checks whether a tenant may store `bytes` more bytes.
     ///
     /// # Errors
     /// A quota that is used up.
@@ -78,12 +78,12 @@ impl Service {
         Err(ApiError::new(problem::QUOTA_EXCEEDED, detail).limit(tenant.limits.max_bytes))
     }
 
-    /// Deletes what is too old and closes what nobody uses, until the service stops.
+    /// Periodically deletes what has expired, retries what could not be read, and closes idle files, until `stop`.
     pub(crate) async fn sweep(self: Arc<Self>, stop: CancellationToken) {
         loop {
             tokio::select! {
                 () = stop.cancelled() => return,
-                () = tokio::time::sleep(SWEEP_EVERY) => {}
+                () = tokio::time::sleep(SWEEP_INTERVAL) => {}
             }
             self.sweep_once().await;
         }
@@ -91,8 +91,8 @@ impl Service {
 
     /// One round of [`Self::sweep`].
     pub(crate) async fn sweep_once(self: &Arc<Self>) {
-        self.read_all_again().await;
-        if self.unread.may_forget() {
+        self.retry_all_unreadable().await;
+        if self.unread.should_sweep_orphans() {
             self.forget_orphans().await;
         }
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_millis() as u64;
@@ -116,9 +116,9 @@ impl Service {
                     tracing::warn!(session = %session.meta.id, detail = %error.problem.detail, "could not be deleted");
                 }
             } else {
-                let mending = Arc::clone(&session);
-                let _ = blocking(move || mending.mend()).await;
-                session.rest_if_idle();
+                let retried = Arc::clone(&session);
+                let _ = blocking(move || retried.retry_failed_writes()).await;
+                session.close_files_if_idle();
             }
         }
     }

@@ -1,9 +1,9 @@
-//! Solving what uploads post: batches of frames in, cages and errors out, handed on to be written.
+//! Solving posted frames in batches; the cages and errors are queued for writing.
 
 use super::Session;
-use super::commit::Solved;
+use super::commit::SolvedFrame;
 use super::frames::{Claim, Digests};
-use super::prepared::Prepared;
+use super::solver_cache::Prepared;
 use super::upload::{FrameJob, Rows};
 use crate::capture::StoredError;
 use crate::problem::{self, ApiError};
@@ -11,15 +11,15 @@ use std::cell::RefCell;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Numbers that a thread keeps room for: frames of models beyond that are rare.
-const KEPT_NUMBERS: usize = 4 << 20;
+/// Values that a thread's frame buffers may keep allocated between batches.
+const MAX_RETAINED_VALUES: usize = 4 << 20;
 
 thread_local! {
-    /// Frames as numbers: big, so kept. Taken out while in use, as a thread may start a batch while it waits within another.
-    static NUMBERS: RefCell<Vec<Vec<f32>>> = const { RefCell::new(Vec::new()) };
+    /// Buffers for frames as f32, reused between batches. Taken while in use, since rayon may start another batch on a waiting thread.
+    static FRAME_BUFFERS: RefCell<Vec<Vec<f32>>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Solves a batch and hands it on to be written.
+/// Solves a batch and queues the results for writing.
 pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<FrameJob>) {
     if let Some(oldest) = jobs.iter().map(|job| job.arrived).min() {
         metrics::histogram!("cager_queue_seconds").record(oldest.elapsed().as_secs_f64());
@@ -42,7 +42,7 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
         let digests = digests(prepared, &job);
         let claim = {
             let mut frames = session.frames();
-            // At once, so that no frame counts twice.
+            // Under the same lock as the claim, so that no frame is counted twice.
             job.leave_queue();
             frames.claim(job.frame, digests, &job.upload)
         };
@@ -50,10 +50,10 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
             Claim::Solve if job.rows == Rows::All => whole.push((job, digests)),
             Claim::Solve => handles.push((job, digests)),
             Claim::Measure => measured.push((job, digests)),
-            Claim::Waiting => job.settle(),
+            Claim::Waiting => job.disarm(),
             Claim::Known => {
                 let (upload, frame) = (Arc::clone(&job.upload), job.frame);
-                job.settle();
+                job.disarm();
                 upload.answer(frame);
             }
             Claim::Sealed => {
@@ -68,9 +68,9 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
             }
         }
     }
-    // A panic must not leave these frames claimed for ever.
+    // If this panics, the claims are released.
     let claimed = |(job, digests): (FrameJob, Digests)| {
-        let guard = GiveUp { session, frames: vec![job.frame] };
+        let guard = ClaimGuard { session, frames: vec![job.frame] };
         (job, digests, guard)
     };
     let measured: Vec<_> = measured.into_iter().map(claimed).collect();
@@ -79,20 +79,20 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
         return measure(session, prepared, measured);
     }
     let batches = [(Rows::All, whole), (Rows::Handles, handles)].map(|(rows, jobs)| {
-        let guard = GiveUp { session, frames: jobs.iter().map(|(job, _)| job.frame).collect() };
+        let guard = ClaimGuard { session, frames: jobs.iter().map(|(job, _)| job.frame).collect() };
         (rows, jobs, guard)
     });
     for (rows, jobs, guard) in batches {
         if !jobs.is_empty() {
-            solve_alike(session, prepared, rows, jobs, None, guard);
+            solve_batch(session, prepared, rows, jobs, None, guard);
         }
     }
     measure(session, prepared, measured);
     metrics::histogram!("cager_solve_seconds").record(clock.elapsed().as_secs_f64());
 }
 
-/// Solves frames of which each depends on the one before: runs of consecutive frames, each after its predecessor's cage. Of a
-/// session's batches only one runs at a time.
+/// Solves frames that each depend on their predecessor: runs of consecutive frames, each run starting from its predecessor's cage. Only one
+/// batch of a session runs at a time.
 fn solve_in_order(
     session: &Arc<Session>,
     prepared: &Prepared,
@@ -101,7 +101,7 @@ fn solve_in_order(
 ) {
     let mut jobs: Vec<(FrameJob, Digests)> = whole.into_iter().chain(handles).collect();
     jobs.sort_by_key(|(job, _)| job.frame);
-    let mut guard = GiveUp { session, frames: jobs.iter().map(|(job, _)| job.frame).collect() };
+    let mut guard = ClaimGuard { session, frames: jobs.iter().map(|(job, _)| job.frame).collect() };
     let mut jobs = jobs.into_iter().peekable();
     while let Some(first) = jobs.next() {
         let (frame, rows) = (first.0.frame, first.0.rows);
@@ -110,16 +110,16 @@ fn solve_in_order(
             run.push(next);
         }
         guard.frames.drain(..run.len());
-        let own = GiveUp { session, frames: run.iter().map(|(job, _)| job.frame).collect() };
+        let own = ClaimGuard { session, frames: run.iter().map(|(job, _)| job.frame).collect() };
         match predecessor(session, frame) {
-            Ok(previous) => solve_alike(session, prepared, rows, run, previous.as_deref(), own),
+            Ok(previous) => solve_batch(session, prepared, rows, run, previous.as_deref(), own),
             Err(error) => fail_all(session, run, own, &error),
         }
     }
 }
 
-/// Measures whole frames whose cages are there from their handle rows. The cages stay as they are.
-fn measure(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<(FrameJob, Digests, GiveUp<'_>)>) {
+/// Measures frames whose cages were solved from handle rows, now that all rows are known. The cages do not change.
+fn measure(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<(FrameJob, Digests, ClaimGuard<'_>)>) {
     for (job, digests, guard) in jobs {
         let mut bytes = Vec::new();
         let entry = session.frames().entry(job.frame).copied();
@@ -137,17 +137,17 @@ fn measure(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<(FrameJob, Dig
     }
 }
 
-fn fail_all(session: &Session, run: Vec<(FrameJob, Digests)>, mut guard: GiveUp<'_>, error: &ApiError) {
+fn fail_all(session: &Session, run: Vec<(FrameJob, Digests)>, mut guard: ClaimGuard<'_>, error: &ApiError) {
     guard.frames.clear();
     for (job, _) in run {
-        for upload in session.frames().gave_up(job.frame) {
+        for upload in session.frames().release_claim(job.frame) {
             upload.fail(error.clone());
         }
-        job.settle();
+        job.disarm();
     }
 }
 
-/// The cage of the frame before, where there is one.
+/// The cage of the previous frame; `None` for frame 0.
 fn predecessor(session: &Session, frame: u32) -> Result<Option<Vec<f32>>, ApiError> {
     let Some(before) = frame.checked_sub(1) else { return Ok(None) };
     if let Some((last, cage)) = &*super::lock(&session.last_solved)
@@ -161,7 +161,7 @@ fn predecessor(session: &Session, frame: u32) -> Result<Option<Vec<f32>>, ApiErr
     Ok(Some(bytes.as_chunks().0.iter().map(|&b| f32::from_le_bytes(b)).collect()))
 }
 
-/// What a client hears whose frame comes before the one that it depends on.
+/// The error for a frame whose predecessor is not solved.
 pub(crate) fn predecessor_missing(frame: u32) -> ApiError {
     let before = frame.saturating_sub(1);
     let detail = format!(
@@ -170,7 +170,7 @@ pub(crate) fn predecessor_missing(frame: u32) -> ApiError {
     ApiError::new(problem::FRAMES_MISSING, detail).frame(frame).missing(vec![[before, frame]])
 }
 
-/// What a client hears whose frame is there already with other content.
+/// The error for a frame that was posted before with other content.
 pub(crate) fn conflict(frame: u32) -> ApiError {
     let detail = format!(
         "frame {frame} was posted before with other content; what was posted first stays, so delete the session to start over"
@@ -178,15 +178,15 @@ pub(crate) fn conflict(frame: u32) -> ApiError {
     ApiError::new(problem::FRAME_CONFLICT, detail).frame(frame)
 }
 
-fn solve_alike(
+fn solve_batch(
     session: &Arc<Session>,
     prepared: &Prepared,
     rows: Rows,
     jobs: Vec<(FrameJob, Digests)>,
     previous: Option<&[f32]>,
-    guard: GiveUp<'_>,
+    guard: ClaimGuard<'_>,
 ) {
-    let mut numbers = NUMBERS.take();
+    let mut numbers = FRAME_BUFFERS.take();
     numbers.resize_with(numbers.len().max(jobs.len()), Vec::new);
     for ((job, _), numbers) in jobs.iter().zip(&mut numbers) {
         numbers.clear();
@@ -203,8 +203,8 @@ fn solve_alike(
         }
         Rows::Handles => (solver.invert_handles_after(previous, &views), vec![StoredError::NOT_MEASURED; jobs.len()]),
     };
-    if numbers.iter().map(Vec::capacity).sum::<usize>() <= KEPT_NUMBERS {
-        NUMBERS.set(numbers);
+    if numbers.iter().map(Vec::capacity).sum::<usize>() <= MAX_RETAINED_VALUES {
+        FRAME_BUFFERS.set(numbers);
     }
     if solver.follows_previous() {
         let last = jobs.last().zip(cages.last()).map(|((job, _), cage)| (job.frame, cage.clone()));
@@ -213,13 +213,13 @@ fn solve_alike(
     finish(session, jobs, cages, errors, guard);
 }
 
-/// Hands what was solved on to be written.
+/// Queues solved frames for writing; fails those that overflow single precision.
 fn finish(
     session: &Arc<Session>,
     jobs: Vec<(FrameJob, Digests)>,
     cages: Vec<Vec<f32>>,
     errors: Vec<StoredError>,
-    mut guard: GiveUp<'_>,
+    mut guard: ClaimGuard<'_>,
 ) {
     guard.frames.clear();
     let mut solved = Vec::with_capacity(jobs.len());
@@ -229,29 +229,29 @@ fn finish(
         if !fits {
             let detail =
                 format!("frame {frame}: its numbers are too large for single precision; scale the capture down");
-            for upload in session.frames().gave_up(frame) {
+            for upload in session.frames().release_claim(frame) {
                 upload.fail(ApiError::new(problem::INVALID_FRAME, detail.clone()).frame(frame));
             }
         } else {
             let permit = job.permits.take().map(|permits| permits.writing);
-            solved.push(Solved { frame, digests, error, cage, _permit: permit });
+            solved.push(SolvedFrame { frame, digests, error, cage, _permit: permit });
         }
-        job.settle();
+        job.disarm();
     }
     session.commit(solved);
 }
 
-/// Frees claimed frames when a batch does not come to its end.
-struct GiveUp<'a> {
+/// Releases the claims of frames that are not finished when it is dropped.
+struct ClaimGuard<'a> {
     session: &'a Session,
     frames: Vec<u32>,
 }
 
-impl Drop for GiveUp<'_> {
+impl Drop for ClaimGuard<'_> {
     fn drop(&mut self) {
         for &frame in &self.frames {
-            // The jobs tell their own uploads; those that waited with them hear it here.
-            for upload in self.session.frames().gave_up(frame).into_iter().skip(1) {
+            // Dropping a job notifies its own upload, the first in the list; the others are notified here.
+            for upload in self.session.frames().release_claim(frame).into_iter().skip(1) {
                 upload.fail(ApiError::internal(&"a batch of frames panicked"));
             }
         }
@@ -259,7 +259,7 @@ impl Drop for GiveUp<'_> {
 }
 
 fn first_not_finite(bytes: &[u8]) -> Option<usize> {
-    // The exponent of NaN and infinity is all ones; without a branch this runs at the speed of memory.
+    // NaN and infinity have an exponent of all ones; a branch-free fold finds them at memory bandwidth.
     let suspicious = |b: &[u8]| u8::from(b[3] & 0x7f == 0x7f && b[2] & 0x80 == 0x80);
     if bytes.chunks_exact(4).fold(0, |any, b| any | suspicious(b)) == 0 {
         return None;

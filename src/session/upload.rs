@@ -1,4 +1,4 @@
-//! One request that posts frames: what it submitted, and what it heard back.
+//! State of one frame upload: what it has submitted and which answers are pending.
 
 use super::Session;
 use crate::admission::Held;
@@ -10,16 +10,15 @@ use std::time::Instant;
 use tokio::sync::{Notify, OwnedSemaphorePermit};
 use tokio_util::sync::CancellationToken;
 
-/// What an upload has submitted and heard back. Answers that nobody has read yet are frame numbers; what they say waits in
-/// the log.
+/// State of one frame upload. Pending answers are frame numbers only; their contents are read from the log.
 #[derive(Default)]
 pub(crate) struct Upload {
     state: Mutex<State>,
     changed: Notify,
     /// The client is gone.
     gone: CancellationToken,
-    /// Something failed, or the client is gone.
-    pointless: CancellationToken,
+    /// A frame failed, or the client is gone.
+    aborted: CancellationToken,
 }
 
 #[derive(Default)]
@@ -31,14 +30,14 @@ struct State {
     error: Option<ApiError>,
 }
 
-/// What comes next in the answer to an upload.
+/// The next part of an upload's response.
 #[derive(Debug)]
-pub(crate) enum Step {
+pub(crate) enum UploadEvent {
     /// These frames are on disk.
     Frames(Vec<u32>),
-    /// Nothing more; why.
+    /// The upload failed; nothing follows.
     Failed(ApiError),
-    /// Nothing more; all is done.
+    /// All frames are answered; nothing follows.
     Done,
 }
 
@@ -57,16 +56,16 @@ impl Upload {
         });
     }
 
-    /// A submitted frame came to nothing. The first reason counts.
+    /// A submitted frame failed. The first error is reported.
     pub(crate) fn fail(&self, error: ApiError) {
         self.with(|s| {
             s.finished += 1;
             s.error.get_or_insert(error);
         });
-        self.pointless.cancel();
+        self.aborted.cancel();
     }
 
-    /// No more frames will be submitted, because the body ended or for this reason.
+    /// No more frames will be submitted: the body ended, or failed with this error.
     pub(crate) fn close(&self, error: Option<ApiError>) {
         self.with(|s| {
             s.closed = true;
@@ -76,20 +75,20 @@ impl Upload {
         });
     }
 
-    /// Whether something failed or the client went away, so that reading more makes no sense.
-    pub(crate) fn is_pointless(&self) -> bool {
-        self.pointless.is_cancelled()
+    /// Whether a frame failed or the client is gone, so that the rest of the body need not be read.
+    pub(crate) fn is_aborted(&self) -> bool {
+        self.aborted.is_cancelled()
     }
 
-    /// As [`Self::is_pointless`], as soon as it is so.
-    pub(crate) async fn pointless(&self) {
-        self.pointless.cancelled().await;
+    /// Waits until [`Self::is_aborted`].
+    pub(crate) async fn aborted(&self) {
+        self.aborted.cancelled().await;
     }
 
-    /// The client went away: what waits is not worth solving.
+    /// The client is gone: queued frames need not be solved.
     pub(crate) fn abandon(&self) {
         self.gone.cancel();
-        self.pointless.cancel();
+        self.aborted.cancel();
     }
 
     pub(crate) fn is_abandoned(&self) -> bool {
@@ -104,16 +103,16 @@ impl Upload {
     }
 
     /// The next answers, at most `most`. For one caller at a time.
-    pub(crate) async fn next(&self, most: usize) -> Step {
+    pub(crate) async fn next(&self, most: usize) -> UploadEvent {
         loop {
             {
                 let mut state = super::lock(&self.state);
                 if !state.answers.is_empty() {
                     let count = most.min(state.answers.len());
-                    return Step::Frames(state.answers.drain(..count).collect());
+                    return UploadEvent::Frames(state.answers.drain(..count).collect());
                 }
                 if state.closed && state.finished == state.submitted {
-                    return state.error.take().map_or(Step::Done, Step::Failed);
+                    return state.error.take().map_or(UploadEvent::Done, UploadEvent::Failed);
                 }
             }
             self.changed.notified().await;
@@ -130,25 +129,25 @@ pub(crate) enum Rows {
     Handles,
 }
 
-/// A frame on its way to a batch.
+/// A frame queued for solving.
 pub(crate) struct FrameJob {
     pub(super) upload: Arc<Upload>,
     pub(super) frame: u32,
     pub(super) rows: Rows,
     /// Little-endian f32, three for each row.
     pub(super) bytes: Vec<u8>,
-    /// Where it counts as long as nobody has claimed its frame.
+    /// Counter of queued frames that includes it until it is claimed.
     queued: Option<Arc<AtomicU64>>,
     pub(super) arrived: Instant,
-    settled: bool,
+    disarmed: bool,
     pub(super) permits: Option<Permits>,
 }
 
-/// What a frame takes of what there is for all.
+/// Limits that a frame counts against.
 pub(crate) struct Permits {
-    /// A place and memory, until it is solved.
+    /// A slot in the upload's window and memory, until it is solved.
     pub(crate) _solving: (OwnedSemaphorePermit, Held),
-    /// A place until it is on disk.
+    /// A slot in the upload's window of unwritten frames, until it is on disk.
     pub(crate) writing: OwnedSemaphorePermit,
 }
 
@@ -170,19 +169,19 @@ impl FrameJob {
             bytes,
             queued: Some(Arc::clone(&session.queued)),
             arrived: Instant::now(),
-            settled: false,
+            disarmed: false,
             permits: Some(permits),
         }
     }
 
-    /// Its upload will hear of it another way.
-    pub(super) fn settle(mut self) {
-        self.settled = true;
+    /// Prevents the error on drop: its upload is notified in another way.
+    pub(super) fn disarm(mut self) {
+        self.disarmed = true;
     }
 
     pub(super) fn fail(self, error: ApiError) {
         let upload = Arc::clone(&self.upload);
-        self.settle();
+        self.disarm();
         upload.fail(error);
     }
 }
@@ -198,7 +197,7 @@ impl FrameJob {
 impl Drop for FrameJob {
     fn drop(&mut self) {
         self.leave_queue();
-        if !self.settled {
+        if !self.disarmed {
             self.upload.fail(ApiError::new(
                 problem::SESSION_DELETED,
                 format!("frame {} was not solved, because its session ended", self.frame),
@@ -216,11 +215,11 @@ mod tests {
         let upload = Upload::default();
         upload.with(|s| s.submitted = 2);
         upload.answer(7);
-        assert!(matches!(upload.next(8).await, Step::Frames(frames) if frames == [7]));
+        assert!(matches!(upload.next(8).await, UploadEvent::Frames(frames) if frames == [7]));
         upload.close(None);
         upload.answer(9);
-        assert!(matches!(upload.next(8).await, Step::Frames(frames) if frames == [9]));
-        assert!(matches!(upload.next(8).await, Step::Done));
+        assert!(matches!(upload.next(8).await, UploadEvent::Frames(frames) if frames == [9]));
+        assert!(matches!(upload.next(8).await, UploadEvent::Done));
     }
 
     #[tokio::test]
@@ -230,7 +229,7 @@ mod tests {
         upload.fail(ApiError::new(problem::INVALID_FRAME, "first"));
         upload.answer(1);
         upload.close(Some(ApiError::new(problem::BAD_REQUEST, "second")));
-        assert!(matches!(upload.next(8).await, Step::Frames(_)));
-        assert!(matches!(upload.next(8).await, Step::Failed(e) if e.problem.detail == "first"));
+        assert!(matches!(upload.next(8).await, UploadEvent::Frames(_)));
+        assert!(matches!(upload.next(8).await, UploadEvent::Failed(e) if e.problem.detail == "first"));
     }
 }

@@ -1,8 +1,8 @@
-//! Cage jobs: what a cage is to be designed from, and the cage that came of it.
+//! Cage jobs: the input of a cage design, and the designed cage.
 
 use super::files::Files;
-use super::found::{Kind, Stored};
 use super::names::check_id;
+use super::scan::{FolderMeta, Kind};
 use super::{ContentKey, Idempotency, Spool, Store, StoreError, StoredFile, is_session_id, meta};
 use cager_proto::cage_messages::CageOptions;
 use serde::de::DeserializeOwned;
@@ -10,18 +10,18 @@ use serde::{Deserialize, Serialize};
 use std::io;
 use std::path::PathBuf;
 
-/// What is known of a cage job from its creation on.
+/// Metadata of a cage job, fixed at its creation.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct CageJobMeta {
     /// Its id; also the name of its folder.
     pub id: String,
-    /// Whose it is.
+    /// Tenant that owns it.
     pub tenant: String,
     /// Creation time, milliseconds since 1970.
     pub created_ms: u64,
-    /// Digest of tenant, rest pose, frames and options: the same gives the same cage.
+    /// Digest of tenant, rest pose, frames and options; jobs with equal keys have the same cage.
     pub key: ContentKey,
-    /// Choices, as they were given.
+    /// Options as requested.
     pub options: CageOptions,
     /// Points of the rest pose.
     pub points: u32,
@@ -31,14 +31,14 @@ pub struct CageJobMeta {
     pub rest: StoredPart,
     /// The frames.
     pub frames: StoredPart,
-    /// The request that made it, so that a repetition finds it.
+    /// Idempotency key and fingerprint of the request that created it.
     pub idempotency: Option<Idempotency>,
 }
 
 /// A file as it was uploaded.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub struct StoredPart {
-    /// File name, for its ending.
+    /// File name; its extension tells the format.
     pub name: String,
     /// Its length.
     pub bytes: u64,
@@ -46,7 +46,7 @@ pub struct StoredPart {
     pub blake3: String,
 }
 
-impl Stored for CageJobMeta {
+impl FolderMeta for CageJobMeta {
     const KIND: Kind = Kind::CageJob;
     const FILE: &str = META;
 
@@ -65,11 +65,11 @@ const ATTEMPTS: &str = "attempts.json";
 const REST: &str = "rest";
 const FRAMES: &str = "frames";
 const CAGE: &str = "cage.obj";
-/// No cage is larger, in bytes.
+/// Upper bound of a cage's size, in bytes.
 const CAGE_BYTES: u64 = 64 << 20;
 
 impl Store {
-    /// Makes a job with its input: whole or not at all, durable on Ok.
+    /// Creates a job with its input, atomically; durable on `Ok`.
     ///
     /// # Errors
     /// [`StoreError::BadId`], [`StoreError::Full`].
@@ -78,14 +78,14 @@ impl Store {
         let files = self.files();
         let place = files.cage_job(&meta.id);
         let bytes = meta::wrap(&place.join(META), "cage job", meta)?;
-        files.publish_folder(&place, |aside| {
-            files.write_new(&aside.join(META), &bytes)?;
-            files.write_new(&aside.join(REST), rest)?;
-            frames.move_to(&aside.join(FRAMES))
+        files.publish_folder(&place, |staging| {
+            files.write_new(&staging.join(META), &bytes)?;
+            files.write_new(&staging.join(REST), rest)?;
+            frames.move_to(&staging.join(FRAMES))
         })
     }
 
-    /// Makes a job whose outcome is known: whole or not at all, durable on Ok. It has no input.
+    /// Creates a finished job without input, atomically; durable on `Ok`.
     ///
     /// # Errors
     /// As [`Self::create_cage_job`].
@@ -100,25 +100,25 @@ impl Store {
         let place = files.cage_job(&meta.id);
         let bytes = meta::wrap(&place.join(META), "cage job", meta)?;
         let outcome = meta::wrap(&place.join(OUTCOME), "cage outcome", outcome)?;
-        files.publish_folder(&place, |aside| {
-            files.write_new(&aside.join(META), &bytes)?;
-            files.write_new(&aside.join(CAGE), cage)?;
-            files.write_new(&aside.join(OUTCOME), &outcome)
+        files.publish_folder(&place, |staging| {
+            files.write_new(&staging.join(META), &bytes)?;
+            files.write_new(&staging.join(CAGE), cage)?;
+            files.write_new(&staging.join(OUTCOME), &outcome)
         })
     }
 
     /// The rest pose of a job that is not finished.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`], or what the system says.
+    /// [`StoreError::Damaged`], or another I/O error.
     pub fn cage_job_rest(&self, meta: &CageJobMeta) -> Result<Vec<u8>, StoreError> {
         self.cage_job_part(&meta.id, REST, meta.rest.bytes, &meta.rest.blake3)
     }
 
-    /// The frames of a job that is not finished. Their digest is not compared: a few of them are read, and each is looked at.
+    /// The frames of a job that is not finished. Their digest is not verified, since only a sample is read; each frame read is validated.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`] where the length differs, or what the system says.
+    /// [`StoreError::Damaged`] where the length differs, or another I/O error.
     pub fn cage_job_frames(&self, meta: &CageJobMeta) -> Result<StoredFile, StoreError> {
         check_id(&meta.id)?;
         let path = self.files().cage_job(&meta.id).join(FRAMES);
@@ -136,32 +136,31 @@ impl Store {
         Ok(file)
     }
 
-    /// Counts one more beginning of the design, durably; gives how many there were. What brings the process down must not do so at every
-    /// start.
+    /// Durably increments the number of attempts and returns it, so that a design that crashes the process is not retried at every start.
     ///
     /// # Errors
-    /// [`StoreError::Full`], or what the system says.
-    pub fn begin_cage_job(&self, id: &str) -> Result<u32, StoreError> {
+    /// [`StoreError::Full`], or another I/O error.
+    pub fn count_cage_job_attempt(&self, id: &str) -> Result<u32, StoreError> {
         check_id(id)?;
         let path = self.files().cage_job(id).join(ATTEMPTS);
-        // One that cannot be read counts from the beginning.
+        // An unreadable counter restarts at 0.
         let before: u32 = meta::read(self.files(), &path, "attempts").ok().flatten().unwrap_or(0);
         self.files().replace(&path, &meta::wrap(&path, "attempts", &(before + 1))?)?;
         Ok(before + 1)
     }
 
-    /// Takes back the last beginning of a design that was stopped in good order.
+    /// Decrements the number of attempts after an orderly stop.
     ///
     /// # Errors
-    /// [`StoreError::Full`], or what the system says; not found where the job was deleted.
-    pub fn forget_beginning(&self, id: &str) -> Result<(), StoreError> {
+    /// [`StoreError::Full`], or another I/O error; not found where the job was deleted.
+    pub fn uncount_cage_job_attempt(&self, id: &str) -> Result<(), StoreError> {
         check_id(id)?;
         let path = self.files().cage_job(id).join(ATTEMPTS);
         let before: u32 = meta::read(self.files(), &path, "attempts").ok().flatten().unwrap_or(0);
         self.files().replace(&path, &meta::wrap(&path, "attempts", &before.saturating_sub(1))?)
     }
 
-    /// Keeps the outcome of a job, and its cage where it has one, and forgets its input: durable on Ok.
+    /// Stores the outcome of a job and its cage, if any, and removes its input; durable on `Ok`.
     ///
     /// # Errors
     /// [`StoreError::BadId`], [`StoreError::Full`]; not found where the job was deleted.
@@ -178,7 +177,7 @@ impl Store {
         Ok(())
     }
 
-    /// The outcome of a job; None where it is not finished.
+    /// The outcome of a job; `None` if it is not finished.
     ///
     /// # Errors
     /// [`StoreError::Damaged`], [`StoreError::BadId`].
@@ -190,12 +189,12 @@ impl Store {
     /// The cage of a completed job, an OBJ file of this length and digest.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`], or what the system says.
+    /// [`StoreError::Damaged`], or another I/O error.
     pub fn cage_job_cage(&self, id: &str, bytes: u64, digest: &str) -> Result<Vec<u8>, StoreError> {
         self.cage_job_part(id, CAGE, bytes.min(CAGE_BYTES), digest)
     }
 
-    /// Removes the input of a finished job, best effort: what stays is removed at the next start.
+    /// Removes the input of a finished job, best effort: files that remain are removed at the next start.
     pub fn forget_cage_job_input(&self, id: &str) {
         for name in [REST, FRAMES, ATTEMPTS] {
             let path = self.files().cage_job(id).join(name);
@@ -208,22 +207,22 @@ impl Store {
         }
     }
 
-    /// Deletes a job; fine where there is none. On Ok it does not come back.
+    /// Deletes a job, if it exists. On `Ok` the deletion is durable.
     ///
     /// # Errors
-    /// [`StoreError::BadId`], or what the system says.
+    /// [`StoreError::BadId`], or another I/O error.
     pub fn delete_cage_job(&self, id: &str) -> Result<(), StoreError> {
         check_id(id)?;
-        self.files().throw_away(&self.files().cage_job(id))
+        self.files().delete_durably(&self.files().cage_job(id))
     }
 
     /// Moves a damaged job to `quarantine/`, with a note of what is wrong.
     ///
     /// # Errors
-    /// [`StoreError::BadId`], or what the system says.
+    /// [`StoreError::BadId`], or another I/O error.
     pub fn quarantine_cage_job(&self, id: &str, why: &str) -> Result<(), StoreError> {
         check_id(id)?;
-        self.files().set_aside(&self.files().cage_job(id), why).map(|_| ())
+        self.files().move_to_quarantine(&self.files().cage_job(id), why).map(|_| ())
     }
 
     /// Bytes of a job's files; 0 where there is none.

@@ -1,4 +1,4 @@
-//! Uploaded rest poses and cages, by their digest: kept for containers, and for preparing anew.
+//! Uploaded rest poses and cages by content key, stored once per tenant: needed to write containers and to prepare again.
 
 use super::{ContentKey, Store, StoreError, meta};
 use serde::{Deserialize, Serialize};
@@ -7,7 +7,7 @@ use std::path::Path;
 /// A rest pose and a cage as they were uploaded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Content {
-    /// File name of the rest pose, for its ending.
+    /// File name of the rest pose; its extension tells the format.
     pub rest_name: String,
     /// The file.
     pub rest: Vec<u8>,
@@ -15,14 +15,14 @@ pub struct Content {
     pub cage_name: String,
     /// The file.
     pub cage: Vec<u8>,
-    /// The matrix of the regularizer of that name.
+    /// The matrix of the regularizer `matrix`.
     pub matrix: Option<MatrixFile>,
 }
 
 /// A cage as it was uploaded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CageFile {
-    /// File name, for its ending.
+    /// File name; its extension tells the format.
     pub name: String,
     /// The file.
     pub bytes: Vec<u8>,
@@ -76,11 +76,10 @@ impl Part {
 const DESCRIPTION: &str = "content.json";
 
 impl Store {
-    /// Keeps content, durably on Ok. Create-only: where the key is there already nothing changes, unless it is damaged: then it
-    /// is replaced.
+    /// Stores content; durable on `Ok`. Content that exists under the key is kept, unless it is damaged.
     ///
     /// # Errors
-    /// [`StoreError::Full`], or what the system says.
+    /// [`StoreError::Full`], or another I/O error.
     pub fn put_content(&self, key: &ContentKey, content: &Content) -> Result<(), StoreError> {
         let files = self.files();
         let place = files.contents().join(key.to_string());
@@ -93,37 +92,37 @@ impl Store {
             return Ok(());
         }
         let bytes = meta::wrap(&place.join(DESCRIPTION), "content", &description)?;
-        let aside = files.temporary("content");
+        let staging = files.temporary("content");
         let make = || {
-            files.disk.create_dir(&aside).map_err(|e| StoreError::of(&aside, "create", e))?;
-            files.write_new(&aside.join("rest"), &content.rest)?;
-            files.write_new(&aside.join("cage"), &content.cage)?;
+            files.disk.create_dir(&staging).map_err(|e| StoreError::of(&staging, "create", e))?;
+            files.write_new(&staging.join("rest"), &content.rest)?;
+            files.write_new(&staging.join("cage"), &content.cage)?;
             if let Some(matrix) = &content.matrix {
-                files.write_new(&aside.join("matrix"), &matrix.bytes)?;
+                files.write_new(&staging.join("matrix"), &matrix.bytes)?;
             }
-            files.write_new(&aside.join(DESCRIPTION), &bytes)?;
-            files.sync_dir(&aside)?;
+            files.write_new(&staging.join(DESCRIPTION), &bytes)?;
+            files.sync_dir(&staging)?;
             let _one_at_a_time = self.publishing();
             if files.exists(&place)? {
-                files.discard(&aside);
+                files.discard(&staging);
                 return Ok(());
             }
-            files.publish(&aside, &place)
+            files.publish(&staging, &place)
         };
-        make().inspect_err(|_| files.discard(&aside))
+        make().inspect_err(|_| files.discard(&staging))
     }
 
-    /// Content by its key; None where there is none. Damaged content is quarantined, so that the next upload replaces it.
+    /// Content by its key; `None` if there is none. Damaged content is moved to quarantine, so that the next upload replaces it.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`], or what the system says.
+    /// [`StoreError::Damaged`], or another I/O error.
     pub fn content(&self, key: &ContentKey) -> Result<Option<Content>, StoreError> {
         let place = self.files().contents().join(key.to_string());
         let found = self.read_content(&place);
-        self.set_aside_if_damaged(&place, found)
+        self.quarantine_if_damaged(&place, found)
     }
 
-    /// The cage of a content alone, by its key: a rest pose may be large. As [`Self::content`] otherwise.
+    /// Only the cage of a content, since a rest pose may be large. Otherwise as [`Self::content`].
     ///
     /// # Errors
     /// As [`Self::content`].
@@ -134,22 +133,22 @@ impl Store {
             let bytes = self.read_content_part(&place, "cage", &cage)?;
             Ok(Some(CageFile { name: cage.name, bytes }))
         });
-        self.set_aside_if_damaged(&place, found)
+        self.quarantine_if_damaged(&place, found)
     }
 
-    /// Forgets content; fine where there is none. A prepared solver of the key stays.
+    /// Removes content, if it exists. A prepared solver of the key is kept.
     ///
     /// # Errors
-    /// What the system says.
+    /// I/O errors.
     pub fn remove_content(&self, key: &ContentKey) -> Result<(), StoreError> {
         let _one_at_a_time = self.publishing();
-        self.files().throw_away(&self.files().contents().join(key.to_string()))
+        self.files().delete_durably(&self.files().contents().join(key.to_string()))
     }
 
     /// The keys of all content.
     ///
     /// # Errors
-    /// What the system says.
+    /// I/O errors.
     pub fn contents(&self) -> Result<Vec<ContentKey>, StoreError> {
         let entries = self.files().list(&self.files().contents())?;
         Ok(entries.iter().filter_map(|entry| entry.name.to_str()?.parse().ok()).collect())
@@ -166,7 +165,7 @@ impl Store {
         self.files().disk.list(&folder).map_or(0, |all| all.iter().map(|e| e.bytes).sum())
     }
 
-    /// A quick look: metadata and lengths, not every byte. Makes sure that what is there is durable.
+    /// Checks metadata and file lengths, not every byte, and makes the folder entry durable.
     fn content_is_there(&self, key: &ContentKey, place: &Path) -> Result<bool, StoreError> {
         if !self.files().exists(place)? {
             return Ok(false);
@@ -181,7 +180,7 @@ impl Store {
             }
             Ok(())
         });
-        match self.set_aside_if_damaged(place, looked) {
+        match self.quarantine_if_damaged(place, looked) {
             Ok(()) => {
                 self.files().sync_dir(&self.files().contents())?;
                 Ok(true)

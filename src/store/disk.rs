@@ -14,7 +14,7 @@ use std::time::SystemTime;
 pub struct Entry {
     /// Its name.
     pub name: OsString,
-    /// Whether it is a folder; a link to one is none.
+    /// Whether it is a folder; false for a symbolic link to one.
     pub is_dir: bool,
     /// Bytes of a file.
     pub bytes: u64,
@@ -27,91 +27,91 @@ pub trait Disk: Send + Sync + Debug {
     /// Makes a file that is not there yet, for reading and writing.
     ///
     /// # Errors
-    /// `AlreadyExists`, or the system's.
+    /// `AlreadyExists`, or another I/O error.
     fn create_new(&self, path: &Path) -> io::Result<Arc<dyn DiskFile>>;
     /// Opens a file that is there, for reading.
     ///
     /// # Errors
-    /// The system's.
+    /// I/O errors.
     fn open(&self, path: &Path) -> io::Result<Arc<dyn DiskFile>>;
     /// Opens a file that is there, for reading and writing.
     ///
     /// # Errors
-    /// The system's.
+    /// I/O errors.
     fn open_for_writing(&self, path: &Path) -> io::Result<Arc<dyn DiskFile>>;
     /// Makes a folder.
     ///
     /// # Errors
-    /// `AlreadyExists`, or the system's.
+    /// `AlreadyExists`, or another I/O error.
     fn create_dir(&self, path: &Path) -> io::Result<()>;
-    /// Moves a file, replacing one that is there, or a folder.
+    /// Renames a file, replacing an existing target, or a folder.
     ///
     /// # Errors
-    /// The system's.
+    /// I/O errors.
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
     /// Removes a file.
     ///
     /// # Errors
-    /// The system's.
+    /// I/O errors.
     fn remove_file(&self, path: &Path) -> io::Result<()>;
     /// Removes an empty folder.
     ///
     /// # Errors
-    /// The system's.
+    /// I/O errors.
     fn remove_dir(&self, path: &Path) -> io::Result<()>;
-    /// What is in a folder, in no order.
+    /// The entries of a folder, in no particular order.
     ///
     /// # Errors
-    /// The system's.
+    /// I/O errors.
     fn list(&self, path: &Path) -> io::Result<Vec<Entry>>;
-    /// Makes a folder's entries durable.
+    /// Makes the entries of a folder durable (fsync).
     ///
     /// # Errors
-    /// The system's.
+    /// I/O errors.
     fn sync_dir(&self, path: &Path) -> io::Result<()>;
     /// Sets a file's time of last change to now.
     ///
     /// # Errors
-    /// The system's.
+    /// I/O errors.
     fn touch(&self, path: &Path) -> io::Result<()>;
-    /// Locks a file, made where it is missing, until the handle is dropped. None where another process has it.
+    /// Creates and locks a file exclusively, until the handle is dropped; `None` if another process holds the lock.
     ///
     /// # Errors
-    /// The system's.
+    /// I/O errors.
     fn lock(&self, path: &Path) -> io::Result<Option<File>>;
     /// Bytes that may still be written to the file system of `path`.
     ///
     /// # Errors
-    /// The system's.
+    /// I/O errors.
     fn free_bytes(&self, path: &Path) -> io::Result<u64>;
 }
 
-/// An open file. Positioned reads and writes, so that readers and a writer can share it.
+/// An open file with positioned reads and writes, so that readers and a writer can share it.
 pub trait DiskFile: Send + Sync + Debug {
     /// Writes some of `bytes` at `offset`; gives how many.
     ///
     /// # Errors
-    /// The system's.
+    /// I/O errors.
     fn write_at(&self, bytes: &[u8], offset: u64) -> io::Result<usize>;
     /// Reads some bytes at `offset`; gives how many, 0 at the end of the file.
     ///
     /// # Errors
-    /// The system's.
+    /// I/O errors.
     fn read_at(&self, bytes: &mut [u8], offset: u64) -> io::Result<usize>;
-    /// Makes what was written durable, with the length.
+    /// Makes data and length durable (fdatasync).
     ///
     /// # Errors
-    /// The system's. What was written since the last success may be lost, and a second call would not say so.
+    /// I/O errors. Everything written since the last success may be lost, and calling it again would not report that.
     fn sync_data(&self) -> io::Result<()>;
     /// Cuts or extends the file.
     ///
     /// # Errors
-    /// The system's.
+    /// I/O errors.
     fn set_len(&self, bytes: u64) -> io::Result<()>;
     /// Length in bytes.
     ///
     /// # Errors
-    /// The system's.
+    /// I/O errors.
     fn length(&self) -> io::Result<u64>;
 }
 
@@ -138,7 +138,7 @@ impl dyn DiskFile + '_ {
     /// Fills `bytes` from `offset` on.
     ///
     /// # Errors
-    /// `UnexpectedEof` where the file ends before, or the system's.
+    /// `UnexpectedEof` where the file ends before, or another I/O error.
     pub fn read_exact_at(&self, mut bytes: &mut [u8], mut offset: u64) -> io::Result<()> {
         while !bytes.is_empty() {
             match self.read_at(bytes, offset) {
@@ -249,7 +249,7 @@ impl DiskFile for File {
 
     fn length(&self) -> io::Result<u64> {
         let metadata = self.metadata()?;
-        // A folder can be opened like a file, and has a length that says nothing.
+        // A folder can be opened like a file; its length is meaningless.
         if metadata.is_dir() {
             return Err(io::ErrorKind::IsADirectory.into());
         }

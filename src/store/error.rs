@@ -1,4 +1,4 @@
-//! What can go wrong with the store, by what the caller can do about it.
+//! Errors of the store, one variant per reaction of the caller.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 /// Why something could not be stored or read back.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// No space: later, or elsewhere, the same call can succeed. Nothing was changed.
+    /// No space left. Nothing was changed; the call can succeed later.
     #[error("there is no space left to write {}; free some, or raise the quota, and try again", path.display())]
     Full {
         /// What was being written.
         path: PathBuf,
     },
-    /// Data that was stored is not what was stored.
+    /// Stored data does not match its checksum or its description.
     #[error("{} is damaged: {what}; restore it from a backup, or delete it", path.display())]
     Damaged {
         /// The file.
@@ -26,29 +26,29 @@ pub enum StoreError {
         /// The folder.
         path: PathBuf,
     },
-    /// A name that no session can have. Nothing was looked up.
+    /// Not a valid id; nothing was looked up.
     #[error("{id:?} is not the id of a session: ids are 1 to 64 of the characters 0-9, a-z and -")]
     BadId {
         /// The name, cut after 80 characters.
         id: String,
     },
-    /// The system refused.
+    /// Another I/O error.
     #[error("could not {action} {}: {cause}; check the disk and the folder's permissions", path.display())]
     Io {
-        /// What was concerned.
+        /// The file or folder.
         path: PathBuf,
-        /// What was being done, a verb.
+        /// What was attempted, as a verb.
         action: &'static str,
-        /// The system's answer.
+        /// The operating system's error.
         cause: io::Error,
     },
 }
 
 impl StoreError {
-    /// Sorts an error of the system.
+    /// Classifies an I/O error.
     pub(crate) fn of(path: &Path, action: &'static str, cause: io::Error) -> Self {
         use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
-        // A store error may have travelled through a writer.
+        // A store error may be wrapped in an I/O error by a writer.
         let cause = match cause.downcast::<Self>() {
             Ok(inner) => return inner,
             Err(cause) => cause,
@@ -69,7 +69,7 @@ impl StoreError {
     }
 }
 
-/// So that a store error can leave the closure that writes a container.
+/// Lets a store error pass through the closure that writes a container.
 impl From<StoreError> for io::Error {
     fn from(error: StoreError) -> Self {
         Self::other(error)

@@ -1,4 +1,4 @@
-//! Whole files and folders: written aside, synced, renamed into place; moved aside, then removed.
+//! Atomic operations on files and folders: written in `tmp/`, synced and renamed into place; moved to `trash/`, then removed.
 
 use super::disk::{Disk, DiskFile};
 use super::{Quarantined, StoreError};
@@ -9,12 +9,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
-/// The folder of a store, and the file layer it lies on.
+/// The root folder of a store, and the file operations on it.
 #[derive(Debug)]
 pub(crate) struct Files {
     pub(crate) disk: Arc<dyn Disk>,
     pub(crate) root: PathBuf,
-    /// Differs between runs, so that leftovers of an earlier one are never in the way.
+    /// Unique per process, so that names never collide with those of an earlier run.
     run: u128,
     next: AtomicU64,
 }
@@ -70,7 +70,7 @@ impl Files {
         self.tmp().join(self.unique(name))
     }
 
-    /// Makes `path` with `bytes`, durable but for its entry in the folder.
+    /// Creates `path` with `bytes` and syncs the file, but not its folder.
     pub(crate) fn write_new(&self, path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
         let file = self.create(path)?;
         file.write_all_at(bytes, 0).map_err(|e| StoreError::of(path, "write", e))?;
@@ -89,7 +89,7 @@ impl Files {
         timed(|| self.disk.sync_dir(path)).map_err(|e| StoreError::of(path, "sync", e))
     }
 
-    /// Writes `bytes` to `path`, which has the old or the new content at every moment; durable on Ok.
+    /// Atomically replaces the content of `path`; durable on `Ok`.
     pub(crate) fn replace(&self, path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
         let temporary = self.temporary("file");
         self.write_new(&temporary, bytes)
@@ -103,35 +103,34 @@ impl Files {
         self.sync_dir(parent(to))
     }
 
-    /// Makes a folder that is not there yet, filled by `fill`: whole or not at all, durable on Ok. Renaming onto a folder with something
-    /// in it is refused, so a name is never taken twice.
+    /// Atomically creates a folder with the content that `fill` writes; durable on `Ok`. Fails with `AlreadyExists` if the name is taken.
     pub(crate) fn publish_folder(
         &self,
         place: &Path,
         fill: impl FnOnce(&Path) -> Result<(), StoreError>,
     ) -> Result<(), StoreError> {
         let name = place.file_name().map_or_else(|| "unnamed".into(), |name| name.to_string_lossy());
-        let aside = self.temporary(&name);
+        let staging = self.temporary(&name);
         let prepare = || {
-            self.disk.create_dir(&aside).map_err(|e| StoreError::of(&aside, "create", e))?;
-            fill(&aside)?;
-            self.sync_dir(&aside)
+            self.disk.create_dir(&staging).map_err(|e| StoreError::of(&staging, "create", e))?;
+            fill(&staging)?;
+            self.sync_dir(&staging)
         };
-        prepare().inspect_err(|_| self.discard(&aside))?;
-        if let Err(error) = self.disk.rename(&aside, place) {
-            self.discard(&aside);
+        prepare().inspect_err(|_| self.discard(&staging))?;
+        if let Err(error) = self.disk.rename(&staging, place) {
+            self.discard(&staging);
             let taken = matches!(error.kind(), io::ErrorKind::DirectoryNotEmpty | io::ErrorKind::AlreadyExists);
             let error = if taken { io::ErrorKind::AlreadyExists.into() } else { error };
             return Err(StoreError::of(place, "create", error));
         }
         self.sync_dir(parent(place)).inspect_err(|_| {
-            if let Err(error) = self.throw_away(place) {
+            if let Err(error) = self.delete_durably(place) {
                 tracing::warn!(%error, path = %place.display(), "what could not be created is still there");
             }
         })
     }
 
-    /// Removes a temporary, best effort: what stays is removed when the store is opened again.
+    /// Removes a temporary file or folder, best effort: what remains is removed when the store is opened again.
     pub(crate) fn discard(&self, path: &Path) {
         if let Err(error) = self.remove_tree(path)
             && !error.is_not_found()
@@ -140,7 +139,7 @@ impl Files {
         }
     }
 
-    /// Whether there is a file or folder of that name.
+    /// Whether a file or folder exists at `path`.
     pub(crate) fn exists(&self, path: &Path) -> Result<bool, StoreError> {
         match self.disk.open(path) {
             Ok(_) => Ok(true),
@@ -149,15 +148,15 @@ impl Files {
         }
     }
 
-    /// Moves a file or folder to `trash/`, durably, then removes it. It is gone on Ok, even where the removal has to be
-    /// finished at the next start. Fine where there is nothing.
-    pub(crate) fn throw_away(&self, path: &Path) -> Result<(), StoreError> {
+    /// Moves a file or folder to `trash/`, durably, then removes it. On `Ok` it does not come back, even if removing it has to be finished
+    /// at the next start. A missing path is no error.
+    pub(crate) fn delete_durably(&self, path: &Path) -> Result<(), StoreError> {
         let trash = self.trash();
         let name = path.file_name().map_or_else(|| "unnamed".into(), |name| name.to_string_lossy());
         let away = trash.join(self.unique(&name));
         let moved = match self.disk.rename(path, &away) {
             Ok(()) => true,
-            // An earlier call may have moved it and failed to sync: that is made up for here.
+            // An earlier call may have moved it without syncing; the syncs below make up for that.
             Err(error) if error.kind() == io::ErrorKind::NotFound => false,
             Err(error) => return Err(StoreError::of(path, "delete", error)),
         };
@@ -169,8 +168,8 @@ impl Files {
         Ok(())
     }
 
-    /// Moves a damaged file or folder to `quarantine/`, with a note beside it.
-    pub(crate) fn set_aside(&self, path: &Path, why: &str) -> Result<Quarantined, StoreError> {
+    /// Moves a damaged file or folder to `quarantine/` and writes a note about the damage beside it.
+    pub(crate) fn move_to_quarantine(&self, path: &Path, why: &str) -> Result<Quarantined, StoreError> {
         let folder = self.quarantine();
         let name: OsString = path.file_name().map_or_else(|| "unnamed".into(), OsString::from);
         let mut target = folder.join(&name);
@@ -188,19 +187,19 @@ impl Files {
         Ok(Quarantined { name: name.to_string_lossy().into_owned(), path: target, why: why.to_owned() })
     }
 
-    /// Removes a file, or a folder with all in it.
+    /// Removes a file or a folder recursively.
     pub(crate) fn remove_tree(&self, path: &Path) -> Result<(), StoreError> {
         match self.disk.remove_file(path) {
             Ok(()) => return Ok(()),
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-            // EISDIR, or EPERM as POSIX has it: seen below whether it is a folder.
+            // EISDIR, or EPERM under POSIX; the calls below report the error unless it is a folder.
             Err(_) => {}
         }
         self.clear(path)?;
         self.disk.remove_dir(path).map_err(|e| StoreError::of(path, "remove", e))
     }
 
-    /// Removes all in a folder.
+    /// Removes everything in a folder.
     pub(crate) fn clear(&self, folder: &Path) -> Result<(), StoreError> {
         for entry in self.list(folder)? {
             self.remove_tree(&folder.join(entry.name))?;
@@ -212,7 +211,7 @@ impl Files {
         self.disk.list(folder).map_err(|e| StoreError::of(folder, "list", e))
     }
 
-    /// A whole file; None where there is none. More than `limit` bytes are damage, found before any memory is taken.
+    /// Reads a whole file; `None` if it does not exist. A length above `limit` is reported as damage before memory is allocated.
     pub(crate) fn read(&self, path: &Path, limit: u64) -> Result<Option<Vec<u8>>, StoreError> {
         let file = match self.disk.open(path) {
             Ok(file) => file,
@@ -229,7 +228,7 @@ impl Files {
     }
 }
 
-/// The folder something is in.
+/// The parent folder; `.` for a bare name.
 pub(crate) fn parent(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if parent != Path::new("") => parent,

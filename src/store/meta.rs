@@ -1,5 +1,4 @@
-//! Small files: JSON in a wrapper with its digest. The wrapper is rebuilt from what was read and compared byte by byte, so
-//! that a change anywhere in the file is found.
+//! Small JSON files with a checksum. A parsed file is rebuilt and compared byte by byte, so that any change is detected.
 
 use super::StoreError;
 use super::files::Files;
@@ -7,7 +6,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::Path;
 
-/// No small file is longer, in bytes.
+/// Longest such file, in bytes.
 const LIMIT: u64 = 1 << 20;
 const TAIL: &str = "}\n";
 
@@ -15,7 +14,7 @@ fn head(kind: &str, body: &[u8]) -> String {
     format!(r#"{{"format":1,"kind":"{kind}","blake3":"{}","body":"#, blake3::hash(body).to_hex())
 }
 
-/// The file's bytes.
+/// The content of a file for `value`.
 pub(crate) fn wrap<T: Serialize>(path: &Path, kind: &str, value: &T) -> Result<Vec<u8>, StoreError> {
     let body = serde_json::to_vec(value).map_err(|e| StoreError::of(path, "write", e.into()))?;
     let mut file = head(kind, &body).into_bytes();
@@ -28,7 +27,7 @@ pub(crate) fn wrap<T: Serialize>(path: &Path, kind: &str, value: &T) -> Result<V
     Ok(file)
 }
 
-/// What the file says; None where there is none.
+/// Reads and verifies a file; `None` if it does not exist.
 pub(crate) fn read<T: DeserializeOwned>(files: &Files, path: &Path, kind: &str) -> Result<Option<T>, StoreError> {
     let Some(file) = files.read(path, LIMIT)? else { return Ok(None) };
     if let Some(format) = newer_format(&file) {
@@ -39,7 +38,7 @@ pub(crate) fn read<T: DeserializeOwned>(files: &Files, path: &Path, kind: &str) 
     unwrap(&file, kind).map(Some).map_err(|what| StoreError::damaged(path, what))
 }
 
-/// The format of a file that a newer version wrote: no damage, so that it is left where it is.
+/// The format number of a file that a newer version wrote; such a file is not damaged and stays in place.
 fn newer_format(file: &[u8]) -> Option<u32> {
     #[derive(serde::Deserialize)]
     struct Wrapper {

@@ -1,5 +1,4 @@
-//! What must survive: sessions with their frame logs and containers, uploaded content, prepared solvers. Blocking; callers
-//! use their own threads.
+//! Persistent data: sessions with their frame logs and containers, uploaded content, cage jobs and prepared solvers. All calls block.
 //!
 //! ```text
 //! sessions/<id>/   session.json  frames.log  capture.cager  complete.json  outcome.json
@@ -10,9 +9,9 @@
 //! quarantine/      damaged, with a note; for a person to look at
 //! ```
 //!
-//! Whole files and folders are written in `tmp/`, synced and renamed into place; folders go through `trash/` before they are
-//! removed. So what is visible in `sessions`, `cages`, `contents` and `prepared` is whole. The frame log is the one file that
-//! grows; [`log`] says how it recovers.
+//! Files and folders are written in `tmp/`, synced and renamed into place; folders are moved to `trash/` before they are removed. So
+//! everything in `sessions`, `cages`, `contents` and `prepared` is complete. Only the frame log grows in place; [`log`] describes its
+//! recovery.
 
 use crate::store::files::Files;
 use std::collections::HashSet;
@@ -29,11 +28,11 @@ mod error;
 #[path = "../../tests/faults/mod.rs"]
 mod faults;
 mod files;
-mod found;
 pub mod log;
 mod meta;
 mod names;
 mod prepared;
+mod scan;
 mod sessions;
 mod solver_file;
 mod spool;
@@ -45,13 +44,13 @@ pub use cage_jobs::{CageJobMeta, StoredPart};
 pub use content::{CageFile, Content, MatrixFile};
 pub use disk::{Disk, LocalDisk};
 pub use error::StoreError;
-pub use found::{Kind, Unread};
 pub use log::{FrameLog, LogEntry, LogReader, LogRecord};
 pub use names::{ContentKey, is_session_id};
+pub use scan::{Kind, Unreadable};
 pub use sessions::{Completion, Container, Idempotency, SessionMeta};
 pub use spool::{Spool, StoredFile};
 
-/// A folder of everything that must survive. Clones share it.
+/// The data folder. Clones share it.
 #[derive(Clone, Debug)]
 pub struct Store {
     inner: Arc<Inner>,
@@ -60,23 +59,23 @@ pub struct Store {
 #[derive(Debug)]
 struct Inner {
     files: Files,
-    /// Held by every open frame log too, so that no other process comes in while one is written.
+    /// Shared with every open frame log, so that the folder stays locked while one is written.
     lock: Arc<File>,
-    /// What is known of logs beside what is in them.
-    logs: Arc<Mutex<Logs>>,
-    /// Taken around "is it there? then put it there" of shared content.
+    /// Which logs are open, and which need rewriting.
+    logs: Arc<Mutex<LogRegistry>>,
+    /// Makes "create unless it exists" atomic for shared content.
     publishing: Mutex<()>,
 }
 
 #[derive(Debug, Default)]
-struct Logs {
-    /// Sessions whose log is open: a second writer would overwrite the first.
+struct LogRegistry {
+    /// Sessions whose log is open; a second writer is refused.
     open: HashSet<String>,
-    /// Sessions whose log the disk may hold damaged, although the system still shows it as it should be.
-    doubtful: HashSet<String>,
+    /// Sessions whose log may have lost data in a failed sync.
+    needs_rewrite: HashSet<String>,
 }
 
-/// A store and what was found in it.
+/// An opened store and its contents.
 #[derive(Debug)]
 pub struct Opened {
     /// The store.
@@ -85,30 +84,29 @@ pub struct Opened {
     pub sessions: Vec<SessionMeta>,
     /// Its cage jobs, oldest first.
     pub cage_jobs: Vec<CageJobMeta>,
-    /// Sessions and cage jobs that are damaged and were moved out of the way.
+    /// Sessions and cage jobs that were damaged and moved to quarantine.
     pub quarantined: Vec<Quarantined>,
-    /// Sessions and cage jobs that could not be read, and lie where they were.
-    pub unread: Vec<Unread>,
+    /// Sessions and cage jobs that could not be read and were left in place.
+    pub unread: Vec<Unreadable>,
 }
 
-/// Something damaged.
+/// A damaged object in quarantine.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Quarantined {
     /// Name of the session, or of the file.
     pub name: String,
-    /// Where it lies now.
+    /// Path in quarantine.
     pub path: PathBuf,
     /// What is wrong with it.
     pub why: String,
 }
 
 impl Store {
-    /// Opens the folder `root`, made where it is missing, for this process alone. Finishes interrupted deletions, removes
-    /// temporaries, and moves sessions with damaged metadata to `quarantine/`. What cannot be read stays where it is.
+    /// Opens the folder `root` for this process alone, creating it if it is missing. Finishes interrupted deletions, removes temporary
+    /// files, and moves objects with damaged metadata to `quarantine/`. Unreadable ones stay in place.
     ///
     /// # Errors
-    /// [`StoreError::Locked`] where another process has it; else what the system says of the folder itself. Damaged sessions
-    /// are no error.
+    /// [`StoreError::Locked`] if another process uses it, or I/O errors of the folder itself. Damaged sessions are not an error.
     pub fn open(root: &Path, disk: Arc<dyn Disk>) -> Result<Opened, StoreError> {
         make_folder(&*disk, root)?;
         let lock_path = root.join("lock");
@@ -126,19 +124,19 @@ impl Store {
         ] {
             make_folder(&*files.disk, &folder)?;
         }
-        // What an earlier process did and did not live to sync counts from here on: nobody sees a deleted session any more.
+        // Renames that an earlier process did not live to sync are made durable before they are relied on.
         for folder in [files.trash(), files.sessions(), files.cages(), files.contents(), files.prepared()] {
             files.sync_dir(&folder)?;
         }
         for folder in [files.trash(), files.tmp()] {
-            // What cannot be removed is in nobody's way.
+            // Leftovers do no harm.
             if let Err(error) = files.clear(&folder) {
                 tracing::warn!(%error, "something deleted still takes space");
             }
         }
-        let found::Found { metas: mut sessions, mut quarantined, mut unread } = found::find::<SessionMeta>(&files)?;
-        let found::Found { metas: mut cage_jobs, quarantined: damaged, unread: more } =
-            found::find::<CageJobMeta>(&files)?;
+        let scan::FolderScan { metas: mut sessions, mut quarantined, mut unread } = scan::find::<SessionMeta>(&files)?;
+        let scan::FolderScan { metas: mut cage_jobs, quarantined: damaged, unread: more } =
+            scan::find::<CageJobMeta>(&files)?;
         quarantined.extend(damaged);
         unread.extend(more);
         sessions.sort_by(|a, b| (a.created_ms, &a.id).cmp(&(b.created_ms, &b.id)));
@@ -152,15 +150,15 @@ impl Store {
         &self.inner.files
     }
 
-    /// Bytes that may still be written; 0 where the system does not say.
+    /// Free space of the file system, in bytes; 0 if unknown.
     pub fn free_bytes(&self) -> u64 {
         self.files().disk.free_bytes(&self.files().root).unwrap_or(0)
     }
 
-    /// Whether the store can write and sync now.
+    /// Checks that the store can write and sync.
     ///
     /// # Errors
-    /// [`StoreError::Full`], or what the system says.
+    /// [`StoreError::Full`], or another I/O error.
     pub fn probe(&self) -> Result<(), StoreError> {
         let files = self.files();
         let path = files.temporary("probe");
@@ -170,13 +168,13 @@ impl Store {
     }
 }
 
-/// Makes a folder with those above it, durably. Fine where it is there.
+/// Creates a folder and its parents, durably, unless it exists.
 fn make_folder(disk: &dyn Disk, path: &Path) -> Result<(), StoreError> {
     let failed = |error| StoreError::of(path, "create the folder", error);
     match disk.create_dir(path) {
         Ok(()) => {}
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
-            // A file of that name, or a folder that may not be read, is found here.
+            // Reports a file of that name, or a folder that cannot be read.
             return disk.list(path).map(|_| ()).map_err(failed);
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => {

@@ -1,11 +1,11 @@
-//! Names that become parts of paths.
+//! Identifiers that become parts of paths.
 
 use super::StoreError;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt;
 use std::str::FromStr;
 
-/// Names a pair of rest pose and cage with its options by their digest.
+/// BLAKE3 digest of tenant, rest pose, cage and options: the key of stored content and of its prepared solver.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ContentKey(pub [u8; 32]);
 
@@ -54,7 +54,7 @@ impl<'de> Deserialize<'de> for ContentKey {
     }
 }
 
-/// Whether `id` may name a session: 1 to 64 of 0-9, a-z and -. Nothing else touches a path.
+/// Whether `id` is a valid id: 1 to 64 of 0-9, a-z and -. Only valid ids are used in paths.
 pub fn is_session_id(id: &str) -> bool {
     (1..=64).contains(&id.len()) && id.bytes().all(|c| matches!(c, b'0'..=b'9' | b'a'..=b'z' | b'-'))
 }

@@ -1,4 +1,4 @@
-//! Prepared solvers by the digest of what they were prepared from: a cache that outlives the process.
+//! Prepared solvers on disk, by content key: a cache that survives restarts.
 
 use super::solver_file;
 use super::{ContentKey, Store, StoreError};
@@ -12,43 +12,43 @@ impl Store {
         self.files().prepared().join(format!("{key}.solver"))
     }
 
-    /// Keeps a prepared solver, durably on Ok. Create-only: where the key is there already, nothing changes.
+    /// Stores a prepared solver; durable on `Ok`. An existing file is kept.
     ///
     /// # Errors
-    /// [`StoreError::Full`], or what the system says.
+    /// [`StoreError::Full`], or another I/O error.
     pub fn put_prepared(&self, key: &ContentKey, solver: &Solver) -> Result<(), StoreError> {
         let files = self.files();
         let place = self.prepared_path(key);
         if files.exists(&place)? {
             return files.sync_dir(&files.prepared());
         }
-        let aside = files.temporary("solver");
+        let staging = files.temporary("solver");
         let make = || {
-            let file = files.create(&aside)?;
+            let file = files.create(&staging)?;
             solver_file::write(&*file, key, solver).map_err(|e| StoreError::of(&place, "write", e))?;
             files.sync_file(&*file, &place)?;
             let _one_at_a_time = self.publishing();
             if files.exists(&place)? {
-                files.discard(&aside);
+                files.discard(&staging);
                 return Ok(());
             }
-            files.publish(&aside, &place)?;
+            files.publish(&staging, &place)?;
             self.used(&place);
             Ok(())
         };
-        make().inspect_err(|_| files.discard(&aside))
+        make().inspect_err(|_| files.discard(&staging))
     }
 
-    /// Whether there is a prepared solver, as far as its name says.
+    /// Whether a file for the key exists; it is not verified.
     pub fn has_prepared(&self, key: &ContentKey) -> bool {
         self.files().exists(&self.prepared_path(key)).unwrap_or(false)
     }
 
-    /// A prepared solver, the same to the bit; None where there is none. A damaged one is quarantined and counts as none; one of
-    /// another version of the format makes room for that of this version.
+    /// Loads a prepared solver, bitwise equal to the stored one; `None` if there is none. A damaged file is moved to quarantine, and a file
+    /// of another format version is removed; both count as none.
     ///
     /// # Errors
-    /// What the system says.
+    /// I/O errors.
     pub fn prepared(&self, key: &ContentKey) -> Result<Option<Solver>, StoreError> {
         let place = self.prepared_path(key);
         let file = match self.files().disk.open(&place) {
@@ -59,7 +59,7 @@ impl Store {
         let found = match solver_file::read(&*file, key) {
             Ok(Some(solver)) => Ok(solver),
             Ok(None) => {
-                tracing::debug!(%key, "a stored solver is of another version of the format and is prepared anew");
+                tracing::debug!(%key, "a solver file has another format version; the solver is prepared again");
                 self.forget_prepared(&place)?;
                 return Ok(None);
             }
@@ -68,13 +68,13 @@ impl Store {
             }
             Err(error) => Err(StoreError::of(&place, "read", error)),
         };
-        match self.set_aside_if_damaged(&place, found) {
+        match self.quarantine_if_damaged(&place, found) {
             Ok(solver) => {
                 self.used(&place);
                 Ok(Some(solver))
             }
             Err(error @ StoreError::Damaged { .. }) => {
-                tracing::warn!(%error, %key, "a prepared solver is left out and prepared anew");
+                tracing::warn!(%error, %key, "a damaged solver file is ignored; the solver is prepared again");
                 Ok(None)
             }
             Err(error) => Err(error),
@@ -89,10 +89,10 @@ impl Store {
         }
     }
 
-    /// Removes prepared solvers, least recently used first, until they take `budget_bytes` at most; gives the bytes freed.
+    /// Removes prepared solvers, least recently used first, until they take at most `budget_bytes`; returns the number of bytes freed.
     ///
     /// # Errors
-    /// What the system says.
+    /// I/O errors.
     pub fn trim_prepared(&self, budget_bytes: u64) -> Result<u64, StoreError> {
         let files = self.files();
         let folder = files.prepared();
@@ -111,11 +111,11 @@ impl Store {
                 Err(error) => return Err(StoreError::of(&path, "remove", error)),
             }
         }
-        // Not synced: one that comes back after a power cut is removed at the next trim.
+        // Not synced: a file that reappears after a power cut is removed by the next trim.
         Ok(freed)
     }
 
-    /// Notes the use where the next process finds it too.
+    /// Updates the time of last use, for the eviction order after a restart.
     fn used(&self, place: &Path) {
         if let Err(error) = self.files().disk.touch(place) {
             tracing::debug!(%error, path = %place.display(), "the last use was not noted");
@@ -123,15 +123,15 @@ impl Store {
     }
 
     pub(super) fn publishing(&self) -> MutexGuard<'_, ()> {
-        // It guards no data, so a thread that died holding it left nothing half done.
+        // It guards no data, so poisoning is harmless.
         self.inner.publishing.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Moves what was found damaged out of the way of a fresh one.
-    pub(super) fn set_aside_if_damaged<T>(&self, place: &Path, found: Result<T, StoreError>) -> Result<T, StoreError> {
+    /// Moves damaged content to quarantine.
+    pub(super) fn quarantine_if_damaged<T>(&self, place: &Path, found: Result<T, StoreError>) -> Result<T, StoreError> {
         if let Err(error @ StoreError::Damaged { .. }) = &found {
             let _one_at_a_time = self.publishing();
-            match self.files().set_aside(place, &error.to_string()) {
+            match self.files().move_to_quarantine(place, &error.to_string()) {
                 Err(error) if !error.is_not_found() => return Err(error),
                 _ => {}
             }

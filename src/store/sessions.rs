@@ -1,9 +1,9 @@
-//! Sessions: their metadata, container and mark of completion.
+//! Sessions: metadata, container and completion mark.
 
 use super::disk::DiskFile;
 use super::files::Files;
-use super::found::{Kind, Stored};
 use super::names::check_id;
+use super::scan::{FolderMeta, Kind};
 use super::{ContentKey, Store, StoreError, is_session_id, meta};
 use cager_proto::messages::SessionOptions;
 use serde::de::DeserializeOwned;
@@ -13,39 +13,39 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What is known of a session from its creation on.
+/// Metadata of a session, fixed at its creation.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct SessionMeta {
     /// Its id; also the name of its folder.
     pub id: String,
-    /// Whose it is.
+    /// Tenant that owns it.
     pub tenant: String,
     /// Creation time, milliseconds since 1970.
     pub created_ms: u64,
-    /// Rest pose, cage and options.
+    /// Key of rest pose, cage and options.
     pub key: ContentKey,
-    /// Version of the computation that its frames are solved with.
+    /// Version of the solver that solves its frames.
     #[serde(default)]
     pub solver_version: u32,
-    /// Choices, as they were given.
+    /// Options as requested.
     pub options: SessionOptions,
-    /// Digest of the rest pose and the wish that its cage was made from, where none was sent.
+    /// Digest of the inputs from which its cage was made, if the service made it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub made_cage: Option<ContentKey>,
-    /// The request that made it, so that a repetition finds it.
+    /// Idempotency key and fingerprint of the request that created it.
     pub idempotency: Option<Idempotency>,
 }
 
 /// A request that may be repeated.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Idempotency {
-    /// The client's name for it.
+    /// The client's idempotency key.
     pub key: String,
-    /// Digest of what was asked.
+    /// Digest of content and options of the request.
     pub fingerprint: String,
 }
 
-/// That a session is complete.
+/// The completion mark of a session.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Completion {
     /// Number of frames.
@@ -65,7 +65,7 @@ pub struct Container {
     pub digest: String,
 }
 
-impl Stored for SessionMeta {
+impl FolderMeta for SessionMeta {
     const KIND: Kind = Kind::Session;
     const FILE: &str = META;
 
@@ -81,11 +81,11 @@ impl Stored for SessionMeta {
 const META: &str = "session.json";
 const COMPLETE: &str = "complete.json";
 const CONTAINER: &str = "capture.cager";
-/// After this time a system that runs has written everything back.
-const WRITTEN_BACK: Duration = Duration::from_secs(600);
+/// Age after which the kernel has written a folder entry back.
+const WRITEBACK_AGE: Duration = Duration::from_secs(600);
 
 impl Store {
-    /// Makes a session: whole or not at all, durable on Ok.
+    /// Creates a session, atomically; durable on `Ok`.
     ///
     /// # Errors
     /// `AlreadyExists` as [`StoreError::Io`] where the id is taken; [`StoreError::BadId`], [`StoreError::Full`].
@@ -94,32 +94,32 @@ impl Store {
         let files = self.files();
         let place = files.session(&meta.id);
         let bytes = meta::wrap(&place.join(META), "session", meta)?;
-        files.publish_folder(&place, |aside| files.write_new(&aside.join(META), &bytes))
+        files.publish_folder(&place, |staging| files.write_new(&staging.join(META), &bytes))
     }
 
-    /// Deletes a session; fine where there is none. On Ok it does not come back; after an error it is there whole, or gone.
+    /// Deletes a session, if it exists. On `Ok` the deletion is durable; after an error the session is either complete or gone.
     ///
     /// # Errors
-    /// [`StoreError::BadId`], or what the system says.
+    /// [`StoreError::BadId`], or another I/O error.
     pub fn delete_session(&self, id: &str) -> Result<(), StoreError> {
         check_id(id)?;
-        self.files().throw_away(&self.files().session(id))
+        self.files().delete_durably(&self.files().session(id))
     }
 
     /// Moves a damaged session to `quarantine/`, with a note of what is wrong.
     ///
     /// # Errors
-    /// [`StoreError::BadId`], or what the system says.
+    /// [`StoreError::BadId`], or another I/O error.
     pub fn quarantine_session(&self, id: &str, why: &str) -> Result<(), StoreError> {
         check_id(id)?;
-        self.files().set_aside(&self.files().session(id), why).map(|_| ())
+        self.files().move_to_quarantine(&self.files().session(id), why).map(|_| ())
     }
 
-    /// Writes the session's container, replacing one that is there: whole or not at all, durable on Ok. A [`StoreError`] that
-    /// leaves `write` inside an [`io::Error`] comes out as it was.
+    /// Atomically writes the session's container, replacing an existing one; durable on `Ok`. A [`StoreError`] inside the [`io::Error`]
+    /// that `write` returns is unwrapped.
     ///
     /// # Errors
-    /// What `write` gives; [`StoreError::BadId`], [`StoreError::Full`].
+    /// Those of `write`; [`StoreError::BadId`], [`StoreError::Full`].
     pub fn write_container(
         &self,
         id: &str,
@@ -128,21 +128,26 @@ impl Store {
         check_id(id)?;
         let files = self.files();
         let place = files.session(id).join(CONTAINER);
-        let aside = files.temporary("container");
+        let staging = files.temporary("container");
         let mut make = || {
-            let file = files.create(&aside)?;
-            let mut out =
-                Hashed { file: &file, buffer: Vec::new(), bytes: 0, digest: blake3::Hasher::new(), broken: false };
+            let file = files.create(&staging)?;
+            let mut out = HashingWriter {
+                file: &file,
+                buffer: Vec::new(),
+                bytes: 0,
+                digest: blake3::Hasher::new(),
+                broken: false,
+            };
             write(&mut out).and_then(|()| out.flush()).map_err(|e| StoreError::of(&place, "write", e))?;
             let container = Container { bytes: out.bytes, digest: out.digest.finalize().to_hex().to_string() };
             files.sync_file(&*file, &place)?;
-            files.publish(&aside, &place)?;
+            files.publish(&staging, &place)?;
             Ok(container)
         };
-        make().inspect_err(|_| files.discard(&aside))
+        make().inspect_err(|_| files.discard(&staging))
     }
 
-    /// Marks the session complete, durably.
+    /// Writes the completion mark, durably.
     ///
     /// # Errors
     /// [`StoreError::BadId`], [`StoreError::Full`].
@@ -152,18 +157,18 @@ impl Store {
         self.files().replace(&path, &meta::wrap(&path, "completion", completion)?)
     }
 
-    /// The session's mark of completion; None where it has none. What this gives is durable.
+    /// Reads the completion mark; `None` if there is none. A mark that is returned is durable.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`], [`StoreError::BadId`], or what the system says.
+    /// [`StoreError::Damaged`], [`StoreError::BadId`], or another I/O error.
     pub fn completion(&self, id: &str) -> Result<Option<Completion>, StoreError> {
         check_id(id)?;
         let folder = self.files().session(id);
         let found: Option<Completion> = meta::read(self.files(), &folder.join(COMPLETE), "completion")?;
         if found.is_some() {
-            // A process may have died between putting it there and syncing the folder. Not worth a sync for each old session.
+            // An earlier process may have renamed the mark without syncing the folder; old entries have been written back since.
             let entries = self.files().list(&folder)?;
-            let old = |e: &super::disk::Entry| e.modified.elapsed().is_ok_and(|age| age > WRITTEN_BACK);
+            let old = |e: &super::disk::Entry| e.modified.elapsed().is_ok_and(|age| age > WRITEBACK_AGE);
             if !entries.iter().all(old) {
                 self.files().sync_dir(&folder)?;
             }
@@ -174,7 +179,7 @@ impl Store {
     /// Length of the session's container; 0 where there is none.
     ///
     /// # Errors
-    /// [`StoreError::BadId`], or what the system says.
+    /// [`StoreError::BadId`], or another I/O error.
     pub fn container_bytes(&self, id: &str) -> Result<u64, StoreError> {
         check_id(id)?;
         let path = self.container_path(id);
@@ -184,10 +189,10 @@ impl Store {
         }
     }
 
-    /// Whether the session's container is the one that was written: its length and digest. Reads all of it.
+    /// Verifies length and digest of the session's container, reading all of it.
     ///
     /// # Errors
-    /// [`StoreError::BadId`], or what the system says.
+    /// [`StoreError::BadId`], or another I/O error.
     pub fn container_is_whole(&self, id: &str, completion: &Completion) -> Result<bool, StoreError> {
         check_id(id)?;
         let path = self.container_path(id);
@@ -206,8 +211,8 @@ impl Store {
         Ok(offset == completion.container_bytes && digest.as_str() == completion.container_digest)
     }
 
-    /// Keeps a note of what was found out about the session, replacing an earlier one of that name: whole or not at all, durable
-    /// on Ok. `name` is one of the program's own.
+    /// Atomically stores a note about the session, replacing an earlier one of that name; durable on `Ok`. `name` is a file name without
+    /// extension.
     ///
     /// # Errors
     /// [`StoreError::BadId`], [`StoreError::Full`].
@@ -226,7 +231,7 @@ impl Store {
         meta::read(self.files(), &self.files().session(id).join(name).with_extension("json"), name)
     }
 
-    /// Where the session's container lies, or would. A name that is no id gives a path where nothing is.
+    /// Path of the session's container, whether or not it exists. For an invalid id it is a path where nothing exists.
     pub fn container_path(&self, id: &str) -> PathBuf {
         let id = if is_session_id(id) { id } else { ".no-session" };
         self.files().session(id).join(CONTAINER)
@@ -241,20 +246,20 @@ impl Store {
     }
 }
 
-/// Writes a file and computes its digest on the way.
-struct Hashed<'a> {
+/// A writer that computes the digest of what it writes.
+struct HashingWriter<'a> {
     file: &'a Arc<dyn DiskFile>,
     buffer: Vec<u8>,
     bytes: u64,
     digest: blake3::Hasher,
-    /// After an error there is a gap, whatever the caller makes of it.
+    /// Set after a failed write: the file has a gap.
     broken: bool,
 }
 
 /// Bytes gathered before a write.
 const BUFFER_BYTES: usize = 1 << 18;
 
-impl Hashed<'_> {
+impl HashingWriter<'_> {
     fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
         if self.broken {
             return Err(io::Error::other("an earlier write failed"));
@@ -266,7 +271,7 @@ impl Hashed<'_> {
     }
 }
 
-impl Write for Hashed<'_> {
+impl Write for HashingWriter<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if self.buffer.len() + bytes.len() > BUFFER_BYTES {
             self.flush()?;

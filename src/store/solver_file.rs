@@ -5,7 +5,7 @@
 use super::ContentKey;
 use super::disk::DiskFile;
 use cager_core::coordinates::{ElementPlan, Refinement, TiedNormals};
-use cager_core::inversion::{Preparation, Pull, Solver, SolverParts, TiedParts};
+use cager_core::inversion::{Preparation, RegularizationTarget, Solver, SolverParts, TiedParts};
 use faer::traits::ComplexField;
 use faer::{ColRef, Mat, MatRef};
 use safetensors::Dtype;
@@ -69,10 +69,10 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
     ];
     arrays.extend(refinement.as_ref().map(|numbers| Array::new("refinement", column(numbers))));
     arrays.extend(plan.as_ref().map(|plan| Array::new("elements", column(plan.as_bytes()))));
-    match solver.pull() {
-        Pull::None => {}
-        Pull::Constant(offset) => arrays.push(Array::new("constant", offset.as_ref())),
-        Pull::Previous { operator, first } => {
+    match solver.regularization_target() {
+        RegularizationTarget::None => {}
+        RegularizationTarget::Constant(offset) => arrays.push(Array::new("constant", offset.as_ref())),
+        RegularizationTarget::Previous { operator, first } => {
             arrays.extend([Array::new("previous", operator.as_ref()), Array::new("first", column(first))]);
         }
     }
@@ -164,12 +164,12 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Option<S
     if source.has("elements") {
         plan = Some(ElementPlan::from_bytes(source.vector("elements")?));
     }
-    let pull = if source.has("constant") {
-        Pull::Constant(source.matrix("constant")?)
+    let target = if source.has("constant") {
+        RegularizationTarget::Constant(source.matrix("constant")?)
     } else if source.has("previous") {
-        Pull::Previous { operator: source.matrix("previous")?, first: source.vector("first")? }
+        RegularizationTarget::Previous { operator: source.matrix("previous")?, first: source.vector("first")? }
     } else {
-        Pull::None
+        RegularizationTarget::None
     };
     let no_fit = || damage("its parts do not fit together");
     let Ok(
@@ -225,7 +225,7 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Option<S
         svd_seconds,
     };
     let (reads_all, positions) = (reads_all != 0.0, positions as usize);
-    let parts = SolverParts { handles, reads_all, operator, pull, phi, positions, tied, diagonal, preparation };
+    let parts = SolverParts { handles, reads_all, operator, target, phi, positions, tied, diagonal, preparation };
     Solver::from_parts(parts).ok_or_else(no_fit).map(Some)
 }
 

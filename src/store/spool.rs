@@ -1,4 +1,4 @@
-//! Files that arrive in pieces: written aside with their digest, read back at any place, and moved to where they belong or forgotten.
+//! Files received in pieces: written to `tmp/` with their digest, then moved into place or removed.
 
 use super::disk::DiskFile;
 use super::{Store, StoreError};
@@ -6,7 +6,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A file that is being received; gone when dropped, unless something took it.
+/// A file being received; removed on drop unless it was moved into place.
 #[derive(Debug)]
 pub struct Spool {
     store: Store,
@@ -21,7 +21,7 @@ impl Store {
     /// A new empty file for what arrives.
     ///
     /// # Errors
-    /// [`StoreError::Full`], or what the system says.
+    /// [`StoreError::Full`], or another I/O error.
     pub fn spool(&self) -> Result<Spool, StoreError> {
         let path = self.files().temporary("spool");
         let file = self.files().create(&path)?;
@@ -30,10 +30,10 @@ impl Store {
 }
 
 impl Spool {
-    /// Appends these bytes. After an error nothing more can be done with it.
+    /// Appends bytes. After an error the spool is unusable.
     ///
     /// # Errors
-    /// [`StoreError::Full`], or what the system says.
+    /// [`StoreError::Full`], or another I/O error.
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), StoreError> {
         self.file.write_all_at(bytes, self.bytes).map_err(|e| StoreError::of(&self.path, "write", e))?;
         self.digest.update(bytes);
@@ -51,12 +51,12 @@ impl Spool {
         self.digest.finalize()
     }
 
-    /// What was written so far, to be read.
+    /// A reader of the bytes written so far.
     pub fn stored(&self) -> StoredFile {
         StoredFile { file: Arc::clone(&self.file), bytes: self.bytes, at: 0 }
     }
 
-    /// Syncs it and moves it into a folder that is not visible yet.
+    /// Syncs the file and moves it into a folder that is not visible yet.
     pub(super) fn move_to(mut self, place: &Path) -> Result<(), StoreError> {
         let files = self.store.files();
         files.sync_file(&*self.file, &self.path)?;
@@ -110,7 +110,7 @@ impl Seek for StoredFile {
             SeekFrom::End(by) => self.bytes.checked_add_signed(by),
             SeekFrom::Current(by) => self.at.checked_add_signed(by),
         };
-        // Beyond the end there is nothing to read.
+        // Seeking beyond the end stays at the end.
         self.at = place.ok_or(io::ErrorKind::InvalidInput)?.min(self.bytes);
         Ok(self.at)
     }

@@ -9,15 +9,15 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 use tokio_util::sync::CancellationToken;
 
-/// Buckets of times that are short on an idle machine, in seconds.
+/// Histogram buckets of short operations, in seconds.
 const SHORT: &[f64] = &[1e-4, 2.5e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0];
-/// Buckets of preparations, in seconds.
+/// Histogram buckets of preparations and designs, in seconds.
 const LONG: &[f64] = &[0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0, 300.0];
 
-/// How often measured times are added up.
+/// Interval at which histograms are aggregated.
 const UPKEEP: Duration = Duration::from_secs(5);
 
-/// The process's recorder, installed with the first call.
+/// The process's metrics recorder, installed by the first call.
 pub fn recorder() -> &'static PrometheusHandle {
     static HANDLE: OnceLock<PrometheusHandle> = OnceLock::new();
     HANDLE.get_or_init(|| {
@@ -41,14 +41,14 @@ pub fn recorder() -> &'static PrometheusHandle {
     })
 }
 
-/// Keeps what was measured small until `stop`, also where nobody asks for it.
+/// Periodically aggregates histograms until `stop`, which bounds their memory even if nobody scrapes them.
 pub async fn keep(stop: CancellationToken) {
     while stop.run_until_cancelled(tokio::time::sleep(UPKEEP)).await.is_some() {
         recorder().run_upkeep();
     }
 }
 
-/// Sets the gauges that are looked up rather than counted.
+/// Sets the gauges that are computed on demand.
 pub(crate) fn observe(service: &Service) {
     Collector::default().collect();
     metrics::gauge!("cager_queue_frames").set(service.engine.waiting() as f64);
@@ -65,7 +65,7 @@ pub(crate) fn observe(service: &Service) {
     }
     metrics::gauge!("cager_disk_free_bytes").set(service.store.free_bytes() as f64);
     metrics::gauge!("cager_uptime_seconds").set(service.started.elapsed().as_secs_f64());
-    // A tenant whose last session is gone has none, rather than as many as before.
+    // A tenant without sessions is reported as 0, not with its last value.
     static SEEN: Mutex<BTreeMap<String, (usize, u64)>> = Mutex::new(BTreeMap::new());
     let mut seen = SEEN.lock().unwrap_or_else(PoisonError::into_inner);
     seen.values_mut().for_each(|usage| *usage = (0, 0));
@@ -83,7 +83,7 @@ fn describe() {
     describe_counter!("cager_log_bytes_total", Unit::Bytes, "Bytes written to frame logs");
     describe_counter!("cager_sessions_created_total", "Sessions made, by tenant");
     describe_counter!("cager_sessions_expired_total", "Sessions deleted because of their age");
-    describe_counter!("cager_quarantined_total", "Damaged things put aside");
+    describe_counter!("cager_quarantined_total", "Damaged sessions, cage designs and files moved to quarantine");
     describe_gauge!("cager_unread", "Sessions and cage designs whose files cannot be read, left where they are");
     describe_gauge!("cager_build_info", "Always 1; version and commit of the program");
     describe_counter!("cager_webhooks_total", "Messages to webhooks, by result: delivered, given_up, gone");
@@ -96,11 +96,14 @@ fn describe() {
         "Connections beyond the limit: spare (answered once) or full"
     );
     describe_counter!("cager_accept_errors_total", "Errors of accepting connections");
-    describe_gauge!("cager_disk_bytes", Unit::Bytes, "Disk space taken by what is on its way");
+    describe_gauge!("cager_disk_bytes", Unit::Bytes, "Disk space of cages waiting to be decoded");
     describe_counter!("cager_body_timeouts_total", "Request bodies that stopped arriving");
     describe_gauge!("cager_connections", "Open connections");
-    describe_counter!("cager_cache_total", "Solvers asked for: memory, disk, joined (being prepared already) or miss");
-    describe_counter!("cager_cache_evictions_total", "Solvers that left the memory");
+    describe_counter!(
+        "cager_cache_total",
+        "Requests for solvers, by result: memory, disk, joined (already being prepared) or miss"
+    );
+    describe_counter!("cager_cache_evictions_total", "Solvers evicted from memory");
     describe_gauge!("cager_cache_bytes", Unit::Bytes, "Memory of caches");
     describe_gauge!("cager_queue_frames", "Frames and cages waiting to be solved or decoded");
     describe_gauge!("cager_streams", "Uploads, followers and decodings that run");
@@ -111,7 +114,7 @@ fn describe() {
         "Cage designs that ended, by result: completed, failed, or known from an earlier one"
     );
     describe_histogram!("cager_design_seconds", Unit::Seconds, "Designing a cage");
-    describe_gauge!("cager_memory_bytes", Unit::Bytes, "Memory taken by what is on its way");
+    describe_gauge!("cager_memory_bytes", Unit::Bytes, "Memory of frames, uploads, downloads and designs in progress");
     describe_gauge!("cager_disk_free_bytes", Unit::Bytes, "Free space of the data folder's file system");
     describe_gauge!("cager_uptime_seconds", Unit::Seconds, "Time since the service started");
     describe_gauge!("cager_sessions", "Sessions, by tenant");

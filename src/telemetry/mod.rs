@@ -1,4 +1,4 @@
-//! What the service says about itself: log lines, metrics, traces, and the identifier that ties them to requests.
+//! Log lines, metrics and traces, and the request identifier that connects them.
 
 mod logging;
 pub mod metrics;

@@ -1,6 +1,6 @@
-//! Every request has an identifier, a span and one line in the log.
+//! Request identifiers, request spans and the access log.
 //!
-//! Only method, path and outcome are logged. Queries, headers and bodies never are: they may hold tokens and captures.
+//! Only method, path and outcome are logged, never queries, headers or bodies: they may contain tokens and captures.
 
 use super::traces;
 use axum::body::Body;
@@ -20,8 +20,8 @@ use tracing::field::Empty;
 use tracing::{Instrument as _, Span};
 
 const HEADER: HeaderName = HeaderName::from_static("x-request-id");
-/// Asked for every few seconds by machines.
-const QUIET: [&str; 3] = ["/healthz", "/readyz", "/metrics"];
+/// Paths polled by probes; logged at debug level.
+const PROBE_PATHS: [&str; 3] = ["/healthz", "/readyz", "/metrics"];
 /// Longest part of a path that is logged.
 const PATH_BYTES: usize = 256;
 
@@ -51,7 +51,7 @@ impl std::fmt::Display for RequestId {
 pub async fn request_id(mut request: Request, next: Next) -> Response {
     let id = RequestId::of(&request);
     let path = request.uri().path();
-    let quiet = QUIET.contains(&path);
+    let quiet = PROBE_PATHS.contains(&path);
     // Paths are percent-encoded ASCII, so that any byte is a boundary; `get` is for those that are not.
     let path = path.get(..PATH_BYTES).unwrap_or(path);
     let method = request.method();
@@ -81,7 +81,7 @@ pub async fn request_id(mut request: Request, next: Next) -> Response {
     response.map(|inner| Body::new(Logged { ended: inner.is_end_stream(), inner, declared, given: 0, log }))
 }
 
-/// Writes the request's line when it is dropped: at the end of the response, or when the client has gone.
+/// Logs the request when it is dropped: at the end of the response, or when the client disconnects.
 struct Log {
     trace: opentelemetry::Context,
     span: Span,
@@ -89,7 +89,7 @@ struct Log {
     quiet: bool,
     /// Status, and time until it was known.
     answered: Option<(StatusCode, Duration)>,
-    /// The response was given to its end.
+    /// Whether the response was sent completely.
     ended: bool,
 }
 
@@ -113,7 +113,7 @@ impl Drop for Log {
     }
 }
 
-/// A response body that takes the request's log line along.
+/// A response body that owns the request's log entry.
 struct Logged {
     inner: Body,
     ended: bool,

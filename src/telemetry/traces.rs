@@ -2,7 +2,7 @@
 //! the environment names a collector, `OTEL_EXPORTER_OTLP_ENDPOINT`; headers, sampler, service name and resource attributes are taken from
 //! the variables of that standard as well. Without a collector nothing is recorded.
 
-use crate::outgoing::Client;
+use crate::http_client::Client;
 use async_trait::async_trait;
 use axum::extract::Request;
 use bytes::Bytes;
@@ -55,7 +55,7 @@ pub fn begin() -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
     Ok(())
 }
 
-/// Sends what is left. Blocks for some seconds at most.
+/// Exports the remaining spans. Blocks for a few seconds at most.
 pub fn end() {
     if let Some(provider) = PROVIDER.get()
         && let Err(error) = provider.shutdown()
@@ -64,16 +64,16 @@ pub fn end() {
     }
 }
 
-fn are_sent() -> bool {
+fn is_enabled() -> bool {
     PROVIDER.get().is_some()
 }
 
-/// Sends for the exporter, whose own thread has no runtime.
+/// HTTP client for the exporter, whose thread has no tokio runtime.
 #[derive(Debug)]
 struct Sender {
     client: Client,
     runtime: Handle,
-    /// Whether the last attempt failed, so that the log has the change and not each of them.
+    /// Whether the last attempt failed, so that only changes are logged.
     failing: Arc<AtomicBool>,
 }
 
@@ -104,9 +104,9 @@ impl HttpClient for Sender {
     }
 }
 
-/// The span of a request, below that of the client where its `traceparent` says so.
+/// The span of a request; a child of the client's span if `traceparent` names it.
 pub(super) fn request(request: &Request) -> Context {
-    if !are_sent() {
+    if !is_enabled() {
         return Context::new();
     }
     let parent = TraceContextPropagator::new().extract(&HeaderExtractor(request.headers()));
@@ -117,22 +117,22 @@ pub(super) fn request(request: &Request) -> Context {
     parent.with_span(span)
 }
 
-/// The identifier by which a request's trace is found, if it is recorded.
+/// The trace id of a request, if it is recorded.
 pub(super) fn trace_id(request: &Context) -> Option<String> {
     let span = request.span();
     span.is_recording().then(|| span.span_context().trace_id().to_string())
 }
 
-/// Names the span of the request at work after its route.
+/// Names the current request's span after its route.
 pub(crate) fn name(method: &str, route: &str) {
-    if are_sent() {
+    if is_enabled() {
         let context = Context::current();
         context.span().update_name(format!("{method} {route}"));
         context.span().set_attribute(KeyValue::new("http.route", route.to_owned()));
     }
 }
 
-/// Ends the span of a request; without a status the client went before it.
+/// Ends the span of a request; `None` if the client disconnected before the response.
 pub(super) fn ended(request: &Context, status: Option<StatusCode>) {
     let span = request.span();
     if let Some(status) = status {
@@ -144,20 +144,20 @@ pub(super) fn ended(request: &Context, status: Option<StatusCode>) {
     span.end();
 }
 
-/// Something that takes a while, below `parent`, until this is dropped.
-pub(crate) struct Step(Context);
+/// A child span of `parent` that ends when it is dropped.
+pub(crate) struct TraceSpan(Context);
 
-impl Step {
+impl TraceSpan {
     /// Begins it.
     pub(crate) fn begin(name: &'static str, parent: &Context) -> Self {
-        if !are_sent() {
+        if !is_enabled() {
             return Self(Context::new());
         }
         Self(parent.with_span(global::tracer(SCOPE).start_with_context(name, parent)))
     }
 }
 
-impl Drop for Step {
+impl Drop for TraceSpan {
     fn drop(&mut self) {
         self.0.span().end();
     }

@@ -1,8 +1,8 @@
-//! Sending a message until it arrives.
+//! Delivering a message, with retries.
 
 use super::file::Hook;
-use super::{Due, Event, NOTE};
-use crate::outgoing::Client;
+use super::{Event, NOTE, PendingMessage};
+use crate::http_client::Client;
 use crate::store::Store;
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
@@ -16,21 +16,21 @@ use std::time::{Duration, SystemTime};
 
 const MINUTE: u64 = 60;
 const HOUR: u64 = 60 * MINUTE;
-/// Pauses after attempts that failed, in seconds; after the last of them the message is given up.
+/// Pauses after failed attempts, in seconds; after the last one the message is given up.
 const PAUSES: [u64; 10] = [2, 15, MINUTE, 5 * MINUTE, 30 * MINUTE, 2 * HOUR, 6 * HOUR, 12 * HOUR, 24 * HOUR, 24 * HOUR];
 
 /// A message to one receiver.
 pub(super) struct Message {
-    /// The session that it is about.
+    /// The session that it reports.
     pub(super) session: String,
     pub(super) body: Bytes,
     pub(super) store: Store,
-    /// Who was not told yet, shared by the messages about one session.
-    pub(super) left: Arc<Mutex<Due>>,
+    /// The receivers that have not acknowledged it, shared by all messages about the session.
+    pub(super) left: Arc<Mutex<PendingMessage>>,
 }
 
 impl Message {
-    /// Sends it until it arrives, or it is given up.
+    /// Sends the message until it is acknowledged or given up.
     pub(super) async fn deliver(self, hook: &Hook, client: &Client) {
         let id = self.id();
         let mut pauses = PAUSES.iter();
@@ -50,10 +50,10 @@ impl Message {
             metrics::counter!("cager_webhooks_total", "result" => "failed_attempt").increment(1);
             let line = hook.line;
             let Some(pause) = pauses.next() else {
-                tracing::error!(line, id, why, "a webhook's message is given up");
+                tracing::error!(line, id, why, "a webhook message is given up");
                 break "given_up";
             };
-            tracing::warn!(line, id, why, again_in_s = pause, "a webhook's message did not arrive");
+            tracing::warn!(line, id, why, again_in_s = pause, "a webhook message was not delivered");
             tokio::time::sleep(Duration::from_secs(*pause)).await;
         };
         metrics::counter!("cager_webhooks_total", "result" => result).increment(1);
@@ -63,17 +63,17 @@ impl Message {
             due.left.retain(|hook| *hook != told);
             self.store.put_note(&self.session, NOTE, &*due)
         });
-        // Then it is told again after a restart, with the same id. A session that is gone has no notes.
+        // If this is not stored, the message is sent again after a restart with the same id. Notes of a deleted session are gone.
         if let Ok(Err(error)) = noted.await {
-            tracing::debug!(%error, "that a webhook's message arrived could not be kept");
+            tracing::debug!(%error, "the delivery of a webhook message could not be stored");
         }
     }
 
-    fn due(&self) -> MutexGuard<'_, Due> {
+    fn due(&self) -> MutexGuard<'_, PendingMessage> {
         self.left.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The same whenever it is sent.
+    /// The same for every attempt.
     fn id(&self) -> String {
         let what = match self.due().event {
             Event::Completed => "completed",
@@ -96,7 +96,7 @@ impl Message {
     }
 }
 
-/// `v1,` and the HMAC-SHA-256 of identifier, time and body with points between them, in base64.
+/// `v1,` and the base64 HMAC-SHA-256 of `id.timestamp.body`.
 fn signature(key: &hmac::Key, id: &str, seconds: u64, body: &[u8]) -> String {
     let mut context = hmac::Context::with_key(key);
     context.update(format!("{id}.{seconds}.").as_bytes());

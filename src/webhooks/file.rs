@@ -4,8 +4,8 @@
 //! [[webhook]]
 //! url = "https://pipeline.example/hooks/cager"
 //! secret = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw"   # of 24 to 64 bytes, base64; the receiver has the same
-//! # tenant = "studio-a"              # whose sessions are told of; without it, those of all
-//! # events = ["session.completed"]   # without it, session.failed as well
+//! # tenant = "studio-a"              # only sessions of this tenant; default: all
+//! # events = ["session.completed"]   # default: session.failed as well
 //! ```
 
 use super::Event;
@@ -22,7 +22,7 @@ use std::sync::atomic::AtomicBool;
 use tokio::sync::Semaphore;
 use toml::Spanned;
 
-/// Messages on their way to one receiver at a time.
+/// Concurrent messages to one receiver.
 const AT_A_TIME: usize = 4;
 const SECRET_PREFIX: &str = "whsec_";
 
@@ -54,18 +54,18 @@ struct Written {
     events: Option<Vec<Event>>,
 }
 
-/// One that is told.
+/// A receiver of messages.
 pub(super) struct Hook {
-    /// Stands for its address and tenant in notes.
+    /// Digest of address and tenant, which identifies it in notes.
     pub(super) id: String,
     pub(super) url: Url,
-    /// Its line in the file, which stands for it in the log: its address may be a secret.
+    /// Its line in the file, which identifies it in the log: the address may be a secret.
     pub(super) line: usize,
     pub(super) key: Key,
     tenant: Option<String>,
     events: Option<Vec<Event>>,
     pub(super) places: Semaphore,
-    /// It answered that it is there no more (410).
+    /// It responded 410 Gone.
     pub(super) gone: AtomicBool,
 }
 
@@ -80,7 +80,7 @@ pub(super) fn read(file: &Path) -> Result<Vec<Hook>, WebhooksError> {
     Ok(entries::read(file, parse)?)
 }
 
-/// Reads entries; errors have their place in the text.
+/// Parses entries; errors have their offset in the text.
 fn parse(text: &str) -> Result<Vec<Hook>, Wrong> {
     let document: Document = entries::document(text, "webhooks")?;
     let mut hooks: Vec<Hook> = Vec::with_capacity(document.webhook.len());
@@ -98,7 +98,7 @@ fn parse(text: &str) -> Result<Vec<Hook>, Wrong> {
 }
 
 fn hook(written: Written, line: usize) -> Result<Hook, Wrong> {
-    let url = crate::outgoing::address(written.url.as_ref()).map_err(|why| (written.url.span().start, why))?;
+    let url = crate::http_client::address(written.url.as_ref()).map_err(|why| (written.url.span().start, why))?;
     let secret = written.secret.as_ref().strip_prefix(SECRET_PREFIX).and_then(|text| BASE64_STANDARD.decode(text).ok());
     let secret = secret.filter(|secret| (24..=64).contains(&secret.len())).ok_or_else(|| {
         let why = "secret must be whsec_ and 24 to 64 bytes in base64: echo whsec_$(openssl rand -base64 32)";

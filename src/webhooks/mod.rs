@@ -1,15 +1,15 @@
-//! Tells others that a session was completed or failed, in the form of Standard Webhooks (standardwebhooks.com).
+//! Webhooks that report completed and failed sessions, in the form of Standard Webhooks (standardwebhooks.com).
 //!
-//! A message is a POST with the headers `webhook-id` (the same whenever it is sent again), `webhook-timestamp` and
-//! `webhook-signature`, and a JSON body. It counts as delivered with an answer of 2xx; otherwise it is sent again after growing pauses, for
-//! some three days. What is not delivered yet is kept with the session, so that it survives a restart: a message arrives at least once.
+//! A message is a POST with the headers `webhook-id` (the same for every attempt), `webhook-timestamp` and `webhook-signature`, and a JSON
+//! body. A response 2xx acknowledges it; otherwise it is sent again after increasing pauses, for about three days. Pending messages are
+//! stored with the session and survive a restart: delivery is at least once.
 
 mod deliver;
 mod file;
 
 pub use file::WebhooksError;
 
-use crate::outgoing::Client;
+use crate::http_client::Client;
 use crate::session::{Phase, Session};
 use crate::store::{Store, StoreError};
 use deliver::Message;
@@ -21,7 +21,7 @@ use std::time::{Duration, SystemTime};
 use tokio::runtime::Handle;
 use tokio_util::sync::CancellationToken;
 
-/// What is told.
+/// The events that are reported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum Event {
     /// A session was completed: its container is there.
@@ -32,20 +32,20 @@ pub(crate) enum Event {
     Failed,
 }
 
-/// What has to be told of a session, and to whom.
+/// A message about a session that has not been delivered to all receivers.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Due {
+pub(crate) struct PendingMessage {
     pub(crate) event: Event,
     /// When it happened, milliseconds since 1970.
     at_ms: u64,
-    /// Hooks that were not told yet, by what stands for their addresses.
+    /// Identifiers of the receivers that have not acknowledged it.
     left: Vec<String>,
 }
 
-/// Name of the note of a session that holds what is [`Due`].
+/// Name of the session note that stores [`PendingMessage`].
 const NOTE: &str = "announce";
 
-/// Who is told.
+/// The configured receivers.
 pub(crate) struct Webhooks {
     hooks: Vec<Arc<Hook>>,
     client: Client,
@@ -55,7 +55,7 @@ pub(crate) struct Webhooks {
 }
 
 impl Webhooks {
-    /// Reads the file; without one nobody is told. Within a tokio runtime, on which messages are sent until `stop`.
+    /// Reads the file; without one there are no receivers. Call within a tokio runtime, which sends the messages until `stop`.
     ///
     /// # Errors
     /// A file that cannot be read, or an entry that is wrong, with its line.
@@ -66,54 +66,54 @@ impl Webhooks {
         Ok(Arc::new(Self { hooks, client, store, runtime: Handle::current(), stop }))
     }
 
-    /// What there is to tell of a session that ends now, if somebody wants to know.
-    fn due(&self, session: &Session, event: Event) -> Option<Due> {
+    /// The message about a session that ends now; `None` if no receiver wants it.
+    fn due(&self, session: &Session, event: Event) -> Option<PendingMessage> {
         let wanted = |hook: &&Arc<Hook>| hook.wants(&session.meta.tenant, event);
         let left: Vec<String> = self.hooks.iter().filter(wanted).map(|hook| hook.id.clone()).collect();
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         let at_ms = now.as_millis().try_into().unwrap_or(u64::MAX);
-        (!left.is_empty()).then_some(Due { event, at_ms, left })
+        (!left.is_empty()).then_some(PendingMessage { event, at_ms, left })
     }
 
-    /// Keeps with a session what there is to tell of it; called before it ends, so that no crash comes between. Blocks.
+    /// Stores the message with the session, before the session ends, so that a crash cannot lose it. Blocks.
     ///
     /// # Errors
-    /// What the store says.
-    pub(crate) fn keep(&self, session: &Session, event: Event) -> Result<Option<Due>, StoreError> {
+    /// Storage errors.
+    pub(crate) fn keep(&self, session: &Session, event: Event) -> Result<Option<PendingMessage>, StoreError> {
         let due = self.due(session, event);
         due.as_ref().map_or(Ok(()), |due| self.store.put_note(&session.meta.id, NOTE, due))?;
         Ok(due)
     }
 
-    /// Tells what was kept with a session and did not arrive, if it has ended so. Blocks.
-    pub(crate) fn tell_left(&self, session: &Session) {
+    /// Sends the stored message of a session that has ended, if some receiver has not acknowledged it. Blocks.
+    pub(crate) fn resend_undelivered(&self, session: &Session) {
         if self.hooks.is_empty() {
             return;
         }
         let due = self.store.note(&session.meta.id, NOTE).unwrap_or_else(|error| {
-            tracing::warn!(session = %session.meta.id, %error, "who has to be told of this session cannot be read");
+            tracing::warn!(session = %session.meta.id, %error, "the pending webhook message of this session cannot be read");
             None
         });
-        let ended = |due: &Due| match due.event {
+        let ended = |due: &PendingMessage| match due.event {
             Event::Completed => matches!(session.status().phase, Phase::Completed(_)),
             Event::Failed => session.has_failed(),
         };
         if let Some(due) = due.filter(ended) {
-            // Its frames are told of as well; where they cannot be read, the log says why.
+            // The message contains frame counts; if the log cannot be read, that is logged.
             let _ = session.load();
             self.tell(session, due);
         }
     }
 
-    /// Tells that a session failed with whose files nothing can be kept, because they are damaged or the disk takes nothing.
-    pub(crate) fn tell_unkept(&self, session: &Session) {
+    /// Reports a failed session whose message cannot be stored, because its files are damaged or the disk refuses writes.
+    pub(crate) fn send_unrecorded(&self, session: &Session) {
         if let Some(due) = self.due(session, Event::Failed) {
             self.tell(session, due);
         }
     }
 
-    /// Tells of a session that has ended. Goes on in the background.
-    pub(crate) fn tell(&self, session: &Session, due: Due) {
+    /// Sends a message to its receivers, in the background.
+    pub(crate) fn tell(&self, session: &Session, due: PendingMessage) {
         let at = SystemTime::UNIX_EPOCH + Duration::from_millis(due.at_ms);
         let body = Body {
             kind: due.event,
@@ -123,7 +123,7 @@ impl Webhooks {
         let body: bytes::Bytes = match serde_json::to_vec(&body) {
             Ok(body) => body.into(),
             Err(error) => {
-                return tracing::error!(session = %session.meta.id, %error, "a webhook's message cannot be written");
+                return tracing::error!(session = %session.meta.id, %error, "a webhook message cannot be serialised");
             }
         };
         let told = |hook: &&Arc<Hook>| due.left.contains(&hook.id) && hook.wants(&session.meta.tenant, due.event);
@@ -138,7 +138,7 @@ impl Webhooks {
             };
             let (client, stop, deleted) = (self.client.clone(), self.stop.clone(), session.deleted().clone());
             self.runtime.spawn(async move {
-                // Of a session that was deleted nothing more is told.
+                // Deletion of the session ends delivery.
                 let delivered = deleted.run_until_cancelled(message.deliver(&hook, &client));
                 stop.run_until_cancelled(delivered).await
             });

@@ -1,9 +1,9 @@
-//! Moves of a cage that keep it enclosing and free of self-intersection.
+//! Constrained moves that keep a cage enclosing and free of self-intersection.
 //!
-//! Before each move, all pairs of features that are near each other are found: points of the model and faces, vertices and faces, edges
-//! and edges, and each face's corners and opposite edges. A wished move is first corrected until it keeps every pair, linearised, at its
-//! least distance. Then each vertex is held to a share of the distance of every pair that it belongs to, less than half where both sides
-//! move, so that no pair can meet: a cage that is valid before a move is valid after it.
+//! Before each move, all pairs of nearby features are collected: points of the model and faces, vertices and faces, edges and edges, and each face's
+//! corners and opposite edges. The desired move is first projected so that every pair, linearised, keeps its minimum distance. Then each vertex may
+//! move by at most a fraction of the distance of every pair that it belongs to, less than half where both sides move, so that no pair can meet: a
+//! cage that is valid before a move is valid after it.
 
 use super::symmetry::Symmetry;
 use crate::geometry::distance::{closest_on_segment, closest_on_segments, closest_on_triangle};
@@ -13,11 +13,11 @@ use cager_core::mesh::TriMesh;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Of the distance of a pair both of whose sides move, and of one to a point at rest, what each side may use up in one move.
+/// Fraction of a pair's distance that a vertex may move: where both sides move, and where one is a fixed point.
 const SHARE: f64 = 0.45;
-const SHARE_OF_REST: f64 = 0.9;
-/// Of its own distance, what a corner may use up that is not at the nearest point: then no point between it and one that is can meet the
-/// other feature either, since `0.9 + 0.4 t ≤ √(1 + t²)` for all t.
+const SHARE_OF_FIXED: f64 = 0.9;
+/// Fraction of its own distance that a corner not at the nearest point may move: no point between it and one at the nearest point can then meet the
+/// other feature, since `0.9 + 0.4 t ≤ √(1 + t²)` for all t.
 const SHARE_OF_FAR: f64 = 0.2;
 /// Sweeps of corrections.
 const SWEEPS: usize = 4;
@@ -27,11 +27,11 @@ const SWEEPS: usize = 4;
 pub(super) struct Distances {
     /// Between the model's points and faces.
     pub(super) clearance: f64,
-    /// Between parts of the cage; `None` where it may cut itself.
+    /// Between parts of the cage; `None` where self-intersection is allowed.
     pub(super) gap: Option<f64>,
 }
 
-/// What a cage must keep away from.
+/// What a cage must keep its distance from: the model's points and, if required, itself.
 pub(super) struct Obstacles {
     points: Vec<DVec3>,
     tree: Bvh,
@@ -53,7 +53,7 @@ struct Pair {
 }
 
 impl Obstacles {
-    /// Whether a collapse leaves the cage valid: its new faces cut no other one, and no point of the model passes to the other side.
+    /// Whether a collapse leaves the cage valid: its new faces intersect no other face, and no point of the model changes sides.
     pub(super) fn allow(&self, mesh: &TriMesh, old: &[[u32; 3]], new: &[[u32; 3]]) -> bool {
         let at = |t: [u32; 3]| t.map(|v| DVec3::from(mesh.vertices[v as usize]));
         let around = Aabb::around(old.iter().flat_map(|&t| at(t)));
@@ -81,13 +81,13 @@ impl Obstacles {
         Self { tree: Bvh::new(&boxes), points, distances, symmetry }
     }
 
-    /// The cage's vertices after a move that is as near to the wished one as the obstacles allow.
-    pub(super) fn moved(&self, cage: &Cage, wishes: &[DVec3]) -> Vec<DVec3> {
+    /// The vertices after the move nearest to the desired one that the obstacles allow.
+    pub(super) fn moved(&self, cage: &Cage, desired_moves: &[DVec3]) -> Vec<DVec3> {
         let x: Vec<DVec3> = cage.vertices().iter().map(|&v| v.into()).collect();
-        let longest = wishes.iter().map(|w| w.length()).fold(0.0, f64::max);
+        let longest = desired_moves.iter().map(|w| w.length()).fold(0.0, f64::max);
         let reach = (2.0 * longest).max(self.distances.gap.unwrap_or(0.0)).max(self.distances.clearance) / SHARE;
         let pairs = self.pairs(cage, &x, reach);
-        let mut moves = wishes.to_vec();
+        let mut moves = desired_moves.to_vec();
         for _ in 0..SWEEPS {
             for pair in &pairs {
                 pair.correct(&x, &mut moves);
@@ -98,7 +98,7 @@ impl Obstacles {
             let middle = pair.middle(&x);
             for k in 0..pair.used {
                 let v = pair.vertices[k] as usize;
-                // What takes no part in the nearest points is farther away, and may move by more.
+                // Vertices of zero weight at the nearest points are farther away and may move more.
                 let own = if pair.weights[k] == 0.0 {
                     SHARE_OF_FAR * (x[v].distance(middle) - 0.5 * pair.distance).max(pair.distance)
                 } else {
@@ -180,7 +180,7 @@ impl Obstacles {
             at_rest: normal.dot(p),
             distance,
             least: self.distances.clearance,
-            share: SHARE_OF_REST,
+            share: SHARE_OF_FIXED,
         })
     }
 }
@@ -229,7 +229,7 @@ impl Pair {
         nearest - 0.5 * self.distance * self.normal
     }
 
-    /// Changes moves as little as brings the pair to its least distance.
+    /// The smallest correction of the moves that restores the least distance of the pair.
     fn correct(&self, x: &[DVec3], moves: &mut [DVec3]) {
         let place = |k: usize| x[self.vertices[k] as usize] + moves[self.vertices[k] as usize];
         let distance: f64 = (0..4)

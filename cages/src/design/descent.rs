@@ -1,9 +1,9 @@
-//! Lowering what a cage leaves of a motion: its vertices move down the gradient of the least-squares error (variable projection),
-//! within what contacts allow, and idle vertices are exchanged for useful ones.
+//! Gradient descent of a cage's least-squares error over a motion (variable projection), constrained by contacts, with relocation of ineffective
+//! vertices.
 
 use super::adam::Adam;
 use super::contact::Obstacles;
-use super::exchange::{self, Exchange};
+use super::exchange::{self, Remeshing};
 use super::fit::{Fit, product};
 use super::samples::Samples;
 use super::{DesignOptions, Style};
@@ -17,13 +17,13 @@ use glam::DVec3;
 const RIDGE: f64 = 1e-4;
 /// Length of the longest steps, as a fraction of the diagonal.
 const STEP: f64 = 0.001;
-/// Points of one step, and of one exchange: what hangs on few vertices is seen by few points, and looks better served than it is.
+/// Points sampled for a step and for remeshing: with fewer, parts with few points appear better reproduced than they are.
 const STEP_POINTS: usize = 2_200;
-const EXCHANGE_POINTS: usize = 5_000;
-/// Share of the way to the middle of its neighbours that a vertex of a cage for editing goes in each of the longest steps.
+const REMESH_POINTS: usize = 5_000;
+/// Fraction of the way to the mean of its neighbours that each vertex of an editable cage moves in a step of full length.
 const FAIRING: f64 = 0.02;
 
-/// A cage on its way.
+/// A cage under optimisation.
 pub(super) struct Descent<'a> {
     pub(super) cage: Cage,
     samples: &'a Samples,
@@ -40,8 +40,8 @@ impl<'a> Descent<'a> {
         Self { cage, samples, obstacles, adam, random: fastrand::Rng::with_seed(options.seed), fairing }
     }
 
-    /// One step; `pace`, from 1 down to 0, is how long it is. A step that leaves no cage is not taken.
-    pub(super) fn step(&mut self, pace: f64) {
+    /// One step; its length is scaled by `step_scale`, from 1 down to 0. Discarded where the result is not a valid cage.
+    pub(super) fn step(&mut self, step_scale: f64) {
         let batch = self.samples.batch(STEP_POINTS, &mut self.random);
         let phi = MeanValue.smooth_coordinates(&self.cage, &batch.points);
         let Some(fit) = Fit::new(phi.as_ref(), batch.motion.as_ref(), RIDGE) else { return };
@@ -52,19 +52,19 @@ impl<'a> Descent<'a> {
         if gradient.iter().flatten().any(|g| !g.is_finite()) {
             return;
         }
-        let mut wishes = self.adam.step(&gradient, pace * STEP * self.samples.diagonal);
+        let mut desired_moves = self.adam.step(&gradient, step_scale * STEP * self.samples.diagonal);
         if self.fairing > 0.0 {
-            self.fair(&mut wishes, pace);
+            self.fair(&mut desired_moves, step_scale);
         }
         let mut mesh = self.cage.mesh().clone();
-        mesh.vertices = self.obstacles.moved(&self.cage, &wishes).into_iter().map(Into::into).collect();
+        mesh.vertices = self.obstacles.moved(&self.cage, &desired_moves).into_iter().map(Into::into).collect();
         if let Ok(moved) = Cage::new(mesh) {
             self.cage = moved;
         }
     }
 
-    /// Draws every vertex towards the middle of its neighbours.
-    fn fair(&self, wishes: &mut [DVec3], pace: f64) {
+    /// Adds to every move a step towards the mean of the neighbours.
+    fn fair(&self, desired_moves: &mut [DVec3], step_scale: f64) {
         let x = self.cage.vertices();
         let mut sums = vec![(DVec3::ZERO, 0.0); x.len()];
         for edge in self.cage.edges() {
@@ -74,17 +74,17 @@ impl<'a> Descent<'a> {
                 sums[v].1 += 1.0;
             }
         }
-        for ((wish, (sum, count)), &x) in wishes.iter_mut().zip(sums).zip(x) {
-            *wish += (sum / count - DVec3::from(x)) * (pace * self.fairing);
+        for ((desired_move, (sum, count)), &x) in desired_moves.iter_mut().zip(sums).zip(x) {
+            *desired_move += (sum / count - DVec3::from(x)) * (step_scale * self.fairing);
         }
     }
 
     /// Exchanges up to a share of the vertices, and grows or shrinks the cage towards `goal` vertices by up to as many.
     pub(super) fn exchange(&mut self, share: f64, goal: usize) {
-        let batch = self.samples.batch(EXCHANGE_POINTS, &mut self.random);
+        let batch = self.samples.batch(REMESH_POINTS, &mut self.random);
         let phi = MeanValue.smooth_coordinates(&self.cage, &batch.points);
         let Some(fit) = Fit::new(phi.as_ref(), batch.motion.as_ref(), RIDGE) else { return };
-        let Exchange { mesh, kept } =
+        let Remeshing { mesh, kept } =
             exchange::exchange(&self.cage, &batch.points, &phi, &fit, self.obstacles, share, goal);
         if let Ok(cage) = Cage::new(mesh) {
             self.cage = cage;

@@ -1,5 +1,4 @@
-//! Where a cage's vertices serve the motion best: splits of edges that would lower the error most, and vertices whose loss would raise
-//! it least.
+//! Adaptive remeshing of a cage: splits the edges that lower the error most and removes the vertices whose loss raises it least.
 
 use super::contact::Obstacles;
 use super::fit::{Fit, solve, transposed_product};
@@ -10,10 +9,10 @@ use cager_core::mesh::{Point, TriMesh};
 use faer::Mat;
 use glam::DVec3;
 
-/// A cage whose vertices lie elsewhere.
-pub(super) struct Exchange {
+/// A remeshed cage.
+pub(super) struct Remeshing {
     pub(super) mesh: TriMesh,
-    /// Which vertex each was before; those beyond the old ones are new.
+    /// Previous index of each vertex; indices out of range are new vertices.
     pub(super) kept: Vec<u32>,
 }
 
@@ -27,7 +26,7 @@ pub(super) fn exchange(
     obstacles: &Obstacles,
     share: f64,
     goal: usize,
-) -> Exchange {
+) -> Remeshing {
     let mesh = cage.mesh();
     let m = mesh.vertices.len();
     let most = ((share * m as f64) as usize).max(1);
@@ -56,7 +55,7 @@ pub(super) fn exchange(
     let mut current = mesh.clone();
     let mut merged: Vec<(u32, u32)> = Vec::new();
     for v in order {
-        // The split that this merger would pay for.
+        // The split that this removal makes room for.
         let pays_for = splits.get((grow + merged.len()).saturating_sub(shrink));
         let pays = merged.len() < shrink || pays_for.is_some_and(|&e| gains[e] > costs[v]);
         if merged.len() >= most.max(shrink.min(m / 4)) || !pays {
@@ -83,7 +82,7 @@ pub(super) fn exchange(
         topology::split(&mut mesh, cage.edges()[e].vertices);
     }
     let (mesh, kept) = topology::merged(&mesh, &merged);
-    Exchange { mesh, kept }
+    Remeshing { mesh, kept }
 }
 
 /// For every edge of the cage, by how much a vertex at its middle would lower `‖X − Φ C‖²`.

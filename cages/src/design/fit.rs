@@ -1,4 +1,4 @@
-//! Least squares over all sampled points: the cages that reproduce a motion best, and what they leave.
+//! Least-squares cages of a sampled motion, and their residuals.
 
 use faer::linalg::matmul::{matmul, triangular};
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
@@ -14,7 +14,7 @@ const BLOCKS: usize = 4;
 pub(super) struct Fit {
     /// Cages `C`, m × c.
     pub(super) cages: Mat<f64>,
-    /// What they leave, `X − Φ C`, n × c.
+    /// Residual `X − Φ C`, n × c.
     pub(super) residual: Mat<f64>,
     /// Lower Cholesky factor of `ΦᵀΦ + ρ`, m × m.
     pub(super) factor: Mat<f64>,

@@ -12,7 +12,7 @@ mod symmetry;
 mod topology;
 
 use self::contact::{Distances, Obstacles};
-use self::run::{Best, Faults, Run};
+use self::run::{Best, Defects, Run};
 use self::samples::Samples;
 use self::symmetry::Symmetry;
 use crate::geometry::outside;
@@ -55,11 +55,11 @@ pub struct DesignOptions {
     pub goal: Goal,
     /// Free or editable.
     pub style: Style,
-    /// Seed of what is drawn at random: the same seed gives the same bits, unless the time limit cuts in.
+    /// Random seed: the same seed gives the same result, unless the time limit ends the design.
     pub seed: u64,
     /// The design ends with the best cage so far when this has passed.
     pub time_limit: Option<Duration>,
-    /// Keep the connectivity of the cage to start with, so that only its vertices move; the goal is then not looked at.
+    /// Keep the connectivity of the cage to start with, so that only its vertices move; the goal is then ignored.
     pub keep_connectivity: bool,
     /// Keep the cage to start with symmetric across the plane of this axis (0, 1, 2 for x, y, z), and so its connectivity too.
     pub symmetry: Option<usize>,
@@ -78,7 +78,7 @@ impl Default for DesignOptions {
     }
 }
 
-/// Where a design has got to.
+/// Progress of a design.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress<'a> {
     /// What is being done, in a few words.
@@ -91,7 +91,7 @@ pub struct Progress<'a> {
     pub better: Option<&'a TriMesh>,
 }
 
-/// What one stage of a design brought.
+/// Result of one stage of a design.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stage {
     /// What was done.
@@ -150,7 +150,7 @@ pub enum DesignError {
     /// No frames.
     #[error("a cage cannot be designed from no frames; give some, or make one from the rest pose alone")]
     NoFrames,
-    /// The watcher said stop before there was a cage.
+    /// Cancelled before there was a cage.
     #[error("the design was stopped before it had a cage")]
     Stopped,
     /// The mesh to start with is not a usable cage.
@@ -180,8 +180,8 @@ pub enum DesignError {
 }
 
 /// Designs a cage from a rest pose and frames of its motion, each with the points of the rest pose back to back: some of the frames
-/// (every second one) are held back to judge by. `start`, where given, is the cage to begin with. `watch` is told how it goes at least
-/// every second and may end it; the best cage so far is then the result. Runs on the current rayon pool.
+/// (every second one) are held back to judge by. `start`, where given, is the cage to begin with. `watch` is called with the progress at least once a
+/// second; it may end the design, whose result is then the best cage so far. Runs on the current rayon pool.
 ///
 /// # Errors
 /// See [`DesignError`].
@@ -227,14 +227,23 @@ pub fn design(
     let cage = Cage::new(mesh)?;
     let samples = Samples::new(rest, frames, &mut fastrand::Rng::with_seed(options.seed));
     let obstacles = obstacles(rest, &cage, options.style, symmetry);
-    let faults = Faults::of(cage.mesh(), &rest.points);
-    let best = Best { mesh: cage.mesh().clone(), judged: samples.judge(&cage) };
-    let run =
-        Run { rest, samples: &samples, obstacles: &obstacles, options, clock, watch, best, faults, stages: Vec::new() };
-    Ok(run.go(cage, frames))
+    let defects = Defects::of(cage.mesh(), &rest.points);
+    let best = Best { mesh: cage.mesh().clone(), evaluation: samples.evaluate(&cage) };
+    let run = Run {
+        rest,
+        samples: &samples,
+        obstacles: &obstacles,
+        options,
+        clock,
+        watch,
+        best,
+        defects,
+        stages: Vec::new(),
+    };
+    Ok(run.optimise(cage, frames))
 }
 
-/// What the cage has to keep clear of: the points inside it, and for editing itself.
+/// The obstacles: the points inside the cage and, for editable cages, the cage itself.
 fn obstacles(rest: &Model, cage: &Cage, style: Style, symmetry: Option<Symmetry>) -> Obstacles {
     let diagonal = diagonal(&rest.points);
     let mut is_outside = vec![false; rest.points.len()];

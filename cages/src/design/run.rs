@@ -1,8 +1,8 @@
-//! A design from its first cage to its last: steps, exchanges, what is judged and kept.
+//! The optimisation loop of a design: steps, remeshing, evaluation, and the best cage so far.
 
 use super::contact::Obstacles;
 use super::descent::Descent;
-use super::samples::{Judged, Samples};
+use super::samples::{Evaluation, Samples};
 use super::{Design, DesignOptions, Goal, Progress, Stage, Style};
 use crate::geometry::{outside, self_intersections};
 use cager_core::cage::Cage;
@@ -14,37 +14,37 @@ use std::time::Instant;
 /// Steps of a design with a given number of vertices.
 const STEPS: usize = 190;
 /// Vertices are exchanged after so many steps each, up to this share of them at a time, until this share of the steps is done.
-const EXCHANGE_EVERY: usize = 10;
-const EXCHANGED: f64 = 0.08;
-const EXCHANGE_UNTIL: f64 = 0.7;
-/// The cage is judged after so many steps each, and what was gained is noted this often.
-const JUDGE_EVERY: usize = 30;
+const REMESH_EVERY: usize = 10;
+const REMESH_SHARE: f64 = 0.08;
+const REMESH_UNTIL: f64 = 0.7;
+/// Steps between two evaluations of the cage, and between two records of the improvement.
+const EVALUATE_EVERY: usize = 30;
 const NOTE_EVERY: usize = 60;
 
-/// An error, as a fraction of the diagonal, that no cage of a model that holds together leaves.
+/// Errors above this, as a fraction of the diagonal, suggest that the frames do not deform the rest pose coherently.
 const NOT_FOLLOWED: f64 = 0.03;
 
 /// The best cage so far.
 #[derive(Clone)]
 pub(super) struct Best {
     pub(super) mesh: TriMesh,
-    pub(super) judged: Judged,
+    pub(super) evaluation: Evaluation,
 }
 
-/// What a cage for editing should not have.
+/// Defects that an editable cage should not have.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Faults {
+pub(super) struct Defects {
     outside: usize,
     cuts: usize,
 }
 
-impl Faults {
+impl Defects {
     pub(super) fn of(mesh: &TriMesh, points: &[Point]) -> Self {
         Self { outside: outside(mesh, points).len(), cuts: self_intersections(mesh).len() }
     }
 }
 
-/// A design on its way.
+/// A running design.
 pub(super) struct Run<'a> {
     pub(super) rest: &'a Model,
     pub(super) samples: &'a Samples,
@@ -53,52 +53,52 @@ pub(super) struct Run<'a> {
     pub(super) clock: Instant,
     pub(super) watch: &'a mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
     pub(super) best: Best,
-    /// What the first cage had wrong; a later one has no more of it.
-    pub(super) faults: Faults,
+    /// Defects of the initial cage; later ones must not have more.
+    pub(super) defects: Defects,
     pub(super) stages: Vec<Stage>,
 }
 
-/// Some steps with a number of vertices in view.
-pub(super) struct Leg {
+/// A sequence of steps with a target number of vertices.
+pub(super) struct Phase {
     pub(super) stage: &'static str,
     pub(super) steps: usize,
     pub(super) goal: usize,
-    /// Part of the whole design that it is, from and to.
+    /// The interval of the overall progress that it covers.
     pub(super) fraction: [f64; 2],
 }
 
 impl Run<'_> {
-    pub(super) fn go(mut self, cage: Cage, frames: &[Vec<f64>]) -> Design {
+    pub(super) fn optimise(mut self, cage: Cage, frames: &[Vec<f64>]) -> Design {
         let mut descent = Descent::new(cage, self.samples, self.obstacles, self.options);
         let mut warnings = Vec::new();
-        let judged = self.best.judged;
-        self.note("start", &descent.cage, judged);
+        let evaluation = self.best.evaluation;
+        self.note("start", &descent.cage, evaluation);
         let begun = Progress {
             stage: "moving the vertices",
             fraction: 0.0,
-            error: Some(judged.held_back),
+            error: Some(evaluation.held_back),
             better: Some(descent.cage.mesh()),
         };
         let ended = match (self.watch)(begun) {
             ControlFlow::Break(()) => ControlFlow::Break(()),
             ControlFlow::Continue(()) => self.descend(&mut descent, frames, &mut warnings),
         };
-        if self.options.style == Style::Editable && self.faults.outside > 0 {
+        if self.options.style == Style::Editable && self.defects.outside > 0 {
             warnings.push(format!(
                 "{} points lie outside the cage that the design began with, and stayed there; repair it first to have all inside",
-                self.faults.outside
+                self.defects.outside
             ));
         }
-        if self.best.judged.held_back > NOT_FOLLOWED {
+        if self.best.evaluation.held_back > NOT_FOLLOWED {
             warnings.push(format!(
                 "even the best cage found leaves an error of {:.1} % of the diagonal: the frames tear the model apart, or are not of this rest pose",
-                100.0 * self.best.judged.held_back
+                100.0 * self.best.evaluation.held_back
             ));
         }
         let timed_out = ended.is_break() && self.is_late();
-        let Best { mesh, judged } = self.best;
+        let Best { mesh, evaluation } = self.best;
         if let Ok(cage) = Cage::new(mesh.clone()) {
-            self.stages.push(stage("the best", &cage, judged, self.samples, self.clock));
+            self.stages.push(stage("the best", &cage, evaluation, self.samples, self.clock));
         }
         Design { cage: mesh, stages: self.stages, timed_out, warnings }
     }
@@ -114,39 +114,40 @@ impl Run<'_> {
             Goal::Vertices(goal) => goal,
             Goal::MeanError(error) => return self.search(descent, frames, error, warnings),
         };
-        self.leg(descent, &Leg { stage: "moving the vertices", steps: STEPS, goal, fraction: [0.0, 1.0] })
+        self.phase(descent, &Phase { stage: "moving the vertices", steps: STEPS, goal, fraction: [0.0, 1.0] })
     }
 
-    /// Takes the steps of a leg; breaks off where the watcher or the time limit says so.
-    pub(super) fn leg(&mut self, descent: &mut Descent<'_>, leg: &Leg) -> ControlFlow<()> {
-        let share = if self.keeps_connectivity() { 0.0 } else { EXCHANGED };
-        let exchanges = (EXCHANGE_UNTIL * leg.steps as f64) as usize;
-        for step in 0..leg.steps {
-            if share > 0.0 && step % EXCHANGE_EVERY == 0 && step <= exchanges {
-                descent.exchange(share, leg.goal);
+    /// Runs a sequence of steps; ends early on request of `watch` or by the time limit.
+    pub(super) fn phase(&mut self, descent: &mut Descent<'_>, phase: &Phase) -> ControlFlow<()> {
+        let share = if self.keeps_connectivity() { 0.0 } else { REMESH_SHARE };
+        let exchanges = (REMESH_UNTIL * phase.steps as f64) as usize;
+        for step in 0..phase.steps {
+            if share > 0.0 && step % REMESH_EVERY == 0 && step <= exchanges {
+                descent.exchange(share, phase.goal);
             }
-            descent.step(0.5 * (1.0 + (PI * step as f64 / leg.steps as f64).cos()) + 0.02);
+            descent.step(0.5 * (1.0 + (PI * step as f64 / phase.steps as f64).cos()) + 0.02);
             let done = step + 1;
             let mut better = None;
-            if done % JUDGE_EVERY == 0 || done == leg.steps {
-                let judged = self.samples.judge(&descent.cage);
+            if done % EVALUATE_EVERY == 0 || done == phase.steps {
+                let evaluation = self.samples.evaluate(&descent.cage);
                 // A smaller cage than asked for may do; a larger one may not.
-                if descent.cage.vertices().len() <= leg.goal && self.keep(&descent.cage, judged) {
+                if descent.cage.vertices().len() <= phase.goal && self.keep(&descent.cage, evaluation) {
                     better = Some(descent.cage.mesh());
                 }
                 if done % NOTE_EVERY == 0 {
-                    self.note(&format!("{done} steps"), &descent.cage, judged);
+                    self.note(&format!("{done} steps"), &descent.cage, evaluation);
                 }
             }
-            let fraction = leg.fraction[0] + (leg.fraction[1] - leg.fraction[0]) * done as f64 / leg.steps as f64;
+            let fraction =
+                phase.fraction[0] + (phase.fraction[1] - phase.fraction[0]) * done as f64 / phase.steps as f64;
             let late = self.is_late();
-            if late && better.is_none() && descent.cage.vertices().len() <= leg.goal {
-                // What was gained since the last look counts too.
-                let judged = self.samples.judge(&descent.cage);
-                self.keep(&descent.cage, judged);
+            if late && better.is_none() && descent.cage.vertices().len() <= phase.goal {
+                // Include the progress since the last evaluation.
+                let evaluation = self.samples.evaluate(&descent.cage);
+                self.keep(&descent.cage, evaluation);
             }
-            let error = Some(self.best.judged.held_back).filter(|error| error.is_finite());
-            (self.watch)(Progress { stage: leg.stage, fraction, error, better })?;
+            let error = Some(self.best.evaluation.held_back).filter(|error| error.is_finite());
+            (self.watch)(Progress { stage: phase.stage, fraction, error, better })?;
             if late {
                 return ControlFlow::Break(());
             }
@@ -154,7 +155,7 @@ impl Run<'_> {
         ControlFlow::Continue(())
     }
 
-    /// A symmetry is one of the vertices that are there.
+    /// Symmetry is a relation between the given vertices, so that it fixes the connectivity as well.
     fn keeps_connectivity(&self) -> bool {
         self.options.keep_connectivity || self.options.symmetry.is_some()
     }
@@ -164,33 +165,33 @@ impl Run<'_> {
     }
 
     /// Keeps a cage that is better than the best so far.
-    fn keep(&mut self, cage: &Cage, judged: Judged) -> bool {
-        let better = judged.held_back < self.best.judged.held_back && self.is_sound(cage);
+    fn keep(&mut self, cage: &Cage, evaluation: Evaluation) -> bool {
+        let better = evaluation.held_back < self.best.evaluation.held_back && self.has_no_new_defects(cage);
         if better {
-            self.best = Best { mesh: cage.mesh().clone(), judged };
+            self.best = Best { mesh: cage.mesh().clone(), evaluation };
         }
         better
     }
 
-    /// Whether a cage for editing is as valid as the first. Moves and exchanges keep it so; this is the proof.
-    fn is_sound(&self, cage: &Cage) -> bool {
+    /// Whether an editable cage has no more defects than the initial one. Moves and remeshing preserve this; it is verified nevertheless.
+    fn has_no_new_defects(&self, cage: &Cage) -> bool {
         self.options.style == Style::Free || {
-            let Faults { outside, cuts } = Faults::of(cage.mesh(), &self.rest.points);
-            outside <= self.faults.outside && cuts <= self.faults.cuts
+            let Defects { outside, cuts } = Defects::of(cage.mesh(), &self.rest.points);
+            outside <= self.defects.outside && cuts <= self.defects.cuts
         }
     }
 
-    fn note(&mut self, name: &str, cage: &Cage, judged: Judged) {
-        self.stages.push(stage(name, cage, judged, self.samples, self.clock));
+    fn note(&mut self, name: &str, cage: &Cage, evaluation: Evaluation) {
+        self.stages.push(stage(name, cage, evaluation, self.samples, self.clock));
     }
 }
 
-fn stage(name: &str, cage: &Cage, judged: Judged, samples: &Samples, clock: Instant) -> Stage {
+fn stage(name: &str, cage: &Cage, evaluation: Evaluation, samples: &Samples, clock: Instant) -> Stage {
     Stage {
         name: name.to_owned(),
         vertices: cage.vertices().len(),
-        designed: judged.designed,
-        held_back: judged.held_back,
+        designed: evaluation.designed,
+        held_back: evaluation.held_back,
         condition_number: samples.condition_number(cage),
         seconds: clock.elapsed().as_secs_f64(),
     }

@@ -1,5 +1,4 @@
-//! The motion that a cage is designed for: some points of the model and what is not affine in their motion, apart from what is held
-//! back to judge by.
+//! Training and validation data of a design: sampled points with the non-affine part of their motion, and points and frames held back for evaluation.
 
 use super::fit::{Fit, gram, product};
 use cager_core::cage::Cage;
@@ -7,26 +6,26 @@ use cager_core::coordinates::MeanValue;
 use cager_core::mesh::{Model, Point, diagonal};
 use faer::{Accum, Mat};
 
-/// Points of a model at most looked at.
+/// Maximum number of points sampled from a model.
 const MOST_POINTS: usize = 20_000;
-/// Columns that the motion is kept in: as many principal directions of its frames' coordinates.
+/// Number of principal components that the motion is reduced to.
 const COLUMNS: usize = 96;
-/// Points and frames that a cage is judged by.
-const JUDGED_POINTS: usize = 8_000;
-const JUDGED_FRAMES: usize = 40;
-/// Vertices of a cage whose condition number is not looked at any more.
+/// Numbers of points and frames on which a cage is evaluated.
+const VALIDATION_POINTS: usize = 8_000;
+const VALIDATION_FRAMES: usize = 40;
+/// Number of vertices above which the condition number is not computed.
 const LARGE: usize = 1_000;
 
 /// Points and their motion.
 pub(super) struct Samples {
     /// Rest positions, n.
     points: Vec<Point>,
-    /// Motion that the design sees, n × c: every frame less its best affine image of the rest pose, which coordinates reproduce anyway, in
-    /// the principal directions of all of them. A fit to these leaves the same sum of squares as one to the frames, up to what they leave out.
+    /// Training motion, n × c: every frame minus its best affine image of the rest pose, which coordinates reproduce exactly, projected to the
+    /// principal components of all frames. A fit to these has the same sum of squared residuals as one to the frames, up to the truncation.
     designed: Mat<f64>,
-    /// Points to judge by, and what they do in frames that the design sees and, from a column on, in those that it does not.
-    judged: Vec<Point>,
-    judged_motion: Mat<f64>,
+    /// Validation points and their motion: in training frames and, from column `held_back_from` on, in held-back frames.
+    validation_points: Vec<Point>,
+    validation_motion: Mat<f64>,
     held_back_from: usize,
     /// Diagonal of the rest pose.
     pub(super) diagonal: f64,
@@ -41,13 +40,13 @@ pub(super) struct Batch {
 
 /// Least-squares errors of a cage over points and frames, as fractions of the diagonal.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Judged {
+pub(super) struct Evaluation {
     pub(super) designed: f64,
     pub(super) held_back: f64,
 }
 
 impl Samples {
-    /// Takes frames in turns for the design and held back; a single one counts as both.
+    /// Alternates frames between training and validation; a single frame serves as both.
     pub(super) fn new(rest: &Model, frames: &[Vec<f64>], random: &mut fastrand::Rng) -> Self {
         let every = |first: usize| -> Vec<&[f64]> { frames.iter().skip(first).step_by(2).map(Vec::as_slice).collect() };
         let (designed, mut held_back) = (every(0), every(1));
@@ -59,14 +58,14 @@ impl Samples {
             indices.sort_unstable();
             indices
         };
-        let (used, judged) = (some(MOST_POINTS), some(JUDGED_POINTS));
-        let (seen, unseen) = (evenly(&designed, JUDGED_FRAMES), evenly(&held_back, JUDGED_FRAMES));
+        let (used, validation_points) = (some(MOST_POINTS), some(VALIDATION_POINTS));
+        let (seen, unseen) = (evenly(&designed, VALIDATION_FRAMES), evenly(&held_back, VALIDATION_FRAMES));
         let at = |indices: &[usize]| -> Vec<Point> { indices.iter().map(|&i| rest.points[i]).collect() };
         Self {
             points: at(&used),
             designed: principal(&without_affine(&rest.points, &used, &designed)),
-            judged: at(&judged),
-            judged_motion: without_affine(&rest.points, &judged, &[seen.as_slice(), &unseen].concat()),
+            validation_points: at(&validation_points),
+            validation_motion: without_affine(&rest.points, &validation_points, &[seen.as_slice(), &unseen].concat()),
             held_back_from: 3 * seen.len(),
             diagonal: diagonal(&rest.points),
         }
@@ -81,27 +80,27 @@ impl Samples {
     }
 
     /// Root mean square errors of a cage, as fractions of the diagonal; infinite where it has none.
-    pub(super) fn judge(&self, cage: &Cage) -> Judged {
-        let phi = MeanValue.smooth_coordinates(cage, &self.judged);
-        let fit = Fit::new(phi.as_ref(), self.judged_motion.as_ref(), 1e-6);
+    pub(super) fn evaluate(&self, cage: &Cage) -> Evaluation {
+        let phi = MeanValue.smooth_coordinates(cage, &self.validation_points);
+        let fit = Fit::new(phi.as_ref(), self.validation_motion.as_ref(), 1e-6);
         let error = |first: usize, last: usize| {
             let Some(fit) = &fit else { return f64::INFINITY };
             let left = fit.residual.as_ref().subcols(first, last - first);
             (left.squared_norm_l2() / (left.nrows() * left.ncols()) as f64 * 3.0).sqrt() / self.diagonal
         };
-        Judged {
+        Evaluation {
             designed: error(0, self.held_back_from),
-            held_back: error(self.held_back_from, self.judged_motion.ncols()),
+            held_back: error(self.held_back_from, self.validation_motion.ncols()),
         }
     }
 
-    /// Condition number of the coordinates of the points to judge by; infinite where they have none, or where it takes longer to find out
-    /// than it is worth.
+    /// Condition number of the coordinates of the validation points; infinite where it is not defined, and for large cages, where it would take too
+    /// long.
     pub(super) fn condition_number(&self, cage: &Cage) -> f64 {
         if cage.vertices().len() > LARGE {
             return f64::INFINITY;
         }
-        let phi = MeanValue.smooth_coordinates(cage, &self.judged);
+        let phi = MeanValue.smooth_coordinates(cage, &self.validation_points);
         match gram(phi.as_ref()).self_adjoint_eigenvalues(faer::Side::Lower) {
             Ok(values) if values[0] > 0.0 => (values[values.len() - 1] / values[0]).sqrt(),
             _ => f64::INFINITY,

@@ -1,9 +1,9 @@
-//! The smallest cage that meets an error: its number of vertices follows from how the error falls with it.
+//! Search for the smallest cage within an error bound, by extrapolating how the error falls with the number of vertices.
 
 use super::MOST_VERTICES;
 use super::descent::Descent;
-use super::run::{Best, Leg, Run};
-use super::samples::{Judged, evenly};
+use super::run::{Best, Phase, Run};
+use super::samples::{Evaluation, evenly};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_core::inversion::{BATCH, Solver, SolverOptions};
@@ -43,12 +43,13 @@ impl Run<'_> {
         let mut ended = ControlFlow::Continue(());
         for round in 0..ROUNDS {
             let fraction = [round as f64 / ROUNDS as f64, (round + 1) as f64 / ROUNDS as f64];
-            // What an earlier leg reached with another number of vertices does not count.
-            let judged = Judged { designed: f64::INFINITY, held_back: f64::INFINITY };
-            self.best = Best { mesh: descent.cage.mesh().clone(), judged };
-            ended = self.leg(descent, &Leg { stage: "searching the smallest cage", steps: STEPS, goal, fraction });
-            if !self.best.judged.held_back.is_finite() {
-                self.best = Best { mesh: descent.cage.mesh().clone(), judged: self.samples.judge(&descent.cage) };
+            // Results with another number of vertices do not count.
+            let evaluation = Evaluation { designed: f64::INFINITY, held_back: f64::INFINITY };
+            self.best = Best { mesh: descent.cage.mesh().clone(), evaluation };
+            ended = self.phase(descent, &Phase { stage: "searching the smallest cage", steps: STEPS, goal, fraction });
+            if !self.best.evaluation.held_back.is_finite() {
+                self.best =
+                    Best { mesh: descent.cage.mesh().clone(), evaluation: self.samples.evaluate(&descent.cage) };
             }
             let best = self.best.clone();
             let found = self.encoded_error(&best, frames);
@@ -89,14 +90,14 @@ impl Run<'_> {
     /// cage.
     fn encoded_error(&self, best: &Best, frames: &[Vec<f64>]) -> f64 {
         let Ok(cage) = Cage::new(best.mesh.clone()) else { return f64::INFINITY };
-        let options = SolverOptions::usual(cage.vertices().len());
+        let options = SolverOptions::for_unknowns(cage.vertices().len());
         let Ok(solver) = Solver::prepare(&MeanValue, &cage, &self.rest.points, options) else { return f64::INFINITY };
         let held_back: Vec<&[f64]> =
             frames.iter().skip(usize::from(frames.len() > 1)).step_by(2).map(Vec::as_slice).collect();
         let mut errors = Vec::new();
         for frames in evenly(&held_back, FRAMES).chunks(BATCH) {
             let cages: Vec<Vec<f32>> =
-                solver.invert_reporting(None, frames).into_iter().map(|found| found.cage).collect();
+                solver.invert_with_convergence(None, frames).into_iter().map(|found| found.cage).collect();
             let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
             errors.extend(solver.decoder().measure(&views, frames));
         }

@@ -38,7 +38,7 @@ impl Symmetry {
         }
     }
 
-    /// Makes moves mirror each other, and what limits them.
+    /// Symmetrises the moves and their limits.
     pub(super) fn apply(&self, moves: &mut [DVec3], most: &mut [f64]) {
         for v in 0..moves.len() {
             let w = self.mirror[v] as usize;

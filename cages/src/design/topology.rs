@@ -84,7 +84,7 @@ pub(super) struct Collapse {
     pub(super) old: Vec<[u32; 3]>,
     /// Faces in their place.
     pub(super) new: Vec<[u32; 3]>,
-    /// How well shaped and how little turned the worst of the new faces is, at most 1.3.
+    /// Quality of the worst new face, from its shape and the rotation of its normal; at most 1.3.
     quality: f64,
 }
 

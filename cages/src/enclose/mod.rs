@@ -13,10 +13,10 @@ use cager_core::mesh::{Model, TriMesh};
 use fair::fair;
 use glam::DVec3;
 use offset::offset_surface;
-use patch::Contents;
+use patch::EnclosedPoints;
 use rayon::prelude::*;
 use simplify::Simplifier;
-use source::Source;
+use source::NormalizedModel;
 
 /// How a cage is made around a model.
 #[derive(Clone, Debug, PartialEq)]
@@ -73,7 +73,7 @@ pub enum EncloseError {
 pub fn enclose(model: &Model, options: &EncloseOptions) -> Result<TriMesh, EncloseError> {
     let clearance = options.clearance.filter(|c| c.is_finite()).unwrap_or(0.0).clamp(0.0, LARGEST_CLEARANCE);
     let mut offset = first_offset(options.vertices).max(2.0 * clearance);
-    let source = Source::new(model, offset)?;
+    let source = NormalizedModel::new(model, offset)?;
     if options.vertices < LEAST {
         return Err(EncloseError::TooFewVertices { vertices: options.vertices, least: LEAST });
     }
@@ -92,17 +92,17 @@ pub fn enclose(model: &Model, options: &EncloseOptions) -> Result<TriMesh, Enclo
 /// Vertices of the least closed surface.
 const LEAST: usize = 4;
 
-/// A larger offset is tried at once where there would be fewer vertices for each part, or for every second handle.
+/// Minimum number of vertices per component, or per topological handle; with fewer, a larger offset is tried at once.
 const VERTICES_PER_PART: usize = 6;
 
-/// An offset, as a fraction of the diagonal, at which every model is a blob.
+/// Largest offset tried, as a fraction of the diagonal.
 const LARGEST_OFFSET: f64 = 1.0;
 
 /// Larger clearances are taken as this, a fraction of the diagonal.
 const LARGEST_CLEARANCE: f64 = 10.0;
 
 /// Clearance kept where none is asked for, as a fraction of the offset.
-const USUAL_CLEARANCE: f64 = 0.2;
+const DEFAULT_CLEARANCE: f64 = 0.2;
 
 /// A small offset keeps limbs apart; a large one lets few vertices enclose. 1.2 % of the diagonal suits 350 vertices.
 fn first_offset(vertices: usize) -> f64 {
@@ -110,7 +110,12 @@ fn first_offset(vertices: usize) -> f64 {
 }
 
 /// A valid cage at one offset, or how many vertices were left.
-fn enclose_at(source: &Source, offset: f64, clearance: f64, options: &EncloseOptions) -> Result<TriMesh, usize> {
+fn enclose_at(
+    source: &NormalizedModel,
+    offset: f64,
+    clearance: f64,
+    options: &EncloseOptions,
+) -> Result<TriMesh, usize> {
     let most_parts = options.vertices / if options.per_part { LEAST } else { VERTICES_PER_PART };
     let surface = offset_surface(source, offset, options.per_part, most_parts.max(1));
     let (positions, faces) = surface.ok_or(usize::MAX)?;
@@ -119,20 +124,25 @@ fn enclose_at(source: &Source, offset: f64, clearance: f64, options: &EncloseOpt
     if handles * VERTICES_PER_PART > options.vertices {
         return Err(usize::MAX);
     }
-    let kept = clearance.max(USUAL_CLEARANCE * offset) + source.thinned;
-    let contents = Contents::new(source.samples.clone(), kept);
-    let mut simplifier = Simplifier::new(positions, faces, &contents);
+    let kept = clearance.max(DEFAULT_CLEARANCE * offset) + source.sampling_radius;
+    let enclosed = EnclosedPoints::new(source.samples.clone(), kept);
+    let mut simplifier = Simplifier::new(positions, faces, &enclosed);
     if !simplifier.simplify(options.vertices) {
         return Err(simplifier.len());
     }
-    fair(&mut simplifier.mesh, &simplifier.quadrics, &contents);
+    fair(&mut simplifier.mesh, &simplifier.quadrics, &enclosed);
     let (used, triangles) = simplifier.mesh.compacted();
     let positions: Vec<DVec3> = used.iter().map(|&v| simplifier.mesh.positions[v as usize]).collect();
     verified(source, &positions, triangles, clearance).ok_or(usize::MAX)
 }
 
 /// The cage in the model's frame of reference, if it is valid there.
-fn verified(source: &Source, positions: &[DVec3], triangles: Vec<[u32; 3]>, clearance: f64) -> Option<TriMesh> {
+fn verified(
+    source: &NormalizedModel,
+    positions: &[DVec3],
+    triangles: Vec<[u32; 3]>,
+    clearance: f64,
+) -> Option<TriMesh> {
     let surface = Surface::new(positions.to_vec(), triangles.clone());
     let encloses = |&p: &DVec3| surface.contains(p) && surface.distance_within(p, clearance).is_none();
     let vertices = positions.iter().map(|&p| source.restored(p)).collect();
@@ -141,7 +151,7 @@ fn verified(source: &Source, positions: &[DVec3], triangles: Vec<[u32; 3]>, clea
 }
 
 /// A box, octahedron or tetrahedron around the model.
-fn simple_shape(source: &Source, vertices: usize, clearance: f64) -> Option<TriMesh> {
+fn simple_shape(source: &NormalizedModel, vertices: usize, clearance: f64) -> Option<TriMesh> {
     let bounds = source.surface.tree.bounds().grown(clearance + 0.02);
     let (center, half) = (bounds.center(), 0.5 * bounds.size());
     let (corners, triangles): (Vec<DVec3>, Vec<[u32; 3]>) = if vertices >= 8 {

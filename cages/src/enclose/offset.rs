@@ -1,8 +1,8 @@
-//! The offset surface of a model: all that is closer than a distance, with its cavities filled, its holes closed where the winding
-//! number says so, and its parts joined by tubes.
+//! The offset surface of a model: the boundary of all points closer than a distance, with cavities filled, holes closed by the winding number, and
+//! components joined by tubes.
 
 use super::lattice::Lattice;
-use super::source::Source;
+use super::source::NormalizedModel;
 use crate::geometry::distance::{closest_on_segment, point_triangle2};
 use crate::geometry::{Aabb, GeneralizedWinding};
 use glam::DVec3;
@@ -16,7 +16,7 @@ const SPACING: f64 = 1.3;
 /// A closed surface at a distance from the model; one component, or with `per_part` as many as there are. `None` where it would have
 /// more than `most_parts` before they are joined.
 pub(super) fn offset_surface(
-    source: &Source,
+    source: &NormalizedModel,
     distance: f64,
     per_part: bool,
     most_parts: usize,
@@ -43,7 +43,7 @@ pub(super) fn offset_surface(
 }
 
 /// Distance less `distance` at every node, negative inside.
-fn distances(source: &Source, lattice: &Lattice, distance: f64, spacing: f64) -> Vec<f64> {
+fn distances(source: &NormalizedModel, lattice: &Lattice, distance: f64, spacing: f64) -> Vec<f64> {
     let reach = distance + 1.1 * spacing;
     let within = source.surface.tree.bounds();
     let winding = source.open.then(|| GeneralizedWinding::new(&source.surface));
@@ -62,7 +62,7 @@ fn distances(source: &Source, lattice: &Lattice, distance: f64, spacing: f64) ->
     (0..lattice.len()).into_par_iter().with_min_len(512).map(value).collect()
 }
 
-/// Makes everything inside that cannot be reached from the border.
+/// Marks as inside everything that cannot be reached from the border.
 fn fill_cavities(lattice: &Lattice, values: &mut [f64]) {
     let mut reached = vec![false; values.len()];
     reached[0] = true;
@@ -84,9 +84,9 @@ fn fill_cavities(lattice: &Lattice, values: &mut [f64]) {
 
 const NONE: u32 = u32::MAX;
 
-/// Labels the connected parts of the inside. Parts that hold nothing of the model, which winding numbers of badly oriented faces
-/// give rise to, are given up.
-fn components(lattice: &Lattice, source: &Source, distance: f64, values: &mut [f64]) -> (Vec<u32>, u32) {
+/// Labels the connected parts of the inside. Parts that hold nothing of the model, which winding numbers of badly oriented faces produce, are
+/// discarded.
+fn components(lattice: &Lattice, source: &NormalizedModel, distance: f64, values: &mut [f64]) -> (Vec<u32>, u32) {
     let mut labels = vec![NONE; values.len()];
     let mut parts = 0;
     for start in 0..values.len() {
@@ -164,7 +164,7 @@ fn root(group: &mut [u32], mut part: u32) -> u32 {
 }
 
 /// Puts a tube as thick as the offset between the points of the model nearest to two nodes.
-fn add_tube(source: &Source, lattice: &Lattice, nodes: [usize; 2], distance: f64, values: &mut [f64]) {
+fn add_tube(source: &NormalizedModel, lattice: &Lattice, nodes: [usize; 2], distance: f64, values: &mut [f64]) {
     let ends = nodes.map(|n| lattice.position(n));
     let nearest = ends.map(|p| source.surface.nearest(p).map_or(p, |n| n.point));
     for [a, b] in [[ends[0], nearest[0]], [nearest[0], nearest[1]], [nearest[1], ends[1]]] {

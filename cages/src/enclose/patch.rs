@@ -1,4 +1,4 @@
-//! A closed mesh whose faces can be exchanged patch by patch, as long as the model stays enclosed and no face cuts another.
+//! A closed mesh with local replacement of faces, as long as the model stays enclosed and no faces intersect.
 
 use crate::geometry::distance::point_triangle2;
 use crate::geometry::surface::crossing;
@@ -10,7 +10,7 @@ const REMOVED: [u32; 3] = [u32::MAX; 3];
 
 /// Points that must stay inside, at a distance from the surface.
 #[derive(Debug)]
-pub(super) struct Contents {
+pub(super) struct EnclosedPoints {
     points: Vec<DVec3>,
     /// Trees over some of the points, by which most faults are found, and over the others.
     trees: [Bvh; 2],
@@ -20,7 +20,7 @@ pub(super) struct Contents {
 /// One point of so many is looked at first.
 const STRIDE: usize = 8;
 
-impl Contents {
+impl EnclosedPoints {
     pub(super) fn new(mut points: Vec<DVec3>, clearance: f64) -> Self {
         let some = points.len().div_ceil(STRIDE);
         (0..some).for_each(|i| points.swap(i, i * STRIDE));
@@ -31,18 +31,18 @@ impl Contents {
 
 /// Faces that would take the place of others with the same border.
 #[derive(Clone, Debug)]
-pub(super) struct Exchange {
-    /// Faces that go.
+pub(super) struct FaceReplacement {
+    /// Faces that are removed.
     pub(super) old: Vec<u32>,
-    /// Faces that come.
+    /// Faces that are added.
     pub(super) new: Vec<[u32; 3]>,
     /// A vertex that moves, and where to; all its faces must be among the old.
     pub(super) moved: Option<(u32, DVec3)>,
 }
 
-/// What is wrong with an exchange.
+/// Why a replacement is invalid.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Fault {
+pub(super) enum Violation {
     /// A point would be outside or too close, by so much.
     Uncovered(f64),
     /// A new face would cut another face.
@@ -100,69 +100,74 @@ impl PatchMesh {
     }
 
     /// Whether the model would stay enclosed and the mesh free of self-intersection.
-    pub(super) fn check(&self, exchange: &Exchange, contents: &Contents) -> Result<(), Fault> {
-        let new: Vec<[DVec3; 3]> = exchange.new.iter().map(|&f| self.corners_after(f, exchange.moved)).collect();
-        self.check_contents(exchange, &new, contents)?;
-        self.check_intersections(exchange, &new)
+    pub(super) fn check(&self, replacement: &FaceReplacement, enclosed: &EnclosedPoints) -> Result<(), Violation> {
+        let new: Vec<[DVec3; 3]> = replacement.new.iter().map(|&f| self.corners_after(f, replacement.moved)).collect();
+        self.check_enclosed(replacement, &new, enclosed)?;
+        self.check_intersections(replacement, &new)
     }
 
     /// A point stays inside when a ray from it crosses as many of the new faces as of the old.
-    fn check_contents(&self, exchange: &Exchange, new: &[[DVec3; 3]], contents: &Contents) -> Result<(), Fault> {
-        let old: Vec<[DVec3; 3]> = exchange.old.iter().map(|&f| self.corners(f)).collect();
-        let clearance = contents.clearance;
+    fn check_enclosed(
+        &self,
+        replacement: &FaceReplacement,
+        new: &[[DVec3; 3]],
+        enclosed: &EnclosedPoints,
+    ) -> Result<(), Violation> {
+        let old: Vec<[DVec3; 3]> = replacement.old.iter().map(|&f| self.corners(f)).collect();
+        let clearance = enclosed.clearance;
         let boxes: Vec<Aabb> = new.iter().map(|&t| Aabb::around(t).grown(clearance)).collect();
         let around = boxes.iter().fold(Aabb::around(old.iter().flatten().copied()), |b, t| b.union(t));
-        let some = contents.points.len().div_ceil(STRIDE);
-        let (first, others) = contents.points.split_at(some);
-        for (tree, points) in contents.trees.iter().zip([first, others]) {
+        let some = enclosed.points.len().div_ceil(STRIDE);
+        let (first, others) = enclosed.points.split_at(some);
+        for (tree, points) in enclosed.trees.iter().zip([first, others]) {
             let worst = uncovered(tree, points, [&old, new], &boxes, &around, clearance);
             if worst > 0.0 {
-                return Err(Fault::Uncovered(worst));
+                return Err(Violation::Uncovered(worst));
             }
         }
         Ok(())
     }
 
-    fn check_intersections(&self, exchange: &Exchange, new: &[[DVec3; 3]]) -> Result<(), Fault> {
+    fn check_intersections(&self, replacement: &FaceReplacement, new: &[[DVec3; 3]]) -> Result<(), Violation> {
         let boxes: Vec<Aabb> = new.iter().map(|&t| Aabb::around(t)).collect();
         let around = boxes.iter().fold(Aabb::EMPTY, |b, t| b.union(t));
         let clear = self.tree.visit(&around, |other| {
-            if self.is_removed(other) || exchange.old.contains(&other) {
+            if self.is_removed(other) || replacement.old.contains(&other) {
                 return true;
             }
             let corners = self.corners(other);
             let other_box = Aabb::around(corners);
             (0..new.len()).all(|i| {
-                let ids = [exchange.new[i], self.faces[other as usize]];
+                let ids = [replacement.new[i], self.faces[other as usize]];
                 !boxes[i].overlaps(&other_box) || !triangles_intersect(ids, [new[i], corners])
             })
         });
-        let cut = |i: usize, j: usize| triangles_intersect([exchange.new[i], exchange.new[j]], [new[i], new[j]]);
+        let cut = |i: usize, j: usize| triangles_intersect([replacement.new[i], replacement.new[j]], [new[i], new[j]]);
         if !clear || (0..new.len()).any(|i| (0..i).any(|j| cut(i, j))) {
-            return Err(Fault::Intersecting);
+            return Err(Violation::Intersecting);
         }
         Ok(())
     }
 
-    /// Carries an exchange out. The new faces take the places of the old, of which there are at least as many.
-    pub(super) fn apply(&mut self, exchange: &Exchange) {
-        if let Some((vertex, to)) = exchange.moved {
+    /// Applies a replacement. The new faces take the places of the old, of which there are at least as many.
+    pub(super) fn apply(&mut self, replacement: &FaceReplacement) {
+        if let Some((vertex, to)) = replacement.moved {
             self.positions[vertex as usize] = to;
         }
-        for &f in &exchange.old {
+        for &f in &replacement.old {
             for v in self.faces[f as usize] {
                 self.around[v as usize].retain(|&g| g != f);
             }
         }
-        for (i, &f) in exchange.old.iter().enumerate() {
-            let face = exchange.new.get(i).copied().unwrap_or(REMOVED);
+        for (i, &f) in replacement.old.iter().enumerate() {
+            let face = replacement.new.get(i).copied().unwrap_or(REMOVED);
             self.faces[f as usize] = face;
             if face != REMOVED {
                 face.iter().for_each(|&v| self.around[v as usize].push(f));
             }
         }
         let (faces, positions) = (&self.faces, &self.positions);
-        for &f in &exchange.old {
+        for &f in &replacement.old {
             self.tree.refit_item(f, |g| match faces[g as usize] {
                 REMOVED => Aabb::EMPTY,
                 face => Aabb::around(face.map(|v| positions[v as usize])),

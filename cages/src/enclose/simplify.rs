@@ -1,7 +1,7 @@
 //! Simplification of a closed mesh by edge collapses that keep it valid: its topology (link condition), the model inside, and free of
 //! self-intersection.
 
-use super::patch::{Contents, Exchange, Fault, PatchMesh, normal, quality};
+use super::patch::{EnclosedPoints, FaceReplacement, PatchMesh, Violation, normal, quality};
 use super::quadric::Quadric;
 use glam::DVec3;
 use std::cmp::Ordering;
@@ -25,7 +25,7 @@ const PRICE: f64 = 8.0;
 
 /// Why an edge cannot be collapsed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Refusal {
+enum Rejection {
     /// A face would be badly shaped.
     Shape,
     /// The mesh would be invalid.
@@ -37,8 +37,8 @@ enum Refusal {
 struct Candidate {
     cost: f64,
     edge: [u32; 2],
-    /// Ages of the ends when it was proposed.
-    ages: [u32; 2],
+    /// Versions of the end vertices when it was proposed; it is stale once they change.
+    versions: [u32; 2],
     /// Where the vertex was found valid, if that cost more than expected.
     position: Option<DVec3>,
     /// Which limits hold.
@@ -70,23 +70,23 @@ impl Ord for Candidate {
 pub(super) struct Simplifier<'a> {
     pub(super) mesh: PatchMesh,
     pub(super) quadrics: Vec<Quadric>,
-    contents: &'a Contents,
-    ages: Vec<u32>,
+    enclosed: &'a EnclosedPoints,
+    versions: Vec<u32>,
     /// Edges of each vertex that could not be collapsed; they are tried again when something near them changes.
-    refused: Vec<Vec<[u32; 2]>>,
+    rejected: Vec<Vec<[u32; 2]>>,
     vertices: usize,
 }
 
 impl<'a> Simplifier<'a> {
-    pub(super) fn new(positions: Vec<DVec3>, faces: Vec<[u32; 3]>, contents: &'a Contents) -> Self {
+    pub(super) fn new(positions: Vec<DVec3>, faces: Vec<[u32; 3]>, enclosed: &'a EnclosedPoints) -> Self {
         let mut quadrics = vec![Quadric::ZERO; positions.len()];
         for face in &faces {
             let corners = face.map(|v| positions[v as usize]);
             (0..3).for_each(|k| quadrics[face[k] as usize] += Quadric::of_corner(corners, k));
         }
-        let (ages, vertices) = (vec![0; positions.len()], positions.len());
-        let refused = vec![Vec::new(); vertices];
-        Self { mesh: PatchMesh::new(positions, faces), quadrics, contents, ages, refused, vertices }
+        let (versions, vertices) = (vec![0; positions.len()], positions.len());
+        let rejected = vec![Vec::new(); vertices];
+        Self { mesh: PatchMesh::new(positions, faces), quadrics, enclosed, versions, rejected, vertices }
     }
 
     /// Number of vertices.
@@ -116,34 +116,34 @@ impl<'a> Simplifier<'a> {
         while self.vertices > goal {
             let Some(candidate) = heap.pop() else { return };
             let [u, v] = candidate.edge;
-            if [u, v].map(|w| self.ages[w as usize]) != candidate.ages {
+            if [u, v].map(|w| self.versions[w as usize]) != candidate.versions {
                 continue;
             }
-            let (exchange, cost) = match self.admissible(&candidate) {
+            let (replacement, cost) = match self.admissible(&candidate) {
                 Ok(found) => found,
-                Err(Refusal::Shape) if candidate.stage + 1 < LIMITS.len() => {
+                Err(Rejection::Shape) if candidate.stage + 1 < LIMITS.len() => {
                     heap.push(Candidate { cost: PRICE * candidate.cost, stage: candidate.stage + 1, ..candidate });
                     continue;
                 }
                 Err(_) => {
-                    self.refused[u as usize].push([u, v]);
+                    self.rejected[u as usize].push([u, v]);
                     continue;
                 }
             };
-            let position = exchange.moved.map(|m| m.1);
+            let position = replacement.moved.map(|m| m.1);
             if candidate.position.is_none() && cost > 1.5 * candidate.cost {
                 heap.push(Candidate { cost, position, ..candidate });
                 continue;
             }
-            self.mesh.apply(&exchange);
+            self.mesh.apply(&replacement);
             let merged = self.quadrics[v as usize];
             self.quadrics[u as usize] += merged;
             self.vertices -= 1;
-            self.ages[v as usize] += 1;
-            self.ages[u as usize] += 1;
+            self.versions[v as usize] += 1;
+            self.versions[u as usize] += 1;
             self.propose_around(u, |_| true, &mut heap);
             for w in self.mesh.ring(u) {
-                for edge in std::mem::take(&mut self.refused[w as usize]) {
+                for edge in std::mem::take(&mut self.rejected[w as usize]) {
                     if edge.iter().all(|&x| x != u) && self.mesh.joined(edge) {
                         self.propose(edge, &mut heap);
                     }
@@ -162,8 +162,8 @@ impl<'a> Simplifier<'a> {
 
     fn propose(&self, edge: [u32; 2], heap: &mut BinaryHeap<Candidate>) {
         let (position, quadric) = self.optimum(edge);
-        let ages = edge.map(|x| self.ages[x as usize]);
-        heap.push(Candidate { cost: quadric.at(position), edge, ages, position: None, stage: 0 });
+        let versions = edge.map(|x| self.versions[x as usize]);
+        heap.push(Candidate { cost: quadric.at(position), edge, versions, position: None, stage: 0 });
     }
 
     fn optimum(&self, edge: [u32; 2]) -> (DVec3, Quadric) {
@@ -177,14 +177,14 @@ impl<'a> Simplifier<'a> {
     }
 
     /// The collapse with a valid position for its vertex, and its cost there.
-    fn admissible(&self, candidate: &Candidate) -> Result<(Exchange, f64), Refusal> {
+    fn admissible(&self, candidate: &Candidate) -> Result<(FaceReplacement, f64), Rejection> {
         let limits = LIMITS[candidate.stage];
         let [u, v] = candidate.edge;
         let mesh = &self.mesh;
         let (ring_u, ring_v) = (mesh.ring(u), mesh.ring(v));
         let common: Vec<u32> = ring_u.iter().filter(|w| ring_v.binary_search(w).is_ok()).copied().collect();
         if common.len() != 2 || common.iter().any(|&w| mesh.around[w as usize].len() < 4) {
-            return Err(Refusal::Validity);
+            return Err(Rejection::Validity);
         }
         let (best, quadric) = self.optimum(candidate.edge);
         let mut kept = Vec::new();
@@ -199,47 +199,47 @@ impl<'a> Simplifier<'a> {
         let outwards = kept.iter().chain(&removed).map(|&f| normal(mesh.corners(f))).sum::<DVec3>().normalize_or_zero();
         let old: Vec<u32> = kept.iter().chain(&removed).copied().collect();
         let mut at = candidate.position.unwrap_or(best);
-        let mut exchange = Exchange { old, new, moved: Some((u, at)) };
+        let mut replacement = FaceReplacement { old, new, moved: Some((u, at)) };
         let size = mesh.positions[u as usize].distance(mesh.positions[v as usize]);
         let mut pushed = 0.0;
         for attempt in 0..5 {
-            if !self.well_shaped(&exchange, kept.len(), limits) {
-                return Err(Refusal::Shape);
+            if !self.well_shaped(&replacement, kept.len(), limits) {
+                return Err(Rejection::Shape);
             }
-            match mesh.check(&exchange, self.contents) {
-                Ok(()) => return Ok((exchange, quadric.at(at) * PRICE.powi(candidate.stage as i32))),
-                Err(Fault::Uncovered(depth)) if attempt < 4 => {
+            match mesh.check(&replacement, self.enclosed) {
+                Ok(()) => return Ok((replacement, quadric.at(at) * PRICE.powi(candidate.stage as i32))),
+                Err(Violation::Uncovered(depth)) if attempt < 4 => {
                     let step = depth * (1.2 + 0.5 * f64::from(attempt)) + 1e-4 * size;
                     pushed += step;
                     if pushed > 2.0 * size {
                         break;
                     }
                     at += step * outwards;
-                    exchange.moved = Some((u, at));
+                    replacement.moved = Some((u, at));
                 }
                 Err(_) => break,
             }
         }
-        Err(Refusal::Validity)
+        Err(Rejection::Validity)
     }
 
     /// Whether no face turns or degrades too much. The first `kept` old faces become the new ones.
-    fn well_shaped(&self, exchange: &Exchange, kept: usize, limits: Limits) -> bool {
+    fn well_shaped(&self, replacement: &FaceReplacement, kept: usize, limits: Limits) -> bool {
         (0..kept).all(|i| {
-            let before = self.mesh.corners(exchange.old[i]);
-            let after = self.mesh.corners_after(exchange.new[i], exchange.moved);
+            let before = self.mesh.corners(replacement.old[i]);
+            let after = self.mesh.corners_after(replacement.new[i], replacement.moved);
             let q = quality(after);
             normal(before).dot(normal(after)) >= limits.turn && (q >= limits.quality || q >= 1.05 * quality(before))
         })
     }
 
-    /// Gives up what was removed.
+    /// Drops removed vertices and faces.
     fn compact(&mut self) {
         let (used, faces) = self.mesh.compacted();
         let positions = used.iter().map(|&v| self.mesh.positions[v as usize]).collect();
         self.quadrics = used.iter().map(|&v| self.quadrics[v as usize]).collect();
-        self.ages = vec![0; used.len()];
-        self.refused = vec![Vec::new(); used.len()];
+        self.versions = vec![0; used.len()];
+        self.rejected = vec![Vec::new(); used.len()];
         self.mesh = PatchMesh::new(positions, faces);
     }
 }

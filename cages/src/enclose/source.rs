@@ -1,4 +1,4 @@
-//! A model made ready to be enclosed: centred, of diagonal one, with all there is of it as triangles.
+//! A model normalised for enclosing: centred, with unit diagonal, and with loose points as degenerate triangles.
 
 use super::EncloseError;
 use crate::geometry::Surface;
@@ -6,27 +6,27 @@ use cager_core::mesh::{Model, bounds, diagonal};
 use glam::DVec3;
 use std::collections::HashSet;
 
-/// No more points than this are looked at while a cage is simplified; more are thinned.
+/// While a cage is simplified, at most this many points are tested; larger models are subsampled.
 const CHECKED_POINTS: usize = 60_000;
 
 /// The model in a frame of reference where it is centred and its diagonal is one.
 #[derive(Debug)]
-pub(super) struct Source {
+pub(super) struct NormalizedModel {
     /// All points of the model.
     pub(super) points: Vec<DVec3>,
     /// Faces as triangles, points without a face as triangles with one corner three times.
     pub(super) surface: Surface,
     /// Whether faces have free edges.
     pub(super) open: bool,
-    /// Points that stand for the model while a cage is simplified.
+    /// Points checked in place of the model while a cage is simplified.
     pub(super) samples: Vec<DVec3>,
     /// Every point is this close to a sample.
-    pub(super) thinned: f64,
+    pub(super) sampling_radius: f64,
     center: DVec3,
     scale: f64,
 }
 
-impl Source {
+impl NormalizedModel {
     pub(super) fn new(model: &Model, spacing: f64) -> Result<Self, EncloseError> {
         if model.points.is_empty() {
             return Err(EncloseError::Empty);
@@ -50,13 +50,13 @@ impl Source {
         triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
         let surface_area = triangles.iter().map(|t| area(t.map(|v| points[v as usize]))).sum::<f64>();
         let spacing_on_faces = (2.5 * spacing).max((surface_area / 10_000.0).sqrt());
-        let (mut samples, thinned) = thin(&points, spacing);
+        let (mut samples, sampling_radius) = thin(&points, spacing);
         for t in &triangles {
             sample_face(t.map(|v| points[v as usize]), spacing_on_faces, &mut samples);
         }
         triangles.extend((0..points.len() as u32).filter(|&v| !used[v as usize]).map(|v| [v; 3]));
         let surface = Surface::new(points.clone(), triangles);
-        Ok(Self { points, surface, open, samples, thinned, center, scale })
+        Ok(Self { points, surface, open, samples, sampling_radius, center, scale })
     }
 
     /// Back in the model's own frame of reference.

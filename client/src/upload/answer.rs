@@ -1,11 +1,11 @@
-//! The lines that come back while frames are sent.
+//! Parses the NDJSON response of an upload.
 
 use crate::error::Failure;
 use crate::problem::classify;
 use cager_proto::messages::{FrameResult, Problem};
 use serde::Deserialize;
 
-/// One line of the answer. Problems first: theirs may name a frame too.
+/// One line. Problems are tried first, since they may also have a field `frame`.
 #[derive(Deserialize)]
 #[serde(untagged)]
 enum Line {

@@ -1,4 +1,4 @@
-//! Reads frames on a thread of its own and cuts them into pieces of a request's body.
+//! Reads frames on a dedicated thread and encodes them as chunks of a request body.
 
 use crate::error::ClientError;
 use crate::source::FrameSource;
@@ -10,17 +10,16 @@ use std::sync::mpsc;
 use std::time::{Duration, Instant};
 use tokio::sync::{mpsc as async_mpsc, oneshot};
 
-/// Frames are gathered to pieces of this size: few hand-overs, and still little memory.
+/// Size of the chunks: few hand-overs at little memory.
 const PIECE_BYTES: usize = 512 << 10;
 
-/// Pieces that wait for the connection; reading goes on meanwhile.
+/// Chunks buffered ahead of the connection.
 const WAITING_PIECES: usize = 3;
 
-/// A connection that has nothing to send gets what there is this often: the frames of a source that is slower than the
-/// connection are not kept back.
-const KEPT_BACK: Duration = Duration::from_millis(5);
+/// Interval at which an idle connection gets an incomplete chunk, so that a slow source does not delay its frames.
+const FLUSH_INTERVAL: Duration = Duration::from_millis(5);
 
-/// The bytes of a request's body.
+/// Encoding of the request body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Layout {
     /// Rows back to back: one range of frames.
@@ -42,18 +41,18 @@ struct Job {
 /// How reading ended: the number of frames of the capture, where its end was met.
 pub(crate) type Outcome = Result<Option<u32>, ClientError>;
 
-/// The body of one request: its pieces, and afterwards how reading ended.
-pub(crate) struct Reading {
+/// The chunks of one request body, and how reading ended.
+pub(crate) struct BodyChunks {
     pub(crate) pieces: async_mpsc::Receiver<Bytes>,
     pub(crate) outcome: oneshot::Receiver<Outcome>,
 }
 
-/// The thread that reads; it ends when this is dropped, after the frame it reads.
-pub(crate) struct Feed {
+/// Handle to the reading thread, which ends after its current frame when this is dropped.
+pub(crate) struct FrameFeed {
     jobs: mpsc::Sender<Job>,
 }
 
-impl Feed {
+impl FrameFeed {
     /// `handles` are the rows to send of every frame; without them all are.
     pub(crate) fn start(
         mut source: impl FrameSource + 'static,
@@ -79,7 +78,7 @@ impl Feed {
         Ok(Self { jobs })
     }
 
-    /// Begins to read the frames of one request. What is left of an earlier one is given up.
+    /// Starts reading the frames of a request; an earlier request is abandoned.
     ///
     /// # Errors
     /// The thread is gone, since the source has panicked.
@@ -88,7 +87,7 @@ impl Feed {
         ranges: Vec<FrameRange>,
         layout: Layout,
         first_alone: bool,
-    ) -> Result<Reading, ClientError> {
+    ) -> Result<BodyChunks, ClientError> {
         let frame = ranges.first().map_or(0, |range| range.first);
         let (pieces, receive) = async_mpsc::channel(WAITING_PIECES);
         let (outcome, ended) = oneshot::channel();
@@ -97,7 +96,7 @@ impl Feed {
             let cause = io::Error::other("the thread that reads the frames has panicked; look at its message");
             ClientError::Source { frame, cause }
         })?;
-        Ok(Reading { pieces: receive, outcome: ended })
+        Ok(BodyChunks { pieces: receive, outcome: ended })
     }
 }
 
@@ -110,7 +109,7 @@ struct Reader {
 }
 
 impl Reader {
-    /// Reads the frames of all ranges; `None` where nobody wants them any more.
+    /// Reads all ranges; `None` if the request was abandoned.
     fn read(&mut self, source: &mut impl FrameSource, ranges: &[FrameRange], body: &mut BodyWriter) -> Option<Outcome> {
         for range in ranges {
             let mut next = range.first;
@@ -128,7 +127,7 @@ impl Reader {
                         return Some(Err(ClientError::Mismatch(what)));
                     }
                     Err(error) => {
-                        // The frames before it are whole, and their results are worth having.
+                        // The frames before it are complete; send them.
                         body.flush()?;
                         return Some(Err(error));
                     }
@@ -150,7 +149,7 @@ impl Reader {
 
     fn read_frame(&mut self, source: &mut impl FrameSource, frame: u32) -> Result<bool, ClientError> {
         let failed = |cause| ClientError::Source { frame, cause };
-        // After an error the source may stand anywhere.
+        // After an error the position of the source is unknown.
         if self.position.take() != Some(frame) {
             source.seek(frame).map_err(failed)?;
         }
@@ -185,21 +184,21 @@ struct BodyWriter {
 }
 
 impl BodyWriter {
-    /// Adds a frame; `None` where nobody wants it any more.
+    /// Adds a frame; `None` if the request was abandoned.
     fn frame(&mut self, kind: Kind, frame: u32, rows: &[f32]) -> Option<()> {
         match self.layout {
             Layout::Raw => self.piece.extend(rows.iter().flat_map(|x| x.to_le_bytes())),
             // The rows were counted: they cannot be of another shape.
             Layout::Records => drop(record::encode(kind, frame, f32::NAN, f32::NAN, rows, &mut self.piece)),
         }
-        let idle = self.pieces.capacity() == self.pieces.max_capacity() && self.flushed.elapsed() >= KEPT_BACK;
+        let idle = self.pieces.capacity() == self.pieces.max_capacity() && self.flushed.elapsed() >= FLUSH_INTERVAL;
         if std::mem::take(&mut self.alone) || idle || self.piece.len() >= PIECE_BYTES { self.flush() } else { Some(()) }
     }
 
     fn flush(&mut self) -> Option<()> {
         let mut rest = Bytes::from(std::mem::take(&mut self.piece));
         while !rest.is_empty() {
-            // A frame may be large; the connection takes it in pieces all the same.
+            // A large frame is split.
             let piece = rest.split_to(rest.len().min(2 * PIECE_BYTES));
             self.pieces.blocking_send(piece).ok()?;
         }

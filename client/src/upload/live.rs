@@ -1,4 +1,4 @@
-//! Requests whose answers begin while they are sent, and proxies that cannot carry them.
+//! Full-duplex requests, whose response begins while the body is sent, and the fallback for proxies that do not support them.
 
 use super::Upload;
 use crate::client::Client;
@@ -7,26 +7,30 @@ use std::pin::pin;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-/// How long a live request may stand still. The service begins its answer within five seconds.
-const STANDSTILL: Duration = Duration::from_secs(10);
+/// How long a full-duplex request may stall. The service begins its response within five seconds.
+const LIVE_STALL_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// How far a request's body has come.
+/// Progress of sending a request body.
 #[derive(Default)]
-pub(super) struct Sent {
-    /// Whether results are asked for while it is sent.
+pub(super) struct SendProgress {
+    /// Whether the request is full-duplex.
     pub(super) live: bool,
     pub(super) bytes: AtomicU64,
-    /// Whether the next frame is still being read, so that nothing can move.
+    /// Whether the connection is waiting for the next frame to be read.
     pub(super) starved: AtomicBool,
 }
 
-/// Waits for something of a request as long as bytes move. A live one that stands still although there is something to send or to be
-/// answered is given up sooner, and the client goes on without.
-pub(super) async fn while_moving<T>(client: &Client, sent: &Sent, what: impl Future<Output = T>) -> Result<T, Failure> {
+/// Awaits `what` as long as bytes move. A full-duplex request that stalls although data is available is abandoned sooner, and full-duplex
+/// requests are disabled.
+pub(super) async fn with_idle_timeout<T>(
+    client: &Client,
+    sent: &SendProgress,
+    what: impl Future<Output = T>,
+) -> Result<T, Failure> {
     if !sent.live {
-        return client.while_moving(&sent.bytes, what).await;
+        return client.with_idle_timeout(&sent.bytes, what).await;
     }
-    let limit = STANDSTILL.min(client.options().idle_timeout / 2);
+    let limit = LIVE_STALL_TIMEOUT.min(client.options().idle_timeout / 2);
     let watched = async {
         let mut what = pin!(what);
         loop {
@@ -35,25 +39,25 @@ pub(super) async fn while_moving<T>(client: &Client, sent: &Sent, what: impl Fut
                 return Ok(value);
             }
             if sent.bytes.load(Ordering::Relaxed) == before && !sent.starved.load(Ordering::Relaxed) {
-                client.give_up_live();
+                client.disable_live();
                 return Err(client
                     .broken(format!("nothing moved for {limit:.0?}; results come after each request from here on")));
             }
         }
     };
-    client.while_moving(&sent.bytes, watched).await?
+    client.with_idle_timeout(&sent.bytes, watched).await?
 }
 
 impl Upload<'_> {
-    /// What a failure of a live request means. One that something in between may have caused is tried again without.
-    pub(super) fn without_live(&mut self, failure: Failure) -> Failure {
+    /// Classifies a failure of a full-duplex request: those that a proxy may have caused are retried without full duplex.
+    pub(super) fn after_live_failure(&mut self, failure: Failure) -> Failure {
         match (failure.status(), failure) {
-            // The service waited for the rest of the body, which was kept back.
+            // A proxy held the rest of the body back.
             (Some(408), failure) => {
-                self.client.give_up_live();
+                self.client.disable_live();
                 failure
             }
-            // Bytes were lost, or the frame is bad: the same frames without live tell.
+            // Either a proxy lost bytes or the frame is invalid; sending it again without full duplex decides.
             (Some(400 | 422), Failure::Final(error)) => {
                 self.live = false;
                 Failure::transient(error)

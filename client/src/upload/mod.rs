@@ -1,4 +1,4 @@
-//! Uploading frames: as fast as the connection takes them, and on after whatever broke it.
+//! Uploading frames, with resumption after broken connections.
 
 mod answer;
 mod feed;
@@ -11,7 +11,7 @@ use crate::error::{ClientError, Failure};
 use crate::sessions::{known, reason};
 use crate::source::FrameSource;
 use cager_proto::messages::{FrameResult, Session, SessionState};
-use feed::{Feed, check_handles};
+use feed::{FrameFeed, check_handles};
 use set::FrameSet;
 use std::time::Duration;
 
@@ -29,7 +29,7 @@ pub enum Rows {
 pub struct UploadOptions<'a> {
     /// Which rows of a frame are sent.
     pub rows: Rows,
-    /// Told every frame's result once, as it comes; on a session that had some already, theirs first.
+    /// Called once with every frame's result; first with those that the session had already.
     pub on_frame: Option<&'a mut (dyn FnMut(FrameResult) + Send)>,
     /// Longest wait for a session that still prepares.
     pub ready_limit: Duration,
@@ -71,7 +71,7 @@ impl Client {
         options: UploadOptions<'_>,
     ) -> Result<Uploaded, ClientError> {
         let session = self.wait_ready(&session.id, options.ready_limit).await?;
-        let points = known(&session.id, "points", session.points).map_err(plain)?;
+        let points = known(&session.id, "points", session.points).map_err(into_error)?;
         if source.points() != points as usize {
             let found = source.points();
             return Err(ClientError::Mismatch(format!(
@@ -94,8 +94,8 @@ impl Client {
             on_frame: options.on_frame,
             sent_bytes: 0,
         };
-        upload.learn(&session).await?;
-        upload.run(&Feed::start(source, handles)?).await
+        upload.synchronise(&session).await?;
+        upload.run(&FrameFeed::start(source, handles)?).await
     }
 }
 
@@ -117,7 +117,7 @@ struct Upload<'a> {
 }
 
 impl Upload<'_> {
-    async fn run(mut self, feed: &Feed) -> Result<Uploaded, ClientError> {
+    async fn run(mut self, feed: &FrameFeed) -> Result<Uploaded, ClientError> {
         let mut backoff = self.client.backoff();
         let mut cautious = false;
         while !self.is_complete() {
@@ -126,8 +126,8 @@ impl Upload<'_> {
             let live = self.live;
             let passed = self.pass(feed, ranges, cautious).await;
             if !live && self.done.len() > before {
-                // What was refused with live results is taken without.
-                self.client.give_up_live();
+                // The retry without full duplex succeeded, so full duplex was at fault.
+                self.client.disable_live();
             }
             let Err(failure) = passed else { continue };
             if self.done.len() > before {
@@ -136,7 +136,7 @@ impl Upload<'_> {
             cautious = matches!(&failure, Failure::Transient { error: ClientError::Broken { .. }, .. });
             backoff.wait_after(failure).await?;
             let session = self.client.session(&self.id).await?;
-            self.learn(&session).await?;
+            self.synchronise(&session).await?;
             if self.done.len() > before {
                 backoff.progress();
             }
@@ -145,8 +145,8 @@ impl Upload<'_> {
         Ok(Uploaded { frames, sent_bytes: self.sent_bytes, retries: backoff.total() })
     }
 
-    /// Takes over what the service has, and reports the results that went astray.
-    async fn learn(&mut self, session: &Session) -> Result<(), ClientError> {
+    /// Synchronises with the frames that the service has, and reports results that were lost with a connection.
+    async fn synchronise(&mut self, session: &Session) -> Result<(), ClientError> {
         if session.state == SessionState::Failed {
             return Err(ClientError::Failed(Box::new(reason(session.clone()))));
         }
@@ -177,8 +177,8 @@ impl Upload<'_> {
     }
 }
 
-/// A failure that no other attempt mends.
-fn plain(failure: Failure) -> ClientError {
+/// The error of a failure that is not retried.
+fn into_error(failure: Failure) -> ClientError {
     match failure {
         Failure::Transient { error, .. } | Failure::Final(error) => error,
     }

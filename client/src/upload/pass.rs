@@ -1,9 +1,9 @@
-//! One request of an upload: frames go out while results come back.
+//! One request of an upload: sends frames and reads their results concurrently.
 
 use super::Upload;
 use super::answer::result;
-use super::feed::{Feed, Layout, Outcome, Reading};
-use super::live::{Sent, while_moving};
+use super::feed::{BodyChunks, FrameFeed, Layout, Outcome};
+use super::live::{SendProgress, with_idle_timeout};
 use super::set::FrameRange;
 use crate::client::Client;
 use crate::error::{ClientError, Failure};
@@ -20,13 +20,13 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 use tokio::sync::{oneshot, watch};
 
-/// How long a cautious request waits for a refusal before it sends a frame, and then for that frame's result.
+/// How long a cautious request waits for an early refusal before it sends a frame, and then for that frame's result.
 const CAUTION: [Duration; 2] = [Duration::from_millis(300), Duration::from_secs(1)];
 
-/// How long the end of an answer is waited for that has nothing more to say.
-const END_PATIENCE: Duration = Duration::from_secs(5);
+/// How long the end of a response is awaited after the last result.
+const END_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// What has been heard from the service during a request.
+/// What has been received from the service during a request.
 const HEAD: u8 = 1;
 const RESULT: u8 = 2;
 
@@ -42,7 +42,12 @@ impl Upload<'_> {
     /// A `cautious` request gives the service a moment to answer before it sends anything, and again after the first frame:
     /// a server that refuses a body over HTTP/1.1 closes the connection, and unread bytes on their way to it make the
     /// operating system throw its answer away. So the request after a broken one gives it time to be heard.
-    pub(super) async fn pass(&mut self, feed: &Feed, ranges: Vec<FrameRange>, cautious: bool) -> Result<(), Failure> {
+    pub(super) async fn pass(
+        &mut self,
+        feed: &FrameFeed,
+        ranges: Vec<FrameRange>,
+        cautious: bool,
+    ) -> Result<(), Failure> {
         let client = self.client.clone();
         let live = self.live && client.is_live();
         // Records have checksums: some proxies lose bytes of a request whose answer has begun.
@@ -59,26 +64,26 @@ impl Upload<'_> {
             Layout::Raw => "application/octet-stream",
             Layout::Records => record::MEDIA_TYPE,
         };
-        let Reading { pieces, mut outcome } = feed.read(ranges.clone(), layout, cautious)?;
+        let BodyChunks { pieces, mut outcome } = feed.read(ranges.clone(), layout, cautious)?;
         let (heard, hearing) = watch::channel(0);
-        let sent = Arc::new(Sent { live, ..Sent::default() });
-        let sending = Sending { pieces, sent: sent.clone(), caution: cautious.then_some((0, hearing)) };
+        let sent = Arc::new(SendProgress { live, ..SendProgress::default() });
+        let sending = RequestBody { pieces, sent: sent.clone(), caution: cautious.then_some((0, hearing)) };
         let request = request
             .header(CONTENT_TYPE, media_type)
             .header(ACCEPT, "application/x-ndjson")
-            .body(Body::wrap_stream(stream::unfold(sending, Sending::next)));
+            .body(Body::wrap_stream(stream::unfold(sending, RequestBody::next)));
         let answer = async {
-            let response = client.accept(while_moving(&client, &sent, request.send()).await?).await?;
+            let response = client.accept(with_idle_timeout(&client, &sent, request.send()).await?).await?;
             heard.send_replace(HEAD);
-            self.take_in(&client, response, &ranges, &sent, &heard, &mut outcome).await
+            self.read_results(&client, response, &ranges, &sent, &heard, &mut outcome).await
         };
         let answer = answer.await;
         self.sent_bytes += sent.bytes.load(Ordering::Relaxed);
         let answer = match answer {
-            Err(failure) if live => Err(self.without_live(failure)),
+            Err(failure) if live => Err(self.after_live_failure(failure)),
             answer => answer,
         };
-        // An answer that names a problem says more than the source, and the source more than a broken connection.
+        // A problem in the response is more specific than an error of the source, and that more than a broken connection.
         if matches!(&answer, Err(failure) if failure.status().is_some()) {
             return answer;
         }
@@ -86,24 +91,24 @@ impl Upload<'_> {
         answer
     }
 
-    async fn take_in(
+    async fn read_results(
         &mut self,
         client: &Client,
         mut response: Response,
         ranges: &[FrameRange],
-        sent: &Sent,
+        sent: &SendProgress,
         heard: &watch::Sender<u8>,
         outcome: &mut oneshot::Receiver<Outcome>,
     ) -> Result<(), Failure> {
         let mut lines = Lines::default();
         loop {
             let piece = if self.is_complete() {
-                match tokio::time::timeout(END_PATIENCE, response.chunk()).await {
+                match tokio::time::timeout(END_TIMEOUT, response.chunk()).await {
                     Ok(Ok(Some(piece))) => Some(piece),
                     _ => None,
                 }
             } else {
-                let piece = while_moving(client, sent, response.chunk()).await?;
+                let piece = with_idle_timeout(client, sent, response.chunk()).await?;
                 piece.map_err(|error| client.network(&error))?
             };
             let Some(piece) = piece else { break };
@@ -111,7 +116,7 @@ impl Upload<'_> {
             lines.push(&piece, |line| self.line(line, ranges))?;
             self.read_outcome(outcome)?;
         }
-        // A last line may lack its end, but not its middle.
+        // The last line may lack its newline, but must be complete.
         if self.line(lines.rest(), ranges).is_err() {
             return Err(client.broken("the answer ended within a line"));
         }
@@ -134,7 +139,7 @@ impl Upload<'_> {
         Ok(())
     }
 
-    /// Learns how reading ended, where it did.
+    /// Checks whether reading has ended, and how.
     fn read_outcome(&mut self, outcome: &mut oneshot::Receiver<Outcome>) -> Result<(), ClientError> {
         match outcome.try_recv() {
             Ok(Ok(total)) => {
@@ -148,21 +153,21 @@ impl Upload<'_> {
 }
 
 /// The body of the request.
-struct Sending {
+struct RequestBody {
     pieces: tokio::sync::mpsc::Receiver<Bytes>,
-    sent: Arc<Sent>,
-    /// What the next piece waits for, and where it is heard.
+    sent: Arc<SendProgress>,
+    /// Stage of the cautious start, and where responses are signalled.
     caution: Option<(u8, watch::Receiver<u8>)>,
 }
 
-impl Sending {
+impl RequestBody {
     async fn next(mut self) -> Option<(Result<Bytes, Infallible>, Self)> {
         if let Some((stage, hearing)) = &mut self.caution
             && *stage < RESULT
         {
             let patience = CAUTION[usize::from(*stage)];
             *stage += 1;
-            // Neither a silent service nor one that is gone keeps the rest back.
+            // A silent or disconnected service does not block the rest.
             let _ = tokio::time::timeout(patience, hearing.wait_for(|heard| *heard >= *stage)).await;
         }
         self.sent.starved.store(true, Ordering::Relaxed);

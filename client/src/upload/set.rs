@@ -1,4 +1,4 @@
-//! Which frames are done, as ranges: captures are long and their gaps few.
+//! Sets of frame numbers as intervals: captures are long and have few gaps.
 
 use cager_proto::messages::FrameCounts;
 use std::collections::BTreeMap;
@@ -26,7 +26,7 @@ impl FrameSet {
         for &[first, end] in &counts.missing {
             missing += u64::from(end.checked_sub(first)?);
         }
-        // Where not all ranges are told, nothing is known of the frames after them: posted again, they are recognised.
+        // If the list of missing ranges is incomplete, later frames are assumed missing; posting them again is harmless.
         let highest = match counts.missing_next {
             Some(next) => next,
             None => u32::try_from(counts.solved.checked_add(missing)?).ok()?,

@@ -1,4 +1,4 @@
-//! What makes a mesh a cage: closed, manifold along edges, consistently oriented, outwards, without degenerate faces.
+//! Validation of a mesh as a cage: closed, edge-manifold, consistently and outwardly oriented, without degenerate faces.
 
 use super::{Edge, Face};
 use crate::mesh::{Point, TriMesh, cross, dot, norm, sub, winding_number};
@@ -86,7 +86,7 @@ pub enum CageError {
         /// Signed volume, negative.
         volume: f64,
     },
-    /// One shell of several points inwards without being a cavity.
+    /// One of several shells points inwards and is not a cavity.
     #[error("the part of the cage with vertex {vertex} points inwards while others point outwards; flip that part")]
     InwardPart {
         /// A vertex of the part.
@@ -221,7 +221,7 @@ fn check_edges(edges: &[Edge], users: &[Vec<(usize, bool)>]) -> Result<(), CageE
     Ok(())
 }
 
-/// Every shell must enclose a positive volume, but for cavities inside another shell.
+/// Every shell must enclose a positive volume, except cavities inside another shell.
 pub(super) fn check_orientation(mesh: &TriMesh, faces: &[Face], edges: usize) -> Result<(), CageError> {
     let shells = shells(faces, edges);
     let volumes: Vec<f64> = shells.iter().map(|shell| volume(mesh, shell)).collect();
@@ -246,7 +246,7 @@ pub(super) fn check_orientation(mesh: &TriMesh, faces: &[Face], edges: usize) ->
     Ok(())
 }
 
-/// Faces grouped by connection over edges.
+/// Connected components over edges, as face indices.
 fn shells(faces: &[Face], edges: usize) -> Vec<Vec<usize>> {
     let mut at_edge = vec![Vec::new(); edges];
     for (f, face) in faces.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! A checked cage: closed, oriented outwards, with its edges.
+//! A validated cage: a closed, outward-oriented triangle mesh with its edges.
 
 mod check;
 
@@ -20,7 +20,7 @@ pub struct Face {
     pub vertices: [u32; 3],
     /// `edges[i]` is the edge opposite corner i.
     pub edges: [u32; 3],
-    /// +1 where the face runs along its edge from the smaller index to the larger, −1 where it runs back.
+    /// +1 where the face traverses the edge from the smaller vertex index to the larger, −1 where it traverses it in the opposite direction.
     pub signs: [f64; 3],
 }
 
@@ -34,7 +34,7 @@ pub struct Cage {
 }
 
 impl Cage {
-    /// Checks a mesh and takes it as a cage.
+    /// Validates a mesh as a cage.
     ///
     /// # Errors
     /// What makes the mesh unusable: see [`CageError`].
@@ -55,7 +55,7 @@ impl Cage {
         &self.mesh
     }
 
-    /// Edges, in the order their first face names them.
+    /// Edges, in the order in which the faces first refer to them.
     pub fn edges(&self) -> &[Edge] {
         &self.edges
     }

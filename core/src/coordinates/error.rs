@@ -1,4 +1,4 @@
-/// Why a system has no coordinates for a model and its cage.
+/// Why coordinates cannot be computed for a model and its cage.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CoordinatesError {
     /// Points outside the cage, where the system is not defined.
@@ -11,7 +11,7 @@ pub enum CoordinatesError {
         /// Largest distance to the cage over the cage's diagonal.
         distance: f64,
     },
-    /// A factorisation failed, or refining ended without reaching the accuracy.
+    /// A factorisation failed, or refinement did not reach the accuracy.
     #[error("{system} coordinates could not be computed for this cage: {reason}; use mean value coordinates (mvc)")]
     NotComputed {
         /// The system's name.

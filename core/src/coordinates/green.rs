@@ -1,17 +1,15 @@
 //! Green coordinates of a closed triangle mesh (Lipman, Levin and Cohen-Or 2008): vertices and face normals.
 //!
-//! `x = Σ φ_v v + Σ ψ_f n_f` by Green's third identity, with the closed forms of `layer.rs`. The double layer jumps at the
-//! cage: its row sums to one inside, to zero outside and to something between on the cage itself. What is missing to one is made up
-//! with the point's affine coordinates in the nearest face: `x = Σ α_i v_i + β n` over the corners and the normal of that face. Inside that
-//! is nothing; on a face, an edge or a vertex it gives the limit from inside; outside it is the analytic continuation
-//! through that face (Lipman et al. 2008, §5). So coordinates are continuous inside, on the cage and through each face, they reproduce
-//! points everywhere, and jump outside where another face becomes the nearest, by about the distance to the cage times the
-//! bend of the deformation.
+//! `x = Σ φ_v v + Σ ψ_f n_f` by Green's third identity, with the closed forms of `layer.rs`. The φ sum to one inside, to zero outside and to a value
+//! in between on the cage itself. The deficit `t = 1 − Σ φ` is distributed over the nearest face, with corners `v_i` and unit normal `n`, by the
+//! point's affine coordinates `x = Σ α_i v_i + β n`: `t α_i` is added to the φ of the corners and `t β` to the ψ of the face. Inside, t is zero; on a
+//! face, an edge or a vertex the result is the limit from inside; outside it is the analytic continuation through that face (Lipman et al. 2008, §5),
+//! which jumps where another face becomes the nearest.
 //!
-//! Normals have a length: the root of the mean area of the faces. So `Φ` has no unit, and a cage's rows have one.
+//! Normals have the length ℓ, the square root of the mean area of the faces, so that `Φ` is dimensionless and all rows of a cage are lengths.
 
 use super::layer::{self, Frame, Layers, Scratch};
-use super::{ByPoint, CoordinateSystem, Coordinates, CoordinatesError, TiedNormals};
+use super::{CoordinateSystem, Coordinates, CoordinatesError, PointwiseCoordinates, TiedNormals};
 use crate::cage::Cage;
 use crate::mesh::{self, Point};
 use crate::simd::{LANES, Lanes, zeros};
@@ -21,19 +19,19 @@ use rayon::prelude::*;
 /// Green coordinates: cage vertices and face normals, defined inside and outside the cage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Green {
-    /// Normals follow from the vertices, see [`TiedNormals`]: the vertices are the unknowns, and the inversion is not linear.
+    /// Normals are functions of the vertices, see [`TiedNormals`]: the vertices are the unknowns, and the inversion is nonlinear.
     #[default]
     Consistent,
-    /// Normals are unknowns of their own, as in the paper of this method, which finds it the least stable case.
+    /// Normals are independent unknowns, as in Thiery et al. 2012, who report it as their least stable case.
     Free,
 }
 
-/// Rows that sum to one within this need no completion.
+/// Rows that sum to one within this need no affine_coordinates.
 const COMPLETE: f64 = 1e-13;
 /// Faces whose distances differ by less than this fraction, as they do at a common edge, are equally near.
 const EQUALLY_NEAR: f64 = 1e-9;
-/// So are faces within this fraction of the cage's size.
-const AT_THE_CAGE: f64 = 1e-13;
+/// Points closer to the cage than this fraction of its size lie on it.
+const ON_CAGE: f64 = 1e-13;
 
 impl CoordinateSystem for Green {
     fn name(&self) -> &'static str {
@@ -68,7 +66,7 @@ impl CoordinateSystem for Green {
         })
     }
 
-    fn by_point(&self) -> Option<ByPoint> {
+    fn pointwise(&self) -> Option<PointwiseCoordinates> {
         Some(coordinates)
     }
 
@@ -110,7 +108,7 @@ fn rows_of(
     mut rows: MatMut<'_, f64>,
     scratch: &mut Scratch,
 ) -> Vec<u32> {
-    let mut outsiders = Vec::new();
+    let mut outside = Vec::new();
     let (count, vertices) = (rows.nrows(), layers.vertices().len());
     for start in (0..count).step_by(LANES) {
         let x = layers.group(points, first + start);
@@ -126,36 +124,36 @@ fn rows_of(
             }
             for (f, share) in nearest_faces(layers, x.map(|c| c.0[l]), missing) {
                 let face = &layers.faces()[f];
-                let (weights, height) = face.completion(from_corner(layers, face, x.map(|c| c.0[l])));
+                let (weights, height) = face.affine_coordinates(from_corner(layers, face, x.map(|c| c.0[l])));
                 for (v, weight) in face.vertices.into_iter().zip(weights) {
                     phi[(start + l, v as usize)] += missing * share * weight;
                 }
                 psi[(start + l, f)] += missing * share * height / length;
             }
             if total.0[l] < 0.5 {
-                outsiders.push((first + start + l) as u32);
+                outside.push((first + start + l) as u32);
             }
         }
     }
-    outsiders
+    outside
 }
 
-/// The point seen from a face's first corner.
+/// The point relative to a face's first corner.
 fn from_corner(layers: &Layers, face: &Frame, x: Point) -> Point {
     let corner = layers.vertices()[face.vertices[0] as usize];
     mesh::sub(x, corner)
 }
 
-/// The faces nearest to the point, those that share the nearest edge or vertex, and the share of each. Shares fall with the angle
-/// between a face's normal and the way to the point, so that they change smoothly from one face over an edge to the next.
+/// The nearest faces, several where a shared edge or vertex is nearest, and the weight of each. Weights fall with the angle between a face's normal
+/// and the direction to the point, so that they vary continuously across edges.
 fn nearest_faces(layers: &Layers, x: Point, missing: f64) -> Vec<(usize, f64)> {
     let distance2 = |face: &Frame| mesh::distance2_to_triangle(face.vertices.map(|v| layers.vertices()[v as usize]), x);
     let distances: Vec<f64> = layers.faces().iter().map(distance2).collect();
     let least = distances.iter().copied().fold(f64::INFINITY, f64::min);
-    let bound = least * (1.0 + EQUALLY_NEAR) + AT_THE_CAGE * AT_THE_CAGE;
+    let bound = least * (1.0 + EQUALLY_NEAR) + ON_CAGE * ON_CAGE;
     let distance = least.sqrt();
     let share = |face: &Frame| {
-        if distance <= AT_THE_CAGE {
+        if distance <= ON_CAGE {
             return 1.0;
         }
         let height = mesh::dot(from_corner(layers, face, x), face.normal()) * missing.signum();

@@ -1,14 +1,14 @@
-//! Potentials of a triangle mesh's layers, in closed form: what Green coordinates and boundary elements are made of.
+//! Single- and double-layer potentials of a triangle mesh in closed form, for Green coordinates and boundary elements.
 //!
 //! For a point `x`, with `r = y − x`: the double layer of the hat function of a vertex, `φ_v = ∫ hat_v (r·n) / 4π|r|³`, and
 //! the single layer of a face, `ψ_f = ∫_f 1 / 4π|r|`. A harmonic function `u` inside a closed mesh is
-//! `u(x) = Σ φ_v u_v + Σ ψ_f ∂u/∂n` as far as it is linear on faces and its normal derivative constant (Green's third identity;
+//! `u(x) = Σ φ_v u_v + Σ ψ_f ∂u/∂n` if it is linear and its normal derivative constant on each face (Green's third identity;
 //! Lipman, Levin and Cohen-Or 2008, Eq. 3).
 //!
 //! Both follow from the solid angle `Ω` of each face and from `L = ∫ 1/|r|` along each edge. An edge's `L` enters its two faces
 //! with opposite signs and `Ω` enters `φ` and `ψ` with opposite signs, so that linear functions are reproduced to rounding
-//! wherever the point lies, even where `Ω` and `L` themselves are lost: at edges, `L` is cut off where it would be infinite,
-//! since its factors vanish there. Weights within a face are formed from coordinates along and across its longest edge,
+//! wherever the point lies, even where `Ω` and `L` themselves are inaccurate: at edges, where `L` is infinite, it is clamped, since its factors
+//! vanish there. Weights within a face are formed from coordinates along and across its longest edge,
 //! whose rounding cancels even in faces a million times longer than wide.
 
 use crate::cage::{Cage, Face};
@@ -26,7 +26,7 @@ pub(super) const TASK_POINTS: usize = 8 * LANES;
 /// A closed triangle mesh, prepared for the potentials of its layers.
 #[derive(Clone, Debug)]
 pub(crate) struct Layers {
-    /// Scaled to a size near one by a power of two, so that nothing overflows and scale does not change a bit.
+    /// Scaled by a power of two to a size near one, so that nothing overflows and results do not depend on the cage's scale.
     vertices: Vec<Point>,
     scale: f64,
     /// Ends and length.
@@ -91,9 +91,9 @@ impl Frame {
         self.axes[2]
     }
 
-    /// `x` as a sum of the face's corners, in the order of [`Self::vertices`], and of its unit normal, in the unit of
-    /// [`Layers`]. `x − v₀` is given, in that unit.
-    pub(super) fn completion(&self, x: Point) -> ([f64; 3], f64) {
+    /// Affine coordinates of `x` with respect to the face's corners, in the order of [`Self::vertices`], and the coefficient of its unit normal.
+    /// Takes `x − v₀`, in the unit of [`Layers`].
+    pub(super) fn affine_coordinates(&self, x: Point) -> ([f64; 3], f64) {
         let [p, q, h] = self.axes.map(|axis| mesh::dot(axis, x));
         let across = q / self.height;
         let second = p / self.length - self.foot * across;
@@ -124,7 +124,7 @@ impl Layers {
         Self { vertices, scale, edges, faces, triangles: cage.mesh().triangles.clone() }
     }
 
-    /// What lengths are multiplied with to come into the unit of the prepared mesh: a power of two.
+    /// Factor from the cage's unit of length to that of the prepared mesh: a power of two.
     pub(super) fn scale(&self) -> f64 {
         self.scale
     }
@@ -158,7 +158,7 @@ impl Layers {
         }
     }
 
-    /// The points from `first` on, in the unit of the prepared mesh; where there are none left, the last one again.
+    /// The points from `first` on, in the unit of the prepared mesh; lanes beyond the last point repeat it.
     pub(super) fn group(&self, points: &[Point], first: usize) -> [Lanes; 3] {
         let mut x = [Lanes::ZERO; 3];
         for l in 0..LANES {

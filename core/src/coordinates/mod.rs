@@ -1,5 +1,4 @@
-//! Cage coordinates: every point as a fixed combination of values that a cage has, `P = Φ·Y`: its vertices, and for some systems
-//! its face normals.
+//! Cage coordinates: each point as a linear combination `P = Φ·Y` of the rows Y of a cage, its vertices and, for Green coordinates, its face normals.
 
 mod error;
 mod green;
@@ -31,13 +30,13 @@ pub struct Coordinates {
     pub plan: Option<ElementPlan>,
 }
 
-/// The definition of the coordinate systems by which containers are written, which compute their coordinates anew when they are decoded.
-/// A change of a system that moves a decoded point by more than 1e-7 of the diagonal is another definition, and the old one stays known.
+/// Version of the definition of the coordinate systems, stored in containers because decoders recompute the coordinates. It increases when a change
+/// moves a decoded point by more than 1e-7 of the diagonal; earlier definitions remain supported.
 pub const DEFINITION: u32 = 3;
 
-/// Whether coordinates of this definition can be computed: all that there ever were. 1 to 3 are the same one; programs that wrote 1 and 2
-/// counted changes of the solver here as well.
-pub fn knows_definition(definition: u32) -> bool {
+/// Whether coordinates of this definition can be computed, as is the case for every one released so far. Definitions 1 to 3 are identical: programs
+/// that wrote 1 and 2 also counted changes of the solver.
+pub fn supports_definition(definition: u32) -> bool {
     (1..=DEFINITION).contains(&definition)
 }
 
@@ -64,8 +63,8 @@ impl Refinement {
     }
 }
 
-/// Coordinates of some points, whatever other points there are.
-pub type ByPoint = fn(&Cage, &[Point]) -> Coordinates;
+/// Computes the coordinates of points independently of each other.
+pub type PointwiseCoordinates = fn(&Cage, &[Point]) -> Coordinates;
 
 /// A system of cage coordinates. Every implementation passes the suite in `core/tests/conformance.rs`.
 pub trait CoordinateSystem: Sync {
@@ -78,12 +77,12 @@ pub trait CoordinateSystem: Sync {
     /// The values of the rest pose, columns × 3: what `Φ` multiplies to give the rest points. The vertices come first.
     fn rest_values(&self, cage: &Cage) -> Vec<Point>;
 
-    /// Unknowns m of a cage: rows that a stored cage has per frame. As many as columns, unless some values follow from others.
+    /// Unknowns m of a cage: rows stored per frame. Equal to the number of columns unless some values are functions of others.
     fn unknowns(&self, cage: &Cage) -> usize {
         self.columns(cage)
     }
 
-    /// The rule by which normals follow from the vertices, where they do: then the vertices alone are unknown.
+    /// How normals are computed from the vertices, for systems in which the vertices alone are unknown.
     fn tied_normals(&self, _cage: &Cage) -> Option<TiedNormals> {
         None
     }
@@ -93,7 +92,7 @@ pub trait CoordinateSystem: Sync {
         0
     }
 
-    /// What [`Self::coordinates`] would refuse before it computes much.
+    /// The inexpensive checks of [`Self::coordinates`].
     ///
     /// # Errors
     /// Points for which the system is not defined.
@@ -101,9 +100,9 @@ pub trait CoordinateSystem: Sync {
         Ok(())
     }
 
-    /// The same as [`Self::coordinates`], where a point's do not depend on the other points and always exist: then `Φ` can be computed
-    /// in parts.
-    fn by_point(&self) -> Option<ByPoint> {
+    /// [`Self::coordinates`] for systems in which a row of `Φ` depends on its own point alone and always exists, so that `Φ` can be computed in
+    /// chunks.
+    fn pointwise(&self) -> Option<PointwiseCoordinates> {
         None
     }
 

@@ -1,14 +1,14 @@
-//! Face normals that follow from the vertices of a deformed cage (Lipman, Levin and Cohen-Or 2008, Eq. 8): the unit normal
+//! Face normals as functions of the vertices of a deformed cage (Lipman, Levin and Cohen-Or 2008, Eq. 8): the unit normal
 //! of each face, times the factor by which the face is stretched.
 //!
 //! With edges `u`, `v` of a face at rest and `u'`, `v'` of the deformed one,
 //! `s² = (|u'|²|v|² − 2 (u'·v')(u·v) + |v'|²|u|²) / 8 area²`, which is the mean of the squares of the two factors by which the
-//! face is stretched. A face that has collapsed to a line or a point has no normal: zero takes its place.
+//! face is stretched. The normal of a face collapsed to a line or a point is zero.
 
 use crate::cage::Cage;
 use crate::mesh::{Point, cross, dot, norm, sub};
 
-/// What ties the normals of a cage to its vertices.
+/// Computes a cage's face normals from its vertices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TiedNormals {
     faces: Vec<[u32; 3]>,
@@ -32,8 +32,8 @@ impl TiedNormals {
         Self { weights: weights.collect(), faces }
     }
 
-    /// Puts the rule together again from [`Self::faces`] and [`Self::weights`]; `None` where they do not fit together or the
-    /// cage has fewer vertices than they name.
+    /// Reassembles it from [`Self::faces`] and [`Self::weights`]; `None` where their lengths differ, an index is out of range or a weight is not
+    /// finite.
     pub fn from_parts(faces: Vec<[u32; 3]>, weights: Vec<[f64; 3]>, vertices: usize) -> Option<Self> {
         let fits = faces.len() == weights.len()
             && faces.iter().flatten().all(|&v| (v as usize) < vertices)
@@ -61,7 +61,7 @@ impl TiedNormals {
         })
     }
 
-    /// How the normal of each face changes with the edges from its first corner to the other two.
+    /// Derivatives of the normal of each face with respect to the edges from its first corner to the other two.
     pub(crate) fn derivatives(&self, vertices: &[Point]) -> Vec<Derivative> {
         let of_face = |(&face, weights): (&[u32; 3], &[f64; 3])| {
             let [u, v] = edges(face, |i| vertices[i as usize]);
@@ -74,7 +74,7 @@ impl TiedNormals {
             let unit = normal.map(|c| c / area);
             let [a, b, c] = *weights;
             let along = [[0, 1, 2].map(|k| 2.0 * a * u[k] + b * v[k]), [0, 1, 2].map(|k| 2.0 * c * v[k] + b * u[k])];
-            // d(u × v) = du × v + u × dv; of it the part across the normal turns it.
+            // d(u × v) = du × v + u × dv; the component orthogonal to the normal rotates it.
             [0, 1].map(|side| {
                 let mut rows = [[0.0; 3]; 3];
                 for k in 0..3 {

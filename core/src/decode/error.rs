@@ -10,7 +10,7 @@ pub struct FrameError {
     pub l2: f64,
     /// `max |e|`.
     pub linf: f64,
-    /// The point of that error; the first of them.
+    /// Index of the first point with that error.
     pub worst: u32,
     /// `Σ |e|²`.
     pub squared: f64,
@@ -23,7 +23,7 @@ pub struct FrameError {
 pub(super) struct Sums {
     squared: f64,
     largest: f64,
-    /// The point whose square that is.
+    /// Index of the point with that error.
     at: usize,
     /// Sums of the positions about the frame's cage centre, and of their squares.
     first: Point,
@@ -54,7 +54,7 @@ impl Sums {
     }
 }
 
-/// Of the points from `first` on, decoded about the centre of their cage.
+/// Error sums of the points from `first` on; decoded positions are relative to the cage's centre.
 pub(super) fn block_sums<T: Copy + Into<f64>>(columns: [&[f32]; 3], part: &[T], centre: Point, first: usize) -> Sums {
     const STRIP: usize = 64;
     let mut sums = Sums::default();

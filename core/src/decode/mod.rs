@@ -1,14 +1,14 @@
-//! Positions from cages, and how far they are from a capture: `P = Φ·Y` in single precision, where `Y` are the rows of a cage,
-//! and where its normals are tied to them, those as well.
+//! Decoding: positions `P = Φ·Y` in single precision from a cage's rows Y, including the normals where these are functions of its vertices; and
+//! errors against a capture.
 
 mod error;
 mod phi;
 
 pub use error::FrameError;
-pub(crate) use phi::in_parts;
+pub(crate) use phi::for_each_chunk;
 
 use crate::cage::Cage;
-use crate::coordinates::{ByPoint, TiedNormals};
+use crate::coordinates::{PointwiseCoordinates, TiedNormals};
 use crate::dense;
 use crate::inversion::product_columns;
 use crate::mesh::Point;
@@ -27,41 +27,51 @@ pub struct Decoder {
     /// Shared by the solvers of one analysis.
     phi: Phi,
     points: usize,
-    /// Columns of positions, which follow a translation; the others are of directions.
+    /// Number of leading columns of `Φ` that multiply vertices, which follow a translation; the others multiply normals.
     positions: usize,
-    /// What the values of all columns after the positions follow from; otherwise they are rows of the cage.
+    /// Computes the normals from the vertices; `None` where normals are rows of the cage.
     normals: Option<Arc<TiedNormals>>,
 }
 
 impl Decoder {
-    /// Takes coordinates n × m whose first `positions` columns are of positions.
+    /// Takes coordinates n × m whose first `positions` columns multiply vertices.
     pub fn new(phi: MatRef<'_, f64>, positions: usize) -> Self {
-        let (points, phi) = (phi.nrows(), Phi::Kept(Arc::new(single(phi))));
+        let (points, phi) = (phi.nrows(), Phi::Stored(Arc::new(single(phi))));
         Self { phi, points, positions, normals: None }
     }
 
-    /// The coordinates of these points, which the decoder keeps. None is ever held in double precision as a whole.
-    pub fn keeping(by_point: ByPoint, cage: &Cage, points: &[Point], columns: usize) -> Self {
+    /// A decoder that stores the coordinates of these points in single precision, computing them chunk by chunk.
+    pub fn with_stored_coordinates(
+        pointwise: PointwiseCoordinates,
+        cage: &Cage,
+        points: &[Point],
+        columns: usize,
+    ) -> Self {
         let mut phi = padded(points.len(), columns);
-        in_parts(by_point, cage, points, columns, |first, part| {
+        for_each_chunk(pointwise, cage, points, columns, |first, part| {
             for j in 0..columns {
                 let to = phi.col_as_slice_mut(j)[first..].iter_mut();
                 to.zip(part.phi.col(j).iter()).for_each(|(to, &x)| *to = x as f32);
             }
         });
-        Self { phi: Phi::Kept(Arc::new(phi)), points: points.len(), positions: cage.vertices().len(), normals: None }
+        Self { phi: Phi::Stored(Arc::new(phi)), points: points.len(), positions: cage.vertices().len(), normals: None }
     }
 
-    /// The coordinates of these points, which are computed anew, some at a time, wherever the decoder is used: the same bits, for
-    /// models whose `Φ` is larger than memory.
-    pub fn computing(by_point: ByPoint, cage: &Cage, points: &[Point], columns: usize) -> Self {
+    /// A decoder that recomputes the coordinates of these points chunk by chunk at every use, with bit-identical results: for models whose `Φ`
+    /// exceeds memory.
+    pub fn with_recomputed_coordinates(
+        pointwise: PointwiseCoordinates,
+        cage: &Cage,
+        points: &[Point],
+        columns: usize,
+    ) -> Self {
         let positions = cage.vertices().len();
-        let phi = Phi::computed(by_point, cage.clone(), points.to_vec(), columns);
+        let phi = Phi::computed(pointwise, cage.clone(), points.to_vec(), columns);
         Self { phi, points: points.len(), positions, normals: None }
     }
 
-    /// Takes coordinates in single precision, n × `columns`, row-major, as they travel to who decodes elsewhere; the first
-    /// `positions` columns are of positions. Decodes to the same bits as the decoder that they came from.
+    /// Takes coordinates in single precision, n × `columns`, row-major, as the service sends them to clients that decode; the first `positions`
+    /// columns multiply vertices. Results are bit-identical to those of the decoder that they came from.
     ///
     /// # Panics
     /// Where the values are not whole rows.
@@ -74,8 +84,8 @@ impl Decoder {
     /// Takes coordinates n × m that are in single precision already.
     pub(crate) fn from_single(mut phi: Mat<f32>, positions: usize) -> Self {
         let points = phi.nrows();
-        phi.resize_with(points.next_multiple_of(dense::WHOLE_ROWS), phi.ncols(), |_, _| 0.0);
-        Self { phi: Phi::Kept(Arc::new(phi)), points, positions, normals: None }
+        phi.resize_with(points.next_multiple_of(dense::TILE_ROWS), phi.ncols(), |_, _| 0.0);
+        Self { phi: Phi::Stored(Arc::new(phi)), points, positions, normals: None }
     }
 
     /// The same coordinates for cages whose normals follow from their vertices.
@@ -91,12 +101,12 @@ impl Decoder {
         self
     }
 
-    /// The rule by which normals follow from the vertices, where they do.
+    /// How normals are computed from the vertices; `None` where they are unknowns or absent.
     pub fn tied_normals(&self) -> Option<&TiedNormals> {
         self.normals.as_deref()
     }
 
-    /// Columns of positions, which follow a translation; they come first.
+    /// Number of columns that multiply vertices; they come first.
     pub fn positions(&self) -> usize {
         self.positions
     }
@@ -116,7 +126,7 @@ impl Decoder {
         if self.normals.is_some() { self.positions } else { self.columns() }
     }
 
-    /// `Φ` in single precision, n × columns, column-major; `None` where it is not kept.
+    /// `Φ` in single precision, n × columns, column-major; `None` where it is not stored.
     pub fn coordinates(&self) -> Option<MatRef<'_, f32>> {
         self.phi.kept().map(|phi| phi.subrows(0, self.points))
     }
@@ -133,7 +143,7 @@ impl Decoder {
 
     /// Positions of up to [`BATCH`](crate::inversion::BATCH) frames, each n × 3 interleaved, from their cages, each m × 3 interleaved.
     ///
-    /// The bits of a frame depend on its cage alone, not on the other frames of the batch.
+    /// The result of a frame is bit-identical whatever the other frames of the batch.
     ///
     /// # Panics
     /// Where the lengths do not fit.
@@ -152,7 +162,7 @@ impl Decoder {
                 part.push(chunk);
             }
         }
-        self.phi.for_parts(|first, phi| {
+        self.phi.for_each_part(|first, phi| {
             let blocks = phi.nrows().div_ceil(BLOCK_ROWS);
             parts[first / BLOCK_ROWS..][..blocks].par_iter_mut().enumerate().for_each_init(
                 || Mat::zeros(BLOCK_ROWS, columns.ncols()),
@@ -182,7 +192,7 @@ impl Decoder {
         assert!(frames.iter().all(|f| f.len() == 3 * n), "every frame has every point");
         let (columns, centres) = self.values(cages);
         let mut blocks: Vec<Vec<Sums>> = Vec::with_capacity(n.div_ceil(BLOCK_ROWS));
-        self.phi.for_parts(|first, phi| {
+        self.phi.for_each_part(|first, phi| {
             let count = phi.nrows().div_ceil(BLOCK_ROWS);
             blocks.par_extend((0..count).into_par_iter().map_init(
                 || Mat::zeros(BLOCK_ROWS, columns.ncols()),
@@ -199,8 +209,8 @@ impl Decoder {
         (0..frames.len()).map(|f| Sums::total(blocks.iter().map(|b| &b[f])).into_error(n)).collect()
     }
 
-    /// What `Φ` multiplies, side by side, three columns for each cage and padding; positions about their own centre, which keeps
-    /// the digits of a capture that travels.
+    /// The matrix that `Φ` multiplies, three columns per cage and padding, and the cages' centres. Vertices are relative to their centre, to keep
+    /// precision far from the origin.
     fn values(&self, cages: &[&[f32]]) -> (Mat<f32>, Vec<Point>) {
         let m = self.unknowns();
         assert!(cages.iter().all(|c| c.len() == 3 * m), "every cage has every unknown");
@@ -242,7 +252,7 @@ fn block_product<'a>(
     columns: MatRef<'_, f32>,
     product: &'a mut Mat<f32>,
 ) -> MatRef<'a, f32> {
-    let whole = rows.next_multiple_of(dense::WHOLE_ROWS);
+    let whole = rows.next_multiple_of(dense::TILE_ROWS);
     dense::multiply(product.as_mut().subrows_mut(0, whole), phi.subrows(block * BLOCK_ROWS, whole), columns);
     product.as_ref().subrows(0, rows)
 }

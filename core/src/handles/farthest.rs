@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 /// Points of one block.
 const BLOCK_POINTS: usize = 32 * LANES;
-/// Blocks that one task looks at.
+/// Blocks per task.
 const TASK_BLOCKS: usize = 64;
 
 /// Adds points to `start` until there are `count`; returns them, `start` first, and the distance of the farthest point from its
@@ -39,7 +39,7 @@ fn farthest(blocks: &[Block]) -> Option<(f64, u32)> {
     Some((best.farthest, best.ids[best.farthest_at]))
 }
 
-/// Points that lie near each other.
+/// A block of neighbouring points with its bounding box.
 struct Block {
     low: Point,
     high: Point,
@@ -67,7 +67,7 @@ impl Block {
         Self { low, high, ids: ids.to_vec(), places, squared, farthest: f64::INFINITY, farthest_at: 0 }
     }
 
-    /// The point at this place becomes a sample.
+    /// Marks the point at this place as a sample.
     fn take(&mut self, place: usize, p: Point) {
         self.squared[place / LANES].0[place % LANES] = -1.0;
         self.update(p);
@@ -82,18 +82,18 @@ impl Block {
     }
 
     fn update(&mut self, p: Point) {
-        self.farthest_at = nearer(&self.places, &mut self.squared, &p);
+        self.farthest_at = update_nearest(&self.places, &mut self.squared, &p);
         self.farthest = self.squared[self.farthest_at / LANES].0[self.farthest_at % LANES];
     }
 }
 
 multiversion! {
-    /// Takes the distances to `p` where they are smaller; returns where the largest is then.
-    fn nearer(places: &[[Lanes; 3]], squared: &mut [Lanes], p: &Point) -> usize = nearer_generic;
+    /// Lowers the squared distances to those to `p` where these are smaller; returns the index of the largest.
+    fn update_nearest(places: &[[Lanes; 3]], squared: &mut [Lanes], p: &Point) -> usize = update_nearest_generic;
 }
 
 #[inline(always)]
-fn nearer_generic(places: &[[Lanes; 3]], squared: &mut [Lanes], p: &Point) -> usize {
+fn update_nearest_generic(places: &[[Lanes; 3]], squared: &mut [Lanes], p: &Point) -> usize {
     let p = [Lanes::splat(p[0]), Lanes::splat(p[1]), Lanes::splat(p[2])];
     let (mut largest, mut group_of) = (Lanes::splat(-2.0), Lanes::ZERO);
     for (g, (place, squared)) in places.iter().zip(squared).enumerate() {
@@ -116,16 +116,16 @@ fn nearer_generic(places: &[[Lanes; 3]], squared: &mut [Lanes], p: &Point) -> us
     at.1
 }
 
-/// All points in blocks along the curve of Morton, and the place of each point on it.
+/// All points in blocks along the Morton curve, and the position of each point on it.
 fn sorted_blocks(points: &[Point]) -> (Vec<Block>, Vec<u32>) {
-    let ids = along_curve(points);
+    let ids = morton_order(points);
     let mut place = vec![0; ids.len()];
     ids.iter().enumerate().for_each(|(at, &id)| place[id as usize] = at as u32);
     (ids.par_chunks(BLOCK_POINTS).map(|ids| Block::new(points, ids)).collect(), place)
 }
 
-/// All points in the order of the curve of Morton.
-pub(crate) fn along_curve(points: &[Point]) -> Vec<u32> {
+/// Indices of all points in Morton order.
+pub(crate) fn morton_order(points: &[Point]) -> Vec<u32> {
     const CELLS: f64 = 1024.0;
     let (low, high) = bounds(points);
     let widest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
@@ -135,7 +135,7 @@ pub(crate) fn along_curve(points: &[Point]) -> Vec<u32> {
         .par_iter()
         .enumerate()
         .map(|(i, p)| {
-            let code = (0..3).fold(0, |code, k| code | spaced(cell(p[k] - low[k])) << k);
+            let code = (0..3).fold(0, |code, k| code | interleave_zeros(cell(p[k] - low[k])) << k);
             (code, i as u32)
         })
         .collect();
@@ -143,8 +143,8 @@ pub(crate) fn along_curve(points: &[Point]) -> Vec<u32> {
     order.into_iter().map(|(_, i)| i).collect()
 }
 
-/// Ten bits with two zeros between each.
-fn spaced(x: u32) -> u32 {
+/// Inserts two zeros between each of the lowest ten bits.
+fn interleave_zeros(x: u32) -> u32 {
     let x = (x | x << 16) & 0x0300_00ff;
     let x = (x | x << 8) & 0x0300_f00f;
     let x = (x | x << 4) & 0x030c_30c3;

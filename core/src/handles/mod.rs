@@ -1,11 +1,4 @@
-//! Which points the inversion reads: from one per unknown to all.
-//!
-//! | handles | rows read | L2 above least squares over all points, four captures |
-//! |---|---|---|
-//! | [`Handles::MaxVol`] | m | 29 … 55 % |
-//! | [`Handles::Rectangular`] | K = 2m | 19 … 43 % |
-//! | [`Handles::Spread`] | K = 2m | 1 … 7 % |
-//! | [`Handles::All`] | n | 0 |
+//! Handles: the points that the inversion reads, from one per unknown to all. `docs/PAPER.md` compares their errors.
 
 pub(crate) mod farthest;
 pub(crate) mod interpolation;
@@ -14,15 +7,15 @@ pub(crate) mod rectangular;
 /// Which points the inversion reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Handles {
-    /// As many as unknowns, of maximum volume: stable, and a frame costs microseconds.
+    /// As many rows as unknowns, of maximum volume: well-conditioned, microseconds per frame.
     MaxVol,
-    /// Those of maximum volume, and the rows of the largest leverage beside them (Mikhalev and Oseledets 2018): for comparison.
+    /// The rows of maximum volume and those of largest leverage (Mikhalev and Oseledets 2018): for comparison.
     Rectangular {
         /// Rows read, K; 2m where none is given.
         count: Option<usize>,
     },
-    /// Those of maximum volume, and points spread evenly over the model; what all others do is interpolated. Close to
-    /// [`Self::All`] for a few percent of the bytes.
+    /// The rows of maximum volume and farthest-point samples, from which the other points are interpolated by kriging. Close to [`Self::All`] while
+    /// reading a few percent of the points.
     Spread {
         /// Rows read, K; 2m where none is given.
         count: Option<usize>,
@@ -32,7 +25,7 @@ pub enum Handles {
 }
 
 impl Default for Handles {
-    /// On four captures 19 to 32 % less error than maximum volume alone.
+    /// Spread handles, two for each unknown.
     fn default() -> Self {
         Self::Spread { count: None }
     }
@@ -42,8 +35,7 @@ impl Handles {
     /// The names, in the order of the documentation.
     pub const NAMES: [&'static str; 4] = ["maxvol", "rectangular", "spread", "all"];
 
-    /// The one with this name, reading `count` rows; `None` where there is none, or where it reads a number of rows of its own
-    /// and yet one is given.
+    /// The variant with this name, reading `count` rows; `None` for an unknown name, and for a count where the variant fixes its own.
     pub fn by_name(name: &str, count: Option<usize>) -> Option<Self> {
         match (name, count) {
             ("maxvol", None) => Some(Self::MaxVol),
@@ -64,7 +56,7 @@ impl Handles {
         }
     }
 
-    /// Rows read of so many points for so many unknowns. Without a wish, twice as many as unknowns where there can be a choice.
+    /// Number of rows read for a model of `points` points and a cage of `unknowns` unknowns; by default twice the unknowns where the number is free.
     pub fn count(self, points: usize, unknowns: usize) -> usize {
         match self {
             Self::MaxVol => unknowns,

@@ -1,10 +1,10 @@
-//! A rest pose and its cage, analysed: coordinates, handles of maximum volume and decompositions, which solvers with any
-//! options share.
+//! Analysis of a rest pose and its cage: coordinates, maximum-volume handles and singular value decompositions, shared by solvers with different
+//! options.
 
-use super::coordinates::{Found, coordinates};
-use super::operator::{Decomposed, Spectra, Wanted};
-use super::prepare::{check, check_options, refuse_far_points};
-use super::reading::Reading;
+use super::coordinates::{AnalysisCoordinates, coordinates};
+use super::handle_system::HandleSystem;
+use super::operator::{Decomposition, RequiredDecompositions, Spectra};
+use super::prepare::{check, check_options, reject_far_points};
 use super::{Preparation, PrepareError, Preparing, Solver, SolverOptions};
 use crate::cage::Cage;
 use crate::coordinates::CoordinateSystem;
@@ -18,19 +18,19 @@ use crate::svd;
 use faer::{Mat, MatRef};
 use std::time::Instant;
 
-/// A rest pose and its cage, analysed: solvers with any options follow at the cost of their operator alone.
+/// Analysis of a rest pose and its cage, from which solvers with any options follow at the cost of their operator alone.
 ///
-/// It holds `Φ` in double precision as well; whoever wants one solver calls [`Solver::prepare`].
+/// It holds `Φ` in double precision as well; for a single solver use [`Solver::prepare`].
 ///
-/// Of a system whose normals follow from the vertices, it analyses where its inversion starts from: mean value coordinates of the
-/// same cage and points. Only the decoder and the errors of reproduction are the system's own.
+/// For a system whose normals are functions of the vertices, it analyses mean value coordinates of the same cage and points, from which the nonlinear
+/// inversion starts. Only the decoder and the reproduction errors are the system's own.
 pub struct Analysis {
-    /// Of the points analysed.
+    /// `Φ` of the points analysed.
     pub(super) phi: Mat<f64>,
     pub(super) cage: Cage,
     /// The points analysed.
     points: Vec<Point>,
-    /// Which points they are, where they are not all.
+    /// Their indices in the model; `None` where all points are analysed.
     sample: Option<Vec<u32>>,
     /// Unknowns of the rest pose, m × 3.
     pub(super) rest: Vec<Point>,
@@ -48,10 +48,10 @@ impl Analysis {
     /// As [`Solver::prepare`].
     pub fn new(system: &dyn CoordinateSystem, cage: &Cage, points: &[Point]) -> Result<Self, PrepareError> {
         check(points, system.unknowns(cage), SolverOptions { spectrum: 0, ..SolverOptions::PAPER })?;
-        Self::of(system, cage, points, Wanted::Everything, &Preparing::default())
+        Self::of(system, cage, points, RequiredDecompositions::Everything, &Preparing::default())
     }
 
-    /// As [`Self::new`], with what solvers of these options need and no more. Of a model of very many points it analyses a sample.
+    /// As [`Self::new`], computing only what solvers with these options need. A model of very many points is analysed on a sample.
     ///
     /// # Errors
     /// As [`Solver::prepare`].
@@ -63,22 +63,30 @@ impl Analysis {
         preparing: &Preparing<'_>,
     ) -> Result<Self, PrepareError> {
         check(points, system.unknowns(cage), options)?;
-        Self::of(system, cage, points, Wanted::For(options.handles), preparing)
+        Self::of(system, cage, points, RequiredDecompositions::For(options.handles), preparing)
     }
 
     fn of(
         system: &dyn CoordinateSystem,
         cage: &Cage,
         points: &[Point],
-        wanted: Wanted,
+        required: RequiredDecompositions,
         preparing: &Preparing<'_>,
     ) -> Result<Self, PrepareError> {
         let (m, diagonal) = (system.unknowns(cage), diagonal(points));
         let clock = Instant::now();
-        refuse_far_points(cage, points)?;
+        reject_far_points(cage, points)?;
         preparing.next("coordinates")?;
-        let Found { phi, sample, decoder, rest, error, outside: (outside, outside_distance), refinement, plan } =
-            coordinates(system, cage, points, wanted, preparing.keeps_coordinates)?;
+        let AnalysisCoordinates {
+            phi,
+            sample,
+            decoder,
+            rest,
+            error,
+            outside: (outside, outside_distance),
+            refinement,
+            plan,
+        } = coordinates(system, cage, points, required, preparing.stores_coordinates)?;
         let coordinates_seconds = clock.elapsed().as_secs_f64();
 
         let clock = Instant::now();
@@ -91,10 +99,10 @@ impl Analysis {
 
         let clock = Instant::now();
         preparing.next("singular values")?;
-        let mut spectra = Spectra::of(&basis, wanted)?;
+        let mut spectra = Spectra::of(&basis, required)?;
         if basis.rank == m && spectra.full_ends[2] <= RANK_TOLERANCE * spectra.full_ends[0] {
             basis = deficient_basis(phi.as_ref()).ok_or(no_handles)?;
-            spectra = Spectra::of(&basis, wanted)?;
+            spectra = Spectra::of(&basis, required)?;
         }
         let rank = basis.rank;
         let preparation = Preparation {
@@ -122,29 +130,29 @@ impl Analysis {
         Ok(Self { phi, cage, points, sample, rest, basis, spectra, decoder, diagonal, preparation })
     }
 
-    /// A choice of handles, decomposed: solvers with any regularisation follow.
+    /// The linear system of a choice of handles with its decomposition, from which solvers with any regularisation follow.
     ///
     /// # Errors
     /// As [`Solver::prepare`].
-    pub fn reading(&self, handles: Handles) -> Result<Reading<'_>, PrepareError> {
+    pub fn handle_system(&self, handles: Handles) -> Result<HandleSystem<'_>, PrepareError> {
         let clock = Instant::now();
         let options = SolverOptions { handles, spectrum: 0, ..SolverOptions::PAPER };
         check_options(self.phi.nrows(), self.phi.ncols(), options)?;
-        let decomposed = Decomposed::new(self.phi.as_ref(), &self.points, &self.basis, &self.spectra, handles)?;
-        Ok(Reading::new(self, decomposed, clock.elapsed().as_secs_f64()))
+        let decomposition = Decomposition::new(self.phi.as_ref(), &self.points, &self.basis, &self.spectra, handles)?;
+        Ok(HandleSystem::new(self, decomposition, clock.elapsed().as_secs_f64()))
     }
 
-    /// As [`Self::reading`], of the given rows, as many as unknowns or more.
+    /// As [`Self::handle_system`], of the given rows, at least as many as unknowns.
     ///
     /// # Errors
     /// [`PrepareError::NoSolution`] where the rows determine nothing.
-    pub fn reading_of(&self, rows: &[u32]) -> Result<Reading<'_>, PrepareError> {
+    pub fn handle_system_of(&self, rows: &[u32]) -> Result<HandleSystem<'_>, PrepareError> {
         let clock = Instant::now();
-        let decomposed = Decomposed::of_given_rows(self.phi.as_ref(), rows.to_vec(), self.phi.ncols())?;
-        Ok(Reading::new(self, decomposed, clock.elapsed().as_secs_f64()))
+        let decomposition = Decomposition::of_given_rows(self.phi.as_ref(), rows.to_vec(), self.phi.ncols())?;
+        Ok(HandleSystem::new(self, decomposition, clock.elapsed().as_secs_f64()))
     }
 
-    /// Which points of the model are analysed, where they are not all.
+    /// Indices of the points analysed; `None` where all are.
     pub(super) fn sample(&self) -> Option<&[u32]> {
         self.sample.as_deref()
     }
@@ -154,24 +162,23 @@ impl Analysis {
     /// # Errors
     /// As [`Solver::prepare`].
     pub fn solver(&self, options: SolverOptions) -> Result<Solver, PrepareError> {
-        self.reading(options.handles)?.solver(options)
+        self.handle_system(options.handles)?.solver(options)
     }
 
-    /// A solver that reads the given rows instead of those of maximum volume, as many as unknowns or more; the handles among the
-    /// options are not looked at.
+    /// A solver that reads the given rows, at least as many as unknowns; the handles in the options are ignored.
     ///
     /// # Errors
     /// As [`Solver::prepare`]; [`PrepareError::NoSolution`] where the rows determine nothing.
-    pub fn solver_reading(&self, rows: &[u32], options: SolverOptions) -> Result<Solver, PrepareError> {
-        self.reading_of(rows)?.solver(options)
+    pub fn solver_of_rows(&self, rows: &[u32], options: SolverOptions) -> Result<Solver, PrepareError> {
+        self.handle_system_of(rows)?.solver(options)
     }
 
-    /// What preparing found out; the singular values are empty, see [`Self::handle_spectrum`] and [`Self::full_spectrum`].
+    /// Results of the preparation; the singular values are empty, see [`Self::handle_spectrum`] and [`Self::full_spectrum`].
     pub fn preparation(&self) -> &Preparation {
         &self.preparation
     }
 
-    /// Cages back to positions.
+    /// The decoder from cages to positions.
     pub fn decoder(&self) -> &Decoder {
         &self.decoder
     }
@@ -186,7 +193,7 @@ impl Analysis {
         &self.basis.handles
     }
 
-    /// Singular values of `Φ□`, descending; of an analysis [for options](Self::for_options) that do not need them, none.
+    /// Singular values of `Φ□`, descending; empty for an analysis [for options](Self::for_options) that do not need them.
     pub fn handle_spectrum(&self) -> &[f64] {
         self.spectra.handles.as_ref().map_or(&[], |svd| &svd.sigma)
     }

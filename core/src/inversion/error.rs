@@ -6,7 +6,7 @@ use crate::regularize::TermError;
 /// Why a solver cannot be prepared.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PrepareError {
-    /// The caller wants it no more.
+    /// The caller cancelled it.
     #[error("the preparation was stopped")]
     Stopped,
     /// NaN or infinity in the rest pose.
@@ -53,7 +53,7 @@ pub enum PrepareError {
         /// Distance from the first vertex of the cage over the diagonal of the cage.
         distance: f64,
     },
-    /// A point whose coordinates are rounding.
+    /// A point whose coordinates are dominated by rounding.
     #[error(
         "rest point {point} is not reproduced by the cage (off by {error:.1e} of its diagonal), as happens far outside it; move the cage around the model or delete the point"
     )]

@@ -1,18 +1,18 @@
-//! The solver: prepared once for a rest pose and its cage, then one matrix product per batch of frames; where normals follow from
-//! vertices, that is the start of an iteration.
+//! Inversion of frames: a [`Solver`] is prepared once for a rest pose and its cage and then takes one matrix product per batch of frames, followed by
+//! Gauss–Newton steps where normals are functions of the vertices.
 
 mod analysis;
 mod consistent;
 mod coordinates;
 mod error;
 mod factored;
+mod handle_system;
 mod operator;
 mod options;
 mod parts;
 mod prepare;
-mod pull;
-mod reading;
 mod solve;
+mod target;
 mod threshold;
 mod translations;
 
@@ -20,13 +20,13 @@ pub use crate::handles::Handles;
 pub use analysis::Analysis;
 pub use consistent::{Convergence, Outcome};
 pub use error::PrepareError;
-pub use factored::{Factored, Projected};
-pub use options::{SolverOptions, usual_spectrum};
+pub use factored::{FactoredInversion, ProjectedFrames};
+pub use handle_system::HandleSystem;
+pub use options::{SolverOptions, default_spectrum};
 pub use parts::{SolverParts, TiedParts};
-pub use prepare::{Preparation, Preparing, check_options, coordinates_fit, refuse_far_points};
-pub use pull::Pull;
-pub use reading::Reading;
-pub use solve::{BATCH, Inverted, Solver};
+pub use prepare::{Preparation, Preparing, check_options, coordinates_fit, reject_far_points};
+pub use solve::{BATCH, InvertedFrame, Solver};
+pub use target::RegularizationTarget;
 pub use threshold::Threshold;
 
 pub(crate) use operator::tall_product;

@@ -1,4 +1,4 @@
-//! The whole inversion as one matrix R, `C = R · H`.
+//! The linear inversion as one matrix R, `C = R · H`.
 
 use super::{BLOCK_ROWS, PrepareError};
 use crate::dense;
@@ -13,16 +13,16 @@ use crate::svd::{self, Svd};
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
-/// Which decompositions are wanted.
+/// Which decompositions to compute.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Wanted {
+pub(super) enum RequiredDecompositions {
     /// All of them.
     Everything,
     /// What solvers that read these handles need.
     For(Handles),
 }
 
-/// From this many unknowns on, decompositions of which only the ends are wanted are not made.
+/// From this many unknowns on, only the largest and smallest singular values are computed where no more of a decomposition is needed.
 const ENDS_ALONE: usize = 512;
 
 /// Decompositions of the handles of maximum volume and of all points.
@@ -41,12 +41,16 @@ pub(super) struct Spectra {
 }
 
 impl Spectra {
-    pub(super) fn of(basis: &RowBasis, wanted: Wanted) -> Result<Self, PrepareError> {
+    pub(super) fn of(basis: &RowBasis, required: RequiredDecompositions) -> Result<Self, PrepareError> {
         let m = basis.square.ncols();
         let (rank, large) = (basis.rank, m >= ENDS_ALONE && basis.rank == m);
-        let whole_frames = matches!(wanted, Wanted::Everything | Wanted::For(Handles::All | Handles::Spread { .. }));
-        let vectors_of_handles = !large || matches!(wanted, Wanted::Everything | Wanted::For(Handles::MaxVol));
-        let values_of_all = !large || wanted == Wanted::Everything;
+        let whole_frames = matches!(
+            required,
+            RequiredDecompositions::Everything | RequiredDecompositions::For(Handles::All | Handles::Spread { .. })
+        );
+        let vectors_of_handles = !large
+            || matches!(required, RequiredDecompositions::Everything | RequiredDecompositions::For(Handles::MaxVol));
+        let values_of_all = !large || required == RequiredDecompositions::Everything;
         let factor = basis.gram_factor();
         let whole = || {
             let factor = factor.as_ref()?;
@@ -76,9 +80,9 @@ impl Spectra {
                 [first, last, last]
             }
         };
-        let handles_ends = match (&handles, wanted) {
+        let handles_ends = match (&handles, required) {
             (Some(svd), _) => [svd.sigma[0], svd.sigma[rank - 1]],
-            (None, Wanted::For(Handles::All)) => {
+            (None, RequiredDecompositions::For(Handles::All)) => {
                 svd::ends(Mat::identity(m, m).as_ref(), basis.square.as_ref(), inverse)
             }
             (None, _) => [f64::NAN; 2],
@@ -88,13 +92,13 @@ impl Spectra {
 }
 
 /// A choice of handles with the decomposition of what is inverted: `Uᵀ` as a matrix on the rows read, Σ and V.
-pub(super) struct Decomposed {
+pub(super) struct Decomposition {
     /// The rows read; those of maximum volume where every point is.
     pub(super) handles: Vec<u32>,
     pub(super) reads_all: bool,
     /// Rows of the inverted matrix: the points over which least squares sums, which for interpolated handles are all that are analysed.
     pub(super) rows: usize,
-    left: Left,
+    left: LeftFactor,
     /// Singular values of the inverted matrix, descending; the first r count.
     pub(super) sigma: Vec<f64>,
     pub(super) rank: usize,
@@ -104,19 +108,19 @@ pub(super) struct Decomposed {
     pub(super) condition: f64,
 }
 
-/// A matrix L with `Uᵀ H = Lᵀ H`.
-enum Left {
+/// A matrix L with `Uᵀ H = Lᵀ H`, explicit or in factors.
+enum LeftFactor {
     /// L, one row per row read × r.
     Rows(Mat<f64>),
     /// U of `L = Φ T R⁻¹ U`, r × r; with the factor R, and T, m × r.
-    OfPoints { u: Mat<f64>, factor: Mat<f64>, to_basis: Mat<f64> },
+    Implicit { u: Mat<f64>, factor: Mat<f64>, to_basis: Mat<f64> },
 }
 
-/// B carries the rounding of `Φ□⁻¹`, which least squares over all points feels beyond this condition.
+/// Condition number of `Φ` up to which the rounding of `Φ□⁻¹` in B is negligible for least squares over all points.
 const GRAM_IS_SAFE: f64 = 1e6;
 
-impl Decomposed {
-    /// Reads as `handles` says.
+impl Decomposition {
+    /// Decomposes the system of a choice of handles.
     pub(super) fn new(
         phi: MatRef<'_, f64>,
         points: &[Point],
@@ -137,37 +141,37 @@ impl Decomposed {
         }
     }
 
-    /// Reads the given rows, each as important as any other.
+    /// Decomposes the given rows, with equal weights.
     pub(super) fn of_given_rows(phi: MatRef<'_, f64>, rows: Vec<u32>, rank: usize) -> Result<Self, PrepareError> {
         let what = "singular value decomposition of the rows";
         let svd = svd::svd(dense::rows_of(phi, &rows).as_ref()).ok_or(failed(what))?;
-        let felt = svd.sigma.iter().filter(|&&x| x > RANK_TOLERANCE * svd.sigma[0]).count();
-        if felt == 0 {
+        let numerical_rank = svd.sigma.iter().filter(|&&x| x > RANK_TOLERANCE * svd.sigma[0]).count();
+        if numerical_rank == 0 {
             return Err(failed("choice of rows"));
         }
-        Ok(Self::of_rows(rows, rank.min(felt), svd))
+        Ok(Self::of_rows(rows, rank.min(numerical_rank), svd))
     }
 
     fn of_rows(handles: Vec<u32>, rank: usize, svd: Svd) -> Self {
         let Svd { u, sigma, v } = svd;
         let condition = sigma[0] / sigma[rank - 1];
-        let left = Left::Rows(u.subcols(0, rank).to_owned());
+        let left = LeftFactor::Rows(u.subcols(0, rank).to_owned());
         Self { rows: handles.len(), handles, reads_all: false, left, sigma, rank, v, condition }
     }
 
     fn of_all(phi: MatRef<'_, f64>, basis: &RowBasis, spectra: &Spectra) -> Result<Self, PrepareError> {
         let rank = basis.rank;
         let (left, sigma, v) = match whole(phi, rank, spectra)? {
-            Whole::Direct(Svd { u, sigma, v }) => (Left::Rows(u.subcols(0, rank).to_owned()), sigma, v),
-            Whole::Compressed(svd) => {
+            FullSvd::Direct(Svd { u, sigma, v }) => (LeftFactor::Rows(u.subcols(0, rank).to_owned()), sigma, v),
+            FullSvd::Compressed(svd) => {
                 let factor = basis.gram_factor().ok_or(failed("factorisation of the handles"))?;
                 let u = svd.u.subcols(0, rank).to_owned();
-                let left = Left::OfPoints { u, factor, to_basis: basis.to_basis.clone() };
+                let left = LeftFactor::Implicit { u, factor, to_basis: basis.to_basis.clone() };
                 (left, svd.sigma.clone(), svd.v.clone())
             }
         };
         let [first, last] = match spectra.handles_ends {
-            // Not asked for when the decompositions were made.
+            // Not computed with the other decompositions.
             [first, _] if first.is_nan() => {
                 let m = phi.ncols();
                 svd::ends(Mat::identity(m, m).as_ref(), basis.square.as_ref(), basis.handles.inverse.as_ref())
@@ -179,7 +183,7 @@ impl Decomposed {
         Ok(Self { handles, reads_all: true, rows, left, sigma, rank, v, condition })
     }
 
-    /// Reads samples and inverts the frame interpolated from them.
+    /// Decomposes the system of spread handles: all points, interpolated from the samples.
     fn of_samples(
         phi: MatRef<'_, f64>,
         points: &[Point],
@@ -192,14 +196,14 @@ impl Decomposed {
         let samples = Samples { points, rows: &handles, reach };
         let (first, others) = handles.split_at(rank);
         let (map, others, svd) = match whole(phi, rank, spectra)? {
-            Whole::Direct(svd) => {
+            FullSvd::Direct(svd) => {
                 let u = svd.u.as_ref().subcols(0, rank);
                 let (inverse, _) = dense::inverse(dense::rows_of(u, first).as_ref());
                 let others = dense::product(dense::rows_of(u, others).as_ref(), inverse.as_ref());
                 let drift = Drift { wide: u, to_basis: None, others: others.as_ref(), gram: inverse.as_ref() };
                 (interpolated(&samples, &drift), others, svd)
             }
-            Whole::Compressed(svd) => {
+            FullSvd::Compressed(svd) => {
                 let (to_basis, gram) = (basis.to_basis.as_ref(), basis.handles.gram.as_ref());
                 let others = dense::product(dense::rows_of(phi, others).as_ref(), to_basis);
                 let drift = Drift { wide: phi, to_basis: Some(to_basis), others: others.as_ref(), gram };
@@ -213,7 +217,7 @@ impl Decomposed {
         };
         let condition = condition_of(phi, &handles, others.as_ref(), basis)
             .ok_or(failed("singular value decomposition of the rows"))?;
-        let left = Left::Rows(map.ok_or(failed("interpolation between the handles"))?.transpose().to_owned());
+        let left = LeftFactor::Rows(map.ok_or(failed("interpolation between the handles"))?.transpose().to_owned());
         Ok(Self { handles, reads_all: false, rows: phi.nrows(), left, sigma: svd.sigma, rank, v: svd.v, condition })
     }
 
@@ -221,9 +225,9 @@ impl Decomposed {
     pub(super) fn operator(&self, phi: MatRef<'_, f64>, data: MatRef<'_, f64>) -> Mat<f64> {
         let to_cage = dense::product(self.v.as_ref(), data);
         match &self.left {
-            Left::Rows(left) if self.reads_all => tall_product(left.as_ref(), to_cage.transpose()),
-            Left::Rows(left) => dense::product(left.as_ref(), to_cage.transpose()),
-            Left::OfPoints { u, factor, to_basis } => {
+            LeftFactor::Rows(left) if self.reads_all => tall_product(left.as_ref(), to_cage.transpose()),
+            LeftFactor::Rows(left) => dense::product(left.as_ref(), to_cage.transpose()),
+            LeftFactor::Implicit { u, factor, to_basis } => {
                 let mut inverse = dense::product(u.as_ref(), to_cage.transpose());
                 dense::solve_upper(factor.as_ref(), &mut inverse);
                 tall_product(phi, dense::product(to_basis.as_ref(), inverse.as_ref()).as_ref())
@@ -234,8 +238,8 @@ impl Decomposed {
     /// `Uᵀ H` of the rows read H, K × columns.
     pub(super) fn project(&self, phi: MatRef<'_, f64>, read: MatRef<'_, f64>) -> Mat<f64> {
         match &self.left {
-            Left::Rows(left) => dense::product(left.transpose(), read),
-            Left::OfPoints { u, factor, to_basis } => {
+            LeftFactor::Rows(left) => dense::product(left.transpose(), read),
+            LeftFactor::Implicit { u, factor, to_basis } => {
                 let mut of_basis = dense::product(to_basis.transpose(), dense::product(phi.transpose(), read).as_ref());
                 let lower = factor.transpose();
                 faer::linalg::triangular_solve::solve_lower_triangular_in_place(
@@ -250,18 +254,18 @@ impl Decomposed {
 }
 
 /// The decomposition of all of `Φ`.
-enum Whole<'a> {
+enum FullSvd<'a> {
     /// Of `Φ` itself.
     Direct(Svd),
     /// Of `R Φ□`: `Φ = B Φ□` and `BᵀB = RᵀR`, so that the left singular vectors of `Φ` are `B R⁻¹ U`.
     Compressed(&'a Svd),
 }
 
-fn whole<'a>(phi: MatRef<'_, f64>, rank: usize, spectra: &'a Spectra) -> Result<Whole<'a>, PrepareError> {
+fn whole<'a>(phi: MatRef<'_, f64>, rank: usize, spectra: &'a Spectra) -> Result<FullSvd<'a>, PrepareError> {
     let what = "singular value decomposition of the coordinates";
     match &spectra.full {
-        Some(full) if full.sigma[0] <= GRAM_IS_SAFE * full.sigma[rank - 1] => Ok(Whole::Compressed(full)),
-        _ => svd::svd(phi).map(Whole::Direct).ok_or(failed(what)),
+        Some(full) if full.sigma[0] <= GRAM_IS_SAFE * full.sigma[rank - 1] => Ok(FullSvd::Compressed(full)),
+        _ => svd::svd(phi).map(FullSvd::Direct).ok_or(failed(what)),
     }
 }
 
@@ -282,8 +286,8 @@ pub(super) fn failed(what: &'static str) -> PrepareError {
 }
 
 /// Zero columns up to a whole tile, see [`product_columns`](super::product_columns).
-pub(super) fn with_whole_tiles(mut operator: Mat<f64>) -> Mat<f64> {
-    operator.resize_with(operator.nrows(), operator.ncols().next_multiple_of(dense::WHOLE_ROWS), |_, _| 0.0);
+pub(super) fn padded_to_tiles(mut operator: Mat<f64>) -> Mat<f64> {
+    operator.resize_with(operator.nrows(), operator.ncols().next_multiple_of(dense::TILE_ROWS), |_, _| 0.0);
     operator
 }
 

@@ -1,13 +1,13 @@
-//! A solver's numbers, for keeping it between runs.
+//! Conversion of a solver to and from plain arrays, for storage.
 
 use super::consistent::Consistent;
-use super::{Preparation, Pull, Solver};
+use super::{Preparation, RegularizationTarget, Solver};
 use crate::coordinates::TiedNormals;
 use crate::decode::Decoder;
 use faer::{Mat, MatRef};
 use std::sync::Arc;
 
-/// Everything a solver is made of, as plain numbers.
+/// The data of a solver as plain arrays.
 #[derive(Clone, Debug)]
 pub struct SolverParts {
     /// The rows read, or where every point is, those of maximum volume.
@@ -16,24 +16,24 @@ pub struct SolverParts {
     pub reads_all: bool,
     /// `Rᵀ`, K × m: one row per point read.
     pub operator: Mat<f64>,
-    /// What is added to `R · H`.
-    pub pull: Pull,
+    /// Contribution of the reference cage, added to `R · H`.
+    pub target: RegularizationTarget,
     /// `Φ`, n × columns.
     pub phi: Mat<f32>,
-    /// Columns of positions, which follow a translation; they come first.
+    /// Number of columns that multiply vertices; they come first.
     pub positions: usize,
-    /// Where normals follow from vertices, what inverting takes beside the operator.
+    /// Additional data of the consistent inversion, where normals are functions of the vertices.
     pub tied: Option<TiedParts>,
     /// Diagonal of the rest pose's bounding box.
     pub diagonal: f64,
-    /// What preparing found out.
+    /// Results of the preparation.
     pub preparation: Preparation,
 }
 
-/// What a solver is made of where normals follow from vertices.
+/// Data of the consistent inversion.
 #[derive(Clone, Debug)]
 pub struct TiedParts {
-    /// The rule by which they do.
+    /// How normals are computed from the vertices.
     pub normals: TiedNormals,
     /// The Gram matrix of the rows read, columns × columns.
     pub gram: Mat<f64>,
@@ -52,22 +52,21 @@ impl Solver {
         self.reads_all
     }
 
-    /// What is added to `R · H`.
-    pub fn pull(&self) -> &Pull {
-        &self.pull
+    /// Contribution of the reference cage, added to `R · H`.
+    pub fn regularization_target(&self) -> &RegularizationTarget {
+        &self.target
     }
 
-    /// Where normals follow from vertices: the rule, the Gram matrix of the rows read, columns × columns, and how much the shape of
-    /// the linear start counts.
+    /// Data of the consistent inversion, if any: the definition of the normals, the Gram matrix of the rows read, columns × columns, and the weight λ
+    /// of the linear start.
     pub fn tied(&self) -> Option<(&TiedNormals, MatRef<'_, f64>, f64)> {
         let consistent = self.consistent.as_ref()?;
         Some((self.decoder.tied_normals()?, consistent.gram(), consistent.weight()))
     }
 
-    /// Puts a solver together again; it gives the same bits as the one its parts were taken from. None where the parts do not
-    /// fit together.
+    /// Reassembles a solver whose results are bit-identical to those of the original. `None` where the parts are inconsistent.
     pub fn from_parts(parts: SolverParts) -> Option<Self> {
-        let SolverParts { handles, reads_all, operator, pull, phi, positions, tied, diagonal, preparation } = parts;
+        let SolverParts { handles, reads_all, operator, target, phi, positions, tied, diagonal, preparation } = parts;
         let (n, columns) = phi.shape();
         let m = if tied.is_some() { positions } else { columns };
         let fits = (1..=n).contains(&m)
@@ -76,7 +75,7 @@ impl Solver {
             && operator.nrows() == if reads_all { n } else { handles.len() }
             && (1..=n).contains(&handles.len())
             && handles.iter().all(|&h| (h as usize) < n)
-            && pull.fits(m)
+            && target.fits(m)
             && tied.as_ref().is_none_or(|tied| tied.fits(columns, positions))
             && diagonal.is_finite();
         if !fits {
@@ -89,8 +88,8 @@ impl Solver {
             let rows = (!reads_all).then_some(handles.as_slice());
             consistent = Some(Arc::new(Consistent::from_gram(&decoder, rows, weight, gram)?));
         }
-        let operator = super::operator::with_whole_tiles(operator);
-        Some(Self { handles, reads_all, operator, pull, consistent, decoder, diagonal, preparation })
+        let operator = super::operator::padded_to_tiles(operator);
+        Some(Self { handles, reads_all, operator, target, consistent, decoder, diagonal, preparation })
     }
 }
 

@@ -1,4 +1,4 @@
-//! Preparing: coordinates, handles, spectrum and operator.
+//! Preparation of a solver: coordinates, handles, spectrum and operator.
 
 use super::operator::tall_product;
 use super::{Analysis, Handles, PrepareError, Solver, SolverOptions};
@@ -10,14 +10,15 @@ use faer::{Mat, MatRef};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
-/// Beyond this affine reproduction error, over the diagonal, coordinates are of no use.
+/// Coordinates with a larger affine reproduction error, over the diagonal, are rejected.
 const NOT_REPRODUCED: f64 = 1e-6;
-/// Farther from the cage, in its diagonals, one point outweighs all others by the inverse of [`WEAK`](crate::regularize::WEAK).
+/// At a larger distance from the cage, in diagonals, a point outweighs all others by the inverse of
+/// [`WEAK_SINGULAR_VALUE`](crate::regularize::WEAK_SINGULAR_VALUE).
 const FAR: f64 = 1e5;
 /// Points outside by less than this fraction of the diagonal lie on the cage.
 const ON_THE_CAGE: f64 = 1e-9;
 
-/// What preparing found out.
+/// Results of the preparation.
 #[derive(Clone, Debug, Default)]
 pub struct Preparation {
     /// Numerical rank of `Φ`, at most m.
@@ -53,7 +54,7 @@ pub struct Preparation {
 }
 
 impl Solver {
-    /// What [`Self::prepare`] would refuse before it computes anything.
+    /// The checks of [`Self::prepare`] that need no computation.
     ///
     /// # Errors
     /// See [`PrepareError`].
@@ -64,7 +65,7 @@ impl Solver {
         options: SolverOptions,
     ) -> Result<(), PrepareError> {
         check(points, system.unknowns(cage), options)?;
-        refuse_far_points(cage, points)?;
+        reject_far_points(cage, points)?;
         Ok(system.check(cage, points)?)
     }
 
@@ -81,7 +82,7 @@ impl Solver {
         Self::prepare_with(system, cage, points, options, &Preparing::default())
     }
 
-    /// As [`Self::prepare`], otherwise than usual.
+    /// As [`Self::prepare`], with a custom term, progress and cancellation.
     ///
     /// # Errors
     /// See [`PrepareError`].
@@ -97,25 +98,24 @@ impl Solver {
         term.delta(cage, system.unknowns(cage))?;
         let analysis = Analysis::for_options(system, cage, points, options, preparing)?;
         preparing.next("operator")?;
-        analysis.reading(options.handles)?.solver_with(options, term)
+        analysis.handle_system(options.handles)?.solver_with(options, term)
     }
 }
 
-/// How to prepare, beside the options of the solver.
+/// How to prepare a solver, apart from its options.
 #[derive(Clone, Copy)]
 pub struct Preparing<'a> {
-    /// A term of the caller's own, for [`Regularizer::Matrix`](crate::regularize::Regularizer::Matrix).
+    /// A custom term, for [`Regularizer::Matrix`](crate::regularize::Regularizer::Matrix).
     pub term: Option<&'a dyn Term>,
-    /// Whether the decoder of a model of very many points keeps their coordinates, which takes four bytes for each point and column, or
-    /// computes them anew whenever it is used.
-    pub keeps_coordinates: bool,
-    /// Told what is computed next; ends the preparation there with [`PrepareError::Stopped`] by a break.
+    /// Whether the decoder of a model of very many points stores their coordinates, four bytes per point and column, or recomputes them at every use.
+    pub stores_coordinates: bool,
+    /// Called with the name of each step before it begins; `Break` ends the preparation with [`PrepareError::Stopped`].
     pub next: &'a dyn Fn(&'static str) -> ControlFlow<()>,
 }
 
 impl Default for Preparing<'_> {
     fn default() -> Self {
-        Self { term: None, keeps_coordinates: true, next: &|_| ControlFlow::Continue(()) }
+        Self { term: None, stores_coordinates: true, next: &|_| ControlFlow::Continue(()) }
     }
 }
 
@@ -123,7 +123,7 @@ impl<'a> Preparing<'a> {
     /// The term of these options.
     ///
     /// # Errors
-    /// [`TermError::Missing`] where it would be the caller's own.
+    /// [`TermError::Missing`] where the options need a custom term and there is none.
     pub fn term(&self, options: SolverOptions) -> Result<&'a dyn Term, TermError> {
         self.term.or_else(|| options.regularizer.term()).ok_or(TermError::Missing)
     }
@@ -136,11 +136,11 @@ impl<'a> Preparing<'a> {
     }
 }
 
-/// Refuses points so far from the cage that their coordinates are rounding.
+/// Rejects points so far from the cage that their coordinates are dominated by rounding.
 ///
 /// # Errors
 /// [`PrepareError::TooFar`].
-pub fn refuse_far_points(cage: &Cage, points: &[Point]) -> Result<(), PrepareError> {
+pub fn reject_far_points(cage: &Cage, points: &[Point]) -> Result<(), PrepareError> {
     let [a, b, c] = cage.vertices()[0];
     for (point, p) in points.iter().enumerate() {
         let distance = norm([p[0] - a, p[1] - b, p[2] - c]) / cage.diagonal();
@@ -151,8 +151,13 @@ pub fn refuse_far_points(cage: &Cage, points: &[Point]) -> Result<(), PrepareErr
     Ok(())
 }
 
-/// Refuses a point whose coordinates are rounding. A stray point enlarges the model's own diagonal, not the cage's.
-pub(super) fn refuse_unreproduced(point: usize, error: f64, cage: &Cage, diagonal: f64) -> Result<(), PrepareError> {
+/// Rejects a point whose coordinates are dominated by rounding. The smaller diagonal counts, since a stray point enlarges that of the model.
+pub(super) fn reject_unreproduced_point(
+    point: usize,
+    error: f64,
+    cage: &Cage,
+    diagonal: f64,
+) -> Result<(), PrepareError> {
     let relative = error / diagonal.min(cage.diagonal());
     if relative.is_nan() || relative > NOT_REPRODUCED {
         return Err(PrepareError::NotReproduced { point, error: relative });
@@ -180,7 +185,7 @@ pub(super) fn check(points: &[Point], unknowns: usize, options: SolverOptions) -
 /// Checks options for so many points and unknowns.
 ///
 /// # Errors
-/// The options among [`PrepareError`].
+/// Those variants of [`PrepareError`] that concern options.
 pub fn check_options(points: usize, unknowns: usize, options: SolverOptions) -> Result<(), PrepareError> {
     if options.regularizer.has_threshold() && options.spectrum > unknowns {
         return Err(PrepareError::SpectrumTooLarge { spectrum: options.spectrum, unknowns });
@@ -206,8 +211,8 @@ pub fn coordinates_fit(points: usize, unknowns: usize, copies: usize) -> bool {
     Vec::<f64>::new().try_reserve_exact(entries).is_ok()
 }
 
-/// Of the points found outside, those that do not lie on the cage and that no part of a cage that cuts itself encloses; and the largest
-/// distance over the diagonal.
+/// Of the points reported as outside, those that neither lie on the cage nor inside a self-overlapping part of it; and their largest distance to the
+/// cage over the diagonal.
 pub(super) fn outside(cage: &Cage, points: &[Point], found: &[u32], diagonal: f64) -> (Vec<u32>, f64) {
     let distance = |i: u32| distance_to_surface(cage.vertices(), &cage.mesh().triangles, points[i as usize]) / diagonal;
     let enclosed = |i: u32| winding_number(cage.vertices(), &cage.mesh().triangles, points[i as usize]) > 0.5;

@@ -1,24 +1,24 @@
-//! Cages from frames: one matrix product for a batch, and for some systems what follows it.
+//! Inversion of frames: one matrix product per batch, followed by the consistent inversion where normals are functions of the vertices.
 
 use super::consistent::Consistent;
-use super::{BLOCK_ROWS, Convergence, Preparation, Pull};
+use super::{BLOCK_ROWS, Convergence, Preparation, RegularizationTarget};
 use crate::decode::Decoder;
 use crate::mesh::Point;
 use faer::{Accum, Mat, Par};
 use std::sync::Arc;
 
-/// Most frames of one matrix product.
+/// Maximum number of frames per matrix product.
 pub const BATCH: usize = 16;
 
-/// A prepared inversion: `C_t = R · H_t`, and for some terms a constant or a part of the previous cage beside it.
+/// A prepared inversion: `C_t = R · H_t`, plus a constant or a linear function of the previous cage for some terms.
 #[derive(Clone, Debug)]
 pub struct Solver {
     pub(super) handles: Vec<u32>,
     pub(super) reads_all: bool,
-    /// `Rᵀ`, K × m, column-major: one row per point read; zero columns follow up to a whole tile.
+    /// `Rᵀ`, K × m, column-major: one row per point read; padded with zero columns to a whole tile.
     pub(super) operator: Mat<f64>,
-    pub(super) pull: Pull,
-    /// What improves cages where their normals follow from their vertices.
+    pub(super) target: RegularizationTarget,
+    /// The consistent inversion, where normals are functions of the vertices.
     pub(super) consistent: Option<Arc<Consistent>>,
     pub(super) decoder: Decoder,
     pub(super) diagonal: f64,
@@ -27,21 +27,21 @@ pub struct Solver {
 
 /// The cage of a frame.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Inverted {
+pub struct InvertedFrame {
     /// m × 3 interleaved.
     pub cage: Vec<f32>,
-    /// How finding it went, where that took more than a matrix product.
+    /// Convergence of the consistent inversion, where there is one.
     pub convergence: Option<Convergence>,
 }
 
 impl Solver {
-    /// What preparing found out.
+    /// Results of the preparation.
     pub fn preparation(&self) -> &Preparation {
         &self.preparation
     }
 
-    /// The rows read, K, in their order: those of maximum volume first. With [`Handles::All`](crate::handles::Handles::All) there are
-    /// no others here: they only condition the solve, and every point is read.
+    /// The rows read, K, in their order: those of maximum volume first. With [`Handles::All`](crate::handles::Handles::All) these are only those of
+    /// maximum volume, although every point is read.
     pub fn handles(&self) -> &[u32] {
         &self.handles
     }
@@ -51,14 +51,14 @@ impl Solver {
         self.diagonal
     }
 
-    /// Cages back to positions.
+    /// The decoder from cages to positions.
     pub fn decoder(&self) -> &Decoder {
         &self.decoder
     }
 
     /// Bytes the prepared solver holds.
     pub fn size_bytes(&self) -> usize {
-        let operator = 8 * self.operator.nrows() * self.operator.ncols() + self.pull.size_bytes();
+        let operator = 8 * self.operator.nrows() * self.operator.ncols() + self.target.size_bytes();
         let consistent = self.consistent.as_ref().map_or(0, |consistent| consistent.size_bytes());
         self.decoder.size_bytes() + operator + consistent + 4 * self.handles.len()
     }
@@ -66,12 +66,12 @@ impl Solver {
     /// Whether every cage depends on the previous frame's, so that frames have to be inverted in order, by
     /// [`Self::invert_after`].
     pub fn follows_previous(&self) -> bool {
-        self.pull.is_previous()
+        self.target.is_previous()
     }
 
     /// Cages, each m × 3 interleaved, of up to [`BATCH`] frames, each n × 3 interleaved.
     ///
-    /// The bits of a cage depend on its frame alone, not on the other frames of the batch.
+    /// The cage of a frame is bit-identical whatever the other frames of the batch.
     ///
     /// # Panics
     /// Where a frame's length does not fit, more frames come than a batch holds, or the solver follows the previous frame.
@@ -80,25 +80,29 @@ impl Solver {
         self.invert_after(None, frames)
     }
 
-    /// As [`Self::invert`], for any solver: where it follows the previous frame, these are consecutive frames, the first after the
-    /// one whose cage is `previous`, or the first of all. Other solvers do not look at it.
+    /// As [`Self::invert`], for any solver: where cages depend on the previous frame, these are consecutive frames, and `previous` is the cage of the
+    /// frame before them, `None` at the beginning. Other solvers ignore it.
     ///
     /// # Panics
     /// Where lengths do not fit, or more frames come than a batch holds.
     pub fn invert_after<T: Copy + Into<f64>>(&self, previous: Option<&[f32]>, frames: &[&[T]]) -> Vec<Vec<f32>> {
-        self.invert_reporting(previous, frames).into_iter().map(|inverted| inverted.cage).collect()
+        self.invert_with_convergence(previous, frames).into_iter().map(|inverted| inverted.cage).collect()
     }
 
     /// As [`Self::invert_after`], with how the inversion of each frame went.
     ///
     /// # Panics
     /// As [`Self::invert_after`].
-    pub fn invert_reporting<T: Copy + Into<f64>>(&self, previous: Option<&[f32]>, frames: &[&[T]]) -> Vec<Inverted> {
+    pub fn invert_with_convergence<T: Copy + Into<f64>>(
+        &self,
+        previous: Option<&[f32]>,
+        frames: &[&[T]],
+    ) -> Vec<InvertedFrame> {
         assert!(frames.iter().all(|f| f.len() == 3 * self.decoder.points()), "every frame has every point");
         self.solve(previous, frames, |row| if self.reads_all { row } else { self.handles[row] as usize })
     }
 
-    /// As [`Self::invert`] of frames of which only the rows of [`Self::handles`] are there, K × 3 interleaved: the same bits.
+    /// As [`Self::invert`], given only the rows of [`Self::handles`], K × 3 interleaved; the result is bit-identical.
     ///
     /// # Panics
     /// As [`Self::invert`], and where the solver reads every point.
@@ -126,7 +130,7 @@ impl Solver {
         previous: Option<&[f32]>,
         frames: &[&[T]],
         point_of_row: impl Fn(usize) -> usize,
-    ) -> Vec<Inverted> {
+    ) -> Vec<InvertedFrame> {
         assert!(previous.is_none_or(|cage| cage.len() == 3 * self.decoder.unknowns()), "a cage has every unknown");
         let mut cages = self.linear(frames, &point_of_row);
         let position = |frame: usize, row: usize| {
@@ -135,22 +139,23 @@ impl Solver {
         };
         if let (Some(consistent), false) = (&self.consistent, self.follows_previous()) {
             for cage in &mut cages {
-                self.pull.add(cage, None, self.decoder.positions());
+                self.target.add(cage, None, self.decoder.positions());
             }
             let found = consistent.refine(&self.decoder, &mut cages, position, self.diagonal);
-            let inverted = |(cage, found): (&Vec<Point>, _)| Inverted { cage: single(cage), convergence: Some(found) };
+            let inverted =
+                |(cage, found): (&Vec<Point>, _)| InvertedFrame { cage: single(cage), convergence: Some(found) };
             return cages.iter().zip(found).map(inverted).collect();
         }
-        let mut solved: Vec<Inverted> = Vec::with_capacity(frames.len());
+        let mut solved: Vec<InvertedFrame> = Vec::with_capacity(frames.len());
         for (f, mut cage) in cages.into_iter().enumerate() {
             let before = solved.last().map(|inverted| inverted.cage.as_slice()).or(previous);
-            self.pull.add(&mut cage, before, self.decoder.positions());
+            self.target.add(&mut cage, before, self.decoder.positions());
             let mut cage = [cage];
             let refine = |consistent: &Arc<Consistent>| {
                 consistent.refine(&self.decoder, &mut cage, |_, row| position(f, row), self.diagonal).pop()
             };
             let convergence = self.consistent.as_ref().and_then(refine);
-            solved.push(Inverted { cage: single(&cage[0]), convergence });
+            solved.push(InvertedFrame { cage: single(&cage[0]), convergence });
         }
         solved
     }
@@ -193,8 +198,8 @@ fn single(cage: &[Point]) -> Vec<f32> {
 
 /// Columns of the product of a batch of frames.
 ///
-/// Few frames cost less in a narrow product. Widths are whole tiles of the kernels, which sum over the unknowns in the same
-/// order in each: a test holds them to it.
+/// Fewer frames take a narrower product. Widths are whole tiles of the kernels, which then sum over the unknowns in the same order (there is a test
+/// for it).
 ///
 /// # Panics
 /// Where more frames come than a batch holds.

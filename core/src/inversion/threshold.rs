@@ -1,13 +1,13 @@
-//! The spectrum threshold from the capture itself: as large as a bound on the extra error lets it be.
+//! Automatic choice of the spectrum threshold: the largest one whose additional error on sample frames stays within a bound.
 
-use super::{BATCH, PrepareError, Reading, Solver, SolverOptions};
+use super::{BATCH, HandleSystem, PrepareError, Solver, SolverOptions};
 use crate::regularize::Term;
 use rayon::prelude::*;
 
-/// Errors below this fraction of the diagonal are rounding: more of it is no loss.
+/// Errors below this fraction of the diagonal count as rounding.
 const ROUNDING: f64 = 1e-6;
 
-/// A threshold that was chosen, and why.
+/// A chosen threshold, and the errors it was chosen by.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Threshold {
     /// The largest threshold found whose error stays within the bound.
@@ -19,14 +19,14 @@ pub struct Threshold {
 }
 
 impl Threshold {
-    /// Mean L2 error at the chosen threshold over that at threshold 0, less one.
+    /// Relative increase of the mean L2 error over that at threshold 0.
     pub fn extra(&self) -> f64 {
         let at = |s| self.tried.iter().find(|&&(tried, _)| tried == s).map_or(0.0, |&(_, l2)| l2);
         if at(0) > 0.0 { at(self.spectrum) / at(0) - 1.0 } else { 0.0 }
     }
 }
 
-impl Reading<'_> {
+impl HandleSystem<'_> {
     /// The largest threshold found at which the mean L2 error of these frames, each n × 3 interleaved, exceeds that at threshold 0 by no more
     /// than the fraction `bound`. Every threshold is measured by the solver that it gives. Where cages follow their predecessors the frames are
     /// the first of the capture, in order.
@@ -51,7 +51,7 @@ impl Reading<'_> {
         let mut tried = vec![(0, error(0)?)];
         let most = (1.0 + bound) * tried[0].1.max(ROUNDING);
         let (mut fits, mut exceeds) = (0, m + 1);
-        // Steps of growing width, then halves.
+        // Exponential search, then bisection.
         let mut next = 1;
         while fits < m && exceeds > m {
             let s = next.min(m);

@@ -1,10 +1,10 @@
-//! Cages follow a translation of the frame exactly, also where truncation, damping or rounding by themselves would not let them.
+//! Translation equivariance: corrects row sums so that cages follow a translation of the frame exactly, despite truncation, damping or rounding.
 
 use faer::Mat;
 use faer::reborrow::Reborrow;
 
-/// The rows of R that give positions sum to one, those that give directions to zero. Takes and gives `Rᵀ`.
-pub(super) fn keep_translations(mut operator: Mat<f64>, positions: usize) -> Mat<f64> {
+/// Makes the rows of R for vertices sum to one and those for normals to zero. Takes and returns `Rᵀ`.
+pub(super) fn with_unit_row_sums(mut operator: Mat<f64>, positions: usize) -> Mat<f64> {
     let read = operator.nrows();
     for j in 0..operator.ncols() {
         let column = operator.col_mut(j);
@@ -17,13 +17,13 @@ pub(super) fn keep_translations(mut operator: Mat<f64>, positions: usize) -> Mat
     operator
 }
 
-/// The pull of another cage does not depend on where that cage is: the entries of every row that meet positions sum to zero.
-pub(super) fn cages_stay(mut pull: Mat<f64>, positions: usize) -> Mat<f64> {
-    for i in 0..pull.nrows() {
-        let share = (0..positions).map(|j| pull[(i, j)]).sum::<f64>() / positions as f64;
+/// Makes the contribution of a reference cage independent of its translation: the entries of every row that multiply vertices sum to zero.
+pub(super) fn with_zero_row_sums(mut target: Mat<f64>, positions: usize) -> Mat<f64> {
+    for i in 0..target.nrows() {
+        let share = (0..positions).map(|j| target[(i, j)]).sum::<f64>() / positions as f64;
         for j in 0..positions {
-            pull[(i, j)] -= share;
+            target[(i, j)] -= share;
         }
     }
-    pull
+    target
 }

@@ -5,8 +5,8 @@ use super::{Reference, Term, TermError};
 use crate::cage::Cage;
 use faer::Mat;
 
-/// Cages like the rest cage: `λ‖Δ C − Δ C_R‖²` with the cage Laplacian, so that sharp features survive. Not invariant to
-/// rotation: parts that turn far from the rest pose shrink, where the term has a say.
+/// Preserves the rest cage's differential coordinates, `λ‖Δ C − Δ C_R‖²` with the cage Laplacian Δ, so that sharp features survive. Not invariant to
+/// rotation: parts rotated far from the rest pose shrink in the regularised directions.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Differential;
 

@@ -4,8 +4,8 @@ use super::{Reference, Term, TermError};
 use crate::cage::Cage;
 use faer::Mat;
 
-/// Smooth cages: each vertex should be the mean of its neighbours, and where a cage's normals are unknown, each of them the
-/// mean of those across its face's edges. It forgets the rest cage's shape ("destructive", §5.1), hence the small s.
+/// Smoothness: penalises the difference of each vertex from the mean of its neighbours, and of each unknown normal from the mean of those of adjacent
+/// faces. It does not preserve the rest cage's shape ("destructive", §5.1), hence the small s.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CageLaplacian;
 

@@ -1,4 +1,4 @@
-//! A term of the user's own, as a sparse matrix.
+//! A custom term, given as a sparse matrix.
 
 use super::{Reference, Term, TermError};
 use crate::cage::Cage;
@@ -8,8 +8,8 @@ use faer::Mat;
 /// Larger entries overflow where they are squared.
 const LARGEST: f64 = 1e100;
 
-/// A sparse matrix Δ, one column per unknown of the cage: `λ‖Δ C‖²`. Where directions of faces are unknown too, a matrix with
-/// one column per vertex leaves them alone.
+/// A sparse matrix Δ, one column per unknown of the cage: `λ‖Δ C‖²`. Where face normals are unknown too, a matrix with one column per vertex does not
+/// affect them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SparseMatrix {
     rows: usize,
@@ -72,7 +72,7 @@ impl SparseMatrix {
         }
         match svd(gram.as_ref()) {
             Some(Svd { sigma, v, .. }) => Mat::from_fn(unknowns, unknowns, |i, j| sigma[i].sqrt() * v[(j, i)]),
-            // Squares overflow; the solve says so.
+            // Squares overflow; the solve then reports the failure.
             None => Mat::full(1, unknowns, f64::NAN),
         }
     }

@@ -1,6 +1,6 @@
 //! Sub-spectral regularisation (Thiery, Tierny and Boubekeur 2012, §5) and the baselines it is compared with.
 //!
-//! A [`Term`] says what a good cage is; it is applied to the unstable end of the spectrum alone. With `A = U Σ Vᵀ`
+//! A [`Term`] is a quadratic penalty on the cage, applied only to the singular directions with the smallest singular values. With `A = U Σ Vᵀ`
 //! and `C = V q` every method here is a matrix `T` in `q = T (Uᵀ H)`.
 
 mod differential;
@@ -31,9 +31,9 @@ pub enum Regularizer {
     /// As the Laplacian, but keep the shape of the previous frame's cage: `λ‖Δ C_t − Δ C_{t−1}‖²`. Makes every frame depend on
     /// the ones before it. See [`Temporal`].
     Temporal,
-    /// As the Laplacian, with a Δ of the user's own: see [`SparseMatrix`].
+    /// As the Laplacian, with a custom Δ: see [`SparseMatrix`].
     Matrix,
-    /// Plain inversion: the data alone.
+    /// No regularisation: the data term alone.
     None,
     /// Drop the last s singular directions.
     TruncatedSvd,
@@ -86,7 +86,7 @@ impl Regularizer {
         matches!(self, Self::Laplacian | Self::Differential | Self::Temporal | Self::Matrix)
     }
 
-    /// Its term; none where the user brings it. The baselines without one leave what no point feels to the Laplacian.
+    /// Its term; `None` where it is custom. The baselines without one apply the Laplacian to directions that no point determines.
     pub fn term(self) -> Option<&'static dyn Term> {
         match self {
             Self::Matrix => None,
@@ -98,4 +98,4 @@ impl Regularizer {
 }
 
 /// Directions with a singular value below this fraction of the largest amplify single-precision cages beyond use.
-pub const WEAK: f64 = 1e-6;
+pub const WEAK_SINGULAR_VALUE: f64 = 1e-6;

@@ -1,10 +1,10 @@
 //! A term on the unstable end of the spectrum, and the baselines (paper §5.2).
 
-use super::{Reference, Regularizer, WEAK};
+use super::{Reference, Regularizer, WEAK_SINGULAR_VALUE};
 use crate::dense;
 use faer::{Mat, MatRef};
 
-/// What [`spectral_map`] needs to know of the decomposition.
+/// Input of [`spectral_map`]: a decomposition and a regularisation term.
 pub(crate) struct Spectrum<'a> {
     /// Singular values above the rank tolerance, descending, r ≤ m.
     pub(crate) sigma: &'a [f64],
@@ -16,17 +16,17 @@ pub(crate) struct Spectrum<'a> {
     pub(crate) reference: Reference,
 }
 
-/// `q = data · (Uᵀ H) + pull · C₀`.
+/// `q = data · (Uᵀ H) + target · C₀`.
 pub(crate) struct SpectralMap {
     /// m × r.
     pub(crate) data: Mat<f64>,
-    /// m × m; none where the term has no reference, or no say.
-    pub(crate) pull: Option<Mat<f64>>,
+    /// m × m; `None` where the term has no reference or regularises no direction.
+    pub(crate) target: Option<Mat<f64>>,
 }
 
 /// The map for a threshold s. `weight` multiplies the term beside a sum over all rows of A; for Tikhonov it is what is added to the
 /// squared singular values. Directions outside the row space of A are always placed by Δ, except by the two baselines without a term; the
-/// terms also place those with a singular value below [`WEAK`] of the largest.
+/// terms also place those with a singular value below [`WEAK_SINGULAR_VALUE`] of the largest.
 ///
 /// `None` where a factorisation fails.
 pub(crate) fn spectral_map(
@@ -36,23 +36,23 @@ pub(crate) fn spectral_map(
     weight: f64,
 ) -> Option<SpectralMap> {
     let (m, r) = (spectrum.v.ncols(), spectrum.sigma.len());
-    let dead = m - r;
+    let null_dimension = m - r;
     let diagonal = |f: &dyn Fn(usize, f64) -> f64| {
         let data = Mat::from_fn(m, r, |i, j| if i == j { f(i, spectrum.sigma[i]) } else { 0.0 });
-        SpectralMap { data, pull: None }
+        SpectralMap { data, target: None }
     };
     match regularizer {
         Regularizer::TruncatedSvd => Some(diagonal(&|k, sigma| if k < m - s { 1.0 / sigma } else { 0.0 })),
         Regularizer::Tikhonov => Some(diagonal(&|_, sigma| sigma / (sigma * sigma + weight))),
         Regularizer::Global => sub_spectral(spectrum, m, weight),
         _ if regularizer.is_sub_spectral() => sub_spectral(spectrum, s.max(weak(spectrum)), weight),
-        _ => sub_spectral(spectrum, dead, 1.0),
+        _ => sub_spectral(spectrum, null_dimension, 1.0),
     }
 }
 
-/// Directions that a term takes whatever the threshold.
+/// Number of directions that a term regularises whatever the threshold.
 fn weak(spectrum: &Spectrum<'_>) -> usize {
-    spectrum.v.ncols() - spectrum.sigma.iter().filter(|&&x| x >= WEAK * spectrum.sigma[0]).count()
+    spectrum.v.ncols() - spectrum.sigma.iter().filter(|&&x| x >= WEAK_SINGULAR_VALUE * spectrum.sigma[0]).count()
 }
 
 /// Directions from m − s on minimise `w‖Δ V_high q_high + Δ V_low q_low − Δ C₀‖² + ‖Σ_high q_high − U_highᵀ H‖²`.
@@ -64,17 +64,17 @@ fn sub_spectral(spectrum: &Spectrum<'_>, s: usize, weight: f64) -> Option<Spectr
         data[(k, k)] = 1.0 / spectrum.sigma[k];
     }
     if s == 0 {
-        return Some(SpectralMap { data, pull: None });
+        return Some(SpectralMap { data, target: None });
     }
-    let bent = dense::product(spectrum.delta, spectrum.v);
-    let (bent_low, bent_high) = (bent.as_ref().subcols(0, low), bent.as_ref().subcols(low, s));
-    let mut system = dense::product(bent_high.transpose(), bent_high);
-    // What rounding leaves of a direction that Δ does not know.
-    let nothing = weight * (1e-14 * spectrum.delta.norm_l2()).powi(2);
-    let coupling = dense::product(bent_high.transpose(), bent_low);
+    let delta_v = dense::product(spectrum.delta, spectrum.v);
+    let (delta_low, delta_high) = (delta_v.as_ref().subcols(0, low), delta_v.as_ref().subcols(low, s));
+    let mut system = dense::product(delta_high.transpose(), delta_high);
+    // Rounding level of a direction in the null space of Δ.
+    let rounding_level = weight * (1e-14 * spectrum.delta.norm_l2()).powi(2);
+    let coupling = dense::product(delta_high.transpose(), delta_low);
     // The right-hand sides of the data, and after them those of the reference.
-    let pulled = if spectrum.reference == Reference::Origin { 0 } else { m };
-    let mut right = Mat::zeros(s, r + pulled);
+    let target_columns = if spectrum.reference == Reference::Origin { 0 } else { m };
+    let mut right = Mat::zeros(s, r + target_columns);
     for i in 0..s {
         for j in 0..s {
             system[(i, j)] *= weight;
@@ -88,15 +88,16 @@ fn sub_spectral(spectrum: &Spectrum<'_>, s: usize, weight: f64) -> Option<Spectr
             right[(i, low + i)] = sigma;
         }
     }
-    if pulled > 0 {
-        let pull = dense::product(bent_high.transpose(), spectrum.delta);
+    if target_columns > 0 {
+        let target = dense::product(delta_high.transpose(), spectrum.delta);
         for (i, j) in (0..m).flat_map(|j| (0..s).map(move |i| (i, j))) {
-            right[(i, r + j)] = weight * pull[(i, j)];
+            right[(i, r + j)] = weight * target[(i, j)];
         }
     }
-    let high = match dense::solve_determined(system.clone(), right.clone(), 1e-13, nothing) {
+    let high = match dense::solve_definite_within(system.clone(), right.clone(), 1e-13, rounding_level) {
         Some(high) => high,
-        // Δ leaves the place of a whole shell free, and no point feels that shell: hold it near the centre.
+        // Neither Δ nor any point determines the position of some connected component: add a small multiple of the identity, which keeps it near the
+        // origin.
         None => {
             let size = (0..s).map(|i| system[(i, i)]).fold(0.0, f64::max);
             for i in 0..s {
@@ -110,6 +111,7 @@ fn sub_spectral(spectrum: &Spectrum<'_>, s: usize, weight: f64) -> Option<Spectr
             data[(low + i, j)] = high[(i, j)];
         }
     }
-    let pull = (pulled > 0).then(|| Mat::from_fn(m, m, |i, j| if i < low { 0.0 } else { high[(i - low, r + j)] }));
-    Some(SpectralMap { data, pull })
+    let target =
+        (target_columns > 0).then(|| Mat::from_fn(m, m, |i, j| if i < low { 0.0 } else { high[(i - low, r + j)] }));
+    Some(SpectralMap { data, target })
 }

@@ -1,12 +1,12 @@
-//! Continuity in time: the cage of the frame before.
+//! Temporal coherence: regularisation towards the previous frame's cage.
 
 use super::laplacian::cage_laplacian;
 use super::{Reference, Term, TermError};
 use crate::cage::Cage;
 use faer::Mat;
 
-/// Cages like the previous frame's: `λ‖Δ C_t − Δ C_{t−1}‖²`, the first frame's like the rest cage. The difference is taken of
-/// differential coordinates, so that a capture may travel as fast as it likes.
+/// Preserves the differential coordinates of the previous frame's cage, `λ‖Δ C_t − Δ C_{t−1}‖²`, and those of the rest cage for the first frame.
+/// Global translations are not penalised.
 ///
 /// Every frame depends on all before it: frames have to be inverted in order, and one cannot be inverted without its
 /// predecessor's cage.

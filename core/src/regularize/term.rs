@@ -1,4 +1,4 @@
-//! What a good cage is: a linear term Δ, and the cage whose Δ it should have.
+//! Regularisation terms `λ‖Δ (C − C₀)‖²`: a matrix Δ and a reference cage C₀.
 
 use crate::cage::Cage;
 use faer::Mat;
@@ -6,7 +6,7 @@ use faer::Mat;
 /// The cage `C₀` in `λ‖Δ C − Δ C₀‖²`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reference {
-    /// None: `Δ C` should vanish.
+    /// Zero: `Δ C` itself is penalised.
     Origin,
     /// The rest pose's; adds a constant to every cage.
     RestCage,

@@ -7,7 +7,7 @@ use super::widen::{Scalar, widen};
 use super::{CacheFormat, FrameReader, mdd, npy, pc2};
 use crate::error::{Error, Fault};
 
-/// What a header promises.
+/// Layout of a cache as its header declares it.
 #[derive(Debug, PartialEq)]
 pub(super) struct Layout {
     pub(super) points: u64,
@@ -46,7 +46,7 @@ impl Order {
     }
 }
 
-/// No header that is read here is longer.
+/// Maximum length of a header.
 pub(super) const LONGEST_HEADER: usize = 12 + (1 << 16);
 
 /// Bytes read at once: few calls, and still within the fast caches.

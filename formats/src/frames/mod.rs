@@ -36,7 +36,7 @@ pub trait FrameReader: Send {
         None
     }
 
-    /// The number that the source gives a frame, which is counted from 0: a file's own number, or how often a cache was sampled. Numbers
+    /// The number that the source assigns to frame `frame`, from a file name or the sampling of a cache; `frame` counts from 0. Numbers
     /// ascend.
     fn number(&self, frame: usize) -> f64 {
         frame as f64
@@ -49,7 +49,7 @@ pub trait FrameReader: Send {
     /// [`Error::NonFinite`], [`Error::PointCount`], and those of the format; the next call tries the same frame again.
     fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error>;
 
-    /// Passes over the next frame; false at the end. Nothing is found out about it, where that saves reading it.
+    /// Skips the next frame, without checking it where that avoids reading it; false at the end.
     ///
     /// # Errors
     /// As [`Self::read_next`].

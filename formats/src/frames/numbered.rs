@@ -7,14 +7,14 @@ use crate::mesh::MeshFormat;
 
 /// A file name with a place for a number.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct Numbered {
+pub(super) struct NumberedNames {
     before: String,
     /// Least number of digits, filled up with zeros.
     digits: usize,
     after: String,
 }
 
-impl Numbered {
+impl NumberedNames {
     /// The name in a path of mesh files that has such a place; a point cache holds all frames in one file.
     pub(super) fn of(path: &Path) -> Option<Self> {
         MeshFormat::guess(path)?;
@@ -73,7 +73,7 @@ mod tests {
     #[test]
     fn printf_and_hash_patterns_name_the_same_files() {
         for pattern in ["walk.%04d.obj", "walk.####.obj"] {
-            let names = Numbered::of(Path::new(pattern)).unwrap();
+            let names = NumberedNames::of(Path::new(pattern)).unwrap();
             assert_eq!(names.name(7.0), "walk.0007.obj");
             assert_eq!(names.name(12345.0), "walk.12345.obj");
             assert!(names.extension_is("obj") && !names.extension_is("ply"));
@@ -91,13 +91,13 @@ mod tests {
                 assert_eq!(names.number(name), number, "{name}");
             }
         }
-        assert_eq!(Numbered::of(Path::new("f%d.ply")).unwrap().number("f12.ply"), Some(12));
+        assert_eq!(NumberedNames::of(Path::new("f%d.ply")).unwrap().number("f12.ply"), Some(12));
     }
 
     #[test]
     fn other_names_are_no_patterns() {
         for name in ["walk.obj", "walk.%s.obj", "walk.%4d.obj", "walk.####.npy", "a.##.b.##.obj", "100%.obj"] {
-            assert_eq!(Numbered::of(Path::new(name)), None, "{name}");
+            assert_eq!(NumberedNames::of(Path::new(name)), None, "{name}");
         }
     }
 }

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 /// Runs of missing frames that a message lists.
 const LISTED: usize = 6;
 
-/// The numbers in names that differ by nothing else: `f-2 f0 f1.5` or `walk.0010_left walk.0011_left`. Files as they stand get theirs;
-/// none where a name has no number, two have the same, or they differ by more.
+/// The numbers in names that differ by nothing else: `f-2 f0 f1.5` or `walk.0010_left walk.0011_left`. In the order of the files; `None` where a name
+/// has no number, two are equal, or the names differ elsewhere.
 pub(super) fn of_files(files: &[PathBuf]) -> Option<Vec<f64>> {
     let folder = files.first()?.parent();
     let stems: Option<Vec<&str>> =

@@ -1,4 +1,4 @@
-//! Some frames of a capture: from one to another, every so many.
+//! Ranges of frames: from one to another, with a step.
 
 use std::fmt;
 use std::path::Path;
@@ -96,11 +96,11 @@ pub fn open_frames_range(
     let reader = open_frames(source, expected_points)?;
     let Some(range) = range else { return Ok(reader) };
     range.check(reader.frames(), source)?;
-    Ok(Box::new(Taken { reader, range, taken: 0, at: 0 }))
+    Ok(Box::new(RangeReader { reader, range, taken: 0, at: 0 }))
 }
 
 /// The frames of a range.
-struct Taken {
+struct RangeReader {
     reader: Box<dyn FrameReader>,
     range: FrameRange,
     /// How many of the range were read or skipped.
@@ -109,7 +109,7 @@ struct Taken {
     at: usize,
 }
 
-impl Taken {
+impl RangeReader {
     /// Moves the reader to the next frame of the range; false at the end.
     fn advance(&mut self) -> Result<bool, Error> {
         if self.taken == self.range.count() {
@@ -131,7 +131,7 @@ impl Taken {
     }
 }
 
-impl FrameReader for Taken {
+impl FrameReader for RangeReader {
     fn points(&self) -> usize {
         self.reader.points()
     }
@@ -144,7 +144,7 @@ impl FrameReader for Taken {
         self.reader.frame_rate()
     }
 
-    /// Those of the source, so that what is left takes as long as before.
+    /// The numbers of the source, so that the timing of the remaining frames is unchanged.
     fn number(&self, frame: usize) -> f64 {
         self.reader.number(self.range.frame(frame))
     }

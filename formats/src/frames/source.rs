@@ -1,4 +1,4 @@
-//! From what was typed to a reader.
+//! Opening the frames of a capture from a path, folder or pattern.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -6,7 +6,7 @@ use std::io::{self, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 
 use super::cache;
-use super::numbered::Numbered;
+use super::numbered::NumberedNames;
 use super::sequence::SequenceReader;
 use super::{CacheFormat, FrameReader, npz, unknown_extension};
 use crate::error::{Error, Fault};
@@ -34,7 +34,7 @@ pub fn open_frames(source: impl AsRef<Path>, expected_points: usize) -> Result<B
         Ok(found) if !found.is_file() => Err(Fault::unsupported("is not a regular file; copy it to one").at(path)),
         Ok(found) => open_file(path, found.len(), expected_points),
         Err(cause) => match path.to_str() {
-            _ if Numbered::of(path).is_some() => open_numbered(path, expected_points),
+            _ if NumberedNames::of(path).is_some() => open_numbered(path, expected_points),
             Some(pattern) if pattern.contains(['*', '?', '[']) => open_pattern(path, pattern, expected_points),
             _ => Err(Error::read(path, cause)),
         },
@@ -47,7 +47,9 @@ pub fn frame_files(source: impl AsRef<Path>) -> Vec<PathBuf> {
     match path.to_str() {
         _ if path.is_dir() => sort(list(path).unwrap_or_default()).0,
         _ if path.exists() => vec![path.to_owned()],
-        Some(pattern) if Numbered::of(path).is_none() => glob::glob(pattern).into_iter().flatten().flatten().collect(),
+        Some(pattern) if NumberedNames::of(path).is_none() => {
+            glob::glob(pattern).into_iter().flatten().flatten().collect()
+        }
         _ => numbered_files(path).unwrap_or_default(),
     }
 }
@@ -130,7 +132,7 @@ fn open_numbered(path: &Path, expected_points: usize) -> Result<Box<dyn FrameRea
 /// The files with a number in the place for it, in the order of the numbers.
 fn numbered_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let number = |file: &PathBuf| Numbered::of(path)?.number(file.file_name()?.to_str()?);
+    let number = |file: &PathBuf| NumberedNames::of(path)?.number(file.file_name()?.to_str()?);
     let mut files: Vec<_> = list(folder)?.into_iter().filter_map(|file| Some((number(&file)?, file))).collect();
     files.sort();
     Ok(files.into_iter().map(|(_, file)| file).collect())

@@ -140,7 +140,7 @@ fn read_bytes(format: MeshFormat, name: &Path, bytes: &[u8], contents: Contents)
         .map_err(|fault| fault.at(name))
 }
 
-/// What text is that no mesh format begins with; a download that went wrong, or an editor's encoding.
+/// Recognises text that no mesh format begins with: a failed download, or an editor's encoding.
 fn foreign_text(bytes: &[u8]) -> Option<&'static str> {
     if matches!(
         bytes,
@@ -153,7 +153,7 @@ fn foreign_text(bytes: &[u8]) -> Option<&'static str> {
     }
     let start = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
     let begins = |word: &str| start.get(..word.len()).is_some_and(|found| found.eq_ignore_ascii_case(word.as_bytes()));
-    (begins("<!doctype") || begins("<html")).then_some("is a web page and no mesh; download the file itself")
+    (begins("<!doctype") || begins("<html")).then_some("is a web page, not a mesh; download the file itself")
 }
 
 /// Checks the corners of one face, which `place` names in messages, against the number of points.

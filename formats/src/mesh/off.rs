@@ -7,7 +7,7 @@ use crate::error::Fault;
 use crate::text::{Lines, integer, point, quoted, words};
 
 pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Model, Fault> {
-    let mut lines = Contentful(Lines::new(bytes));
+    let mut lines = ContentLines(Lines::new(bytes));
     let (points, faces) = counts(&mut lines)?;
     let mut model = Model::default();
     // A vertex takes at least six bytes: three digits and three separators.
@@ -37,9 +37,9 @@ pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Model, Fault> {
 }
 
 /// The lines that say something, without comments.
-struct Contentful<'a>(Lines<'a>);
+struct ContentLines<'a>(Lines<'a>);
 
-impl<'a> Iterator for Contentful<'a> {
+impl<'a> Iterator for ContentLines<'a> {
     type Item = &'a [u8];
 
     fn next(&mut self) -> Option<&'a [u8]> {
@@ -51,7 +51,7 @@ impl<'a> Iterator for Contentful<'a> {
 }
 
 /// Numbers of vertices and faces, from the line of the keyword or the one after it.
-fn counts(lines: &mut Contentful<'_>) -> Result<(usize, usize), Fault> {
+fn counts(lines: &mut ContentLines<'_>) -> Result<(usize, usize), Fault> {
     let mut line = lines.next().unwrap_or_default();
     let keyword = words(line).next().unwrap_or_default();
     if let Some(prefix) = keyword.strip_suffix(b"OFF") {

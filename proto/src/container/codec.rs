@@ -60,7 +60,7 @@ pub(crate) fn decode(
     let mut raw = join_planes(&planes, if codec == DIFFERENCE { 4 } else { width });
     drop(planes);
     if codec == DIFFERENCE {
-        add_up(&mut raw, stride);
+        undo_differences(&mut raw, stride);
     }
     Ok(raw)
 }
@@ -99,7 +99,7 @@ fn differences(raw: &[u8], stride: usize) -> Vec<u8> {
     (0..words.len()).flat_map(|k| zigzag(words[k].wrapping_sub(before(k)) as i32).to_le_bytes()).collect()
 }
 
-fn add_up(bytes: &mut [u8], stride: usize) {
+fn undo_differences(bytes: &mut [u8], stride: usize) {
     for k in 0..bytes.len() / 4 {
         let zigzag = u32_at(bytes, 4 * k);
         let difference = (zigzag >> 1) ^ (zigzag & 1).wrapping_neg();

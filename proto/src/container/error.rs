@@ -7,7 +7,7 @@ use std::io;
 #[non_exhaustive]
 pub enum Error {
     /// Some other kind of file.
-    #[error("is no .cager file: it does not begin as one; name a file that cager encode wrote")]
+    #[error("is not a .cager file: its first bytes differ; name a file that cager encode wrote")]
     NotAContainer,
     /// A later layout.
     #[error("has version {0} of the format, and this program reads version 1; use a newer cager")]

@@ -1,4 +1,4 @@
-//! Reading a container: checked before it is believed, any frame at once.
+//! Reading a container: validated before use, with random access to frames.
 
 use super::codec;
 use super::section::{self, FOOTER_BYTES, HEADER_BYTES, PRELUDE_BYTES, SectionHeader};
@@ -31,7 +31,7 @@ struct Entry {
     header: SectionHeader,
 }
 
-/// Reads one container from anything that can be searched.
+/// Reads a container from any seekable input.
 pub struct ContainerReader<R: Read + Seek> {
     input: R,
     file_bytes: u64,
@@ -140,7 +140,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         entry.map(|entry| self.raw(entry)).transpose()
     }
 
-    /// The stored rows of one frame, rows × 3. Any order will do; neighbours are fastest one after another.
+    /// The stored rows of one frame, rows × 3. In any order; consecutive frames are fastest.
     ///
     /// # Errors
     /// A frame that does not exist; damage.
@@ -309,10 +309,10 @@ impl<R: Read + Seek> ContainerReader<R> {
             .map_err(|e| Error::corrupt(entry.offset, format!("the header cannot be read ({e})")))?;
         let h = &self.header;
         if h.frame_rate.is_some_and(|fps| !(fps.is_finite() && fps > 0.0)) {
-            return Err(Error::corrupt(entry.offset, "the frame rate is no rate"));
+            return Err(Error::corrupt(entry.offset, "the frame rate is not a positive number"));
         }
         if h.rows_per_frame == 0 || h.points > u64::from(u32::MAX) || h.cage_vertices > u64::from(u32::MAX) {
-            return Err(Error::corrupt(entry.offset, "the header counts what cannot be"));
+            return Err(Error::corrupt(entry.offset, "the header has impossible counts"));
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! What a comparison finds out, as plain data: the content of `--json`, and of the report's tables and plots.
+//! The results of a comparison as plain data: the content of `--json`, and of the tables and plots of the report.
 
 mod random;
 mod spectra;
@@ -12,8 +12,8 @@ pub(crate) use summary::{Choice, Claim, Recommendation, Smoothness, Verdict, cla
 pub(crate) use swaps::{SwapTrace, Swaps};
 pub(crate) use vectors::Vectors;
 
+use super::evaluation::{PerFrame, Totals};
 use super::methods::Method;
-use super::track::{PerFrame, Totals};
 use serde::Serialize;
 
 /// Everything a comparison finds out. Lengths are fractions of the rest pose's bounding-box diagonal.
@@ -25,9 +25,9 @@ pub(crate) struct Figures {
     pub(crate) capture: Capture,
     /// Each coordinate system, in the order asked for.
     pub(crate) systems: Vec<System>,
-    /// What the figures advise.
+    /// Recommended options.
     pub(crate) recommendation: Recommendation,
-    /// What the paper says, held against this capture.
+    /// The paper's claims, checked on this capture.
     pub(crate) claims: Vec<Claim>,
 }
 

@@ -1,7 +1,7 @@
 //! Handles drawn at random against those of maximum volume (the paper's Fig. 3).
 
+use crate::compare::evaluation::Totals;
 use crate::compare::noise::Random;
-use crate::compare::track::Totals;
 use serde::Serialize;
 
 /// Draws at random.

@@ -1,4 +1,4 @@
-//! What the figures advise, and what becomes of the paper's claims on this capture.
+//! Recommended options, and the paper's claims checked on this capture.
 
 use super::{MethodFigures, NoiseFigures, System, SystemFigures};
 use crate::compare::methods::Method;
@@ -9,7 +9,7 @@ use serde::Serialize;
 
 /// A method is accurate enough to be recommended where its mean L2 is at most this many times the lowest of its system.
 const ACCURATE: f64 = 1.4;
-/// Differences below this are none.
+/// Relative differences below this do not count.
 const CLEAR: f64 = 0.02;
 
 /// What the figures advise.
@@ -85,7 +85,7 @@ fn choices(system: &System) -> Vec<Choice> {
     figures.methods.iter().map(choice).filter(|c| c.l2_mean.is_finite()).collect()
 }
 
-/// What became of a claim.
+/// Whether a claim holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Verdict {

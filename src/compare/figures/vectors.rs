@@ -1,4 +1,4 @@
-//! Where the singular vectors of `Φ□` live on the cage (the paper's Figs. 11 and 15).
+//! Localisation of the singular vectors of `Φ□` on the cage (the paper's Figs. 11 and 15).
 
 use cager_core::inversion::Analysis;
 use serde::Serialize;
@@ -10,8 +10,8 @@ const LAST: usize = 5;
 /// Singular vectors of `Φ□`.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Vectors {
-    /// For every singular direction, the number of unknowns it lives on: `1 / Σ v⁴`, m for one spread evenly, 1 for one on a
-    /// single unknown.
+    /// For every singular direction, its participation number, `1 / Σ v⁴`: the effective number of unknowns, m for a vector spread evenly, 1 for one
+    /// on a single unknown.
     pub(crate) spread: Vec<f64>,
     /// Mean of these over the first and over the last tenth.
     pub(crate) spread_first: f64,

@@ -1,35 +1,35 @@
 //! Stability of the cages.
 
-use super::Shown;
+use super::SystemSection;
 use super::parts::{Html, Table, coloured, percent, scale};
 use crate::compare::figures::{Figures, MethodFigures, SystemFigures};
 use crate::compare::render::Ramp;
-use crate::plot::{Axis, Chart, Cover, Mark, Series};
+use crate::plot::{Axis, AxisRange, Chart, Mark, Series};
 use cager_core::inversion::Handles;
 use cager_core::regularize::Regularizer;
 
 /// Spikes and edges, per method and threshold.
-pub(super) fn section(html: &mut Html, figures: &Figures, systems: &[Shown<'_>]) {
+pub(super) fn section(html: &mut Html, figures: &Figures, systems: &[SystemSection<'_>]) {
     html.section("cages", "Stability of the cages");
-    html.paragraph("A good cage moves as smoothly as the model. The second difference in time, |C(t+1) − 2 C(t) + C(t−1)|, is what the eye sees as shaking: its mean over vertices and frames measures how restless a cage is, its largest value the worst spike. The change of the cage's edges against the rest cage measures how far it has lost its shape.");
-    for (name, found, shots) in systems {
+    html.paragraph("A good cage moves as smoothly as the model. The second difference in time, |C(t+1) − 2 C(t) + C(t−1)|, is what the eye sees as shaking: its mean over vertices and frames measures how much a cage jitters, its largest value the worst spike. The change of the cage's edges against the rest cage measures how far it has lost its shape.");
+    for (name, found, pictures) in systems {
         html.heading(name);
         html.plots(
             &[
                 by_threshold(name, found, "mean spike", "mean second difference, %", |m| m.totals.spike_mean),
                 by_threshold(name, found, "largest spike", "largest second difference, %", |m| m.totals.spike_max),
                 by_threshold(name, found, "edges", "mean change of edges, %", |m| m.totals.edges_mean),
-                trade(name, found, figures.capture.motion_mean),
+                error_and_jitter(name, found, figures.capture.motion_mean),
                 over_time(name, found, &figures.capture.measured),
             ],
             "How smoothly the cages move, and what it costs.",
-            "The first three over the spectrum threshold s, for every choice of points read; global regularisation has no threshold and is a level line. Then every method by its error and its restlessness, both better towards the lower left corner, with the model's own mean as a line; and the largest spike of every frame. Axes need not begin at zero.",
+            "The first three over the spectrum threshold s, for every choice of points read; global regularisation has no threshold and is a level line. Then every method by its error and its jitter, both better towards the lower left corner, with the model's own mean as a line; and the largest spike of every frame. Axes need not begin at zero.",
             "Paper: Figs. 8, 12, 13, 19 and 20.",
         );
         html.table(&table(found, figures));
         html.pictures(
-            &shots.cages,
-            &scale("0", &format!("{} % and more", percent(shots.cages_top, 2)), &Ramp::css()),
+            &pictures.cages,
+            &scale("0", &format!("{} % and more", percent(pictures.cages_top, 2)), &Ramp::css()),
             &format!("Cages of frame {}, coloured by each vertex's second difference in time.", figures.capture.shown),
             "It is the frame of plain least squares' largest spike, and all pictures have the same view and scale. Spikes that reach beyond the picture are cut off.",
             "Paper: Figs. 8, 13, 18, 19 and 20.",
@@ -66,12 +66,12 @@ fn by_threshold(
     Chart {
         title: format!("{name}: {title}"),
         x: Axis::counting("spectrum threshold s"),
-        y: Axis::new(label, Cover::Around),
+        y: Axis::new(label, AxisRange::Around),
         series,
     }
 }
 
-fn trade(name: &str, found: &SystemFigures, motion: f64) -> Chart {
+fn error_and_jitter(name: &str, found: &SystemFigures, motion: f64) -> Chart {
     let mut series: Vec<Series> = Vec::new();
     for m in &found.methods {
         let point = (100.0 * m.totals.l2_mean, 100.0 * m.totals.spike_mean);
@@ -88,9 +88,9 @@ fn trade(name: &str, found: &SystemFigures, motion: f64) -> Chart {
     let points = vec![(low, 100.0 * motion), (high, 100.0 * motion)];
     series.push(Series { label: "the model itself".to_owned(), class: "k-random", mark: Mark::Dashes, points });
     Chart {
-        title: format!("{name}: error and restlessness"),
-        x: Axis::new("mean L2, %", Cover::Around),
-        y: Axis::new("mean second difference, %", Cover::Around),
+        title: format!("{name}: error and jitter"),
+        x: Axis::new("mean L2, %", AxisRange::Around),
+        y: Axis::new("mean second difference, %", AxisRange::Around),
         series,
     }
 }
@@ -105,7 +105,7 @@ fn over_time(name: &str, found: &SystemFigures, measured: &[usize]) -> Chart {
     Chart {
         title: format!("{name}: largest spike"),
         x: Axis::counting("frame"),
-        y: Axis::new("largest second difference, %", Cover::Factors),
+        y: Axis::new("largest second difference, %", AxisRange::Logarithmic),
         series: series.collect(),
     }
 }

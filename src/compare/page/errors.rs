@@ -1,21 +1,21 @@
 //! Errors of the model: per frame, per method, and with noise.
 
-use super::Shown;
+use super::SystemSection;
 use super::parts::{Html, Table, coloured, percent, scale};
 use crate::compare::figures::{Figures, MethodFigures, SystemFigures};
 use crate::compare::methods::Method;
 use crate::compare::render::Ramp;
-use crate::plot::{Axis, Chart, Cover, Mark, Series};
+use crate::plot::{Axis, AxisRange, Chart, Mark, Series};
 
 /// The error curves and their table.
-pub(super) fn section(html: &mut Html, figures: &Figures, systems: &[Shown<'_>]) {
+pub(super) fn section(html: &mut Html, figures: &Figures, systems: &[SystemSection<'_>]) {
     html.section("errors", "Errors of the reconstructed model");
-    for (name, found, shots) in systems {
+    for (name, found, pictures) in systems {
         html.heading(name);
         let charts = [("L2", "L2, %", false), ("L∞", "L∞, %", true)].map(|(title, label, linf)| Chart {
             title: format!("{name}: {title}"),
             x: Axis::counting("frame"),
-            y: Axis::new(label, Cover::FromZero),
+            y: Axis::new(label, AxisRange::FromZero),
             series: found
                 .methods
                 .iter()
@@ -31,14 +31,14 @@ pub(super) fn section(html: &mut Html, figures: &Figures, systems: &[Shown<'_>])
         );
         html.table(&table(found));
         html.pictures(
-            &shots.models,
-            &scale("0", &format!("{} % and more", percent(shots.models_top, 2)), &Ramp::css()),
+            &pictures.models,
+            &scale("0", &format!("{} % and more", percent(pictures.models_top, 2)), &Ramp::css()),
             &format!("Frame {} reconstructed, coloured by the distance of every point from the capture.", figures.capture.shown),
             "It is the frame in which the cage of plain least squares spikes most. One scale for all pictures of the row but for the first, whose points were drawn at random and whose errors may be off the scale.",
             "Paper: Figs. 3, 10 and 18.",
         );
         html.pictures(
-            &shots.row,
+            &pictures.row,
             "",
             "The capture as the paper's method encodes it.",
             "Maxvol handles with sub-spectral regularisation at the usual threshold: the reconstructed model, and its cage around it.",
@@ -91,7 +91,7 @@ fn frames(found: &SystemFigures, measured: &[usize]) -> Table {
 }
 
 /// The noise test.
-pub(super) fn noise(html: &mut Html, figures: &Figures, systems: &[Shown<'_>]) {
+pub(super) fn noise(html: &mut Html, figures: &Figures, systems: &[SystemSection<'_>]) {
     html.section("noise", "Noise on the capture");
     let radius = percent(figures.capture.noise_radius, 1);
     let measured = &figures.capture.measured;
@@ -137,7 +137,7 @@ pub(super) fn noise(html: &mut Html, figures: &Figures, systems: &[Shown<'_>]) {
         charts.push(Chart {
             title: format!("{name}: L∞"),
             x: Axis::counting("frame"),
-            y: Axis::new("L∞, %", Cover::FromZero),
+            y: Axis::new("L∞, %", AxisRange::FromZero),
             series: lines,
         });
     }

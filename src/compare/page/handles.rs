@@ -1,14 +1,14 @@
-//! How handles are found, and what others would do.
+//! How handles are found, compared with other choices.
 
-use super::Shown;
+use super::SystemSection;
 use super::parts::{Html, Table, coloured, condition, number, percent};
 use crate::compare::figures::{DRAW_FRAMES, SwapTrace};
-use crate::plot::{Axis, Chart, Cover, Mark, Series};
+use crate::plot::{Axis, AxisRange, Chart, Mark, Series};
 use cager_core::inversion::Handles;
 use cager_core::regularize::Regularizer;
 
 /// Volume and condition number over the swaps.
-pub(super) fn swaps(html: &mut Html, systems: &[Shown<'_>]) {
+pub(super) fn swaps(html: &mut Html, systems: &[SystemSection<'_>]) {
     html.section("swaps", "Maxvol, swap by swap");
     let mut charts = Vec::new();
     let mut shots = Vec::new();
@@ -19,7 +19,7 @@ pub(super) fn swaps(html: &mut Html, systems: &[Shown<'_>]) {
             ("pivoted LU", "k-cager", Some(&found.swaps.from_lu)),
             ("LU of a few drawn points", "k-all", found.swaps.from_random.as_ref()),
         ];
-        let chart = |title: &str, label: &str, cover: Cover, points: fn(&SwapTrace) -> Vec<(f64, f64)>| Chart {
+        let chart = |title: &str, label: &str, cover: AxisRange, points: fn(&SwapTrace) -> Vec<(f64, f64)>| Chart {
             title: format!("{name}: {title}"),
             x: Axis::counting("swaps"),
             y: Axis::new(label, cover),
@@ -31,10 +31,10 @@ pub(super) fn swaps(html: &mut Html, systems: &[Shown<'_>]) {
                 })
                 .collect(),
         };
-        charts.push(chart("volume", "ln |det Φ□|", Cover::Around, |t| {
+        charts.push(chart("volume", "ln |det Φ□|", AxisRange::Around, |t| {
             t.log_volume.iter().enumerate().map(|(k, v)| (k as f64, *v)).collect()
         }));
-        charts.push(chart("condition number", "condition number of Φ□", Cover::Factors, |t| {
+        charts.push(chart("condition number", "condition number of Φ□", AxisRange::Logarithmic, |t| {
             t.after.iter().zip(&t.condition).map(|(&k, c)| (k as f64, *c)).collect()
         }));
         for (label, class, trace) in traces {
@@ -74,7 +74,7 @@ pub(super) fn swaps(html: &mut Html, systems: &[Shown<'_>]) {
 }
 
 /// Random handles against those of maximum volume.
-pub(super) fn random(html: &mut Html, systems: &[Shown<'_>]) {
+pub(super) fn random(html: &mut Html, systems: &[SystemSection<'_>]) {
     html.section("random", "Random handles against maxvol");
     let mut charts = Vec::new();
     let mut table = Table::new(
@@ -137,8 +137,8 @@ pub(super) fn random(html: &mut Html, systems: &[Shown<'_>]) {
         }
         charts.push(Chart {
             title: format!("{name}: error and condition number"),
-            x: Axis::new("condition number", Cover::Factors),
-            y: Axis::new("mean L2, %", Cover::Factors),
+            x: Axis::new("condition number", AxisRange::Logarithmic),
+            y: Axis::new("mean L2, %", AxisRange::Logarithmic),
             series,
         });
     }

@@ -15,12 +15,12 @@ use crate::plot::escaped;
 use parts::Html;
 
 /// A computed system: its name, figures and pictures.
-type Shown<'a> = (&'a str, &'a SystemFigures, &'a Pictures);
+type SystemSection<'a> = (&'a str, &'a SystemFigures, &'a Pictures);
 
 /// The whole page.
 pub(crate) fn page(figures: &Figures, pictures: &[Pictures]) -> String {
-    let systems: Vec<Shown<'_>> =
-        figures.computed().zip(pictures).map(|((name, found), shots)| (name, found, shots)).collect();
+    let systems: Vec<SystemSection<'_>> =
+        figures.computed().zip(pictures).map(|((name, found), pictures)| (name, found, pictures)).collect();
     let mut html = Html::default();
     summary::claims(&mut html, figures);
     summary::refused(&mut html, figures);

@@ -1,4 +1,4 @@
-//! What pages are made of: sections, figures, tables, pictures.
+//! Building blocks of the page: sections, figures, tables, pictures.
 
 use crate::compare::pictures::Picture;
 use crate::plot::{Chart, escaped};

@@ -1,11 +1,11 @@
 //! Singular values.
 
-use super::Shown;
+use super::SystemSection;
 use super::parts::{Html, Table, condition, number};
-use crate::plot::{Axis, Chart, Cover, Mark, Series};
+use crate::plot::{Axis, AxisRange, Chart, Mark, Series};
 
 /// Spectra of all systems.
-pub(super) fn section(html: &mut Html, systems: &[Shown<'_>]) {
+pub(super) fn section(html: &mut Html, systems: &[SystemSection<'_>]) {
     html.section("spectra", "Spectra of the coordinate matrices");
     let mut charts = Vec::new();
     let mut table = Table::new(
@@ -23,7 +23,7 @@ pub(super) fn section(html: &mut Html, systems: &[Shown<'_>]) {
             let top = values.first().copied().unwrap_or(1.0);
             values.iter().enumerate().skip(from).map(|(k, s)| ((k + 1) as f64, s / top)).collect()
         };
-        let chart = |title: String, from: usize, cover: Cover| Chart {
+        let chart = |title: String, from: usize, cover: AxisRange| Chart {
             title,
             x: Axis::counting("singular value number"),
             y: Axis::new("over the largest", cover),
@@ -37,8 +37,8 @@ pub(super) fn section(html: &mut Html, systems: &[Shown<'_>]) {
                 })
                 .collect(),
         };
-        charts.push(chart(format!("{name}: whole spectrum"), 0, Cover::Factors));
-        charts.push(chart(format!("{name}: last fifth"), found.unknowns * 4 / 5, Cover::FromZero));
+        charts.push(chart(format!("{name}: whole spectrum"), 0, AxisRange::Logarithmic));
+        charts.push(chart(format!("{name}: last fifth"), found.unknowns * 4 / 5, AxisRange::FromZero));
         for (label, class, values, cond) in spectra {
             let at = |part: f64| values.get(((values.len() - 1) as f64 * part) as usize).map_or(f64::NAN, |s| *s);
             let cells = [0.0, 0.25, 0.5, 0.75, 1.0].map(|part| value(at(part)));

@@ -1,6 +1,6 @@
 //! Times, in the form of the paper's Table 1.
 
-use super::Shown;
+use super::SystemSection;
 use super::parts::{Html, Table, coloured, percent, seconds};
 use crate::compare::figures::Figures;
 use crate::plot::{escaped, grouped};
@@ -18,7 +18,7 @@ const PAPER: [PaperRow; 5] = [
 ];
 
 /// The table.
-pub(super) fn section(html: &mut Html, figures: &Figures, systems: &[Shown<'_>]) {
+pub(super) fn section(html: &mut Html, figures: &Figures, systems: &[SystemSection<'_>]) {
     html.section("times", "Times");
     let capture = &figures.capture;
     let mut table = Table::new(
@@ -38,7 +38,7 @@ pub(super) fn section(html: &mut Html, figures: &Figures, systems: &[Shown<'_>])
     );
     for (name, found, _) in systems {
         let usual = found.method(|m| m.is_cager() && m.curve);
-        let error = |f: fn(&crate::compare::track::Totals) -> f64| usual.map_or(f64::NAN, |m| f(&m.totals));
+        let error = |f: fn(&crate::compare::evaluation::Totals) -> f64| usual.map_or(f64::NAN, |m| f(&m.totals));
         let s = &found.seconds;
         table.row(vec![
             format!("{}, {name}", escaped(&capture.source)),

@@ -1,7 +1,7 @@
 //! `GET /v1/cages/{id}/cage.obj`: the best cage so far, and in the end the result.
 
 use crate::cage_job::Cage;
-use crate::http::extract::FoundJob;
+use crate::http::extract::RequestedCageJob;
 use crate::http::openapi;
 use crate::http::ranged::Immutable;
 use crate::problem::ApiError;
@@ -14,18 +14,18 @@ use http::header::{CACHE_CONTROL, CONTENT_DISPOSITION};
 use http::{HeaderMap, HeaderValue};
 use std::sync::Arc;
 
-/// The best cage so far, an OBJ file. The `ETag` names it; while the design runs another may follow, when it is completed it never changes.
+/// The best cage so far, as an OBJ file. Its `ETag` changes with the cage; once the design is completed, it never changes.
 #[utoipa::path(
     get, path = "/v1/cages/{id}/cage.obj", operation_id = "get_designed_cage", tag = "cages", params(openapi::CageId, openapi::Conditions),
     responses(
         (status = 200, description = "The cage", content_type = "model/obj", body = String),
         (status = 206, description = "The range asked for", content_type = "model/obj", body = String),
-        (status = 304, description = "What the client has is still right"),
+        (status = 304, description = "The client's copy is current"),
     ),
 )]
 pub(crate) async fn get(
     State(service): State<Arc<Service>>,
-    FoundJob { job, tenant }: FoundJob,
+    RequestedCageJob { job, tenant }: RequestedCageJob,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let store = service.store.clone();

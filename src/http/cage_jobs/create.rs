@@ -3,7 +3,7 @@
 use super::parts;
 use crate::http::extract::Caller;
 use crate::http::frames::too_slow;
-use crate::http::multipart::{self, Announced};
+use crate::http::multipart::{self, FormHeader};
 use crate::http::openapi;
 use crate::problem::ApiError;
 use crate::service::Service;
@@ -31,8 +31,8 @@ pub(crate) async fn create(
     request: Request,
 ) -> Result<Response, ApiError> {
     let limit = service.config.max_frames_bytes.saturating_add(service.config.max_rest_bytes);
-    let form = multipart::announced(&service, &request, "rest, frames and options", limit)?;
-    let Announced { idempotency_key, patience } = form;
+    let form = multipart::check_form_header(&service, &request, "rest, frames and options", limit)?;
+    let FormHeader { idempotency_key, patience } = form;
     let _place = service.stream(&tenant)?;
     let reading = parts::read(&service, &tenant, request, idempotency_key);
     let new = timeout(patience, reading).await.map_err(|_| too_slow())??;

@@ -1,6 +1,6 @@
 //! Listing, looking at and deleting cage designs.
 
-use crate::http::extract::{Caller, FoundJob, Named, Query};
+use crate::http::extract::{Caller, Query, Requested, RequestedCageJob};
 use crate::http::openapi;
 use crate::http::sessions::{PAGE, PageQuery};
 use crate::problem::ApiError;
@@ -27,7 +27,7 @@ pub(crate) async fn list(
 
 /// A cage design.
 #[utoipa::path(get, path = "/v1/cages/{id}", operation_id = "get_cage_design", tag = "cages", params(openapi::CageId), responses((status = 200, description = "The design", body = CageJob)))]
-pub(crate) async fn get(FoundJob { job, .. }: FoundJob) -> Json<CageJob> {
+pub(crate) async fn get(RequestedCageJob { job, .. }: RequestedCageJob) -> Json<CageJob> {
     Json(job.view())
 }
 
@@ -35,7 +35,7 @@ pub(crate) async fn get(FoundJob { job, .. }: FoundJob) -> Json<CageJob> {
 #[utoipa::path(delete, path = "/v1/cages/{id}", operation_id = "delete_cage_design", tag = "cages", params(openapi::CageId), responses((status = 204, description = "It is gone")))]
 pub(crate) async fn delete(
     State(service): State<Arc<Service>>,
-    Named(job): Named<crate::cage_job::CageJob>,
+    Requested(job): Requested<crate::cage_job::CageJob>,
 ) -> Result<StatusCode, ApiError> {
     service.delete_cage_job(&job).await?;
     Ok(StatusCode::NO_CONTENT)

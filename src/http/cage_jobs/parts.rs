@@ -1,9 +1,9 @@
-//! The multipart body that asks for a cage: the rest pose goes to memory, frames to the disk as they come.
+//! Parses the multipart body of a cage design: the rest pose into memory, the frames onto disk as they arrive.
 
 use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::cage_job::create::{NewCageJob, check_options};
-use crate::config::ENVELOPE_BYTES;
+use crate::config::MULTIPART_OVERHEAD_BYTES;
 use crate::http::multipart::{NAME_CHARACTERS, bad, broken, file_name, read_options};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
@@ -22,23 +22,23 @@ use std::pin::Pin;
 use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll};
 
-/// Bytes of frames written at a time; quota is asked for in the same pieces.
-const WRITTEN: usize = 1 << 20;
+/// Bytes of frames written to disk at a time; quota is reserved in the same steps.
+const SPOOL_CHUNK_BYTES: usize = 1 << 20;
 
 /// Reads all parts.
 ///
 /// # Errors
-/// Parts that are missing, twice there, unknown or too large; no room; those of the disk.
+/// Parts that are missing, twice there, unknown or too large; no room; storage errors.
 pub(in crate::http) async fn read(
     service: &Arc<Service>,
     tenant: &Arc<Tenant>,
     request: Request,
     idempotency_key: Option<String>,
 ) -> Result<NewCageJob, ApiError> {
-    let pace = Arc::new(Mutex::new(Pace::default()));
+    let pace = Arc::new(Mutex::new(ParserBacklog::default()));
     let counted = Arc::clone(&pace);
     let request = request
-        .map(|body| Body::from_stream(OneAtATime { inner: body.into_data_stream(), pace: counted, gave: false }));
+        .map(|body| Body::from_stream(ChunkwiseBody { inner: body.into_data_stream(), pace: counted, gave: false }));
     let body = Multipart::from_request(request, &())
         .await
         .map_err(|error| bad(format!("the multipart body cannot be read: {}", error.body_text())))?;
@@ -57,7 +57,7 @@ pub(in crate::http) async fn read(
 struct Receiver<'a> {
     service: &'a Arc<Service>,
     tenant: &'a Arc<Tenant>,
-    pace: Arc<Mutex<Pace>>,
+    pace: Arc<Mutex<ParserBacklog>>,
     room: Held,
     reserved: Reserved,
 }
@@ -80,10 +80,10 @@ impl Receiver<'_> {
                 "rest" => rest = Some(self.read_rest(field).await?),
                 "frames" => frames = Some(self.read_frames(field).await?),
                 _ => {
-                    let wish: CageOptions = read_options(field).await?;
-                    // Before the frames arrive, if that is how they are sent.
-                    check_options(&wish, &self.service.config)?;
-                    options = Some(wish);
+                    let request: CageOptions = read_options(field).await?;
+                    // Validated before the frames arrive if the part comes first.
+                    check_options(&request, &self.service.config)?;
+                    options = Some(request);
                 }
             }
         }
@@ -129,7 +129,7 @@ impl Receiver<'_> {
             let chunk = self.chunk(&mut field).await?;
             let ended = chunk.is_none();
             waiting.extend_from_slice(&chunk.unwrap_or_default());
-            if waiting.len() < WRITTEN && !ended {
+            if waiting.len() < SPOOL_CHUNK_BYTES && !ended {
                 continue;
             }
             if spool.bytes() + waiting.len() as u64 > limit {
@@ -168,23 +168,23 @@ impl Receiver<'_> {
     }
 }
 
-/// How far the parser of parts is behind what has arrived.
+/// Progress of the multipart parser relative to the body.
 #[derive(Default)]
-struct Pace {
-    /// Bytes that arrived and are in no part yet: what is kept until a part is found.
+struct ParserBacklog {
+    /// Bytes received that belong to no part yet; the parser buffers them.
     unused: u64,
-    /// There were too many of them.
+    /// Whether that limit was exceeded.
     stuck: bool,
 }
 
-/// Gives the pieces of a body one at a time: the parser keeps all that it can get at once, and should not get a whole capture.
-struct OneAtATime {
+/// Yields a body chunk by chunk: the multipart parser buffers whatever is available, which must not be a whole capture.
+struct ChunkwiseBody {
     inner: BodyDataStream,
-    pace: Arc<Mutex<Pace>>,
+    pace: Arc<Mutex<ParserBacklog>>,
     gave: bool,
 }
 
-impl Stream for OneAtATime {
+impl Stream for ChunkwiseBody {
     type Item = Result<Bytes, axum::Error>;
 
     fn poll_next(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Option<Self::Item>> {
@@ -197,7 +197,7 @@ impl Stream for OneAtATime {
         if let Some(Ok(bytes)) = &piece {
             let mut pace = lock(&self.pace);
             pace.unused += bytes.len() as u64;
-            if pace.unused > 2 * ENVELOPE_BYTES {
+            if pace.unused > 2 * MULTIPART_OVERHEAD_BYTES {
                 pace.stuck = true;
                 return Poll::Ready(Some(Err(axum::Error::new("it has no parts"))));
             }

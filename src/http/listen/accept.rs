@@ -2,8 +2,8 @@
 
 use super::Limits;
 use super::connection::Shared;
-use super::socket::Keep;
-use super::waiting::Waiting;
+use super::idle::IdleConnections;
+use super::socket::ConnectionResources;
 use axum::Router;
 use futures_util::FutureExt as _;
 use socket2::TcpKeepalive;
@@ -20,21 +20,21 @@ use tokio_rustls::TlsAcceptor;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
-/// How long a connection waits for the place of one that is being closed for it.
-const DISPLACED_WITHIN: Duration = Duration::from_secs(1);
+/// How long a new connection waits for the slot of a displaced one.
+const DISPLACE_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// First and longest pause after an error of accepting, such as having no file descriptor left.
+/// First and longest pause after an accept error, such as running out of file descriptors.
 const PAUSES: (Duration, Duration) = (Duration::from_millis(10), Duration::from_secs(1));
 
-/// Serves `app` on `listener` until `stop`, then lets open requests finish within the drain time.
+/// Serves `app` on `listener` until `stop`, then lets requests in progress finish within the drain time.
 ///
-/// Where all places are taken, a connection without a request makes way for a new one, those that never sent one first. Where all are
-/// at work, connections beyond the limit get one answer of `spare`, which should know health and otherwise say 503; beyond the spare ones
-/// they are closed. On `stop` every connection is told at once; streams of the router that have no end of their own must
-/// watch the same token. Requests carry their peer as [`axum::extract::ConnectInfo`].
+/// If all slots are taken, a connection without a request is closed in favour of a new one, preferring those that never sent a request. If
+/// all are serving requests, connections beyond the limit get one response of `spare`, which should answer health checks and otherwise 503;
+/// beyond the spare slots they are closed. On `stop` all connections are shut down gracefully; streaming handlers must watch the same
+/// token. Requests carry the peer address as [`axum::extract::ConnectInfo`].
 ///
 /// # Errors
-/// None at present: errors of accepting are logged and waited out.
+/// None at present: accept errors are logged and retried.
 pub async fn serve(
     listener: TcpListener,
     app: Router,
@@ -66,7 +66,7 @@ pub async fn serve(
             }
         }
     }
-    // Nobody may get into the queue of a service that no longer accepts.
+    // Refuse connections instead of queueing them while draining.
     drop(listener);
     acceptor.drain().await;
     Ok(())
@@ -85,20 +85,20 @@ impl Acceptor {
     fn admit(&mut self, stream: TcpStream, peer: SocketAddr) {
         self.pause = PAUSES.0;
         let [waiting, spare_waiting] = &self.shared.waiting;
-        // In the order in which they came: a place that becomes free belongs to who was displaced for it.
+        // First come, first served: a slot that becomes free goes to the connection that was waiting first.
         let admitted = admit(&self.places, waiting).map(|turn| (turn, false, waiting));
         let admitted = admitted.or_else(|| Some((admit(&self.spare_places, spare_waiting)?, true, spare_waiting)));
         let Some((turn, spare, waiting)) = admitted else {
             metrics::counter!("cager_connections_rejected_total", "reason" => "full").increment(1);
             return;
         };
-        // Frames are small and answers are wanted at once. A socket that refuses is dead anyway.
+        // Frames are small and latency matters. Errors mean that the socket is closed.
         let _ = stream.set_nodelay(true);
         let _ = socket2::SockRef::from(&stream).set_tcp_keepalive(&keep_alive());
         let entry = Arc::new(waiting.enter());
         let (tracker, shared) = (self.tracker.clone(), Arc::clone(&self.shared));
         self.tracker.spawn(async move {
-            let permit = entry.displaced.run_until_cancelled(timeout(DISPLACED_WITHIN, turn)).await;
+            let permit = entry.displaced.run_until_cancelled(timeout(DISPLACE_TIMEOUT, turn)).await;
             let Some(Ok(permit)) = permit else {
                 metrics::counter!("cager_connections_rejected_total", "reason" => "full").increment(1);
                 return;
@@ -106,14 +106,18 @@ impl Acceptor {
             if spare {
                 metrics::counter!("cager_connections_rejected_total", "reason" => "spare").increment(1);
             }
-            let keep = Keep { tracker, abort: shared.abort.clone(), place: Box::new(Place::new(permit)) };
+            let keep = ConnectionResources {
+                tracker,
+                abort: shared.abort.clone(),
+                place: Box::new(ConnectionSlot::new(permit)),
+            };
             let reason = shared.connection(stream, peer, spare, keep, entry).await;
             metrics::counter!("cager_connections_closed_total", "reason" => reason.label()).increment(1);
             tracing::trace!(%peer, reason = reason.label(), "connection closed");
         });
     }
 
-    /// Waits after an error of accepting: without a pause, a process without file descriptors would spin.
+    /// Waits after an accept error: without a pause, a process out of file descriptors would spin.
     async fn failed(&mut self, error: &io::Error) {
         // The client went away before it was accepted.
         if matches!(error.kind(), ErrorKind::ConnectionAborted | ErrorKind::ConnectionReset) {
@@ -136,31 +140,31 @@ impl Acceptor {
     }
 }
 
-/// Its turn for a place.
-type Turn = Pin<Box<dyn Future<Output = OwnedSemaphorePermit> + Send>>;
+/// Resolves to a connection permit.
+type PermitFuture = Pin<Box<dyn Future<Output = OwnedSemaphorePermit> + Send>>;
 
-/// A turn for a place: now, or as soon as a connection that waits for its client has made way. None where all are at work.
-fn admit(places: &Arc<Semaphore>, waiting: &Waiting) -> Option<Turn> {
+/// A permit now, or as soon as an idle connection has been displaced; `None` if all are serving requests.
+fn admit(places: &Arc<Semaphore>, waiting: &IdleConnections) -> Option<PermitFuture> {
     let mut turn = Box::pin(unconstrained(Arc::clone(places).acquire_owned()));
-    // Asked once, it has its place in the queue.
+    // Polling once enters the semaphore's queue.
     match turn.as_mut().now_or_never() {
-        Some(permit) => permit.ok().map(|permit| Box::pin(std::future::ready(permit)) as Turn),
+        Some(permit) => permit.ok().map(|permit| Box::pin(std::future::ready(permit)) as PermitFuture),
         None if waiting.displace() => Some(Box::pin(async move { turn.await.expect("the semaphore is never closed") })),
         None => None,
     }
 }
 
-/// The system asks idle peers whether they are still there, so that a follower whose machine is gone does not stay for ever.
+/// TCP keep-alive, so that streams to vanished peers end.
 fn keep_alive() -> TcpKeepalive {
     TcpKeepalive::new().with_time(Duration::from_secs(60)).with_interval(Duration::from_secs(15)).with_retries(4)
 }
 
-/// A connection's place, counted while it is held.
-struct Place {
+/// A connection's slot, counted in the metrics.
+struct ConnectionSlot {
     _permit: OwnedSemaphorePermit,
 }
 
-impl Place {
+impl ConnectionSlot {
     fn new(permit: OwnedSemaphorePermit) -> Self {
         metrics::counter!("cager_connections_total").increment(1);
         metrics::gauge!("cager_connections").increment(1.0);
@@ -168,7 +172,7 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for ConnectionSlot {
     fn drop(&mut self) {
         metrics::gauge!("cager_connections").decrement(1.0);
     }

@@ -1,4 +1,4 @@
-//! Bodies that keep the connection's state and clocks up to date.
+//! Request and response bodies that report progress to the connection's state.
 
 use super::state::{InFlight, State};
 use bytes::Bytes;
@@ -13,10 +13,10 @@ use std::task::{Context, Poll, ready};
 use std::time::Duration;
 use tokio::time::{Instant, Sleep, sleep};
 
-/// Largest piece of a response handed to HTTP/2 at once, so that what it holds back for a slow reader stays small.
+/// Largest chunk of a response passed to HTTP/2 at once, which bounds the memory of a slow reader.
 const PIECE_BYTES: usize = 64 << 10;
 
-/// The client stopped sending in the middle of a request body. It is the source of the body's error.
+/// The client stopped sending within a request body. It is the source of the body's error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BodyTimeout {
     /// How long was waited.
@@ -31,25 +31,25 @@ impl fmt::Display for BodyTimeout {
 
 impl Error for BodyTimeout {}
 
-/// Whether an error while reading a request body is, at its root, a [`BodyTimeout`] (to be answered with 408).
+/// Whether the root cause of an error while reading a request body is a [`BodyTimeout`], which means 408.
 pub fn is_body_timeout(error: &(dyn Error + 'static)) -> bool {
     std::iter::successors(Some(error), |&error| error.source()).any(<dyn Error>::is::<BodyTimeout>)
 }
 
-/// A request body that fails when the client pauses too long.
-pub(super) struct Upload {
+/// A request body that fails if the client pauses too long.
+pub(super) struct RequestBody {
     inner: Incoming,
     state: Arc<State>,
     in_flight: Option<Arc<InFlight>>,
     timeout: Duration,
-    /// Runs while somebody waits.
+    /// Runs only while a handler waits for data.
     clock: Option<Pin<Box<Sleep>>>,
     waiting: bool,
     /// Set when the body is dropped before its end.
     unfinished: Arc<AtomicBool>,
 }
 
-impl Upload {
+impl RequestBody {
     pub(super) fn new(inner: Incoming, state: Arc<State>, in_flight: Arc<InFlight>, timeout: Duration) -> Self {
         // A request without a body is complete.
         let empty = inner.is_end_stream();
@@ -77,7 +77,7 @@ impl Upload {
     }
 }
 
-impl Body for Upload {
+impl Body for RequestBody {
     type Data = Bytes;
     type Error = Box<dyn Error + Send + Sync>;
 
@@ -93,9 +93,9 @@ impl Body for Upload {
             return Poll::Ready(Some(Err(BodyTimeout { after: this.timeout }.into())));
         };
         this.waiting = false;
-        this.state.body_came();
+        this.state.body_progressed();
         if let Some(in_flight) = &this.in_flight {
-            in_flight.body_came();
+            in_flight.body_progressed();
         }
         if frame.is_none() || this.inner.is_end_stream() {
             this.state.body_ended();
@@ -113,7 +113,7 @@ impl Body for Upload {
     }
 }
 
-impl Drop for Upload {
+impl Drop for RequestBody {
     fn drop(&mut self) {
         if self.in_flight.is_some() {
             self.unfinished.store(true, Ordering::Release);
@@ -121,8 +121,8 @@ impl Drop for Upload {
     }
 }
 
-/// A response body that says whether the client reads it.
-pub(super) struct Reply {
+/// A response body that reports whether the client reads it.
+pub(super) struct ResponseBody {
     inner: axum::body::Body,
     in_flight: Arc<InFlight>,
     /// Rest of a large piece, for HTTP/2.
@@ -130,13 +130,13 @@ pub(super) struct Reply {
     split: bool,
 }
 
-impl Reply {
+impl ResponseBody {
     pub(super) fn new(inner: axum::body::Body, in_flight: Arc<InFlight>, split: bool) -> Self {
         Self { inner, in_flight, rest: Bytes::new(), split }
     }
 }
 
-impl Body for Reply {
+impl Body for ResponseBody {
     type Data = Bytes;
     type Error = axum::Error;
 
@@ -175,7 +175,7 @@ impl Body for Reply {
     }
 }
 
-impl Drop for Reply {
+impl Drop for ResponseBody {
     fn drop(&mut self) {
         self.in_flight.unread(false);
     }

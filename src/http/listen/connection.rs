@@ -1,10 +1,10 @@
-//! The life of one connection.
+//! Serving one connection.
 
 use super::Limits;
+use super::idle::{IdleConnections, IdleEntry};
 use super::service::Requests;
-use super::socket::{Keep, Socket};
+use super::socket::{ConnectionResources, Socket};
 use super::state::{Reason, State};
-use super::waiting::{Entry, Waiting};
 use axum::Router;
 use hyper_util::rt::{TokioExecutor, TokioIo, TokioTimer};
 use hyper_util::server::conn::auto::Builder;
@@ -18,11 +18,11 @@ use tokio::time::{Instant, MissedTickBehavior, interval, timeout};
 use tokio_rustls::TlsAcceptor;
 use tokio_util::sync::CancellationToken;
 
-/// How long a connection without requests may take to say goodbye.
-const GOODBYE: Duration = Duration::from_secs(1);
-/// Most bytes of HTTP/1.1 held for one connection, each way. A header that never ends stops here.
+/// How long closing a connection without requests may take.
+const CLOSE_TIMEOUT: Duration = Duration::from_secs(1);
+/// Limit of HTTP/1.1 buffers per connection and direction, in bytes; also bounds endless headers.
 const BUFFER_BYTES: usize = 128 << 10;
-/// Pause after which HTTP/2 asks whether the client is still there, and how long it may take to answer.
+/// Interval of HTTP/2 pings, and the time to answer them.
 const PING: Duration = Duration::from_secs(20);
 
 /// What all connections share.
@@ -33,8 +33,8 @@ pub(super) struct Shared {
     pub(super) tls: Option<TlsAcceptor>,
     pub(super) stop: CancellationToken,
     pub(super) abort: CancellationToken,
-    /// Connections that wait for their client, and the spare ones among them.
-    pub(super) waiting: [Arc<Waiting>; 2],
+    /// Idle connections: regular ones, and spare ones.
+    pub(super) waiting: [Arc<IdleConnections>; 2],
 }
 
 impl Shared {
@@ -43,7 +43,7 @@ impl Shared {
         let mut builder = Builder::new(TokioExecutor::new());
         builder
             .http1()
-            // The library's own limit would also end idle connections; the clock here tells them apart.
+            // The library's limit would also end idle connections; the state machine here distinguishes the two.
             .header_read_timeout(None)
             .keep_alive(!spare)
             .max_buf_size(BUFFER_BYTES.max(limits.max_header_bytes));
@@ -67,8 +67,8 @@ impl Shared {
         stream: TcpStream,
         peer: SocketAddr,
         spare: bool,
-        keep: Keep,
-        entry: Arc<Entry>,
+        keep: ConnectionResources,
+        entry: Arc<IdleEntry>,
     ) -> Reason {
         let Some(tls) = &self.tls else { return self.requests(stream, peer, spare, keep, entry).await };
         let handshake = timeout(self.limits.header_timeout, tls.accept(stream));
@@ -85,7 +85,14 @@ impl Shared {
         }
     }
 
-    async fn requests<S>(&self, stream: S, peer: SocketAddr, spare: bool, keep: Keep, entry: Arc<Entry>) -> Reason
+    async fn requests<S>(
+        &self,
+        stream: S,
+        peer: SocketAddr,
+        spare: bool,
+        keep: ConnectionResources,
+        entry: Arc<IdleEntry>,
+    ) -> Reason
     where
         S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
     {
@@ -103,7 +110,7 @@ impl Shared {
         let mut connection = std::pin::pin!(builder.serve_connection(socket, service));
         let mut clock = interval(self.limits.tick());
         clock.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        // Why and since when the connection is being closed in good order.
+        // Reason and start of a graceful shutdown.
         let mut closing: Option<(Reason, Instant)> = None;
         loop {
             let reason = tokio::select! {
@@ -122,7 +129,7 @@ impl Shared {
                         state.abandon();
                         return Reason::Displaced;
                     }
-                    // A request has just come: its answer says that it is the last.
+                    // A request has just arrived: its response announces the close.
                     Reason::Displaced
                 }
                 () = begun.notified(), if closing.is_none() => Reason::Spare,
@@ -135,19 +142,19 @@ impl Shared {
                     reason
                 }
             };
-            // A request that has just arrived is still answered.
+            // A request that has just arrived is still served.
             closing = Some((reason, Instant::now()));
             connection.as_mut().graceful_shutdown();
         }
     }
 }
 
-/// Whether a connection has to be closed, and why.
+/// The limit that a connection exceeds, if any.
 fn overdue(state: &State, limits: &Limits, closing: Option<(Reason, Instant)>) -> Option<Reason> {
     match closing {
-        Some((reason, since)) if state.is_idle() => (since.elapsed() >= GOODBYE).then_some(reason),
-        // Being idle is what closing waits for.
-        Some(_) => state.verdict(limits).filter(|reason| *reason != Reason::Idle),
-        None => state.verdict(limits),
+        Some((reason, since)) if state.is_idle() => (since.elapsed() >= CLOSE_TIMEOUT).then_some(reason),
+        // Idleness is what the shutdown waits for.
+        Some(_) => state.exceeded_limit(limits).filter(|reason| *reason != Reason::Idle),
+        None => state.exceeded_limit(limits),
     }
 }

@@ -1,25 +1,25 @@
 //! A look at the raw bytes of a request's header, before the HTTP library has parsed it.
 //!
-//! Two facts are lost in parsing: that a request declared both `Content-Length` and `Transfer-Encoding` (the library drops the
-//! length; a proxy in front may have believed it, which is how requests are smuggled), and when the header began.
+//! Two facts are lost in parsing: that a request has both `Content-Length` and `Transfer-Encoding` (the library drops the length, but a
+//! proxy in front may have used it: request smuggling), and when the header began.
 
 const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
 const CONTENT_LENGTH: &[u8] = b"content-length:";
 const TRANSFER_ENCODING: &[u8] = b"transfer-encoding:";
 
-/// What a whole header said.
+/// Facts about a complete header.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Head {
     /// Its size, in bytes.
     pub(super) bytes: usize,
-    /// It declared its body's length in two ways.
+    /// Whether it has both `Content-Length` and `Transfer-Encoding`.
     pub(super) ambiguous: bool,
 }
 
-/// What is known after some more bytes.
+/// Result of scanning more bytes.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Scan {
-    /// The header goes on.
+    /// The header is incomplete.
     More,
     /// This is HTTP/2.
     Http2,

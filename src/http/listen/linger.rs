@@ -1,8 +1,8 @@
-//! Closing without destroying the last response.
+//! Lingering close, which lets the client read the last response.
 //!
-//! A system that closes a socket while bytes for it still arrive answers them with a reset, and a reset discards the response
-//! that the client has not read yet: of early refusals (413 in the middle of an upload), nineteen of twenty never arrived. So
-//! the server says that it is done, and goes on taking bytes for a short while.
+//! Closing a socket while data still arrives makes the kernel send a reset, and a reset discards data that the client has not read: of
+//! early refusals, such as 413 during an upload, 19 of 20 were lost. So the server closes its sending side and keeps reading for a short
+//! while.
 
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
@@ -12,7 +12,7 @@ use tokio::time::{sleep, timeout};
 const TIME: Duration = Duration::from_secs(2);
 /// Most bytes that are read and thrown away.
 const BYTES: usize = 1 << 20;
-/// How long the socket stays open, unread, after that: a client that reads along gets its answer in this time.
+/// How long the socket stays open without reading after that, so that the client can read the response.
 const HOLD: Duration = Duration::from_millis(500);
 
 /// Closes the sending side, then takes bytes until the client closes, or for 1 MiB, or for 2 s.

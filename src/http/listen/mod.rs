@@ -1,19 +1,18 @@
 //! The listener: connections, their protocols and their time limits.
 //!
-//! `axum::serve` lets a client stay for ever: it may say nothing, half a header or half a body, and it may never read. Here every
-//! wait for a client has an end, the number of connections has one, and so has a shutdown. HTTP/1.1, HTTP/2 with prior
-//! knowledge and, under TLS, both by negotiation are served on the same port.
+//! `axum::serve` has no limits: a client may stall in a header or a body, or never read. Here every wait for a client, the number of
+//! connections and shutdown are bounded. One port serves HTTP/1.1, HTTP/2 with prior knowledge and, under TLS, both by negotiation.
 
 mod accept;
 mod body;
 mod connection;
 mod head;
+mod idle;
 mod linger;
 mod service;
 mod socket;
 mod state;
 mod tls;
-mod waiting;
 
 pub use accept::serve;
 pub use body::{BodyTimeout, is_body_timeout};
@@ -21,17 +20,17 @@ pub use tls::{Tls, TlsError, tls_config};
 
 use std::time::Duration;
 
-/// What a client may take: time, connections and header space.
+/// Limits on time, connections and headers.
 #[derive(Clone, Debug)]
 pub struct Limits {
     /// From the connection (or the first byte of a later request) to the end of the header, and for a TLS handshake.
     pub header_timeout: Duration,
-    /// Longest pause of a request body that somebody waits for. Pauses because the server does not read do not count.
+    /// Longest pause of a request body while a handler waits for it.
     pub body_timeout: Duration,
     /// How long a connection without requests stays open.
     pub idle_timeout: Duration,
-    /// Longest time in which a response's reader takes nothing. Long by default, since a paused viewer is legitimate; a client
-    /// that still uploads on the same connection counts as alive.
+    /// Longest time without progress of a response. Long by default, since a paused viewer is legitimate; an upload on the same connection
+    /// counts as progress.
     pub write_timeout: Duration,
     /// How long open requests may go on after the stop signal.
     pub drain_timeout: Duration,

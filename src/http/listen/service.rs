@@ -1,7 +1,7 @@
-//! From the protocol to the router: refuses what is ambiguous or too large, and wraps the bodies.
+//! Between protocol and router: refuses ambiguous or oversized headers and wraps the bodies.
 
 use super::Limits;
-use super::body::{Reply, Upload};
+use super::body::{RequestBody, ResponseBody};
 use super::head::Head;
 use super::state::State;
 use axum::Router;
@@ -26,12 +26,12 @@ pub(super) struct Requests {
     pub(super) peer: SocketAddr,
     pub(super) limits: Arc<Limits>,
     pub(super) state: Arc<State>,
-    /// Told when a request has begun, where a connection gets only one.
+    /// Notified when the first request begins, on connections that serve only one.
     pub(super) only_one: Option<Arc<Notify>>,
 }
 
 impl hyper::service::Service<Request<Incoming>> for Requests {
-    type Response = Response<Reply>;
+    type Response = Response<ResponseBody>;
     type Error = Infallible;
     type Future = Pin<Box<dyn Future<Output = Result<Self::Response, Infallible>> + Send>>;
 
@@ -47,17 +47,22 @@ impl hyper::service::Service<Request<Incoming>> for Requests {
                 Some(problem) => (problem, true),
                 None => {
                     let upload = |body| {
-                        Upload::new(body, Arc::clone(&this.state), Arc::clone(&in_flight), this.limits.body_timeout)
+                        RequestBody::new(
+                            body,
+                            Arc::clone(&this.state),
+                            Arc::clone(&in_flight),
+                            this.limits.body_timeout,
+                        )
                     };
                     let mut request = request.map(upload);
                     let unfinished = request.body().unfinished();
                     request.extensions_mut().insert(ConnectInfo(this.peer));
                     let Ok(response) = this.app.clone().call(request.map(Body::new)).await;
-                    // What is left of the body would be taken for the next request.
+                    // The rest of the body would be parsed as the next request.
                     (response, unfinished.load(Ordering::Acquire))
                 }
             };
-            let mut response = response.map(|body| Reply::new(body, in_flight, http2));
+            let mut response = response.map(|body| ResponseBody::new(body, in_flight, http2));
             if close && !http2 {
                 response.headers_mut().insert(CONNECTION, HeaderValue::from_static("close"));
             }
@@ -66,11 +71,11 @@ impl hyper::service::Service<Request<Incoming>> for Requests {
     }
 }
 
-/// The answer to a request that must not reach the router.
+/// The response to a request that must not reach the router.
 fn refusal(request: &Request<Incoming>, head: Option<Head>, limits: &Limits) -> Option<Response<Body>> {
     let lengths = match head {
         Some(head) => head.ambiguous,
-        // The header came along with the request before it, so that nobody has looked at it.
+        // A pipelined header, which the scanner has not seen.
         None => request.version() != Version::HTTP_2 && request.headers().contains_key(TRANSFER_ENCODING),
     };
     if lengths {

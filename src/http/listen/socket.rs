@@ -1,4 +1,4 @@
-//! The byte stream of a connection, which reports what happens on it.
+//! The byte stream of a connection, which reports reads and writes to the connection's state.
 
 use super::linger::linger;
 use super::state::State;
@@ -10,8 +10,8 @@ use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
-/// What stays with a connection until its socket is really closed.
-pub(super) struct Keep {
+/// Resources of a connection until its socket is closed.
+pub(super) struct ConnectionResources {
     /// Where a lingering socket is waited for at shutdown.
     pub(super) tracker: TaskTracker,
     /// Ends lingering.
@@ -24,11 +24,11 @@ pub(super) struct Keep {
 pub(super) struct Socket<S: AsyncRead + AsyncWrite + Unpin + Send + 'static> {
     io: Option<S>,
     state: Arc<State>,
-    keep: Option<Keep>,
+    keep: Option<ConnectionResources>,
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin + Send + 'static> Socket<S> {
-    pub(super) fn new(io: S, state: Arc<State>, keep: Keep) -> Self {
+    pub(super) fn new(io: S, state: Arc<State>, keep: ConnectionResources) -> Self {
         Self { io: Some(io), state, keep: Some(keep) }
     }
 
@@ -81,7 +81,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + Send + 'static> AsyncWrite for Socket<S
 
     fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         let outcome = self.io()?.poll_flush(cx);
-        // Being flushed is the end of a wait, but no progress.
+        // A completed flush ends a blocked write but is no progress.
         match &outcome {
             Poll::Pending => self.state.blocked(),
             Poll::Ready(_) => self.state.flushed(),
@@ -101,7 +101,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + Send + 'static> Drop for Socket<S> {
         if !self.state.may_linger() || tokio::runtime::Handle::try_current().is_err() {
             return;
         }
-        let Keep { tracker, abort, place } = keep;
+        let ConnectionResources { tracker, abort, place } = keep;
         tracker.spawn(async move {
             abort.run_until_cancelled(linger(io)).await;
             drop(place);

@@ -1,8 +1,8 @@
-//! What a connection is doing and since when: written by its socket and its requests, judged by its clock.
+//! Activity of a connection and since when: updated by its socket and its requests, checked against the time limits.
 
 use super::Limits;
 use super::head::{Head, HeadScanner, Scan};
-use super::waiting::Entry;
+use super::idle::IdleEntry;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::Duration;
 use tokio::time::Instant;
@@ -53,7 +53,7 @@ impl Reason {
 pub(super) struct State {
     facts: Mutex<Facts>,
     /// Listed while the connection waits for its client.
-    entry: Arc<Entry>,
+    entry: Arc<IdleEntry>,
 }
 
 #[derive(Debug)]
@@ -63,7 +63,7 @@ struct Facts {
     requests: u64,
     /// Requests whose body is still coming or whose response is still going.
     in_flight: usize,
-    /// Requests at work.
+    /// Requests in progress.
     open: Vec<Weak<InFlight>>,
     /// Start of the connection, later the end of the last request.
     idle_since: Instant,
@@ -74,14 +74,14 @@ struct Facts {
     head: Option<Head>,
     /// The socket takes no more.
     blocked_since: Option<Instant>,
-    /// Last time that a response got on, or a body came.
+    /// Last progress of a response or a request body.
     progress: Instant,
-    /// More bytes of a request may come that nobody reads: closing at once would destroy the response on its way.
+    /// Unread request bytes may follow, so that closing at once would discard the response.
     may_linger: bool,
 }
 
 impl State {
-    pub(super) fn new(entry: Arc<Entry>) -> Arc<Self> {
+    pub(super) fn new(entry: Arc<IdleEntry>) -> Arc<Self> {
         let now = Instant::now();
         let facts = Mutex::new(Facts {
             http2: false,
@@ -103,7 +103,7 @@ impl State {
         self.facts.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The socket gave bytes; none is the end.
+    /// Bytes were read; an empty slice is the end of the stream.
     pub(super) fn read(&self, bytes: &[u8]) {
         let mut facts = self.facts();
         if bytes.is_empty() {
@@ -183,7 +183,7 @@ impl State {
     }
 
     /// A piece of a request body came.
-    pub(super) fn body_came(&self) {
+    pub(super) fn body_progressed(&self) {
         self.facts().progress = Instant::now();
     }
 
@@ -197,13 +197,13 @@ impl State {
         self.facts().in_flight == 0
     }
 
-    /// Whether a limit has passed.
-    pub(super) fn verdict(&self, limits: &Limits) -> Option<Reason> {
+    /// The time limit that has been exceeded, if any.
+    pub(super) fn exceeded_limit(&self, limits: &Limits) -> Option<Reason> {
         let now = Instant::now();
         let past = |since: Instant, limit: Duration| now.saturating_duration_since(since) >= limit;
         let facts = self.facts();
-        // In HTTP/2 a stalled response does not block the socket, and what it holds is free only when the connection is closed; that
-        // others get on says nothing of it. In HTTP/1.1 every byte that goes out is of the one response.
+        // In HTTP/2 a stalled response does not block the socket, and its memory is released only by closing the connection, whatever
+        // progress other streams make. In HTTP/1.1 every byte written belongs to the one response.
         let unread = facts.open.iter().filter_map(|open| open.upgrade()?.unread_since());
         let unread = unread.min().map(|since| if facts.http2 { since } else { since.max(facts.progress) });
         let blocked = facts.blocked_since.map(|since| since.max(facts.progress));
@@ -223,10 +223,10 @@ impl State {
     }
 }
 
-/// Held by the two halves of a request: its body and its response.
+/// Shared by the two halves of a request: its body and its response.
 pub(super) struct InFlight {
     state: Arc<State>,
-    /// Since when the response has given a piece to the protocol and was not asked for the next: the client has to read first.
+    /// Since when the protocol has not asked for the response's next chunk: the client has to read first.
     unread_since: Mutex<Option<Instant>>,
 }
 
@@ -239,14 +239,14 @@ impl InFlight {
         *self.lock()
     }
 
-    /// The response is asked for its next piece (`false`) or has just given one (`true`).
+    /// Records that a chunk was handed to the protocol (`true`) or the next one was requested (`false`).
     pub(super) fn unread(&self, unread: bool) {
         *self.lock() = unread.then(Instant::now);
         self.state.facts().progress = Instant::now();
     }
 
-    /// A piece of the request's body came: who still sends need not read.
-    pub(super) fn body_came(&self) {
+    /// A client that still sends need not read.
+    pub(super) fn body_progressed(&self) {
         if let Some(since) = &mut *self.lock() {
             *since = Instant::now();
         }

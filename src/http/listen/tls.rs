@@ -1,4 +1,4 @@
-//! TLS: certificate and key from PEM files, taken anew when they change.
+//! TLS: certificate and key from PEM files, reloaded when they change.
 
 use rustls::ServerConfig;
 use rustls::crypto::{CryptoProvider, ring};
@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 
-/// How often the files are looked at, when connections come.
-const LOOK_EVERY: Duration = Duration::from_secs(2);
+/// Shortest interval between checks of the files, made when connections arrive.
+const POLL_INTERVAL: Duration = Duration::from_secs(2);
 
 /// Where certificate and key are.
 #[derive(Clone, Debug)]
@@ -77,7 +77,7 @@ fn load(tls: &Tls, provider: &CryptoProvider) -> Result<CertifiedKey, TlsError> 
     })
 }
 
-/// When and how large the files are; changes when they do.
+/// Modification time and length of both files.
 type Stamp = [Option<(SystemTime, u64)>; 2];
 
 fn stamp(tls: &Tls) -> Stamp {
@@ -110,7 +110,7 @@ impl std::fmt::Debug for Loaded {
 impl ResolvesServerCert for Certificate {
     fn resolve(&self, _: ClientHello<'_>) -> Option<Arc<CertifiedKey>> {
         let mut loaded = self.loaded.lock().unwrap_or_else(PoisonError::into_inner);
-        if loaded.looked.elapsed() >= LOOK_EVERY {
+        if loaded.looked.elapsed() >= POLL_INTERVAL {
             loaded.looked = Instant::now();
             let stamp = stamp(&self.files);
             if stamp != loaded.stamp {

@@ -10,9 +10,9 @@
 //!   durable u64   handle digest [u8; 16]   full digest [u8; 16]   cage [f32; 3 * rows]   crc32c u32
 //! ```
 //!
-//! The checksums of marks and records go on from the header's, and those of records cover their place too, so that a record of
-//! another session or from elsewhere in the file is none. Marks lie in sectors of their own: writing one cannot tear the
-//! header, nor the other mark.
+//! The CRC of the header is the initial value of all other CRCs, and that of a record includes its offset, so a record of another session
+//! or from another offset fails its checksum. Each mark lies in a sector of its own: a torn write of one affects neither the header nor the
+//! other mark.
 
 use super::{LogEntry, LogRecord};
 use crate::store::disk::DiskFile;
@@ -23,7 +23,7 @@ const VERSION: u32 = 1;
 const HEADER_BYTES: usize = 84;
 /// Where the records begin.
 pub(super) const DATA_START: u64 = 4096;
-/// What the system writes at once.
+/// Size of the blocks in which the file system writes.
 pub(super) const BLOCK_BYTES: u64 = 4096;
 const MARKS: [u64; 2] = [512, 1024];
 const MARK_BYTES: usize = 12;
@@ -74,7 +74,7 @@ impl Layout {
         block
     }
 
-    /// Whether a file that begins so is this log; if not, what is wrong.
+    /// Compares the first block with the expected header; the error says what differs.
     pub(super) fn check_first_block(&self, block: &[u8]) -> Result<(), String> {
         let header = &block[..HEADER_BYTES];
         if header == self.header {
@@ -89,21 +89,21 @@ impl Layout {
         if u32_at(header, 12) != self.rows {
             return Err(format!("its cages have {} rows instead of {}", u32_at(header, 12), self.rows));
         }
-        Err("it is of another session".into())
+        Err("it belongs to another session".into())
     }
 
-    /// The largest length that a mark claims to be durable, and how many marks were set at least.
+    /// The larger of the durable lengths in the two marks, and the number of marks written so far modulo 2.
     pub(super) fn marked(&self, block: &[u8]) -> (u64, u64) {
         let claims = MARKS.map(|at| {
             let mark = &block[at as usize..][..MARK_BYTES];
             let intact = mark[8..] == crc32c::crc32c_append(self.seed, &mark[..8]).to_le_bytes();
             if intact { u64_at(mark, 0) } else { 0 }
         });
-        // The next mark goes over the smaller claim.
+        // The next mark replaces the smaller length.
         (claims[0].max(claims[1]), u64::from(claims[1] > claims[0]))
     }
 
-    /// Marks a durable length; `number` counts up from mark to mark.
+    /// Writes a mark with a durable length; `number` is the mark's sequence number.
     pub(super) fn write_mark(&self, file: &dyn DiskFile, number: u64, durable: u64) -> io::Result<()> {
         let mut mark = [0; MARK_BYTES];
         mark[..8].copy_from_slice(&durable.to_le_bytes());
@@ -132,7 +132,7 @@ impl Layout {
         out.extend_from_slice(&self.record_crc(offset, &out[start..]).to_le_bytes());
     }
 
-    /// The record at `offset`, whose bytes these are, and the durable length it claims; None where it is not intact.
+    /// Parses the record at `offset`, with the durable length that it recorded; `None` if its checksum does not match.
     pub(super) fn read_record(&self, record: &[u8], offset: u64) -> Option<(LogEntry, u64)> {
         let (body, crc) = record.split_at_checked(self.stride() as usize - 4)?;
         if crc != self.record_crc(offset, body).to_le_bytes() {
@@ -151,7 +151,7 @@ impl Layout {
         Some((entry, u64_at(body, 32)))
     }
 
-    /// The cage in a record's bytes.
+    /// The bytes of the cage in a record.
     pub(super) fn cage<'a>(&self, record: &'a [u8]) -> &'a [u8] {
         &record[FIXED_BYTES..][..self.cage_bytes()]
     }

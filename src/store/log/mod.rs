@@ -1,15 +1,15 @@
-//! The frame log: solved frames in order of arrival, appended in groups, each group durable before anyone hears of it.
+//! The frame log: solved frames in order of arrival, appended in groups; a group is acknowledged after it is durable.
 //!
-//! Two kinds of claims say which bytes were acknowledged. Every record tells how long the log was durable when it was written,
-//! and after each sync one of two marks in the file's first block is set to the new length, without a sync of its own: it
-//! is true whenever it is found, and reaches the disk with the next group at the latest. Bad bytes below a claim are damage; bad
-//! bytes beyond every claim are the torn end of a group that nobody was told about, and are cut off.
+//! The acknowledged length is recorded twice: every record contains the durable length at the time it was written, and after each sync one
+//! of two alternating marks in the first block is set to the new length. The mark is not synced by itself; it reaches the disk with the
+//! next group at the latest. Invalid bytes below the largest recorded length are damage; invalid bytes beyond it are a torn write that was
+//! never acknowledged, and are cut off.
 //!
-//! What was acknowledged last and lost its mark to a power cut cannot be told from a torn end if it is damaged later, before
-//! the log is opened again. Opening makes all that it finds durable and marks it.
+//! If a power cut loses the mark of the last group, later damage to that group is taken for a torn write. Opening the log therefore syncs
+//! and marks everything that it finds.
 
 use super::names::check_id;
-use super::{Logs, Store, StoreError};
+use super::{LogRegistry, Store, StoreError};
 use crate::store::disk::DiskFile;
 use crate::store::files::timed;
 use format::{BLOCK_BYTES, Layout};
@@ -40,9 +40,9 @@ pub struct LogRecord<'a> {
     pub squared: f64,
     /// `Σ |p − p̄|²` of the frame about its own centroid.
     pub spread: f64,
-    /// Digest of the handle rows that came.
+    /// Digest of the handle rows received.
     pub handle_digest: [u8; 16],
-    /// Digest of the whole frame; None where only handle rows came.
+    /// Digest of all rows; `None` if only handle rows were received.
     pub full_digest: Option<[u8; 16]>,
     /// The cage, m × 3 interleaved.
     pub cage: &'a [f32],
@@ -53,7 +53,7 @@ pub struct LogRecord<'a> {
 pub struct LogEntry {
     /// Number of the frame.
     pub frame: u32,
-    /// Where its record begins, in bytes.
+    /// Offset of its record in the file, in bytes.
     pub offset: u64,
     /// `sqrt(mean |e|²)`; NaN where it was not measured.
     pub l2: f32,
@@ -63,9 +63,9 @@ pub struct LogEntry {
     pub squared: f64,
     /// `Σ |p − p̄|²` of the frame about its own centroid.
     pub spread: f64,
-    /// Digest of the handle rows that came.
+    /// Digest of the handle rows received.
     pub handle_digest: [u8; 16],
-    /// Digest of the whole frame; None where only handle rows came.
+    /// Digest of all rows; `None` if only handle rows were received.
     pub full_digest: Option<[u8; 16]>,
 }
 
@@ -75,23 +75,23 @@ pub struct FrameLog {
     file: Arc<dyn DiskFile>,
     path: PathBuf,
     layout: Layout,
-    /// Bytes that are durable; the file has more only during an append.
+    /// Length up to which the file is durable; the file is longer only during an append.
     durable: u64,
-    /// The durable bytes since the last multiple of [`BLOCK_BYTES`]: an append shares their block.
+    /// The durable bytes since the last multiple of [`BLOCK_BYTES`]: the next append writes to the same block.
     tail: Vec<u8>,
-    /// Marks set so far: they alternate between two places.
+    /// Number of marks written so far; they alternate between two places.
     marks: u64,
-    /// After an error that could not be undone.
-    refuses: bool,
+    /// Set after an error that could not be undone; all further appends fail.
+    poisoned: bool,
     buffer: Vec<u8>,
-    only: OnlyWriter,
+    only: WriterGuard,
 }
 
-/// Larger buffers are given back after an append.
-const KEPT_BUFFER_BYTES: usize = 4 << 20;
+/// Buffers larger than this are freed after an append.
+const MAX_RETAINED_BUFFER_BYTES: usize = 4 << 20;
 
 impl Store {
-    /// Where the session's log lies, or would. A name that is no id gives a path where nothing is.
+    /// Path of the session's log, whether or not it exists. For an invalid id it is a path where nothing exists.
     pub fn log_path(&self, id: &str) -> PathBuf {
         self.container_path(id).with_file_name("frames.log")
     }
@@ -99,31 +99,31 @@ impl Store {
     /// Whether the session has a log.
     ///
     /// # Errors
-    /// [`StoreError::BadId`], or what the system says.
+    /// [`StoreError::BadId`], or another I/O error.
     pub fn has_log(&self, id: &str) -> Result<bool, StoreError> {
         check_id(id)?;
         self.files().exists(&self.log_path(id))
     }
 
-    /// Opens a session's log, made where it is missing, for cages of `rows` rows; gives the frames in it, in the log's order,
-    /// each once. Every record is checked, a torn end is cut off, and all that is given is durable.
+    /// Opens a session's log for cages of `rows` rows, creating it if it is missing; returns its frames in the order of the log, each once.
+    /// All records are verified, a torn end is cut off, and everything returned is durable.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`] where acknowledged records are damaged or missing, or the log is of other cages; nothing is
-    /// changed then. `ResourceBusy` as [`StoreError::Io`] where the log is open already. [`StoreError::BadId`].
+    /// [`StoreError::Damaged`] if acknowledged records are damaged or missing, or the log has cages of another size; the file is not
+    /// changed then. `ResourceBusy` as [`StoreError::Io`] if the log is open already. [`StoreError::BadId`].
     pub fn open_log(&self, id: &str, rows: u32) -> Result<(FrameLog, Vec<LogEntry>), StoreError> {
         check_id(id)?;
         let files = self.files();
         let path = files.session(id).join("frames.log");
-        let mut only = OnlyWriter::new(self, id, &path)?;
+        let mut only = WriterGuard::new(self, id, &path)?;
         let layout = Layout::new(id, rows);
         if !files.exists(&path)? {
-            // The first block appears whole, so a log without one is damaged.
+            // The first block is created atomically, so a log without it is damaged.
             files.replace(&path, &layout.first_block())?;
         }
         let file = files.disk.open_for_writing(&path).map_err(|e| StoreError::of(&path, "open", e))?;
-        let recovered = recovery::recover(files, &*file, &path, &layout, only.doubtful);
-        only.doubtful = recovered.is_err();
+        let recovered = recovery::recover(files, &*file, &path, &layout, only.needs_rewrite);
+        only.needs_rewrite = recovered.is_err();
         let recovered = recovered?;
         let log = FrameLog {
             file,
@@ -132,7 +132,7 @@ impl Store {
             durable: recovered.durable,
             tail: recovered.tail,
             marks: recovered.marks,
-            refuses: false,
+            poisoned: false,
             buffer: Vec::new(),
             only,
         };
@@ -141,10 +141,10 @@ impl Store {
 }
 
 impl Store {
-    /// Opens a session's log for reading frames that are known to be in it.
+    /// Opens a session's log for reading frames whose entries are known.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`] where it is gone or of other cages, [`StoreError::BadId`], or what the system says.
+    /// [`StoreError::Damaged`] if it is missing or has cages of another size, [`StoreError::BadId`], or another I/O error.
     pub fn log_reader(&self, id: &str, rows: u32) -> Result<LogReader, StoreError> {
         check_id(id)?;
         let path = self.log_path(id);
@@ -162,21 +162,21 @@ impl Store {
         Ok(LogReader::new(file, path, layout))
     }
 
-    /// Whether the disk may hold less of a session's log than the system shows, until the log is opened again with success.
-    pub fn log_is_doubtful(&self, id: &str) -> bool {
-        self.inner.logs.lock().unwrap_or_else(PoisonError::into_inner).doubtful.contains(id)
+    /// Whether a failed sync may have lost data that reads still return; true until the log is reopened successfully.
+    pub fn log_needs_rewrite(&self, id: &str) -> bool {
+        self.inner.logs.lock().unwrap_or_else(PoisonError::into_inner).needs_rewrite.contains(id)
     }
 }
 
 impl FrameLog {
-    /// Appends records with one write and one sync for all; on Ok they are durable. On an error none of them is in the log; where
-    /// even that could not be reached, the log refuses all further appends until it is opened anew.
+    /// Appends records with one write and one sync; durable on `Ok`. After an error none of them is in the log; if the file cannot be
+    /// restored, all further appends fail until the log is reopened.
     ///
     /// # Errors
     /// [`StoreError::Full`]; [`StoreError::Io`] with `InvalidInput` where a cage has another number of rows.
     pub fn append(&mut self, records: &[LogRecord<'_>]) -> Result<Vec<LogEntry>, StoreError> {
-        if self.refuses {
-            let cause = io::Error::other("an earlier error could not be undone; it has to be opened anew");
+        if self.poisoned {
+            let cause = io::Error::other("an earlier error could not be undone; the log has to be reopened");
             return Err(StoreError::of(&self.path, "append to", cause));
         }
         if records.is_empty() {
@@ -200,12 +200,12 @@ impl FrameLog {
         if written.is_ok() {
             self.advance(&buffer);
         }
-        buffer.shrink_to(KEPT_BUFFER_BYTES);
+        buffer.shrink_to(MAX_RETAINED_BUFFER_BYTES);
         self.buffer = buffer;
         written.map(|()| entries)
     }
 
-    /// Reads the cages back; independent of appends.
+    /// A reader of the cages, independent of appends.
     pub fn reader(&self) -> LogReader {
         LogReader::new(self.file.clone(), self.path.clone(), self.layout)
     }
@@ -218,20 +218,20 @@ impl FrameLog {
             .and_then(|()| timed(|| self.file.sync_data()).inspect_err(|_| sync_failed = true));
         result.map_err(|error| {
             if let Err(error) = self.cut_back(sync_failed) {
-                self.refuses = true;
-                self.only.doubtful = sync_failed;
-                tracing::error!(%error, path = %self.path.display(), "a frame log takes no more frames until it is opened anew");
+                self.poisoned = true;
+                self.only.needs_rewrite = sync_failed;
+                tracing::error!(%error, path = %self.path.display(), "a frame log rejects appends until it is reopened");
             }
             StoreError::of(&self.path, "append to", error)
         })
     }
 
-    /// Takes a failed append out of the file again.
+    /// Removes a failed append from the file.
     fn cut_back(&mut self, sync_failed: bool) -> io::Result<()> {
         self.file.set_len(self.durable)?;
         if sync_failed {
-            // The system may have dropped what it could not write, and calls it written. That includes durable bytes in the same
-            // block as the first new ones, and in the first block, which has the marks: they are written once more.
+            // After a failed sync the kernel may drop dirty pages and report them as clean. This also affects durable bytes that share a
+            // block with new ones, and the first block with the marks: they are written again.
             self.file.write_all_at(&self.layout.first_block(), 0)?;
             self.layout.write_mark(&*self.file, self.marks, self.durable)?;
             self.file.write_all_at(&self.tail, self.durable - self.tail.len() as u64)?;
@@ -240,7 +240,7 @@ impl FrameLog {
         Ok(())
     }
 
-    /// After a sync.
+    /// Updates the state after a successful sync.
     fn advance(&mut self, bytes: &[u8]) {
         let before = self.durable;
         self.durable += bytes.len() as u64;
@@ -253,7 +253,7 @@ impl FrameLog {
         }
         metrics::counter!("cager_log_bytes_total").increment(bytes.len() as u64);
         self.marks += 1;
-        // The frames are durable with or without it.
+        // The frames are durable even without the mark.
         if let Err(error) = self.layout.write_mark(&*self.file, self.marks, self.durable) {
             tracing::debug!(%error, path = %self.path.display(), "a frame log's length was not marked");
         }
@@ -267,37 +267,36 @@ impl LogRecord<'_> {
     }
 }
 
-/// Holds the session's place among the open logs, and the store's lock.
+/// Registers the log as open, and keeps the store's lock.
 #[derive(Debug)]
-struct OnlyWriter {
+struct WriterGuard {
     id: String,
-    logs: Arc<Mutex<Logs>>,
-    /// Whether the disk may hold something else than the system shows: a sync failed, and what it may have ruined was not
-    /// written again. Outlives this.
-    doubtful: bool,
+    logs: Arc<Mutex<LogRegistry>>,
+    /// Whether a failed sync may have lost data that has not been written again. Survives the guard: it is stored in the registry on drop.
+    needs_rewrite: bool,
     _lock: Arc<File>,
 }
 
-impl OnlyWriter {
+impl WriterGuard {
     fn new(store: &Store, id: &str, path: &Path) -> Result<Self, StoreError> {
         let logs = store.inner.logs.clone();
-        let doubtful = {
+        let needs_rewrite = {
             let mut known = logs.lock().unwrap_or_else(PoisonError::into_inner);
             if !known.open.insert(id.to_owned()) {
                 return Err(StoreError::of(path, "open", io::ErrorKind::ResourceBusy.into()));
             }
-            known.doubtful.remove(id)
+            known.needs_rewrite.remove(id)
         };
-        Ok(Self { id: id.to_owned(), logs, doubtful, _lock: store.inner.lock.clone() })
+        Ok(Self { id: id.to_owned(), logs, needs_rewrite, _lock: store.inner.lock.clone() })
     }
 }
 
-impl Drop for OnlyWriter {
+impl Drop for WriterGuard {
     fn drop(&mut self) {
         let mut known = self.logs.lock().unwrap_or_else(PoisonError::into_inner);
         known.open.remove(&self.id);
-        if self.doubtful {
-            known.doubtful.insert(std::mem::take(&mut self.id));
+        if self.needs_rewrite {
+            known.needs_rewrite.insert(std::mem::take(&mut self.id));
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Cages back from the log.
+//! Reading cages from a frame log.
 
 use super::format::{DATA_START, Layout};
 use super::{LogEntry, StoreError};
@@ -7,7 +7,7 @@ use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Records are read together up to this many bytes.
+/// Adjacent records are read together, up to this many bytes.
 const READ_BYTES: u64 = 1 << 20;
 
 /// Reads cages; clones read the same file.
@@ -28,10 +28,10 @@ impl LogReader {
         self.layout.rows()
     }
 
-    /// Appends the cages of `entries` to `out`, each m × 3 `f32`, little-endian. After an error `out` is as before.
+    /// Appends the cages of `entries` to `out`, each m × 3 `f32`, little-endian. On an error `out` is unchanged.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`] where a record is not what was appended, or what the system says.
+    /// [`StoreError::Damaged`] if a record fails its checksum, or another I/O error.
     pub fn read_cages(&self, entries: &[LogEntry], out: &mut Vec<u8>) -> Result<(), StoreError> {
         let before = out.len();
         self.read(entries, out).inspect_err(|_| out.truncate(before))

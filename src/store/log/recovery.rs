@@ -1,4 +1,4 @@
-//! What a log holds after whatever ended the last process.
+//! Recovery of a frame log when it is opened: verifies its records, cuts a torn end off, and makes the rest durable.
 
 use super::format::{BLOCK_BYTES, DATA_START, Layout};
 use super::{LogEntry, StoreError};
@@ -7,7 +7,7 @@ use crate::store::files::{Files, parent};
 use std::collections::HashMap;
 use std::path::Path;
 
-/// Read at once, in bytes.
+/// Bytes read at a time.
 const READ_BYTES: u64 = 1 << 20;
 
 pub(super) struct Recovered {
@@ -24,7 +24,7 @@ pub(super) fn recover(
     file: &dyn DiskFile,
     path: &Path,
     layout: &Layout,
-    doubtful: bool,
+    needs_rewrite: bool,
 ) -> Result<Recovered, StoreError> {
     let failed = |error| StoreError::of(path, "read", error);
     let length = file.length().map_err(failed)?;
@@ -52,12 +52,12 @@ pub(super) fn recover(
     }
     let tail = read_range(file, end - end % BLOCK_BYTES, end).map_err(failed)?;
     if end == DATA_START {
-        // Its entry in the folder may not be durable, and the first group counts on it.
+        // The folder entry may not be durable yet, and later appends rely on it.
         files.sync_dir(parent(path))?;
     }
-    if claimed < end || doubtful {
-        // Nobody may have synced these records, or a sync of them may have failed and will not fail again; written once more,
-        // they can be synced. So can the first block. A sync that failed may also have ruined what shares a block with them.
+    if claimed < end || needs_rewrite {
+        // These records may never have been synced, or their sync failed and would not be reported again. Writing them again makes them
+        // dirty, so that they can be synced; so with the first block, and the blocks that share a page with them.
         let failed = |error| StoreError::of(path, "write", error);
         file.write_all_at(&block, 0).map_err(failed)?;
         let mut at = claimed - claimed % BLOCK_BYTES;
@@ -88,11 +88,11 @@ pub(super) fn recover(
 }
 
 struct Scan {
-    /// Records up to the first that is not intact.
+    /// Records before the first invalid one.
     entries: Vec<LogEntry>,
-    /// Where that one begins, or the file's last whole record ends.
+    /// Offset of the first invalid record, or the end of the last complete one.
     end: u64,
-    /// The largest durable length that an intact record claims, also of those after `end`.
+    /// Largest durable length recorded by any valid record, including those after `end`.
     claimed: u64,
 }
 

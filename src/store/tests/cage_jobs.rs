@@ -60,7 +60,7 @@ fn live(given: &Given, told: &mut Told) -> Result<(), StoreError> {
         twice(|| create(&store, id))?;
         told.created.push(id);
     }
-    twice(|| store.begin_cage_job("a"))?;
+    twice(|| store.count_cage_job_attempt("a"))?;
     twice(|| store.finish_cage_job("a", &OUTCOME, Some(CAGE)))?;
     told.finished = true;
     twice(|| store.delete_cage_job("b"))?;
@@ -112,7 +112,7 @@ fn a_job_keeps_its_input_until_it_is_over_and_its_cage_from_then_on() {
     let store = given.open().store;
     create(&store, "a").unwrap();
     assert!(store.cage_job_bytes("a") > 8000);
-    assert_eq!([store.begin_cage_job("a").unwrap(), store.begin_cage_job("a").unwrap()], [1, 2]);
+    assert_eq!([store.count_cage_job_attempt("a").unwrap(), store.count_cage_job_attempt("a").unwrap()], [1, 2]);
     store.finish_cage_job("a", &OUTCOME, Some(CAGE)).unwrap();
     assert!(store.cage_job_bytes("a") < 2000);
     assert!(matches!(store.cage_job_rest(&meta("a")), Err(StoreError::Damaged { .. })));

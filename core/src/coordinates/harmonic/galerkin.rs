@@ -248,7 +248,7 @@ pub(super) fn right_hand_sides(outer: &Outer, layers: &Layers, unknowns: &Unknow
                         data.col_as_slice_mut(v)[here.clone()].copy_from_slice(&value.0);
                     }
                     for (l, q) in here.enumerate() {
-                        let (hats, _) = face.completion([0, 1, 2].map(|k| x[k].0[l] - corner[k]));
+                        let (hats, _) = face.affine_coordinates([0, 1, 2].map(|k| x[k].0[l] - corner[k]));
                         for i in 0..3 {
                             data[(q, face.vertices[i] as usize)] += 0.5 * hats[i];
                         }

@@ -22,8 +22,8 @@ const NARROW: f64 = 1e-3;
 const TOUCHING: f64 = 1e-12;
 
 impl MeanValue {
-    /// `Φ`, n × m, for points off the cage's surface: to about 1e-9, without the extra digits that [`coordinates`] spends on points
-    /// at the surface and on thin cages. Runs on the current rayon pool; the result does not depend on it.
+    /// `Φ`, n × m, for points off the cage's surface: accurate to about 1e-9, without the special cases of [`coordinates`] for points at the surface
+    /// and thin cages. Runs on the current rayon pool; the result does not depend on it.
     ///
     /// [`coordinates`]: crate::coordinates::CoordinateSystem::coordinates
     pub fn smooth_coordinates(self, cage: &Cage, points: &[Point]) -> Mat<f64> {
@@ -84,7 +84,7 @@ impl MeanValue {
     }
 }
 
-/// What the forward pass of one lane group leaves.
+/// Intermediate values of the forward pass of one lane group.
 struct Scratch {
     /// Unit vectors from the points to each cage vertex, `u`.
     directions: Vec<[Lanes; 3]>,
@@ -108,7 +108,7 @@ impl Scratch {
     }
 }
 
-/// What the backward pass adds up.
+/// Accumulators of the backward pass.
 struct Adjoint {
     /// Derivative by each weight times the reciprocal distance, `∂E/∂W_j / d_j`.
     weights: Vec<Lanes>,
@@ -132,7 +132,7 @@ impl Adjoint {
     }
 }
 
-/// `filled` points from `start` on; the last one fills the group up.
+/// `filled` points from `start` on, padded with the last one.
 fn lanes_of(points: &[Point], start: usize, filled: usize) -> [Lanes; 3] {
     let mut x = [Lanes::ZERO; 3];
     for l in 0..LANES {
@@ -153,8 +153,8 @@ fn store(mut rows: MatMut<'_, f64>, weights: &[Lanes], scale: Lanes) {
     }
 }
 
-/// Derivatives by the weights from those by their quotients: `(g_ij − Σ_k g_ik Φ_ik)/ΣW`, over the distances. Lanes that repeat the last
-/// point count nothing.
+/// Derivatives by the weights from those by their quotients: `(g_ij − Σ_k g_ik Φ_ik)/ΣW`, over the distances. Lanes that repeat the last point
+/// contribute zero.
 fn load(rows: (MatRef<'_, f64>, MatRef<'_, f64>), scale: Lanes, nearness: &[Lanes], out: &mut [Lanes]) {
     let (phi, upstream) = rows;
     let mut mean = Lanes::ZERO;
@@ -236,7 +236,7 @@ fn edge_term(edge: &Edge, directions: &[[Lanes; 3]], out: &mut [Lanes; 5]) {
     out[4] = slope * 0.5;
 }
 
-/// What a lane group sees of a face.
+/// Terms of one face for the points of a lane group.
 struct FaceTerms {
     /// `u_j × u_k`, by the corner opposite.
     g: [[Lanes; 3]; 3],

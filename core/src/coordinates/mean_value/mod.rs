@@ -10,7 +10,7 @@
 mod gradient;
 mod integral;
 
-use super::{ByPoint, CoordinateSystem, Coordinates, CoordinatesError};
+use super::{CoordinateSystem, Coordinates, CoordinatesError, PointwiseCoordinates};
 use crate::cage::{Cage, Edge, Face};
 use crate::mesh::{self, Point};
 use crate::simd::{LANES, Lanes, angle, cross, dot, multiversion, zeros};
@@ -47,7 +47,7 @@ impl CoordinateSystem for MeanValue {
         cage.vertices().to_vec()
     }
 
-    fn by_point(&self) -> Option<ByPoint> {
+    fn pointwise(&self) -> Option<PointwiseCoordinates> {
         Some(coordinates)
     }
 

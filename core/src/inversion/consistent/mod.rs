@@ -1,55 +1,48 @@
-//! The inversion of coordinates whose normals follow from the cage's vertices: `min ‖Φ_v C + Φ_f N(C) − P‖²` over the points
-//! read.
+//! Consistent inversion: Gauss–Newton for coordinates whose face normals N(C) are functions of the cage's vertices C.
 //!
-//! It starts from the cage `C₀` of a linear inversion, that of mean value coordinates, which lies close and has no folded faces, and keeps the
-//! shape that it has as far as the points leave it open. Where the points alone count, λ is small, and `C₀` is regularised all the same in directions
-//! that they hardly determine: from a wild cage the steps end in a worse minimum.
+//! It minimises `E(C) = (v/K) Σ |Φ_v C + Φ_f N(C) − P|² + λ ‖Δ (C − C₀)‖²` over the K points read, with the cage Laplacian Δ over the v vertices. The
+//! start and reference C₀ is the cage of a linear inversion with mean value coordinates. λ is positive even without regularisation, so that
+//! directions that the points hardly determine stay near C₀.
 //!
-//! `E(C) = (v/K) Σ |Φ_v C + Φ_f N(C) − P|² + λ ‖Δ (C − C₀)‖²`, with the cage Laplacian Δ over v vertices and K points read.
-//!
-//! Gauss–Newton steps minimise it, each solved by conjugate gradients that `(v/K) Φ_vᵀΦ_v + λ ΔᵀΔ` preconditions. A step that
-//! does not lower E is shortened, and then left out, so that the points read are never worse reproduced than by `C₀`. The fixed
-//! point `C ← R (P − Φ_f N(C))` does not converge on real captures: where normals and vertices move the model against each
-//! other its contraction is close to one, and folds of the cage keep it moving. Free Green coordinates are no place to
-//! start from either: their cages have spikes a quarter of the model long.
-//!
-//! All frames of a batch share the products with `G = (v/K) ΦᵀΦ`; everything else is a frame's own, so that its bits depend on no other.
+//! Each step is solved by conjugate gradients, preconditioned by the inverse of `(v/K) Φ_vᵀΦ_v + λ ΔᵀΔ`. A step that does not lower E is halved a few
+//! times and then skipped, so that E never exceeds its value at C₀. All frames of a batch share the products with `G = (v/K) ΦᵀΦ`; the result of a
+//! frame does not depend on the other frames.
 
+mod gram_matrix;
 mod state;
-mod sums;
 
 use crate::coordinates::TiedNormals;
 use crate::decode::Decoder;
 use crate::dense;
 use crate::mesh::Point;
 use faer::{Accum, Mat, MatRef, Par};
-use state::{Moving, dot};
+use state::{FrameState, dot};
 
 use super::{BLOCK_ROWS, product_columns};
 
-/// Most Gauss–Newton steps of a frame.
-const STEPS: usize = 24;
-/// Most conjugate gradients of a step.
-const GRADIENTS: usize = 8;
-/// Fraction of the first preconditioned squared residual at which gradients have converged.
-const GRADIENT_TOLERANCE: f64 = 1e-4;
+/// Maximum number of Gauss–Newton steps per frame.
+const MAX_STEPS: usize = 24;
+/// Maximum number of conjugate gradient iterations per step.
+const MAX_CG_ITERATIONS: usize = 8;
+/// Conjugate gradients stop at this fraction of the initial preconditioned squared residual.
+const CG_TOLERANCE: f64 = 1e-4;
 /// A step that lowers E by less than this fraction is the last.
 const TOLERANCE: f64 = 1e-3;
-/// Steps are halved so often before they are left out.
-const HALVINGS: usize = 4;
-/// Below this fraction of the squared positions, E is rounding.
+/// Maximum number of times a step is tried, halved each time.
+const MAX_STEP_TRIALS: usize = 4;
+/// Below this fraction of the squared positions, E is at rounding level.
 const ROUNDING: f64 = 1e-14;
-/// The smallest weight λ, beside which nothing of the shape's is left.
-const LEAST_WEIGHT: f64 = 1e-9;
+/// Smallest weight λ; the regularisation is negligible there.
+const MIN_WEIGHT: f64 = 1e-9;
 
 /// How the inversion of one frame went.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Convergence {
     /// Gauss–Newton steps taken.
     pub steps: usize,
-    /// Root of the mean square distance of the points read over the rest diagonal, as the linear start leaves it.
+    /// Root mean square distance of the points read for the linear start, over the rest diagonal.
     pub start: f64,
-    /// The same, of the cage found.
+    /// The same for the resulting cage.
     pub residual: f64,
     /// How it ended.
     pub outcome: Outcome,
@@ -58,22 +51,22 @@ pub struct Convergence {
 /// How the inversion of one frame ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// The last step changed next to nothing, or no further one was an improvement.
+    /// The last step lowered E by less than the tolerance, or no further step lowered it.
     Converged,
-    /// As many steps were taken as are allowed, and each was an improvement.
+    /// The maximum number of steps was taken, each of which lowered E.
     StepLimit,
-    /// No step was an improvement: the cage is the linear start's.
+    /// No step lowered E: the cage is that of the linear start.
     KeptStart,
 }
 
-/// Prepared for the points that a solver reads.
+/// Consistent inversion, prepared for the points that a solver reads.
 #[derive(Clone, Debug)]
 pub(crate) struct Consistent {
-    /// `G`, T × T for T = v + f; zero columns follow up to a whole tile, as in all of these.
+    /// `G`, T × T for T = v + f; padded with zero columns to a whole tile.
     gram: Mat<f64>,
-    /// `G`, and among vertices `λ ΔᵀΔ` beside it, for the conjugate gradients; zero rows follow up to a whole tile.
+    /// `G` plus `λ ΔᵀΔ` in the block of the vertices, for the conjugate gradients; padded with zero rows to a whole tile.
     curvature: Mat<f32>,
-    /// The inverse of its part among vertices, v × v; zero rows follow as well.
+    /// Inverse of the block of the vertices, v × v; padded likewise.
     preconditioner: Mat<f32>,
     /// Rows read of Φ, K × T; none where every point is read.
     rows: Option<Mat<f64>>,
@@ -86,20 +79,21 @@ pub(crate) struct Consistent {
 }
 
 impl Consistent {
-    /// `G` of the points read: the given rows, or where there are none, all.
+    /// `G` of the given rows, or of all points for `None`.
     pub(crate) fn gram_of(decoder: &Decoder, rows: Option<&[u32]>) -> Mat<f64> {
         let read = rows.map_or(decoder.points(), <[u32]>::len);
-        sums::gram(decoder, rows, decoder.positions() as f64 / read as f64)
+        gram_matrix::gram(decoder, rows, decoder.positions() as f64 / read as f64)
     }
 
-    /// For the same points, with their [`Self::gram_of`]. `None` where no factorisation succeeds, or where normals are not tied.
+    /// Prepares the inversion from the [`Self::gram_of`] of the same points. `None` where the factorisation fails, or where normals are not functions
+    /// of the vertices.
     pub(crate) fn from_gram(decoder: &Decoder, rows: Option<&[u32]>, weight: f64, gram: Mat<f64>) -> Option<Self> {
         let neighbours = neighbours(decoder.tied_normals()?, decoder.positions());
         let (v, total) = (decoder.positions(), decoder.columns());
         if gram.shape() != (total, total) {
             return None;
         }
-        let weight = weight.max(LEAST_WEIGHT);
+        let weight = weight.max(MIN_WEIGHT);
         let mut system = gram.submatrix(0, 0, v, v).to_owned();
         let size = (0..v).map(|i| system[(i, i)]).fold(0.0, f64::max);
         for (i, near) in neighbours.iter().enumerate() {
@@ -118,7 +112,7 @@ impl Consistent {
         let curvature = single(total, &curvature);
         let preconditioner = single(v, &|i, j| preconditioner[(i, j)]);
         let whole = |mut a: Mat<f64>| {
-            let columns = a.ncols().next_multiple_of(dense::WHOLE_ROWS);
+            let columns = a.ncols().next_multiple_of(dense::TILE_ROWS);
             a.resize_with(a.nrows(), columns, |_, _| 0.0);
             a
         };
@@ -126,7 +120,7 @@ impl Consistent {
             gram: whole(gram),
             curvature,
             preconditioner,
-            rows: rows.map(|rows| whole(sums::rows_of(decoder, rows))),
+            rows: rows.map(|rows| whole(gram_matrix::rows_of(decoder, rows))),
             neighbours,
             weight,
             share: v as f64 / rows.map_or(decoder.points(), <[u32]>::len) as f64,
@@ -150,8 +144,7 @@ impl Consistent {
         doubles(&self.gram) + singles(&self.curvature) + singles(&self.preconditioner) + rows
     }
 
-    /// Improves the cages of a batch in place. `point` gives row i of those read of frame f; `diagonal` is the unit of what is
-    /// reported.
+    /// Refines the cages of a batch in place. `point(f, i)` is the i-th point read of frame f; `diagonal` is the unit of the reported distances.
     pub(crate) fn refine(
         &self,
         decoder: &Decoder,
@@ -160,17 +153,17 @@ impl Consistent {
         diagonal: f64,
     ) -> Vec<Convergence> {
         let Some(tied) = decoder.tied_normals() else { return Vec::new() };
-        let mut frames: Vec<Moving> = cages.iter().map(|cage| Moving::new(cage)).collect();
+        let mut frames: Vec<FrameState> = cages.iter().map(|cage| FrameState::new(cage)).collect();
         self.read(decoder, &mut frames, point);
         let values: Vec<Vec<Point>> = frames.iter().map(|frame| frame.values(tied, &frame.cage)).collect();
-        for (frame, (values, products)) in frames.iter_mut().zip(values.iter().zip(self.times_gram(&values))) {
+        for (frame, (values, products)) in frames.iter_mut().zip(values.iter().zip(self.gram_product(&values))) {
             frame.energy = frame.data_energy(values, &products);
             frame.start_energy = frame.energy;
             frame.products = products;
         }
-        for _ in 0..STEPS {
+        for _ in 0..MAX_STEPS {
             for frame in frames.iter_mut().filter(|frame| frame.outcome.is_none()) {
-                if frame.energy <= ROUNDING * frame.squares {
+                if frame.energy <= ROUNDING * frame.squared_positions {
                     frame.outcome = Some(Outcome::Converged);
                 }
             }
@@ -178,7 +171,7 @@ impl Consistent {
                 break;
             }
             let steps = self.steps(tied, &frames);
-            self.walk(tied, &mut frames, &steps);
+            self.line_search(tied, &mut frames, &steps);
         }
         let vertices = decoder.positions() as f64;
         let length = |energy: f64| (energy.max(0.0) / vertices).sqrt() / diagonal;
@@ -190,14 +183,14 @@ impl Consistent {
             .map(|frame| Convergence {
                 steps: frame.steps,
                 start: length(frame.start_energy),
-                residual: length(frame.energy - self.shape_energy(frame, &frame.cage)),
+                residual: length(frame.energy - self.regularization_energy(frame, &frame.cage)),
                 outcome: frame.outcome.unwrap_or(Outcome::StepLimit),
             })
             .collect()
     }
 
-    /// Right-hand sides `(v/K) Φᵀ P`, and the squares of the positions.
-    fn read(&self, decoder: &Decoder, frames: &mut [Moving], point: impl Fn(usize, usize) -> Point) {
+    /// Right-hand sides `(v/K) Φᵀ P`, and `(v/K) Σ |P|²`.
+    fn read(&self, decoder: &Decoder, frames: &mut [FrameState], point: impl Fn(usize, usize) -> Point) {
         let read = self.rows.as_ref().map_or(decoder.points(), Mat::nrows);
         let (total, width) = (self.gram.nrows(), product_columns(frames.len()));
         let padded = self.gram.ncols();
@@ -210,7 +203,7 @@ impl Consistent {
                 for i in 0..count {
                     let p = point(f, first + i);
                     let p = [0, 1, 2].map(|k| p[k] - frame.origin[k]);
-                    frame.squares += self.share * dot(p, p);
+                    frame.squared_positions += self.share * dot(p, p);
                     for k in 0..3 {
                         block[(i, 3 * f + k)] = self.share * p[k];
                     }
@@ -219,7 +212,7 @@ impl Consistent {
             let rows = match &self.rows {
                 Some(rows) => rows.as_ref().subrows(first, count),
                 None => {
-                    sums::convert(decoder, first, count, &mut converted);
+                    gram_matrix::convert(decoder, first, count, &mut converted);
                     converted.as_ref().subrows(0, count)
                 }
             };
@@ -228,30 +221,35 @@ impl Consistent {
             faer::linalg::matmul::matmul(sides.as_mut(), accumulate, rows.transpose(), block, 1.0, Par::Seq);
         }
         for (f, frame) in frames.iter_mut().enumerate() {
-            frame.side = (0..total).map(|j| [0, 1, 2].map(|k| sides[(j, 3 * f + k)])).collect();
+            frame.right_hand_side = (0..total).map(|j| [0, 1, 2].map(|k| sides[(j, 3 * f + k)])).collect();
         }
     }
 
-    /// The Gauss–Newton step of each frame that still moves.
-    fn steps(&self, tied: &TiedNormals, frames: &[Moving]) -> Vec<Vec<Point>> {
+    /// The Gauss–Newton step of each frame that has not converged.
+    fn steps(&self, tied: &TiedNormals, frames: &[FrameState]) -> Vec<Vec<Point>> {
         let mut searches: Vec<_> = frames
             .iter()
-            .map(|frame| frame.outcome.is_none().then(|| state::Search::new(tied, frame, &self.pull_back(frame))))
+            .map(|frame| {
+                frame
+                    .outcome
+                    .is_none()
+                    .then(|| state::ConjugateGradients::new(tied, frame, &self.regularization_gradient(frame)))
+            })
             .collect();
-        for gradient in 0..GRADIENTS {
+        for gradient in 0..MAX_CG_ITERATIONS {
             let residuals: Vec<Vec<Point>> =
-                searches.iter().map(|s| active(s).map_or(Vec::new(), state::Search::residual)).collect();
-            let better = state::products(self.preconditioner.as_ref(), &residuals, |x| x as f32, f64::from);
-            for (search, better) in searches.iter_mut().zip(better) {
+                searches.iter().map(|s| active(s).map_or(Vec::new(), state::ConjugateGradients::residual)).collect();
+            let preconditioned = state::products(self.preconditioner.as_ref(), &residuals, |x| x as f32, f64::from);
+            for (search, preconditioned) in searches.iter_mut().zip(preconditioned) {
                 if let Some(search) = search {
-                    search.turn(&better, gradient == 0, GRADIENT_TOLERANCE);
+                    search.update_direction(&preconditioned, gradient == 0, CG_TOLERANCE);
                 }
             }
-            if searches.iter().flatten().all(state::Search::is_done) {
+            if searches.iter().flatten().all(state::ConjugateGradients::is_done) {
                 break;
             }
             let moved: Vec<Vec<Point>> =
-                searches.iter().map(|s| active(s).map_or(Vec::new(), |s| s.moved_values(tied))).collect();
+                searches.iter().map(|s| active(s).map_or(Vec::new(), |s| s.jacobian_product(tied))).collect();
             let products = state::products(self.curvature.as_ref(), &moved, |x| x as f32, f64::from);
             for (search, products) in searches.iter_mut().zip(products) {
                 if let Some(search) = search {
@@ -259,14 +257,14 @@ impl Consistent {
                 }
             }
         }
-        searches.into_iter().map(|search| search.map_or(Vec::new(), state::Search::into_step)).collect()
+        searches.into_iter().map(|search| search.map_or(Vec::new(), state::ConjugateGradients::into_step)).collect()
     }
 
-    /// Takes the steps as far as they lower E.
-    fn walk(&self, tied: &TiedNormals, frames: &mut [Moving], steps: &[Vec<Point>]) {
+    /// Backtracking line search: takes each step, halved until it lowers E.
+    fn line_search(&self, tied: &TiedNormals, frames: &mut [FrameState], steps: &[Vec<Point>]) {
         let mut length = 1.0;
         let mut waiting: Vec<bool> = frames.iter().map(|frame| frame.outcome.is_none()).collect();
-        for _ in 0..HALVINGS {
+        for _ in 0..MAX_STEP_TRIALS {
             let trials: Vec<(Vec<Point>, Vec<Point>)> = frames
                 .iter()
                 .zip(steps)
@@ -282,13 +280,13 @@ impl Consistent {
                 })
                 .collect();
             let (moved, values): (Vec<_>, Vec<_>) = trials.into_iter().unzip();
-            let products = self.times_gram(&values);
+            let products = self.gram_product(&values);
             for (f, (cage, products)) in moved.into_iter().zip(products).enumerate() {
                 let frame = &mut frames[f];
                 if !waiting[f] {
                     continue;
                 }
-                let energy = frame.data_energy(&values[f], &products) + self.shape_energy(frame, &cage);
+                let energy = frame.data_energy(&values[f], &products) + self.regularization_energy(frame, &cage);
                 if energy < frame.energy {
                     waiting[f] = false;
                     frame.steps += 1;
@@ -310,12 +308,12 @@ impl Consistent {
         }
     }
 
-    fn times_gram(&self, values: &[Vec<Point>]) -> Vec<Vec<Point>> {
+    fn gram_product(&self, values: &[Vec<Point>]) -> Vec<Vec<Point>> {
         state::products(self.gram.transpose(), values, |x| x, |x| x)
     }
 
     /// `Δ x`.
-    fn bent(&self, x: &[Point]) -> Vec<Point> {
+    fn laplacian(&self, x: &[Point]) -> Vec<Point> {
         let of_vertex = |(i, near): (usize, &Vec<u32>)| {
             let share = 1.0 / near.len() as f64;
             [0, 1, 2].map(|k| x[i][k] - share * near.iter().map(|&j| x[j as usize][k]).sum::<f64>())
@@ -324,10 +322,10 @@ impl Consistent {
     }
 
     /// `λ ΔᵀΔ x`.
-    fn shape_gradient(&self, x: &[Point]) -> Vec<Point> {
-        let bent = self.bent(x);
-        let mut out: Vec<Point> = bent.clone();
-        for (near, b) in self.neighbours.iter().zip(&bent) {
+    fn apply_regularization(&self, x: &[Point]) -> Vec<Point> {
+        let laplacian = self.laplacian(x);
+        let mut out: Vec<Point> = laplacian.clone();
+        for (near, b) in self.neighbours.iter().zip(&laplacian) {
             for &j in near {
                 for k in 0..3 {
                     out[j as usize][k] -= b[k] / near.len() as f64;
@@ -337,23 +335,23 @@ impl Consistent {
         out.into_iter().map(|x| x.map(|c| self.weight * c)).collect()
     }
 
-    fn shape_energy(&self, frame: &Moving, cage: &[Point]) -> f64 {
-        self.weight * self.bent(&frame.moved_by(cage)).iter().map(|&b| dot(b, b)).sum::<f64>()
+    fn regularization_energy(&self, frame: &FrameState, cage: &[Point]) -> f64 {
+        self.weight * self.laplacian(&frame.displacement(cage)).iter().map(|&b| dot(b, b)).sum::<f64>()
     }
 
-    fn pull_back(&self, frame: &Moving) -> Vec<Point> {
-        self.shape_gradient(&frame.moved_by(&frame.cage))
+    fn regularization_gradient(&self, frame: &FrameState) -> Vec<Point> {
+        self.apply_regularization(&frame.displacement(&frame.cage))
     }
 }
 
-/// A search that goes on.
-fn active(search: &Option<state::Search>) -> Option<&state::Search> {
+/// The iteration, unless it has ended.
+fn active(search: &Option<state::ConjugateGradients>) -> Option<&state::ConjugateGradients> {
     search.as_ref().filter(|search| !search.is_done())
 }
 
-/// Square, in single precision, with zero rows up to a whole tile.
+/// An n × n matrix in single precision, padded with zero rows to a whole tile.
 fn single(n: usize, entry: &dyn Fn(usize, usize) -> f64) -> Mat<f32> {
-    Mat::from_fn(n.next_multiple_of(dense::WHOLE_ROWS), n, |i, j| if i < n { entry(i, j) as f32 } else { 0.0 })
+    Mat::from_fn(n.next_multiple_of(dense::TILE_ROWS), n, |i, j| if i < n { entry(i, j) as f32 } else { 0.0 })
 }
 
 /// Neighbours of each vertex of a closed mesh: along every edge, one of its two faces runs away from the vertex.

@@ -1,4 +1,4 @@
-//! Where a frame is on its way, and the conjugate gradients of its next step.
+//! State of one frame during the consistent inversion, and the conjugate gradients of its Gauss–Newton step.
 
 use super::Outcome;
 use super::product_columns;
@@ -6,15 +6,15 @@ use crate::coordinates::TiedNormals;
 use crate::mesh::Point;
 use faer::{Mat, MatRef};
 
-/// One frame. Positions are about the centre of the start, which keeps the digits of a capture that travels.
-pub(super) struct Moving {
+/// State of one frame. Positions are relative to the centre of the initial cage, to keep precision far from the origin.
+pub(super) struct FrameState {
     pub(super) origin: Point,
     start: Vec<Point>,
     pub(super) cage: Vec<Point>,
     /// `(v/K) Φᵀ P`, T × 3.
-    pub(super) side: Vec<Point>,
+    pub(super) right_hand_side: Vec<Point>,
     /// `(v/K) Σ |P|²`.
-    pub(super) squares: f64,
+    pub(super) squared_positions: f64,
     /// `G Y` of the cage's values Y.
     pub(super) products: Vec<Point>,
     pub(super) energy: f64,
@@ -23,7 +23,7 @@ pub(super) struct Moving {
     pub(super) outcome: Option<Outcome>,
 }
 
-impl Moving {
+impl FrameState {
     pub(super) fn new(cage: &[Point]) -> Self {
         let mut origin = [0.0; 3];
         for row in cage {
@@ -37,8 +37,8 @@ impl Moving {
             origin,
             cage: start.clone(),
             start,
-            side: Vec::new(),
-            squares: 0.0,
+            right_hand_side: Vec::new(),
+            squared_positions: 0.0,
             products: Vec::new(),
             energy: 0.0,
             start_energy: 0.0,
@@ -47,22 +47,22 @@ impl Moving {
         }
     }
 
-    /// Vertices and the normals that follow from them, T × 3.
+    /// Vertices and their normals, T × 3.
     pub(super) fn values(&self, tied: &TiedNormals, cage: &[Point]) -> Vec<Point> {
         cage.iter().copied().chain(tied.normals(|v| cage[v as usize])).collect()
     }
 
-    /// The first term of E.
+    /// Data term of E.
     pub(super) fn data_energy(&self, values: &[Point], products: &[Point]) -> f64 {
-        let terms = values.iter().zip(products).zip(&self.side);
-        self.squares + terms.map(|((&y, g), s)| dot(y, [0, 1, 2].map(|k| g[k] - 2.0 * s[k]))).sum::<f64>()
+        let terms = values.iter().zip(products).zip(&self.right_hand_side);
+        self.squared_positions + terms.map(|((&y, g), s)| dot(y, [0, 1, 2].map(|k| g[k] - 2.0 * s[k]))).sum::<f64>()
     }
 
-    pub(super) fn moved_by(&self, cage: &[Point]) -> Vec<Point> {
+    pub(super) fn displacement(&self, cage: &[Point]) -> Vec<Point> {
         cage.iter().zip(&self.start).map(|(c, s)| [0, 1, 2].map(|k| c[k] - s[k])).collect()
     }
 
-    /// The cage where it was found.
+    /// Writes the refined cage back, relative to the origin of the capture.
     pub(super) fn write(&self, cage: &mut [Point]) {
         if self.steps > 0 {
             for (to, from) in cage.iter_mut().zip(&self.cage) {
@@ -73,25 +73,25 @@ impl Moving {
 }
 
 /// Conjugate gradients on `(JᵀGJ + λΔᵀΔ) d = −½ ∇E`, where `J` is the derivative of a cage's values.
-pub(super) struct Search {
+pub(super) struct ConjugateGradients {
     derivatives: Vec<[[Point; 3]; 2]>,
     step: Vec<Point>,
     residual: Vec<Point>,
     direction: Vec<Point>,
-    /// Product of the residual with the preconditioned one; the first one of all.
+    /// Inner product of the residual with the preconditioned residual, and its initial value.
     size: f64,
     first_size: f64,
     done: bool,
 }
 
-impl Search {
-    /// From a frame and the gradient of the second term of E, halved.
-    pub(super) fn new(tied: &TiedNormals, frame: &Moving, pull_back: &[Point]) -> Self {
+impl ConjugateGradients {
+    /// From a frame and half the gradient of the regularisation term of E.
+    pub(super) fn new(tied: &TiedNormals, frame: &FrameState, regularization_gradient: &[Point]) -> Self {
         let derivatives = tied.derivatives(&frame.cage);
         let difference = |(s, g): (&Point, &Point)| [0, 1, 2].map(|k| s[k] - g[k]);
-        let open: Vec<Point> = frame.side.iter().zip(&frame.products).map(difference).collect();
-        let mut residual = gathered(tied, &derivatives, &open);
-        for (r, p) in residual.iter_mut().zip(pull_back) {
+        let open: Vec<Point> = frame.right_hand_side.iter().zip(&frame.products).map(difference).collect();
+        let mut residual = transposed_jacobian_product(tied, &derivatives, &open);
+        for (r, p) in residual.iter_mut().zip(regularization_gradient) {
             *r = [0, 1, 2].map(|k| r[k] - p[k]);
         }
         let zeros = vec![[0.0; 3]; residual.len()];
@@ -110,12 +110,12 @@ impl Search {
         self.step
     }
 
-    /// The next direction, by the preconditioned residual.
-    pub(super) fn turn(&mut self, better: &[Point], first: bool, tolerance: f64) {
+    /// Computes the next search direction from the preconditioned residual.
+    pub(super) fn update_direction(&mut self, preconditioned: &[Point], first: bool, tolerance: f64) {
         if self.done {
             return;
         }
-        let size: f64 = self.residual.iter().zip(better).map(|(&r, &z)| dot(r, z)).sum();
+        let size: f64 = self.residual.iter().zip(preconditioned).map(|(&r, &z)| dot(r, z)).sum();
         if first {
             self.first_size = size;
         }
@@ -124,15 +124,15 @@ impl Search {
             self.done = true;
             return;
         }
-        let turn = if first { 0.0 } else { size / self.size };
-        for (d, z) in self.direction.iter_mut().zip(better) {
-            *d = [0, 1, 2].map(|k| z[k] + turn * d[k]);
+        let beta = if first { 0.0 } else { size / self.size };
+        for (d, z) in self.direction.iter_mut().zip(preconditioned) {
+            *d = [0, 1, 2].map(|k| z[k] + beta * d[k]);
         }
         self.size = size;
     }
 
     /// `J d` of the direction, T × 3.
-    pub(super) fn moved_values(&self, tied: &TiedNormals) -> Vec<Point> {
+    pub(super) fn jacobian_product(&self, tied: &TiedNormals) -> Vec<Point> {
         let d = &self.direction;
         let of_face = |(&[a, b, c], derivative): (&[u32; 3], &[[Point; 3]; 2])| {
             let [a, b, c] = [a, b, c].map(|v| d[v as usize]);
@@ -142,12 +142,12 @@ impl Search {
         d.iter().copied().chain(tied.faces().iter().zip(&self.derivatives).map(of_face)).collect()
     }
 
-    /// Goes along the direction d, by the curvature times `J d`.
+    /// Steps along the direction d; takes the product of the curvature matrix with `J d`.
     pub(super) fn advance(&mut self, tied: &TiedNormals, products: &[Point]) {
         if self.done {
             return;
         }
-        let image = gathered(tied, &self.derivatives, products);
+        let image = transposed_jacobian_product(tied, &self.derivatives, products);
         let curvature: f64 = self.direction.iter().zip(&image).map(|(&d, &i)| dot(d, i)).sum();
         let length = self.size / curvature;
         if !(length.is_finite() && length > 0.0) {
@@ -164,7 +164,7 @@ impl Search {
 }
 
 /// `Jᵀ w` of values w, T × 3.
-fn gathered(tied: &TiedNormals, derivatives: &[[[Point; 3]; 2]], w: &[Point]) -> Vec<Point> {
+fn transposed_jacobian_product(tied: &TiedNormals, derivatives: &[[[Point; 3]; 2]], w: &[Point]) -> Vec<Point> {
     let vertices = w.len() - derivatives.len();
     let mut out = w[..vertices].to_vec();
     for ((&[a, b, c], derivative), w) in tied.faces().iter().zip(derivatives).zip(&w[vertices..]) {
@@ -179,7 +179,7 @@ fn gathered(tied: &TiedNormals, derivatives: &[[[Point; 3]; 2]], w: &[Point]) ->
     out
 }
 
-/// `A · X` for the X of every frame that has one, side by side. The bits of a frame do not depend on the others.
+/// `A · X` for the X of every frame that has one, as columns of one matrix. The result of a frame does not depend, bit for bit, on the others.
 pub(super) fn products<T: faer::traits::RealField + Copy>(
     a: MatRef<'_, T>,
     frames: &[Vec<Point>],

@@ -7,7 +7,7 @@ use std::path::{MAIN_SEPARATOR, Path, PathBuf};
 
 use cager_core::mesh::Polygons;
 
-use super::numbered::Numbered;
+use super::numbered::NumberedNames;
 use super::{CacheFormat, unknown_extension};
 use crate::atomic::Target;
 use crate::error::{Error, Fault};
@@ -61,7 +61,7 @@ impl Default for FrameOptions {
 
 /// The file or folder that [`create_frames`] makes for this path: of a pattern, the folder.
 pub fn frames_path(path: &Path) -> &Path {
-    let pattern = mesh_pattern(path).is_some() || Numbered::of(path).is_some();
+    let pattern = mesh_pattern(path).is_some() || NumberedNames::of(path).is_some();
     path.parent().filter(|_| pattern).unwrap_or(path)
 }
 
@@ -95,7 +95,7 @@ pub fn create_frames(
     if target == Target::StandardOutput {
         return Ok(Box::new(CacheWriter::create(announced, &target, CacheFormat::Npy, options)?));
     }
-    if let Some(names) = Numbered::of(given) {
+    if let Some(names) = NumberedNames::of(given) {
         check_numbered(&names, path).map_err(|fault| fault.at(given))?;
         return Ok(Box::new(SequenceWriter::create(announced, &target, faces, names, options)?));
     }
@@ -103,7 +103,7 @@ pub fn create_frames(
         let whole = |frame: usize| options.number(frame).abs().trunc().to_string().len();
         let digits = whole(0).max(whole(frames - 1)).max(4);
         let extension = if pattern == Some("*.ply") { ".ply" } else { ".obj" };
-        let names = Numbered::new("frame_", digits, extension);
+        let names = NumberedNames::new("frame_", digits, extension);
         return Ok(Box::new(SequenceWriter::create(announced, &target, faces, names, options)?));
     }
     match CacheFormat::from_path(path) {
@@ -112,7 +112,7 @@ pub fn create_frames(
     }
 }
 
-fn check_numbered(names: &Numbered, folder: &Path) -> Result<(), Fault> {
+fn check_numbered(names: &NumberedNames, folder: &Path) -> Result<(), Fault> {
     if !(names.extension_is("obj") || names.extension_is("ply")) {
         return Err(Fault::unsupported(
             "is not of a mesh format that is written for frames; end the name in .obj or .ply",
@@ -130,7 +130,7 @@ fn is_folder(path: &Path) -> bool {
     separated || path.extension().is_none() || path.is_dir()
 }
 
-/// What is to come, and how much of it has.
+/// Announced size of an output, and the number of frames written.
 struct Announced {
     path: PathBuf,
     points: usize,

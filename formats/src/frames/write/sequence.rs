@@ -4,7 +4,7 @@ use std::io::{self, BufWriter, Write};
 
 use cager_core::mesh::{Model, Polygons};
 
-use super::super::numbered::Numbered;
+use super::super::numbered::NumberedNames;
 use super::{Announced, FrameOptions, FrameWriter};
 use crate::atomic::{AtomicDir, Target};
 use crate::error::{Error, Fault};
@@ -14,7 +14,7 @@ pub(super) struct SequenceWriter {
     announced: Announced,
     folder: AtomicDir,
     format: Format,
-    names: Numbered,
+    names: NumberedNames,
     options: FrameOptions,
 }
 
@@ -31,7 +31,7 @@ impl SequenceWriter {
         announced: Announced,
         target: &Target,
         faces: &Polygons,
-        names: Numbered,
+        names: NumberedNames,
         options: &FrameOptions,
     ) -> Result<Self, Error> {
         if let Some(&index) = faces.indices().iter().find(|&&index| index as usize >= announced.points) {

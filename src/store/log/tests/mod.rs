@@ -342,12 +342,12 @@ fn what_a_sync_ruined_while_the_disk_refused_is_written_again_when_it_takes_it()
     disk.fail_from(Some(Op::Sync), 1, Fault::Ruin(EIO));
     assert!(append(&mut log, &[21]).is_err());
     drop(log);
-    assert!(fixture.store.log_is_doubtful("a"));
+    assert!(fixture.store.log_needs_rewrite("a"));
     assert!(fixture.store.open_log("a", ROWS).is_err(), "what is given would not be durable");
-    assert!(fixture.store.log_is_doubtful("a"));
+    assert!(fixture.store.log_needs_rewrite("a"));
     disk.disarm();
     drop(fixture.store.open_log("a", ROWS).unwrap());
-    assert!(!fixture.store.log_is_doubtful("a"));
+    assert!(!fixture.store.log_needs_rewrite("a"));
     drop(fixture.store);
     disk.restart(Loss::Everything).unwrap();
     let (log, entries) = fixture.given.open().store.open_log("a", ROWS).unwrap();

@@ -1,4 +1,4 @@
-//! A service of this process's own, for as long as one command needs it.
+//! A service within this process, for the duration of one command.
 
 use super::serve::run_until;
 use crate::config::ServeConfig;
@@ -12,7 +12,7 @@ use std::time::Duration;
 use tokio_util::sync::CancellationToken;
 
 /// The same service as `cager serve`, on a free port that only this machine reaches. Stopped and forgotten when dropped.
-pub(super) struct OwnService {
+pub(super) struct LocalService {
     address: String,
     stop: CancellationToken,
     running: Option<JoinHandle<Result<()>>>,
@@ -20,7 +20,7 @@ pub(super) struct OwnService {
     _data: ScratchDir,
 }
 
-impl OwnService {
+impl LocalService {
     /// Starts one that keeps its data in a temporary folder within `folder`.
     pub(super) fn start(folder: &Path) -> Result<Self> {
         let data = ScratchDir::create(folder)?;
@@ -40,7 +40,7 @@ impl OwnService {
         let serve = move || {
             let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().thread_name("serve").build()?;
             let outcome = runtime.block_on(run_until(config, token, |address| {
-                // Who started this waits for it.
+                // `start` waits for it.
                 let _ = listens.send(address);
             }));
             runtime.shutdown_timeout(Duration::from_secs(2));
@@ -80,9 +80,9 @@ impl OwnService {
     }
 }
 
-impl Drop for OwnService {
+impl Drop for LocalService {
     fn drop(&mut self) {
-        // Told already, or of no interest beside the error that led here.
+        // The error was reported already, or is secondary to the one that led here.
         let _ = self.end();
     }
 }

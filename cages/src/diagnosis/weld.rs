@@ -1,4 +1,4 @@
-//! Vertices in the same place along open borders, as flat shading and UVs split them, made one again.
+//! Welding of coincident vertices along open borders, where flat shading and UV seams split them.
 
 use super::connectivity::edges;
 use cager_core::mesh::{Model, Polygons, diagonal};

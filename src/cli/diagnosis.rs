@@ -1,18 +1,18 @@
 //! `cager cage --check` and `--repair`: what is wrong with a cage, and what of it can be repaired.
 
-use super::cage::{Targets, cage_bytes, picture_of, whole};
+use super::cage::{Targets, cage_bytes, complete_file, picture_of};
 use super::cage_args::CageArgs;
-use super::dry_run::tell_would;
+use super::dry_run::tell_dry_run;
 use super::print;
 use anyhow::{Result, bail};
-use cager_cages::doctor::{Findings, check, repair};
+use cager_cages::diagnosis::{Findings, check, repair};
 use cager_core::mesh::{Model, TriMesh};
 use cager_formats::{Target, commit_together, read_model};
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::Path;
 
-/// What was found out about a cage. Counts are of what [`cager_cages::doctor::Findings`] lists.
+/// What was found out about a cage. Counts are of what [`cager_cages::diagnosis::Findings`] lists.
 #[derive(Serialize)]
 pub(super) struct CheckReport {
     /// Whether it may be encoded with.
@@ -63,7 +63,7 @@ impl CheckReport {
             outside_distance: found.outside.map(|outside| outside.distance),
             condition_number: found.condition_number,
             changes,
-            findings: found.sentences(),
+            findings: found.messages(),
         }
     }
 }
@@ -98,14 +98,14 @@ fn repair_cage(args: &CageArgs, (output, targets): (&Target, &Targets), rest: &M
         bail!(
             "{}: could not be repaired: {}; nothing was written",
             path.display(),
-            repaired.remaining.sentences().join("; ")
+            repaired.remaining.messages().join("; ")
         );
     }
     let report = CheckReport::new(&repaired.remaining, repaired.changes.clone());
     if args.outputs.dry_run {
-        return tell_would(output, "a repaired cage", &[targets.report.clone(), targets.picture.clone()]);
+        return tell_dry_run(output, "a repaired cage", &[targets.report.clone(), targets.picture.clone()]);
     }
-    let mut files = vec![whole(output, &cage_bytes(output, &repaired.cage)?)?];
+    let mut files = vec![complete_file(output, &cage_bytes(output, &repaired.cage)?)?];
     let picture = || picture_of(args, &TriMesh::from(rest), &TriMesh::from(&repaired.cage));
     files.extend(targets.complete(&report, picture)?);
     commit_together(files)?;
@@ -137,7 +137,7 @@ fn verdict(path: &Path, found: &Findings) -> String {
         let _ = write!(text, ", condition number {condition:.1}");
     }
     text.push('\n');
-    for sentence in found.sentences() {
+    for sentence in found.messages() {
         let _ = writeln!(text, "  found    {sentence}");
     }
     text

@@ -1,30 +1,30 @@
-//! Terms whose reference is another cage: what they add to `R · H`.
+//! Regularisation towards a reference cage: what it adds to `R · H`.
 
 use faer::Mat;
 
-/// What pulls cages towards others.
+/// The cage towards which solutions are regularised, as its contribution to the solution.
 #[derive(Clone, Debug)]
-pub enum Pull {
+pub enum RegularizationTarget {
     /// Nothing.
     None,
     /// Towards the rest cage: `c₀` of `C = R·H + c₀`, m × 3.
     Constant(Mat<f64>),
     /// Towards the previous frame's cage: S of `C_t = R·H_t + S·C_{t−1}`.
     Previous {
-        /// S, m × m; the entries of every row that meet positions sum to zero.
+        /// S, m × m; the entries of every row that multiply vertices sum to zero.
         operator: Mat<f64>,
         /// The first frame's predecessor, m × 3 interleaved: the rest cage.
         first: Vec<f32>,
     },
 }
 
-impl Pull {
+impl RegularizationTarget {
     /// Whether frames depend on their predecessors.
     pub fn is_previous(&self) -> bool {
         matches!(self, Self::Previous { .. })
     }
 
-    /// Whether it can belong to a solver with so many unknowns.
+    /// Whether its shapes match a solver with so many unknowns.
     pub(super) fn fits(&self, unknowns: usize) -> bool {
         match self {
             Self::None => true,
@@ -43,7 +43,7 @@ impl Pull {
         }
     }
 
-    /// Adds what it adds to a cage, m × 3, whose predecessor was this.
+    /// Adds its contribution to a cage, m × 3, given the previous frame's cage.
     pub(super) fn add(&self, cage: &mut [[f64; 3]], previous: Option<&[f32]>, positions: usize) {
         match self {
             Self::None => {}

@@ -1,4 +1,4 @@
-//! What the vertices of a cage do to a model: which move nothing, and how well-conditioned the coordinates are.
+//! Influence of a cage's vertices on a model: vertices without effect, and the condition number of the coordinates.
 
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
@@ -10,10 +10,10 @@ use faer::{Accum, Mat, MatRef, Par};
 /// A vertex moves no point when none of its coordinates is larger.
 const IDLE: f64 = 1e-4;
 
-/// Coordinates that are looked at, at most: of fewer points where the cage has many vertices.
+/// Maximum number of coordinates evaluated; points are subsampled accordingly.
 const ENTRIES: usize = 20_000_000;
 
-/// Cages with more vertices are not judged: it would take minutes.
+/// Cages with more vertices are not analysed: it would take minutes.
 const MOST_VERTICES: usize = 2_000;
 
 /// Vertices that move no point, and the condition number of the mean value coordinates; neither of a cage of thousands of vertices.

@@ -1,30 +1,30 @@
-//! Whether the frames of a capture belong to a rest pose: units, axes and the order of points, told by edge lengths, extents and
-//! the correlation of positions. What deformation does to all three is far from what a mix-up does.
+//! Detects whether the frames of a capture belong to a rest pose: units, axes and order of points, by edge lengths, extents and the
+//! correlation of positions. Deformation changes these far less than a mix-up does.
 
 use cager_core::mesh::{Model, Point, bounds};
 use std::fmt;
 
-/// Frames that are worth comparing with a rest pose, evenly spaced.
+/// Number of evenly spaced frames to compare.
 pub const FRAMES: usize = 5;
 
-/// Edges, or pairs of points, looked at in a frame.
-const PAIRS: usize = 20_000;
+/// Most edges or pairs of points compared per frame.
+const MAX_PAIRS: usize = 20_000;
 
-/// Distances computed at most to find the neighbours of a point cloud's points.
-const DISTANCES: usize = 20_000_000;
+/// Most distances computed to find nearest neighbours in a point cloud.
+const MAX_DISTANCES: usize = 20_000_000;
 
-/// What a capture that does not belong to its rest pose looks like. Ratios are of the capture to the rest pose.
+/// A mismatch between a capture and its rest pose. Ratios are capture to rest pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mismatch {
-    /// The points come in another order: the first frame's edges are so many times longer, and no edge is one any more.
+    /// The order of points differs: median ratio of edge lengths in the first frame.
     Order(f64),
-    /// Everything is larger or smaller by this factor in every frame.
+    /// All frames are scaled by about this factor.
     Units(f64),
-    /// The axes y and z changed places.
+    /// The axes y and z are exchanged.
     Axes(Up),
 }
 
-/// Which axis points up in a capture whose axes are not those of its rest pose.
+/// The up axis of a capture whose axes differ from those of its rest pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Up {
     /// The second; the third does in the rest pose.
@@ -35,15 +35,17 @@ pub enum Up {
     Other,
 }
 
-/// What is wrong with a capture, by some of its frames, the first among them, points × 3 each; empty where it may well belong to the
-/// rest pose. Every frame has to agree: a capture that deforms a model in earnest is not taken for a mistake.
+/// Detects mismatches from some frames, including the first, points × 3 each; empty if the capture plausibly belongs to the rest pose. All
+/// frames must agree, so that strong deformation is not mistaken for a mismatch.
 pub fn mismatches(rest: &Model, frames: &[Vec<f64>]) -> Vec<Mismatch> {
     let Some(rest_shape) = Shape::of(&rest.points) else { return Vec::new() };
     let pairs = neighbours(rest);
-    let compared: Vec<Compared> =
-        frames.iter().filter_map(|frame| Compared::new(rest, &rest_shape, &pairs, frame.as_chunks().0)).collect();
+    let compared: Vec<FrameComparison> = frames
+        .iter()
+        .filter_map(|frame| FrameComparison::new(rest, &rest_shape, &pairs, frame.as_chunks().0))
+        .collect();
     let Some(first) = compared.first() else { return Vec::new() };
-    if compared.iter().all(Compared::is_shuffled) {
+    if compared.iter().all(FrameComparison::is_shuffled) {
         return vec![Mismatch::Order(first.edges)];
     }
     let mut found = Vec::new();
@@ -51,24 +53,24 @@ pub fn mismatches(rest: &Model, frames: &[Vec<f64>]) -> Vec<Mismatch> {
         found.push(Mismatch::Units(first.edges));
     }
     let exchanged: Vec<Up> = compared.iter().filter_map(|frame| frame.turn.exchanged()).collect();
-    if 5 * exchanged.len() >= 2 * compared.len() && !compared.iter().any(|frame| frame.turn.is_clearly_none()) {
+    if 5 * exchanged.len() >= 2 * compared.len() && !compared.iter().any(|frame| frame.turn.clearly_keeps_axes()) {
         found.push(Mismatch::Axes(exchanged[0]));
     }
     found
 }
 
-/// A factor of its own in every frame is motion; the same one in all, on every edge, is a unit.
-fn in_other_units(compared: &[Compared]) -> bool {
+/// A scale that varies between frames is motion; the same scale in all frames and on all edges is a unit.
+fn in_other_units(compared: &[FrameComparison]) -> bool {
     let ratios = || compared.iter().map(|frame| frame.edges);
     let (least, most) = (ratios().fold(f64::INFINITY, f64::min), ratios().fold(0.0, f64::max));
-    let alike = |frame: &Compared| (frame.edges / frame.extent).ln().abs() < 0.7;
-    let even = compared.iter().all(|frame| frame.unevenness < 0.3) && most < 1.1 * least;
+    let alike = |frame: &FrameComparison| (frame.edges / frame.extent).ln().abs() < 0.7;
+    let even = compared.iter().all(|frame| frame.log_quartile_ratio < 0.3) && most < 1.1 * least;
     let factor = if even { 2.2 } else { 5.0 };
     let away = least > factor || most < 1.0 / factor;
     away && most < 1.5 * least && compared.iter().all(alike)
 }
 
-/// Where a shape is and how large.
+/// Position and size of a point set.
 struct Shape {
     centre: Point,
     /// Root mean square distance from the centre.
@@ -79,7 +81,7 @@ struct Shape {
 }
 
 impl Shape {
-    /// None for points in one place, or not finite.
+    /// `None` if the points coincide or are not finite.
     fn of(points: &[Point]) -> Option<Self> {
         let n = points.len() as f64;
         let (low, high) = bounds(points);
@@ -90,7 +92,7 @@ impl Shape {
         let centre: Point = std::array::from_fn(|k| points.iter().map(|p| p[k]).sum::<f64>() / n);
         let radius = (points.iter().map(|&p| distance(p, centre).powi(2)).sum::<f64>() / n).sqrt();
         let count = points.len().min(2_000);
-        // Multiples of an odd number far from every regularity of a mesh.
+        // Multiplicative hashing picks pairs unrelated to the mesh's order.
         let other = |k: usize| k.wrapping_mul(0x9e37_79b9_7f4a_7c15) % points.len();
         let pairs = (1..=count).map(|k| distance(points[other(k)], points[other(k + count)])).collect();
         (radius.is_finite() && radius > 0.0).then_some(())?;
@@ -98,22 +100,22 @@ impl Shape {
     }
 }
 
-/// A frame beside the rest pose.
-struct Compared {
-    /// Median ratio of an edge's length.
+/// Comparison of a frame with the rest pose.
+struct FrameComparison {
+    /// Median ratio of edge lengths.
     edges: f64,
-    /// Logarithm of the ratio of the upper to the lower quartile of those ratios.
-    unevenness: f64,
+    /// Natural logarithm of the ratio of upper to lower quartile of the edge ratios.
+    log_quartile_ratio: f64,
     /// Ratio of the diagonals of the bounding boxes.
     extent: f64,
-    /// Median length of an edge, as a fraction of the distance of two points chosen at random: about 1 where an edge is as good as any
-    /// other two points; in the rest pose and in the frame.
+    /// Median edge length over the median distance of two random points, in the rest pose and in the frame; about 1 if edges are as long as
+    /// random pairs.
     edge_in_rest: f64,
     edge_in_frame: f64,
-    turn: Turn,
+    turn: AxisScores,
 }
 
-impl Compared {
+impl FrameComparison {
     fn new(rest: &Model, rest_shape: &Shape, pairs: &[[u32; 2]], frame: &[Point]) -> Option<Self> {
         let shape = Shape::of(frame)?;
         let length = |points: &[Point], [a, b]: [u32; 2]| distance(points[a as usize], points[b as usize]);
@@ -121,11 +123,11 @@ impl Compared {
         let [lower, edges, upper] = quartiles(both.iter().map(|(r, f)| f / r).collect())?;
         Some(Self {
             edges,
-            unevenness: (upper / lower.max(f64::MIN_POSITIVE)).ln(),
+            log_quartile_ratio: (upper / lower.max(f64::MIN_POSITIVE)).ln(),
             extent: shape.diagonal / rest_shape.diagonal,
             edge_in_rest: quartiles(both.iter().map(|b| b.0).collect())?[1] / rest_shape.distance,
             edge_in_frame: quartiles(both.iter().map(|b| b.1).collect())?[1] / shape.distance,
-            turn: Turn::new(&correlation((&rest.points, rest_shape), (frame, &shape))),
+            turn: AxisScores::new(&correlation((&rest.points, rest_shape), (frame, &shape))),
         })
     }
 
@@ -133,21 +135,21 @@ impl Compared {
         let longer = self.edges / self.extent;
         let like_any_two = self.edge_in_frame / self.edge_in_rest;
         let least = longer.min(like_any_two);
-        let scattered = self.unevenness > 1.0 && least > 2.0;
-        let like_strangers = self.unevenness > 0.5 && least > 2.5 && self.edge_in_frame > 0.5;
-        // A model that is crumpled up keeps its edges.
-        self.edges > 1.2 && (scattered || like_strangers)
+        let scattered = self.log_quartile_ratio > 1.0 && least > 2.0;
+        let as_far_as_random_points = self.log_quartile_ratio > 0.5 && least > 2.5 && self.edge_in_frame > 0.5;
+        // Crumpling preserves edge lengths.
+        self.edges > 1.2 && (scattered || as_far_as_random_points)
     }
 }
 
-/// Edges of a mesh, or nearest neighbours in a point cloud, that have a length; some of them where there are many.
+/// Edges of a mesh, or nearest neighbours in a point cloud, of non-zero length; subsampled if there are many.
 fn neighbours(rest: &Model) -> Vec<[u32; 2]> {
     let points = &rest.points;
     let apart = |&[a, b]: &[u32; 2]| distance(points[a as usize], points[b as usize]) > 0.0;
-    let stride = rest.faces.indices().len().div_ceil(PAIRS).max(1);
+    let stride = rest.faces.indices().len().div_ceil(MAX_PAIRS).max(1);
     if rest.faces.is_empty() {
         let n = points.len();
-        let count = (DISTANCES / n.max(1)).clamp(32, 500).min(n);
+        let count = (MAX_DISTANCES / n.max(1)).clamp(32, 500).min(n);
         let nearest = |a: usize| {
             let to = |b: usize| distance(points[a], points[b]);
             let others = (0..n).filter(|&b| to(b) > 0.0);
@@ -159,8 +161,8 @@ fn neighbours(rest: &Model) -> Vec<[u32; 2]> {
     sides.step_by(stride).filter(apart).collect()
 }
 
-/// `Σ p qᵀ` over the points of rest pose and frame, about their centres and divided by their radii and number: the identity over three
-/// for a ball that did not move.
+/// `Σ p qᵀ` of corresponding points about their centres, divided by both radii and the number of points; one third of the identity for an
+/// unmoved ball.
 fn correlation((rest, of_rest): (&[Point], &Shape), (frame, of_frame): (&[Point], &Shape)) -> [Point; 3] {
     let mut sum = [[0.0; 3]; 3];
     let scale = 1.0 / (of_rest.radius * of_frame.radius * rest.len() as f64);
@@ -174,20 +176,20 @@ fn correlation((rest, of_rest): (&[Point], &Shape), (frame, of_frame): (&[Point]
     sum
 }
 
-/// How well the turns that map axes to axes take the rest pose to a frame: 1 where one of them is all that happened. A model that
-/// faces another way, turned about its upward axis, has no exchanged axes.
-struct Turn {
-    /// The best without an exchange of y and z, mirror images included.
+/// How well signed permutations of the axes map the rest pose to a frame; 1 is a perfect match. A rotation about the up axis does not
+/// exchange axes.
+struct AxisScores {
+    /// Best score of permutations that do not exchange y and z, reflections included.
     without: f64,
-    /// The best proper one with it.
+    /// Best score of rotations that exchange them.
     with: f64,
-    /// The best mirror image with it.
+    /// Best score of reflections that exchange them.
     mirrored: f64,
-    /// What the best proper one does.
+    /// Up axis of the best such rotation.
     up: Up,
 }
 
-impl Turn {
+impl AxisScores {
     fn new(correlation: &[Point; 3]) -> Self {
         const ORDERS: [([usize; 3], f64); 6] = [
             ([0, 1, 2], 1.0),
@@ -221,14 +223,14 @@ impl Turn {
         best
     }
 
-    /// The axis that points up, where y and z are clearly exchanged.
+    /// The up axis, if y and z are clearly exchanged.
     fn exchanged(&self) -> Option<Up> {
         let best = self.with.max(self.mirrored);
         let mirror = 1.0 - self.mirrored < 0.5 * (1.0 - self.with);
         Self::clearly(best, self.without).then_some(if mirror { Up::Other } else { self.up })
     }
 
-    fn is_clearly_none(&self) -> bool {
+    fn clearly_keeps_axes(&self) -> bool {
         Self::clearly(self.without, self.with.max(self.mirrored))
     }
 
@@ -241,7 +243,7 @@ fn distance(a: Point, b: Point) -> f64 {
     (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Lower quartile, median and upper quartile; none of no or of infinite numbers.
+/// Lower quartile, median and upper quartile; `None` for an empty set or infinite values.
 fn quartiles(mut values: Vec<f64>) -> Option<[f64; 3]> {
     values.sort_by(f64::total_cmp);
     let found = [1, 2, 3].map(|k| values.get(k * values.len() / 4).copied().unwrap_or(f64::NAN));
@@ -270,7 +272,7 @@ impl fmt::Display for Mismatch {
     }
 }
 
-/// A ratio as people write it: that of two usual units where it is near to one, as motion changes edges a little.
+/// Formats a ratio, rounded to that of two common units if it is within 5 % of one.
 fn factor(ratio: f64) -> String {
     const UNITS: [f64; 9] = [2.54, 3.28, 10.0, 12.0, 25.4, 30.48, 39.37, 100.0, 1000.0];
     match UNITS.into_iter().find(|unit| (ratio / unit - 1.0).abs() < 0.05) {

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-/// Longest border that is filled; longer ones are a decision of the artist's.
+/// Longest border loop that is filled; longer ones are left to the user.
 pub(super) const LONGEST: usize = 40;
 
 /// Faces that fill a border loop, given in their direction: one polygon where it has at most four corners, otherwise triangles.

@@ -1,4 +1,4 @@
-//! What the service asks of others: addresses that its operator named, over TLS unless they are on this machine.
+//! HTTP client for outgoing requests to addresses that the operator configured: TLS is required except on loopback addresses.
 
 use reqwest::{RequestBuilder, Url, redirect};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
@@ -7,29 +7,29 @@ use std::time::Duration;
 /// Longest time for one request, its answer included.
 const TIMEOUT: Duration = Duration::from_secs(10);
 
-/// A client that goes where it is told and nowhere else: an answer cannot send it on to an address behind the firewall. What stays on this
-/// machine goes through no proxy.
+/// An HTTP client that follows no redirects, so that a response cannot send it to an address behind the firewall. Loopback addresses bypass
+/// proxies.
 #[derive(Clone, Debug)]
 pub(crate) struct Client {
-    here: reqwest::Client,
-    elsewhere: reqwest::Client,
+    direct: reqwest::Client,
+    proxied: reqwest::Client,
 }
 
 impl Client {
     /// # Errors
     /// The system's certificates cannot be read.
     pub(crate) fn new() -> reqwest::Result<Self> {
-        // Another one of the process keeps its place and serves as well.
+        // Fails if the process has installed another provider, which serves as well.
         let _ = rustls::crypto::ring::default_provider().install_default();
         let agent = concat!("cager/", env!("CARGO_PKG_VERSION"));
         let builder =
             || reqwest::Client::builder().timeout(TIMEOUT).redirect(redirect::Policy::none()).user_agent(agent);
         let loopback = [SocketAddr::from((Ipv4Addr::LOCALHOST, 0)), SocketAddr::from((Ipv6Addr::LOCALHOST, 0))];
-        let here = builder().no_proxy().resolve_to_addrs("localhost", &loopback).build()?;
-        Ok(Self { here, elsewhere: builder().build()? })
+        let direct = builder().no_proxy().resolve_to_addrs("localhost", &loopback).build()?;
+        Ok(Self { direct, proxied: builder().build()? })
     }
 
-    /// Begins a request to an address that [`address`] let pass.
+    /// Starts a GET request to an address validated by [`address`].
     pub(crate) fn get(&self, url: &Url) -> RequestBuilder {
         self.of(url).get(url.clone())
     }
@@ -39,23 +39,23 @@ impl Client {
         self.of(url).post(url.clone())
     }
 
-    /// The one that an address is for.
+    /// The client for an address.
     pub(crate) fn of(&self, url: &Url) -> &reqwest::Client {
-        if url.scheme() == "http" { &self.here } else { &self.elsewhere }
+        if url.scheme() == "http" { &self.direct } else { &self.proxied }
     }
 }
 
-/// An address that may be asked: `https`, or `http` on this machine.
+/// Parses and validates an address: `https`, or `http` on a loopback address.
 ///
 /// # Errors
-/// What is wrong with it; only its host is named, since the rest may be a secret.
+/// A description that contains only the host, since the rest may be a secret.
 pub(crate) fn address(text: &str) -> Result<Url, String> {
     let url: Url = text.parse().map_err(|error| format!("this is no address: {error}"))?;
     let host = url.host_str().unwrap_or_default().trim_matches(['[', ']']);
-    let here = host == "localhost" || host.parse::<IpAddr>().is_ok_and(|address| address.is_loopback());
+    let direct = host == "localhost" || host.parse::<IpAddr>().is_ok_and(|address| address.is_loopback());
     match url.scheme() {
         "https" => Ok(url),
-        "http" if here => Ok(url),
+        "http" if direct => Ok(url),
         "http" => Err(format!("what is sent to {host} could be read on the way; use https://")),
         _ => Err("this is no address of the web; use https://".to_owned()),
     }

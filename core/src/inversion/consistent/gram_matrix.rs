@@ -1,5 +1,4 @@
-//! What of Φ the inversion needs: sums over the points read, of the coordinates that the decoder has, so that what is minimised is
-//! what decoding leaves.
+//! Gram matrix of the points read, from the decoder's single-precision coordinates, so that the minimised error is that of decoding.
 
 use super::BLOCK_ROWS;
 use crate::decode::Decoder;
@@ -36,10 +35,10 @@ pub(super) fn convert(decoder: &Decoder, first: usize, count: usize, out: &mut M
 pub(super) fn gram(decoder: &Decoder, rows: Option<&[u32]>, share: f64) -> Mat<f64> {
     let total = decoder.columns();
     let mut gram = Mat::<f64>::zeros(total, total);
-    let gathered = rows.map(|rows| rows_of(decoder, rows));
+    let transposed_jacobian_product = rows.map(|rows| rows_of(decoder, rows));
     gram.as_mut().par_col_chunks_mut(TASK_COLUMNS).enumerate().for_each(|(task, mut columns)| {
         let (left, width) = (task * TASK_COLUMNS, columns.ncols());
-        if let Some(rows) = &gathered {
+        if let Some(rows) = &transposed_jacobian_product {
             let some = rows.as_ref().subcols(left, width);
             faer::linalg::matmul::matmul(columns, Accum::Replace, rows.transpose(), some, share, Par::Seq);
             return;
@@ -55,7 +54,7 @@ pub(super) fn gram(decoder: &Decoder, rows: Option<&[u32]>, share: f64) -> Mat<f
             faer::linalg::matmul::matmul(columns.as_mut(), accumulate, block.transpose(), some, share, Par::Seq);
         }
     });
-    // Symmetric to the last bit, as the gradients take it to be.
+    // Exactly symmetric, as the conjugate gradients assume.
     for j in 0..total {
         for i in 0..j {
             gram[(j, i)] = gram[(i, j)];

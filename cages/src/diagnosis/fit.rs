@@ -1,6 +1,6 @@
-//! Cages that miss their model because of a unit, an axis that points up, or a place.
+//! Detection of cages that miss their model because of different units, axes or position.
 
-use super::Misfit;
+use super::Alignment;
 use crate::geometry::outside;
 use cager_core::mesh::{Model, Point, TriMesh, bounds};
 use std::fmt;
@@ -8,16 +8,16 @@ use std::fmt;
 /// Points that candidates are judged by.
 const SAMPLE: usize = 400;
 
-/// How many of one usual unit of length make another: powers of ten, inches, feet.
+/// Ratios of common units of length: powers of ten, inches, feet.
 const UNITS: [f64; 13] =
     [1.0, 10.0, 0.1, 100.0, 0.01, 1000.0, 0.001, 2.54, 1.0 / 2.54, 25.4, 0.0254, 0.3048, 1.0 / 0.3048];
 
 /// A change of axes.
 type Turn = fn(Point) -> Point;
 
-/// The least change of unit, axes and place after which nine of ten points of a model are inside a cage; none where none of the usual
-/// ones does it.
-pub fn misfit(mesh: &TriMesh, model: &Model) -> Option<Misfit> {
+/// The smallest change of units, axes and position after which nine of ten points of a model are inside a cage; `None` where no common one achieves
+/// that.
+pub fn alignment(mesh: &TriMesh, model: &Model) -> Option<Alignment> {
     let stride = model.points.len().div_ceil(SAMPLE).max(1);
     let sample: Vec<Point> = model.points.iter().step_by(stride).copied().collect();
     let (low, high) = bounds(&model.points);
@@ -37,7 +37,7 @@ pub fn misfit(mesh: &TriMesh, model: &Model) -> Option<Misfit> {
                 let fits = (0..3)
                     .all(|k| cage_high[k] - cage_low[k] < 2.0 * (high[k] - low[k]).max(1e-3 * (high[0] - low[0])));
                 if fits && 10 * outside(&changed, &sample).len() <= sample.len() {
-                    return Some(Misfit { scale, axes, shift });
+                    return Some(Alignment { scale, axes, shift });
                 }
             }
         }
@@ -45,7 +45,7 @@ pub fn misfit(mesh: &TriMesh, model: &Model) -> Option<Misfit> {
     None
 }
 
-impl fmt::Display for Misfit {
+impl fmt::Display for Alignment {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut changes = Vec::new();
         if self.scale != 1.0 {

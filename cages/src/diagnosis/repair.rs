@@ -113,7 +113,7 @@ impl Repairing {
         });
     }
 
-    /// Within each part, most faces decide; the others are turned around.
+    /// In each connected component, the minority of faces is flipped to agree with the majority.
     fn orient_consistently(&mut self) {
         let edges = edges(&self.faces);
         let mut turned: Vec<Option<bool>> = vec![None; self.faces.len()];
@@ -205,7 +205,7 @@ impl Repairing {
     fn enlarge(&mut self, model: &Model) {
         let mesh = TriMesh::from(&self.model());
         let findings = check(&mesh, model);
-        let Some(outside) = findings.outside.filter(|_| findings.misfit.is_none()) else { return };
+        let Some(outside) = findings.outside.filter(|_| findings.alignment.is_none()) else { return };
         let Some(positions) = enlarged(&mesh, model) else { return };
         let moves: Vec<f64> = positions.iter().zip(&self.points).map(|(a, b)| a.distance(*b)).collect();
         let moved = moves.iter().filter(|m| **m > 0.0).count();

@@ -1,4 +1,4 @@
-//! What a cage is to be, as it was asked for and checked.
+//! Validation of the options of a cage design.
 
 use crate::problem::{self, ApiError};
 use crate::session::cage_source::{VERTICES, vertices_detail};
@@ -8,11 +8,11 @@ use std::time::Duration;
 
 const NAME_CHARACTERS: usize = 200;
 
-/// Checks the options of a design and gives them as the design wants them.
+/// Validates the options of a design and converts them.
 ///
 /// # Errors
 /// An option that is out of range, not available, or contradicts another.
-pub(super) fn design_options(options: &CageOptions, most_seconds: u64) -> Result<DesignOptions, ApiError> {
+pub(super) fn design_options(options: &CageOptions, max_seconds: u64) -> Result<DesignOptions, ApiError> {
     let mut design = DesignOptions::default();
     let refuse = |detail: String| Err(ApiError::new(problem::INVALID_OPTIONS, detail));
     if options.name.as_ref().is_some_and(|name| name.chars().count() > NAME_CHARACTERS) {
@@ -38,15 +38,15 @@ pub(super) fn design_options(options: &CageOptions, most_seconds: u64) -> Result
     if options.frames == Some(0) {
         return refuse("frames: a capture has at least one frame".into());
     }
-    let most = Duration::from_secs(most_seconds);
+    let most = Duration::from_secs(max_seconds);
     let limit = match options.time_limit_s {
         None => most,
         Some(seconds) if !(seconds.is_finite() && seconds > 0.0) => {
             return refuse(format!("time_limit_s: is {seconds}; give a positive number of seconds"));
         }
         Some(seconds) if seconds > most.as_secs_f64() => {
-            let detail = format!("time_limit_s: is {seconds}, and this service allows {most_seconds} s");
-            return Err(ApiError::new(problem::INVALID_OPTIONS, detail).limit(most_seconds));
+            let detail = format!("time_limit_s: is {seconds}, and this service allows {max_seconds} s");
+            return Err(ApiError::new(problem::INVALID_OPTIONS, detail).limit(max_seconds));
         }
         Some(seconds) => Duration::from_secs_f64(seconds),
     };

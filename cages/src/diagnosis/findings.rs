@@ -1,7 +1,7 @@
-//! Everything that is wrong with a cage.
+//! All defects of a cage.
 
 use super::connectivity::{edges, fans, shells};
-use super::fit::misfit;
+use super::fit::alignment;
 use super::influence::influence;
 use crate::geometry::{Surface, outside, self_intersections};
 use cager_core::cage::{Cage, CageError};
@@ -48,8 +48,8 @@ pub struct Findings {
     pub self_intersections: Vec<[u32; 2]>,
     /// Points of the model outside the cage; unknown of a cage that cannot be encoded with.
     pub outside: Option<Outside>,
-    /// A mistake of unit, axes or place that would explain most points being outside.
-    pub misfit: Option<Misfit>,
+    /// A change of units, axes or position after which the cage would enclose most points that are outside.
+    pub alignment: Option<Alignment>,
     /// Vertices that move no point of the model.
     pub idle_vertices: Vec<u32>,
     /// Ratio of the greatest to the least singular value of the mean value coordinates.
@@ -59,9 +59,9 @@ pub struct Findings {
 /// Points of a model outside its cage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outside {
-    /// How many.
+    /// Number of points outside.
     pub count: usize,
-    /// Of how many.
+    /// Number of points of the model.
     pub points: usize,
     /// The farthest of them.
     pub farthest: u32,
@@ -71,7 +71,7 @@ pub struct Outside {
 
 /// A change of the cage after which it would enclose the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Misfit {
+pub struct Alignment {
     /// Factor on all coordinates.
     pub scale: f64,
     /// Axes to turn: `"y and z"` where up is another axis, otherwise none.
@@ -95,7 +95,7 @@ impl Findings {
     }
 }
 
-/// Everything wrong with a cage around a model, rather than the first fault.
+/// All defects of a cage around a model, rather than the first one.
 pub fn check(mesh: &TriMesh, model: &Model) -> Findings {
     let n = mesh.vertices.len();
     let finite = |v: &u32| mesh.vertices[*v as usize].iter().all(|x| x.is_finite());
@@ -219,7 +219,7 @@ fn examine_fit(findings: &mut Findings, mesh: &TriMesh, model: &Model) {
         distance: distance / extent,
     });
     if 2 * found.len() > model.points.len() {
-        findings.misfit = misfit(mesh, model);
+        findings.alignment = alignment(mesh, model);
     }
     (findings.idle_vertices, findings.condition_number) = influence(mesh, model);
 }

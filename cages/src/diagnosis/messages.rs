@@ -1,11 +1,11 @@
-//! What the doctor finds, in sentences that say what to do.
+//! Findings as messages that say what to do.
 
 use super::Findings;
 use std::fmt;
 
 impl Findings {
     /// One sentence for each thing that is wrong, with what to do about it; empty for a faultless cage.
-    pub fn sentences(&self) -> Vec<String> {
+    pub fn messages(&self) -> Vec<String> {
         let mut said = Vec::new();
         let mut say = |wrong: usize, sentence: String| {
             if wrong > 0 {
@@ -130,8 +130,8 @@ impl Findings {
                 ),
             );
         }
-        if let Some(misfit) = f.misfit {
-            say(1, misfit.to_string());
+        if let Some(alignment) = f.alignment {
+            say(1, alignment.to_string());
         }
         say(
             f.idle_vertices.len(),
@@ -164,6 +164,6 @@ impl fmt::Display for Findings {
             (true, true) => "usable, and fit to be edited",
         };
         write!(f, "{} vertices, {} faces, {} components: {verdict}", self.vertices, self.faces, self.components)?;
-        self.sentences().iter().try_for_each(|s| write!(f, "\n{s}"))
+        self.messages().iter().try_for_each(|s| write!(f, "\n{s}"))
     }
 }

@@ -2,7 +2,7 @@
 
 mod common;
 
-use cager_cages::doctor::{check, repair};
+use cager_cages::diagnosis::{check, repair};
 use cager_cages::{EncloseOptions, enclose};
 use cager_core::mesh::{Model, Polygons, TriMesh};
 use common::{append, model, sphere, verdict};
@@ -27,7 +27,7 @@ fn quad_cube(half: f64) -> Model {
 #[test]
 fn a_sound_cage_has_nothing_to_report() {
     let findings = check(&cage(), &ball());
-    assert!(findings.editable() && findings.sentences().is_empty(), "{findings}");
+    assert!(findings.editable() && findings.messages().is_empty(), "{findings}");
     assert!(findings.condition_number.is_some_and(|c| c > 1.0 && c < 1e4));
     let repaired = repair(&model(&cage()), &ball());
     assert!(repaired.changes.is_empty());
@@ -47,7 +47,7 @@ fn everything_wrong_is_reported_at_once() {
     assert!(!findings.inconsistent_edges.is_empty() && !findings.non_manifold_edges.is_empty());
     assert_eq!(findings.loose_vertices, [60]);
     assert_eq!(findings.duplicate_faces, [[0, findings.faces as u32 - 1]]);
-    assert!(findings.sentences().len() >= 5, "{findings}");
+    assert!(findings.messages().len() >= 5, "{findings}");
 
     let repaired = repair(&model(&broken), &ball());
     assert!(repaired.remaining.editable(), "{:?}\n{}", repaired.changes, repaired.remaining);
@@ -99,13 +99,13 @@ fn units_and_axes_are_guessed() {
     // A cage a hundred times too large encloses, but one too small does not.
     let mut metres = fitting.clone();
     metres.vertices.iter_mut().flatten().for_each(|x| *x *= 0.01);
-    let misfit = check(&metres, &tall).misfit.unwrap();
-    assert_eq!((misfit.scale, misfit.axes), (100.0, None));
+    let alignment = check(&metres, &tall).alignment.unwrap();
+    assert_eq!((alignment.scale, alignment.axes), (100.0, None));
     let mut z_up = fitting;
     z_up.vertices.iter_mut().for_each(|p| *p = [p[0], -p[2], p[1]]);
-    let misfit = check(&z_up, &tall).misfit.unwrap();
-    assert_eq!((misfit.scale, misfit.axes), (1.0, Some("y and z")));
-    assert!(misfit.to_string().contains("y and z"));
+    let alignment = check(&z_up, &tall).alignment.unwrap();
+    assert_eq!((alignment.scale, alignment.axes), (1.0, Some("y and z")));
+    assert!(alignment.to_string().contains("y and z"));
 }
 
 #[test]
@@ -118,7 +118,7 @@ fn no_input_is_too_broken() {
         mesh.triangles.iter().for_each(|t| broken.faces.push(t));
         let _ = check(&mesh, &ball());
         let remaining = repair(&broken, &ball()).remaining;
-        assert!(!remaining.usable() && !remaining.sentences().is_empty());
+        assert!(!remaining.usable() && !remaining.messages().is_empty());
     }
     let mut two = ball();
     append(&mut two, &sphere([0.5, 0.0, 0.0], 1.0, 12));
@@ -140,7 +140,7 @@ fn cages_of_the_data_are_judged_and_repaired() {
         let findings = check(&TriMesh::from(&cage), &model);
         eprintln!("\n{folder}: {findings}");
         assert_eq!(findings.usable(), usable, "{folder}");
-        assert!(!findings.sentences().is_empty());
+        assert!(!findings.messages().is_empty());
         let repaired = repair(&cage, &model);
         eprintln!("-> {:?}\n-> {}", repaired.changes, repaired.remaining);
         assert!(repaired.remaining.usable(), "{folder}");

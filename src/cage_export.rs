@@ -1,4 +1,4 @@
-//! The cages of a container as files that other programs open.
+//! Exports the cages of a container in formats that other programs read.
 
 use crate::decode::{DecodeError, frame_options, open};
 use crate::timing::Timing;
@@ -7,20 +7,20 @@ use cager_formats::{AtomicFile, FrameRange, Target, commit_together, create_fram
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// What [`write_cages`] has written.
+/// Result of [`write_cages`].
 pub struct CagesWritten {
     /// Number of frames.
     pub frames: usize,
     /// Vertices of the cage.
     pub vertices: u64,
-    /// The file with the rest cage; standard output has none beside it.
+    /// File with the rest cage; `None` for standard output.
     pub rest: Option<PathBuf>,
-    /// Normals of each frame that are no positions and were left out: those of `green-free`.
+    /// Normals per frame that were left out because they are no positions (`green-free`).
     pub normals: u64,
 }
 
-/// Writes the cages of a container, or a range of them, to `output` in any format of frames, and the rest cage with its faces
-/// beside them: see [`rest_cage_path`]. Each appears whole or not at all, the frames first. A dry run reads and checks, and writes neither.
+/// Writes the cages of a container, or a range of them, to `output`, and the rest cage with its faces to [`rest_cage_path`]. Each file is
+/// created atomically, the frames first. A dry run reads and validates without writing.
 ///
 /// # Errors
 /// Damage; an output that refuses; another file in the place of the rest cage.
@@ -59,7 +59,7 @@ pub fn write_cages(
         progress(place + 1);
     }
     if !dry_run {
-        // Complete before the frames have their name, so that a full disk leaves neither.
+        // Completed before the frames get their name, so that on a full disk neither is created.
         rest_file.as_mut().map(AtomicFile::complete).transpose()?;
         writer.finish()?;
         commit_together(rest_file.into_iter().collect())?;
@@ -84,7 +84,7 @@ pub fn rest_cage_path(output: &Path) -> PathBuf {
     named.with_extension("cage.obj")
 }
 
-/// Begins the file of the rest cage; none where it is there already.
+/// Starts writing the rest cage; `None` if an identical file exists.
 fn rest_file(path: &Path, replaces: bool, bytes: &[u8]) -> Result<Option<AtomicFile>, DecodeError> {
     match std::fs::read(path) {
         Ok(there) if there == bytes => Ok(None),

@@ -1,8 +1,8 @@
-//! One method followed through the capture: errors of the model, spikes of the cage.
+//! Evaluation of one method over the frames of a capture: errors of the model, and spikes of the cage.
 
 use super::sample::{Frame, Sample};
 use cager_core::cage::Cage;
-use cager_core::inversion::{Factored, Projected, Reading};
+use cager_core::inversion::{FactoredInversion, HandleSystem, ProjectedFrames};
 use cager_core::mesh::{Point, diagonal};
 use serde::Serialize;
 use std::collections::VecDeque;
@@ -49,7 +49,7 @@ fn length(a: Point, b: Point) -> f64 {
     (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// What is found out about every measured frame; lengths are fractions of the rest diagonal, and NaN is what does not exist.
+/// Results for every measured frame; lengths are fractions of the rest diagonal, and NaN is what does not exist.
 #[derive(Clone, Debug, Default, Serialize)]
 pub(crate) struct PerFrame {
     /// `sqrt(mean |e|²)` over the points.
@@ -124,10 +124,10 @@ fn max(values: &[f64]) -> f64 {
 /// A batch of frames for one method.
 #[derive(Clone, Copy)]
 pub(crate) struct Batch<'a> {
-    /// What the method reads.
-    pub(crate) reading: &'a Reading<'a>,
-    /// The frames as it sees them.
-    pub(crate) projected: &'a Projected,
+    /// The system whose rows the method reads.
+    pub(crate) handle_system: &'a HandleSystem<'a>,
+    /// The projected frames.
+    pub(crate) projected: &'a ProjectedFrames,
     /// Whether to take the time of the inversion.
     pub(crate) timed: bool,
     /// The frames.
@@ -136,40 +136,40 @@ pub(crate) struct Batch<'a> {
     pub(crate) clean: &'a [Frame],
 }
 
-/// A method on its way through the capture.
-pub(crate) struct Track {
+/// The evaluation of a method over the capture.
+pub(crate) struct MethodEvaluation {
     /// The method.
-    pub(crate) method: Arc<Factored>,
+    pub(crate) method: Arc<FactoredInversion>,
     /// Whether it reads the frames with noise.
     pub(crate) noisy: bool,
-    /// What was found so far.
+    /// Results so far.
     pub(crate) found: PerFrame,
     /// L2 and L∞ against the frames without noise, of one that reads them with it.
     pub(crate) clean: PerFrame,
     /// Seconds of one inversion, on one thread; NaN before the first batch.
     pub(crate) frame_seconds: f64,
-    /// The last cages and their frames.
+    /// The last two cages with the numbers of their frames.
     before: VecDeque<(usize, Vec<f32>)>,
 }
 
-impl Track {
+impl MethodEvaluation {
     /// At the beginning.
-    pub(crate) fn new(method: Arc<Factored>, noisy: bool, sample: &Sample) -> Self {
+    pub(crate) fn new(method: Arc<FactoredInversion>, noisy: bool, sample: &Sample) -> Self {
         let empty = || PerFrame::empty(sample.measured().len());
         Self { method, noisy, found: empty(), clean: empty(), frame_seconds: f64::NAN, before: VecDeque::new() }
     }
 
     /// Inverts and measures the frames that follow.
     pub(crate) fn take(&mut self, on: &Batch<'_>, sample: &Sample, shape: &Shape) {
-        let Batch { reading, projected, timed, frames, clean } = *on;
+        let Batch { handle_system, projected, timed, frames, clean } = *on;
         let views: Vec<&[f64]> = frames.iter().map(|frame| frame.points.as_slice()).collect();
         let previous = self.before.back().map(|(_, cage)| cage.as_slice());
         let clock = Instant::now();
-        let cages = reading.cages(&self.method, previous, projected, &views);
+        let cages = handle_system.cages(&self.method, previous, projected, &views);
         if timed {
             self.frame_seconds = self.frame_seconds.min(clock.elapsed().as_secs_f64() / frames.len() as f64);
         }
-        let decoder = reading.decoder();
+        let decoder = handle_system.decoder();
         let measured: Vec<usize> = (0..frames.len()).filter(|&i| frames[i].measured).collect();
         let errors = |of: &[Frame]| {
             let cages: Vec<&[f32]> = measured.iter().map(|&i| cages[i].as_slice()).collect();
@@ -219,7 +219,7 @@ pub(crate) fn second_differences<T: Copy + Into<f64>>([a, b, c]: [&[T]; 3], coun
     (0..count).map(|i| (0..3).map(|k| bend(3 * i + k).powi(2)).sum::<f64>().sqrt()).collect()
 }
 
-/// The model's own second temporal differences, which no cage can be expected to stay below.
+/// Second temporal differences of the model's own points, as a reference for those of cages.
 #[derive(Clone, Debug)]
 pub(crate) struct Motion {
     before: VecDeque<(usize, Vec<f64>)>,

@@ -1,4 +1,4 @@
-//! How the faces of a mesh, polygons of any arity, hang together; nothing about the mesh is taken for granted.
+//! Connectivity of polygon meshes of any arity, without assumptions on their validity.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -46,7 +46,7 @@ fn root(group: &mut [u32], mut f: u32) -> u32 {
     f
 }
 
-/// The faces around each vertex, in groups that hang together by edges at that vertex: one group at a manifold vertex.
+/// The faces around each vertex, grouped by connection over edges at that vertex: one group at a manifold vertex.
 pub(super) fn fans(vertices: usize, faces: &[impl AsRef<[u32]>]) -> Vec<Vec<Vec<u32>>> {
     let mut around: Vec<Vec<u32>> = vec![Vec::new(); vertices];
     for (f, face) in faces.iter().enumerate() {

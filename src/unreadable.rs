@@ -1,4 +1,4 @@
-//! Sessions and cage jobs whose files could not be read: left where they are, counted, and read again until they can be.
+//! Sessions and cage jobs whose files could not be read: they stay in place and are retried until they can be read.
 
 use crate::problem::{self, ApiError};
 use crate::service::Service;
@@ -12,33 +12,33 @@ use std::sync::{Arc, Mutex};
 use std::time::Instant;
 use tokio::sync::MutexGuard;
 
-/// What could not be read.
+/// All unreadable sessions and cage jobs.
 #[derive(Default)]
-pub(crate) struct Unread {
-    known: Mutex<BTreeMap<(Kind, String), Left>>,
-    /// Held while one is read again or deleted. Never waited for in a thread that blocks: the holder may need one.
+pub(crate) struct UnreadableFiles {
+    known: Mutex<BTreeMap<(Kind, String), UnreadableEntry>>,
+    /// Taken while one is retried or deleted. Never awaited on the blocking pool, since the holder may need one of its threads.
     reading: Arc<tokio::sync::Mutex<()>>,
-    /// Whether rest poses and cages of no session may have been left for what could not be read.
-    spared: AtomicBool,
+    /// Whether orphaned content may have been kept because of unreadable sessions.
+    orphans_kept: AtomicBool,
 }
 
-/// One that could not be read.
+/// An unreadable session or cage job.
 #[derive(Clone)]
-struct Left {
-    /// Where it is known.
+struct UnreadableEntry {
+    /// Its tenant, if known.
     tenant: Option<String>,
-    /// When reading it again began last.
+    /// When the last retry began.
     tried: Option<Instant>,
 }
 
-impl Unread {
-    /// Lists one more; the log has it once.
+impl UnreadableFiles {
+    /// Adds one, or updates it; logged only the first time.
     pub(crate) fn add(&self, kind: Kind, id: &str, tenant: Option<&str>, why: &str) {
-        self.spared.store(true, Relaxed);
+        self.orphans_kept.store(true, Relaxed);
         let key = (kind, id.to_owned());
         let mut known = lock(&self.known);
         let tried = known.get(&key).and_then(|left| left.tried);
-        let before = known.insert(key, Left { tenant: tenant.map(str::to_owned), tried });
+        let before = known.insert(key, UnreadableEntry { tenant: tenant.map(str::to_owned), tried });
         drop(known);
         if before.is_none() {
             tracing::error!(kind = kind.name(), id, why, "cannot be read, and is left where it is");
@@ -53,26 +53,26 @@ impl Unread {
         lock(&self.known).is_empty()
     }
 
-    /// Whether what was spared can go now. Says so once.
-    pub(crate) fn may_forget(&self) -> bool {
-        self.is_empty() && self.spared.swap(false, Relaxed)
+    /// Whether orphaned content should be looked for now; true once after the last unreadable one is gone.
+    pub(crate) fn should_sweep_orphans(&self) -> bool {
+        self.is_empty() && self.orphans_kept.swap(false, Relaxed)
     }
 
     pub(crate) fn count(&self, kind: Kind) -> usize {
         lock(&self.known).keys().filter(|(of, _)| *of == kind).count()
     }
 
-    /// Keeps one from being read again meanwhile.
+    /// Prevents a retry while the guard is held; `None` if it is not listed.
     pub(crate) async fn hold(&self, kind: Kind, id: &str) -> Option<MutexGuard<'_, ()>> {
         self.left(kind, id)?;
         Some(self.reading.lock().await)
     }
 
-    fn left(&self, kind: Kind, id: &str) -> Option<Left> {
+    fn left(&self, kind: Kind, id: &str) -> Option<UnreadableEntry> {
         lock(&self.known).get(&(kind, id.to_owned())).cloned()
     }
 
-    /// What an operator should know; none where all could be read.
+    /// A summary for operators; `None` if everything could be read.
     pub(crate) fn summary(&self) -> Option<String> {
         let [sessions, jobs] = [Kind::Session, Kind::CageJob].map(|kind| self.count(kind));
         (sessions + jobs > 0).then(|| {
@@ -83,52 +83,52 @@ impl Unread {
     }
 }
 
-/// What a client hears of one.
+/// The response to a request for an unreadable one.
 pub(crate) fn problem(kind: Kind) -> ApiError {
     let kind = kind.name();
     let detail = format!(
-        "the files of this {kind} cannot be read now; nothing of them was removed, so try again when the operator has looked at the disk"
+        "the files of this {kind} cannot be read at the moment; nothing was removed, so try again when the operator has checked the disk"
     );
     ApiError::new(problem::STORAGE_FAILED, detail).retry_after(10)
 }
 
 impl Service {
-    /// Takes in a session found on disk.
-    pub(crate) fn take_in_session(self: &Arc<Self>, meta: SessionMeta) {
+    /// Resumes a session found on disk and updates the list.
+    pub(crate) fn resume_and_track_session(self: &Arc<Self>, meta: SessionMeta) {
         let (id, tenant) = (meta.id.clone(), meta.tenant.clone());
-        self.taken_in(Kind::Session, &id, &tenant, self.resume(meta));
+        self.track_outcome(Kind::Session, &id, &tenant, self.resume(meta));
     }
 
-    /// Takes in a cage job found on disk.
-    pub(crate) fn take_in_cage_job(self: &Arc<Self>, meta: CageJobMeta) {
+    /// Resumes a cage job found on disk and updates the list.
+    pub(crate) fn resume_and_track_cage_job(self: &Arc<Self>, meta: CageJobMeta) {
         let (id, tenant) = (meta.id.clone(), meta.tenant.clone());
-        self.taken_in(Kind::CageJob, &id, &tenant, self.resume_cage_job(meta));
+        self.track_outcome(Kind::CageJob, &id, &tenant, self.resume_cage_job(meta));
     }
 
-    fn taken_in(&self, kind: Kind, id: &str, tenant: &str, outcome: Result<(), StoreError>) {
+    fn track_outcome(&self, kind: Kind, id: &str, tenant: &str, outcome: Result<(), StoreError>) {
         match outcome {
             Ok(()) => self.unread.forget(kind, id),
             Err(error) => self.unread.add(kind, id, Some(tenant), &error.to_string()),
         }
     }
 
-    /// Reads one again if it could not be read before and may be the tenant's.
+    /// Retries one if it is listed and may belong to the tenant.
     ///
     /// # Errors
     /// It still cannot be read.
-    pub(crate) async fn read_again(self: &Arc<Self>, kind: Kind, tenant: &str, id: &str) -> Result<(), ApiError> {
+    pub(crate) async fn retry_unreadable(self: &Arc<Self>, kind: Kind, tenant: &str, id: &str) -> Result<(), ApiError> {
         match self.unread.left(kind, id) {
             Some(left) if left.tenant.as_deref().is_none_or(|owner| owner == tenant) => {
-                self.read_now(kind, id.to_owned()).await
+                self.retry_now(kind, id.to_owned()).await
             }
             _ => Ok(()),
         }
     }
 
-    /// Deletes one that could not be read, if there is one of that name; its rest pose and cage go once nothing is unread.
+    /// Deletes an unreadable one; false if none is listed under this id. Its content is removed once nothing is unreadable.
     ///
     /// # Errors
-    /// What the system says.
+    /// I/O errors.
     pub(crate) async fn delete_unread(self: &Arc<Self>, kind: Kind, id: &str) -> Result<bool, ApiError> {
         let Some(_one) = self.unread.hold(kind, id).await else { return Ok(false) };
         // It may have been read while this waited.
@@ -145,21 +145,21 @@ impl Service {
         Ok(true)
     }
 
-    /// Reads all again that could not be read before.
-    pub(crate) async fn read_all_again(self: &Arc<Self>) {
+    /// Retries all that are listed.
+    pub(crate) async fn retry_all_unreadable(self: &Arc<Self>) {
         let all: Vec<(Kind, String)> = lock(&self.unread.known).keys().cloned().collect();
         for (kind, id) in all {
-            // The log has the reason since it was met.
-            let _ = self.read_now(kind, id).await;
+            // The reason is logged already.
+            let _ = self.retry_now(kind, id).await;
         }
     }
 
-    async fn read_now(self: &Arc<Self>, kind: Kind, id: String) -> Result<(), ApiError> {
+    async fn retry_now(self: &Arc<Self>, kind: Kind, id: String) -> Result<(), ApiError> {
         let came = Instant::now();
         let one = Arc::clone(&self.unread.reading).lock_owned().await;
         match self.unread.left(kind, &id) {
             None => return Ok(()),
-            // Somebody has read it since this was asked for.
+            // It has been retried since this call.
             Some(left) if left.tried.is_some_and(|tried| tried >= came) => return Err(problem(kind)),
             Some(_) => {}
         }
@@ -171,10 +171,10 @@ impl Service {
             let _one = one;
             let found = match kind {
                 Kind::Session => {
-                    service.store.find_again(&id).map(|meta| meta.map(|meta| service.take_in_session(meta)))
+                    service.store.reload_meta(&id).map(|meta| meta.map(|meta| service.resume_and_track_session(meta)))
                 }
                 Kind::CageJob => {
-                    service.store.find_again(&id).map(|meta| meta.map(|meta| service.take_in_cage_job(meta)))
+                    service.store.reload_meta(&id).map(|meta| meta.map(|meta| service.resume_and_track_cage_job(meta)))
                 }
             };
             if matches!(found, Ok(None)) {

@@ -5,7 +5,7 @@ use cager_core::mesh::{Model, TriMesh, diagonal};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// No vertex is moved farther than this fraction of the diagonal; what needs more is another cage.
+/// Maximum displacement of a vertex, as a fraction of the diagonal.
 const FARTHEST: f64 = 0.06;
 
 /// Points end up this far inside, as a fraction of the diagonal.

@@ -1,32 +1,32 @@
-//! What holds for every command: threads, and how much is said.
+//! Options of every command: number of threads and verbosity.
 
-use super::args::Manners;
+use super::args::GlobalArgs;
 use super::print;
 use anyhow::{Context, Result};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// How much is said; set once, before the command.
-static SAID: OnceLock<Said> = OnceLock::new();
+/// Verbosity; set once, before the command.
+static VERBOSITY: OnceLock<Verbosity> = OnceLock::new();
 
 /// Whether stdout holds an output, so that nothing else may go there.
 static STDOUT_TAKEN: AtomicBool = AtomicBool::new(false);
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Said {
-    Least,
-    Usual,
-    Most,
+enum Verbosity {
+    Quiet,
+    Normal,
+    Verbose,
 }
 
-impl Manners {
-    pub(super) fn adopt(&self) -> Result<()> {
+impl GlobalArgs {
+    pub(super) fn apply(&self) -> Result<()> {
         let said = match (self.quiet, self.verbose) {
-            (true, _) => Said::Least,
-            (_, true) => Said::Most,
-            _ => Said::Usual,
+            (true, _) => Verbosity::Quiet,
+            (_, true) => Verbosity::Verbose,
+            _ => Verbosity::Normal,
         };
-        let _ = SAID.set(said);
+        let _ = VERBOSITY.set(said);
         if let Some(threads) = self.threads {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
             pool.build_global().with_context(|| format!("--threads {threads}"))?;
@@ -35,14 +35,14 @@ impl Manners {
     }
 }
 
-/// Whether only what was asked for is said.
+/// Whether `--quiet` is given.
 pub(crate) fn is_quiet() -> bool {
-    SAID.get() == Some(&Said::Least)
+    VERBOSITY.get() == Some(&Verbosity::Quiet)
 }
 
-/// Whether times are said, too.
+/// Whether `--verbose` is given.
 pub(crate) fn is_verbose() -> bool {
-    SAID.get() == Some(&Said::Most)
+    VERBOSITY.get() == Some(&Verbosity::Verbose)
 }
 
 /// Takes stdout for an output; false where another one has it.
@@ -54,7 +54,7 @@ pub(super) fn stdout_is_taken() -> bool {
     STDOUT_TAKEN.load(Ordering::Relaxed)
 }
 
-/// Says on stdout what was done, or on stderr where stdout holds an output.
+/// Prints a summary to stdout, or to stderr where stdout holds an output; nothing with `--quiet`.
 pub(crate) fn tell(text: &str) -> Result<()> {
     if is_quiet() { Ok(()) } else { print(text) }
 }

@@ -1,34 +1,34 @@
-//! From the bytes of a body to frames, however they are cut.
+//! Reassembles frames from the chunks of a request body.
 
 use crate::problem::{self, ApiError};
 use crate::session::facts::Facts;
 use crate::session::upload::Rows;
 use cager_proto::record::{self, FrameHeader, Kind, RecordError};
 
-/// A whole frame.
+/// A complete frame.
 #[derive(Debug, PartialEq)]
-pub(crate) struct FrameIn {
+pub(crate) struct ReceivedFrame {
     pub(crate) frame: u32,
     pub(crate) rows: Rows,
     /// Little-endian f32, three for each row.
     pub(crate) bytes: Vec<u8>,
 }
 
-/// How frames follow each other in a body.
+/// How frames are laid out in a body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Layout {
-    /// Back to back, numbered from here.
+    /// Back to back, numbered from `first`.
     Raw { first: u32, rows: Rows },
-    /// As frame records, with their own numbers.
+    /// As frame records, which contain their numbers.
     Records,
 }
 
-/// Puts frames together.
+/// Incremental parser of a request body.
 pub(crate) struct FrameReader {
     layout: Layout,
     points: u32,
     handles: u32,
-    /// Number of the next raw frame; beyond u32 there is none.
+    /// Number of the next raw frame; an error beyond `u32::MAX`.
     next: u64,
     head: Vec<u8>,
     record: Option<FrameHeader>,
@@ -54,7 +54,7 @@ impl FrameReader {
         }
     }
 
-    /// Bytes of the largest frame that can come next: what the caller makes room for before it gives more.
+    /// Size of the largest possible next frame, in bytes; the caller reserves this much memory before it calls [`Self::push`].
     pub(crate) fn frame_bytes(&self) -> usize {
         let rows = match self.layout {
             Layout::Raw { rows: Rows::Handles, .. } => self.handles,
@@ -64,16 +64,16 @@ impl FrameReader {
         12 * rows as usize
     }
 
-    /// Whether nothing of the next frame is there, so that no room is taken for it yet.
+    /// Whether no byte of the next frame has been received.
     pub(crate) fn is_between_frames(&self) -> bool {
         !self.begun
     }
 
-    /// Takes bytes from the front of `input`; a frame when one is whole, and nothing when it needs more input.
+    /// Consumes bytes from the front of `input`; returns a frame once it is complete.
     ///
     /// # Errors
-    /// A record that is damaged or does not belong here.
-    pub(crate) fn push(&mut self, input: &mut &[u8]) -> Result<Option<FrameIn>, ApiError> {
+    /// A record that is damaged or of another kind or size.
+    pub(crate) fn push(&mut self, input: &mut &[u8]) -> Result<Option<ReceivedFrame>, ApiError> {
         if input.is_empty() {
             return Ok(None);
         }
@@ -109,13 +109,13 @@ impl FrameReader {
         self.head.clear();
         self.begun = false;
         self.next += 1;
-        Ok(Some(FrameIn { frame, rows, bytes }))
+        Ok(Some(ReceivedFrame { frame, rows, bytes }))
     }
 
-    /// Whether the body may end here.
+    /// Checks that the body may end here.
     ///
     /// # Errors
-    /// It ends within a frame.
+    /// The body ends within a frame.
     pub(crate) fn finish(&self) -> Result<(), ApiError> {
         if !self.begun {
             return Ok(());
@@ -135,7 +135,7 @@ impl FrameReader {
         ))
     }
 
-    /// The header of the record at hand, as soon as it is whole.
+    /// The header of the current record, once it is complete.
     fn header(&mut self, input: &mut &[u8]) -> Result<Option<FrameHeader>, ApiError> {
         if self.record.is_none() {
             let take = input.len().min(record::HEADER_BYTES - self.head.len());
@@ -183,7 +183,7 @@ mod tests {
         }
     }
 
-    fn read(layout: Layout, body: &[u8], chunk: usize) -> Result<Vec<FrameIn>, ApiError> {
+    fn read(layout: Layout, body: &[u8], chunk: usize) -> Result<Vec<ReceivedFrame>, ApiError> {
         let mut reader = FrameReader::new(layout, &facts());
         let mut frames = Vec::new();
         for mut piece in body.chunks(chunk) {

@@ -1,21 +1,21 @@
-//! Sets of frame numbers as runs of consecutive ones: their size is the number of gaps, not of frames.
+//! Sets of frame numbers as maximal intervals of consecutive numbers; memory grows with the number of gaps.
 
 use std::collections::BTreeMap;
 
-/// First number of each run, and its last.
+/// First and last number of each interval, inclusive.
 #[derive(Debug, Default)]
-pub(crate) struct Runs(BTreeMap<u32, u32>);
+pub(crate) struct IntervalSet(BTreeMap<u32, u32>);
 
-/// Some of the ranges that are missing in a set.
+/// A page of the ranges missing from a set.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct Missing {
     /// Ranges `[a, b)`, ascending.
     pub(crate) ranges: Vec<[u32; 2]>,
-    /// Where the ones after them begin, if there are more.
+    /// Where to continue, if the page does not list all of them.
     pub(crate) next: Option<u32>,
 }
 
-impl Runs {
+impl IntervalSet {
     /// Adds a number.
     pub(crate) fn insert(&mut self, number: u32) {
         let before = self.0.range(..=number).next_back().map(|(&first, &last)| (first, last));
@@ -27,28 +27,28 @@ impl Runs {
         self.0.insert(first, last);
     }
 
-    /// Removes all numbers from this one on.
+    /// Removes all numbers from `from` on.
     pub(crate) fn truncate(&mut self, from: u32) {
         self.0.split_off(&from);
         if let Some(mut run) = self.0.last_entry()
             && *run.get() >= from
         {
-            // It begins before.
+            // This interval begins before `from`.
             *run.get_mut() = from - 1;
         }
     }
 
-    /// How many consecutive numbers there are from `first` on.
+    /// Number of consecutive members from `first` on.
     pub(crate) fn length_from(&self, first: u32) -> u64 {
         let run = self.0.range(..=first).next_back().filter(|&(_, &last)| last >= first);
         run.map_or(0, |(_, &last)| u64::from(last - first) + 1)
     }
 
-    /// The ranges from `from` to `end` that are missing, at most so many.
+    /// At most `most` ranges of `from..end` that are missing.
     pub(crate) fn missing(&self, from: u32, end: u32, most: usize) -> Missing {
         let mut ranges = Vec::new();
         let mut next = u64::from(from) + self.length_from(from);
-        // Past the run that `from` lies in.
+        // Skip the interval that contains `from`.
         let Ok(begin) = u32::try_from(next) else { return Missing::default() };
         let later = self.0.range(begin..).map(|(&first, &last)| (u64::from(first), u64::from(last) + 1));
         for (first, after) in later.chain([(u64::from(end), u64::from(end))]) {
@@ -88,7 +88,7 @@ mod tests {
     fn runs_say_what_a_plain_set_says() {
         let mut random = fastrand::Rng::with_seed(7);
         for _ in 0..200 {
-            let (mut runs, mut set) = (Runs::default(), BTreeSet::new());
+            let (mut runs, mut set) = (IntervalSet::default(), BTreeSet::new());
             for _ in 0..random.usize(0..60) {
                 let number = random.u32(0..40);
                 runs.insert(number);
@@ -117,7 +117,7 @@ mod tests {
 
     #[test]
     fn the_highest_number_is_no_exception() {
-        let mut runs = Runs::default();
+        let mut runs = IntervalSet::default();
         runs.insert(u32::MAX);
         runs.insert(u32::MAX - 1);
         assert_eq!(runs.length_from(u32::MAX - 1), 2);

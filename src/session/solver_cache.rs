@@ -1,4 +1,5 @@
-//! Prepared solvers by content: in memory up to a budget, on disk beyond, each prepared once however many ask.
+//! Cache of prepared solvers by content key: in memory up to a budget, then on disk. Concurrent requests for the same key share one
+//! preparation.
 
 use super::prepare::{self, Choices, Geometry};
 use crate::admission::{Budget, Held};
@@ -6,7 +7,7 @@ use crate::config::ServeConfig;
 use crate::engine::threads;
 use crate::problem::{self, ApiError};
 use crate::store::{CageFile, Content, ContentKey, Store};
-use crate::telemetry::traces::Step;
+use crate::telemetry::traces::TraceSpan;
 use cager_core::inversion::{Solver, SolverOptions};
 use cager_proto::messages::{CacheUse, PreparationSeconds};
 use opentelemetry::Context;
@@ -15,7 +16,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Instant;
 use tokio::sync::{Semaphore, watch};
 
-/// A solver with what goes with it.
+/// A prepared solver with its warnings, cage sizes and the digest of its handles.
 pub(crate) struct Prepared {
     pub(crate) solver: Solver,
     pub(crate) options: SolverOptions,
@@ -25,30 +26,30 @@ pub(crate) struct Prepared {
     pub(crate) warnings: Vec<String>,
 }
 
-/// How a request for a solver ended.
+/// A prepared solver, whether it came from a cache, and what obtaining it took.
 #[derive(Clone)]
-pub(crate) struct Got {
+pub(crate) struct SolverResponse {
     pub(crate) prepared: Arc<Prepared>,
     pub(crate) cache: CacheUse,
     pub(crate) seconds: PreparationSeconds,
 }
 
-type Landing = watch::Sender<Option<Result<Got, ApiError>>>;
-type Flight = watch::Receiver<Option<Result<Got, ApiError>>>;
+type ResultSender = watch::Sender<Option<Result<SolverResponse, ApiError>>>;
+type ResultReceiver = watch::Receiver<Option<Result<SolverResponse, ApiError>>>;
 
-/// A solver that somebody waits for.
-pub(crate) struct Wanted {
+/// A request for a prepared solver.
+pub(crate) struct SolverRequest {
     pub(crate) key: ContentKey,
     pub(crate) tenant: String,
     pub(crate) choices: Choices,
-    /// Rest pose and cage where they have been read already.
+    /// Rest pose and cage, if they have been parsed already.
     pub(crate) geometry: Option<Arc<Geometry>>,
-    /// The trace of who asks.
+    /// Trace context of the caller.
     pub(crate) trace: Context,
 }
 
-/// Stored solvers read at a time: the disk decides how fast that is.
-const LOADS: usize = 4;
+/// Solver files read at a time: more would compete for the same disk.
+const MAX_CONCURRENT_LOADS: usize = 4;
 
 /// The cache of solvers.
 pub(crate) struct Solvers {
@@ -56,29 +57,29 @@ pub(crate) struct Solvers {
     store: Store,
     budget_bytes: u64,
     disk_budget_bytes: u64,
-    /// Memory that one preparation may take.
-    most_bytes: u64,
-    /// Solvers being prepared at a time.
+    /// Largest memory of one preparation, in bytes.
+    max_bytes: u64,
+    /// Limits concurrent preparations.
     places: Arc<Budget>,
-    /// Solvers being read from disk at a time.
+    /// Limits concurrent reads of solver files.
     loads: Semaphore,
     pool: Arc<rayon::ThreadPool>,
 }
 
 #[derive(Default)]
 struct Inner {
-    kept: HashMap<ContentKey, Kept>,
+    kept: HashMap<ContentKey, CacheEntry>,
     bytes: u64,
     clock: u64,
     flights: HashMap<ContentKey, InFlight>,
 }
 
 struct InFlight {
-    landing: Arc<Landing>,
+    sender: Arc<ResultSender>,
     tenant: String,
 }
 
-struct Kept {
+struct CacheEntry {
     prepared: Arc<Prepared>,
     bytes: u64,
     used: u64,
@@ -88,33 +89,33 @@ impl Solvers {
     /// Starts the threads that prepare.
     ///
     /// # Errors
-    /// The system's, where threads cannot be started.
+    /// Threads cannot be started.
     pub(crate) fn new(store: Store, config: &ServeConfig) -> std::io::Result<Self> {
-        let pool = threads::pool("prepare", config.workers, threads::GIVES_WAY)?;
+        let pool = threads::pool("prepare", config.workers, threads::NICE_COMPUTE)?;
         Ok(Self {
             inner: Mutex::default(),
             store,
             budget_bytes: config.cache_bytes,
             disk_budget_bytes: config.prepared_disk_bytes,
-            most_bytes: config.max_prepare_bytes,
+            max_bytes: config.max_prepare_bytes,
             places: config.budget(config.max_preparing as u64),
-            loads: Semaphore::new(LOADS),
+            loads: Semaphore::new(MAX_CONCURRENT_LOADS),
             pool: Arc::new(pool),
         })
     }
 
-    /// A place among what may be prepared at a time.
+    /// A permit to prepare.
     pub(crate) async fn place(&self, tenant: &str) -> Held {
         self.places.take(tenant, 1).await
     }
 
-    /// The threads that prepare.
+    /// The thread pool that prepares.
     pub(crate) fn pool(&self) -> Arc<rayon::ThreadPool> {
         Arc::clone(&self.pool)
     }
 
     /// The solver of a content if it is in memory.
-    pub(crate) fn at_hand(&self, key: &ContentKey) -> Option<Arc<Prepared>> {
+    pub(crate) fn in_memory(&self, key: &ContentKey) -> Option<Arc<Prepared>> {
         let mut inner = super::lock(&self.inner);
         inner.clock += 1;
         let clock = inner.clock;
@@ -124,12 +125,12 @@ impl Solvers {
         Some(Arc::clone(&kept.prepared))
     }
 
-    /// Whether the solver of a content is stored, so that its rest pose and cage are known to be good.
+    /// Whether a solver file exists for the content, which means that rest pose and cage were validated before.
     pub(crate) fn is_stored(&self, key: &ContentKey) -> bool {
         self.store.has_prepared(key)
     }
 
-    /// Frees what is kept in memory; gives how many bytes that was.
+    /// Drops all solvers from the cache; returns their size in bytes.
     pub(crate) fn evict(&self) -> u64 {
         let mut inner = super::lock(&self.inner);
         inner.kept.clear();
@@ -137,27 +138,27 @@ impl Solvers {
         std::mem::take(&mut inner.bytes)
     }
 
-    /// Preparations that run or wait.
+    /// Number of preparations that run or wait.
     pub(crate) fn in_flight(&self) -> usize {
         super::lock(&self.inner).flights.len()
     }
 
-    /// Preparations that run or wait for one tenant.
+    /// Number of a tenant's preparations that run or wait.
     pub(crate) fn in_flight_of(&self, tenant: &str) -> usize {
         super::lock(&self.inner).flights.values().filter(|flight| flight.tenant == tenant).count()
     }
 
-    /// The solver of a content: from memory, from disk, or prepared now. Where all give up, it is not prepared, or
-    /// only to the end of the step that is being computed.
-    pub(crate) async fn get(self: &Arc<Self>, wanted: Wanted) -> Result<Got, ApiError> {
-        if let Some(prepared) = self.at_hand(&wanted.key) {
-            return Ok(Got { prepared, cache: CacheUse::Hit, seconds: PreparationSeconds::default() });
+    /// The solver of a content: from memory, from disk, or prepared now. If all callers give up, the preparation is cancelled before its
+    /// next step.
+    pub(crate) async fn get(self: &Arc<Self>, wanted: SolverRequest) -> Result<SolverResponse, ApiError> {
+        if let Some(prepared) = self.in_memory(&wanted.key) {
+            return Ok(SolverResponse { prepared, cache: CacheUse::Hit, seconds: PreparationSeconds::default() });
         }
-        let (mut flight, mine) = self.board(wanted);
+        let (mut flight, mine) = self.join_or_start(wanted);
         loop {
             if let Some(result) = flight.borrow_and_update().clone() {
-                // Who only came along found it prepared.
-                return result.map(|got| if mine { got } else { Got { cache: CacheUse::Hit, ..got } });
+                // For callers that joined a running preparation it counts as a cache hit.
+                return result.map(|got| if mine { got } else { SolverResponse { cache: CacheUse::Hit, ..got } });
             }
             if flight.changed().await.is_err() {
                 return Err(ApiError::internal(&"a preparation ended without a result"));
@@ -165,29 +166,29 @@ impl Solvers {
         }
     }
 
-    /// The flight that prepares a content, begun if there is none; and whether it was begun here.
-    fn board(self: &Arc<Self>, wanted: Wanted) -> (Flight, bool) {
+    /// Joins the running preparation of the content or starts one; and whether it was started here.
+    fn join_or_start(self: &Arc<Self>, wanted: SolverRequest) -> (ResultReceiver, bool) {
         let mut inner = super::lock(&self.inner);
         if let Some(flight) = inner.flights.get(&wanted.key) {
             metrics::counter!("cager_cache_total", "result" => "joined").increment(1);
-            return (flight.landing.subscribe(), false);
+            return (flight.sender.subscribe(), false);
         }
-        let (landing, flight) = watch::channel(None);
-        let landing = Arc::new(landing);
-        inner.flights.insert(wanted.key, InFlight { landing: Arc::clone(&landing), tenant: wanted.tenant.clone() });
+        let (sender, flight) = watch::channel(None);
+        let sender = Arc::new(sender);
+        inner.flights.insert(wanted.key, InFlight { sender: Arc::clone(&sender), tenant: wanted.tenant.clone() });
         let solvers = Arc::clone(self);
-        tokio::spawn(async move { solvers.fly(wanted, &landing).await });
+        tokio::spawn(async move { solvers.run_preparation(wanted, &sender).await });
         (flight, true)
     }
 
-    async fn fly(self: Arc<Self>, wanted: Wanted, landing: &Arc<Landing>) {
+    async fn run_preparation(self: Arc<Self>, wanted: SolverRequest, sender: &Arc<ResultSender>) {
         let key = wanted.key;
         let result = loop {
-            let flying = Arc::clone(&self).load_or_prepare(&wanted, landing);
-            match flying.await {
+            let attempt = Arc::clone(&self).load_or_prepare(&wanted, sender);
+            match attempt.await {
                 Some(result) => break result,
-                // Unless somebody came along just now.
-                None if self.called_off(&key, landing) => return,
+                // Unless another caller joined at this moment.
+                None if self.cancel_if_unawaited(&key, sender) => return,
                 None => {}
             }
         };
@@ -196,30 +197,30 @@ impl Solvers {
         }
         super::lock(&self.inner).flights.remove(&key);
         let fresh = result.as_ref().ok().filter(|got| got.cache == CacheUse::Miss).map(|got| Arc::clone(&got.prepared));
-        // Nobody may be listening any more.
-        let _ = landing.send(Some(result));
-        // Nobody has to wait for it: without it the same solver is prepared again.
+        // All receivers may be gone.
+        let _ = sender.send(Some(result));
+        // Stored in the background: without the file the solver is prepared again after a restart.
         if let Some(prepared) = fresh {
             drop(tokio::task::spawn_blocking(move || self.store(&key, &prepared)));
         }
     }
 
-    /// Takes a flight back that nobody waits for.
-    fn called_off(&self, key: &ContentKey, landing: &Landing) -> bool {
+    /// Removes a preparation that no caller waits for; false if one has joined.
+    fn cancel_if_unawaited(&self, key: &ContentKey, sender: &ResultSender) -> bool {
         let mut inner = super::lock(&self.inner);
-        let off = landing.receiver_count() == 0;
+        let off = sender.receiver_count() == 0;
         if off {
             inner.flights.remove(key);
         }
         off
     }
 
-    /// None where nobody waits for it any more.
+    /// `None` if no caller waits any more.
     async fn load_or_prepare(
         self: Arc<Self>,
-        wanted: &Wanted,
-        landing: &Arc<Landing>,
-    ) -> Option<Result<Got, ApiError>> {
+        wanted: &SolverRequest,
+        sender: &Arc<ResultSender>,
+    ) -> Option<Result<SolverResponse, ApiError>> {
         let clock = Instant::now();
         let (key, choices) = (wanted.key, wanted.choices);
         {
@@ -233,23 +234,23 @@ impl Solvers {
         }
         let place = tokio::select! {
             place = self.places.take(&wanted.tenant, 1) => place,
-            () = landing.closed() => return None,
+            () = sender.closed() => return None,
         };
         let queued = clock.elapsed().as_secs_f64();
-        let _step = Step::begin("prepare", &wanted.trace);
+        let _step = TraceSpan::begin("prepare", &wanted.trace);
         let geometry = wanted.geometry.clone();
-        let waited_for = Arc::clone(landing);
+        let waited_for = Arc::clone(sender);
         let work = move || self.prepare(&key, &choices, geometry, queued, place, &|| !waited_for.is_closed());
         tokio::task::spawn_blocking(work).await.unwrap_or_else(|e| Err(ApiError::internal(&e))).transpose()
     }
 
     /// The stored solver of a content, if there is one. Blocks.
-    fn load(&self, key: &ContentKey, choices: &Choices, clock: Instant) -> Result<Option<Got>, ApiError> {
+    fn load(&self, key: &ContentKey, choices: &Choices, clock: Instant) -> Result<Option<SolverResponse>, ApiError> {
         let queued = clock.elapsed().as_secs_f64();
         let solver = match self.store.prepared(key) {
             Ok(Some(solver)) => solver,
             Ok(None) => return Ok(None),
-            // Preparing again mends it.
+            // Preparing again replaces the file.
             Err(error) => {
                 tracing::warn!(%error, "a stored solver cannot be read");
                 return Ok(None);
@@ -263,10 +264,10 @@ impl Solvers {
         let total = clock.elapsed().as_secs_f64();
         let seconds = PreparationSeconds { queued, read: total - queued, total, ..PreparationSeconds::default() };
         let prepared = Arc::new(prepare::with_solver(solver, &cage, options));
-        Ok(Some(Got { prepared, cache: CacheUse::Hit, seconds }))
+        Ok(Some(SolverResponse { prepared, cache: CacheUse::Hit, seconds }))
     }
 
-    /// Prepares the solver of a content, or some of it where it is not `wanted` any more. Blocks.
+    /// Prepares the solver of a content; `None` if `wanted` became false. Blocks.
     fn prepare(
         &self,
         key: &ContentKey,
@@ -275,7 +276,7 @@ impl Solvers {
         queued: f64,
         _place: Held,
         wanted: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Option<Got>, ApiError> {
+    ) -> Result<Option<SolverResponse>, ApiError> {
         let clock = Instant::now();
         metrics::counter!("cager_cache_total", "result" => "miss").increment(1);
         let geometry = match geometry {
@@ -283,7 +284,7 @@ impl Solvers {
             None => Arc::new(prepare::read(&self.content(key)?, choices)?),
         };
         let read = clock.elapsed().as_secs_f64();
-        let prepared = self.pool.install(|| prepare::prepare(&geometry, choices, self.most_bytes, wanted))?;
+        let prepared = self.pool.install(|| prepare::prepare(&geometry, choices, self.max_bytes, wanted))?;
         let Some(prepared) = prepared else { return Ok(None) };
         let found = prepared.solver.preparation();
         let seconds = PreparationSeconds {
@@ -295,7 +296,7 @@ impl Solvers {
             total: queued + clock.elapsed().as_secs_f64(),
         };
         metrics::histogram!("cager_prepare_seconds").record(clock.elapsed().as_secs_f64());
-        Ok(Some(Got { prepared: Arc::new(prepared), cache: CacheUse::Miss, seconds }))
+        Ok(Some(SolverResponse { prepared: Arc::new(prepared), cache: CacheUse::Miss, seconds }))
     }
 
     fn content(&self, key: &ContentKey) -> Result<Content, ApiError> {
@@ -303,7 +304,7 @@ impl Solvers {
         content.ok_or_else(deleted)
     }
 
-    /// Stores a solver for after a restart. Blocks. One that cannot be written costs time only.
+    /// Writes a solver file for use after a restart. A failure is only logged, since the solver can be prepared again. Blocks.
     fn store(&self, key: &ContentKey, prepared: &Prepared) {
         let kept = self.store.put_prepared(key, &prepared.solver);
         if let Err(error) = kept.and_then(|()| self.store.trim_prepared(self.disk_budget_bytes).map(|_| ())) {
@@ -317,7 +318,7 @@ impl Solvers {
         inner.clock += 1;
         let used = inner.clock;
         if bytes <= self.budget_bytes {
-            let old = inner.kept.insert(key, Kept { prepared: Arc::clone(prepared), bytes, used });
+            let old = inner.kept.insert(key, CacheEntry { prepared: Arc::clone(prepared), bytes, used });
             inner.bytes += bytes;
             inner.bytes -= old.map_or(0, |old| old.bytes);
         }

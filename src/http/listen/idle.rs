@@ -1,5 +1,5 @@
-//! Connections that wait for their client: when places run out, one of them makes way. Those that have not sent any request go first, then
-//! those between two, unless the next may be on its way; the one that has waited longest before all others of its kind.
+//! Idle connections, in the order in which they are closed when slots run out: first those that never sent a request, then those between
+//! two requests, unless the last one has just ended; in each group the longest idle first.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -7,42 +7,43 @@ use std::time::Duration;
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 
-/// A connection between two requests is left alone for so long.
+/// How long after a request a connection is not displaced.
 const BETWEEN_REQUESTS: Duration = Duration::from_secs(1);
 
-/// Connections without a request, in the order in which they make way.
+/// Connections without a request in progress, in the order in which they are displaced.
 #[derive(Default)]
-pub(super) struct Waiting(Mutex<List>);
+pub(super) struct IdleConnections(Mutex<List>);
 
 #[derive(Default)]
 struct List {
     next: u64,
-    /// By whether they have sent a request before, and since when they wait.
+    /// Keyed by whether they have sent a request, and by the order in which they became idle.
     connections: BTreeMap<(bool, u64), (Instant, CancellationToken)>,
 }
 
-/// A connection's entry; gone when dropped.
-pub(super) struct Entry {
-    waiting: Arc<Waiting>,
-    /// Where it is listed; nowhere while a request is at work.
+/// A connection's entry in the list; removed on drop.
+pub(super) struct IdleEntry {
+    waiting: Arc<IdleConnections>,
+    /// Its key; `None` while a request is in progress.
     place: Mutex<Option<(bool, u64)>>,
     /// Cancelled when the connection has to go.
     pub(super) displaced: CancellationToken,
 }
 
-impl Waiting {
+impl IdleConnections {
     fn lock(&self) -> MutexGuard<'_, List> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Adds a connection that has sent nothing.
-    pub(super) fn enter(self: &Arc<Self>) -> Entry {
-        let entry = Entry { waiting: Arc::clone(self), place: Mutex::default(), displaced: CancellationToken::new() };
+    pub(super) fn enter(self: &Arc<Self>) -> IdleEntry {
+        let entry =
+            IdleEntry { waiting: Arc::clone(self), place: Mutex::default(), displaced: CancellationToken::new() };
         entry.wait(false);
         entry
     }
 
-    /// Closes the first connection of the list; false if none can be closed.
+    /// Closes the first connection of the list; false if none may be closed.
     pub(super) fn displace(&self) -> bool {
         let mut list = self.lock();
         let Some(first) = list.connections.first_entry() else { return false };
@@ -55,12 +56,12 @@ impl Waiting {
     }
 }
 
-impl Entry {
+impl IdleEntry {
     fn place(&self) -> MutexGuard<'_, Option<(bool, u64)>> {
         self.place.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The connection waits for its client, which has sent a request before or has not.
+    /// The connection is idle; `has_asked` says whether it has sent a request before.
     pub(super) fn wait(&self, has_asked: bool) {
         let mut list = self.waiting.lock();
         let place = (has_asked, list.next);
@@ -69,7 +70,7 @@ impl Entry {
         *self.place() = Some(place);
     }
 
-    /// The connection has a request at work.
+    /// The connection has a request in progress.
     pub(super) fn work(&self) {
         let mut list = self.waiting.lock();
         if let Some(place) = self.place().take() {
@@ -78,7 +79,7 @@ impl Entry {
     }
 }
 
-impl Drop for Entry {
+impl Drop for IdleEntry {
     fn drop(&mut self) {
         self.work();
     }

@@ -1,4 +1,4 @@
-//! Sessions and cage jobs as they are found in their folders.
+//! Scanning the store for sessions and cage jobs.
 
 use super::files::Files;
 use super::names::check_id;
@@ -6,7 +6,7 @@ use super::{Quarantined, Store, StoreError, is_session_id, meta};
 use serde::de::DeserializeOwned;
 use std::path::PathBuf;
 
-/// What has a folder of its own.
+/// Kinds of objects that have a folder of their own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     /// A session.
@@ -16,7 +16,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// What it is called, in messages and in its metadata.
+    /// Its name in messages and metadata.
     pub fn name(self) -> &'static str {
         match self {
             Self::Session => "session",
@@ -25,43 +25,43 @@ impl Kind {
     }
 }
 
-/// Something that could not be read and lies where it was.
+/// A folder that could not be read and was left in place.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Unread {
+pub struct Unreadable {
     /// Session or cage job.
     pub kind: Kind,
     /// Name of its folder.
     pub name: String,
-    /// Where it lies.
+    /// Path of the folder.
     pub path: PathBuf,
     /// Why it could not be read.
     pub why: String,
 }
 
-/// Metadata in a folder of its own.
-pub(crate) trait Stored: DeserializeOwned {
+/// Metadata of an object that has a folder of its own.
+pub(crate) trait FolderMeta: DeserializeOwned {
     const KIND: Kind;
-    /// Name of the file.
+    /// Name of the metadata file.
     const FILE: &str;
 
-    /// Its id; also the name of its folder.
+    /// Id; also the name of its folder.
     fn id(&self) -> &str;
 
-    /// Where the folders of the kind lie.
+    /// The folder that contains all objects of the kind.
     fn all(files: &Files) -> PathBuf;
 }
 
-/// What lies in the folders of a kind.
-pub(super) struct Found<M> {
+/// Result of scanning the folders of one kind.
+pub(super) struct FolderScan<M> {
     pub(super) metas: Vec<M>,
     pub(super) quarantined: Vec<Quarantined>,
-    pub(super) unread: Vec<Unread>,
+    pub(super) unread: Vec<Unreadable>,
 }
 
-/// Reads all folders of a kind. What is damaged is set aside; what cannot be read, or not be set aside, stays where it is.
-pub(super) fn find<M: Stored>(files: &Files) -> Result<Found<M>, StoreError> {
+/// Reads the metadata of all objects of a kind. Damaged ones are moved to quarantine; unreadable ones stay in place.
+pub(super) fn find<M: FolderMeta>(files: &Files) -> Result<FolderScan<M>, StoreError> {
     let all = M::all(files);
-    let mut found = Found { metas: Vec::new(), quarantined: Vec::new(), unread: Vec::new() };
+    let mut found = FolderScan { metas: Vec::new(), quarantined: Vec::new(), unread: Vec::new() };
     for entry in files.list(&all)? {
         let name = entry.name.to_string_lossy().into_owned();
         let path = all.join(&entry.name);
@@ -75,33 +75,33 @@ pub(super) fn find<M: Stored>(files: &Files) -> Result<Found<M>, StoreError> {
                 found.metas.push(meta);
                 continue;
             }
-            Err(error @ StoreError::Damaged { .. }) => files.set_aside(&path, &error.to_string()),
-            // It may be readable the next time.
+            Err(error @ StoreError::Damaged { .. }) => files.move_to_quarantine(&path, &error.to_string()),
+            // It may be readable later.
             Err(error) => Err(error),
         };
         match aside {
             Ok(aside) => found.quarantined.push(aside),
-            Err(error) => found.unread.push(Unread { kind: M::KIND, name, path, why: error.to_string() }),
+            Err(error) => found.unread.push(Unreadable { kind: M::KIND, name, path, why: error.to_string() }),
         }
     }
     Ok(found)
 }
 
-fn read<M: Stored>(files: &Files, id: &str) -> Result<M, StoreError> {
+fn read<M: FolderMeta>(files: &Files, id: &str) -> Result<M, StoreError> {
     let (folder, kind) = (M::all(files).join(id), M::KIND.name());
     match meta::read::<M>(files, &folder.join(M::FILE), kind)? {
         Some(meta) if meta.id() == id => Ok(meta),
-        Some(meta) => Err(StoreError::damaged(&folder, format!("its metadata is of the {kind} {}", meta.id()))),
+        Some(meta) => Err(StoreError::damaged(&folder, format!("its metadata belongs to the {kind} {}", meta.id()))),
         None => Err(StoreError::damaged(&folder, format!("{} is missing", M::FILE))),
     }
 }
 
 impl Store {
-    /// Reads the metadata of one more session or cage job; None where its folder is gone. Nothing is set aside.
+    /// Reads the metadata of one object; `None` if its folder does not exist. Nothing is moved to quarantine.
     ///
     /// # Errors
-    /// [`StoreError::BadId`], [`StoreError::Damaged`], or what the system says.
-    pub(crate) fn find_again<M: Stored>(&self, id: &str) -> Result<Option<M>, StoreError> {
+    /// [`StoreError::BadId`], [`StoreError::Damaged`], or another I/O error.
+    pub(crate) fn reload_meta<M: FolderMeta>(&self, id: &str) -> Result<Option<M>, StoreError> {
         check_id(id)?;
         match self.files().exists(&M::all(self.files()).join(id))? {
             true => read(self.files(), id).map(Some),

@@ -1,5 +1,4 @@
-//! Request bodies in a content coding (RFC 9110, §8.4): unpacked piece by piece before a handler sees them, so that its limits hold for what
-//! is in them.
+//! Decodes request bodies with a `Content-Encoding` (RFC 9110, §8.4) as a stream, so that size limits apply to the decoded bytes.
 
 use crate::problem::{self, ApiError};
 use async_compression::tokio::bufread::{GzipDecoder, ZstdDecoder};
@@ -43,7 +42,7 @@ pub(super) async fn decoded(mut request: Request, next: Next) -> Response {
             return refused;
         }
     };
-    // Of what is packed.
+    // It was the length of the encoded body.
     request.headers_mut().remove(header::CONTENT_LENGTH);
     next.run(request.map(unpack)).await
 }

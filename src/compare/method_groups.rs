@@ -1,10 +1,10 @@
-//! Choices of rows, and what each is tried with: frames are projected once for all methods that read the same rows.
+//! Methods grouped by the rows that they read, so that frames are projected once per group.
 
+use super::evaluation::{Batch, MethodEvaluation, Shape};
 use super::figures::{DRAW_FRAMES, draws};
 use super::methods::{Method, methods};
 use super::sample::{Frame, Sample};
-use super::track::{Batch, Shape, Track};
-use cager_core::inversion::{Analysis, Factored, Handles, PrepareError, Reading, SolverOptions};
+use cager_core::inversion::{Analysis, FactoredInversion, HandleSystem, Handles, PrepareError, SolverOptions};
 use cager_core::regularize::Regularizer;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -13,15 +13,15 @@ use std::time::Instant;
 /// Times of an inversion are the least of this many.
 const REPEATS: usize = 3;
 
-/// What a track is of; methods with their place among all.
+/// Which series this is; methods with their position in the order of all.
 #[derive(Clone)]
-pub(super) enum Subject {
+pub(super) enum SeriesKind {
     Method(usize, Method),
     Noise(usize, Method),
     Draw(String, Vec<u32>, SolverOptions),
 }
 
-impl Subject {
+impl SeriesKind {
     fn options(&self) -> SolverOptions {
         match self {
             Self::Method(_, method) | Self::Noise(_, method) => method.options(),
@@ -30,12 +30,12 @@ impl Subject {
     }
 }
 
-/// A choice of rows that is to be prepared.
-pub(super) struct Plan {
-    pub(super) subjects: Vec<Subject>,
+/// A choice of rows to be prepared, and the series that read them.
+pub(super) struct GroupPlan {
+    pub(super) series: Vec<SeriesKind>,
 }
 
-/// Every choice of rows: those of the methods, draws at random, and the rows maxvol starts from, with their name.
+/// All choices of rows: those of the methods, random ones, and the named ones that maxvol starts from.
 pub(super) fn plans(
     points: usize,
     unknowns: usize,
@@ -43,93 +43,95 @@ pub(super) fn plans(
     damping: f64,
     in_order: bool,
     start: (String, Vec<u32>),
-) -> Vec<Plan> {
+) -> Vec<GroupPlan> {
     let all = methods(unknowns, usual, damping, in_order);
-    let mut plans: Vec<(Handles, Plan)> = Vec::new();
+    let mut plans: Vec<(Handles, GroupPlan)> = Vec::new();
     let noisy = all.iter().filter(|m| is_tried_with_noise(m)).cloned().enumerate();
-    let noisy: Vec<Subject> = noisy.map(|(order, method)| Subject::Noise(order, method)).collect();
-    let plain = all.into_iter().enumerate().map(|(order, method)| Subject::Method(order, method));
-    for subject in plain.chain(noisy) {
-        let handles = subject.options().handles;
+    let noisy: Vec<SeriesKind> = noisy.map(|(order, method)| SeriesKind::Noise(order, method)).collect();
+    let plain = all.into_iter().enumerate().map(|(order, method)| SeriesKind::Method(order, method));
+    for series in plain.chain(noisy) {
+        let handles = series.options().handles;
         match plans.iter_mut().find(|(of, _)| *of == handles) {
-            Some((_, plan)) => plan.subjects.push(subject),
-            None => plans.push((handles, Plan { subjects: vec![subject] })),
+            Some((_, plan)) => plan.series.push(series),
+            None => plans.push((handles, GroupPlan { series: vec![series] })),
         }
     }
     let regularised = SolverOptions { spectrum: usual, ..SolverOptions::PAPER };
     let drawn = draws(unknowns, points).into_iter().chain([start]).map(|(name, rows)| {
-        let draw = |options| Subject::Draw(name.clone(), rows.clone(), options);
-        Plan { subjects: [data_alone(), regularised].map(draw).to_vec() }
+        let draw = |options| SeriesKind::Draw(name.clone(), rows.clone(), options);
+        GroupPlan { series: [data_alone(), regularised].map(draw).to_vec() }
     });
     plans.into_iter().map(|(_, plan)| plan).chain(drawn).collect()
 }
 
-/// Plain inversion.
+/// Options of the unregularised inversion.
 pub(super) fn data_alone() -> SolverOptions {
     SolverOptions { regularizer: Regularizer::None, spectrum: 0, ..SolverOptions::default() }
 }
 
-/// Plain least squares, and what reads fewer points.
+/// Unregularised least squares, and methods that read fewer points.
 fn is_tried_with_noise(method: &Method) -> bool {
     let plain = method.regularizer == Regularizer::None && matches!(method.handles, Handles::All | Handles::MaxVol);
     let proposed = method.regularizer == Regularizer::Laplacian && method.handles != Handles::All;
     method.curve && (plain || proposed || method.regularizer == Regularizer::Global)
 }
 
-impl Plan {
+impl GroupPlan {
     pub(super) fn is_draw(&self) -> bool {
-        matches!(self.subjects.first(), Some(Subject::Draw(..)))
+        matches!(self.series.first(), Some(SeriesKind::Draw(..)))
     }
 
-    /// Bytes that its choice will take at the most, about.
+    /// Upper estimate of the memory that the group takes, in bytes.
     pub(super) fn bytes(&self, analysis: &Analysis) -> usize {
         let m = analysis.coordinates().ncols();
         let columns = if analysis.decoder().tied_normals().is_some() { analysis.decoder().columns() } else { 0 };
         let operator = if columns > 0 { m * analysis.coordinates().nrows() } else { 0 };
-        8 * m * m * 4 + (8 * (m * m + operator) + 16 * columns * columns) * self.subjects.len()
+        8 * m * m * 4 + (8 * (m * m + operator) + 16 * columns * columns) * self.series.len()
     }
 }
 
 /// Rows with their decomposition, and every method that reads them.
-pub(super) struct Choice<'a> {
-    pub(super) reading: Reading<'a>,
-    pub(super) methods: Vec<(SolverOptions, Arc<Factored>)>,
-    pub(super) tracks: Vec<(Subject, Track)>,
+pub(super) struct MethodGroup<'a> {
+    pub(super) handle_system: HandleSystem<'a>,
+    pub(super) methods: Vec<(SolverOptions, Arc<FactoredInversion>)>,
+    pub(super) evaluations: Vec<(SeriesKind, MethodEvaluation)>,
     is_tied: bool,
     is_draw: bool,
     /// The frames measured.
     sample: Sample,
 }
 
-impl<'a> Choice<'a> {
+impl<'a> MethodGroup<'a> {
     /// Decomposes the rows of a plan and prepares its methods.
-    pub(super) fn prepare(analysis: &'a Analysis, plan: &Plan, sample: &Sample) -> Result<Self, PrepareError> {
-        let reading = match plan.subjects.first() {
-            Some(Subject::Draw(_, rows, _)) => analysis.reading_of(rows)?,
-            Some(Subject::Method(_, method) | Subject::Noise(_, method)) => analysis.reading(method.handles)?,
+    pub(super) fn prepare(analysis: &'a Analysis, plan: &GroupPlan, sample: &Sample) -> Result<Self, PrepareError> {
+        let handle_system = match plan.series.first() {
+            Some(SeriesKind::Draw(_, rows, _)) => analysis.handle_system_of(rows)?,
+            Some(SeriesKind::Method(_, method) | SeriesKind::Noise(_, method)) => {
+                analysis.handle_system(method.handles)?
+            }
             None => return Err(PrepareError::NoSolution { what: "choice of rows" }),
         };
         let mut options: Vec<SolverOptions> = Vec::new();
-        for of in plan.subjects.iter().map(Subject::options) {
+        for of in plan.series.iter().map(SeriesKind::options) {
             if !options.contains(&of) {
                 options.push(of);
             }
         }
-        // The first by itself: what all of them share is computed with it.
+        // The first alone, since it computes what all of them share.
         let (first, others) = options.split_at(1);
-        let factored = |of: &SolverOptions| Ok((*of, Arc::new(reading.factored(*of)?)));
-        let mut methods: Vec<(SolverOptions, Arc<Factored>)> =
+        let factored = |of: &SolverOptions| Ok((*of, Arc::new(handle_system.factored(*of)?)));
+        let mut methods: Vec<(SolverOptions, Arc<FactoredInversion>)> =
             first.iter().map(factored).collect::<Result<_, PrepareError>>()?;
         methods.extend(others.par_iter().map(factored).collect::<Result<Vec<_>, PrepareError>>()?);
         let is_tied = analysis.decoder().tied_normals().is_some();
         let sample = if is_tied && plan.is_draw() { sample.some(DRAW_FRAMES) } else { sample.clone() };
-        let track = |subject: &Subject| {
-            let (_, method) = methods.iter().find(|(of, _)| *of == subject.options())?;
-            let track = Track::new(method.clone(), matches!(subject, Subject::Noise(..)), &sample);
-            Some((subject.clone(), track))
+        let evaluation = |series: &SeriesKind| {
+            let (_, method) = methods.iter().find(|(of, _)| *of == series.options())?;
+            let evaluation = MethodEvaluation::new(method.clone(), matches!(series, SeriesKind::Noise(..)), &sample);
+            Some((series.clone(), evaluation))
         };
-        let tracks = plan.subjects.iter().filter_map(track).collect();
-        Ok(Self { reading, methods, tracks, is_tied, is_draw: plan.is_draw(), sample })
+        let evaluations = plan.series.iter().filter_map(evaluation).collect();
+        Ok(Self { handle_system, methods, evaluations, is_tied, is_draw: plan.is_draw(), sample })
     }
 
     pub(super) fn is_draw(&self) -> bool {
@@ -137,23 +139,23 @@ impl<'a> Choice<'a> {
     }
 
     pub(super) fn reads_noise(&self) -> bool {
-        self.tracks.iter().any(|(_, track)| track.noisy)
+        self.evaluations.iter().any(|(_, evaluation)| evaluation.noisy)
     }
 
     /// Times the matrix product that encoding takes, which is the same for every method that reads these rows; where frames depend
-    /// on each other, with what that takes. Where every method iterates, tracks are timed on their way instead.
+    /// on each other, with what that takes. Where every method iterates, series are timed while they are evaluated instead.
     pub(super) fn time(&mut self, batch: &[Frame]) -> Result<(), PrepareError> {
         if self.is_draw || self.is_tied {
             return Ok(());
         }
         let frames: Vec<&[f64]> = batch.iter().map(|frame| frame.points.as_slice()).collect();
         let mut known: Option<f64> = None;
-        for (subject, track) in &mut self.tracks {
-            let ordered = track.method.follows_previous();
-            track.frame_seconds = match known.filter(|_| !ordered) {
+        for (series, evaluation) in &mut self.evaluations {
+            let ordered = evaluation.method.follows_previous();
+            evaluation.frame_seconds = match known.filter(|_| !ordered) {
                 Some(seconds) => seconds,
                 None => {
-                    let solver = self.reading.solver(subject.options())?;
+                    let solver = self.handle_system.solver(series.options())?;
                     let seconds = (0..REPEATS).map(|_| {
                         let clock = Instant::now();
                         std::hint::black_box(solver.invert_after(None, &frames));
@@ -163,7 +165,7 @@ impl<'a> Choice<'a> {
                 }
             };
             if !ordered {
-                known = Some(track.frame_seconds);
+                known = Some(evaluation.frame_seconds);
             }
         }
         Ok(())
@@ -185,23 +187,23 @@ impl<'a> Choice<'a> {
         }
         let project = |of: &[Frame]| {
             let frames: Vec<&[f64]> = of.iter().map(|frame| frame.points.as_slice()).collect();
-            self.reading.project(&frames)
+            self.handle_system.project(&frames)
         };
         let clean = project(batch);
         let noisy = self.reads_noise().then(|| project(with_noise));
-        let (reading, is_tied, sample) = (&self.reading, self.is_tied, &self.sample);
-        self.tracks.par_iter_mut().for_each(|(_, track)| {
+        let (handle_system, is_tied, sample) = (&self.handle_system, self.is_tied, &self.sample);
+        self.evaluations.par_iter_mut().for_each(|(_, evaluation)| {
             let (frames, projected) = match &noisy {
-                Some(noisy) if track.noisy => (with_noise, noisy),
+                Some(noisy) if evaluation.noisy => (with_noise, noisy),
                 _ => (batch, &clean),
             };
-            track.take(&Batch { reading, projected, timed: is_tied, frames, clean: batch }, sample, shape);
+            evaluation.take(&Batch { handle_system, projected, timed: is_tied, frames, clean: batch }, sample, shape);
         });
     }
 
     /// Cages of up to a batch of frames by the method with these options, if it is among these.
     pub(super) fn invert(&self, options: SolverOptions, frames: &[&[f64]]) -> Option<Vec<Vec<f32>>> {
         let (_, method) = self.methods.iter().find(|(of, _)| *of == options)?;
-        Some(self.reading.cages(method, None, &self.reading.project(frames), frames))
+        Some(self.handle_system.cages(method, None, &self.handle_system.project(frames), frames))
     }
 }
