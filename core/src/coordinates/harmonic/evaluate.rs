@@ -10,7 +10,7 @@ use super::elements::Unknowns;
 use super::near::{Group, Near};
 use super::potential::{Tables, potentials};
 use super::solve::{Densities, Part, single};
-use super::surface::{Foot, Surface};
+use super::surface::{ClosestPoint, Surface};
 use crate::coordinates::layer::{self, INVERSE_4PI, Layers, group_potentials, write_group};
 use crate::mesh::Point;
 use crate::simd::{LANES, Lanes, multiversion};
@@ -19,12 +19,12 @@ use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
 const TASK_POINTS: usize = 16 * LANES;
-/// High unknowns are felt up to so many radii of their element.
-const FELT: f64 = 4.0;
+/// High unknowns count up to this many radii from their element's centre.
+const HIGH_RANGE: f64 = 4.0;
 /// Elements with at least this part of the largest share of a change are marked.
 const MAIN: f64 = 0.3;
 
-/// What everything is computed from.
+/// Densities on the surface, from which coordinates are evaluated.
 pub(super) struct Solution<'a> {
     pub(super) tables: &'a Tables,
     pub(super) layers: &'a Layers,
@@ -37,7 +37,7 @@ pub(super) struct Solution<'a> {
 /// Coordinates, and how far they are from final.
 pub(super) struct Evaluated {
     pub(super) phi: Mat<f64>,
-    /// Largest change of an entry by the highest degrees; 0 where nobody asked for it.
+    /// Largest change of an entry by the highest degrees; 0 where it was not requested.
     pub(super) change: f64,
     /// Elements that changes above the tolerance mostly come from.
     pub(super) marked: Vec<bool>,
@@ -45,9 +45,9 @@ pub(super) struct Evaluated {
     pub(super) correction: f64,
 }
 
-/// What one task finds beside its rows.
+/// Result of one task besides its rows.
 #[derive(Default)]
-struct Found {
+struct TaskResult {
     change: f64,
     marked: Vec<u32>,
     correction: f64,
@@ -65,12 +65,17 @@ struct Scratch {
 }
 
 /// `Φ` at these points, in the unit of the layers.
-pub(super) fn evaluate(solution: &Solution<'_>, points: &[Point], feet: &[Foot], tolerance: f64) -> Evaluated {
+pub(super) fn evaluate(
+    solution: &Solution<'_>,
+    points: &[Point],
+    closest_points: &[ClosestPoint],
+    tolerance: f64,
+) -> Evaluated {
     let m = solution.layers.vertices().len();
-    let near = Near::new(solution, points, feet);
+    let near = Near::new(solution, points, closest_points);
     let low = single(solution.densities.low.as_ref());
     let mut phi = crate::simd::zeros::<f64>(points.len(), m);
-    let found: Vec<Found> = phi
+    let found: Vec<TaskResult> = phi
         .as_mut()
         .par_row_chunks_mut(TASK_POINTS)
         .enumerate()
@@ -108,17 +113,17 @@ fn evaluate_task(
     tolerance: f64,
     mut rows: MatMut<'_, f64>,
     scratch: &mut Scratch,
-) -> Found {
+) -> TaskResult {
     let layers = solution.layers;
     let count = rows.nrows();
-    let mut found = Found::default();
+    let mut found = TaskResult::default();
     for start in (0..count).step_by(LANES) {
         let group = near.group(first + start);
         evaluate_group(solution, &group, start, scratch);
         let filled = LANES.min(count - start);
         for (l, i) in (first + start..first + start + filled).enumerate() {
-            let foot = &near.feet[i];
-            for (&v, weight) in layers.triangles()[foot.face as usize].iter().zip(foot.weights) {
+            let closest = &near.closest_points[i];
+            for (&v, weight) in layers.triangles()[closest.face as usize].iter().zip(closest.weights) {
                 scratch.values[v as usize].0[l] += near.shares[i] * weight;
             }
         }
@@ -150,11 +155,11 @@ fn evaluate_task(
 /// Values and changes of one lane group, and its rows of the single layers.
 fn evaluate_group(solution: &Solution<'_>, group: &Group, start: usize, scratch: &mut Scratch) {
     let Solution { tables, layers, unknowns, densities, .. } = solution;
-    let Group { x, y, share, own } = group;
+    let Group { x, y, share, off_surface } = group;
     let twice = share.0.iter().any(|s| *s > 0.0);
     group_potentials(layers, x, &mut scratch.layers);
     for (value, double) in scratch.values.iter_mut().zip(&scratch.layers.double) {
-        *value = weigh(*double, *own) * INVERSE_4PI;
+        *value = weigh(*double, *off_surface) * INVERSE_4PI;
     }
     if twice {
         group_potentials(layers, y, &mut scratch.layers);
@@ -167,12 +172,12 @@ fn evaluate_group(solution: &Solution<'_>, group: &Group, start: usize, scratch:
     let mut values = [Lanes::ZERO; MAX_FUNCTIONS];
     for (e, element) in unknowns.elements.iter().enumerate() {
         let part = &densities.parts[e];
-        let keep = is_felt(&element.triangle.centre, FELT * element.triangle.radius, x);
+        let keep = is_within(&element.triangle.centre, HIGH_RANGE * element.triangle.radius, x);
         let near = !part.vertices.is_empty() && keep.0.iter().any(|k| *k > 0.0);
         let degree = if near { element.degree } else { low_degree };
         potentials(tables, &element.triangle, degree, x, &mut values);
         for value in &mut values[..functions(degree)] {
-            *value = weigh(*value, *own);
+            *value = weigh(*value, *off_surface);
         }
         if twice {
             let mut others = [Lanes::ZERO; MAX_FUNCTIONS];
@@ -211,13 +216,13 @@ fn weigh(value: Lanes, by: Lanes) -> Lanes {
 
 /// One where a point is nearer than the limit.
 #[inline(always)]
-fn is_felt(centre: &Point, limit: f64, x: &[Lanes; 3]) -> Lanes {
+fn is_within(centre: &Point, limit: f64, x: &[Lanes; 3]) -> Lanes {
     let r = [x[0] - Lanes::splat(centre[0]), x[1] - Lanes::splat(centre[1]), x[2] - Lanes::splat(centre[2])];
     crate::simd::dot(&r, &r).map(|d| if d < limit * limit { 1.0 } else { 0.0 })
 }
 
 multiversion! {
-    /// Adds the changes of one element, and its high densities if they are felt.
+    /// Adds the changes of one element, and its high densities if the points are near.
     fn add_part(part: &Part, all: usize, low: usize, near: bool, potentials: &[Lanes; MAX_FUNCTIONS], values: &mut [Lanes], change: &mut [Lanes])
         = add_part_generic;
 }
@@ -232,11 +237,11 @@ fn add_part_generic(
     values: &mut [Lanes],
     change: &mut [Lanes],
 ) {
-    let felt = if near { all } else { low };
+    let used = if near { all } else { low };
     for (c, &v) in part.vertices.iter().enumerate() {
         if !part.change.is_empty() {
             let mut sum = Lanes::ZERO;
-            for (potential, &density) in potentials[..felt].iter().zip(&part.change[c * all..]) {
+            for (potential, &density) in potentials[..used].iter().zip(&part.change[c * all..]) {
                 sum = sum + *potential * density;
             }
             change[v as usize] = change[v as usize] + sum;
@@ -262,8 +267,8 @@ fn mark(solution: &Solution<'_>, group: &Group, l: usize, vertex: u32, marked: &
         let all = functions(element.degree);
         potentials(tables, &element.triangle, element.degree, &x, &mut values);
         potentials(tables, &element.triangle, element.degree, &y, &mut others);
-        let [own, twin] = [&group.own, &group.share].map(|by| Lanes::splat(by.0[l]));
-        let value = |k: usize| weigh(values[k], own).0[0] - weigh(others[k], twin).0[0];
+        let [off_surface, twin] = [&group.off_surface, &group.share].map(|by| Lanes::splat(by.0[l]));
+        let value = |k: usize| weigh(values[k], off_surface).0[0] - weigh(others[k], twin).0[0];
         let share: f64 = (0..all).map(|k| value(k) * part.change[place * all + k]).sum();
         shares.push((share.abs(), e as u32));
     }

@@ -37,7 +37,7 @@ use evaluate::{Evaluated, Solution};
 use faer::Mat;
 pub use plan::ElementPlan;
 use solve::Steps;
-use surface::{Foot, Side, Surface};
+use surface::{ClosestPoint, Side, Surface};
 
 /// Harmonic coordinates: one unknown per cage vertex, defined inside the cage and on it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -75,7 +75,7 @@ impl CoordinateSystem for Harmonic {
     }
 
     fn check(&self, cage: &Cage, points: &[Point]) -> Result<(), CoordinatesError> {
-        check_inside(&Surface::new(cage.vertices(), cage).feet(points), cage.diagonal())
+        check_inside(&Surface::new(cage.vertices(), cage).closest_points(points), cage.diagonal())
     }
 
     fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError> {
@@ -104,8 +104,8 @@ fn solve_for(
     let layers = Layers::new(cage);
     let points: Vec<Point> = points.iter().map(|p| p.map(|c| c * layers.scale())).collect();
     let surface = Surface::new(layers.vertices(), cage);
-    let feet = surface.feet(&points);
-    check_inside(&feet, cage.diagonal() * layers.scale())?;
+    let closest_points = surface.closest_points(&points);
+    check_inside(&closest_points, cage.diagonal() * layers.scale())?;
     let problem = Problem {
         tables: potential::Tables::new(),
         affine: affine::AffineFit::new(layers.vertices()),
@@ -113,7 +113,7 @@ fn solve_for(
         layers: &layers,
         surface: &surface,
         points: &points,
-        feet: &feet,
+        closest_points: &closest_points,
     };
     solve(&problem)
 }
@@ -122,13 +122,13 @@ fn not_computed(reason: String) -> CoordinatesError {
     CoordinatesError::NotComputed { system: NAME, reason }
 }
 
-fn check_inside(feet: &[Foot], diagonal: f64) -> Result<(), CoordinatesError> {
-    let outside = |i: &usize| feet[*i].side == Side::Outside;
-    let points: Vec<u32> = (0..feet.len()).filter(outside).map(|i| i as u32).collect();
+fn check_inside(closest_points: &[ClosestPoint], diagonal: f64) -> Result<(), CoordinatesError> {
+    let outside = |i: &usize| closest_points[*i].side == Side::Outside;
+    let points: Vec<u32> = (0..closest_points.len()).filter(outside).map(|i| i as u32).collect();
     if points.is_empty() {
         return Ok(());
     }
-    let distance = points.iter().map(|&i| feet[i as usize].distance).fold(0.0, f64::max) / diagonal;
+    let distance = points.iter().map(|&i| closest_points[i as usize].distance).fold(0.0, f64::max) / diagonal;
     Err(CoordinatesError::Outside { system: NAME, points, distance })
 }
 
@@ -141,13 +141,13 @@ struct Problem<'a> {
     layers: &'a Layers,
     surface: &'a Surface<'a>,
     points: &'a [Point],
-    feet: &'a [Foot],
+    closest_points: &'a [ClosestPoint],
 }
 
 /// Solves on finer and finer elements until that changes nothing more, or no more of them are allowed.
 fn refine(problem: &Problem<'_>) -> Result<Coordinates, CoordinatesError> {
-    let Problem { corners, points, feet, .. } = problem;
-    let inside = feet.iter().zip(*points).filter(|(foot, _)| foot.side == Side::Inside);
+    let Problem { corners, points, closest_points, .. } = problem;
+    let inside = closest_points.iter().zip(*points).filter(|(closest, _)| closest.side == Side::Inside);
     let inside: Vec<Point> = inside.map(|(_, &x)| x).collect();
     let mut elements = elements::elements(corners, &inside);
     let mut degree = low_degree(elements.len()).ok_or_else(|| {
@@ -202,7 +202,7 @@ fn solve_on(
     given: Option<&Steps>,
     measures: bool,
 ) -> Result<(Evaluated, Steps, f64), CoordinatesError> {
-    let Problem { tables, affine, layers, surface, points, feet, .. } = problem;
+    let Problem { tables, affine, layers, surface, points, closest_points, .. } = problem;
     let bytes = memory::needed(unknowns, layers.vertices().len());
     if bytes > memory::MOST_BYTES {
         let gigabytes = 1e-9 * bytes as f64;
@@ -215,7 +215,7 @@ fn solve_on(
         solve::solve(operator, &sides, unknowns, layers.triangles(), given, measures)
             .ok_or_else(|| not_computed("the equations on its faces are singular in double precision".to_owned()))?;
     let solution = Solution { tables, layers, surface, affine, unknowns, densities: &densities };
-    let found = evaluate::evaluate(&solution, points, feet, Refinement::TOLERANCE);
+    let found = evaluate::evaluate(&solution, points, closest_points, Refinement::TOLERANCE);
     // Written so that NaN is an error.
     if !(found.correction <= MISSED && found.change.is_finite()) {
         return Err(not_computed(format!(

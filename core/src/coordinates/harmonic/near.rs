@@ -1,23 +1,24 @@
-//! How much of the error that the densities leave on the surface reaches each point.
+//! Correction near the surface: the densities leave an error in the boundary values, which decays inside over the length of an
+//! element. The error at the closest point of the surface, times a share from 0 to 1, is subtracted at each point.
 
 use super::evaluate::Solution;
-use super::surface::{Foot, Side};
+use super::surface::{ClosestPoint, Side};
 use crate::mesh::{self, Point, distance2_to_triangle};
 use crate::simd::{LANES, Lanes};
 use rayon::prelude::*;
 
-/// Points, and how much of the error at its foot each is freed from.
+/// Points with their closest points of the surface and shares.
 pub(super) struct Near<'a> {
     pub(super) points: &'a [Point],
-    pub(super) feet: &'a [Foot],
+    pub(super) closest_points: &'a [ClosestPoint],
     /// From 0 inside to 1 on the surface.
     pub(super) shares: Vec<f64>,
-    /// How far inside of the surface its values are taken.
+    /// Distance inside the surface at which its values are taken.
     inwards: f64,
 }
 
 impl<'a> Near<'a> {
-    pub(super) fn new(solution: &Solution<'_>, points: &'a [Point], feet: &'a [Foot]) -> Self {
+    pub(super) fn new(solution: &Solution<'_>, points: &'a [Point], closest_points: &'a [ClosestPoint]) -> Self {
         // The error of a density of degree p changes its sign about p times along an element.
         let reaches: Vec<f64> = solution
             .unknowns
@@ -27,41 +28,42 @@ impl<'a> Near<'a> {
             .collect();
         let farthest = reaches.iter().copied().fold(0.0, f64::max);
         let touching = solution.surface.thickness();
-        let share = |foot: &Foot| {
-            if foot.side == Side::On {
+        let share = |closest: &ClosestPoint| {
+            if closest.side == Side::On {
                 return 1.0;
-            } else if foot.distance >= farthest {
+            } else if closest.distance >= farthest {
                 return 0.0;
             }
-            // All elements that meet at the foot, so that the order of faces does not count.
+            // All elements that meet at the closest, so that the order of faces does not count.
             let meet = solution.unknowns.elements.iter().zip(&reaches).filter(|(element, _)| {
                 let triangle = &element.triangle;
-                let apart = mesh::norm([0, 1, 2].map(|k| triangle.centre[k] - foot.place[k]));
+                let apart = mesh::norm([0, 1, 2].map(|k| triangle.centre[k] - closest.place[k]));
                 apart <= triangle.radius + touching
-                    && distance2_to_triangle(triangle.corners, foot.place) <= touching * touching
+                    && distance2_to_triangle(triangle.corners, closest.place) <= touching * touching
             });
             let reach = meet.map(|(_, &reach)| reach).fold(f64::INFINITY, f64::min);
-            (1.0 - foot.distance / reach).max(0.0).powi(3)
+            (1.0 - closest.distance / reach).max(0.0).powi(3)
         };
-        let shares = feet.par_iter().map(share).collect();
-        Self { points, feet, shares, inwards: solution.surface.thickness() }
+        let shares = closest_points.par_iter().map(share).collect();
+        Self { points, closest_points, shares, inwards: solution.surface.thickness() }
     }
 
-    /// Eight points, those places on the surface from which their shares come, just inside, and the shares; the last point again where
-    /// there are no more. Points on the surface need nothing of themselves, which the last lanes say.
+    /// Eight points, their closest points moved just inside, and the shares; the last point is repeated where there are no more. Points on
+    /// the surface skip the evaluation at themselves; `off_surface` marks the others.
     pub(super) fn group(&self, first: usize) -> Group {
-        let mut group = Group { x: [Lanes::ZERO; 3], y: [Lanes::ZERO; 3], share: Lanes::ZERO, own: Lanes::ZERO };
+        let mut group =
+            Group { x: [Lanes::ZERO; 3], y: [Lanes::ZERO; 3], share: Lanes::ZERO, off_surface: Lanes::ZERO };
         for l in 0..LANES {
             let i = (first + l).min(self.points.len() - 1);
-            let (x, foot) = (self.points[i], &self.feet[i]);
-            let on_surface = foot.side == Side::On;
-            group.own.0[l] = if on_surface { 0.0 } else { 1.0 };
+            let (x, closest) = (self.points[i], &self.closest_points[i]);
+            let on_surface = closest.side == Side::On;
+            group.off_surface.0[l] = if on_surface { 0.0 } else { 1.0 };
             group.share.0[l] = if on_surface { 0.0 } else { self.shares[i] };
             for k in 0..3 {
                 group.x[k].0[l] = x[k];
-                let inwards = self.inwards / foot.distance.max(self.inwards);
+                let inwards = self.inwards / closest.distance.max(self.inwards);
                 group.y[k].0[l] =
-                    if self.shares[i] > 0.0 { foot.place[k] + inwards * (x[k] - foot.place[k]) } else { x[k] };
+                    if self.shares[i] > 0.0 { closest.place[k] + inwards * (x[k] - closest.place[k]) } else { x[k] };
             }
         }
         group
@@ -70,10 +72,10 @@ impl<'a> Near<'a> {
 
 /// Eight points at once.
 pub(super) struct Group {
-    /// The points, and the places on the surface whose error they are freed from.
+    /// The points, and their closest points on the surface, whose error is subtracted.
     pub(super) x: [Lanes; 3],
     pub(super) y: [Lanes; 3],
-    /// How much of it, and whether the points need something of themselves.
+    /// Share of that error, and 1 for points off the surface, 0 for points on it.
     pub(super) share: Lanes,
-    pub(super) own: Lanes,
+    pub(super) off_surface: Lanes,
 }

@@ -12,7 +12,7 @@ use crate::simd::{LANES, Lanes, dot, multiversion};
 const FAR: f64 = 6.0;
 /// and here with fewer points and degrees.
 const FARTHER: f64 = 20.0;
-/// Degree of the densities that are felt there.
+/// Degree of the densities that count there.
 const FARTHER_DEGREE: usize = 2;
 
 /// What the potentials of all triangles need.
@@ -124,7 +124,6 @@ fn quadrature(
 #[cfg(test)]
 mod tests {
     use super::super::basis::MAX_DEGREE;
-    use super::super::triangle::minus;
     use super::*;
     use crate::mesh::{self, Point};
 
@@ -139,7 +138,7 @@ mod tests {
         depth: usize,
     ) {
         let part = Triangle::new(at.map(|p| whole.point(p[0], p[1])));
-        if depth < 40 && mesh::norm(minus(part.centre, x)) < 8.0 * part.radius {
+        if depth < 40 && mesh::norm(mesh::sub(part.centre, x)) < 8.0 * part.radius {
             let middle = |p: [f64; 2], q: [f64; 2]| [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])];
             let [a, b, c] = at;
             let (d, e, f) = (middle(a, b), middle(b, c), middle(c, a));
@@ -153,7 +152,7 @@ mod tests {
             let [a, b, c] = at;
             let p = [0, 1].map(|k| a[k] + node[0] * (b[k] - a[k]) + node[1] * (c[k] - a[k]));
             tables.basis.values(p, &mut values[..functions(degree)]);
-            let weight = INVERSE_4PI * part.area * node[2] / mesh::norm(minus(whole.point(p[0], p[1]), x));
+            let weight = INVERSE_4PI * part.area * node[2] / mesh::norm(mesh::sub(whole.point(p[0], p[1]), x));
             for k in 0..functions(degree) {
                 out[k] += weight * values[k];
             }

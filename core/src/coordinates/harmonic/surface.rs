@@ -1,4 +1,4 @@
-//! Where points are: inside the cage, outside, or on its surface, and the nearest place there.
+//! The closest point of the cage's surface, and whether a point is inside, outside or on it.
 
 use crate::mesh::{self, Point};
 use rayon::prelude::*;
@@ -14,9 +14,9 @@ pub(super) enum Side {
     Outside,
 }
 
-/// Nearest place on the surface.
+/// The point of the surface closest to another.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Foot {
+pub(super) struct ClosestPoint {
     pub(super) face: u32,
     /// Barycentric coordinates in the face.
     pub(super) weights: [f64; 3],
@@ -25,14 +25,14 @@ pub(super) struct Foot {
     pub(super) side: Side,
 }
 
-/// A surface, prepared for such questions.
+/// A closed surface with bounding spheres and normals, for closest points.
 pub(super) struct Surface<'a> {
     vertices: &'a [Point],
     faces: &'a [[u32; 3]],
     /// Centre and radius of each face.
     spheres: Vec<(Point, f64)>,
     normals: Vec<Point>,
-    /// Sums of the normals around each vertex by angle, and the faces across the edges opposite each corner: what tells the
+    /// Sums of the normals around each vertex by angle, and the faces across the edges opposite each corner: which tell the
     /// sides of edges and vertices apart (Bærentzen and Aanæs 2005).
     vertex_normals: Vec<Point>,
     across: Vec<[u32; 3]>,
@@ -49,13 +49,13 @@ impl<'a> Surface<'a> {
         for f in 0..faces.len() {
             let p = corners(f);
             let centre = [0, 1, 2].map(|k| (p[0][k] + p[1][k] + p[2][k]) / 3.0);
-            spheres.push((centre, p.iter().map(|&p| mesh::norm(minus(p, centre))).fold(0.0, f64::max)));
-            let normal = mesh::cross(minus(p[1], p[0]), minus(p[2], p[0]));
+            spheres.push((centre, p.iter().map(|&p| mesh::norm(mesh::sub(p, centre))).fold(0.0, f64::max)));
+            let normal = mesh::cross(mesh::sub(p[1], p[0]), mesh::sub(p[2], p[0]));
             let length = mesh::norm(normal);
             let normal = normal.map(|c| c / length);
             normals.push(normal);
             for i in 0..3 {
-                let (a, b) = (minus(p[(i + 1) % 3], p[i]), minus(p[(i + 2) % 3], p[i]));
+                let (a, b) = (mesh::sub(p[(i + 1) % 3], p[i]), mesh::sub(p[(i + 2) % 3], p[i]));
                 let angle = mesh::norm(mesh::cross(a, b)).atan2(mesh::dot(a, b));
                 let sum = &mut vertex_normals[faces[f][i] as usize];
                 *sum = [0, 1, 2].map(|k| sum[k] + angle * normal[k]);
@@ -79,14 +79,14 @@ impl<'a> Surface<'a> {
         self.thickness
     }
 
-    /// The feet of all points.
-    pub(super) fn feet(&self, points: &[Point]) -> Vec<Foot> {
-        points.par_iter().map(|&x| self.foot(x)).collect()
+    /// The closest point of the surface to each point.
+    pub(super) fn closest_points(&self, points: &[Point]) -> Vec<ClosestPoint> {
+        points.par_iter().map(|&x| self.closest(x)).collect()
     }
 
-    fn foot(&self, x: Point) -> Foot {
+    fn closest(&self, x: Point) -> ClosestPoint {
         // Centres are on the surface, so that the nearest of them bounds the distance.
-        let apart: Vec<f64> = self.spheres.iter().map(|(centre, _)| mesh::norm(minus(*centre, x))).collect();
+        let apart: Vec<f64> = self.spheres.iter().map(|(centre, _)| mesh::norm(mesh::sub(*centre, x))).collect();
         let mut best = apart.iter().copied().fold(f64::INFINITY, f64::min);
         let mut found: Option<([f64; 3], Point, usize)> = None;
         for (f, (_, radius)) in self.spheres.iter().enumerate() {
@@ -95,15 +95,15 @@ impl<'a> Surface<'a> {
             }
             let corners = self.faces[f].map(|v| self.vertices[v as usize]);
             let (weights, place) = nearest_in_triangle(corners, self.normals[f], x);
-            let distance = mesh::norm(minus(x, place));
+            let distance = mesh::norm(mesh::sub(x, place));
             if distance < best || found.is_none() {
                 best = distance.min(best);
                 found = Some((weights, place, f));
             }
         }
         let (weights, place, face) = found.unwrap_or_default();
-        let distance = mesh::norm(minus(x, place));
-        let away = minus(x, place);
+        let distance = mesh::norm(mesh::sub(x, place));
+        let away = mesh::sub(x, place);
         let at: Vec<usize> = (0..3).filter(|&i| weights[i] != 0.0).collect();
         let normal = match at[..] {
             [corner] => self.vertex_normals[self.faces[face][corner] as usize],
@@ -120,12 +120,8 @@ impl<'a> Surface<'a> {
         } else {
             Side::Inside
         };
-        Foot { face: face as u32, weights, place, distance, side }
+        ClosestPoint { face: face as u32, weights, place, distance, side }
     }
-}
-
-fn minus(a: Point, b: Point) -> Point {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 /// The point of a triangle that is nearest to x, and its barycentric coordinates. From distances to the edges, which are exact in
@@ -136,14 +132,14 @@ fn nearest_in_triangle(corners: [Point; 3], normal: Point, x: Point) -> ([f64; 3
     let mut least = f64::INFINITY;
     for i in 0..3 {
         let [j, k] = [(i + 1) % 3, (i + 2) % 3];
-        let (p, edge) = (corners[j], minus(corners[k], corners[j]));
+        let (p, edge) = (corners[j], mesh::sub(corners[k], corners[j]));
         let outward = mesh::cross(edge, normal);
-        let beyond = mesh::dot(outward, minus(x, p));
-        weights[i] = beyond / mesh::dot(outward, minus(corners[i], p));
+        let beyond = mesh::dot(outward, mesh::sub(x, p));
+        weights[i] = beyond / mesh::dot(outward, mesh::sub(corners[i], p));
         if beyond > 0.0 {
-            let t = (mesh::dot(edge, minus(x, p)) / mesh::dot(edge, edge)).clamp(0.0, 1.0);
+            let t = (mesh::dot(edge, mesh::sub(x, p)) / mesh::dot(edge, edge)).clamp(0.0, 1.0);
             let place = [0, 1, 2].map(|c| p[c] + t * edge[c]);
-            let away = minus(x, place);
+            let away = mesh::sub(x, place);
             if mesh::dot(away, away) < least {
                 least = mesh::dot(away, away);
                 let mut at = [0.0; 3];
@@ -153,7 +149,7 @@ fn nearest_in_triangle(corners: [Point; 3], normal: Point, x: Point) -> ([f64; 3
         }
     }
     nearest.unwrap_or_else(|| {
-        let height = mesh::dot(normal, minus(x, corners[0]));
+        let height = mesh::dot(normal, mesh::sub(x, corners[0]));
         let total: f64 = weights.iter().sum();
         (weights.map(|w| w / total), [0, 1, 2].map(|c| x[c] - height * normal[c]))
     })
@@ -179,12 +175,12 @@ mod tests {
         let mut counts = [0, 0];
         for _ in 0..2000 {
             let x = [0, 1, 2].map(|k| 0.5 * (low[k] + high[k]) + 1.2 * random() * (high[k] - low[k]));
-            let foot = surface.foot(x);
+            let closest = surface.closest(x);
             let inside = mesh::winding_number(cage.vertices(), &cage.mesh().triangles, x) > 0.5;
-            assert_eq!(foot.side, if inside { Side::Inside } else { Side::Outside }, "{x:?}");
+            assert_eq!(closest.side, if inside { Side::Inside } else { Side::Outside }, "{x:?}");
             counts[usize::from(inside)] += 1;
             let distance = mesh::distance_to_surface(cage.vertices(), &cage.mesh().triangles, x);
-            assert!((foot.distance - distance).abs() < 1e-12 * cage.diagonal(), "{} {distance}", foot.distance);
+            assert!((closest.distance - distance).abs() < 1e-12 * cage.diagonal(), "{} {distance}", closest.distance);
         }
         assert!(counts.iter().all(|&c| c > 100), "{counts:?}");
     }

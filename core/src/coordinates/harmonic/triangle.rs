@@ -19,25 +19,21 @@ pub(super) struct Triangle {
     pub(super) lengths: [f64; 3],
 }
 
-pub(super) fn minus(a: Point, b: Point) -> Point {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
 impl Triangle {
     pub(super) fn new(corners: [Point; 3]) -> Self {
         let [a, b, c] = corners;
-        let normal = mesh::cross(minus(b, a), minus(c, a));
+        let normal = mesh::cross(mesh::sub(b, a), mesh::sub(c, a));
         let double_area = mesh::norm(normal);
         let normal = normal.map(|x| x / double_area);
         let centre = [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0);
-        let radius = corners.iter().map(|&p| mesh::norm(minus(p, centre))).fold(0.0, f64::max);
-        let sides = [minus(b, a), minus(c, b), minus(c, a)];
+        let radius = corners.iter().map(|&p| mesh::norm(mesh::sub(p, centre))).fold(0.0, f64::max);
+        let sides = [mesh::sub(b, a), mesh::sub(c, b), mesh::sub(c, a)];
         let lengths = sides.map(mesh::norm);
         let along = [0, 1, 2].map(|e| sides[e].map(|x| x / lengths[e]));
         let outward =
             [mesh::cross(along[0], normal), mesh::cross(along[1], normal), mesh::cross(along[2], normal).map(|x| -x)];
         let gradient = |opposite: Point| mesh::cross(normal, opposite).map(|x| x / double_area);
-        let gradients = [gradient(minus(a, c)), gradient(minus(b, a))];
+        let gradients = [gradient(mesh::sub(a, c)), gradient(mesh::sub(b, a))];
         Self { corners, centre, radius, area: 0.5 * double_area, normal, gradients, along, outward, lengths }
     }
 
