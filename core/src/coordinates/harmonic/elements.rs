@@ -16,21 +16,26 @@ pub(super) struct Element {
     pub(super) degree: usize,
     /// Cuts of the face that come before this element where its division is written in preorder, as in a [plan](super::plan).
     pub(super) cuts: Vec<u8>,
+    /// Cuts above it from before the first solution: unknowns are in the order of this number, and otherwise of faces and preorder.
+    depth: u32,
 }
 
 /// The cut into four parts; smaller numbers are those of the corner from which a cut goes to the middle of the opposite side.
 pub(super) const QUARTERS: u8 = 7;
+/// What is added to the number of a corner where the cut was made after the first solution.
+pub(super) const LATER: u8 = 8;
 
 impl Element {
     /// A face as a whole.
     pub(super) fn face(face: usize, corners: [Point; 3]) -> Self {
-        Self { triangle: Triangle::new(corners), face: face as u32, degree: 0, cuts: Vec::new() }
+        Self { triangle: Triangle::new(corners), face: face as u32, degree: 0, cuts: Vec::new(), depth: 0 }
     }
 
     /// The parts that a cut gives.
     pub(super) fn parts(&self, cut: u8) -> Vec<Self> {
         let middle = |p: Point, q: Point| [0, 1, 2].map(|k| 0.5 * (p[k] + q[k]));
-        let corner = |i: usize| self.triangle.corners[(usize::from(cut) % QUARTERS as usize + i) % 3];
+        let first = if cut == QUARTERS { 0 } else { usize::from(cut % LATER) };
+        let corner = |i: usize| self.triangle.corners[(first + i) % 3];
         let [a, b, c] = [0, 1, 2].map(corner);
         let triangles = if cut == QUARTERS {
             let (d, e, f) = (middle(a, b), middle(b, c), middle(c, a));
@@ -39,7 +44,8 @@ impl Element {
             let d = middle(b, c);
             vec![[a, b, d], [a, d, c]]
         };
-        let part = |corners| Self { triangle: Triangle::new(corners), cuts: Vec::new(), ..*self };
+        let depth = self.depth + u32::from(cut < QUARTERS);
+        let part = |corners| Self { triangle: Triangle::new(corners), cuts: Vec::new(), depth, ..*self };
         let mut parts: Vec<Self> = triangles.into_iter().map(part).collect();
         parts[0].cuts = [self.cuts.as_slice(), &[cut]].concat();
         parts
@@ -160,16 +166,16 @@ pub(super) fn mark_thin(elements: &[Element], marked: &mut [bool]) {
     }
 }
 
-/// The marked elements one degree higher, or divided.
-pub(super) fn refined(elements: &[Element], marked: &[bool]) -> Vec<Element> {
+/// The elements in preorder, the marked ones one degree higher, or divided.
+pub(super) fn refined(unknowns: &Unknowns, marked: &[bool]) -> Vec<Element> {
     let mut out = Vec::new();
-    for (element, &marked) in elements.iter().zip(marked) {
+    for (element, marked) in unknowns.preorder.iter().map(|&k| (&unknowns.elements[k], marked[k])) {
         if !marked {
             out.push(element.clone());
         } else if element.degree < element.most() {
             out.push(Element { degree: element.degree + 1, ..element.clone() });
         } else {
-            out.extend(element.parts(element.halving().unwrap_or(QUARTERS)));
+            out.extend(element.parts(element.halving().map_or(QUARTERS, |corner| LATER + corner)));
         }
     }
     out
@@ -178,6 +184,8 @@ pub(super) fn refined(elements: &[Element], marked: &[bool]) -> Vec<Element> {
 /// Where the unknowns are: those of low degree of all elements are solved for together, those above around each vertex.
 pub(super) struct Unknowns {
     pub(super) elements: Vec<Element>,
+    /// Places of the elements in preorder, face by face.
+    pub(super) preorder: Vec<usize>,
     /// Degree of the low polynomials, and how many every element has.
     pub(super) low_degree: usize,
     pub(super) low: usize,
@@ -186,13 +194,21 @@ pub(super) struct Unknowns {
 }
 
 impl Unknowns {
+    /// Takes elements in preorder.
     pub(super) fn new(elements: Vec<Element>, low_degree: usize) -> Self {
+        let mut order: Vec<usize> = (0..elements.len()).collect();
+        order.sort_by_key(|&k| elements[k].depth);
+        let mut preorder = vec![0; elements.len()];
+        for (place, &k) in order.iter().enumerate() {
+            preorder[k] = place;
+        }
+        let elements: Vec<Element> = order.iter().map(|&k| elements[k].clone()).collect();
         let low = functions(low_degree);
         let mut starts = vec![0];
         for element in &elements {
             starts.push(starts[starts.len() - 1] + functions(element.degree) - low);
         }
-        Self { elements, low_degree, low, starts }
+        Self { elements, preorder, low_degree, low, starts }
     }
 
     /// Number of low unknowns.

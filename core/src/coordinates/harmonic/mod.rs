@@ -171,7 +171,7 @@ fn refine(problem: &Problem<'_>) -> Result<Coordinates, CoordinatesError> {
         if found.correction > Refinement::TOLERANCE {
             elements::mark_thin(&unknowns.elements, &mut found.marked);
         }
-        elements = elements::refined(&unknowns.elements, &found.marked);
+        elements = elements::refined(&unknowns, &found.marked);
         let more = elements.len() <= most && found.marked.contains(&true);
         let Some(next) = low_degree(elements.len()).filter(|_| more) else {
             return Ok(solution(found.phi));

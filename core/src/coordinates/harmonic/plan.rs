@@ -2,7 +2,7 @@
 //! that a decoder solves the same equations by the same steps and decides nothing; `docs/FORMAT.md` has the layout.
 
 use super::basis::{MAX_DEGREE, functions};
-use super::elements::{Element, QUARTERS, Unknowns};
+use super::elements::{Element, LATER, QUARTERS, Unknowns};
 use super::patch::{DAMPING, PATCH};
 use super::solve::{Steps, TURNS};
 use super::{LEAST_DEGREE, LOW_DEGREES};
@@ -28,7 +28,7 @@ impl ElementPlan {
     /// The elements, each face's division in preorder, and the steps of the solution.
     pub(super) fn new(unknowns: &Unknowns, steps: &Steps) -> Self {
         let mut bytes = vec![unknowns.low_degree as u8, steps.damping, steps.turns];
-        for element in &unknowns.elements {
+        for element in unknowns.preorder.iter().map(|&k| &unknowns.elements[k]) {
             bytes.extend_from_slice(&element.cuts);
             bytes.push(element.degree as u8);
         }
@@ -99,7 +99,7 @@ fn divide<'a>(
     while let Some(mut element) = waiting.pop() {
         let Some((&byte, rest)) = bytes.split_first() else { return Err("it has fewer faces than the cage") };
         bytes = rest;
-        if byte < 3 || byte == QUARTERS {
+        if byte < 3 || byte == QUARTERS || (LATER..LATER + 3).contains(&byte) {
             waiting.extend(element.parts(byte).into_iter().rev());
         } else if (LEAST_DEGREE..=MAX_DEGREE).contains(&usize::from(byte)) {
             element.degree = usize::from(byte);
@@ -128,7 +128,7 @@ mod tests {
 
     /// One face of a degree, the other cut, one half of which is cut into four.
     fn plan() -> ElementPlan {
-        let mut bytes = vec![1, 0, 2, 5, 2, 3, QUARTERS, 3, 4, 6, 3];
+        let mut bytes = vec![1, 0, 2, 5, LATER + 2, 3, QUARTERS, 3, 4, 6, 3];
         // Four vertices, six elements: 24 bits.
         bytes.extend([0, 0, 1, 0, 0b0100_0001, 0, 0b1000_0000]);
         ElementPlan::from_bytes(bytes)
@@ -149,6 +149,15 @@ mod tests {
         assert_eq!(steps.patches, [vec![0], vec![0], vec![], vec![5]]);
         assert_eq!((steps.turns, steps.patch_damping.as_slice()), (2, &[0, 0, 1, 0][..]));
         assert_eq!(ElementPlan::new(&unknowns, &steps), plan());
+    }
+
+    #[test]
+    fn elements_that_were_cut_before_the_first_solution_come_last() {
+        let bytes = [&[1, 0, 1, 1, 3, 4, LATER + 1, 5, 6][..], &[0; 4], &[0; 2]].concat();
+        let (unknowns, steps) = ElementPlan::from_bytes(bytes.clone()).read(&faces(), 4).expect("a plan");
+        let degrees: Vec<usize> = unknowns.elements.iter().map(|element| element.degree).collect();
+        assert_eq!(degrees, [5, 6, 3, 4]);
+        assert_eq!(ElementPlan::new(&unknowns, &steps).as_bytes(), bytes);
     }
 
     #[test]
