@@ -172,7 +172,7 @@ fn a_disk_that_stays_full_loses_nothing() {
         let _ = live(&given, &mut told);
         let what = format!("full from operation {nth} on");
         let refused =
-            |error: &StoreError| matches!(error, StoreError::Full { .. }) || error.to_string().contains("anew");
+            |error: &StoreError| matches!(error, StoreError::Full { .. }) || error.to_string().contains("reopened");
         assert!(told.errors.iter().all(refused), "{what}: {:?}", told.errors);
         given.disk.disarm();
         let seen = look(&given, &told, &what);
