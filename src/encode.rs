@@ -284,7 +284,7 @@ impl BatchPlan {
     }
 }
 
-/// Reads all frames; returns the seconds spent handle_system, without waiting for the solver.
+/// Reads all frames; returns the seconds spent reading, without waiting for the solver.
 fn read_batches(
     frames: &mut dyn FrameReader,
     size: usize,

@@ -48,7 +48,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
         frames,
         systems: &systems,
         frames_at_most: args.frames_at_most as usize,
-        up: args.up.map(Into::into),
+        up: args.up,
         names: [&args.rest, &args.cage, &args.frames].map(|path| path.display().to_string()),
     };
     let expected = seconds(&job);

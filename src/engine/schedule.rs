@@ -45,7 +45,7 @@ struct LaneState<W> {
     more: bool,
     /// Whether its batches run one after another.
     in_order: bool,
-    /// The tenant's turn at which it was last served, for round-robin order.
+    /// Value of the tenant's `turn` when the lane was last served; the lane with the smallest is next, which makes the order round-robin.
     served: u64,
 }
 
@@ -106,12 +106,14 @@ impl<W: Clone> Schedule<W> {
             tenant.waiting -= lane.waiting;
             tenant.lanes.retain(|&other| other != id);
         }
-        // A tenant ahead of the virtual time keeps its pass, so that short uploads cannot reset it.
-        let time = self.time;
-        self.tenants.retain(|_, tenant| !tenant.lanes.is_empty() || tenant.pass > time);
+        // A tenant ahead of one that waits keeps its pass, so that short uploads cannot reset it.
+        let behind = self.smallest_waiting_pass();
+        self.tenants
+            .retain(|_, tenant| !tenant.lanes.is_empty() || behind.is_some_and(|smallest| tenant.pass > smallest));
     }
 
     pub(super) fn pushed(&mut self, id: u64, now: Instant) {
+        let behind = self.smallest_waiting_pass();
         let Some(lane) = self.lanes.get_mut(&id) else { return };
         if lane.waiting == 0 {
             lane.oldest = now;
@@ -120,13 +122,16 @@ impl<W: Clone> Schedule<W> {
         self.waiting += 1;
         // A tenant that was idle starts at the smallest pass of the waiting tenants, or at the virtual time if none waits: idle time earns
         // no credit.
-        let behind = self.tenants.values().filter(|t| t.waiting > 0).map(|t| t.pass).reduce(f64::min);
         if let Some(tenant) = self.tenants.get_mut(&lane.tenant) {
             if tenant.waiting == 0 {
                 tenant.pass = tenant.pass.max(behind.unwrap_or(self.time));
             }
             tenant.waiting += 1;
         }
+    }
+
+    fn smallest_waiting_pass(&self) -> Option<f64> {
+        self.tenants.values().filter(|tenant| tenant.waiting > 0).map(|tenant| tenant.pass).reduce(f64::min)
     }
 
     /// Runs a lane's batches one at a time.
@@ -283,6 +288,24 @@ mod tests {
         (0..1600).for_each(|_| schedule.pushed(late, now));
         let served = serve(&mut schedule, now, 20);
         assert_eq!(served.iter().filter(|&&w| w == "busy").count(), 10);
+    }
+
+    #[test]
+    fn a_tenant_that_closes_its_lane_after_each_batch_gets_no_more_than_others() {
+        let now = Instant::now();
+        let mut schedule = Schedule::new(1);
+        let steady = schedule.add("steady", 1.0, 1.0, "steady");
+        (0..3200).for_each(|_| schedule.pushed(steady, now));
+        let mut batches = 0;
+        for _ in 0..40 {
+            let brief = schedule.add("brief", 1.0, 1.0, "brief");
+            (0..16).for_each(|_| schedule.pushed(brief, now));
+            while serve(&mut schedule, now, 1) != ["brief"] {
+                batches += 1;
+            }
+            schedule.remove(brief);
+        }
+        assert!((38..=42).contains(&batches), "{batches} batches of the steady tenant beside 40");
     }
 
     #[test]

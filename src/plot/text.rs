@@ -19,7 +19,7 @@ pub(crate) fn escaped(text: &str) -> String {
 }
 
 /// A whole number with its digits in groups of three, `1,234,567`.
-pub(crate) fn grouped(number: impl ToString) -> String {
+pub(crate) fn grouped(number: impl ToString + Copy) -> String {
     let digits = number.to_string();
     let mut out = String::new();
     for (i, digit) in digits.chars().enumerate() {

@@ -129,7 +129,7 @@ impl Session {
             return;
         }
         let outcome = self.open_log(&mut log).and_then(|log| {
-            // Opening the log may have found some of these frames; they are counted already.
+            // Opening the log may have found some of these frames on disk; they are not written again.
             records.retain(|record| {
                 let frames = self.frames();
                 let known = frames.entry(record.frame);

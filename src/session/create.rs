@@ -119,7 +119,7 @@ impl Service {
         }
         metrics::counter!("cager_sessions_created_total", "tenant" => tenant.name.clone()).increment(1);
         match session.facts() {
-            // After a restart the solver would be found in the cache; storing the outcome only saves that lookup.
+            // Not awaited: without a stored outcome a restart prepares the session again, and finds its solver on disk.
             Some(facts) => drop(self.keep_outcome(&session, Outcome::Ready(Box::new(facts)))),
             None => {
                 let preparing =
@@ -211,7 +211,7 @@ impl Service {
     fn keep_outcome(&self, session: &Arc<Session>, outcome: Outcome) -> impl Future<Output = ()> + use<> {
         let (store, id, session) = (self.store.clone(), session.meta.id.clone(), Arc::clone(session));
         let done = tokio::task::spawn_blocking(move || {
-            // Every ready session has a log; a missing one means damage.
+            // First the log, then the outcome: after a restart a ready session without a log is taken for damaged.
             let log = if matches!(outcome, Outcome::Ready(_)) { session.make_log() } else { Ok(()) };
             if let Err(error) = log.and_then(|()| store.put_note(&id, OUTCOME, &outcome)) {
                 tracing::warn!(session = %id, %error, "the outcome of the preparation could not be stored; a restart prepares the session again");
@@ -235,7 +235,7 @@ impl Service {
             let cost = {
                 let decoder = prepared.solver.decoder();
                 let (points, columns) = (decoder.points() as f64, decoder.columns() as f64);
-                // The iteration for tied normals multiplies by a square matrix about this many times.
+                // Where normals are functions of the vertices, the iteration multiplies by a square matrix about this many times.
                 let products = if decoder.tied_normals().is_some() { 40.0 } else { 0.0 };
                 points * columns + products * columns * columns
             };
@@ -306,7 +306,8 @@ pub(super) const OUTCOME: &str = "outcome";
 fn content_key(tenant: &str, content: &Content, options: &SessionOptions, choices: &Choices) -> ContentKey {
     let mut hasher = blake3::Hasher::new();
     let extension = |name: &str| name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
-    // Defaults are written out, so that an omitted option and its default give the same key.
+    // Defaults are written out, so that an omitted option and its default give the same key; not those of `spectrum` and `handle_count`, which depend
+    // on the cage.
     let solving = SessionOptions {
         name: None,
         frame_rate: None,

@@ -60,7 +60,7 @@ pub(crate) enum Claim {
 #[derive(Default)]
 pub(crate) struct Frames {
     solved: BTreeMap<u32, LogEntry>,
-    /// The numbers of `solved`.
+    /// The keys of `solved` as intervals, so that missing ranges are found without visiting every frame.
     runs: IntervalSet,
     pending: HashMap<u32, Pending>,
     /// Whether new frames are refused.
@@ -114,8 +114,8 @@ impl Frames {
         if known.is_some() { Claim::Measure } else { Claim::Solve }
     }
 
-    /// Refuses new frames from here on, provided all frames below `frames` are solved and none beyond is solved or pending; with `discard`,
-    /// solved frames beyond are allowed. Returns whether it was sealed before.
+    /// Refuses new frames from here on, provided all frames below `frames` are solved, none of them is being measured, and none beyond is solved or
+    /// pending; with `discard`, solved frames beyond are allowed. Returns whether it was sealed before.
     ///
     /// # Errors
     /// [`SealError`]; nothing has changed.

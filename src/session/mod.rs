@@ -40,7 +40,8 @@ pub(crate) struct Session {
     webhooks: Arc<Webhooks>,
     status: Mutex<Status>,
     frames: Mutex<Frames>,
-    /// Whether the log exists on disk. It is created before the session becomes ready, so that a missing log is recognised as damage.
+    /// Whether the log exists on disk. It is created before the outcome of the preparation is stored, so that a log missing after a restart is
+    /// recognised as damage.
     pub(crate) has_log: AtomicBool,
     /// Whether the frames in the log have been added to `frames`.
     loaded: AtomicBool,

@@ -20,7 +20,7 @@ pub(crate) struct Registry {
 struct Inner {
     sessions: BTreeMap<String, Arc<Session>>,
     requests: Requests,
-    /// Number and bytes of sessions being created, by tenant.
+    /// Number and bytes of sessions and cage jobs being created, by tenant.
     reserved: HashMap<String, (u64, u64)>,
 }
 
@@ -129,7 +129,7 @@ impl Registry {
         super::lock(&self.inner).usage_of(tenant)
     }
 
-    /// Atomically reserves quota for a session of `bytes` bytes if `allowed` accepts the usage so far (count, bytes).
+    /// Atomically reserves quota for a session or cage job of `bytes` bytes if `allowed` accepts the usage so far (count and bytes of sessions).
     ///
     /// # Errors
     /// Those of `allowed`.

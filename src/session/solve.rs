@@ -68,7 +68,7 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
             }
         }
     }
-    // If this panics, the claims are released.
+    // From here on a guard releases the claims of frames that a panic leaves unfinished.
     let claimed = |(job, digests): (FrameJob, Digests)| {
         let guard = ClaimGuard { session, frames: vec![job.frame] };
         (job, digests, guard)
@@ -76,15 +76,15 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
     let measured: Vec<_> = measured.into_iter().map(claimed).collect();
     if prepared.solver.follows_previous() {
         solve_in_order(session, prepared, whole, handles);
-        return measure(session, prepared, measured);
-    }
-    let batches = [(Rows::All, whole), (Rows::Handles, handles)].map(|(rows, jobs)| {
-        let guard = ClaimGuard { session, frames: jobs.iter().map(|(job, _)| job.frame).collect() };
-        (rows, jobs, guard)
-    });
-    for (rows, jobs, guard) in batches {
-        if !jobs.is_empty() {
-            solve_batch(session, prepared, rows, jobs, None, guard);
+    } else {
+        let batches = [(Rows::All, whole), (Rows::Handles, handles)].map(|(rows, jobs)| {
+            let guard = ClaimGuard { session, frames: jobs.iter().map(|(job, _)| job.frame).collect() };
+            (rows, jobs, guard)
+        });
+        for (rows, jobs, guard) in batches {
+            if !jobs.is_empty() {
+                solve_batch(session, prepared, rows, jobs, None, guard);
+            }
         }
     }
     measure(session, prepared, measured);

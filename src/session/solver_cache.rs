@@ -250,7 +250,7 @@ impl Solvers {
         let solver = match self.store.prepared(key) {
             Ok(Some(solver)) => solver,
             Ok(None) => return Ok(None),
-            // Preparing again replaces the file.
+            // The solver is prepared again; the file is kept, since it may be readable later.
             Err(error) => {
                 tracing::warn!(%error, "a stored solver cannot be read");
                 return Ok(None);

@@ -1,10 +1,10 @@
-//! Uploaded rest poses and cages by content key, stored once per tenant: needed to write containers and to prepare again.
+//! Rest poses, cages and regularisation matrices by content key, stored once per tenant: needed to write containers and to prepare again.
 
 use super::{ContentKey, Store, StoreError, meta};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// A rest pose and a cage as they were uploaded.
+/// A rest pose as it was uploaded, and its cage, uploaded or made by the service.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Content {
     /// File name of the rest pose; its extension tells the format.
@@ -19,7 +19,7 @@ pub struct Content {
     pub matrix: Option<MatrixFile>,
 }
 
-/// A cage as it was uploaded.
+/// A cage file, uploaded or made by the service.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CageFile {
     /// File name; its extension tells the format.

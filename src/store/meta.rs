@@ -1,4 +1,4 @@
-//! Small JSON files with a checksum. A parsed file is rebuilt and compared byte by byte, so that any change is detected.
+//! Small JSON files with a checksum. On reading, everything around the body is rebuilt and compared byte by byte, so that any change is detected.
 
 use super::StoreError;
 use super::files::Files;

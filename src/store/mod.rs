@@ -1,9 +1,10 @@
 //! Persistent data: sessions with their frame logs and containers, uploaded content, cage jobs and prepared solvers. All calls block.
 //!
 //! ```text
-//! sessions/<id>/   session.json  frames.log  capture.cager  complete.json  outcome.json
-//! cages/<id>/      job.json  rest  frames  cage.obj  outcome.json
-//! contents/<key>/  content.json  rest  cage
+//! lock             locked while a process uses the folder
+//! sessions/<id>/   session.json  frames.log  capture.cager  complete.json  outcome.json  announce.json
+//! cages/<id>/      job.json  rest  frames  attempts.json  cage.obj  outcome.json
+//! contents/<key>/  content.json  rest  cage  matrix
 //! prepared/<key>.solver
 //! tmp/             being written; emptied at start       trash/       being removed; emptied at start
 //! quarantine/      damaged, with a note; for a person to look at

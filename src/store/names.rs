@@ -5,7 +5,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt;
 use std::str::FromStr;
 
-/// BLAKE3 digest of tenant, rest pose, cage and options: the key of stored content and of its prepared solver.
+/// BLAKE3 digest of the inputs of some work and their tenant: the key of stored content and of its prepared solver; also identifies the inputs of a
+/// cage job or of a cage that the service made.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ContentKey(pub [u8; 32]);
 

@@ -127,7 +127,7 @@ impl Store {
         self.inner.publishing.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Moves damaged content to quarantine.
+    /// Moves the content or solver file at `place` to quarantine if `found` says that it is damaged.
     pub(super) fn quarantine_if_damaged<T>(&self, place: &Path, found: Result<T, StoreError>) -> Result<T, StoreError> {
         if let Err(error @ StoreError::Damaged { .. }) = &found {
             let _one_at_a_time = self.publishing();

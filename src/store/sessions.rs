@@ -1,4 +1,4 @@
-//! Sessions: metadata, container and completion mark.
+//! Sessions: metadata, container, completion mark and notes.
 
 use super::disk::DiskFile;
 use super::files::Files;
@@ -22,7 +22,7 @@ pub struct SessionMeta {
     pub tenant: String,
     /// Creation time, milliseconds since 1970.
     pub created_ms: u64,
-    /// Key of rest pose, cage and options.
+    /// Key of its content and of its prepared solver.
     pub key: ContentKey,
     /// Version of the solver that solves its frames.
     #[serde(default)]
@@ -97,7 +97,7 @@ impl Store {
         files.publish_folder(&place, |staging| files.write_new(&staging.join(META), &bytes))
     }
 
-    /// Deletes a session, if it exists. On `Ok` the deletion is durable; after an error the session is either complete or gone.
+    /// Deletes a session, if it exists. On `Ok` the deletion is durable; after an error the session is either gone or still there as a whole.
     ///
     /// # Errors
     /// [`StoreError::BadId`], or another I/O error.

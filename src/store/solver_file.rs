@@ -13,7 +13,7 @@ use safetensors::tensor::{Metadata, TensorInfo};
 use std::collections::HashMap;
 use std::io;
 
-/// Version of the format; those up to 4 were of another kind.
+/// Version of the format; versions up to 4 were not safetensors files and begin with [`OLD_FORMAT`].
 const VERSION: &str = "5";
 const OLD_FORMAT: &[u8] = b"CGRSOLV";
 const HEADER_BYTES: u64 = 1 << 16;
@@ -324,8 +324,13 @@ impl In<'_> {
     fn shape<T: Number>(&self, name: &str) -> io::Result<[usize; 2]> {
         let is_next = |info: &&TensorInfo| info.data_offsets.0 as u64 == self.offset - self.start;
         let info = self.metadata.info(name).filter(|info| info.dtype == T::TYPE).filter(is_next);
-        info.and_then(|info| info.shape.first_chunk().copied())
-            .ok_or_else(|| damage("an array is not what it should be"))
+        let shape = info.and_then(|info| {
+            let [columns, rows] = <[usize; 2]>::try_from(info.shape.as_slice()).ok()?;
+            let bytes = columns.checked_mul(rows)?.checked_mul(size_of::<T>())?;
+            let (start, end) = info.data_offsets;
+            (bytes == end - start && (rows > 0 || columns <= 1)).then_some([columns, rows])
+        });
+        shape.ok_or_else(|| damage("an array is not what it should be"))
     }
 
     fn vector<T: Number>(&mut self, name: &str) -> io::Result<Vec<T>> {

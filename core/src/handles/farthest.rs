@@ -1,7 +1,8 @@
 //! Farthest-point sampling: each next point is the one farthest from all before it (Eldar, Lindenbaum, Porat and Zeevi 1997).
 //!
-//! Points are sorted along a space-filling curve into blocks with bounding boxes. A new sample concerns only the blocks that
-//! it is closer to than their farthest point, so that all samples together cost little more than a few passes.
+//! Points are sorted along a space-filling curve into blocks with bounding boxes. A new sample can lower distances in a
+//! block only if it is closer to the box than the block's largest distance to a sample so far; others are skipped, so that all samples together
+//! cost little more than a few passes.
 
 use crate::mesh::{Point, bounds};
 use crate::simd::{LANES, Lanes, multiversion};

@@ -57,8 +57,7 @@ pub(crate) struct Drift<'a> {
 /// `Lᵀ N`, r × K.
 ///
 /// With `B_S = [I; D]` the contrasts `W = [−D, I]` annihilate every cage deformation, and `N = [B, 0] + (k − B Ω₁) Wᵀ (W Ω Wᵀ)⁻¹ W` is the same
-/// prediction, from
-/// K − r equations; Ω₁ are the first r rows of Ω.
+/// prediction, from K − r equations; Ω₁ are the first r rows of Ω.
 ///
 /// `None` where the factorisation fails.
 pub(crate) fn interpolated(samples: &Samples<'_>, drift: &Drift<'_>) -> Option<Mat<f64>> {
@@ -101,7 +100,7 @@ pub(crate) fn interpolated(samples: &Samples<'_>, drift: &Drift<'_>) -> Option<M
     Some(map)
 }
 
-/// `wideᵀ k`, columns of `wide` × K, with the covariance k of all points with the samples. Points are taken in blocks along a
+/// `wideᵀ k`, columns of `wide` × K, with the covariance k of `points` (all, or some samples) with the samples. They are taken in blocks along a
 /// space-filling curve, each with the samples within its support, and summed in that order, so that the result does not depend on the threads.
 fn with_all_points(covariance: Covariance, points: &[Point], samples: &[Point], wide: MatRef<'_, f64>) -> Mat<f64> {
     let m = wide.ncols();

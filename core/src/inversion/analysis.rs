@@ -94,7 +94,7 @@ impl Analysis {
         let no_handles = PrepareError::NoSolution { what: "choice of handles" };
         let mut basis = row_basis(phi.as_ref()).ok_or(no_handles.clone())?;
         let maxvol_seconds = clock.elapsed().as_secs_f64();
-        // Not before: maxvol takes the most memory.
+        // Built only now, since memory use peaks in maxvol.
         let decoder = decoder.unwrap_or_else(|| Decoder::new(phi.as_ref(), cage.vertices().len()));
 
         let clock = Instant::now();
@@ -165,7 +165,7 @@ impl Analysis {
         self.handle_system(options.handles)?.solver(options)
     }
 
-    /// A solver that reads the given rows, at least as many as unknowns; the handles in the options are ignored.
+    /// A solver that reads the given rows, at least as many as unknowns; the handles in the options are checked, but not used.
     ///
     /// # Errors
     /// As [`Solver::prepare`]; [`PrepareError::NoSolution`] where the rows determine nothing.

@@ -12,7 +12,7 @@ use crate::mesh::{Point, diagonal};
 use faer::Mat;
 use rayon::prelude::*;
 
-/// Entries of the largest `Φ` that is analysed as a whole, unless it has fewer than [`ROWS_PER_UNKNOWN`].
+/// Largest number of entries of `Φ` up to which all points are analysed; with [`ROWS_PER_UNKNOWN`] rows per unknown or fewer they always are.
 const ENTRIES: usize = 1 << 25;
 /// Minimum number of points analysed per unknown.
 const ROWS_PER_UNKNOWN: usize = 8;
@@ -38,8 +38,8 @@ pub(super) struct AnalysisCoordinates {
     pub(super) plan: Option<ElementPlan>,
 }
 
-/// A sample of points spaced evenly along a space-filling curve, at least as many as are read; `None` where all points are analysed. Its density
-/// follows that of the model.
+/// A sample of points spaced evenly along a space-filling curve; `None` where all points are analysed. It has at least as many points as the handles
+/// read, except with [`Handles::All`], for which the sample stands for all. Its density follows that of the model.
 fn sample(points: &[Point], unknowns: usize, required: RequiredDecompositions) -> Option<Vec<u32>> {
     let read = match required {
         RequiredDecompositions::Everything => return None,
@@ -129,7 +129,7 @@ fn of_sample(
             }
         });
     });
-    // A part of the cage may be determined by very few points, which the sample could miss.
+    // A part of the cage may be determined by very few points, which the sample could miss: add those with the largest coordinates of each column.
     sample.extend(nearest.iter().flatten().map(|&(_, point)| point));
     sample.sort_unstable();
     sample.dedup();

@@ -20,11 +20,11 @@ enum Form {
 
 #[derive(Clone, Debug)]
 struct Factors {
-    /// The first singular directions are scaled by these.
+    /// Factors of the leading k singular directions, each of which depends on itself alone.
     scales: Vec<f64>,
-    /// The others are these combinations, (m − s) × r.
+    /// The other singular directions as combinations of all, (m − k) × r.
     mixed: Mat<f64>,
-    /// For each unknown, the difference of its weights from the sum that translation equivariance requires.
+    /// For each unknown, the sum of weights that translation equivariance requires minus the actual sum.
     missing: Vec<f64>,
     target: RegularizationTarget,
 }

@@ -22,7 +22,7 @@ pub struct HandleSystem<'a> {
     pub(super) decomposition: Decomposition,
     /// Time the decomposition took.
     pub(super) seconds: f64,
-    /// Gram matrix of the rows read, for tied normals; expensive, and therefore computed on first use.
+    /// Scaled Gram matrix of the rows read, for tied normals (functions of the vertices); expensive, and therefore computed on first use.
     gram: OnceLock<Mat<f64>>,
 }
 
@@ -47,7 +47,7 @@ impl<'a> HandleSystem<'a> {
         &self.decomposition.sigma
     }
 
-    /// The solver with these options; the handles among them are not looked at. The weight λ is relative to the mean square error of the
+    /// The solver with these options; their handles are checked, but this system's are used. The weight λ is relative to the mean square error of the
     /// points in the data term, so that it means the same whichever points are read: λ · K/m multiplies the regularisation of a
     /// sum over K points, for m unknowns. For maximum-volume handles K = m, the paper's own setting.
     ///
@@ -57,7 +57,8 @@ impl<'a> HandleSystem<'a> {
         self.solver_with(options, options.regularizer.term().ok_or(TermError::Missing)?)
     }
 
-    /// As [`Self::solver`], with a custom term, for [`Regularizer::Matrix`]; the other regularizers apply it to unknowns that no point determines.
+    /// As [`Self::solver`], with a custom term, which takes the place of the regularizer's own; [`Regularizer::TruncatedSvd`] and
+    /// [`Regularizer::Tikhonov`] use none.
     ///
     /// # Errors
     /// As [`Solver::prepare`].
@@ -118,8 +119,8 @@ impl<'a> HandleSystem<'a> {
         check_options(analysis.phi.nrows(), m, options)?;
         let options = without_idle_term(options);
         let tied = analysis.decoder.tied_normals().is_some();
-        // Without regularisation the Gauss–Newton steps follow the points alone; their start is regularised nevertheless, since from an
-        // ill-conditioned one they end in a worse minimum.
+        // Without regularisation the Gauss–Newton steps are held to their start by the small weight of `start_weight` only; the start itself is
+        // regularised nevertheless, since from an ill-conditioned one they end in a worse minimum.
         let unregularized = tied && is_unregularized(options);
         let regularization_operator =
             self.regularization_operator(if unregularized { &CageLaplacian } else { term })?;
@@ -191,7 +192,7 @@ impl<'a> HandleSystem<'a> {
 /// Singular values below this fraction of the largest are of directions that the points hardly determine.
 const ILL_CONDITIONED: f64 = 1e-2;
 
-/// A weight of zero is the same as a threshold of zero.
+/// Drops the regularisation term where λ is zero, which makes it the same as a threshold of zero.
 fn without_idle_term(options: SolverOptions) -> SolverOptions {
     if options.lambda > 0.0 {
         return options;
@@ -209,7 +210,7 @@ fn is_unregularized(options: SolverOptions) -> bool {
     options.regularizer == Regularizer::None || options.regularizer.is_sub_spectral() && options.spectrum == 0
 }
 
-/// Weight of the regularisation towards the linear start: λ where the options have a term, otherwise a small constant.
+/// Weight of the Gauss–Newton steps' regularisation towards the linear start: λ where the options have a term, otherwise a small constant.
 fn start_weight(options: SolverOptions) -> f64 {
     const WITHOUT_TERM: f64 = 1e-3;
     let has_term = options.regularizer.is_sub_spectral() || options.regularizer == Regularizer::Global;

@@ -28,15 +28,15 @@ const ENDS_ALONE: usize = 512;
 /// Decompositions of the handles of maximum volume and of all points.
 #[derive(Clone)]
 pub(super) struct Spectra {
-    /// Of `Φ□`; none where only its ends are known.
+    /// Of `Φ□`; none where at most its extreme singular values are needed.
     pub(super) handles: Option<Svd>,
-    /// Largest and smallest singular value of `Φ□` over the rank; NaN where nobody asks.
+    /// Largest and smallest singular value of `Φ□` over the rank; NaN where they are not needed.
     pub(super) handles_ends: [f64; 2],
     /// Singular values of `Φ`; none where only the ends are known.
     pub(super) full_sigma: Vec<f64>,
     /// The largest of them, the smallest over the rank, and the last of all.
     pub(super) full_ends: [f64; 3],
-    /// Of `R Φ□`, where a frame is inverted as a whole.
+    /// Of `R Φ□`, with R from [`RowBasis::gram_factor`]; only where least squares sums over all points.
     pub(super) full: Option<Svd>,
 }
 
@@ -93,10 +93,10 @@ impl Spectra {
 
 /// A choice of handles with the decomposition of what is inverted: `Uᵀ` as a matrix on the rows read, Σ and V.
 pub(super) struct Decomposition {
-    /// The rows read; those of maximum volume where every point is.
+    /// The rows read; where every point is read, those of maximum volume.
     pub(super) handles: Vec<u32>,
     pub(super) reads_all: bool,
-    /// Rows of the inverted matrix: the points over which least squares sums, which for interpolated handles are all that are analysed.
+    /// Number of rows of the inverted matrix: of the points over which least squares sums. For spread handles these are all points analysed.
     pub(super) rows: usize,
     left: LeftFactor,
     /// Singular values of the inverted matrix, descending; the first r count.
@@ -112,7 +112,7 @@ pub(super) struct Decomposition {
 enum LeftFactor {
     /// L, one row per row read × r.
     Rows(Mat<f64>),
-    /// U of `L = Φ T R⁻¹ U`, r × r; with the factor R, and T, m × r.
+    /// `L = Φ T R⁻¹ U`: U, r × r; R, here the factor of [`RowBasis::gram_factor`]; and T = `to_basis`, m × r.
     Implicit { u: Mat<f64>, factor: Mat<f64>, to_basis: Mat<f64> },
 }
 

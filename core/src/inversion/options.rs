@@ -12,8 +12,8 @@ pub struct SolverOptions {
     pub regularizer: Regularizer,
     /// Spectrum threshold s: how many of the last singular directions are regularised.
     pub spectrum: usize,
-    /// Weight λ of the regularisation beside the mean square error of the points in the data term; α for Tikhonov. 0 is the same as a
-    /// threshold of 0.
+    /// Weight λ of the regularisation beside the mean square error of the points in the data term; α for Tikhonov; the truncated SVD does not use it.
+    /// 0 is the same as a threshold of 0.
     pub lambda: f64,
 }
 

@@ -10,7 +10,7 @@ use std::sync::Arc;
 /// The data of a solver as plain arrays.
 #[derive(Clone, Debug)]
 pub struct SolverParts {
-    /// The rows read, or where every point is, those of maximum volume.
+    /// Indices of the points read; where every point is read, those of maximum volume.
     pub handles: Vec<u32>,
     /// Whether the inversion reads every point instead of the handles.
     pub reads_all: bool,
@@ -35,9 +35,9 @@ pub struct SolverParts {
 pub struct TiedParts {
     /// How normals are computed from the vertices.
     pub normals: TiedNormals,
-    /// The Gram matrix of the rows read, columns × columns.
+    /// `(v/K) ΦᵀΦ` of the K points read, for v vertices; columns × columns.
     pub gram: Mat<f64>,
-    /// How much the shape of the linear start counts.
+    /// Weight λ of the regularisation towards the linear start.
     pub weight: f64,
 }
 

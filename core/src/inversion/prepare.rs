@@ -12,10 +12,10 @@ use std::ops::ControlFlow;
 
 /// Coordinates with a larger affine reproduction error, over the diagonal, are rejected.
 const NOT_REPRODUCED: f64 = 1e-6;
-/// At a larger distance from the cage, in diagonals, a point outweighs all others by the inverse of
-/// [`WEAK_SINGULAR_VALUE`](crate::regularize::WEAK_SINGULAR_VALUE).
+/// Largest distance of a point from the cage, in diagonals of the cage. The coordinates of a point farther away are so large that, beside them, the
+/// others may fall below [`WEAK_SINGULAR_VALUE`](crate::regularize::WEAK_SINGULAR_VALUE).
 const FAR: f64 = 1e5;
-/// Points outside by less than this fraction of the diagonal lie on the cage.
+/// Points outside by at most this fraction of the diagonal count as lying on the cage.
 const ON_THE_CAGE: f64 = 1e-9;
 
 /// Results of the preparation.
@@ -27,15 +27,15 @@ pub struct Preparation {
     pub affine_reproduction_error: f64,
     /// Condition number of `Φ`, over its rank.
     pub condition_full: f64,
-    /// Condition number of `Φ□`, over its rank.
+    /// Condition number of the rows read, over their rank; of `Φ□` where every point is read.
     pub condition_handles: f64,
-    /// Singular values of the inverted matrix, descending: `Φ□`, or `Φ` where every point is read.
+    /// Singular values of the inverted matrix, descending: of `Φ` for spread handles and where every point is read, otherwise of the rows read.
     pub singular_values: Vec<f64>,
     /// Swaps of maxvol after its start.
     pub swaps: usize,
     /// `ln |det Φ□|`.
     pub log_volume: f64,
-    /// Largest `|B_ij|` after the last swap.
+    /// Largest `|B_ij|` of `Φ = B Φ□` after the last swap.
     pub max_entry: f64,
     /// Points outside the cage, ascending.
     pub outside: Vec<u32>,
@@ -43,7 +43,7 @@ pub struct Preparation {
     pub outside_distance: f64,
     /// How the coordinates were refined, where they are a numerical solution.
     pub refinement: Option<Refinement>,
-    /// What they were solved on then.
+    /// The boundary elements on which they were solved, in that case.
     pub plan: Option<ElementPlan>,
     /// Seconds for the coordinates.
     pub coordinates_seconds: f64,
@@ -94,7 +94,7 @@ impl Solver {
         preparing: &Preparing<'_>,
     ) -> Result<Self, PrepareError> {
         let term = preparing.term(options)?;
-        // Known before anything is computed.
+        // A term that does not fit the cage is refused before anything is computed.
         term.delta(cage, system.unknowns(cage))?;
         let analysis = Analysis::for_options(system, cage, points, options, preparing)?;
         preparing.next("operator")?;

@@ -40,8 +40,8 @@ impl Solver {
         &self.preparation
     }
 
-    /// The rows read, K, in their order: those of maximum volume first. With [`Handles::All`](crate::handles::Handles::All) these are only those of
-    /// maximum volume, although every point is read.
+    /// Indices of the points read, K, in the order in which they are read. With [`Handles::All`](crate::handles::Handles::All) these are those of
+    /// maximum volume, although every point is read; for a very large model they are its sample, and no other point is read.
     pub fn handles(&self) -> &[u32] {
         &self.handles
     }

@@ -1,7 +1,7 @@
 //! Sub-spectral regularisation (Thiery, Tierny and Boubekeur 2012, §5) and the baselines it is compared with.
 //!
 //! A [`Term`] is a quadratic penalty on the cage, applied only to the singular directions with the smallest singular values. With `A = U Σ Vᵀ`
-//! and `C = V q` every method here is a matrix `T` in `q = T (Uᵀ H)`.
+//! and `C = V q` every method here is a matrix `T` in `q = T (Uᵀ H)`, to which a term with a reference cage adds a linear function of that cage.
 
 mod differential;
 mod laplacian;
@@ -86,7 +86,8 @@ impl Regularizer {
         matches!(self, Self::Laplacian | Self::Differential | Self::Temporal | Self::Matrix)
     }
 
-    /// Its term; `None` where it is custom. The baselines without one apply the Laplacian to directions that no point determines.
+    /// Its term; `None` where it is custom. [`Self::None`] applies the Laplacian only to directions that no point determines;
+    /// [`Self::TruncatedSvd`] and [`Self::Tikhonov`] do not use it.
     pub fn term(self) -> Option<&'static dyn Term> {
         match self {
             Self::Matrix => None,

@@ -69,7 +69,7 @@ fn sub_spectral(spectrum: &Spectrum<'_>, s: usize, weight: f64) -> Option<Spectr
     let delta_v = dense::product(spectrum.delta, spectrum.v);
     let (delta_low, delta_high) = (delta_v.as_ref().subcols(0, low), delta_v.as_ref().subcols(low, s));
     let mut system = dense::product(delta_high.transpose(), delta_high);
-    // Rounding level of a direction in the null space of Δ.
+    // Diagonal entry that rounding alone leaves for a direction in the null space of Δ.
     let rounding_level = weight * (1e-14 * spectrum.delta.norm_l2()).powi(2);
     let coupling = dense::product(delta_high.transpose(), delta_low);
     // The right-hand sides of the data, and after them those of the reference.

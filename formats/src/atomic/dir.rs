@@ -71,14 +71,12 @@ impl AtomicDir {
             // Where nobody adds to it any more.
             let free = check_free(&self.path, &aside.0, |name| self.replaced.contains(name));
             if let Err(error) = free {
-                fs::rename(&aside.0, target).map_err(failed)?;
+                names.give_back(&mut old, target).map_err(failed)?;
                 return Err(error);
             }
         }
         if let Err(cause) = fs::rename(&self.folder.0, target) {
-            if let Some(aside) = &old {
-                fs::rename(&aside.0, target).map_err(failed)?;
-            }
+            names.give_back(&mut old, target).map_err(failed)?;
             return Err(failed(cause));
         }
         drop(names);

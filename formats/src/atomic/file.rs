@@ -111,7 +111,12 @@ impl AtomicFile {
             return fs::rename(&temporary.0, &place.target);
         }
         // Where that fails it is removed, as its drop would do.
-        Ok(TempPath::try_from_path(&temporary.0)?.persist_noclobber(&place.target)?)
+        let Err(error) = TempPath::try_from_path(&temporary.0)?.persist_noclobber(&place.target) else { return Ok(()) };
+        if error.error.kind() == io::ErrorKind::AlreadyExists || place.target.exists() {
+            return Err(error.into());
+        }
+        // File systems without hard links, where nothing better than looking first can be had.
+        fs::rename(error.path.keep()?, &place.target)
     }
 
     fn give_back_name(&self, before: &Before) -> io::Result<()> {

@@ -43,6 +43,16 @@ impl Names {
         self.0.insert(path.clone());
         Ok((made, Temporary(path)))
     }
+
+    /// Gives what was moved aside its name back. Where that fails it stays under its temporary name, since it is the user's.
+    pub(super) fn give_back(&mut self, aside: &mut Option<Temporary>, target: &Path) -> io::Result<()> {
+        let Some(mut aside) = aside.take() else { return Ok(()) };
+        let path = std::mem::take(&mut aside.0);
+        std::mem::forget(aside);
+        self.0.remove(&path);
+        fs::rename(&path, target)
+            .map_err(|cause| io::Error::new(cause.kind(), format!("{cause}; what was there is in {}", path.display())))
+    }
 }
 
 /// A temporary file or folder, removed when dropped unless it has been renamed. Dropping takes the lock.

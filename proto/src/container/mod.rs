@@ -57,7 +57,8 @@ pub struct Header {
 impl Header {
     /// Bytes of the f32 positions of so many frames and of one connectivity: what a container is smaller than.
     pub fn capture_bytes(&self, frames: usize) -> u64 {
-        4 * self.rest_corners + 12 * self.points * frames as u64
+        let positions = self.points.saturating_mul(12).saturating_mul(frames as u64);
+        self.rest_corners.saturating_mul(4).saturating_add(positions)
     }
 }
 

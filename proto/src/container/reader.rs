@@ -323,6 +323,9 @@ impl<R: Read + Seek> ContainerReader<R> {
             self.entry(tag)?;
         }
         let most_faces = usize::from(self.header.rest_faces > 0);
+        if most_faces == 0 && self.header.rest_corners > 0 {
+            return Err(Error::corrupt(0, "the header counts corners of a model without faces".to_owned()));
+        }
         for (tag, least, most) in [
             (tag::REST_FACES, most_faces, most_faces),
             (tag::ELEMENTS, 0, 1),

@@ -79,7 +79,7 @@ pub struct FrameLog {
     durable: u64,
     /// The durable bytes since the last multiple of [`BLOCK_BYTES`]: the next append writes to the same block.
     tail: Vec<u8>,
-    /// Number of marks written so far; they alternate between two places.
+    /// Sequence number of the last mark, whose parity is its place; after reopening it starts from the parity alone.
     marks: u64,
     /// Set after an error that could not be undone; all further appends fail.
     poisoned: bool,

@@ -57,7 +57,7 @@ pub(super) fn recover(
     }
     if claimed < end || needs_rewrite {
         // These records may never have been synced, or their sync failed and would not be reported again. Writing them again makes them
-        // dirty, so that they can be synced; so with the first block, and the blocks that share a page with them.
+        // dirty, so that they can be synced. The same goes for the first block, and for the durable bytes in the same block as the first of them.
         let failed = |error| StoreError::of(path, "write", error);
         file.write_all_at(&block, 0).map_err(failed)?;
         let mut at = claimed - claimed % BLOCK_BYTES;

@@ -195,7 +195,7 @@ pub(super) struct Unknowns {
 
 impl Unknowns {
     /// Takes elements in preorder.
-    pub(super) fn new(elements: Vec<Element>, low_degree: usize) -> Self {
+    pub(super) fn new(elements: &[Element], low_degree: usize) -> Self {
         let mut order: Vec<usize> = (0..elements.len()).collect();
         order.sort_by_key(|&k| elements[k].depth);
         let mut preorder = vec![0; elements.len()];

@@ -156,7 +156,7 @@ fn refine(problem: &Problem<'_>) -> Result<Coordinates, CoordinatesError> {
     let most = ELEMENTS.max(2 * elements.len());
     let mut refinements = 0;
     loop {
-        let unknowns = Unknowns::new(elements, degree);
+        let unknowns = Unknowns::new(&elements, degree);
         let (mut found, steps, remainder) = solve_on(problem, &unknowns, None, true)?;
         let change = found.change.max(found.correction);
         let solution = |phi: Mat<f64>| {
@@ -186,7 +186,9 @@ fn follow(problem: &Problem<'_>, plan: &ElementPlan) -> Result<Coordinates, Coor
     let (unknowns, steps) = plan
         .read(&problem.corners, problem.layers.vertices().len())
         .map_err(|reason| CoordinatesError::BadPlan { system: NAME, reason })?;
-    let (found, ..) = solve_on(problem, &unknowns, Some(&steps), false)?;
+    // Whoever decodes cannot choose other coordinates: it is the plan that does not suit the cage.
+    let (found, ..) = solve_on(problem, &unknowns, Some(&steps), false)
+        .map_err(|_| CoordinatesError::BadPlan { system: NAME, reason: "its equations cannot be solved" })?;
     Ok(Coordinates { phi: found.phi, outside: Vec::new(), refinement: None, plan: Some(plan.clone()) })
 }
 
@@ -238,7 +240,7 @@ mod tests {
         let mut value = None;
         let kept = solve_for(&cage, &rest.points, |problem| {
             let elements = elements::elements(&problem.corners, &[]);
-            let unknowns = Unknowns::new(elements, 1);
+            let unknowns = Unknowns::new(&elements, 1);
             let found = solve_on(problem, &unknowns, None, true)?;
             value = Some(work(problem, &unknowns, found));
             Ok(Coordinates { phi: Mat::zeros(0, 0), outside: Vec::new(), refinement: None, plan: None })

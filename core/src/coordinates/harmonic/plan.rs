@@ -62,7 +62,7 @@ impl ElementPlan {
         for (face, &corners) in faces.iter().enumerate() {
             rest = divide(Element::face(face, corners), rest, &mut elements, most)?;
         }
-        let unknowns = Unknowns::new(elements, least);
+        let unknowns = Unknowns::new(&elements, least);
         let count = unknowns.elements.len();
         if rest.len() != vertices + (count * vertices).div_ceil(8) {
             return Err("it does not have as many faces and vertices as the cage");
@@ -104,7 +104,8 @@ fn divide<'a>(
         } else if (LEAST_DEGREE..=MAX_DEGREE).contains(&usize::from(byte)) {
             element.degree = usize::from(byte);
             // Cut until nothing is left.
-            if !(element.triangle.height() > 0.0) {
+            let has_area = element.triangle.height() > 0.0;
+            if !has_area {
                 return Err("it has an element without area");
             }
             elements.push(element);

@@ -35,10 +35,10 @@ pub(super) fn convert(decoder: &Decoder, first: usize, count: usize, out: &mut M
 pub(super) fn gram(decoder: &Decoder, rows: Option<&[u32]>, share: f64) -> Mat<f64> {
     let total = decoder.columns();
     let mut gram = Mat::<f64>::zeros(total, total);
-    let transposed_jacobian_product = rows.map(|rows| rows_of(decoder, rows));
+    let rows_read = rows.map(|rows| rows_of(decoder, rows));
     gram.as_mut().par_col_chunks_mut(TASK_COLUMNS).enumerate().for_each(|(task, mut columns)| {
         let (left, width) = (task * TASK_COLUMNS, columns.ncols());
-        if let Some(rows) = &transposed_jacobian_product {
+        if let Some(rows) = &rows_read {
             let some = rows.as_ref().subcols(left, width);
             faer::linalg::matmul::matmul(columns, Accum::Replace, rows.transpose(), some, share, Par::Seq);
             return;

@@ -5,8 +5,8 @@
 //! directions that the points hardly determine stay near C₀.
 //!
 //! Each step is solved by conjugate gradients, preconditioned by the inverse of `(v/K) Φ_vᵀΦ_v + λ ΔᵀΔ`. A step that does not lower E is halved a few
-//! times and then skipped, so that E never exceeds its value at C₀. All frames of a batch share the products with `G = (v/K) ΦᵀΦ`; the result of a
-//! frame does not depend on the other frames.
+//! times; if it still does not, it is not taken and the iteration ends, so that E never exceeds its value at C₀. All frames of a batch share the
+//! products with `G = (v/K) ΦᵀΦ`; the result of a frame does not depend on the other frames.
 
 mod gram_matrix;
 mod state;
@@ -28,7 +28,7 @@ const MAX_CG_ITERATIONS: usize = 8;
 const CG_TOLERANCE: f64 = 1e-4;
 /// A step that lowers E by less than this fraction is the last.
 const TOLERANCE: f64 = 1e-3;
-/// Maximum number of times a step is tried, halved each time.
+/// Maximum number of lengths at which a step is tried, each half of the one before.
 const MAX_STEP_TRIALS: usize = 4;
 /// Below this fraction of the squared positions, E is at rounding level.
 const ROUNDING: f64 = 1e-14;
@@ -236,13 +236,13 @@ impl Consistent {
                     .then(|| state::ConjugateGradients::new(tied, frame, &self.regularization_gradient(frame)))
             })
             .collect();
-        for gradient in 0..MAX_CG_ITERATIONS {
+        for iteration in 0..MAX_CG_ITERATIONS {
             let residuals: Vec<Vec<Point>> =
                 searches.iter().map(|s| active(s).map_or(Vec::new(), state::ConjugateGradients::residual)).collect();
             let preconditioned = state::products(self.preconditioner.as_ref(), &residuals, |x| x as f32, f64::from);
             for (search, preconditioned) in searches.iter_mut().zip(preconditioned) {
                 if let Some(search) = search {
-                    search.update_direction(&preconditioned, gradient == 0, CG_TOLERANCE);
+                    search.update_direction(&preconditioned, iteration == 0, CG_TOLERANCE);
                 }
             }
             if searches.iter().flatten().all(state::ConjugateGradients::is_done) {
@@ -344,7 +344,7 @@ impl Consistent {
     }
 }
 
-/// The iteration, unless it has ended.
+/// The conjugate gradients of a frame, unless they have ended.
 fn active(search: &Option<state::ConjugateGradients>) -> Option<&state::ConjugateGradients> {
     search.as_ref().filter(|search| !search.is_done())
 }
@@ -354,7 +354,7 @@ fn single(n: usize, entry: &dyn Fn(usize, usize) -> f64) -> Mat<f32> {
     Mat::from_fn(n.next_multiple_of(dense::TILE_ROWS), n, |i, j| if i < n { entry(i, j) as f32 } else { 0.0 })
 }
 
-/// Neighbours of each vertex of a closed mesh: along every edge, one of its two faces runs away from the vertex.
+/// Neighbours of each vertex of a closed mesh, each once: the two faces of an edge run along it in opposite directions.
 fn neighbours(tied: &TiedNormals, vertices: usize) -> Vec<Vec<u32>> {
     let mut neighbours = vec![Vec::new(); vertices];
     for &[a, b, c] in tied.faces() {

@@ -119,7 +119,7 @@ impl ConjugateGradients {
         if first {
             self.first_size = size;
         }
-        // Written so that it holds for NaN.
+        // Negated, so that NaN ends the iteration as well.
         if !(size > tolerance * self.first_size || (first && size > 0.0)) {
             self.done = true;
             return;
