@@ -93,7 +93,7 @@ fn the_report_is_one_well_formed_file_that_refers_to_no_other(dir: &Dir, html: &
     for reference in ["http:", "https:", "url(", "@import", "file:", "javascript:"] {
         assert!(!html.contains(reference), "{reference}");
     }
-    assert!(numbers_are_finite(html), "a number that is none");
+    assert!(numbers_are_finite(html), "NaN or infinity in the page");
     // Links within the page lead somewhere.
     for link in html.split("href=\"#").skip(1).filter_map(|rest| rest.split('"').next()) {
         assert!(html.contains(&format!("id=\"{link}\"")), "{link}");

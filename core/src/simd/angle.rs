@@ -1,6 +1,7 @@
 //! The arc tangent of eight pairs at once.
 
 use super::Lanes;
+use super::lanes::polynomial;
 
 /// Coefficients of `atan(x)/x` in `x²` on `|x| ≤ tan(π/8)`: a Chebyshev fit with an error below 2e-18.
 const ATAN: [f64; 12] = [
@@ -28,15 +29,7 @@ pub(crate) fn angle(s: Lanes, c: Lanes) -> Lanes {
     let folded = small.zip(big, |a, b| if a > TAN_PI_8 * b { 1.0 } else { 0.0 });
     let x = (small - folded * big) / (big + folded * small);
     let z = x * x;
-    // Estrin's scheme: four short chains instead of one of eleven dependent steps.
-    let pair = |k: usize| z * ATAN[k + 1] + ATAN[k];
-    let z2 = z * z;
-    let z4 = z2 * z2;
-    let low = pair(0) + pair(2) * z2;
-    let mid = pair(4) + pair(6) * z2;
-    let high = pair(8) + pair(10) * z2;
-    let series = low + (mid + high * z4) * z4;
-    let octant = x * series + folded * std::f64::consts::FRAC_PI_4;
+    let octant = x * polynomial(&ATAN, z) + folded * std::f64::consts::FRAC_PI_4;
     let swapped = s.zip(size, |a, b| if a > b { 1.0 } else { 0.0 });
     let quadrant = octant * (swapped * -2.0 + 1.0) + swapped * std::f64::consts::FRAC_PI_2;
     quadrant.zip(c, |q, c| if c < 0.0 { std::f64::consts::PI - q } else { q })

@@ -82,3 +82,15 @@ pub(crate) fn dot(a: &[Lanes; 3], b: &[Lanes; 3]) -> Lanes {
 pub(crate) fn cross(a: &[Lanes; 3], b: &[Lanes; 3]) -> [Lanes; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
+
+/// `Σ cₖ zᵏ` by Estrin's scheme: four short chains instead of one of eleven dependent steps.
+#[inline(always)]
+pub(super) fn polynomial(c: &[f64; 12], z: Lanes) -> Lanes {
+    let pair = |k: usize| z * c[k + 1] + c[k];
+    let z2 = z * z;
+    let z4 = z2 * z2;
+    let low = pair(0) + pair(2) * z2;
+    let mid = pair(4) + pair(6) * z2;
+    let high = pair(8) + pair(10) * z2;
+    low + (mid + high * z4) * z4
+}

@@ -1,5 +1,6 @@
 //! The logarithm of eight ratios at once.
 
+use super::lanes::polynomial;
 use super::{LANES, Lanes};
 
 /// Coefficients of `atanh(x)/x` in `x²`: on `|x| ≤ 1/5` the first term left out is below 1e-18.
@@ -37,14 +38,7 @@ pub(crate) fn ln_ratio(a: Lanes, b: Lanes, near: Lanes) -> Lanes {
         x.0[l] = if whole.0[l] == 0.0 { near.0[l] } else { far.0[l] };
     }
     let z = x * x;
-    let pair = |k: usize| z * ATANH[k + 1] + ATANH[k];
-    let z2 = z * z;
-    let z4 = z2 * z2;
-    let low = pair(0) + pair(2) * z2;
-    let mid = pair(4) + pair(6) * z2;
-    let high = pair(8) + pair(10) * z2;
-    let series = low + (mid + high * z4) * z4;
-    x * series * 2.0 + whole * std::f64::consts::LN_2
+    x * polynomial(&ATANH, z) * 2.0 + whole * std::f64::consts::LN_2
 }
 
 #[cfg(test)]
