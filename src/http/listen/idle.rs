@@ -1,5 +1,6 @@
 //! Idle connections, in the order in which they are closed when slots run out: first those that never sent a request, then those between
-//! two requests, unless the last one has just ended; in each group the longest idle first.
+//! two requests, unless the last one has just ended; in each group the longest idle first. One that was just accepted comes last: its request may
+//! be on its way.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -9,6 +10,8 @@ use tokio_util::sync::CancellationToken;
 
 /// How long after a request a connection is not displaced.
 const BETWEEN_REQUESTS: Duration = Duration::from_secs(1);
+/// How long a connection has for its first request before it comes first.
+const FIRST_REQUEST: Duration = Duration::from_millis(500);
 
 /// Connections without a request in progress, in the order in which they are displaced.
 #[derive(Default)]
@@ -46,13 +49,15 @@ impl IdleConnections {
     /// Closes the first connection of the list; false if none may be closed.
     pub(super) fn displace(&self) -> bool {
         let mut list = self.lock();
-        let Some(first) = list.connections.first_entry() else { return false };
-        let ((has_asked, _), (since, _)) = (*first.key(), first.get());
-        if has_asked && since.elapsed() < BETWEEN_REQUESTS {
-            return false;
-        }
-        first.remove().1.cancel();
-        true
+        let of_kind = |has_asked: bool, grace: Duration| {
+            let (&key, (since, _)) = list.connections.range((has_asked, 0)..=(has_asked, u64::MAX)).next()?;
+            (since.elapsed() >= grace).then_some(key)
+        };
+        let first = of_kind(false, FIRST_REQUEST)
+            .or_else(|| of_kind(true, BETWEEN_REQUESTS))
+            .or_else(|| of_kind(false, Duration::ZERO));
+        let displaced = first.and_then(|key| list.connections.remove(&key));
+        displaced.inspect(|(_, token)| token.cancel()).is_some()
     }
 }
 
@@ -82,5 +87,29 @@ impl IdleEntry {
 impl Drop for IdleEntry {
     fn drop(&mut self) {
         self.work();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn a_connection_just_accepted_is_displaced_last() {
+        let list = Arc::new(IdleConnections::default());
+        let asked = list.enter();
+        asked.work();
+        asked.wait(true);
+        let silent = list.enter();
+        tokio::time::sleep(BETWEEN_REQUESTS).await;
+        let fresh = list.enter();
+        let gone = || [&silent, &asked, &fresh].map(|entry| entry.displaced.is_cancelled());
+        assert!(list.displace());
+        assert_eq!(gone(), [true, false, false]);
+        assert!(list.displace());
+        assert_eq!(gone(), [true, true, false]);
+        assert!(list.displace());
+        assert_eq!(gone(), [true; 3]);
+        assert!(!list.displace());
     }
 }
