@@ -1,5 +1,6 @@
 //! Writes solved frames to a container and computes the report; shared by `encode` and the service, so that both produce the same bytes.
 
+use cager_codec::CodedMesh;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, DEFINITION};
 use cager_core::inversion::{Solver, SolverOptions};
@@ -7,7 +8,7 @@ use cager_core::mesh::Model;
 use cager_core::regularize::{Regularizer, WEAK_SINGULAR_VALUE};
 use cager_proto::container::{self, ContainerWriter, Header, counted_from_zero};
 
-use cager_proto::report::{ConditionNumber, FrameError, MaxVol, Report};
+use cager_proto::report::{Coding, ConditionNumber, FrameError, MaxVol, Report};
 use std::io::Write;
 
 /// What containers and reports say they were written by.
@@ -71,7 +72,21 @@ impl<W: Write> CaptureWriter<W> {
     /// # Errors
     /// An output that refuses; sizes beyond the format.
     pub fn new(out: W, encoding: &Encoding<'_>) -> Result<Self, container::Error> {
-        let mut writer = ContainerWriter::new(out, &header(encoding), encoding.rest, encoding.cage.mesh())?;
+        Self::with_meshes(out, encoding, None)
+    }
+
+    /// The same with the rest pose and the cage in the bytes of a codec.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_meshes(
+        out: W,
+        encoding: &Encoding<'_>,
+        coded: Option<(&CodedMesh, &CodedMesh)>,
+    ) -> Result<Self, container::Error> {
+        let (rest, cage) = coded.unzip();
+        let meshes = ((encoding.rest, rest), (encoding.cage.mesh(), cage));
+        let mut writer = ContainerWriter::with_meshes(out, &header(encoding), meshes.0, meshes.1)?;
         if let Some(plan) = &encoding.solver.preparation().plan {
             writer.add_elements(plan.as_bytes())?;
         }
@@ -96,11 +111,49 @@ impl<W: Write> CaptureWriter<W> {
         if extent > self.farthest.1 {
             self.farthest = (self.report.frames, extent);
         }
+        self.add_error(error);
+        self.writer.write_frame(cage, error.l2, error.linf)
+    }
+
+    /// Adds the next frames as coded bytes, their errors, and which of their cages lies farthest from the origin, and how far.
+    ///
+    /// # Errors
+    /// An output that refuses.
+    pub fn write_group(
+        &mut self,
+        cages: &[u8],
+        residual: Option<&[u8]>,
+        errors: &[StoredError],
+        (frame, extent): (usize, f64),
+    ) -> Result<(), container::Error> {
+        if extent > self.farthest.1 {
+            self.farthest = (self.report.frames + frame, extent);
+        }
+        errors.iter().for_each(|error| self.add_error(error));
+        let errors: Vec<(f32, f32)> = errors.iter().map(|error| (error.l2, error.linf)).collect();
+        self.writer.write_group(cages, residual, &errors)
+    }
+
+    fn add_error(&mut self, error: &StoredError) {
         self.squared += error.squared;
         self.spread += error.spread;
         self.report.error.per_frame.push(FrameError { l2: f64::from(error.l2), linf: f64::from(error.linf) });
         self.report.frames += 1;
-        self.writer.write_frame(cage, error.l2, error.linf)
+    }
+
+    /// Frames written so far.
+    pub fn frames(&self) -> usize {
+        self.report.frames
+    }
+
+    /// Bytes written so far.
+    pub fn bytes(&self) -> u64 {
+        self.writer.bytes()
+    }
+
+    /// Says how the frames were coded.
+    pub fn set_coding(&mut self, coding: Coding) {
+        self.report.coding = Some(coding);
     }
 
     /// Writes what comes after the frames. Sizes, times and the worst point of the report are left to the caller.

@@ -1,10 +1,10 @@
 //! Decodes containers to positions.
 
-use crate::coordinates;
 use crate::edited::EditedCages;
 use crate::memory::Memory;
 use crate::timing::Timing;
 use cager_core::cage::{Cage, CageError};
+use cager_core::coordinates;
 use cager_core::coordinates::{CoordinatesError, ElementPlan, supports_definition};
 use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, PrepareError, coordinates_fit, reject_far_points};
@@ -103,6 +103,26 @@ pub type Container = ContainerReader<BufReader<File>>;
 /// # Errors
 /// A file that cannot be read or is no container; the path is named.
 pub fn open(path: &Path) -> Result<Container, DecodeError> {
+    open_with(path, ContainerReader::open)
+}
+
+/// Opens what is there of a container that was damaged or cut.
+///
+/// # Errors
+/// As [`open`]; a file without a whole model and cage.
+pub fn open_cut(path: &Path) -> Result<Container, DecodeError> {
+    match open(path) {
+        Err(DecodeError::Container { cause: container::Error::Corrupt { .. }, .. }) => {
+            open_with(path, ContainerReader::open_cut)
+        }
+        opened => opened,
+    }
+}
+
+fn open_with(
+    path: &Path,
+    read: impl FnOnce(BufReader<File>) -> Result<Container, container::Error>,
+) -> Result<Container, DecodeError> {
     let fail = |cause| DecodeError::container(path, cause);
     // Opening a pipe would block until another process writes to it.
     if std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
@@ -112,7 +132,7 @@ pub fn open(path: &Path) -> Result<Container, DecodeError> {
     if file.metadata().is_ok_and(|m| m.is_dir()) {
         return Err(fail(container::Error::NotAContainer));
     }
-    ContainerReader::open(BufReader::new(file)).map_err(fail)
+    read(BufReader::new(file)).map_err(fail)
 }
 
 /// What to decode, if not all frames of the container with its own model and cages.
@@ -130,10 +150,24 @@ pub struct Decoding<'a> {
     pub dry_run: bool,
     /// Memory limit; by default half of the free memory.
     pub memory: Option<Memory>,
+    /// How much of the file is decoded.
+    pub layer: Layer,
+    /// Whether frames that are damaged, or missing from the end of a file that was cut, are left out instead of refused.
+    pub salvage: bool,
+}
+
+/// How much of a coded file is decoded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Layer {
+    /// What the cages say alone.
+    Cages,
+    /// Everything that is there.
+    #[default]
+    All,
 }
 
 /// Result of [`decode`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Decoded {
     /// Points of every frame.
     pub points: usize,
@@ -141,6 +175,8 @@ pub struct Decoded {
     pub frames: usize,
     /// Points of another model that lie outside the rest cage.
     pub outside: usize,
+    /// Frames of the file that were left out because they are damaged, from 0.
+    pub damaged: Vec<usize>,
 }
 
 /// A model in its rest pose with its decoder, and the number of its points outside the rest cage.
@@ -250,16 +286,29 @@ pub fn decode(
     progress: &mut dyn FnMut(usize),
 ) -> Result<Decoded, DecodeError> {
     let fail = |cause| DecodeError::container(input, cause);
-    let mut container = open(input)?;
-    let Decoding { model, cages: mut edited, range, timing, dry_run, memory } = what;
+    let Decoding { model, cages: mut edited, range, timing, dry_run, memory, layer, salvage } = what;
+    let mut container = if salvage { open_cut(input) } else { open(input) }?;
+    // The residual is of the file's own model and cages.
+    let own = model.is_none() && edited.is_none();
     let memory = memory.unwrap_or_else(Memory::half_of_free);
     let there = edited.as_ref().map_or(container.frames(), EditedCages::frames);
     range.map_or(Ok(()), |range| range.check(there, input))?;
     let taken = range.unwrap_or(FrameRange::all(there));
-    let frames = if there == 0 { 0 } else { taken.count() };
-    let options = frame_options(&mut container, there, taken, timing).map_err(fail)?;
-    // Decoding does not need it, but a damaged file is refused wherever the damage is.
-    container.report().map_err(fail)?;
+    let mut wanted: Vec<usize> =
+        if there == 0 { Vec::new() } else { (0..taken.count()).map(|k| taken.frame(k)).collect() };
+    let mut options = frame_options(&mut container, there, taken, timing).map_err(fail)?;
+    let mut damaged = Vec::new();
+    if salvage && edited.is_none() {
+        damaged = wanted.clone();
+        damaged.retain(|&frame| !container.is_intact(frame, own && layer == Layer::All));
+        let mut at = wanted.iter();
+        options.numbers.retain(|_| at.next().is_none_or(|frame| !damaged.contains(frame)));
+        wanted.retain(|frame| !damaged.contains(frame));
+    } else {
+        // Decoding does not need it, but a damaged file is refused wherever the damage is.
+        container.report().map_err(fail)?;
+    }
+    let frames = wanted.len();
     let batch = |points: usize| memory.frames(12 * points, BATCH);
     let keeps = |points: usize, columns: usize| memory.keeps(points, columns, frames.div_ceil(batch(points)));
     let BoundModel { rest, decoder, outside } = bind(&mut container, input, model, keeps)?;
@@ -272,7 +321,7 @@ pub fn decode(
     while first < frames {
         let count = batch.min(frames - first);
         for (k, cage) in cages[..count].iter_mut().enumerate() {
-            let frame = taken.frame(first + k);
+            let frame = wanted[first + k];
             match &mut edited {
                 Some(edited) => edited.read_frame(frame, cage)?,
                 None => container.read_frame(frame, cage).map_err(fail)?,
@@ -281,6 +330,9 @@ pub fn decode(
         if !dry_run {
             let views: Vec<&[f32]> = cages[..count].iter().map(Vec::as_slice).collect();
             decoder.decode(&views, &mut positions[..count]);
+            if own && layer == Layer::All {
+                container.add_residual(&wanted[first..first + count], &mut positions[..count]).map_err(fail)?;
+            }
             for frame in &positions[..count] {
                 writer.write_frame(frame)?;
             }
@@ -291,5 +343,5 @@ pub fn decode(
     if !dry_run {
         writer.finish()?;
     }
-    Ok(Decoded { points: rest.points.len(), frames, outside })
+    Ok(Decoded { points: rest.points.len(), frames, outside, damaged })
 }

@@ -38,6 +38,8 @@ pub fn edit(
     let refused = |cause: container::Error| written(output.path(), cause);
     let (rest, cage) = (container.rest().map_err(fail)?, container.cage().map_err(fail)?);
     let report = container.report().map_err(fail)?;
+    // The residual belongs to the cages as they were; without it the errors are others.
+    let loses = container.has_residual();
     let file = BufWriter::with_capacity(1 << 20, AtomicFile::create(output)?);
     let mut writer = ContainerWriter::new(file, container.header(), &rest, &cage).map_err(refused)?;
     if let Some(elements) = container.elements().map_err(fail)? {
@@ -50,7 +52,7 @@ pub fn edit(
         let mut error = (f32::NAN, f32::NAN);
         if frame < container.frames() {
             container.read_frame(frame, &mut old).map_err(fail)?;
-            if old == new {
+            if old == new && !loses {
                 let known = report.error.per_frame[frame];
                 error = (known.l2 as f32, known.linf as f32);
             }
@@ -59,11 +61,12 @@ pub fn edit(
         writer.write_frame(&new, error.0, error.1).map_err(refused)?;
         progress(frame + 1);
     }
-    let same = changed == 0 && frames == container.frames();
+    let same = changed == 0 && frames == container.frames() && !loses;
     if frames == container.frames() {
         writer.add_frame_numbers(&container.frame_numbers().map_err(fail)?).map_err(refused)?;
     }
-    let report = if same { report } else { after_editing(report) };
+    // Cages are stored as they are.
+    let report = Report { coding: None, ..if same { report } else { after_editing(report) } };
     let buffered = writer.finish(Some(&report)).map_err(refused)?;
     let mut container = buffered.into_inner().map_err(|error| refused(error.into_error().into()))?;
     container.complete()?;

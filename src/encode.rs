@@ -1,18 +1,20 @@
 //! Encoding: solves one cage per frame and measures the errors that a decoder will produce.
 
 use crate::capture::{CaptureWriter, Encoding, StoredError};
+use crate::coding::{CodedGroup, CodingError, Goal, GroupCoder, RestMeshes, Room};
 use crate::memory::Memory;
+use cager_codec::{CageBasis, MOST_ROWS};
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::decode::FrameError;
 use cager_core::inversion::{Analysis, BATCH, Convergence, PrepareError, Preparing, Solver, SolverOptions};
-use cager_core::mesh::Model;
+use cager_core::mesh::{Model, diagonal};
 use cager_core::regularize::Term;
 use cager_formats::{Action, AtomicFile, FrameReader, Target};
 use cager_proto::container;
-use cager_proto::report::{Consistency, Report, Seconds, SpectrumChoice, WorstError};
+use cager_proto::report::{Coding, Consistency, Report, Seconds, SpectrumChoice, WorstError};
 use rayon::prelude::*;
-use std::io::BufWriter;
+use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -30,6 +32,9 @@ pub enum EncodeError {
     /// The frames could not be read, or the output not be created.
     #[error(transparent)]
     Formats(#[from] cager_formats::Error),
+    /// The frames cannot be coded as asked for.
+    #[error(transparent)]
+    Coding(#[from] CodingError),
     /// The frames end before they should.
     #[error("ends after {found} frames where {announced} are announced; get the capture again")]
     EndsEarly {
@@ -82,6 +87,10 @@ pub struct Job<'a> {
     pub choose: Option<ChooseSpectrum>,
     /// What the encoding may hold in memory.
     pub memory: Memory,
+    /// What the file is to meet; without it frames are stored as they are solved for.
+    pub goal: Option<Goal>,
+    /// Whether the rest pose and the cage are stored as they are also where a goal would allow less.
+    pub exact_rest: bool,
 }
 
 /// How to select a spectrum threshold.
@@ -149,10 +158,25 @@ pub enum EncodeProgress {
 /// See [`EncodeError`].
 pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded, EncodeError> {
     let clock = Instant::now();
-    let fail = |cause| EncodeError::container(job.output.path(), cause);
+    let path = job.output.path();
+    let fail = |cause| EncodeError::container(path, cause);
+    let explain = |error| match error {
+        GroupError::Coding(error) => EncodeError::Coding(error),
+        GroupError::Container(cause) => fail(cause),
+    };
     // First, so that an unwritable output fails before the work.
     let file = AtomicFile::create(job.output)?;
+    let meshes =
+        job.goal.filter(|_| !job.exact_rest).and_then(|goal| RestMeshes::new(goal, job.rest, job.cage, job.system));
+    let (given, stored) =
+        (diagonal(&job.rest.points), meshes.as_ref().map(|meshes| diagonal(&meshes.rest.mesh.points)));
+    // A bound holds in the unit of the rest pose that was given, and in that of the one that is stored.
+    let unit = stored.map_or(given, |stored| stored.min(given));
+    let (rest, cage) = meshes.as_ref().map_or((job.rest, job.cage), |meshes| (&meshes.rest.mesh, &meshes.checked));
+    let Job { frames, output, system, options, term, choose, memory, goal, exact_rest, .. } = job;
+    let job = Job { rest, cage, frames: &mut *frames, output, system, options, term, choose, memory, goal, exact_rest };
     let (solver, options, choice) = prepare(&job, &|step| progress(EncodeProgress::Preparing(step)))?;
+    let basis = job.goal.map(|_| basis(&job, &solver)).transpose()?;
     let encoding = Encoding {
         rest: job.rest,
         cage: job.cage,
@@ -161,7 +185,23 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
         solver: &solver,
         frame_rate: job.frames.frame_rate(),
     };
-    let mut writer = CaptureWriter::new(BufWriter::with_capacity(1 << 20, file), &encoding).map_err(fail)?;
+    let coded = meshes.as_ref().map(|meshes| (&meshes.rest, &meshes.cage));
+    let out = BufWriter::with_capacity(1 << 20, file);
+    let mut writer = CaptureWriter::with_meshes(out, &encoding, coded).map_err(fail)?;
+    let group_frames = container::group_frames(job.rest.points.len(), solver.decoder().unknowns());
+    // A group is held as captured, as cages leave it, and decoded.
+    let group_frames = job.memory.frames(48 * job.rest.points.len(), group_frames);
+    let mut coder = job.goal.zip(basis.as_ref()).map(|(goal, basis)| {
+        let room = match goal {
+            Goal::Size(bytes) => {
+                let frames = job.frames.frames();
+                let other = writer.bytes() + AROUND + 8 * frames as u64;
+                Some(Room { bytes: bytes.saturating_sub(other), frames, other })
+            }
+            _ => None,
+        };
+        GroupCoder::new(goal, job.rest, unit, basis, solver.decoder(), group_frames, room)
+    });
     writer.number_frames((0..job.frames.frames()).map(|frame| job.frames.number(frame)).collect());
     let found = solver.preparation();
     let mut seconds = Seconds {
@@ -191,14 +231,28 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
             }
             let solved: Vec<SolvedBatch> = if solver.follows_previous() {
                 let in_order = waiting.iter().map(|batch| {
-                    let solved = solve(&solver, batch, previous.as_deref());
+                    let solved = solve(&solver, batch, previous.as_deref(), coder.is_none());
                     previous = solved.cages.last().cloned();
                     solved
                 });
                 in_order.collect()
             } else {
-                waiting.par_iter().map(|batch| solve(&solver, batch, None)).collect()
+                waiting.par_iter().map(|batch| solve(&solver, batch, None, coder.is_none())).collect()
             };
+            if let Some(coder) = &mut coder {
+                for (batch, solved) in waiting.into_iter().zip(solved) {
+                    seconds.invert += solved.invert_seconds;
+                    convergence.extend(solved.convergence);
+                    for (frame, cage) in batch.into_iter().zip(solved.cages) {
+                        if coder.push(frame, cage) {
+                            close(coder, &mut writer, &mut worst, &mut seconds, solver.diagonal()).map_err(&explain)?;
+                        }
+                        done += 1;
+                    }
+                }
+                progress(EncodeProgress::Frames(done));
+                continue;
+            }
             for batch in waiting {
                 // The reader may have stopped already.
                 let _ = empty.send(batch);
@@ -221,9 +275,18 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
         }
         let outcome = reader.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
         seconds.read += outcome?;
+        if let Some(coder) = coder.as_mut().filter(|coder| !coder.is_empty()) {
+            close(coder, &mut writer, &mut worst, &mut seconds, solver.diagonal()).map_err(&explain)?;
+        }
         Ok(())
     })?;
 
+    if let Some(steps) = coder.as_ref().and_then(GroupCoder::steps) {
+        let max_error = job.goal.and_then(|goal| if let Goal::MaxError(error) = goal { Some(error) } else { None });
+        let (cage_step, residual_step) =
+            (steps.cage / solver.diagonal(), steps.residual.map(|s| s / solver.diagonal()));
+        writer.set_coding(Coding { max_error, cage_step, residual_step, group_frames });
+    }
     let clock_write = Instant::now();
     let (buffered, mut report) = writer.finish().map_err(fail)?;
     report.spectrum_choice = choice;
@@ -231,9 +294,59 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
     report.error.worst = worst;
     let mut container = buffered.into_inner().map_err(|e| fail(container::Error::from(e.into_error())))?;
     report.set_output(container.complete()?);
+    if let Some(Goal::Size(asked)) = job.goal
+        && report.bytes.output > asked
+    {
+        return Err(CodingError::TooSmall { asked, least: report.bytes.output }.into());
+    }
     seconds.write += clock_write.elapsed().as_secs_f64();
     report.seconds = Seconds { total: clock.elapsed().as_secs_f64(), ..seconds };
     Ok(Encoded { report, container })
+}
+
+/// Bytes of a file after its frames but for eight of each: the report and the table of contents, about.
+const AROUND: u64 = 1500;
+
+/// Codes a group and writes it.
+fn close<W: Write>(
+    coder: &mut GroupCoder<'_>,
+    writer: &mut CaptureWriter<W>,
+    worst: &mut Option<WorstError>,
+    seconds: &mut Seconds,
+    diagonal: f64,
+) -> Result<(), GroupError> {
+    let clock = Instant::now();
+    let CodedGroup { cages, residual, errors, farthest } = coder.close()?;
+    let before = writer.frames();
+    for (frame, error) in errors.iter().enumerate() {
+        if worst.is_none_or(|worst| error.linf > worst.distance) {
+            *worst = Some(WorstError { frame: before + frame, point: Some(error.worst), distance: error.linf });
+        }
+    }
+    seconds.measure += clock.elapsed().as_secs_f64();
+    let errors: Vec<StoredError> = errors.iter().map(|error| StoredError::new(error, diagonal)).collect();
+    Ok(writer.write_group(&cages, residual.as_deref(), &errors, farthest)?)
+}
+
+/// Why a group is not in the file.
+#[derive(Debug, thiserror::Error)]
+enum GroupError {
+    #[error(transparent)]
+    Coding(#[from] CodingError),
+    #[error(transparent)]
+    Container(#[from] container::Error),
+}
+
+/// The coordinates in which cages are coded.
+fn basis(job: &Job<'_>, solver: &Solver) -> Result<CageBasis, EncodeError> {
+    let rows = solver.decoder().unknowns();
+    if rows > MOST_ROWS {
+        return Err(CodingError::TooManyRows { rows, most: MOST_ROWS }.into());
+    }
+    let plan = solver.preparation().plan.as_ref();
+    CageBasis::of(job.system, job.cage, &job.rest.points, plan, None)
+        .map_err(PrepareError::from)?
+        .ok_or_else(|| CodingError::Uncountable { first: 0, last: 0 }.into())
 }
 
 /// The solver, its options, and how the spectrum threshold was selected.
@@ -322,8 +435,8 @@ struct SolvedBatch {
     measure_seconds: f64,
 }
 
-/// Solves a batch; `previous` is the cage of the frame before its first.
-fn solve(solver: &Solver, batch: &Batch, previous: Option<&[f32]>) -> SolvedBatch {
+/// Solves a batch; `previous` is the cage of the frame before its first, `measures` whether errors are measured on these cages.
+fn solve(solver: &Solver, batch: &Batch, previous: Option<&[f32]>, measures: bool) -> SolvedBatch {
     let frames: Vec<&[f64]> = batch.iter().map(Vec::as_slice).collect();
     let clock = Instant::now();
     let inverted = solver.invert_with_convergence(previous, &frames);
@@ -331,7 +444,7 @@ fn solve(solver: &Solver, batch: &Batch, previous: Option<&[f32]>) -> SolvedBatc
     let convergence = inverted.iter().filter_map(|inverted| inverted.convergence).collect();
     let cages: Vec<Vec<f32>> = inverted.into_iter().map(|inverted| inverted.cage).collect();
     let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
-    let errors = solver.decoder().measure(&views, &frames);
+    let errors = if measures { solver.decoder().measure(&views, &frames) } else { Vec::new() };
     let measure_seconds = clock.elapsed().as_secs_f64() - invert_seconds;
     SolvedBatch { cages, errors, convergence, invert_seconds, measure_seconds }
 }

@@ -70,6 +70,9 @@ pub struct Report {
     pub handle_indices: Vec<u32>,
     /// Errors of what a decoder of the written file gets back.
     pub error: Errors,
+    /// How frames were coded, where an error, a size or a quality was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coding: Option<Coding>,
     /// Sizes.
     pub bytes: Bytes,
     /// Times. Reading, inverting and measuring overlap, so `total` is less than the sum on several processors. Absent where they are all
@@ -128,15 +131,35 @@ impl Report {
             "bytes",
             "seconds",
         ];
+        // Of many bytes beside coded frames, and of little use without the cage they were found for.
+        const LONG: [&str; 2] = ["singular_values", "handle_indices"];
         let mut value = serde_json::to_value(self)?;
         if let Some(report) = value.as_object_mut() {
-            report.retain(|key, _| !ELSEWHERE.contains(&key.as_str()));
+            let short = self.coding.is_some();
+            let left_out = |key: &str| ELSEWHERE.contains(&key) || short && LONG.contains(&key);
+            report.retain(|key, _| !left_out(key));
         }
         if let Some(error) = value["error"].as_object_mut() {
             error.retain(|key, _| key != "worst" && key != "per_frame");
         }
         serde_json::to_vec(&value)
     }
+}
+
+/// How frames were coded. Steps are fractions of the diagonal.
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
+#[serde(default)]
+pub struct Coding {
+    /// Guaranteed: no point of any frame is farther from where it was captured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_error: Option<f64>,
+    /// Step of the cages: the root mean square over the points of what one coefficient moves the model.
+    pub cage_step: f64,
+    /// Step of the residual; absent where there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub residual_step: Option<f64>,
+    /// Most frames of a group.
+    pub group_frames: usize,
 }
 
 /// How a numerical solution for the coordinates was refined.

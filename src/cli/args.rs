@@ -2,11 +2,13 @@
 
 use super::cage_args::CageArgs;
 use super::checks::{CaptureArgs, CheckArgs, TimingArgs};
+use super::coding_args::{ErrorBound, Quality, TargetSize, Unit};
 use super::names;
 use super::outputs::OutputArgs;
 use super::transfer_args::{EditArgs, TransferArgs};
 use crate::compare::Up;
 use crate::config::{ServeFlags, bytes};
+use crate::decode::Layer;
 use crate::memory::Memory;
 use cager_cages::Style;
 use cager_core::coordinates::CoordinateSystem;
@@ -107,6 +109,9 @@ pub(crate) struct EncodeArgs {
     #[arg(long, value_name = "SIZE", value_parser = memory, hide_default_value = true)]
     pub(crate) memory: Option<Memory>,
 
+    #[command(flatten)]
+    pub(crate) coding: CodingArgs,
+
     /// Write sizes, errors per frame, spectrum and times as JSON.
     #[arg(long, value_name = "REPORT.json")]
     pub(crate) report: Option<PathBuf>,
@@ -131,8 +136,9 @@ pub(crate) struct DesignArgs {
     #[arg(long, value_name = "N", conflicts_with_all = ["cage", "mean_error"], value_parser = clap::value_parser!(u32).range(4..=1_500))]
     pub(crate) cage_vertices: Option<u32>,
 
-    /// Design the smallest cage whose mean L2 error is at most E, a fraction of the rest pose's diagonal.
-    #[arg(long, value_name = "E", conflicts_with = "cage", allow_negative_numbers = true)]
+    /// Without --cage, design the smallest cage whose mean L2 error is at most E, a fraction of the rest pose's diagonal; with one, write the
+    /// smallest file of which that holds.
+    #[arg(long, value_name = "E", allow_negative_numbers = true)]
     pub(crate) mean_error: Option<f64>,
 
     /// What the designed cage is for [default: free with mean value coordinates, editable with others].
@@ -146,6 +152,32 @@ pub(crate) struct DesignArgs {
     /// End the design with the best cage so far after so many seconds.
     #[arg(long, value_name = "S", conflicts_with = "cage", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) time_limit: Option<u32>,
+}
+
+/// How exactly and how small frames are stored. Without any of these, cages are stored as they are solved for.
+#[derive(Args, Debug)]
+pub(crate) struct CodingArgs {
+    /// Guarantee that no point of any frame is farther than E from where it was captured: a fraction of the rest pose's diagonal, such as
+    /// 0.001, or a length such as 0.2mm, with --unit.
+    #[arg(long, value_name = "E", allow_hyphen_values = true, conflicts_with_all = ["target_size", "quality", "mean_error"])]
+    pub(crate) max_error: Option<ErrorBound>,
+
+    /// Write at most so many bytes, such as 500KB, or so many bits for each point and frame, such as 0.5bpvf.
+    #[arg(long, value_name = "SIZE", allow_hyphen_values = true, conflicts_with_all = ["quality", "mean_error"])]
+    pub(crate) target_size: Option<TargetSize>,
+
+    /// preview: cages alone; standard: errors that are not seen; master: a guaranteed maximum error of 0.0001 of the rest pose's
+    /// diagonal.
+    #[arg(long, value_enum, value_name = "QUALITY", conflicts_with = "mean_error")]
+    pub(crate) quality: Option<Quality>,
+
+    /// What one unit of the capture's positions is, for lengths given to --max-error.
+    #[arg(long, value_enum, value_name = "UNIT", requires = "max_error")]
+    pub(crate) unit: Option<Unit>,
+
+    /// Store the rest pose and the cage as they are, not on a grid finer than the errors asked for.
+    #[arg(long)]
+    pub(crate) exact_rest: bool,
 }
 
 #[derive(Args)]
@@ -211,6 +243,14 @@ pub(crate) struct DecodeArgs {
     /// is free].
     #[arg(long, value_name = "SIZE", value_parser = memory, hide_default_value = true)]
     pub(crate) memory: Option<Memory>,
+
+    /// cages: what the cages say alone, fast and coarse; all: with the residual of files that have one.
+    #[arg(long, value_enum, value_name = "LAYER", default_value = "all", conflicts_with = "cages")]
+    pub(crate) layer: Layer,
+
+    /// Decode what can be of a file that is damaged or was cut: frames that cannot are left out and named.
+    #[arg(long, conflicts_with_all = ["cages", "with_cages"])]
+    pub(crate) salvage: bool,
 
     #[command(flatten)]
     pub(crate) transfer: TransferArgs,

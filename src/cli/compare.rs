@@ -7,9 +7,9 @@ use super::outputs::Outputs;
 use super::solver_options::{read_cage, with_input_name};
 use super::{human_bytes, plain, progress};
 use crate::compare::{CompareError, Figures, Job, Progress, compare, page, seconds};
-use crate::coordinates;
 use crate::frames::CaptureFiles;
 use anyhow::Result;
+use cager_core::coordinates;
 use cager_core::coordinates::CoordinateSystem;
 use cager_formats::{AtomicFile, commit_together, read_model};
 use indicatif::ProgressBar;
@@ -87,7 +87,7 @@ fn show(bar: &ProgressBar, step: &str, done: f64, expected: f64) {
 /// The systems asked for, each once; all where none is.
 fn systems(given: &[&'static dyn CoordinateSystem]) -> Vec<&'static dyn CoordinateSystem> {
     if given.is_empty() {
-        return coordinates::ALL.to_vec();
+        return coordinates::SYSTEMS.to_vec();
     }
     let mut systems: Vec<&'static dyn CoordinateSystem> = Vec::new();
     for &system in given {

@@ -18,7 +18,7 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     let dry_run = args.outputs.dry_run;
     let inputs = [Some(&args.input), transfer.with_cages.as_ref(), transfer.model.as_ref()];
     let output = Outputs::new(args.outputs, inputs.into_iter().flatten())?.frames(&args.output)?;
-    let container = decode::open(&args.input)?;
+    let container = if args.salvage { decode::open_cut(&args.input) } else { decode::open(&args.input) }?;
     let edited = transfer.with_cages.as_ref().map(|path| EditedCages::open(path, &container)).transpose()?;
     let model = transfer.model.as_ref().map(|path| read_model(path)).transpose()?;
     let there = edited.as_ref().map_or(container.frames(), EditedCages::frames);
@@ -56,6 +56,8 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
         timing: (&args.timing).into(),
         dry_run,
         memory: args.memory,
+        layer: args.layer,
+        salvage: args.salvage,
     };
     let bar = progress::PreparationBar::new("decoding", taken);
     let result = decode::decode(&args.input, &output, what, &mut |done| bar.done(done));
@@ -64,6 +66,13 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     // For the file's own model, encoding has warned already.
     if let (Some(path), true) = (&transfer.model, found.outside > 0) {
         warn(&[outside(path, found.outside, found.points)]);
+    }
+    if let [first, .., last] | [first @ last] = found.damaged[..] {
+        let count = grouped(found.damaged.len());
+        warn(&[format!(
+            "{}: {count} of frames {first} to {last} are damaged and left out; get the file again",
+            args.input.display()
+        )]);
     }
     if dry_run {
         return tell_dry_run(&output, &size(found.frames, found.points, "points"), &[]);

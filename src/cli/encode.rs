@@ -2,6 +2,7 @@
 
 use super::args::{EncodeArgs, SpectrumArg};
 use super::checks::{capture_files, check_cage, check_capture};
+use super::coding_args::goal;
 use super::dry_run::{read_files, size, tell_dry_run};
 use super::encode_summary::{summary, write_report};
 use super::outputs::Outputs;
@@ -31,6 +32,9 @@ pub(super) fn run(args: &EncodeArgs) -> Result<()> {
     let mut rest = read_model(&args.rest)?;
     let mut files = capture_files(&args.capture, &args.frames, &mut rest);
     files.range = args.frames_range;
+    refuse_coding_by_service(args)?;
+    // What is wrong with it is told before anything is computed.
+    goal(args, &rest, 1)?;
     let cage = args.cage.as_ref().map(|path| read_cage(path, args.flip_cage)).transpose()?;
     if args.capture.weld && args.server.is_some() {
         bail!("--weld: a service reads the rest pose as it is; give --server one without seams, or encode here");
@@ -49,6 +53,23 @@ pub(super) fn run(args: &EncodeArgs) -> Result<()> {
             encode_locally(args, &targets, &files, &rest, &cage, Some(report), clock)
         }
         (Some(address), cage) => encode_remote::run(args, &targets, address, files, &rest, cage.as_ref(), clock),
+    }
+}
+
+/// A service stores cages as they are solved for.
+fn refuse_coding_by_service(args: &EncodeArgs) -> Result<()> {
+    let coding = &args.coding;
+    let asked = [
+        ("--max-error", coding.max_error.is_some()),
+        ("--target-size", coding.target_size.is_some()),
+        ("--quality", coding.quality.is_some()),
+        ("--mean-error", args.design.mean_error.is_some() && args.cage.is_some()),
+    ];
+    match asked.into_iter().find(|(_, asked)| *asked && args.server.is_some()) {
+        Some((name, _)) => {
+            bail!("{name}: a service stores cages as they are solved for; leave --server out to encode here")
+        }
+        None => Ok(()),
     }
 }
 
@@ -159,6 +180,7 @@ fn encode_locally(
 
     let bar = progress::PreparationBar::new("encoding", frames.frames())
         .expecting(|| seconds_to_prepare(system, cage, rest.points.len()));
+    let announced = frames.frames();
     let job = Job {
         rest,
         cage,
@@ -169,6 +191,8 @@ fn encode_locally(
         term: matrix.as_ref().map(|matrix| matrix as &dyn Term),
         choose,
         memory,
+        goal: goal(args, rest, announced)?,
+        exact_rest: args.coding.exact_rest,
     };
     let result = encode::encode(job, &|told| match told {
         EncodeProgress::Preparing(step) => bar.preparing(step),

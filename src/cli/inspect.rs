@@ -81,10 +81,11 @@ fn as_text(name: &str, report: &Report, sections: &[Section]) -> Result<String> 
     if !report.generator.is_empty() {
         encoded(&mut out, report)?;
     }
-    writeln!(out, "  sections  {:<6}{:>8}{:>12}{:>12}", "tag", "number", "stored", "decoded")?;
+    writeln!(out, "  sections  {:<6}{:>8}{:>12}{:>12}{:>8}", "tag", "number", "stored", "decoded", "share")?;
     for s in sections {
         let (bytes, raw_bytes) = (human_bytes(s.bytes), human_bytes(s.raw_bytes));
-        writeln!(out, "            {:<6}{:>8}{bytes:>12}{raw_bytes:>12}", s.tag, s.count)?;
+        let share = 100.0 * s.bytes as f64 / report.bytes.output.max(1) as f64;
+        writeln!(out, "            {:<6}{:>8}{bytes:>12}{raw_bytes:>12}{share:>6.1} %", s.tag, s.count)?;
     }
     Ok(out)
 }
@@ -112,16 +113,27 @@ fn encoded(out: &mut String, report: &Report) -> Result<()> {
     } else {
         writeln!(out, "  error     {}", errors(e))?;
     }
-    let end = |value: Option<&f64>| value.copied().unwrap_or(0.0);
+    if let Some(coding) = &report.coding {
+        let percent = |x: f64| format!("{:.4} %", 100.0 * x);
+        let bound = coding.max_error.map_or_else(String::new, |error| {
+            format!("every point of every frame guaranteed within {} of the diagonal; ", percent(error))
+        });
+        let residual = coding.residual_step.map_or_else(String::new, |step| format!(", residual {}", percent(step)));
+        writeln!(
+            out,
+            "  coding    {bound}steps: cages {}{residual}; groups of up to {} frames",
+            percent(coding.cage_step),
+            coding.group_frames
+        )?;
+    }
+    let values = match report.singular_values[..] {
+        [first, .., last] => format!("{first:.4} … {last:.4e}, "),
+        _ => String::new(),
+    };
     writeln!(
         out,
-        "  spectrum  {:.4} … {:.4e}, rank {} of {}; condition {:.1} (all points {:.1})",
-        end(report.singular_values.first()),
-        end(report.singular_values.last()),
-        report.rank,
-        report.unknowns,
-        report.condition_number.handles,
-        report.condition_number.full
+        "  spectrum  {values}rank {} of {}; condition {:.1} (all points {:.1})",
+        report.rank, report.unknowns, report.condition_number.handles, report.condition_number.full
     )?;
     Ok(())
 }

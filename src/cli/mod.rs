@@ -4,6 +4,7 @@ mod args;
 mod cage;
 mod cage_args;
 mod checks;
+mod coding_args;
 mod compare;
 mod decode;
 mod demo;

@@ -1,8 +1,8 @@
 //! Values of options that are named as the library names them, each with its help.
 
-use crate::coordinates;
 use crate::design::style_by_name;
 use cager_cages::Style;
+use cager_core::coordinates;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::Handles;
 use cager_core::regularize::Regularizer;
@@ -92,7 +92,7 @@ mod tests {
     #[test]
     fn every_name_of_the_library_can_be_given_and_no_other() {
         let names = |names: &Names| names.iter().map(|&(name, _)| name).collect::<Vec<_>>();
-        assert_eq!(names(COORDINATES), coordinates::ALL.map(CoordinateSystem::name));
+        assert_eq!(names(COORDINATES), coordinates::SYSTEMS.map(CoordinateSystem::name));
         assert_eq!(names(HANDLES), Handles::NAMES);
         assert_eq!(names(REGULARIZERS), Regularizer::ALL.map(Regularizer::name));
         assert_eq!(names(STYLES), ALL_STYLES.map(style_name));

@@ -2,11 +2,11 @@
 
 use super::solver_cache::Prepared;
 use crate::capture::preparation_warnings;
-use crate::coordinates;
 use crate::problem::{self, ApiError};
 use crate::store::Content;
 use cager_cages::diagnosis::weld;
 use cager_core::cage::Cage;
+use cager_core::coordinates;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{Handles, PrepareError, Preparing, Solver, SolverOptions, check_options, default_spectrum};
 use cager_core::mesh::{Model, TriMesh};
@@ -49,7 +49,7 @@ impl Choices {
         }
         let name = options.coordinates.as_deref().unwrap_or("mvc");
         let Some(system) = coordinates::by_name(name) else {
-            let names = coordinates::ALL.map(CoordinateSystem::name).join(", ");
+            let names = coordinates::SYSTEMS.map(CoordinateSystem::name).join(", ");
             return refuse(format!("coordinates: {name:?} is not available; give one of {names}"));
         };
         let wanted = options.handles.as_deref().unwrap_or(Handles::default().name());

@@ -57,6 +57,8 @@ pub(crate) fn run_with(
         term: None,
         choose: None,
         memory: Memory::half_of_free(),
+        goal: None,
+        exact_rest: false,
     };
     let encoded = encode(job, &|_| {}).expect("an encoding");
     commit_together(vec![encoded.container]).expect("a container");

@@ -70,6 +70,8 @@ impl Reference {
             term: None,
             choose: None,
             memory: Memory::half_of_free(),
+            goal: None,
+            exact_rest: false,
         };
         let encoded = encode(job, &|_| {}).expect("an encoding");
         commit_together(vec![encoded.container]).expect("the container");

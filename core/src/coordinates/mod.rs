@@ -63,6 +63,14 @@ impl Refinement {
     }
 }
 
+/// Every coordinate system, the usual one first.
+pub const SYSTEMS: [&dyn CoordinateSystem; 4] = [&MeanValue, &Harmonic, &Green::Consistent, &Green::Free];
+
+/// The coordinate system with this name on the command line, in reports and in containers.
+pub fn by_name(name: &str) -> Option<&'static dyn CoordinateSystem> {
+    SYSTEMS.into_iter().find(|system| system.name() == name)
+}
+
 /// Computes the coordinates of points independently of each other.
 pub type PointwiseCoordinates = fn(&Cage, &[Point]) -> Coordinates;
 

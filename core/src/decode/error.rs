@@ -18,6 +18,31 @@ pub struct FrameError {
     pub spread: f64,
 }
 
+impl FrameError {
+    /// Of decoded positions, points × 3, against those of the capture.
+    ///
+    /// # Panics
+    /// Where there are not as many.
+    pub fn of_positions(decoded: &[f32], captured: &[f64]) -> Self {
+        assert_eq!(decoded.len(), captured.len(), "every point of the frame");
+        let centre: Point = std::array::from_fn(|k| captured.get(k).copied().unwrap_or_default());
+        let mut sums = Sums::default();
+        for (at, (a, b)) in decoded.chunks_exact(3).zip(captured.chunks_exact(3)).enumerate() {
+            let squared = (0..3).map(|k| (f64::from(a[k]) - b[k]).powi(2)).sum::<f64>();
+            sums.squared += squared;
+            if squared > sums.largest {
+                (sums.largest, sums.at) = (squared, at);
+            }
+            for k in 0..3 {
+                let x = b[k] - centre[k];
+                sums.first[k] += x;
+                sums.second += x * x;
+            }
+        }
+        sums.into_error(decoded.len() / 3)
+    }
+}
+
 /// Sums over the points of a block.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Sums {

@@ -3,6 +3,9 @@
 
 use super::{byte, mend, u64_at};
 use crate::Target;
+use cager_codec::{CageBasis, CodedMesh, Hierarchy, ResidualGroup, encode_cages, encode_residual};
+use cager_core::cage::Cage;
+use cager_core::coordinates::MeanValue;
 use cager_core::mesh::{Model, Polygons, TriMesh};
 use cager_proto::container::{ContainerReader, ContainerWriter, Header};
 use cager_proto::report::Report;
@@ -22,6 +25,7 @@ pub(super) const CONTAINER: Target = Target {
         "ERRS",
         "TOC_",
         "summ",
+        "resi",
         "note",
         "CGRE",
         "mvc",
@@ -70,7 +74,39 @@ fn seeds() -> Vec<Vec<u8>> {
     };
     let mut intact = file(3, true);
     intact[0] = 0;
-    vec![intact, file(3, true), file(0, false)]
+    vec![intact, file(3, true), file(0, false), coded(&header, &rest, &cage)]
+}
+
+/// A file of coded meshes, cages and residual.
+fn coded(header: &Header, rest: &Model, cage: &TriMesh) -> Vec<u8> {
+    let mut faces = Polygons::new();
+    cage.triangles.iter().for_each(|triangle| faces.push(triangle));
+    let coded_cage = CodedMesh::new(&Model { points: cage.vertices.clone(), faces }, 0.01).expect("a mesh");
+    let coded_rest = CodedMesh::new(rest, 0.01).expect("a mesh");
+    let mesh = TriMesh { vertices: coded_cage.mesh.points.clone(), triangles: coded_cage.mesh.faces.triangulated() };
+    let checked = Cage::new(mesh.clone()).expect("a cage");
+    let basis = CageBasis::of(&MeanValue, &checked, &coded_rest.mesh.points, None, None).expect("coordinates");
+    let basis = basis.expect("a basis");
+    let frames: Vec<Vec<f32>> =
+        (0..5u8).map(|k| (0..12u8).map(|i| f32::from(i) * 0.1 + f32::from(k) * 0.05).collect()).collect();
+    let views: Vec<&[f32]> = frames.iter().map(Vec::as_slice).collect();
+    let cages = encode_cages(&basis, &views, 0.01).expect("cages");
+    let captured: Vec<Vec<f64>> =
+        frames.iter().map(|frame| frame.iter().map(|&x| f64::from(x) + 0.1).collect()).collect();
+    let captured: Vec<&[f64]> = captured.iter().map(Vec::as_slice).collect();
+    let group =
+        ResidualGroup { captured: &captured, of_cages: &frames, step: 0.02, bound: Some(0.005), most_numbers: 1000 };
+    let hierarchy = Hierarchy::new(&coded_rest.mesh.faces, coded_rest.mesh.points.len());
+    let residual = encode_residual(&hierarchy, &group).expect("a residual");
+    let mut writer = ContainerWriter::with_meshes(
+        vec![1],
+        header,
+        (&coded_rest.mesh, Some(&coded_rest)),
+        (&mesh, Some(&coded_cage)),
+    )
+    .expect("a header");
+    writer.write_group(&cages, Some(&residual), &[(0.5, 1.5); 5]).expect("a group");
+    writer.finish(None).expect("a container")
 }
 
 fn run(mut bytes: &[u8]) {

@@ -10,6 +10,8 @@ pub(crate) const RAW: u8 = 0;
 pub(crate) const PLANES: u8 = 1;
 /// Elements are 32-bit words; each less the word one stride before it, zigzag, byte planes, zstd.
 pub(crate) const DIFFERENCE: u8 = 2;
+/// Whole numbers of the `cager-codec` crate; what they are depends on the section.
+pub(crate) const CODED: u8 = 3;
 
 const LEVEL: i32 = 3;
 /// zstd's window at this level is 2 MiB; a file that asks for much more is not ours.

@@ -3,11 +3,13 @@
 //! `docs/FORMAT.md` specifies the bytes.
 
 mod codec;
+mod coded;
 mod error;
 mod reader;
 mod section;
 mod writer;
 
+pub use coded::most_residual_numbers;
 pub use error::Error;
 pub use reader::{ContainerReader, SectionInfo};
 pub use writer::ContainerWriter;
@@ -22,6 +24,15 @@ pub const VERSION: u16 = 1;
 pub(crate) const HEADER_LIMIT: usize = 64 << 10;
 /// Frames of one chunk: what reading one frame decompresses.
 pub const CHUNK_FRAMES: usize = 16;
+
+/// Frames of a coded group, at the most: longer ones take fewer bytes, and reading one frame decodes its group.
+const GROUP_FRAMES: usize = 256;
+
+/// Frames of a coded group of so many points and rows a frame, so that readers can decode it in little memory.
+pub fn group_frames(points: usize, rows: usize) -> usize {
+    let fitting = (cager_codec::MOST_POSITIONS / points.max(1)).min((2 << 20) / (12 * rows.max(1)));
+    fitting.clamp(1, GROUP_FRAMES)
+}
 
 /// What a decoder must know. Stored as bincode of fixed-width integers, see [`crate::wire`].
 #[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
@@ -85,7 +96,8 @@ pub(crate) mod tag {
     pub(crate) const CONTENTS: [u8; 4] = *b"TOC_";
     pub(crate) const NUMBERS: [u8; 4] = *b"fnum";
     pub(crate) const REPORT: [u8; 4] = *b"summ";
-    pub(crate) const KNOWN: [[u8; 4]; 11] = [
+    pub(crate) const RESIDUAL: [u8; 4] = *b"resi";
+    pub(crate) const KNOWN: [[u8; 4]; 12] = [
         HEADER,
         REST_POINTS,
         REST_FACES,
@@ -97,5 +109,6 @@ pub(crate) mod tag {
         CONTENTS,
         NUMBERS,
         REPORT,
+        RESIDUAL,
     ];
 }

@@ -1,6 +1,7 @@
 //! Reading a container: validated before use, with random access to frames.
 
-use super::codec;
+use super::codec::{self, CODED};
+use super::coded::Groups;
 use super::section::{self, FOOTER_BYTES, HEADER_BYTES, PRELUDE_BYTES, SectionHeader};
 use super::{Error, HEADER_LIMIT, Header, counted_from_zero, tag};
 use crate::le::{self, f32_at, u32_at, u64_at};
@@ -26,15 +27,15 @@ pub struct SectionInfo {
 }
 
 #[derive(Clone, Copy)]
-struct Entry {
-    offset: u64,
-    header: SectionHeader,
+pub(super) struct Entry {
+    pub(super) offset: u64,
+    pub(super) header: SectionHeader,
 }
 
 /// Reads a container from any seekable input.
 pub struct ContainerReader<R: Read + Seek> {
     input: R,
-    file_bytes: u64,
+    pub(super) file_bytes: u64,
     entries: Vec<Entry>,
     /// Entries of the frame chunks, by first frame.
     chunks: Vec<usize>,
@@ -42,6 +43,9 @@ pub struct ContainerReader<R: Read + Seek> {
     header: Header,
     /// The chunk decoded last.
     cached: Option<(usize, Vec<u8>)>,
+    pub(super) groups: Groups,
+    /// The last chunk that [`Self::is_intact`] could not read.
+    damaged_chunk: Option<usize>,
 }
 
 impl<R: Read + Seek> ContainerReader<R> {
@@ -50,7 +54,47 @@ impl<R: Read + Seek> ContainerReader<R> {
     ///
     /// # Errors
     /// See [`Error`].
-    pub fn open(mut input: R) -> Result<Self, Error> {
+    pub fn open(input: R) -> Result<Self, Error> {
+        let mut reader = Self::begin(input)?;
+        let file_bytes = reader.file_bytes;
+        if file_bytes < (PRELUDE_BYTES + HEADER_BYTES + FOOTER_BYTES) as u64 {
+            return Err(Error::corrupt(file_bytes, "the file was cut"));
+        }
+        let mut footer = [0; FOOTER_BYTES];
+        reader.input.seek(SeekFrom::Start(file_bytes - FOOTER_BYTES as u64))?;
+        reader.input.read_exact(&mut footer)?;
+        reader.read_contents(section::check_footer(&footer, file_bytes)?)?;
+        reader.read_header()?;
+        reader.check_sizes(true)?;
+        Ok(reader)
+    }
+
+    /// Opens what is there of a file that was cut or damaged, from its beginning on: the frames before the cut. Sections are checked as they are
+    /// read, and [`Self::is_intact`] says which frames can be.
+    ///
+    /// # Errors
+    /// See [`Error`]: a file without a whole model and cage.
+    pub fn open_cut(input: R) -> Result<Self, Error> {
+        let mut reader = Self::begin(input)?;
+        reader.scan()?;
+        reader.read_header()?;
+        reader.check_sizes(false)?;
+        Ok(reader)
+    }
+
+    /// Whether a frame can be read, with its residual where `residual` asks for it.
+    pub fn is_intact(&mut self, frame: usize, residual: bool) -> bool {
+        let chunk = self.chunks.partition_point(|&k| self.entries[k].header.first as usize <= frame);
+        if self.damaged_chunk == Some(chunk) {
+            return false;
+        }
+        let mut cage = Vec::new();
+        let intact = self.read_frame(frame, &mut cage).is_ok() && (!residual || self.load_residual(frame).is_ok());
+        self.damaged_chunk = (!intact).then_some(chunk).or(self.damaged_chunk);
+        intact
+    }
+
+    fn begin(mut input: R) -> Result<Self, Error> {
         let file_bytes = input.seek(SeekFrom::End(0))?;
         let mut prelude = [0; PRELUDE_BYTES];
         input.rewind()?;
@@ -62,14 +106,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         }
         input.read_exact(&mut prelude)?;
         section::check_prelude(&prelude)?;
-        if file_bytes < (PRELUDE_BYTES + HEADER_BYTES + FOOTER_BYTES) as u64 {
-            return Err(Error::corrupt(file_bytes, "the file was cut"));
-        }
-        let mut footer = [0; FOOTER_BYTES];
-        input.seek(SeekFrom::Start(file_bytes - FOOTER_BYTES as u64))?;
-        input.read_exact(&mut footer)?;
-        let contents = section::check_footer(&footer, file_bytes)?;
-        let mut reader = Self {
+        Ok(Self {
             input,
             file_bytes,
             entries: Vec::new(),
@@ -77,11 +114,9 @@ impl<R: Read + Seek> ContainerReader<R> {
             frames: 0,
             header: Header::default(),
             cached: None,
-        };
-        reader.read_contents(contents)?;
-        reader.read_header()?;
-        reader.check_sizes()?;
-        Ok(reader)
+            groups: Groups::default(),
+            damaged_chunk: None,
+        })
     }
 
     /// What a decoder must know.
@@ -99,25 +134,38 @@ impl<R: Read + Seek> ContainerReader<R> {
     /// # Errors
     /// Damage.
     pub fn rest(&mut self) -> Result<Model, Error> {
-        let points = self.positions(tag::REST_POINTS)?;
-        let mut faces = Polygons::new();
-        if self.header.rest_faces > 0 {
-            let (offset, numbers) = self.indices(tag::REST_FACES)?;
-            let (arities, indices) = numbers.split_at(self.header.rest_faces as usize);
-            let mut rest = indices;
-            for &arity in arities {
-                let Some((face, tail)) = rest.split_at_checked(arity as usize) else {
-                    return Err(Error::corrupt(offset, "the faces of the model have more corners than there are"));
-                };
-                check_indices(face, points.len(), offset)?;
-                faces.push(face);
-                rest = tail;
-            }
-            if !rest.is_empty() {
-                return Err(Error::corrupt(offset, "the faces of the model have fewer corners than there are"));
-            }
-        }
+        let faces = self.rest_faces()?;
+        let points = self.positions(tag::REST_POINTS, &faces)?;
         Ok(Model { points, faces })
+    }
+
+    fn rest_faces(&mut self) -> Result<Polygons, Error> {
+        if self.header.rest_faces == 0 {
+            return Ok(Polygons::new());
+        }
+        let points = self.header.points as usize;
+        if let Some(coded) = self.coded(tag::REST_FACES)? {
+            let corners = self.header.rest_corners as usize;
+            self.limit_points(tag::REST_POINTS)?;
+            return coded.faces(points, self.header.rest_faces as usize, corners);
+        }
+        let mut faces = Polygons::new();
+        let (offset, numbers) = self.indices(tag::REST_FACES)?;
+        let (arities, indices) = numbers.split_at(self.header.rest_faces as usize);
+        let mut rest = indices;
+        for &arity in arities {
+            let Some((face, tail)) = rest.split_at_checked(arity as usize) else {
+                return Err(Error::corrupt(offset, "the faces of the model have more corners than there are"));
+            };
+            check_indices(face, points, offset)?;
+            faces.push(face);
+            rest = tail;
+        }
+        if rest.is_empty() {
+            Ok(faces)
+        } else {
+            Err(Error::corrupt(offset, "the faces of the model have fewer corners than there are"))
+        }
     }
 
     /// The cage around the rest pose.
@@ -125,7 +173,17 @@ impl<R: Read + Seek> ContainerReader<R> {
     /// # Errors
     /// Damage.
     pub fn cage(&mut self) -> Result<TriMesh, Error> {
-        let vertices = self.positions(tag::CAGE_VERTICES)?;
+        let (points, count) = (self.header.cage_vertices as usize, self.header.cage_faces as usize);
+        if let Some(coded) = self.coded(tag::CAGE_FACES)? {
+            self.limit_points(tag::CAGE_VERTICES)?;
+            let faces = coded.faces(points, count, count.saturating_mul(3))?;
+            if faces.arities().iter().any(|&arity| arity != 3) {
+                return Err(Error::corrupt(coded.offset, "the cage has faces that are no triangles"));
+            }
+            let vertices = self.positions(tag::CAGE_VERTICES, &faces)?;
+            return Ok(TriMesh { vertices, triangles: faces.triangulated() });
+        }
+        let vertices = self.positions(tag::CAGE_VERTICES, &Polygons::new())?;
         let (offset, numbers) = self.indices(tag::CAGE_FACES)?;
         check_indices(&numbers, vertices.len(), offset)?;
         Ok(TriMesh { vertices, triangles: numbers.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect() })
@@ -152,7 +210,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         let entry = self.entries[self.chunks[chunk]];
         if self.cached.as_ref().is_none_or(|(cached, _)| *cached != chunk) {
             self.cached = None;
-            let raw = self.raw(entry)?;
+            let raw = if entry.header.codec == CODED { self.group(entry)? } else { self.raw(entry)? };
             self.cached = Some((chunk, raw));
         }
         let Some((_, raw)) = &self.cached else { return Err(Error::NoSuchFrame { frame, frames: self.frames }) };
@@ -169,7 +227,7 @@ impl<R: Read + Seek> ContainerReader<R> {
     /// Errors of all frames.
     ///
     /// # Errors
-    /// Damage.
+    /// Damage; a file that was cut before them.
     pub fn errors(&mut self) -> Result<Vec<FrameError>, Error> {
         let entry = self.entry(tag::ERRORS)?;
         let raw = self.raw(entry)?;
@@ -241,6 +299,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         for frame in 0..self.frames {
             self.read_frame(frame, &mut cage)?;
         }
+        self.verify_residuals()?;
         for k in 0..self.entries.len() {
             let entry = self.entries[k];
             if !tag::KNOWN.contains(&entry.header.tag) {
@@ -279,24 +338,50 @@ impl<R: Read + Seek> ContainerReader<R> {
                 .and_then(|x| x.checked_add(header.payload_bytes))
                 .filter(|&x| x <= offset)
                 .ok_or_else(|| Error::corrupt(offset, "the table of contents lists a section beyond itself"))?;
-            if SectionHeader::is_required(header.tag) && !tag::KNOWN.contains(&header.tag) {
-                return Err(Error::UnknownSection(String::from_utf8_lossy(&header.tag).into_owned()));
-            }
-            if header.tag == tag::FRAMES {
-                let end = header.first.checked_add(header.count);
-                let (true, Some(end)) = (header.first as usize == self.frames && header.count > 0, end) else {
-                    return Err(Error::corrupt(offset, "the frames are not in order"));
-                };
-                self.frames = end as usize;
-                self.chunks.push(self.entries.len());
-            }
-            self.entries.push(Entry { offset: at, header });
+            self.add_entry(Entry { offset: at, header })?;
         }
         if next == offset {
             Ok(())
         } else {
             Err(Error::corrupt(offset, "the table of contents does not list all sections"))
         }
+    }
+
+    fn add_entry(&mut self, entry: Entry) -> Result<(), Error> {
+        let header = entry.header;
+        if SectionHeader::is_required(header.tag) && !tag::KNOWN.contains(&header.tag) {
+            return Err(Error::UnknownSection(String::from_utf8_lossy(&header.tag).into_owned()));
+        }
+        // A residual comes right before the frames that it belongs to.
+        let residual = self.entries.last().filter(|last| last.header.tag == tag::RESIDUAL).map(|last| last.header);
+        let of_other =
+            |last: SectionHeader| header.tag != tag::FRAMES || (last.first, last.count) != (header.first, header.count);
+        if residual.is_some_and(of_other) || header.tag == tag::RESIDUAL && header.codec != CODED {
+            return Err(Error::corrupt(entry.offset, "a residual is not followed by its frames"));
+        }
+        if header.tag == tag::FRAMES {
+            let end = header.first.checked_add(header.count);
+            let (true, Some(end)) = (header.first as usize == self.frames && header.count > 0, end) else {
+                return Err(Error::corrupt(entry.offset, "the frames are not in order"));
+            };
+            self.frames = end as usize;
+            self.chunks.push(self.entries.len());
+        }
+        self.entries.push(entry);
+        Ok(())
+    }
+
+    /// Lists the sections from front to back, up to the first whose header is damaged or whose payload is not all there.
+    fn scan(&mut self) -> Result<(), Error> {
+        let mut next = PRELUDE_BYTES as u64;
+        while next + HEADER_BYTES as u64 <= self.file_bytes {
+            let Ok(header) = self.header_at(next) else { break };
+            let end = (next + HEADER_BYTES as u64).checked_add(header.payload_bytes);
+            let Some(end) = end.filter(|&end| end <= self.file_bytes && header.tag != tag::CONTENTS) else { break };
+            self.add_entry(Entry { offset: next, header: SectionHeader { payload_crc: 0, ..header } })?;
+            next = end;
+        }
+        Ok(())
     }
 
     fn read_header(&mut self) -> Result<(), Error> {
@@ -318,9 +403,12 @@ impl<R: Read + Seek> ContainerReader<R> {
     }
 
     /// Every section must be there as often as it should, and have the size that the header's counts give it.
-    fn check_sizes(&self) -> Result<(), Error> {
-        for tag in [tag::REST_POINTS, tag::CAGE_VERTICES, tag::CAGE_FACES, tag::ERRORS] {
+    fn check_sizes(&self, whole: bool) -> Result<(), Error> {
+        for tag in [tag::REST_POINTS, tag::CAGE_VERTICES, tag::CAGE_FACES] {
             self.entry(tag)?;
+        }
+        if whole {
+            self.entry(tag::ERRORS)?;
         }
         let most_faces = usize::from(self.header.rest_faces > 0);
         if most_faces == 0 && self.header.rest_corners > 0 {
@@ -356,7 +444,7 @@ impl<R: Read + Seek> ContainerReader<R> {
                 tag::REST_POINTS | tag::CAGE_VERTICES => s.width == 4 || s.width == 8,
                 tag::REST_FACES | tag::CAGE_FACES | tag::FRAMES | tag::ERRORS => s.width == 4,
                 tag::NUMBERS => s.width == 8,
-                tag::ELEMENTS => s.width == 1,
+                tag::ELEMENTS | tag::RESIDUAL => s.width == 1,
                 _ => s.width > 0,
             };
             if expected != Some(s.raw_bytes) || !width_fits {
@@ -366,7 +454,12 @@ impl<R: Read + Seek> ContainerReader<R> {
         Ok(())
     }
 
-    fn entry(&self, tag: [u8; 4]) -> Result<Entry, Error> {
+    /// The sections with this tag, in the order of the file.
+    pub(super) fn sections_of(&self, tag: [u8; 4]) -> impl Iterator<Item = Entry> {
+        self.entries.iter().filter(move |e| e.header.tag == tag).copied()
+    }
+
+    pub(super) fn entry(&self, tag: [u8; 4]) -> Result<Entry, Error> {
         let mut found = self.entries.iter().filter(|e| e.header.tag == tag);
         match (found.next(), found.next()) {
             (Some(&entry), None) => Ok(entry),
@@ -388,9 +481,7 @@ impl<R: Read + Seek> ContainerReader<R> {
     /// The decoded bytes of a section, checked against both its header and the table of contents.
     fn raw(&mut self, entry: Entry) -> Result<Vec<u8>, Error> {
         let header = entry.header;
-        if header.raw_bytes > SectionHeader::most_raw_bytes(header.tag, self.file_bytes) {
-            return Err(Error::corrupt(entry.offset, "a section declares more bytes than the file can hold"));
-        }
+        self.check_limit(entry)?;
         let payload = self.payload(entry)?;
         let stride = if header.tag == tag::FRAMES { 3 * self.header.rows_per_frame as usize } else { 1 };
         codec::decode(
@@ -403,8 +494,16 @@ impl<R: Read + Seek> ContainerReader<R> {
         )
     }
 
+    pub(super) fn check_limit(&self, entry: Entry) -> Result<(), Error> {
+        let SectionHeader { tag, codec, raw_bytes, .. } = entry.header;
+        if raw_bytes > SectionHeader::most_raw_bytes(tag, codec, self.file_bytes) {
+            return Err(Error::corrupt(entry.offset, "a section declares more bytes than the file can hold"));
+        }
+        Ok(())
+    }
+
     /// The stored bytes of a section.
-    fn payload(&mut self, entry: Entry) -> Result<Vec<u8>, Error> {
+    pub(super) fn payload(&mut self, entry: Entry) -> Result<Vec<u8>, Error> {
         let header = self.header_at(entry.offset)?;
         let in_contents = SectionHeader { payload_crc: header.payload_crc, ..entry.header };
         if header != in_contents {
@@ -422,8 +521,12 @@ impl<R: Read + Seek> ContainerReader<R> {
         Ok(payload)
     }
 
-    fn positions(&mut self, tag: [u8; 4]) -> Result<Vec<Point>, Error> {
+    fn positions(&mut self, tag: [u8; 4], faces: &Polygons) -> Result<Vec<Point>, Error> {
         let entry = self.entry(tag)?;
+        if let Some(coded) = self.coded(tag)? {
+            let count = if tag == tag::REST_POINTS { self.header.points } else { self.header.cage_vertices };
+            return coded.positions(faces, count as usize);
+        }
         let raw = self.raw(entry)?;
         let points: Vec<Point> = if entry.header.width == 4 {
             let value = |b: &[u8], k: usize| f64::from(f32_at(b, k));

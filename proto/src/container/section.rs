@@ -2,7 +2,7 @@
 
 use crate::le::{u32_at, u64_at};
 
-use super::{Error, HEADER_LIMIT, MAGIC, VERSION, tag};
+use super::{Error, HEADER_LIMIT, MAGIC, VERSION, codec, tag};
 
 pub(crate) const PRELUDE_BYTES: usize = 16;
 pub(crate) const HEADER_BYTES: usize = 40;
@@ -61,9 +61,11 @@ impl SectionHeader {
 
     /// Most bytes that a section may decode to in a file of this length; what else a reader builds from them keeps its
     /// memory below 64 MiB and 256 times the file.
-    pub(crate) fn most_raw_bytes(tag: [u8; 4], file_bytes: u64) -> u64 {
+    pub(crate) fn most_raw_bytes(tag: [u8; 4], codec: u8, file_bytes: u64) -> u64 {
         let (times, more) = match tag {
             tag::HEADER => return HEADER_LIMIT as u64,
+            // Decoding whole numbers takes several times what they become.
+            _ if codec == codec::CODED => (16, 2 << 20),
             // Two bytes of JSON may become an empty text of 24 bytes.
             tag::REPORT => (16, 4 << 20),
             _ => (48, 12 << 20),

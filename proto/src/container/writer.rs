@@ -1,10 +1,11 @@
 //! Writing a container, frame by frame.
 
-use super::codec::{self, DIFFERENCE, PLANES, RAW};
+use super::codec::{self, CODED, DIFFERENCE, PLANES, RAW};
 use super::section::{self, SectionHeader};
 use super::{CHUNK_FRAMES, Error, HEADER_LIMIT, Header, counted_from_zero, tag};
 use crate::report::Report;
 use crate::wire;
+use cager_codec::CodedMesh;
 use cager_core::mesh::{Model, Point, TriMesh};
 use std::io::Write;
 
@@ -28,6 +29,27 @@ impl<W: Write> ContainerWriter<W> {
     /// # Errors
     /// Where the output refuses, a mesh exceeds what the format can count, or readers would refuse the meshes.
     pub fn new(out: W, header: &Header, rest: &Model, cage: &TriMesh) -> Result<Self, Error> {
+        Self::with_meshes(out, header, (rest, None), (cage, None))
+    }
+
+    /// The same with meshes in the bytes of [`CodedMesh`], where they are given; `rest` and `cage` are what these decode to.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_meshes(
+        out: W,
+        header: &Header,
+        (rest, coded_rest): (&Model, Option<&CodedMesh>),
+        (cage, coded_cage): (&TriMesh, Option<&CodedMesh>),
+    ) -> Result<Self, Error> {
+        // Readers refuse what expands too far; such meshes are stored as others are.
+        let fits = |coded: &&CodedMesh| {
+            let (points, corners) = (coded.mesh.points.len(), coded.mesh.faces.indices().len());
+            let raw = (12 * points).max(4 * (coded.mesh.faces.len() + corners)) as u64;
+            let payloads = (coded.faces.len() + coded.positions.len()) as u64;
+            raw <= SectionHeader::most_raw_bytes(tag::REST_POINTS, CODED, payloads)
+        };
+        let (coded_rest, coded_cage) = (coded_rest.filter(fits), coded_cage.filter(fits));
         let header = Header {
             points: rest.points.len() as u64,
             rest_faces: rest.faces.len() as u64,
@@ -49,21 +71,33 @@ impl<W: Write> ContainerWriter<W> {
         writer.put(&section::prelude())?;
         let encoded = wire::encode::<_, HEADER_LIMIT>(&writer.header).map_err(|e| Error::TooLarge(e.to_string()))?;
         writer.section(tag::HEADER, RAW, 1, 0, &encoded)?;
-        writer.positions(tag::REST_POINTS, &rest.points)?;
-        if !rest.faces.is_empty() {
+        writer.positions(tag::REST_POINTS, &rest.points, coded_rest)?;
+        if let Some(coded) = coded_rest.filter(|_| !rest.faces.is_empty()) {
+            let raw_bytes = 4 * (rest.faces.len() + rest.faces.indices().len());
+            writer.coded(tag::REST_FACES, &coded.faces, raw_bytes, (0, 0))?;
+        } else if !rest.faces.is_empty() {
             let numbers: Vec<u8> =
                 rest.faces.arities().iter().chain(rest.faces.indices()).flat_map(|i| i.to_le_bytes()).collect();
             writer.section(tag::REST_FACES, DIFFERENCE, 4, 1, &numbers)?;
         }
-        writer.positions(tag::CAGE_VERTICES, &cage.vertices)?;
-        let corners: Vec<u8> = cage.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()).collect();
-        writer.section(tag::CAGE_FACES, DIFFERENCE, 4, 1, &corners)?;
+        writer.positions(tag::CAGE_VERTICES, &cage.vertices, coded_cage)?;
+        if let Some(coded) = coded_cage {
+            writer.coded(tag::CAGE_FACES, &coded.faces, 12 * cage.triangles.len(), (0, 0))?;
+        } else {
+            let corners: Vec<u8> = cage.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()).collect();
+            writer.section(tag::CAGE_FACES, DIFFERENCE, 4, 1, &corners)?;
+        }
         Ok(writer)
     }
 
     /// The header, with the counts of the meshes.
     pub fn header(&self) -> &Header {
         &self.header
+    }
+
+    /// Bytes written so far, frames that wait for their chunk aside.
+    pub fn bytes(&self) -> u64 {
+        self.offset
     }
 
     /// Adds the boundary elements that the coordinates were solved on.
@@ -95,6 +129,29 @@ impl<W: Write> ContainerWriter<W> {
         self.errors.extend_from_slice(&l2.to_le_bytes());
         self.errors.extend_from_slice(&linf.to_le_bytes());
         if self.pending_frames == CHUNK_FRAMES { self.flush_chunk() } else { Ok(()) }
+    }
+
+    /// Adds a group of frames as `cager_codec::encode_cages` gives them, what `cager_codec::encode_residual` adds to their positions, and their
+    /// errors over the rest diagonal. Groups are at most [`group_frames`](super::group_frames) long, and a file has no other frames.
+    ///
+    /// # Errors
+    /// An output that refuses.
+    pub fn write_group(&mut self, cages: &[u8], residual: Option<&[u8]>, errors: &[(f32, f32)]) -> Result<(), Error> {
+        let first = (self.errors.len() / 8) as u32;
+        let frames = (first, errors.len() as u32);
+        if first.checked_add(frames.1).is_none() || self.pending_frames > 0 {
+            return Err(Error::TooLarge("a file holds at most 4,294,967,295 frames".to_owned()));
+        }
+        // Before the cages, so that cages that are there have all that belongs to them.
+        if let Some(residual) = residual {
+            self.coded(tag::RESIDUAL, residual, residual.len(), frames)?;
+        }
+        self.coded(tag::FRAMES, cages, 12 * errors.len() * self.header.rows_per_frame as usize, frames)?;
+        for (l2, linf) in errors {
+            self.errors.extend_from_slice(&l2.to_le_bytes());
+            self.errors.extend_from_slice(&linf.to_le_bytes());
+        }
+        Ok(())
     }
 
     /// Adds the numbers that the frames have where they come from, ascending; 0, 1, 2, … take no place.
@@ -147,7 +204,10 @@ impl<W: Write> ContainerWriter<W> {
     }
 
     /// Single precision where it loses nothing, as for models that came from such a file.
-    fn positions(&mut self, tag: [u8; 4], points: &[Point]) -> Result<(), Error> {
+    fn positions(&mut self, tag: [u8; 4], points: &[Point], coded: Option<&CodedMesh>) -> Result<(), Error> {
+        if let Some(coded) = coded {
+            return self.coded(tag, &coded.positions, 12 * points.len(), (0, 0));
+        }
         let single = points.iter().flatten().all(|&x| f64::from(x as f32).to_bits() == x.to_bits());
         let (width, raw): (usize, Vec<u8>) = if single {
             (4, points.iter().flatten().flat_map(|&x| (x as f32).to_le_bytes()).collect())
@@ -172,26 +232,41 @@ impl<W: Write> ContainerWriter<W> {
     ) -> Result<(), Error> {
         let (codec, payload) = match codec::encode(codec, raw, width, stride)? {
             // Readers refuse what expands too far, lest a small file takes all their memory.
-            (_, payload) if raw.len() as u64 > SectionHeader::most_raw_bytes(tag, payload.len() as u64) => {
+            (codec, payload) if raw.len() as u64 > SectionHeader::most_raw_bytes(tag, codec, payload.len() as u64) => {
                 (RAW, raw.to_vec())
             }
             encoded => encoded,
         };
+        self.payload((tag, codec, width as u8), &payload, raw.len(), frames)
+    }
+
+    fn coded(&mut self, tag: [u8; 4], payload: &[u8], raw_bytes: usize, frames: (u32, u32)) -> Result<(), Error> {
+        let width = if tag == tag::RESIDUAL { 1 } else { 4 };
+        self.payload((tag, CODED, width), payload, raw_bytes, frames)
+    }
+
+    fn payload(
+        &mut self,
+        (tag, codec, width): ([u8; 4], u8, u8),
+        payload: &[u8],
+        raw_bytes: usize,
+        frames: (u32, u32),
+    ) -> Result<(), Error> {
         let header = SectionHeader {
             tag,
             codec,
-            width: width as u8,
+            width,
             first: frames.0,
             count: frames.1,
             payload_bytes: payload.len() as u64,
-            raw_bytes: raw.len() as u64,
-            payload_crc: crc32c::crc32c(&payload),
+            raw_bytes: raw_bytes as u64,
+            payload_crc: crc32c::crc32c(payload),
         };
         let header = header.to_bytes();
         self.contents.extend_from_slice(&self.offset.to_le_bytes());
         self.contents.extend_from_slice(&header[..32]);
         self.put(&header)?;
-        self.put(&payload)
+        self.put(payload)
     }
 
     fn put(&mut self, bytes: &[u8]) -> Result<(), Error> {

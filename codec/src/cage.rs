@@ -1,0 +1,167 @@
+//! Cages of a group of frames: `Y = E A` in the coordinates of [`CageBasis`], A in whole steps.
+
+use crate::basis::CageBasis;
+use crate::entropy::{Coder, Decoder, Encoder, Integers, MOST, SIZES, size_class};
+use crate::error::{Error, Result};
+use crate::trajectories::{Trajectories, fit};
+use crate::{MOST_FRAMES, linear};
+use faer::Mat;
+
+/// Bytes before the coded numbers: whether the basis is rotated, then the step as f64 and the number of components as u16.
+const HEAD: usize = 1 + STEP_AND_COUNT;
+pub(crate) const STEP_AND_COUNT: usize = 10;
+
+/// Part of a step from which a number is rounded away from 0: small ones cost less than they are worth.
+const ROUND_UP: f64 = 0.44;
+
+/// Encodes cages, each rows × 3, in steps of `step`: the root mean square over the points of what one coefficient moves the model. `None` where
+/// numbers are not finite, or too far apart to be counted in these steps.
+///
+/// # Panics
+/// Where a cage has another number of rows, or there are more than [`MOST_FRAMES`].
+pub fn encode_cages(basis: &CageBasis, cages: &[&[f32]], step: f64) -> Option<Vec<u8>> {
+    let (rows, frames) = (basis.rows(), cages.len());
+    assert!(frames <= MOST_FRAMES && cages.iter().all(|cage| cage.len() == 3 * rows));
+    // m × 3 T, to T × 3 m.
+    let y = basis.forward(cages);
+    let motion = Mat::from_fn(frames, 3 * rows, |t, value| y[(value / 3, 3 * t + value % 3)]);
+    let gram = linear::product(motion.as_ref(), motion.transpose());
+    let chosen = Trajectories::choose(gram.as_ref(), 3 * rows, step, frames.min(3 * rows))?;
+    let count = chosen.count();
+    let values = fit(chosen.values().as_ref(), motion.as_ref())?;
+    let mut whole = Vec::with_capacity(count * 3 * rows);
+    for k in 0..count {
+        for value in 0..3 * rows {
+            let exact = values[(k, value)] / step;
+            let steps = (exact.abs() + ROUND_UP).floor().copysign(exact);
+            if steps.is_nan() || steps.abs() > f64::from(MOST) {
+                return None;
+            }
+            whole.push(steps as i32);
+        }
+    }
+    let mut bytes = vec![u8::from(basis.rotated())];
+    bytes.extend(step.to_le_bytes());
+    bytes.extend((count as u16).to_le_bytes());
+    let mut coder = Encoder::default();
+    chosen.code(&mut coder, frames, count);
+    code_values(&mut coder, rows, count, &whole);
+    bytes.extend(coder.into_bytes());
+    Some(bytes)
+}
+
+/// The cages that [`encode_cages`] wrote, of as many frames.
+///
+/// # Errors
+/// Bytes that are none of it.
+pub fn decode_cages(basis: &CageBasis, frames: usize, bytes: &[u8]) -> Result<Vec<Vec<f32>>> {
+    let rows = basis.rows();
+    let (head, coded) = bytes.split_first_chunk::<HEAD>().ok_or(Error::Damaged("a group of cages is cut"))?;
+    let (step, count) = step_and_count(&std::array::from_fn(|k| head[1 + k]));
+    if frames > MOST_FRAMES || count > frames.min(3 * rows) || !(step.is_finite() && step > 0.0) {
+        return Err(Error::Damaged("a group of cages has impossible counts"));
+    }
+    let mut coder = Decoder::new(coded)?;
+    let trajectories = Trajectories::default().code(&mut coder, frames, count);
+    let whole = code_values(&mut coder, rows, count, &[]);
+    coder.check()?;
+    let values = Mat::from_fn(count, 3 * rows, |k, value| f64::from(whole[k * 3 * rows + value]) * step);
+    let motion = linear::product(trajectories.values().as_ref(), values.as_ref());
+    let y = Mat::from_fn(rows, 3 * frames, |j, column| motion[(column / 3, 3 * j + column % 3)]);
+    Ok(basis.inverse(y.as_ref()))
+}
+
+/// Whether bytes of [`encode_cages`] are in a rotated basis.
+///
+/// # Errors
+/// Bytes that are none of it.
+pub fn is_rotated(bytes: &[u8]) -> Result<bool> {
+    match bytes.first() {
+        Some(0) => Ok(false),
+        Some(1) => Ok(true),
+        _ => Err(Error::Damaged("a group of cages has an unknown basis")),
+    }
+}
+
+pub(crate) fn step_and_count(head: &[u8; STEP_AND_COUNT]) -> (f64, usize) {
+    let [a, b, c, d, e, f, g, h, low, high] = *head;
+    (f64::from_le_bytes([a, b, c, d, e, f, g, h]), usize::from(u16::from_le_bytes([low, high])))
+}
+
+/// Codes components × rows × 3 numbers. What surrounds one in the rows, in the components and in its point says how large it will be.
+fn code_values(coder: &mut impl Coder, rows: usize, count: usize, given: &[i32]) -> Vec<i32> {
+    let mut models = Integers::new(3 * SIZES);
+    let width = 3 * rows;
+    let mut found: Vec<i32> = Vec::with_capacity(width * count);
+    for at in 0..width * count {
+        let (k, value) = (at / width, at % width);
+        let size = |known: bool, back: usize| if known { found[at - back].unsigned_abs().min(1 << 20) } else { 0 };
+        let around = 8 * size(value >= 3, 3)
+            + 4 * size(value >= 6, 6)
+            + 8 * size(k >= 1, width)
+            + 4 * size(k >= 2, 2 * width)
+            + 6 * size(value % 3 >= 1, 1)
+            + 3 * size(value % 3 >= 2, 2);
+        let context = SIZES * (value % 3) + size_class(around);
+        let value = models.code(coder, context, given.get(at).copied().unwrap_or(0));
+        found.push(value);
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cager_core::mesh::Point;
+
+    fn basis(rows: usize) -> CageBasis {
+        let mut random = fastrand::Rng::with_seed(3);
+        let phi = Mat::from_fn(5 * rows, rows, |_, _| random.f64() / rows as f64);
+        let rest: Vec<Point> = (0..rows).map(|k| [k as f64 / rows as f64, 0.5, 0.0]).collect();
+        CageBasis::for_encoding(phi.as_ref(), &rest).unwrap()
+    }
+
+    fn cages(rows: usize, frames: usize) -> Vec<Vec<f32>> {
+        let value = |t: usize, k: usize| (t as f32 * 0.2 + (k % 3) as f32).sin() * (1.0 + k as f32 / rows as f32);
+        (0..frames).map(|t| (0..3 * rows).map(|k| value(t, k)).collect()).collect()
+    }
+
+    #[test]
+    fn cages_come_back_within_what_the_step_allows() {
+        for (rows, frames) in [(20, 30), (4, 1), (1, 9), (30, 2)] {
+            let (basis, cages) = (basis(rows), cages(rows, frames));
+            let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
+            let mut sizes = Vec::new();
+            for step in [1e-2, 1e-4, 1e-6] {
+                let bytes = encode_cages(&basis, &views, step).unwrap();
+                let back = decode_cages(&basis, frames, &bytes).unwrap();
+                let views: Vec<&[f32]> = back.iter().map(Vec::as_slice).collect();
+                let (a, b) =
+                    (basis.forward(&views), basis.forward(&cages.iter().map(Vec::as_slice).collect::<Vec<_>>()));
+                let rms = (&a - &b).norm_l2() / ((3 * rows * frames) as f64).sqrt();
+                assert!(rms < step + 1e-6, "{rows} {frames} {step} {rms}");
+                sizes.push(bytes.len());
+            }
+            assert!(sizes.is_sorted(), "{sizes:?}");
+        }
+    }
+
+    #[test]
+    fn damage_is_an_error_or_finite_cages() {
+        let (basis, cages) = (basis(20), cages(20, 30));
+        let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
+        let bytes = encode_cages(&basis, &views, 1e-4).unwrap();
+        for cut in 0..bytes.len() {
+            let _ = decode_cages(&basis, 30, &bytes[..cut]);
+        }
+        for at in 0..bytes.len() {
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 0x5a;
+            let _ = decode_cages(&basis, 30, &damaged);
+        }
+        assert!(decode_cages(&basis, 30, &bytes[..5]).is_err());
+        assert!(decode_cages(&basis, MOST_FRAMES + 1, &bytes).is_err());
+        let nan = vec![f32::NAN; 60];
+        assert!(encode_cages(&basis, &[&nan], 1e-3).is_none());
+    }
+}

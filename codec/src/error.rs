@@ -1,0 +1,9 @@
+/// Why bytes could not be decoded.
+#[derive(Debug, thiserror::Error, PartialEq, Eq)]
+pub enum Error {
+    /// The bytes are cut, damaged or of another model.
+    #[error("{0}")]
+    Damaged(&'static str),
+}
+
+pub(crate) type Result<T> = std::result::Result<T, Error>;

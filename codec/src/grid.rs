@@ -1,0 +1,129 @@
+//! Positions of a mesh at rest, on a grid.
+
+use crate::entropy::{Coder, Decoder, Encoder, Integers, MOST, SIZES, size_class};
+use crate::error::{Error, Result};
+use crate::parallelograms::Predictions;
+use cager_core::mesh::{Point, Polygons, bounds};
+
+/// Bytes before the coded numbers: origin and step as f64.
+const HEAD: usize = 32;
+
+/// A grid of positions, each rounded to single precision.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grid {
+    origin: Point,
+    step: f64,
+}
+
+impl Grid {
+    /// Over these points, with this step between positions. `None` where there are none, or too many steps.
+    pub fn new(points: &[Point], step: f64) -> Option<Self> {
+        let (low, high) = bounds(points);
+        let steps = (0..3).map(|k| (high[k] - low[k]) / step).fold(0.0, f64::max);
+        let far = low.iter().chain(&high).any(|x| x.abs() > f64::from(f32::MAX));
+        let finite = points.iter().flatten().all(|x| x.is_finite());
+        (!points.is_empty() && finite && step > 0.0 && steps.is_finite() && steps < f64::from(MOST >> 2) && !far)
+            .then_some(Self { origin: low, step })
+    }
+
+    /// The nearest position of the grid.
+    pub fn nearest(&self, point: Point) -> Point {
+        self.position(self.steps(point))
+    }
+
+    fn steps(&self, point: Point) -> [i32; 3] {
+        std::array::from_fn(|k| ((point[k] - self.origin[k]) / self.step).round() as i32)
+    }
+
+    fn position(&self, steps: [i32; 3]) -> Point {
+        std::array::from_fn(|k| f64::from((self.origin[k] + f64::from(steps[k]) * self.step) as f32))
+    }
+}
+
+/// Codes the positions of the grid nearest to these points.
+pub fn encode_positions(grid: Grid, faces: &Polygons, points: &[Point]) -> Vec<u8> {
+    let mut bytes: Vec<u8> = grid.origin.iter().chain([&grid.step]).flat_map(|x| x.to_le_bytes()).collect();
+    let mut coder = Encoder::default();
+    let given: Vec<[i32; 3]> = points.iter().map(|&point| grid.steps(point)).collect();
+    code(&mut coder, faces, points.len(), &given);
+    bytes.extend(coder.into_bytes());
+    bytes
+}
+
+/// The positions that [`encode_positions`] wrote, for the same faces in the same order.
+///
+/// # Errors
+/// Bytes that are none of it.
+pub fn decode_positions(bytes: &[u8], faces: &Polygons, points: usize) -> Result<Vec<Point>> {
+    let (head, coded) = bytes.split_first_chunk::<HEAD>().ok_or(Error::Damaged("positions are cut"))?;
+    let number = |k: usize| f64::from_le_bytes(std::array::from_fn(|byte| head[8 * k + byte]));
+    let grid = Grid { origin: [number(0), number(1), number(2)], step: number(3) };
+    let mut coder = Decoder::new(coded)?;
+    let steps = code(&mut coder, faces, points, &[]);
+    coder.check()?;
+    Ok(steps.into_iter().map(|steps| grid.position(steps)).collect())
+}
+
+fn code(coder: &mut impl Coder, faces: &Polygons, points: usize, given: &[[i32; 3]]) -> Vec<[i32; 3]> {
+    let mut found = vec![[0i32; 3]; points];
+    let mut models = Integers::new(3 * SIZES);
+    let mut around = 0;
+    for (vertex, triples, near) in Predictions::new(faces, points).iter() {
+        let at = |v: u32, k: usize| i64::from(found[v as usize][k]);
+        let mut met = [0; 3];
+        let mut size = 0;
+        for k in 0..3 {
+            let expected = match triples.len() as i64 {
+                0 if near == vertex => 0,
+                0 => at(near as u32, k),
+                count => triples.iter().map(|&[a, b, c]| at(a, k) + at(b, k) - at(c, k)).sum::<i64>().div_euclid(count),
+            };
+            let most = i64::from(MOST);
+            let expected = expected.clamp(-most, most) as i32;
+            let value = given.get(vertex).map_or(0, |steps| steps[k] - expected);
+            let context = SIZES * triples.len().min(2) + size_class((around + 6 * size).min(1 << 20));
+            let value = models.code(coder, context, value);
+            met[k] = value.saturating_add(expected);
+            size += value.unsigned_abs().min(1 << 16);
+        }
+        around = (around + 8 * size / 3) / 2;
+        found[vertex] = met;
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn positions_come_back_on_the_grid_in_their_order() {
+        let mut random = fastrand::Rng::with_seed(5);
+        let points: Vec<Point> = (0..200).map(|_| std::array::from_fn(|_| 100.0 * random.f64() - 30.0)).collect();
+        let mut faces = Polygons::new();
+        (0..150u32).for_each(|k| faces.push(&[k, k + 1, k + 2]));
+        for step in [10.0, 1e-2, 1e-4] {
+            let grid = Grid::new(&points, step).unwrap();
+            let bytes = encode_positions(grid, &faces, &points);
+            let back = decode_positions(&bytes, &faces, points.len()).unwrap();
+            for (&a, b) in points.iter().zip(&back) {
+                assert_eq!(grid.nearest(a), *b);
+                assert!((0..3).all(|k| (a[k] - b[k]).abs() <= 0.5 * step + 1e-5));
+            }
+        }
+        assert!(Grid::new(&[], 1.0).is_none());
+        assert!(Grid::new(&points, 1e-9).is_none());
+        assert!(Grid::new(&[[f64::NAN; 3]], 1.0).is_none());
+    }
+
+    #[test]
+    fn damage_is_an_error_or_positions() {
+        let mut random = fastrand::Rng::with_seed(6);
+        for _ in 0..200 {
+            let bytes: Vec<u8> = (0..4 * random.usize(..40)).map(|_| random.u8(..)).collect();
+            if let Ok(points) = decode_positions(&bytes, &Polygons::new(), 50) {
+                assert_eq!(points.len(), 50);
+            }
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! An order of a mesh's vertices from coarse to fine, in which each is predicted from neighbours on the mesh that come before it.
+//!
+//! Independent vertices are taken away round by round, those of few neighbours first; the neighbours of one that is gone are joined to the one of
+//! them that has the fewest. It depends on the faces alone, in whole numbers.
+
+use cager_core::mesh::Polygons;
+
+/// Rounds end when so few vertices are left; these are not predicted.
+const COARSEST: usize = 48;
+
+/// Vertices from coarse to fine.
+#[derive(Clone, Debug)]
+pub struct Hierarchy {
+    order: Vec<u32>,
+    starts: Vec<u32>,
+    parents: Vec<u32>,
+}
+
+impl Hierarchy {
+    /// Of the vertices of these faces; without an edge a vertex is not predicted.
+    pub fn new(faces: &Polygons, points: usize) -> Self {
+        let mut near: Vec<Vec<u32>> = vec![Vec::new(); points];
+        for face in faces.iter() {
+            for (k, &a) in face.iter().enumerate() {
+                let b = face[(k + 1) % face.len()];
+                if a != b {
+                    near[a as usize].push(b);
+                    near[b as usize].push(a);
+                }
+            }
+        }
+        for list in &mut near {
+            list.sort_unstable();
+            list.dedup();
+        }
+        let mut left: Vec<u32> = (0..points as u32).collect();
+        let mut removed: Vec<(u32, Vec<u32>)> = Vec::with_capacity(points);
+        let mut blocked = vec![0u32; points];
+        let mut round = 0;
+        while left.len() > COARSEST {
+            round += 1;
+            left.sort_unstable_by_key(|&v| (near[v as usize].len(), v));
+            let before = removed.len();
+            for &v in &left {
+                if blocked[v as usize] != round && !near[v as usize].is_empty() {
+                    near[v as usize].iter().for_each(|&w| blocked[w as usize] = round);
+                    blocked[v as usize] = round;
+                    removed.push((v, Vec::new()));
+                }
+            }
+            if removed.len() == before {
+                break;
+            }
+            let mut gone = vec![false; points];
+            for (v, parents) in &mut removed[before..] {
+                gone[*v as usize] = true;
+                *parents = std::mem::take(&mut near[*v as usize]);
+                join(&mut near, *v, parents);
+            }
+            left.retain(|&v| !gone[v as usize]);
+        }
+        left.sort_unstable();
+        let mut hierarchy = Self { order: left, starts: vec![0], parents: Vec::new() };
+        hierarchy.starts.resize(hierarchy.order.len() + 1, 0);
+        for (v, parents) in removed.iter().rev() {
+            hierarchy.order.push(*v);
+            hierarchy.parents.extend(parents);
+            hierarchy.starts.push(hierarchy.parents.len() as u32);
+        }
+        hierarchy
+    }
+
+    /// Number of vertices.
+    pub fn points(&self) -> usize {
+        self.order.len()
+    }
+
+    /// The vertices in order, each with those that predict it.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (usize, &[u32])> {
+        self.order
+            .iter()
+            .enumerate()
+            .map(|(k, &v)| (v as usize, &self.parents[self.starts[k] as usize..self.starts[k + 1] as usize]))
+    }
+}
+
+/// Takes v from the lists of its neighbours and joins these to the one that has the fewest.
+fn join(near: &mut [Vec<u32>], v: u32, neighbours: &[u32]) {
+    for &w in neighbours {
+        let list = &mut near[w as usize];
+        if let Ok(place) = list.binary_search(&v) {
+            list.remove(place);
+        }
+    }
+    let Some(&hub) = neighbours.iter().min_by_key(|&&w| (near[w as usize].len(), w)) else { return };
+    for &w in neighbours {
+        if w != hub {
+            for (a, b) in [(hub, w), (w, hub)] {
+                let list = &mut near[a as usize];
+                if let Err(place) = list.binary_search(&b) {
+                    list.insert(place, b);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_vertex_comes_once_and_after_those_that_predict_it() {
+        let side = 30u32;
+        let mut faces = Polygons::new();
+        for (i, j) in (0..side - 1).flat_map(|i| (0..side - 1).map(move |j| (i, j))) {
+            let at = |i: u32, j: u32| i * side + j;
+            faces.push(&[at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+        let points = (side * side) as usize + 7;
+        let hierarchy = Hierarchy::new(&faces, points);
+        let mut known = vec![false; points];
+        let mut predicted = 0;
+        for (v, parents) in hierarchy.iter() {
+            assert!(!known[v] && parents.iter().all(|&p| known[p as usize]));
+            known[v] = true;
+            predicted += usize::from(!parents.is_empty());
+        }
+        assert!(known.iter().all(|&k| k) && predicted >= points - COARSEST - 7);
+    }
+}

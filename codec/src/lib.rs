@@ -1,0 +1,35 @@
+//! Animated meshes and their cages to bytes and back, with a bound on the error of every vertex in every frame: plain data in, plain data out; no
+//! I/O.
+//!
+//! Every number is decoded by an entropy decoder of whole numbers, whose predictions and models are whole numbers too. Floating point comes
+//! after it, so machines that round differently decode the same numbers and positions that differ by rounding alone.
+
+mod basis;
+mod cage;
+mod connectivity;
+mod corrections;
+mod entropy;
+mod error;
+mod grid;
+mod hierarchy;
+mod linear;
+mod mesh;
+mod parallelograms;
+mod residual;
+mod trajectories;
+
+pub use basis::CageBasis;
+pub use cage::{decode_cages, encode_cages, is_rotated};
+pub use connectivity::{decode_faces, encode_faces};
+pub use error::Error;
+pub use grid::{Grid, decode_positions, encode_positions};
+pub use hierarchy::Hierarchy;
+pub use mesh::CodedMesh;
+pub use residual::{Residual, ResidualGroup, encode_residual};
+
+/// Most positions of one group of frames, points times frames: what decoding one holds in memory follows from it.
+pub const MOST_POSITIONS: usize = 1 << 26;
+/// Most frames of a group.
+pub const MOST_FRAMES: usize = 1024;
+/// Most rows of a cage.
+pub const MOST_ROWS: usize = 4096;

@@ -1,0 +1,97 @@
+//! Motion of a group of frames as few trajectories, each shared by all points: `M ≈ E A`, with M frames × values, E frames × components of
+//! nearly orthonormal columns, the eigenvectors of `M Mᵀ` (Karhunen–Loève transform in time), and A what each value takes of them.
+
+use crate::entropy::{Coder, Integers, SIZES, size_class};
+use crate::linear;
+use faer::{Mat, MatRef};
+
+/// Components whose energy per value is below this fraction of that of rounding to whole steps are left out.
+const WORTH: f64 = 0.3 / 12.0;
+/// Largest number of binary digits of an entry of E.
+const MOST_DIGITS: u32 = 26;
+
+/// The trajectories of a group as whole numbers: of each, its digits, and its cosine transform in time in units of 2^−digits.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Trajectories {
+    frames: usize,
+    digits: Vec<u32>,
+    /// Component by component, frames each.
+    waves: Vec<i32>,
+}
+
+impl Trajectories {
+    /// Those worth keeping of motion with this `M Mᵀ`, `width` values a frame, coded in steps of `step`; at most `most` of them.
+    pub(crate) fn choose(gram: MatRef<'_, f64>, width: usize, step: f64, most: usize) -> Option<Self> {
+        let frames = gram.nrows();
+        let (energies, vectors) = linear::eigen(gram)?;
+        let least = WORTH * width as f64 * step * step;
+        let count = energies.iter().take_while(|&&energy| energy > least).count().min(most);
+        let waves = linear::product(cosines(frames).as_ref(), vectors.subcols(0, count));
+        // An entry's error times the component's length is an error of the values: coded to the same step.
+        let digits: Vec<u32> = energies[..count]
+            .iter()
+            .map(|energy| ((energy.sqrt() / step).log2().ceil().max(2.0) as u32).min(MOST_DIGITS))
+            .collect();
+        let whole = |k: usize| {
+            let unit = (digits[k] as f64).exp2();
+            let column = waves.col(k);
+            (0..frames).map(move |t| (column[t] * unit).round() as i32).collect::<Vec<i32>>()
+        };
+        Some(Self { frames, waves: (0..count).flat_map(whole).collect(), digits })
+    }
+
+    /// Number of components.
+    pub(crate) fn count(&self) -> usize {
+        self.digits.len()
+    }
+
+    /// Codes `count` of them.
+    pub(crate) fn code(&self, coder: &mut impl Coder, frames: usize, count: usize) -> Self {
+        let mut lengths = Integers::new(1);
+        let mut models = Integers::new(SIZES);
+        let mut found = Self { frames, digits: Vec::with_capacity(count), waves: Vec::with_capacity(frames * count) };
+        let mut before = 0;
+        for k in 0..count {
+            let digits = self.digits.get(k).copied().unwrap_or(0);
+            before += lengths.code(coder, 0, digits as i32 - before);
+            before = before.clamp(0, MOST_DIGITS as i32);
+            found.digits.push(before as u32);
+            let (mut last, mut last_but_one) = (0, 0);
+            for t in 0..frames {
+                let above = if k > 0 { found.waves[(k - 1) * frames + t].unsigned_abs() } else { 0 };
+                let size = last.min(1 << 20) * 8 + last_but_one.min(1 << 20) * 4 + above.min(1 << 20) * 4;
+                let value = self.waves.get(k * frames + t).copied().unwrap_or(0);
+                let value = models.code(coder, size_class(size), value);
+                found.waves.push(value);
+                (last_but_one, last) = (last, value.unsigned_abs());
+            }
+        }
+        found
+    }
+
+    /// E, frames × components.
+    pub(crate) fn values(&self) -> Mat<f64> {
+        let waves = Mat::from_fn(self.frames, self.count(), |t, k| {
+            f64::from(self.waves[k * self.frames + t]) / (self.digits[k] as f64).exp2()
+        });
+        linear::product(cosines(self.frames).transpose(), waves.as_ref())
+    }
+}
+
+/// A of least squares: components × values, for M frames × values.
+pub(crate) fn fit(trajectories: MatRef<'_, f64>, motion: MatRef<'_, f64>) -> Option<Mat<f64>> {
+    let count = trajectories.ncols();
+    let mut inner = linear::product(trajectories.transpose(), trajectories);
+    for k in 0..count {
+        inner[(k, k)] += 1e-9;
+    }
+    let mut values = linear::product(trajectories.transpose(), motion);
+    linear::solve_cholesky(linear::cholesky(inner.as_ref())?.as_ref(), &mut values);
+    Some(values)
+}
+
+/// The orthonormal cosine transform (DCT-II) of so many values.
+fn cosines(n: usize) -> Mat<f64> {
+    let scale = |k: usize| if k == 0 { (1.0 / n as f64).sqrt() } else { (2.0 / n as f64).sqrt() };
+    Mat::from_fn(n, n, |k, t| scale(k) * (std::f64::consts::PI * (t as f64 + 0.5) * k as f64 / n as f64).cos())
+}

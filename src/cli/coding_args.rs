@@ -1,0 +1,166 @@
+//! What `cager encode` is asked of errors and sizes.
+
+use super::args::EncodeArgs;
+use crate::coding::Goal;
+use crate::config::bytes;
+use anyhow::{Result, bail};
+use cager_core::mesh::{Model, diagonal};
+use clap::ValueEnum;
+use std::str::FromStr;
+
+/// A largest error: a fraction of the diagonal, or a length in metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum ErrorBound {
+    Fraction(f64),
+    Metres(f64),
+}
+
+/// A size of a file: bytes, or bits for each point and frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum TargetSize {
+    Bytes(u64),
+    BitsPerPoint(f64),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Quality {
+    Preview,
+    Standard,
+    Master,
+}
+
+/// A unit of length.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Unit {
+    Mm,
+    Cm,
+    M,
+    In,
+    Ft,
+}
+
+impl Unit {
+    fn metres(self) -> f64 {
+        match self {
+            Self::Mm => 1e-3,
+            Self::Cm => 1e-2,
+            Self::M => 1.0,
+            Self::In => 0.0254,
+            Self::Ft => 0.3048,
+        }
+    }
+}
+
+/// The number before a unit, and the unit.
+fn parts(text: &str) -> Result<(f64, &str), String> {
+    let text = text.trim();
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    // The exponent of a number ends in a digit.
+    let number: f64 = digits.trim().parse().map_err(|_| format!("{text:?} does not begin with a number"))?;
+    if number.is_finite() && number > 0.0 {
+        Ok((number, &text[digits.len()..]))
+    } else {
+        Err(format!("{text:?} is not a finite number above 0"))
+    }
+}
+
+impl FromStr for ErrorBound {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (number, unit) = parts(text)?;
+        match unit {
+            "" if number >= 1.0 => Err(format!("{number} is a fraction of the rest pose's diagonal, so below 1")),
+            "" => Ok(Self::Fraction(number)),
+            unit => Unit::from_str(unit, true)
+                .map(|unit| Self::Metres(number * unit.metres()))
+                .map_err(|_| format!("{unit:?} is no unit; use mm, cm, m, in or ft, or leave it out for a fraction")),
+        }
+    }
+}
+
+impl FromStr for TargetSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if let Some(number) = text.trim().strip_suffix("bpvf") {
+            return parts(number).and_then(|(number, unit)| match unit {
+                "" => Ok(Self::BitsPerPoint(number)),
+                unit => Err(format!("{unit:?} before bpvf")),
+            });
+        }
+        match bytes(text) {
+            Some(bytes @ 1..) => Ok(Self::Bytes(bytes)),
+            _ => Err(format!(
+                "{text:?} is neither a size such as 500KB nor bits for each point and frame such as 0.5bpvf"
+            )),
+        }
+    }
+}
+
+/// What the file is to meet, for this rest pose and so many frames; `None` where nothing is asked.
+pub(super) fn goal(args: &EncodeArgs, rest: &Model, frames: usize) -> Result<Option<Goal>> {
+    let coding = &args.coding;
+    let unit = coding.unit.map(Unit::metres);
+    Ok(match (coding.max_error, coding.target_size, coding.quality) {
+        (Some(ErrorBound::Fraction(_)), ..) if unit.is_some() => {
+            bail!(
+                "--unit: the maximum error is a fraction of the diagonal; give a length such as 0.2mm, or leave --unit out"
+            )
+        }
+        (Some(ErrorBound::Fraction(error)), ..) => Some(Goal::MaxError(error)),
+        (Some(ErrorBound::Metres(length)), ..) => {
+            let Some(unit) = unit else {
+                bail!(
+                    "--max-error: a length needs --unit, what one unit of the capture's positions is, such as --unit cm"
+                )
+            };
+            let diagonal = diagonal(&rest.points);
+            let error = length / unit / diagonal;
+            if error.is_nan() || error >= 1.0 {
+                bail!(
+                    "--max-error: is {error:.3} times the rest pose's diagonal, {diagonal:.4} units; check --unit, or give a shorter length"
+                );
+            }
+            Some(Goal::MaxError(error))
+        }
+        (_, Some(TargetSize::Bytes(bytes)), _) => Some(Goal::Size(bytes)),
+        (_, Some(TargetSize::BitsPerPoint(bits)), _) => {
+            Some(Goal::Size((bits * rest.points.len() as f64 * frames as f64 / 8.0) as u64))
+        }
+        (.., Some(Quality::Preview)) => Some(Goal::Preview),
+        (.., Some(Quality::Standard)) => Some(Goal::Standard),
+        (.., Some(Quality::Master)) => Some(Goal::MASTER),
+        _ => match args.design.mean_error {
+            Some(error) if args.cage.is_some() => {
+                if !(error > 0.0 && error < 1.0) {
+                    bail!(
+                        "--mean-error: is {error}; give a fraction of the rest pose's diagonal above 0, such as 0.001"
+                    );
+                }
+                Some(Goal::MeanError(error))
+            }
+            _ => None,
+        },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounds_and_sizes_are_read_with_their_units() {
+        assert_eq!("1e-3".parse(), Ok(ErrorBound::Fraction(1e-3)));
+        assert_eq!("0.2mm".parse(), Ok(ErrorBound::Metres(0.2e-3)));
+        assert_eq!("2 in".parse(), Ok(ErrorBound::Metres(2.0 * 0.0254)));
+        assert_eq!("500KB".parse(), Ok(TargetSize::Bytes(500_000)));
+        assert_eq!("0.5bpvf".parse(), Ok(TargetSize::BitsPerPoint(0.5)));
+        for wrong in ["", "mm", "-1", "0", "NaN", "inf", "1", "2e-3furlong"] {
+            assert!(wrong.parse::<ErrorBound>().is_err(), "{wrong}");
+        }
+        for wrong in ["", "KB", "-1", "0", "5 parsecs"] {
+            assert!(wrong.parse::<TargetSize>().is_err(), "{wrong}");
+        }
+    }
+}
