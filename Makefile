@@ -3,13 +3,14 @@
 CARGO ?= cargo
 PYTHON ?= python3
 PEERS := benches/.venv/bin/python
+CODECS := target/codecs/bin/python
 SCHEMATHESIS := target/schemathesis/bin/python
 
 BLENDER := target/blender/bin/python
 
 LINT := target/lint-deploy
 
-.PHONY: help demo test captures proxies blender soak lint lint-deploy doc bench paper cages openapi schemathesis fuzz audit clean
+.PHONY: help demo test captures proxies blender soak lint lint-deploy doc bench bench-codec paper cages openapi schemathesis fuzz audit clean
 
 help: ## list these commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
@@ -82,6 +83,15 @@ bench: $(PEERS) ## measure the figures beside their peers: benches/results.json 
 $(PEERS): benches/peers/requirements.txt
 	$(PYTHON) -m venv benches/.venv
 	benches/.venv/bin/pip install --quiet --requirement benches/peers/requirements.txt
+	@touch $@
+
+bench-codec: $(CODECS) ## sizes and errors of coded files beside other formats, on the captures in CAGER_CAPTURES: docs/RATES.md, its plots, the README
+	$(CARGO) build --release --locked --bin cager
+	$(CODECS) benches/codec.py
+
+$(CODECS): benches/peers/codecs.txt
+	$(PYTHON) -m venv target/codecs
+	target/codecs/bin/pip install --quiet --requirement benches/peers/codecs.txt
 	@touch $@
 
 paper: ## run the paper's comparisons on the captures in CAGER_CAPTURES and write the tables of docs/PAPER.md; reports in out/paper/

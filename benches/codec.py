@@ -1,0 +1,284 @@
+"""Sizes and errors of coded captures beside other formats': docs/RATES.md, its plots and the table in the README.
+
+`make bench-codec` builds the program and calls this with the Python of the peers. Everything in a file counts: model, cage, errors, tables.
+Errors are measured on what each decoder gives back. The captures are looked for in CAGER_CAPTURES (default ../shared/data); cages that are
+designed stay in the folder given as argument (default out/codec).
+"""
+
+import io
+import json
+import lzma
+import math
+import os
+import subprocess
+import sys
+import time
+
+import DracoPy
+import meshoptimizer
+import numpy as np
+import zstandard
+from pxr import Usd, UsdGeom, Vt
+
+from cages import CAGER, DATA, ROOT, table, write
+
+README = os.path.join(ROOT, "README.md")
+PAGE = os.path.join(ROOT, "docs", "RATES.md")
+CAPTURES = ["samba", "horse-gallop", "makehuman-cmu-walk", "chickenCrossing", "supercages-arm"]
+SETTINGS = [
+    ["--quality", "preview"],
+    *(["--mean-error", f"{e:g}"] for e in (5e-3, 2e-3, 1.4e-3, 1e-3, 7e-4, 5e-4, 2.5e-4, 1e-4, 5e-5)),
+    *(["--max-error", f"{e:g}"] for e in (1e-2, 1e-3, 1e-4, 1e-5)),
+]
+# For cages that were not made for the motion.
+FEW = [SETTINGS[0], ["--mean-error", "0.001"], ["--max-error", "0.001"], ["--max-error", "0.0001"]]
+
+
+class Capture:
+    def __init__(self, name):
+        self.name, self.folder = name, os.path.join(DATA, name)
+        self.frames = np.load(os.path.join(self.folder, "frames.npy")).astype(np.float64)
+        points, faces = [], []
+        with open(os.path.join(self.folder, "rest.obj"), encoding="utf-8") as file:
+            for line in file:
+                words = line.split()
+                if words[:1] == ["v"]:
+                    points.append([float(x) for x in words[1:4]])
+                elif words[:1] == ["f"]:
+                    faces.append([int(x.split("/")[0]) - 1 for x in words[1:]])
+        self.rest = np.array(points)
+        self.faces = np.array([[f[0], f[k], f[k + 1]] for f in faces for k in range(1, len(f) - 1)], np.uint32)
+        self.diagonal = np.linalg.norm(np.ptp(self.rest, axis=0))
+        self.spread = np.square(self.frames - self.frames.mean(1, keepdims=True)).sum()
+
+    def row(self, kind, setting, size, decoded, encode, decode):
+        """Figures of a file of `size` bytes that decodes to these frames; times in seconds for the whole capture."""
+        difference = self.frames - decoded
+        count, points, _ = self.frames.shape
+        return {
+            "capture": self.name,
+            "kind": kind,
+            "setting": setting,
+            "bytes": size,
+            "bpvf": 8 * size / (count * points),
+            "kg": 100 * math.sqrt(np.square(difference).sum() / self.spread),
+            "max": np.linalg.norm(difference, axis=2).max() / self.diagonal,
+            "encode": count / encode,
+            "decode": count / decode,
+        }
+
+
+def timed(work):
+    start = time.perf_counter()
+    result = work()
+    return result, time.perf_counter() - start
+
+
+def cager(*arguments):
+    done = subprocess.run([CAGER, *arguments, "--quiet", "--overwrite"], stderr=subprocess.PIPE, text=True)
+    if done.returncode != 0:
+        raise SystemExit(done.stderr)
+
+
+def cages(capture, folder):
+    """Kinds of cages and their files: designed for this capture, made by a program, made by an artist."""
+    designed = os.path.join(folder, f"{capture.name}-350.obj")
+    if not os.path.exists(designed):
+        cager("cage", "--rest", f"{capture.folder}/rest.obj", "--frames", f"{capture.folder}/frames.npy", "--style", "free", "-o", designed)
+    found = {"designed, 350": designed}
+    for name, kind in [("cage350.obj", "offset surface, 350"), ("cage.obj", "artist's")]:
+        path = os.path.join(capture.folder, name)
+        if os.path.exists(path):
+            found[kind] = path
+    return found
+
+
+def ours(capture, folder):
+    out, back = os.path.join(folder, "out.cager"), os.path.join(folder, "back.npy")
+    for kind, cage in cages(capture, folder).items():
+        for setting in SETTINGS if kind.startswith("designed") else FEW:
+            files = ["--rest", f"{capture.folder}/rest.obj", "--cage", cage, "--frames", f"{capture.folder}/frames.npy"]
+            _, encode = timed(lambda: cager("encode", *files, *setting, "-o", out))
+            _, decode = timed(lambda: cager("decode", out, "-o", back))
+            yield capture.row(f"cager, cage {kind}", " ".join(setting), os.path.getsize(out), np.load(back), encode, decode)
+
+
+def draco(capture):
+    for bits in (8, 10, 12, 14):
+        def encode(**more):
+            return [DracoPy.encode(f.astype(np.float32), capture.faces, quantization_bits=bits, compression_level=10, **more) for f in capture.frames]
+
+        files, seconds = timed(encode)
+        _, back = timed(lambda: [DracoPy.decode(f).points for f in files])
+        # The smaller files lose the order of the points; errors are those of the same quantisation in order.
+        decoded = np.stack([DracoPy.decode(f).points for f in encode(preserve_order=True)])
+        yield capture.row("Draco, each frame", f"{bits} bits", sum(map(len, files)), decoded, seconds, back)
+
+
+def meshopt(capture):
+    low, extent = capture.frames.min((0, 1)), np.ptp(capture.frames, axis=(0, 1)).max()
+    count, points, _ = capture.frames.shape
+    indices = meshoptimizer.encode_index_buffer(capture.faces.ravel(), len(capture.faces) * 3, points)
+    for bits in (8, 10, 12, 14, 16):
+        scale = (2**bits - 1) / extent
+
+        def encode():
+            whole = np.round((capture.frames - low) * scale).astype(np.int32)
+            deltas = np.diff(whole, axis=0, prepend=np.zeros((1, points, 3), np.int32))
+            padded = np.zeros((count, points, 4), np.int16)
+            padded[:, :, :3] = deltas.astype(np.uint16).view(np.int16)
+            return [meshoptimizer.encode_vertex_buffer(frame, points, 8) for frame in padded]
+
+        def decode():
+            frames = []
+            for file in files:
+                frame = meshoptimizer.decode_vertex_buffer(points, 8, file)
+                frames.append(np.ascontiguousarray(frame).view(np.int16).reshape(points, 4)[:, :3])
+            whole = np.cumsum(np.stack(frames).astype(np.int64), axis=0) & 0xFFFF
+            return whole / scale + low
+
+        files, seconds = timed(encode)
+        decoded, back = timed(decode)
+        yield capture.row("meshoptimizer, temporal deltas", f"{bits} bits", sum(map(len, files)) + len(indices), decoded, seconds, back)
+
+
+def pca(capture):
+    count, points, _ = capture.frames.shape
+    connectivity = len(lzma.compress(np.diff(capture.faces.ravel().astype(np.int32)).astype(np.int32).tobytes(), preset=9))
+    for components, step in ((5, 1e-2), (10, 4e-3), (20, 2e-3), (40, 1e-3), (80, 5e-4)):
+        if components >= count:
+            continue
+
+        def encode():
+            flat = capture.frames.reshape(count, -1)
+            mean = flat.mean(0)
+            values, vectors = np.linalg.eigh((flat - mean) @ (flat - mean).T)
+            weights = vectors[:, ::-1][:, :components]
+            basis = weights.T @ (flat - mean)
+            parts, back = [], []
+            # One step for all components, which have the length of what they move.
+            for array, unit in ((mean, step / 8 * capture.diagonal), (basis, step * capture.diagonal), (weights, 2**-12)):
+                whole = np.round(array / unit).astype(np.int32)
+                parts += [((whole >> 8) & 0xFF).astype(np.uint8).tobytes(), (whole & 0xFF).astype(np.uint8).tobytes(), (whole >> 16).astype(np.int8).tobytes()]
+                back.append(whole * unit)
+            return lzma.compress(b"".join(parts), preset=9), back
+
+        (file, (mean, basis, weights)), seconds = timed(encode)
+        decoded, back = timed(lambda: (weights @ basis + mean).reshape(capture.frames.shape))
+        yield capture.row("quantised PCA, xz", f"{components} components", len(file) + connectivity, decoded, seconds, back)
+
+
+def plain(capture):
+    data = capture.frames.astype(np.float32)
+    raw = data.tobytes() + capture.faces.tobytes()
+    for kind, encode, decode in [
+        ("float32, zstd 19", zstandard.ZstdCompressor(19).compress, zstandard.ZstdDecompressor().decompress),
+        ("float32, xz 9", lambda raw: lzma.compress(raw, preset=9), lzma.decompress),
+    ]:
+        file, seconds = timed(lambda: encode(raw))
+        _, back = timed(lambda: decode(file))
+        yield capture.row(kind, "", len(file), data.astype(np.float64), seconds, back)
+    path = "/tmp/cager-bench.usdc"
+
+    def usd():
+        if os.path.exists(path):
+            os.remove(path)
+        stage = Usd.Stage.CreateNew(path)
+        mesh = UsdGeom.Mesh.Define(stage, "/model")
+        mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(capture.faces), 3, np.int32)))
+        mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(capture.faces.ravel().astype(np.int32)))
+        attribute = mesh.CreatePointsAttr()
+        for k, frame in enumerate(data):
+            attribute.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(frame)), k)
+        stage.Save()
+
+    _, seconds = timed(usd)
+
+    def read():
+        stage = Usd.Stage.Open(path)
+        points = UsdGeom.Mesh(stage.GetPrimAtPath("/model")).GetPointsAttr()
+        return [np.array(points.Get(k)) for k in range(len(data))]
+
+    _, back = timed(read)
+    yield capture.row("USD (usdc)", "", os.path.getsize(path), data.astype(np.float64), seconds, back)
+    os.remove(path)
+
+
+def plot(name, rows):
+    """Bits over error, both logarithmic; a line for each kind."""
+    width, height, left, bottom, top, right = 760, 420, 56, 44, 16, 232
+    lossy = [row for row in rows if row["kg"] > 1e-3]
+    low = [math.log10(min(row[key] for row in lossy)) - 0.1 for key in ("kg", "bpvf")]
+    high = [math.log10(max(row[key] for row in lossy)) + 0.1 for key in ("kg", "bpvf")]
+    x = lambda kg: left + (math.log10(kg) - low[0]) / (high[0] - low[0]) * (width - left - right)
+    y = lambda bpvf: height - bottom - (math.log10(bpvf) - low[1]) / (high[1] - low[1]) * (height - bottom - top)
+    colours = ["#1a6fb5", "#6aa9dc", "#123a5e", "#c0504d", "#d98b2b", "#6b8e23"]
+    out = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" font-family="sans-serif" font-size="12">', f'<rect width="{width}" height="{height}" fill="#fff"/>']
+    for axis, place, label in ((0, x, lambda v: f"{v:g}"), (1, y, lambda v: f"{v:g}")):
+        for power in range(math.floor(low[axis]), math.ceil(high[axis]) + 1):
+            for factor in (1, 2, 5):
+                value = factor * 10.0**power
+                if not low[axis] <= math.log10(value) <= high[axis]:
+                    continue
+                at = place(value)
+                if axis == 0:
+                    out.append(f'<path d="M{at:.1f} {top}V{height - bottom}" stroke="#e4e4e4"/><text x="{at:.1f}" y="{height - bottom + 16}" text-anchor="middle">{label(value)}</text>')
+                else:
+                    out.append(f'<path d="M{left} {at:.1f}H{width - right}" stroke="#e4e4e4"/><text x="{left - 6}" y="{at + 4:.1f}" text-anchor="end">{label(value)}</text>')
+    out.append(f'<text x="{(left + width - right) / 2}" y="{height - 8}" text-anchor="middle">KG error, %</text>')
+    out.append(f'<text x="14" y="{(top + height - bottom) / 2}" text-anchor="middle" transform="rotate(-90 14 {(top + height - bottom) / 2})">bits per vertex and frame</text>')
+    for k, kind in enumerate(dict.fromkeys(row["kind"] for row in lossy)):
+        points = sorted((row["kg"], row["bpvf"]) for row in lossy if row["kind"] == kind)
+        colour = colours[k % len(colours)]
+        path = " ".join(f"{x(kg):.1f},{y(bpvf):.1f}" for kg, bpvf in points)
+        out.append(f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="1.6"/>')
+        out += [f'<circle cx="{x(kg):.1f}" cy="{y(bpvf):.1f}" r="2.6" fill="{colour}"/>' for kg, bpvf in points]
+        out.append(f'<path d="M{width - right + 14} {top + 14 + 18 * k}h18" stroke="{colour}" stroke-width="2"/><text x="{width - right + 38}" y="{top + 18 + 18 * k}">{kind}</text>')
+    with open(os.path.join(ROOT, "docs", f"rates-{name}.svg"), "w", encoding="utf-8") as file:
+        file.write("\n".join(out + ["</svg>", ""]))
+
+
+def rows_of(rows):
+    return table(
+        ["file", "setting", "bits per vertex and frame", "KG error, %", "largest error, % of the diagonal", "encoded, frames/s", "decoded, frames/s"],
+        [[r["kind"], r["setting"], f"{r['bpvf']:.3f}", f"{r['kg']:.4f}", f"{100 * r['max']:.4f}", f"{r['encode']:,.0f}", f"{r['decode']:,.0f}"] for r in rows],
+    )
+
+
+def main():
+    folder = sys.argv[1] if len(sys.argv) > 1 else os.path.join(ROOT, "out", "codec")
+    os.makedirs(folder, exist_ok=True)
+    page = io.StringIO()
+    chosen = []
+    everything = []
+    for name in CAPTURES:
+        capture = Capture(name)
+        rows = [row for part in (ours(capture, folder), draco(capture), meshopt(capture), pca(capture), plain(capture)) for row in part]
+        plot(name, rows)
+        everything += rows
+        count, points, _ = capture.frames.shape
+        page.write(f"\n## {name}\n\n{points:,} points, {count} frames.\n\n![bits over error](rates-{name}.svg)\n\n{rows_of(rows)}\n")
+        print(name, flush=True)
+        if name in ("samba", "horse-gallop"):
+            for goal in (0.6, 0.21, 0.1):
+                line = [name, f"{goal} %"]
+                for kind in ("cager, cage designed, 350", "quantised PCA, xz", "Draco, each frame", "meshoptimizer, temporal deltas"):
+                    fitting = [r for r in rows if r["kind"] == kind and r["kg"] <= goal]
+                    best = min(fitting, key=lambda r: r["bpvf"], default=None)
+                    line.append("–" if best is None else f"{best['bpvf']:.2f} at {best['kg']:.2f} %")
+                chosen.append(line)
+    with open(os.path.join(folder, "rates.json"), "w", encoding="utf-8") as file:
+        json.dump(everything, file, indent=1)
+    with open(PAGE, encoding="utf-8") as file:
+        text = write(file.read(), "rates", page.getvalue())
+    with open(PAGE, "w", encoding="utf-8") as file:
+        file.write(text)
+    head = ["capture", "KG error at most", "cager, designed cage of 350", "quantised PCA + xz", "Draco, each frame", "meshoptimizer, temporal deltas"]
+    with open(README, encoding="utf-8") as file:
+        text = write(file.read(), "rates", table(head, chosen))
+    with open(README, "w", encoding="utf-8") as file:
+        file.write(text)
+
+
+if __name__ == "__main__":
+    main()
