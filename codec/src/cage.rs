@@ -53,7 +53,7 @@ pub fn encode_cages(basis: &CageBasis, cages: &[&[f32]], step: f64) -> Option<Ve
 /// The cages that [`encode_cages`] wrote, of as many frames.
 ///
 /// # Errors
-/// Bytes that are none of it.
+/// Bytes that the encoder did not write.
 pub fn decode_cages(basis: &CageBasis, frames: usize, bytes: &[u8]) -> Result<Vec<Vec<f32>>> {
     let rows = basis.rows();
     let (head, coded) = bytes.split_first_chunk::<HEAD>().ok_or(Error::Damaged("a group of cages is cut"))?;
@@ -74,7 +74,7 @@ pub fn decode_cages(basis: &CageBasis, frames: usize, bytes: &[u8]) -> Result<Ve
 /// Whether bytes of [`encode_cages`] are in a rotated basis.
 ///
 /// # Errors
-/// Bytes that are none of it.
+/// Bytes that the encoder did not write.
 pub fn is_rotated(bytes: &[u8]) -> Result<bool> {
     match bytes.first() {
         Some(0) => Ok(false),

@@ -85,7 +85,7 @@ fn encode_walk(faces: &Polygons, points: usize, in_rings: bool) -> Vec<u8> {
 /// The polygons that [`encode_faces`] wrote: `count` faces with `corners` corners in all.
 ///
 /// # Errors
-/// Bytes that are none of it.
+/// Bytes that the encoder did not write.
 pub fn decode_faces(bytes: &[u8], points: usize, count: usize, corners: usize) -> Result<Polygons> {
     let mut coder = Decoder::new(bytes)?;
     let mut walk = Walk::new(points, corners, coder.even(false));

@@ -16,7 +16,7 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Over these points, with this step between positions. `None` where there are none, or too many steps.
+    /// Over these points, with this step between positions. `None` for an empty list, and where the points span too many steps.
     pub fn new(points: &[Point], step: f64) -> Option<Self> {
         let (low, high) = bounds(points);
         let steps = (0..3).map(|k| (high[k] - low[k]) / step).fold(0.0, f64::max);
@@ -53,7 +53,7 @@ pub fn encode_positions(grid: Grid, faces: &Polygons, points: &[Point]) -> Vec<u
 /// The positions that [`encode_positions`] wrote, for the same faces in the same order.
 ///
 /// # Errors
-/// Bytes that are none of it.
+/// Bytes that the encoder did not write.
 pub fn decode_positions(bytes: &[u8], faces: &Polygons, points: usize) -> Result<Vec<Point>> {
     let (head, coded) = bytes.split_first_chunk::<HEAD>().ok_or(Error::Damaged("positions are cut"))?;
     let number = |k: usize| f64::from_le_bytes(std::array::from_fn(|byte| head[8 * k + byte]));

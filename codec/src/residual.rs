@@ -115,7 +115,7 @@ impl Residual {
     /// What [`encode_residual`] wrote, for a group of as many frames, where that are at most so many numbers of components.
     ///
     /// # Errors
-    /// Bytes that are none of it.
+    /// Bytes that the encoder did not write.
     pub fn decode(hierarchy: &Hierarchy, frames: usize, bytes: &[u8], most: usize) -> Result<Self> {
         let points = hierarchy.points();
         if frames > MOST_FRAMES || points.saturating_mul(frames) > MOST_POSITIONS {
@@ -267,7 +267,7 @@ impl<'a> Components<'a> {
     }
 }
 
-/// To whole steps, towards 0 in doubt.
+/// Rounded to whole steps; less than 11/16 of a step is dropped.
 fn rounded(parts: i64) -> i32 {
     let steps = (parts.abs() + ROUND_UP) / PARTS * parts.signum();
     steps.clamp(-i64::from(MOST), i64::from(MOST)) as i32

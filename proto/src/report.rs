@@ -155,7 +155,7 @@ pub struct Coding {
     pub max_error: Option<f64>,
     /// Step of the cages: the root mean square over the points of what one coefficient moves the model.
     pub cage_step: f64,
-    /// Step of the residual; absent where there is none.
+    /// Step of the residual; absent from files without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub residual_step: Option<f64>,
     /// Most frames of a group.
