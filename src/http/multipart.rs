@@ -10,9 +10,11 @@ use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::cage_source::Uploaded;
 use crate::store::{CageFile, MatrixFile};
+use axum::body::{Body, BodyDataStream};
 use axum::extract::multipart::{Field, MultipartError};
 use axum::extract::{FromRequest, Multipart, Request};
 use cager_proto::messages::SessionOptions;
+use futures_util::{StreamExt as _, stream};
 use serde::de::DeserializeOwned;
 use std::sync::Arc;
 use std::time::Duration;
@@ -71,11 +73,28 @@ pub(super) fn check_form_header(
 /// Parts that are missing, twice there, unknown or too large; no room.
 pub(crate) async fn read(service: &Arc<Service>, tenant: &Tenant, request: Request) -> Result<Parts, ApiError> {
     let (metered, request) = Metered::new(service, tenant, request, "rest pose and cage have");
-    let body = Multipart::from_request(request, &())
-        .await
-        .map_err(|error| bad(format!("the multipart body cannot be read: {}", error.body_text())))?;
+    let body = form(request).await?;
     let ((uploaded, options), room) = metered.finish(read_parts(service, body).await)?;
     Ok(Parts { uploaded, options, room })
+}
+
+/// The form in a request's body.
+///
+/// # Errors
+/// It is no multipart form.
+pub(super) async fn form(request: Request) -> Result<Multipart, ApiError> {
+    // It gets one piece at a time: the parser (multer 3.1) buffers whatever is there, which must not be a whole capture; and it looks for the first
+    // boundary between two readings of the body, and takes one that comes to its end in the second for incomplete.
+    let pieces = |(mut pieces, is_first): (BodyDataStream, bool)| async move {
+        if !is_first {
+            tokio::task::yield_now().await;
+        }
+        pieces.next().await.map(|piece| (piece, (pieces, false)))
+    };
+    let request = request.map(|body| Body::from_stream(stream::unfold((body.into_data_stream(), true), pieces)));
+    Multipart::from_request(request, &())
+        .await
+        .map_err(|error| bad(format!("the multipart body cannot be read: {}", error.body_text())))
 }
 
 async fn read_parts(service: &Service, mut body: Multipart) -> Result<(Uploaded, SessionOptions), ApiError> {
@@ -169,4 +188,34 @@ pub(super) fn broken(error: &MultipartError) -> ApiError {
         return general;
     }
     bad(format!("the multipart body cannot be read: {}", error.body_text()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytes::Bytes;
+    use std::task::Poll;
+
+    #[tokio::test]
+    async fn a_form_that_comes_while_it_is_looked_at_is_read() {
+        let text = "--b\r\nContent-Disposition: form-data; name=\"x\"\r\n\r\n1\r\n--b--\r\n";
+        let mut polls = 0;
+        let body = stream::poll_fn(move |cx| {
+            polls += 1;
+            match polls {
+                1 => {
+                    cx.waker().wake_by_ref();
+                    Poll::Pending
+                }
+                2 => Poll::Ready(Some(Ok::<_, std::io::Error>(Bytes::from_static(text.as_bytes())))),
+                _ => Poll::Ready(None),
+            }
+        });
+        let request = Request::builder().header("content-type", "multipart/form-data; boundary=b");
+        let request = request.body(Body::from_stream(body)).expect("a request");
+        let mut form = form(request).await.expect("a form");
+        let field = form.next_field().await.expect("a whole form").expect("a part");
+        assert_eq!(field.name(), Some("x"));
+        assert_eq!(field.text().await.expect("its text"), "1");
+    }
 }

@@ -1,7 +1,7 @@
 //! Another model within a session's rest cage, to be moved by its cages: the parts of a `decode` body that brings one.
 
 use super::metered::Metered;
-use super::multipart::{bad, broken, file_name};
+use super::multipart::{bad, broken, file_name, form};
 use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::problem::{self, ApiError};
@@ -9,7 +9,7 @@ use crate::service::Service;
 use crate::session::Session;
 use crate::session::create::blocking;
 use crate::session::prepare::{Choices, check_model, read_part};
-use axum::extract::{FromRequest, Multipart, Request};
+use axum::extract::{Multipart, Request};
 use bytes::Bytes;
 use cager_core::decode::Decoder;
 use cager_core::inversion::reject_far_points;
@@ -42,9 +42,7 @@ pub(super) async fn read(
     request: Request,
 ) -> Result<(Uploaded, BoxStream<'static, Result<Bytes, ApiError>>), ApiError> {
     let (metered, request) = Metered::new(service, tenant, request, "the model has");
-    let mut body = Multipart::from_request(request, &())
-        .await
-        .map_err(|error| bad(format!("the multipart body cannot be read: {}", error.body_text())))?;
+    let mut body = form(request).await?;
     // The cages that follow wait on the disk, under a limit of their own.
     let ((name, bytes), room) = metered.finish(read_model(&mut body).await)?;
     let model = Uploaded { name, bytes, _room: room };

@@ -4,7 +4,7 @@ use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::cage_job::create::{NewCageJob, check_options};
 use crate::config::MULTIPART_OVERHEAD_BYTES;
-use crate::http::multipart::{NAME_CHARACTERS, bad, broken, file_name, read_options};
+use crate::http::multipart::{NAME_CHARACTERS, bad, broken, file_name, form, read_options};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::commit::storage_error;
@@ -12,15 +12,13 @@ use crate::session::create::blocking;
 use crate::session::lock;
 use crate::session::registry::Reserved;
 use crate::store::Spool;
-use axum::body::{Body, BodyDataStream};
+use axum::body::Body;
 use axum::extract::multipart::Field;
-use axum::extract::{FromRequest, Multipart, Request};
+use axum::extract::{Multipart, Request};
 use bytes::{Bytes, BytesMut};
 use cager_proto::cage_messages::CageOptions;
-use futures_util::Stream;
-use std::pin::Pin;
+use futures_util::StreamExt as _;
 use std::sync::{Arc, Mutex};
-use std::task::{Context, Poll};
 
 /// Bytes of frames written to disk at a time; quota is reserved in the same steps.
 const SPOOL_CHUNK_BYTES: usize = 1 << 20;
@@ -37,11 +35,15 @@ pub(in crate::http) async fn read(
 ) -> Result<NewCageJob, ApiError> {
     let pace = Arc::new(Mutex::new(ParserBacklog::default()));
     let counted = Arc::clone(&pace);
-    let request = request
-        .map(|body| Body::from_stream(ChunkwiseBody { inner: body.into_data_stream(), pace: counted, gave: false }));
-    let body = Multipart::from_request(request, &())
-        .await
-        .map_err(|error| bad(format!("the multipart body cannot be read: {}", error.body_text())))?;
+    let count = move |piece: Result<Bytes, axum::Error>| {
+        let piece = piece?;
+        let mut pace = lock(&counted);
+        pace.unused += piece.len() as u64;
+        pace.stuck |= pace.unused > 2 * MULTIPART_OVERHEAD_BYTES;
+        if pace.stuck { Err(axum::Error::new("it has no parts")) } else { Ok(piece) }
+    };
+    let request = request.map(|body| Body::from_stream(body.into_data_stream().map(count)));
+    let body = form(request).await?;
     let receiver = Receiver {
         service,
         tenant,
@@ -175,33 +177,4 @@ struct ParserBacklog {
     unused: u64,
     /// Whether that limit was exceeded.
     stuck: bool,
-}
-
-/// Yields a body chunk by chunk: the multipart parser buffers whatever is available, which must not be a whole capture.
-struct ChunkwiseBody {
-    inner: BodyDataStream,
-    pace: Arc<Mutex<ParserBacklog>>,
-    gave: bool,
-}
-
-impl Stream for ChunkwiseBody {
-    type Item = Result<Bytes, axum::Error>;
-
-    fn poll_next(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Option<Self::Item>> {
-        if std::mem::take(&mut self.gave) {
-            context.waker().wake_by_ref();
-            return Poll::Pending;
-        }
-        let piece = std::task::ready!(Pin::new(&mut self.inner).poll_next(context));
-        self.gave = true;
-        if let Some(Ok(bytes)) = &piece {
-            let mut pace = lock(&self.pace);
-            pace.unused += bytes.len() as u64;
-            if pace.unused > 2 * MULTIPART_OVERHEAD_BYTES {
-                pace.stuck = true;
-                return Poll::Ready(Some(Err(axum::Error::new("it has no parts"))));
-            }
-        }
-        Poll::Ready(piece)
-    }
 }
