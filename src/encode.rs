@@ -1,9 +1,8 @@
 //! Encoding: solves one cage per frame and measures the errors that a decoder will produce.
 
 use crate::capture::{CaptureWriter, Encoding, StoredError};
-use crate::coding::{CodedGroup, CodingError, Goal, GroupCoder, RestMeshes, Room};
+use crate::coding::{Carried, CodedGroup, CodingError, Goal, GroupCoder, GroupDecoder, RestMeshes};
 use crate::memory::Memory;
-use cager_codec::{CageBasis, MOST_ROWS};
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::decode::FrameError;
@@ -12,11 +11,12 @@ use cager_core::mesh::{Model, diagonal};
 use cager_core::regularize::Term;
 use cager_formats::{Action, AtomicFile, FrameReader, Target};
 use cager_proto::container;
-use cager_proto::report::{Coding, Consistency, Report, Seconds, SpectrumChoice, WorstError};
+use cager_proto::report::{Consistency, Report, Seconds, SpectrumChoice, WorstError};
 use rayon::prelude::*;
 use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Instant;
 
@@ -176,7 +176,7 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
     let Job { frames, output, system, options, term, choose, memory, goal, exact_rest, .. } = job;
     let job = Job { rest, cage, frames: &mut *frames, output, system, options, term, choose, memory, goal, exact_rest };
     let (solver, options, choice) = prepare(&job, &|step| progress(EncodeProgress::Preparing(step)))?;
-    let basis = job.goal.map(|_| basis(&job, &solver)).transpose()?;
+    let model = job.goal.map(|_| GroupDecoder::new(job.system, job.cage, job.rest, &solver)).transpose()?;
     let encoding = Encoding {
         rest: job.rest,
         cage: job.cage,
@@ -191,16 +191,9 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
     let group_frames = container::group_frames(job.rest.points.len(), solver.decoder().unknowns());
     // A group is held as captured, as cages leave it, and decoded.
     let group_frames = job.memory.frames(48 * job.rest.points.len(), group_frames);
-    let mut coder = job.goal.zip(basis.as_ref()).map(|(goal, basis)| {
-        let room = match goal {
-            Goal::Size(bytes) => {
-                let frames = job.frames.frames();
-                let other = writer.bytes() + AROUND + 8 * frames as u64;
-                Some(Room { bytes: bytes.saturating_sub(other), frames, other })
-            }
-            _ => None,
-        };
-        GroupCoder::new(goal, job.rest, unit, basis, solver.decoder(), group_frames, room)
+    let mut coder = job.goal.zip(model).map(|(goal, model)| {
+        let room = goal.room(writer.bytes(), job.frames.frames());
+        GroupCoder::new(goal, Arc::new(model), unit, group_frames, Carried { room, ..Carried::default() })
     });
     writer.number_frames((0..job.frames.frames()).map(|frame| job.frames.number(frame)).collect());
     let found = solver.preparation();
@@ -281,11 +274,12 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
         Ok(())
     })?;
 
-    if let Some(steps) = coder.as_ref().and_then(GroupCoder::steps) {
-        let max_error = job.goal.and_then(|goal| if let Goal::MaxError(error) = goal { Some(error) } else { None });
-        let (cage_step, residual_step) =
-            (steps.cage / solver.diagonal(), steps.residual.map(|s| s / solver.diagonal()));
-        writer.set_coding(Coding { max_error, cage_step, residual_step, group_frames });
+    let coded = job.goal.zip(coder.as_ref());
+    let coding = |(goal, coder): (Goal, &GroupCoder)| {
+        goal.coding(&coder.carried(), job.rest.points.len(), solver.diagonal(), group_frames)
+    };
+    if let Some(coding) = coded.and_then(coding) {
+        writer.set_coding(coding);
     }
     let clock_write = Instant::now();
     let (buffered, mut report) = writer.finish().map_err(fail)?;
@@ -304,12 +298,9 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
     Ok(Encoded { report, container })
 }
 
-/// Bytes of a file after its frames but for eight of each: the report and the table of contents, about.
-const AROUND: u64 = 1500;
-
 /// Codes a group and writes it.
 fn close<W: Write>(
-    coder: &mut GroupCoder<'_>,
+    coder: &mut GroupCoder,
     writer: &mut CaptureWriter<W>,
     worst: &mut Option<WorstError>,
     seconds: &mut Seconds,
@@ -335,18 +326,6 @@ enum GroupError {
     Coding(#[from] CodingError),
     #[error(transparent)]
     Container(#[from] container::Error),
-}
-
-/// The coordinates in which cages are coded.
-fn basis(job: &Job<'_>, solver: &Solver) -> Result<CageBasis, EncodeError> {
-    let rows = solver.decoder().unknowns();
-    if rows > MOST_ROWS {
-        return Err(CodingError::TooManyRows { rows, most: MOST_ROWS }.into());
-    }
-    let plan = solver.preparation().plan.as_ref();
-    CageBasis::of(job.system, job.cage, &job.rest.points, plan, None)
-        .map_err(PrepareError::from)?
-        .ok_or_else(|| CodingError::Uncountable { first: 0, last: 0 }.into())
 }
 
 /// The solver, its options, and how the spectrum threshold was selected.

@@ -196,6 +196,10 @@ async fn run(
     let mut reader = ContainerReader::open(BufReader::new(file.reader()?)).map_err(RemoteError::Container)?;
     reader.verify().map_err(RemoteError::Container)?;
     let mut report = reader.report().map_err(RemoteError::Container)?;
+    // Coded files do not hold them.
+    if report.handle_indices.is_empty() {
+        report.handle_indices = client.handles(session).await?;
+    }
     steps.download = clock_download.elapsed();
     report.seconds = seconds(&ready.seconds, &steps, clock.elapsed());
     Ok((Encoded { report, container: file }, steps))

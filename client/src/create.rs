@@ -105,8 +105,15 @@ fn refuse_not_finite(options: &SessionOptions) -> Result<(), ClientError> {
         flip_cage: _,
         frame_rate,
         frames: _,
+        max_error,
+        mean_error,
+        target_size: _,
+        quality: _,
+        exact_rest: _,
     } = options;
-    for (name, value) in [("lambda", lambda), ("frame_rate", frame_rate)] {
+    let numbers =
+        [("lambda", lambda), ("frame_rate", frame_rate), ("max_error", max_error), ("mean_error", mean_error)];
+    for (name, value) in numbers {
         if let Some(value) = value.filter(|value| !value.is_finite()) {
             return Err(ClientError::Mismatch(format!("{name}: is {value}; give a finite number, or leave it out")));
         }

@@ -167,7 +167,7 @@ async fn some_cages_come_in_one_piece() {
 #[tokio::test]
 async fn progress_goes_on_after_the_last_event() {
     let event = |id: u32, state: SessionState| {
-        let progress = Progress { state, received: u64::from(id), solved: u64::from(id) };
+        let progress = Progress { state, received: u64::from(id), solved: u64::from(id), coded: None };
         format!("id: {id}\ndata: {}\n\n", serde_json::to_string(&progress).expect("JSON"))
     };
     let (address, log) = scripted(completed(9), move |number, mut exchange| async move {

@@ -19,6 +19,17 @@ const PRECISION: usize = 16;
 const FAST: u32 = 4;
 const SLOW: u32 = 7;
 
+/// 2³² over each rate, rounded up.
+const RECIPROCALS: [u64; (1 << SLOW) + 1] = {
+    let mut reciprocals = [0; (1 << SLOW) + 1];
+    let mut rate = 1;
+    while rate < reciprocals.len() {
+        reciprocals[rate] = (1u64 << 32).div_ceil(rate as u64);
+        rate += 1;
+    }
+    reciprocals
+};
+
 /// The probability that a binary digit is 0: the mean of two estimates that follow what they meet fast and slowly.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bit {
@@ -42,9 +53,9 @@ impl Bit {
     fn meet(&mut self, one: bool) {
         // At first a plain average of what was met.
         let rate = |limit: u32| (u32::from(self.met) + 2).min(1 << limit);
-        let toward = |p: u16, rate: u32| {
-            if one { p - (u32::from(p) / rate) as u16 } else { p + (u32::from(u16::MAX - p) / rate) as u16 }
-        };
+        // 16 digits times a reciprocal of 32, rounded up, is the quotient for divisors this small.
+        let part = |p: u16, rate: u32| ((u64::from(p) * RECIPROCALS[rate as usize]) >> 32) as u16;
+        let toward = |p: u16, rate: u32| if one { p - part(p, rate) } else { p + part(u16::MAX - p, rate) };
         (self.fast, self.slow) = (toward(self.fast, rate(FAST)), toward(self.slow, rate(SLOW)));
         self.met = (self.met + 1).min(1 << SLOW);
     }
@@ -294,6 +305,13 @@ mod tests {
         (0..1_000).for_each(|_| _ = decoder.bits(20, 0));
         assert!(decoder.check().is_err());
         assert!(bytes.len() < 12_000, "{}", bytes.len());
+    }
+
+    #[test]
+    fn reciprocals_divide_as_division_does() {
+        for rate in 1..=1u64 << SLOW {
+            assert!((0..=u64::from(u16::MAX)).all(|p| p * RECIPROCALS[rate as usize] >> 32 == p / rate), "{rate}");
+        }
     }
 
     #[test]

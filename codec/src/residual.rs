@@ -13,6 +13,7 @@ use crate::{MOST_FRAMES, MOST_POSITIONS, linear};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use rayon::prelude::*;
+use std::sync::LazyLock;
 
 /// Bytes before the coded numbers: the step as f64, the number of components as u16, the step of corrections as f64, the bytes of the components as u32.
 const HEAD: usize = 22;
@@ -22,6 +23,8 @@ const PARTS: i64 = 16;
 const ROUND_UP: i64 = 5;
 /// Points that one task adds up.
 const BLOCK: usize = 2048;
+/// Components that are looked at together before they are coded.
+const AT_A_TIME: usize = 8;
 
 /// A group to encode: for each frame, where its points are and where its cage takes them, points × 3.
 pub struct ResidualGroup<'a> {
@@ -60,14 +63,24 @@ pub fn encode_residual(hierarchy: &Hierarchy, group: &ResidualGroup<'_>) -> Opti
     chosen.code(&mut coder, frames, count);
     let mut decoded = Residual::new(&chosen, points);
     let mut components = Components::new(hierarchy);
-    for k in 0..count {
-        let target: Vec<i64> = (0..3 * points)
-            .map(|value| {
-                let x = values[(k, value)] / group.step * PARTS as f64;
-                (x.abs() < f64::from(MOST)).then_some(x.round() as i64)
+    let all: Vec<usize> = (0..count).collect();
+    for some in all.chunks(AT_A_TIME) {
+        // What of a component does not depend on those before it is found for some at once.
+        let targets: Vec<(Vec<i64>, bool)> = some
+            .par_iter()
+            .map(|&k| {
+                let parts = |value: usize| {
+                    let x = values[(k, value)] / group.step * PARTS as f64;
+                    (x.abs() < f64::from(MOST)).then_some(x.round() as i64)
+                };
+                let target: Vec<i64> = (0..3 * points).map(parts).collect::<Option<_>>()?;
+                let predicts = cost(hierarchy, &target, true) < cost(hierarchy, &target, false);
+                Some((target, predicts))
             })
             .collect::<Option<_>>()?;
-        decoded.set(k, components.code(&mut coder, &target), group.step);
+        for (&k, (target, predicts)) in some.iter().zip(&targets) {
+            decoded.set(k, components.code(&mut coder, target, *predicts), group.step);
+        }
     }
     let coded = coder.into_bytes();
     let corrections = match group.bound {
@@ -135,7 +148,7 @@ impl Residual {
         let mut residual = Self::new(&trajectories, points);
         let mut components = Components::new(hierarchy);
         for k in 0..count {
-            residual.set(k, components.code(&mut coder, &[]), step);
+            residual.set(k, components.code(&mut coder, &[], false), step);
             coder.check()?;
         }
         residual.corrections = Corrections::decode(corrected, frames, points, correction)?;
@@ -221,9 +234,8 @@ impl<'a> Components<'a> {
         }
     }
 
-    /// Codes the numbers nearest to `target`; gives what a decoder makes of them.
-    fn code(&mut self, coder: &mut impl Coder, target: &[i64]) -> &[i64] {
-        let predicts = !target.is_empty() && self.cost(target, true) < self.cost(target, false);
+    /// Codes the numbers nearest to `target`, as differences to their prediction or not; gives what a decoder makes of them.
+    fn code(&mut self, coder: &mut impl Coder, target: &[i64], predicts: bool) -> &[i64] {
         let predicts = coder.bit(&mut self.flag, predicts);
         let models = &mut self.models[usize::from(predicts)];
         let found = &mut self.found;
@@ -248,23 +260,26 @@ impl<'a> Components<'a> {
         std::mem::swap(&mut self.before, &mut self.sizes);
         found
     }
+}
 
-    /// About how many binary digits the numbers take.
-    fn cost(&self, target: &[i64], predicts: bool) -> f64 {
-        let mut found = vec![0i64; target.len()];
-        let mut cost = 0.0;
-        for (vertex, parents) in self.hierarchy.iter() {
-            for k in 0..3 {
-                let at = 3 * vertex + k;
-                let expected =
-                    if predicts { mean(parents.iter().map(|&parent| found[3 * parent as usize + k])) } else { 0 };
-                let value = rounded(target[at] - expected);
-                found[at] = expected + PARTS * i64::from(value);
-                cost += (1.0 + 2.0 * f64::from(value.unsigned_abs())).log2();
-            }
+/// About how many binary digits the numbers of a component take.
+fn cost(hierarchy: &Hierarchy, target: &[i64], predicts: bool) -> f64 {
+    static DIGITS: LazyLock<[f64; 256]> =
+        LazyLock::new(|| std::array::from_fn(|size| (1.0 + 2.0 * size as f64).log2()));
+    let mut found = vec![0i64; target.len()];
+    let mut cost = 0.0;
+    for (vertex, parents) in hierarchy.iter() {
+        for k in 0..3 {
+            let at = 3 * vertex + k;
+            let expected =
+                if predicts { mean(parents.iter().map(|&parent| found[3 * parent as usize + k])) } else { 0 };
+            let value = rounded(target[at] - expected);
+            found[at] = expected + PARTS * i64::from(value);
+            let size = value.unsigned_abs();
+            cost += DIGITS.get(size as usize).copied().unwrap_or_else(|| (1.0 + 2.0 * f64::from(size)).log2());
         }
-        cost
     }
+    cost
 }
 
 /// Rounded to whole steps; less than 11/16 of a step is dropped.

@@ -74,6 +74,26 @@ pub struct SessionOptions {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(minimum = 1))]
     pub frames: Option<u32>,
+    /// Code the frames in groups so that no point of any frame is farther from where it was posted than this fraction of the diagonal. At
+    /// most one of `max_error`, `mean_error`, `target_size` and `quality` is given; frames are then posted whole.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schema(exclusive_minimum = 0, exclusive_maximum = 1))]
+    pub max_error: Option<f64>,
+    /// The same with the root mean square error of the points, averaged over the frames.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schema(exclusive_minimum = 0, exclusive_maximum = 1))]
+    pub mean_error: Option<f64>,
+    /// Most bytes of the container; `frames` is needed with it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schema(minimum = 1))]
+    pub target_size: Option<u64>,
+    /// `preview` (cages alone), `standard` (errors that are not seen) or `master` (as `max_error` 1e-4).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schema(pattern = "^(preview|standard|master)$"))]
+    pub quality: Option<String>,
+    /// Keep rest pose and cage exactly as they were sent, where one of these four allows less.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub exact_rest: bool,
 }
 
 /// A cage that is not sent. At most one of its fields is given.
@@ -162,6 +182,9 @@ pub struct Session {
     pub affine_reproduction_error: Option<f64>,
     /// How far the frames are.
     pub frames: FrameCounts,
+    /// How far the coding of the frames is; only where the session was made with `max_error`, `mean_error`, `target_size` or `quality`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub coding: Option<CodedFrames>,
     /// Whether the prepared solver was there already.
     pub cache: Option<CacheUse>,
     /// Times of the preparation.
@@ -208,6 +231,21 @@ pub struct FrameCounts {
     /// Where the ranges that follow begin, if `missing` has not all of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub missing_next: Option<u32>,
+}
+
+/// Frames of a session that are coded in groups.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct CodedFrames {
+    /// Most frames of a group; null until the session is prepared.
+    pub group_frames: Option<u32>,
+    /// Frames in groups that are coded, from frame 0 on.
+    pub frames: u32,
+    /// Bytes of these groups.
+    pub bytes: u64,
+    /// Why the next group cannot be coded as asked for; completing answers the same.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub problem: Option<Problem>,
 }
 
 /// Times of a preparation; all zero where the solver was there already.
@@ -282,6 +320,9 @@ pub struct Progress {
     pub received: u64,
     /// Frames that are solved and on disk.
     pub solved: u64,
+    /// Frames in groups that are coded, where the session's frames are.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub coded: Option<u32>,
 }
 
 /// An error as problem details (RFC 9457), `application/problem+json`.

@@ -32,7 +32,6 @@ pub(super) fn run(args: &EncodeArgs) -> Result<()> {
     let mut rest = read_model(&args.rest)?;
     let mut files = capture_files(&args.capture, &args.frames, &mut rest);
     files.range = args.frames_range;
-    refuse_coding_by_service(args)?;
     // What is wrong with it is told before anything is computed.
     goal(args, &rest, 1)?;
     let cage = args.cage.as_ref().map(|path| read_cage(path, args.flip_cage)).transpose()?;
@@ -53,23 +52,6 @@ pub(super) fn run(args: &EncodeArgs) -> Result<()> {
             encode_locally(args, &targets, &files, &rest, &cage, Some(report), clock)
         }
         (Some(address), cage) => encode_remote::run(args, &targets, address, files, &rest, cage.as_ref(), clock),
-    }
-}
-
-/// A service stores cages as they are solved for.
-fn refuse_coding_by_service(args: &EncodeArgs) -> Result<()> {
-    let coding = &args.coding;
-    let asked = [
-        ("--max-error", coding.max_error.is_some()),
-        ("--target-size", coding.target_size.is_some()),
-        ("--quality", coding.quality.is_some()),
-        ("--mean-error", args.design.mean_error.is_some() && args.cage.is_some()),
-    ];
-    match asked.into_iter().find(|(_, asked)| *asked && args.server.is_some()) {
-        Some((name, _)) => {
-            bail!("{name}: a service stores cages as they are solved for; leave --server out to encode here")
-        }
-        None => Ok(()),
     }
 }
 

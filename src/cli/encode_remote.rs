@@ -1,9 +1,11 @@
 //! `cager encode --server`.
 
 use super::args::{EncodeArgs, SolverArgs, SpectrumArg};
+use super::coding_args::goal;
 use super::encode::{Targets, checked_solver, design_options, finish};
 use super::solver_options::{designed_spectrum, matrix, solver_for, spectrum_bound};
 use super::{plain, progress, tell, warn};
+use crate::coding::Goal;
 use crate::frames::CaptureFiles;
 use crate::remote::{EncodedRemotely, FileFrames, RemoteCage, RemoteJob, RemoteProgress, encode_remotely};
 use anyhow::{Context, Result, bail};
@@ -63,7 +65,7 @@ pub(super) fn run(
         flip_cage: args.flip_cage,
         frame_rate: frames.frame_rate(),
         frames: frames.frames(),
-        ..SessionOptions::default()
+        ..coding_options(goal(args, rest, frames.frames().unwrap_or(1) as usize)?, args.coding.exact_rest)
     };
     let design = design_options(args, rest.points.len())?;
     let bar = progress::frames("encoding", frames.frames().unwrap_or(0) as usize);
@@ -94,6 +96,19 @@ pub(super) fn run(
     encoded.report.seconds.read += read_seconds;
     finish(targets, encoded, report_file, clock)?;
     tell(&format!("  service {}, session {}\n", plain(address), plain(&session)))
+}
+
+/// What the container is to meet, as a session is asked for it.
+fn coding_options(goal: Option<Goal>, exact_rest: bool) -> SessionOptions {
+    let options = SessionOptions { exact_rest, ..SessionOptions::default() };
+    match goal {
+        None => SessionOptions::default(),
+        Some(Goal::MaxError(error)) => SessionOptions { max_error: Some(error), ..options },
+        Some(Goal::MeanError(error)) => SessionOptions { mean_error: Some(error), ..options },
+        Some(Goal::Size(bytes)) => SessionOptions { target_size: Some(bytes), ..options },
+        Some(Goal::Preview) => SessionOptions { quality: Some("preview".to_owned()), ..options },
+        Some(Goal::Standard) => SessionOptions { quality: Some("standard".to_owned()), ..options },
+    }
 }
 
 pub(super) fn refuse_choosing(args: &SolverArgs) -> Result<()> {

@@ -5,10 +5,16 @@
 
 mod group;
 mod meshes;
+mod model;
 mod steps;
 
-pub(crate) use group::{CodedGroup, GroupCoder, Room};
+pub(crate) use group::{Carried, CodedGroup, GroupCoder, Room};
 pub(crate) use meshes::RestMeshes;
+pub(crate) use model::GroupDecoder;
+
+use cager_core::coordinates::CoordinatesError;
+use cager_proto::report::Coding;
+use group::Steps;
 
 /// What a coded file is to meet; errors are fractions of the rest pose's diagonal.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,7 +34,50 @@ pub enum Goal {
 impl Goal {
     /// The quality for what is to be worked on later.
     pub const MASTER: Self = Self::MaxError(1e-4);
+
+    /// Refuses an error that positions in single precision cannot hold where numbers are as large as `farthest`.
+    ///
+    /// # Errors
+    /// [`CodingError::BelowPrecision`].
+    pub(crate) fn check_precision(self, diagonal: f64, farthest: f64) -> Result<(), CodingError> {
+        let (asked, times) = match self {
+            Self::MaxError(error) => (error, 4.0),
+            Self::MeanError(error) => (error, 1.0),
+            _ => return Ok(()),
+        };
+        let least = times * slack(diagonal, farthest) / diagonal;
+        if asked < least { Err(CodingError::BelowPrecision { asked, least }) } else { Ok(()) }
+    }
+
+    /// The steps for a step of the residual and that of the cage over it, for a model of so many points.
+    fn steps(self, (residual, ratio): (f64, f64), points: usize) -> Steps {
+        let cage = ratio * residual / (points as f64).sqrt();
+        Steps { cage, residual: (self != Self::Preview).then_some(residual) }
+    }
+
+    /// How frames were coded that left `carried`, as a report says it.
+    pub(crate) fn coding(self, carried: &Carried, points: usize, diagonal: f64, group_frames: usize) -> Option<Coding> {
+        let steps = self.steps(carried.chosen?, points);
+        let max_error = if let Self::MaxError(error) = self { Some(error) } else { None };
+        let residual_step = steps.residual.map(|step| step / diagonal);
+        Some(Coding { max_error, cage_step: steps.cage / diagonal, residual_step, group_frames })
+    }
+
+    /// What the size leaves for so many frames after the `written` bytes of the meshes.
+    pub(crate) fn room(self, written: u64, frames: usize) -> Option<Room> {
+        let Self::Size(bytes) = self else { return None };
+        let other = written + AROUND + 8 * frames as u64;
+        Some(Room { bytes: bytes.saturating_sub(other), frames, other })
+    }
 }
+
+/// What positions may differ by from machine to machine where numbers are as large as `farthest`.
+fn slack(diagonal: f64, farthest: f64) -> f64 {
+    1e-6 * diagonal + f64::from(f32::EPSILON) * farthest
+}
+
+/// Bytes of a file after its frames but for eight of each: the report and the table of contents, about.
+const AROUND: u64 = 1500;
 
 /// Why frames cannot be coded as asked for.
 #[derive(Debug, thiserror::Error, PartialEq)]
@@ -63,6 +112,9 @@ pub enum CodingError {
         /// Last one.
         last: usize,
     },
+    /// Coordinates of the points that the basis of the cages is made from.
+    #[error(transparent)]
+    Coordinates(#[from] CoordinatesError),
     /// A cage with very many vertices.
     #[error(
         "cages of {rows} rows cannot be coded, only up to {most}; encode without a target for error, size or quality, or take a smaller cage"

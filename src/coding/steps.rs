@@ -10,7 +10,7 @@ const USUAL_RATIO: f64 = 1.6;
 /// Step of the residual over the largest error allowed, likewise.
 const USUAL_STEP: f64 = 1.8;
 
-impl GroupCoder<'_> {
+impl GroupCoder {
     /// Step and ratio by what the first frames cost.
     pub(super) fn choose(&self) -> Result<(f64, f64), CodingError> {
         let count = self.frames.len().min(TRIAL);
@@ -18,17 +18,22 @@ impl GroupCoder<'_> {
             Goal::Preview => Ok((2.8e-3 * self.diagonal / USUAL_RATIO * self.per_row(), USUAL_RATIO)),
             Goal::Standard => Ok((3e-3 * self.diagonal, USUAL_RATIO)),
             Goal::MaxError(error) => {
-                let size = |step: f64, ratio: f64| Ok(self.code(count, step, ratio)?.bytes());
                 let unit = error * self.diagonal;
-                let (mut best, mut chosen) = (size(USUAL_STEP * unit, USUAL_RATIO)?, (USUAL_STEP, USUAL_RATIO));
-                for (step, ratio) in [(1.0, 1.6), (1.0, 1.0 / 1.6), (1.4, 1.0), (1.0 / 1.4, 1.0)] {
-                    let tried = (chosen.0 * step, chosen.1 * ratio);
-                    let found = size(tried.0 * unit, tried.1)?;
-                    if found < best {
-                        (best, chosen) = (found, tried);
-                    }
+                let size = |(step, ratio): (f64, f64)| {
+                    self.encode(count, step * unit, ratio).map(|group| (group.bytes(), (step, ratio)))
+                };
+                let usual = (USUAL_STEP, USUAL_RATIO);
+                let mut best = size(usual)?;
+                for (step, ratio) in [(1.0, 1.6), (1.4, 1.0)] {
+                    let (_, from) = best;
+                    let (more, less) =
+                        rayon::join(|| size((from.0 * step, from.1 * ratio)), || size((from.0 / step, from.1 / ratio)));
+                    best = [more?, less?]
+                        .into_iter()
+                        .fold(best, |best, tried| if tried.0 < best.0 { tried } else { best });
                 }
-                Ok((chosen.0 * unit, chosen.1))
+                let (_, (step, ratio)) = best;
+                Ok((step * unit, ratio))
             }
             // Found for every group: see below.
             Goal::MeanError(error) => Ok((4.0 * error * self.diagonal, USUAL_RATIO)),
@@ -38,24 +43,22 @@ impl GroupCoder<'_> {
 
     /// Root of points over rows of a cage: a step of this times the unit moves the points by about the unit.
     fn per_row(&self) -> f64 {
-        (self.decoder.points() as f64 / self.basis.rows() as f64).sqrt()
+        (self.model.points() as f64 / self.model.basis.rows() as f64).sqrt()
     }
 
-    /// The group in the largest step, or the smallest, that is `fine`, to a twentieth; all steps on the other side of it are. Begins at the step of the
-    /// group before. `None` where no step is.
-    fn group_in(
+    /// What `tried` gives for the largest step, or the smallest, for which it gives anything, to a twentieth; it does for all steps on the other side
+    /// of it. Begins at the step of the group before. `None` where it does for no step.
+    fn for_step<T>(
         &mut self,
         largest: bool,
-        fine: impl Fn(&CodedGroup) -> bool,
-    ) -> Result<Option<CodedGroup>, CodingError> {
-        let (start, ratio) = self.chosen.unwrap_or((1e-3 * self.diagonal, USUAL_RATIO));
+        tried: impl Fn(&Self, f64, f64) -> Result<Option<T>, CodingError>,
+    ) -> Result<Option<T>, CodingError> {
+        let (start, ratio) = self.carried.chosen.unwrap_or((1e-3 * self.diagonal, USUAL_RATIO));
         let (least, most) = (1e-7 * self.diagonal, 2.0 * self.diagonal);
-        let all = self.frames.len();
         // Steps that are too small to count are not fine.
-        let tried = |step: f64| match self.code(all, step, ratio) {
-            Ok(group) if fine(&group) => Ok(Some(group)),
-            Ok(_) | Err(CodingError::Uncountable { .. }) => Ok(None),
-            Err(error) => Err(error),
+        let tried = |step: f64| match tried(self, step, ratio) {
+            Err(CodingError::Uncountable { .. }) => Ok(None),
+            found => found,
         };
         let mut step = start.clamp(least, most);
         let mut found = tried(step)?;
@@ -87,28 +90,35 @@ impl GroupCoder<'_> {
                     (found, best) = (Some(group), best * factor);
                 }
             }
-            self.chosen = Some((best, ratio));
+            self.carried.chosen = Some((best, ratio));
         }
         Ok(found)
     }
 
     pub(super) fn code_to_mean(&mut self, goal: f64) -> Result<CodedGroup, CodingError> {
-        let found = self.group_in(true, |group| group.mean() <= goal)?;
+        let found = self.for_step(true, |coder, step, ratio| {
+            let group = coder.code(coder.frames.len(), step, ratio)?;
+            Ok(Some(group).filter(|group| group.mean() <= goal))
+        })?;
         let asked = goal / self.diagonal;
         found.ok_or(CodingError::BelowPrecision { asked, least: 2.0 * asked })
     }
 
     /// In the bytes that belong to these of the frames that are left.
     pub(super) fn code_to_size(&mut self, asked: u64) -> Result<CodedGroup, CodingError> {
-        let room = self.room.unwrap_or_default();
+        let room = self.carried.room.unwrap_or_default();
         let part = self.frames.len() as f64 / room.frames.max(1) as f64;
         let share = (room.bytes as f64 * part) as u64;
-        if let Some(group) = self.group_in(false, |group| group.bytes() <= share)? {
-            let (bytes, frames) = (room.bytes - group.bytes(), room.frames - self.frames.len());
-            self.room = Some(Room { bytes, frames, ..room });
-            return Ok(group);
+        let found = self.for_step(false, |coder, step, ratio| {
+            let group = coder.encode(coder.frames.len(), step, ratio)?;
+            Ok(Some(group).filter(|group| group.bytes() <= share))
+        })?;
+        if let Some(group) = found {
+            let (bytes, frames) = (room.bytes - group.bytes(), room.frames.saturating_sub(self.frames.len()));
+            self.carried.room = Some(Room { bytes, frames, ..room });
+            return self.finish(group);
         }
-        let coarsest = self.code(self.frames.len(), 2.0 * self.diagonal, USUAL_RATIO)?.bytes();
+        let coarsest = self.encode(self.frames.len(), 2.0 * self.diagonal, USUAL_RATIO)?.bytes();
         Err(CodingError::TooSmall { asked, least: room.other + (coarsest as f64 / part).ceil() as u64 })
     }
 }

@@ -1,6 +1,7 @@
 //! `POST /v1/sessions/{id}/decode`: cages in, positions out.
 
-use super::extract::{RequestedSession, content_type};
+use super::decode_layer::{self, LayerQuery};
+use super::extract::{Query, RequestedSession, content_type};
 use super::frames::{body_error, prepared, stopping};
 use super::{openapi, other_model};
 use crate::admission::Held;
@@ -25,8 +26,10 @@ use tokio::sync::{oneshot, watch};
 ///
 /// As a form, another model that lies in the same rest cage is moved instead: its points are those of the file in the part `model`, and
 /// `Cager-Outside` says how many of them lie outside the rest cage.
+///
+/// With `layer` and no body, the session's own frames are decoded, where their frames are coded up to the last group that is.
 #[utoipa::path(
-    post, path = "/v1/sessions/{id}/decode", operation_id = "decode_cages", tag = "results", params(openapi::Id),
+    post, path = "/v1/sessions/{id}/decode", operation_id = "decode_cages", tag = "results", params(openapi::Id, LayerQuery),
     request_body(description = "m × 3 numbers per cage", content(
         (Vec<u8> = "application/octet-stream"), (openapi::OtherModelForm = "multipart/form-data"),
     )),
@@ -36,14 +39,18 @@ use tokio::sync::{oneshot, watch};
 pub(crate) async fn post(
     State(service): State<Arc<Service>>,
     RequestedSession { session, tenant }: RequestedSession,
+    Query(query): Query<LayerQuery>,
     request: Request,
 ) -> Result<Response, ApiError> {
+    if query.is_given() {
+        return decode_layer::respond(service, session, &tenant, query).await;
+    }
     let media_type = content_type(request.headers());
     let with_model = match media_type.as_deref() {
         Some("application/octet-stream") => false,
         Some("multipart/form-data") => true,
         _ => {
-            let detail = "send cages as application/octet-stream, or a model and cages as multipart/form-data";
+            let detail = "send cages as application/octet-stream, or a model and cages as multipart/form-data; or nothing, with layer=cages or layer=all";
             return Err(ApiError::new(problem::MEDIA_TYPE, detail));
         }
     };

@@ -114,8 +114,7 @@ pub(crate) async fn post(
     let facts = prepared(&service, &session).await?;
     session.completion_resolved().await?;
     if rows == Rows::Handles && !facts.reads_handles_only {
-        let detail =
-            "this session reads every point (handles is all), so handle rows are not enough; post whole frames";
+        let detail = "this session needs every point, since handles is all, or an error, a size or a quality was asked for; post whole frames";
         return Err(ApiError::new(problem::INVALID_FRAME, detail));
     }
     let arriving = http_body::Body::size_hint(&body).exact().unwrap_or(0);
@@ -275,7 +274,7 @@ impl UploadReader {
                         let place = Arc::clone(&places).acquire_owned().await.expect(open);
                         let memory = &self.service.frame_memory;
                         let memory = memory.take(&self.tenant.name, frames.frame_bytes() as u64).await;
-                        Permits { _solving: (place, memory), writing: unwritten }
+                        Permits { solving: Some((place, memory)), _writing: unwritten }
                     };
                     permits = Some(tokio::select! {
                         error = &mut stopped => return Err(error),

@@ -8,6 +8,7 @@ mod container;
 mod content_encoding;
 mod coordinates;
 mod decode;
+mod decode_layer;
 mod errors;
 mod events;
 mod extract;

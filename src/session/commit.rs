@@ -1,6 +1,7 @@
 //! Group commit of solved frames: everything queued for a session is appended and synced once, then its uploads are notified.
 
 use super::frames::Digests;
+use super::upload::Permits;
 use super::{Phase, Session};
 use crate::capture::StoredError;
 use crate::problem::{self, ApiError};
@@ -9,7 +10,6 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
-use tokio::sync::OwnedSemaphorePermit;
 
 /// Approximate size of a log record without its cage, in bytes.
 const RECORD_BYTES: usize = 96;
@@ -20,8 +20,10 @@ pub(crate) struct SolvedFrame {
     pub(crate) digests: Digests,
     pub(crate) error: StoredError,
     pub(crate) cage: Vec<f32>,
-    /// Counts against the upload's limit of frames that are not on disk yet.
-    pub(crate) _permit: Option<OwnedSemaphorePermit>,
+    /// As it was posted, where it has to wait on disk until its group is coded.
+    pub(crate) posted: Option<Vec<u8>>,
+    /// What it counts against: the upload's limit of frames that are not on disk yet, and with `posted` its memory.
+    pub(crate) _permits: Option<Permits>,
 }
 
 /// Frames queued for writing, and whether a commit thread is working on the session.
@@ -59,7 +61,8 @@ impl Committer {
 
 /// Approximate size of frames in the log, in bytes.
 fn stored_bytes(solved: &[SolvedFrame]) -> u64 {
-    solved.iter().map(|s| (RECORD_BYTES + 4 * s.cage.len()) as u64).sum()
+    let posted = |s: &SolvedFrame| s.posted.as_ref().map_or(0, Vec::len);
+    solved.iter().map(|s| (RECORD_BYTES + 4 * s.cage.len() + posted(s)) as u64).sum()
 }
 
 fn run(queue: &Mutex<Receiver<Arc<Session>>>) {
@@ -135,6 +138,13 @@ impl Session {
                 let known = frames.entry(record.frame);
                 known.is_none_or(|known| known.full_digest.is_none() && record.full_digest.is_some())
             });
+            // First what has to be coded: a frame that the log has, has been posted as its digest there says.
+            let posted: Vec<(u32, &[u8])> = solved
+                .iter()
+                .filter(|s| records.iter().any(|record| record.frame == s.frame))
+                .filter_map(|s| Some((s.frame, s.posted.as_deref()?)))
+                .collect();
+            self.keep_frames(&posted)?;
             log.append(&records)
         });
         if outcome.is_err() {

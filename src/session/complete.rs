@@ -1,19 +1,19 @@
 //! Completing a session: writes its container once; from then on the session does not change.
 
+use super::container_frames::ContainerFrames;
 use super::create::blocking;
 use super::frames::SealError;
 use super::intervals::Missing;
-use super::prepare::{self, Choices};
+use super::prepare::{self, Choices, Geometry, cannot_be_coded};
 use super::solver_cache::Prepared;
 use super::{Phase, Session};
-use crate::capture::{CaptureWriter, Encoding, StoredError};
+use crate::coding::{CodingError, Goal};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{CageFile, Completion, Content, LogEntry, StoreError};
+use crate::store::{CageFile, Completion, StoreError};
 use crate::telemetry::traces::TraceSpan;
 use crate::webhooks::{Event, PendingMessage, Webhooks};
 use cager_core::cage::Cage;
-use cager_proto::container;
 use cager_proto::messages::Complete;
 use opentelemetry::Context;
 use opentelemetry::trace::FutureExt as _;
@@ -25,9 +25,6 @@ use tokio::time::timeout;
 
 /// Longest wait for a change notification before checking again whether frames are still being measured.
 const MEASURING_POLL_INTERVAL: Duration = Duration::from_secs(1);
-/// Frames read from the log at a time.
-const READ_FRAMES: usize = 64;
-
 impl Service {
     /// Declares that the session has `frames` frames, and writes its container. Runs to the end even if the client disconnects.
     pub(crate) async fn complete(self: &Arc<Self>, session: &Arc<Session>, request: Complete) -> Result<(), ApiError> {
@@ -72,7 +69,8 @@ impl Service {
                 format!("frames: is {frames}, and the session was created for {}", expected.unwrap_or_default());
             return Err(ApiError::new(problem::INVALID_OPTIONS, detail));
         }
-        let (before, entries) = loop {
+        session.check_end(frames)?;
+        let before = loop {
             let mut changes = session.changes();
             if let Some(sealed) = session.seal_at(frames, request.discard_beyond)? {
                 break sealed;
@@ -80,10 +78,12 @@ impl Service {
             let _ = timeout(MEASURING_POLL_INTERVAL, changes.changed()).await;
         };
         let mut sealed = UnsealOnFailure { session, kept: before };
+        session.check_end(frames)?;
+        self.code_groups(session, Some(frames)).await?;
         let prepared = self.solver(session).await?;
         let (writing, webhooks) = (Arc::clone(session), Arc::clone(&self.webhooks));
         let writers = Arc::clone(&self.container_writers);
-        let work = move || writers.install(|| write(&writing, &prepared, &entries, frames, &webhooks));
+        let work = move || writers.install(|| write(&writing, &prepared, frames, &webhooks));
         let written = blocking(work).await?;
         let Written { completion, replaced, due } = written.map_err(|error| match session.status().phase {
             // The log or the content turned out to be damaged.
@@ -92,6 +92,9 @@ impl Service {
         })?;
         session.completed(completion, replaced);
         sealed.kept = true;
+        let cleaned = Arc::clone(session);
+        blocking(move || cleaned.remove_uncoded(frames)).await?;
+        session.forget_coder();
         if let Some(due) = due {
             self.webhooks.tell(session, due);
         }
@@ -115,17 +118,13 @@ impl Drop for UnsealOnFailure<'_> {
 
 impl Session {
     /// Stops accepting new frames, so that no acknowledged frame is missing from the container. Returns whether the session was sealed
-    /// before, and the frames of the container; `None` while some of them are still being measured.
+    /// before; `None` while some of its frames are still being measured.
     ///
     /// # Errors
     /// `FRAMES_MISSING`; `FRAME_CONFLICT` for a frame beyond the end.
-    fn seal_at(&self, frames: u32, discard_beyond: bool) -> Result<Option<(bool, Vec<LogEntry>)>, ApiError> {
-        let mut known = self.frames();
-        match known.seal_at(frames, discard_beyond) {
-            Ok(before) => {
-                let entries = known.entries().take_while(|entry| entry.frame < frames).copied().collect();
-                Ok(Some((before, entries)))
-            }
+    fn seal_at(&self, frames: u32, discard_beyond: bool) -> Result<Option<bool>, ApiError> {
+        match self.frames().seal_at(frames, discard_beyond) {
+            Ok(before) => Ok(Some(before)),
             Err(SealError::Measuring) => Ok(None),
             Err(SealError::Missing(Missing { ranges, next })) => {
                 let count: u64 = ranges.iter().map(|[a, b]| u64::from(b - a)).sum();
@@ -197,9 +196,14 @@ impl Session {
         }
     }
 
-    fn content(&self) -> Result<Content, ApiError> {
+    /// Reads rest pose and cage again. Blocks.
+    ///
+    /// # Errors
+    /// Storage errors; `SESSION_DELETED`.
+    pub(crate) fn geometry(&self) -> Result<Geometry, ApiError> {
         let content = self.store.content(&self.meta.key).map_err(|error| self.storage_error(&error))?;
-        content.ok_or_else(|| self.missing_content_error())
+        let content = content.ok_or_else(|| self.missing_content_error())?;
+        prepare::read(&content, &Choices::of(&self.meta.options)?)
     }
 
     fn missing_content_error(&self) -> ApiError {
@@ -211,9 +215,13 @@ impl Session {
     /// # Errors
     /// Storage errors; `SESSION_DELETED`.
     pub(crate) fn rest_cage(&self) -> Result<Cage, ApiError> {
+        let choices = Choices::of(&self.meta.options)?;
+        if choices.goal.is_some() {
+            return Ok(self.geometry()?.cage);
+        }
         let file = self.store.content_cage(&self.meta.key).map_err(|error| self.storage_error(&error))?;
         let CageFile { name, bytes } = file.ok_or_else(|| self.missing_content_error())?;
-        prepare::read_cage(&name, &bytes, &Choices::of(&self.meta.options)?)
+        prepare::read_cage(&name, &bytes, &choices)
     }
 }
 
@@ -226,56 +234,28 @@ struct Written {
     due: Option<PendingMessage>,
 }
 
-fn write(
-    session: &Session,
-    prepared: &Prepared,
-    entries: &[LogEntry],
-    frames: u32,
-    webhooks: &Webhooks,
-) -> Result<Written, ApiError> {
+fn write(session: &Session, prepared: &Prepared, frames: u32, webhooks: &Webhooks) -> Result<Written, ApiError> {
     let stored = |error: StoreError| session.storage_error(&error);
-    let choices = Choices::of(&session.meta.options)?;
-    let geometry = prepare::read(&session.content()?, &choices)?;
-    let encoding = Encoding {
-        rest: &geometry.rest,
-        cage: &geometry.cage,
-        system: choices.system,
-        options: prepared.options,
-        solver: &prepared.solver,
-        frame_rate: session.meta.options.frame_rate,
+    let geometry = session.geometry()?;
+    let mut write = |out: &mut dyn Write| -> io::Result<()> {
+        let out = BufWriter::with_capacity(1 << 20, out);
+        let mut container = ContainerFrames::begin(session, prepared, &geometry, out)?;
+        while container.write_next(session, frames)? {}
+        if container.frames() < frames {
+            return Err(io::Error::other(format!("frame {} is not there", container.frames())));
+        }
+        container.finish(session)?.flush()
     };
-    let mut write = |out: &mut dyn Write| write_frames(session, &encoding, entries, out);
     // A damaged container that is replaced is already counted.
     let replaced = session.store.container_bytes(&session.meta.id).unwrap_or(0);
     let written = session.store.write_container(&session.meta.id, &mut write).map_err(stored)?;
+    if let Some(Goal::Size(asked)) = session.goal()
+        && written.bytes > asked
+    {
+        return Err(cannot_be_coded(Goal::Size(asked), &CodingError::TooSmall { asked, least: written.bytes }));
+    }
     let completion = Completion { frames, container_bytes: written.bytes, container_digest: written.digest };
     let due = webhooks.keep(session, Event::Completed).map_err(stored)?;
     session.mark(&completion).map_err(stored)?;
     Ok(Written { completion, replaced, due })
-}
-
-fn write_frames(
-    session: &Session,
-    encoding: &Encoding<'_>,
-    entries: &[LogEntry],
-    out: &mut dyn Write,
-) -> io::Result<()> {
-    let plain = |error: container::Error| match error {
-        container::Error::Io(error) => error,
-        other => io::Error::other(other.to_string()),
-    };
-    let mut writer = CaptureWriter::new(BufWriter::with_capacity(1 << 20, out), encoding).map_err(plain)?;
-    let row_bytes = 12 * encoding.solver.decoder().unknowns();
-    let (mut bytes, mut cage) = (Vec::new(), Vec::new());
-    for entries in entries.chunks(READ_FRAMES) {
-        bytes.clear();
-        session.read_cages(entries, &mut bytes)?;
-        for (entry, bytes) in entries.iter().zip(bytes.chunks_exact(row_bytes)) {
-            cage.clear();
-            cage.extend(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])));
-            let error = StoredError { l2: entry.l2, linf: entry.linf, squared: entry.squared, spread: entry.spread };
-            writer.write_frame(&cage, &error).map_err(plain)?;
-        }
-    }
-    writer.finish().map_err(plain)?.0.flush()
 }

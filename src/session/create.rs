@@ -101,7 +101,7 @@ impl Service {
         };
         let status = match &in_memory {
             Some(prepared) => {
-                let facts = Facts::new(prepared, CacheUse::Hit, PreparationSeconds::default());
+                let facts = Facts::new(prepared, choices.goal.is_some(), CacheUse::Hit, PreparationSeconds::default());
                 Status { phase: Phase::Ready, facts: Some(facts) }
             }
             None => Status { phase: Phase::Preparing, facts: None },
@@ -117,6 +117,7 @@ impl Service {
             self.registry.insert(Arc::clone(&session));
             drop(room);
         }
+        self.code_in_background(&session);
         metrics::counter!("cager_sessions_created_total", "tenant" => tenant.name.clone()).increment(1);
         match session.facts() {
             // Not awaited: without a stored outcome a restart prepares the session again, and finds its solver on disk.
@@ -176,7 +177,7 @@ impl Service {
         match got {
             Ok(SolverResponse { prepared, cache, mut seconds }) => {
                 seconds.total = clock.elapsed().as_secs_f64();
-                let facts = Facts::new(&prepared, cache, seconds);
+                let facts = Facts::new(&prepared, choices.goal.is_some(), cache, seconds);
                 session.set_status(Status { phase: Phase::Preparing, facts: Some(facts.clone()) });
                 self.keep_outcome(&session, Outcome::Ready(Box::new(facts.clone()))).await;
                 // The previous process may have ended after writing frames but before storing the outcome. They are loaded before clients

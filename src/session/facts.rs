@@ -13,7 +13,7 @@ pub(crate) struct Facts {
     /// BLAKE3 digest of the handle indices, hexadecimal; empty in notes of earlier versions.
     #[serde(default)]
     pub(crate) handles_digest: String,
-    /// Whether handle rows are enough to invert a frame.
+    /// Whether handle rows of a frame are enough: to invert it, and since nothing has to be coded.
     pub(crate) reads_handles_only: bool,
     pub(crate) cage_vertices: u32,
     pub(crate) cage_faces: u32,
@@ -37,7 +37,7 @@ pub(crate) enum Outcome {
 }
 
 impl Facts {
-    pub(crate) fn new(prepared: &Prepared, cache: CacheUse, seconds: PreparationSeconds) -> Self {
+    pub(crate) fn new(prepared: &Prepared, is_coded: bool, cache: CacheUse, seconds: PreparationSeconds) -> Self {
         let solver = &prepared.solver;
         let found = solver.preparation();
         Self {
@@ -45,7 +45,7 @@ impl Facts {
             unknowns: solver.decoder().unknowns() as u32,
             handle_count: solver.handles().len() as u32,
             handles_digest: prepared.handles_digest.clone(),
-            reads_handles_only: !solver.reads_all(),
+            reads_handles_only: !solver.reads_all() && !is_coded,
             cage_vertices: prepared.cage_vertices,
             cage_faces: prepared.cage_faces,
             spectrum: prepared.options.spectrum as u32,

@@ -2,6 +2,7 @@
 
 use super::intervals::{IntervalSet, Missing};
 use super::upload::Upload;
+use crate::capture::StoredError;
 use crate::store::LogEntry;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -158,6 +159,16 @@ impl Frames {
         }
         self.runs.insert(entry.frame);
         self.pending.remove(&entry.frame).map_or_else(Vec::new, |pending| pending.waiting)
+    }
+
+    /// Sets the errors of solved frames from `first` on: those of what they decode to.
+    pub(crate) fn set_errors(&mut self, first: u32, errors: &[StoredError]) {
+        for (frame, error) in (first..).zip(errors) {
+            if let Some(entry) = self.solved.get_mut(&frame) {
+                (entry.l2, entry.linf, entry.squared, entry.spread) =
+                    (error.l2, error.linf, error.squared, error.spread);
+            }
+        }
     }
 
     /// Whether the entry adds to what is known: a new frame, or the errors of one that was not measured.

@@ -3,9 +3,11 @@
 pub(crate) mod cage_source;
 pub(crate) mod commit;
 pub(crate) mod complete;
+pub(crate) mod container_frames;
 pub(crate) mod create;
 pub(crate) mod facts;
 pub(crate) mod frames;
+pub(crate) mod groups;
 mod intervals;
 pub(crate) mod prepare;
 pub(crate) mod registry;
@@ -15,6 +17,7 @@ pub(crate) mod solve;
 pub(crate) mod solver_cache;
 pub(crate) mod upload;
 
+use crate::coding::{Goal, GroupCoder, GroupDecoder};
 use crate::engine::Lane;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
@@ -26,6 +29,8 @@ use cager_proto::messages::{FrameCounts, Problem, Progress, Session as View, Ses
 use commit::{CommitQueue, Committer};
 use facts::Facts;
 use frames::{Frames, RANGES};
+use groups::Groups;
+use prepare::Choices;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use tokio::sync::watch;
@@ -54,6 +59,12 @@ pub(crate) struct Session {
     log: Mutex<Option<FrameLog>>,
     reader: Mutex<Option<LogReader>>,
     lane: Mutex<Weak<LiveLane>>,
+    /// What the container is to meet; without it frames are stored as they are solved for.
+    goal: Option<Goal>,
+    groups: Mutex<Groups>,
+    /// Codes the next group; taken while one is coded. `None` until it is needed.
+    coding: Arc<tokio::sync::Mutex<Option<GroupCoder>>>,
+    group_decoder: Mutex<Weak<GroupDecoder>>,
     /// Taken while the container is written, so that it is written once.
     pub(crate) completing: tokio::sync::Mutex<()>,
     version: watch::Sender<u64>,
@@ -112,6 +123,7 @@ impl Session {
         if matches!(status.phase, Phase::Completed(_)) {
             frames.seal();
         }
+        let goal = Choices::of(&meta.options).ok().and_then(|choices| choices.goal);
         Self {
             meta,
             store: service.store.clone(),
@@ -128,6 +140,10 @@ impl Session {
             log: Mutex::default(),
             reader: Mutex::default(),
             lane: Mutex::default(),
+            goal,
+            groups: Mutex::default(),
+            coding: Arc::default(),
+            group_decoder: Mutex::default(),
             completing: tokio::sync::Mutex::new(()),
             version: watch::Sender::new(0),
             completion_unknown: AtomicBool::new(false),
@@ -268,8 +284,11 @@ impl Session {
                 if same { upload.answer(entry.frame) } else { upload.fail(solve::conflict(entry.frame)) }
             }
         }
-        self.loaded.store(true, Ordering::Release);
         drop(frames);
+        if !self.loaded.load(Ordering::Acquire) {
+            self.load_groups()?;
+        }
+        self.loaded.store(true, Ordering::Release);
         Ok(log)
     }
 
@@ -370,6 +389,7 @@ impl Session {
         if idle && let Ok(mut log) = self.log.try_lock() {
             *lock(&self.reader) = None;
             *log = None;
+            self.forget_coder();
         }
     }
 
@@ -395,6 +415,7 @@ impl Session {
             state,
             received: frames.received_count() + self.queued.load(Ordering::Relaxed),
             solved: frames.solved_count(),
+            coded: self.coded_frames(),
         }
     }
 
@@ -441,6 +462,7 @@ impl Session {
             rank: facts.map(|f| f.rank),
             affine_reproduction_error: facts.map(|f| f.affine_reproduction_error),
             frames,
+            coding: self.coding_view(facts),
             cache: facts.map(|f| f.cache),
             seconds: facts.map_or_else(Default::default, |f| f.seconds),
             warnings: facts.map_or_else(Vec::new, |f| f.warnings.clone()),

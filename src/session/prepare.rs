@@ -2,14 +2,16 @@
 
 use super::solver_cache::Prepared;
 use crate::capture::preparation_warnings;
+use crate::coding::{CodingError, Goal, RestMeshes};
 use crate::problem::{self, ApiError};
 use crate::store::Content;
 use cager_cages::diagnosis::weld;
+use cager_codec::{CodedMesh, MOST_ROWS};
 use cager_core::cage::Cage;
 use cager_core::coordinates;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{Handles, PrepareError, Preparing, Solver, SolverOptions, check_options, default_spectrum};
-use cager_core::mesh::{Model, TriMesh};
+use cager_core::mesh::{Model, TriMesh, diagonal};
 use cager_core::regularize::{Regularizer, SparseMatrix, Term};
 use cager_formats::{MeshFormat, read_matrix_bytes, read_model_bytes};
 use cager_proto::messages::SessionOptions;
@@ -25,6 +27,9 @@ pub(crate) struct Choices {
     pub(crate) spectrum: Option<u32>,
     pub(crate) lambda: f64,
     pub(crate) flip_cage: bool,
+    /// What the container is to meet; without it frames are stored as they are solved for.
+    pub(crate) goal: Option<Goal>,
+    pub(crate) exact_rest: bool,
 }
 
 const NAME_CHARACTERS: usize = 200;
@@ -69,7 +74,9 @@ impl Choices {
         if !(lambda.is_finite() && lambda >= 0.0) {
             return refuse(format!("lambda: is {lambda}; give a finite number of at least 0"));
         }
-        Ok(Self { system, handles, regularizer, spectrum: options.spectrum, lambda, flip_cage: options.flip_cage })
+        let (spectrum, flip_cage, exact_rest) = (options.spectrum, options.flip_cage, options.exact_rest);
+        let goal = goal(options)?;
+        Ok(Self { system, handles, regularizer, spectrum, lambda, flip_cage, goal, exact_rest })
     }
 
     /// The solver's options for a cage of so many unknowns.
@@ -83,12 +90,49 @@ impl Choices {
     }
 }
 
-/// Rest pose and cage of a session.
+/// What the container is to meet.
+fn goal(options: &SessionOptions) -> Result<Option<Goal>, ApiError> {
+    let refuse = |detail: String| Err(ApiError::new(problem::INVALID_OPTIONS, detail));
+    let SessionOptions { max_error, mean_error, target_size, quality, frames, .. } = options;
+    let names = [
+        max_error.map(|_| "max_error"),
+        mean_error.map(|_| "mean_error"),
+        target_size.map(|_| "target_size"),
+        quality.as_ref().map(|_| "quality"),
+    ];
+    let given: Vec<&str> = names.into_iter().flatten().collect();
+    if let [first, second, ..] = given[..] {
+        return refuse(format!("{second}: is given beside {first}; give one of them"));
+    }
+    if let (&[name], Some(error)) = (&given[..], max_error.or(*mean_error))
+        && !(error > 0.0 && error < 1.0)
+    {
+        return refuse(format!("{name}: is {error}; give a fraction of the rest pose's diagonal above 0 and below 1"));
+    }
+    if target_size.is_some() && frames.is_none() {
+        return refuse("target_size: is shared out among the frames; give their number as frames".to_owned());
+    }
+    Ok(match quality.as_deref() {
+        None => max_error.map(Goal::MaxError).or(mean_error.map(Goal::MeanError)).or(target_size.map(Goal::Size)),
+        Some("preview") => Some(Goal::Preview),
+        Some("standard") => Some(Goal::Standard),
+        Some("master") => Some(Goal::MASTER),
+        Some(other) => {
+            return refuse(format!("quality: {other:?} is not available; give one of preview, standard, master"));
+        }
+    })
+}
+
+/// Rest pose and cage of a session, on a grid where its frames are coded.
 pub(crate) struct Geometry {
     pub(crate) rest: Model,
     pub(crate) cage: Cage,
     /// The matrix of the regularizer `matrix`.
     pub(crate) matrix: Option<SparseMatrix>,
+    /// Rest pose and cage in the bytes of the codec.
+    pub(crate) coded: Option<(CodedMesh, CodedMesh)>,
+    /// The unit of guaranteed errors: the diagonal of the rest pose as it was sent, or as it is stored, whichever is less.
+    pub(crate) unit: f64,
 }
 
 fn read_matrix(content: &Content, choices: &Choices) -> Result<Option<SparseMatrix>, ApiError> {
@@ -109,10 +153,19 @@ fn read_matrix(content: &Content, choices: &Choices) -> Result<Option<SparseMatr
 /// Bytes that cannot be read; a cage that cannot be used.
 pub(crate) fn read(content: &Content, choices: &Choices) -> Result<Geometry, ApiError> {
     let rest = read_part("rest", &content.rest_name, &content.rest)?;
-    Ok(Geometry {
-        rest,
-        cage: read_cage(&content.cage_name, &content.cage, choices)?,
-        matrix: read_matrix(content, choices)?,
+    let cage = read_cage(&content.cage_name, &content.cage, choices)?;
+    let matrix = read_matrix(content, choices)?;
+    let given = diagonal(&rest.points);
+    let goal = choices.goal.filter(|_| !choices.exact_rest);
+    Ok(match goal.and_then(|goal| RestMeshes::new(goal, &rest, &cage, choices.system)) {
+        Some(RestMeshes { rest, cage, checked }) => Geometry {
+            unit: given.min(diagonal(&rest.mesh.points)),
+            rest: rest.mesh.clone(),
+            cage: checked,
+            matrix,
+            coded: Some((rest, cage)),
+        },
+        None => Geometry { rest, cage, matrix, coded: None, unit: given },
     })
 }
 
@@ -152,9 +205,40 @@ pub(crate) fn check(geometry: &Geometry, choices: &Choices, max_bytes: u64) -> R
     }
     check_memory(geometry, choices, options, max_bytes)?;
     Solver::check(choices.system, &geometry.cage, &geometry.rest.points, options).map_err(|error| refused(&error))?;
+    choices.goal.map_or(Ok(()), |goal| check_goal(goal, geometry, unknowns))?;
     let Some(matrix) = &geometry.matrix else { return Ok(()) };
     matrix.delta(&geometry.cage, unknowns).map_err(|error| refused(&error.into()))?;
     Ok(())
+}
+
+/// Refuses a goal that no frame could meet.
+fn check_goal(goal: Goal, geometry: &Geometry, rows: usize) -> Result<(), ApiError> {
+    let farthest = geometry.rest.points.iter().flatten().fold(0.0f64, |far, x| far.max(x.abs()));
+    let meshes = geometry.coded.as_ref().map_or(0, |(rest, cage)| {
+        (rest.faces.len() + rest.positions.len() + cage.faces.len() + cage.positions.len()) as u64
+    });
+    let checked = match goal {
+        _ if rows > MOST_ROWS => Err(CodingError::TooManyRows { rows, most: MOST_ROWS }),
+        Goal::Size(asked) if asked <= meshes => Err(CodingError::TooSmall { asked, least: meshes }),
+        goal => goal.check_precision(geometry.unit, farthest),
+    };
+    checked.map_err(|error| cannot_be_coded(goal, &error))
+}
+
+/// The response where frames cannot be coded as asked for.
+pub(crate) fn cannot_be_coded(goal: Goal, error: &CodingError) -> ApiError {
+    let kind = if matches!(error, CodingError::Uncountable { .. }) {
+        problem::INVALID_FRAME
+    } else {
+        problem::INVALID_OPTIONS
+    };
+    let option = match goal {
+        Goal::MaxError(_) => "max_error",
+        Goal::MeanError(_) => "mean_error",
+        Goal::Size(_) => "target_size",
+        Goal::Preview | Goal::Standard => "quality",
+    };
+    ApiError::new(kind, format!("{option}: {error}"))
 }
 
 /// Prepares the solver. `wanted` is called before each step; returns `None` once it is false.
@@ -290,7 +374,8 @@ mod tests {
     #[test]
     fn boundary_elements_count_as_memory_before_anything_is_prepared() {
         let Capture { rest, cage, .. } = Capture::new(&Options { points: 2000, frames: 1, cage_vertices: 300 });
-        let geometry = Geometry { rest, cage: Cage::new(cage).expect("a cage"), matrix: None };
+        let cage = Cage::new(cage).expect("a cage");
+        let geometry = Geometry { rest, cage, matrix: None, coded: None, unit: 1.0 };
         let checked = |system: &str, max_bytes: u64| {
             let options = SessionOptions { coordinates: Some(system.to_owned()), ..SessionOptions::default() };
             let choices = Choices::of(&options).expect("options");

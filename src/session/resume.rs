@@ -133,6 +133,7 @@ impl Service {
                 Ok(choices) => {
                     let session = self.found(meta, Status { phase: Phase::Preparing, facts: None });
                     self.registry.insert(Arc::clone(&session));
+                    self.code_in_background(&session);
                     tokio::spawn(Arc::clone(self).prepare(session, choices, None, mark));
                     return;
                 }
@@ -147,6 +148,7 @@ impl Service {
             session.set_phase(phase);
         }
         self.registry.insert(Arc::clone(&session));
+        self.code_in_background(&session);
         self.webhooks.resend_undelivered(&session);
     }
 

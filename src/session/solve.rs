@@ -32,6 +32,14 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
         if job.upload.is_abandoned() || session.is_deleted() {
             continue;
         }
+        if job.rows == Rows::Handles && session.goal().is_some() {
+            let frame = job.frame;
+            let detail = format!(
+                "frame {frame}: has handle rows only, and an error, a size or a quality was asked for; post it whole"
+            );
+            job.fail(ApiError::new(problem::INVALID_FRAME, detail).frame(frame));
+            continue;
+        }
         if let Some(row) = first_not_finite(&job.bytes) {
             let what = if job.rows == Rows::All { "point" } else { "handle" };
             let (frame, detail) =
@@ -233,8 +241,12 @@ fn finish(
                 upload.fail(ApiError::new(problem::INVALID_FRAME, detail.clone()).frame(frame));
             }
         } else {
-            let permit = job.permits.take().map(|permits| permits.writing);
-            solved.push(SolvedFrame { frame, digests, error, cage, _permit: permit });
+            let posted = session.goal().map(|_| std::mem::take(&mut job.bytes));
+            let mut permits = job.permits.take();
+            if let (None, Some(permits)) = (&posted, &mut permits) {
+                permits.solving = None;
+            }
+            solved.push(SolvedFrame { frame, digests, error, cage, posted, _permits: permits });
         }
         job.disarm();
     }

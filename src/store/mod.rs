@@ -3,6 +3,7 @@
 //! ```text
 //! lock             locked while a process uses the folder
 //! sessions/<id>/   session.json  frames.log  capture.cager  complete.json  outcome.json  announce.json
+//!                  frames-<first>  group-<first>
 //! cages/<id>/      job.json  rest  frames  attempts.json  cage.obj  outcome.json
 //! contents/<key>/  content.json  rest  cage  matrix
 //! prepared/<key>.solver
@@ -11,8 +12,8 @@
 //! ```
 //!
 //! Files and folders are written in `tmp/`, synced and renamed into place; folders are moved to `trash/` before they are removed. So
-//! everything in `sessions`, `cages`, `contents` and `prepared` is complete. Only the frame log grows in place; [`log`] describes its
-//! recovery.
+//! everything in `sessions`, `cages`, `contents` and `prepared` is complete. Only the frame log grows in place, whose recovery [`log`]
+//! describes, and frames that wait to be coded, whose digests it has.
 
 use crate::store::files::Files;
 use std::collections::HashSet;
@@ -29,6 +30,7 @@ mod error;
 #[path = "../../tests/faults/mod.rs"]
 mod faults;
 mod files;
+mod groups;
 pub mod log;
 mod meta;
 mod names;

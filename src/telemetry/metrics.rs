@@ -119,6 +119,7 @@ fn describe() {
     describe_gauge!("cager_uptime_seconds", Unit::Seconds, "Time since the service started");
     describe_gauge!("cager_sessions", "Sessions, by tenant");
     describe_gauge!("cager_stored_bytes", Unit::Bytes, "Disk space of sessions and cage designs, by tenant");
+    describe_counter!("cager_coded_frames_total", "Frames coded in groups, by tenant");
     describe_histogram!("cager_queue_seconds", Unit::Seconds, "Wait of a batch's oldest frame");
     describe_histogram!("cager_solve_seconds", Unit::Seconds, "Inverting and measuring a batch of up to 16 frames");
     describe_histogram!("cager_prepare_seconds", Unit::Seconds, "Preparing a solver");

@@ -105,7 +105,6 @@ fn what_cannot_be_met_is_refused_in_a_sentence_and_nothing_is_written() {
         ("--mean-error 1e-12", "single precision"),
         ("--dry-run --max-error 0.2mm", "needs --unit"),
         ("--mean-error NaN", "above 0"),
-        ("--max-error 1e-3 --server http://127.0.0.1:1", "leave --server out"),
     ] {
         let output = dir.cager(&format!("{ENCODE} {args}")).run();
         assert_eq!(output.status, Some(1), "{args}: {}", output.stderr);

@@ -3,10 +3,10 @@
 use crate::server::{Server, capture, ready};
 use crate::support::{ENCODE, read_cages, read_frames};
 use cager_client::cage_messages::CageState;
-use cager_client::messages::{CageSource, FrameResult, Problem, Session, SessionState};
+use cager_client::messages::{CageSource, FrameResult, Problem, Session, SessionOptions, SessionState};
 use cager_client::{
-    CageFrame, Client, ClientError, ClientOptions, FnFrames, LocalDecoder, MemoryFrames, MeshFile, NewCage, Rows,
-    UploadOptions,
+    CageFrame, Client, ClientError, ClientOptions, FnFrames, Layer, LocalDecoder, MemoryFrames, MeshFile, NewCage,
+    NewSession, Rows, UploadOptions,
 };
 use futures_util::{StreamExt as _, TryStreamExt as _};
 use std::time::Duration;
@@ -72,6 +72,44 @@ async fn cages_can_be_followed_decoded_and_downloaded() {
     client.delete(id).await.expect("deleted");
     assert_eq!(client.session(id).await.expect_err("gone").status(), Some(404));
     assert_eq!(client.delete(id).await.expect_err("gone").status(), Some(404));
+}
+
+#[tokio::test]
+async fn a_coded_capture_is_followed_through_a_restart_and_decoded_by_layers() {
+    let (dir, points, values) = capture();
+    let mut server = Server::start(&dir);
+    let place = server.place.clone();
+    let client = server.client();
+    let meshes = ["rest.obj", "cage.obj"].map(|name| MeshFile::new(name, dir.read(name)));
+    let [rest, cage] = meshes;
+    let options = SessionOptions { max_error: Some(1e-3), ..SessionOptions::default() };
+    let new = NewSession { options, ..NewSession::new(rest, cage) };
+    let id = client.create(&new).await.expect("a session").id;
+    let session = client.wait_ready(&id, Duration::from_secs(60)).await.expect("ready");
+    let (follower, followed_id) = (client.clone(), id.clone());
+    let followed = tokio::spawn(async move {
+        let mut out = Vec::new();
+        follower.follow_container(&followed_id, &mut out).await.map(|bytes| (bytes, out))
+    });
+    let half = 3 * points * 10;
+    upload(&client, &session, points, &values[..half]).await;
+    server.kill();
+    let _server = Server::start_at(&dir, &place, &[]);
+    upload(&client, &session, points, &values).await;
+    client.complete(&id, 20).await.expect("complete");
+    let (bytes, followed) = followed.await.expect("no panic").expect("followed to the end");
+    let mut file = Vec::new();
+    client.download(&id, &mut file).await.expect("a container");
+    assert!(bytes == file.len() as u64 && followed == file, "the stream is the container");
+
+    dir.write("there.cager", &file);
+    for (layer, name) in [(Layer::Cages, "cages"), (Layer::All, "all")] {
+        dir.cager(&format!("decode there.cager -o {name}.npy --layer {name}")).succeeds();
+        let decoded = read_frames(&dir.path(&format!("{name}.npy")), points);
+        let here: Vec<f32> = decoded[5..9].concat().iter().map(|&x| x as f32).collect();
+        assert_eq!(client.decode_frames(&id, 5..9, layer).await.expect("positions"), here, "{name}");
+    }
+    assert_eq!(client.decode_frames(&id, 15..21, Layer::All).await.expect_err("too many").status(), Some(409));
 }
 
 #[tokio::test]

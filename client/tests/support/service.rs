@@ -220,6 +220,7 @@ pub fn session(state: SessionState) -> Session {
         rank: None,
         affine_reproduction_error: None,
         frames: FrameCounts::default(),
+        coding: None,
         cache: Some(CacheUse::Miss),
         seconds: PreparationSeconds::default(),
         warnings: Vec::new(),

@@ -1,3 +1,4 @@
+mod coded;
 mod concurrent;
 mod create;
 mod geometry;

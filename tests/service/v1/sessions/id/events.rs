@@ -44,7 +44,7 @@ async fn progress_is_told_from_the_beginning_to_completion() {
     assert!(heard.is_sorted_by_key(|(_, progress)| progress.solved), "{heard:?}");
     assert!(heard.iter().all(|(_, progress)| progress.solved <= progress.received), "{heard:?}");
     let last = &heard.last().expect("an event").1;
-    assert_eq!(*last, Progress { state: SessionState::Completed, received: 40, solved: 40 });
+    assert_eq!(*last, Progress { state: SessionState::Completed, received: 40, solved: 40, coded: None });
     let ids: std::collections::BTreeSet<&String> = heard.iter().map(|(id, _)| id).collect();
     assert_eq!(ids.len(), heard.len(), "an id says what was told");
     // The client hears the same end.

@@ -1,0 +1,70 @@
+//! What groups of one model are coded and decoded with.
+
+use super::CodingError;
+use cager_codec::{CageBasis, Error, Hierarchy, MOST_ROWS, Residual, decode_cages};
+use cager_core::cage::Cage;
+use cager_core::coordinates::CoordinateSystem;
+use cager_core::decode::Decoder;
+use cager_core::inversion::{BATCH, Solver};
+use cager_core::mesh::Model;
+
+/// Decodes groups of frames: the basis of its cages, the order of its points, and its coordinates.
+pub(crate) struct GroupDecoder {
+    pub(super) basis: CageBasis,
+    pub(super) hierarchy: Hierarchy,
+    decoder: Decoder,
+}
+
+impl GroupDecoder {
+    /// For a rest pose and cage as a decoder reads them, and the solver prepared with them.
+    ///
+    /// # Errors
+    /// More rows than can be coded; coordinates that cannot be computed.
+    pub(crate) fn new(
+        system: &dyn CoordinateSystem,
+        cage: &Cage,
+        rest: &Model,
+        solver: &Solver,
+    ) -> Result<Self, CodingError> {
+        let decoder = solver.decoder().clone();
+        let rows = decoder.unknowns();
+        if rows > MOST_ROWS {
+            return Err(CodingError::TooManyRows { rows, most: MOST_ROWS });
+        }
+        let plan = solver.preparation().plan.as_ref();
+        let basis = CageBasis::of(system, cage, &rest.points, plan, None)?;
+        let basis = basis.ok_or(CodingError::Uncountable { first: 0, last: 0 })?;
+        let hierarchy = Hierarchy::new(&rest.faces, rest.points.len());
+        Ok(Self { basis, hierarchy, decoder })
+    }
+
+    pub(super) fn points(&self) -> usize {
+        self.decoder.points()
+    }
+
+    /// The cages of a group.
+    ///
+    /// # Errors
+    /// Damaged bytes.
+    pub(crate) fn cages(&self, frames: usize, bytes: &[u8]) -> Result<Vec<Vec<f32>>, Error> {
+        decode_cages(&self.basis, frames, bytes)
+    }
+
+    /// The positions that cages say.
+    pub(crate) fn positions(&self, cages: &[Vec<f32>]) -> Vec<Vec<f32>> {
+        let mut positions: Vec<Vec<f32>> = vec![Vec::new(); cages.len()];
+        for (cages, positions) in cages.chunks(BATCH).zip(positions.chunks_mut(BATCH)) {
+            let cages: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
+            self.decoder.decode(&cages, positions);
+        }
+        positions
+    }
+
+    /// Adds a group's residual to all its positions.
+    ///
+    /// # Errors
+    /// Damaged bytes.
+    pub(crate) fn add_residual(&self, bytes: &[u8], positions: &mut [Vec<f32>]) -> Result<(), Error> {
+        Residual::decode(&self.hierarchy, positions.len(), bytes, usize::MAX).map(|residual| residual.add(0, positions))
+    }
+}

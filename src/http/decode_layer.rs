@@ -1,0 +1,173 @@
+//! `POST /v1/sessions/{id}/decode?layer=…`: positions of a session's own frames.
+
+use super::frames::prepared;
+use crate::admission::Held;
+use crate::auth::Tenant;
+use crate::coding::GroupDecoder;
+use crate::problem::{self, ApiError};
+use crate::service::Service;
+use crate::session::create::blocking;
+use crate::session::solver_cache::Prepared;
+use crate::session::{Session, gone};
+use axum::body::Body;
+use axum::response::{IntoResponse, Response};
+use bytes::Bytes;
+use cager_core::inversion::BATCH;
+use http::header;
+use serde::Deserialize;
+use std::collections::VecDeque;
+use std::io;
+use std::sync::Arc;
+
+/// Which of the session's frames to decode, and how much of them.
+#[derive(Clone, Copy, Debug, Deserialize, utoipa::IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(crate) struct LayerQuery {
+    /// `cages`: what the cages say alone. `all`: with the residual, where there is one.
+    #[param(inline)]
+    layer: Option<Layer>,
+    /// First frame, with `layer`.
+    first: Option<u32>,
+    /// Number of frames, with `layer`; all that can be decoded where it is left out.
+    count: Option<u32>,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, utoipa::ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Layer {
+    Cages,
+    All,
+}
+
+impl LayerQuery {
+    pub(super) fn is_given(&self) -> bool {
+        self.layer.is_some() || self.first.is_some() || self.count.is_some()
+    }
+}
+
+pub(super) async fn respond(
+    service: Arc<Service>,
+    session: Arc<Session>,
+    tenant: &Tenant,
+    query: LayerQuery,
+) -> Result<Response, ApiError> {
+    let Some(layer) = query.layer else {
+        return Err(ApiError::new(problem::BAD_REQUEST, "first and count go with layer=cages or layer=all"));
+    };
+    let place = service.stream(tenant)?;
+    let facts = prepared(&service, &session).await?;
+    let first = query.first.unwrap_or(0);
+    // Numbers of frames are 32 bits wide, so their ends may not be.
+    let there = match session.coded_frames() {
+        Some(coded) => u64::from(coded),
+        None => u64::from(first) + session.frames().run_length(first),
+    };
+    let end = query.count.map_or(there, |count| u64::from(first) + u64::from(count));
+    if end > there || u64::from(first) >= there {
+        let what = if session.goal().is_some() { "coded" } else { "solved" };
+        let detail = format!(
+            "frames from {first} to {} were asked for, and those below {there} are {what}; wait for the rest",
+            end.saturating_sub(1)
+        );
+        return Err(ApiError::new(problem::FRAMES_MISSING, detail));
+    }
+    let solver = service.solver(&session).await?;
+    let at_a_time = match session.goal() {
+        Some(_) => session.coded_group(first).map_or(1, |group| group.frames as usize),
+        None => BATCH,
+    };
+    let held = 12 * u64::from(facts.points) * at_a_time.min((end - u64::from(first)) as usize) as u64;
+    let memory = service.download_memory.take(&tenant.name, held).await;
+    let of = Arc::clone(&session);
+    let source = match session.goal() {
+        Some(goal) => Source::Groups(blocking(move || of.decoder_of_groups(&solver, goal)).await??),
+        None => Source::Cages(solver),
+    };
+    let (ready, source) = (VecDeque::new(), Arc::new(source));
+    let decoding = Decoding { service, session, source, layer, next: first, end, ready, _held: (place, memory) };
+    let stream = futures_util::stream::unfold(Some(decoding), |decoding| async {
+        let mut decoding = decoding?;
+        match decoding.next().await {
+            Ok(bytes) => bytes.map(|bytes| (Ok(bytes), Some(decoding))),
+            Err(error) => Some((Err(io::Error::from(error)), None)),
+        }
+    });
+    Ok(([(header::CONTENT_TYPE, "application/octet-stream")], Body::from_stream(stream)).into_response())
+}
+
+/// Where positions come from.
+enum Source {
+    /// Cages as they were solved.
+    Cages(Arc<Prepared>),
+    /// Coded groups.
+    Groups(Arc<GroupDecoder>),
+}
+
+struct Decoding {
+    service: Arc<Service>,
+    session: Arc<Session>,
+    source: Arc<Source>,
+    layer: Layer,
+    /// The frame that is decoded next.
+    next: u32,
+    end: u64,
+    /// Decoded and not sent.
+    ready: VecDeque<Vec<f32>>,
+    _held: (Held, Held),
+}
+
+impl Decoding {
+    async fn next(&mut self) -> Result<Option<Bytes>, ApiError> {
+        if self.ready.is_empty() && u64::from(self.next) < self.end {
+            let _place = self.service.completing.take(&self.session.meta.tenant, 1).await;
+            let (session, source) = (Arc::clone(&self.session), Arc::clone(&self.source));
+            let (layer, next, end) = (self.layer, self.next, self.end);
+            let threads = Arc::clone(&self.service.container_writers);
+            let work = move || threads.install(|| decode(&session, &source, layer, next, end));
+            self.ready = tokio::select! {
+                decoded = blocking(work) => decoded??,
+                () = self.session.deleted().cancelled() => return Err(gone()),
+            };
+            self.next = (u64::from(self.next) + self.ready.len() as u64) as u32;
+        }
+        let frame = self.ready.pop_front();
+        Ok(frame.map(|positions| positions.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>().into()))
+    }
+}
+
+/// Positions of the next frames: those of a group, or a batch.
+fn decode(
+    session: &Session,
+    source: &Source,
+    layer: Layer,
+    next: u32,
+    end: u64,
+) -> Result<VecDeque<Vec<f32>>, ApiError> {
+    let wanted = (end - u64::from(next)) as usize;
+    let decoder = match source {
+        Source::Cages(prepared) => {
+            let entries = session.frames().run(next, wanted.min(BATCH));
+            let mut bytes = Vec::new();
+            session.read_cages(&entries, &mut bytes)?;
+            let numbers: Vec<f32> = bytes.as_chunks().0.iter().map(|&b| f32::from_le_bytes(b)).collect();
+            let cages: Vec<&[f32]> = numbers.chunks_exact((numbers.len() / entries.len().max(1)).max(1)).collect();
+            let mut positions = vec![Vec::new(); cages.len()];
+            prepared.solver.decoder().decode(&cages, &mut positions);
+            return Ok(positions.into());
+        }
+        Source::Groups(decoder) => decoder,
+    };
+    let group = session.coded_group(next).ok_or_else(gone)?;
+    let stored = session.read_group(group.first)?;
+    let damaged = |error: cager_codec::Error| ApiError::internal(&error);
+    let cages = decoder.cages(group.frames as usize, &stored.cages).map_err(damaged)?;
+    let mut positions = decoder.positions(&cages);
+    if let (Layer::All, Some(residual)) = (layer, &stored.residual) {
+        decoder.add_residual(residual, &mut positions).map_err(damaged)?;
+    }
+    let mut positions: VecDeque<Vec<f32>> = positions.into();
+    positions.drain(..(next - group.first) as usize);
+    positions.truncate(wanted);
+    Ok(positions)
+}

@@ -1,0 +1,106 @@
+//! A session's container, written as its frames come.
+
+use super::Session;
+use super::prepare::{Choices, Geometry};
+use super::solver_cache::Prepared;
+use crate::capture::{CaptureWriter, Encoding, StoredError};
+use crate::coding::Carried;
+use cager_proto::container;
+use std::io::{self, Write};
+
+/// Frames read from the log at a time.
+const READ_FRAMES: usize = 64;
+
+/// Writes a container from its beginning on: the meshes, then frames in order, and what comes after them.
+pub(crate) struct ContainerFrames<W: Write> {
+    writer: CaptureWriter<W>,
+    diagonal: f64,
+    points: usize,
+    /// What the last group left.
+    carried: Carried,
+}
+
+impl<W: Write> ContainerFrames<W> {
+    /// Writes what comes before the frames.
+    ///
+    /// # Errors
+    /// Options of another version; an output that refuses.
+    pub(crate) fn begin(session: &Session, prepared: &Prepared, geometry: &Geometry, out: W) -> io::Result<Self> {
+        let choices = Choices::of(&session.meta.options)?;
+        let encoding = Encoding {
+            rest: &geometry.rest,
+            cage: &geometry.cage,
+            system: choices.system,
+            options: prepared.options,
+            solver: &prepared.solver,
+            frame_rate: session.meta.options.frame_rate,
+        };
+        let coded = geometry.coded.as_ref().map(|(rest, cage)| (rest, cage));
+        let writer = CaptureWriter::with_meshes(out, &encoding, coded).map_err(plain)?;
+        let points = geometry.rest.points.len();
+        Ok(Self { writer, diagonal: prepared.solver.diagonal(), points, carried: Carried::default() })
+    }
+
+    /// Frames written so far.
+    pub(crate) fn frames(&self) -> u32 {
+        self.writer.frames() as u32
+    }
+
+    /// Bytes written so far.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.writer.bytes()
+    }
+
+    /// Writes the next frames below `end`: a coded group, or some frames as they were solved. False where there are none. Blocks.
+    ///
+    /// # Errors
+    /// Damage; an output that refuses.
+    pub(crate) fn write_next(&mut self, session: &Session, end: u32) -> io::Result<bool> {
+        let next = self.frames();
+        if next >= end {
+            return Ok(false);
+        }
+        if session.goal().is_some() {
+            let Some(group) = session.coded_group(next).filter(|group| group.first + group.frames <= end) else {
+                return Ok(false);
+            };
+            let stored = session.read_group(group.first)?;
+            let written =
+                self.writer.write_group(&stored.cages, stored.residual.as_deref(), &stored.errors(), stored.farthest);
+            self.carried = stored.carried;
+            return written.map(|()| true).map_err(plain);
+        }
+        let entries = session.frames().run(next, READ_FRAMES.min((end - next) as usize));
+        let mut bytes = Vec::new();
+        session.read_cages(&entries, &mut bytes)?;
+        let mut cage = Vec::new();
+        for (entry, bytes) in entries.iter().zip(bytes.chunks_exact((bytes.len() / entries.len().max(1)).max(1))) {
+            cage.clear();
+            cage.extend(bytes.as_chunks().0.iter().map(|&b| f32::from_le_bytes(b)));
+            let error = StoredError { l2: entry.l2, linf: entry.linf, squared: entry.squared, spread: entry.spread };
+            self.writer.write_frame(&cage, &error).map_err(plain)?;
+        }
+        Ok(!entries.is_empty())
+    }
+
+    /// Writes what comes after the frames, and gives back the output, which the caller flushes.
+    ///
+    /// # Errors
+    /// An output that refuses.
+    pub(crate) fn finish(mut self, session: &Session) -> io::Result<W> {
+        let rows = session.facts().map_or(1, |facts| facts.unknowns as usize);
+        let group_frames = super::groups::group_frames(self.points, rows);
+        let coding = |goal: crate::coding::Goal| goal.coding(&self.carried, self.points, self.diagonal, group_frames);
+        if let Some(coding) = session.goal().and_then(coding) {
+            self.writer.set_coding(coding);
+        }
+        self.writer.finish().map(|(out, _)| out).map_err(plain)
+    }
+}
+
+fn plain(error: container::Error) -> io::Error {
+    match error {
+        container::Error::Io(error) => error,
+        other => io::Error::other(other.to_string()),
+    }
+}

@@ -1,0 +1,398 @@
+//! Sessions made with a goal for error, size or quality: their frames wait on disk until their group is whole, and are then coded.
+
+use super::Session;
+use super::container_frames::ContainerFrames;
+use super::create::blocking;
+use super::facts::Facts;
+use super::prepare::{Choices, Geometry, cannot_be_coded};
+use super::solver_cache::Prepared;
+use crate::capture::StoredError;
+use crate::coding::{Carried, Goal, GroupCoder, GroupDecoder};
+use crate::problem::{self, ApiError};
+use crate::service::Service;
+use crate::store::{LogEntry, StoreError};
+use cager_proto::container;
+use cager_proto::messages::CodedFrames;
+use serde::{Deserialize, Serialize};
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
+
+/// Bytes of frames that coding a group may hold: as posted, as cages leave them, and decoded.
+const MOST_HELD: usize = 512 << 20;
+
+/// Most frames of a group. The same for a session on any machine, since groups on disk are numbered by it.
+pub(crate) fn group_frames(points: usize, rows: usize) -> usize {
+    container::group_frames(points, rows).min(MOST_HELD / (48 * points.max(1))).max(1)
+}
+
+/// What of a session's frames is coded.
+#[derive(Default)]
+pub(crate) struct Groups {
+    /// From frame 0 on, without gaps.
+    coded: Vec<CodedGroup>,
+    carried: Carried,
+    /// Why the next group cannot be coded as asked for.
+    failed: Option<ApiError>,
+}
+
+/// A coded group on disk.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CodedGroup {
+    pub(crate) first: u32,
+    pub(crate) frames: u32,
+    bytes: u64,
+}
+
+/// What the file of a coded group holds.
+#[derive(Deserialize, Serialize)]
+pub(crate) struct StoredGroup {
+    pub(crate) cages: Vec<u8>,
+    pub(crate) residual: Option<Vec<u8>>,
+    /// Errors of what the frames decode to, as [`StoredError`].
+    errors: Vec<(f32, f32, f64, f64)>,
+    /// The frame whose cage lies farthest from the origin, and how far.
+    pub(crate) farthest: (usize, f64),
+    pub(crate) carried: Carried,
+}
+
+impl StoredGroup {
+    pub(crate) fn errors(&self) -> Vec<StoredError> {
+        let error = |&(l2, linf, squared, spread)| StoredError { l2, linf, squared, spread };
+        self.errors.iter().map(error).collect()
+    }
+}
+
+impl Groups {
+    /// Frames that are coded.
+    pub(crate) fn frames(&self) -> u32 {
+        self.coded.last().map_or(0, |group| group.first + group.frames)
+    }
+
+    /// The group that a frame belongs to, if it is coded.
+    pub(crate) fn of(&self, frame: u32) -> Option<CodedGroup> {
+        let at = self.coded.partition_point(|group| group.first + group.frames <= frame);
+        self.coded.get(at).copied()
+    }
+
+    fn add(&mut self, first: u32, group: &StoredGroup, bytes: u64) {
+        self.coded.push(CodedGroup { first, frames: group.errors.len() as u32, bytes });
+        self.carried = group.carried;
+    }
+}
+
+impl Session {
+    /// What the container is to meet; `None` where frames are stored as they are solved for.
+    pub(crate) fn goal(&self) -> Option<Goal> {
+        self.goal
+    }
+
+    /// Frames that are coded, in sessions whose frames are.
+    pub(crate) fn coded_frames(&self) -> Option<u32> {
+        self.goal.map(|_| super::lock(&self.groups).frames())
+    }
+
+    /// What of the frames is coded, as the API says it.
+    pub(crate) fn coding_view(&self, facts: Option<&Facts>) -> Option<CodedFrames> {
+        self.goal?;
+        let groups = super::lock(&self.groups);
+        Some(CodedFrames {
+            group_frames: facts.map(|facts| group_frames(facts.points as usize, facts.unknowns as usize) as u32),
+            frames: groups.frames(),
+            bytes: groups.coded.iter().map(|group| group.bytes).sum(),
+            problem: groups.failed.as_ref().map(|error| (*error.problem).clone()),
+        })
+    }
+
+    /// The coded group that a frame belongs to.
+    pub(crate) fn coded_group(&self, frame: u32) -> Option<CodedGroup> {
+        super::lock(&self.groups).of(frame)
+    }
+
+    /// Reads a coded group. Blocks.
+    ///
+    /// # Errors
+    /// Damage, after which the session has failed and is in quarantine; I/O errors.
+    pub(crate) fn read_group(&self, first: u32) -> Result<StoredGroup, ApiError> {
+        let found = self.store.group(&self.meta.id, first).and_then(|found| {
+            let gone = || StoreError::damaged(&self.store.log_path(&self.meta.id), format!("group {first} is gone"));
+            found.map(|(group, _)| group).ok_or_else(gone)
+        });
+        found.map_err(|error| self.fail_if_damaged(error))
+    }
+
+    /// Finds the coded groups on disk. The frames of the log are known already. Blocks.
+    pub(super) fn load_groups(&self) -> Result<(), StoreError> {
+        if self.goal.is_none() {
+            return Ok(());
+        }
+        let mut found = Groups::default();
+        while self.declared().is_none_or(|declared| found.frames() < declared) {
+            let first = found.frames();
+            let Some((group, bytes)) = self.store.group::<StoredGroup>(&self.meta.id, first)? else { break };
+            if group.errors.is_empty() {
+                return Err(StoreError::damaged(&self.store.log_path(&self.meta.id), "a group has no frames"));
+            }
+            self.frames().set_errors(first, &group.errors());
+            found.add(first, &group, bytes);
+            // The process may have ended before it did.
+            self.remove_coded(first, found.frames())?;
+        }
+        *super::lock(&self.groups) = found;
+        Ok(())
+    }
+
+    /// Bytes of a frame, and most frames of a group.
+    fn frame_bytes(&self) -> (usize, u32) {
+        let facts = self.facts();
+        let (points, rows) = facts.map_or((1, 1), |facts| (facts.points as usize, facts.unknowns as usize));
+        (12 * points, group_frames(points, rows) as u32)
+    }
+
+    /// Removes files of frames that are all coded, now that those from `first` to `end` are. Returns their bytes.
+    fn remove_coded(&self, first: u32, end: u32) -> Result<u64, StoreError> {
+        let (frame_bytes, most) = self.frame_bytes();
+        let mut removed = 0;
+        for file in (first / most * most..end).step_by(most as usize).filter(|file| file + most <= end) {
+            self.store.remove_frames(&self.meta.id, Some(file))?;
+            removed += frame_bytes as u64 * u64::from(most);
+        }
+        Ok(removed)
+    }
+
+    /// Makes frames durable that wait for their group. Blocks.
+    pub(super) fn keep_frames(&self, frames: &[(u32, &[u8])]) -> Result<(), StoreError> {
+        let (frame_bytes, most) = self.frame_bytes();
+        let mut frames = frames.to_vec();
+        frames.sort_unstable_by_key(|(frame, _)| *frame);
+        for together in frames.chunk_by(|a, b| a.0 / most == b.0 / most) {
+            self.store.put_frames(&self.meta.id, together[0].0 / most * most, frame_bytes, together)?;
+        }
+        Ok(())
+    }
+
+    /// The entries of the next group: all of them solved, and the group as long as groups are, or up to `end`.
+    fn next_group(&self, end: Option<u32>) -> Option<Vec<LogEntry>> {
+        self.facts()?;
+        let first = {
+            let groups = super::lock(&self.groups);
+            if groups.failed.is_some() {
+                return None;
+            }
+            groups.frames()
+        };
+        let (_, most) = self.frame_bytes();
+        let count = end.map_or(most, |end| most.min(end.saturating_sub(first)));
+        let frames = self.frames();
+        (count > 0 && frames.run_length(first) >= u64::from(count)).then(|| frames.run(first, count as usize))
+    }
+
+    /// Codes a group and stores it. Blocks.
+    fn code(&self, goal: Goal, coder: &mut GroupCoder, diagonal: f64, entries: &[LogEntry]) -> Result<(), ApiError> {
+        let (first, row_bytes) = (entries[0].frame, 12 * self.facts().map_or(0, |facts| facts.unknowns as usize));
+        let mut cages = Vec::new();
+        self.read_cages(entries, &mut cages)?;
+        let (frame_bytes, most) = self.frame_bytes();
+        let mut frame = vec![0; frame_bytes];
+        for (entry, cage) in entries.iter().zip(cages.chunks_exact(row_bytes)) {
+            let read = self.store.read_frame(&self.meta.id, entry.frame / most * most, entry.frame, &mut frame);
+            let read = read.and_then(|()| match entry.full_digest {
+                Some(digest) if blake3::hash(&frame).as_bytes()[..16] == digest => Ok(()),
+                _ => {
+                    let what = format!("frame {} does not match its checksum", entry.frame);
+                    Err(StoreError::damaged(&self.store.log_path(&self.meta.id), what))
+                }
+            });
+            read.map_err(|error| self.fail_if_damaged(error))?;
+            let numbers =
+                |bytes: &[u8]| -> Vec<f32> { bytes.as_chunks().0.iter().map(|&b| f32::from_le_bytes(b)).collect() };
+            coder.push(numbers(&frame).into_iter().map(f64::from).collect(), numbers(cage));
+        }
+        let coded = coder.close().map_err(|error| {
+            let error = cannot_be_coded(goal, &error);
+            tracing::info!(session = %self.meta.id, first, detail = %error.problem.detail, "frames cannot be coded");
+            super::lock(&self.groups).failed = Some(error.clone());
+            self.touch();
+            error
+        })?;
+        let stored = |error| StoredError::new(error, diagonal);
+        let errors: Vec<StoredError> = coded.errors.iter().map(stored).collect();
+        let group = StoredGroup {
+            cages: coded.cages,
+            residual: coded.residual,
+            errors: errors.iter().map(|e| (e.l2, e.linf, e.squared, e.spread)).collect(),
+            farthest: coded.farthest,
+            carried: coder.carried(),
+        };
+        let put = self.store.put_group(&self.meta.id, first, &group).map_err(|error| self.storage_error(&error))?;
+        self.bytes.fetch_add(put, Relaxed);
+        self.frames().set_errors(first, &errors);
+        super::lock(&self.groups).add(first, &group, put);
+        match self.remove_coded(first, first + entries.len() as u32) {
+            Ok(removed) => {
+                let less = |bytes: u64| Some(bytes.saturating_sub(removed));
+                let _ = self.bytes.fetch_update(Relaxed, Relaxed, less);
+            }
+            // The next start does it.
+            Err(error) => tracing::warn!(session = %self.meta.id, %error, "frames that are coded still take space"),
+        }
+        metrics::counter!("cager_coded_frames_total", "tenant" => self.meta.tenant.clone())
+            .increment(entries.len() as u64);
+        self.touch();
+        Ok(())
+    }
+
+    /// The coder of the next group. Blocks.
+    fn coder(&self, prepared: &Prepared, goal: Goal) -> Result<GroupCoder, ApiError> {
+        let geometry = self.geometry()?;
+        let model = self.group_decoder(prepared, &geometry, goal)?;
+        let most = group_frames(prepared.solver.decoder().points(), prepared.solver.decoder().unknowns());
+        let mut carried = super::lock(&self.groups).carried;
+        if carried.frames == 0 {
+            let meshes = ContainerFrames::begin(self, prepared, &geometry, io::sink());
+            let meshes = meshes.map_err(|error| ApiError::internal(&error))?;
+            carried.room = goal.room(meshes.bytes(), self.meta.options.frames.unwrap_or(0) as usize);
+        }
+        Ok(GroupCoder::new(goal, model, geometry.unit, most, carried))
+    }
+
+    fn group_decoder(
+        &self,
+        prepared: &Prepared,
+        geometry: &Geometry,
+        goal: Goal,
+    ) -> Result<Arc<GroupDecoder>, ApiError> {
+        let system = Choices::of(&self.meta.options)?.system;
+        let mut kept = super::lock(&self.group_decoder);
+        if let Some(decoder) = kept.upgrade() {
+            return Ok(decoder);
+        }
+        let made = GroupDecoder::new(system, &geometry.cage, &geometry.rest, &prepared.solver);
+        let made = Arc::new(made.map_err(|error| cannot_be_coded(goal, &error))?);
+        *kept = Arc::downgrade(&made);
+        Ok(made)
+    }
+
+    /// What decodes the session's groups, shared while it is used. Blocks.
+    ///
+    /// # Errors
+    /// Content that is gone; coordinates that cannot be computed.
+    pub(crate) fn decoder_of_groups(&self, prepared: &Prepared, goal: Goal) -> Result<Arc<GroupDecoder>, ApiError> {
+        if let Some(decoder) = super::lock(&self.group_decoder).upgrade() {
+            return Ok(decoder);
+        }
+        self.group_decoder(prepared, &self.geometry()?, goal)
+    }
+}
+
+impl Service {
+    /// Codes the frames of a session, where they are to be, as groups become whole.
+    pub(crate) fn code_in_background(self: &Arc<Self>, session: &Arc<Session>) {
+        if session.goal().is_some() {
+            tokio::spawn(Arc::clone(self).code_as_they_come(Arc::clone(session)));
+        }
+    }
+
+    async fn code_as_they_come(self: Arc<Self>, session: Arc<Session>) {
+        let mut changes = session.changes();
+        loop {
+            changes.mark_unchanged();
+            match session.status().phase {
+                super::Phase::Completed(_) | super::Phase::Failed(_) => return,
+                super::Phase::Ready if session.next_group(None).is_some() => {
+                    let _place = self.completing.take(&session.meta.tenant, 1).await;
+                    match self.code_groups(&session, None).await {
+                        Ok(()) => continue,
+                        Err(error) => {
+                            tracing::warn!(session = %session.meta.id, detail = %error.problem.detail, "a group is not coded");
+                        }
+                    }
+                }
+                _ => {}
+            }
+            tokio::select! {
+                changed = changes.changed() => if changed.is_err() { return },
+                () = session.deleted().cancelled() => return,
+                () = self.stopping().cancelled() => return,
+            }
+        }
+    }
+
+    /// Codes all groups that are whole, and with `end` the last one as well. The caller holds a place of `completing`.
+    ///
+    /// # Errors
+    /// Frames that cannot be coded as asked for; storage errors.
+    pub(crate) async fn code_groups(
+        self: &Arc<Self>,
+        session: &Arc<Session>,
+        end: Option<u32>,
+    ) -> Result<(), ApiError> {
+        let Some(goal) = session.goal() else { return Ok(()) };
+        session.ensure_loaded().await?;
+        let mut coding = Arc::clone(&session.coding).lock_owned().await;
+        while let Some(entries) = session.next_group(end) {
+            let prepared = self.solver(session).await?;
+            let (session, writers) = (Arc::clone(session), Arc::clone(&self.container_writers));
+            let work = move || {
+                let outcome = writers.install(|| -> Result<(), ApiError> {
+                    // After an error the coder is made anew, from what is on disk.
+                    let mut coder = coding.take().map_or_else(|| session.coder(&prepared, goal), Ok)?;
+                    session.code(goal, &mut coder, prepared.solver.diagonal(), &entries)?;
+                    *coding = Some(coder);
+                    Ok(())
+                });
+                (coding, outcome)
+            };
+            let (kept, outcome) = blocking(work).await?;
+            coding = kept;
+            outcome?;
+        }
+        match &super::lock(&session.groups).failed {
+            Some(error) => Err(error.clone()),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Session {
+    /// Refuses an end within a coded group, of which nothing can be left out any more.
+    ///
+    /// # Errors
+    /// `FRAME_CONFLICT`.
+    pub(crate) fn check_end(&self, frames: u32) -> Result<(), ApiError> {
+        let Some(group) = frames.checked_sub(1).and_then(|last| self.coded_group(last)) else { return Ok(()) };
+        let end = group.first + group.frames;
+        if frames == end {
+            return Ok(());
+        }
+        let detail = format!(
+            "frames {} to {} are coded together already, so none of them can be left out; complete with {} or at least {end} frames, or post the frames to a new session",
+            group.first,
+            end - 1,
+            group.first
+        );
+        Err(ApiError::new(problem::FRAME_CONFLICT, detail))
+    }
+
+    /// Removes frames and groups that do not belong to a container of so many frames. Blocks.
+    pub(super) fn remove_uncoded(&self, frames: u32) {
+        if self.goal.is_none() {
+            return;
+        }
+        let removed = self.store.remove_frames(&self.meta.id, None);
+        if let Err(error) = removed.and_then(|()| self.store.remove_groups_from(&self.meta.id, frames)) {
+            tracing::warn!(session = %self.meta.id, %error, "frames that are not in the container still take space");
+        }
+        let mut groups = super::lock(&self.groups);
+        groups.coded.retain(|group| group.first < frames);
+        drop(groups);
+        self.bytes.store(self.store.session_bytes(&self.meta.id) + self.store.content_bytes(&self.meta.key), Relaxed);
+    }
+
+    /// Forgets what coding keeps in memory.
+    pub(super) fn forget_coder(&self) {
+        if let Ok(mut coder) = self.coding.try_lock() {
+            *coder = None;
+        }
+    }
+}
