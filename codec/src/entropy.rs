@@ -310,7 +310,7 @@ mod tests {
     #[test]
     fn reciprocals_divide_as_division_does() {
         for rate in 1..=1u64 << SLOW {
-            assert!((0..=u64::from(u16::MAX)).all(|p| p * RECIPROCALS[rate as usize] >> 32 == p / rate), "{rate}");
+            assert!((0..=u64::from(u16::MAX)).all(|p| (p * RECIPROCALS[rate as usize]) >> 32 == p / rate), "{rate}");
         }
     }
 

@@ -185,8 +185,7 @@ async fn a_bad_pair_fails_with_the_reason() {
     let cage = String::from_utf8(dir.read("cage.obj")).expect("text");
     let open =
         cage.lines().filter(|line| !line.starts_with("f ")).map(|l| format!("{l}\n")).collect::<String>() + "f 1 2 3\n";
-    let new =
-        cager_client::NewSession::new(MeshFile::new("rest.obj", dir.read("rest.obj")), MeshFile::new("cage.obj", open));
+    let new = NewSession::new(MeshFile::new("rest.obj", dir.read("rest.obj")), MeshFile::new("cage.obj", open));
     let outcome = match client.create(&new).await {
         Ok(session) => client.wait_ready(&session.id, Duration::from_secs(60)).await,
         refused => refused,
@@ -240,7 +239,7 @@ async fn a_cage_is_designed_followed_fetched_used_and_deleted() {
     assert_eq!(client.cage_jobs().await.expect("designs"), std::slice::from_ref(&job));
     let obj = client.cage_obj(&job.id).await.expect("a cage");
     assert!(obj.starts_with(b"v "));
-    let mut new = cager_client::NewSession::new(rest(), MeshFile::new("cage.obj", obj));
+    let mut new = NewSession::new(rest(), MeshFile::new("cage.obj", obj));
     new.cage = None;
     new.options.cage = Some(CageSource { id: Some(job.id.clone()), ..CageSource::default() });
     let session = client.create(&new).await.expect("a session");
