@@ -1,7 +1,7 @@
 //! Encoding: solves one cage per frame and measures the errors that a decoder will produce.
 
 use crate::capture::{CaptureWriter, Encoding, StoredError};
-use crate::coding::{Carried, CodedGroup, CodingError, Goal, GroupCoder, GroupDecoder, RestMeshes};
+use crate::coding::{Carried, CodedGroup, CodingError, Goal, GroupCoder, GroupDecoder, HELD, RestMeshes, group_frames};
 use crate::memory::Memory;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
@@ -188,9 +188,8 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
     let coded = meshes.as_ref().map(|meshes| (&meshes.rest, &meshes.cage));
     let out = BufWriter::with_capacity(1 << 20, file);
     let mut writer = CaptureWriter::with_meshes(out, &encoding, coded).map_err(fail)?;
-    let group_frames = container::group_frames(job.rest.points.len(), solver.decoder().unknowns());
-    // A group is held as captured, as cages leave it, and decoded.
-    let group_frames = job.memory.frames(48 * job.rest.points.len(), group_frames);
+    let group_frames = group_frames(job.rest.points.len(), solver.decoder().unknowns());
+    let group_frames = job.memory.frames(HELD * job.rest.points.len(), group_frames);
     let mut coder = job.goal.zip(model).map(|(goal, model)| {
         let room = goal.room(writer.bytes(), job.frames.frames());
         GroupCoder::new(goal, Arc::new(model), unit, group_frames, Carried { room, ..Carried::default() })

@@ -30,6 +30,15 @@ impl Client {
         Ok(progress.bytes)
     }
 
+    /// Bytes of a completed session's container.
+    pub(crate) async fn container_length(&self, id: &str) -> Result<u64, Failure> {
+        let request = self.request(Method::GET, &["v1", "sessions", id, "capture.cager"], &[]).await?;
+        let response = self.send(request.header(RANGE, "bytes=0-0")).await?;
+        let range = text(response.headers(), CONTENT_RANGE);
+        let total = range.as_deref().and_then(content_range).and_then(|(_, total)| total);
+        total.ok_or_else(|| Failure::protocol("it does not say how long the container is"))
+    }
+
     /// Goes on with a download on one connection, to its end.
     async fn download_on(&self, id: &str, out: &mut (impl Write + Send), written: &mut Written) -> Result<(), Failure> {
         let mut request = self.request(Method::GET, &["v1", "sessions", id, "capture.cager"], &[]).await?;

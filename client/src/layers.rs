@@ -91,7 +91,12 @@ impl Client {
         }
         let session = self.session(id).await?;
         match session.state {
-            SessionState::Completed => Ok(()),
+            SessionState::Completed => match self.container_length(id).await? {
+                length if length == *written => Ok(()),
+                _ => Err(Failure::protocol(
+                    "frames that had come already were left out in the end; download the container",
+                )),
+            },
             SessionState::Failed => Err(ClientError::Failed(Box::new(reason(session))).into()),
             SessionState::Preparing | SessionState::Ready => Err(self.broken("the stream ended before the container")),
         }

@@ -10,6 +10,7 @@ use super::solver_options::{
     designed_spectrum, matrix, read_cage, solver, solver_for, spectrum_bound, with_input_name,
 };
 use super::{design, encode_remote, grouped, progress, tell, warn};
+use crate::coding::{CAGE_SIZE_FRAMES, CageSizes};
 use crate::design::{read_frames, report as design_report};
 use crate::encode::{self, ChooseSpectrum, EncodeProgress, Encoded, Job, sample_frames};
 use crate::frames::CaptureFiles;
@@ -19,7 +20,7 @@ use anyhow::{Context, Result, bail};
 use cager_cages::{DesignOptions, Style};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
-use cager_core::inversion::{PrepareError, Solver, SolverOptions, check_options};
+use cager_core::inversion::{PrepareError, Solver, SolverOptions, check_options, default_spectrum};
 use cager_core::mesh::Model;
 use cager_core::regularize::{Regularizer, SparseMatrix, Term};
 use cager_formats::{AtomicFile, FrameReader, Target, commit_together, read_model};
@@ -124,13 +125,39 @@ pub(super) fn design_options(args: &EncodeArgs, points: usize) -> Result<DesignO
 
 /// A cage from the capture itself.
 fn designed(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<(Cage, DesignReport)> {
-    let options = design_options(args, rest.points.len())?;
+    let mut options = design_options(args, rest.points.len())?;
+    if let Some(vertices) = best_cage_size(args, files, rest)? {
+        tell(&format!(
+            "cages of several sizes were tried on the first frames: {vertices} vertices suit what is asked for\n"
+        ))?;
+        options.goal = design::goal(Some(vertices as u32), None, rest.points.len())?;
+    }
     let frames = read_frames(files).map_err(|error| name_files(error, args))?;
     let design = design::design((&args.rest, rest), (&args.frames, &frames), None, &options)?;
     warn(&design.warnings);
     let report = design_report(&design, &options, frames.len());
     let cage = Cage::new(design.cage).with_context(|| args.rest.display().to_string())?;
     Ok((cage, report))
+}
+
+/// How many vertices a designed cage should have for a bound or a size, where neither they nor an error of the cage are given.
+fn best_cage_size(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<Option<usize>> {
+    let mut reader = files.open()?;
+    let total = reader.frames();
+    let goal = goal(args, rest, total)?;
+    let (Some(goal), None, None) = (goal, args.design.cage_vertices, args.design.mean_error) else { return Ok(None) };
+    let frames = sample_frames(reader.as_mut(), CAGE_SIZE_FRAMES, true).map_err(|error| name_files(error, args))?;
+    let memory = args.memory.unwrap_or_else(Memory::half_of_free);
+    let (system, _) = solver_for(&args.solver, |_| 0)?;
+    let sizes = CageSizes { goal, rest, system, frames: &frames, total, memory };
+    let bar = progress::steps();
+    bar.set_message("trying cages of several sizes");
+    let best = sizes.best(|cage, rest| {
+        let options = SolverOptions { spectrum: default_spectrum(system.unknowns(cage)), ..SolverOptions::default() };
+        Solver::prepare(system, cage, &rest.points, options)
+    });
+    bar.finish_and_clear();
+    Ok(best)
 }
 
 fn encode_locally(

@@ -90,8 +90,15 @@ impl GroupCoder {
         self.carried
     }
 
+    /// Says that so many frames are left, those that wait included.
+    pub(crate) fn expect(&mut self, frames: usize) {
+        if let Some(room) = &mut self.carried.room {
+            room.frames = frames;
+        }
+    }
+
     /// Forgets frames that wait.
-    pub(crate) fn clear(&mut self) {
+    fn clear(&mut self) {
         self.frames.clear();
         self.cages.clear();
     }

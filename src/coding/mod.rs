@@ -3,16 +3,19 @@
 //! One number, the step of the residual, decides a file's size and error. A step of the cage that moves all points by as much in the root mean square
 //! costs as much per binary digit; how far apart the two are best is measured on the first frames, and so is the step that meets an error or a size.
 
+mod cage_size;
 mod group;
 mod meshes;
 mod model;
 mod steps;
 
+pub(crate) use cage_size::{CageSizes, FRAMES as CAGE_SIZE_FRAMES};
 pub(crate) use group::{Carried, CodedGroup, GroupCoder, Room};
 pub(crate) use meshes::RestMeshes;
 pub(crate) use model::GroupDecoder;
 
 use cager_core::coordinates::CoordinatesError;
+use cager_proto::container;
 use cager_proto::report::Coding;
 use group::Steps;
 
@@ -69,11 +72,33 @@ impl Goal {
         let other = written + AROUND + 8 * frames as u64;
         Some(Room { bytes: bytes.saturating_sub(other), frames, other })
     }
+
+    /// Refuses a size that meshes of so many bytes fill already.
+    ///
+    /// # Errors
+    /// [`CodingError::TooSmall`].
+    pub(crate) fn check_size(self, meshes: u64, frames: usize) -> Result<(), CodingError> {
+        match (self, self.room(meshes, frames)) {
+            (Self::Size(asked), Some(Room { bytes: 0, other: least, .. })) => {
+                Err(CodingError::TooSmall { asked, least })
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 /// What positions may differ by from machine to machine where numbers are as large as `farthest`.
 fn slack(diagonal: f64, farthest: f64) -> f64 {
     1e-6 * diagonal + f64::from(f32::EPSILON) * farthest
+}
+
+/// Bytes that coding a group holds, and of these for each position of a frame: as captured, of its cage, as a residual, decoded.
+const MOST_HELD: usize = 512 << 20;
+pub(crate) const HELD: usize = 112;
+
+/// Most frames of a group. The same on every machine, so that files are.
+pub(crate) fn group_frames(points: usize, rows: usize) -> usize {
+    container::group_frames(points, rows).min(MOST_HELD / (HELD * points.max(1))).max(1)
 }
 
 /// Bytes of a file after its frames but for eight of each: the report and the table of contents, about.
@@ -84,7 +109,8 @@ const AROUND: u64 = 1500;
 pub enum CodingError {
     /// Below what single precision can hold.
     #[error(
-        "an error of {asked:.1e} of the diagonal is below what positions in single precision can hold here; ask for at least {least:.1e}, or move the capture closer to the origin"
+        "an error of {asked:.1e} of the diagonal is below what positions in single precision can hold here; {}",
+        if *least < 1.0 { format!("ask for at least {least:.1e}, or move the capture closer to the origin") } else { "check these frames, whose positions are very far from the origin".to_owned() }
     )]
     BelowPrecision {
         /// Asked for.

@@ -46,6 +46,13 @@ impl GroupCoder {
         (self.model.points() as f64 / self.model.basis.rows() as f64).sqrt()
     }
 
+    /// Bytes of the frames that wait, in the steps where [`Self::choose`] begins for a bound.
+    pub(super) fn usual_bytes(&self) -> Result<u64, CodingError> {
+        let Goal::MaxError(error) = self.goal else { return Ok(0) };
+        let step = USUAL_STEP * error * self.diagonal;
+        self.encode(self.frames.len(), step, USUAL_RATIO).map(|group| group.bytes())
+    }
+
     /// What `tried` gives for the largest step, or the smallest, for which it gives anything, to a twentieth; it does for all steps on the other side
     /// of it. Begins at the step of the group before. `None` where it does for no step.
     fn for_step<T>(
@@ -115,7 +122,7 @@ impl GroupCoder {
         })?;
         if let Some(group) = found {
             let (bytes, frames) = (room.bytes - group.bytes(), room.frames.saturating_sub(self.frames.len()));
-            self.carried.room = Some(Room { bytes, frames, ..room });
+            self.carried.room = Some(Room { bytes, frames, other: room.other + group.bytes() });
             return self.finish(group);
         }
         let coarsest = self.encode(self.frames.len(), 2.0 * self.diagonal, USUAL_RATIO)?.bytes();

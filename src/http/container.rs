@@ -31,8 +31,8 @@ const MEDIA_TYPE: &str = "application/vnd.cager";
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(crate) struct ContainerQuery {
-    /// Keep the stream open for frames still to come, until the session is completed. Its bytes are then those of the container; before, every
-    /// whole section can be decoded.
+    /// Keep the stream open for frames still to come, until the session is completed. Its bytes are then those of the container, but for errors that
+    /// were measured after a frame was sent; before, every whole section can be decoded.
     #[serde(default)]
     follow: bool,
 }
@@ -200,7 +200,10 @@ impl Writing {
             if frames.write_next(&session, last.unwrap_or(u32::MAX))? {
                 return Ok((Some(frames), Written::Frames(unsent.take())));
             }
-            if last.is_some_and(|last| frames.frames() >= last) {
+            if last.is_some_and(|last| frames.frames() > last) {
+                return Err(io::Error::other("frames that were sent were left out when the session was completed"));
+            }
+            if last == Some(frames.frames()) {
                 frames.finish(&session)?;
                 return Ok((None, Written::End(unsent.take())));
             }

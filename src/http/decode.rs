@@ -43,6 +43,11 @@ pub(crate) async fn post(
     request: Request,
 ) -> Result<Response, ApiError> {
     if query.is_given() {
+        if http_body::Body::size_hint(request.body()).exact() != Some(0) {
+            let detail =
+                "with layer, frames of the session are decoded; send no body, or leave layer, first and count out";
+            return Err(ApiError::new(problem::BAD_REQUEST, detail));
+        }
         return decode_layer::respond(service, session, &tenant, query).await;
     }
     let media_type = content_type(request.headers());

@@ -66,9 +66,9 @@ pub(super) async fn respond(
     let end = query.count.map_or(there, |count| u64::from(first) + u64::from(count));
     if end > there || u64::from(first) >= there {
         let what = if session.goal().is_some() { "coded" } else { "solved" };
+        let missing = there.max(u64::from(first));
         let detail = format!(
-            "frames from {first} to {} were asked for, and those below {there} are {what}; wait for the rest",
-            end.saturating_sub(1)
+            "frame {missing} was asked for and is not {what}; ask for fewer frames, or wait if it is still to come"
         );
         return Err(ApiError::new(problem::FRAMES_MISSING, detail));
     }
@@ -77,7 +77,7 @@ pub(super) async fn respond(
         Some(_) => session.coded_group(first).map_or(1, |group| group.frames as usize),
         None => BATCH,
     };
-    let held = 12 * u64::from(facts.points) * at_a_time.min((end - u64::from(first)) as usize) as u64;
+    let held = 12 * u64::from(facts.points) * at_a_time as u64;
     let memory = service.download_memory.take(&tenant.name, held).await;
     let of = Arc::clone(&session);
     let source = match session.goal() {
@@ -85,7 +85,8 @@ pub(super) async fn respond(
         None => Source::Cages(solver),
     };
     let (ready, source) = (VecDeque::new(), Arc::new(source));
-    let decoding = Decoding { service, session, source, layer, next: first, end, ready, _held: (place, memory) };
+    let decoding =
+        Decoding { service, session, source, layer, next: u64::from(first), end, ready, _held: (place, memory) };
     let stream = futures_util::stream::unfold(Some(decoding), |decoding| async {
         let mut decoding = decoding?;
         match decoding.next().await {
@@ -110,7 +111,7 @@ struct Decoding {
     source: Arc<Source>,
     layer: Layer,
     /// The frame that is decoded next.
-    next: u32,
+    next: u64,
     end: u64,
     /// Decoded and not sent.
     ready: VecDeque<Vec<f32>>,
@@ -119,17 +120,24 @@ struct Decoding {
 
 impl Decoding {
     async fn next(&mut self) -> Result<Option<Bytes>, ApiError> {
-        if self.ready.is_empty() && u64::from(self.next) < self.end {
-            let _place = self.service.completing.take(&self.session.meta.tenant, 1).await;
+        if self.ready.is_empty() && self.next < self.end {
+            let place = self.service.completing.take(&self.session.meta.tenant, 1).await;
             let (session, source) = (Arc::clone(&self.session), Arc::clone(&self.source));
             let (layer, next, end) = (self.layer, self.next, self.end);
             let threads = Arc::clone(&self.service.container_writers);
-            let work = move || threads.install(|| decode(&session, &source, layer, next, end));
+            let work = move || {
+                let _place = place;
+                threads.install(|| decode(&session, &source, layer, next as u32, (end - next) as usize))
+            };
             self.ready = tokio::select! {
                 decoded = blocking(work) => decoded??,
                 () = self.session.deleted().cancelled() => return Err(gone()),
             };
-            self.next = (u64::from(self.next) + self.ready.len() as u64) as u32;
+            if self.ready.is_empty() {
+                let detail = format!("frame {next} was left out when the session was completed");
+                return Err(ApiError::new(problem::FRAMES_MISSING, detail));
+            }
+            self.next += self.ready.len() as u64;
         }
         let frame = self.ready.pop_front();
         Ok(frame.map(|positions| positions.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>().into()))
@@ -142,9 +150,8 @@ fn decode(
     source: &Source,
     layer: Layer,
     next: u32,
-    end: u64,
+    wanted: usize,
 ) -> Result<VecDeque<Vec<f32>>, ApiError> {
-    let wanted = (end - u64::from(next)) as usize;
     let decoder = match source {
         Source::Cages(prepared) => {
             let entries = session.frames().run(next, wanted.min(BATCH));
@@ -158,7 +165,7 @@ fn decode(
         }
         Source::Groups(decoder) => decoder,
     };
-    let group = session.coded_group(next).ok_or_else(gone)?;
+    let Some(group) = session.coded_group(next) else { return Ok(VecDeque::new()) };
     let stored = session.read_group(group.first)?;
     let damaged = |error: cager_codec::Error| ApiError::internal(&error);
     let cages = decoder.cages(group.frames as usize, &stored.cages).map_err(damaged)?;

@@ -113,6 +113,7 @@ pub(crate) async fn post(
     let place = service.stream(&tenant)?;
     let facts = prepared(&service, &session).await?;
     session.completion_resolved().await?;
+    session.check_coding()?;
     if rows == Rows::Handles && !facts.reads_handles_only {
         let detail = "this session needs every point, since handles is all, or an error, a size or a quality was asked for; post whole frames";
         return Err(ApiError::new(problem::INVALID_FRAME, detail));

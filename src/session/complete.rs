@@ -79,7 +79,7 @@ impl Service {
         };
         let mut sealed = UnsealOnFailure { session, kept: before };
         session.check_end(frames)?;
-        self.code_groups(session, Some(frames)).await?;
+        self.code_rest(session, frames).await?;
         let prepared = self.solver(session).await?;
         let (writing, webhooks) = (Arc::clone(session), Arc::clone(&self.webhooks));
         let writers = Arc::clone(&self.container_writers);
@@ -160,7 +160,9 @@ impl Session {
         }
         match self.store.completion(&self.meta.id).map_err(|error| self.fail_if_damaged(error))? {
             Some(completion) => {
+                let frames = completion.frames;
                 self.completed(completion, 0);
+                self.remove_uncoded(frames);
                 self.webhooks.resend_undelivered(self);
             }
             None => self.frames().unseal(),

@@ -89,7 +89,7 @@ impl<W: Write> ContainerFrames<W> {
     /// An output that refuses.
     pub(crate) fn finish(mut self, session: &Session) -> io::Result<W> {
         let rows = session.facts().map_or(1, |facts| facts.unknowns as usize);
-        let group_frames = super::groups::group_frames(self.points, rows);
+        let group_frames = crate::coding::group_frames(self.points, rows);
         let coding = |goal: crate::coding::Goal| goal.coding(&self.carried, self.points, self.diagonal, group_frames);
         if let Some(coding) = session.goal().and_then(coding) {
             self.writer.set_coding(coding);

@@ -147,6 +147,11 @@ impl Frames {
         self.sealed = true;
     }
 
+    /// Whether new frames are refused.
+    pub(crate) fn is_sealed(&self) -> bool {
+        self.sealed
+    }
+
     /// Accepts new frames again.
     pub(crate) fn unseal(&mut self) {
         self.sealed = false;

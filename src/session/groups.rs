@@ -1,30 +1,26 @@
 //! Sessions made with a goal for error, size or quality: their frames wait on disk until their group is whole, and are then coded.
 
-use super::Session;
 use super::container_frames::ContainerFrames;
 use super::create::blocking;
 use super::facts::Facts;
 use super::prepare::{Choices, Geometry, cannot_be_coded};
 use super::solver_cache::Prepared;
+use super::{Phase, Session};
 use crate::capture::StoredError;
-use crate::coding::{Carried, Goal, GroupCoder, GroupDecoder};
+use crate::coding::{Carried, Goal, GroupCoder, GroupDecoder, group_frames};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{LogEntry, StoreError};
-use cager_proto::container;
 use cager_proto::messages::CodedFrames;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
+use std::time::Duration;
 
-/// Bytes of frames that coding a group may hold: as posted, as cages leave them, and decoded.
-const MOST_HELD: usize = 512 << 20;
-
-/// Most frames of a group. The same for a session on any machine, since groups on disk are numbered by it.
-pub(crate) fn group_frames(points: usize, rows: usize) -> usize {
-    container::group_frames(points, rows).min(MOST_HELD / (48 * points.max(1))).max(1)
-}
+/// Pause before a group is tried again that could not be stored.
+const RETRY: Duration = Duration::from_secs(30);
 
 /// What of a session's frames is coded.
 #[derive(Default)]
@@ -32,8 +28,10 @@ pub(crate) struct Groups {
     /// From frame 0 on, without gaps.
     coded: Vec<CodedGroup>,
     carried: Carried,
-    /// Why the next group cannot be coded as asked for.
-    failed: Option<ApiError>,
+    /// Why the next group cannot be coded as asked for, and how many frames it has.
+    failed: Option<(u32, ApiError)>,
+    /// Files of frames whose names are durable, by their first frame.
+    named: BTreeSet<u32>,
 }
 
 /// A coded group on disk.
@@ -100,7 +98,7 @@ impl Session {
             group_frames: facts.map(|facts| group_frames(facts.points as usize, facts.unknowns as usize) as u32),
             frames: groups.frames(),
             bytes: groups.coded.iter().map(|group| group.bytes).sum(),
-            problem: groups.failed.as_ref().map(|error| (*error.problem).clone()),
+            problem: groups.failed.as_ref().map(|(_, error)| (*error.problem).clone()),
         })
     }
 
@@ -112,13 +110,25 @@ impl Session {
     /// Reads a coded group. Blocks.
     ///
     /// # Errors
-    /// Damage, after which the session has failed and is in quarantine; I/O errors.
+    /// A group that was left out at completion meanwhile; damage, after which the session has failed and is in quarantine; I/O errors.
     pub(crate) fn read_group(&self, first: u32) -> Result<StoredGroup, ApiError> {
-        let found = self.store.group(&self.meta.id, first).and_then(|found| {
-            let gone = || StoreError::damaged(&self.store.log_path(&self.meta.id), format!("group {first} is gone"));
-            found.map(|(group, _)| group).ok_or_else(gone)
-        });
-        found.map_err(|error| self.fail_if_damaged(error))
+        let found = self.store.group(&self.meta.id, first).map_err(|error| self.fail_if_damaged(error))?;
+        match found {
+            Some((group, _)) => Ok(group),
+            None if self.coded_group(first).is_none() => Err(left_out(first)),
+            None => {
+                let what = format!("group {first} is gone");
+                Err(self.fail_if_damaged(StoreError::damaged(&self.store.log_path(&self.meta.id), what)))
+            }
+        }
+    }
+
+    /// Refuses frames for groups that cannot be coded.
+    ///
+    /// # Errors
+    /// What completing would answer.
+    pub(crate) fn check_coding(&self) -> Result<(), ApiError> {
+        super::lock(&self.groups).failed.as_ref().map_or(Ok(()), |(_, error)| Err(error.clone()))
     }
 
     /// Finds the coded groups on disk. The frames of the log are known already. Blocks.
@@ -138,6 +148,10 @@ impl Session {
             // The process may have ended before it did.
             self.remove_coded(first, found.frames())?;
         }
+        if let Some(declared) = self.declared() {
+            self.store.remove_frames(&self.meta.id, None)?;
+            self.store.remove_groups_from(&self.meta.id, declared)?;
+        }
         *super::lock(&self.groups) = found;
         Ok(())
     }
@@ -154,6 +168,7 @@ impl Session {
         let (frame_bytes, most) = self.frame_bytes();
         let mut removed = 0;
         for file in (first / most * most..end).step_by(most as usize).filter(|file| file + most <= end) {
+            super::lock(&self.groups).named.remove(&file);
             self.store.remove_frames(&self.meta.id, Some(file))?;
             removed += frame_bytes as u64 * u64::from(most);
         }
@@ -166,25 +181,32 @@ impl Session {
         let mut frames = frames.to_vec();
         frames.sort_unstable_by_key(|(frame, _)| *frame);
         for together in frames.chunk_by(|a, b| a.0 / most == b.0 / most) {
-            self.store.put_frames(&self.meta.id, together[0].0 / most * most, frame_bytes, together)?;
+            let first = together[0].0 / most * most;
+            let is_known = super::lock(&self.groups).named.contains(&first);
+            self.store.put_frames(&self.meta.id, first, is_known, frame_bytes, together)?;
+            super::lock(&self.groups).named.insert(first);
         }
         Ok(())
     }
 
-    /// The entries of the next group: all of them solved, and the group as long as groups are, or up to `end`.
+    /// The entries of the next group: all of them solved, and the group as long as groups are, or up to `end`, which a completion says.
     fn next_group(&self, end: Option<u32>) -> Option<Vec<LogEntry>> {
         self.facts()?;
-        let first = {
+        let (_, most) = self.frame_bytes();
+        let (first, count) = {
             let groups = super::lock(&self.groups);
-            if groups.failed.is_some() {
+            let first = groups.frames();
+            let count = end.map_or(most, |end| most.min(end.saturating_sub(first)));
+            // With fewer frames it might go.
+            if groups.failed.as_ref().is_some_and(|(failed, _)| count >= *failed) {
                 return None;
             }
-            groups.frames()
+            (first, count)
         };
-        let (_, most) = self.frame_bytes();
-        let count = end.map_or(most, |end| most.min(end.saturating_sub(first)));
         let frames = self.frames();
-        (count > 0 && frames.run_length(first) >= u64::from(count)).then(|| frames.run(first, count as usize))
+        let waits = end.is_none() && frames.is_sealed();
+        let is_whole = count > 0 && !waits && frames.run_length(first) >= u64::from(count);
+        is_whole.then(|| frames.run(first, count as usize))
     }
 
     /// Codes a group and stores it. Blocks.
@@ -209,9 +231,11 @@ impl Session {
             coder.push(numbers(&frame).into_iter().map(f64::from).collect(), numbers(cage));
         }
         let coded = coder.close().map_err(|error| {
-            let error = cannot_be_coded(goal, &error);
-            tracing::info!(session = %self.meta.id, first, detail = %error.problem.detail, "frames cannot be coded");
-            super::lock(&self.groups).failed = Some(error.clone());
+            let mut error = cannot_be_coded(goal, &error);
+            let last = first + (entries.len() as u32 - 1);
+            error.problem.detail = format!("frames {first} to {last}: {}", error.problem.detail);
+            tracing::info!(session = %self.meta.id, detail = %error.problem.detail, "frames cannot be coded");
+            super::lock(&self.groups).failed = Some((entries.len() as u32, error.clone()));
             self.touch();
             error
         })?;
@@ -227,7 +251,11 @@ impl Session {
         let put = self.store.put_group(&self.meta.id, first, &group).map_err(|error| self.storage_error(&error))?;
         self.bytes.fetch_add(put, Relaxed);
         self.frames().set_errors(first, &errors);
-        super::lock(&self.groups).add(first, &group, put);
+        {
+            let mut groups = super::lock(&self.groups);
+            groups.failed = None;
+            groups.add(first, &group, put);
+        }
         match self.remove_coded(first, first + entries.len() as u32) {
             Ok(removed) => {
                 let less = |bytes: u64| Some(bytes.saturating_sub(removed));
@@ -297,60 +325,78 @@ impl Service {
         let mut changes = session.changes();
         loop {
             changes.mark_unchanged();
+            let mut failed = false;
             match session.status().phase {
-                super::Phase::Completed(_) | super::Phase::Failed(_) => return,
-                super::Phase::Ready if session.next_group(None).is_some() => {
-                    let _place = self.completing.take(&session.meta.tenant, 1).await;
-                    match self.code_groups(&session, None).await {
-                        Ok(()) => continue,
+                Phase::Completed(_) | Phase::Failed(_) => return,
+                Phase::Ready => {
+                    let coded = self.code_next_in_turn(&session).await;
+                    match coded {
+                        Ok(true) => continue,
+                        Ok(false) => {}
                         Err(error) => {
+                            failed = true;
                             tracing::warn!(session = %session.meta.id, detail = %error.problem.detail, "a group is not coded");
                         }
                     }
                 }
-                _ => {}
+                Phase::Preparing => {}
             }
             tokio::select! {
                 changed = changes.changed() => if changed.is_err() { return },
+                // A disk may have space again.
+                () = tokio::time::sleep(RETRY), if failed => {}
                 () = session.deleted().cancelled() => return,
                 () = self.stopping().cancelled() => return,
             }
         }
     }
 
-    /// Codes all groups that are whole, and with `end` the last one as well. The caller holds a place of `completing`.
+    async fn code_next_in_turn(self: &Arc<Self>, session: &Arc<Session>) -> Result<bool, ApiError> {
+        session.ensure_loaded().await?;
+        if session.next_group(None).is_none() {
+            return Ok(false);
+        }
+        // One group at a time, so that others get their turn.
+        let _place = self.completing.take(&session.meta.tenant, 1).await;
+        self.code_next(session, None).await
+    }
+
+    /// Codes all that is left below `end`, the last group as well. The caller holds a place of `completing`.
     ///
     /// # Errors
     /// Frames that cannot be coded as asked for; storage errors.
-    pub(crate) async fn code_groups(
-        self: &Arc<Self>,
-        session: &Arc<Session>,
-        end: Option<u32>,
-    ) -> Result<(), ApiError> {
-        let Some(goal) = session.goal() else { return Ok(()) };
+    pub(crate) async fn code_rest(self: &Arc<Self>, session: &Arc<Session>, end: u32) -> Result<(), ApiError> {
+        if session.goal().is_none() {
+            return Ok(());
+        }
         session.ensure_loaded().await?;
+        while self.code_next(session, Some(end)).await? {}
+        // A group that was being coded may have gone beyond.
+        session.check_end(end)?;
+        if session.coded_frames().is_some_and(|coded| coded < end) { session.check_coding() } else { Ok(()) }
+    }
+
+    /// Codes the next group; false where there is none.
+    async fn code_next(self: &Arc<Self>, session: &Arc<Session>, end: Option<u32>) -> Result<bool, ApiError> {
+        let Some(goal) = session.goal() else { return Ok(false) };
         let mut coding = Arc::clone(&session.coding).lock_owned().await;
-        while let Some(entries) = session.next_group(end) {
-            let prepared = self.solver(session).await?;
-            let (session, writers) = (Arc::clone(session), Arc::clone(&self.container_writers));
-            let work = move || {
-                let outcome = writers.install(|| -> Result<(), ApiError> {
-                    // After an error the coder is made anew, from what is on disk.
-                    let mut coder = coding.take().map_or_else(|| session.coder(&prepared, goal), Ok)?;
-                    session.code(goal, &mut coder, prepared.solver.diagonal(), &entries)?;
-                    *coding = Some(coder);
-                    Ok(())
-                });
-                (coding, outcome)
-            };
-            let (kept, outcome) = blocking(work).await?;
-            coding = kept;
-            outcome?;
-        }
-        match &super::lock(&session.groups).failed {
-            Some(error) => Err(error.clone()),
-            None => Ok(()),
-        }
+        let Some(entries) = session.next_group(end) else { return Ok(false) };
+        let prepared = self.solver(session).await?;
+        let (session, writers) = (Arc::clone(session), Arc::clone(&self.container_writers));
+        let work = move || {
+            writers.install(|| -> Result<(), ApiError> {
+                // After an error the coder is made anew, from what is on disk.
+                let mut coder = coding.take().map_or_else(|| session.coder(&prepared, goal), Ok)?;
+                if let Some(end) = end {
+                    coder.expect((end - entries[0].frame) as usize);
+                }
+                session.code(goal, &mut coder, prepared.solver.diagonal(), &entries)?;
+                *coding = Some(coder);
+                Ok(())
+            })
+        };
+        blocking(work).await??;
+        Ok(true)
     }
 }
 
@@ -365,11 +411,10 @@ impl Session {
         if frames == end {
             return Ok(());
         }
+        let (first, last) = (group.first, end - 1);
+        let fewer = if first > 0 { format!("{first} or ") } else { String::new() };
         let detail = format!(
-            "frames {} to {} are coded together already, so none of them can be left out; complete with {} or at least {end} frames, or post the frames to a new session",
-            group.first,
-            end - 1,
-            group.first
+            "frames {first} to {last} are coded together already, so none of them can be left out; complete with {fewer}at least {end} frames, or post the frames to a new session"
         );
         Err(ApiError::new(problem::FRAME_CONFLICT, detail))
     }
@@ -379,13 +424,12 @@ impl Session {
         if self.goal.is_none() {
             return;
         }
+        // First out of the list, so that what is read meanwhile is not taken for damaged.
+        super::lock(&self.groups).coded.retain(|group| group.first < frames);
         let removed = self.store.remove_frames(&self.meta.id, None);
         if let Err(error) = removed.and_then(|()| self.store.remove_groups_from(&self.meta.id, frames)) {
             tracing::warn!(session = %self.meta.id, %error, "frames that are not in the container still take space");
         }
-        let mut groups = super::lock(&self.groups);
-        groups.coded.retain(|group| group.first < frames);
-        drop(groups);
         self.bytes.store(self.store.session_bytes(&self.meta.id) + self.store.content_bytes(&self.meta.key), Relaxed);
     }
 
@@ -395,4 +439,10 @@ impl Session {
             *coder = None;
         }
     }
+}
+
+/// The response for a frame that is not in the container.
+fn left_out(frame: u32) -> ApiError {
+    let detail = format!("frame {frame} was left out when the session was completed; ask for those before");
+    ApiError::new(problem::FRAMES_MISSING, detail).frame(frame)
 }

@@ -30,6 +30,8 @@ pub(crate) struct Choices {
     /// What the container is to meet; without it frames are stored as they are solved for.
     pub(crate) goal: Option<Goal>,
     pub(crate) exact_rest: bool,
+    /// Number of frames, where it was given.
+    frames: u32,
 }
 
 const NAME_CHARACTERS: usize = 200;
@@ -76,7 +78,8 @@ impl Choices {
         }
         let (spectrum, flip_cage, exact_rest) = (options.spectrum, options.flip_cage, options.exact_rest);
         let goal = goal(options)?;
-        Ok(Self { system, handles, regularizer, spectrum, lambda, flip_cage, goal, exact_rest })
+        let frames = options.frames.unwrap_or(0);
+        Ok(Self { system, handles, regularizer, spectrum, lambda, flip_cage, goal, exact_rest, frames })
     }
 
     /// The solver's options for a cage of so many unknowns.
@@ -205,22 +208,21 @@ pub(crate) fn check(geometry: &Geometry, choices: &Choices, max_bytes: u64) -> R
     }
     check_memory(geometry, choices, options, max_bytes)?;
     Solver::check(choices.system, &geometry.cage, &geometry.rest.points, options).map_err(|error| refused(&error))?;
-    choices.goal.map_or(Ok(()), |goal| check_goal(goal, geometry, unknowns))?;
+    choices.goal.map_or(Ok(()), |goal| check_goal(goal, geometry, unknowns, choices.frames))?;
     let Some(matrix) = &geometry.matrix else { return Ok(()) };
     matrix.delta(&geometry.cage, unknowns).map_err(|error| refused(&error.into()))?;
     Ok(())
 }
 
 /// Refuses a goal that no frame could meet.
-fn check_goal(goal: Goal, geometry: &Geometry, rows: usize) -> Result<(), ApiError> {
+fn check_goal(goal: Goal, geometry: &Geometry, rows: usize, frames: u32) -> Result<(), ApiError> {
     let farthest = geometry.rest.points.iter().flatten().fold(0.0f64, |far, x| far.max(x.abs()));
     let meshes = geometry.coded.as_ref().map_or(0, |(rest, cage)| {
         (rest.faces.len() + rest.positions.len() + cage.faces.len() + cage.positions.len()) as u64
     });
     let checked = match goal {
         _ if rows > MOST_ROWS => Err(CodingError::TooManyRows { rows, most: MOST_ROWS }),
-        Goal::Size(asked) if asked <= meshes => Err(CodingError::TooSmall { asked, least: meshes }),
-        goal => goal.check_precision(geometry.unit, farthest),
+        goal => goal.check_size(meshes, frames as usize).and_then(|()| goal.check_precision(geometry.unit, farthest)),
     };
     checked.map_err(|error| cannot_be_coded(goal, &error))
 }

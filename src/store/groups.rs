@@ -22,25 +22,31 @@ impl Store {
         self.log_path(id).with_file_name(format!("{kind}{first:010}"))
     }
 
-    /// Writes frames, `stride` bytes each, into the file that begins with frame `first`; durable on `Ok`. They have no checksum: the log has
-    /// their digests.
+    /// Writes frames, `stride` bytes each, into the file that begins with frame `first`; durable on `Ok`, with `is_known` where the file's name
+    /// was durable before. They have no checksum: the log has their digests.
     ///
     /// # Errors
     /// [`StoreError::BadId`], [`StoreError::Full`].
-    pub fn put_frames(&self, id: &str, first: u32, stride: usize, frames: &[(u32, &[u8])]) -> Result<(), StoreError> {
+    pub fn put_frames(
+        &self,
+        id: &str,
+        first: u32,
+        is_known: bool,
+        stride: usize,
+        frames: &[(u32, &[u8])],
+    ) -> Result<(), StoreError> {
         check_id(id)?;
         let (files, path) = (self.files(), self.part(id, FRAMES, first));
-        let (file, is_new) = match files.disk.open_for_writing(&path) {
-            Ok(file) => (file, false),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => (files.create(&path)?, true),
-            Err(error) => return Err(StoreError::of(&path, "open", error)),
+        let file = match files.disk.open_for_writing(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound && !is_known => files.create(&path)?,
+            opened => opened.map_err(|e| StoreError::of(&path, "open", e))?,
         };
         for (frame, bytes) in frames {
             let offset = u64::from(frame - first) * stride as u64;
             file.write_all_at(bytes, offset).map_err(|e| StoreError::of(&path, "write", e))?;
         }
         files.sync_file(&*file, &path)?;
-        if is_new { files.sync_dir(super::files::parent(&path)) } else { Ok(()) }
+        if is_known { Ok(()) } else { files.sync_dir(super::files::parent(&path)) }
     }
 
     /// Reads a frame, as long as `bytes`, from the file that begins with frame `first`.

@@ -1,0 +1,67 @@
+//! How many vertices a cage needs for what a coded file is to meet: some frames are coded with cages of several sizes, made around the rest pose.
+
+use super::{Carried, CodingError, Goal, GroupCoder, GroupDecoder, HELD, RestMeshes, group_frames};
+use crate::memory::Memory;
+use cager_cages::{EncloseOptions, enclose};
+use cager_core::cage::Cage;
+use cager_core::coordinates::CoordinateSystem;
+use cager_core::inversion::{PrepareError, Solver};
+use cager_core::mesh::{Model, diagonal};
+use std::sync::Arc;
+
+/// Numbers of vertices that are compared.
+const SIZES: [usize; 6] = [80, 120, 180, 250, 350, 500];
+/// Frames that are coded for each.
+pub(crate) const FRAMES: usize = 64;
+
+/// What the sizes are compared for.
+pub(crate) struct CageSizes<'a> {
+    pub(crate) goal: Goal,
+    pub(crate) rest: &'a Model,
+    pub(crate) system: &'a dyn CoordinateSystem,
+    /// The first frames of the capture, at most [`FRAMES`].
+    pub(crate) frames: &'a [Vec<f64>],
+    /// Frames of the capture.
+    pub(crate) total: usize,
+    pub(crate) memory: Memory,
+}
+
+impl CageSizes<'_> {
+    /// The number of vertices that gives the smallest file, or the smallest error where a size is the goal. `None` where the goal does not say which is
+    /// better, or no cage can be coded. `prepare` makes a solver for a cage and a rest pose.
+    pub(crate) fn best(&self, prepare: impl Fn(&Cage, &Model) -> Result<Solver, PrepareError>) -> Option<usize> {
+        if !matches!(self.goal, Goal::MaxError(_) | Goal::Size(_)) || self.frames.is_empty() {
+            return None;
+        }
+        let most = self.rest.points.len() / 2;
+        let tried = SIZES.into_iter().filter(|&vertices| vertices <= most);
+        let cost = |vertices| Some((self.cost(vertices, &prepare)?, vertices));
+        let best = tried.filter_map(cost).min_by(|a, b| a.0.total_cmp(&b.0));
+        best.map(|(_, vertices)| vertices)
+    }
+
+    /// Bytes of the whole file, or the mean error in its size.
+    fn cost(&self, vertices: usize, prepare: &impl Fn(&Cage, &Model) -> Result<Solver, PrepareError>) -> Option<f64> {
+        let cage = enclose(self.rest, &EncloseOptions { vertices, ..EncloseOptions::default() }).ok()?;
+        let cage = Cage::new(cage).ok()?;
+        let meshes = RestMeshes::new(self.goal, self.rest, &cage, self.system)?;
+        let rest = &meshes.rest.mesh;
+        let solver = prepare(&meshes.checked, rest).ok()?;
+        let model = GroupDecoder::new(self.system, &meshes.checked, rest, &solver).ok()?;
+        let bytes = |mesh: &cager_codec::CodedMesh| mesh.faces.len() + mesh.positions.len();
+        let other = (bytes(&meshes.rest) + bytes(&meshes.cage)) as u64;
+        let most = group_frames(rest.points.len(), solver.decoder().unknowns()).min(self.frames.len());
+        let most = self.memory.frames(HELD * rest.points.len(), most);
+        let carried = Carried { room: self.goal.room(other, self.total), ..Carried::default() };
+        let mut coder = GroupCoder::new(self.goal, Arc::new(model), diagonal(&rest.points), most, carried);
+        let frames: Vec<&[f64]> = self.frames[..most].iter().map(Vec::as_slice).collect();
+        for (frame, cage) in frames.iter().zip(solver.invert(&frames)) {
+            coder.push(frame.to_vec(), cage);
+        }
+        let cost: Result<f64, CodingError> = match self.goal {
+            Goal::Size(_) => coder.close().map(|group| group.mean()),
+            _ => coder.usual_bytes().map(|bytes| other as f64 + bytes as f64 * self.total as f64 / most as f64),
+        };
+        cost.ok()
+    }
+}
