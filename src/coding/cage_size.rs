@@ -5,7 +5,7 @@ use crate::memory::Memory;
 use cager_cages::{EncloseOptions, enclose};
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{PrepareError, Solver};
+use cager_core::inversion::{BATCH, PrepareError, Solver};
 use cager_core::mesh::{Model, diagonal};
 use std::sync::Arc;
 
@@ -34,9 +34,19 @@ impl CageSizes<'_> {
             return None;
         }
         let most = self.rest.points.len() / 2;
-        let tried = SIZES.into_iter().filter(|&vertices| vertices <= most);
-        let cost = |vertices| Some((self.cost(vertices, &prepare)?, vertices));
-        let best = tried.filter_map(cost).min_by(|a, b| a.0.total_cmp(&b.0));
+        let (mut best, mut worse) = (None::<(f64, usize)>, 0);
+        for vertices in SIZES.into_iter().filter(|&vertices| vertices <= most) {
+            let Some(cost) = self.cost(vertices, &prepare) else { continue };
+            if best.is_none_or(|(least, _)| cost < least) {
+                (best, worse) = (Some((cost, vertices)), 0);
+            } else {
+                worse += 1;
+            }
+            // It falls, then grows.
+            if worse == 2 {
+                break;
+            }
+        }
         best.map(|(_, vertices)| vertices)
     }
 
@@ -55,8 +65,10 @@ impl CageSizes<'_> {
         let carried = Carried { room: self.goal.room(other, self.total), ..Carried::default() };
         let mut coder = GroupCoder::new(self.goal, Arc::new(model), diagonal(&rest.points), most, carried);
         let frames: Vec<&[f64]> = self.frames[..most].iter().map(Vec::as_slice).collect();
-        for (frame, cage) in frames.iter().zip(solver.invert(&frames)) {
-            coder.push(frame.to_vec(), cage);
+        for batch in frames.chunks(BATCH) {
+            for (frame, cage) in batch.iter().zip(solver.invert(batch)) {
+                coder.push(frame.to_vec(), cage);
+            }
         }
         let cost: Result<f64, CodingError> = match self.goal {
             Goal::Size(_) => coder.close().map(|group| group.mean()),

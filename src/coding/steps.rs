@@ -10,6 +10,11 @@ const USUAL_RATIO: f64 = 1.6;
 /// Step of the residual over the largest error allowed, likewise.
 const USUAL_STEP: f64 = 1.8;
 
+/// Figures so near to what is allowed are good enough, and so are steps so near to each other.
+const NEAR: f64 = 1.04;
+/// Most steps that are tried for a group.
+const MOST_TRIALS: usize = 20;
+
 impl GroupCoder {
     /// Step and ratio by what the first frames cost.
     pub(super) fn choose(&self) -> Result<(f64, f64), CodingError> {
@@ -53,59 +58,71 @@ impl GroupCoder {
         self.encode(self.frames.len(), step, USUAL_RATIO).map(|group| group.bytes())
     }
 
-    /// What `tried` gives for the largest step, or the smallest, for which it gives anything, to a twentieth; it does for all steps on the other side
-    /// of it. Begins at the step of the group before. `None` where it does for no step.
+    /// What `tried` gives in the step where its figure, over what is allowed, is nearly 1 and not above; the figure grows with the step, or falls where
+    /// `grows` is false. Begins at the step of the group before. `None` where no step does it.
     fn for_step<T>(
         &mut self,
-        largest: bool,
-        tried: impl Fn(&Self, f64, f64) -> Result<Option<T>, CodingError>,
+        grows: bool,
+        tried: impl Fn(&Self, f64, f64) -> Result<(T, f64), CodingError>,
     ) -> Result<Option<T>, CodingError> {
         let (start, ratio) = self.carried.chosen.unwrap_or((1e-3 * self.diagonal, USUAL_RATIO));
         let (least, most) = (1e-7 * self.diagonal, 2.0 * self.diagonal);
-        // Steps that are too small to count are not fine.
-        let tried = |step: f64| match tried(self, step, ratio) {
-            Err(CodingError::Uncountable { .. }) => Ok(None),
-            found => found,
-        };
         let mut step = start.clamp(least, most);
-        let mut found = tried(step)?;
-        let further = if found.is_some() == largest { 2.0 } else { 0.5 };
-        let mut best = step;
-        loop {
-            let next = step * further;
-            if !(least..=most).contains(&next) {
+        // Between a step that is fine and one that is not.
+        let mut best: Option<(f64, f64, T)> = None;
+        let mut refused: Option<f64> = None;
+        let mut before: Option<(f64, f64)> = None;
+        for _ in 0..MOST_TRIALS {
+            let figure = match tried(self, step, ratio) {
+                Ok((found, figure)) => {
+                    let is_fine = figure <= 1.0;
+                    if is_fine && best.as_ref().is_none_or(|(_, closest, _)| figure >= *closest) {
+                        best = Some((step, figure, found));
+                    } else if !is_fine {
+                        refused = Some(step);
+                    }
+                    figure.max(1e-6)
+                }
+                // Steps that are too small to count.
+                Err(CodingError::Uncountable { .. }) => {
+                    refused = Some(step);
+                    if grows { 1e-6 } else { 1e6 }
+                }
+                Err(error) => return Err(error),
+            };
+            let fine = best.as_ref().map(|(step, ..)| *step);
+            let near = |(fine, refused): (f64, f64)| (fine / refused).ln().abs() < NEAR.ln();
+            if (1.0 / NEAR..=1.0).contains(&figure) || fine.zip(refused).is_some_and(near) {
                 break;
             }
-            let group = tried(next)?;
-            let was_fine = found.is_some();
+            // Figures are about powers of the step.
+            let usual = if grows { 1.0 } else { -1.0 };
+            let power = before.map_or(usual, |(s, f): (f64, f64)| (figure / f).ln() / (step / s).ln());
+            let power = if (0.2..5.0).contains(&(usual * power)) { power } else { usual };
+            let mut next = step * (NEAR.sqrt() * figure).powf(-1.0 / power).clamp(0.125, 8.0);
+            if let Some((fine, refused)) = fine.zip(refused)
+                && !(fine.min(refused)..=fine.max(refused)).contains(&next)
+            {
+                next = (fine * refused).sqrt();
+            }
+            let next = next.clamp(least, most);
+            if next == step {
+                break;
+            }
+            before = Some((step, figure));
             step = next;
-            if group.is_some() {
-                (found, best) = (group, next);
-                if !was_fine {
-                    break;
-                }
-            } else if was_fine {
-                break;
-            }
         }
-        if found.is_some() {
-            // Between a step that is fine and one twice or half as large that is not.
-            let mut factor = if largest { 2.0f64 } else { 0.5 };
-            for _ in 0..4 {
-                factor = factor.sqrt();
-                if let Some(group) = tried(best * factor)? {
-                    (found, best) = (Some(group), best * factor);
-                }
-            }
-            self.carried.chosen = Some((best, ratio));
-        }
-        Ok(found)
+        Ok(best.map(|(step, _, found)| {
+            self.carried.chosen = Some((step, ratio));
+            found
+        }))
     }
 
     pub(super) fn code_to_mean(&mut self, goal: f64) -> Result<CodedGroup, CodingError> {
         let found = self.for_step(true, |coder, step, ratio| {
             let group = coder.code(coder.frames.len(), step, ratio)?;
-            Ok(Some(group).filter(|group| group.mean() <= goal))
+            let mean = group.mean();
+            Ok((group, mean / goal))
         })?;
         let asked = goal / self.diagonal;
         found.ok_or(CodingError::BelowPrecision { asked, least: 2.0 * asked })
@@ -118,7 +135,8 @@ impl GroupCoder {
         let share = (room.bytes as f64 * part) as u64;
         let found = self.for_step(false, |coder, step, ratio| {
             let group = coder.encode(coder.frames.len(), step, ratio)?;
-            Ok(Some(group).filter(|group| group.bytes() <= share))
+            let bytes = group.bytes();
+            Ok((group, bytes as f64 / share.max(1) as f64))
         })?;
         if let Some(group) = found {
             let (bytes, frames) = (room.bytes - group.bytes(), room.frames.saturating_sub(self.frames.len()));

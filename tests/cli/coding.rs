@@ -92,6 +92,21 @@ fn sizes_and_mean_errors_are_met() {
 }
 
 #[test]
+fn without_a_cage_its_size_is_chosen_for_the_bound() {
+    let (dir, _) = Dir::with_capture();
+    let encode = ENCODE.replace(" --cage cage.obj", "");
+    let chosen = |bound: &str, output: &str| -> u64 {
+        let encode = encode.replace("out.cager", output);
+        let args = format!("{encode} --max-error {bound} --time-limit 1 --report {output}.json");
+        let said = dir.cager(&args).succeeds().stdout;
+        assert!(said.contains("vertices suit what is asked for"), "{said}");
+        dir.json(&format!("{output}.json"))["cage_vertices"].as_u64().expect("a number")
+    };
+    let (coarse, fine) = (chosen("5e-2", "coarse.cager"), chosen("1e-4", "fine.cager"));
+    assert!(coarse <= 80 && coarse <= fine, "{coarse} {fine}");
+}
+
+#[test]
 fn what_cannot_be_met_is_refused_in_a_sentence_and_nothing_is_written() {
     let (dir, _) = Dir::with_capture();
     let before = dir.contents();

@@ -114,7 +114,8 @@ async fn an_error_after_the_first_record_cuts_a_stream_of_records_off() {
     body.truncate(body.len() - 1);
     for api in [app.stranger(), app.http2()] {
         let request = api.request(Method::POST, &path).header("content-type", OCTETS).header("accept", RECORDS);
-        let response = request.body(body.clone()).send().await.expect("an answer");
+        // Over HTTP/2 the cut may overtake the header.
+        let Ok(response) = request.body(body.clone()).send().await else { continue };
         if response.status() == 200 {
             assert!(response.bytes().await.is_err(), "a stream that is not whole must not look whole");
         } else {
