@@ -29,6 +29,9 @@ const MAX_CONCURRENT_PARSING: usize = 2;
 /// Sessions completed at a time: each reads all its frames and keeps a processor busy.
 const MAX_CONCURRENT_COMPLETIONS: u64 = 2;
 
+/// Groups of frames coded or decoded at a time, at most: each takes up to half a gigabyte.
+const MAX_CONCURRENT_CODINGS: usize = 4;
+
 /// Step in which the memory permit of an upload grows, in bytes; small, so that hundreds of small models fit.
 const UPLOAD_PIECE: u64 = 64 << 10;
 
@@ -58,6 +61,10 @@ pub struct Service {
     pub(crate) completing: Arc<Budget>,
     /// Threads that write containers.
     pub(crate) container_writers: Arc<rayon::ThreadPool>,
+    /// Groups of frames being coded or decoded.
+    pub(crate) coding: Arc<Budget>,
+    /// Threads that code and decode them.
+    pub(crate) coders: Arc<rayon::ThreadPool>,
     /// Memory for frames between arrival and solving, in bytes.
     pub(crate) frame_memory: Arc<Budget>,
     /// Memory for uploaded rest poses and cages, in bytes.
@@ -79,6 +86,7 @@ pub(crate) struct ResourceUse {
     requests: u64,
     streams: u64,
     completing: u64,
+    coding: u64,
     preparing: usize,
     frame_bytes: u64,
     upload_bytes: u64,
@@ -141,6 +149,7 @@ impl Service {
         let solvers = Solvers::new(opened.store.clone(), &config).map_err(StartError::Threads)?;
         let container_writers =
             threads::pool("complete", MAX_CONCURRENT_COMPLETIONS as usize, threads::NICE_BACKGROUND);
+        let coders = threads::pool("code", config.workers, threads::NICE_BACKGROUND);
         let service = Arc::new(Self {
             access,
             webhooks,
@@ -158,6 +167,8 @@ impl Service {
             streams: config.budget(config.max_streams as u64),
             completing: config.budget(MAX_CONCURRENT_COMPLETIONS),
             container_writers: Arc::new(container_writers.map_err(StartError::Threads)?),
+            coding: config.budget((config.workers / 2).clamp(1, MAX_CONCURRENT_CODINGS) as u64),
+            coders: Arc::new(coders.map_err(StartError::Threads)?),
             frame_memory: config.budget(config.frame_bytes),
             upload_memory: config.budget(config.upload_bytes),
             download_memory: config.budget(config.download_bytes),
@@ -321,7 +332,7 @@ impl Service {
     /// Tenants that use shared resources.
     pub(crate) fn tenants_in_use(&self) -> BTreeSet<String> {
         let budgets = [&self.requests, &self.streams, &self.completing, &self.frame_memory, &self.upload_memory];
-        let more = [&self.download_memory, &self.spool_space];
+        let more = [&self.coding, &self.download_memory, &self.spool_space];
         budgets.into_iter().chain(more).flat_map(|budget| budget.tenants()).collect()
     }
 
@@ -331,6 +342,7 @@ impl Service {
             requests: self.requests.held_by(tenant),
             streams: self.streams.held_by(tenant),
             completing: self.completing.held_by(tenant),
+            coding: self.coding.held_by(tenant),
             preparing: self.solvers.in_flight_of(tenant),
             frame_bytes: self.frame_memory.held_by(tenant),
             upload_bytes: self.upload_memory.held_by(tenant),

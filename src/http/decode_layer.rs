@@ -121,10 +121,10 @@ struct Decoding {
 impl Decoding {
     async fn next(&mut self) -> Result<Option<Bytes>, ApiError> {
         if self.ready.is_empty() && self.next < self.end {
-            let place = self.service.completing.take(&self.session.meta.tenant, 1).await;
+            let place = self.service.coding.take(&self.session.meta.tenant, 1).await;
             let (session, source) = (Arc::clone(&self.session), Arc::clone(&self.source));
             let (layer, next, end) = (self.layer, self.next, self.end);
-            let threads = Arc::clone(&self.service.container_writers);
+            let threads = Arc::clone(&self.service.coders);
             let work = move || {
                 let _place = place;
                 threads.install(|| decode(&session, &source, layer, next as u32, (end - next) as usize))

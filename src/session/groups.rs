@@ -356,12 +356,10 @@ impl Service {
         if session.next_group(None).is_none() {
             return Ok(false);
         }
-        // One group at a time, so that others get their turn.
-        let _place = self.completing.take(&session.meta.tenant, 1).await;
         self.code_next(session, None).await
     }
 
-    /// Codes all that is left below `end`, the last group as well. The caller holds a place of `completing`.
+    /// Codes all that is left below `end`, the last group as well.
     ///
     /// # Errors
     /// Frames that cannot be coded as asked for; storage errors.
@@ -379,12 +377,15 @@ impl Service {
     /// Codes the next group; false where there is none.
     async fn code_next(self: &Arc<Self>, session: &Arc<Session>, end: Option<u32>) -> Result<bool, ApiError> {
         let Some(goal) = session.goal() else { return Ok(false) };
+        // A place for each group, so that others get their turn; before the lock, so that who has that need not wait for a place.
+        let place = self.coding.take(&session.meta.tenant, 1).await;
         let mut coding = Arc::clone(&session.coding).lock_owned().await;
         let Some(entries) = session.next_group(end) else { return Ok(false) };
         let prepared = self.solver(session).await?;
-        let (session, writers) = (Arc::clone(session), Arc::clone(&self.container_writers));
+        let (session, threads) = (Arc::clone(session), Arc::clone(&self.coders));
         let work = move || {
-            writers.install(|| -> Result<(), ApiError> {
+            let _place = place;
+            threads.install(|| -> Result<(), ApiError> {
                 // After an error the coder is made anew, from what is on disk.
                 let mut coder = coding.take().map_or_else(|| session.coder(&prepared, goal), Ok)?;
                 if let Some(end) = end {
