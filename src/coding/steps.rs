@@ -1,10 +1,12 @@
 //! How large steps are: for a bound and a size by what the first frames cost, for a mean error and a size held in every group.
 
 use super::group::{CodedGroup, GroupCoder, Room};
-use super::{CodingError, Goal};
+use super::{CodingError, Goal, HELD, MOST_HELD};
 
 /// Frames that steps are chosen by.
 const TRIAL: usize = 48;
+/// Positions of frames that may be coded together.
+const MOST_TOGETHER: usize = MOST_HELD / HELD;
 /// Step of the cage over that of the residual, both as what they move the points, where nothing was measured.
 const USUAL_RATIO: f64 = 1.6;
 /// Step of the residual over the largest error allowed, likewise.
@@ -27,12 +29,14 @@ impl GroupCoder {
                 let size = |(step, ratio): (f64, f64)| {
                     self.encode(count, step * unit, ratio).map(|group| (group.bytes(), (step, ratio)))
                 };
-                let usual = (USUAL_STEP, USUAL_RATIO);
-                let mut best = size(usual)?;
+                // Two at once take twice the memory, of which a large group is all there is.
+                let is_small = 2 * count * self.model.points() <= MOST_TOGETHER;
+                let mut best = size((USUAL_STEP, USUAL_RATIO))?;
                 for (step, ratio) in [(1.0, 1.6), (1.4, 1.0)] {
                     let (_, from) = best;
+                    let (more, less) = ((from.0 * step, from.1 * ratio), (from.0 / step, from.1 / ratio));
                     let (more, less) =
-                        rayon::join(|| size((from.0 * step, from.1 * ratio)), || size((from.0 / step, from.1 / ratio)));
+                        if is_small { rayon::join(|| size(more), || size(less)) } else { (size(more), size(less)) };
                     best = [more?, less?]
                         .into_iter()
                         .fold(best, |best, tried| if tried.0 < best.0 { tried } else { best });
