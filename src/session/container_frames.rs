@@ -51,7 +51,8 @@ impl<W: Write> ContainerFrames<W> {
         self.writer.bytes()
     }
 
-    /// Writes the next frames below `end`: a coded group, or some frames as they were solved. False where there are none. Blocks.
+    /// Writes the next frames below `end`: a coded group, or some frames as they were solved. Returns false if the next
+    /// frame is not ready. Blocks.
     ///
     /// # Errors
     /// Damage; an output that refuses.

@@ -374,7 +374,7 @@ impl Service {
         if session.coded_frames().is_some_and(|coded| coded < end) { session.check_coding() } else { Ok(()) }
     }
 
-    /// Codes the next group; false where there is none.
+    /// Codes the next group. Returns false if no group is complete.
     async fn code_next(self: &Arc<Self>, session: &Arc<Session>, end: Option<u32>) -> Result<bool, ApiError> {
         let Some(goal) = session.goal() else { return Ok(false) };
         // A place for each group, so that others get their turn; before the lock, so that who has that need not wait for a place.

@@ -93,7 +93,7 @@ impl Store {
         Ok(bytes.len() as u64)
     }
 
-    /// The coded group that begins with `first`, and the bytes of its file; `None` where there is none.
+    /// The coded group that begins with `first`, and the bytes of its file; `None` if it has not been stored.
     ///
     /// # Errors
     /// [`StoreError::Damaged`], [`StoreError::BadId`].
