@@ -141,10 +141,12 @@ impl Session {
             // First what has to be coded: a frame that the log has, has been posted as its digest there says.
             let posted: Vec<(u32, &[u8])> = solved
                 .iter()
-                .filter(|s| records.iter().any(|record| record.frame == s.frame))
                 .filter_map(|s| Some((s.frame, s.posted.as_deref()?)))
+                .filter(|(frame, _)| records.iter().any(|record| record.frame == *frame))
                 .collect();
-            self.keep_frames(&posted)?;
+            if !posted.is_empty() {
+                self.keep_frames(&posted)?;
+            }
             log.append(&records)
         });
         if outcome.is_err() {
