@@ -3,7 +3,7 @@
 use crate::basis::CageBasis;
 use crate::entropy::{Coder, Decoder, Encoder, Integers, MOST, SIZES, size_class};
 use crate::error::{Error, Result};
-use crate::trajectories::{Trajectories, fit};
+use crate::trajectories::{PULSE_FRAMES, Trajectories, fit};
 use crate::{MOST_FRAMES, linear};
 use faer::Mat;
 
@@ -14,32 +14,57 @@ pub(crate) const STEP_AND_COUNT: usize = 10;
 /// Part of a step from which a number is rounded away from 0: small ones cost less than they are worth.
 const ROUND_UP: f64 = 0.44;
 
+/// Whether groups come before and after a group. The frame next to one is coded more exactly, so that the model does not jump from group to group.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Neighbours {
+    /// A group ends right before this one.
+    pub before: bool,
+    /// A group begins right after this one.
+    pub after: bool,
+}
+
+/// Error of a frame beside another group over what it would be.
+const JOINT_ERROR: f64 = 0.1;
+
 /// Encodes cages, each rows × 3, in steps of `step`: the root mean square over the points of what one coefficient moves the model. `None` where
 /// numbers are not finite, or too far apart to be counted in these steps.
 ///
 /// # Panics
 /// Where a cage has another number of rows, or there are more than [`MOST_FRAMES`].
-pub fn encode_cages(basis: &CageBasis, cages: &[&[f32]], step: f64) -> Option<Vec<u8>> {
+pub fn encode_cages(basis: &CageBasis, cages: &[&[f32]], step: f64, neighbours: Neighbours) -> Option<Vec<u8>> {
     let (rows, frames) = (basis.rows(), cages.len());
     assert!(frames <= MOST_FRAMES && cages.iter().all(|cage| cage.len() == 3 * rows));
     // m × 3 T, to T × 3 m.
     let y = basis.forward(cages);
     let motion = Mat::from_fn(frames, 3 * rows, |t, value| y[(value / 3, 3 * t + value % 3)]);
     let gram = linear::product(motion.as_ref(), motion.transpose());
-    let chosen = Trajectories::choose(gram.as_ref(), 3 * rows, step, frames.min(3 * rows))?;
-    let count = chosen.count();
-    let values = fit(chosen.values().as_ref(), motion.as_ref())?;
-    let mut whole = Vec::with_capacity(count * 3 * rows);
-    for k in 0..count {
-        for value in 0..3 * rows {
-            let exact = values[(k, value)] / step;
-            let steps = (exact.abs() + ROUND_UP).floor().copysign(exact);
-            if steps.is_nan() || steps.abs() > f64::from(MOST) {
-                return None;
-            }
-            whole.push(steps as i32);
+    // Two are left for the frames beside other groups.
+    let most = frames.min(3 * rows);
+    let joined = if frames >= 4 * PULSE_FRAMES && most > 2 { neighbours } else { Neighbours::default() };
+    let left = usize::from(joined.before) + usize::from(joined.after);
+    let mut chosen = Trajectories::choose(gram.as_ref(), 3 * rows, step, most - left)?;
+    let exact = fit(chosen.values().as_ref(), motion.as_ref())?;
+    let in_steps = |exact: f64, round_up: f64| {
+        let steps = (exact.abs() / step + round_up).floor();
+        (steps <= f64::from(MOST)).then_some(steps.copysign(exact) as i32)
+    };
+    let width = 3 * rows;
+    let numbers = (0..chosen.count() * width).map(|at| in_steps(exact[(at / width, at % width)], ROUND_UP));
+    let mut whole: Vec<i32> = numbers.collect::<Option<_>>()?;
+    for (frame, is_joined) in [(0, joined.before), (frames - 1, joined.after)] {
+        if !is_joined {
+            continue;
         }
+        // What the trajectories so far leave of this frame, and of it alone: few frames away it is another.
+        let e = chosen.values();
+        let of = |k: usize, value: usize| e[(frame, k)] * step * f64::from(whole[k * width + value]);
+        let decoded = |value: usize| (0..chosen.count()).map(|k| of(k, value)).sum::<f64>();
+        let missing: Vec<f64> = (0..width).map(|value| motion[(frame, value)] - decoded(value)).collect();
+        let rms = (missing.iter().map(|x| x * x).sum::<f64>() / width as f64).sqrt();
+        let Some(height) = chosen.push_pulse(frame, JOINT_ERROR * 12f64.sqrt() * rms / step) else { continue };
+        whole.extend(missing.iter().map(|x| in_steps(x / height, 0.5)).collect::<Option<Vec<_>>>()?);
     }
+    let count = chosen.count();
     let mut bytes = vec![u8::from(basis.rotated())];
     bytes.extend(step.to_le_bytes());
     bytes.extend((count as u16).to_le_bytes());
@@ -133,7 +158,7 @@ mod tests {
             let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
             let mut sizes = Vec::new();
             for step in [1e-2, 1e-4, 1e-6] {
-                let bytes = encode_cages(&basis, &views, step).unwrap();
+                let bytes = encode_cages(&basis, &views, step, Neighbours::default()).unwrap();
                 let back = decode_cages(&basis, frames, &bytes).unwrap();
                 let views: Vec<&[f32]> = back.iter().map(Vec::as_slice).collect();
                 let (a, b) =
@@ -147,10 +172,40 @@ mod tests {
     }
 
     #[test]
+    fn neighbouring_groups_join_smoothly() {
+        let (rows, frames, step) = (30, 64, 2e-2);
+        let basis = basis(rows);
+        let mut random = fastrand::Rng::with_seed(5);
+        let waves: Vec<[f32; 3]> = (0..3 * rows).map(|_| std::array::from_fn(|_| random.f32())).collect();
+        let value = |t: usize, [a, b, c]: [f32; 3]| {
+            a * (0.1 * t as f32 * (0.2 + b)).sin() + 0.3 * c * (0.3 * t as f32 + 6.0 * a).sin()
+        };
+        let cages: Vec<Vec<f32>> =
+            (0..3 * frames).map(|t| waves.iter().map(|&wave| value(t, wave)).collect()).collect();
+        // What coding adds to each frame, in what it moves the model.
+        let changes = |joins: bool| {
+            let coded = cages.chunks(frames).enumerate().flat_map(|(k, group)| {
+                let views: Vec<&[f32]> = group.iter().map(Vec::as_slice).collect();
+                let neighbours = Neighbours { before: joins && k > 0, after: joins && k < 2 };
+                decode_cages(&basis, frames, &encode_cages(&basis, &views, step, neighbours).unwrap()).unwrap()
+            });
+            let errors: Vec<Mat<f64>> =
+                coded.zip(&cages).map(|(a, b)| basis.forward(&[&a]) - basis.forward(&[b])).collect();
+            let all: Vec<f64> = errors.windows(2).map(|pair| (&pair[1] - &pair[0]).norm_l2()).collect();
+            let mut sorted = all.clone();
+            sorted.sort_by(f64::total_cmp);
+            [frames, 2 * frames].map(|joint| all[joint - 1] / sorted[all.len() / 2])
+        };
+        let (without, with) = (changes(false), changes(true));
+        assert!(with.iter().all(|&change| change < 1.5), "{with:?}");
+        assert!(without.iter().all(|&change| change > 8.0), "{without:?}");
+    }
+
+    #[test]
     fn damage_is_an_error_or_finite_cages() {
         let (basis, cages) = (basis(20), cages(20, 30));
         let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
-        let bytes = encode_cages(&basis, &views, 1e-4).unwrap();
+        let bytes = encode_cages(&basis, &views, 1e-4, Neighbours::default()).unwrap();
         for cut in 0..bytes.len() {
             let _ = decode_cages(&basis, 30, &bytes[..cut]);
         }
@@ -162,6 +217,6 @@ mod tests {
         assert!(decode_cages(&basis, 30, &bytes[..5]).is_err());
         assert!(decode_cages(&basis, MOST_FRAMES + 1, &bytes).is_err());
         let nan = vec![f32::NAN; 60];
-        assert!(encode_cages(&basis, &[&nan], 1e-3).is_none());
+        assert!(encode_cages(&basis, &[&nan], 1e-3, Neighbours::default()).is_none());
     }
 }

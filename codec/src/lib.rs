@@ -19,7 +19,7 @@ mod residual;
 mod trajectories;
 
 pub use basis::CageBasis;
-pub use cage::{decode_cages, encode_cages, is_rotated};
+pub use cage::{Neighbours, decode_cages, encode_cages, is_rotated};
 pub use connectivity::{decode_faces, encode_faces};
 pub use error::Error;
 pub use grid::{Grid, decode_positions, encode_positions};

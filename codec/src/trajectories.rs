@@ -10,6 +10,11 @@ const WORTH: f64 = 0.3 / 12.0;
 /// Largest number of binary digits of an entry of E.
 const MOST_DIGITS: u32 = 26;
 
+/// Frames over which a pulse beside another group falls to 0.
+pub(crate) const PULSE_FRAMES: usize = 8;
+/// Binary digits of the largest entry of a pulse.
+const PULSE_DIGITS: f64 = 7.0;
+
 /// The trajectories of a group as whole numbers: of each, its digits, and its cosine transform in time in units of 2^−digits.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Trajectories {
@@ -38,6 +43,22 @@ impl Trajectories {
             (0..frames).map(move |t| (column[t] * unit).round() as i32).collect::<Vec<i32>>()
         };
         Some(Self { frames, waves: (0..count).flat_map(whole).collect(), digits })
+    }
+
+    /// Adds a trajectory that is about `height` at `frame`, the first or last one, and falls to 0 from there; its value at that frame. `None` where it is too low or
+    /// too high to be counted.
+    pub(crate) fn push_pulse(&mut self, frame: usize, height: f64) -> Option<f64> {
+        let digits = PULSE_DIGITS - height.log2().floor();
+        if !(2.0..=f64::from(MOST_DIGITS)).contains(&digits) {
+            return None;
+        }
+        let part = |t: usize| t.abs_diff(frame).min(PULSE_FRAMES) as f64 / PULSE_FRAMES as f64;
+        let pulse = Mat::from_fn(self.frames, 1, |t, _| height * 0.5 * (1.0 + (std::f64::consts::PI * part(t)).cos()));
+        let waves = linear::product(cosines(self.frames).as_ref(), pulse.as_ref());
+        self.waves.extend(waves.col(0).iter().map(|x| (x * digits.exp2()).round() as i32));
+        self.digits.push(digits as u32);
+        let value = self.values()[(frame, self.count() - 1)];
+        Some(value)
     }
 
     /// Number of components.

@@ -2,7 +2,9 @@
 
 mod support;
 
-use cager_codec::{CageBasis, CodedMesh, Hierarchy, ResidualGroup, decode_cages, encode_cages, encode_residual};
+use cager_codec::{
+    CageBasis, CodedMesh, Hierarchy, Neighbours, ResidualGroup, decode_cages, encode_cages, encode_residual,
+};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_core::mesh::{Model, Polygons, TriMesh};
@@ -29,7 +31,7 @@ fn coded() -> (Vec<u8>, Vec<Vec<f32>>) {
     let mut decoded = Vec::new();
     for group in cages.chunks(4) {
         let views: Vec<&[f32]> = group.iter().map(Vec::as_slice).collect();
-        let bytes = encode_cages(&basis, &views, 1e-3).unwrap();
+        let bytes = encode_cages(&basis, &views, 1e-3, Neighbours::default()).unwrap();
         decoded.extend(decode_cages(&basis, group.len(), &bytes).unwrap());
         let captured: Vec<Vec<f64>> = group.iter().map(|f| f.iter().map(|&x| f64::from(x) + 0.25).collect()).collect();
         let captured: Vec<&[f64]> = captured.iter().map(Vec::as_slice).collect();

@@ -4,7 +4,7 @@ use super::group::{CodedGroup, GroupCoder, Room};
 use super::{CodingError, Goal, HELD, MOST_HELD};
 
 /// Frames that steps are chosen by.
-const TRIAL: usize = 48;
+const TRIAL: usize = 32;
 /// Positions of frames that may be coded together.
 const MOST_TOGETHER: usize = MOST_HELD / HELD;
 /// Step of the cage over that of the residual, both as what they move the points, where nothing was measured.
