@@ -16,6 +16,7 @@ pub(crate) mod retention;
 pub(crate) mod solve;
 pub(crate) mod solver_cache;
 pub(crate) mod upload;
+mod view;
 
 use crate::coding::{Goal, GroupCoder, GroupDecoder};
 use crate::engine::Lane;
@@ -23,12 +24,11 @@ use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{Completion, FrameLog, LogEntry, LogReader, SessionMeta, Store, StoreError};
 use crate::webhooks::Webhooks;
-use cager_core::inversion::{Handles, SolverOptions};
 use cager_core::regularize::Regularizer;
-use cager_proto::messages::{FrameCounts, Problem, Progress, Session as View, SessionState};
+use cager_proto::messages::Problem;
 use commit::{CommitQueue, Committer};
 use facts::Facts;
-use frames::{Frames, RANGES};
+use frames::Frames;
 use groups::Groups;
 use prepare::Choices;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -407,71 +407,6 @@ impl Session {
         }
     }
 
-    /// State and frame counts, for server-sent events.
-    pub(crate) fn progress(&self) -> Progress {
-        let state = state_of(&lock(&self.status).phase);
-        let frames = self.frames();
-        Progress {
-            state,
-            received: frames.received_count() + self.queued.load(Ordering::Relaxed),
-            solved: frames.solved_count(),
-            coded: self.coded_frames(),
-        }
-    }
-
-    /// The session as returned by the API.
-    pub(crate) fn view(&self) -> View {
-        self.view_with(RANGES)
-    }
-
-    /// As [`Self::view`], with at most so many ranges of missing frames.
-    pub(crate) fn view_with(&self, ranges: usize) -> View {
-        let status = self.status();
-        let (options, facts) = (&self.meta.options, status.facts.as_ref());
-        let frames = {
-            let frames = self.frames();
-            let missing = frames.missing(0, self.declared(), ranges);
-            FrameCounts {
-                received: frames.received_count() + self.queued.load(Ordering::Relaxed),
-                solved: frames.solved_count(),
-                missing: missing.ranges,
-                missing_next: missing.next,
-            }
-        };
-        let or = |given: &Option<String>, default: &str| given.clone().unwrap_or_else(|| default.to_owned());
-        let problem = match &status.phase {
-            Phase::Failed(problem) => Some((**problem).clone()),
-            _ => None,
-        };
-        View {
-            id: self.meta.id.clone(),
-            name: options.name.clone(),
-            state: state_of(&status.phase),
-            created: self.meta.created_ms as f64 / 1e3,
-            points: facts.map(|f| f.points),
-            unknowns: facts.map(|f| f.unknowns),
-            handle_count: facts.map(|f| f.handle_count),
-            cage_vertices: facts.map(|f| f.cage_vertices),
-            cage_faces: facts.map(|f| f.cage_faces),
-            coordinates: or(&options.coordinates, "mvc"),
-            handles: or(&options.handles, Handles::default().name()),
-            regularizer: or(&options.regularizer, Regularizer::default().name()),
-            spectrum: facts.map(|f| f.spectrum).or(options.spectrum),
-            lambda: options.lambda.unwrap_or(SolverOptions::default().lambda),
-            condition_number: facts.map(|f| f.condition_number),
-            rank: facts.map(|f| f.rank),
-            affine_reproduction_error: facts.map(|f| f.affine_reproduction_error),
-            frames,
-            coding: self.coding_view(facts),
-            cache: facts.map(|f| f.cache),
-            seconds: facts.map_or_else(Default::default, |f| f.seconds),
-            warnings: facts.map_or_else(Vec::new, |f| f.warnings.clone()),
-            problem,
-        }
-    }
-}
-
-impl Session {
     /// Replaces `SESSION_DELETED` by the error for missing content if the session itself still exists.
     pub(crate) fn explain_missing_content(&self, error: ApiError) -> ApiError {
         if error.problem.word() != problem::SESSION_DELETED.word || self.is_deleted() {
@@ -485,15 +420,6 @@ impl Session {
 /// The error that ends requests to a deleted session.
 pub(crate) fn gone() -> ApiError {
     ApiError::new(problem::SESSION_DELETED, "the session was deleted")
-}
-
-fn state_of(phase: &Phase) -> SessionState {
-    match phase {
-        Phase::Preparing => SessionState::Preparing,
-        Phase::Ready => SessionState::Ready,
-        Phase::Completed(_) => SessionState::Completed,
-        Phase::Failed(_) => SessionState::Failed,
-    }
 }
 
 /// Locks, ignoring poisoning: a panic while locked leaves no half-finished update.

@@ -1,7 +1,8 @@
 //! Sections of whole numbers: meshes, groups of cages and what is added to their positions, by the `cager-codec` crate.
 
 use super::codec::CODED;
-use super::reader::{ContainerReader, Entry};
+use super::contents::Entry;
+use super::reader::ContainerReader;
 use super::section::SectionHeader;
 use super::{Error, tag};
 use cager_codec::{

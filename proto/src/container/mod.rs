@@ -4,6 +4,7 @@
 
 mod codec;
 mod coded;
+mod contents;
 mod error;
 mod reader;
 mod section;

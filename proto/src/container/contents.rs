@@ -1,0 +1,160 @@
+//! Which sections a container has: the table of contents, or the headers of a cut file one after another; and whether they are as many and as large as the header says.
+
+use super::codec::{self, CODED};
+use super::reader::ContainerReader;
+use super::section::{FOOTER_BYTES, HEADER_BYTES, PRELUDE_BYTES, SectionHeader};
+use super::{Error, tag};
+use crate::le::{u32_at, u64_at};
+use std::io::{Read, Seek};
+
+/// Bytes of one entry of the table of contents: an offset and the section's header but for its checksums.
+const ENTRY_BYTES: usize = 40;
+
+#[derive(Clone, Copy)]
+pub(super) struct Entry {
+    pub(super) offset: u64,
+    pub(super) header: SectionHeader,
+}
+
+impl<R: Read + Seek> ContainerReader<R> {
+    pub(super) fn read_contents(&mut self, offset: u64) -> Result<(), Error> {
+        let end = self.file_bytes - FOOTER_BYTES as u64;
+        if offset < PRELUDE_BYTES as u64 || offset.checked_add(HEADER_BYTES as u64).is_none_or(|start| start > end) {
+            return Err(Error::corrupt(end, "the table of contents lies outside the file"));
+        }
+        let header = self.header_at(offset)?;
+        if header.tag != tag::CONTENTS
+            || header.codec != codec::RAW
+            || header.payload_bytes != end - offset - HEADER_BYTES as u64
+        {
+            return Err(Error::corrupt(offset, "there is no table of contents where the end says"));
+        }
+        let contents = self.raw(Entry { offset, header })?;
+        if contents.len() % ENTRY_BYTES != 0 {
+            return Err(Error::corrupt(offset, "the table of contents is cut"));
+        }
+        let mut next = PRELUDE_BYTES as u64;
+        for line in contents.chunks_exact(ENTRY_BYTES) {
+            let at = u64_at(line, 0);
+            let header = section_fields(&line[8..]);
+            // Sections follow each other without gaps, so that no byte of the file goes unchecked.
+            if at != next {
+                return Err(Error::corrupt(offset, "the table of contents leaves a gap"));
+            }
+            next = at
+                .checked_add(HEADER_BYTES as u64)
+                .and_then(|x| x.checked_add(header.payload_bytes))
+                .filter(|&x| x <= offset)
+                .ok_or_else(|| Error::corrupt(offset, "the table of contents lists a section beyond itself"))?;
+            self.add_entry(Entry { offset: at, header })?;
+        }
+        if next == offset {
+            Ok(())
+        } else {
+            Err(Error::corrupt(offset, "the table of contents does not list all sections"))
+        }
+    }
+
+    pub(super) fn add_entry(&mut self, entry: Entry) -> Result<(), Error> {
+        let header = entry.header;
+        if SectionHeader::is_required(header.tag) && !tag::KNOWN.contains(&header.tag) {
+            return Err(Error::UnknownSection(String::from_utf8_lossy(&header.tag).into_owned()));
+        }
+        // A residual comes right before the frames that it belongs to.
+        let residual = self.entries.last().filter(|last| last.header.tag == tag::RESIDUAL).map(|last| last.header);
+        let of_other =
+            |last: SectionHeader| header.tag != tag::FRAMES || (last.first, last.count) != (header.first, header.count);
+        if residual.is_some_and(of_other) || header.tag == tag::RESIDUAL && header.codec != CODED {
+            return Err(Error::corrupt(entry.offset, "a residual is not followed by its frames"));
+        }
+        if header.tag == tag::FRAMES {
+            let end = header.first.checked_add(header.count);
+            let (true, Some(end)) = (header.first as usize == self.frames && header.count > 0, end) else {
+                return Err(Error::corrupt(entry.offset, "the frames are not in order"));
+            };
+            self.frames = end as usize;
+            self.chunks.push(self.entries.len());
+        }
+        self.entries.push(entry);
+        Ok(())
+    }
+
+    /// Lists the sections from front to back, up to the first whose header is damaged or whose payload is not all there.
+    pub(super) fn scan(&mut self) -> Result<(), Error> {
+        let mut next = PRELUDE_BYTES as u64;
+        while next + HEADER_BYTES as u64 <= self.file_bytes {
+            let Ok(header) = self.header_at(next) else { break };
+            let end = (next + HEADER_BYTES as u64).checked_add(header.payload_bytes);
+            let Some(end) = end.filter(|&end| end <= self.file_bytes && header.tag != tag::CONTENTS) else { break };
+            self.add_entry(Entry { offset: next, header: SectionHeader { payload_crc: 0, ..header } })?;
+            next = end;
+        }
+        Ok(())
+    }
+
+    /// Every section must be there as often as it should, and have the size that the header's counts give it.
+    pub(super) fn check_sizes(&self, whole: bool) -> Result<(), Error> {
+        for tag in [tag::REST_POINTS, tag::CAGE_VERTICES, tag::CAGE_FACES] {
+            self.entry(tag)?;
+        }
+        if whole {
+            self.entry(tag::ERRORS)?;
+        }
+        let most_faces = usize::from(self.header.rest_faces > 0);
+        if most_faces == 0 && self.header.rest_corners > 0 {
+            return Err(Error::corrupt(0, "the header counts corners of a model without faces".to_owned()));
+        }
+        for (tag, least, most) in [
+            (tag::REST_FACES, most_faces, most_faces),
+            (tag::ELEMENTS, 0, 1),
+            (tag::NUMBERS, 0, 1),
+            (tag::REPORT, 0, 1),
+            (tag::CONTENTS, 0, 0),
+        ] {
+            let count = self.entries.iter().filter(|e| e.header.tag == tag).count();
+            if count < least || count > most {
+                let name = String::from_utf8_lossy(&tag);
+                return Err(Error::corrupt(0, format!("the section {name} is there {count} times")));
+            }
+        }
+        for entry in &self.entries {
+            let (h, s) = (&self.header, &entry.header);
+            let expected = match s.tag {
+                tag::REST_POINTS => h.points.checked_mul(3 * u64::from(s.width)),
+                tag::REST_FACES => h.rest_faces.checked_add(h.rest_corners).and_then(|n| n.checked_mul(4)),
+                tag::CAGE_VERTICES => h.cage_vertices.checked_mul(3 * u64::from(s.width)),
+                tag::CAGE_FACES => h.cage_faces.checked_mul(12),
+                tag::FRAMES => {
+                    u64::from(s.count).checked_mul(12).and_then(|n| n.checked_mul(u64::from(h.rows_per_frame)))
+                }
+                tag::ERRORS | tag::NUMBERS => Some(8 * self.frames as u64),
+                _ => Some(s.raw_bytes),
+            };
+            let width_fits = match s.tag {
+                tag::REST_POINTS | tag::CAGE_VERTICES => s.width == 4 || s.width == 8,
+                tag::REST_FACES | tag::CAGE_FACES | tag::FRAMES | tag::ERRORS => s.width == 4,
+                tag::NUMBERS => s.width == 8,
+                tag::ELEMENTS | tag::RESIDUAL => s.width == 1,
+                _ => s.width > 0,
+            };
+            if expected != Some(s.raw_bytes) || !width_fits {
+                return Err(Error::corrupt(entry.offset, "a section does not have the size that the header gives it"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The fields of a section header as the table of contents repeats them.
+fn section_fields(b: &[u8]) -> SectionHeader {
+    SectionHeader {
+        tag: [b[0], b[1], b[2], b[3]],
+        codec: b[4],
+        width: b[5],
+        first: u32_at(b, 8),
+        count: u32_at(b, 12),
+        payload_bytes: u64_at(b, 16),
+        raw_bytes: u64_at(b, 24),
+        payload_crc: 0,
+    }
+}
