@@ -12,6 +12,7 @@ import math
 import os
 import subprocess
 import sys
+import tempfile
 import time
 
 import DracoPy
@@ -24,6 +25,7 @@ from cages import CAGER, DATA, ROOT, table, write
 
 README = os.path.join(ROOT, "README.md")
 PAGE = os.path.join(ROOT, "docs", "RATES.md")
+BLENDER = os.path.join(ROOT, "target", "blender", "bin", "python")
 CAPTURES = ["samba", "horse-gallop", "makehuman-cmu-walk", "chickenCrossing", "supercages-arm"]
 SETTINGS = [
     ["--quality", "preview"],
@@ -204,6 +206,26 @@ def plain(capture):
     os.remove(path)
 
 
+def alembic(capture):
+    """Through Blender, which `make blender` installs; without it there is no such row."""
+    if not os.path.exists(BLENDER):
+        print("no Alembic: `make blender` installs what writes it", file=sys.stderr)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [os.path.join(folder, name) for name in ("rest.npy", "faces.npy", "frames.npy", "out.abc")]
+        frames = capture.frames.astype(np.float32)
+        for path, array in zip(paths, (capture.rest, capture.faces, frames)):
+            np.save(path, array)
+        script = os.path.join(ROOT, "benches", "peers", "alembic.py")
+        done = subprocess.run([BLENDER, script, *paths], capture_output=True, text=True)
+        if done.returncode != 0:
+            raise SystemExit(done.stderr)
+        found = json.loads(done.stdout.strip().splitlines()[-1])
+        if found["apart"] > 1e-6 * capture.diagonal:
+            raise SystemExit(f"{capture.name}: Alembic gave back positions {found['apart']:.1e} apart")
+    yield capture.row("Alembic (Ogawa)", "", found["bytes"], frames.astype(np.float64), found["write"], found["read"])
+
+
 def plot(name, rows):
     """Bits over error, both logarithmic; a line for each kind."""
     width, height, left, bottom, top, right = 760, 420, 56, 44, 16, 232
@@ -253,7 +275,7 @@ def main():
     everything = []
     for name in CAPTURES:
         capture = Capture(name)
-        rows = [row for part in (ours(capture, folder), draco(capture), meshopt(capture), pca(capture), plain(capture)) for row in part]
+        rows = [row for part in (ours(capture, folder), draco(capture), meshopt(capture), pca(capture), plain(capture), alembic(capture)) for row in part]
         plot(name, rows)
         everything += rows
         count, points, _ = capture.frames.shape
