@@ -1,13 +1,21 @@
 # The service: docker build -t cager .
 #
-# Two stages, both Debian 12, so that the program finds the C library it was linked with. The second holds that library, time zones,
+# The viewer is built first, by Node. Then two stages, both Debian 12, so that the program finds the C library it was linked with. The second holds that library, time zones,
 # certificates and a user, but no shell and no package manager: a service that takes bytes from anyone should have nothing else to run.
 # Only the C compiler's runtime is needed beside the C library (zstd is C), hence `cc`.
 
+ARG NODE_VERSION=22
 ARG RUST_VERSION=1.95
+
+FROM node:${NODE_VERSION}-bookworm-slim AS page
+WORKDIR /web
+COPY web .
+RUN npm ci --silent && npm run --silent build
+
 FROM rust:${RUST_VERSION}-bookworm AS build
 WORKDIR /src
 COPY . .
+COPY --from=page /web/dist web/dist
 RUN --mount=type=cache,target=/usr/local/cargo/registry \
     --mount=type=cache,target=/src/target \
     cargo build --release --locked --bin cager \

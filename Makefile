@@ -10,24 +10,53 @@ BLENDER := target/blender/bin/python
 
 LINT := target/lint-deploy
 
-.PHONY: help demo test captures proxies blender soak lint lint-deploy doc bench bench-codec paper cages openapi schemathesis fuzz audit clean
+NPM := $(shell command -v npm 2>/dev/null)
+PAGE := web/dist/index.html
+
+.PHONY: help demo test web viewer page-test page-lint captures proxies blender soak lint lint-deploy doc bench bench-codec paper cages openapi schemathesis fuzz audit clean
 
 help: ## list these commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
 
-demo: ## encode and decode the built-in capture; results in cager-demo/
+demo: viewer ## encode and decode the built-in capture; results in cager-demo/
 	$(CARGO) run --release --locked --quiet --bin cager -- demo
+
+web: $(PAGE) ## build the viewer, which the program takes in when it is built next; needs Node 20.19 or later
+
+# The viewer where Node is; the program is built without it elsewhere.
+viewer:
+ifdef NPM
+	@$(MAKE) --no-print-directory web
+else
+	@echo "Node is not here, so the program is built without its viewer"
+endif
+
+web/node_modules: web/package.json web/package-lock.json
+	cd web && npm ci --silent
+	@touch $@
+
+$(PAGE): web/node_modules $(wildcard web/*.ts web/*.html web/*.json) $(shell find web/src -type f 2>/dev/null)
+	cd web && npm run --silent build
 
 CAPTURES := $(or $(CAGER_CAPTURES),../shared/data)
 
-test: ## run every test; those on real captures where these are at hand
+test: viewer ## run every test; those on real captures where these are at hand, those of the viewer where Node and Chromium are
 	@$(CARGO) test --workspace --locked --doc --quiet
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
 		$(CARGO) nextest run --workspace --locked; \
 	else \
 		$(CARGO) test --workspace --locked --lib --bins --tests; \
 	fi
+	@$(MAKE) --no-print-directory page-test
 	@if [ -d "$(CAPTURES)" ]; then $(MAKE) --no-print-directory captures; fi
+
+# The program that the tests before have built serves the page to a browser.
+page-test:
+ifdef NPM
+	cd web && CAGER_BINARY=$(abspath target/debug/cager) npm test --silent
+else
+	@echo "Node is not here, so the tests of the viewer are left out"
+endif
 
 captures: ## run the tests that need the real captures in CAGER_CAPTURES (../shared/data)
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
@@ -55,6 +84,15 @@ lint: ## formatting, clippy and documentation, all warnings denied
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --workspace --all-targets --locked -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps --locked
+	@$(MAKE) --no-print-directory page-lint
+
+page-lint:
+ifdef NPM
+	@$(MAKE) --no-print-directory web/node_modules
+	cd web && npm run --silent check && npm run --silent lint
+else
+	@echo "Node is not here, so the sources of the viewer are not checked"
+endif
 
 lint-deploy: $(LINT)/bin/python ## Dockerfile, manifests, alerts and dashboard against their schemas; needs the network
 	$(LINT)/bin/hadolint Dockerfile
@@ -122,4 +160,4 @@ audit: ## licences and advisories of all dependencies; needs cargo-deny and the 
 
 clean: ## remove everything that was built
 	$(CARGO) clean
-	rm -rf benches/.venv cager-demo
+	rm -rf benches/.venv cager-demo web/node_modules web/dist

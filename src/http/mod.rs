@@ -24,12 +24,12 @@ mod multipart;
 pub mod openapi;
 mod origin;
 mod other_model;
+mod page;
 mod progress;
 mod ranged;
 mod respond;
 mod router;
 mod sessions;
-mod viewer;
 
 pub use admin::admin;
 pub use router::{document, router, spare};

@@ -78,13 +78,10 @@ impl Immutable {
     }
 
     fn select(&self, headers: &HeaderMap, etag: &str) -> Result<Selection, ApiError> {
-        let text = |name| headers.get(name).and_then(|value: &HeaderValue| value.to_str().ok());
-        if let Some(known) = text(header::IF_NONE_MATCH) {
-            let same = |tag: &str| tag == "*" || tag.trim_start_matches("W/") == etag;
-            if known.split(',').any(|tag| same(tag.trim())) {
-                return Ok(Selection::NotModified);
-            }
+        if is_known(headers, etag) {
+            return Ok(Selection::NotModified);
         }
+        let text = |name| headers.get(name).and_then(|value: &HeaderValue| value.to_str().ok());
         if text(header::IF_RANGE).is_some_and(|tag| tag != etag) {
             return Ok(Selection::All);
         }
@@ -116,6 +113,12 @@ impl Immutable {
             }
         }))
     }
+}
+
+/// Whether the client says that it has the content with this tag.
+pub(super) fn is_known(headers: &HeaderMap, etag: &str) -> bool {
+    let known = headers.get(header::IF_NONE_MATCH).and_then(|value| value.to_str().ok()).unwrap_or_default();
+    known.split(',').map(str::trim).any(|tag| tag == "*" || tag.trim_start_matches("W/") == etag)
 }
 
 enum Selection {

@@ -6,7 +6,7 @@ use super::guarded::with_permit;
 use super::respond::PROBLEM_JSON;
 use super::{
     cage, cage_jobs, cages, container, coordinates, decode, errors, events, extract, frames, health, openapi, origin,
-    sessions, viewer,
+    page, sessions,
 };
 use crate::problem::{self, ApiError, Kind};
 use crate::service::Service;
@@ -15,6 +15,7 @@ use axum::error_handling::HandleErrorLayer;
 use axum::extract::{DefaultBodyLimit, MatchedPath, Request, State};
 use axum::middleware::{Next, from_fn, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
+use axum::routing::get;
 use axum::{BoxError, Router};
 use cager_proto::messages::Problem;
 use http::{Extensions, HeaderMap, HeaderValue, StatusCode, Version, header};
@@ -65,9 +66,16 @@ pub(super) fn open() -> OpenApiRouter<Arc<Service>> {
     OpenApiRouter::new().routes(routes!(health::live)).routes(routes!(health::ready)).routes(routes!(health::metrics))
 }
 
-/// The list page and the OpenAPI document.
+/// The page and the OpenAPI document.
 fn described() -> OpenApiRouter<Arc<Service>> {
-    OpenApiRouter::new().routes(routes!(viewer::page)).routes(routes!(openapi::get))
+    OpenApiRouter::new().routes(routes!(page::page)).routes(routes!(openapi::get))
+}
+
+/// Files that the page loads.
+fn page_files() -> Router<Arc<Service>> {
+    Router::new()
+        .route("/assets/{name}", get(page::asset))
+        .route(&format!("/{}", page::COMPONENT), get(page::component))
 }
 
 /// The OpenAPI document of all routes.
@@ -93,7 +101,7 @@ pub fn router(service: Arc<Service>) -> Router {
     let cors = origin::cors(&service.config);
     let routes = Router::from(open())
         .merge(guarded)
-        .merge(Router::from(described()))
+        .merge(Router::from(described()).merge(page_files()))
         .fallback(|| async { ApiError::new(problem::NOT_FOUND, "the routes are listed in /openapi.json") })
         .layer(from_fn_with_state(Arc::clone(&service), check_host_and_origin))
         .with_state(service);
@@ -148,7 +156,7 @@ fn is_worth_compressing(_: StatusCode, _: Version, headers: &HeaderMap, _: &Exte
     const LEAST: u64 = 1024;
     let text = |name| headers.get(name).and_then(|value: &HeaderValue| value.to_str().ok());
     let media_type = text(header::CONTENT_TYPE).and_then(|value| value.split(';').next()).unwrap_or_default();
-    matches!(media_type, "application/json" | "text/html")
+    matches!(media_type, "application/json" | "text/html" | "text/javascript" | "text/css" | "image/svg+xml")
         && text(header::CONTENT_LENGTH).and_then(|length| length.parse().ok()).is_none_or(|length: u64| length >= LEAST)
 }
 

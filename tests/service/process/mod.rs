@@ -1,6 +1,7 @@
 mod access;
 mod limits;
 mod overload;
+mod page;
 mod problems;
 mod provider;
 mod restart;

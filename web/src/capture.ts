@@ -1,0 +1,122 @@
+/** What the parts of the page hand to each other: a capture's static part, and its frames as they come. */
+
+import type { Source } from './container/source';
+
+/** Coordinate systems a container can name; docs/FORMAT.md defines them. */
+export type CoordinateSystem = 'mvc' | 'harmonic' | 'green' | 'green-free';
+
+/** A closed mesh of triangles. */
+export interface TriangleMesh {
+  /** x y z of each vertex. */
+  readonly positions: Float64Array;
+  /** Three vertex indices of each triangle, counter-clockwise from outside. */
+  readonly triangles: Uint32Array;
+}
+
+/** Everything that does not change from frame to frame. */
+export interface StaticPart {
+  readonly system: CoordinateSystem;
+  /** Points of the model at rest, x y z each. */
+  readonly rest: Float64Array;
+  /** Number of corners of each polygon of the model; empty for a point cloud. */
+  readonly cornerCounts: Uint32Array;
+  /** Point indices of all corners, polygon by polygon. */
+  readonly corners: Uint32Array;
+  readonly cage: TriangleMesh;
+  /** Rows of three numbers of one frame: what the coordinate system's columns multiply. */
+  readonly rowsPerFrame: number;
+  /** Frames per second, if the file or session says. */
+  readonly frameRate: number | null;
+  /** Figures about the encoding (`Report` in proto/src/report.rs), as far as known. */
+  readonly report: Readonly<Record<string, unknown>> | null;
+  /** Boundary elements that harmonic coordinates were solved on (`ELEM` in docs/FORMAT.md), where the file has them. */
+  readonly elements?: Uint8Array;
+}
+
+/** Frames that follow one another, decoded from what a file or a service sent. */
+export interface FrameBlock {
+  /** Number of the first frame, counted from 0. */
+  readonly first: number;
+  readonly count: number;
+  /** Rows of all frames, `count × rowsPerFrame × 3`. */
+  readonly cages: Float32Array;
+  /** What is added to the positions decoded from the cages, where the block has a residual layer. */
+  readonly residual: Residual | null;
+}
+
+/**
+ * A block's residual: frame k of the block adds `Σ_r trajectories[k·rank + r] · shapes[(r·points + p)·3 + axis]` to every point p, then
+ * the corrections of that frame.
+ */
+export interface Residual {
+  readonly rank: number;
+  /** `count × rank`. */
+  readonly trajectories: Float32Array;
+  /** `rank × points × 3`. */
+  readonly shapes: Float32Array;
+  /** Frame k corrects `correctedPoints[correctionStarts[k] … correctionStarts[k + 1])`. */
+  readonly correctionStarts: Uint32Array;
+  readonly correctedPoints: Uint32Array;
+  /** x y z for each of `correctedPoints`. */
+  readonly correctionVectors: Float32Array;
+}
+
+/** Errors of frames as fractions of the rest pose's diagonal; NaN where not measured. */
+export interface FrameErrors {
+  readonly l2: Float32Array;
+  readonly linf: Float32Array;
+}
+
+/** How the frames of a session that is still running arrive. */
+export interface LiveStatus {
+  /**
+   * `following`: connected. `reconnecting`: broken, tried again at `retryAt`. `signed-out`: waits for a token. `ended`: nothing follows any more,
+   * since the session is completed or gone.
+   */
+  readonly state: 'following' | 'reconnecting' | 'signed-out' | 'ended';
+  /** When it is tried again, in milliseconds as of `Date.now()`; null while nothing is broken. */
+  readonly retryAt: number | null;
+  /** Seconds from a frame's being solved to its being here, within half a round trip; null before it was measured. */
+  readonly latencySeconds: number | null;
+  /** Frames that are solved and not here yet. */
+  readonly behindFrames: number;
+  /** Bits and frames that arrived in the last seconds, per second. */
+  readonly bitsPerSecond: number;
+  readonly framesPerSecond: number;
+  /** Frames that somebody had to wait for. */
+  readonly lateFrames: number;
+  /** Frames passed over because the connection was too slow for all of them, or thrown away because they were damaged; each is fetched when it is looked at. */
+  readonly droppedFrames: number;
+}
+
+/** A capture that is being looked at, from a file, a finished session or one that is still running. */
+export interface Capture {
+  readonly name: string;
+  readonly static: StaticPart;
+  /** Number of frames known so far. */
+  readonly frames: number;
+  /** Whether no more frames will come. */
+  readonly complete: boolean;
+  /** Errors of the frames known so far; may be shorter than `frames`. */
+  readonly errors: FrameErrors;
+  /** Number where each frame comes from, or null if these count from 0 as frames do. */
+  readonly frameNumbers: Float64Array | null;
+  /** The block that has frame `frame`; waits for frames that are still to come where the capture is not complete. */
+  block(frame: number, signal?: AbortSignal): Promise<FrameBlock>;
+  /** Φ, points × columns, from the service; for coordinate systems that the page does not compute itself. */
+  coordinates?(onProgress?: (fraction: number) => void, signal?: AbortSignal): Promise<Float32Array>;
+  /** Point numbers of the handles, where they are known. */
+  handles?(signal?: AbortSignal): Promise<Uint32Array>;
+  /** How far each point of a frame is from where it was captured, as fractions of the diagonal; null where the original is not kept. */
+  pointErrors?(frame: number, signal?: AbortSignal): Promise<Float32Array | null>;
+  /** The container that holds the capture, for copies of it with edited cages. */
+  container?(signal?: AbortSignal): Promise<Source>;
+  /** Positions of some cages, decoded by the service: for each `rowsPerFrame × 3` floats of the body, points × 3. */
+  decode?(cages: Blob, signal?: AbortSignal): Promise<Response>;
+  /** How frames arrive, of a session that was running when it was opened. */
+  readonly live?: LiveStatus | null;
+  /** Fires `change` when frames arrive, the state changes or something fails (`problem` then says what). */
+  readonly events: EventTarget;
+  readonly problem: string | null;
+  close(): void;
+}

@@ -1,0 +1,76 @@
+/** Everything that the coded sections of one capture need between one and the next: synchronous, for a worker. */
+
+import type { CoordinateSystem, Residual, TriangleMesh } from '../capture';
+import { columnsOf, computeCoordinates } from '../coordinates/compute';
+import { CageBasis } from './basis';
+import { cagesOf, decodeCageNumbers } from './cages';
+import { decodeFaces } from './connectivity';
+import { CodedDataError } from './error';
+import { type Hierarchy, vertexHierarchy } from './hierarchy';
+import { type Polygons } from './polygons';
+import { decodePositions } from './positions';
+import { decodeResidual } from './residual';
+
+/** Decodes the coded sections of one capture. */
+export class GroupDecoder {
+  private model: { polygons: Polygons; points: number } | null = null;
+  private hierarchy: Hierarchy | null = null;
+  private basis: CageBasis | null = null;
+
+  /** {@link decodeFaces} */
+  faces(bytes: Uint8Array, points: number, faces: number, corners: number): Polygons {
+    return decodeFaces(bytes, points, faces, corners);
+  }
+
+  /** {@link decodePositions} */
+  positions(bytes: Uint8Array, faces: Polygons, points: number): Float64Array {
+    return decodePositions(bytes, faces, points);
+  }
+
+  /** Says which mesh residuals are of. */
+  setModel(polygons: Polygons, points: number): void {
+    this.model = { polygons, points };
+    this.hierarchy = null;
+  }
+
+  /** Computes the coordinates of sampled points, x y z each, and adds them as {@link addCoordinates} does. */
+  computeBasis(
+    system: CoordinateSystem,
+    cage: TriangleMesh,
+    points: Float64Array,
+    rows: number,
+    isFirst: boolean,
+  ): void {
+    this.addCoordinates(computeCoordinates(system, cage, points), columnsOf(system, cage), rows, isFirst);
+  }
+
+  /** Adds coordinates of sampled points to the basis of cages, points × columns; `isFirst` begins a new basis. */
+  addCoordinates(coordinates: Float64Array, columns: number, rows: number, isFirst: boolean): void {
+    if (isFirst || this.basis === null) {
+      this.basis = new CageBasis(rows);
+    }
+    this.basis.add(coordinates, columns);
+  }
+
+  /**
+   * The cages of a group of so many frames, frames × rows × 3.
+   *
+   * @param rest rows of the rest pose, rows × 3.
+   */
+  cages(bytes: Uint8Array, frames: number, rest: Float64Array): Float32Array {
+    const numbers = decodeCageNumbers(bytes, frames, rest.length / 3);
+    if (this.basis === null) {
+      throw new CodedDataError('there are no coordinates for the basis of the cages');
+    }
+    return cagesOf(numbers, this.basis, rest);
+  }
+
+  /** {@link decodeResidual} of the model of {@link setModel}. */
+  residual(bytes: Uint8Array, frames: number, mostNumbers: number): Residual {
+    if (this.model === null) {
+      throw new CodedDataError('there is no model for the residual');
+    }
+    this.hierarchy ??= vertexHierarchy(this.model.polygons, this.model.points);
+    return decodeResidual(bytes, this.hierarchy, frames, mostNumbers);
+  }
+}

@@ -1,0 +1,133 @@
+/** What is added to the positions of a group's cages; docs/FORMAT.md, "Residual". `codec/src/residual.rs` is the reference. */
+
+import type { Residual } from '../capture';
+import { MOST_FRAMES } from './cages';
+import { decodeCorrections } from './corrections';
+import { CodedDataError } from './error';
+import type { Hierarchy } from './hierarchy';
+import { IntegerModels, SIZE_CLASSES, sizeClass } from './integers';
+import { BinaryModels, RangeDecoder } from './rangeDecoder';
+import { decodeTrajectories } from './trajectories';
+
+/** Most positions of a group, points times frames. */
+const MOST_POSITIONS = 2 ** 26;
+/** Step (f64), number of components (u16), step of corrections (f64), and bytes of the components (u32). */
+const HEAD_BYTES = 22;
+/** Parts of a step in which predictions are counted. */
+const PARTS = 16;
+
+/**
+ * Decodes the residual of a group of so many frames.
+ *
+ * @param mostNumbers most numbers of its components, three for each point.
+ * @throws {CodedDataError} for bytes that the encoder did not write.
+ */
+export function decodeResidual(bytes: Uint8Array, hierarchy: Hierarchy, frames: number, mostNumbers: number): Residual {
+  const points = hierarchy.order.length;
+  if (frames > MOST_FRAMES || points * frames > MOST_POSITIONS) {
+    throw new CodedDataError('a group has too many positions');
+  }
+  if (bytes.length < HEAD_BYTES) {
+    throw new CodedDataError('a residual is cut');
+  }
+  const head = new DataView(bytes.buffer, bytes.byteOffset, HEAD_BYTES);
+  const step = head.getFloat64(0, true);
+  const rank = head.getUint16(8, true);
+  const correctionStep = head.getFloat64(10, true);
+  const middle = HEAD_BYTES + head.getUint32(18, true);
+  const tooMany = rank > Math.min(frames, 3 * points) || 3 * points * rank > mostNumbers || middle > bytes.length;
+  if (tooMany || !Number.isFinite(step) || !Number.isFinite(correctionStep)) {
+    throw new CodedDataError('a residual has impossible counts');
+  }
+  const decoder = new RangeDecoder(bytes.subarray(HEAD_BYTES, middle));
+  const trajectories = Float32Array.from(decodeTrajectories(decoder, frames, rank));
+  const shapes = new Float32Array(rank * 3 * points);
+  const components = new Components(decoder, hierarchy);
+  const unit = step / PARTS;
+  for (let k = 0; k < rank; k++) {
+    const parts = components.next();
+    for (let at = 0, out = k * 3 * points; at < parts.length; at++, out++) {
+      shapes[out] = parts[at] * unit;
+    }
+  }
+  return { rank, trajectories, shapes, ...decodeCorrections(bytes.subarray(middle), frames, points, correctionStep) };
+}
+
+/** Reads component after component. */
+class Components {
+  private readonly predicted = new IntegerModels(3 * SIZE_CLASSES);
+  private readonly plain = new IntegerModels(3 * SIZE_CLASSES);
+  private readonly kind = new BinaryModels(1);
+  private readonly found: Float64Array;
+  /** Sizes of the numbers of the component before, and of this one. */
+  private before: Uint32Array;
+  private sizes: Uint32Array;
+
+  constructor(
+    private readonly decoder: RangeDecoder,
+    private readonly hierarchy: Hierarchy,
+  ) {
+    const values = 3 * hierarchy.order.length;
+    this.found = new Float64Array(values);
+    this.before = new Uint32Array(values);
+    this.sizes = new Uint32Array(values);
+  }
+
+  /** Values of the next component in parts of a step, x y z of each point. */
+  next(): Float64Array {
+    const { decoder, found, before, sizes } = this;
+    const { order, starts, parents } = this.hierarchy;
+    const predicts = decoder.bit(this.kind, 0) === 1;
+    const models = predicts ? this.predicted : this.plain;
+    for (let place = 0; place < order.length; place++) {
+      const start = starts[place];
+      const end = starts[place + 1];
+      const count = end - start;
+      let beside = 0;
+      for (let axis = 0; axis < 3; axis++) {
+        const at = 3 * order[place] + axis;
+        let around = 0;
+        let sum = 0;
+        for (let k = start; k < end; k++) {
+          const parent = 3 * parents[k] + axis;
+          around += sizes[parent];
+          sum += found[parent];
+        }
+        let expected = 0;
+        if (count > 0) {
+          around = Math.floor((16 * around) / count);
+          expected = predicts ? Math.floor(sum / count) : 0;
+        }
+        const context = SIZE_CLASSES * axis + sizeClass(around + 6 * before[at] + beside);
+        const value = models.signed(decoder, context);
+        found[at] = expected + PARTS * value;
+        const size = Math.min(Math.abs(value), 1 << 16);
+        sizes[at] = size;
+        beside = (beside >> 1) + 5 * size;
+      }
+    }
+    this.before = sizes;
+    this.sizes = before;
+    return found;
+  }
+}
+
+/** Adds what a residual says of one of its group's frames to positions, x y z of each point, in single precision. */
+export function addResidual(residual: Residual, frame: number, positions: Float32Array): void {
+  const { rank, trajectories, shapes, correctionStarts, correctedPoints, correctionVectors } = residual;
+  const sums = new Float64Array(positions.length);
+  for (let k = 0; k < rank; k++) {
+    const factor = trajectories[frame * rank + k];
+    for (let at = 0, from = k * positions.length; at < positions.length; at++, from++) {
+      sums[at] += factor * shapes[from];
+    }
+  }
+  for (let at = 0; at < positions.length; at++) {
+    positions[at] += sums[at];
+  }
+  for (let k = correctionStarts[frame]; k < correctionStarts[frame + 1]; k++) {
+    for (let axis = 0; axis < 3; axis++) {
+      positions[3 * correctedPoints[k] + axis] += correctionVectors[3 * k + axis];
+    }
+  }
+}

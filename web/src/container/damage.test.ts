@@ -1,0 +1,207 @@
+import { describe, expect, it } from 'vitest';
+import { LocalCodec } from '../codec/localCodec';
+import { ContainerError } from './error';
+import { HEADER_BYTES, parseFields, PRELUDE_BYTES, viewOf } from './section';
+import { ContainerStream } from './stream';
+import {
+  allBlocks,
+  goldenBytes,
+  offsetOf,
+  openBytes,
+  type Part,
+  putTogether,
+  randomNumbers,
+  rawPart,
+  sign,
+  takeApart,
+} from './testSupport';
+
+const SENTENCES = /^[A-Z].*\.$/s;
+
+/** What a person is told of these bytes, at opening or in a capture's `problem`; null if nothing is wrong. */
+async function complaint(bytes: Uint8Array): Promise<string | null> {
+  try {
+    const capture = await openBytes(bytes);
+    try {
+      await allBlocks(capture);
+    } finally {
+      capture.close();
+    }
+    return capture.problem;
+  } catch (error) {
+    expect(error).toBeInstanceOf(ContainerError);
+    return (error as Error).message;
+  }
+}
+
+/** The same for bytes that are read from front to back. */
+async function streamComplaint(bytes: Uint8Array): Promise<string | null> {
+  const stream = new ContainerStream({
+    codec: new LocalCodec(),
+    onStatic: () => undefined,
+    onBlock: () => undefined,
+  });
+  try {
+    await stream.push(bytes);
+    return (await stream.finish()).problem;
+  } catch (error) {
+    expect(error).toBeInstanceOf(ContainerError);
+    return (error as Error).message;
+  }
+}
+
+describe.each(['coded-mvc', 'definition3-mvc'])('the file %s', (name) => {
+  const intact = goldenBytes(name);
+
+  it('is without a problem when it is whole', async () => {
+    expect(await complaint(intact)).toBeNull();
+    expect(await streamComplaint(intact)).toBeNull();
+  });
+
+  it('cut at any length gives a sentence', async () => {
+    for (let length = 0; length < intact.length; length += length < 60 ? 1 : 23) {
+      expect(await complaint(intact.subarray(0, length)), `${length} bytes`).toMatch(SENTENCES);
+      expect(await streamComplaint(intact.subarray(0, length)), `${length} bytes`).toMatch(SENTENCES);
+    }
+  });
+
+  it('with a bit changed anywhere gives a sentence', async () => {
+    for (let at = 0; at < intact.length; at += 5) {
+      const bytes = intact.slice();
+      bytes[at] ^= 1 << (at & 7);
+      expect(await complaint(bytes), `byte ${at}`).toMatch(SENTENCES);
+      expect(await streamComplaint(bytes), `byte ${at}`).toMatch(SENTENCES);
+    }
+  });
+
+  it('with numbers in its payloads changed and right checksums gives a sentence or a capture', async () => {
+    const random = randomNumbers(7);
+    for (let turn = 0; turn < 150; turn++) {
+      const parts = takeApart(intact);
+      const { payload } = parts[random(parts.length)];
+      for (let k = random(4); k >= 0; k--) {
+        payload[random(payload.length)] = random(2) === 0 ? 0xff : random(256);
+      }
+      const bytes = putTogether(parts);
+      expect((await complaint(bytes)) ?? 'Fine.', `turn ${turn}`).toMatch(SENTENCES);
+      expect((await streamComplaint(bytes)) ?? 'Fine.', `turn ${turn}`).toMatch(SENTENCES);
+    }
+  });
+
+  it('with a field of a section set to an extreme and right checksums gives a sentence or a capture', async () => {
+    const count = takeApart(intact).length;
+    const fields = [4, 5, 6, 8, 12, 24, 28];
+    for (let place = 0; place < count; place++) {
+      for (const field of fields) {
+        for (const value of [0, 1, 3, 0x7f, 0xff]) {
+          const parts = takeApart(intact);
+          parts[place].header.fill(value, field, field < 8 ? field + 1 : field + 4);
+          const bytes = putTogether(parts);
+          expect((await complaint(bytes)) ?? 'Fine.', `${place} ${field} ${value}`).toMatch(SENTENCES);
+          expect((await streamComplaint(bytes)) ?? 'Fine.', `${place} ${field} ${value}`).toMatch(SENTENCES);
+        }
+      }
+    }
+  });
+});
+
+it('of a file that was cut, the frames before the cut can be read', async () => {
+  const intact = goldenBytes('definition3-mvc');
+  const cut = intact.subarray(0, offsetOf(intact, 'ERRS') + 10);
+  const capture = await openBytes(cut);
+  expect(capture.problem).toMatch(/the end is missing/);
+  expect((await allBlocks(capture))[0].cages).toEqual((await allBlocks(await openBytes(intact)))[0].cages);
+  expect(capture.errors.l2.length).toBe(0);
+});
+
+it('a damaged residual leaves the frames of the cages', async () => {
+  const intact = goldenBytes('coded-green');
+  const bytes = intact.slice();
+  bytes[offsetOf(intact, 'resi') + HEADER_BYTES + 100] ^= 4;
+  const capture = await openBytes(bytes);
+  const [block] = await allBlocks(capture);
+  expect(block.residual).toBeNull();
+  expect(block.cages).toEqual((await allBlocks(await openBytes(intact)))[0].cages);
+  expect(capture.problem).toMatch(/checksum/);
+});
+
+it('a damaged chunk is named, and the one after it is read', async () => {
+  const parts = takeApart(goldenBytes('definition3-mvc'));
+  const place = parts.findIndex(({ header }) => parseFields(header, 0).tag === 'FRAM');
+  const chunk = parts[place];
+  const second = { header: chunk.header.slice(), payload: chunk.payload };
+  viewOf(second.header).setUint32(8, 3, true);
+  const errors = rawPart('ERRS', new Uint8Array(48), 4);
+  const bytes = putTogether([...parts.slice(0, place + 1), second, errors]);
+  bytes[offsetOf(bytes, 'FRAM') + HEADER_BYTES + 5] ^= 1;
+  const capture = await openBytes(bytes);
+  await expect(capture.block(0)).rejects.toThrow(/checksum/);
+  expect((await capture.block(5)).first).toBe(3);
+  const firsts: number[] = [];
+  const stream = new ContainerStream({
+    codec: new LocalCodec(),
+    onStatic: () => undefined,
+    onBlock: ({ first }) => firsts.push(first),
+  });
+  await stream.push(bytes);
+  expect((await stream.finish()).problem).toMatch(/checksum/);
+  expect(firsts).toEqual([3]);
+});
+
+describe('a file of another program', () => {
+  const parts = takeApart(goldenBytes('definition3-mvc'));
+  const withPart = (part: Part) => putTogether([...parts.slice(0, 1), part, ...parts.slice(1)]);
+
+  it('with an unknown optional section is read as if that was not there', async () => {
+    const bytes = withPart(rawPart('xtra', Uint8Array.of(1, 2, 3)));
+    expect(await complaint(bytes)).toBeNull();
+    expect(await streamComplaint(bytes)).toBeNull();
+  });
+
+  it('with an unknown required section is refused by the name of that', async () => {
+    const bytes = withPart(rawPart('XTRA', Uint8Array.of(1, 2, 3)));
+    expect(await complaint(bytes)).toMatch(/“XTRA”.*newer viewer/);
+    expect(await streamComplaint(bytes)).toMatch(/“XTRA”.*newer viewer/);
+  });
+
+  it('with a report in an unknown codec is read without the report', async () => {
+    const changed = takeApart(goldenBytes('definition3-mvc'));
+    changed.find(({ header }) => parseFields(header, 0).tag === 'summ')!.header[4] = 9;
+    const bytes = putTogether(changed);
+    const capture = await openBytes(bytes);
+    expect(capture.static.report).toBeNull();
+    expect(capture.problem).toMatch(/codec 9/);
+    expect((await allBlocks(capture)).length).toBe(1);
+    expect(await streamComplaint(bytes)).toMatch(/codec 9/);
+  });
+
+  it('of a newer version is refused by its number', async () => {
+    const bytes = goldenBytes('definition3-mvc');
+    bytes[8] = 2;
+    sign(bytes.subarray(0, PRELUDE_BYTES));
+    expect(await complaint(bytes)).toMatch(/version 2/);
+    expect(await streamComplaint(bytes)).toMatch(/version 2/);
+  });
+
+  it('of another kind is refused with what to choose', async () => {
+    const text = new TextEncoder().encode('solid teapot\nfacet normal 0 0 1\n');
+    expect(await complaint(text)).toMatch(/not a \.cager file/);
+    expect(await streamComplaint(text)).toMatch(/not a \.cager file/);
+  });
+
+  it('with coordinates of a later definition is refused', async () => {
+    const changed = takeApart(goldenBytes('definition3-mvc'));
+    viewOf(changed[0].payload).setUint32(0, 4, true);
+    expect(await complaint(putTogether(changed))).toMatch(/definition 4/);
+  });
+
+  it('that declares more than it can hold is refused before memory is taken', async () => {
+    const [head, points, ...others] = takeApart(goldenBytes('definition3-mvc'));
+    const count = viewOf(head.payload).byteLength - 1 - 4 - 8 * 5;
+    expect(Number(viewOf(head.payload).getBigUint64(count, true))).toBe(120);
+    const most = 2n ** 32n - 1n;
+    viewOf(head.payload).setBigUint64(count, most, true);
+    viewOf(points.header).setBigUint64(24, 3n * BigInt(points.header[5]) * most, true);
+    expect(await complaint(putTogether([head, points, ...others]))).toMatch(/more bytes than the file can hold/);
+  });
+});

@@ -1,0 +1,114 @@
+/** Model and cage from their sections. */
+
+import type { StaticPart, TriangleMesh } from '../capture';
+import type { Codec } from '../codec/client';
+import { CodedDataError } from '../codec/error';
+import { NO_POLYGONS, type Polygons } from '../codec/polygons';
+import { decodePayload } from './codecs';
+import { damaged } from './error';
+import type { Head } from './head';
+import { CODEC, type Entry } from './section';
+
+/** Sections before the frames that model and cage are made of. */
+export const STATIC_TAGS = ['RPTS', 'RFAC', 'CVTX', 'CTRI', 'ELEM'] as const;
+export type StaticTag = (typeof STATIC_TAGS)[number];
+
+/** A section and its payload as it is in the file, whose checksum and sizes were checked. */
+export interface Section {
+  readonly entry: Entry;
+  readonly payload: Uint8Array;
+}
+
+/** Decodes what does not change from frame to frame. */
+export async function decodeStatic(
+  head: Head,
+  sections: ReadonlyMap<StaticTag, Section>,
+  codec: Codec,
+): Promise<StaticPart> {
+  const polygons = await decodeModelFaces(head, sections.get('RFAC'), codec);
+  const rest = await decodePoints(sections.get('RPTS')!, polygons, head.points, codec);
+  const elements = sections.get('ELEM');
+  return {
+    system: head.system,
+    rest,
+    cornerCounts: polygons.counts,
+    corners: polygons.corners,
+    cage: await decodeCage(head, sections.get('CTRI')!, sections.get('CVTX')!, codec),
+    rowsPerFrame: head.rowsPerFrame,
+    frameRate: head.frameRate,
+    report: null,
+    ...(elements === undefined ? {} : { elements: decodePayload(elements.entry, elements.payload) }),
+  };
+}
+
+async function decodeModelFaces(head: Head, section: Section | undefined, codec: Codec): Promise<Polygons> {
+  if (section === undefined) {
+    return NO_POLYGONS;
+  }
+  const { entry, payload } = section;
+  if (entry.fields.codec === CODEC.coded) {
+    const args: [Uint8Array, number, number, number] = [payload, head.points, head.restFaces, head.restCorners];
+    return located(entry, codec.call('faces', args));
+  }
+  const words = new Uint32Array(decodePayload(entry, payload).buffer);
+  const counts = words.slice(0, head.restFaces);
+  const corners = words.slice(head.restFaces);
+  if (counts.reduce((sum, count) => sum + count, 0) !== corners.length) {
+    throw damaged(entry.offset, 'the faces of the model do not have as many corners as there are');
+  }
+  checkIndices(corners, head.points, entry);
+  return { counts, corners };
+}
+
+async function decodeCage(head: Head, faces: Section, vertices: Section, codec: Codec): Promise<TriangleMesh> {
+  const { entry, payload } = faces;
+  const { cageVertices, cageFaces } = head;
+  if (entry.fields.codec !== CODEC.coded) {
+    const triangles = new Uint32Array(decodePayload(entry, payload).buffer);
+    checkIndices(triangles, cageVertices, entry);
+    return { positions: await decodePoints(vertices, NO_POLYGONS, cageVertices, codec), triangles };
+  }
+  const args: [Uint8Array, number, number, number] = [payload, cageVertices, cageFaces, 3 * cageFaces];
+  const polygons = await located(entry, codec.call('faces', args));
+  if (polygons.counts.some((count) => count !== 3)) {
+    throw damaged(entry.offset, 'the cage has faces that are no triangles');
+  }
+  return { positions: await decodePoints(vertices, polygons, cageVertices, codec), triangles: polygons.corners };
+}
+
+/** Positions, x y z each; coded ones are predicted along these faces. */
+async function decodePoints(
+  { entry, payload }: Section,
+  faces: Polygons,
+  count: number,
+  codec: Codec,
+): Promise<Float64Array> {
+  let positions: Float64Array;
+  if (entry.fields.codec === CODEC.coded) {
+    positions = await located(entry, codec.call('positions', [payload, faces, count]));
+  } else {
+    const { buffer } = decodePayload(entry, payload);
+    positions = entry.fields.width === 4 ? Float64Array.from(new Float32Array(buffer)) : new Float64Array(buffer);
+  }
+  const bad = positions.findIndex((x) => !Number.isFinite(x));
+  if (bad >= 0) {
+    throw damaged(entry.offset, `position ${Math.floor(bad / 3)} is not finite`);
+  }
+  return positions;
+}
+
+/** Says where in the file damage of coded numbers is. */
+export async function located<T>(entry: Entry, decoded: Promise<T>): Promise<T> {
+  try {
+    return await decoded;
+  } catch (error) {
+    throw error instanceof CodedDataError ? damaged(entry.offset, error.message) : error;
+  }
+}
+
+function checkIndices(indices: Uint32Array, points: number, entry: Entry): void {
+  const bad = indices.find((index) => index >= points);
+  if (bad !== undefined) {
+    throw damaged(entry.offset, `a face names point ${bad} of ${points}`);
+  }
+}

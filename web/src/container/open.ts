@@ -1,0 +1,226 @@
+/** Captures in containers that are read at random: what is asked for is read, decoded and kept for a while. */
+
+import type { Capture, FrameBlock, FrameErrors, StaticPart } from '../capture';
+import { type Codec, createCodec } from '../codec/client';
+import { BlockCache } from './blockCache';
+import { BlockDecoder, type CoordinatesOf } from './blocks';
+import { ContainerError, damaged, isDamage, isTolerable } from './error';
+import { checkHeadSection, type Head, parseHead } from './head';
+import { checkSize, type Chunk, type Layout } from './layout';
+import { decodePayload } from './codecs';
+import { decodeStatic, type Section, STATIC_TAGS, type StaticTag } from './meshes';
+import { readContents, readSections, scanSections } from './sectionReader';
+import { checkPrelude, type Entry, PRELUDE_BYTES } from './section';
+import { EndsCache, type Source } from './source';
+import { decodeErrors, decodeFrameNumbers, decodeReport, NO_ERRORS } from './tail';
+import { KNOWN_TAGS } from './tag';
+
+/** Bytes at either end that are read at once: most of the static part of coded captures, and all that comes behind the frames of most. */
+const FIRST_BYTES = 1 << 16;
+const LAST_BYTES = 1 << 13;
+
+export interface OpenOptions {
+  readonly name?: string;
+  /** Where coordinates in double precision come from, which coded cages need; by default the codec's worker computes them where it can. */
+  readonly coordinates?: CoordinatesOf;
+  /** What decodes coded sections, closed with the capture; by default a worker. */
+  readonly codec?: Codec;
+  readonly signal?: AbortSignal;
+}
+
+/** A capture in a container. */
+export interface ContainerCapture extends Capture {
+  readonly head: Head;
+}
+
+/**
+ * Opens a container and decodes its model and cage. Of a file that was cut or damaged, the frames that are intact can be read where model and cage are, and
+ * `problem` says what is wrong.
+ *
+ * @throws {ContainerError} where the file is no container, is of a later program, or has no intact model and cage.
+ */
+export async function openContainer(source: Source, options: OpenOptions = {}): Promise<ContainerCapture> {
+  const { signal, name = 'capture.cager', coordinates = null } = options;
+  const ends = await EndsCache.of(source, FIRST_BYTES, LAST_BYTES, signal);
+  checkPrelude(await ends.read(0, Math.min(PRELUDE_BYTES, source.size), signal));
+  const { layout, problem } = await readLayout(ends, signal);
+  const head = await readHead(ends, layout, signal);
+  layout.checkStatic(head);
+  if (problem === null) {
+    layout.checkComplete(head);
+  }
+  for (let k = 0; k < layout.length; k++) {
+    const { tag } = layout.at(k).fields;
+    if (KNOWN_TAGS.has(tag) && tag !== 'HEAD') {
+      checkSize(layout.at(k), head, layout.frames, source.size);
+    }
+  }
+  const codec = options.codec ?? createCodec();
+  try {
+    const part = await readStatic(ends, layout, head, codec, signal);
+    const capture = new FileCapture(name, head, part, layout, ends, codec, coordinates, problem);
+    await capture.readTail(signal);
+    return capture;
+  } catch (error) {
+    codec.close();
+    throw error;
+  }
+}
+
+/** The sections; of a damaged file those that can be found from the front, and what is wrong. */
+async function readLayout(source: Source, signal?: AbortSignal): Promise<{ layout: Layout; problem: string | null }> {
+  try {
+    return { layout: await readContents(source, signal), problem: null };
+  } catch (error) {
+    if (!isDamage(error)) {
+      throw error;
+    }
+    return { layout: await scanSections(source, signal), problem: error.message };
+  }
+}
+
+async function readHead(source: Source, layout: Layout, signal?: AbortSignal): Promise<Head> {
+  const entry = layout.get('HEAD');
+  if (entry === undefined) {
+    throw damaged(layout.end, 'the section HEAD is missing');
+  }
+  checkHeadSection(entry);
+  const [{ payload }] = await readSections(source, [entry], signal);
+  return parseHead(decodePayload(entry, payload), entry.offset);
+}
+
+async function readStatic(
+  source: Source,
+  layout: Layout,
+  head: Head,
+  codec: Codec,
+  signal?: AbortSignal,
+): Promise<StaticPart> {
+  const entries = STATIC_TAGS.map((tag) => layout.get(tag)).filter((entry) => entry !== undefined);
+  entries.sort((a, b) => a.offset - b.offset);
+  const sections = await readSections(source, entries, signal);
+  return decodeStatic(head, new Map(sections.map((found) => [found.entry.fields.tag as StaticTag, found])), codec);
+}
+
+class FileCapture implements ContainerCapture {
+  static: StaticPart;
+  readonly frames: number;
+  readonly complete = true;
+  readonly events = new EventTarget();
+  errors: FrameErrors = NO_ERRORS;
+  frameNumbers: Float64Array | null = null;
+  private readonly cache: BlockCache;
+  private readonly blocks: BlockDecoder;
+
+  constructor(
+    readonly name: string,
+    readonly head: Head,
+    part: StaticPart,
+    private readonly layout: Layout,
+    private readonly source: Source,
+    private readonly codec: Codec,
+    coordinates: CoordinatesOf | null,
+    public problem: string | null,
+  ) {
+    this.static = part;
+    this.frames = layout.frames;
+    this.blocks = new BlockDecoder(part, codec, coordinates);
+    this.cache = new BlockCache((first, signal) => this.load(first, signal));
+  }
+
+  async block(frame: number, signal?: AbortSignal): Promise<FrameBlock> {
+    const chunk = frame >= 0 ? this.layout.chunkOf(frame) : undefined;
+    if (chunk === undefined) {
+      throw new RangeError(`The capture has ${this.frames} frames, so there is no frame ${frame}.`);
+    }
+    const { first, count } = chunk.frames.fields;
+    const block = await this.cache.get(first, signal);
+    // After the last comes the first one, as in a loop.
+    const next = first + count < this.frames ? first + count : 0;
+    if (next !== first) {
+      this.cache.prefetch(next);
+    }
+    return block;
+  }
+
+  container(): Promise<Source> {
+    return Promise.resolve(this.source);
+  }
+
+  close(): void {
+    this.cache.clear();
+    this.codec.close();
+  }
+
+  /** Reads errors, numbers and the report; what of them is damaged stays empty. */
+  async readTail(signal?: AbortSignal): Promise<void> {
+    await this.readOptional('ERRS', (section) => (this.errors = decodeErrors(section)), signal);
+    await this.readOptional('fnum', (section) => (this.frameNumbers = decodeFrameNumbers(section)), signal);
+    await this.readOptional(
+      'summ',
+      (section) => (this.static = { ...this.static, report: decodeReport(section) }),
+      signal,
+    );
+  }
+
+  private async readOptional(tag: string, take: (section: Section) => void, signal?: AbortSignal): Promise<void> {
+    const entry = this.layout.get(tag);
+    if (entry === undefined) {
+      return;
+    }
+    try {
+      const [section] = await readSections(this.source, [entry], signal);
+      take(section);
+    } catch (error) {
+      if (!isTolerable(error, tag)) {
+        throw error;
+      }
+      this.report(error);
+    }
+  }
+
+  private async load(first: number, signal: AbortSignal): Promise<FrameBlock> {
+    const { frames, residual } = this.layout.chunkOf(first)!;
+    try {
+      const sections = await this.readChunk({ frames, residual }, signal);
+      const { block, problem } = await this.blocks.decode(sections.frames, sections.residual, this.source.size, signal);
+      if (problem !== null) {
+        this.report(problem);
+      }
+      return block;
+    } catch (error) {
+      this.report(error);
+      throw error;
+    }
+  }
+
+  /** Reads the sections of a chunk; frames whose residual is damaged are read without it. */
+  private async readChunk(
+    { frames, residual }: Chunk,
+    signal: AbortSignal,
+  ): Promise<{ frames: Section; residual: Section | null }> {
+    const read = async (entries: Entry[]) => readSections(this.source, entries, signal);
+    if (residual === null) {
+      return { frames: (await read([frames]))[0], residual: null };
+    }
+    try {
+      const [first, second] = await read([residual, frames]);
+      return { frames: second, residual: first };
+    } catch (error) {
+      if (!isDamage(error)) {
+        throw error;
+      }
+      const [section] = await read([frames]);
+      this.report(error);
+      return { frames: section, residual: null };
+    }
+  }
+
+  /** Keeps what is wrong with the container, for those who look. */
+  private report(error: unknown): void {
+    if (error instanceof ContainerError && this.problem === null) {
+      this.problem = error.message;
+      this.events.dispatchEvent(new Event('change'));
+    }
+  }
+}

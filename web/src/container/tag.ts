@@ -1,0 +1,11 @@
+/** Tags of sections. */
+
+/** Tags of the sections that this reader knows. */
+export const KNOWN_TAGS: ReadonlySet<string> = new Set(
+  'HEAD RPTS RFAC CVTX CTRI ELEM FRAM resi ERRS fnum summ TOC_'.split(' '),
+);
+
+/** Whether a reader that does not know the section must refuse the file. */
+export function isRequired(tag: string): boolean {
+  return !/^[a-z]/.test(tag);
+}

@@ -1,0 +1,41 @@
+/** The sections after the frames: errors, numbers and the report. */
+
+import type { FrameErrors } from '../capture';
+import { decodePayload } from './codecs';
+import { damaged } from './error';
+import type { Section } from './meshes';
+
+export const NO_ERRORS: FrameErrors = { l2: new Float32Array(0), linf: new Float32Array(0) };
+
+/** `ERRS`: errors of all frames. */
+export function decodeErrors({ entry, payload }: Section): FrameErrors {
+  const pairs = new Float32Array(decodePayload(entry, payload).buffer);
+  const take = (place: number) => Float32Array.from({ length: pairs.length / 2 }, (_, k) => pairs[2 * k + place]);
+  return { l2: take(0), linf: take(1) };
+}
+
+/** `fnum`: the number of each frame where it comes from. */
+export function decodeFrameNumbers({ entry, payload }: Section): Float64Array {
+  const numbers = new Float64Array(decodePayload(entry, payload).buffer);
+  if (!numbers.every((x, k) => Number.isFinite(x) && (k === 0 || numbers[k - 1] < x))) {
+    throw damaged(entry.offset, 'the numbers of the frames do not ascend');
+  }
+  return numbers;
+}
+
+/** `summ`: figures about the encoding. */
+export function decodeReport({ entry, payload }: Section): Readonly<Record<string, unknown>> {
+  let report: unknown;
+  try {
+    report = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(decodePayload(entry, payload)));
+  } catch (error) {
+    if (error instanceof SyntaxError || error instanceof TypeError) {
+      throw damaged(entry.offset, 'the report cannot be read');
+    }
+    throw error;
+  }
+  if (typeof report !== 'object' || report === null || Array.isArray(report)) {
+    throw damaged(entry.offset, 'the report is not an object');
+  }
+  return report as Record<string, unknown>;
+}

@@ -1,0 +1,112 @@
+/** A camera that turns around a point. Lengths are in units of the rest pose's diagonal, angles in radians. */
+export interface CameraState {
+  readonly target: readonly [number, number, number];
+  /** Angle around the vertical axis: 0 looks from +z, a quarter turn from +x. */
+  readonly azimuth: number;
+  /** Angle above the horizon. */
+  readonly elevation: number;
+  readonly distance: number;
+}
+
+/** Vertical field of view in radians. */
+export const FIELD_OF_VIEW = 0.56;
+const STEEPEST = Math.PI / 2 - 0.01;
+const [NEAREST, FARTHEST] = [0.02, 60];
+/** How much larger than the box the picture is where it is framed. */
+const ROOM = 1.16;
+
+export const HOME: CameraState = { target: [0, 0, 0], azimuth: 0.5, elevation: 0.16, distance: 2.2 };
+
+/** Turns the camera around its target. */
+export function orbited(camera: CameraState, azimuth: number, elevation: number): CameraState {
+  const steep = Math.min(STEEPEST, Math.max(-STEEPEST, camera.elevation + elevation));
+  return { ...camera, azimuth: wrapped(camera.azimuth + azimuth), elevation: steep };
+}
+
+/** Comes nearer for factors below one. */
+export function zoomed(camera: CameraState, factor: number): CameraState {
+  return { ...camera, distance: Math.min(FARTHEST, Math.max(NEAREST, camera.distance * factor)) };
+}
+
+/** Moves target and camera in the plane of the picture, by fractions of the picture's height. */
+export function panned(camera: CameraState, right: number, up: number): CameraState {
+  const height = 2 * camera.distance * Math.tan(FIELD_OF_VIEW / 2);
+  const axes = axesOf(camera);
+  const move = (k: number) => camera.target[k] + height * (right * axes.right[k] + up * axes.up[k]);
+  return { ...camera, target: [move(0), move(1), move(2)] };
+}
+
+/** A box along the axes. */
+export interface Box {
+  readonly low: readonly [number, number, number];
+  readonly high: readonly [number, number, number];
+}
+
+/** Looks at a box so that it fits into the picture, whose width is `aspect` times its height, with some room around it. */
+export function framed(camera: CameraState, { low, high }: Box, aspect: number): CameraState {
+  const target = [0, 1, 2].map((k) => (low[k] + high[k]) / 2) as [number, number, number];
+  const { right, up, back } = axesOf(camera);
+  const slope = Math.tan(FIELD_OF_VIEW / 2) / ROOM;
+  let distance = NEAREST;
+  for (let corner = 0; corner < 8; corner++) {
+    const offset = [0, 1, 2].map((k) => (corner & (1 << k) ? high[k] : low[k]) - target[k]);
+    const along = (axis: readonly number[]) => offset[0] * axis[0] + offset[1] * axis[1] + offset[2] * axis[2];
+    const across = Math.max(Math.abs(along(up)), Math.abs(along(right)) / aspect);
+    distance = Math.max(distance, across / slope + along(back));
+  }
+  return { ...camera, target, distance: Math.min(FARTHEST, distance) };
+}
+
+/** Where the camera is. */
+export function eyeOf(camera: CameraState): [number, number, number] {
+  const { back } = axesOf(camera);
+  const at = (k: number) => camera.target[k] + camera.distance * back[k];
+  return [at(0), at(1), at(2)];
+}
+
+/** A camera between two others; goes the shorter way round. */
+export function blended(from: CameraState, to: CameraState, share: number): CameraState {
+  const mix = (a: number, b: number) => a + (b - a) * share;
+  return {
+    target: [0, 1, 2].map((k) => mix(from.target[k], to.target[k])) as [number, number, number],
+    azimuth: wrapped(from.azimuth + wrapped(to.azimuth - from.azimuth) * share),
+    elevation: mix(from.elevation, to.elevation),
+    distance: Math.exp(mix(Math.log(from.distance), Math.log(to.distance))),
+  };
+}
+
+/** Whether nobody sees the difference between two cameras. */
+export function nearlySame(a: CameraState, b: CameraState): boolean {
+  const far = Math.max(...a.target.map((value, k) => Math.abs(value - b.target[k]))) / b.distance;
+  const turned = Math.max(Math.abs(wrapped(a.azimuth - b.azimuth)), Math.abs(a.elevation - b.elevation));
+  return far < 2e-4 && turned < 2e-4 && Math.abs(Math.log(a.distance / b.distance)) < 2e-4;
+}
+
+/** The camera as text for links: angles in degrees, distance, target. */
+export function cameraText(camera: CameraState): string {
+  const degrees = [camera.azimuth, camera.elevation].map((angle) => rounded((angle * 180) / Math.PI, 1));
+  return [...degrees, ...[camera.distance, ...camera.target].map((value) => rounded(value, 3))].join(',');
+}
+
+/** Reads {@link cameraText}; null where it is not one. */
+export function cameraFromText(text: string | null): CameraState | null {
+  if (text === null || text.length > 200) return null;
+  const values = text.split(',').map((part) => (part.trim() === '' ? NaN : Number(part)));
+  if (values.length !== 6 || !values.every((value) => Number.isFinite(value) && Math.abs(value) < 1e6)) return null;
+  const [azimuth, elevation, distance, x, y, z] = values;
+  const camera: CameraState = { target: [x, y, z], azimuth: 0, elevation: 0, distance: 1 };
+  return zoomed(orbited(camera, (azimuth * Math.PI) / 180, (elevation * Math.PI) / 180), distance);
+}
+
+function axesOf({ azimuth, elevation }: CameraState) {
+  const [sa, ca, se, ce] = [Math.sin(azimuth), Math.cos(azimuth), Math.sin(elevation), Math.cos(elevation)];
+  return { right: [ca, 0, -sa], up: [-se * sa, ce, -se * ca], back: [ce * sa, se, ce * ca] };
+}
+
+function wrapped(angle: number): number {
+  return angle - 2 * Math.PI * Math.round(angle / (2 * Math.PI));
+}
+
+function rounded(value: number, digits: number): number {
+  return Number(value.toFixed(digits));
+}

@@ -1,0 +1,66 @@
+import {
+  DataArrayTexture,
+  DataTexture,
+  FloatType,
+  RedFormat,
+  RGBAFormat,
+  RGBAIntegerFormat,
+  RGIntegerFormat,
+  ShortType,
+  UnsignedIntType,
+} from 'three';
+import type { PhiLayout } from './packing';
+import { WIDTH } from './packing';
+import { FAN_WIDTH } from './decodeShaders';
+import type { Surface } from './surface';
+
+/** Φ as it was packed, 16-bit integers or full floats. */
+export function phiTexture(texels: Int16Array | Float32Array, layout: PhiLayout): DataArrayTexture {
+  const texture = new DataArrayTexture(texels, WIDTH, layout.height, layout.layers);
+  texture.format = texels instanceof Int16Array ? RGBAIntegerFormat : RGBAFormat;
+  texture.type = texels instanceof Int16Array ? ShortType : FloatType;
+  if (texels instanceof Int16Array) texture.internalFormat = 'RGBA16I';
+  texture.needsUpdate = true;
+  return texture;
+}
+
+/** Four floats per texel, `data` when it is not empty. */
+export function floatTexture(data: Float32Array, width: number, height: number): DataTexture {
+  const texture = new DataTexture(data, width, height, RGBAFormat, FloatType);
+  texture.needsUpdate = true;
+  return texture;
+}
+
+/** One float per point, in the arrangement of all textures that hold something for each point. */
+export function pointValueTexture(values: Float32Array, bands: number): DataTexture {
+  const data = new Float32Array(WIDTH * bands);
+  data.set(values.subarray(0, data.length));
+  const texture = new DataTexture(data, WIDTH, bands, RedFormat, FloatType);
+  texture.needsUpdate = true;
+  return texture;
+}
+
+/** The triangles around each point: where they begin and how many, and the list of their other corners. */
+export function fanTextures(
+  surface: Surface,
+  bands: number,
+  limit: number,
+): { starts: DataTexture; fans: DataTexture } {
+  const points = surface.fanStarts.length - 1;
+  const ranges = new Uint32Array(2 * WIDTH * bands);
+  for (let p = 0; p < points; p++) {
+    ranges[2 * p] = surface.fanStarts[p];
+    ranges[2 * p + 1] = surface.fanStarts[p + 1] - surface.fanStarts[p];
+  }
+  const height = Math.max(1, Math.ceil(surface.fans.length / (2 * FAN_WIDTH)));
+  if (height > limit) throw new Error('The model has more faces than this device can draw; open it on another device.');
+  const padded = new Uint32Array(2 * FAN_WIDTH * height);
+  padded.set(surface.fans);
+  return { starts: pairTexture(ranges, WIDTH, bands), fans: pairTexture(padded, FAN_WIDTH, height) };
+}
+
+function pairTexture(data: Uint32Array<ArrayBuffer>, width: number, height: number): DataTexture {
+  const texture = new DataTexture(data, width, height, RGIntegerFormat, UnsignedIntType);
+  texture.needsUpdate = true;
+  return texture;
+}

@@ -1,0 +1,300 @@
+import {
+  BufferAttribute,
+  BufferGeometry,
+  Camera,
+  FloatType,
+  GLSL3,
+  HalfFloatType,
+  Mesh,
+  NearestFilter,
+  NoBlending,
+  RawShaderMaterial,
+  RGBAFormat,
+  Vector2,
+  Vector3,
+  WebGLRenderTarget,
+  type DataArrayTexture,
+  type DataTexture,
+  type IUniform,
+  type Texture,
+  type WebGLRenderer,
+} from 'three';
+import type { StaticPart } from '../capture';
+import { columnsOf } from '../coordinates/compute';
+import { TiedNormals } from '../coordinates/tiedNormals';
+import { diagonalOf } from '../coordinates/topology';
+import { fanTextures, floatTexture, phiTexture } from './dataTextures';
+import { coverVertexShader, normalShader, positionShader } from './decodeShaders';
+import { cageSize, layoutOf, meanOf, packPhi, WIDTH, type PhiLayout } from './packing';
+import type { Surface } from './surface';
+
+/** What is added to the positions of a frame by a residual layer: x y z and one unused number of each point. */
+export type Offsets = Float32Array | null;
+
+/** A frame, or something between two frames. */
+export interface Pose {
+  /** Rows that Φ multiplies, `rowsPerFrame × 3`. */
+  readonly rows: Float32Array | Float64Array;
+  /** Offsets of the frames before and after, and how much the latter counts. */
+  readonly before: Offsets;
+  readonly after: Offsets;
+  readonly mix: number;
+}
+
+/**
+ * Decodes frames on the graphics processor: one pass multiplies Φ by a cage and writes positions into a texture, a second one writes normals.
+ *
+ * The textures are in units of the rest pose's diagonal, relative to the middle of its bounding box; {@link place} converts.
+ */
+export class Decoder {
+  /** Bits of an entry of Φ, and what rounding to them moves a point by at the most, in fractions of the diagonal. */
+  precision = { bits: 32, error: 0 };
+  readonly columns: number;
+  readonly points: number;
+  /** Length of the rest pose's diagonal, in the capture's unit. */
+  readonly diagonal: number;
+  /** Middle of the rest pose's bounding box. */
+  readonly centre: readonly [number, number, number];
+  private readonly layout: PhiLayout;
+  private readonly tiedNormals: TiedNormals | null;
+  private readonly values: Float64Array;
+  private readonly cageTexture: DataTexture;
+  private readonly offsetTextures: readonly [DataTexture, DataTexture];
+  private readonly shownOffsets: [Offsets, Offsets] = [null, null];
+  private readonly positionTarget: WebGLRenderTarget;
+  private readonly normalTarget: WebGLRenderTarget;
+  private readonly positionUniforms;
+  private positionPass: Pass | null = null;
+  private readonly normalPass: Pass;
+  private motionTarget: WebGLRenderTarget | null = null;
+  private phi: DataArrayTexture | null = null;
+  private isDisposed = false;
+
+  constructor(
+    private readonly renderer: WebGLRenderer,
+    private readonly capture: StaticPart,
+    surface: Surface,
+  ) {
+    const gl = renderer.getContext() as WebGL2RenderingContext;
+    const limits = {
+      size: gl.getParameter(gl.MAX_TEXTURE_SIZE) as number,
+      layers: gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS) as number,
+    };
+    this.points = capture.rest.length / 3;
+    this.columns = columnsOf(capture.system, capture.cage);
+    this.diagonal = diagonalOf(capture.rest) || 1;
+    this.centre = middleOf(capture.rest);
+    this.layout = layoutOf(this.points, this.columns, limits);
+    this.tiedNormals = capture.system === 'green' ? new TiedNormals(capture.cage) : null;
+    this.values = new Float64Array(3 * this.columns);
+    this.cageTexture = floatTexture(new Float32Array(12 * this.layout.blocks), this.layout.blocks, 3);
+    const { bands } = this.layout;
+    const offsetsOf = () => floatTexture(new Float32Array(4 * WIDTH * bands), WIDTH, bands);
+    this.offsetTextures = [offsetsOf(), offsetsOf()];
+    this.positionTarget = target(bands, FloatType);
+    this.normalTarget = target(bands, HalfFloatType);
+    this.positionUniforms = {
+      phi: { value: null as DataArrayTexture | null },
+      scale: { value: 1 },
+      cage: { value: this.cageTexture },
+      offsetsBefore: { value: this.offsetTextures[0] },
+      offsetsAfter: { value: this.offsetTextures[1] },
+      offsetWeights: { value: new Vector2() },
+      origin: { value: new Vector3() },
+      blocks: { value: this.layout.blocks },
+      bandsPerLayer: { value: this.layout.bandsPerLayer },
+    };
+    const fans = fanTextures(surface, bands, limits.size);
+    this.normalPass = new Pass(normalShader, {
+      positions: { value: this.positions },
+      fanStarts: { value: fans.starts },
+      fans: { value: fans.fans },
+    });
+  }
+
+  /** Position of point i in texel (i mod WIDTH, ⌊i / WIDTH⌋). */
+  get positions(): Texture {
+    return this.positionTarget.texture;
+  }
+
+  /** Unit normals, as {@link positions}. */
+  get normals(): Texture {
+    return this.normalTarget.texture;
+  }
+
+  get bands(): number {
+    return this.layout.bands;
+  }
+
+  get ready(): boolean {
+    return this.phi !== null;
+  }
+
+  /** Takes Φ, points × columns. */
+  async setPhi(phi: Float32Array): Promise<void> {
+    if (phi.length !== this.points * this.columns) {
+      throw new Error('The coordinates are not those of this model and cage; reload the page.');
+    }
+    const packed = await packPhi(phi, this.columns, cageSize(this.capture), this.layout);
+    if (this.isDisposed) return;
+    const compact = packed.texels instanceof Int16Array;
+    this.phi?.dispose();
+    this.phi = phiTexture(packed.texels, this.layout);
+    this.precision = { bits: compact ? 16 : 32, error: packed.error };
+    this.positionUniforms.phi.value = this.phi;
+    this.positionUniforms.scale.value = compact ? packed.scale / 32767 ** 2 : 1;
+    this.positionPass = new Pass(positionShader(compact), this.positionUniforms);
+  }
+
+  /** Converts a point of the capture, in its unit, to the unit of the textures; all three axes in place. */
+  place(positions: Float32Array) {
+    for (let k = 0; k < positions.length; k++) positions[k] = (positions[k] - this.centre[k % 3]) / this.diagonal;
+  }
+
+  /** Computes positions and normals of a pose. Does nothing before Φ is there. */
+  decode(pose: Pose) {
+    if (!this.positionPass) return;
+    this.fillColumns(pose.rows, this.values);
+    this.uploadCage(this.centre);
+    this.setOffsets(pose, 1 - pose.mix, pose.mix);
+    const shown = this.renderer.getRenderTarget();
+    this.positionPass.render(this.renderer, this.positionTarget);
+    this.normalPass.render(this.renderer, this.normalTarget);
+    this.renderer.setRenderTarget(shown);
+  }
+
+  /** Computes how far each point moves from one frame to the next, into a texture like {@link positions}; null before Φ is there. */
+  decodeMotion(
+    pose: Pick<Pose, 'before' | 'after'>,
+    rowsBefore: Float32Array,
+    rowsAfter: Float32Array,
+  ): Texture | null {
+    if (!this.positionPass) return null;
+    this.motionTarget ??= target(this.bands, FloatType);
+    const earlier = new Float64Array(this.values.length);
+    this.fillColumns(rowsBefore, earlier);
+    this.fillColumns(rowsAfter, this.values);
+    for (let k = 0; k < earlier.length; k++) this.values[k] -= earlier[k];
+    this.uploadCage([0, 0, 0]);
+    this.setOffsets(pose, -1, 1);
+    const shown = this.renderer.getRenderTarget();
+    this.positionPass.render(this.renderer, this.motionTarget);
+    this.renderer.setRenderTarget(shown);
+    return this.motionTarget.texture;
+  }
+
+  /** Positions of the pose that was decoded last, x y z of each point in the capture's unit. Waits for the graphics processor. */
+  readPositions(): Float32Array {
+    const texels = new Float32Array(4 * WIDTH * this.bands);
+    this.renderer.readRenderTargetPixels(this.positionTarget, 0, 0, WIDTH, this.bands, texels);
+    const positions = new Float32Array(3 * this.points);
+    for (let p = 0; p < this.points; p++) {
+      for (let k = 0; k < 3; k++) positions[3 * p + k] = texels[4 * p + k] * this.diagonal + this.centre[k];
+    }
+    return positions;
+  }
+
+  dispose() {
+    this.isDisposed = true;
+    this.phi?.dispose();
+    for (const texture of [this.cageTexture, ...this.offsetTextures]) texture.dispose();
+    this.positionTarget.dispose();
+    this.normalTarget.dispose();
+    this.motionTarget?.dispose();
+    this.positionPass?.dispose();
+    this.normalPass.dispose();
+  }
+
+  /** Rows of a frame and, for `green`, the normals that follow from them: what the columns of Φ multiply. */
+  private fillColumns(rows: Float32Array | Float64Array, values: Float64Array) {
+    values.set(rows);
+    this.tiedNormals?.write(rows, values, this.capture.cage.positions.length);
+  }
+
+  /** Uploads the values of all columns, those of vertices relative to their mean, and that mean relative to `zero`. */
+  private uploadCage(zero: readonly [number, number, number]) {
+    const { values, diagonal } = this;
+    const vertices = this.capture.cage.positions.length / 3;
+    const mean = meanOf(values, vertices);
+    const texels = this.cageTexture.image.data as unknown as Float32Array;
+    for (let column = 0; column < this.columns; column++) {
+      for (let k = 0; k < 3; k++) {
+        const value = values[3 * column + k] - (column < vertices ? mean[k] : 0);
+        texels[4 * this.layout.blocks * k + column] = value / diagonal;
+      }
+    }
+    this.cageTexture.needsUpdate = true;
+    const [x, y, z] = [0, 1, 2].map((k) => (mean[k] - zero[k]) / diagonal);
+    this.positionUniforms.origin.value.set(x, y, z);
+  }
+
+  private setOffsets({ before, after }: Pick<Pose, 'before' | 'after'>, weightBefore: number, weightAfter: number) {
+    this.uploadOffsets(0, before);
+    this.uploadOffsets(1, after);
+    const weights = this.positionUniforms.offsetWeights.value;
+    weights.set(before ? weightBefore / this.diagonal : 0, after ? weightAfter / this.diagonal : 0);
+  }
+
+  private uploadOffsets(which: 0 | 1, offsets: Offsets) {
+    if (!offsets || this.shownOffsets[which] === offsets) return;
+    this.shownOffsets[which] = offsets;
+    (this.offsetTextures[which].image.data as unknown as Float32Array).set(offsets);
+    this.offsetTextures[which].needsUpdate = true;
+  }
+}
+
+/** A fragment shader that runs once for every texel of a target. */
+class Pass {
+  readonly uniforms: Record<string, IUniform>;
+  private readonly mesh: Mesh<BufferGeometry, RawShaderMaterial>;
+  private readonly camera = new Camera();
+
+  constructor(fragmentShader: string, uniforms: Record<string, IUniform>) {
+    this.uniforms = uniforms;
+    const material = new RawShaderMaterial({
+      glslVersion: GLSL3,
+      vertexShader: coverVertexShader,
+      fragmentShader,
+      uniforms,
+      depthTest: false,
+      depthWrite: false,
+      blending: NoBlending,
+    });
+    this.mesh = new Mesh(new BufferGeometry().setIndex(new BufferAttribute(Uint32Array.of(0, 1, 2), 1)), material);
+    this.mesh.frustumCulled = false;
+  }
+
+  render(renderer: WebGLRenderer, into: WebGLRenderTarget) {
+    renderer.setRenderTarget(into);
+    renderer.render(this.mesh, this.camera);
+  }
+
+  dispose() {
+    for (const { value } of Object.values(this.uniforms)) (value as Partial<Texture> | null)?.dispose?.();
+    this.mesh.geometry.dispose();
+    this.mesh.material.dispose();
+  }
+}
+
+function target(bands: number, type: typeof FloatType | typeof HalfFloatType): WebGLRenderTarget {
+  return new WebGLRenderTarget(WIDTH, bands, {
+    type,
+    format: RGBAFormat,
+    minFilter: NearestFilter,
+    magFilter: NearestFilter,
+    depthBuffer: false,
+  });
+}
+
+function middleOf(positions: Float64Array): [number, number, number] {
+  const middle: [number, number, number] = [0, 0, 0];
+  for (let axis = 0; axis < 3; axis++) {
+    let [low, high] = [Infinity, -Infinity];
+    for (let k = axis; k < positions.length; k += 3) {
+      low = Math.min(low, positions[k]);
+      high = Math.max(high, positions[k]);
+    }
+    if (high >= low) middle[axis] = low / 2 + high / 2;
+  }
+  return middle;
+}

@@ -1,0 +1,134 @@
+import {
+  Camera,
+  Color,
+  LinearFilter,
+  Matrix3,
+  Mesh,
+  NoBlending,
+  RGBAFormat,
+  UnsignedByteType,
+  Vector2,
+  Vector3,
+  WebGLRenderTarget,
+  type Texture,
+  type WebGLRenderer,
+} from 'three';
+import { coverVertexShader } from './decodeShaders';
+import { numberedGeometry, shaderMaterial } from './materials';
+import {
+  blurShader,
+  groundFragmentShader,
+  groundVertexShader,
+  shadowFragmentShader,
+  shadowVertexShader,
+} from './sceneShaders';
+
+/** Texels along a side of the shadow. */
+const SHADOW_SIZE = 160;
+/** Half the side of the square that the shadow covers, and the height up to which something casts one, in diagonals. */
+const [SHADOW_REACH, SHADOW_HEIGHT] = [0.8, 0.9];
+
+/** The ground: a grid that fades with the distance, and the model's soft shadow on it. */
+export class Ground {
+  readonly mesh: Mesh;
+  readonly middle = new Vector3(0, -0.5, 0);
+  private readonly ink = { value: new Color() };
+  private readonly strength = { value: 0.5 };
+  private readonly sharp = shadowTarget();
+  private readonly soft = shadowTarget();
+  private readonly caster: Mesh;
+  private readonly blur: Mesh;
+  private readonly source: { value: Texture | null } = { value: null };
+  private readonly way = { value: new Vector2() };
+  private readonly turn = { value: new Matrix3() };
+  private readonly eye = new Camera();
+
+  constructor(positions: Texture, triangles: Uint32Array) {
+    this.mesh = new Mesh(
+      numberedGeometry(Uint32Array.of(0, 1, 2, 2, 1, 3)),
+      shaderMaterial(
+        groundVertexShader,
+        groundFragmentShader,
+        {
+          middle: { value: this.middle },
+          reach: { value: 4 },
+          cell: { value: 0.1 },
+          ink: this.ink,
+          grid: { value: true },
+          shadow: { value: this.sharp.texture },
+          shadowReach: { value: SHADOW_REACH },
+          shadowStrength: this.strength,
+        },
+        { transparent: true, depthWrite: false },
+      ),
+    );
+    const casting = {
+      positions: { value: positions },
+      turn: this.turn,
+      middle: { value: this.middle },
+      reach: { value: SHADOW_REACH },
+      height: { value: SHADOW_HEIGHT },
+    };
+    this.caster = new Mesh(
+      numberedGeometry(triangles),
+      shaderMaterial(shadowVertexShader, shadowFragmentShader, casting),
+    );
+    this.blur = new Mesh(
+      numberedGeometry(Uint32Array.of(0, 1, 2)),
+      shaderMaterial(
+        coverVertexShader,
+        blurShader,
+        { source: this.source, way: this.way },
+        { depthTest: false, depthWrite: false, blending: NoBlending },
+      ),
+    );
+    for (const mesh of [this.mesh, this.caster, this.blur]) mesh.frustumCulled = false;
+  }
+
+  setColors(ink: Color, shadowStrength: number) {
+    this.ink.value.copy(ink).convertLinearToSRGB();
+    this.strength.value = shadowStrength;
+  }
+
+  /** Draws the shadow of the model as it is now; `turn` takes the model's axes to the scene's. */
+  castShadow(renderer: WebGLRenderer, turn: Matrix3) {
+    this.turn.value.copy(turn);
+    const clear = renderer.getClearColor(new Color());
+    renderer.setClearColor(0x000000, 1);
+    renderer.setRenderTarget(this.sharp);
+    renderer.clear();
+    renderer.render(this.caster, this.eye);
+    for (const spread of [0.55, 1.3]) {
+      this.pass(renderer, this.sharp, this.soft, spread, 0);
+      this.pass(renderer, this.soft, this.sharp, 0, spread);
+    }
+    renderer.setRenderTarget(null);
+    renderer.setClearColor(clear);
+  }
+
+  dispose() {
+    this.sharp.dispose();
+    this.soft.dispose();
+    for (const mesh of [this.mesh, this.caster, this.blur]) {
+      mesh.geometry.dispose();
+      (mesh.material as { dispose(): void }).dispose();
+    }
+  }
+
+  private pass(renderer: WebGLRenderer, from: WebGLRenderTarget, to: WebGLRenderTarget, x: number, y: number) {
+    this.source.value = from.texture;
+    this.way.value.set(x, y);
+    renderer.setRenderTarget(to);
+    renderer.render(this.blur, this.eye);
+  }
+}
+
+function shadowTarget(): WebGLRenderTarget {
+  return new WebGLRenderTarget(SHADOW_SIZE, SHADOW_SIZE, {
+    format: RGBAFormat,
+    type: UnsignedByteType,
+    minFilter: LinearFilter,
+    magFilter: LinearFilter,
+    depthBuffer: true,
+  });
+}

@@ -1,0 +1,66 @@
+import {
+  BufferAttribute,
+  BufferGeometry,
+  Color,
+  DataTexture,
+  DoubleSide,
+  GLSL3,
+  LinearFilter,
+  RawShaderMaterial,
+  RGBAFormat,
+  UnsignedByteType,
+  Vector3,
+  Vector4,
+  type IUniform,
+  type ShaderMaterialParameters,
+} from 'three';
+import { heatTexels } from './colorMap';
+
+/** A material of our own shaders. */
+export function shaderMaterial(
+  vertexShader: string,
+  fragmentShader: string,
+  uniforms: Record<string, IUniform>,
+  parameters: ShaderMaterialParameters = {},
+): RawShaderMaterial {
+  return new RawShaderMaterial({
+    glslVersion: GLSL3,
+    vertexShader,
+    fragmentShader,
+    uniforms,
+    side: DoubleSide,
+    ...parameters,
+  });
+}
+
+/** A geometry of numbers alone: the vertex shader looks up what belongs to them. */
+export function numberedGeometry(index: Uint32Array): BufferGeometry {
+  return new BufferGeometry().setIndex(new BufferAttribute(index, 1));
+}
+
+/** Uniforms that everything drawn at points of the model shares. */
+export function modelUniforms() {
+  return {
+    positions: { value: null },
+    normals: { value: null },
+    heat: { value: null },
+    heatScale: { value: 1 },
+    heatShare: { value: 0 },
+    heatColors: { value: heatTexture() },
+    color: { value: new Color() },
+    skyDirection: { value: new Vector3(0, 1, 0) },
+  } satisfies Record<string, IUniform>;
+}
+
+/** An sRGB colour with opacity, as our shaders for lines and dots want it. */
+export function ink(color: Color, opacity: number): Vector4 {
+  const { r, g, b } = color.clone().convertLinearToSRGB();
+  return new Vector4(r, g, b, opacity);
+}
+
+function heatTexture(): DataTexture {
+  const texture = new DataTexture(heatTexels(256), 256, 1, RGBAFormat, UnsignedByteType);
+  texture.minFilter = texture.magFilter = LinearFilter;
+  texture.needsUpdate = true;
+  return texture;
+}

@@ -1,0 +1,97 @@
+import { Group, LineSegments, Mesh, Points, type Color, type DataTexture, type Texture, type Vector3 } from 'three';
+import { pointValueTexture } from './dataTextures';
+import type { Decoder } from './decoder';
+import { ink, modelUniforms, numberedGeometry, shaderMaterial } from './materials';
+import { inkFragmentShader, modelFragmentShader, modelVertexShader } from './sceneShaders';
+import type { Surface } from './surface';
+
+/** The model as surface, wireframe, points and handles, all placed by the decoder's textures. */
+export class ModelView {
+  readonly group = new Group();
+  readonly surface: Mesh;
+  readonly wireframe: LineSegments;
+  readonly points: Points;
+  readonly handles: Points;
+  private readonly uniforms = modelUniforms();
+  private readonly cloudSize = { value: 1 };
+  private readonly wireInk = { value: ink(this.uniforms.color.value, 0.5) };
+  private readonly handleInk = { value: ink(this.uniforms.color.value, 1) };
+  private readonly handleSize = { value: 1 };
+  private heat: DataTexture | null = null;
+
+  constructor(
+    private readonly decoder: Decoder,
+    surface: Surface,
+  ) {
+    const uniforms = this.uniforms as Record<string, { value: unknown }>;
+    uniforms.positions.value = decoder.positions satisfies Texture;
+    uniforms.normals.value = decoder.normals;
+    const all = Uint32Array.from({ length: decoder.points }, (_, p) => p);
+    const still = { towards: { value: 0 }, asPoints: { value: false }, pointSize: { value: 1 } };
+    const shaded = (own: Record<string, { value: unknown }>) =>
+      shaderMaterial(modelVertexShader, modelFragmentShader, { ...uniforms, ...still, ...own });
+    const drawn = (own: Record<string, { value: unknown }>) =>
+      shaderMaterial(
+        modelVertexShader,
+        inkFragmentShader,
+        { ...uniforms, ...still, ...own },
+        { transparent: true, depthWrite: false },
+      );
+    this.surface = new Mesh(numberedGeometry(surface.triangles), shaded({}));
+    this.wireframe = new LineSegments(
+      numberedGeometry(surface.edges),
+      drawn({ towards: { value: 0.0012 }, ink: this.wireInk }),
+    );
+    this.points = new Points(numberedGeometry(all), shaded({ asPoints: { value: true }, pointSize: this.cloudSize }));
+    this.handles = new Points(
+      numberedGeometry(new Uint32Array(0)),
+      drawn({ towards: { value: 0.004 }, asPoints: { value: true }, pointSize: this.handleSize, ink: this.handleInk }),
+    );
+    this.group.add(this.surface, this.points, this.wireframe, this.handles);
+    for (const object of this.group.children) object.frustumCulled = false;
+  }
+
+  setHandles(handles: Uint32Array) {
+    this.handles.geometry.dispose();
+    this.handles.geometry = numberedGeometry(handles.filter((point) => point < this.decoder.points));
+  }
+
+  /**
+   * Colours the model by a value of each point, from 0 to `largest`: numbers, or a texture whose vectors have these lengths. Null for its own
+   * colour.
+   */
+  setHeat(values: Float32Array | Texture | null, largest: number) {
+    this.heat?.dispose();
+    this.heat = values instanceof Float32Array ? pointValueTexture(values, this.decoder.bands) : null;
+    (this.uniforms.heat as { value: unknown }).value = this.heat ?? values;
+    this.uniforms.heatScale.value = largest > 0 ? 1 / largest : 0;
+    this.uniforms.heatShare.value = values ? 1 : 0;
+  }
+
+  setColors(model: Color, wire: Color, wireOpacity: number, handle: Color) {
+    this.uniforms.color.value.copy(model);
+    this.wireInk.value = ink(wire, wireOpacity);
+    this.handleInk.value = ink(handle, 0.95);
+  }
+
+  /** Sizes in pixels of the picture: of a point one diagonal away that is as large as the distance between points, and of a handle one away. */
+  setSizes(pixelsPerUnit: number, pixelRatio: number) {
+    const spacing = 1.1 / Math.sqrt(Math.max(1, this.decoder.points));
+    this.cloudSize.value = Math.min(0.02, spacing) * pixelsPerUnit;
+    this.handleSize.value = 0.0085 * pixelsPerUnit + pixelRatio;
+  }
+
+  /** The vertical axis, in the camera's space. */
+  setSky(direction: Vector3) {
+    this.uniforms.skyDirection.value.copy(direction);
+  }
+
+  dispose() {
+    for (const object of [this.surface, this.wireframe, this.points, this.handles]) {
+      object.geometry.dispose();
+      (object.material as { dispose(): void }).dispose();
+    }
+    this.uniforms.heatColors.value.dispose();
+    this.heat?.dispose();
+  }
+}

@@ -1,0 +1,313 @@
+import { Color, Group, Matrix3, Matrix4, Mesh, PerspectiveCamera, Scene, Vector2, Vector3, WebGLRenderer } from 'three';
+import type { StaticPart } from '../capture';
+import { CageView } from './cageView';
+import { eyeOf, FIELD_OF_VIEW, type Box, type CameraState } from './camera';
+import { coverVertexShader } from './decodeShaders';
+import { Decoder, type Pose } from './decoder';
+import { Ground } from './ground';
+import { numberedGeometry, shaderMaterial } from './materials';
+import { ModelView } from './modelView';
+import { backdropShader } from './sceneShaders';
+import { surfaceOf } from './surface';
+
+/** What is drawn. */
+export interface Layers {
+  readonly model: boolean;
+  readonly wireframe: boolean;
+  readonly points: boolean;
+  readonly cage: boolean;
+  readonly handles: boolean;
+  readonly ground: boolean;
+}
+
+/** Colours of the picture, as CSS colours in sRGB. */
+export interface StageColors {
+  readonly top: string;
+  readonly bottom: string;
+  readonly model: string;
+  readonly wire: string;
+  readonly cage: string;
+  readonly handle: string;
+  readonly grid: string;
+  readonly shadow: number;
+}
+
+/** CSS pixels of the canvas that something lies above. */
+export interface Covered {
+  readonly right: number;
+  readonly bottom: number;
+}
+
+/** Pictures that may show the same shadow where they must come fast. */
+const SHADOW_EVERY = 6;
+
+/** Turns the model's axes to the scene's, whose y is up. */
+const UPRIGHT = { y: new Matrix4(), z: new Matrix4().makeRotationX(-Math.PI / 2) } as const;
+
+/** Draws one capture on a canvas: model, cage, ground and backdrop. Lengths in the scene are in units of the rest pose's diagonal. */
+export class Stage {
+  readonly decoder: Decoder;
+  private readonly renderer: WebGLRenderer;
+  private readonly scene = new Scene();
+  private readonly camera = new PerspectiveCamera((FIELD_OF_VIEW * 180) / Math.PI, 1, 0.01, 100);
+  private readonly upright = new Group();
+  private readonly model: ModelView;
+  private readonly cage: CageView;
+  private readonly ground: Ground;
+  private readonly backdrop: Mesh;
+  private readonly backdropColors = {
+    top: { value: new Color() },
+    bottom: { value: new Color() },
+    size: { value: new Vector2() },
+  };
+  private readonly hasFaces: boolean;
+  /** Vertices of the cage as it is shown, x y z each, in diagonals and in the model's axes. */
+  readonly cageVertices: Float32Array;
+  private size = '';
+  private shadowIsOld = true;
+  private picturesWithShadow = 0;
+  private pose: Pose | null = null;
+  private grounded = false;
+  private up: 'y' | 'z' = 'y';
+  /** The lowest vertex of the cage in all frames that are known, along either axis, and how far above it the model's lowest point is. */
+  private readonly lowest = { y: Infinity, z: Infinity };
+  private soleAboveCage = 0;
+
+  /** Throws one sentence for a person where the browser or the device cannot draw this. */
+  constructor(
+    readonly canvas: HTMLCanvasElement,
+    capture: StaticPart,
+  ) {
+    this.renderer = createRenderer(canvas);
+    if (!this.renderer.extensions.has('EXT_color_buffer_float')) {
+      this.renderer.dispose();
+      throw new Error(
+        'This device cannot compute in floating point on its graphics processor; open the capture on another one.',
+      );
+    }
+    const surface = surfaceOf(capture);
+    this.hasFaces = surface.triangles.length > 0;
+    this.decoder = new Decoder(this.renderer, capture, surface);
+    this.model = new ModelView(this.decoder, surface);
+    this.cage = new CageView(capture.cage);
+    this.ground = new Ground(this.decoder.positions, surface.triangles);
+    this.backdrop = new Mesh(
+      numberedGeometry(Uint32Array.of(0, 1, 2)),
+      shaderMaterial(coverVertexShader, backdropShader, this.backdropColors, { depthTest: false, depthWrite: false }),
+    );
+    this.backdrop.frustumCulled = false;
+    this.cageVertices = new Float32Array(capture.cage.positions.length);
+    this.upright.matrixAutoUpdate = false;
+    this.upright.add(this.model.group, this.cage.group);
+    this.scene.add(this.backdrop, this.upright, this.ground.mesh);
+    this.showCage(capture.cage.positions);
+    this.putGroundBelow(this.cageVertices);
+    canvas.addEventListener('webglcontextrestored', () => this.setPose(this.pose));
+  }
+
+  /** Takes what is in diagonals and in the model's axes to the clip space of the picture that was drawn last. */
+  get clipMatrix(): Matrix4 {
+    const { projectionMatrix, matrixWorldInverse } = this.camera;
+    return new Matrix4().multiplyMatrices(projectionMatrix, matrixWorldInverse).multiply(this.upright.matrix);
+  }
+
+  /** Whether edges need a finer picture to look smooth. */
+  get isJagged(): boolean {
+    return !this.renderer.getContext().getContextAttributes()?.antialias;
+  }
+
+  setUp(axis: 'y' | 'z') {
+    this.up = axis;
+    this.upright.matrix.copy(UPRIGHT[axis]);
+    this.upright.matrixWorldNeedsUpdate = true;
+    this.grounded = false;
+    this.setPose(this.pose);
+    if (!this.decoder.ready) this.putGroundBelow(this.cageVertices);
+  }
+
+  /** Takes note of frames that have come: the ground is below all of them. Rows are those of frames one after another, `rowsPerFrame` each. */
+  include(cages: Float32Array, rowsPerFrame: number) {
+    const { diagonal, centre } = this.decoder;
+    for (let first = 0; first < cages.length; first += 3 * rowsPerFrame) {
+      for (let k = first; k < first + this.cageVertices.length; k += 3) {
+        this.lowest.y = Math.min(this.lowest.y, (cages[k + 1] - centre[1]) / diagonal);
+        this.lowest.z = Math.min(this.lowest.z, (cages[k + 2] - centre[2]) / diagonal);
+      }
+    }
+    this.lowerGround();
+  }
+
+  setLayers(layers: Layers) {
+    const { ready } = this.decoder;
+    this.model.surface.visible = ready && layers.model && this.hasFaces;
+    this.model.wireframe.visible = ready && layers.wireframe;
+    this.model.points.visible = ready && (layers.points || (layers.model && !this.hasFaces));
+    this.model.handles.visible = ready && layers.handles;
+    // Until the model is there, the cage stands for it.
+    this.cage.group.visible = layers.cage || !ready;
+    this.ground.mesh.visible = layers.ground;
+  }
+
+  setColors(colors: StageColors) {
+    this.backdropColors.top.value.set(colors.top).convertLinearToSRGB();
+    this.backdropColors.bottom.value.set(colors.bottom).convertLinearToSRGB();
+    this.model.setColors(new Color(colors.model), new Color(colors.wire), 0.42, new Color(colors.handle));
+    this.cage.setColor(new Color(colors.cage));
+    this.ground.setColors(new Color(colors.grid), colors.shadow);
+  }
+
+  setHandles(handles: Uint32Array) {
+    this.model.setHandles(handles);
+  }
+
+  /** Colours the model by a value of each point, from 0 to `largest`; null for its own colour. */
+  setHeat(values: Float32Array | null, largest: number) {
+    this.model.setHeat(values, largest);
+  }
+
+  /** Colours the model by how far each point moves from one frame to the next, in diagonals. */
+  setMotion(
+    frames: Pick<Pose, 'before' | 'after'>,
+    rowsBefore: Float32Array,
+    rowsAfter: Float32Array,
+    largest: number,
+  ) {
+    this.model.setHeat(this.decoder.decodeMotion(frames, rowsBefore, rowsAfter), largest);
+  }
+
+  /** Shows a pose; decodes it where Φ is there. */
+  setPose(pose: Pose | null) {
+    this.pose = pose;
+    if (!pose) return;
+    this.showCage(pose.rows);
+    if (!this.decoder.ready) return;
+    this.decoder.decode(pose);
+    this.shadowIsOld = true;
+    if (this.grounded) return;
+    this.grounded = true;
+    const positions = this.decoder.readPositions();
+    this.decoder.place(positions);
+    this.putGroundBelow(positions);
+  }
+
+  /** Takes the size of the canvas in CSS pixels, and how much of it is covered: the rest shows what the camera looks at. */
+  resize(width: number, height: number, pixelRatio: number, covered: Covered) {
+    this.camera.setViewOffset(width, height, covered.right / 2, covered.bottom / 2, width, height);
+    const size = `${width} ${height} ${pixelRatio}`;
+    // Even an unchanged size would empty the canvas and make all its buffers anew.
+    if (size === this.size) return;
+    this.size = size;
+    this.renderer.setPixelRatio(pixelRatio);
+    this.renderer.setSize(Math.max(1, width), Math.max(1, height), false);
+    this.camera.aspect = Math.max(1, width) / Math.max(1, height);
+    this.renderer.getDrawingBufferSize(this.backdropColors.size.value);
+    const pixelsPerUnit = this.backdropColors.size.value.y / (2 * Math.tan(FIELD_OF_VIEW / 2));
+    this.model.setSizes(pixelsPerUnit, pixelRatio);
+    this.cage.setSizes(pixelRatio);
+  }
+
+  /** Draws a picture. Where pictures must come fast, the shadow follows the model only now and then. */
+  draw(state: CameraState, hurried = false) {
+    if (this.renderer.getContext().isContextLost()) return;
+    const { camera } = this;
+    camera.position.set(...eyeOf(state));
+    camera.lookAt(...state.target);
+    camera.near = state.distance * 0.02;
+    camera.far = state.distance + 40;
+    camera.updateProjectionMatrix();
+    camera.updateMatrixWorld();
+    this.model.setSky(new Vector3(0, 1, 0).transformDirection(camera.matrixWorldInverse));
+    const isDue = !hurried || ++this.picturesWithShadow >= SHADOW_EVERY;
+    if (isDue && this.shadowIsOld && this.ground.mesh.visible && this.model.surface.visible) {
+      this.picturesWithShadow = 0;
+      this.ground.castShadow(this.renderer, new Matrix3().setFromMatrix4(this.upright.matrix));
+      this.shadowIsOld = false;
+    }
+    this.renderer.setRenderTarget(null);
+    this.renderer.clear();
+    this.renderer.render(this.scene, camera);
+  }
+
+  /** A box around the model as it is now, or around the cage before there is one. */
+  bounds(): Box {
+    if (!this.pose || !this.decoder.ready) return boxOf(this.cageVertices, this.upright.matrix);
+    const positions = this.decoder.readPositions();
+    this.decoder.place(positions);
+    return boxOf(positions, this.upright.matrix);
+  }
+
+  dispose() {
+    this.model.dispose();
+    this.cage.dispose();
+    this.ground.dispose();
+    this.decoder.dispose();
+    this.renderer.dispose();
+  }
+
+  private showCage(vertices: ArrayLike<number>) {
+    for (let k = 0; k < this.cageVertices.length; k++) this.cageVertices[k] = vertices[k];
+    this.decoder.place(this.cageVertices);
+    this.cage.setVertices(this.cageVertices);
+  }
+
+  private putGroundBelow(positions: Float32Array) {
+    const { low, high } = boxOf(positions, this.upright.matrix);
+    if (!Number.isFinite(low[1])) return;
+    this.soleAboveCage = low[1] - boxOf(this.cageVertices, this.upright.matrix).low[1];
+    this.ground.middle.set((low[0] + high[0]) / 2, low[1] - 0.002, (low[2] + high[2]) / 2);
+    this.lowerGround();
+  }
+
+  /** Keeps the ground below all frames that are known: the model's lowest point is about as far above the cage's as in the first one. */
+  private lowerGround() {
+    const level = this.lowest[this.up] + this.soleAboveCage - 0.002;
+    if (level < this.ground.middle.y) this.ground.middle.y = level;
+    this.shadowIsOld = true;
+  }
+}
+
+function createRenderer(canvas: HTMLCanvasElement): WebGLRenderer {
+  const antialias = !isSoftwareRendered();
+  const context = canvas.getContext('webgl2', { antialias, alpha: false, powerPreference: 'high-performance' });
+  if (!context) {
+    throw new Error(
+      'This browser has no WebGL 2, which draws the model: turn on hardware acceleration in its settings, or use a newer one.',
+    );
+  }
+  const renderer = new WebGLRenderer({ canvas, context });
+  renderer.autoClear = false;
+  renderer.sortObjects = false;
+  return renderer;
+}
+
+/** Whether the processor does the work of a graphics processor: smoothing edges then costs more than a picture at twice the size when all rests. */
+function isSoftwareRendered(): boolean {
+  softwareRendered ??= probeRenderer();
+  return softwareRendered;
+}
+
+let softwareRendered: boolean | null = null;
+
+function probeRenderer(): boolean {
+  const context = new OffscreenCanvas(1, 1).getContext('webgl2');
+  if (!context) return false;
+  const details = context.getExtension('WEBGL_debug_renderer_info');
+  const name = String(context.getParameter(details ? details.UNMASKED_RENDERER_WEBGL : context.RENDERER));
+  context.getExtension('WEBGL_lose_context')?.loseContext();
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+}
+
+function boxOf(positions: Float32Array, turn: Matrix4): Box {
+  const low: [number, number, number] = [Infinity, Infinity, Infinity];
+  const high: [number, number, number] = [-Infinity, -Infinity, -Infinity];
+  const point = new Vector3();
+  for (let k = 0; k < positions.length; k += 3) {
+    point.set(positions[k], positions[k + 1], positions[k + 2]).applyMatrix4(turn);
+    for (let axis = 0; axis < 3; axis++) {
+      const value = point.getComponent(axis);
+      low[axis] = Math.min(low[axis], value);
+      high[axis] = Math.max(high[axis], value);
+    }
+  }
+  return { low, high };
+}

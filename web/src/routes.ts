@@ -1,0 +1,47 @@
+/** Routes of the page, all in the fragment: `#/`, `#/session/ID`, `#/file`, `#/upload`. What follows `?` is the state of the view, for links. */
+
+/** Where in the page somebody is. */
+export type Route = { page: 'sessions' } | { page: 'session'; id: string } | { page: 'file' } | { page: 'upload' };
+
+/** A route and the parameters of its view, such as the frame and the camera. */
+export interface Location {
+  readonly route: Route;
+  readonly view: URLSearchParams;
+}
+
+/** Reads a fragment, with or without its `#`; anything unknown is the list of sessions. */
+export function parseFragment(fragment: string): Location {
+  const [path, query] = splitOnce(fragment.replace(/^#/, ''), '?');
+  const view = new URLSearchParams(query);
+  const parts = path.split('/').filter((part) => part !== '');
+  if (parts[0] === 'session' && parts.length === 2) return { route: { page: 'session', id: decoded(parts[1]) }, view };
+  if (parts[0] === 'file') return { route: { page: 'file' }, view };
+  if (parts[0] === 'upload') return { route: { page: 'upload' }, view };
+  return { route: { page: 'sessions' }, view };
+}
+
+/** The fragment of a route, with its `#`. */
+export function fragmentOf(route: Route, view = new URLSearchParams()): string {
+  const path =
+    route.page === 'sessions'
+      ? '#/'
+      : route.page === 'session'
+        ? `#/session/${encodeURIComponent(route.id)}`
+        : `#/${route.page}`;
+  const query = view.toString();
+  return query === '' ? path : `${path}?${query}`;
+}
+
+function splitOnce(text: string, separator: string): [string, string] {
+  const at = text.indexOf(separator);
+  return at < 0 ? [text, ''] : [text.slice(0, at), text.slice(at + separator.length)];
+}
+
+/** Links are typed by people: a broken escape is taken as it stands. */
+function decoded(part: string): string {
+  try {
+    return decodeURIComponent(part);
+  } catch {
+    return part;
+  }
+}

@@ -1,0 +1,74 @@
+/** Waiting before trying again: longer each time, with chance, and shorter when the network comes back. */
+
+import { ServiceProblem, problemBehind } from './problem';
+
+const FIRST_SECONDS = 0.4;
+const MOST_SECONDS = 15;
+
+/** Grows the wait between attempts, from 0.4 s to 15 s, each at random between half and all of it. */
+export class Backoff {
+  #attempts = 0;
+
+  /** Seconds to wait before the next attempt; what the service asked for, if that is longer. */
+  next(asked: number | null = null): number {
+    const most = Math.min(MOST_SECONDS, FIRST_SECONDS * 2 ** this.#attempts);
+    this.#attempts += 1;
+    return Math.max(asked ?? 0, most * (0.5 + 0.5 * Math.random()));
+  }
+
+  /** To be called when something succeeded. */
+  reset(): void {
+    this.#attempts = 0;
+  }
+}
+
+/** Waits; the return of the network ends it early, and `signal` ends it with its reason. */
+export function pause(seconds: number, signal?: AbortSignal): Promise<void> {
+  return new Promise((resolve, reject) => {
+    signal?.throwIfAborted();
+    const done = (): void => {
+      clearTimeout(timer);
+      globalThis.removeEventListener('online', early);
+      signal?.removeEventListener('abort', aborted);
+    };
+    const early = (): void => {
+      done();
+      resolve();
+    };
+    const aborted = (): void => {
+      done();
+      reject(signal?.reason as Error);
+    };
+    const timer = setTimeout(early, 1000 * seconds);
+    globalThis.addEventListener('online', early);
+    signal?.addEventListener('abort', aborted);
+  });
+}
+
+/** What {@link persistently} says before it waits. */
+export interface Retry {
+  readonly problem: ServiceProblem;
+  readonly seconds: number;
+}
+
+/**
+ * Repeats what may be repeated until it succeeds, or fails with something that does not pass by itself. `attempts` bounds how often in a row;
+ * `onRetry` hears of every wait.
+ */
+export async function persistently<T>(
+  work: () => Promise<T>,
+  options: { signal?: AbortSignal | undefined; attempts?: number; onRetry?: (retry: Retry) => void } = {},
+): Promise<T> {
+  const backoff = new Backoff();
+  for (let left = options.attempts ?? Infinity; ; left -= 1) {
+    try {
+      return await work();
+    } catch (error) {
+      const problem = problemBehind(error);
+      if (!(problem instanceof ServiceProblem) || !problem.passes || left <= 1) throw problem;
+      const seconds = backoff.next(problem.retryAfter);
+      options.onRetry?.({ problem, seconds });
+      await pause(seconds, options.signal);
+    }
+  }
+}

@@ -1,0 +1,46 @@
+/** The events of a session, followed over broken connections and restarts of the service. */
+
+import { Backoff, pause } from './backoff';
+import type { Progress } from './messages';
+import { ServiceProblem, problemBehind } from './problem';
+import { type Service, piecesOf, sessionPath } from './service';
+import { EventParser } from './sse';
+
+/**
+ * Tells `onProgress` of every change of a session until it is completed or failed, whatever breaks in between.
+ *
+ * @throws ServiceProblem where it cannot go on: the session was deleted, the token is refused
+ */
+export async function followProgress(
+  service: Service,
+  id: string,
+  onProgress: (progress: Progress) => void,
+  signal: AbortSignal,
+): Promise<void> {
+  const backoff = new Backoff();
+  let last = '';
+  for (;;) {
+    try {
+      const headers = new Headers({ Accept: 'text/event-stream' });
+      if (last !== '') headers.set('Last-Event-ID', last);
+      const response = await service.request(sessionPath(id, 'events'), { headers, cache: 'no-store', signal });
+      const [parser, text] = [new EventParser(), new TextDecoder()];
+      for await (const piece of piecesOf(response)) {
+        for (const event of parser.push(text.decode(piece, { stream: true }))) {
+          backoff.reset();
+          last = event.id || last;
+          if (event.type === 'deleted') throw new ServiceProblem('session-deleted', 410);
+          if (event.type !== 'progress') continue;
+          const progress = JSON.parse(event.data) as Progress;
+          onProgress(progress);
+          if (progress.state === 'completed' || progress.state === 'failed') return;
+        }
+      }
+      await pause(backoff.next(), signal);
+    } catch (error) {
+      const problem = problemBehind(error);
+      if (!(problem instanceof ServiceProblem) || !problem.passes) throw problem;
+      await pause(backoff.next(problem.retryAfter), signal);
+    }
+  }
+}

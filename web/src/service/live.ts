@@ -1,0 +1,96 @@
+/** Opens a session as a capture, whatever state it is in. */
+
+import type { Capture, StaticPart } from '../capture';
+import { openContainer } from '../container/open';
+import { httpSource } from '../container/source';
+import { ContainerStream } from '../container/stream';
+import { type Retry, pause, persistently } from './backoff';
+import { LiveCapture, type SessionCapture } from './liveCapture';
+import type { Session } from './messages';
+import { ServiceProblem, problemBehind, problemFrom } from './problem';
+import { Service, piecesOf, sessionPath } from './service';
+import { pageToken } from './token';
+
+export type { SessionCapture } from './liveCapture';
+
+/** Choices of {@link openSession}. */
+export interface OpenSessionOptions {
+  readonly service?: Service;
+  readonly signal?: AbortSignal;
+  /** Hears a sentence about what is waited for, such as a session that is being prepared; empty when it goes on. */
+  readonly onWaiting?: (sentence: string) => void;
+}
+
+const PREPARING_SECONDS = 1;
+/** How often in a row opening is tried while the service does not answer. */
+const ATTEMPTS = 5;
+
+/**
+ * Opens the session `id` of the service beside the page. A completed one is read from its container by ranges. Of a running one the static part comes
+ * from the front of its container, and its cages as they are solved; when it is completed, the same capture goes on as that of its container.
+ *
+ * @throws ServiceProblem where there is no such session, it failed, or the service wants a token; its message is a sentence to show
+ */
+export async function openSession(id: string, options: OpenSessionOptions = {}): Promise<SessionCapture> {
+  const { service = new Service(), signal = new AbortController().signal, onWaiting } = options;
+  const onRetry = ({ problem }: Retry): void => onWaiting?.(problem.message);
+  const retried = <T>(work: () => Promise<T>): Promise<T> =>
+    persistently(work, { signal, onRetry, attempts: ATTEMPTS });
+  const open = (session: Session, until: AbortSignal): Promise<Capture> => openFinished(service, session, until);
+  const session = await whenPrepared(() => retried(() => service.session(id, signal)), onWaiting, signal);
+  if (session.state === 'completed') return Object.assign(await retried(() => open(session, signal)), { live: null });
+  const part = await retried(() => readStatic(service, id, signal));
+  onWaiting?.('');
+  // Frames were solved while the static part came.
+  return new LiveCapture(service, await retried(() => service.session(id, signal)), part, open);
+}
+
+/** Waits until a session is prepared. */
+async function whenPrepared(
+  look: () => Promise<Session>,
+  onWaiting: OpenSessionOptions['onWaiting'],
+  signal: AbortSignal,
+): Promise<Session> {
+  for (;;) {
+    const session = await look();
+    if (session.problem) throw problemFrom(session.problem);
+    if (session.state !== 'preparing') return session;
+    onWaiting?.('The session is being prepared; large models take minutes.');
+    await pause(PREPARING_SECONDS, signal);
+  }
+}
+
+/** The capture in a completed session's container, read by ranges. */
+async function openFinished(service: Service, session: Session, signal: AbortSignal): Promise<Capture> {
+  const url = service.address(sessionPath(session.id, 'capture.cager'));
+  try {
+    const source = await httpSource(url, { headers: () => service.authorization(), signal });
+    return await openContainer(source, { name: session.name ?? session.id, signal });
+  } catch (error) {
+    const problem = problemBehind(error);
+    if (problem instanceof ServiceProblem && problem.status === 401) pageToken.refused();
+    throw problem;
+  }
+}
+
+/** Model and cage of a running session: what its container begins with. The rest of it is not read. */
+async function readStatic(service: Service, id: string, signal: AbortSignal): Promise<StaticPart> {
+  const response = await service.request(`${sessionPath(id, 'capture.cager')}?follow=true`, {
+    cache: 'no-store',
+    signal,
+  });
+  const found: StaticPart[] = [];
+  const stream = new ContainerStream({
+    onStatic: (part) => found.push(part),
+    onBlock: () => undefined,
+  });
+  try {
+    for await (const piece of piecesOf(response)) {
+      await stream.push(piece);
+      if (found.length > 0) return found[0];
+    }
+    throw new ServiceProblem('unreachable', 0);
+  } finally {
+    stream.close();
+  }
+}

@@ -1,0 +1,225 @@
+/** A session that is still running, as a {@link Capture}: what is solved so far, live, until it is completed and read from its container. */
+
+import type { Capture, FrameBlock, FrameErrors, LiveStatus, StaticPart } from '../capture';
+import { persistently } from './backoff';
+import { CageRecordReader, RECORDS_MEDIA_TYPE } from './frameRecords';
+import { FrameStore, GrowingErrors } from './frameStore';
+import { LiveFollower } from './liveFollower';
+import { type Session, solvedFromStart } from './messages';
+import { isAbort, sentenceOf } from './problem';
+import { type Service, piecesOf, sessionPath } from './service';
+
+/** A capture of a session; `live` while it is followed. */
+export interface SessionCapture extends Capture {
+  /** How the frames arrive; null of a session that was completed before it was opened. */
+  readonly live: LiveStatus | null;
+}
+
+/** Least seconds between two looks at the errors of all frames. */
+const ERRORS_SECONDS = 5;
+
+/** Follows a session from the end of what is solved; earlier frames are fetched when they are looked at. */
+export class LiveCapture implements SessionCapture {
+  readonly events = new EventTarget();
+  readonly name: string;
+  static: StaticPart;
+  frames: number;
+  complete = false;
+  readonly #service: Service;
+  readonly #id: string;
+  readonly #openFinished: (session: Session, signal: AbortSignal) => Promise<Capture>;
+  readonly #store: FrameStore;
+  readonly #measured = new GrowingErrors();
+  readonly #follower: LiveFollower;
+  readonly #fetching = new Map<number, Promise<void>>();
+  readonly #closing = new AbortController();
+  #finished: Capture | null = null;
+  #lastProblem: string | null = null;
+  #late = 0;
+  /** What the errors were fetched for, and when: coding a group changes them, and frames passed over bring none. */
+  #errorsFetched = { coded: -1, skipped: -1, at: -Infinity };
+
+  /** @param openFinished opens the container, once there is one */
+  constructor(
+    service: Service,
+    session: Session,
+    part: StaticPart,
+    openFinished: (session: Session, signal: AbortSignal) => Promise<Capture>,
+  ) {
+    this.#service = service;
+    this.#id = session.id;
+    this.#openFinished = openFinished;
+    this.name = session.name ?? session.id;
+    this.static = part;
+    this.frames = solvedFromStart(session.frames);
+    this.#store = new FrameStore(part.rowsPerFrame);
+    this.#follower = new LiveFollower(service, session.id, part.rowsPerFrame, this.frames, {
+      record: (record) => {
+        this.#store.put(record.frame, record.rows);
+        this.#measured.putRecord(record);
+        this.frames = record.frame + 1;
+      },
+      skipped: (end) => (this.frames = end),
+      looked: (look) => void this.#fetchErrors(look),
+      changed: () => this.#changed(),
+    });
+    void this.#run();
+  }
+
+  get errors(): FrameErrors {
+    return this.#finished?.errors ?? this.#measured.upTo(this.frames);
+  }
+
+  get frameNumbers(): Float64Array | null {
+    return this.#finished?.frameNumbers ?? null;
+  }
+
+  get problem(): string | null {
+    return this.#finished?.problem ?? this.#lastProblem ?? this.#follower.problem;
+  }
+
+  get live(): LiveStatus {
+    const follower = this.#follower;
+    const isOver = this.complete;
+    return {
+      state: isOver ? 'ended' : follower.state,
+      retryAt: isOver ? null : follower.retryAt,
+      latencySeconds: follower.latency.seconds,
+      behindFrames: isOver ? 0 : follower.behind,
+      bitsPerSecond: 8 * follower.bytes.perSecond(),
+      framesPerSecond: follower.frames.perSecond(),
+      lateFrames: this.#late,
+      droppedFrames: follower.skipped + follower.damaged,
+    };
+  }
+
+  async block(frame: number, signal?: AbortSignal): Promise<FrameBlock> {
+    let isLate = false;
+    for (;;) {
+      signal?.throwIfAborted();
+      this.#closing.signal.throwIfAborted();
+      if (this.#finished) return this.#finished.block(frame, signal);
+      const block = this.#store.block(frame);
+      if (block) return block;
+      if (frame < this.frames) await this.#fetchAround(frame);
+      else if (this.complete)
+        throw new RangeError(this.problem ?? `The capture has ${this.frames} frames, so there is no frame ${frame}.`);
+      else {
+        this.#late += isLate ? 0 : 1;
+        isLate = true;
+        await this.#change(signal);
+      }
+    }
+  }
+
+  close(): void {
+    this.#closing.abort();
+    this.#finished?.close();
+  }
+
+  async #run(): Promise<void> {
+    const { signal } = this.#closing;
+    try {
+      const session = await this.#follower.run(signal);
+      if (session) {
+        const opening = () => this.#openFinished(session, signal);
+        const onRetry = ({ problem }: { problem: Error }): void => {
+          this.#lastProblem = problem.message;
+          this.#changed();
+        };
+        const finished = await persistently(opening, { signal, onRetry });
+        this.#lastProblem = null;
+        finished.events.addEventListener('change', () => this.#changed());
+        // The meshes are the same; whoever made buffers of them can keep these.
+        this.static = { ...this.static, report: finished.static.report };
+        this.frames = finished.frames;
+        this.#finished = finished;
+      }
+    } catch (error) {
+      if (signal.aborted) return;
+      this.#lastProblem = sentenceOf(error);
+    }
+    this.complete = true;
+    this.#changed();
+  }
+
+  /** Fetches the frames of the chunk that has `frame`, once for all who wait for it. */
+  #fetchAround(frame: number): Promise<void> {
+    const { chunkFrames } = this.#store;
+    const chunk = Math.floor(frame / chunkFrames);
+    const known = this.#fetching.get(chunk);
+    if (known) return known;
+    const first = chunk * chunkFrames;
+    const count = Math.min(chunkFrames, this.frames - first);
+    const fetching = this.#fetchFrames(first, count).finally(() => this.#fetching.delete(chunk));
+    this.#fetching.set(chunk, fetching);
+    return fetching;
+  }
+
+  async #fetchFrames(first: number, count: number): Promise<void> {
+    const { signal } = this.#closing;
+    const path = `${sessionPath(this.#id, 'cages')}?first=${first}&count=${count}`;
+    const headers = { Accept: RECORDS_MEDIA_TYPE };
+    await persistently(
+      async () => {
+        const reader = new CageRecordReader(this.static.rowsPerFrame);
+        let received = 0;
+        const response = await this.#service.request(path, { headers, cache: 'no-store', signal });
+        for await (const piece of piecesOf(response)) {
+          this.#follower.bytes.add(piece.length);
+          for (const { frame, rows } of reader.push(piece)) {
+            if (frame < first || frame >= first + count)
+              throw new Error('The service sent another frame than was asked for.');
+            this.#store.put(frame, rows);
+            received += 1;
+          }
+        }
+        if (received < count) throw new Error('The service sent fewer frames than were asked for.');
+      },
+      { signal, attempts: 4 },
+    );
+  }
+
+  /** Fetches the errors of all frames where those here are not those any more. */
+  async #fetchErrors(session: Session): Promise<void> {
+    const coded = session.coding?.frames ?? 0;
+    const { skipped } = this.#follower;
+    const fetched = this.#errorsFetched;
+    const now = performance.now();
+    const isKnown = fetched.coded === coded && fetched.skipped === skipped;
+    if (isKnown || session.frames.solved === 0 || now - fetched.at < 1000 * ERRORS_SECONDS) return;
+    this.#errorsFetched = { coded, skipped, at: now };
+    try {
+      for (const { frame, l2, linf } of await this.#service.errors(this.#id, this.#closing.signal)) {
+        this.#measured.put(frame, l2, linf);
+      }
+      this.#changed();
+    } catch (error) {
+      if (!isAbort(error)) this.#errorsFetched = { coded: -1, skipped: -1, at: now };
+    }
+  }
+
+  /** The next change, or the caller's abort. */
+  #change(signal?: AbortSignal): Promise<void> {
+    return new Promise((resolve, reject) => {
+      const changed = (): void => {
+        signal?.removeEventListener('abort', aborted);
+        this.#closing.signal.removeEventListener('abort', changed);
+        this.events.removeEventListener('change', changed);
+        resolve();
+      };
+      const aborted = (): void => {
+        this.#closing.signal.removeEventListener('abort', changed);
+        this.events.removeEventListener('change', changed);
+        reject(signal?.reason as Error);
+      };
+      this.events.addEventListener('change', changed);
+      this.#closing.signal.addEventListener('abort', changed);
+      signal?.addEventListener('abort', aborted, { once: true });
+    });
+  }
+
+  #changed(): void {
+    this.events.dispatchEvent(new Event('change'));
+  }
+}

@@ -1,0 +1,62 @@
+/** How a running session reaches this page: rates, delay, and what came late. */
+
+const WINDOW_SECONDS = 4;
+
+/** What arrived lately, as a rate. */
+export class RateMeter {
+  #samples: { at: number; amount: number }[] = [];
+  #began = performance.now();
+
+  add(amount: number): void {
+    const now = performance.now();
+    if (this.#samples.length === 0) this.#began = now;
+    const last = this.#samples.at(-1);
+    // Pieces of a fast transfer are too many to be kept one by one.
+    if (last && now - last.at < 50) last.amount += amount;
+    else this.#samples.push({ at: now, amount });
+  }
+
+  /** Amount per second over the last seconds. */
+  perSecond(): number {
+    const now = performance.now();
+    this.#samples = this.#samples.filter((sample) => now - sample.at < 1000 * WINDOW_SECONDS);
+    const sum = this.#samples.reduce((total, sample) => total + sample.amount, 0);
+    const seconds = Math.min(WINDOW_SECONDS, Math.max(0.25, (now - this.#began) / 1000));
+    return sum / seconds;
+  }
+}
+
+/**
+ * Estimates the delay between a frame's being solved and its arrival. A look at the session says how many frames are solved at a time between the
+ * request and its answer; the delay is how much later the last of them arrived.
+ */
+export class LatencyMeter {
+  #seconds: number | null = null;
+  #awaited: { frame: number; at: number } | null = null;
+  #arrived: { frame: number; at: number } | null = null;
+
+  /** A frame arrived; they come in order. */
+  arrived(frame: number): void {
+    const now = performance.now();
+    this.#arrived = { frame, at: now };
+    if (this.#awaited && frame >= this.#awaited.frame) {
+      this.#take((now - this.#awaited.at) / 1000);
+      this.#awaited = null;
+    }
+  }
+
+  /** A look at the session: asked at `from`, answered at `to` (of `performance.now()`), frames up to `frame` solved. */
+  looked(from: number, to: number, frame: number): void {
+    const solvedBy = (from + to) / 2;
+    if (this.#arrived && this.#arrived.frame >= frame) this.#take((to - from) / 2000);
+    else this.#awaited ??= { frame, at: solvedBy };
+  }
+
+  get seconds(): number | null {
+    return this.#seconds;
+  }
+
+  #take(seconds: number): void {
+    this.#seconds = this.#seconds === null ? seconds : 0.7 * this.#seconds + 0.3 * seconds;
+  }
+}

@@ -1,0 +1,102 @@
+/** The service's JSON bodies, as docs/openapi.json has them. Lengths are fractions of the rest pose's diagonal, times are seconds. */
+
+import type { CoordinateSystem } from '../capture';
+import type { ProblemDetails } from './problem';
+
+export type SessionState = 'preparing' | 'ready' | 'completed' | 'failed';
+
+/** A session; what preparing finds is null until it is done. */
+export interface Session {
+  readonly id: string;
+  readonly name: string | null;
+  readonly state: SessionState;
+  /** Seconds since 1970. */
+  readonly created: number;
+  readonly points: number | null;
+  /** Rows of three numbers of a solved frame. */
+  readonly unknowns: number | null;
+  readonly handle_count: number | null;
+  readonly cage_vertices: number | null;
+  readonly cage_faces: number | null;
+  readonly coordinates: CoordinateSystem;
+  readonly handles: string;
+  readonly regularizer: string;
+  readonly spectrum: number | null;
+  readonly lambda: number;
+  readonly condition_number: { readonly full: number; readonly handles: number } | null;
+  readonly rank: number | null;
+  readonly affine_reproduction_error: number | null;
+  readonly frames: FrameCounts;
+  /** Only of sessions whose frames are coded in groups. */
+  readonly coding?: CodedFrames;
+  readonly cache: 'hit' | 'miss' | null;
+  readonly seconds: Readonly<Record<string, number>>;
+  readonly warnings: readonly string[];
+  /** Why it failed. */
+  readonly problem?: ProblemDetails;
+}
+
+/** How far the frames of a session are. */
+export interface FrameCounts {
+  readonly received: number;
+  readonly solved: number;
+  /** Ranges `[a, b)` below the highest frame that are not solved; the first ones. */
+  readonly missing: readonly (readonly [number, number])[];
+  /** Where the ranges begin that `missing` leaves out. */
+  readonly missing_next?: number;
+}
+
+/** How far the coding of a session's frames is. */
+export interface CodedFrames {
+  readonly group_frames: number | null;
+  readonly frames: number;
+  readonly bytes: number;
+  readonly problem?: ProblemDetails;
+}
+
+/** A page of sessions, newest first. */
+export interface SessionPage {
+  readonly sessions: readonly Session[];
+  /** Where the next page begins; null on the last. */
+  readonly next: string | null;
+}
+
+/** A solved frame; errors are null where only handle rows were sent. */
+export interface FrameResult {
+  readonly frame: number;
+  readonly l2: number | null;
+  readonly linf: number | null;
+}
+
+/** What the events of a session say. */
+export interface Progress {
+  readonly state: SessionState;
+  readonly received: number;
+  readonly solved: number;
+  readonly coded?: number;
+}
+
+/** Choices for a new session; what is left out has the service's default. */
+export interface SessionOptions {
+  name?: string;
+  coordinates?: CoordinateSystem;
+  cage?: { vertices?: number; id?: string };
+  frame_rate?: number;
+  frames?: number;
+  max_error?: number;
+  quality?: 'preview' | 'standard' | 'master';
+}
+
+/** Numbers of the frames below `end` that are not solved, as ranges `[a, b)`. */
+export function unsolved(frames: FrameCounts, end: number): [number, number][] {
+  const ranges = frames.missing.filter(([a]) => a < end).map(([a, b]): [number, number] => [a, Math.min(b, end)]);
+  // Frames are the ones that are solved, the gaps between them, and those after the last one.
+  const below = frames.missing_next ?? frames.solved + frames.missing.reduce((sum, [a, b]) => sum + b - a, 0);
+  if (frames.missing_next === undefined && below < end) ranges.push([below, end]);
+  return ranges;
+}
+
+/** How many frames from 0 on are solved without a gap. */
+export function solvedFromStart(frames: FrameCounts): number {
+  return frames.missing.length > 0 ? frames.missing[0][0] : frames.solved;
+}

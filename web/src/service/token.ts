@@ -1,0 +1,49 @@
+/** The access token of this page: in memory, or in session storage so that it outlives a reload. Never in an address. */
+
+const KEY = 'cager-token';
+
+/** Holds the token. Fires `change` when it changes, and `wanted` when the service refused the present one or asked for one. */
+export class TokenStore extends EventTarget {
+  #token: string | null;
+
+  /** @param storage where the token outlives a reload; null where the browser has none for this page */
+  constructor(private readonly storage: Storage | null) {
+    super();
+    this.#token = guarded(() => storage?.getItem(KEY) ?? null);
+  }
+
+  get token(): string | null {
+    return this.#token;
+  }
+
+  /** Takes a token; `keep` keeps it until the tab is closed, otherwise until the page is. */
+  set(token: string, keep: boolean): void {
+    this.#token = token;
+    guarded(() => (keep ? this.storage?.setItem(KEY, token) : this.storage?.removeItem(KEY)));
+    this.dispatchEvent(new Event('change'));
+  }
+
+  /** Forgets the token. */
+  clear(): void {
+    this.#token = null;
+    guarded(() => this.storage?.removeItem(KEY));
+    this.dispatchEvent(new Event('change'));
+  }
+
+  /** Says that the service refused the present token, or wants one. */
+  refused(): void {
+    this.dispatchEvent(new Event('wanted'));
+  }
+}
+
+/** The token of the page. */
+export const pageToken = new TokenStore(guarded(() => globalThis.sessionStorage));
+
+/** Storage throws where a browser's settings forbid it. */
+function guarded<T>(use: () => T): T | null {
+  try {
+    return use();
+  } catch {
+    return null;
+  }
+}

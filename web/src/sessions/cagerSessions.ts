@@ -1,0 +1,363 @@
+import { LitElement, html, nothing } from 'lit';
+import { customElement, query, state } from 'lit/decorators.js';
+import { repeat } from 'lit/directives/repeat.js';
+import type { Session } from '../service/messages';
+import { ServiceProblem, sentenceOf } from '../service/problem';
+import { Service } from '../service/service';
+import { pageToken } from '../service/token';
+import { controls, tokens } from '../style/tokens';
+import { cardsStyle } from './cardsStyle';
+import { downloadContainer } from './download';
+import { deleteDialog, deleteDialogStyle } from './deleteDialog';
+import { emptyList, emptyListStyle } from './emptyList';
+import { FigureLoader } from './figures';
+import { isFiltering, matches, type StateFilter } from './filter';
+import * as glyphs from './glyphs';
+import { nameOf, row, tableHead } from './row';
+import { SessionList, isUnfinished } from './sessionList';
+import { sessionsStyle } from './sessionsStyle';
+import './signIn';
+import { counted } from './text';
+
+const PAGE_ROWS = 25;
+/** HTTP/1.1 has six connections to a host, for all tabs together: most sessions are polled there instead. */
+const STREAMS_OF_HTTP1 = 2;
+const STREAMS_OF_HTTP2 = 16;
+
+const STATES: readonly (readonly [StateFilter, string])[] = [
+  ['all', 'All'],
+  ['running', 'Running'],
+  ['completed', 'Completed'],
+  ['failed', 'Failed'],
+];
+
+/**
+ * The sessions of the service beside the page: newest first, kept up to date while the page is seen, to be searched, opened, downloaded and
+ * deleted. Asks for a token where the service wants one.
+ */
+@customElement('cager-sessions')
+export class Sessions extends LitElement {
+  static override styles = [tokens, controls, sessionsStyle, cardsStyle, emptyListStyle, deleteDialogStyle];
+
+  readonly #service = new Service();
+  readonly #list = new SessionList(this.#service);
+  readonly #figures = new FigureLoader(this.#service);
+
+  @state() private text = '';
+  @state() private states: StateFilter = 'all';
+  @state() private page = 0;
+  @state() private wantsToken = false;
+  @state() private removing: Session | null = null;
+  @state() private isRemoving = false;
+  @state() private removalFailure = '';
+  /** Why something that was asked for did not happen. */
+  @state() private failure = '';
+  @state() private said = '';
+  @state() private downloads: ReadonlyMap<string, number> = new Map();
+  @query('dialog') private dialog!: HTMLDialogElement;
+
+  #clock: ReturnType<typeof setInterval> | undefined;
+  #fetchingOlder = false;
+
+  override connectedCallback(): void {
+    super.connectedCallback();
+    this.#list.addEventListener('change', this.#changed);
+    this.#figures.addEventListener('change', this.#changed);
+    pageToken.addEventListener('wanted', this.#tokenWanted);
+    pageToken.addEventListener('change', this.#tokenChanged);
+    document.addEventListener('visibilitychange', this.#visibilityChanged);
+    // Ages and rates go on without news from the service.
+    this.#clock = setInterval(() => this.requestUpdate(), 5000);
+    this.#visibilityChanged();
+  }
+
+  override disconnectedCallback(): void {
+    super.disconnectedCallback();
+    this.#list.removeEventListener('change', this.#changed);
+    this.#figures.removeEventListener('change', this.#changed);
+    pageToken.removeEventListener('wanted', this.#tokenWanted);
+    pageToken.removeEventListener('change', this.#tokenChanged);
+    document.removeEventListener('visibilitychange', this.#visibilityChanged);
+    clearInterval(this.#clock);
+    this.#list.stop();
+  }
+
+  override render() {
+    if (this.wantsToken) return html`<div class="page"><cager-sign-in></cager-sign-in></div>`;
+    const sessions = this.#list.sessions;
+    const isEmpty = this.#list.loaded && sessions.length === 0;
+    return html`
+      <main class="page">
+        ${this.#header(sessions)} ${this.#notices()}
+        ${isEmpty ? emptyList() : html`${this.#filters()}${this.#table(sessions)}`} ${this.#confirmation()}
+        <p class="visually-hidden" role="status">${this.said}</p>
+      </main>
+    `;
+  }
+
+  protected override updated(): void {
+    const shown = this.#shown(this.#list.sessions).rows;
+    this.#figures.want(shown);
+    const [navigation] = performance.getEntriesByType('navigation') as PerformanceNavigationTiming[];
+    const streams = /^h[23]$/.test(navigation.nextHopProtocol) ? STREAMS_OF_HTTP2 : STREAMS_OF_HTTP1;
+    const isOn = !document.hidden && this.isConnected && !this.wantsToken;
+    this.#list.shown = new Set(shown.map(({ id }) => id));
+    // Those that move first: some wait for ever.
+    const unfinished = shown.filter(isUnfinished).map(({ id }) => id);
+    const moves = (id: string): number => Math.sign(this.#list.rates.of(id) ?? 0);
+    const ids = unfinished.sort((a, b) => moves(b) - moves(a)).slice(0, streams);
+    this.#list.follow(isOn ? ids : []);
+  }
+
+  #header(sessions: readonly Session[]) {
+    const running = sessions.filter(isUnfinished).length;
+    const failed = sessions.filter((session) => session.state === 'failed').length;
+    const summary = [
+      `${counted(sessions.length, 'session')}${this.#list.hasOlder ? ' and older ones' : ''}`,
+      running > 0 ? `${running} not finished` : '',
+      failed > 0 ? `${failed} failed` : '',
+    ];
+    return html`
+      <header>
+        <h1>Sessions</h1>
+        <span class="summary">${sessions.length > 0 ? summary.filter(Boolean).join(' · ') : nothing}</span>
+        <span class="spacer"></span>
+        ${
+          pageToken.token === null
+            ? nothing
+            : html`<button type="button" class="quiet" @click=${() => pageToken.clear()}>Sign out</button>`
+        }
+        <a class="button" href="#/file">${glyphs.file} Open a file</a>
+        <a class="button primary" href="#/upload">${glyphs.upload} Upload a capture</a>
+      </header>
+    `;
+  }
+
+  #notices() {
+    const { trouble } = this.#list;
+    return html`
+      ${
+        trouble
+          ? html`<div class="notice" role="alert">
+              ${glyphs.alert}
+              <p>${sentenceOf(trouble.problem)} ${trouble.retryAt === null ? '' : 'The list goes on by itself.'}</p>
+              <button type="button" @click=${() => this.#list.refresh()}>Try now</button>
+            </div>`
+          : nothing
+      }
+      ${
+        this.failure
+          ? html`<div class="notice" role="alert">
+              ${glyphs.alert}
+              <p>${this.failure}</p>
+              <button type="button" class="quiet icon" aria-label="Close" @click=${() => (this.failure = '')}>
+                ${glyphs.cross}
+              </button>
+            </div>`
+          : nothing
+      }
+    `;
+  }
+
+  #filters() {
+    return html`
+      <div class="bar">
+        <div class="search">
+          ${glyphs.search}
+          <input
+            type="search"
+            aria-label="Search sessions by name, identifier or coordinates"
+            placeholder="Search"
+            .value=${this.text}
+            @input=${(event: InputEvent) => this.#filter((event.target as HTMLInputElement).value, this.states)}
+          />
+        </div>
+        <div class="states" role="group" aria-label="State">
+          ${STATES.map(
+            ([state, word]) =>
+              html`<button
+                type="button"
+                aria-pressed=${this.states === state ? 'true' : 'false'}
+                @click=${() => this.#filter(this.text, state)}
+              >
+                ${word}
+              </button>`,
+          )}
+        </div>
+      </div>
+    `;
+  }
+
+  #table(sessions: readonly Session[]) {
+    if (!this.#list.loaded) {
+      return html`<div class="list" aria-busy="true">
+        ${[1, 2, 3].map(() => html`<div class="placeholder"></div>`)}
+      </div>`;
+    }
+    const { rows, first, matching, isWhole } = this.#shown(sessions);
+    const now = Date.now() / 1000;
+    return html`
+      <div class="list">
+        <table role="table" aria-label="Sessions, newest first">
+          ${tableHead}
+          ${repeat(
+            rows,
+            (session) => session.id,
+            (session) =>
+              row({
+                session,
+                figures: this.#figures.of(session.id),
+                rate: this.#list.rates.of(session.id),
+                now,
+                downloaded: this.downloads.get(session.id) ?? null,
+                onDownload: () => void this.#download(session),
+                onRemove: () => void this.#askRemoval(session),
+              }),
+          )}
+        </table>
+        ${rows.length === 0 ? html`<p class="nothing muted">No session is like that.</p>` : nothing}
+      </div>
+      ${
+        matching > rows.length || !isWhole
+          ? html`<nav class="pager" aria-label="Pages">
+              <span class="figures">${first + 1}–${first + rows.length} of ${matching}${isWhole ? '' : '+'}</span>
+              <button type="button" ?disabled=${first === 0} @click=${() => this.#turn(-1)}>Newer</button>
+              <button
+                type="button"
+                ?disabled=${isWhole && first + rows.length >= matching}
+                @click=${() => this.#turn(1)}
+              >
+                Older
+              </button>
+            </nav>`
+          : nothing
+      }
+    `;
+  }
+
+  #confirmation() {
+    const { removing } = this;
+    if (!removing) return nothing;
+    return deleteDialog(removing, {
+      isRunning: this.isRemoving,
+      failure: this.removalFailure,
+      // The event comes late: the dialog may be another one by then, or open again.
+      onClose: (event) => {
+        if (event.target === this.dialog && !this.dialog.open) this.removing = null;
+      },
+      onKeep: () => this.dialog.close(),
+      onDelete: () => void this.#remove(removing),
+    });
+  }
+
+  /** The rows of the present page; `matching` of the sessions here are those asked for, and `isWhole` says that there are no older ones. */
+  #shown(sessions: readonly Session[]) {
+    const filter = { text: this.text, state: this.states };
+    const matching = sessions.filter((session) => matches(session, filter));
+    const last = Math.max(0, Math.ceil(matching.length / PAGE_ROWS) - 1);
+    const first = PAGE_ROWS * Math.min(this.page, last);
+    const isWhole = !this.#list.hasOlder;
+    // Older pages may have more of what is asked for.
+    if (!isWhole && matching.length < first + PAGE_ROWS && isFiltering(filter)) void this.#fetchOlder();
+    return { rows: matching.slice(first, first + PAGE_ROWS), first, matching: matching.length, isWhole };
+  }
+
+  #filter(text: string, states: StateFilter): void {
+    this.text = text;
+    this.states = states;
+    this.page = 0;
+  }
+
+  async #turn(pages: number): Promise<void> {
+    const { first, rows, matching, isWhole } = this.#shown(this.#list.sessions);
+    if (pages > 0 && !isWhole && first + rows.length >= matching) await this.#fetchOlder();
+    this.page = Math.max(0, first / PAGE_ROWS + pages);
+    this.scrollTo({ top: 0 });
+  }
+
+  async #fetchOlder(): Promise<void> {
+    if (this.#fetchingOlder) return;
+    this.#fetchingOlder = true;
+    try {
+      await this.#list.older();
+    } catch (error) {
+      this.failure = sentenceOf(error);
+    } finally {
+      this.#fetchingOlder = false;
+    }
+  }
+
+  async #download(session: Session): Promise<void> {
+    const note = (part: number | null): void => {
+      const downloads = new Map(this.downloads);
+      if (part === null) downloads.delete(session.id);
+      else downloads.set(session.id, part);
+      this.downloads = downloads;
+    };
+    try {
+      note(0);
+      await downloadContainer(this.#service, session.id, nameOf(session), note);
+      this.said = `Downloaded ${nameOf(session)}`;
+    } catch (error) {
+      this.failure = sentenceOf(error);
+    } finally {
+      note(null);
+    }
+  }
+
+  async #askRemoval(session: Session): Promise<void> {
+    this.removalFailure = '';
+    this.removing = session;
+    await this.updateComplete;
+    this.dialog.showModal();
+  }
+
+  async #remove(session: Session): Promise<void> {
+    this.isRemoving = true;
+    try {
+      const ids = this.#shown(this.#list.sessions).rows.map(({ id }) => id);
+      await this.#list.remove(session.id);
+      this.said = `Deleted ${nameOf(session)}`;
+      this.removing = null;
+      // The button that had the focus is gone; the row after it, or the last one, takes it.
+      const at = ids.indexOf(session.id);
+      const next = ids[at + 1] ?? ids[at - 1];
+      await this.updateComplete;
+      const selector = next ? `tbody[data-id="${CSS.escape(next)}"] a.name` : 'a.primary';
+      this.renderRoot.querySelector<HTMLElement>(selector)?.focus();
+    } catch (error) {
+      this.removalFailure = sentenceOf(error);
+    } finally {
+      this.isRemoving = false;
+    }
+  }
+
+  #changed = (): void => {
+    const { trouble } = this.#list;
+    this.wantsToken = trouble?.problem instanceof ServiceProblem && trouble.problem.status === 401;
+    this.requestUpdate();
+  };
+
+  #tokenWanted = (): void => {
+    this.wantsToken = true;
+  };
+
+  #tokenChanged = (): void => {
+    this.wantsToken = false;
+    this.page = 0;
+    this.#figures.reset();
+    this.#list.reset();
+  };
+
+  #visibilityChanged = (): void => {
+    if (document.hidden) this.#list.stop();
+    else this.#list.start();
+    this.requestUpdate();
+  };
+}
+
+declare global {
+  interface HTMLElementTagNameMap {
+    'cager-sessions': Sessions;
+  }
+}

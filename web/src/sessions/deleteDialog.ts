@@ -1,0 +1,65 @@
+import { css, html, nothing } from 'lit';
+import type { Session } from '../service/messages';
+import * as glyphs from './glyphs';
+import { nameOf } from './row';
+import { isUnfinished } from './sessionList';
+
+/** What the dialog shows, and what its buttons do. */
+export interface DeleteDialog {
+  /** Whether the service is being asked. */
+  readonly isRunning: boolean;
+  /** Why it could not be deleted; empty while all is well. */
+  readonly failure: string;
+  readonly onClose: (event: Event) => void;
+  readonly onKeep: () => void;
+  readonly onDelete: () => void;
+}
+
+/** Asks whether a session is to be deleted. Whoever renders it opens it as a modal dialog. */
+export function deleteDialog(session: Session, dialog: DeleteDialog) {
+  const stops = isUnfinished(session) ? 'Work on it stops. ' : '';
+  const what = session.state === 'completed' ? 'Its container and all its frames are' : 'All its frames are';
+  return html`
+    <dialog aria-labelledby="delete-title" aria-describedby="delete-what" @close=${dialog.onClose}>
+      <h2 id="delete-title">Delete “${nameOf(session)}”?</h2>
+      <p id="delete-what">${stops}${what} deleted for good.</p>
+      ${
+        dialog.failure
+          ? html`<p class="problem" role="alert">${glyphs.alert}<span>${dialog.failure}</span></p>`
+          : nothing
+      }
+      <div class="buttons">
+        <button type="button" autofocus @click=${dialog.onKeep}>Keep it</button>
+        <button type="button" class="danger" ?disabled=${dialog.isRunning} @click=${dialog.onDelete}>Delete</button>
+      </div>
+    </dialog>
+  `;
+}
+
+export const deleteDialogStyle = css`
+  dialog {
+    max-width: min(460px, calc(100vw - 32px));
+    padding: var(--cager-space-5);
+    border: 1px solid var(--cager-line);
+    border-radius: var(--cager-radius-large);
+    background: var(--cager-surface);
+    color: var(--cager-text);
+    box-shadow: var(--cager-shadow);
+  }
+  dialog::backdrop {
+    background: rgb(0 0 0 / 0.5);
+  }
+  dialog h2 {
+    margin: 0 0 var(--cager-space-2);
+    font-size: var(--cager-size-large);
+    overflow-wrap: anywhere;
+  }
+  dialog p {
+    margin: 0 0 var(--cager-space-5);
+  }
+  dialog .buttons {
+    display: flex;
+    justify-content: flex-end;
+    gap: var(--cager-space-2);
+  }
+`;

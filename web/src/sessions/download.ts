@@ -1,0 +1,31 @@
+import type { Service } from '../service/service';
+import { piecesOf, sessionPath } from '../service/service';
+
+/**
+ * Downloads a session's container through the page, since a plain link cannot carry the token, and has the browser save it.
+ *
+ * @param onProgress hears the part that has arrived, 0 to 1
+ */
+export async function downloadContainer(
+  service: Service,
+  id: string,
+  name: string,
+  onProgress: (part: number) => void,
+): Promise<void> {
+  const response = await service.request(sessionPath(id, 'capture.cager'));
+  const total = Number(response.headers.get('content-length'));
+  const pieces: BlobPart[] = [];
+  let received = 0;
+  for await (const piece of piecesOf(response)) {
+    pieces.push(piece as Uint8Array<ArrayBuffer>);
+    received += piece.length;
+    if (total > 0) onProgress(Math.min(1, received / total));
+  }
+  if (total > 0 && received < total) throw new Error('The download broke off. Start it again.');
+  const link = document.createElement('a');
+  link.href = URL.createObjectURL(new Blob(pieces, { type: 'application/vnd.cager' }));
+  // Signs that file systems do not take.
+  link.download = `${name.replace(/[\\/:*?"<>|\p{Cc}]+/gu, '-')}.cager`;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+}

@@ -1,0 +1,172 @@
+/** Sizes and errors of sessions, which the list itself does not have: fetched for those that are seen. */
+
+import { decodeReport } from '../container/tail';
+import {
+  ENTRY_BYTES,
+  type Entry,
+  FOOTER_BYTES,
+  HEADER_BYTES,
+  checkFooter,
+  parseFields,
+  safeInteger,
+  viewOf,
+} from '../container/section';
+import type { Session } from '../service/messages';
+import { type Service, bodyOf, sessionPath } from '../service/service';
+
+/** Errors are fractions of the diagonal; null: not measured. */
+export interface Figures {
+  readonly meanL2: number | null;
+  readonly worst: number | null;
+  /** Of the container; null before there is one. */
+  readonly bytes: number | null;
+  /** How many times smaller it is than the capture in single precision. */
+  readonly ratio: number | null;
+}
+
+/** More than the table of contents and the report of most containers. */
+const TAIL_BYTES = 64 << 10;
+const AT_ONCE = 2;
+/** Least time between looks at the errors of a running session; longer for many frames, since all of them come each time. */
+const LEAST_MS = 5000;
+const MS_PER_FRAME = 2;
+const RETRY_MS = 30_000;
+
+/** Fetches figures and keeps them. Fires `change`. */
+export class FigureLoader extends EventTarget {
+  readonly #figures = new Map<string, Figures>();
+  /** Of how many frames the figures of a session are, whether these are the last, and when to look again at the earliest. */
+  readonly #fetched = new Map<string, { solved: number; isFinal: boolean; next: number }>();
+  readonly #wanted = new Map<string, Session>();
+  #atWork = 0;
+
+  constructor(private readonly service: Service) {
+    super();
+  }
+
+  of(id: string): Figures | null {
+    return this.#figures.get(id) ?? null;
+  }
+
+  /** Fetches what is not known of these sessions, or not known anew. */
+  want(sessions: readonly Session[]): void {
+    this.#wanted.clear();
+    for (const session of sessions) {
+      if (this.#isDue(session)) this.#wanted.set(session.id, session);
+    }
+    while (this.#atWork < AT_ONCE && this.#wanted.size > 0) void this.#work();
+  }
+
+  /** Forgets everything, for another token. */
+  reset(): void {
+    this.#figures.clear();
+    this.#fetched.clear();
+    this.#wanted.clear();
+  }
+
+  #isDue(session: Session): boolean {
+    if (session.state === 'preparing' || session.frames.solved === 0) return false;
+    const fetched = this.#fetched.get(session.id);
+    if (!fetched) return true;
+    if (fetched.isFinal || performance.now() < fetched.next) return false;
+    return fetched.solved !== session.frames.solved || isOver(session);
+  }
+
+  async #work(): Promise<void> {
+    this.#atWork += 1;
+    for (const [id, session] of this.#wanted) {
+      this.#wanted.delete(id);
+      const { solved } = session.frames;
+      const note = (wait: number, known: number, isFinal: boolean) =>
+        this.#fetched.set(id, { solved: known, isFinal, next: performance.now() + wait });
+      note(Math.max(LEAST_MS, MS_PER_FRAME * solved), solved, isOver(session));
+      try {
+        const fetch = session.state === 'completed' ? containerFigures : frameFigures;
+        this.#figures.set(id, await fetch(this.service, session));
+      } catch {
+        // Figures are an addition: what is wrong with the service, the list itself says.
+        note(RETRY_MS, -1, false);
+      }
+      this.dispatchEvent(new Event('change'));
+    }
+    this.#atWork -= 1;
+  }
+}
+
+function isOver(session: Session): boolean {
+  return session.state === 'completed' || session.state === 'failed';
+}
+
+/** Of the frames that are solved so far. */
+async function frameFigures(service: Service, session: Session): Promise<Figures> {
+  const frames = await service.errors(session.id);
+  let [sum, measured, worst] = [0, 0, 0];
+  for (const { l2, linf } of frames) {
+    if (l2 === null || linf === null) continue;
+    sum += l2;
+    measured += 1;
+    worst = Math.max(worst, linf);
+  }
+  const meanL2 = measured > 0 ? sum / measured : null;
+  return { meanL2, worst: measured > 0 ? worst : null, bytes: null, ratio: null };
+}
+
+/** What the report at the end of a completed session's container says (docs/FORMAT.md, `summ`). */
+export async function containerFigures(service: Service, session: Session): Promise<Figures> {
+  let tail = await readTail(service, session.id, TAIL_BYTES);
+  const contents = checkFooter(tail.bytes.subarray(-FOOTER_BYTES), tail.total);
+  if (contents < tail.first) tail = await readTail(service, session.id, tail.total - contents);
+  const entries = contentsOf(tail, contents);
+  const summary = entries.get('summ');
+  if (summary && summary.offset < tail.first) tail = await readTail(service, session.id, tail.total - summary.offset);
+  const report = summary ? reportAt(tail.bytes.subarray(summary.offset - tail.first), summary) : {};
+  const error = (report.error ?? {}) as Record<string, unknown>;
+  // Faces and corners of the model from the size of both, and from the triangles, of which each face has its corners less two.
+  const facesAndCorners = (entries.get('RFAC')?.fields.rawBytes ?? 0) / 4;
+  const corners = (2 * facesAndCorners + (numberOf(report.triangles) ?? 0)) / 3;
+  const capture = 12 * (session.points ?? 0) * session.frames.solved + 4 * corners;
+  return {
+    meanL2: numberOf(error.l2_mean),
+    worst: numberOf(error.linf_max),
+    bytes: tail.total,
+    ratio: capture > 0 ? capture / tail.total : null,
+  };
+}
+
+/** Entries of the table of contents by their tags, the last of each; the table begins at the offset `contents`. */
+function contentsOf(tail: Tail, contents: number): Map<string, Entry> {
+  const entries = new Map<string, Entry>();
+  const end = tail.bytes.length - FOOTER_BYTES - ENTRY_BYTES;
+  for (let at = contents - tail.first + HEADER_BYTES; at <= end; at += ENTRY_BYTES) {
+    const bytes = tail.bytes.subarray(at, at + ENTRY_BYTES);
+    const fields = parseFields(bytes.subarray(8), contents);
+    entries.set(fields.tag, { offset: safeInteger(viewOf(bytes), 0, contents), fields });
+  }
+  return entries;
+}
+
+function reportAt(bytes: Uint8Array, entry: Entry): Readonly<Record<string, unknown>> {
+  return decodeReport({ entry, payload: bytes.subarray(HEADER_BYTES, HEADER_BYTES + entry.fields.payloadBytes) });
+}
+
+/** The end of a container. */
+interface Tail {
+  readonly bytes: Uint8Array;
+  /** Offset of the first of these bytes. */
+  readonly first: number;
+  /** Bytes of the whole container. */
+  readonly total: number;
+}
+
+async function readTail(service: Service, id: string, bytes: number): Promise<Tail> {
+  const headers = { Range: `bytes=-${bytes}` };
+  const response = await service.request(sessionPath(id, 'capture.cager'), { headers });
+  const range = /^bytes (\d+)-\d+\/(\d+)$/.exec(response.headers.get('content-range') ?? '');
+  const body = new Uint8Array(await bodyOf(response));
+  const total = range ? Number(range[2]) : body.length;
+  return { bytes: body, first: range ? Number(range[1]) : 0, total };
+}
+
+function numberOf(value: unknown): number | null {
+  return typeof value === 'number' ? value : null;
+}

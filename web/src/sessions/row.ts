@@ -1,0 +1,195 @@
+import { html, nothing, type TemplateResult } from 'lit';
+import type { Session } from '../service/messages';
+import { problemFrom, sentenceOf } from '../service/problem';
+import type { Figures } from './figures';
+import * as glyphs from './glyphs';
+import * as text from './text';
+
+/** What a row shows, and what its buttons do. */
+export interface Row {
+  readonly session: Session;
+  readonly figures: Figures | null;
+  /** Frames per second; null where it is not known. */
+  readonly rate: number | null;
+  /** Seconds since 1970. */
+  readonly now: number;
+  /** Part of the container that has been downloaded; null while none is. */
+  readonly downloaded: number | null;
+  readonly onDownload: () => void;
+  readonly onRemove: () => void;
+}
+
+/** The head of the table. */
+export const tableHead = html`
+  <thead role="rowgroup">
+    <tr role="row">
+      <th role="columnheader" scope="col">Session</th>
+      <th role="columnheader" scope="col">State</th>
+      <th role="columnheader" scope="col">Progress</th>
+      <th role="columnheader" scope="col" class="number">Rate</th>
+      <th
+        role="columnheader"
+        scope="col"
+        class="number"
+        title="Root mean square over the points, mean over the frames; of the rest pose's diagonal"
+      >
+        Mean error
+      </th>
+      <th
+        role="columnheader"
+        scope="col"
+        class="number"
+        title="Of the point and frame that are farthest off; of the rest pose's diagonal"
+      >
+        Worst error
+      </th>
+      <th role="columnheader" scope="col" class="number">Size</th>
+      <th role="columnheader" scope="col" class="number">Created</th>
+      <th role="columnheader" scope="col"><span class="visually-hidden">Actions</span></th>
+    </tr>
+  </thead>
+`;
+
+/** A session's name for people. */
+export function nameOf(session: Session): string {
+  return session.name ?? `Session ${session.id.slice(0, 8)}`;
+}
+
+/** The rows of one session, in a `tbody` of its own. Roles are given, since narrow screens do not lay it out as a table. */
+export function row(row: Row): TemplateResult {
+  const { session, figures, now } = row;
+  const name = nameOf(session);
+  return html`
+    <tbody role="rowgroup" data-id=${session.id}>
+      <tr class="session" role="row">
+        <td class="title" role="cell">
+          <a class="name" href="#/session/${encodeURIComponent(session.id)}" title=${name}>${name}</a>
+          <div class="facts">${facts(session)}</div>
+        </td>
+        <td role="cell">${state(session, row.rate)}</td>
+        <td role="cell">${frames(session)}</td>
+        <td role="cell" class="number" data-label="Rate">${rate(session, row.rate)}</td>
+        <td role="cell" class="number" data-label="Mean error">${figures ? text.fraction(figures.meanL2) : nothing}</td>
+        <td role="cell" class="number" data-label="Worst error">${figures ? text.fraction(figures.worst) : nothing}</td>
+        <td role="cell" class="number" data-label="Size">${sizes(session, figures)}</td>
+        <td role="cell" class="number">
+          <time datetime=${new Date(1000 * session.created).toISOString()} title=${text.moment(session.created)}
+            >${text.age(session.created, now)}</time
+          >
+        </td>
+        <td class="tools" role="cell"><div class="actions">${download(row, name)}${remove(row, name)}</div></td>
+      </tr>
+      ${remarks(session)}
+    </tbody>
+  `;
+}
+
+function facts(session: Session): string {
+  const parts = [
+    session.points === null ? null : text.counted(session.points, 'point'),
+    session.cage_vertices === null ? null : `cage of ${text.count(session.cage_vertices)}`,
+    session.coordinates === 'mvc' ? null : session.coordinates,
+  ];
+  return parts.filter((part) => part !== null).join(' · ');
+}
+
+function state(session: Session, rate: number | null): TemplateResult {
+  const [look, word] = stateOf(session, rate);
+  return html`<span class="state"><span class="dot ${look}"></span>${word}</span>`;
+}
+
+function stateOf(session: Session, rate: number | null): [string, string] {
+  switch (session.state) {
+    case 'preparing':
+      return ['preparing', 'Preparing'];
+    case 'completed':
+      return ['completed', 'Completed'];
+    case 'failed':
+      return ['failed', 'Failed'];
+    case 'ready':
+      return rate !== null && rate > 0 ? ['running', 'Running'] : ['waiting', 'Waiting'];
+  }
+}
+
+function frames(session: Session) {
+  const { received, solved, missing } = session.frames;
+  if (session.state === 'preparing' && received === 0) return nothing;
+  if (session.state === 'completed' || session.state === 'failed') return text.counted(solved, 'frame');
+  if (received === 0) return html`<span class="muted">no frames yet</span>`;
+  const gaps = missing.reduce((sum, [first, end]) => sum + end - first, 0);
+  const remarks = [
+    session.coding ? `${text.count(session.coding.frames)} coded` : null,
+    gaps > 0 ? `${text.count(gaps)} missing` : null,
+  ].filter((remark) => remark !== null);
+  const known = received + gaps;
+  return html`
+    <span
+      >${solved === known ? text.counted(solved, 'frame') : `${text.count(solved)} of ${text.count(known)} frames`}</span
+    >
+    ${solved === known ? nothing : html`<progress aria-label="Frames solved" max=${known} value=${solved}></progress>`}
+    ${remarks.length > 0 ? html`<div class="small">${remarks.join(' · ')}</div>` : nothing}
+  `;
+}
+
+function rate(session: Session, rate: number | null) {
+  return session.state === 'ready' && rate !== null && rate > 0 ? text.perSecond(rate) : nothing;
+}
+
+function sizes(session: Session, figures: Figures | null) {
+  if (session.state !== 'completed' && session.coding) return text.size(session.coding.bytes);
+  const bytes = figures?.bytes ?? null;
+  if (!figures || bytes === null) return nothing;
+  const ratio =
+    figures.ratio === null ? nothing : html` <span class="small">${text.ratio(figures.ratio)} smaller</span>`;
+  return html`${text.size(bytes)}${ratio}`;
+}
+
+function download(row: Row, name: string) {
+  if (row.session.state !== 'completed') return nothing;
+  const { downloaded } = row;
+  const label = downloaded === null ? `Download ${name}` : `Downloading ${name}, ${Math.round(100 * downloaded)} %`;
+  return html`
+    <button
+      type="button"
+      class="download"
+      title="Download"
+      aria-label=${label}
+      ?disabled=${downloaded !== null}
+      @click=${row.onDownload}
+    >
+      ${downloaded === null ? glyphs.download : html`<span class="small">${Math.round(100 * downloaded)}%</span>`}
+    </button>
+  `;
+}
+
+function remove(row: Row, name: string) {
+  return html`
+    <button type="button" class="remove" title="Delete" aria-label="Delete ${name}" @click=${row.onRemove}>
+      ${glyphs.trash}
+    </button>
+  `;
+}
+
+/** Why it failed and what to do, and, to be unfolded, what to know of it. */
+function remarks(session: Session) {
+  const wrong = session.problem ?? session.coding?.problem;
+  const { warnings } = session;
+  if (!wrong && warnings.length === 0) return nothing;
+  const line = (look: string, sentence: string) =>
+    html`<p class="problem ${look}">${glyphs.alert}<span>${sentence}</span></p>`;
+  return html`
+    <tr class="more" role="row">
+      <td role="cell" colspan="9">
+        ${wrong ? line('', problemFrom(wrong).message) : nothing}
+        ${
+          warnings.length > 0
+            ? html`<details>
+                <summary>${text.counted(warnings.length, 'warning')}</summary>
+                ${warnings.map((warning) => line('mild', sentenceOf(new Error(warning))))}
+              </details>`
+            : nothing
+        }
+      </td>
+    </tr>
+  `;
+}

@@ -1,0 +1,90 @@
+/** What dropped files are taken for: a rest pose, a cage, frames. People can say otherwise afterwards. */
+
+import { extensionOf } from './meshes';
+
+/** A file and where it lay in what was dropped. */
+export interface Dropped {
+  readonly file: File;
+  /** Path below the folder that was dropped, or the name. */
+  readonly path: string;
+}
+
+export type Role = 'rest' | 'cage' | 'frames' | 'unused';
+
+/** A file, or a row of mesh files that are one frame each, and what it is taken for. */
+export interface Item {
+  readonly name: string;
+  /** In the order of the numbers in their names. */
+  readonly files: readonly File[];
+  readonly role: Role;
+  /** Roles that it can have. */
+  readonly choices: readonly Role[];
+  /** Why it is not used, for kinds of files that cannot be. */
+  readonly remark: string;
+}
+
+const ARRAYS = new Set(['npy', 'pc2']);
+const MESHES = new Set(['obj', 'ply', 'off', 'stl', 'glb']);
+const NATURAL = new Intl.Collator('en', { numeric: true });
+
+/** Remarks on formats that the command line takes and this page does not. */
+const ELSEWHERE: Readonly<Record<string, string>> = {
+  mdd: 'Point caches .mdd can be encoded with the command line, cager encode --server.',
+  cager: 'This is an encoded capture already: open it as a file.',
+  npz: 'Save the array of positions alone, as .npy.',
+};
+
+/** Sorts files into items and gives each a role; at most one is the rest pose, one the cage and one the frames. */
+export function classify(dropped: readonly Dropped[]): Item[] {
+  const rows = new Map<string, File[]>();
+  const visible = dropped.filter(({ path }) => !path.split('/').some((part) => part.startsWith('.')));
+  for (const { file, path } of [...visible].sort((a, b) => NATURAL.compare(a.path, b.path))) {
+    const extension = extensionOf(file.name);
+    // Files whose names differ in their last number alone are frames of one row.
+    const key = extension === 'obj' ? path.replace(/\d+(\D*)$/, '#$1') : path;
+    const row = rows.get(key);
+    if (row) row.push(file);
+    else rows.set(key, [file]);
+  }
+  const items = [...rows.values()].map(itemOf);
+  return withRoles(items);
+}
+
+/** The items with one given another role; whatever had it before is not used then. */
+export function reassigned(items: readonly Item[], changed: Item, role: Role): Item[] {
+  return items.map((item) => {
+    if (item === changed) return { ...item, role };
+    return role !== 'unused' && item.role === role ? { ...item, role: 'unused' } : item;
+  });
+}
+
+function itemOf(files: File[]): Item {
+  const [{ name }] = files;
+  const extension = extensionOf(name);
+  const base = { files, role: 'unused', remark: '' } as const;
+  if (files.length > 1) return { ...base, name: `${name} and ${files.length - 1} more`, choices: ['frames', 'unused'] };
+  if (ARRAYS.has(extension)) return { ...base, name, choices: ['frames', 'unused'] };
+  if (MESHES.has(extension)) return { ...base, name, choices: ['rest', 'cage', 'unused'] };
+  const remark = ELSEWHERE[extension] ?? 'This kind of file is not used.';
+  return { ...base, name, choices: ['unused'], remark };
+}
+
+function withRoles(items: Item[]): Item[] {
+  const meshes = items.filter((item) => item.choices.includes('rest'));
+  const named = (word: RegExp) => meshes.find((item) => word.test(item.name));
+  const cage = named(/cage|wrap/i) ?? bySize(meshes).at(meshes.length > 1 ? 0 : meshes.length);
+  const rest = named(/rest|bind|base|neutral/i) ?? bySize(meshes.filter((item) => item !== cage)).at(-1);
+  const frames = bySize(items.filter((item) => item.choices.includes('frames'))).at(-1);
+  const order: readonly Role[] = ['rest', 'frames', 'cage', 'unused'];
+  const withRole = items.map((item): Item => {
+    const role = item === frames ? 'frames' : item === rest ? 'rest' : item === cage ? 'cage' : 'unused';
+    return { ...item, role };
+  });
+  return withRole.sort((a, b) => order.indexOf(a.role) - order.indexOf(b.role));
+}
+
+/** Smallest first: cages are smaller than models, and captures larger than anything beside them. */
+function bySize(items: readonly Item[]): Item[] {
+  const size = (item: Item): number => item.files.reduce((sum, file) => sum + file.size, 0);
+  return [...items].sort((a, b) => size(a) - size(b));
+}

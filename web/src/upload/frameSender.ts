@@ -1,0 +1,110 @@
+/** Posts frames in batches of a size that suits the connection, two at a time so that the service never waits for the page. */
+
+import type { FrameResult } from '../service/messages';
+import { type ProblemDetails, problemBehind, problemFrom } from '../service/problem';
+import type { Service } from '../service/service';
+import type { FrameSource } from './frameSource';
+
+const AT_ONCE = 2;
+const FIRST_BYTES = 1 << 20;
+const MOST_BYTES = 16 << 20;
+/** How long a batch should take: long enough to be worth a request, short enough for progress to be seen. */
+const BATCH_SECONDS = 1.5;
+
+/** What happens to frames. */
+export interface Heard {
+  /** A frame is solved and on the service's disk. */
+  readonly solved: (result: FrameResult) => void;
+  /** A batch is acknowledged: so many frames, so many bytes. */
+  readonly sent: (frames: number, bytes: number) => void;
+}
+
+/** Posts frames of a capture, whole or the rows of the handles alone. */
+export class FrameSender {
+  #batchBytes = FIRST_BYTES;
+
+  /**
+   * @param path of the session's frames
+   * @param handles numbers of the points to send of each frame, in this order; null for all points
+   */
+  constructor(
+    private readonly service: Service,
+    private readonly path: string,
+    private readonly source: FrameSource,
+    private readonly handles: Uint32Array | null,
+    private readonly heard: Heard,
+  ) {}
+
+  /** Posts the frames of these ranges `[a, b)`. After a failure some of them may have arrived: the service knows which. */
+  async send(ranges: readonly (readonly [number, number])[], signal: AbortSignal): Promise<void> {
+    const failed = new AbortController();
+    const either = AbortSignal.any([signal, failed.signal]);
+    const batches = this.#batches(ranges);
+    const work = async (): Promise<void> => {
+      for (const [first, count] of batches) await this.#post(first, count, either);
+    };
+    const failures: Error[] = [];
+    const note = (error: unknown): void => {
+      failures.push(problemBehind(error));
+      failed.abort();
+    };
+    await Promise.all(Array.from({ length: AT_ONCE }, () => work().catch(note)));
+    // The other worker's abort is a consequence of the first failure.
+    if (failures.length > 0) throw failures[0];
+  }
+
+  /** The next batch is as large as the connection suggests at the time it is taken. A generator may be shared by those who take from it. */
+  *#batches(ranges: readonly (readonly [number, number])[]): Generator<[number, number], void, undefined> {
+    for (const [begin, end] of ranges) {
+      for (let first = begin; first < end;) {
+        const count = Math.min(end - first, Math.max(1, Math.floor(this.#batchBytes / this.#frameBytes)));
+        yield [first, count];
+        first += count;
+      }
+    }
+  }
+
+  get #frameBytes(): number {
+    return 12 * (this.handles?.length ?? this.source.points);
+  }
+
+  async #post(first: number, count: number, signal: AbortSignal): Promise<void> {
+    const body = this.#chosen(await this.source.read(first, count), count);
+    const began = performance.now();
+    const response = await this.service.request(`${this.path}?first=${first}${this.handles ? '&rows=handles' : ''}`, {
+      method: 'POST',
+      headers: { 'Content-Type': 'application/octet-stream', Accept: 'application/x-ndjson' },
+      body: body as Float32Array<ArrayBuffer>,
+      signal,
+    });
+    for (const line of (await response.text()).split('\n')) {
+      if (line === '') continue;
+      const result = JSON.parse(line) as FrameResult | ProblemDetails;
+      // An error after the first result has no status of its own; it is the last line.
+      if ('type' in result) throw problemFrom(result);
+      this.heard.solved(result as FrameResult);
+    }
+    this.heard.sent(count, body.byteLength);
+    this.#adapt(body.byteLength, (performance.now() - began) / 1000);
+  }
+
+  #chosen(frames: Float32Array, count: number): Float32Array {
+    if (!this.handles) return frames;
+    const { handles } = this;
+    const rows = new Float32Array(count * 3 * handles.length);
+    for (let k = 0; k < count; k += 1) {
+      for (let i = 0; i < handles.length; i += 1) {
+        const from = 3 * (k * this.source.points + handles[i]);
+        rows.set(frames.subarray(from, from + 3), 3 * (k * handles.length + i));
+      }
+    }
+    return rows;
+  }
+
+  #adapt(bytes: number, seconds: number): void {
+    const wanted = (bytes / Math.max(seconds, 0.01)) * BATCH_SECONDS;
+    // Half of the way, so that one slow answer does not change much.
+    const next = (this.#batchBytes + Math.min(MOST_BYTES, wanted)) / 2;
+    this.#batchBytes = Math.max(this.#frameBytes, Math.min(2 * this.#batchBytes, next));
+  }
+}

@@ -1,0 +1,107 @@
+import { html, nothing } from 'lit';
+import * as glyphs from '../sessions/glyphs';
+import type { Figures } from '../sessions/figures';
+import { count, counted, fraction, perSecond, ratio as times, size, span } from '../sessions/text';
+import { errorChart } from './errorChart';
+import type { Stage, UploadJob } from './uploadJob';
+
+/** What the buttons of a running upload do. */
+export interface JobActions {
+  readonly stop: () => void;
+  readonly goOn: () => void;
+  readonly discard: () => void;
+  readonly another: () => void;
+}
+
+const STEPS: readonly (readonly [Stage, string])[] = [
+  ['creating', 'Send the meshes'],
+  ['preparing', 'Prepare'],
+  ['sending', 'Send frames'],
+  ['completing', 'Write the container'],
+];
+
+const TITLES: Readonly<Record<Stage, string>> = {
+  creating: 'Sending the rest pose',
+  preparing: 'Preparing the cage',
+  sending: 'Encoding',
+  completing: 'Writing the container',
+  completed: 'Encoded',
+  stopped: 'Stopped',
+  failed: 'This did not work',
+};
+
+/** An upload: how far it is, what its errors are, and what can be done about it. */
+export function jobView(job: UploadJob, furthest: Stage, actions: JobActions) {
+  const { session, plan, stage } = job;
+  const total = plan.frames.frames;
+  const name = job.options.name ?? 'the capture';
+  const canWatch = session !== null && session.state !== 'preparing' && session.state !== 'failed';
+  const at = STEPS.findIndex(([step]) => step === (job.isActive ? stage : furthest));
+  return html`
+    <section class="card" aria-labelledby="job-title">
+      <h2 id="job-title" class=${stage === 'completed' ? 'good' : ''}>${TITLES[stage]}: ${name}</h2>
+      <ol class="steps">
+        ${STEPS.map(([, word], i) => {
+          const isDone = stage === 'completed' || i < at;
+          const isCurrent = job.isActive && i === at;
+          return html`<li class=${isDone ? 'done' : ''} aria-current=${isCurrent ? 'step' : nothing}>
+            <span class="mark">${isDone ? glyphs.check : i + 1}</span>${word}
+          </li>`;
+        })}
+      </ol>
+      <progress aria-label="Frames encoded" max=${total} value=${job.done}></progress>
+      <div class="figuresRow figures">
+        <span><b>${count(job.done)}</b> of ${counted(total, 'frame')}</span>
+        ${stage === 'sending' ? html`<span>${perSecond(job.framesPerSecond)}</span><span>${size(job.bytesPerSecond)}/s</span>` : nothing}
+        ${stage === 'sending' && job.secondsLeft !== null ? html`<span>${span(job.secondsLeft)} left</span>` : nothing}
+        ${
+          job.handlesOnly
+            ? html`<span
+                >${count(session?.handle_count ?? 0)} of ${counted(plan.frames.points, 'point')} of each frame
+                sent</span
+              >`
+            : nothing
+        }
+        ${containerFacts(job.figures)}
+      </div>
+      ${
+        job.trouble
+          ? html`<p class=${job.isActive ? 'note' : 'note bad'} role="alert">
+              ${glyphs.alert}<span>${job.trouble}</span>
+            </p>`
+          : nothing
+      }
+      ${errorChart(job.measured)}
+      <div class="buttons">
+        ${
+          canWatch
+            ? html`<a class="button primary" href="#/session/${encodeURIComponent(session.id)}"
+                >${glyphs.play} ${stage === 'completed' ? 'Look at it' : 'Watch it live'}</a
+              >`
+            : nothing
+        }
+        ${job.isActive ? html`<button type="button" @click=${actions.stop}>Stop</button>` : nothing}
+        ${
+          stage === 'stopped' || stage === 'failed'
+            ? html`<button type="button" @click=${actions.goOn}>${stage === 'stopped' ? 'Go on' : 'Try again'}</button>
+                <button type="button" @click=${actions.discard}>
+                  ${session ? 'Delete what was sent' : 'Put it away'}
+                </button>`
+            : nothing
+        }
+        ${stage === 'completed' ? html`<button type="button" @click=${actions.another}>Upload another capture</button>` : nothing}
+      </div>
+      ${stage === 'sending' ? html`<p class="muted">You can look at it meanwhile; the upload goes on while this tab is open.</p>` : nothing}
+    </section>
+  `;
+}
+
+function containerFacts(figures: Figures | null) {
+  const { bytes, ratio, meanL2 } = figures ?? { bytes: null, ratio: null, meanL2: null };
+  if (bytes === null) return nothing;
+  return html`
+    <span>container of <b>${size(bytes)}</b></span>
+    ${ratio === null ? nothing : html`<span><b>${times(ratio)}</b> smaller than the frames</span>`}
+    ${meanL2 === null ? nothing : html`<span>mean error <b>${fraction(meanL2)}</b></span>`}
+  `;
+}

@@ -1,0 +1,27 @@
+import { expect, test } from 'vitest';
+import { DEFAULT_CHOICES, optionsOf, sendsHandles } from './optionsForm';
+
+test('what_is_left_empty_is_the_services_choice', () => {
+  expect(optionsOf(DEFAULT_CHOICES, 12, true)).toEqual({ frames: 12, coordinates: 'mvc' });
+});
+
+test('choices_become_options', () => {
+  const choices = { ...DEFAULT_CHOICES, name: ' walk ', frameRate: '29.97', cageVertices: '200', bound: '0.05' };
+  expect(optionsOf({ ...choices, accuracy: 'bound' }, 12, false)).toEqual({
+    frames: 12,
+    coordinates: 'mvc',
+    name: 'walk',
+    frame_rate: 29.97,
+    cage: { vertices: 200 },
+    max_error: 0.0005,
+  });
+  expect(optionsOf({ ...choices, accuracy: 'standard' }, 12, true)).toMatchObject({ quality: 'standard' });
+  expect(optionsOf(choices, 12, true)).not.toHaveProperty('cage');
+});
+
+test('handle_rows_are_sent_where_whole_frames_would_take_long', () => {
+  expect(sendsHandles(DEFAULT_CHOICES, 10 << 20)).toBe(false);
+  expect(sendsHandles(DEFAULT_CHOICES, 100 << 20)).toBe(true);
+  expect(sendsHandles({ ...DEFAULT_CHOICES, send: 'all' }, 100 << 20)).toBe(false);
+  expect(sendsHandles({ ...DEFAULT_CHOICES, send: 'handles' }, 1)).toBe(true);
+});

@@ -1,0 +1,53 @@
+/** What will be sent, checked as far as that goes before anything is. */
+
+import { counted } from '../sessions/text';
+import type { Item } from './classify';
+import type { FrameSource } from './frameSource';
+import { ObjFrames, extensionOf, pointsOf } from './meshes';
+import { npyFrames } from './npy';
+import { pc2Frames } from './pc2';
+
+/** A capture that can be sent. */
+export interface Plan {
+  readonly rest: File;
+  /** Without one the service makes it. */
+  readonly cage: File | null;
+  readonly frames: FrameSource;
+  /** What to know of it, sentences. */
+  readonly remarks: readonly string[];
+}
+
+/**
+ * Makes a plan of the items' roles.
+ *
+ * @throws Error whose message says what is missing or does not fit
+ */
+export async function planOf(items: readonly Item[]): Promise<Plan> {
+  const having = (role: Item['role']) => items.find((item) => item.role === role);
+  const [framesItem, cageItem] = [having('frames'), having('cage')];
+  if (!framesItem) {
+    throw new Error(
+      'Frames are missing: drop an array (.npy), a point cache (.pc2), or a folder with one .obj per frame.',
+    );
+  }
+  const frames = await framesOf(framesItem.files);
+  const restItem = having('rest');
+  if (!restItem && framesItem.files.length < 2) {
+    throw new Error('The rest pose is missing: drop the mesh that moves, as .obj, .ply, .off, .stl or .glb.');
+  }
+  const rest = (restItem ?? framesItem).files[0];
+  const remarks = restItem ? [] : [`The first frame, ${rest.name}, is taken as the rest pose.`];
+  const points = await pointsOf(rest);
+  if (points !== null && points !== frames.points) {
+    throw new Error(
+      `${framesItem.name} has ${counted(frames.points, 'point')} in each frame and the rest pose ${rest.name} has ${counted(points, 'point')}: both have to be the same mesh, with its points in the same order.`,
+    );
+  }
+  if (!cageItem) remarks.push('There is no cage: the service makes one around the rest pose.');
+  return { rest, cage: cageItem?.files[0] ?? null, frames, remarks };
+}
+
+async function framesOf(files: readonly File[]): Promise<FrameSource> {
+  if (files.length > 1) return ObjFrames.of(files);
+  return extensionOf(files[0].name) === 'npy' ? npyFrames(files[0]) : pc2Frames(files[0]);
+}

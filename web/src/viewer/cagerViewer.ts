@@ -1,0 +1,427 @@
+import { html, LitElement, nothing, type PropertyValues } from 'lit';
+import { customElement, property, query, state } from 'lit/decorators.js';
+import type { Capture } from '../capture';
+import { openContainer } from '../container/open';
+import { blobSource, httpSource } from '../container/source';
+import { controls, tokens } from '../style/tokens';
+import { perform } from './actions';
+import { emptyState, notice, progressBox } from './messages';
+import { panelStyle } from './panelStyle';
+import { figuresPanel, helpSheet, legend, toolbar, transportBar } from './parts';
+import { Player } from './player';
+import { canRecord } from './recording';
+import { actionOf, type Action } from './shortcuts';
+import { stageColors } from './stageColors';
+import { clock, grouped, percent } from './text';
+import './timeline';
+import type { Timeline } from './timeline';
+import { sought, started } from './transport';
+import { viewerStyle } from './viewerStyle';
+import { viewFromText, viewText } from './viewState';
+
+/** How long the view must rest before it is told to whoever keeps links. */
+const REST_MILLISECONDS = 300;
+/** CSS pixels below which the tools cover what matters. */
+const NARROW = 680;
+/** A finer picture than this costs more than it shows. */
+const FINEST_PIXEL_RATIO = 2;
+
+/**
+ * Plays a capture: `<cager-viewer src="walk.cager" autoplay></cager-viewer>`, or one that is set as the property `capture`. A `.cager` file that is
+ * dropped on it plays too.
+ *
+ * @attr src address of a container
+ * @attr autoplay begins to play at once
+ * @attr name what is written above the picture, in place of the file's name
+ * @slot lead something before the title, such as a way back
+ * @fires ready when the model can be seen
+ * @fires framechange with the number of the frame that is shown
+ * @fires viewchange with the view as text, when it rests, for links; set `view` to return to it
+ * @fires problem with one sentence, when something failed
+ */
+@customElement('cager-viewer')
+export class CagerViewer extends LitElement {
+  static override styles = [tokens, controls, viewerStyle, panelStyle];
+
+  @property() src: string | null = null;
+  @property() name: string | null = null;
+  @property({ type: Boolean }) autoplay = false;
+  /** The capture to play; whoever sets it closes it. */
+  @property({ attribute: false }) capture: Capture | null = null;
+  /** The view to begin with, as `viewchange` tells it. */
+  @property() view = '';
+  @state() player: Player | null = null;
+  @state() figures = false;
+  @state() recording: AbortController | null = null;
+  @state() private opening: string | null = null;
+  @state() private problem: string | null = null;
+  /** Why nothing can be shown. */
+  @state() private failure: string | null = null;
+  @state() private dropping = false;
+  @query('canvas') private readonly canvas!: HTMLCanvasElement;
+  @query('cager-timeline') private readonly timeline!: Timeline | null;
+  @query('dialog') private readonly sheet!: HTMLDialogElement;
+  private opened: Capture | null = null;
+  private load = new AbortController();
+  private removed = new AbortController();
+  private look = 0;
+  private shownFrame = -1;
+  private deckHeight = 0;
+  private restTimer = 0;
+  private wasReady = false;
+  private cameraWasMoved = false;
+  private upAxis: 'y' | 'z' = 'y';
+  private readonly sizes = new ResizeObserver(() => this.resize());
+
+  /** Plays a file without any server. */
+  async open(file: File): Promise<void> {
+    await this.openFrom(file.name, (signal) => openContainer(blobSource(file), { name: file.name, signal }));
+  }
+
+  play() {
+    if (this.player) this.player.transport = started(this.player.transport);
+  }
+
+  pause() {
+    if (this.player) this.player.transport = { ...this.player.transport, playing: false };
+  }
+
+  /** The frame that is shown; setting it goes there. */
+  get frame(): number {
+    return Math.floor(this.player?.transport.position ?? 0);
+  }
+
+  set frame(frame: number) {
+    if (this.player) this.player.transport = sought(this.player.transport, frame);
+  }
+
+  /** Which axis of the capture points up. */
+  get up(): 'y' | 'z' {
+    return this.upAxis;
+  }
+
+  set up(axis: 'y' | 'z') {
+    this.upAxis = axis;
+    this.player?.setUp(axis);
+    this.player?.frameAll();
+  }
+
+  /** Positions of a frame as they are decoded for the picture, x y z of each point. */
+  readPositions(frame: number): Promise<Float32Array> {
+    if (!this.player) return Promise.reject(new Error('There is no capture to read from; open one first.'));
+    return this.player.readPositions(frame);
+  }
+
+  /** Shows one sentence about something that went wrong, or takes it away. */
+  report(problem: string | null) {
+    this.problem = problem;
+    if (problem === null) return;
+    this.dispatchEvent(new CustomEvent<string>('problem', { detail: problem, bubbles: true, composed: true }));
+  }
+
+  /** Shows the keyboard shortcuts. */
+  openHelp() {
+    this.sheet.showModal();
+  }
+
+  /** What is written above the picture, and in file names. */
+  get heading(): string {
+    return this.name ?? this.player?.capture.name ?? this.opening ?? 'Capture';
+  }
+
+  override connectedCallback() {
+    super.connectedCallback();
+    this.removed = new AbortController();
+    const { signal } = this.removed;
+    this.sizes.observe(this);
+    for (const feature of ['(prefers-color-scheme: dark)', '(prefers-contrast: more)']) {
+      matchMedia(feature).addEventListener('change', () => this.applyColors(), { signal });
+    }
+    const themes = new MutationObserver(() => this.applyColors());
+    themes.observe(document.documentElement, { attributeFilter: ['data-theme'] });
+    signal.addEventListener('abort', () => themes.disconnect());
+    this.addEventListener('keydown', this.pressKey, { signal });
+    this.addEventListener('dragover', (event) => this.dragOver(event), { signal });
+    this.addEventListener('dragleave', () => (this.dropping = false), { signal });
+    this.addEventListener('drop', (event) => this.dropFile(event), { signal });
+    if (this.hasUpdated && this.capture) this.show(this.capture);
+  }
+
+  override disconnectedCallback() {
+    super.disconnectedCallback();
+    this.removed.abort();
+    this.load.abort();
+    this.sizes.disconnect();
+    clearTimeout(this.restTimer);
+    this.unload();
+  }
+
+  protected override updated(changed: PropertyValues) {
+    const { src } = this;
+    if (changed.has('src') && src !== null) {
+      const name = decodeURIComponent(src.split(/[?#]/)[0].split('/').pop() ?? src);
+      void this.openFrom(name, async (signal) => openContainer(await httpSource(src, { signal }), { name, signal }));
+    }
+    if (changed.has('capture') && this.capture) this.show(this.capture);
+    if (this.measureDeck() !== this.deckHeight) this.resize();
+    this.writePlace();
+  }
+
+  override render() {
+    const { player } = this;
+    return html`
+      <canvas
+        tabindex="0"
+        role="img"
+        aria-label=${`${this.heading}: the model, drawn. Drag or use the keys A, D, W, X to turn it.`}
+        ?hidden=${!player}
+        @dblclick=${() => player?.frameAll()}
+      ></canvas>
+      ${player ? this.overlay(player) : emptyState(this.opening, this.failure, (file) => void this.open(file))}
+      ${this.dropping ? html`<div class="drop">Drop a capture to play it</div>` : nothing}
+      ${helpSheet(() => this.sheet.close())}
+    `;
+  }
+
+  private overlay(player: Player) {
+    const { capture, transport, progress } = player;
+    const { static: part } = capture;
+    const act = (action: Action) => perform(action, this);
+    const hasErrors = capture.errors.linf.some(Number.isFinite);
+    return html`
+      <div class="lead">
+        <slot name="lead"></slot>
+        <div class="title glass">
+          <h1 title=${this.heading}>${this.heading}</h1>
+          <p class="figures">
+            ${grouped(part.rest.length / 3)} points, ${grouped(capture.frames)} frames<span class="more"
+              >, cage of ${grouped(part.cage.positions.length / 3)} vertices</span
+            >
+          </p>
+        </div>
+        ${capture.complete ? nothing : this.liveBadge(player)}
+      </div>
+      ${toolbar(player, act, {
+        figures: this.figures,
+        recording: this.recording !== null,
+        recordable: canRecord(),
+      })}
+      ${this.figures ? figuresPanel(player) : nothing} ${legend(player)}
+      ${this.problem !== null ? notice(this.problem, () => (this.problem = null)) : nothing}
+      ${progress ? progressBox(progress.doing, progress.fraction) : player.buffering ? progressBox('Loading', null) : nothing}
+      <div class="deck glass">
+        ${transportBar(player, act, (speed) => (player.transport = { ...transport, speed }), hasErrors)}
+        <cager-timeline
+          .frames=${capture.frames}
+          .errors=${capture.errors}
+          .frameNumbers=${capture.frameNumbers}
+          .look=${this.look}
+          .position=${transport.position}
+          @seek=${(event: CustomEvent<number>) => (player.transport = sought(player.transport, event.detail))}
+        ></cager-timeline>
+      </div>
+    `;
+  }
+
+  private liveBadge(player: Player) {
+    const atEnd = player.transport.playing && player.transport.position > player.transport.frames - 45;
+    const goLive = () => (player.transport = started(sought(player.transport, player.transport.frames - 15)));
+    return atEnd
+      ? html`<span class="live" role="status">LIVE</span>`
+      : html`<button class="live behind" @click=${goLive}>Go live</button>`;
+  }
+
+  private async openFrom(name: string, open: (signal: AbortSignal) => Promise<Capture>) {
+    this.load.abort();
+    this.load = new AbortController();
+    const { signal } = this.load;
+    this.unload();
+    this.failure = null;
+    this.opening = name;
+    try {
+      const capture = await open(signal);
+      if (signal.aborted) {
+        capture.close();
+        return;
+      }
+      this.show(capture);
+      this.opened = capture;
+    } catch (error) {
+      if (!signal.aborted) this.fail(error);
+    }
+  }
+
+  private show(capture: Capture) {
+    this.unload();
+    this.failure = this.problem = null;
+    this.opening = capture.name;
+    // A canvas whose context was given up cannot be used again.
+    const canvas = this.canvas.cloneNode() as HTMLCanvasElement;
+    this.canvas.replaceWith(canvas);
+    canvas.addEventListener('dblclick', () => this.player?.frameAll());
+    try {
+      canvas.hidden = false;
+      this.begin(new Player(canvas, capture));
+    } catch (error) {
+      this.fail(error);
+    }
+  }
+
+  private begin(player: Player) {
+    const view = viewFromText(this.view);
+    this.player = player;
+    // Blurring what lies below is dear where no graphics processor does it.
+    this.toggleAttribute('plain', player.stage.isJagged);
+    this.wasReady = false;
+    this.cameraWasMoved = view.camera !== null;
+    player.onProblem = (problem) => this.report(problem);
+    player.onState = () => {
+      this.requestUpdate();
+      this.announceReady();
+    };
+    player.onTick = () => this.tick();
+    player.controls.onGrab = () => {
+      this.cameraWasMoved = true;
+      this.canvas.focus();
+    };
+    this.upAxis = view.up;
+    player.layers = view.layers;
+    player.setUp(view.up);
+    this.applyColors();
+    this.resize();
+    if (view.frame !== null) player.transport = sought(player.transport, view.frame);
+    if (view.camera) player.controls.go(view.camera, true);
+    else player.goHome(true);
+    // It is the view of this capture, not of the next one.
+    this.view = '';
+    if (this.autoplay && view.frame === null && !matchMedia('(prefers-reduced-motion: reduce)').matches) this.play();
+    if (player.capture.problem !== null) this.report(player.capture.problem);
+  }
+
+  private unload() {
+    this.recording?.abort();
+    this.player?.dispose();
+    this.player = null;
+    this.opened?.close();
+    this.opened = null;
+  }
+
+  private fail(error: unknown) {
+    this.unload();
+    this.failure = error instanceof Error ? error.message : String(error);
+    this.report(this.failure);
+  }
+
+  private announceReady() {
+    const { player } = this;
+    if (this.wasReady || !player?.stage.decoder.ready) return;
+    this.wasReady = true;
+    this.dispatchEvent(new CustomEvent('ready', { bubbles: true, composed: true }));
+  }
+
+  private tick() {
+    const { player } = this;
+    if (!player) return;
+    if (this.timeline) this.timeline.position = player.transport.position;
+    this.writePlace();
+    if (this.frame !== this.shownFrame) {
+      this.shownFrame = this.frame;
+      this.dispatchEvent(new CustomEvent<number>('framechange', { detail: this.frame, bubbles: true, composed: true }));
+    }
+    clearTimeout(this.restTimer);
+    this.restTimer = window.setTimeout(() => this.tellView(), REST_MILLISECONDS);
+  }
+
+  private tellView() {
+    const { player } = this;
+    if (!player) return;
+    const { playing } = player.transport;
+    const detail = viewText({
+      frame: playing || this.frame === 0 ? null : this.frame,
+      camera: this.cameraWasMoved ? player.controls.destination : null,
+      up: this.upAxis,
+      layers: player.layers,
+    });
+    this.dispatchEvent(new CustomEvent<string>('viewchange', { detail, bubbles: true, composed: true }));
+    if (this.figures) this.requestUpdate();
+  }
+
+  /** Writes what changes with every picture: rendering the template sixty times a second would cost more. */
+  private writePlace() {
+    const { player } = this;
+    if (!player) return;
+    const write = (selector: string, text: string) => {
+      const place = this.renderRoot.querySelector(selector);
+      if (place && place.textContent !== text) place.textContent = text;
+    };
+    const { capture, transport } = player;
+    const frame = Math.min(this.frame, Math.max(0, capture.frames - 1));
+    const last = Math.max(0, capture.frames - 1);
+    write('[data-place]', `${frame} / ${last}`);
+    write('[data-clock]', clock(frame / transport.rate));
+    const figure = (value: number | undefined) =>
+      value === undefined || !Number.isFinite(value) ? '–' : percent(value);
+    write('[data-l2]', figure(capture.errors.l2[frame]));
+    write('[data-linf]', figure(capture.errors.linf[frame]));
+  }
+
+  private applyColors() {
+    this.look++;
+    this.player?.stage.setColors(stageColors(this));
+    this.player?.refresh();
+  }
+
+  private measureDeck(): number {
+    const deck = this.renderRoot.querySelector('.deck');
+    const height = deck ? this.getBoundingClientRect().bottom - deck.getBoundingClientRect().top : 0;
+    this.style.setProperty('--deck-height', `${Math.round(height)}px`);
+    return Math.round(height);
+  }
+
+  private resize() {
+    const { clientWidth, clientHeight } = this;
+    if (clientWidth === 0 || clientHeight === 0) return;
+    const ratio = Math.min(FINEST_PIXEL_RATIO, devicePixelRatio);
+    this.deckHeight = this.measureDeck();
+    const tools = this.renderRoot.querySelector('.tools')?.clientWidth ?? 0;
+    // In a wide picture the tools stand beside the model anyway.
+    const right = clientWidth < NARROW ? tools + 12 : 0;
+    this.player?.resize(clientWidth, clientHeight, ratio, { right, bottom: this.deckHeight });
+    if (!this.cameraWasMoved) this.player?.goHome(true);
+  }
+
+  /** Does what a key asks for; a page that shows nothing else can hand it all key presses. */
+  readonly pressKey = (event: KeyboardEvent) => {
+    if (event.defaultPrevented) return;
+    const target = event.composedPath()[0] as HTMLElement;
+    const isControl = /^(BUTTON|A|INPUT|SELECT|LABEL)$/.test(target.tagName);
+    // Space and Enter press a button that has the focus; letters choose within a list.
+    if (isControl && (event.key === ' ' || event.key === 'Enter' || target.tagName === 'SELECT')) return;
+    if (this.sheet.open || !this.player) return;
+    const action = actionOf(event);
+    if (!action) return;
+    event.preventDefault();
+    if (action.startsWith('turn') || action.startsWith('zoom')) this.cameraWasMoved = true;
+    perform(action, this);
+  };
+
+  private dragOver(event: DragEvent) {
+    if (!event.dataTransfer?.types.includes('Files')) return;
+    event.preventDefault();
+    this.dropping = true;
+  }
+
+  private dropFile(event: DragEvent) {
+    this.dropping = false;
+    const file = event.dataTransfer?.files[0];
+    if (!file) return;
+    event.preventDefault();
+    void this.open(file);
+  }
+}
+
+declare global {
+  interface HTMLElementTagNameMap {
+    'cager-viewer': CagerViewer;
+  }
+}

@@ -1,0 +1,33 @@
+import { html, svg, type SVGTemplateResult, type TemplateResult } from 'lit';
+
+/** Line drawings on a field of 24 × 24. */
+const DRAWINGS = {
+  play: svg`<path d="M8 5.5v13l10.5-6.5z" fill="currentColor"/>`,
+  pause: svg`<path d="M8.5 6v12M15.5 6v12" stroke-width="3.4"/>`,
+  previous: svg`<path d="M17 6.5v11L9.5 12z" fill="currentColor"/><path d="M6.5 6.5v11"/>`,
+  next: svg`<path d="M7 6.5v11l7.5-5.5z" fill="currentColor"/><path d="M17.5 6.5v11"/>`,
+  loop: svg`<path d="M5 11.5V10a3 3 0 0 1 3-3h10M15.5 4.5 18 7l-2.5 2.5M19 12.5V14a3 3 0 0 1-3 3H6M8.5 19.5 6 17l2.5-2.5"/>`,
+  worst: svg`<path d="M4 18.5 9 12l3.5 3L17 7.5l3 4"/><circle cx="17" cy="6.5" r="2.4" fill="currentColor" stroke="none"/>`,
+  model: svg`<path d="M12 3.5c4.7 0 8.5 3.8 8.5 8.5s-3.8 8.5-8.5 8.5S3.5 16.7 3.5 12 7.3 3.5 12 3.5z"/><path d="M8 8.5c1-1.5 2.3-2.2 4-2.3"/><path d="M12 20.5c3.5-1.5 6-4.5 6.5-8.5" opacity=".45"/>`,
+  wireframe: svg`<path d="M12 3.5 20 8v8l-8 4.5L4 16V8zM4 8l8 4.5L20 8M12 12.5v8M4 16l8-3.5 8 3.5M12 3.5v9"/>`,
+  points: svg`<g fill="currentColor" stroke="none"><circle cx="6" cy="7" r="1.6"/><circle cx="12" cy="5" r="1.6"/><circle cx="18" cy="8" r="1.6"/><circle cx="8.5" cy="12.5" r="1.6"/><circle cx="15" cy="12.5" r="1.6"/><circle cx="6" cy="18" r="1.6"/><circle cx="12" cy="18.5" r="1.6"/><circle cx="18.5" cy="17" r="1.6"/></g>`,
+  cage: svg`<path d="M12 3 20 7.5v9L12 21l-8-4.5v-9z"/><path d="M4 7.5 12 12l8-4.5M12 12v9"/><g fill="currentColor" stroke="none"><circle cx="12" cy="3" r="1.7"/><circle cx="20" cy="7.5" r="1.7"/><circle cx="20" cy="16.5" r="1.7"/><circle cx="12" cy="21" r="1.7"/><circle cx="4" cy="16.5" r="1.7"/><circle cx="4" cy="7.5" r="1.7"/></g>`,
+  handles: svg`<circle cx="12" cy="12" r="2.6" fill="currentColor"/><circle cx="12" cy="12" r="6.5"/><path d="M12 2.5v3M12 18.5v3M2.5 12h3M18.5 12h3"/>`,
+  ground: svg`<path d="M3 17.5 8 9h8l5 8.5zM5.6 13h12.8M10.5 9 9 17.5M13.5 9l1.5 8.5"/>`,
+  heat: svg`<path d="M12 3.5c1 3.5 5.5 5.5 5.5 10.5a5.5 5.5 0 0 1-11 0c0-2 .8-3.3 2-4.5.2 1.5.8 2.3 1.7 2.7C10 9 10.5 6 12 3.5z"/>`,
+  frame: svg`<path d="M4 8.5V5.5A1.5 1.5 0 0 1 5.5 4h3M15.5 4h3A1.5 1.5 0 0 1 20 5.5v3M20 15.5v3a1.5 1.5 0 0 1-1.5 1.5h-3M8.5 20h-3A1.5 1.5 0 0 1 4 18.5v-3"/><circle cx="12" cy="12" r="3.3"/>`,
+  camera: svg`<path d="M4 8.5A1.5 1.5 0 0 1 5.5 7H8l1.5-2.5h5L16 7h2.5A1.5 1.5 0 0 1 20 8.5v9a1.5 1.5 0 0 1-1.5 1.5h-13A1.5 1.5 0 0 1 4 17.5z"/><circle cx="12" cy="13" r="3.5"/>`,
+  turntable: svg`<ellipse cx="12" cy="16" rx="8.5" ry="3.5"/><path d="M12 4v8M9.5 6.5 12 4l2.5 2.5"/><path d="m14 21.2-2.3-1.7 2.3-1.8"/>`,
+  figures: svg`<circle cx="12" cy="12" r="8.5"/><path d="M12 11v5.5M12 7.6v.1"/>`,
+  keyboard: svg`<rect x="3" y="6.5" width="18" height="11" rx="2"/><path d="M7 10.5h.1M10.3 10.5h.1M13.7 10.5h.1M17 10.5h.1M8 14h8"/>`,
+  fullscreen: svg`<path d="M9 4H4v5M15 4h5v5M20 15v5h-5M4 15v5h5"/>`,
+  close: svg`<path d="m6 6 12 12M18 6 6 18"/>`,
+  file: svg`<path d="M13 3.5H7A1.5 1.5 0 0 0 5.5 5v14A1.5 1.5 0 0 0 7 20.5h10a1.5 1.5 0 0 0 1.5-1.5V9zM13 3.5V9h5.5"/>`,
+} satisfies Record<string, SVGTemplateResult>;
+
+export type GlyphName = keyof typeof DRAWINGS;
+
+/** A drawing beside or instead of a text; screen readers pass over it. */
+export function glyph(name: GlyphName): TemplateResult {
+  return html`<svg class="glyph" viewBox="0 0 24 24" aria-hidden="true">${DRAWINGS[name]}</svg>`;
+}

@@ -1,0 +1,67 @@
+import { html, nothing, type TemplateResult } from 'lit';
+import { glyph } from './glyphs';
+
+/** A sentence about something that went wrong, while the capture can still be looked at. */
+export function notice(problem: string, close: () => void): TemplateResult {
+  return html`<div class="notice glass" role="alert">
+    <span>${problem}</span>
+    <button class="quiet icon" aria-label="Close this message" @click=${close}>${glyph('close')}</button>
+  </div>`;
+}
+
+/** What is being done, and how much of it is done where somebody knows. */
+export function progressBox(doing: string, fraction: number | null): TemplateResult {
+  return html`<div class="progress glass" role="status">
+    <div class="figures">
+      <span>${doing}</span><span>${fraction === null ? '' : `${Math.round(100 * fraction)} %`}</span>
+    </div>
+    <div
+      class="bar"
+      role="progressbar"
+      aria-label=${doing}
+      aria-valuenow=${fraction === null ? nothing : Math.round(100 * fraction)}
+      ?hidden=${fraction === null}
+    >
+      <div .style=${`transform: scaleX(${fraction ?? 0})`}></div>
+    </div>
+  </div>`;
+}
+
+/** What is there while there is no capture: its name while it is opened, else why it cannot be shown, and how to choose one. */
+export function emptyState(
+  opening: string | null,
+  failure: string | null,
+  choose: (file: File) => void,
+): TemplateResult {
+  if (opening !== null && failure === null) {
+    return html`<div class="empty" role="status">
+      <div class="lead"><slot name="lead"></slot></div>
+      <p>Opening ${opening}</p>
+    </div>`;
+  }
+  const take = (event: Event) => {
+    const file = (event.target as HTMLInputElement).files?.[0];
+    if (file) choose(file);
+  };
+  return html`<div class="empty">
+    <div class="lead"><slot name="lead"></slot></div>
+    ${glyph('cage')}
+    <h1>${failure === null ? 'Drop a capture here' : 'This cannot be shown'}</h1>
+    ${
+      failure === null
+        ? html`<p>A .cager file plays in this page. It is not sent anywhere.</p>`
+        : html`<p class="failure" role="alert">${failure}</p>`
+    }
+    <label class="button primary" tabindex="0" @keydown=${pressLabel}>
+      ${glyph('file')} Choose a file
+      <input class="visually-hidden" type="file" accept=".cager" tabindex="-1" @change=${take} />
+    </label>
+  </div>`;
+}
+
+/** A label that looks like a button is pressed like one. */
+function pressLabel(event: KeyboardEvent) {
+  if (event.key !== 'Enter' && event.key !== ' ') return;
+  event.preventDefault();
+  (event.currentTarget as HTMLElement).click();
+}

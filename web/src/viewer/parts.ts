@@ -1,0 +1,204 @@
+import { html, nothing, type TemplateResult } from 'lit';
+import { heatGradient } from '../render/colorMap';
+import type { Layers } from '../render/stage';
+import { glyph, type GlyphName } from './glyphs';
+import type { Heat } from './heatMap';
+import type { Player } from './player';
+import { keyLabel, SHORTCUTS, type Action } from './shortcuts';
+import { bitrate, grouped, percent, SYSTEM_NAMES } from './text';
+import { SPEEDS } from './transport';
+
+/** What the parts ask the viewer to do. */
+export type Act = (action: Action) => void;
+
+const LAYER_NAMES: Readonly<Record<keyof Layers, string>> = {
+  model: 'Model',
+  wireframe: 'Wireframe',
+  points: 'Points',
+  cage: 'Cage',
+  handles: 'Handles',
+  ground: 'Ground',
+};
+
+const HEAT_NAMES: Readonly<Record<Heat, string>> = {
+  none: 'Heat map',
+  motion: 'Heat map: movement from frame to frame',
+  error: 'Heat map: error of each point',
+};
+
+/** A button with a drawing; `pressed` makes it a switch. */
+function tool(action: Action, name: GlyphName, label: string, act: Act, pressed?: boolean): TemplateResult {
+  return html`<button
+    class="quiet icon"
+    data-action=${action}
+    title="${label} (${keyLabel(action)})"
+    aria-label=${label}
+    aria-pressed=${pressed === undefined ? nothing : String(pressed)}
+    @click=${() => act(action)}
+  >
+    ${glyph(name)}
+  </button>`;
+}
+
+/** Switches for what is drawn, and what to do with the picture. */
+export function toolbar(
+  player: Player,
+  act: Act,
+  shown: { figures: boolean; recording: boolean; recordable: boolean },
+) {
+  const layers = Object.keys(LAYER_NAMES) as (keyof Layers)[];
+  const possible = layers.filter((layer) => layer !== 'handles' || player.capture.handles !== undefined);
+  return html`<div class="tools glass" role="toolbar" aria-label="View" aria-orientation="vertical">
+    ${possible.map((layer) => tool(layer, layer, LAYER_NAMES[layer], act, player.layers[layer]))}
+    ${tool('heat', 'heat', HEAT_NAMES[player.heatMap.kind], act, player.heatMap.kind !== 'none')}
+    <hr />
+    ${tool('frame', 'frame', 'Frame the model', act)} ${tool('picture', 'camera', 'Save a picture', act)}
+    ${
+      shown.recordable
+        ? tool(
+            'turntable',
+            'turntable',
+            shown.recording ? 'Stop recording' : 'Record a turntable video',
+            act,
+            shown.recording,
+          )
+        : nothing
+    }
+    ${tool('fullscreen', 'fullscreen', 'Full screen', act)} ${tool('figures', 'figures', 'Figures', act, shown.figures)}
+    ${tool('help', 'keyboard', 'Keyboard shortcuts', act)}
+  </div>`;
+}
+
+/** Play, step, speed, place and errors. */
+export function transportBar(player: Player, act: Act, onSpeed: (speed: number) => void, hasErrors: boolean) {
+  const { transport } = player;
+  return html`<div class="transport">
+    <button
+      class="primary play"
+      title="${transport.playing ? 'Pause' : 'Play'} (${keyLabel('play')})"
+      aria-label=${transport.playing ? 'Pause' : 'Play'}
+      @click=${() => act('play')}
+    >
+      ${glyph(transport.playing ? 'pause' : 'play')}
+    </button>
+    ${tool('previous', 'previous', 'One frame back', act)} ${tool('next', 'next', 'One frame on', act)}
+    ${tool('loop', 'loop', 'Loop', act, transport.loop)}
+    ${hasErrors ? tool('worst', 'worst', 'Frame with the largest error', act) : nothing}
+    <select
+      class="figures"
+      aria-label="Speed"
+      title="Speed"
+      @change=${(event: Event) => onSpeed(Number((event.target as HTMLSelectElement).value))}
+    >
+      ${SPEEDS.map((speed) => html`<option value=${speed} .selected=${speed === transport.speed}>${speed}×</option>`)}
+    </select>
+    <div class="place figures"><span data-place></span><span class="clock muted" data-clock></span></div>
+    ${
+      hasErrors
+        ? html`<dl class="errors figures">
+            <div title="Root mean square of the distances of all points, as part of the diagonal">
+              <dt><i></i></dt>
+              <dt>L2</dt>
+              <dd data-l2></dd>
+            </div>
+            <div class="linf" title="Largest distance of a point, as part of the diagonal">
+              <dt><i></i></dt>
+              <dt>L∞</dt>
+              <dd data-linf></dd>
+            </div>
+          </dl>`
+        : nothing
+    }
+  </div>`;
+}
+
+/** What the colours of the heat map mean. */
+export function legend(player: Player) {
+  const { kind, largest } = player.heatMap;
+  if (kind === 'none') return nothing;
+  const text = kind === 'motion' ? 'Movement from frame to frame' : 'Distance from the capture';
+  return html`<div class="legend glass">
+    ${text}
+    <div class="bar" .style=${`background: ${heatGradient()}`}></div>
+    <div class="ends figures"><span>0</span><span>${percent(largest)} of the diagonal</span></div>
+  </div>`;
+}
+
+/** Figures about the capture and the playing. */
+export function figuresPanel(player: Player) {
+  const { static: part, frames } = player.capture;
+  const { decoder } = player.stage;
+  const points = part.rest.length / 3;
+  const cageRate = part.rowsPerFrame * 12 * player.transport.rate;
+  const rawRate = points * 12 * player.transport.rate;
+  const row = (label: string, value: string) =>
+    html`<dt>${label}</dt>
+      <dd>${value}</dd>`;
+  const { bits, error } = decoder.precision;
+  const live = player.capture.live ?? null;
+  return html`<aside class="panel glass" aria-label="Figures">
+    <h2>Capture</h2>
+    <dl>
+      ${row('Points', grouped(points))} ${row('Polygons', grouped(part.cornerCounts.length))}
+      ${row('Frames', grouped(frames))} ${row('Frames per second', String(player.transport.rate))}
+    </dl>
+    <h2>Cage</h2>
+    <dl>
+      ${row('Vertices', grouped(part.cage.positions.length / 3))}
+      ${row('Triangles', grouped(part.cage.triangles.length / 3))} ${row('Unknowns', grouped(part.rowsPerFrame))}
+    </dl>
+    <p class="muted">${SYSTEM_NAMES[part.system]}</p>
+    <h2>Bytes while it plays, before compression</h2>
+    <dl>${row('Cages', bitrate(cageRate))} ${row('All points', bitrate(rawRate))}</dl>
+    ${
+      live
+        ? html`<h2>Live</h2>
+            <dl>
+              ${row('Behind the service', live.latencySeconds === null ? '–' : `${live.latencySeconds.toFixed(2)} s`)}
+              ${row('Arriving', bitrate(live.bitsPerSecond / 8))}
+              ${row('Frames arriving per second', live.framesPerSecond.toFixed(1))}
+              ${row('Frames not here yet', grouped(live.behindFrames))}
+              ${row('Frames dropped', grouped(live.droppedFrames))}
+            </dl>`
+        : nothing
+    }
+    <h2>This browser</h2>
+    <dl>
+      ${row('Pictures per second', player.picturesPerSecond > 0 ? player.picturesPerSecond.toFixed(0) : '–')}
+      ${row('Frames passed over', grouped(player.dropped))} ${row('Weights', decoder.ready ? `${bits} bits` : '–')}
+      ${error > 0 ? row('Rounding moves a point by', `< ${percent(error)}`) : nothing}
+    </dl>
+  </aside>`;
+}
+
+/** All shortcuts, in a dialog. */
+export function helpSheet(close: () => void) {
+  return html`<dialog
+    aria-labelledby="help-title"
+    @click=${(event: Event) => event.target === event.currentTarget && close()}
+  >
+    <header>
+      <h2 id="help-title">Keyboard shortcuts</h2>
+      <button class="quiet icon" aria-label="Close" @click=${close}>${glyph('close')}</button>
+    </header>
+    <div class="columns">
+      ${SHORTCUTS.map(
+        ({ title, entries }) =>
+          html`<section>
+            <h3>${title}</h3>
+            <dl>
+              ${entries.map(
+                ({ action, label }) =>
+                  html`<dt><kbd>${keyLabel(action)}</kbd></dt>
+                    <dd>${label}</dd>`,
+              )}
+            </dl>
+          </section>`,
+      )}
+    </div>
+    <p class="muted">
+      Drag to turn, drag with the right button or two fingers to move, turn the wheel or pinch to come nearer.
+      Double-click to frame the model.
+    </p>
+  </dialog>`;
+}

@@ -1,0 +1,120 @@
+/** What keys do in the viewer: the help sheet lists them, and key presses are looked up here. */
+export type Action =
+  | 'play'
+  | 'previous'
+  | 'next'
+  | 'back'
+  | 'forth'
+  | 'first'
+  | 'last'
+  | 'slower'
+  | 'faster'
+  | 'loop'
+  | 'smooth'
+  | 'worst'
+  | 'frame'
+  | 'home'
+  | 'turnLeft'
+  | 'turnRight'
+  | 'turnUp'
+  | 'turnDown'
+  | 'zoomIn'
+  | 'zoomOut'
+  | 'up'
+  | 'model'
+  | 'wireframe'
+  | 'points'
+  | 'cage'
+  | 'handles'
+  | 'ground'
+  | 'heat'
+  | 'picture'
+  | 'turntable'
+  | 'fullscreen'
+  | 'figures'
+  | 'help';
+
+interface Shortcut {
+  readonly action: Action;
+  /** Values of `KeyboardEvent.key`; the first one is shown. */
+  readonly keys: readonly string[];
+  readonly label: string;
+}
+
+export const SHORTCUTS: readonly { readonly title: string; readonly entries: readonly Shortcut[] }[] = [
+  {
+    title: 'Play',
+    entries: [
+      { action: 'play', keys: [' ', 'k'], label: 'Play or pause' },
+      { action: 'previous', keys: ['ArrowLeft', ','], label: 'One frame back' },
+      { action: 'next', keys: ['ArrowRight', '.'], label: 'One frame on' },
+      { action: 'back', keys: ['PageUp', 'j'], label: 'Ten frames back' },
+      { action: 'forth', keys: ['PageDown'], label: 'Ten frames on' },
+      { action: 'first', keys: ['Home'], label: 'First frame' },
+      { action: 'last', keys: ['End'], label: 'Last frame' },
+      { action: 'slower', keys: ['<', '['], label: 'Slower' },
+      { action: 'faster', keys: ['>', ']'], label: 'Faster' },
+      { action: 'loop', keys: ['l'], label: 'Loop on or off' },
+      { action: 'smooth', keys: ['s'], label: 'Blend between frames on or off' },
+      { action: 'worst', keys: ['e'], label: 'Frame with the largest error' },
+    ],
+  },
+  {
+    title: 'Look',
+    entries: [
+      { action: 'frame', keys: ['f'], label: 'Frame the model' },
+      { action: 'home', keys: ['0'], label: 'Look from the front again' },
+      { action: 'turnLeft', keys: ['a'], label: 'Turn left' },
+      { action: 'turnRight', keys: ['d'], label: 'Turn right' },
+      { action: 'turnUp', keys: ['w'], label: 'Turn up' },
+      { action: 'turnDown', keys: ['x'], label: 'Turn down' },
+      { action: 'zoomIn', keys: ['+', '='], label: 'Nearer' },
+      { action: 'zoomOut', keys: ['-'], label: 'Farther' },
+      { action: 'up', keys: ['z'], label: 'Which axis is up: y or z' },
+      { action: 'fullscreen', keys: ['Enter'], label: 'Full screen' },
+    ],
+  },
+  {
+    title: 'Show',
+    entries: [
+      { action: 'model', keys: ['1'], label: 'Model' },
+      { action: 'wireframe', keys: ['2'], label: 'Wireframe' },
+      { action: 'points', keys: ['3'], label: 'Points' },
+      { action: 'cage', keys: ['4', 'c'], label: 'Cage' },
+      { action: 'handles', keys: ['5'], label: 'Handles' },
+      { action: 'ground', keys: ['6', 'g'], label: 'Ground' },
+      { action: 'heat', keys: ['h'], label: 'Heat map' },
+      { action: 'figures', keys: ['i'], label: 'Figures' },
+      { action: 'picture', keys: ['p'], label: 'Save a picture' },
+      { action: 'turntable', keys: ['t'], label: 'Record a turntable video' },
+      { action: 'help', keys: ['?'], label: 'This sheet' },
+    ],
+  },
+];
+
+const ACTIONS = new Map(
+  SHORTCUTS.flatMap(({ entries }) => entries).flatMap(({ action, keys }) => keys.map((key) => [key, action])),
+);
+
+/** What a key press asks for; nothing with a control, alt or command key, which belong to the browser. */
+export function actionOf(event: Pick<KeyboardEvent, 'key' | 'ctrlKey' | 'altKey' | 'metaKey'>): Action | null {
+  if (event.ctrlKey || event.altKey || event.metaKey) return null;
+  return ACTIONS.get(event.key.length === 1 ? event.key.toLowerCase() : event.key) ?? null;
+}
+
+/** The key for an action as it is written on keyboards. */
+export function keyLabel(action: Action): string {
+  const names: Record<string, string> = {
+    ' ': 'Space',
+    ArrowLeft: '←',
+    ArrowRight: '→',
+    PageUp: 'Page ↑',
+    PageDown: 'Page ↓',
+  };
+  for (const { entries } of SHORTCUTS) {
+    const found = entries.find((entry) => entry.action === action);
+    if (found)
+      return names[found.keys[0]] ?? (found.keys[0].length === 1 ? found.keys[0].toUpperCase() : found.keys[0]);
+  }
+  return '';
+}

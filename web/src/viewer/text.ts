@@ -1,0 +1,33 @@
+/** A fraction as a percentage with three digits that count. */
+export function percent(fraction: number): string {
+  const value = 100 * fraction;
+  if (value === 0) return '0 %';
+  const digits = Math.min(6, Math.max(0, 2 - Math.floor(Math.log10(Math.abs(value)))));
+  return `${Number(value.toFixed(digits))} %`;
+}
+
+/** A number with its thousands set apart. */
+export function grouped(value: number): string {
+  return value.toLocaleString('en-US');
+}
+
+/** Bytes per second as bits per second. */
+export function bitrate(bytesPerSecond: number): string {
+  const bits = 8 * bytesPerSecond;
+  return bits >= 1e6 ? `${(bits / 1e6).toFixed(bits >= 1e7 ? 0 : 1)} Mbit/s` : `${Math.round(bits / 1e3)} kbit/s`;
+}
+
+/** Seconds as minutes, seconds and hundredths. */
+export function clock(seconds: number): string {
+  const hundredths = Math.max(0, Math.floor(seconds * 100 + 1e-6));
+  const two = (value: number) => String(value).padStart(2, '0');
+  return `${Math.floor(hundredths / 6000)}:${two(Math.floor(hundredths / 100) % 60)}.${two(hundredths % 100)}`;
+}
+
+/** Names of coordinate systems for people. */
+export const SYSTEM_NAMES = {
+  mvc: 'mean value coordinates',
+  harmonic: 'harmonic coordinates',
+  green: 'Green coordinates',
+  'green-free': 'Green coordinates, free normals',
+} as const;

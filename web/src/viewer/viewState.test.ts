@@ -1,0 +1,46 @@
+import { describe, expect, it } from 'vitest';
+import { fragmentOf, parseFragment } from '../routes';
+import { USUAL_LAYERS, viewFromText, viewText } from './viewState';
+
+describe('view in a link', () => {
+  it('is read as it was written', () => {
+    const view = {
+      frame: 17,
+      camera: { target: [0.1, 0.2, -0.3], azimuth: 0.5, elevation: -0.25, distance: 2.5 },
+      up: 'z',
+      layers: { ...USUAL_LAYERS, cage: true, ground: false },
+    } as const;
+    const read = viewFromText(viewText(view));
+    expect(read).toMatchObject({ frame: 17, up: 'z', layers: view.layers });
+    expect(read.camera!.distance).toBe(2.5);
+    expect(read.camera!.azimuth).toBeCloseTo(0.5, 2);
+  });
+
+  it('says nothing where everything is as usual', () => {
+    expect(viewText({ frame: null, camera: null, up: 'y', layers: USUAL_LAYERS })).toBe('');
+  });
+
+  it('passes over what is wrong', () => {
+    expect(viewFromText('frame=-3&camera=1,2&up=q')).toEqual({
+      frame: null,
+      camera: null,
+      up: 'y',
+      layers: USUAL_LAYERS,
+    });
+    expect(viewFromText('frame=1e99').frame).toBeNull();
+  });
+});
+
+describe('routes', () => {
+  it.each(['#/', '#/file', '#/upload', '#/session/a%2Fb?frame=3'])('%s is read as it is written', (fragment) => {
+    const { route, view } = parseFragment(fragment);
+    expect(fragmentOf(route, view)).toBe(fragment);
+  });
+
+  it('takes ids as they are, and anything unknown for the list', () => {
+    expect(parseFragment('#/session/a%2Fb').route).toEqual({ page: 'session', id: 'a/b' });
+    expect(parseFragment('#/session/%E0%A4%A').route).toEqual({ page: 'session', id: '%E0%A4%A' });
+    expect(parseFragment('#/nothing/of/this').route).toEqual({ page: 'sessions' });
+    expect(parseFragment('').route).toEqual({ page: 'sessions' });
+  });
+});

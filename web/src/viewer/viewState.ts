@@ -1,0 +1,59 @@
+import { cameraFromText, cameraText, type CameraState } from '../render/camera';
+import type { Layers } from '../render/stage';
+
+/** What a link says about the view: everything in it is optional. */
+export interface ViewState {
+  readonly frame: number | null;
+  readonly camera: CameraState | null;
+  readonly up: 'y' | 'z';
+  readonly layers: Layers;
+}
+
+export const USUAL_LAYERS: Layers = {
+  model: true,
+  wireframe: false,
+  points: false,
+  cage: false,
+  handles: false,
+  ground: true,
+};
+
+const LETTERS: Readonly<Record<keyof Layers, string>> = {
+  model: 'm',
+  wireframe: 'w',
+  points: 'p',
+  cage: 'c',
+  handles: 'h',
+  ground: 'g',
+};
+const NAMES = Object.keys(LETTERS) as (keyof Layers)[];
+
+/** Reads `frame=12&camera=…&up=z&show=mcg`; what is missing or wrong is as usual. */
+export function viewFromText(text: string): ViewState {
+  const parameters = new URLSearchParams(text);
+  const frame = Number(parameters.get('frame') ?? NaN);
+  const show = parameters.get('show');
+  return {
+    frame: Number.isSafeInteger(frame) && frame >= 0 ? frame : null,
+    camera: cameraFromText(parameters.get('camera')),
+    up: parameters.get('up') === 'z' ? 'z' : 'y',
+    layers: show === null ? USUAL_LAYERS : layersOf((name) => show.includes(LETTERS[name])),
+  };
+}
+
+/** Writes what {@link viewFromText} reads; what is as usual is left out. */
+export function viewText({ frame, camera, up, layers }: ViewState): string {
+  const parameters = new URLSearchParams();
+  if (frame !== null) parameters.set('frame', String(frame));
+  if (camera) parameters.set('camera', cameraText(camera));
+  if (up === 'z') parameters.set('up', up);
+  if (NAMES.some((name) => layers[name] !== USUAL_LAYERS[name])) {
+    const shown = NAMES.filter((name) => layers[name]).map((name) => LETTERS[name]);
+    parameters.set('show', shown.join(''));
+  }
+  return parameters.toString().replaceAll('%2C', ',');
+}
+
+function layersOf(shown: (name: keyof Layers) => boolean): Layers {
+  return Object.fromEntries(NAMES.map((name) => [name, shown(name)])) as unknown as Layers;
+}

@@ -1,0 +1,142 @@
+import { css, html, LitElement, type PropertyValues } from 'lit';
+import { customElement, property, query, state } from 'lit/decorators.js';
+import type { Capture } from '../capture';
+import { openSession } from '../service/live';
+import { problemBehind, ServiceProblem } from '../service/problem';
+import { Service } from '../service/service';
+import { pageToken } from '../service/token';
+import '../sessions/signIn';
+import { controls } from '../style/tokens';
+import './cagerViewer';
+import type { CagerViewer } from './cagerViewer';
+
+/** The page of one capture: a session of the service, or a file. */
+@customElement('cager-viewer-page')
+export class ViewerPage extends LitElement {
+  static override styles = [
+    controls,
+    css`
+      :host {
+        display: block;
+        height: 100dvh;
+      }
+      main {
+        height: 100%;
+      }
+      .back {
+        width: 36px;
+        min-height: 36px;
+        padding: 0;
+        border-radius: 50%;
+        background: var(--cager-glass);
+        box-shadow: var(--cager-shadow);
+        color: var(--cager-text);
+      }
+      .message {
+        display: grid;
+        place-content: center;
+        justify-items: center;
+        gap: var(--cager-space-4);
+        height: 100%;
+        padding: var(--cager-space-5);
+        text-align: center;
+      }
+      .message p {
+        max-width: 36em;
+        margin: 0;
+        text-wrap: balance;
+      }
+    `,
+  ];
+
+  /** The session to show; null for a file. */
+  @property() session: string | null = null;
+  @property({ attribute: false }) file: File | null = null;
+  /** The view to begin with. */
+  @property() view = '';
+  @state() private capture: Capture | null = null;
+  @state() private waiting = '';
+  @state() private failure: string | null = null;
+  @state() private wantsToken = false;
+  @query('cager-viewer') private readonly viewer!: CagerViewer | null;
+  private readonly service = new Service();
+  private opening = new AbortController();
+  private readonly retry = () => void this.openSession();
+  private readonly passKey = (event: KeyboardEvent) => this.viewer?.pressKey(event);
+
+  override connectedCallback() {
+    super.connectedCallback();
+    pageToken.addEventListener('change', this.retry);
+    document.addEventListener('keydown', this.passKey);
+    void this.openSession();
+  }
+
+  override disconnectedCallback() {
+    super.disconnectedCallback();
+    pageToken.removeEventListener('change', this.retry);
+    document.removeEventListener('keydown', this.passKey);
+    this.opening.abort();
+    this.capture?.close();
+  }
+
+  protected override firstUpdated(changed: PropertyValues) {
+    if (changed.has('file') && this.file) void this.viewer?.open(this.file);
+  }
+
+  override render() {
+    if (this.wantsToken) return html`<main><cager-sign-in></cager-sign-in></main>`;
+    if (this.session !== null && !this.capture) return this.message();
+    return html`<main>
+      <cager-viewer autoplay .capture=${this.capture} .view=${this.view}>
+        <a class="button back" slot="lead" href="#/" aria-label="All sessions" title="All sessions">
+          <svg class="glyph" viewBox="0 0 24 24" aria-hidden="true"><path d="M14.5 6 8.500 12l6 6" /></svg>
+        </a>
+      </cager-viewer>
+    </main>`;
+  }
+
+  private message() {
+    return html`<main class="message">
+      ${
+        this.failure === null
+          ? html`<p role="status">${this.waiting || 'Opening the session'}</p>`
+          : html`<p role="alert">${this.failure}</p>
+              <button class="primary" @click=${this.retry}>Try again</button>`
+      }
+      <a href="#/">All sessions</a>
+    </main>`;
+  }
+
+  private async openSession() {
+    const { session, service } = this;
+    if (session === null) return;
+    this.opening.abort();
+    this.opening = new AbortController();
+    const { signal } = this.opening;
+    this.failure = null;
+    this.wantsToken = false;
+    try {
+      const onWaiting = (sentence: string) => (this.waiting = sentence);
+      const capture: Capture = await openSession(session, { service, signal, onWaiting });
+      if (signal.aborted) {
+        capture.close();
+        return;
+      }
+      capture.coordinates = async (onProgress, until) => (await service.coordinates(session, onProgress, until)).values;
+      capture.handles = (until) => service.handles(session, until);
+      this.capture?.close();
+      this.capture = capture;
+    } catch (error) {
+      if (signal.aborted) return;
+      const problem = problemBehind(error);
+      this.wantsToken = problem instanceof ServiceProblem && problem.status === 401;
+      this.failure = problem.message;
+    }
+  }
+}
+
+declare global {
+  interface HTMLElementTagNameMap {
+    'cager-viewer-page': ViewerPage;
+  }
+}

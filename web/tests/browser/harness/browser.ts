@@ -1,0 +1,48 @@
+/** A headless browser, and pages whose errors fail a test. */
+
+import { type Browser, type Page, chromium as launcher } from 'playwright-core';
+import { chromium } from './programs';
+
+const FLAGS = [
+  '--no-sandbox',
+  '--disable-background-networking',
+  '--disable-component-update',
+  '--disable-sync',
+  '--use-angle=swiftshader',
+  '--enable-unsafe-swiftshader',
+];
+
+export function launch(): Promise<Browser> {
+  return launcher.launch({ executablePath: chromium!, args: FLAGS });
+}
+
+/** A page in a context of its own, and what its console and its policy complained about. */
+export interface Watched {
+  readonly page: Page;
+  /** Errors so far; those of answers a test provokes can be passed over by their text. */
+  readonly errors: string[];
+  close(): Promise<void>;
+}
+
+/** @param expected parts of messages that this test provokes, such as a status that it wants to see handled */
+export async function openPage(browser: Browser, url: string, expected: readonly string[] = []): Promise<Watched> {
+  const context = await browser.newContext({ acceptDownloads: true, viewport: { width: 1280, height: 800 } });
+  const page = await context.newPage();
+  const errors: string[] = [];
+  const note = (text: string): void => {
+    if (!expected.some((part) => text.includes(part))) errors.push(text);
+  };
+  page.on('console', (message) => {
+    if (message.type() === 'error' || message.type() === 'warning') note(`${message.text()} ${message.location().url}`);
+  });
+  page.on('pageerror', (error) => note(String(error)));
+  await page.goto(url);
+  return { page, errors, close: () => context.close() };
+}
+
+/** Makes the connection of a page as slow as so many bytes per second in either direction; as fast as it is where nothing is said. */
+export async function slow(page: Page, to: { uploadThroughput?: number; downloadThroughput?: number }): Promise<void> {
+  const session = await page.context().newCDPSession(page);
+  const unlimited = { offline: false, latency: 0, downloadThroughput: -1, uploadThroughput: -1 };
+  await session.send('Network.emulateNetworkConditions', { ...unlimited, ...to });
+}

@@ -1,0 +1,283 @@
+import { afterAll, beforeAll, describe, expect, test } from 'vitest';
+import type { Capture } from '../../src/capture';
+import { openPage, slow, type Watched } from './harness/browser';
+import type { TestClient } from './harness/client';
+import { missing } from './harness/programs';
+import { Site } from './harness/site';
+import { SphereCapture } from './harness/sphere';
+
+const capture = new SphereCapture();
+
+describe.skipIf(missing)('a session as a capture', { timeout: 60_000 }, () => {
+  let site: Site;
+  let client: TestClient;
+
+  beforeAll(async () => {
+    site = await Site.start();
+    client = site.client();
+  }, 120_000);
+
+  afterAll(() => site.close());
+
+  test('a_running_session_is_followed_frame_by_frame_until_its_container', async () => {
+    const { id } = await client.create(capture, { name: 'live' });
+    const ready = await client.whenReady(id);
+    await client.post(id, capture, 0, 5);
+    const watched = await openPage(site.browser, site.server.parts);
+    await opened(watched, id);
+    const opening = await state(watched);
+    expect(opening).toMatchObject({ frames: 5, complete: false, problem: null, points: capture.points });
+    expect(opening.cage).toBe(3 * ready.cage_vertices!);
+
+    await client.post(id, capture, 5, 20);
+    await eventually(watched, 'frames', 25);
+    // The first frames were solved before the page came; it fetches them when they are looked at.
+    for (const frame of [0, 4, 5, 24]) {
+      expect(await cage(watched, frame)).toEqual(await solvedCage(client, id, frame));
+    }
+    await expect.poll(() => state(watched)).toMatchObject({ measured: 25 });
+    const followed = await state(watched);
+    expect(followed.live).toMatchObject({ state: 'following', droppedFrames: 0, behindFrames: 0 });
+    await expect.poll(async () => (await state(watched)).live!.latencySeconds, { timeout: 8000 }).toBeLessThan(2);
+    expect(followed.live!.bitsPerSecond).toBeGreaterThan(0);
+
+    await client.complete(id, 25);
+    await eventually(watched, 'complete', true);
+    const finished = await state(watched);
+    expect(finished).toMatchObject({ frames: 25, problem: null, measured: 25 });
+    expect(finished.live!.state).toBe('ended');
+    expect(await cage(watched, 7)).toEqual(await solvedCage(client, id, 7));
+    expect(watched.errors).toEqual([]);
+    await watched.close();
+  });
+
+  test('a_frame_that_is_still_to_come_is_waited_for', async () => {
+    const { id } = await client.create(capture, { name: 'awaited' });
+    await client.whenReady(id);
+    const watched = await openPage(site.browser, site.server.parts);
+    await opened(watched, id);
+    const awaited = cage(watched, 2);
+    await expect.poll(async () => (await state(watched)).live!.lateFrames).toBe(1);
+    await client.post(id, capture, 0, 3);
+    expect(await awaited).toEqual(await solvedCage(client, id, 2));
+    await watched.close();
+  });
+
+  test('a_service_that_is_killed_and_restarted_is_followed_on', async () => {
+    const { id } = await client.create(capture, { name: 'restarted' });
+    await client.whenReady(id);
+    await client.post(id, capture, 0, 4);
+    const watched = await openPage(site.browser, site.server.parts, ['502', 'ERR_']);
+    await opened(watched, id);
+    await site.service.kill();
+    await expect.poll(async () => (await state(watched)).live!.state).toBe('reconnecting');
+    expect((await state(watched)).problem).toMatch(/service/);
+    await site.service.run();
+    await client.post(id, capture, 4, 10);
+    await eventually(watched, 'frames', 14);
+    expect(await state(watched)).toMatchObject({ problem: null, complete: false });
+    expect(await cage(watched, 13)).toEqual(await solvedCage(client, id, 13));
+    expect(watched.errors).toEqual([]);
+    await watched.close();
+  });
+
+  test('a_network_that_is_lost_without_a_word_is_noticed_and_followed_on_when_it_is_back', async () => {
+    const { id } = await client.create(capture, { name: 'lost' });
+    await client.whenReady(id);
+    const watched = await openPage(site.browser, site.server.parts);
+    await opened(watched, id);
+    await client.post(id, capture, 0, 2);
+    await eventually(watched, 'frames', 2);
+    site.server.stall();
+    await client.post(id, capture, 2, 5);
+    await expect.poll(async () => (await state(watched)).problem, { timeout: 20_000 }).toMatch(/does not answer/);
+    expect((await state(watched)).frames).toBe(2);
+    site.server.recover();
+    await expect.poll(async () => (await state(watched)).frames, { timeout: 30_000 }).toBe(7);
+    expect(await state(watched)).toMatchObject({ problem: null, complete: false });
+    await watched.close();
+  });
+
+  test('a_session_whose_frames_are_coded_is_followed_and_ends_with_its_residual', async () => {
+    const { id } = await client.create(capture, { name: 'coded', max_error: 1e-3 });
+    await client.whenReady(id);
+    await client.post(id, capture, 0, 6);
+    const watched = await openPage(site.browser, site.server.parts);
+    await opened(watched, id);
+    await client.post(id, capture, 6, 6);
+    await eventually(watched, 'frames', 12);
+    await client.complete(id, 12);
+    await eventually(watched, 'complete', true);
+    const largest = await watched.page.evaluate(async () => {
+      const { errors, block } = window.parts.capture!;
+      const first = await block.call(window.parts.capture, 0);
+      return { residual: first.residual !== null, worst: Math.max(...errors.linf) };
+    });
+    expect(largest.residual).toBe(true);
+    expect(largest.worst).toBeLessThanOrEqual(1e-3);
+    expect(watched.errors).toEqual([]);
+    await watched.close();
+  });
+
+  test('a_session_that_is_deleted_while_it_is_watched_says_so_and_keeps_its_frames', async () => {
+    const { id } = await client.create(capture, { name: 'deleted' });
+    await client.whenReady(id);
+    const watched = await openPage(site.browser, site.server.parts, ['404', '410']);
+    await opened(watched, id);
+    await client.post(id, capture, 0, 3);
+    await eventually(watched, 'frames', 3);
+    await client.call(`/${id}`, { method: 'DELETE' });
+    await eventually(watched, 'complete', true);
+    expect((await state(watched)).problem).toMatch(/deleted/);
+    expect((await cage(watched, 1)).length).toBeGreaterThan(0);
+    expect(watched.errors).toEqual([]);
+    await watched.close();
+  });
+
+  test('a_slow_connection_stays_at_the_newest_frame_and_fetches_the_others_when_they_are_looked_at', async () => {
+    const { id } = await client.create(capture, { name: 'slow' });
+    await client.whenReady(id);
+    const watched = await openPage(site.browser, site.server.parts);
+    await slow(watched.page, { downloadThroughput: 10_000 });
+    await opened(watched, id);
+    // As from a farm that solves a hundred frames in a second: 50 kB/s.
+    for (let first = 0; first < 600; first += 50) {
+      await client.post(id, capture, first, 50);
+      await watched.page.waitForTimeout(500);
+    }
+    await eventually(watched, 'frames', 600);
+    expect((await state(watched)).live!.droppedFrames).toBeGreaterThan(100);
+    await slow(watched.page, {});
+    expect(await cage(watched, 500)).toEqual(await solvedCage(client, id, 500));
+    await expect.poll(async () => (await state(watched)).measured, { timeout: 15_000 }).toBe(600);
+    expect(watched.errors).toEqual([]);
+    await watched.close();
+  });
+
+  test('the_viewer_follows_a_session_that_is_being_uploaded', async () => {
+    const { id } = await client.create(capture, { name: 'watched' });
+    await client.whenReady(id);
+    await client.post(id, capture, 0, 4);
+    const { page, errors, close } = await openPage(site.browser, `${site.page}#/session/${id}`);
+    const frames = () =>
+      page.locator('cager-viewer').evaluate((viewer) => (viewer as unknown as { capture: Capture }).capture.frames);
+    await expect.poll(frames, { timeout: 20_000 }).toBe(4);
+    await client.post(id, capture, 4, 8);
+    await expect.poll(frames).toBe(12);
+    await page.getByText('LIVE').or(page.getByText('Go live')).first().waitFor();
+    await client.complete(id, 12);
+    await expect.poll(() => page.getByText('LIVE').or(page.getByText('Go live')).count()).toBe(0);
+    expect(errors).toEqual([]);
+    await close();
+  });
+
+  test('coordinates_go_on_where_they_broke_off', async () => {
+    const { id } = await client.create(new SphereCapture(4), { name: 'harmonic', coordinates: 'harmonic' });
+    await client.whenReady(id);
+    const watched = await openPage(site.browser, site.server.parts, ['ERR_', '502']);
+    site.server.cutNext = { path: '/coordinates', bytes: 100_000 };
+    const ranges: (string | undefined)[] = [];
+    watched.page.on('request', (request) => ranges.push(request.headers().range));
+    const { rows, columns, heard, values } = await watched.page.evaluate(async (session) => {
+      const heard: number[] = [];
+      const { rows, columns, values } = await new window.parts.Service().coordinates(session, (part) =>
+        heard.push(part),
+      );
+      return { rows, columns, heard, values: [...values] };
+    }, id);
+    expect([rows, columns]).toEqual([2562, 42]);
+    const there = new Float32Array(await (await client.call(`/${id}/coordinates`)).arrayBuffer());
+    expect(values).toEqual([...there]);
+    expect(ranges.at(-1)).toBe('bytes=100000-');
+    expect(heard.every((part, k) => k === 0 || part > heard[k - 1])).toBe(true);
+    expect(heard.at(-1)).toBe(1);
+    await watched.close();
+  });
+
+  test('a_session_that_failed_says_why', async () => {
+    const { id } = await client.create(capture, { name: 'failed' });
+    await client.whenReady(id);
+    await client.post(id, capture, 0, 2);
+    await site.service.restartWithDamage(id);
+    expect((await client.session(id)).state).toBe('failed');
+    const watched = await openPage(site.browser, site.server.parts);
+    const refused = opened(watched, id).then(
+      () => '',
+      (error: unknown) => String(error),
+    );
+    expect(await refused).toMatch(/damaged/);
+    await watched.close();
+  });
+});
+
+describe.skipIf(missing)('a session behind tokens', { timeout: 60_000 }, () => {
+  const tokens = ['the-first-token-of-studio-a-for-tests', 'the-second-token-of-studio-a-for-tests'];
+  let site: Site;
+
+  beforeAll(async () => {
+    site = await Site.start({ 'studio-a': tokens[0] });
+  }, 120_000);
+
+  afterAll(() => site.close());
+
+  test('a_token_that_ends_while_a_session_is_followed_is_asked_for_anew', async () => {
+    const { id } = await site.client(tokens[0]).create(capture, { name: 'guarded' });
+    await site.client(tokens[0]).whenReady(id);
+    await site.client(tokens[0]).post(id, capture, 0, 3);
+    const watched = await openPage(site.browser, site.server.parts, ['401', 'ERR_']);
+    const signIn = (token: string) => watched.page.evaluate((given) => window.parts.pageToken.set(given, false), token);
+    await signIn(tokens[0]);
+    await opened(watched, id);
+    await site.service.setTokens({ 'studio-a': tokens[1] });
+    await expect.poll(async () => (await state(watched)).live!.state, { timeout: 15_000 }).toBe('signed-out');
+    expect((await state(watched)).problem).toMatch(/Sign in with an access token/);
+    await site.client(tokens[1]).post(id, capture, 3, 4);
+    await signIn(tokens[1]);
+    await eventually(watched, 'frames', 7);
+    expect(await state(watched)).toMatchObject({ problem: null, measured: 7 });
+    expect(watched.errors).toEqual([]);
+    await watched.close();
+  });
+});
+
+async function opened({ page }: Watched, id: string): Promise<void> {
+  await page.evaluate(async (session) => {
+    window.parts.capture = await window.parts.openSession(session);
+  }, id);
+}
+
+/** What the page knows of its capture. */
+async function state({ page }: Watched) {
+  return page.evaluate(() => {
+    const capture = window.parts.capture as Awaited<ReturnType<typeof window.parts.openSession>>;
+    const { frames, complete, problem, live } = capture;
+    return {
+      frames,
+      complete,
+      problem,
+      live,
+      points: capture.static.rest.length / 3,
+      cage: capture.static.cage.positions.length,
+      measured: [...capture.errors.l2].filter((error) => !Number.isNaN(error)).length,
+    };
+  });
+}
+
+async function eventually(watched: Watched, key: 'frames' | 'complete', value: unknown): Promise<void> {
+  await expect.poll(async () => (await state(watched))[key], { timeout: 20_000 }).toBe(value);
+}
+
+/** The solved cage of a frame, as the page has it. */
+async function cage({ page }: Watched, frame: number): Promise<number[]> {
+  return page.evaluate(async (wanted) => {
+    const block = await window.parts.capture!.block(wanted);
+    const stride = block.cages.length / block.count;
+    return [...block.cages.subarray((wanted - block.first) * stride, (wanted - block.first + 1) * stride)];
+  }, frame);
+}
+
+/** The same as the service has it. */
+async function solvedCage(client: TestClient, id: string, frame: number): Promise<number[]> {
+  const bytes = await (await client.call(`/${id}/cages?first=${frame}&count=1`)).arrayBuffer();
+  return [...new Float32Array(bytes)];
+}

@@ -1,0 +1,293 @@
+import { execFileSync } from 'node:child_process';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import type { Page } from 'playwright-core';
+import { afterAll, beforeAll, describe, expect, test } from 'vitest';
+import { seriousFindings } from './harness/axe';
+import { openPage, slow } from './harness/browser';
+import { cager, missing } from './harness/programs';
+import { Site } from './harness/site';
+import { SphereCapture } from './harness/sphere';
+
+const capture = new SphereCapture();
+const FRAMES = 30;
+
+describe.skipIf(missing)('an upload', { timeout: 60_000 }, () => {
+  let site: Site;
+
+  beforeAll(async () => {
+    site = await Site.start();
+  }, 120_000);
+
+  afterAll(() => site.close());
+
+  test('what_is_dropped_is_encoded_with_the_errors_that_it_says', async () => {
+    const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`);
+    expect(await seriousFindings(page)).toEqual([]);
+    await drop(page, { 'rest.obj': capture.rest, 'cage.obj': capture.cage, 'wave.npy': capture.npy(FRAMES) });
+    await page.getByText(`${FRAMES} frames of 642 points`).waitFor();
+    expect(await roles(page)).toEqual({ 'rest.obj': 'rest', 'wave.npy': 'frames', 'cage.obj': 'cage' });
+    expect(await page.getByLabel('Name').inputValue()).toBe('wave');
+    expect(await seriousFindings(page)).toEqual([]);
+    await page.getByRole('button', { name: 'Encode' }).click();
+    const id = await encoded(page);
+    expect(await seriousFindings(page)).toEqual([]);
+    expect(errors).toEqual([]);
+    await close();
+
+    const told = await toldErrors(site, id);
+    const measured = decodedErrors(Buffer.from(await (await site.client().call(`/${id}/capture.cager`)).arrayBuffer()));
+    expect(told.length).toBe(FRAMES);
+    told.forEach(({ l2, linf }, frame) => {
+      expect(Math.abs(l2 - measured[frame].l2)).toBeLessThan(1e-6);
+      expect(Math.abs(linf - measured[frame].linf)).toBeLessThan(1e-6);
+    });
+    expect(Math.max(...told.map(({ linf }) => linf))).toBeGreaterThan(1e-4);
+  });
+
+  test('a_mesh_per_frame_without_rest_pose_or_cage_is_enough', async () => {
+    const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`);
+    const files = Object.fromEntries([8, 9, 10, 11].map((frame) => [`shot_${frame}.obj`, capture.frameObj(frame)]));
+    await drop(page, files);
+    await page.getByText('The first frame, shot_8.obj, is taken as the rest pose.').waitFor();
+    await page.getByText('the service makes one around the rest pose').waitFor();
+    await page.getByRole('button', { name: 'Encode' }).click();
+    const id = await encoded(page);
+    expect((await site.client().session(id)).frames.solved).toBe(4);
+    expect(errors).toEqual([]);
+    await close();
+  });
+
+  test('frames_of_another_mesh_are_refused_before_anything_is_sent', async () => {
+    const { page, close } = await openPage(site.browser, `${site.page}#/upload`);
+    const before = await sessions(site);
+    await drop(page, { 'rest.obj': new SphereCapture(2).rest, 'wave.npy': capture.npy(2) });
+    await page.getByText(/wave\.npy has 642 points in each frame and the rest pose rest\.obj has 162 points/).waitFor();
+    expect(await page.getByRole('button', { name: 'Encode' }).isDisabled()).toBe(true);
+    expect(await sessions(site)).toBe(before);
+    await close();
+  });
+
+  test('arrays_that_cannot_be_read_are_refused_in_words', async () => {
+    const { page, close } = await openPage(site.browser, `${site.page}#/upload`);
+    const text = Buffer.from(capture.npy(2)).toString('latin1');
+    const fortran = Buffer.from(text.replace('False,', 'True, '), 'latin1');
+    await drop(page, { 'rest.obj': capture.rest, 'wave.npy': fortran });
+    await page.getByText(/Fortran order.*ascontiguousarray/).waitFor();
+    const integers = Buffer.from(text.replace('<f4', '<i4'), 'latin1');
+    await drop(page, { 'wave.npy': integers });
+    await page.getByText(/numbers are of the type <i4/).waitFor();
+    await close();
+  });
+
+  test('handle_rows_alone_give_the_same_cages', async () => {
+    const whole = await site.client().encode(capture, { name: 'whole' }, FRAMES);
+    const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`);
+    await drop(page, { 'rest.obj': capture.rest, 'cage.obj': capture.cage, 'wave.npy': capture.npy(FRAMES) });
+    await page.getByText('More options').click();
+    await page.getByLabel('What is sent').selectOption('handles');
+    await page.getByText('errors are not measured').waitFor();
+    await page.getByRole('button', { name: 'Encode' }).click();
+    const id = await encoded(page);
+    await page.getByText('84 of 642 points of each frame sent').waitFor();
+    const cages = async (session: string): Promise<Buffer> =>
+      Buffer.from(await (await site.client().call(`/${session}/cages?first=0&count=${FRAMES}`)).arrayBuffer());
+    expect((await cages(id)).equals(await cages(whole))).toBe(true);
+    expect(errors).toEqual([]);
+    await close();
+  });
+
+  test('a_service_that_is_killed_during_an_upload_gets_the_rest_when_it_is_back', async () => {
+    const large = new SphereCapture(4);
+    const frames = 1200;
+    const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`, ['502', 'ERR_']);
+    // The bytes are made in the page: they are too many to be carried there.
+    await drop(
+      page,
+      { 'rest.obj': large.rest, 'cage.obj': large.cage, 'wave.npy': large.npy(4) },
+      { name: 'wave.npy', times: frames / 4 },
+    );
+    await page.getByText(`1,200 frames of 2,562 points`).waitFor();
+    await page.getByRole('button', { name: 'Encode' }).click();
+    await page.getByText('You can look at it meanwhile').waitFor();
+    await site.service.kill();
+    await page
+      .getByRole('alert')
+      .getByText(/tries again/)
+      .waitFor();
+    await site.service.run();
+    const id = await encoded(page);
+    expect((await site.client().session(id)).frames).toMatchObject({ solved: frames, missing: [] });
+    expect(errors).toEqual([]);
+    await close();
+  });
+
+  test('an_upload_goes_on_while_the_session_is_watched', async () => {
+    const large = new SphereCapture(4);
+    const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`);
+    await slow(page, { uploadThroughput: 8 << 20 });
+    const files = { 'rest.obj': large.rest, 'cage.obj': large.cage, 'wave.npy': large.npy(4) };
+    await drop(page, files, { name: 'wave.npy', times: 200 });
+    await page.getByRole('button', { name: 'Encode' }).click();
+    await page.getByRole('link', { name: 'Watch it live' }).click();
+    const id = /#\/session\/([0-9a-f]+)/.exec(page.url())![1];
+    await page.locator('cager-viewer').waitFor();
+    await expect.poll(async () => (await site.client().session(id)).state, { timeout: 30_000 }).toBe('completed');
+    await page.goto(`${site.page}#/upload`);
+    await page.getByRole('heading', { name: 'Encoded: wave' }).waitFor();
+    expect(errors).toEqual([]);
+    await close();
+  });
+
+  test('an_upload_that_was_stopped_goes_on_or_is_deleted', async () => {
+    const large = new SphereCapture(4);
+    const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`);
+    await slow(page, { uploadThroughput: 3 << 20 });
+    await drop(
+      page,
+      { 'rest.obj': large.rest, 'cage.obj': large.cage, 'wave.npy': large.npy(4) },
+      { name: 'wave.npy', times: 300 },
+    );
+    await page.getByRole('button', { name: 'Encode' }).click();
+    await page.getByText('You can look at it meanwhile').waitFor();
+    await page.getByRole('button', { name: 'Stop' }).click();
+    await page.getByRole('heading', { name: /Stopped/ }).waitFor();
+    await page.getByRole('button', { name: 'Go on' }).click();
+    await page.getByText('You can look at it meanwhile').waitFor();
+    await page.getByRole('button', { name: 'Stop' }).click();
+    const before = await sessions(site);
+    await page.getByRole('button', { name: 'Delete what was sent' }).click();
+    await page
+      .getByRole('button', { name: 'Choose files' })
+      .or(page.getByRole('button', { name: 'Add files' }))
+      .waitFor();
+    expect(await sessions(site)).toBe(before - 1);
+    expect(errors).toEqual([]);
+    await close();
+  });
+});
+
+describe.skipIf(missing)('an upload to a service with little room', { timeout: 60_000 }, () => {
+  let site: Site;
+
+  beforeAll(async () => {
+    site = await Site.start({}, ['tenant_max_bytes=2 MiB']);
+  }, 120_000);
+
+  afterAll(() => site.close());
+
+  test('a_full_quota_says_what_to_do_and_the_upload_can_go_on', async () => {
+    const small = new SphereCapture(2);
+    const { id: other } = await site.client().create(small, { name: 'other' });
+    await site.client().whenReady(other);
+    await site.client().post(other, small, 0, 3000);
+    const { page, close } = await openPage(site.browser, `${site.page}#/upload`, ['507']);
+    await drop(page, { 'rest.obj': small.rest, 'cage.obj': small.cage, 'wave.npy': small.npy(1000) });
+    await page.getByRole('button', { name: 'Encode' }).click();
+    await page
+      .getByRole('alert')
+      .getByText(/Delete sessions that are no longer needed/)
+      .waitFor();
+    await site.client().call(`/${other}`, { method: 'DELETE' });
+    await page.getByRole('button', { name: 'Try again' }).click();
+    await encoded(page);
+    await close();
+  });
+});
+
+type Files = Readonly<Record<string, string | Uint8Array>>;
+
+/** Drops files on the upload; the numbers of the array `repeated.name` are repeated behind each other, and its header says so. */
+async function drop(page: Page, files: Files, repeated?: { name: string; times: number }): Promise<void> {
+  const carried = Object.entries(files).map(
+    ([name, content]) => [name, Buffer.from(content).toString('base64')] as const,
+  );
+  await page.locator('cager-upload main').evaluate(
+    (zone, { carried, repeated }) => {
+      const transfer = new DataTransfer();
+      for (const [name, base64] of carried) {
+        const bytes = Uint8Array.from(atob(base64), (sign) => sign.charCodeAt(0));
+        let parts: Uint8Array<ArrayBuffer>[] = [bytes];
+        if (name === repeated?.name) {
+          const begin = 10 + new DataView(bytes.buffer).getUint16(8, true);
+          const header = new TextDecoder('latin1').decode(bytes.subarray(10, begin));
+          const frames = Number(/\((\d+),/.exec(header)![1]);
+          const more =
+            header
+              .replace(`(${frames},`, `(${frames * repeated.times},`)
+              .trimEnd()
+              .padEnd(begin - 11) + '\n';
+          parts = [bytes.subarray(0, 10), new TextEncoder().encode(more)];
+          for (let k = 0; k < repeated.times; k += 1) parts.push(bytes.subarray(begin));
+        }
+        transfer.items.add(new File(parts, name));
+      }
+      zone.dispatchEvent(
+        new DragEvent('dragover', { dataTransfer: transfer, bubbles: true, cancelable: true, composed: true }),
+      );
+      zone.dispatchEvent(
+        new DragEvent('drop', { dataTransfer: transfer, bubbles: true, cancelable: true, composed: true }),
+      );
+    },
+    { carried, repeated },
+  );
+}
+
+/** Waits for the end of the upload; the session's identifier. */
+async function encoded(page: Page): Promise<string> {
+  const link = page.getByRole('link', { name: 'Look at it' });
+  await link.waitFor({ timeout: 40_000 });
+  return (await link.getAttribute('href'))!.replace('#/session/', '');
+}
+
+async function roles(page: Page): Promise<Record<string, string>> {
+  const selects = page.locator('cager-upload .items select');
+  return selects.evaluateAll((found) =>
+    Object.fromEntries(
+      (found as HTMLSelectElement[]).map((select) => [
+        select.getAttribute('aria-label')!.replace(/^What (.*) is$/, '$1'),
+        select.value,
+      ]),
+    ),
+  );
+}
+
+async function sessions(site: Site): Promise<number> {
+  return ((await (await site.client().call('')).json()) as { sessions: unknown[] }).sessions.length;
+}
+
+interface FrameError {
+  readonly l2: number;
+  readonly linf: number;
+}
+
+async function toldErrors(site: Site, id: string): Promise<FrameError[]> {
+  return ((await (await site.client().call(`/${id}/errors`)).json()) as { frames: FrameError[] }).frames;
+}
+
+/** Errors of what the program decodes from a container, as fractions of the rest pose's diagonal. */
+function decodedErrors(container: Buffer): FrameError[] {
+  const folder = mkdtempSync(join(tmpdir(), 'cager-web-'));
+  try {
+    writeFileSync(join(folder, 'capture.cager'), container);
+    execFileSync(cager!, ['decode', join(folder, 'capture.cager'), '-o', join(folder, 'out.npy'), '--quiet']);
+    const file = readFileSync(join(folder, 'out.npy'));
+    const begin = 10 + file.readUInt16LE(8);
+    const decoded = new Float32Array(file.buffer.slice(file.byteOffset + begin, file.byteOffset + file.length));
+    const posted = capture.frames(0, FRAMES);
+    const stride = 3 * capture.points;
+    const diagonal = Math.hypot(2, 2, 2);
+    return Array.from({ length: FRAMES }, (_, frame) => {
+      let [sum, largest] = [0, 0];
+      for (let i = frame * stride; i < (frame + 1) * stride; i += 3) {
+        const square = [0, 1, 2].reduce((total, axis) => total + (decoded[i + axis] - posted[i + axis]) ** 2, 0);
+        sum += square;
+        largest = Math.max(largest, square);
+      }
+      return { l2: Math.sqrt(sum / capture.points) / diagonal, linf: Math.sqrt(largest) / diagonal };
+    });
+  } finally {
+    rmSync(folder, { recursive: true, force: true });
+  }
+}
