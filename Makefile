@@ -13,10 +13,10 @@ LINT := target/lint-deploy
 NPM := $(shell command -v npm 2>/dev/null)
 PAGE := web/dist/index.html
 
-.PHONY: help demo test web viewer page-test page-lint captures proxies blender soak lint lint-deploy doc bench bench-codec paper cages openapi schemathesis fuzz audit clean
+.PHONY: help demo test web viewer page-test page-lint captures proxies blender soak lint lint-deploy doc bench bench-codec viewer-figures viewer-pictures paper cages openapi schemathesis fuzz audit clean
 
 help: ## list these commands
-	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 18
 
 demo: viewer ## encode and decode the built-in capture; results in cager-demo/
 	$(CARGO) run --release --locked --quiet --bin cager -- demo
@@ -126,6 +126,14 @@ $(PEERS): benches/peers/requirements.txt
 bench-codec: $(CODECS) ## sizes and errors of coded files beside other formats, on the captures in CAGER_CAPTURES: docs/RATES.md, its plots, the README
 	$(CARGO) build --release --locked --bin cager
 	$(CODECS) benches/codec.py
+
+viewer-figures: web ## sizes, times and memory of the viewer on the built-in demo, looped for MINUTES (10): docs/VIEWER.md; needs Chromium
+	$(CARGO) build --release --locked --bin cager
+	cd web && CAGER_BINARY=$(abspath target/release/cager) node tools/run.js tools/figures.ts
+
+viewer-pictures: web ## pictures of the viewer, list and upload on the built-in demo: docs/pictures; needs Chromium
+	$(CARGO) build --release --locked --bin cager
+	cd web && CAGER_BINARY=$(abspath target/release/cager) node tools/run.js tools/pictures.ts
 
 $(CODECS): benches/peers/codecs.txt
 	$(PYTHON) -m venv target/codecs

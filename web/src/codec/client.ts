@@ -1,7 +1,9 @@
 /** The page's side of decoding: the calls of `GroupDecoder`, answered by a worker. */
 
+import { moduleWorker } from '../moduleWorker';
 import { CodedDataError } from './error';
 import type { Answer, Arguments, Call, Method, Result } from './messages';
+import workerAddress from './worker.ts?worker&url';
 
 /** Decodes the coded sections of one capture, one call after another. */
 export interface Codec {
@@ -68,7 +70,7 @@ class WorkerCodec implements Codec {
   }
 
   private start(): Worker {
-    const worker = new Worker(new URL('./worker.ts', import.meta.url), { type: 'module', name: 'cager-codec' });
+    const worker = moduleWorker(workerAddress);
     worker.onmessage = ({ data }: MessageEvent<Answer>) => this.answer(data);
     worker.onerror = () => this.fail(new Error('The decoder stopped. Reload the page.'));
     return worker;

@@ -1,6 +1,8 @@
 import type { StaticPart } from '../capture';
 import { columnsOf } from './compute';
 import type { FromWorker, ToWorker } from './messages';
+import { moduleWorker } from '../moduleWorker';
+import workerAddress from './worker.ts?worker&url';
 
 /** Entries of Φ that a worker computes before it reports: some tens of milliseconds of work. */
 const SLICE_ENTRIES = 1 << 17;
@@ -66,7 +68,7 @@ export async function computePhi(capture: StaticPart, options: ComputeOptions = 
 }
 
 function startWorker(): Worker {
-  return new Worker(new URL('./worker.ts', import.meta.url), { type: 'module' });
+  return moduleWorker(workerAddress);
 }
 
 function send(worker: Worker, message: ToWorker) {

@@ -67,6 +67,7 @@ export class Decoder {
   private positionPass: Pass | null = null;
   private readonly normalPass: Pass;
   private motionTarget: WebGLRenderTarget | null = null;
+  private placed: PlacedFrame | null = null;
   private phi: DataArrayTexture | null = null;
   private isDisposed = false;
 
@@ -183,6 +184,24 @@ export class Decoder {
     return this.motionTarget.texture;
   }
 
+  /** Takes a frame that is given as positions, x y z of each point in the capture's unit, and computes its normals; into textures of their own. */
+  placeFrame(positions: Float32Array) {
+    this.placed ??= placedFrame(this.bands, this.normalPass);
+    const texels = this.placed.positions.image.data as unknown as Float32Array;
+    for (let p = 0; p < this.points; p++) {
+      for (let k = 0; k < 3; k++) texels[4 * p + k] = (positions[3 * p + k] - this.centre[k]) / this.diagonal;
+    }
+    this.placed.positions.needsUpdate = true;
+    const shown = this.renderer.getRenderTarget();
+    this.placed.pass.render(this.renderer, this.placed.normals);
+    this.renderer.setRenderTarget(shown);
+  }
+
+  /** Textures of {@link placeFrame}, like {@link positions} and {@link normals}; null before there is one. */
+  get placedTextures(): { readonly positions: Texture; readonly normals: Texture } | null {
+    return this.placed && { positions: this.placed.positions, normals: this.placed.normals.texture };
+  }
+
   /** Positions of the pose that was decoded last, x y z of each point in the capture's unit. Waits for the graphics processor. */
   readPositions(): Float32Array {
     const texels = new Float32Array(4 * WIDTH * this.bands);
@@ -201,6 +220,8 @@ export class Decoder {
     this.positionTarget.dispose();
     this.normalTarget.dispose();
     this.motionTarget?.dispose();
+    this.placed?.normals.dispose();
+    this.placed?.pass.dispose();
     this.positionPass?.dispose();
     this.normalPass.dispose();
   }
@@ -241,6 +262,19 @@ export class Decoder {
     (this.offsetTextures[which].image.data as unknown as Float32Array).set(offsets);
     this.offsetTextures[which].needsUpdate = true;
   }
+}
+
+/** A frame that is given as positions: these, the normals that follow, and the pass that computes them. */
+interface PlacedFrame {
+  readonly positions: DataTexture;
+  readonly normals: WebGLRenderTarget;
+  readonly pass: Pass;
+}
+
+function placedFrame(bands: number, like: Pass): PlacedFrame {
+  const positions = floatTexture(new Float32Array(4 * WIDTH * bands), WIDTH, bands);
+  const pass = new Pass(normalShader, { ...like.uniforms, positions: { value: positions } });
+  return { positions, normals: target(bands, HalfFloatType), pass };
 }
 
 /** A fragment shader that runs once for every texel of a target. */

@@ -1,6 +1,8 @@
 import type { Capture, FrameBlock, Residual } from '../capture';
 import type { Offsets } from './decoder';
 import type { FromResidualWorker, ToResidualWorker } from './residualWorker';
+import { moduleWorker } from '../moduleWorker';
+import residualWorkerAddress from './residualWorker.ts?worker&url';
 
 /** What a frame is decoded from. */
 export interface FrameData {
@@ -8,6 +10,9 @@ export interface FrameData {
   readonly rows: Float32Array;
   readonly offsets: Offsets;
 }
+
+/** Gives the rows of a frame to show in place of its own, both `rowsPerFrame × 3`. */
+export type FrameEdit = (frame: number, rows: Float32Array) => Float32Array;
 
 /** Bytes of blocks that are kept. */
 const BLOCK_BYTES = 192 * 2 ** 20;
@@ -22,6 +27,8 @@ export class FrameStore {
   onArrival: () => void = () => undefined;
   /** Called with every block that comes. */
   onBlock: (block: FrameBlock) => void = () => undefined;
+  /** Changes frames as they are taken out; null leaves them as they are. Edited ones have no offsets, which belong to cages as they were captured. */
+  edit: FrameEdit | null = null;
   private readonly blocks = new Map<number, FrameBlock>();
   private readonly offsets = new Map<number, Float32Array>();
   private readonly asked = new Set<number>();
@@ -39,6 +46,7 @@ export class FrameStore {
     if (!block) return null;
     const width = 3 * this.capture.static.rowsPerFrame;
     const rows = block.cages.subarray((frame - block.first) * width, (frame - block.first + 1) * width);
+    if (this.edit) return { rows: this.edit(frame, rows), offsets: null };
     if (!block.residual) return { rows, offsets: null };
     const offsets = this.offsets.get(frame);
     return offsets ? { rows, offsets } : null;
@@ -153,7 +161,7 @@ export class FrameStore {
 
   private send(message: ToResidualWorker) {
     if (!this.worker) {
-      this.worker = new Worker(new URL('./residualWorker.ts', import.meta.url), { type: 'module' });
+      this.worker = moduleWorker(residualWorkerAddress);
       this.worker.onmessage = ({ data }: MessageEvent<FromResidualWorker>) => this.receive(data);
     }
     this.worker.postMessage(message);

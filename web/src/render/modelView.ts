@@ -18,6 +18,7 @@ export class ModelView {
   private readonly handleInk = { value: ink(this.uniforms.color.value, 1) };
   private readonly handleSize = { value: 1 };
   private heat: DataTexture | null = null;
+  private hasHeat = false;
 
   constructor(
     private readonly decoder: Decoder,
@@ -65,7 +66,17 @@ export class ModelView {
     this.heat = values instanceof Float32Array ? pointValueTexture(values, this.decoder.bands) : null;
     (this.uniforms.heat as { value: unknown }).value = this.heat ?? values;
     this.uniforms.heatScale.value = largest > 0 ? 1 / largest : 0;
-    this.uniforms.heatShare.value = values ? 1 : 0;
+    this.hasHeat = values !== null;
+    this.uniforms.heatShare.value = this.hasHeat ? 1 : 0;
+  }
+
+  /** Shows the frame that the decoder was given as positions, in the model's own colour; or what it decoded. */
+  showPlaced(isPlaced: boolean) {
+    const placed = isPlaced ? this.decoder.placedTextures : null;
+    const uniforms = this.uniforms as Record<string, { value: unknown }>;
+    uniforms.positions.value = placed?.positions ?? this.decoder.positions;
+    uniforms.normals.value = placed?.normals ?? this.decoder.normals;
+    this.uniforms.heatShare.value = this.hasHeat && !placed ? 1 : 0;
   }
 
   setColors(model: Color, wire: Color, wireOpacity: number, handle: Color) {

@@ -32,6 +32,9 @@ export interface StageColors {
   readonly shadow: number;
 }
 
+/** What of a capture whose original is there is drawn: what is decoded, the original, or the original to the left of a line. */
+export type Side = 'decoded' | 'original' | 'both';
+
 /** CSS pixels of the canvas that something lies above. */
 export interface Covered {
   readonly right: number;
@@ -63,6 +66,8 @@ export class Stage {
   private readonly hasFaces: boolean;
   /** Vertices of the cage as it is shown, x y z each, in diagonals and in the model's axes. */
   readonly cageVertices: Float32Array;
+  private side: Side = 'decoded';
+  private split = 0.5;
   private size = '';
   private shadowIsOld = true;
   private picturesWithShadow = 0;
@@ -156,6 +161,17 @@ export class Stage {
     this.ground.setColors(new Color(colors.grid), colors.shadow);
   }
 
+  /** Takes the original of the pose that is shown, x y z of each point in the capture's unit. */
+  setOriginal(positions: Float32Array) {
+    this.decoder.placeFrame(positions);
+  }
+
+  /** Which side is drawn; the line between both is at `split`, a fraction of the picture's width. */
+  setSide(side: Side, split: number) {
+    this.side = side;
+    this.split = split;
+  }
+
   setHandles(handles: Uint32Array) {
     this.model.setHandles(handles);
   }
@@ -225,7 +241,10 @@ export class Stage {
     }
     this.renderer.setRenderTarget(null);
     this.renderer.clear();
-    this.renderer.render(this.scene, camera);
+    const hasOriginal = this.decoder.placedTextures !== null;
+    if (this.side === 'decoded' || !hasOriginal) this.renderer.render(this.scene, camera);
+    else if (this.side === 'original') this.drawOriginal();
+    else this.drawBoth();
   }
 
   /** A box around the model as it is now, or around the cage before there is one. */
@@ -242,6 +261,29 @@ export class Stage {
     this.ground.dispose();
     this.decoder.dispose();
     this.renderer.dispose();
+  }
+
+  private drawBoth() {
+    const { renderer } = this;
+    const { x: width, y: height } = renderer.getSize(new Vector2());
+    const line = Math.round(width * this.split);
+    renderer.setScissorTest(true);
+    renderer.setScissor(line, 0, width - line, height);
+    renderer.render(this.scene, this.camera);
+    renderer.setScissor(0, 0, line, height);
+    this.drawOriginal();
+    renderer.setScissorTest(false);
+  }
+
+  /** The original has neither a cage nor handles. */
+  private drawOriginal() {
+    const [cage, handles] = [this.cage.group.visible, this.model.handles.visible];
+    this.cage.group.visible = this.model.handles.visible = false;
+    this.model.showPlaced(true);
+    this.renderer.render(this.scene, this.camera);
+    this.model.showPlaced(false);
+    this.cage.group.visible = cage;
+    this.model.handles.visible = handles;
   }
 
   private showCage(vertices: ArrayLike<number>) {

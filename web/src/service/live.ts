@@ -2,9 +2,10 @@
 
 import type { Capture, StaticPart } from '../capture';
 import { openContainer } from '../container/open';
-import { httpSource } from '../container/source';
+import { httpSource, type Source } from '../container/source';
 import { ContainerStream } from '../container/stream';
 import { type Retry, pause, persistently } from './backoff';
+import { basisRows } from './basisRows';
 import { LiveCapture, type SessionCapture } from './liveCapture';
 import type { Session } from './messages';
 import { ServiceProblem, problemBehind, problemFrom } from './problem';
@@ -65,12 +66,30 @@ async function openFinished(service: Service, session: Session, signal: AbortSig
   const url = service.address(sessionPath(session.id, 'capture.cager'));
   try {
     const source = await httpSource(url, { headers: () => service.authorization(), signal });
-    return await openContainer(source, { name: session.name ?? session.id, signal });
+    // The page cannot compute these coordinates, and coded cages are decoded with them.
+    const coordinates = session.coordinates === 'harmonic' ? basisRows(service, session.id, signal) : null;
+    const name = session.name ?? session.id;
+    return await openContainer(watchingToken(source), { name, signal, ...(coordinates && { coordinates }) });
   } catch (error) {
-    const problem = problemBehind(error);
-    if (problem instanceof ServiceProblem && problem.status === 401) pageToken.refused();
-    throw problem;
+    throw told(error);
   }
+}
+
+/** The same source; says that a token is wanted where it is refused later, while the capture is played. */
+function watchingToken(source: Source): Source {
+  const read = (first: number, bytes: number, signal?: AbortSignal): Promise<Uint8Array> =>
+    source.read(first, bytes, signal).catch((error: unknown) => {
+      told(error);
+      throw error;
+    });
+  return { size: source.size, read };
+}
+
+/** The problem behind an error; the page hears of one that a token solves. */
+function told(error: unknown): Error {
+  const problem = problemBehind(error);
+  if (problem instanceof ServiceProblem && problem.status === 401) pageToken.refused();
+  return problem;
 }
 
 /** Model and cage of a running session: what its container begins with. The rest of it is not read. */

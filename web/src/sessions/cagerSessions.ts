@@ -97,10 +97,10 @@ export class Sessions extends LitElement {
 
   protected override updated(): void {
     const shown = this.#shown(this.#list.sessions).rows;
-    this.#figures.want(shown);
     const [navigation] = performance.getEntriesByType('navigation') as PerformanceNavigationTiming[];
     const streams = /^h[23]$/.test(navigation.nextHopProtocol) ? STREAMS_OF_HTTP2 : STREAMS_OF_HTTP1;
     const isOn = !document.hidden && this.isConnected && !this.wantsToken;
+    this.#figures.want(isOn ? shown : []);
     this.#list.shown = new Set(shown.map(({ id }) => id));
     // Those that move first: some wait for ever.
     const unfinished = shown.filter(isUnfinished).map(({ id }) => id);

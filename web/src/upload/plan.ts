@@ -47,7 +47,9 @@ export async function planOf(items: readonly Item[]): Promise<Plan> {
   return { rest, cage: cageItem?.files[0] ?? null, frames, remarks };
 }
 
-async function framesOf(files: readonly File[]): Promise<FrameSource> {
-  if (files.length > 1) return ObjFrames.of(files);
-  return extensionOf(files[0].name) === 'npy' ? npyFrames(files[0]) : pc2Frames(files[0]);
+/** Frames of an array, a point cache, or of `.obj` files in this order. */
+export async function framesOf(files: readonly File[]): Promise<FrameSource> {
+  const extension = extensionOf(files[0].name);
+  if (files.length > 1 || extension === 'obj') return ObjFrames.of(files);
+  return extension === 'npy' ? npyFrames(files[0]) : pc2Frames(files[0]);
 }

@@ -47,10 +47,12 @@ export function perform(action: Action, viewer: CagerViewer) {
     handles: () => toggle('handles'),
     ground: () => toggle('ground'),
     heat: () => player.setHeat(nextHeat(player)),
+    compare: () => compare(player),
     picture: () => void savePicture(viewer, player),
     turntable: () => void toggleRecording(viewer, player),
     fullscreen: () => void toggleFullscreen(viewer),
     figures: () => (viewer.figures = !viewer.figures),
+    edit: () => void viewer.editing.toggle(),
     help: () => viewer.openHelp(),
   };
   actions[action]();
@@ -63,6 +65,14 @@ function goToWorst(player: Player) {
 
 function nextHeat({ heatMap: { kind, kinds } }: Player): Heat {
   return kinds[(kinds.indexOf(kind) + 1) % kinds.length];
+}
+
+/** Shows the next side of a comparison; without an original, where one could come from. */
+function compare(player: Player) {
+  const { comparison } = player;
+  const next = { decoded: 'both', both: 'original', original: 'decoded' } as const;
+  if (comparison.original) comparison.side = next[comparison.side];
+  else player.setHeat('error');
 }
 
 async function savePicture(viewer: CagerViewer, player: Player) {
@@ -104,6 +114,7 @@ async function toggleFullscreen(viewer: CagerViewer) {
   }
 }
 
-function stem(viewer: CagerViewer): string {
+/** What files that are saved are named after. */
+export function stem(viewer: CagerViewer): string {
   return viewer.heading.replace(/\.cager$/i, '').replace(/[^\w.-]+/g, '-');
 }

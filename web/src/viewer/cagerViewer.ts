@@ -4,7 +4,8 @@ import type { Capture } from '../capture';
 import { openContainer } from '../container/open';
 import { blobSource, httpSource } from '../container/source';
 import { controls, tokens } from '../style/tokens';
-import { perform } from './actions';
+import { EditMode } from '../editing/editMode';
+import { perform, stem } from './actions';
 import { emptyState, notice, progressBox } from './messages';
 import { panelStyle } from './panelStyle';
 import { figuresPanel, helpSheet, legend, toolbar, transportBar } from './parts';
@@ -16,6 +17,11 @@ import { clock, grouped, percent } from './text';
 import './timeline';
 import type { Timeline } from './timeline';
 import { sought, started } from './transport';
+import type { Dropped } from '../upload/classify';
+import { droppedFiles } from '../upload/drop';
+import { divider } from './comparisonParts';
+import { comparisonStyle } from './comparisonStyle';
+import { PointMarks } from './pointMarks';
 import { viewerStyle } from './viewerStyle';
 import { viewFromText, viewText } from './viewState';
 
@@ -28,7 +34,7 @@ const FINEST_PIXEL_RATIO = 2;
 
 /**
  * Plays a capture: `<cager-viewer src="walk.cager" autoplay></cager-viewer>`, or one that is set as the property `capture`. A `.cager` file that is
- * dropped on it plays too.
+ * dropped on it plays too; original frames that are dropped on it show where the error is.
  *
  * @attr src address of a container
  * @attr autoplay begins to play at once
@@ -41,7 +47,7 @@ const FINEST_PIXEL_RATIO = 2;
  */
 @customElement('cager-viewer')
 export class CagerViewer extends LitElement {
-  static override styles = [tokens, controls, viewerStyle, panelStyle];
+  static override styles = [tokens, controls, viewerStyle, panelStyle, comparisonStyle];
 
   @property() src: string | null = null;
   @property() name: string | null = null;
@@ -61,12 +67,15 @@ export class CagerViewer extends LitElement {
   @query('canvas') private readonly canvas!: HTMLCanvasElement;
   @query('cager-timeline') private readonly timeline!: Timeline | null;
   @query('dialog') private readonly sheet!: HTMLDialogElement;
+  readonly editing = new EditMode(this);
+  private marks: PointMarks | null = null;
   private opened: Capture | null = null;
   private load = new AbortController();
   private removed = new AbortController();
   private look = 0;
   private shownFrame = -1;
   private deckHeight = 0;
+  private panelShare = 0;
   private restTimer = 0;
   private wasReady = false;
   private cameraWasMoved = false;
@@ -76,6 +85,19 @@ export class CagerViewer extends LitElement {
   /** Plays a file without any server. */
   async open(file: File): Promise<void> {
     await this.openFrom(file.name, (signal) => openContainer(blobSource(file), { name: file.name, signal }));
+  }
+
+  /** Takes the frames that the capture was encoded from, and shows how far it is from them. */
+  async openOriginal(files: readonly Dropped[] | Promise<readonly Dropped[]>): Promise<void> {
+    const { player } = this;
+    if (!player) return;
+    try {
+      await player.comparison.open(await files);
+      if (player.heatMap.kind !== 'error') player.setHeat('error');
+      this.problem = null;
+    } catch (error) {
+      this.report(error instanceof Error ? error.message : String(error));
+    }
   }
 
   play() {
@@ -163,7 +185,7 @@ export class CagerViewer extends LitElement {
       void this.openFrom(name, async (signal) => openContainer(await httpSource(src, { signal }), { name, signal }));
     }
     if (changed.has('capture') && this.capture) this.show(this.capture);
-    if (this.measureDeck() !== this.deckHeight) this.resize();
+    if (this.measureDeck() !== this.deckHeight || this.editing.panelShare !== this.panelShare) this.resize();
     this.writePlace();
   }
 
@@ -178,7 +200,13 @@ export class CagerViewer extends LitElement {
         @dblclick=${() => player?.frameAll()}
       ></canvas>
       ${player ? this.overlay(player) : emptyState(this.opening, this.failure, (file) => void this.open(file))}
-      ${this.dropping ? html`<div class="drop">Drop a capture to play it</div>` : nothing}
+      ${
+        this.dropping
+          ? html`<div class="drop">
+              ${player ? 'Drop another capture to play it, or the original frames to compare with' : 'Drop a capture to play it'}
+            </div>`
+          : nothing
+      }
       ${helpSheet(() => this.sheet.close())}
     `;
   }
@@ -189,6 +217,7 @@ export class CagerViewer extends LitElement {
     const act = (action: Action) => perform(action, this);
     const hasErrors = capture.errors.linf.some(Number.isFinite);
     return html`
+      ${divider(player)} ${this.marks?.template}
       <div class="lead">
         <slot name="lead"></slot>
         <div class="title glass">
@@ -196,17 +225,19 @@ export class CagerViewer extends LitElement {
           <p class="figures">
             ${grouped(part.rest.length / 3)} points, ${grouped(capture.frames)} frames<span class="more"
               >, cage of ${grouped(part.cage.positions.length / 3)} vertices</span
-            >
+            >${this.editing.hasEdits ? ', edited' : nothing}
           </p>
         </div>
         ${capture.complete ? nothing : this.liveBadge(player)}
       </div>
       ${toolbar(player, act, {
         figures: this.figures,
+        editing: this.editing.isOn,
         recording: this.recording !== null,
         recordable: canRecord(),
       })}
-      ${this.figures ? figuresPanel(player) : nothing} ${legend(player)}
+      ${this.editing.panel(stem(this))} ${this.figures ? figuresPanel(player) : nothing}
+      ${legend(player, this.comparisonActs, this.editing.isOn)}
       ${this.problem !== null ? notice(this.problem, () => (this.problem = null)) : nothing}
       ${progress ? progressBox(progress.doing, progress.fraction) : player.buffering ? progressBox('Loading', null) : nothing}
       <div class="deck glass">
@@ -215,6 +246,7 @@ export class CagerViewer extends LitElement {
           .frames=${capture.frames}
           .errors=${capture.errors}
           .frameNumbers=${capture.frameNumbers}
+          .range=${this.editing.range}
           .look=${this.look}
           .position=${transport.position}
           @seek=${(event: CustomEvent<number>) => (player.transport = sought(player.transport, event.detail))}
@@ -222,6 +254,14 @@ export class CagerViewer extends LitElement {
       </div>
     `;
   }
+
+  private readonly comparisonActs = {
+    open: (files: readonly Dropped[]) => void this.openOriginal(files),
+    close: () => {
+      this.player?.comparison.close();
+      this.player?.setHeat('none');
+    },
+  };
 
   private liveBadge(player: Player) {
     const atEnd = player.transport.playing && player.transport.position > player.transport.frames - 45;
@@ -262,6 +302,8 @@ export class CagerViewer extends LitElement {
     try {
       canvas.hidden = false;
       this.begin(new Player(canvas, capture));
+      this.marks = new PointMarks(this.renderRoot);
+      this.marks.follow(canvas, this.player!);
     } catch (error) {
       this.fail(error);
     }
@@ -300,6 +342,7 @@ export class CagerViewer extends LitElement {
 
   private unload() {
     this.recording?.abort();
+    this.editing.close();
     this.player?.dispose();
     this.player = null;
     this.opened?.close();
@@ -323,7 +366,9 @@ export class CagerViewer extends LitElement {
     const { player } = this;
     if (!player) return;
     if (this.timeline) this.timeline.position = player.transport.position;
+    this.editing.draw();
     this.writePlace();
+    this.marks?.place(player);
     if (this.frame !== this.shownFrame) {
       this.shownFrame = this.frame;
       this.dispatchEvent(new CustomEvent<number>('framechange', { detail: this.frame, bubbles: true, composed: true }));
@@ -359,8 +404,10 @@ export class CagerViewer extends LitElement {
     const last = Math.max(0, capture.frames - 1);
     write('[data-place]', `${frame} / ${last}`);
     write('[data-clock]', clock(frame / transport.rate));
+    // What was measured is not what is shown any more.
+    const isEdited = this.editing.changes(frame);
     const figure = (value: number | undefined) =>
-      value === undefined || !Number.isFinite(value) ? '–' : percent(value);
+      value === undefined || !Number.isFinite(value) || isEdited ? '–' : percent(value);
     write('[data-l2]', figure(capture.errors.l2[frame]));
     write('[data-linf]', figure(capture.errors.linf[frame]));
   }
@@ -369,6 +416,7 @@ export class CagerViewer extends LitElement {
     this.look++;
     this.player?.stage.setColors(stageColors(this));
     this.player?.refresh();
+    this.editing.recolor();
   }
 
   private measureDeck(): number {
@@ -385,19 +433,23 @@ export class CagerViewer extends LitElement {
     this.deckHeight = this.measureDeck();
     const tools = this.renderRoot.querySelector('.tools')?.clientWidth ?? 0;
     // In a wide picture the tools stand beside the model anyway.
-    const right = clientWidth < NARROW ? tools + 12 : 0;
-    this.player?.resize(clientWidth, clientHeight, ratio, { right, bottom: this.deckHeight });
+    const isNarrow = clientWidth < NARROW;
+    const right = isNarrow ? tools + 12 : 0;
+    this.panelShare = this.editing.panelShare;
+    const bottom = this.deckHeight + (isNarrow ? Math.round(this.panelShare * clientHeight) : 0);
+    this.style.setProperty('--covered-height', `${bottom}px`);
+    this.player?.resize(clientWidth, clientHeight, ratio, { right, bottom });
     if (!this.cameraWasMoved) this.player?.goHome(true);
   }
 
   /** Does what a key asks for; a page that shows nothing else can hand it all key presses. */
   readonly pressKey = (event: KeyboardEvent) => {
-    if (event.defaultPrevented) return;
+    if (event.defaultPrevented || this.sheet.open || this.editing.pressKey(event)) return;
     const target = event.composedPath()[0] as HTMLElement;
     const isControl = /^(BUTTON|A|INPUT|SELECT|LABEL)$/.test(target.tagName);
     // Space and Enter press a button that has the focus; letters choose within a list.
     if (isControl && (event.key === ' ' || event.key === 'Enter' || target.tagName === 'SELECT')) return;
-    if (this.sheet.open || !this.player) return;
+    if (!this.player) return;
     const action = actionOf(event);
     if (!action) return;
     event.preventDefault();
@@ -413,10 +465,14 @@ export class CagerViewer extends LitElement {
 
   private dropFile(event: DragEvent) {
     this.dropping = false;
-    const file = event.dataTransfer?.files[0];
+    const { dataTransfer } = event;
+    const file = dataTransfer?.files[0];
     if (!file) return;
     event.preventDefault();
-    void this.open(file);
+    // Beside an open capture, whatever is no capture itself can only be what it was encoded from.
+    if (this.player && !/\.cager$/i.test(file.name)) {
+      void this.openOriginal(droppedFiles(dataTransfer));
+    } else void this.open(file);
   }
 }
 

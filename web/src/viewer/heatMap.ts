@@ -1,50 +1,70 @@
 import type { Capture } from '../capture';
+import type { Original } from '../originals/original';
+import { pointErrors, type PointErrors } from '../originals/pointErrors';
 import type { FrameStore } from '../render/frameStore';
 import type { Stage } from '../render/stage';
 
 /** What colours the model: nothing, the movement from frame to frame, or the distance from where it was captured. */
 export type Heat = 'none' | 'motion' | 'error';
 
+/** The errors of a frame that is shown. */
+export interface MeasuredFrame extends PointErrors {
+  readonly frame: number;
+  /** Points as they are shown, x y z each, in the scene's unit. */
+  readonly places: Float32Array;
+}
+
 /** Colours the model by a value of each point that belongs to the frame that is shown. */
 export class HeatMap {
   /** Called when the colours have changed. */
   onChange: () => void = () => undefined;
-  /** Called with one sentence where there are no values. */
-  onProblem: (problem: string) => void = () => undefined;
   kind: Heat = 'none';
-  /** What the warmest colour stands for, in diagonals: the largest value so far, so that colours of frames can be compared. */
+  /**
+   * What the warmest colour stands for, in diagonals: the largest value so far, so that colours of frames can be compared. Of errors it is what all
+   * but a few points stay below: the worst one alone would leave all others dark.
+   */
   largest = 0;
+  /** Errors of the frame that is shown, where the map shows errors and the original is there. */
+  measured: MeasuredFrame | null = null;
   private frame = -1;
 
   constructor(
     private readonly capture: Capture,
     private readonly stage: Stage,
     private readonly store: FrameStore,
-    private readonly signal: AbortSignal,
   ) {}
 
-  /** The maps that this capture can have. */
-  get kinds(): readonly Heat[] {
-    return this.capture.pointErrors ? ['none', 'motion', 'error'] : ['none', 'motion'];
-  }
+  /** The maps that there are. */
+  readonly kinds: readonly Heat[] = ['none', 'motion', 'error'];
 
   show(kind: Heat) {
     this.kind = kind;
     this.frame = -1;
     this.largest = 0;
-    if (kind === 'none') this.stage.setHeat(null, 1);
+    this.measured = null;
+    this.stage.setHeat(null, 1);
   }
 
-  /** Colours the model for a frame of so many. */
+  /** Colours the model for a frame of so many, by its movement. */
   update(frame: number, frames: number) {
-    if (this.kind === 'none' || frame === this.frame || !this.stage.decoder.ready) return;
-    if (this.kind === 'error') {
-      this.frame = frame;
-      void this.fetchErrors(frame);
-    } else if (this.showMotion(frame, frame + 1 < frames ? frame + 1 : frame - 1)) {
-      this.frame = frame;
-      this.onChange();
-    }
+    if (this.kind !== 'motion' || frame === this.frame || !this.stage.decoder.ready) return;
+    if (!this.showMotion(frame, frame + 1 < frames ? frame + 1 : frame - 1)) return;
+    this.frame = frame;
+    this.onChange();
+  }
+
+  /** Colours the model by how far the frame that is decoded is from its original. */
+  measure(frame: number, original: Original | null) {
+    const positions = original?.peek(frame);
+    if (this.kind !== 'error' || !positions || !this.stage.decoder.ready) return;
+    const { decoder } = this.stage;
+    const places = decoder.readPositions();
+    const errors = pointErrors(places, positions, decoder.diagonal);
+    decoder.place(places);
+    this.measured = { ...errors, frame, places };
+    this.largest = Math.max(this.largest, errors.usual);
+    this.stage.setHeat(errors.values, this.largest);
+    this.onChange();
   }
 
   private showMotion(frame: number, neighbour: number): boolean {
@@ -62,22 +82,5 @@ export class HeatMap {
       farthest = Math.max(farthest, Math.hypot(to[k] - from[k], to[k + 1] - from[k + 1], to[k + 2] - from[k + 2]));
     }
     return farthest / this.stage.decoder.diagonal;
-  }
-
-  private async fetchErrors(frame: number) {
-    try {
-      const errors = (await this.capture.pointErrors?.(frame, this.signal)) ?? null;
-      if (this.kind !== 'error' || frame !== this.frame) return;
-      if (errors === null) {
-        throw new Error('The original of this frame is not kept, so that its errors cannot be shown on the model.');
-      }
-      for (const error of errors) if (error > this.largest) this.largest = error;
-      this.stage.setHeat(errors, this.largest);
-    } catch (error) {
-      if (this.signal.aborted) return;
-      this.show('none');
-      this.onProblem(error instanceof Error ? error.message : String(error));
-    }
-    this.onChange();
   }
 }

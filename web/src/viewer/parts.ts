@@ -1,6 +1,7 @@
 import { html, nothing, type TemplateResult } from 'lit';
 import { heatGradient } from '../render/colorMap';
 import type { Layers } from '../render/stage';
+import { comparisonPanel, type ComparisonActs } from './comparisonParts';
 import { glyph, type GlyphName } from './glyphs';
 import type { Heat } from './heatMap';
 import type { Player } from './player';
@@ -44,13 +45,14 @@ function tool(action: Action, name: GlyphName, label: string, act: Act, pressed?
 export function toolbar(
   player: Player,
   act: Act,
-  shown: { figures: boolean; recording: boolean; recordable: boolean },
+  shown: { figures: boolean; editing: boolean; recording: boolean; recordable: boolean },
 ) {
   const layers = Object.keys(LAYER_NAMES) as (keyof Layers)[];
   const possible = layers.filter((layer) => layer !== 'handles' || player.capture.handles !== undefined);
   return html`<div class="tools glass" role="toolbar" aria-label="View" aria-orientation="vertical">
     ${possible.map((layer) => tool(layer, layer, LAYER_NAMES[layer], act, player.layers[layer]))}
     ${tool('heat', 'heat', HEAT_NAMES[player.heatMap.kind], act, player.heatMap.kind !== 'none')}
+    ${tool('edit', 'edit', 'Edit the cage', act, shown.editing)}
     <hr />
     ${tool('frame', 'frame', 'Frame the model', act)} ${tool('picture', 'camera', 'Save a picture', act)}
     ${
@@ -112,15 +114,21 @@ export function transportBar(player: Player, act: Act, onSpeed: (speed: number) 
   </div>`;
 }
 
-/** What the colours of the heat map mean. */
-export function legend(player: Player) {
-  const { kind, largest } = player.heatMap;
-  if (kind === 'none') return nothing;
-  const text = kind === 'motion' ? 'Movement from frame to frame' : 'Distance from the capture';
-  return html`<div class="legend glass">
-    ${text}
-    <div class="bar" .style=${`background: ${heatGradient()}`}></div>
-    <div class="ends figures"><span>0</span><span>${percent(largest)} of the diagonal</span></div>
+/** What the colours of the heat map mean, and how the original compares. */
+export function legend(player: Player, acts: ComparisonActs, beside: boolean) {
+  const { heatMap, comparison } = player;
+  if (heatMap.kind === 'none' && !comparison.original) return nothing;
+  const isMotion = heatMap.kind === 'motion';
+  const compares = !isMotion || comparison.original;
+  return html`<div class="legend glass ${compares ? 'comparison' : ''} ${beside ? 'beside' : ''}">
+    ${
+      isMotion
+        ? html`Movement from frame to frame
+            <div class="bar" .style=${`background: ${heatGradient()}`}></div>
+            <div class="ends figures"><span>0</span><span>${percent(heatMap.largest)} of the diagonal</span></div>`
+        : nothing
+    }
+    ${compares ? comparisonPanel(player, acts) : nothing}
   </div>`;
 }
 

@@ -3,8 +3,10 @@ import { canCompute } from '../coordinates/compute';
 import { computePhi } from '../coordinates/pool';
 import { framed, HOME, zoomed, type CameraState } from '../render/camera';
 import { CameraControls } from '../render/cameraControls';
-import { FrameStore } from '../render/frameStore';
+import { FrameStore, type FrameEdit } from '../render/frameStore';
+import type { Original } from '../originals/original';
 import { Stage, type Covered, type Layers } from '../render/stage';
+import { Comparison } from './comparison';
 import { HeatMap, type Heat } from './heatMap';
 import { Quality } from './quality';
 import { advanced, framesAhead, framesAround, sought, standing, USUAL_RATE, type Transport } from './transport';
@@ -16,13 +18,10 @@ export interface Progress {
   readonly fraction: number | null;
 }
 
-type Rows = Float32Array | Float64Array;
-
-/** Gives the rows of a frame to show in place of its own, both `rowsPerFrame × 3`. */
-export type FrameEdit = (frame: number, rows: Float32Array) => Rows;
-
 /** Frames that are loaded ahead of the one that is shown. */
 const AHEAD = 24;
+/** Frames of the original that are read ahead. */
+const ORIGINALS_AHEAD = 3;
 /** Frames that a live capture is entered before its end, so that playing does not wait for every one. */
 const LIVE_MARGIN = 15;
 /** Longest step of the clock: a tab that was hidden goes on where it was. */
@@ -39,6 +38,8 @@ export class Player {
   readonly stage: Stage;
   readonly controls: CameraControls;
   readonly heatMap: HeatMap;
+  /** The original frames, where they are at hand. */
+  readonly comparison: Comparison;
   progress: Progress | null = null;
   /** Whether the frame that should be shown has not come yet. */
   buffering = false;
@@ -51,9 +52,8 @@ export class Player {
   private state: Transport;
   private shownLayers = USUAL_LAYERS;
   private shownPosition = -1;
-  /** The frame that could not be loaded last: it is not asked for again and again. */
+  /** The frame that could not be loaded last: it is not asked for again until somebody plays or seeks. */
   private failedFrame = -1;
-  private edit: FrameEdit | null = null;
   private captureProblem: string | null = null;
   private poseIsOld = true;
   private scheduled = 0;
@@ -77,12 +77,13 @@ export class Player {
     this.store = new FrameStore(capture);
     this.store.onArrival = () => this.wake();
     this.store.onBlock = ({ cages }) => this.stage.include(cages, capture.static.rowsPerFrame);
-    this.heatMap = new HeatMap(capture, this.stage, this.store, this.stop.signal);
+    this.heatMap = new HeatMap(capture, this.stage, this.store);
     this.heatMap.onChange = () => {
       this.onState();
       this.wake();
     };
-    this.heatMap.onProblem = (problem) => this.onProblem(problem);
+    this.comparison = new Comparison(capture, this.stage);
+    this.comparison.onChange = () => this.refresh();
     this.state = { ...standing(), rate: capture.static.frameRate ?? USUAL_RATE };
     this.followCapture();
     if (!capture.complete) this.state = sought(this.state, capture.frames - LIVE_MARGIN);
@@ -99,6 +100,7 @@ export class Player {
 
   set transport(transport: Transport) {
     this.state = transport;
+    this.failedFrame = -1;
     this.onState();
     this.wake();
   }
@@ -131,8 +133,9 @@ export class Player {
 
   /** Shows frames with other rows than the capture has: `edit` gives those of a frame. Null shows the capture itself. */
   setFrameEdit(edit: FrameEdit | null) {
-    this.edit = edit;
-    this.refresh();
+    this.store.edit = edit;
+    // Movement is that of the frames as they are shown.
+    this.setHeat(this.heatMap.kind);
   }
 
   /** Shows all of the capture as it is now, from the side the camera is on or from the usual one. */
@@ -276,7 +279,9 @@ export class Player {
   private play(seconds: number) {
     // While Φ is computed, pictures would take the processor from it.
     const next = this.isPrepared ? advanced(this.state, seconds) : this.state;
-    const { before, after, mix } = framesAround(next);
+    const original = this.wantedOriginal;
+    // Between two frames there is nothing to compare.
+    const { before, after, mix } = framesAround(original ? { ...next, smooth: false } : next);
     const [here, there] = [this.store.peek(before), mix > 0 ? this.store.peek(after) : null];
     this.store.prefetch(framesAhead(next, AHEAD));
     if (!here || (mix > 0 && !there)) {
@@ -287,26 +292,50 @@ export class Player {
       }
       return;
     }
+    original?.prefetch(framesAhead(next, ORIGINALS_AHEAD));
+    if (original && !original.peek(before)) {
+      this.buffering = true;
+      original.load(before).then(
+        () => this.wake(),
+        (error: unknown) => this.failOriginal(error),
+      );
+      return;
+    }
     this.buffering = false;
     if (this.state.playing)
       this.dropped += Math.max(0, Math.floor(next.position) - Math.floor(this.state.position) - 1);
     const ended = this.state.playing && !next.playing;
     this.state = next;
     if (ended) this.onState();
-    if (!this.poseIsOld && next.position === this.shownPosition) return;
+    if (!this.poseIsOld && before + mix === this.shownPosition) return;
     this.poseIsOld = false;
-    this.shownPosition = next.position;
-    const rowsBefore = this.edit?.(before, here.rows) ?? here.rows;
-    const rows = there ? blendedRows(rowsBefore, this.edit?.(after, there.rows) ?? there.rows, mix) : rowsBefore;
+    this.shownPosition = before + mix;
+    const rows = there ? blendedRows(here.rows, there.rows, mix) : here.rows;
     this.heatMap.update(before, this.state.frames);
     this.stage.setPose({ rows, before: here.offsets, after: there?.offsets ?? null, mix });
+    this.comparison.update(before);
+    this.heatMap.measure(before, original);
   }
 
   private failFrame(frame: number, error: unknown) {
     if (this.stop.signal.aborted) return;
-    this.failedFrame = frame;
     this.buffering = false;
     this.transport = { ...this.state, playing: false };
+    this.failedFrame = frame;
+    this.onProblem(sentence(error));
+  }
+
+  /** The original, where what is shown needs it. */
+  private get wantedOriginal(): Original | null {
+    const { original, side } = this.comparison;
+    return side !== 'decoded' || this.heatMap.kind === 'error' ? original : null;
+  }
+
+  private failOriginal(error: unknown) {
+    if (this.stop.signal.aborted || !this.comparison.original) return;
+    this.buffering = false;
+    this.comparison.close();
+    this.setHeat('none');
     this.onProblem(sentence(error));
   }
 
@@ -323,7 +352,7 @@ export class Player {
   }
 }
 
-function blendedRows(from: Rows, to: Rows, share: number): Float64Array {
+function blendedRows(from: Float32Array, to: Float32Array, share: number): Float64Array {
   const rows = new Float64Array(from.length);
   for (let k = 0; k < rows.length; k++) rows[k] = from[k] + (to[k] - from[k]) * share;
   return rows;

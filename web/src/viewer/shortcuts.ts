@@ -28,10 +28,12 @@ export type Action =
   | 'handles'
   | 'ground'
   | 'heat'
+  | 'compare'
   | 'picture'
   | 'turntable'
   | 'fullscreen'
   | 'figures'
+  | 'edit'
   | 'help';
 
 interface Shortcut {
@@ -56,7 +58,7 @@ export const SHORTCUTS: readonly { readonly title: string; readonly entries: rea
       { action: 'faster', keys: ['>', ']'], label: 'Faster' },
       { action: 'loop', keys: ['l'], label: 'Loop on or off' },
       { action: 'smooth', keys: ['s'], label: 'Blend between frames on or off' },
-      { action: 'worst', keys: ['e'], label: 'Frame with the largest error' },
+      { action: 'worst', keys: ['m'], label: 'Frame with the largest error' },
     ],
   },
   {
@@ -84,7 +86,9 @@ export const SHORTCUTS: readonly { readonly title: string; readonly entries: rea
       { action: 'handles', keys: ['5'], label: 'Handles' },
       { action: 'ground', keys: ['6', 'g'], label: 'Ground' },
       { action: 'heat', keys: ['h'], label: 'Heat map' },
+      { action: 'compare', keys: ['o'], label: 'Original, decoded model, or both' },
       { action: 'figures', keys: ['i'], label: 'Figures' },
+      { action: 'edit', keys: ['e'], label: 'Edit the cage' },
       { action: 'picture', keys: ['p'], label: 'Save a picture' },
       { action: 'turntable', keys: ['t'], label: 'Record a turntable video' },
       { action: 'help', keys: ['?'], label: 'This sheet' },

@@ -6,6 +6,11 @@ export function percent(fraction: number): string {
   return `${Number(value.toFixed(digits))} %`;
 }
 
+/** A number with three digits that count. */
+export function threeDigits(value: number): string {
+  return String(Number(value.toPrecision(3)));
+}
+
 /** A number with its thousands set apart. */
 export function grouped(value: number): string {
   return value.toLocaleString('en-US');

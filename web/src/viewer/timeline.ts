@@ -1,8 +1,9 @@
-import { css, html, LitElement, unsafeCSS, type PropertyValues } from 'lit';
+import { css, html, LitElement, svg, unsafeCSS, type PropertyValues } from 'lit';
 import { customElement, property, query } from 'lit/decorators.js';
 import uPlot from 'uplot';
 import uPlotStyle from 'uplot/dist/uPlot.min.css?inline';
 import type { FrameErrors } from '../capture';
+import { weightAt, type FrameRange } from '../editing/cageEdit';
 import { percent } from './text';
 import { controls } from '../style/tokens';
 
@@ -71,6 +72,18 @@ export class Timeline extends LitElement {
       .slider:hover .thumb {
         scale: 1.2;
       }
+      .range {
+        position: absolute;
+        top: 0;
+        left: 0;
+        width: 100%;
+        height: 9px;
+        overflow: visible;
+        fill: color-mix(in srgb, var(--cager-cage) 45%, transparent);
+        stroke: var(--cager-cage);
+        stroke-width: 1.25;
+        stroke-linejoin: round;
+      }
       .needle,
       .hover {
         position: absolute;
@@ -109,6 +122,8 @@ export class Timeline extends LitElement {
   @property({ attribute: false }) errors: FrameErrors | null = null;
   /** Numbers of the frames where they come from, if these are others. */
   @property({ attribute: false }) frameNumbers: Float64Array | null = null;
+  /** Frames that an edit is kept over, drawn as high as it counts in each. */
+  @property({ attribute: false }) range: FrameRange | null = null;
   /** Changes when colours do: the chart is drawn anew. */
   @property({ type: Number }) look = 0;
   @query('.chart') private readonly chartPlace!: HTMLElement | null;
@@ -149,6 +164,7 @@ export class Timeline extends LitElement {
         <div class="hover" hidden></div>
         <div class="tip figures" hidden></div>
         <div class="track">
+          ${this.range ? rangeDrawing(this.range, this.frames) : null}
           <div class="rail"></div>
           <div class="done"></div>
           <div class="thumb"></div>
@@ -302,6 +318,17 @@ export class Timeline extends LitElement {
   private seek(frame: number) {
     this.dispatchEvent(new CustomEvent<number>('seek', { detail: frame }));
   }
+}
+
+/** The weight of an edit over the frames of a capture. */
+function rangeDrawing(range: FrameRange, frames: number) {
+  const { first, last } = range;
+  const points = [`${first},1`];
+  for (let frame = first; frame <= last; frame++) points.push(`${frame},${1 - weightAt(range, frame)}`);
+  points.push(`${last},1`);
+  return svg`<svg class="range" viewBox="0 0 ${Math.max(1, frames - 1)} 1" preserveAspectRatio="none" aria-hidden="true">
+    <polygon points=${points.join(' ')} vector-effect="non-scaling-stroke" />
+  </svg>`;
 }
 
 /** What the browser makes of a colour that depends on the theme, for canvases, which know no custom properties. */

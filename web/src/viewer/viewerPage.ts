@@ -1,9 +1,10 @@
-import { css, html, LitElement, type PropertyValues } from 'lit';
+import { css, html, LitElement, nothing, type PropertyValues } from 'lit';
 import { customElement, property, query, state } from 'lit/decorators.js';
 import type { Capture } from '../capture';
+import { httpSource } from '../container/source';
 import { openSession } from '../service/live';
 import { problemBehind, ServiceProblem } from '../service/problem';
-import { Service } from '../service/service';
+import { Service, sessionPath } from '../service/service';
 import { pageToken } from '../service/token';
 import '../sessions/signIn';
 import { controls } from '../style/tokens';
@@ -31,6 +32,14 @@ export class ViewerPage extends LitElement {
         background: var(--cager-glass);
         box-shadow: var(--cager-shadow);
         color: var(--cager-text);
+      }
+      .sign-in {
+        position: fixed;
+        inset: 0;
+        z-index: 1;
+        overflow: auto;
+        padding: var(--cager-space-4);
+        background: color-mix(in srgb, var(--cager-background) 70%, transparent);
       }
       .message {
         display: grid;
@@ -62,18 +71,23 @@ export class ViewerPage extends LitElement {
   private readonly service = new Service();
   private opening = new AbortController();
   private readonly retry = () => void this.openSession();
-  private readonly passKey = (event: KeyboardEvent) => this.viewer?.pressKey(event);
+  private readonly tokenWanted = () => (this.wantsToken = true);
+  private readonly passKey = (event: KeyboardEvent) => {
+    if (!this.wantsToken) this.viewer?.pressKey(event);
+  };
 
   override connectedCallback() {
     super.connectedCallback();
-    pageToken.addEventListener('change', this.retry);
+    pageToken.addEventListener('change', this.tokenChanged);
+    pageToken.addEventListener('wanted', this.tokenWanted);
     document.addEventListener('keydown', this.passKey);
     void this.openSession();
   }
 
   override disconnectedCallback() {
     super.disconnectedCallback();
-    pageToken.removeEventListener('change', this.retry);
+    pageToken.removeEventListener('change', this.tokenChanged);
+    pageToken.removeEventListener('wanted', this.tokenWanted);
     document.removeEventListener('keydown', this.passKey);
     this.opening.abort();
     this.capture?.close();
@@ -84,14 +98,21 @@ export class ViewerPage extends LitElement {
   }
 
   override render() {
-    if (this.wantsToken) return html`<main><cager-sign-in></cager-sign-in></main>`;
+    if (this.wantsToken && !this.capture) return html`<main><cager-sign-in></cager-sign-in></main>`;
     if (this.session !== null && !this.capture) return this.message();
     return html`<main>
-      <cager-viewer autoplay .capture=${this.capture} .view=${this.view}>
+      <cager-viewer autoplay ?inert=${this.wantsToken} .capture=${this.capture} .view=${this.view}>
         <a class="button back" slot="lead" href="#/" aria-label="All sessions" title="All sessions">
           <svg class="glyph" viewBox="0 0 24 24" aria-hidden="true"><path d="M14.5 6 8.500 12l6 6" /></svg>
         </a>
       </cager-viewer>
+      ${
+        this.wantsToken
+          ? html`<div class="sign-in" role="dialog" aria-modal="true" aria-label="Sign in">
+              <cager-sign-in></cager-sign-in>
+            </div>`
+          : nothing
+      }
     </main>`;
   }
 
@@ -106,6 +127,13 @@ export class ViewerPage extends LitElement {
       <a href="#/">All sessions</a>
     </main>`;
   }
+
+  /** A capture that is open stays: a running session is followed on with the new token, a finished one plays on when somebody asks. */
+  private readonly tokenChanged = () => {
+    this.wantsToken = false;
+    if (!this.capture) void this.openSession();
+    else this.viewer?.report(null);
+  };
 
   private async openSession() {
     const { session, service } = this;
@@ -123,6 +151,15 @@ export class ViewerPage extends LitElement {
         return;
       }
       capture.coordinates = async (onProgress, until) => (await service.coordinates(session, onProgress, until)).values;
+      const below = (path: string) => sessionPath(session, path);
+      capture.container ??= (until) => {
+        const headers = () => service.authorization();
+        return httpSource(service.address(below('capture.cager')), { headers, signal: until });
+      };
+      capture.decode = (cages, until) => {
+        const headers = { 'Content-Type': 'application/octet-stream' };
+        return service.request(below('decode'), { method: 'POST', headers, body: cages, signal: until ?? null });
+      };
       capture.handles = (until) => service.handles(session, until);
       this.capture?.close();
       this.capture = capture;

@@ -114,7 +114,7 @@ export const viewerStyle = css`
     position: absolute;
     top: var(--cager-space-3);
     right: var(--cager-space-3);
-    max-height: calc(100% - var(--deck-height, 120px) - 2 * var(--cager-space-3));
+    max-height: calc(100% - var(--covered-height, 120px) - 2 * var(--cager-space-3));
     display: flex;
     flex-direction: column;
     gap: 2px;

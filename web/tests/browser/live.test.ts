@@ -1,10 +1,16 @@
+import { execFileSync } from 'node:child_process';
+import { mkdtemp, readFile, rm, writeFile } from 'node:fs/promises';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
 import type { Capture } from '../../src/capture';
+import { seriousFindings } from './harness/axe';
 import { openPage, slow, type Watched } from './harness/browser';
 import type { TestClient } from './harness/client';
-import { missing } from './harness/programs';
+import { cager, missing } from './harness/programs';
 import { Site } from './harness/site';
 import { SphereCapture } from './harness/sphere';
+import { parseNpy } from './npy';
 
 const capture = new SphereCapture();
 
@@ -140,10 +146,10 @@ describe.skipIf(missing)('a session as a capture', { timeout: 60_000 }, () => {
     const watched = await openPage(site.browser, site.server.parts);
     await slow(watched.page, { downloadThroughput: 10_000 });
     await opened(watched, id);
-    // As from a farm that solves a hundred frames in a second: 50 kB/s.
+    // As from a farm that solves two hundred frames in a second: 100 kB/s.
     for (let first = 0; first < 600; first += 50) {
       await client.post(id, capture, first, 50);
-      await watched.page.waitForTimeout(500);
+      await watched.page.waitForTimeout(250);
     }
     await eventually(watched, 'frames', 600);
     expect((await state(watched)).live!.droppedFrames).toBeGreaterThan(100);
@@ -194,6 +200,23 @@ describe.skipIf(missing)('a session as a capture', { timeout: 60_000 }, () => {
     await watched.close();
   });
 
+  test('a_finished_session_of_coded_frames_and_harmonic_coordinates_is_decoded_with_what_the_service_computed', async () => {
+    const id = await client.encode(capture, { name: 'coded harmonic', coordinates: 'harmonic', max_error: 1e-3 }, 10);
+    const watched = await openPage(site.browser, site.server.parts);
+    await opened(watched, id);
+    const there = parseNpy(await decodedCages(client, id));
+    const size = Math.max(...there.values);
+    for (const frame of [0, 9]) {
+      const expected = there.values.subarray(frame * 3 * there.shape[1], (frame + 1) * 3 * there.shape[1]);
+      const here = await cage(watched, frame);
+      expect(here).toHaveLength(expected.length);
+      const off = here.map((value, k) => Math.abs(value - expected[k]) / size);
+      expect(Math.max(...off)).toBeLessThan(1e-5);
+    }
+    expect(watched.errors).toEqual([]);
+    await watched.close();
+  });
+
   test('a_session_that_failed_says_why', async () => {
     const { id } = await client.create(capture, { name: 'failed' });
     await client.whenReady(id);
@@ -238,7 +261,56 @@ describe.skipIf(missing)('a session behind tokens', { timeout: 60_000 }, () => {
     expect(watched.errors).toEqual([]);
     await watched.close();
   });
+
+  test('the_page_asks_for_a_token_over_what_is_watched_and_goes_on_with_it', async () => {
+    await site.service.setTokens({ 'studio-a': tokens[0] });
+    const client = site.client(tokens[0]);
+    await expect
+      .poll(() =>
+        client.call('').then(
+          () => true,
+          () => false,
+        ),
+      )
+      .toBe(true);
+    const { id } = await client.create(capture, { name: 'watched' });
+    await client.whenReady(id);
+    await client.post(id, capture, 0, 3);
+    const { page, errors, close } = await openPage(site.browser, `${site.page}#/session/${id}`, ['401', 'ERR_']);
+    const signIn = async (token: string) => {
+      await page.getByLabel('Access token').fill(token);
+      await page.keyboard.press('Enter');
+    };
+    const frames = () =>
+      page.locator('cager-viewer').evaluate((viewer) => (viewer as unknown as { capture: Capture }).capture.frames);
+    await signIn(tokens[0]);
+    await expect.poll(frames, { timeout: 20_000 }).toBe(3);
+    await page.locator('cager-viewer').evaluate((viewer) => (viewer.id = 'the same'));
+    await site.service.setTokens({ 'studio-a': tokens[1] });
+    await page.getByRole('dialog', { name: 'Sign in' }).waitFor({ timeout: 15_000 });
+    expect(await seriousFindings(page)).toEqual([]);
+    await site.client(tokens[1]).post(id, capture, 3, 4);
+    await signIn(tokens[1]);
+    await expect.poll(frames, { timeout: 20_000 }).toBe(7);
+    expect(await page.getByRole('dialog').count()).toBe(0);
+    expect(await page.locator('cager-viewer').getAttribute('id')).toBe('the same');
+    expect(errors).toEqual([]);
+    await close();
+  });
 });
+
+/** The cages of a session's container, as the program decodes them. */
+async function decodedCages(client: TestClient, id: string): Promise<Uint8Array> {
+  const folder = await mkdtemp(join(tmpdir(), 'cager-web-'));
+  try {
+    const [file, cages] = [join(folder, 'capture.cager'), join(folder, 'cages.npy')];
+    await writeFile(file, Buffer.from(await (await client.call(`/${id}/capture.cager`)).arrayBuffer()));
+    execFileSync(cager!, ['decode', file, '--cages', '-o', cages, '--quiet'], { stdio: 'pipe' });
+    return await readFile(cages);
+  } finally {
+    await rm(folder, { recursive: true });
+  }
+}
 
 async function opened({ page }: Watched, id: string): Promise<void> {
   await page.evaluate(async (session) => {

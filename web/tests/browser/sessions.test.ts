@@ -144,8 +144,10 @@ describe.skipIf(missing)('the list of sessions', { timeout: 60_000 }, () => {
   });
 
   test('a_page_that_nobody_sees_asks_for_nothing', async () => {
+    // With one that is not finished the page asks every three seconds.
+    await site.client().create(capture, { name: 'waiting' });
     const { page, close } = await openPage(site.browser, `${site.page}#/`);
-    await row(page, 'finished').waitFor();
+    await row(page, 'waiting').waitFor();
     const setHidden = (hidden: boolean) =>
       page.evaluate((value) => {
         Object.defineProperty(document, 'hidden', { value, configurable: true });
@@ -154,7 +156,7 @@ describe.skipIf(missing)('the list of sessions', { timeout: 60_000 }, () => {
     await setHidden(true);
     let asked = 0;
     page.on('request', () => (asked += 1));
-    await page.waitForTimeout(7000);
+    await page.waitForTimeout(3500);
     expect(asked).toBe(0);
     await site.client().encode(capture, { name: 'meanwhile' }, 2);
     await setHidden(false);

@@ -101,7 +101,9 @@ describe.skipIf(chromium === undefined)('the viewer', { timeout: 90_000 }, () =>
       .getByRole('alert')
       .getByText(/service/)
       .waitFor();
-    await expect.poll(() => page.getByRole('button', { name: 'Cage' }).getAttribute('aria-pressed')).toBe('true');
+    await expect
+      .poll(() => page.getByRole('button', { name: 'Cage', exact: true }).getAttribute('aria-pressed'))
+      .toBe('true');
     expect(watched?.errors).toEqual([]);
   });
 

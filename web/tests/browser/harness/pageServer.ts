@@ -116,6 +116,8 @@ function send(folder: string, path: string, answer: ServerResponse): void {
     'Content-Type': TYPES[extname(file)] ?? 'application/octet-stream',
     'Content-Security-Policy': POLICY,
     'X-Content-Type-Options': 'nosniff',
+    // As the service does for its allowed origins.
+    'Access-Control-Allow-Origin': '*',
   });
   createReadStream(file).pipe(answer);
 }

@@ -1,0 +1,72 @@
+import { describe, expect, it } from 'vitest';
+import type { FrameBlock } from '../capture';
+import { editedBlock, editedRows, fitted, weightAt, type CageEdit } from './cageEdit';
+
+const range = { first: 4, last: 12, easeIn: 3, easeOut: 2 };
+const edit: CageEdit = { id: 1, vertices: [1], offsets: Float64Array.of(0, 0, 0, 1, 2, 3), range, enabled: true };
+
+describe('the range of an edit', () => {
+  it('comes in, stays whole and goes out without a jump, and touches no other frame', () => {
+    const weights = Array.from({ length: 20 }, (_, frame) => weightAt(range, frame));
+    expect(weights.map((weight) => weight > 0)).toEqual(weights.map((_, frame) => frame >= 4 && frame <= 12));
+    expect(weights.slice(7, 11)).toEqual([1, 1, 1, 1]);
+    for (let frame = 4; frame <= 7; frame++) expect(weights[frame]).toBeGreaterThan(weights[frame - 1]);
+    for (let frame = 11; frame <= 13; frame++) expect(weights[frame]).toBeLessThan(weights[frame - 1]);
+  });
+
+  it('is whole in every frame where nothing eases', () => {
+    const plain = { first: 2, last: 3, easeIn: 0, easeOut: 0 };
+    expect([1, 2, 3, 4].map((frame) => weightAt(plain, frame))).toEqual([0, 1, 1, 0]);
+  });
+
+  it('is made to fit the capture, with at least one whole frame', () => {
+    expect(fitted({ first: -5, last: 99, easeIn: 50, easeOut: 50 }, 10)).toEqual({
+      first: 0,
+      last: 9,
+      easeIn: 9,
+      easeOut: 0,
+    });
+    expect(fitted({ first: 7, last: 3, easeIn: NaN, easeOut: 1.4 }, 10)).toEqual({
+      first: 7,
+      last: 7,
+      easeIn: 0,
+      easeOut: 0,
+    });
+    const tight = fitted({ first: 3, last: 9, easeIn: 4, easeOut: 4 }, 10);
+    expect(weightAt(tight, tight.first + tight.easeIn)).toBe(1);
+  });
+});
+
+describe('edited frames', () => {
+  it('are displaced by the share that the frame has, and rows behind the vertices stay', () => {
+    const rows = Float32Array.of(0, 0, 0, 1, 1, 1, 9, 9, 9);
+    expect([...editedRows(rows, 8, [edit])]).toEqual([0, 0, 0, 2, 3, 4, 9, 9, 9]);
+    const half = editedRows(rows, 12, [edit]);
+    expect(half[3]).toBeCloseTo(1 + weightAt(range, 12), 6);
+    expect(editedRows(rows, 3, [edit])).toBe(rows);
+    expect(editedRows(rows, 8, [{ ...edit, enabled: false }])).toBe(rows);
+  });
+
+  it('add up where edits overlap', () => {
+    const rows = new Float32Array(6);
+    expect([...editedRows(rows, 8, [edit, { ...edit, id: 2 }])]).toEqual([0, 0, 0, 2, 4, 6]);
+  });
+
+  it('leave the block as it was, and have no residual', () => {
+    const residual = {
+      rank: 0,
+      trajectories: new Float32Array(0),
+      shapes: new Float32Array(0),
+      correctionStarts: new Uint32Array(4),
+      correctedPoints: new Uint32Array(0),
+      correctionVectors: new Float32Array(0),
+    };
+    const block: FrameBlock = { first: 3, count: 3, cages: new Float32Array(18), residual };
+    const edited = editedBlock(block, [edit], { rowsPerFrame: 2 });
+    expect(block.cages.every((x) => x === 0)).toBe(true);
+    expect(edited.residual).toBeNull();
+    for (let k = 0; k < 3; k++) expect(edited.cages[6 * k + 4]).toBeCloseTo(2 * weightAt(range, 3 + k), 6);
+    expect(editedBlock(block, [], { rowsPerFrame: 2 })).toBe(block);
+    expect(editedBlock(block, [{ ...edit, offsets: new Float64Array(6) }], { rowsPerFrame: 2 })).toBe(block);
+  });
+});

@@ -1,0 +1,83 @@
+import type { FrameBlock, StaticPart } from '../capture';
+
+/** Frames that an edit is kept over, counted from 0, both ends included. */
+export interface FrameRange {
+  readonly first: number;
+  readonly last: number;
+  /** Frames from `first` on over which the edit comes in; it is whole at `first + easeIn`. */
+  readonly easeIn: number;
+  /** Frames up to `last` over which it goes out. */
+  readonly easeOut: number;
+}
+
+/** Displacements of cage vertices over a range of frames. */
+export interface CageEdit {
+  readonly id: number;
+  /** Vertices that were moved by hand; others follow by falloff and symmetry. */
+  readonly vertices: readonly number[];
+  /** What is added to each vertex of the cage where the edit is whole, x y z each in the capture's unit. */
+  readonly offsets: Float64Array;
+  readonly range: FrameRange;
+  /** Whether it counts. */
+  readonly enabled: boolean;
+}
+
+/**
+ * How much of an edit a frame has, from 0 outside its range to 1: a smoothstep (3t² − 2t³) on either side, above 0 in every frame of the range.
+ */
+export function weightAt({ first, last, easeIn, easeOut }: FrameRange, frame: number): number {
+  if (frame < first || frame > last) return 0;
+  return smoothstep((frame - first + 1) / (easeIn + 1)) * smoothstep((last - frame + 1) / (easeOut + 1));
+}
+
+/** A range as it can be in a capture of so many frames: whole frames in order, and easing that leaves at least one frame whole. */
+export function fitted(range: FrameRange, frames: number): FrameRange {
+  const whole = (value: number, most: number) =>
+    Math.min(most, Math.max(0, Number.isFinite(value) ? Math.round(value) : 0));
+  const first = whole(range.first, Math.max(0, frames - 1));
+  const last = Math.max(first, whole(range.last, Math.max(0, frames - 1)));
+  const easeIn = whole(range.easeIn, last - first);
+  return { first, last, easeIn, easeOut: whole(range.easeOut, last - first - easeIn) };
+}
+
+/** Adds edits to the rows of a frame, `rowsPerFrame × 3`, whose first rows are the cage's vertices. Rows that no edit changes come back as they are. */
+export function editedRows(rows: Float32Array, frame: number, edits: readonly CageEdit[]): Float32Array {
+  let sums: Float64Array | null = null;
+  for (const { offsets, range, enabled } of edits) {
+    const weight = enabled ? weightAt(range, frame) : 0;
+    if (weight === 0) continue;
+    sums ??= Float64Array.from(rows);
+    for (let k = 0; k < offsets.length; k++) sums[k] += weight * offsets[k];
+  }
+  return sums === null ? rows : Float32Array.from(sums);
+}
+
+/**
+ * A block with edits added to its cages; the block itself stays as it is. A residual belongs to the cages as they were captured, so that a capture
+ * with edits has none in any frame, as `cager edit` writes it.
+ */
+export function editedBlock(
+  block: FrameBlock,
+  edits: readonly CageEdit[],
+  { rowsPerFrame }: Pick<StaticPart, 'rowsPerFrame'>,
+): FrameBlock {
+  if (!edits.some(counts)) return block;
+  const cages = block.cages.slice();
+  const width = 3 * rowsPerFrame;
+  for (let k = 0; k < block.count; k++) {
+    const rows = block.cages.subarray(k * width, (k + 1) * width);
+    const edited = editedRows(rows, block.first + k, edits);
+    if (edited !== rows) cages.set(edited, k * width);
+  }
+  return { ...block, cages, residual: null };
+}
+
+/** Whether an edit changes anything. */
+export function counts({ enabled, offsets }: CageEdit): boolean {
+  return enabled && offsets.some((x) => x !== 0);
+}
+
+function smoothstep(t: number): number {
+  const x = Math.min(1, t);
+  return x * x * (3 - 2 * x);
+}

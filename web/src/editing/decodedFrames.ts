@@ -1,0 +1,59 @@
+import type { Capture } from '../capture';
+import type { CageEdit } from './cageEdit';
+import { chunksOf } from './editedContainer';
+
+/** Bytes of cages in one request; services limit what they take at once. */
+const REQUEST_BYTES = 4 * 2 ** 20;
+
+/**
+ * All frames with their edits as positions, decoded by the service, in a NumPy file: frames × points × 3 in single precision.
+ *
+ * @param onProgress hears the part that has arrived, 0 to 1
+ * @throws ServiceProblem where the service refuses; its message is a sentence to show
+ */
+export async function decodedFrames(
+  capture: Capture,
+  edits: readonly CageEdit[],
+  { signal, onProgress }: { signal?: AbortSignal; onProgress?: (fraction: number) => void } = {},
+): Promise<Blob> {
+  const { frames } = capture;
+  const { rest, rowsPerFrame } = capture.static;
+  const points = rest.length / 3;
+  // Blobs may leave memory; arrays of all frames would not.
+  const pieces: Blob[] = [new Blob([npyHeader([frames, points, 3])])];
+  const chunkFrames = Math.max(1, Math.floor(REQUEST_BYTES / (12 * rowsPerFrame)));
+  for await (const { first, count, rows } of chunksOf(capture, frames, edits, signal, chunkFrames)) {
+    const response = await capture.decode!(new Blob([rows]), signal);
+    const expected = 12 * points * count;
+    let received = 0;
+    const counter = new TransformStream<Uint8Array, Uint8Array>({
+      transform(piece, controller) {
+        received += piece.length;
+        onProgress?.((first + (count * received) / expected) / frames);
+        controller.enqueue(piece);
+      },
+    });
+    let positions: Blob;
+    try {
+      positions = await new Response(response.body!.pipeThrough(counter)).blob();
+    } catch (error) {
+      signal?.throwIfAborted();
+      throw new Error('The connection to the service broke off; export again.', { cause: error });
+    }
+    if (received !== expected) throw new Error('The service sent fewer frames than were asked for; export again.');
+    pieces.push(positions);
+  }
+  return new Blob(pieces, { type: 'application/octet-stream' });
+}
+
+/** What a NumPy file of little-endian floats in C order begins with (format version 1.0). */
+export function npyHeader(shape: readonly number[]): Uint8Array<ArrayBuffer> {
+  const text = `{'descr': '<f4', 'fortran_order': False, 'shape': (${shape.join(', ')}), }`;
+  // With the ten bytes before it, the header ends with a line break at a multiple of 64.
+  const length = Math.ceil((text.length + 11) / 64) * 64 - 10;
+  const bytes = new Uint8Array(10 + length).fill(0x20);
+  bytes.set([0x93, 0x4e, 0x55, 0x4d, 0x50, 0x59, 1, 0, length & 0xff, length >> 8]);
+  bytes.set(new TextEncoder().encode(text), 10);
+  bytes[bytes.length - 1] = 0x0a;
+  return bytes;
+}

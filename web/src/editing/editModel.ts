@@ -1,0 +1,202 @@
+import type { StaticPart } from '../capture';
+import { fitted, weightAt, type CageEdit, type FrameRange } from './cageEdit';
+import { CageGraph, type FalloffMeasure } from './falloff';
+import { Grip } from './grip';
+import { History } from './history';
+import type { Vector } from './projection';
+import { AXES, mirrorOf, type Axis, type Mirror } from './symmetry';
+
+/** Frames that a new edit is kept over: the one that is shown, some around it with easing, or all. */
+export type Reach = 'frame' | 'around' | 'all';
+
+/** How the next vertices that are moved take others with them. */
+export interface EditSettings {
+  /** Radius of the falloff as a fraction of the rest pose's diagonal. */
+  readonly radius: number;
+  readonly measure: FalloffMeasure;
+  readonly symmetry: Axis | null;
+  readonly reach: Reach;
+}
+
+/** Frames that an edit with the reach `around` eases over, on either side. */
+const EASE_FRAMES = 12;
+/** Least share of vertices with a partner at which a cage counts as symmetric. */
+const SYMMETRIC = 0.5;
+
+/** Edits of one capture's cages: chosen vertices, settings, the edits and their history. Knows nothing of pictures and pointers. */
+export class EditModel {
+  /** Called after every change. */
+  onChange: () => void = () => undefined;
+  readonly graph: CageGraph;
+  /** Planes across which the cage is symmetric, by their axes. */
+  readonly mirrors: ReadonlyMap<Axis, Mirror>;
+  private readonly history = new History<readonly CageEdit[]>([]);
+  private chosen: readonly number[] = [];
+  private choices: EditSettings = { radius: 0.12, measure: 'surface', symmetry: null, reach: 'around' };
+  private shownId: number | null = null;
+  /** With which settings an edit was made: moving the same vertices again adds to it only with the same ones. */
+  private readonly madeWith = new Map<number, string>();
+  private lastId = 0;
+  private steps = 0;
+  private gripOf: { readonly key: string; readonly grip: Grip } | null = null;
+
+  /** @param diagonal length of the rest pose's diagonal, in the capture's unit */
+  constructor(
+    part: Pick<StaticPart, 'cage'>,
+    readonly diagonal: number,
+  ) {
+    this.graph = new CageGraph(part.cage);
+    const mirrors = AXES.map((axis) => [axis, mirrorOf(this.graph, axis)] as const);
+    this.mirrors = new Map(mirrors.filter(([, { share }]) => share >= SYMMETRIC));
+  }
+
+  get edits(): readonly CageEdit[] {
+    return this.history.present;
+  }
+
+  get canUndo(): boolean {
+    return this.history.canUndo;
+  }
+
+  get canRedo(): boolean {
+    return this.history.canRedo;
+  }
+
+  /** Vertices that will be moved. */
+  get selection(): readonly number[] {
+    return this.chosen;
+  }
+
+  set selection(vertices: readonly number[]) {
+    this.chosen = [...new Set(vertices)].sort((a, b) => a - b);
+    this.history.endStep();
+    this.onChange();
+  }
+
+  get settings(): EditSettings {
+    return this.choices;
+  }
+
+  set settings(settings: EditSettings) {
+    this.choices = settings;
+    this.onChange();
+  }
+
+  /** The edit whose range is shown. */
+  get active(): CageEdit | null {
+    return this.edits.find(({ id }) => id === this.shownId) ?? null;
+  }
+
+  activate(id: number | null): void {
+    this.shownId = id;
+    const edit = this.active;
+    if (edit) this.selection = edit.vertices;
+    else this.onChange();
+  }
+
+  /** How much each vertex takes part when the chosen ones move. */
+  get weights(): Float64Array {
+    return this.grip().weights;
+  }
+
+  /**
+   * Begins to move the chosen vertices, seen in a frame where they follow wholly. What it returns moves them by a vector in the capture's unit, counted
+   * from where they are now, as often as it is called; all of it is one step.
+   *
+   * @param step continues the step of this name, if the last change was one of it
+   */
+  move(frame: number, frames: number, step = `move ${++this.steps}`): (by: Vector) => void {
+    const key = this.key();
+    const grip = this.grip();
+    const vertices = this.chosen;
+    const before = this.edits;
+    const { active } = this;
+    const continued =
+      active?.enabled && this.madeWith.get(active.id) === key && weightAt(active.range, frame) === 1 ? active : null;
+    const id = continued?.id ?? ++this.lastId;
+    const range = continued?.range ?? rangeAround(frame, frames, this.settings.reach);
+    this.madeWith.set(id, key);
+    return (by) => {
+      const offsets = grip.offsets(by);
+      continued?.offsets.forEach((x, k) => (offsets[k] += x));
+      const edit: CageEdit = { id, vertices, offsets, range, enabled: true };
+      const next = continued ? before.map((other) => (other.id === id ? edit : other)) : [...before, edit];
+      this.shownId = id;
+      this.change(next, step);
+    };
+  }
+
+  /** Sets the range of an edit; settings of the same range that follow each other are one step. */
+  setRange(id: number, range: FrameRange, frames: number): void {
+    this.replace(id, { range: fitted(range, frames) }, `range ${id}`);
+  }
+
+  setEnabled(id: number, enabled: boolean): void {
+    this.replace(id, { enabled }, null);
+  }
+
+  remove(id: number): void {
+    this.change(
+      this.edits.filter((edit) => edit.id !== id),
+      null,
+    );
+  }
+
+  /** Takes all edits away; that can be undone as well. */
+  reset(): void {
+    if (this.edits.length > 0) this.change([], null);
+  }
+
+  undo(): boolean {
+    return this.told(this.history.undo());
+  }
+
+  redo(): boolean {
+    return this.told(this.history.redo());
+  }
+
+  private replace(id: number, part: Partial<CageEdit>, step: string | null): void {
+    this.change(
+      this.edits.map((edit) => (edit.id === id ? { ...edit, ...part } : edit)),
+      step,
+    );
+  }
+
+  private change(edits: readonly CageEdit[], step: string | null): void {
+    this.history.change(edits, step);
+    this.onChange();
+  }
+
+  private told(isMoved: boolean): boolean {
+    // What was shown may be gone; the newest is what the next movement adds to.
+    if (isMoved && !this.active) this.shownId = this.edits.at(-1)?.id ?? null;
+    if (isMoved) this.onChange();
+    return isMoved;
+  }
+
+  private key(): string {
+    const { radius, measure, symmetry } = this.choices;
+    return [radius, measure, symmetry, ...this.chosen].join(' ');
+  }
+
+  private grip(): Grip {
+    const key = this.key();
+    if (this.gripOf?.key !== key) {
+      const { radius, measure, symmetry } = this.choices;
+      const mirror = (symmetry && this.mirrors.get(symmetry)) ?? null;
+      this.gripOf = {
+        key,
+        grip: new Grip(this.graph, this.chosen, { radius: radius * this.diagonal, measure, mirror }),
+      };
+    }
+    return this.gripOf.grip;
+  }
+}
+
+/** The range of a new edit, which is whole at a frame. */
+export function rangeAround(frame: number, frames: number, reach: Reach): FrameRange {
+  if (reach === 'all') return fitted({ first: 0, last: frames - 1, easeIn: 0, easeOut: 0 }, frames);
+  const ease = reach === 'around' ? EASE_FRAMES : 0;
+  const [first, last] = [Math.max(0, frame - ease), Math.min(frames - 1, frame + ease)];
+  return fitted({ first, last, easeIn: frame - first, easeOut: last - frame }, frames);
+}

@@ -1,0 +1,271 @@
+import { html, LitElement, nothing, type PropertyValues } from 'lit';
+import { customElement, property, state } from 'lit/decorators.js';
+import { glyph } from '../viewer/glyphs';
+import { controls } from '../style/tokens';
+import { editRow } from './editRow';
+import { editPanelStyle } from './editPanelStyle';
+import type { CageEditor } from './editor';
+import type { EditSettings, Reach } from './editModel';
+import { exportEdited, obstacle, type ExportKind } from './exporter';
+import { drawing } from './drawings';
+import { AXES, type Axis } from './symmetry';
+
+/** Largest radius of the falloff, as a fraction of the rest pose's diagonal. */
+const LARGEST_RADIUS = 0.6;
+const REACHES: readonly (readonly [Reach, string])[] = [
+  ['frame', 'This frame'],
+  ['around', 'Around it'],
+  ['all', 'All frames'],
+];
+
+/**
+ * The controls of a {@link CageEditor}.
+ *
+ * @fires leave when editing is to end
+ * @fires problem with one sentence, when an export failed
+ */
+@customElement('cager-edit-panel')
+export class EditPanel extends LitElement {
+  static override styles = [controls, editPanelStyle];
+
+  @property({ attribute: false }) editor!: CageEditor;
+  /** What exported files are named after. */
+  @property() name = 'capture';
+  @state() private exporting: { kind: ExportKind; fraction: number; stop: AbortController } | null = null;
+  private readonly refresh = () => this.requestUpdate();
+
+  override disconnectedCallback() {
+    super.disconnectedCallback();
+    this.editor.removeEventListener('change', this.refresh);
+    this.exporting?.stop.abort();
+  }
+
+  protected override willUpdate(changed: PropertyValues<this>) {
+    if (!changed.has('editor')) return;
+    changed.get('editor')?.removeEventListener('change', this.refresh);
+    this.editor.addEventListener('change', this.refresh);
+  }
+
+  override render() {
+    const { model, said } = this.editor;
+    const { edits } = model;
+    return html`<section class="panel" aria-label="Edit the cage" @keydown=${this.keepKey}>
+      <header>
+        <h2>Edit the cage</h2>
+        ${this.action('undo', 'Undo (Ctrl Z)', !model.canUndo, () => model.undo())}
+        ${this.action('redo', 'Redo (Ctrl Shift Z)', !model.canRedo, () => model.redo())}
+        ${this.action('reset', 'Take all edits away', edits.length === 0, () => model.reset())}
+        <button class="quiet icon" title="Done (E)" aria-label="Done" @click=${this.leave}>${glyph('close')}</button>
+      </header>
+      <p class="visually-hidden" role="status">${said}</p>
+      <div class="body">
+        ${this.selectionRow()} ${this.settingRows(model.settings)}
+        <h3>Edits</h3>
+        ${
+          edits.length === 0
+            ? html`<p class="muted">None yet: drag a vertex of the cage.</p>`
+            : html`<ul>
+                ${edits.map((edit) => editRow(this.editor, edit))}
+              </ul>`
+        }
+        ${this.notes()}
+        <details>
+          <summary>Mouse and keys</summary>
+          <p>
+            Drag a vertex, an arrow or a square. Shift and a click add a vertex, Shift and a drag choose all in a box. A
+            click beside the cage chooses none.
+          </p>
+          <dl>
+            ${KEYS.map(
+              ([key, text]) =>
+                html`<dt><kbd>${key}</kbd></dt>
+                  <dd>${text}</dd>`,
+            )}
+          </dl>
+        </details>
+      </div>
+      ${this.exportRow()}
+    </section>`;
+  }
+
+  private selectionRow() {
+    const { model } = this.editor;
+    const { selection } = model;
+    const chosen =
+      selection.length === 0
+        ? 'No vertex chosen'
+        : selection.length === 1
+          ? `Vertex ${selection[0]}`
+          : `${selection.length} vertices`;
+    const toggle = () => {
+      this.editor.addsToSelection = !this.editor.addsToSelection;
+      this.requestUpdate();
+    };
+    return html`<div class="row">
+      <strong class="figures">${chosen}</strong>
+      <button aria-pressed=${this.editor.addsToSelection} title="Clicks add vertices, as with Shift" @click=${toggle}>
+        Several
+      </button>
+      <button ?disabled=${selection.length === 0} @click=${() => this.editor.select([])}>None</button>
+    </div>`;
+  }
+
+  private settingRows(settings: EditSettings) {
+    const { model } = this.editor;
+    const set = (part: Partial<EditSettings>) => (model.settings = { ...settings, ...part });
+    const percent = Math.round(100 * settings.radius);
+    const planes = [null, ...AXES];
+    return html`
+      <label class="setting" for="radius">
+        <span>Falloff</span><output class="figures">${percent === 0 ? 'off' : `${percent} % of the diagonal`}</output>
+      </label>
+      <div class="row">
+        <input
+          id="radius"
+          type="range"
+          min="0"
+          max=${100 * LARGEST_RADIUS}
+          step="1"
+          .value=${String(percent)}
+          @input=${(event: Event) => set({ radius: Number((event.target as HTMLInputElement).value) / 100 })}
+        />
+        <select
+          aria-label="Falloff is measured"
+          @change=${(event: Event) =>
+            set({ measure: (event.target as HTMLSelectElement).value === 'space' ? 'space' : 'surface' })}
+        >
+          <option value="surface" .selected=${settings.measure === 'surface'}>On the surface</option>
+          <option value="space" .selected=${settings.measure === 'space'}>In space</option>
+        </select>
+      </div>
+      <div class="setting" id="symmetry">Symmetry</div>
+      <div class="segments" role="group" aria-labelledby="symmetry">
+        ${planes.map((axis) => this.planeButton(axis, settings, () => set({ symmetry: axis })))}
+      </div>
+      <div class="setting" id="reach">New edits reach</div>
+      <div class="segments" role="group" aria-labelledby="reach">
+        ${REACHES.map(
+          ([reach, label]) =>
+            html`<button aria-pressed=${settings.reach === reach} @click=${() => set({ reach })}>${label}</button>`,
+        )}
+      </div>
+    `;
+  }
+
+  private planeButton(axis: Axis | null, settings: EditSettings, choose: () => void) {
+    const mirror = axis && this.editor.model.mirrors.get(axis);
+    const title = !axis
+      ? 'Moves what is chosen alone'
+      : mirror
+        ? `Mirrors across ${axis}: ${Math.round(100 * mirror.share)} % of the vertices have a partner`
+        : `The cage is not symmetric across ${axis}`;
+    return html`<button
+      aria-pressed=${settings.symmetry === axis}
+      aria-label=${axis ? `Across ${axis}` : 'Off'}
+      title=${title}
+      ?disabled=${axis !== null && !mirror}
+      @click=${choose}
+    >
+      ${axis ? axis.toUpperCase() : 'Off'}
+    </button>`;
+  }
+
+  private notes() {
+    const { static: part } = this.editor.player.capture;
+    const isCoded = (part.report?.coding as { residual_step?: number } | undefined)?.residual_step !== undefined;
+    return html`${
+      part.system === 'green-free'
+        ? html`<p class="muted">
+            Normals of this cage are stored beside its vertices and stay as they were captured: the model follows a
+            moved vertex, but does not turn or swell with the faces around it. Encode with
+            <code>--coordinates green</code> for that.
+          </p>`
+        : nothing
+    }
+    ${
+      isCoded
+        ? html`<p class="muted">
+            The corrections that this file stores beside its cages belong to the cages as they were: an edited capture
+            is shown and exported without them.
+          </p>`
+        : nothing
+    }`;
+  }
+
+  private exportRow() {
+    const { exporting } = this;
+    if (exporting) {
+      return html`<footer>
+        <progress aria-label="Exporting" max="1" .value=${exporting.fraction}></progress>
+        <button @click=${() => exporting.stop.abort()}>Stop</button>
+      </footer>`;
+    }
+    const button = (kind: ExportKind, label: string) => {
+      const reason = obstacle(this.editor.player.capture, kind);
+      return html`<button
+        title=${reason ?? 'Saves the capture with all edits that count'}
+        ?disabled=${reason !== null}
+        @click=${() => void this.export(kind)}
+      >
+        ${drawing('save')} ${label}
+      </button>`;
+    };
+    return html`<footer aria-label="Export">
+      ${button('container', '.cager')} ${button('frames', 'Decoded frames')}
+    </footer>`;
+  }
+
+  private async export(kind: ExportKind) {
+    const stop = new AbortController();
+    const onProgress = (fraction: number) => (this.exporting = { kind, fraction, stop });
+    onProgress(0);
+    try {
+      const { player, model } = this.editor;
+      await exportEdited(player.capture, model.edits, kind, this.name, { signal: stop.signal, onProgress });
+    } catch (error) {
+      if (!stop.signal.aborted) {
+        const detail = error instanceof Error ? error.message : String(error);
+        this.dispatchEvent(new CustomEvent<string>('problem', { detail }));
+      }
+    } finally {
+      this.exporting = null;
+    }
+  }
+
+  private action(name: 'undo' | 'redo' | 'reset', label: string, isDisabled: boolean, act: () => void) {
+    return html`<button
+      class="quiet icon"
+      title=${label}
+      aria-label=${label.replace(/ \(.*/, '')}
+      ?disabled=${isDisabled}
+      @click=${act}
+    >
+      ${drawing(name)}
+    </button>`;
+  }
+
+  private leave() {
+    this.dispatchEvent(new Event('leave'));
+  }
+
+  /** Keys of a field are the field's: arrows move its value, not the capture. */
+  private keepKey(event: KeyboardEvent) {
+    const target = event.composedPath()[0] as HTMLElement;
+    if (/^(INPUT|SELECT)$/.test(target.tagName) && event.key !== 'Escape') event.stopPropagation();
+  }
+}
+
+const KEYS = [
+  ['Enter', 'choose the vertex in the middle'],
+  ['Tab', 'the next vertex; with Shift the one before'],
+  ['Alt ←', 'the vertex on the left; so in every direction'],
+  ['← ↑', 'move it; with Shift farther'],
+  ['Page ↑', 'move it away; Page ↓ nearer'],
+  ['Esc', 'choose none; then done'],
+] as const;
+
+declare global {
+  interface HTMLElementTagNameMap {
+    'cager-edit-panel': EditPanel;
+  }
+}

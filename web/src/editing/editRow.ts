@@ -1,0 +1,59 @@
+import { html, nothing } from 'lit';
+import type { CageEdit, FrameRange } from './cageEdit';
+import { drawing } from './drawings';
+import type { CageEditor } from './editor';
+
+/** An edit in the list: whether it counts, its vertices and frames; of the one that is worked on, fields for its range. */
+export function editRow(editor: CageEditor, edit: CageEdit) {
+  const { model } = editor;
+  const { id, vertices, range, enabled } = edit;
+  const name = vertices.length === 1 ? `Vertex ${vertices[0]}` : `${vertices.length} vertices`;
+  const isActive = model.active?.id === id;
+  const activate = () => model.activate(isActive ? null : id);
+  return html`<li class=${isActive ? 'active' : nothing}>
+    <div class="row">
+      <input
+        type="checkbox"
+        aria-label=${`${name}, frames ${range.first} to ${range.last}: counts`}
+        .checked=${enabled}
+        @change=${() => model.setEnabled(id, !enabled)}
+      />
+      <button class="quiet name" aria-expanded=${isActive} @click=${activate}>
+        <span>${name}</span>
+        <span class="muted figures">${range.first === range.last ? range.first : `${range.first}–${range.last}`}</span>
+      </button>
+      <button
+        class="quiet icon"
+        aria-label=${`Remove the edit of ${name}`}
+        title="Remove"
+        @click=${() => model.remove(id)}
+      >
+        ${drawing('remove')}
+      </button>
+    </div>
+    ${isActive ? rangeFields(editor, edit) : nothing}
+  </li>`;
+}
+
+function rangeFields({ model, player }: CageEditor, { id, range }: CageEdit) {
+  const frames = player.capture.frames;
+  const field = (key: keyof FrameRange, label: string) =>
+    html`<label
+      >${label}
+      <input
+        type="number"
+        class="figures"
+        min="0"
+        max=${frames - 1}
+        .value=${String(range[key])}
+        @change=${(event: Event) => {
+          const input = event.target as HTMLInputElement;
+          if (input.value !== '') model.setRange(id, { ...range, [key]: Number(input.value) }, frames);
+          // What does not fit was put right, perhaps to what it was before.
+          input.value = String(model.edits.find((other) => other.id === id)?.range[key] ?? range[key]);
+        }}
+    /></label>`;
+  return html`<div class="range">
+    ${field('first', 'First')} ${field('last', 'Last')} ${field('easeIn', 'Ease in')} ${field('easeOut', 'Ease out')}
+  </div>`;
+}

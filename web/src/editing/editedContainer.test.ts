@@ -1,0 +1,118 @@
+import { execFileSync } from 'node:child_process';
+import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { describe, expect, it } from 'vitest';
+import { bytesSource } from '../container/source';
+import { allBlocks, goldenBytes, openBytes, positionsOf, takeApart } from '../container/testSupport';
+import { parseFields } from '../container/section';
+import { diagonalOf } from '../coordinates/topology';
+import { editedBlock, type CageEdit } from './cageEdit';
+import { npyHeader } from './decodedFrames';
+import { writeEdited } from './editedContainer';
+
+const NAMES = ['definition3-mvc', 'definition3-green', 'definition3-green-free', 'definition2-mvc', 'coded-mvc'];
+const program = process.env.CAGER_BINARY;
+
+/** Moves a vertex in frame 1 of 3. */
+function editOf(vertices: number): CageEdit {
+  const offsets = new Float64Array(3 * vertices);
+  offsets.set([0.25, -0.5, 0.125], 15);
+  return { id: 1, vertices: [5], offsets, range: { first: 1, last: 1, easeIn: 0, easeOut: 0 }, enabled: true };
+}
+
+async function written(name: string, edits: readonly CageEdit[]): Promise<Uint8Array<ArrayBuffer>> {
+  const capture = await openBytes(goldenBytes(name));
+  const { container } = await writeEdited(bytesSource(goldenBytes(name)), capture, edits);
+  return new Uint8Array(await container.arrayBuffer());
+}
+
+describe.each(NAMES)('%s, edited', (name) => {
+  it('has the edited cages, all else as it was, and no errors that nobody measured', async () => {
+    const before = await openBytes(goldenBytes(name));
+    const edit = editOf(26);
+    const bytes = await written(name, [edit]);
+    const after = await openBytes(bytes);
+    expect(after.problem).toBeNull();
+    expect(after.head).toEqual(before.head);
+    expect({ ...after.static, report: null }).toEqual({ ...before.static, report: null });
+    const expected = (await allBlocks(before)).map((block) => editedBlock(block, [edit], before.static));
+    expect(await allBlocks(after)).toEqual(expected);
+    const losesAll = name.startsWith('coded');
+    expect([...after.errors.linf].map(Number.isNaN)).toEqual([losesAll, true, losesAll]);
+    if (!losesAll) expect(after.errors.l2[2]).toBe(before.errors.l2[2]);
+    const report = after.static.report as { error: Record<string, unknown>; coding?: unknown; warnings: string[] };
+    expect(report.error.linf_max).toBeNull();
+    expect(report.coding).toBeUndefined();
+    expect(report.warnings.at(-1)).toMatch(/edited/);
+  });
+
+  it('keeps sections of model and cage as they were coded', async () => {
+    const kept = (bytes: Uint8Array) =>
+      takeApart(bytes).filter(({ header }) => /HEAD|RPTS|RFAC|CVTX|CTRI|ELEM/.test(parseFields(header, 0).tag));
+    expect(kept(await written(name, [editOf(26)]))).toEqual(kept(goldenBytes(name)));
+  });
+
+  it.runIf(program)('is read by the program, which decodes what the page does', async () => {
+    const folder = mkdtempSync(join(tmpdir(), 'cager-edited-'));
+    try {
+      const path = join(folder, 'edited.cager');
+      const bytes = await written(name, [editOf(26)]);
+      writeFileSync(path, bytes);
+      expect(execFileSync(program!, ['inspect', path]).toString()).toMatch(/edited/);
+      const decode = (from: string, ...options: string[]) => {
+        const to = join(folder, 'decoded.npy');
+        execFileSync(program!, ['decode', from, '-o', to, '--overwrite', '-q', ...options]);
+        return floatsOf(readFileSync(to));
+      };
+      const decoded = decode(path);
+      const after = await openBytes(bytes);
+      const shown = positionsOf(after.static, await allBlocks(after));
+      const diagonal = diagonalOf(after.static.rest);
+      const farthest = shown.reduce((far, x, k) => Math.max(far, Math.abs(x - decoded[k])), 0);
+      expect(farthest / diagonal).toBeLessThan(1e-6);
+      const source = join(folder, 'source.cager');
+      writeFileSync(source, goldenBytes(name));
+      const original = decode(source, ...(name.startsWith('coded') ? ['--layer', 'cages'] : []));
+      const points = after.head.points * 3;
+      for (const frame of [0, 2]) {
+        const [a, b] = [decoded, original].map((all) => all.slice(frame * points, (frame + 1) * points));
+        // Coded cages are decoded to numbers that differ by rounding between programs.
+        if (name.startsWith('coded')) {
+          expect(a.reduce((far, x, k) => Math.max(far, Math.abs(x - b[k])), 0) / diagonal).toBeLessThan(1e-6);
+        } else {
+          expect(a).toEqual(b);
+        }
+      }
+      expect(decoded.slice(points, 2 * points)).not.toEqual(original.slice(points, 2 * points));
+    } finally {
+      rmSync(folder, { recursive: true });
+    }
+  });
+});
+
+it('refuses a vertex beyond single precision', async () => {
+  const edit = editOf(26);
+  edit.offsets[15] = 1e39;
+  await expect(written('definition3-mvc', [edit])).rejects.toThrow(/move it closer/);
+});
+
+it('a copy without edits keeps errors and figures', async () => {
+  const before = await openBytes(goldenBytes('definition3-mvc'));
+  const after = await openBytes(await written('definition3-mvc', []));
+  expect(after.errors).toEqual(before.errors);
+  expect(after.static.report).toEqual(before.static.report);
+});
+
+it('the header of a NumPy file is padded to a multiple of 64 bytes and names the shape', () => {
+  const header = npyHeader([120, 20_000, 3]);
+  expect(header.length % 64).toBe(0);
+  expect(new TextDecoder('latin1').decode(header)).toContain("'shape': (120, 20000, 3), }");
+  expect(header[8] + 256 * header[9]).toBe(header.length - 10);
+});
+
+if (program && !existsSync(program)) throw new Error(`CAGER_BINARY names ${program}, which does not exist.`);
+
+function floatsOf(npy: Buffer): Float32Array {
+  return new Float32Array(Uint8Array.from(npy.subarray(10 + npy.readUInt16LE(8))).buffer);
+}

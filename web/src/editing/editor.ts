@@ -1,0 +1,242 @@
+import type { Player } from '../viewer/player';
+import { resolvedColor } from '../viewer/timeline';
+import { sought } from '../viewer/transport';
+import { counts, editedRows } from './cageEdit';
+import { EditModel } from './editModel';
+import { EditPointer } from './editPointer';
+import { gizmoAt, type Gizmo } from './gizmo';
+import { keyCommand, type KeyCommand } from './keys';
+import { drawOverlay, type OverlayColors } from './overlay';
+import { placedVertices, vertexAt, vertexTowards, type PlacedVertex } from './picking';
+import { Projection, plus, type Vector } from './projection';
+
+/** What the editor needs of the viewer around it. */
+export interface EditorHost extends HTMLElement {
+  readonly player: Player | null;
+  readonly renderRoot: HTMLElement | DocumentFragment;
+}
+
+/** Milliseconds after which another press of an arrow key is a step of its own. */
+const PAUSE = 1200;
+
+/** Picks and moves vertices of a cage in the picture of a player, by pointer and by keys. */
+export class CageEditor extends EventTarget {
+  readonly model: EditModel;
+  /** Whether picking adds to what is chosen, for fingers that have no shift key. */
+  addsToSelection = false;
+  /** What was done last, for screen readers. */
+  said = '';
+  /** Vertices of the cage and gizmo where they were drawn last. */
+  places: readonly (PlacedVertex | null)[] = [];
+  projection: Projection | null = null;
+  gizmo: Gizmo | null = null;
+  private readonly canvas = document.createElement('canvas');
+  private readonly stop = new AbortController();
+  private readonly pointer: EditPointer;
+  private colors: OverlayColors | null = null;
+  private lastKey = { step: 0, time: -Infinity };
+
+  constructor(
+    private readonly host: EditorHost,
+    readonly player: Player,
+  ) {
+    super();
+    const { decoder } = player.stage;
+    this.model = new EditModel(player.capture.static, decoder.diagonal);
+    this.model.onChange = () => this.changed();
+    this.canvas.setAttribute('aria-hidden', 'true');
+    // Pointers go through to the picture below, which the camera is turned on.
+    Object.assign(this.canvas.style, {
+      position: 'absolute',
+      inset: '0',
+      width: '100%',
+      height: '100%',
+      pointerEvents: 'none',
+    });
+    player.stage.canvas.after(this.canvas);
+    this.pointer = new EditPointer(this, host, this.stop.signal);
+    player.setFrameEdit(null);
+  }
+
+  /** The frame that vertices are moved in. */
+  get frame(): number {
+    return Math.round(this.player.transport.position);
+  }
+
+  /** Draws vertices and gizmo above the picture as it is now. */
+  draw() {
+    const { stage } = this.player;
+    const { clientWidth, clientHeight } = stage.canvas;
+    if (this.stop.signal.aborted || clientWidth === 0) return;
+    this.projection = new Projection(stage.clipMatrix.elements, clientWidth, clientHeight);
+    this.places = placedVertices(this.projection, stage.cageVertices, this.model.graph.cage.triangles);
+    const { selection } = this.model;
+    this.gizmo = selection.length > 0 ? gizmoAt(this.projection, this.middle()) : null;
+    this.colors ??= this.readColors();
+    const { hovered, constraint, band } = this.pointer;
+    const state = {
+      vertices: this.places,
+      selection: new Set(selection),
+      weights: selection.length > 0 ? this.model.weights : null,
+      hovered,
+      gizmo: this.gizmo,
+      constraint,
+      band,
+    };
+    drawOverlay(this.canvas, state, this.colors);
+  }
+
+  /** Takes the colours anew, after the theme has changed. */
+  recolor() {
+    this.colors = null;
+    this.draw();
+  }
+
+  /** Does what a key asks for; whether it asked for anything. */
+  pressKey(event: KeyboardEvent): boolean {
+    const target = event.composedPath()[0] as Element;
+    const isInPicture = target === this.player.stage.canvas || target === document.body || target === this.host;
+    const command = keyCommand(event, { isInPicture, hasSelection: this.model.selection.length > 0 });
+    if (!command) return false;
+    event.preventDefault();
+    if (this.pointer.isDown && event.key === 'Escape') this.pointer.cancel();
+    else this.perform(command);
+    return true;
+  }
+
+  /** Ends editing. The edits stay in the picture; whoever begins again goes on with the same editor. */
+  hide() {
+    this.pointer.rest();
+    this.canvas.hidden = true;
+  }
+
+  show() {
+    this.canvas.hidden = false;
+    this.settle();
+    this.draw();
+  }
+
+  dispose() {
+    this.stop.abort();
+    this.canvas.remove();
+  }
+
+  /** Whether the cage is edited now. */
+  get isShown(): boolean {
+    return !this.canvas.hidden;
+  }
+
+  private perform(command: KeyCommand) {
+    const { model } = this;
+    switch (command.kind) {
+      case 'undo':
+        this.say(model.undo() ? 'Undone.' : 'There is nothing to undo.');
+        break;
+      case 'redo':
+        this.say(model.redo() ? 'Done again.' : 'There is nothing to do again.');
+        break;
+      case 'clear':
+        this.select([]);
+        break;
+      case 'leave':
+        this.dispatchEvent(new Event('leave'));
+        break;
+      case 'enter':
+        this.select([this.nearestToMiddle()]);
+        break;
+      case 'step':
+        this.select([this.stepped(command.by)]);
+        break;
+      case 'towards': {
+        const next = vertexTowards(this.places, model.selection[0], command);
+        if (next >= 0) this.select([next]);
+        break;
+      }
+      case 'nudge':
+        this.nudge(command);
+    }
+  }
+
+  private nudge({ right, up, away, pixels }: KeyCommand & { kind: 'nudge' }) {
+    if (!this.projection) return;
+    this.settle();
+    const now = performance.now();
+    if (now - this.lastKey.time > PAUSE) this.lastKey.step++;
+    this.lastKey.time = now;
+    const at = this.middle();
+    const axes = this.projection.axes(at);
+    const way = plus(plus(plus([0, 0, 0], axes.right, right), axes.up, up), axes.away, away);
+    const length = pixels * this.projection.unitsPerPixel(at) * this.model.diagonal;
+    const { frames } = this.player.transport;
+    this.model.move(
+      this.frame,
+      frames,
+      `key ${this.lastKey.step} ${this.frame}`,
+    )([way[0] * length, way[1] * length, way[2] * length]);
+    this.sayMoved();
+  }
+
+  /** Chooses vertices and says so. */
+  select(vertices: readonly number[]) {
+    this.model.selection = vertices.filter((v) => v >= 0);
+    this.say(this.model.selection.length === 0 ? 'No vertex is chosen.' : `${this.named()} chosen.`);
+  }
+
+  /** Tells screen readers that the chosen vertices were moved. */
+  sayMoved() {
+    this.say(`${this.named()} moved in frame ${this.frame}.`);
+  }
+
+  /** Tells screen readers what was done. */
+  private say(sentence: string) {
+    this.said = sentence;
+    this.dispatchEvent(new Event('change'));
+  }
+
+  private changed() {
+    const { edits } = this.model;
+    this.player.setFrameEdit(edits.some(counts) ? (frame, rows) => editedRows(rows, frame, edits) : null);
+    this.dispatchEvent(new Event('change'));
+    this.draw();
+  }
+
+  /** Stands still at a whole frame: vertices are moved in one frame, not between two. */
+  settle() {
+    const { transport } = this.player;
+    const position = Math.round(transport.position);
+    if (transport.playing || position !== transport.position) {
+      this.player.transport = { ...sought(transport, position), playing: false };
+    }
+  }
+
+  /** The middle of the chosen vertices, in the scene's unit. */
+  middle(): Vector {
+    const { cageVertices } = this.player.stage;
+    const { selection } = this.model;
+    const mean = (k: number) => selection.reduce((sum, v) => sum + cageVertices[3 * v + k], 0) / selection.length;
+    return [mean(0), mean(1), mean(2)];
+  }
+
+  private nearestToMiddle(): number {
+    const { clientWidth, clientHeight } = this.player.stage.canvas;
+    const inFront = this.places.map((place) => (place?.isBehind === false ? place : null));
+    return vertexAt(inFront, clientWidth / 2, clientHeight / 2, Infinity);
+  }
+
+  private stepped(by: number): number {
+    const { vertices } = this.model.graph;
+    return (((this.model.selection[0] + by) % vertices) + vertices) % vertices;
+  }
+
+  private named(): string {
+    const { selection } = this.model;
+    return selection.length === 1 ? `Vertex ${selection[0]}` : `${selection.length} vertices`;
+  }
+
+  private readColors(): OverlayColors {
+    const style = getComputedStyle(this.host);
+    const color = (name: string) => resolvedColor(this.host.renderRoot, style.getPropertyValue(`--cager-${name}`));
+    const axes = [color('bad'), color('good'), color('accent')] as const;
+    return { vertex: color('cage'), chosen: color('accent'), outline: color('stage'), axes };
+  }
+}

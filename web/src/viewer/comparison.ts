@@ -1,0 +1,62 @@
+import type { Capture } from '../capture';
+import type { Original } from '../originals/original';
+import type { Side, Stage } from '../render/stage';
+import type { Dropped } from '../upload/classify';
+
+/** The capture beside the frames that it was encoded from, where somebody has given them to the page. */
+export class Comparison {
+  /** Called when something else is to be shown. */
+  onChange: () => void = () => undefined;
+  original: Original | null = null;
+  private shownSide: Side = 'decoded';
+  private place = 0.5;
+
+  constructor(
+    private readonly capture: Capture,
+    private readonly stage: Stage,
+  ) {}
+
+  get side(): Side {
+    return this.shownSide;
+  }
+
+  set side(side: Side) {
+    this.shownSide = side;
+    this.apply();
+  }
+
+  /** Where the original ends and the decoded model begins, as a fraction of the picture's width. */
+  get split(): number {
+    return this.place;
+  }
+
+  set split(split: number) {
+    this.place = Math.min(0.95, Math.max(0.05, split));
+    this.apply();
+  }
+
+  /** Takes the original frames. Throws one sentence for a person where they are not those of this capture. */
+  async open(files: readonly Dropped[]): Promise<void> {
+    const { openOriginal } = await import('../originals/original');
+    const original = await openOriginal(files, this.capture);
+    await original.load(0);
+    this.original = original;
+    this.onChange();
+  }
+
+  close() {
+    this.original = null;
+    this.side = 'decoded';
+  }
+
+  /** Gives the picture the original of a frame, which is in memory. */
+  update(frame: number) {
+    const positions = this.shownSide === 'decoded' ? null : this.original?.peek(frame);
+    if (positions) this.stage.setOriginal(positions);
+  }
+
+  private apply() {
+    this.stage.setSide(this.original ? this.shownSide : 'decoded', this.place);
+    this.onChange();
+  }
+}

@@ -1,0 +1,137 @@
+import { html, nothing, type TemplateResult } from 'lit';
+import { heatGradient } from '../render/colorMap';
+import type { Side } from '../render/stage';
+import type { Dropped } from '../upload/classify';
+import { pickedFiles } from '../upload/drop';
+import { glyph } from './glyphs';
+import type { MeasuredFrame } from './heatMap';
+import type { Player } from './player';
+import { grouped, percent, threeDigits } from './text';
+
+/** What the parts of a comparison ask the viewer to do. */
+export interface ComparisonActs {
+  open(files: readonly Dropped[]): void;
+  close(): void;
+}
+
+const SIDE_NAMES: Readonly<Record<Side, string>> = { decoded: 'Decoded', both: 'Both', original: 'Original' };
+/** Rounding of the picture that is a larger part of the errors than this is told. */
+const TELLING_PART = 0.05;
+/** A root mean square beyond this, in diagonals, means that the files are of something else. */
+const UNLIKELY_ERROR = 0.1;
+/** How far a press of an arrow key moves the line between both sides. */
+const KEY_STEP = 0.02;
+
+/** The colour bar, how to compare, and figures of the frame; or where the original could come from. */
+export function comparisonPanel(player: Player, acts: ComparisonActs): TemplateResult {
+  const { comparison, heatMap } = player;
+  const { original } = comparison;
+  if (!original) {
+    return html`<p>
+        Drop the original frames here to see where the error is; neither the service nor the file keeps them. They are
+        not sent anywhere.
+      </p>
+      ${chooser('Choose the original frames', acts)}`;
+  }
+  const { measured } = heatMap;
+  const sides = Object.keys(SIDE_NAMES) as Side[];
+  const showsErrors = heatMap.kind === 'error' && measured !== null;
+  return html`
+    <div class="source">
+      <span title=${original.name}>${showsErrors ? 'Distance from the original' : original.name}</span>
+      <button class="quiet icon" aria-label="Put the original away" title="Put the original away" @click=${acts.close}>
+        ${glyph('close')}
+      </button>
+    </div>
+    ${showsErrors ? errorFigures(player, measured) : nothing}
+    <div class="sides" role="group" aria-label="What is shown">
+      ${sides.map(
+        (side) =>
+          html`<button aria-pressed=${String(comparison.side === side)} @click=${() => (comparison.side = side)}>
+            ${SIDE_NAMES[side]}
+          </button>`,
+      )}
+    </div>
+  `;
+}
+
+function errorFigures({ heatMap, stage }: Player, { worst, largest, l2 }: MeasuredFrame) {
+  const { diagonal, precision } = stage.decoder;
+  const more = heatMap.largest < largest ? ' and more' : '';
+  return html`<div class="bar" .style=${`background: ${heatGradient()}`}></div>
+    <div class="ends figures">
+      <span>0</span
+      ><span>${percent(heatMap.largest)} of the diagonal (${threeDigits(heatMap.largest * diagonal)})${more}</span>
+    </div>
+    <dl class="figures">
+      <dt>Worst point, ${grouped(worst)}</dt>
+      <dd>${percent(largest)} (${threeDigits(largest * diagonal)})</dd>
+      <dt>Root mean square</dt>
+      <dd>${percent(l2)} (${threeDigits(l2 * diagonal)})</dd>
+    </dl>
+    ${
+      l2 > UNLIKELY_ERROR
+        ? html`<p class="remark">
+            That is far off: the files may have another unit, or their points in another order.
+          </p>`
+        : precision.error > TELLING_PART * largest
+          ? html`<p class="remark">Up to ${percent(precision.error)} of it is the rounding of this picture.</p>`
+          : nothing
+    }`;
+}
+
+function chooser(label: string, acts: ComparisonActs) {
+  const take = (event: Event) => {
+    const { files } = event.target as HTMLInputElement;
+    if (files && files.length > 0) acts.open(pickedFiles(files));
+  };
+  const press = (event: KeyboardEvent) => {
+    if (event.key !== 'Enter' && event.key !== ' ') return;
+    event.preventDefault();
+    (event.currentTarget as HTMLElement).click();
+  };
+  return html`<label class="button" tabindex="0" @keydown=${press}>
+    ${glyph('file')} ${label}
+    <input class="visually-hidden" type="file" multiple accept=".npy,.pc2,.obj" tabindex="-1" @change=${take} />
+  </label>`;
+}
+
+/** The line between the original and the decoded model, to be dragged. */
+export function divider({ comparison }: Player) {
+  if (!comparison.original || comparison.side !== 'both') return nothing;
+  const drag = (event: PointerEvent) => {
+    const line = event.currentTarget as HTMLElement;
+    if (event.type === 'pointerdown') line.setPointerCapture(event.pointerId);
+    if (!line.hasPointerCapture(event.pointerId)) return;
+    const { left, width } = line.parentElement?.getBoundingClientRect() ?? hostBox(line);
+    comparison.split = (event.clientX - left) / width;
+  };
+  const press = (event: KeyboardEvent) => {
+    const step = { ArrowLeft: -KEY_STEP, ArrowRight: KEY_STEP }[event.key];
+    if (step === undefined) return;
+    event.preventDefault();
+    event.stopPropagation();
+    comparison.split += step;
+  };
+  const share = Math.round(100 * comparison.split);
+  return html`<div
+    class="divider"
+    role="slider"
+    tabindex="0"
+    aria-label="Where the original ends and the decoded model begins"
+    aria-valuemin="0"
+    aria-valuemax="100"
+    aria-valuenow=${share}
+    aria-valuetext=${`${share} % original`}
+    .style=${`left: ${100 * comparison.split}%`}
+    @pointerdown=${drag}
+    @pointermove=${drag}
+    @keydown=${press}
+  >
+    <span class="left">Original</span><span class="right">Decoded</span>
+  </div>`;
+}
+
+function hostBox(line: HTMLElement): DOMRect {
+  return (line.getRootNode() as ShadowRoot).host.getBoundingClientRect();
+}

@@ -1,0 +1,66 @@
+import { html } from 'lit';
+import { pointAt, spotOf, type Picture, type Spot } from '../originals/pointAt';
+import type { Player } from './player';
+import { grouped, percent, threeDigits } from './text';
+
+/** How far from the pointer a point may be, in CSS pixels. */
+const REACH = 14;
+
+/** Marks in the picture: the worst point of the frame, and the one under the pointer, each with its number and its distance from the original. */
+export class PointMarks {
+  private pointer: Spot | null = null;
+
+  /** The marks; {@link place} puts them where they belong. */
+  readonly template = html`<div class="mark worst" hidden>
+      <i></i><span><b></b><data></data></span>
+    </div>
+    <div class="mark probe" hidden>
+      <i></i><span><b></b><data></data></span>
+    </div>`;
+
+  constructor(private readonly root: ParentNode) {}
+
+  /** Follows the pointer above a canvas. */
+  follow(canvas: HTMLCanvasElement, player: Player) {
+    const point = (event: PointerEvent) => {
+      // What is dragged is the camera.
+      const drags = event.type === 'pointermove' && event.buttons !== 0;
+      this.pointer = drags || event.type === 'pointerleave' ? null : { x: event.offsetX, y: event.offsetY };
+      this.place(player);
+    };
+    for (const type of ['pointermove', 'pointerdown', 'pointerleave'] as const) canvas.addEventListener(type, point);
+  }
+
+  /** To be called after every picture. */
+  place(player: Player) {
+    const { heatMap, comparison, stage } = player;
+    const [worst, probe] = ['.worst', '.probe'].map((mark) => this.root.querySelector<HTMLElement>(`.mark${mark}`));
+    if (!worst || !probe) return;
+    const { measured } = heatMap;
+    const isShown = heatMap.kind === 'error' && measured !== null && comparison.side !== 'original';
+    worst.hidden = !isShown;
+    probe.hidden = true;
+    if (!isShown) return;
+    const picture: Picture = {
+      matrix: stage.clipMatrix.elements,
+      width: stage.canvas.clientWidth,
+      height: stage.canvas.clientHeight,
+    };
+    const begin = comparison.side === 'both' ? comparison.split * picture.width : 0;
+    const put = (mark: HTMLElement, point: number) => {
+      const spot = spotOf(measured.places, point, picture);
+      mark.hidden = !spot || spot.x < begin;
+      if (!spot) return;
+      mark.style.transform = `translate(${spot.x}px, ${spot.y}px)`;
+      mark.classList.toggle('flipped', spot.x > 0.6 * picture.width);
+      const value = measured.values[point];
+      const distance = `${percent(value)} (${threeDigits(value * stage.decoder.diagonal)})`;
+      mark.querySelector('b')!.textContent = `Point ${grouped(point)}: `;
+      mark.querySelector('data')!.textContent = distance;
+    };
+    put(worst, measured.worst);
+    const under =
+      this.pointer && this.pointer.x >= begin ? pointAt(measured.places, this.pointer, picture, REACH) : null;
+    if (under !== null && under !== measured.worst) put(probe, under);
+  }
+}

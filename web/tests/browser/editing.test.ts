@@ -1,0 +1,263 @@
+import { execFile } from 'node:child_process';
+import { mkdtemp, readFile, rm, writeFile } from 'node:fs/promises';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { promisify } from 'node:util';
+import type { Page } from 'playwright-core';
+import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
+import { diagonalOf } from '../../src/coordinates/topology';
+import { weightAt } from '../../src/editing/cageEdit';
+import type { CagerViewer } from '../../src/viewer/cagerViewer';
+import type { ViewerPage } from '../../src/viewer/viewerPage';
+import { seriousFindings } from './harness/axe';
+import { openPage, type Watched } from './harness/browser';
+import { cager, missing } from './harness/programs';
+import { Site } from './harness/site';
+import { SphereCapture } from './harness/sphere';
+import { parseNpy } from './npy';
+
+const FRAMES = 30;
+const run = promisify(execFile);
+
+describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
+  const sphere = new SphereCapture(2);
+  let site: Site;
+  let session: string;
+  let folder: string;
+  let diagonal: number;
+  let watched: Watched | null = null;
+
+  beforeAll(async () => {
+    site = await Site.start();
+    session = await site.client().encode(sphere, { name: 'wave' }, FRAMES);
+    folder = await mkdtemp(join(tmpdir(), 'cager-editing-'));
+    const rest = sphere.rest.match(/^v .*$/gm)!.flatMap((line) => line.slice(2).split(' ').map(Number));
+    diagonal = diagonalOf(Float64Array.from(rest));
+  }, 120_000);
+
+  afterAll(async () => {
+    await site.close();
+    await rm(folder, { recursive: true, force: true });
+  });
+
+  afterEach(async () => {
+    await watched?.close();
+    watched = null;
+  });
+
+  /** Opens the session, stands still at a frame and begins to edit. */
+  async function editing(frame: number): Promise<Page> {
+    watched = await openPage(site.browser, `${site.page}#/session/${session}?frame=${frame}`);
+    const { page } = watched;
+    await page.waitForFunction(() => {
+      const viewer = document.querySelector<ViewerPage>('cager-viewer-page')?.renderRoot.querySelector('cager-viewer');
+      return viewer?.player?.stage.decoder.ready === true && viewer.player.progress === null;
+    });
+    await page.keyboard.press('e');
+    await page.getByRole('region', { name: 'Edit the cage' }).waitFor();
+    return page;
+  }
+
+  /** Drags the vertex of the cage that is nearest to the middle of the picture; returns its number. */
+  async function dragVertex(page: Page, byX: number, byY: number): Promise<number> {
+    const { vertex, x, y } = await withViewer(page, (viewer) => {
+      const { width, height, left, top } = viewer.renderRoot.querySelector('canvas')!.getBoundingClientRect();
+      const away = (place: { x: number; y: number }) => Math.hypot(place.x - width / 2, place.y - height / 2);
+      const places = viewer.editing.editor!.places.map((place, vertex) => ({ ...place!, vertex }));
+      const [nearest] = places.filter(({ isBehind }) => !isBehind).sort((a, b) => away(a) - away(b));
+      return Promise.resolve({ vertex: nearest.vertex, x: nearest.x + left, y: nearest.y + top });
+    });
+    await page.mouse.move(x, y);
+    await page.mouse.down();
+    for (let k = 1; k <= 4; k++) await page.mouse.move(x + (byX * k) / 4, y + (byY * k) / 4);
+    await page.mouse.up();
+    return vertex;
+  }
+
+  const distances = (a: readonly number[], b: readonly number[]) =>
+    Array.from({ length: a.length / 3 }, (_, p) =>
+      Math.hypot(a[3 * p] - b[3 * p], a[3 * p + 1] - b[3 * p + 1], a[3 * p + 2] - b[3 * p + 2]),
+    );
+  const farthest = (a: readonly number[], b: readonly number[]) => Math.max(...distances(a, b)) / diagonal;
+
+  it('the model follows a dragged vertex near it, and undo and redo go back and forth', async () => {
+    const page = await editing(12);
+    await setRadius(page, 0);
+    const before = await readPositions(page, 12);
+    const vertex = await dragVertex(page, 60, -40);
+    const after = await readPositions(page, 12);
+    const moved = distances(before, after);
+    const place = await withViewer(page, (viewer) =>
+      Promise.resolve([...viewer.editing.editor!.model.graph.cage.positions]),
+    );
+    const rest = sphere.rest.match(/^v .*$/gm)!.map((line) => line.slice(2).split(' ').map(Number));
+    const from = place.slice(3 * vertex, 3 * vertex + 3);
+    const order = rest
+      .map((point, p) => ({ p, away: Math.hypot(...point.map((x, k) => x - from[k])) }))
+      .sort((a, b) => a.away - b.away);
+    const near = moved[order[0].p];
+    expect(near / diagonal).toBeGreaterThan(0.01);
+    for (const { p } of order.slice(-order.length / 4)) expect(moved[p]).toBeLessThan(0.05 * near);
+    await page.keyboard.press('Control+z');
+    expect(await readPositions(page, 12)).toEqual(before);
+    await page.keyboard.press('Control+Shift+z');
+    expect(await readPositions(page, 12)).toEqual(after);
+    expect(watched?.errors).toEqual([]);
+  });
+
+  it('a falloff takes the neighbourhood along, symmetry the other side, and a box chooses all in it', async () => {
+    const page = await editing(0);
+    const movedVertices = async () => {
+      const offsets = await withViewer(page, (viewer) =>
+        Promise.resolve([...viewer.editing.editor!.model.edits.at(-1)!.offsets]),
+      );
+      return offsets.filter((_, k) => k % 3 === 0 && offsets.slice(k, k + 3).some((x) => x !== 0)).length;
+    };
+    await setRadius(page, 0);
+    await dragVertex(page, 30, 0);
+    expect(await movedVertices()).toBe(1);
+    await page.keyboard.press('Control+z');
+    await page.getByRole('button', { name: 'Across x' }).click();
+    await page
+      .locator('cager-viewer canvas')
+      .first()
+      .click({ position: { x: 500, y: 40 } });
+    await page.keyboard.press('Enter');
+    await page.keyboard.press('Alt+ArrowRight');
+    await page.keyboard.press('Alt+ArrowRight');
+    await page.keyboard.press('ArrowUp');
+    expect(await movedVertices()).toBe(2);
+    await setRadius(page, 30);
+    await page.locator('cager-viewer canvas').first().focus();
+    await page.keyboard.press('ArrowUp');
+    expect(await movedVertices()).toBeGreaterThan(6);
+    await page.keyboard.press('Escape');
+    await page.keyboard.down('Shift');
+    await page.mouse.move(420, 60);
+    await page.mouse.down();
+    await page.mouse.move(1100, 620, { steps: 4 });
+    await page.mouse.up();
+    await page.keyboard.up('Shift');
+    const chosen = await withViewer(page, ({ editing }) => Promise.resolve(editing.editor!.model.selection.length));
+    expect(chosen).toBeGreaterThan(10);
+    expect(watched?.errors).toEqual([]);
+  });
+
+  it('an edit is kept over its range of frames, with ease in and out', async () => {
+    const page = await editing(12);
+    await dragVertex(page, 50, 20);
+    const fields = { First: 6, Last: 20, 'Ease in': 4, 'Ease out': 6 };
+    for (const [name, value] of Object.entries(fields)) {
+      const field = page.getByRole('spinbutton', { name });
+      await field.fill(String(value));
+      await field.press('Tab');
+    }
+    await expect.poll(() => page.locator('cager-timeline .range').count()).toBe(1);
+    const frames = [5, 6, 8, 12, 16, 20, 21];
+    const edited = await Promise.all(frames.map((frame) => readPositions(page, frame)));
+    await page.getByRole('checkbox', { name: /^Vertex/ }).uncheck();
+    const plain = await Promise.all(frames.map((frame) => readPositions(page, frame)));
+    const moved = frames.map((_, k) => farthest(edited[k], plain[k]));
+    const whole = moved[3];
+    expect(whole).toBeGreaterThan(0.01);
+    frames.forEach((frame, k) => {
+      const weight = weightAt({ first: 6, last: 20, easeIn: 4, easeOut: 6 }, frame);
+      expect(moved[k] / whole, `frame ${frame}`).toBeCloseTo(weight, 3);
+    });
+    expect(watched?.errors).toEqual([]);
+  });
+
+  it('works by keyboard alone, without a trap, and passes the checks of accessibility', async () => {
+    const page = await editing(3);
+    const state = () =>
+      withViewer(page, ({ editing }) => {
+        const { selection, edits } = editing.editor!.model;
+        return Promise.resolve({ isOn: editing.isOn, chosen: [...selection], edits: edits.length });
+      });
+    const before = await readPositions(page, 3);
+    await page.keyboard.press('Enter');
+    const [first] = (await state()).chosen;
+    await page.keyboard.press('Tab');
+    expect((await state()).chosen).toEqual([first + 1]);
+    await page.keyboard.press('Shift+Tab');
+    expect((await state()).chosen).toEqual([first]);
+    await page.keyboard.press('Shift+ArrowUp');
+    await page.keyboard.press('PageUp');
+    await page.keyboard.press('ArrowRight');
+    expect(await state()).toEqual({ isOn: true, chosen: [first], edits: 1 });
+    expect(farthest(before, await readPositions(page, 3))).toBeGreaterThan(0.001);
+    expect(await seriousFindings(page)).toEqual([]);
+    await page.keyboard.press('Escape');
+    expect((await state()).chosen).toEqual([]);
+    await page.keyboard.press('Tab');
+    expect(await page.evaluate(() => document.activeElement?.tagName)).not.toBe('BODY');
+    expect((await state()).chosen).toEqual([]);
+    // Presses within a second are one step; this machine may be slower.
+    for (let k = 0; k < 3; k++) await page.keyboard.press('Control+z');
+    expect(await readPositions(page, 3)).toEqual(before);
+    await page.keyboard.press('Escape');
+    await expect.poll(async () => (await state()).isOn).toBe(false);
+    expect(watched?.errors).toEqual([]);
+  });
+
+  it('an exported container and decoded frames are what the page shows', async () => {
+    const page = await editing(12);
+    await dragVertex(page, 70, 30);
+    const download = async (name: string) => {
+      const button = page.getByRole('button', { name, exact: true });
+      const [saved] = await Promise.all([page.waitForEvent('download'), button.click()]);
+      return { name: saved.suggestedFilename(), content: await readFile(await saved.path()) };
+    };
+    const container = await download('.cager');
+    const positions = await download('Decoded frames');
+    expect([container.name, positions.name]).toEqual(['wave-edited.cager', 'wave-edited.npy']);
+
+    const [path, output] = ['edited.cager', 'decoded.npy'].map((name) => join(folder, name));
+    await writeFile(path, container.content);
+    await run(cager!, ['decode', path, '-o', output, '--overwrite', '-q']);
+    const decoded = parseNpy(await readFile(output));
+    const sent = parseNpy(positions.content);
+    expect(sent.shape).toEqual(decoded.shape);
+    expect(sent.shape).toEqual([FRAMES, sphere.points, 3]);
+    const length = 3 * sphere.points;
+    const original = await readFrames(session);
+    for (const frame of [0, 6, 12, FRAMES - 1]) {
+      const shown = await readPositions(page, frame);
+      for (const { values } of [decoded, sent]) {
+        expect(farthest(shown, [...values.slice(frame * length, (frame + 1) * length)])).toBeLessThan(1e-4);
+      }
+    }
+    const last = (FRAMES - 1) * length;
+    expect(decoded.values.slice(last)).toEqual(original.slice(last));
+    expect(decoded.values.slice(12 * length, 13 * length)).not.toEqual(original.slice(12 * length, 13 * length));
+    const { stdout, stderr } = await run(cager!, ['inspect', path]);
+    expect(stdout + stderr).toMatch(/the cages were edited/);
+    expect(watched?.errors).toEqual([]);
+  });
+
+  /** What the program decodes of a session's own container. */
+  async function readFrames(id: string): Promise<Float32Array | Float64Array> {
+    const response = await site.client().call(`/${id}/capture.cager`);
+    const [path, output] = ['original.cager', 'original.npy'].map((name) => join(folder, name));
+    await writeFile(path, new Uint8Array(await response.arrayBuffer()));
+    await run(cager!, ['decode', path, '-o', output, '--overwrite', '-q']);
+    return parseNpy(await readFile(output)).values;
+  }
+});
+
+/** Runs something in the page with its viewer; `of` must not refer to anything outside. */
+async function withViewer<T>(page: Page, of: (viewer: CagerViewer) => Promise<T>): Promise<T> {
+  return page.evaluate(
+    `(${of.toString()})(document.querySelector('cager-viewer-page').shadowRoot.querySelector('cager-viewer'))`,
+  );
+}
+
+async function readPositions(page: Page, frame: number): Promise<number[]> {
+  return page.evaluate(
+    `document.querySelector('cager-viewer-page').shadowRoot.querySelector('cager-viewer').readPositions(${frame}).then((positions) => [...positions])`,
+  );
+}
+
+async function setRadius(page: Page, percent: number) {
+  await page.getByRole('slider', { name: 'Falloff' }).fill(String(percent));
+}
