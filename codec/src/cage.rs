@@ -38,11 +38,8 @@ pub fn encode_cages(basis: &CageBasis, cages: &[&[f32]], step: f64, neighbours: 
     let y = basis.forward(cages);
     let motion = Mat::from_fn(frames, 3 * rows, |t, value| y[(value / 3, 3 * t + value % 3)]);
     let gram = linear::product(motion.as_ref(), motion.transpose());
-    // Two are left for the frames beside other groups.
     let most = frames.min(3 * rows);
-    let joined = if frames >= 4 * PULSE_FRAMES && most > 2 { neighbours } else { Neighbours::default() };
-    let left = usize::from(joined.before) + usize::from(joined.after);
-    let mut chosen = Trajectories::choose(gram.as_ref(), 3 * rows, step, most - left)?;
+    let mut chosen = Trajectories::choose(gram.as_ref(), 3 * rows, step, most)?;
     let exact = fit(chosen.values().as_ref(), motion.as_ref())?;
     let in_steps = |exact: f64, round_up: f64| {
         let steps = (exact.abs() / step + round_up).floor();
@@ -51,8 +48,9 @@ pub fn encode_cages(basis: &CageBasis, cages: &[&[f32]], step: f64, neighbours: 
     let width = 3 * rows;
     let numbers = (0..chosen.count() * width).map(|at| in_steps(exact[(at / width, at % width)], ROUND_UP));
     let mut whole: Vec<i32> = numbers.collect::<Option<_>>()?;
-    for (frame, is_joined) in [(0, joined.before), (frames - 1, joined.after)] {
-        if !is_joined {
+    for (frame, is_joined) in [(0, neighbours.before), (frames.saturating_sub(1), neighbours.after)] {
+        // With as many trajectories as there can be every frame is as exact as a step.
+        if !is_joined || frames < 4 * PULSE_FRAMES || chosen.count() == most {
             continue;
         }
         // What the trajectories so far leave of this frame, and of it alone: few frames away it is another.
@@ -199,6 +197,21 @@ mod tests {
         let (without, with) = (changes(false), changes(true));
         assert!(with.iter().all(|&change| change < 1.5), "{with:?}");
         assert!(without.iter().all(|&change| change > 8.0), "{without:?}");
+    }
+
+    #[test]
+    fn joints_cost_no_exactness_where_every_trajectory_is_needed() {
+        let mut random = fastrand::Rng::with_seed(6);
+        for (rows, frames) in [(4, 40), (20, 32)] {
+            let basis = basis(rows);
+            let cages: Vec<Vec<f32>> = (0..frames).map(|_| (0..3 * rows).map(|_| random.f32()).collect()).collect();
+            let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
+            let both = Neighbours { before: true, after: true };
+            let bytes = encode_cages(&basis, &views, 1e-5, both).unwrap();
+            for (a, b) in decode_cages(&basis, frames, &bytes).unwrap().iter().zip(&cages) {
+                assert!((basis.forward(&[a]) - basis.forward(&[b])).norm_max() < 1e-3);
+            }
+        }
     }
 
     #[test]

@@ -55,14 +55,16 @@ fn found(request: &HeaderMap, path: &str, name: &str, cached: &'static str) -> R
 
 fn send(request: &HeaderMap, name: &str, file: EmbeddedFile, cached: &'static str) -> Response {
     let digest: String = file.metadata.sha256_hash()[..16].iter().map(|byte| format!("{byte:02x}")).collect();
+    let digest = format!("\"{digest}\"");
     let headers = [
-        (header::ETAG, format!("\"{digest}\"")),
+        // Weak, since the same tag goes with the compressed file.
+        (header::ETAG, format!("W/{digest}")),
         (header::CACHE_CONTROL, cached.to_owned()),
         (header::CONTENT_SECURITY_POLICY, POLICY.to_owned()),
         (header::X_CONTENT_TYPE_OPTIONS, "nosniff".to_owned()),
         (header::REFERRER_POLICY, "no-referrer".to_owned()),
     ];
-    if is_known(request, &headers[0].1) {
+    if is_known(request, &digest) {
         return (StatusCode::NOT_MODIFIED, headers).into_response();
     }
     let data = match file.data {
