@@ -67,7 +67,7 @@ fn the_commands_for_tokens_make_a_file_that_is_accepted() {
 
 #[test]
 fn links_between_documents_lead_somewhere() {
-    for document in ["README.md", "docs/ARCHITECTURE.md", "docs/CLIENTS.md", DOCUMENT] {
+    for document in ["README.md", "docs/ARCHITECTURE.md", "docs/CLIENTS.md", "docs/VIEWER.md", DOCUMENT] {
         let folder = repository().join(document);
         let folder = folder.parent().expect("a folder");
         for link in text(document).split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
@@ -75,8 +75,9 @@ fn links_between_documents_lead_somewhere() {
             if link.contains("://") || file.is_empty() {
                 continue;
             }
-            let target = fs::read_to_string(folder.join(file));
-            let target = target.unwrap_or_else(|error| panic!("{document}: {link}: {error}"));
+            let target = fs::read(folder.join(file)).unwrap_or_else(|error| panic!("{document}: {link}: {error}"));
+            // A picture has no headings.
+            let target = String::from_utf8_lossy(&target);
             let anchors: Vec<String> = target.lines().filter(|line| line.starts_with('#')).map(slug).collect();
             assert!(anchor.is_empty() || anchors.iter().any(|a| a == anchor), "{document}: {link}: {anchors:?}");
         }
