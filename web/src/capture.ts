@@ -95,6 +95,8 @@ export interface Capture {
   readonly static: StaticPart;
   /** Number of frames known so far. */
   readonly frames: number;
+  /** Bytes that all frames take in the container, residuals included, where these are known. */
+  readonly frameBytes?: number;
   /** Whether no more frames will come. */
   readonly complete: boolean;
   /** Errors of the frames known so far; may be shorter than `frames`. */
@@ -115,7 +117,12 @@ export interface Capture {
   decode?(cages: Blob, signal?: AbortSignal): Promise<Response>;
   /** How frames arrive, of a session that was running when it was opened. */
   readonly live?: LiveStatus | null;
-  /** Fires `change` when frames arrive, the state changes or something fails (`problem` then says what). */
+  /** The frames that are read together with this one, and fail together with it; the frame alone where that is not known. */
+  readTogether?(frame: number): { readonly first: number; readonly count: number };
+  /**
+   * Fires `change` when frames arrive, the state changes or something fails (`problem` then says what), and `replaced` when blocks come from another
+   * source from now on: those that were given out before are not to be mixed with them.
+   */
   readonly events: EventTarget;
   readonly problem: string | null;
   close(): void;

@@ -32,7 +32,10 @@ async function elementOf(route: Route, view: string): Promise<HTMLElement> {
 async function show(anew = false) {
   const { route, view } = parseFragment(location.hash);
   const wanted = fragmentOf(route);
-  if (wanted === shown && !anew) return;
+  if (wanted === shown && !anew) {
+    document.querySelector('cager-viewer-page')?.goTo(view.toString());
+    return;
+  }
   shown = wanted;
   try {
     const element = await elementOf(route, view.toString());
@@ -52,14 +55,30 @@ function dropCapture(event: DragEvent) {
   if (event.defaultPrevented || !file) return;
   event.preventDefault();
   if (!/\.cager$/i.test(file.name)) return;
+  openFile(file);
+}
+
+/** Goes to the page of files; what was shown is closed. */
+function openFile(file: File) {
   dropped = file;
-  location.hash = fragmentOf({ page: 'file' });
+  history.pushState(null, '', fragmentOf({ page: 'file' }));
   void show(true);
+}
+
+/** A file that is chosen beside a session takes a page of its own, since the view of the one is none of the other. */
+function chooseFile(event: CustomEvent<File>) {
+  if (parseFragment(location.hash).route.page === 'file') {
+    dropped = event.detail;
+    return;
+  }
+  event.preventDefault();
+  openFile(event.detail);
 }
 
 addEventListener('hashchange', () => void show());
 addEventListener('dragover', (event) => event.preventDefault());
 addEventListener('drop', dropCapture);
+document.addEventListener('filechosen', (event) => chooseFile(event as CustomEvent<File>));
 document.addEventListener('viewchange', (event) => {
   const { route } = parseFragment(location.hash);
   const view = new URLSearchParams((event as CustomEvent<string>).detail);

@@ -29,6 +29,16 @@ export class Layout {
     return last === undefined ? 0 : last.first + last.count;
   }
 
+  /** Bytes of the sections of all frames and their residuals. */
+  get frameBytes(): number {
+    let bytes = 0;
+    for (const { frames, residual } of this.chunks) {
+      bytes += HEADER_BYTES + frames.fields.payloadBytes;
+      if (residual !== null) bytes += HEADER_BYTES + residual.fields.payloadBytes;
+    }
+    return bytes;
+  }
+
   /** Number of sections. */
   get length(): number {
     return this.entries.length;

@@ -105,6 +105,7 @@ async function readStatic(
 class FileCapture implements ContainerCapture {
   static: StaticPart;
   readonly frames: number;
+  readonly frameBytes: number;
   readonly complete = true;
   readonly events = new EventTarget();
   errors: FrameErrors = NO_ERRORS;
@@ -124,6 +125,7 @@ class FileCapture implements ContainerCapture {
   ) {
     this.static = part;
     this.frames = layout.frames;
+    this.frameBytes = layout.frameBytes;
     this.blocks = new BlockDecoder(part, codec, coordinates);
     this.cache = new BlockCache((first, signal) => this.load(first, signal));
   }
@@ -141,6 +143,10 @@ class FileCapture implements ContainerCapture {
       this.cache.prefetch(next);
     }
     return block;
+  }
+
+  readTogether(frame: number): { readonly first: number; readonly count: number } {
+    return this.layout.chunkOf(frame)?.frames.fields ?? { first: frame, count: 1 };
   }
 
   container(): Promise<Source> {

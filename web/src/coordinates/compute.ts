@@ -7,6 +7,9 @@ export function canCompute(system: CoordinateSystem): boolean {
   return system !== 'harmonic';
 }
 
+/** Most bytes that Φ may take, in memory or as texels: more makes browsers and devices fail without a word. */
+export const MOST_PHI_BYTES = 2 ** 30;
+
 /** Columns of Φ: the cage's vertices and, for Green coordinates, its faces. */
 export function columnsOf(system: CoordinateSystem, cage: TriangleMesh): number {
   const vertices = cage.positions.length / 3;

@@ -1,5 +1,5 @@
 import type { StaticPart } from '../capture';
-import { columnsOf } from './compute';
+import { columnsOf, MOST_PHI_BYTES } from './compute';
 import type { FromWorker, ToWorker } from './messages';
 import { moduleWorker } from '../moduleWorker';
 import workerAddress from './worker.ts?worker&url';
@@ -76,10 +76,12 @@ function send(worker: Worker, message: ToWorker) {
 }
 
 function allocate(points: number, columns: number): Float32Array {
+  const bytes = 4 * points * columns;
   try {
+    if (bytes > MOST_PHI_BYTES) throw new RangeError();
     return new Float32Array(points * columns);
   } catch {
-    const gigabytes = ((4 * points * columns) / 2 ** 30).toFixed(1);
+    const gigabytes = (bytes / 2 ** 30).toFixed(1);
     throw new Error(
       `The coordinates of ${points} points take ${gigabytes} GB, more than this browser gives a page; use a coarser model or cage.`,
     );

@@ -18,6 +18,8 @@ export type FrameEdit = (frame: number, rows: Float32Array) => Float32Array;
 const BLOCK_BYTES = 192 * 2 ** 20;
 /** Bytes of offsets that are kept. */
 const OFFSET_BYTES = 96 * 2 ** 20;
+/** Frames whose offsets are kept, whatever they take. */
+const LEAST_OFFSETS = 8;
 
 /**
  * Frames of a capture that are in memory or on their way. Blocks are asked for one after another; residual layers are added up in a worker.
@@ -25,6 +27,10 @@ const OFFSET_BYTES = 96 * 2 ** 20;
 export class FrameStore {
   /** Called whenever a frame that was missing has come. */
   onArrival: () => void = () => undefined;
+  /** Called when frames have to be taken out anew: they come from another source. */
+  onReplaced: () => void = () => undefined;
+  /** Called when frames that are loaded ahead do not come: `frame` and those that are read together with it. */
+  onFailure: (frame: number, error: unknown) => void = () => undefined;
   /** Called with every block that comes. */
   onBlock: (block: FrameBlock) => void = () => undefined;
   /** Changes frames as they are taken out; null leaves them as they are. Edited ones have no offsets, which belong to cages as they were captured. */
@@ -37,8 +43,18 @@ export class FrameStore {
   private waiting: (() => void)[] = [];
   private readonly stop = new AbortController();
   private worker: Worker | null = null;
+  /** How often the source of blocks was replaced. */
+  private generation = 0;
+  /** Frames whose offsets are needed next, the one that is shown first. */
+  private near: readonly number[] = [];
+  /** Frames that {@link frame} waits for. */
+  private readonly awaited = new Map<number, number>();
+  private readonly mostOffsets: number;
 
-  constructor(private readonly capture: Capture) {}
+  constructor(private readonly capture: Capture) {
+    this.mostOffsets = Math.max(LEAST_OFFSETS, Math.floor(OFFSET_BYTES / (16 * (capture.static.rest.length / 3))));
+    capture.events.addEventListener('replaced', () => this.replace(), { signal: this.stop.signal });
+  }
 
   /** The frame, if all of it is here. */
   peek(frame: number): FrameData | null {
@@ -52,36 +68,49 @@ export class FrameStore {
     return offsets ? { rows, offsets } : null;
   }
 
-  /** Sees to it that a frame comes; resolves when it has, to false where the block that should have it has not. */
-  async load(frame: number): Promise<boolean> {
+  /** Sees to it that a frame comes; resolves when its block has. */
+  async load(frame: number): Promise<void> {
     let block = this.blockOf(frame);
     if (!block) {
       block = await this.request(frame);
       this.arrived();
     }
+    if (frame < block.first || frame >= block.first + block.count)
+      throw new Error(`Frame ${frame} is not where the capture says; load it again.`);
     if (block.residual && !this.offsets.has(frame)) this.requestOffsets(block, block.residual, frame);
-    return frame >= block.first && frame < block.first + block.count;
   }
 
   /** The frame, once all of it is here. */
   async frame(frame: number): Promise<FrameData> {
-    if (!(await this.load(frame))) throw new Error(`Frame ${frame} is not where the capture says; load it again.`);
-    for (;;) {
-      const data = this.peek(frame);
-      if (data) return data;
-      await new Promise<void>((resolve) => this.waiting.push(resolve));
+    this.awaited.set(frame, (this.awaited.get(frame) ?? 0) + 1);
+    try {
+      for (;;) {
+        await this.load(frame);
+        const data = this.peek(frame);
+        if (data) return data;
+        await new Promise<void>((resolve) => this.waiting.push(resolve));
+      }
+    } finally {
+      const others = this.awaited.get(frame)! - 1;
+      if (others > 0) this.awaited.set(frame, others);
+      else this.awaited.delete(frame);
     }
   }
 
-  /** Loads the first of these frames that is missing, and the offsets of those that are there. */
+  /**
+   * Loads the first of these frames that is missing, and the offsets of those that are there, as many as can be kept. The first one is that which is
+   * shown.
+   */
   prefetch(frames: Iterable<number>) {
-    for (const frame of frames) {
+    const ahead = [...frames];
+    this.near = ahead.slice(0, this.mostOffsets - 2);
+    for (const [k, frame] of ahead.entries()) {
       const block = this.blockOf(frame);
       if (block) {
-        if (block.residual && !this.offsets.has(frame)) this.requestOffsets(block, block.residual, frame);
+        const isNear = k < this.near.length;
+        if (isNear && block.residual && !this.offsets.has(frame)) this.requestOffsets(block, block.residual, frame);
       } else {
-        // A failure shows when the frame is loaded to be looked at.
-        if (this.loading.size === 0) this.load(frame).catch(() => undefined);
+        if (this.loading.size === 0) this.load(frame).catch((error: unknown) => this.onFailure(frame, error));
         return;
       }
     }
@@ -89,9 +118,23 @@ export class FrameStore {
 
   close() {
     this.stop.abort();
-    this.worker?.terminate();
-    this.blocks.clear();
-    this.offsets.clear();
+    this.forget();
+  }
+
+  private replace() {
+    this.generation++;
+    this.forget();
+    for (const resolve of this.waiting.splice(0)) resolve();
+    this.onReplaced();
+  }
+
+  private forget() {
+    if (this.worker) {
+      this.worker.onmessage = null;
+      this.worker.terminate();
+      this.worker = null;
+    }
+    for (const kept of [this.blocks, this.offsets, this.asked, this.loading, this.atWorker]) kept.clear();
   }
 
   private blockOf(frame: number): FrameBlock | null {
@@ -108,13 +151,18 @@ export class FrameStore {
   private request(frame: number): Promise<FrameBlock> {
     const running = this.loading.get(frame);
     if (running) return running;
+    const { generation } = this;
     const loading = this.capture
       .block(frame, this.stop.signal)
       .then((block) => {
+        // It may have been on its way when its source was replaced.
+        if (generation !== this.generation) return this.request(frame);
         this.keep(block);
         return block;
       })
-      .finally(() => this.loading.delete(frame));
+      .finally(() => {
+        if (this.loading.get(frame) === loading) this.loading.delete(frame);
+      });
     this.loading.set(frame, loading);
     return loading;
   }
@@ -146,12 +194,22 @@ export class FrameStore {
     const frame = block + index;
     this.asked.delete(frame);
     this.offsets.set(frame, offsets);
-    const most = Math.max(8, Math.floor(OFFSET_BYTES / offsets.byteLength));
-    for (const oldest of this.offsets.keys()) {
-      if (this.offsets.size <= most) break;
-      this.offsets.delete(oldest);
-    }
+    this.evictOffsets();
     this.arrived();
+  }
+
+  /** Drops the offsets farthest from the frame that is shown; what is needed next is never more than what is kept. */
+  private evictOffsets() {
+    while (this.offsets.size > this.mostOffsets) {
+      const shown = this.near[0] ?? 0;
+      let farthest = -1;
+      for (const frame of this.offsets.keys()) {
+        if (this.near.includes(frame) || this.awaited.has(frame)) continue;
+        if (farthest < 0 || Math.abs(frame - shown) > Math.abs(farthest - shown)) farthest = frame;
+      }
+      if (farthest < 0) return;
+      this.offsets.delete(farthest);
+    }
   }
 
   private arrived() {

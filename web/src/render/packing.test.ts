@@ -37,6 +37,12 @@ describe('Φ in a texture', () => {
     expect(() => layoutOf(3_000_000, 9000, limits)).toThrow(/coarser cage/);
   });
 
+  it('that would take more than a gigabyte is refused though the device could arrange it', () => {
+    const large = { size: 16_384, layers: 2048 };
+    expect(() => layoutOf(1_000_000, 400, large)).toThrow(/coarser cage/);
+    expect(layoutOf(1_000_000, 250, large).layers).toBeGreaterThan(1);
+  });
+
   it('holds every entry where the layout says', async () => {
     const [points, columns] = [2 * WIDTH + 7, 6];
     const phi = Float32Array.from({ length: points * columns }, (_, k) => (k % 97) / 64);

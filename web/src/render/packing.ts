@@ -1,4 +1,5 @@
 import type { StaticPart } from '../capture';
+import { MOST_PHI_BYTES } from '../coordinates/compute';
 import { diagonalOf } from '../coordinates/topology';
 
 /** Points per row of the textures that hold something for each point: point i is texel (i mod WIDTH, ⌊i / WIDTH⌋). */
@@ -35,9 +36,14 @@ export interface TextureLimits {
 export function layoutOf(points: number, columns: number, limits: TextureLimits): PhiLayout {
   const blocks = Math.ceil(columns / 4);
   const bands = Math.max(1, Math.ceil(points / WIDTH));
-  const bandsPerLayer = Math.min(bands, Math.floor(limits.size / Math.max(1, blocks)));
-  const layers = Math.ceil(bands / bandsPerLayer);
-  if (bandsPerLayer < 1 || layers > limits.layers || bands > limits.size || limits.size < WIDTH) {
+  const mostBands = Math.min(bands, Math.floor(limits.size / Math.max(1, blocks)));
+  const layers = Math.ceil(bands / mostBands);
+  // All layers have the same height: spread evenly, bands leave the last one least empty.
+  const bandsPerLayer = Math.ceil(bands / layers);
+  // Texels of full floats, which are four columns each; 16 bits may turn out not to be accurate enough.
+  const bytes = 16 * WIDTH * bandsPerLayer * blocks * layers;
+  const fits = mostBands >= 1 && layers <= limits.layers && bands <= limits.size && limits.size >= WIDTH;
+  if (!fits || bytes > MOST_PHI_BYTES) {
     throw new Error(
       `${points} points × ${columns} columns do not fit this device's graphics memory; open the capture on another device, or encode it with a coarser cage.`,
     );

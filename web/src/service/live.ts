@@ -69,16 +69,16 @@ async function openFinished(service: Service, session: Session, signal: AbortSig
     // The page cannot compute these coordinates, and coded cages are decoded with them.
     const coordinates = session.coordinates === 'harmonic' ? basisRows(service, session.id, signal) : null;
     const name = session.name ?? session.id;
-    return await openContainer(watchingToken(source), { name, signal, ...(coordinates && { coordinates }) });
+    return await openContainer(steady(source), { name, signal, ...(coordinates && { coordinates }) });
   } catch (error) {
     throw told(error);
   }
 }
 
-/** The same source; says that a token is wanted where it is refused later, while the capture is played. */
-function watchingToken(source: Source): Source {
+/** The same source, read again where the network fails; says that a token is wanted where it is refused later, while the capture is played. */
+function steady(source: Source): Source {
   const read = (first: number, bytes: number, signal?: AbortSignal): Promise<Uint8Array> =>
-    source.read(first, bytes, signal).catch((error: unknown) => {
+    persistently(() => source.read(first, bytes, signal), { signal, attempts: ATTEMPTS }).catch((error: unknown) => {
       told(error);
       throw error;
     });

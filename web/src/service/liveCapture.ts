@@ -112,6 +112,10 @@ export class LiveCapture implements SessionCapture {
     }
   }
 
+  readTogether(frame: number): { readonly first: number; readonly count: number } {
+    return this.#finished?.readTogether?.(frame) ?? { first: frame, count: 1 };
+  }
+
   close(): void {
     this.#closing.abort();
     this.#finished?.close();
@@ -134,6 +138,8 @@ export class LiveCapture implements SessionCapture {
         this.static = { ...this.static, report: finished.static.report };
         this.frames = finished.frames;
         this.#finished = finished;
+        // Coded cages are not quite the solved ones, and have residuals that belong to them.
+        this.events.dispatchEvent(new Event('replaced'));
       }
     } catch (error) {
       if (signal.aborted) return;

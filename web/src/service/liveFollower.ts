@@ -74,6 +74,7 @@ export class LiveFollower {
         if (session.problem) throw problemFrom(session.problem);
         if (session.state === 'completed') return session;
         this.#catchUp(session);
+        this.latency.reset(this.#next);
         await this.#receive(signal);
         // It ended by itself: the session is completed or deleted, or something in between closed the connection.
         await pause(this.#backoff.next(), signal);

@@ -33,12 +33,20 @@ export class RateMeter {
 export class LatencyMeter {
   #seconds: number | null = null;
   #awaited: { frame: number; at: number } | null = null;
-  #arrived: { frame: number; at: number } | null = null;
+  /** Frames below this one are here, or are not sent. */
+  #next = 0;
+
+  /** Begins anew, with a stream whose first frame is `next`. */
+  reset(next: number): void {
+    this.#seconds = null;
+    this.#awaited = null;
+    this.#next = next;
+  }
 
   /** A frame arrived; they come in order. */
   arrived(frame: number): void {
     const now = performance.now();
-    this.#arrived = { frame, at: now };
+    this.#next = frame + 1;
     if (this.#awaited && frame >= this.#awaited.frame) {
       this.#take((now - this.#awaited.at) / 1000);
       this.#awaited = null;
@@ -48,7 +56,7 @@ export class LatencyMeter {
   /** A look at the session: asked at `from`, answered at `to` (of `performance.now()`), frames up to `frame` solved. */
   looked(from: number, to: number, frame: number): void {
     const solvedBy = (from + to) / 2;
-    if (this.#arrived && this.#arrived.frame >= frame) this.#take((to - from) / 2000);
+    if (frame < this.#next) this.#take((to - from) / 2000);
     else this.#awaited ??= { frame, at: solvedBy };
   }
 

@@ -2,18 +2,20 @@ import { html, LitElement, nothing, type PropertyValues } from 'lit';
 import { customElement, property, query, state } from 'lit/decorators.js';
 import type { Capture } from '../capture';
 import { openContainer } from '../container/open';
+import { checkPrelude, PRELUDE_BYTES } from '../container/section';
 import { blobSource, httpSource } from '../container/source';
 import { controls, tokens } from '../style/tokens';
 import { EditMode } from '../editing/editMode';
 import { perform, stem } from './actions';
 import { emptyState, notice, progressBox } from './messages';
+import { liveBadge, liveFrame, livePlace } from './liveBadge';
 import { panelStyle } from './panelStyle';
 import { figuresPanel, helpSheet, legend, toolbar, transportBar } from './parts';
 import { Player } from './player';
 import { canRecord } from './recording';
 import { actionOf, type Action } from './shortcuts';
 import { stageColors } from './stageColors';
-import { clock, grouped, percent } from './text';
+import { clock, fileNameOf, grouped, percent } from './text';
 import './timeline';
 import type { Timeline } from './timeline';
 import { sought, started } from './transport';
@@ -23,7 +25,7 @@ import { divider } from './comparisonParts';
 import { comparisonStyle } from './comparisonStyle';
 import { PointMarks } from './pointMarks';
 import { viewerStyle } from './viewerStyle';
-import { viewFromText, viewText } from './viewState';
+import { viewFromText, viewText, type ViewState } from './viewState';
 
 /** How long the view must rest before it is told to whoever keeps links. */
 const REST_MILLISECONDS = 300;
@@ -44,6 +46,8 @@ const FINEST_PIXEL_RATIO = 2;
  * @fires framechange with the number of the frame that is shown
  * @fires viewchange with the view as text, when it rests, for links; set `view` to return to it
  * @fires problem with one sentence, when something failed
+ * @fires filechosen with a container that somebody dropped or chose; whoever cancels it sees to the file
+ * @fires signin when somebody wants to sign in, to follow a session on
  */
 @customElement('cager-viewer')
 export class CagerViewer extends LitElement {
@@ -54,7 +58,7 @@ export class CagerViewer extends LitElement {
   @property({ type: Boolean }) autoplay = false;
   /** The capture to play; whoever sets it closes it. */
   @property({ attribute: false }) capture: Capture | null = null;
-  /** The view to begin with, as `viewchange` tells it. */
+  /** The view to go to, as `viewchange` tells it. */
   @property() view = '';
   @state() player: Player | null = null;
   @state() figures = false;
@@ -77,6 +81,11 @@ export class CagerViewer extends LitElement {
   private deckHeight = 0;
   private panelShare = 0;
   private restTimer = 0;
+  /** Kind of the live place that the badge was rendered for last. */
+  private shownPlace = '';
+  private secondTimer = 0;
+  /** The file that is shown, where it is no address. */
+  private file: File | null = null;
   private wasReady = false;
   private cameraWasMoved = false;
   private upAxis: 'y' | 'z' = 'y';
@@ -84,7 +93,21 @@ export class CagerViewer extends LitElement {
 
   /** Plays a file without any server. */
   async open(file: File): Promise<void> {
-    await this.openFrom(file.name, (signal) => openContainer(blobSource(file), { name: file.name, signal }));
+    await this.openFrom(file.name, (signal) => openContainer(blobSource(file), { name: file.name, signal }), file);
+  }
+
+  /** Goes to a view as `viewchange` tells it. */
+  goTo(text: string) {
+    const { player } = this;
+    if (!player) {
+      this.view = text;
+      return;
+    }
+    const view = viewFromText(text);
+    this.take(view, player, false);
+    // A link without a frame is of the first one, or of a capture that plays.
+    if (view.frame === null && !player.transport.playing) player.transport = sought(player.transport, 0);
+    this.view = '';
   }
 
   /** Takes the frames that the capture was encoded from, and shows how far it is from them. */
@@ -166,25 +189,33 @@ export class CagerViewer extends LitElement {
     this.addEventListener('dragover', (event) => this.dragOver(event), { signal });
     this.addEventListener('dragleave', () => (this.dropping = false), { signal });
     this.addEventListener('drop', (event) => this.dropFile(event), { signal });
-    if (this.hasUpdated && this.capture) this.show(this.capture);
+    // An element that was only moved still has its capture.
+    if (this.hasUpdated && !this.player && this.opening === null) this.reopen();
   }
 
   override disconnectedCallback() {
     super.disconnectedCallback();
     this.removed.abort();
-    this.load.abort();
     this.sizes.disconnect();
     clearTimeout(this.restTimer);
-    this.unload();
+    clearTimeout(this.secondTimer);
+    queueMicrotask(() => {
+      if (this.isConnected) return;
+      this.load.abort();
+      this.opening = null;
+      if (this.player) this.view = this.viewNow(this.player);
+      this.unload();
+    });
   }
 
   protected override updated(changed: PropertyValues) {
-    const { src } = this;
-    if (changed.has('src') && src !== null) {
-      const name = decodeURIComponent(src.split(/[?#]/)[0].split('/').pop() ?? src);
-      void this.openFrom(name, async (signal) => openContainer(await httpSource(src, { signal }), { name, signal }));
-    }
-    if (changed.has('capture') && this.capture) this.show(this.capture);
+    if (this.isConnected) this.follow(changed);
+    // The canvas is replaced with every capture, so no binding of the template can reach it.
+    this.canvas.hidden = !this.player;
+    this.canvas.setAttribute(
+      'aria-label',
+      `${this.heading}: the model, drawn. Drag or use the keys A, D, W, X to turn it.`,
+    );
     if (this.measureDeck() !== this.deckHeight || this.editing.panelShare !== this.panelShare) this.resize();
     this.writePlace();
   }
@@ -192,14 +223,8 @@ export class CagerViewer extends LitElement {
   override render() {
     const { player } = this;
     return html`
-      <canvas
-        tabindex="0"
-        role="img"
-        aria-label=${`${this.heading}: the model, drawn. Drag or use the keys A, D, W, X to turn it.`}
-        ?hidden=${!player}
-        @dblclick=${() => player?.frameAll()}
-      ></canvas>
-      ${player ? this.overlay(player) : emptyState(this.opening, this.failure, (file) => void this.open(file))}
+      <canvas tabindex="0" role="img" hidden></canvas>
+      ${player ? this.overlay(player) : emptyState(this.opening, this.failure, (file) => void this.choose(file))}
       ${
         this.dropping
           ? html`<div class="drop">
@@ -239,7 +264,15 @@ export class CagerViewer extends LitElement {
       ${this.editing.panel(stem(this))} ${this.figures ? figuresPanel(player) : nothing}
       ${legend(player, this.comparisonActs, this.editing.isOn)}
       ${this.problem !== null ? notice(this.problem, () => (this.problem = null)) : nothing}
-      ${progress ? progressBox(progress.doing, progress.fraction) : player.buffering ? progressBox('Loading', null) : nothing}
+      ${
+        this.opening !== null
+          ? progressBox(`Opening ${this.opening}`, null)
+          : progress
+            ? progressBox(progress.doing, progress.fraction)
+            : player.buffering
+              ? progressBox('Loading', null)
+              : nothing
+      }
       <div class="deck glass">
         ${transportBar(player, act, (speed) => (player.transport = { ...transport, speed }), hasErrors)}
         <cager-timeline
@@ -264,18 +297,54 @@ export class CagerViewer extends LitElement {
   };
 
   private liveBadge(player: Player) {
-    const atEnd = player.transport.playing && player.transport.position > player.transport.frames - 45;
-    const goLive = () => (player.transport = started(sought(player.transport, player.transport.frames - 15)));
-    return atEnd
-      ? html`<span class="live" role="status">LIVE</span>`
-      : html`<button class="live behind" @click=${goLive}>Go live</button>`;
+    const place = livePlace(player.capture.live ?? null, player.transport, Date.now());
+    const goLive = () => (player.transport = started(sought(player.transport, liveFrame(player.transport))));
+    const signIn = () => this.dispatchEvent(new CustomEvent('signin', { bubbles: true, composed: true }));
+    clearTimeout(this.secondTimer);
+    if (place.kind === 'reconnecting') this.secondTimer = window.setTimeout(() => this.requestUpdate(), 1000);
+    return liveBadge(place, goLive, signIn);
   }
 
-  private async openFrom(name: string, open: (signal: AbortSignal) => Promise<Capture>) {
+  /** Shows what `src`, `capture` and `view` say now. */
+  private follow(changed: PropertyValues) {
+    if (changed.has('src') && this.src !== null) this.openAddress(this.src);
+    else if (changed.get('src')) this.empty();
+    if (changed.has('capture') && this.capture) this.show(this.capture);
+    else if (changed.get('capture') && this.player?.capture === changed.get('capture')) this.empty();
+    if (changed.has('view') && this.view !== '' && this.player) this.goTo(this.view);
+  }
+
+  private reopen() {
+    if (this.file) void this.open(this.file);
+    else if (this.capture) this.show(this.capture);
+    else if (this.src !== null) this.openAddress(this.src);
+  }
+
+  private openAddress(src: string) {
+    const name = fileNameOf(src);
+    this.unload();
+    void this.openFrom(name, async (signal) => openContainer(await httpSource(src, { signal }), { name, signal }));
+  }
+
+  /** Plays a file that somebody dropped or chose, unless its first bytes say that it is no container. */
+  private async choose(file: File) {
+    try {
+      const source = blobSource(file);
+      checkPrelude(await source.read(0, Math.min(PRELUDE_BYTES, source.size)));
+    } catch (error) {
+      if (this.player || this.opening !== null) this.report(error instanceof Error ? error.message : String(error));
+      else this.fail(error);
+      return;
+    }
+    const chosen = new CustomEvent('filechosen', { detail: file, bubbles: true, composed: true, cancelable: true });
+    if (this.dispatchEvent(chosen)) await this.open(file);
+  }
+
+  /** Opens a capture and shows it in place of the present one, which stays if that fails. */
+  private async openFrom(name: string, open: (signal: AbortSignal) => Promise<Capture>, file: File | null = null) {
     this.load.abort();
     this.load = new AbortController();
     const { signal } = this.load;
-    this.unload();
     this.failure = null;
     this.opening = name;
     try {
@@ -286,15 +355,20 @@ export class CagerViewer extends LitElement {
       }
       this.show(capture);
       this.opened = capture;
+      this.file = file;
     } catch (error) {
-      if (!signal.aborted) this.fail(error);
+      if (signal.aborted) return;
+      if (this.player) {
+        this.opening = null;
+        this.report(error instanceof Error ? error.message : String(error));
+      } else this.fail(error);
     }
   }
 
   private show(capture: Capture) {
     this.unload();
-    this.failure = this.problem = null;
-    this.opening = capture.name;
+    this.file = null;
+    this.failure = this.problem = this.opening = null;
     // A canvas whose context was given up cannot be used again.
     const canvas = this.canvas.cloneNode() as HTMLCanvasElement;
     this.canvas.replaceWith(canvas);
@@ -315,7 +389,6 @@ export class CagerViewer extends LitElement {
     // Blurring what lies below is dear where no graphics processor does it.
     this.toggleAttribute('plain', player.stage.isJagged);
     this.wasReady = false;
-    this.cameraWasMoved = view.camera !== null;
     player.onProblem = (problem) => this.report(problem);
     player.onState = () => {
       this.requestUpdate();
@@ -326,18 +399,32 @@ export class CagerViewer extends LitElement {
       this.cameraWasMoved = true;
       this.canvas.focus();
     };
-    this.upAxis = view.up;
-    player.layers = view.layers;
-    player.setUp(view.up);
     this.applyColors();
     this.resize();
-    if (view.frame !== null) player.transport = sought(player.transport, view.frame);
-    if (view.camera) player.controls.go(view.camera, true);
-    else player.goHome(true);
+    this.take(view, player, true);
     // It is the view of this capture, not of the next one.
     this.view = '';
     if (this.autoplay && view.frame === null && !matchMedia('(prefers-reduced-motion: reduce)').matches) this.play();
     if (player.capture.problem !== null) this.report(player.capture.problem);
+  }
+
+  /** Goes to a view; one that names a frame stands there. */
+  private take(view: ViewState, player: Player, atOnce: boolean) {
+    this.cameraWasMoved = view.camera !== null;
+    this.upAxis = view.up;
+    player.layers = view.layers;
+    player.setUp(view.up);
+    if (view.frame !== null) player.transport = { ...sought(player.transport, view.frame), playing: false };
+    if (view.camera) player.controls.go(view.camera, atOnce);
+    else player.goHome(atOnce);
+  }
+
+  /** Shows nothing, as if there never had been a capture. */
+  private empty() {
+    this.load.abort();
+    this.unload();
+    this.file = null;
+    this.failure = this.problem = this.opening = null;
   }
 
   private unload() {
@@ -347,10 +434,12 @@ export class CagerViewer extends LitElement {
     this.player = null;
     this.opened?.close();
     this.opened = null;
+    clearTimeout(this.secondTimer);
   }
 
   private fail(error: unknown) {
     this.unload();
+    this.opening = null;
     this.failure = error instanceof Error ? error.message : String(error);
     this.report(this.failure);
   }
@@ -369,6 +458,7 @@ export class CagerViewer extends LitElement {
     this.editing.draw();
     this.writePlace();
     this.marks?.place(player);
+    this.renewBadge(player);
     if (this.frame !== this.shownFrame) {
       this.shownFrame = this.frame;
       this.dispatchEvent(new CustomEvent<number>('framechange', { detail: this.frame, bubbles: true, composed: true }));
@@ -380,15 +470,25 @@ export class CagerViewer extends LitElement {
   private tellView() {
     const { player } = this;
     if (!player) return;
-    const { playing } = player.transport;
-    const detail = viewText({
-      frame: playing || this.frame === 0 ? null : this.frame,
+    const detail = this.viewNow(player);
+    this.dispatchEvent(new CustomEvent<string>('viewchange', { detail, bubbles: true, composed: true }));
+    if (this.figures) this.requestUpdate();
+  }
+
+  private viewNow(player: Player): string {
+    return viewText({
+      frame: player.transport.playing || this.frame === 0 ? null : this.frame,
       camera: this.cameraWasMoved ? player.controls.destination : null,
       up: this.upAxis,
       layers: player.layers,
     });
-    this.dispatchEvent(new CustomEvent<string>('viewchange', { detail, bubbles: true, composed: true }));
-    if (this.figures) this.requestUpdate();
+  }
+
+  /** Renders anew when playing comes near the newest frame of a running session, or falls behind it. */
+  private renewBadge({ capture, transport }: Player) {
+    const place = capture.complete ? '' : livePlace(capture.live ?? null, transport, Date.now()).kind;
+    if (place !== this.shownPlace) this.requestUpdate();
+    this.shownPlace = place;
   }
 
   /** Writes what changes with every picture: rendering the template sixty times a second would cost more. */
@@ -472,7 +572,7 @@ export class CagerViewer extends LitElement {
     // Beside an open capture, whatever is no capture itself can only be what it was encoded from.
     if (this.player && !/\.cager$/i.test(file.name)) {
       void this.openOriginal(droppedFiles(dataTransfer));
-    } else void this.open(file);
+    } else void this.choose(file);
   }
 }
 

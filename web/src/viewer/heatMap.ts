@@ -45,6 +45,11 @@ export class HeatMap {
     this.stage.setHeat(null, 1);
   }
 
+  /** Forgets what is coloured, which is computed anew with the next picture. */
+  refresh() {
+    this.frame = -1;
+  }
+
   /** Colours the model for a frame of so many, by its movement. */
   update(frame: number, frames: number) {
     if (this.kind !== 'motion' || frame === this.frame || !this.stage.decoder.ready) return;

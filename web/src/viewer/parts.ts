@@ -134,10 +134,11 @@ export function legend(player: Player, acts: ComparisonActs, beside: boolean) {
 
 /** Figures about the capture and the playing. */
 export function figuresPanel(player: Player) {
-  const { static: part, frames } = player.capture;
+  const { static: part, frames, frameBytes } = player.capture;
   const { decoder } = player.stage;
   const points = part.rest.length / 3;
   const cageRate = part.rowsPerFrame * 12 * player.transport.rate;
+  const fileRate = frameBytes === undefined || frames === 0 ? null : (frameBytes / frames) * player.transport.rate;
   const rawRate = points * 12 * player.transport.rate;
   const row = (label: string, value: string) =>
     html`<dt>${label}</dt>
@@ -148,7 +149,8 @@ export function figuresPanel(player: Player) {
     <h2>Capture</h2>
     <dl>
       ${row('Points', grouped(points))} ${row('Polygons', grouped(part.cornerCounts.length))}
-      ${row('Frames', grouped(frames))} ${row('Frames per second', String(player.transport.rate))}
+      ${row('Frames', grouped(frames))}
+      ${row('Frames per second', `${player.transport.rate}${part.frameRate === null ? ' (assumed)' : ''}`)}
     </dl>
     <h2>Cage</h2>
     <dl>
@@ -156,8 +158,11 @@ export function figuresPanel(player: Player) {
       ${row('Triangles', grouped(part.cage.triangles.length / 3))} ${row('Unknowns', grouped(part.rowsPerFrame))}
     </dl>
     <p class="muted">${SYSTEM_NAMES[part.system]}</p>
-    <h2>Bytes while it plays, before compression</h2>
-    <dl>${row('Cages', bitrate(cageRate))} ${row('All points', bitrate(rawRate))}</dl>
+    <h2>Bytes while it plays</h2>
+    <dl>
+      ${fileRate === null ? nothing : row('Frames of this file', bitrate(fileRate))}
+      ${row('Cages before compression', bitrate(cageRate))} ${row('All points, not compressed', bitrate(rawRate))}
+    </dl>
     ${
       live
         ? html`<h2>Live</h2>
@@ -166,6 +171,7 @@ export function figuresPanel(player: Player) {
               ${row('Arriving', bitrate(live.bitsPerSecond / 8))}
               ${row('Frames arriving per second', live.framesPerSecond.toFixed(1))}
               ${row('Frames not here yet', grouped(live.behindFrames))}
+              ${row('Frames waited for', grouped(live.lateFrames))}
               ${row('Frames dropped', grouped(live.droppedFrames))}
             </dl>`
         : nothing

@@ -8,6 +8,7 @@ import type { Original } from '../originals/original';
 import { Stage, type Covered, type Layers } from '../render/stage';
 import { Comparison } from './comparison';
 import { HeatMap, type Heat } from './heatMap';
+import { Holes } from './holes';
 import { Quality } from './quality';
 import { advanced, framesAhead, framesAround, sought, standing, USUAL_RATE, type Transport } from './transport';
 import { USUAL_LAYERS } from './viewState';
@@ -52,8 +53,8 @@ export class Player {
   private state: Transport;
   private shownLayers = USUAL_LAYERS;
   private shownPosition = -1;
-  /** The frame that could not be loaded last: it is not asked for again until somebody plays or seeks. */
-  private failedFrame = -1;
+  /** Frames that could not be loaded: they are not asked for again until somebody plays or seeks. */
+  private readonly holes = new Holes();
   private captureProblem: string | null = null;
   private poseIsOld = true;
   private scheduled = 0;
@@ -76,6 +77,8 @@ export class Player {
     this.controls.onMove = () => this.wake();
     this.store = new FrameStore(capture);
     this.store.onArrival = () => this.wake();
+    this.store.onFailure = (frame, error) => this.failFrame(frame, error);
+    this.store.onReplaced = () => this.replaceFrames();
     this.store.onBlock = ({ cages }) => this.stage.include(cages, capture.static.rowsPerFrame);
     this.heatMap = new HeatMap(capture, this.stage, this.store);
     this.heatMap.onChange = () => {
@@ -100,7 +103,7 @@ export class Player {
 
   set transport(transport: Transport) {
     this.state = transport;
-    this.failedFrame = -1;
+    this.holes.clear();
     this.onState();
     this.wake();
   }
@@ -278,18 +281,20 @@ export class Player {
   /** Moves on if the frames are there, and sees to those that will be needed. */
   private play(seconds: number) {
     // While Φ is computed, pictures would take the processor from it.
-    const next = this.isPrepared ? advanced(this.state, seconds) : this.state;
+    const advancing = this.isPrepared ? advanced(this.state, seconds) : this.state;
+    const news = this.holes.news(Math.floor(advancing.position));
+    if (news !== null) this.onProblem(news);
+    const next = advancing.playing ? this.holes.past(advancing) : advancing;
     const original = this.wantedOriginal;
     // Between two frames there is nothing to compare.
-    const { before, after, mix } = framesAround(original ? { ...next, smooth: false } : next);
+    const { before, after, mix } = this.soundFramesAround(original ? { ...next, smooth: false } : next);
     const [here, there] = [this.store.peek(before), mix > 0 ? this.store.peek(after) : null];
-    this.store.prefetch(framesAhead(next, AHEAD));
+    this.store.prefetch([...framesAhead(next, AHEAD)].filter((frame) => !this.holes.at(frame)));
     if (!here || (mix > 0 && !there)) {
-      this.buffering = next.frames > 0;
       const missing = here ? after : before;
-      if (this.buffering && missing !== this.failedFrame) {
-        this.store.load(missing).catch((error: unknown) => this.failFrame(missing, error));
-      }
+      this.buffering = next.frames > 0 && !this.holes.at(missing);
+      if (this.buffering) this.store.load(missing).catch((error: unknown) => this.failFrame(missing, error));
+      else this.stopAt(next);
       return;
     }
     original?.prefetch(framesAhead(next, ORIGINALS_AHEAD));
@@ -302,7 +307,7 @@ export class Player {
       return;
     }
     this.buffering = false;
-    if (this.state.playing)
+    if (this.state.playing && next === advancing)
       this.dropped += Math.max(0, Math.floor(next.position) - Math.floor(this.state.position) - 1);
     const ended = this.state.playing && !next.playing;
     this.state = next;
@@ -319,10 +324,28 @@ export class Player {
 
   private failFrame(frame: number, error: unknown) {
     if (this.stop.signal.aborted) return;
-    this.buffering = false;
-    this.transport = { ...this.state, playing: false };
-    this.failedFrame = frame;
-    this.onProblem(sentence(error));
+    const { first, count } = this.capture.readTogether?.(frame) ?? { first: frame, count: 1 };
+    this.holes.add({ first, count, problem: sentence(error) });
+    this.wake();
+  }
+
+  /** Stops where playing cannot go on. */
+  private stopAt(next: Transport) {
+    if (!this.state.playing || next.playing) return;
+    this.state = next;
+    this.onState();
+  }
+
+  /** Frames to blend; the one before a hole stands until it is over. */
+  private soundFramesAround(transport: Transport): ReturnType<typeof framesAround> {
+    const frames = framesAround(transport);
+    return frames.mix > 0 && this.holes.at(frames.after) ? { ...frames, after: frames.before, mix: 0 } : frames;
+  }
+
+  private replaceFrames() {
+    this.holes.clear();
+    this.heatMap.refresh();
+    this.refresh();
   }
 
   /** The original, where what is shown needs it. */
@@ -341,6 +364,7 @@ export class Player {
 
   private regainContext() {
     this.onProblem(null);
+    this.heatMap.refresh();
     this.refresh();
   }
 

@@ -36,3 +36,14 @@ export const SYSTEM_NAMES = {
   green: 'Green coordinates',
   'green-free': 'Green coordinates, free normals',
 } as const;
+
+/** The last part of an address as it is shown to people: escapes are decoded where they can be. */
+export function fileNameOf(address: string): string {
+  const path = address.split(/[?#]/)[0];
+  const name = path.split('/').findLast((part) => part !== '') ?? address;
+  try {
+    return decodeURIComponent(name);
+  } catch {
+    return name;
+  }
+}

@@ -114,6 +114,13 @@ export class Timeline extends LitElement {
           height: 44px;
         }
       }
+      @container (max-width: 320px) or (max-height: 220px) {
+        .chart,
+        .needle,
+        .hover {
+          display: none;
+        }
+      }
     `,
   ];
 
@@ -253,7 +260,7 @@ export class Timeline extends LitElement {
   }
 
   private left(): number {
-    return this.isMeasured() ? GUTTER : MARGIN;
+    return this.chartPlace?.clientHeight ? GUTTER : MARGIN;
   }
 
   private movePlace() {

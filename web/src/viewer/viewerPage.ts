@@ -76,6 +76,12 @@ export class ViewerPage extends LitElement {
     if (!this.wantsToken) this.viewer?.pressKey(event);
   };
 
+  /** Goes to another view of what is shown. */
+  goTo(view: string) {
+    if (this.viewer) this.viewer.goTo(view);
+    else this.view = view;
+  }
+
   override connectedCallback() {
     super.connectedCallback();
     pageToken.addEventListener('change', this.tokenChanged);
@@ -101,7 +107,13 @@ export class ViewerPage extends LitElement {
     if (this.wantsToken && !this.capture) return html`<main><cager-sign-in></cager-sign-in></main>`;
     if (this.session !== null && !this.capture) return this.message();
     return html`<main>
-      <cager-viewer autoplay ?inert=${this.wantsToken} .capture=${this.capture} .view=${this.view}>
+      <cager-viewer
+        autoplay
+        ?inert=${this.wantsToken}
+        .capture=${this.capture}
+        .view=${this.view}
+        @signin=${this.tokenWanted}
+      >
         <a class="button back" slot="lead" href="#/" aria-label="All sessions" title="All sessions">
           <svg class="glyph" viewBox="0 0 24 24" aria-hidden="true"><path d="M14.5 6 8.500 12l6 6" /></svg>
         </a>

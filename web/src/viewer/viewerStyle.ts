@@ -6,8 +6,8 @@ export const viewerStyle = css`
     position: relative;
     display: block;
     overflow: hidden;
-    min-height: 260px;
     height: 100%;
+    contain-intrinsic-block-size: 260px;
     background: var(--cager-stage);
     container-type: size;
     -webkit-tap-highlight-color: transparent;
@@ -307,6 +307,38 @@ export const viewerStyle = css`
   @container (max-width: 400px) {
     .clock {
       display: none;
+    }
+  }
+  @container (max-width: 320px) or (max-height: 220px) {
+    .tools,
+    .title,
+    .legend,
+    .place,
+    .transport select,
+    .transport button:not(.play) {
+      display: none;
+    }
+    .deck {
+      left: 4px;
+      right: 4px;
+      bottom: 4px;
+      display: flex;
+      align-items: center;
+      padding: 2px 4px;
+    }
+    .deck cager-timeline {
+      flex: 1;
+      min-width: 0;
+    }
+    .transport .play {
+      width: 28px;
+      height: 28px;
+      min-width: 0;
+      padding: 0;
+    }
+    .transport .play svg {
+      width: 16px;
+      height: 16px;
     }
   }
   @media (pointer: coarse) {

@@ -10,6 +10,7 @@ import type { TestClient } from './harness/client';
 import { cager, missing } from './harness/programs';
 import { Site } from './harness/site';
 import { SphereCapture } from './harness/sphere';
+import { dropOnViewer, inViewer, whenShown } from './harness/viewing';
 import { parseNpy } from './npy';
 
 const capture = new SphereCapture();
@@ -174,6 +175,29 @@ describe.skipIf(missing)('a session as a capture', { timeout: 60_000 }, () => {
     await client.complete(id, 12);
     await expect.poll(() => page.getByText('LIVE').or(page.getByText('Go live')).count()).toBe(0);
     expect(errors).toEqual([]);
+    await close();
+  });
+
+  test('the_page_is_live_only_while_the_service_answers_and_a_dropped_file_leaves_the_session', async () => {
+    const { id } = await client.create(capture, { name: 'dead' });
+    await client.whenReady(id);
+    await client.post(id, capture, 0, 20);
+    const { page, close } = await openPage(site.browser, `${site.page}#/session/${id}`, ['ERR_', '502']);
+    await whenShown(page);
+    if (!(await inViewer(page, (viewer) => viewer.player!.transport.playing, null))) await page.keyboard.press('Space');
+    await page.getByText('LIVE', { exact: true }).waitFor();
+    await site.service.kill();
+    await page.getByText(/^Reconnecting/).waitFor({ timeout: 20_000 });
+    expect(await page.getByText('LIVE', { exact: true }).count()).toBe(0);
+    await dropOnViewer(page, { 'holiday.cager': Buffer.from('a picture of a beach') });
+    expect(await page.evaluate(() => location.hash)).toContain(id);
+    const file = await readFile(new URL('../../../tests/golden/definition3-mvc.cager', import.meta.url));
+    await dropOnViewer(page, { 'walk.cager': file });
+    await page.getByRole('img', { name: /^walk\.cager: the model/ }).waitFor({ timeout: 20_000 });
+    expect(await page.evaluate(() => location.hash)).toMatch(/^#\/file/);
+    await site.service.run();
+    await page.goBack();
+    await page.getByRole('img', { name: /^dead: the model/ }).waitFor({ timeout: 20_000 });
     await close();
   });
 

@@ -1,0 +1,97 @@
+import { afterEach, expect, test, vi } from 'vitest';
+import type { Capture, FrameBlock, Residual } from '../capture';
+import { FrameStore } from './frameStore';
+import type { ToResidualWorker } from './residualWorker';
+
+const NO_RESIDUAL: Residual = {
+  rank: 0,
+  trajectories: new Float32Array(0),
+  shapes: new Float32Array(0),
+  correctionStarts: new Uint32Array(0),
+  correctedPoints: new Uint32Array(0),
+  correctionVectors: new Float32Array(0),
+};
+
+/** A capture of one row a frame, whose blocks come from `block`. */
+function captureOf(points: number, frames: number, block: (frame: number) => Promise<FrameBlock>): Capture {
+  const cage = { positions: new Float64Array(3), triangles: new Uint32Array(0) };
+  const [cornerCounts, corners] = [new Uint32Array(0), new Uint32Array(0)];
+  const rest = new Float64Array(3 * points);
+  return {
+    name: 'capture',
+    static: { system: 'mvc', rest, cornerCounts, corners, cage, rowsPerFrame: 1, frameRate: null, report: null },
+    frames,
+    complete: true,
+    errors: { l2: new Float32Array(0), linf: new Float32Array(0) },
+    frameNumbers: null,
+    block,
+    events: new EventTarget(),
+    problem: null,
+    close: () => undefined,
+  };
+}
+
+/** Node has no web workers: this one answers later. */
+class AnsweringWorker {
+  static frames = 0;
+  onmessage: ((event: { data: unknown }) => void) | null = null;
+
+  postMessage(message: ToResidualWorker) {
+    if (message.kind !== 'frame') return;
+    AnsweringWorker.frames++;
+    const { block, index } = message;
+    setTimeout(() => this.onmessage?.({ data: { block, index, offsets: new Float32Array(4) } }));
+  }
+
+  terminate() {
+    this.onmessage = null;
+  }
+}
+
+afterEach(() => vi.unstubAllGlobals());
+
+const settled = () => new Promise((resolve) => setTimeout(resolve, 30));
+
+test('blocks of another source replace all that are there, and those on their way', async () => {
+  const answers: ((block: FrameBlock) => void)[] = [];
+  const capture = captureOf(1, 4, () => new Promise((resolve) => answers.push(resolve)));
+  const store = new FrameStore(capture);
+  const blockOf = (first: number, value: number) => {
+    return { first, count: 2, cages: new Float32Array(6).fill(value), residual: null };
+  };
+  const early = store.load(0);
+  answers[0](blockOf(0, 1));
+  await early;
+  const late = store.frame(2);
+  const onReplaced = vi.fn();
+  store.onReplaced = onReplaced;
+  capture.events.dispatchEvent(new Event('replaced'));
+  expect(onReplaced).toHaveBeenCalledOnce();
+  expect(store.peek(0)).toBeNull();
+  answers[1](blockOf(2, 1));
+  await settled();
+  answers[2](blockOf(2, 7));
+  expect((await late).rows[0]).toBe(7);
+});
+
+test('a paused picture of a large model comes to rest, and a far frame can be read meanwhile', async () => {
+  vi.stubGlobal('Worker', AnsweringWorker);
+  vi.stubGlobal('document', { baseURI: 'http://localhost/' });
+  vi.stubGlobal('location', { origin: 'http://localhost' });
+  const cages = new Float32Array(3 * 200);
+  const block = { first: 0, count: 200, cages, residual: NO_RESIDUAL };
+  const store = new FrameStore(captureOf(500_000, 200, () => Promise.resolve(block)));
+  const ahead = Array.from({ length: 24 }, (_, k) => 50 + k);
+  store.onArrival = () => store.prefetch(ahead);
+  store.prefetch(ahead);
+  await settled();
+  await settled();
+  expect(AnsweringWorker.frames).toBeLessThan(24);
+  expect(AnsweringWorker.frames).toBeGreaterThan(4);
+  expect((await store.frame(199)).offsets).not.toBeNull();
+  for (let frame = 100; frame < 110; frame++) await store.frame(frame);
+  expect(store.peek(50)).not.toBeNull();
+  const asked = AnsweringWorker.frames;
+  await settled();
+  expect(AnsweringWorker.frames).toBe(asked);
+});

@@ -1,0 +1,54 @@
+import { html, type TemplateResult } from 'lit';
+import type { LiveStatus } from '../capture';
+import { threeDigits } from './text';
+import type { Transport } from './transport';
+
+/** What is shown counts as live while it is no more seconds than this behind the newest frame. */
+const LIVE_SECONDS = 2;
+/** Frames and seconds that playing keeps from the newest frame, the fewer of both, so that it does not wait for every one. */
+const [MARGIN_FRAMES, MARGIN_SECONDS] = [15, 1];
+
+/** Where the picture of a running session stands; `behind` and `retry` are seconds. */
+export type LivePlace =
+  | { readonly kind: 'live' }
+  | { readonly kind: 'behind'; readonly behind: number }
+  | { readonly kind: 'reconnecting'; readonly retry: number }
+  | { readonly kind: 'signed-out' };
+
+/** The place of a transport in a session that is followed; `now` as `Date.now()` tells it. */
+export function livePlace(live: LiveStatus | null, transport: Transport, now: number): LivePlace {
+  if (live?.state === 'signed-out') return { kind: 'signed-out' };
+  if (live?.state === 'reconnecting') {
+    return { kind: 'reconnecting', retry: Math.max(0, Math.ceil(((live.retryAt ?? now) - now) / 1000)) };
+  }
+  const frames = Math.max(0, transport.frames - 1 - transport.position) + (live?.behindFrames ?? 0);
+  const behind = frames / transport.rate;
+  return transport.playing && behind <= LIVE_SECONDS ? { kind: 'live' } : { kind: 'behind', behind };
+}
+
+/** The frame from which a running session is played live. */
+export function liveFrame({ frames, rate }: Transport): number {
+  return Math.max(0, frames - 1 - Math.min(MARGIN_FRAMES, Math.floor(MARGIN_SECONDS * rate)));
+}
+
+/** Says whether the picture is live, and what can be done where it is not. */
+export function liveBadge(place: LivePlace, goLive: () => void, signIn: () => void): TemplateResult {
+  switch (place.kind) {
+    case 'live':
+      return html`<span class="live" role="status">LIVE</span>`;
+    case 'behind':
+      return html`<button
+        class="live behind"
+        title="${threeDigits(place.behind)} s behind the newest frame"
+        @click=${goLive}
+      >
+        Go live
+      </button>`;
+    case 'reconnecting':
+      return html`<span class="live behind"
+        >${place.retry > 0 ? `Reconnecting in ${place.retry} s` : 'Reconnecting'}</span
+      >`;
+    case 'signed-out':
+      return html`<button class="live behind" @click=${signIn}>Sign in</button>`;
+  }
+}
