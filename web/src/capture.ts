@@ -109,8 +109,6 @@ export interface Capture {
   coordinates?(onProgress?: (fraction: number) => void, signal?: AbortSignal): Promise<Float32Array>;
   /** Point numbers of the handles, where they are known. */
   handles?(signal?: AbortSignal): Promise<Uint32Array>;
-  /** How far each point of a frame is from where it was captured, as fractions of the diagonal; null where the original is not kept. */
-  pointErrors?(frame: number, signal?: AbortSignal): Promise<Float32Array | null>;
   /** The container that holds the capture, for copies of it with edited cages. */
   container?(signal?: AbortSignal): Promise<Source>;
   /** Positions of some cages, decoded by the service: for each `rowsPerFrame × 3` floats of the body, points × 3. */

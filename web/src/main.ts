@@ -65,7 +65,7 @@ function openFile(file: File) {
   void show(true);
 }
 
-/** A file that is chosen beside a session takes a page of its own, since the view of the one is none of the other. */
+/** A file that is opened from a session moves to its own route, so that its frame and camera are not written into the session's link. */
 function chooseFile(event: CustomEvent<File>) {
   if (parseFragment(location.hash).route.page === 'file') {
     dropped = event.detail;

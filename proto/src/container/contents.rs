@@ -4,7 +4,7 @@ use super::codec::{self, CODED};
 use super::reader::ContainerReader;
 use super::section::{FOOTER_BYTES, HEADER_BYTES, PRELUDE_BYTES, SectionHeader};
 use super::{Error, tag};
-use crate::le::{u32_at, u64_at};
+use crate::le::u64_at;
 use std::io::{Read, Seek};
 
 /// Bytes of one entry of the table of contents: an offset and the section's header but for its checksums.
@@ -36,7 +36,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         let mut next = PRELUDE_BYTES as u64;
         for line in contents.chunks_exact(ENTRY_BYTES) {
             let at = u64_at(line, 0);
-            let header = section_fields(&line[8..]);
+            let header = SectionHeader::of_entry(&line[8..]);
             // Sections follow each other without gaps, so that no byte of the file goes unchecked.
             if at != next {
                 return Err(Error::corrupt(offset, "the table of contents leaves a gap"));
@@ -142,19 +142,5 @@ impl<R: Read + Seek> ContainerReader<R> {
             }
         }
         Ok(())
-    }
-}
-
-/// The fields of a section header as the table of contents repeats them.
-fn section_fields(b: &[u8]) -> SectionHeader {
-    SectionHeader {
-        tag: [b[0], b[1], b[2], b[3]],
-        codec: b[4],
-        width: b[5],
-        first: u32_at(b, 8),
-        count: u32_at(b, 12),
-        payload_bytes: u64_at(b, 16),
-        raw_bytes: u64_at(b, 24),
-        payload_crc: 0,
     }
 }

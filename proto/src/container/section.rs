@@ -47,7 +47,12 @@ impl SectionHeader {
         if b[6..8] != [0, 0] {
             return Err(Error::corrupt(offset + 6, "reserved bytes are not zero"));
         }
-        Ok(Self {
+        Ok(Self { payload_crc: u32_at(b, 32), ..Self::of_entry(b) })
+    }
+
+    /// The fields before the checksums, as the table of contents repeats them.
+    pub(crate) fn of_entry(b: &[u8]) -> Self {
+        Self {
             tag: [b[0], b[1], b[2], b[3]],
             codec: b[4],
             width: b[5],
@@ -55,8 +60,8 @@ impl SectionHeader {
             count: u32_at(b, 12),
             payload_bytes: u64_at(b, 16),
             raw_bytes: u64_at(b, 24),
-            payload_crc: u32_at(b, 32),
-        })
+            payload_crc: 0,
+        }
     }
 
     /// Most bytes that a section may decode to in a file of this length; what else a reader builds from them keeps its

@@ -204,7 +204,7 @@ class Walk {
   }
 }
 
-/** Removes the last `x` of a list; false if there is none. */
+/** Removes the last occurrence of `x` from a list; false if the list does not contain it. */
 function removeLast(list: number[], x: number): boolean {
   const at = list.lastIndexOf(x);
   if (at < 0) {

@@ -23,7 +23,7 @@ export class UnmetVertices {
     return count;
   }
 
-  /** Takes out the one with so many before it; null if there is none. */
+  /** Removes and returns the vertex that has `rank` unmet vertices below it; null if fewer are left. */
   take(rank: number): number | null {
     if (rank < 0 || rank >= this.left) {
       return null;

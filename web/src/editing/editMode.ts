@@ -11,7 +11,7 @@ export interface EditHost extends HTMLElement {
   report(problem: string): void;
 }
 
-/** Edit mode of a viewer: fetches the editor when it is first wanted, and stands for it where there is none yet. */
+/** Edit mode of a viewer: loads the editor when it is first used, and answers for it until it is loaded. */
 export class EditMode {
   isOn = false;
   editor: CageEditor | null = null;

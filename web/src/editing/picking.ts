@@ -66,7 +66,7 @@ export function verticesWithin(places: readonly (PlacedVertex | null)[], box: Re
   return found;
 }
 
-/** The vertex that comes next from one in a direction of the picture: near, and not far off that direction; −1 where there is none. */
+/** The nearest vertex roughly in a given direction on the screen, for selection by arrow keys; −1 if no vertex lies that way. */
 export function vertexTowards(
   places: readonly (PlacedVertex | null)[],
   from: number,

@@ -7,7 +7,7 @@ export const AXES: readonly Axis[] = ['x', 'y', 'z'];
 /** Which vertex of a cage lies where another one is mirrored to. */
 export interface Mirror {
   readonly axis: 0 | 1 | 2;
-  /** The vertex across the plane, itself for one on it, −1 where there is none. */
+  /** The mirror image of each vertex: the vertex itself if it lies on the plane, −1 if no vertex matches. */
   readonly partner: Int32Array;
   /** Share of the vertices that have one. */
   readonly share: number;

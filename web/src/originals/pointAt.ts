@@ -24,7 +24,7 @@ export function spotOf(
   return { x: (cx / w / 2 + 0.5) * width, y: (0.5 - cy / w / 2) * height };
 }
 
-/** The point that is seen at a spot: of those within `reach` pixels, the one that is nearest to the eye. Null where there is none. */
+/** The point that is seen at a spot: of those within `reach` pixels, the one nearest to the eye; null if no point is within reach. */
 export function pointAt(positions: ArrayLike<number>, spot: Spot, picture: Picture, reach: number): number | null {
   const { matrix: m, width, height } = picture;
   let [nearest, depth] = [-1, Infinity];

@@ -63,7 +63,7 @@ export class UploadJob extends EventTarget {
     return this.#bytes.perSecond();
   }
 
-  /** Seconds until the last frame is there, at the present rate; null where there is none. */
+  /** Seconds until the last frame is there, at the present rate; null while the rate is unknown. */
   get secondsLeft(): number | null {
     const rate = this.framesPerSecond;
     return rate > 0 ? (this.plan.frames.frames - this.done) / rate : null;

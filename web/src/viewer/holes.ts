@@ -32,7 +32,7 @@ export class Holes {
     return hole.problem;
   }
 
-  /** Goes on at the first frame that may come: around the end where it loops. Stops where there is none. */
+  /** Goes on at the first frame that may come: past the end when playback loops. Stops if every frame left is damaged. */
   past(transport: Transport): Transport {
     let frame = Math.floor(transport.position);
     // Each hole is met once, and one of them a second time around the end.
