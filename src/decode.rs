@@ -5,7 +5,7 @@ use crate::memory::Memory;
 use crate::timing::Timing;
 use cager_core::cage::{Cage, CageError};
 use cager_core::coordinates;
-use cager_core::coordinates::{CoordinatesError, ElementPlan, supports_definition};
+use cager_core::coordinates::{Coordinates, CoordinatesError, ElementPlan, supports_definition};
 use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, PrepareError, coordinates_fit, reject_far_points};
 use cager_core::mesh::{Model, Point};
@@ -189,8 +189,8 @@ struct BoundModel {
 /// Entries of `Φ` computed at a time to find the points outside.
 const OUTSIDE_ENTRIES: usize = 1 << 23;
 
-/// Computes the coordinates of the container's model, or of another, in the container's cage; `keeps(points, columns)` decides whether to
-/// keep them in memory.
+/// Computes the coordinates of the container's model, if they are not `known`, or of another, in the container's cage; `keeps(points, columns)` decides whether
+/// to keep them in memory.
 ///
 /// # Errors
 /// Damage, or coordinates that this program does not compute.
@@ -198,6 +198,7 @@ fn bind(
     container: &mut Container,
     path: &Path,
     other: Option<(&Path, &Model)>,
+    known: Option<Coordinates>,
     keeps: impl FnOnce(usize, usize) -> bool,
 ) -> Result<BoundModel, DecodeError> {
     let fail = |cause| DecodeError::container(path, cause);
@@ -228,8 +229,9 @@ fn bind(
             .map_err(|cause| DecodeError::Model { path: model_path.to_owned(), cause })?;
     }
     let plan = container.elements().map_err(fail)?.map(ElementPlan::from_bytes);
-    if let Some(pointwise) = system.pointwise().filter(|_| plan.is_none()) {
-        let keeps = keeps(rest.points.len(), columns);
+    let keeps = keeps(rest.points.len(), columns);
+    let known = known.filter(|_| other.is_none() && (keeps || plan.is_some()));
+    if let Some(pointwise) = system.pointwise().filter(|_| plan.is_none() && known.is_none()) {
         let decoder = if keeps { Decoder::with_stored_coordinates } else { Decoder::with_recomputed_coordinates }(
             pointwise,
             &cage,
@@ -246,9 +248,10 @@ fn bind(
         let gigabytes = 12e-9 * rest.points.len() as f64 * columns as f64;
         return Err(DecodeError::Memory { path: model_path.to_owned(), gigabytes });
     }
-    let coordinates = match &plan {
-        Some(plan) => system.coordinates_by_plan(&cage, &rest.points, plan),
-        None => system.coordinates(&cage, &rest.points),
+    let coordinates = match (known, &plan) {
+        (Some(known), _) => Ok(known),
+        (None, Some(plan)) => system.coordinates_by_plan(&cage, &rest.points, plan),
+        (None, None) => system.coordinates(&cage, &rest.points),
     };
     let found = coordinates.map_err(|cause| DecodeError::Coordinates { path: model_path.to_owned(), cause })?;
     let decoder = Decoder::new(found.phi.as_ref(), cage.vertices().len()).with_tied_normals(system.tied_normals(&cage));
@@ -311,7 +314,11 @@ pub fn decode(
     let frames = wanted.len();
     let batch = |points: usize| memory.frames(12 * points, BATCH);
     let keeps = |points: usize, columns: usize| memory.keeps(points, columns, frames.div_ceil(batch(points)));
-    let BoundModel { rest, decoder, outside } = bind(&mut container, input, model, keeps)?;
+    let known = match wanted.first() {
+        Some(&frame) if own && layer == Layer::All => container.read_ahead(frame).map_err(fail)?,
+        _ => None,
+    };
+    let BoundModel { rest, decoder, outside } = bind(&mut container, input, model, known, keeps)?;
     let batch = batch(rest.points.len());
     let mut writer = create_frames(output, rest.points.len(), frames, &rest.faces, &options)?;
     // Both keep their allocations from batch to batch.

@@ -1,7 +1,9 @@
 //! Encoding: solves one cage per frame and measures the errors that a decoder will produce.
 
 use crate::capture::{CaptureWriter, Encoding, StoredError};
-use crate::coding::{Carried, CodedGroup, CodingError, Goal, GroupCoder, GroupDecoder, HELD, RestMeshes, group_frames};
+use crate::coding::{
+    Carried, CodedGroup, CodingError, Goal, GroupCoder, GroupDecoder, GroupSpace, HELD, RestMeshes, group_frames,
+};
 use crate::memory::Memory;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
@@ -175,8 +177,19 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
     let (rest, cage) = meshes.as_ref().map_or((job.rest, job.cage), |meshes| (&meshes.rest.mesh, &meshes.checked));
     let Job { frames, output, system, options, term, choose, memory, goal, exact_rest, .. } = job;
     let job = Job { rest, cage, frames: &mut *frames, output, system, options, term, choose, memory, goal, exact_rest };
-    let (solver, options, choice) = prepare(&job, &|step| progress(EncodeProgress::Preparing(step)))?;
-    let model = job.goal.map(|_| GroupDecoder::new(job.system, job.cage, job.rest, &solver)).transpose()?;
+    // What groups are coded in needs nothing of the solver, unless the coordinates are a numerical solution.
+    let begins_early = goal.is_some() && system.pointwise().is_some();
+    let (prepared, space) = std::thread::scope(|scope| {
+        let space = begins_early.then(|| scope.spawn(|| GroupSpace::new(system, cage, rest, None)));
+        let prepared = prepare(&job, &|step| progress(EncodeProgress::Preparing(step)));
+        (prepared, space.map(|space| space.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))))
+    });
+    let (solver, options, choice) = prepared?;
+    let model = match (goal, space) {
+        (None, _) => None,
+        (Some(_), Some(space)) => Some(GroupDecoder::in_space(space?, &solver)),
+        (Some(_), None) => Some(GroupDecoder::new(system, cage, rest, &solver)?),
+    };
     let encoding = Encoding {
         rest: job.rest,
         cage: job.cage,

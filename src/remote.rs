@@ -50,8 +50,8 @@ pub struct RemoteJob<'a, F> {
     pub address: &'a str,
     /// Token to show there.
     pub token: Option<&'a str>,
-    /// File with the model in its rest pose.
-    pub rest: &'a Path,
+    /// The model in its rest pose, as a file.
+    pub rest: MeshFile,
     /// The cage around it.
     pub cage: RemoteCage<'a>,
     /// File with the matrix of the regularizer `matrix`.
@@ -123,7 +123,7 @@ async fn encode<F: FrameSource + 'static>(
     // First, so that an unwritable output fails before the work.
     let file = AtomicFile::create(job.output)?;
     let mut new = NewSession {
-        rest: mesh_file(job.rest)?,
+        rest: job.rest,
         cage: None,
         regularizer_matrix: job.matrix.map(mesh_file).transpose()?,
         options: job.options,
@@ -229,7 +229,11 @@ fn name_output(error: ClientError) -> RemoteError {
     }
 }
 
-fn mesh_file(path: &Path) -> Result<MeshFile, cager_formats::Error> {
+/// The bytes of a file, for a service.
+///
+/// # Errors
+/// A file that cannot be read; it is named.
+pub fn mesh_file(path: &Path) -> Result<MeshFile, cager_formats::Error> {
     let bytes = std::fs::read(path).map_err(|cause| cager_formats::Error::Io {
         path: PathBuf::from(path),
         action: Action::Read,

@@ -119,16 +119,13 @@ impl Client {
         self.retrying(|| async {
             let frame = 3 * known(id, "unknowns", session.unknowns)? as usize;
             let points = known(id, "points", session.points)?;
-            if frame == 0 || !cages.len().is_multiple_of(frame) {
-                let what = format!("{} values are no whole cages of {frame} each; give whole frames", cages.len());
-                return Err(ClientError::Mismatch(what).into());
-            }
+            let frames = Self::whole_cages(cages, frame)?;
             let request = self.request(Method::POST, &["v1", "sessions", id, "decode"], &[]).await?;
             let request = request
                 .header("content-type", "application/octet-stream")
                 .header(ACCEPT, "application/octet-stream")
                 .body(body.clone());
-            let expected = bytes_of([12, u64::from(points), (cages.len() / frame) as u64])?;
+            let expected = bytes_of([12, u64::from(points), frames as u64])?;
             let positions = whole(self, self.send(request).await?, expected).await?;
             if positions.len() as u64 != expected {
                 return Err(self.broken(format!("{} of {expected} bytes came", positions.len())));
@@ -137,9 +134,18 @@ impl Client {
         })
         .await
     }
+
+    /// Number of cages of `frame` values each.
+    pub(crate) fn whole_cages(cages: &[f32], frame: usize) -> Result<usize, ClientError> {
+        if frame == 0 || !cages.len().is_multiple_of(frame) {
+            let what = format!("{} values are no whole cages of {frame} each; give whole frames", cages.len());
+            return Err(ClientError::Mismatch(what));
+        }
+        Ok(cages.len() / frame)
+    }
 }
 
-fn number(headers: &HeaderMap, name: &str) -> Result<u32, Failure> {
+pub(crate) fn number(headers: &HeaderMap, name: &str) -> Result<u32, Failure> {
     let value = headers.get(name).and_then(|value| value.to_str().ok()?.parse().ok());
     value.ok_or_else(|| Failure::protocol(format!("the header {name} is missing or no number")))
 }

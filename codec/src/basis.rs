@@ -6,7 +6,7 @@
 
 use crate::linear;
 use cager_core::cage::Cage;
-use cager_core::coordinates::{CoordinateSystem, CoordinatesError, ElementPlan};
+use cager_core::coordinates::{CoordinateSystem, Coordinates, CoordinatesError, ElementPlan};
 use cager_core::mesh::Point;
 use faer::{Mat, MatRef, Par};
 
@@ -32,8 +32,8 @@ pub struct CageBasis {
 }
 
 impl CageBasis {
-    /// For a model in its cage: from every k-th point, with the smallest k that leaves 16,384 of them. `rotated` is what the encoder found; an encoder
-    /// leaves it out. `None` where numbers are not finite.
+    /// For a model in its cage: from every k-th point, with the smallest k that leaves 16,384 of them; and the coordinates of these. `rotated` is what the
+    /// encoder found; an encoder leaves it out. `None` where numbers are not finite.
     ///
     /// # Errors
     /// As [`CoordinateSystem::coordinates`].
@@ -43,7 +43,7 @@ impl CageBasis {
         points: &[Point],
         plan: Option<&ElementPlan>,
         rotated: Option<bool>,
-    ) -> Result<Option<Self>, CoordinatesError> {
+    ) -> Result<Option<(Self, Coordinates)>, CoordinatesError> {
         let every = points.len().div_ceil(SAMPLE).max(1);
         let sample: Vec<Point> = points.iter().step_by(every).copied().collect();
         let found = match plan {
@@ -53,10 +53,11 @@ impl CageBasis {
         // Of normals that follow from the vertices no rows are stored.
         let rows = system.unknowns(cage);
         let (phi, rest) = (found.phi.subcols(0, rows), &system.rest_values(cage)[..rows]);
-        Ok(match rotated {
+        let basis = match rotated {
             Some(rotated) => Self::new(phi, rest, rotated),
             None => Self::for_encoding(phi, rest),
-        })
+        };
+        Ok(basis.map(|basis| (basis, found)))
     }
 
     /// From rows of `Φ`, any number of them × m, and the rest pose's rows, m × 3. `None` where numbers are not finite.

@@ -4,14 +4,10 @@
 //! and ignores the argument, or only adds up what it would cost.
 
 use crate::error::{Error, Result};
-use constriction::Queue;
-use constriction::backends::ReadWords;
-use constriction::stream::model::{DecoderModel, EncoderModel, EntropyModel};
-use constriction::stream::queue::{DefaultRangeDecoder, DefaultRangeEncoder};
-use constriction::stream::{Decode, Encode};
-use std::cell::Cell;
+use constriction::stream::Encode;
+use constriction::stream::model::{EncoderModel, EntropyModel};
+use constriction::stream::queue::DefaultRangeEncoder;
 use std::num::NonZeroU16;
-use std::rc::Rc;
 
 /// Bits of a probability.
 const PRECISION: usize = 16;
@@ -46,18 +42,25 @@ impl Default for Bit {
 
 impl Bit {
     /// Probability of 0 in units of 2⁻¹⁶, never 0 or 1.
+    #[inline(always)]
     fn zero(self) -> u16 {
         (((u32::from(self.fast) + u32::from(self.slow)) / 2) as u16).clamp(48, u16::MAX - 47)
     }
 
+    #[inline(always)]
     fn meet(&mut self, one: bool) {
-        // At first a plain average of what was met.
-        let rate = |limit: u32| (u32::from(self.met) + 2).min(1 << limit);
-        // 16 digits times a reciprocal of 32, rounded up, is the quotient for divisors this small.
-        let part = |p: u16, rate: u32| ((u64::from(p) * RECIPROCALS[rate as usize]) >> 32) as u16;
-        let toward = |p: u16, rate: u32| if one { p - part(p, rate) } else { p + part(u16::MAX - p, rate) };
-        (self.fast, self.slow) = (toward(self.fast, rate(FAST)), toward(self.slow, rate(SLOW)));
-        self.met = (self.met + 1).min(1 << SLOW);
+        let left = |p: u16| if one { p } else { u16::MAX - p };
+        let (fast, slow) = if self.met >= (1 << SLOW) - 2 {
+            (left(self.fast) >> FAST, left(self.slow) >> SLOW)
+        } else {
+            // At first a plain average of what was met. 16 digits times a reciprocal of 32, rounded up, is the quotient for divisors this small.
+            let rate = u32::from(self.met) + 2;
+            self.met += 1;
+            let part = |p: u16, rate: u32| ((u64::from(p) * RECIPROCALS[rate as usize]) >> 32) as u16;
+            (part(left(self.fast), rate.min(1 << FAST)), part(left(self.slow), rate))
+        };
+        let toward = |p: u16, part: u16| if one { p - part } else { p + part };
+        (self.fast, self.slow) = (toward(self.fast, fast), toward(self.slow, slow));
     }
 }
 
@@ -77,7 +80,7 @@ pub(crate) trait Coder {
     }
 }
 
-/// The model of one digit as the range coder reads it.
+/// The model of one digit as the range coder takes it.
 struct Probability(u16);
 
 impl EntropyModel<PRECISION> for Probability {
@@ -92,14 +95,6 @@ impl EncoderModel<PRECISION> for Probability {
         } else {
             NonZeroU16::new(self.0).map(|p| (0, p))
         }
-    }
-}
-
-impl DecoderModel<PRECISION> for Probability {
-    fn quantile_function(&self, quantile: u16) -> (bool, u16, NonZeroU16) {
-        let one = quantile >= self.0;
-        let (from, width) = if one { (self.0, self.0.wrapping_neg()) } else { (0, self.0) };
-        (one, from, NonZeroU16::new(width).unwrap_or(NonZeroU16::MIN))
     }
 }
 
@@ -124,64 +119,69 @@ impl Coder for Encoder {
     }
 }
 
-/// The words of a stream, and zeros after its end.
-struct Words {
-    words: std::vec::IntoIter<u32>,
-    /// Words read past the end.
-    past: Rc<Cell<u32>>,
-}
-
-impl ReadWords<u32, Queue> for Words {
-    type ReadError = std::convert::Infallible;
-
-    fn read(&mut self) -> std::result::Result<Option<u32>, Self::ReadError> {
-        let word = self.words.next();
-        self.past.set(self.past.get().saturating_add(u32::from(word.is_none())));
-        Ok(Some(word.unwrap_or_default()))
-    }
-
-    fn maybe_exhausted(&self) -> bool {
-        self.words.len() == 0
-    }
-}
-
 /// Words that a decoder reads past the end of what an encoder wrote, at the most.
 const PAST: u32 = 2;
 
-/// Reads. Past the end it goes on with zeros until it is checked; what reads checks that numbers are possible.
-pub(crate) struct Decoder {
-    coder: DefaultRangeDecoder<Words>,
-    past: Rc<Cell<u32>>,
+/// Reads what the encoder of `constriction` wrote. A digit is 0 or 1, so that one comparison says which, where that crate's decoder for any alphabet divides by
+/// the range: half of the time of decoding. Past the end it goes on with zeros until it is checked; what reads checks that numbers are possible.
+pub(crate) struct Decoder<'a> {
+    words: std::slice::Iter<'a, [u8; 4]>,
+    /// Words read past the end.
+    past: u32,
+    /// Where the coded number lies in the range that is left, from its beginning.
+    offset: u64,
+    range: u64,
     damaged: bool,
 }
 
-impl Decoder {
-    pub(crate) fn new(bytes: &[u8]) -> Result<Self> {
+impl<'a> Decoder<'a> {
+    pub(crate) fn new(bytes: &'a [u8]) -> Result<Self> {
         let (words, rest) = bytes.as_chunks::<4>();
         if !rest.is_empty() {
             return Err(Error::Damaged("coded numbers are cut"));
         }
-        let words: Vec<u32> = words.iter().map(|&word| u32::from_le_bytes(word)).collect();
-        let past = Rc::default();
-        let words = Words { words: words.into_iter(), past: Rc::clone(&past) };
-        let coder = DefaultRangeDecoder::with_backend(words).unwrap_or_else(|infallible| match infallible {});
-        Ok(Self { coder, past, damaged: false })
+        let mut decoder = Self { words: words.iter(), past: 0, offset: 0, range: u64::MAX, damaged: false };
+        decoder.offset = decoder.word() << 32;
+        decoder.offset |= decoder.word();
+        Ok(decoder)
+    }
+
+    fn word(&mut self) -> u64 {
+        match self.words.next() {
+            Some(&word) => u64::from(u32::from_le_bytes(word)),
+            None => {
+                self.past = self.past.saturating_add(1);
+                0
+            }
+        }
     }
 
     /// Whether all that was read can be what an encoder wrote.
     pub(crate) fn check(&self) -> Result<()> {
-        if self.damaged || self.past.get() > PAST { Err(Error::Damaged("coded numbers are damaged")) } else { Ok(()) }
+        if self.damaged || self.past > PAST { Err(Error::Damaged("coded numbers are damaged")) } else { Ok(()) }
     }
 }
 
-impl Coder for Decoder {
+impl Coder for Decoder<'_> {
+    #[inline(always)]
     fn bit(&mut self, model: &mut Bit, _: bool) -> bool {
-        let value = self.coder.decode_symbol(Probability(model.zero())).unwrap_or_else(|_| {
-            self.damaged = true;
-            false
-        });
-        model.meet(value);
-        value
+        let unit = self.range >> PRECISION;
+        let zeros = unit * u64::from(model.zero());
+        let one = self.offset >= zeros;
+        if one {
+            // No encoder leaves a number in what is lost by rounding the range down to whole units.
+            self.damaged |= self.offset >= unit << PRECISION;
+            self.offset -= zeros;
+            self.range = (unit << PRECISION) - zeros;
+        } else {
+            self.range = zeros;
+        }
+        if self.range < 1 << 32 {
+            self.range <<= 32;
+            self.offset = self.offset << 32 | self.word();
+        }
+        model.meet(one);
+        one
     }
 }
 
@@ -265,8 +265,19 @@ impl Integers {
 
 /// The context of a number from the sizes around it, in sixteenths: 0 to [`SIZES`] − 1.
 pub(crate) fn size_class(sixteenths: u32) -> usize {
-    const EDGES: [u32; SIZES - 1] = [1, 3, 5, 8, 12, 17, 24, 34, 48, 70, 100, 150, 230, 400, 900];
-    EDGES.partition_point(|&edge| edge <= sixteenths)
+    const EDGES: [u32; SIZES - 1] = [1, 3, 5, 8, 12, 17, 24, 34, 48, 70, 100, 150, 230, 400, MOST];
+    const MOST: u32 = 900;
+    const CLASSES: [u8; MOST as usize + 1] = {
+        let mut classes = [0; MOST as usize + 1];
+        let mut size = 1;
+        while size < classes.len() {
+            let class = classes[size - 1];
+            classes[size] = class + (size as u32 == EDGES[class as usize]) as u8;
+            size += 1;
+        }
+        classes
+    };
+    usize::from(CLASSES[sixteenths.min(MOST) as usize])
 }
 
 /// Classes of [`size_class`].

@@ -34,14 +34,18 @@ impl Hierarchy {
             list.dedup();
         }
         let mut left: Vec<u32> = (0..points as u32).collect();
+        let mut by_size: Vec<u64> = Vec::with_capacity(points);
         let mut removed: Vec<(u32, Vec<u32>)> = Vec::with_capacity(points);
         let mut blocked = vec![0u32; points];
         let mut round = 0;
         while left.len() > COARSEST {
             round += 1;
-            left.sort_unstable_by_key(|&v| (near[v as usize].len(), v));
+            // The number of neighbours, then the vertex, as one number.
+            by_size.clear();
+            by_size.extend(left.iter().map(|&v| (near[v as usize].len() as u64) << 32 | u64::from(v)));
+            by_size.sort_unstable();
             let before = removed.len();
-            for &v in &left {
+            for v in by_size.iter().map(|&numbers| numbers as u32) {
                 if blocked[v as usize] != round && !near[v as usize].is_empty() {
                     near[v as usize].iter().for_each(|&w| blocked[w as usize] = round);
                     blocked[v as usize] = round;

@@ -57,30 +57,37 @@ pub fn encode_residual(hierarchy: &Hierarchy, group: &ResidualGroup<'_>) -> Opti
         frames.min(group.most_numbers / (3 * points).max(1)),
     )?;
     let count = chosen.count();
-    let values = fit(chosen.values().as_ref(), motion.as_ref())?;
+    // Values × components: each component is read several times.
+    let values = fit(chosen.values().as_ref(), motion.as_ref())?.transpose().to_owned();
     drop(motion);
+    let per_unit = PARTS as f64 / group.step;
+    let most = f64::from(MOST) / per_unit;
     let mut coder = Encoder::default();
     chosen.code(&mut coder, frames, count);
     let mut decoded = Residual::new(&chosen, points);
     let mut components = Components::new(hierarchy);
+    let target_of = |k: usize| {
+        let parts = |x: f64| (x.abs() < most).then_some((per_unit * x + 0.5f64.copysign(x)) as i64);
+        let (vertices, _) = values.col_as_slice(k).as_chunks::<3>();
+        let target = vertices.iter().map(|&[x, y, z]| Some([parts(x)?, parts(y)?, parts(z)?]));
+        let target: Vec<[i64; 3]> = target.collect::<Option<_>>()?;
+        let predicts = cost(hierarchy, &target, true) < cost(hierarchy, &target, false);
+        Some((target, predicts))
+    };
+    // While some components are coded, what does not depend on them is found for the next.
     let all: Vec<usize> = (0..count).collect();
-    for some in all.chunks(AT_A_TIME) {
-        // What of a component does not depend on those before it is found for some at once.
-        let targets: Vec<(Vec<i64>, bool)> = some
-            .par_iter()
-            .map(|&k| {
-                let parts = |value: usize| {
-                    let x = values[(k, value)] / group.step * PARTS as f64;
-                    (x.abs() < f64::from(MOST)).then_some(x.round() as i64)
-                };
-                let target: Vec<i64> = (0..3 * points).map(parts).collect::<Option<_>>()?;
-                let predicts = cost(hierarchy, &target, true) < cost(hierarchy, &target, false);
-                Some((target, predicts))
-            })
-            .collect::<Option<_>>()?;
-        for (&k, (target, predicts)) in some.iter().zip(&targets) {
-            decoded.set(k, components.code(&mut coder, target, *predicts), group.step);
-        }
+    let mut chunks = all.chunks(AT_A_TIME);
+    let mut next =
+        || chunks.next().map(|some| (some, some.par_iter().map(|&k| target_of(k)).collect::<Option<Vec<_>>>()));
+    let mut found = next();
+    while let Some((some, targets)) = found {
+        let targets = targets?;
+        let code = || {
+            for (&k, (target, predicts)) in some.iter().zip(&targets) {
+                decoded.set(k, components.code(&mut coder, target, *predicts), group.step);
+            }
+        };
+        (found, ()) = rayon::join(&mut next, code);
     }
     let coded = coder.into_bytes();
     let corrections = match group.bound {
@@ -119,10 +126,10 @@ impl Residual {
         }
     }
 
-    fn set(&mut self, component: usize, parts: &[i64], step: f64) {
+    fn set(&mut self, component: usize, parts: &[[i64; 3]], step: f64) {
         let unit = step / PARTS as f64;
         let column = self.values.col_mut(component).iter_mut();
-        column.zip(parts).for_each(|(value, &parts)| *value = (parts as f64 * unit) as f32);
+        column.zip(parts.as_flattened()).for_each(|(value, &parts)| *value = (parts as f64 * unit) as f32);
     }
 
     /// What [`encode_residual`] wrote, for a group of as many frames, where that are at most so many numbers of components.
@@ -214,46 +221,48 @@ struct Components<'a> {
     models: [Integers; 2],
     flag: crate::entropy::Bit,
     /// Sizes of the numbers of the component before.
-    before: Vec<u32>,
-    sizes: Vec<u32>,
+    before: Vec<[u32; 3]>,
+    sizes: Vec<[u32; 3]>,
     /// The numbers of this component.
-    found: Vec<i64>,
+    found: Vec<[i64; 3]>,
 }
 
 impl<'a> Components<'a> {
     fn new(hierarchy: &'a Hierarchy) -> Self {
-        let values = 3 * hierarchy.points();
+        let points = hierarchy.points();
         let models = [Integers::new(3 * SIZES), Integers::new(3 * SIZES)];
         Self {
             hierarchy,
             models,
             flag: Default::default(),
-            before: vec![0; values],
-            sizes: vec![0; values],
-            found: vec![0; values],
+            before: vec![[0; 3]; points],
+            sizes: vec![[0; 3]; points],
+            found: vec![[0; 3]; points],
         }
     }
 
     /// Codes the numbers nearest to `target`, as differences to their prediction or not; gives what a decoder makes of them.
-    fn code(&mut self, coder: &mut impl Coder, target: &[i64], predicts: bool) -> &[i64] {
+    fn code(&mut self, coder: &mut impl Coder, target: &[[i64; 3]], predicts: bool) -> &[[i64; 3]] {
         let predicts = coder.bit(&mut self.flag, predicts);
         let models = &mut self.models[usize::from(predicts)];
         let found = &mut self.found;
         for (vertex, parents) in self.hierarchy.iter() {
             let near = parents.len().max(1) as u64;
+            let mut around = [0u64; 3];
+            for &parent in parents {
+                let sizes = &self.sizes[parent as usize];
+                (0..3).for_each(|k| around[k] += u64::from(sizes[k]));
+            }
+            let expected = if predicts { mean(found, parents) } else { [0; 3] };
             let mut beside = 0;
             for k in 0..3 {
-                let at = 3 * vertex + k;
-                let of = |&parent: &u32| 3 * parent as usize + k;
-                let around: u64 = parents.iter().map(|parent| u64::from(self.sizes[of(parent)])).sum();
-                let around = (16 * around / near).min(1 << 20) as u32;
-                let expected = if predicts { mean(parents.iter().map(|parent| found[of(parent)])) } else { 0 };
-                let context = size_class(around + 6 * self.before[at] + beside);
-                let value = target.get(at).map_or(0, |target| rounded(target - expected));
+                let around = (16 * around[k] / near).min(1 << 20) as u32;
+                let context = size_class(around + 6 * self.before[vertex][k] + beside);
+                let value = target.get(vertex).map_or(0, |target| rounded(target[k] - expected[k]));
                 let value = models.code(coder, SIZES * k + context, value);
-                found[at] = expected + PARTS * i64::from(value);
+                found[vertex][k] = expected[k] + PARTS * i64::from(value);
                 let size = value.unsigned_abs().min(1 << 16);
-                self.sizes[at] = size;
+                self.sizes[vertex][k] = size;
                 beside = beside / 2 + 5 * size;
             }
         }
@@ -263,18 +272,16 @@ impl<'a> Components<'a> {
 }
 
 /// About how many binary digits the numbers of a component take.
-fn cost(hierarchy: &Hierarchy, target: &[i64], predicts: bool) -> f64 {
+fn cost(hierarchy: &Hierarchy, target: &[[i64; 3]], predicts: bool) -> f64 {
     static DIGITS: LazyLock<[f64; 256]> =
         LazyLock::new(|| std::array::from_fn(|size| (1.0 + 2.0 * size as f64).log2()));
-    let mut found = vec![0i64; target.len()];
+    let mut found = vec![[0i64; 3]; target.len()];
     let mut cost = 0.0;
     for (vertex, parents) in hierarchy.iter() {
+        let expected = if predicts { mean(&found, parents) } else { [0; 3] };
         for k in 0..3 {
-            let at = 3 * vertex + k;
-            let expected =
-                if predicts { mean(parents.iter().map(|&parent| found[3 * parent as usize + k])) } else { 0 };
-            let value = rounded(target[at] - expected);
-            found[at] = expected + PARTS * i64::from(value);
+            let value = rounded(target[vertex][k] - expected[k]);
+            found[vertex][k] = expected[k] + PARTS * i64::from(value);
             let size = value.unsigned_abs();
             cost += DIGITS.get(size as usize).copied().unwrap_or_else(|| (1.0 + 2.0 * f64::from(size)).log2());
         }
@@ -288,10 +295,14 @@ fn rounded(parts: i64) -> i32 {
     steps.clamp(-i64::from(MOST), i64::from(MOST)) as i32
 }
 
-/// The mean of whole numbers, rounded down; 0 of none.
-fn mean(values: impl ExactSizeIterator<Item = i64>) -> i64 {
-    let count = values.len() as i64;
-    if count == 0 { 0 } else { values.sum::<i64>().div_euclid(count) }
+/// What a vertex is predicted from its parents: their means, rounded down; without parents 0.
+fn mean(found: &[[i64; 3]], parents: &[u32]) -> [i64; 3] {
+    let mut sums = [0; 3];
+    for &parent in parents {
+        (0..3).for_each(|k| sums[k] += found[parent as usize][k]);
+    }
+    let count = parents.len().max(1) as i64;
+    sums.map(|sum| sum.div_euclid(count))
 }
 
 #[cfg(test)]

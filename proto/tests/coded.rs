@@ -23,7 +23,7 @@ fn coded() -> (Vec<u8>, Vec<Vec<f32>>) {
     let rest = CodedMesh::new(&small_model(), 1e-3).unwrap();
     let mesh = TriMesh { vertices: cage.mesh.points.clone(), triangles: cage.mesh.faces.triangulated() };
     let checked = Cage::new(mesh.clone()).unwrap();
-    let basis = CageBasis::of(&MeanValue, &checked, &rest.mesh.points, None, None).unwrap().unwrap();
+    let (basis, _) = CageBasis::of(&MeanValue, &checked, &rest.mesh.points, None, None).unwrap().unwrap();
     let hierarchy = Hierarchy::new(&rest.mesh.faces, rest.mesh.points.len());
     let meshes = ((&rest.mesh, Some(&rest)), (&mesh, Some(&cage)));
     let mut writer = ContainerWriter::with_meshes(Vec::new(), &header(4), meshes.0, meshes.1).unwrap();

@@ -7,7 +7,7 @@ use super::{grouped, human_bytes, interrupt, progress, tell};
 use crate::decode::{self, Decoding};
 use crate::encode::Encoded;
 use crate::plot::error_plot;
-use crate::remote::{EncodedRemotely, RemoteCage, RemoteJob, RemoteProgress, Steps, encode_remotely};
+use crate::remote::{EncodedRemotely, RemoteCage, RemoteJob, RemoteProgress, Steps, encode_remotely, mesh_file};
 use anyhow::{Context, Result, ensure};
 use cager_client::FnFrames;
 use cager_client::messages::SessionOptions;
@@ -42,7 +42,7 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
     let job = RemoteJob {
         address: service.address(),
         token: None,
-        rest: &rest_file,
+        rest: mesh_file(&rest_file)?,
         cage: RemoteCage::File(&cage_file),
         matrix: None,
         frames: generated(&capture),

@@ -9,8 +9,8 @@ use super::outputs::Outputs;
 use super::solver_options::{
     designed_spectrum, matrix, read_cage, solver, solver_for, spectrum_bound, with_input_name,
 };
-use super::{design, encode_remote, grouped, progress, tell, warn};
-use crate::coding::{CAGE_SIZE_FRAMES, CageSizes};
+use super::{design, encode_remote, grouped, human_bytes, progress, tell, warn};
+use crate::coding::{CAGE_SIZE_FRAMES, CageSizes, Goal};
 use crate::design::{read_frames, report as design_report};
 use crate::encode::{self, ChooseSpectrum, EncodeProgress, Encoded, Job, sample_frames};
 use crate::frames::CaptureFiles;
@@ -36,9 +36,6 @@ pub(super) fn run(args: &EncodeArgs) -> Result<()> {
     // What is wrong with it is told before anything is computed.
     goal(args, &rest, 1)?;
     let cage = args.cage.as_ref().map(|path| read_cage(path, args.flip_cage)).transpose()?;
-    if args.capture.weld && args.server.is_some() {
-        bail!("--weld: a service reads the rest pose as it is; give --server one without seams, or encode here");
-    }
     check_capture(&files, (&args.rest, &rest), &args.capture.checks, true)?;
     if let (Some(path), Some(cage)) = (&args.cage, &cage) {
         check_cage((path, cage.mesh()), &rest, &args.capture.checks)?;
@@ -92,7 +89,13 @@ fn dry_run(
         Some(cage) => {
             let (system, _) = checked_solver(args, rest, cage, matrix.as_ref())?;
             let frames = read_files(files)?;
-            format!("cages of {}, and the rest pose", size(frames, system.unknowns(cage), "unknowns"))
+            match goal(args, rest, frames)? {
+                None => format!("cages of {}, and the rest pose", size(frames, system.unknowns(cage), "unknowns")),
+                Some(Goal::Size(most)) => {
+                    format!("{} frames, coded, {} at the most", grouped(frames), human_bytes(most))
+                }
+                Some(_) => format!("{} frames, coded; how large they are only coding them tells", grouped(frames)),
+            }
         }
         None => {
             design_options(args, rest.points.len())?;
@@ -125,6 +128,17 @@ pub(super) fn design_options(args: &EncodeArgs, points: usize) -> Result<DesignO
 
 /// A cage from the capture itself.
 fn designed(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<(Cage, DesignReport)> {
+    let options = sized_design(args, files, rest)?;
+    let frames = read_frames(files).map_err(|error| name_files(error, args))?;
+    let design = design::design((&args.rest, rest), (&args.frames, &frames), None, &options)?;
+    warn(&design.warnings);
+    let report = design_report(&design, &options, frames.len());
+    let cage = Cage::new(design.cage).with_context(|| args.rest.display().to_string())?;
+    Ok((cage, report))
+}
+
+/// How a cage is designed, of as many vertices as suit what the file is to meet.
+pub(super) fn sized_design(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<DesignOptions> {
     let mut options = design_options(args, rest.points.len())?;
     if let Some(vertices) = best_cage_size(args, files, rest)? {
         tell(&format!(
@@ -132,12 +146,7 @@ fn designed(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<(Ca
         ))?;
         options.goal = design::goal(Some(vertices as u32), None, rest.points.len())?;
     }
-    let frames = read_frames(files).map_err(|error| name_files(error, args))?;
-    let design = design::design((&args.rest, rest), (&args.frames, &frames), None, &options)?;
-    warn(&design.warnings);
-    let report = design_report(&design, &options, frames.len());
-    let cage = Cage::new(design.cage).with_context(|| args.rest.display().to_string())?;
-    Ok((cage, report))
+    Ok(options)
 }
 
 /// How many vertices a designed cage should have for a bound or a size, where neither they nor an error of the cage are given.

@@ -2,17 +2,19 @@
 
 use super::args::{EncodeArgs, SolverArgs, SpectrumArg};
 use super::coding_args::goal;
-use super::encode::{Targets, checked_solver, design_options, finish};
+use super::encode::{Targets, checked_solver, finish, sized_design};
 use super::solver_options::{designed_spectrum, matrix, solver_for, spectrum_bound};
 use super::{plain, progress, tell, warn};
 use crate::coding::Goal;
 use crate::frames::CaptureFiles;
-use crate::remote::{EncodedRemotely, FileFrames, RemoteCage, RemoteJob, RemoteProgress, encode_remotely};
+use crate::remote::{EncodedRemotely, FileFrames, RemoteCage, RemoteJob, RemoteProgress, encode_remotely, mesh_file};
 use anyhow::{Context, Result, bail};
-use cager_client::FrameSource;
+use cager_cages::DesignOptions;
 use cager_client::messages::SessionOptions;
+use cager_client::{FrameSource, MeshFile};
 use cager_core::cage::Cage;
 use cager_core::mesh::Model;
+use cager_formats::obj_bytes;
 use cager_proto::container::counted_from_zero;
 use std::time::Instant;
 
@@ -27,6 +29,11 @@ pub(super) fn run(
     cage: Option<&Cage>,
     clock: Instant,
 ) -> Result<()> {
+    // Here, since a service designs before it sees what the frames cost.
+    let design = match cage {
+        Some(_) => DesignOptions::default(),
+        None => sized_design(args, &files, rest)?,
+    };
     let frames = FileFrames::open(files)?;
     if !counted_from_zero(&frames.numbers()) {
         warn(&["a service numbers frames from 0; encode here to keep the numbers of the files".to_owned()]);
@@ -67,12 +74,12 @@ pub(super) fn run(
         frames: frames.frames(),
         ..coding_options(goal(args, rest, frames.frames().unwrap_or(1) as usize)?, args.coding.exact_rest)
     };
-    let design = design_options(args, rest.points.len())?;
     let bar = progress::frames("encoding", frames.frames().unwrap_or(0) as usize);
     let job = RemoteJob {
         address,
         token: token.as_deref(),
-        rest: &args.rest,
+        // A service reads a rest pose as it is, with the doubles along seams.
+        rest: if args.capture.weld { MeshFile::new("welded.obj", obj_bytes(rest)) } else { mesh_file(&args.rest)? },
         cage: match &args.cage {
             Some(path) => RemoteCage::File(path),
             None => RemoteCage::Designed(&design),

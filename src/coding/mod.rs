@@ -12,7 +12,7 @@ mod steps;
 pub(crate) use cage_size::{CageSizes, FRAMES as CAGE_SIZE_FRAMES};
 pub(crate) use group::{Carried, CodedGroup, GroupCoder, Room};
 pub(crate) use meshes::RestMeshes;
-pub(crate) use model::GroupDecoder;
+pub(crate) use model::{GroupDecoder, GroupSpace};
 
 use cager_core::coordinates::CoordinatesError;
 use cager_proto::container;

@@ -3,12 +3,40 @@
 use super::CodingError;
 use cager_codec::{CageBasis, Error, Hierarchy, MOST_ROWS, Residual, decode_cages};
 use cager_core::cage::Cage;
-use cager_core::coordinates::CoordinateSystem;
+use cager_core::coordinates::{CoordinateSystem, ElementPlan};
 use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, Solver};
 use cager_core::mesh::Model;
 
-/// Decodes groups of frames: the basis of its cages, the order of its points, and its coordinates.
+/// What the numbers of groups mean: the basis of the model's cages, and the order of its points.
+pub(crate) struct GroupSpace {
+    basis: CageBasis,
+    hierarchy: Hierarchy,
+}
+
+impl GroupSpace {
+    /// For a rest pose and cage as a decoder reads them, and the elements that their coordinates are solved on, where these are a numerical solution.
+    ///
+    /// # Errors
+    /// More rows than can be coded; coordinates that cannot be computed.
+    pub(crate) fn new(
+        system: &dyn CoordinateSystem,
+        cage: &Cage,
+        rest: &Model,
+        plan: Option<&ElementPlan>,
+    ) -> Result<Self, CodingError> {
+        let rows = system.unknowns(cage);
+        if rows > MOST_ROWS {
+            return Err(CodingError::TooManyRows { rows, most: MOST_ROWS });
+        }
+        let basis = CageBasis::of(system, cage, &rest.points, plan, None)?;
+        let (basis, _) = basis.ok_or(CodingError::Uncountable { first: 0, last: 0 })?;
+        let hierarchy = Hierarchy::new(&rest.faces, rest.points.len());
+        Ok(Self { basis, hierarchy })
+    }
+}
+
+/// Decodes groups of frames of one model.
 pub(crate) struct GroupDecoder {
     pub(super) basis: CageBasis,
     pub(super) hierarchy: Hierarchy,
@@ -19,23 +47,21 @@ impl GroupDecoder {
     /// For a rest pose and cage as a decoder reads them, and the solver prepared with them.
     ///
     /// # Errors
-    /// More rows than can be coded; coordinates that cannot be computed.
+    /// As [`GroupSpace::new`].
     pub(crate) fn new(
         system: &dyn CoordinateSystem,
         cage: &Cage,
         rest: &Model,
         solver: &Solver,
     ) -> Result<Self, CodingError> {
-        let decoder = solver.decoder().clone();
-        let rows = decoder.unknowns();
-        if rows > MOST_ROWS {
-            return Err(CodingError::TooManyRows { rows, most: MOST_ROWS });
-        }
-        let plan = solver.preparation().plan.as_ref();
-        let basis = CageBasis::of(system, cage, &rest.points, plan, None)?;
-        let basis = basis.ok_or(CodingError::Uncountable { first: 0, last: 0 })?;
-        let hierarchy = Hierarchy::new(&rest.faces, rest.points.len());
-        Ok(Self { basis, hierarchy, decoder })
+        let space = GroupSpace::new(system, cage, rest, solver.preparation().plan.as_ref())?;
+        Ok(Self::in_space(space, solver))
+    }
+
+    /// With a space that was found while the solver was prepared.
+    pub(crate) fn in_space(space: GroupSpace, solver: &Solver) -> Self {
+        let GroupSpace { basis, hierarchy } = space;
+        Self { basis, hierarchy, decoder: solver.decoder().clone() }
     }
 
     pub(super) fn points(&self) -> usize {

@@ -1,7 +1,7 @@
 //! Files that do not belong together, or are not what their names say: noticed before the work, with the likely cause.
 
 use crate::refused::assert_sentence;
-use crate::support::{Dir, ENCODE, Small, as_model, npy, npy_f64, polygons, quad_box, read_frames};
+use crate::support::{Dir, ENCODE, Small, as_model, npy, npy_f64, quad_box, read_frames, split};
 use cager_core::mesh::{Model, Point, Polygons};
 
 /// Every point of every frame changed.
@@ -202,17 +202,6 @@ fn arrays_with_their_axes_in_another_order_encode_as_if_they_had_the_usual_one()
     dir.write("frames.npy", npy("<f8", true, &format!("({frames}, {n}, 3)"), &fortran));
     dir.cager(&format!("{ENCODE} --report fortran.json")).succeeds();
     assert_eq!(dir.json("fortran.json")["error"], dir.json("usual.json")["error"]);
-}
-
-/// Every face with corners of its own, as flat shading exports it; and the points that they came from.
-fn split(model: &Model) -> (Model, Vec<usize>) {
-    let mut faces = Vec::new();
-    let mut from = Vec::new();
-    for face in model.faces.iter() {
-        faces.push((from.len() as u32..(from.len() + face.len()) as u32).collect());
-        from.extend(face.iter().map(|&v| v as usize));
-    }
-    (Model { points: from.iter().map(|&v| model.points[v]).collect(), faces: polygons(faces) }, from)
 }
 
 #[test]

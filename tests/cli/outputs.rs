@@ -182,6 +182,10 @@ fn a_dry_run_says_what_would_be_written_and_writes_nothing() {
     let said = dry(&dir, &format!("{ENCODE_NEW} -o new.cager --report new.json"));
     assert!(said.contains("new.cager: ") && said.contains(&size) && said.contains("new.json: "), "{said}");
     assert!(dry(&dir, &format!("{ENCODE_NEW} -o new.cager --server http://127.0.0.1:9")).contains(&size));
+    let coded = dry(&dir, &format!("{ENCODE_NEW} -o new.cager --target-size 30000"));
+    assert!(coded.contains("20 frames, coded, 30.0 kB at the most"), "{coded}");
+    let coded = dry(&dir, &format!("{ENCODE_NEW} -o new.cager --max-error 0.01"));
+    assert!(coded.contains("20 frames, coded; "), "{coded}");
     let designed = ENCODE_NEW.replace(" --cage cage.obj", "");
     assert!(dry(&dir, &format!("{designed} -o new.cager")).contains("a cage would be designed"));
     assert!(dry(&dir, "decode out.cager -o new.npy").contains("20 frames of 600 points, about 144.0 kB"));

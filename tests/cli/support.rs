@@ -246,6 +246,17 @@ pub(crate) fn npy(kind: &str, fortran: bool, shape: &str, data: &[u8]) -> Vec<u8
     file
 }
 
+/// Every face with corners of its own, as flat shading exports it; and the points that they came from.
+pub(crate) fn split(model: &Model) -> (Model, Vec<usize>) {
+    let mut faces = Vec::new();
+    let mut from = Vec::new();
+    for face in model.faces.iter() {
+        faces.push((from.len() as u32..(from.len() + face.len()) as u32).collect());
+        from.extend(face.iter().map(|&v| v as usize));
+    }
+    (Model { points: from.iter().map(|&v| model.points[v]).collect(), faces: polygons(faces) }, from)
+}
+
 pub(crate) fn npy_f64(frames: &[Vec<f64>]) -> Vec<u8> {
     let data: Vec<u8> = frames.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
     npy("<f8", false, &format!("({}, {}, 3)", frames.len(), frames[0].len() / 3), &data)

@@ -1,7 +1,7 @@
 //! The service within a container's walls: no root, no capabilities, nothing to write but one folder.
 
 use crate::support::{FRAMES, Service, cager, ends_within, succeeds, write_capture};
-use cager::remote::{RemoteCage, RemoteJob, encode_remotely};
+use cager::remote::{RemoteCage, RemoteJob, encode_remotely, mesh_file};
 use cager_client::MemoryFrames;
 use cager_client::messages::SessionOptions;
 use rustix::process::{Pid, Signal, getuid, kill_process};
@@ -112,7 +112,7 @@ fn encode_through(address: &str, folder: &Path) {
     let job = RemoteJob {
         address,
         token: None,
-        rest: &folder.join("rest.obj"),
+        rest: mesh_file(&folder.join("rest.obj")).expect("a rest pose"),
         cage: RemoteCage::File(&folder.join("cage.obj")),
         matrix: None,
         frames: MemoryFrames::new(values.len() / 3 / FRAMES, values),

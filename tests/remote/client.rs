@@ -67,6 +67,13 @@ async fn cages_can_be_followed_decoded_and_downloaded() {
     dir.cager("decode there.cager -o decoded.npy").succeeds();
     let decoded: Vec<f32> = read_frames(&dir.path("decoded.npy"), points).concat().iter().map(|&x| x as f32).collect();
     assert_eq!(decoded, positions);
+    // The same model as if it were another one, and one that is none.
+    let rest = MeshFile::new("other.obj", dir.read("rest.obj"));
+    let moved = client.decode_model(id, &rest, &cages.concat()).await.expect("positions");
+    assert_eq!((moved.outside, moved.positions), (0, positions));
+    let none = MeshFile::new("other.obj", "v 0 0\n");
+    assert_eq!(client.decode_model(id, &none, &cages[0]).await.expect_err("no model").status(), Some(422));
+    assert!(client.decode_model(id, &rest, &[0.0; 7]).await.is_err());
 
     assert_eq!(client.sessions().await.expect("sessions").len(), 1);
     client.delete(id).await.expect("deleted");

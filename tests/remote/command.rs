@@ -1,7 +1,7 @@
 //! `cager encode --server`.
 
 use crate::server::{Server, capture};
-use crate::support::{Dir, ENCODE, Small, npy_f64, read_frames};
+use crate::support::{Dir, ENCODE, Small, npy_f64, read_frames, split};
 use serde_json::Value;
 
 /// A token and its SHA-256.
@@ -73,6 +73,24 @@ fn a_capture_in_doubles_is_sent_in_singles() {
 }
 
 #[test]
+fn seams_are_welded_before_anything_is_sent() {
+    let (dir, ..) = capture();
+    let server = Server::start(&dir);
+    let small = Small::new();
+    let (rest, from) = split(&small.rest);
+    dir.model("rest.obj", &rest);
+    let seamed = |frame: &Vec<f64>| from.iter().flat_map(|&v| [0, 1, 2].map(|k| frame[3 * v + k])).collect();
+    let frames: Vec<Vec<f64>> = small.frames.iter().map(seamed).collect();
+    let rounded: Vec<Vec<f64>> =
+        frames.iter().map(|frame| frame.iter().map(|&x| f64::from(x as f32)).collect()).collect();
+    dir.write("frames.npy", npy_f64(&rounded));
+    dir.cager(&format!("{ENCODE} --weld")).succeeds();
+    let here = dir.read("out.cager");
+    dir.cager(&format!("{ENCODE} --weld --server {}", server.address())).succeeds();
+    assert!(dir.read("out.cager") == here, "other bytes");
+}
+
+#[test]
 fn without_a_cage_the_service_designs_one_and_keeps_nothing_of_the_design() {
     let (dir, ..) = capture();
     let server = Server::start(&dir);
@@ -87,6 +105,11 @@ fn without_a_cage_the_service_designs_one_and_keeps_nothing_of_the_design() {
     // The container has the cage, so that it decodes without the service.
     dir.cager("decode out.cager -o decoded.npy").succeeds();
 
+    // For an error the number of vertices is found before, from the frames that are here.
+    let said = dir.cager(&format!("{encode} --max-error 0.05 --time-limit 1 --overwrite")).succeeds().stdout;
+    assert!(said.contains("vertices suit what is asked for"), "{said}");
+    assert!(dir.json("r.json")["cage_vertices"].as_u64().is_some_and(|vertices| vertices <= 80), "{said}");
+
     for (options, status, word) in [
         ("--mean-error -1", 1, "--mean-error: is -1"),
         ("--mean-error 0.01 --cage-vertices 60", 2, "cannot be used with"),
@@ -97,7 +120,7 @@ fn without_a_cage_the_service_designs_one_and_keeps_nothing_of_the_design() {
         assert_eq!(said.status, Some(status), "{options}");
         assert!(said.stderr.contains(word), "{options}: {}", said.stderr);
     }
-    assert_eq!((designs(&server), sessions(&server)), (0, 1));
+    assert_eq!((designs(&server), sessions(&server)), (0, 2));
 }
 
 #[tokio::main(flavor = "current_thread")]

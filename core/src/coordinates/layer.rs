@@ -186,6 +186,31 @@ pub(super) fn write_group(mut rows: MatMut<'_, f64>, start: usize, values: &[Lan
     }
 }
 
+/// What [`edge_logarithm`] gives.
+pub(super) struct EdgeLogarithm {
+    /// `∫ 1/|r|` along the edge, clamped on it.
+    pub(super) value: Lanes,
+    /// `a·b`.
+    pub(super) cosine: Lanes,
+}
+
+/// `∫ 1/|r|` along an edge of this length between `a` and `b`, each as seen from the point and followed by its distance.
+#[inline(always)]
+pub(super) fn edge_logarithm(a: &[Lanes; 4], b: &[Lanes; 4], length: f64) -> EdgeLogarithm {
+    let c = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let product = a[3] * b[3];
+    let far = a[3] + b[3];
+    let sum = far + Lanes::splat(length);
+    // |a||b| + a·b, free of cancellation between the ends as well: |a × b|² / (|a||b| − a·b).
+    let between = cosine.map(|c| if c < 0.0 { 1.0 } else { 0.0 });
+    let top = sum * sum * (between * (product - cosine) + between.map(|b| 1.0 - b));
+    let bottom = (between * dot(&c, &c) + between.map(|b| 1.0 - b) * (product + cosine)) * 2.0;
+    let least = top * (1.0 / LARGEST);
+    let bottom = bottom.zip(least, |a, b| if a < b { b } else { a });
+    EdgeLogarithm { value: ln_ratio(top, bottom, Lanes::splat(length) / far), cosine }
+}
+
 multiversion! {
     /// Potentials at one lane group, left in the scratch.
     pub(super) fn group_potentials(layers: &Layers, x: &[Lanes; 3], scratch: &mut Scratch) = group_potentials_generic;
@@ -204,20 +229,10 @@ fn group_potentials_generic(layers: &Layers, x: &[Lanes; 3], scratch: &mut Scrat
     }
     for (k, &([a, b], length)) in layers.edges.iter().enumerate() {
         let (a, b) = (&scratch.corners[a as usize], &scratch.corners[b as usize]);
-        let c = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-        let cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-        let product = a[3] * b[3];
-        let far = a[3] + b[3];
-        let sum = far + length;
-        // |a||b| + a·b, free of cancellation between the ends as well: |a × b|² / (|a||b| − a·b).
-        let between = cosine.map(|c| if c < 0.0 { 1.0 } else { 0.0 });
-        let top = sum * sum * (between * (product - cosine) + between.map(|b| 1.0 - b));
-        let bottom = (between * dot(&c, &c) + between.map(|b| 1.0 - b) * (product + cosine)) * 2.0;
-        let least = top * (1.0 / LARGEST);
-        let bottom = bottom.zip(least, |a, b| if a < b { b } else { a });
         let edge = &mut scratch.edges[k];
-        edge[0] = ln_ratio(top, bottom, Lanes::splat(length) / far);
-        edge[1] = cosine;
+        let logarithm = edge_logarithm(a, b, length);
+        edge[0] = logarithm.value;
+        edge[1] = logarithm.cosine;
     }
     for (f, face) in layers.faces.iter().enumerate() {
         let [v0, v1, v2] = face.vertices.map(|v| v as usize);

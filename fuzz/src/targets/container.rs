@@ -86,7 +86,7 @@ fn coded(header: &Header, rest: &Model, cage: &TriMesh) -> Vec<u8> {
     let mesh = TriMesh { vertices: coded_cage.mesh.points.clone(), triangles: coded_cage.mesh.faces.triangulated() };
     let checked = Cage::new(mesh.clone()).expect("a cage");
     let basis = CageBasis::of(&MeanValue, &checked, &coded_rest.mesh.points, None, None).expect("coordinates");
-    let basis = basis.expect("a basis");
+    let (basis, _) = basis.expect("a basis");
     let frames: Vec<Vec<f32>> =
         (0..5u8).map(|k| (0..12u8).map(|i| f32::from(i) * 0.1 + f32::from(k) * 0.05).collect()).collect();
     let views: Vec<&[f32]> = frames.iter().map(Vec::as_slice).collect();

@@ -9,7 +9,7 @@ use cager_codec::{
     CageBasis, Hierarchy, MOST_ROWS, Residual, decode_cages, decode_faces, decode_positions, is_rotated,
 };
 use cager_core::cage::Cage;
-use cager_core::coordinates::{self, ElementPlan, supports_definition};
+use cager_core::coordinates::{self, CoordinateSystem, Coordinates, ElementPlan, supports_definition};
 use cager_core::mesh::{Point, Polygons};
 use std::io::{Read, Seek};
 
@@ -18,8 +18,26 @@ use std::io::{Read, Seek};
 pub(super) struct Groups {
     basis: Option<CageBasis>,
     hierarchy: Option<Hierarchy>,
-    /// The residual decoded last, by its first frame.
-    residual: Option<(usize, Residual)>,
+    /// The residuals decoded last, each with the entry that it was read from.
+    residuals: Vec<(Entry, Residual)>,
+}
+
+/// What the basis of coded cages is computed from.
+struct Binding {
+    system: &'static dyn CoordinateSystem,
+    cage: Cage,
+    points: Vec<Point>,
+    plan: Option<ElementPlan>,
+    offset: u64,
+}
+
+impl Binding {
+    fn basis(&self, rotated: bool) -> Result<(CageBasis, Coordinates), Error> {
+        let corrupt = |what: String| Error::corrupt(self.offset, what);
+        CageBasis::of(self.system, &self.cage, &self.points, self.plan.as_ref(), Some(rotated))
+            .map_err(|e| corrupt(e.to_string()))?
+            .ok_or_else(|| corrupt("the coordinates have no basis".to_owned()))
+    }
 }
 
 /// The bytes of a section.
@@ -41,6 +59,14 @@ impl CodedSection {
         }
     }
 
+    fn is_rotated(&self) -> Result<bool, Error> {
+        is_rotated(&self.payload).map_err(|e| self.damaged(&e))
+    }
+
+    fn residual(&self, hierarchy: &Hierarchy, frames: u32, most: usize) -> Result<Residual, Error> {
+        Residual::decode(hierarchy, frames as usize, &self.payload, most).map_err(|e| self.damaged(&e))
+    }
+
     fn damaged(&self, error: &cager_codec::Error) -> Error {
         Error::corrupt(self.offset, error.to_string())
     }
@@ -55,7 +81,7 @@ impl<R: Read + Seek> ContainerReader<R> {
 
     fn coded_entry(&mut self, entry: Entry) -> Result<CodedSection, Error> {
         self.check_limit(entry)?;
-        Ok(CodedSection { offset: entry.offset, payload: self.payload(entry)? })
+        self.coded_payload(entry)
     }
 
     /// Faces are decoded before the positions that say how many points there can be.
@@ -66,9 +92,9 @@ impl<R: Read + Seek> ContainerReader<R> {
     /// The cages of a coded group, as the bytes of an uncoded one.
     pub(super) fn group(&mut self, entry: Entry) -> Result<Vec<u8>, Error> {
         let section = self.coded_entry(entry)?;
-        let rotated = is_rotated(&section.payload).map_err(|e| section.damaged(&e))?;
+        let rotated = section.is_rotated()?;
         if self.groups.basis.as_ref().is_none_or(|basis| basis.rotated() != rotated) {
-            self.groups.basis = Some(self.basis(&section, rotated)?);
+            self.groups.basis = Some(self.binding(entry.offset)?.basis(rotated)?.0);
         }
         let Some(basis) = &self.groups.basis else {
             return Err(Error::corrupt(entry.offset, "a group without a basis"));
@@ -78,7 +104,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         Ok(cages.iter().flatten().flat_map(|x| x.to_le_bytes()).collect())
     }
 
-    fn basis(&mut self, section: &CodedSection, rotated: bool) -> Result<CageBasis, Error> {
+    fn binding(&mut self, offset: u64) -> Result<Binding, Error> {
         let header = self.header().clone();
         let unsupported = |what: String| Error::UnknownSection(what);
         let Some(system) = coordinates::by_name(&header.coordinates) else {
@@ -87,16 +113,52 @@ impl<R: Read + Seek> ContainerReader<R> {
         if !supports_definition(header.coordinates_definition) {
             return Err(unsupported(format!("coordinates of definition {}", header.coordinates_definition)));
         }
-        let corrupt = |what: String| Error::corrupt(section.offset, what);
+        let corrupt = |what: String| Error::corrupt(offset, what);
         let points = self.rest()?.points;
         let cage = Cage::new(self.cage()?).map_err(|e| corrupt(e.to_string()))?;
         if system.unknowns(&cage) != header.rows_per_frame as usize || system.unknowns(&cage) > MOST_ROWS {
             return Err(corrupt(format!("a frame has {} rows", header.rows_per_frame)));
         }
         let plan = self.elements()?.map(ElementPlan::from_bytes);
-        CageBasis::of(system, &cage, &points, plan.as_ref(), Some(rotated))
-            .map_err(|e| corrupt(e.to_string()))?
-            .ok_or_else(|| corrupt("the coordinates have no basis".to_owned()))
+        Ok(Binding { system, cage, points, plan, offset })
+    }
+
+    /// Decodes what a frame of a coded file needs before its cage is read, the coordinates of the model beside the residual of its group: these are most
+    /// of the work, and each keeps a processor busy. The coordinates of all points, where the basis of the cages took them all.
+    ///
+    /// # Errors
+    /// A frame that does not exist; damage.
+    pub fn read_ahead(&mut self, frame: usize) -> Result<Option<Coordinates>, Error> {
+        let entry = self.chunk_of(frame)?;
+        if entry.header.codec != CODED {
+            return Ok(None);
+        }
+        let rotated = self.coded_entry(entry)?.is_rotated()?;
+        let binding = self.binding(entry.offset)?;
+        let rest = self.rest()?;
+        let residual = match self.residual_entry(frame) {
+            Some(entry) => Some((entry, self.coded_payload(entry)?)),
+            None => None,
+        };
+        let most = most_residual_numbers(self.file_bytes);
+        let (basis, residual) = rayon::join(
+            || binding.basis(rotated),
+            || {
+                residual.map(|(entry, section)| {
+                    let hierarchy = Hierarchy::new(&rest.faces, rest.points.len());
+                    let residual = section.residual(&hierarchy, entry.header.count, most)?;
+                    Ok::<_, Error>((hierarchy, (entry, residual)))
+                })
+            },
+        );
+        let (basis, coordinates) = basis?;
+        self.groups.basis = Some(basis);
+        if let Some(found) = residual {
+            let (hierarchy, residual) = found?;
+            self.groups.hierarchy = Some(hierarchy);
+            self.groups.residuals = vec![residual];
+        }
+        Ok(Some(coordinates).filter(|found| found.phi.nrows() == rest.points.len()))
     }
 
     /// Whether the file holds more of the positions than its cages say.
@@ -118,7 +180,7 @@ impl<R: Read + Seek> ContainerReader<R> {
             let first = entry.header.first as usize;
             let follows = |k: usize| frames[k] == frame + (k - done) && covers(&entry.header, frames[k]);
             let end = (done + 1..frames.len()).find(|&k| !follows(k)).unwrap_or(frames.len());
-            if let Some((_, residual)) = &self.groups.residual {
+            if let Some((_, residual)) = self.groups.residuals.iter().find(|(of, _)| of.offset == entry.offset) {
                 residual.add(frame - first, &mut positions[done..end]);
             }
             done = end;
@@ -126,35 +188,57 @@ impl<R: Read + Seek> ContainerReader<R> {
         Ok(())
     }
 
+    fn residual_entry(&self, frame: usize) -> Option<Entry> {
+        self.sections_of(tag::RESIDUAL).find(|entry| covers(&entry.header, frame))
+    }
+
     /// Decodes the residual of a frame's group, if there is one.
     pub(super) fn load_residual(&mut self, frame: usize) -> Result<Option<Entry>, Error> {
-        let found = self.sections_of(tag::RESIDUAL).find(|entry| covers(&entry.header, frame));
-        let Some(entry) = found else { return Ok(None) };
-        let first = entry.header.first as usize;
-        if self.groups.residual.as_ref().is_none_or(|(of, _)| *of != first) {
-            self.groups.residual = None;
-            self.groups.residual = Some((first, self.residual(entry)?));
+        let Some(entry) = self.residual_entry(frame) else { return Ok(None) };
+        if self.groups.residuals.iter().all(|(of, _)| of.offset != entry.offset) {
+            let end = |entry: &Entry| entry.header.first as usize + entry.header.count as usize;
+            // Who goes on from one group to the next is likely to read the one after it too, and two are decoded in the time of one.
+            let goes_on =
+                self.groups.residuals.last().is_some_and(|(last, _)| end(last) == entry.header.first as usize);
+            let after = self.residual_entry(end(&entry)).filter(|_| goes_on);
+            self.groups.residuals.clear();
+            let section = self.coded_payload(entry)?;
+            // Damage there is told when it is its turn.
+            let after = after.and_then(|entry| Some((entry, self.coded_payload(entry).ok()?)));
+            let most = most_residual_numbers(self.file_bytes);
+            let hierarchy = self.hierarchy()?;
+            let (residual, after) = rayon::join(
+                || section.residual(hierarchy, entry.header.count, most),
+                || after.and_then(|(of, section)| Some((of, section.residual(hierarchy, of.header.count, most).ok()?))),
+            );
+            self.groups.residuals.push((entry, residual?));
+            self.groups.residuals.extend(after);
         }
         Ok(Some(entry))
     }
 
-    fn residual(&mut self, entry: Entry) -> Result<Residual, Error> {
-        if self.groups.hierarchy.is_none() {
-            let rest = self.rest()?;
-            self.groups.hierarchy = Some(Hierarchy::new(&rest.faces, rest.points.len()));
-        }
-        let section = CodedSection { offset: entry.offset, payload: self.payload(entry)? };
-        let Some(hierarchy) = &self.groups.hierarchy else { return Err(Error::corrupt(entry.offset, "no mesh")) };
-        let most = most_residual_numbers(self.file_bytes);
-        Residual::decode(hierarchy, entry.header.count as usize, &section.payload, most)
-            .map_err(|e| section.damaged(&e))
+    fn hierarchy(&mut self) -> Result<&Hierarchy, Error> {
+        let made = match self.groups.hierarchy.take() {
+            Some(hierarchy) => hierarchy,
+            None => {
+                let rest = self.rest()?;
+                Hierarchy::new(&rest.faces, rest.points.len())
+            }
+        };
+        Ok(self.groups.hierarchy.insert(made))
+    }
+
+    fn coded_payload(&mut self, entry: Entry) -> Result<CodedSection, Error> {
+        Ok(CodedSection { offset: entry.offset, payload: self.payload(entry)? })
     }
 
     /// Reads every residual.
     pub(super) fn verify_residuals(&mut self) -> Result<(), Error> {
         let entries: Vec<Entry> = self.sections_of(tag::RESIDUAL).collect();
+        let most = most_residual_numbers(self.file_bytes);
         for entry in entries {
-            self.residual(entry)?;
+            let section = self.coded_payload(entry)?;
+            section.residual(self.hierarchy()?, entry.header.count, most)?;
         }
         Ok(())
     }

@@ -33,8 +33,10 @@ pub struct ContainerReader<R: Read + Seek> {
     pub(super) chunks: Vec<usize>,
     pub(super) frames: usize,
     pub(super) header: Header,
-    /// The chunk decoded last.
-    cached: Option<(usize, Vec<u8>)>,
+    /// The model, once it was decoded.
+    rest: Option<Model>,
+    /// The chunk decoded last, by its offset.
+    cached: Option<(u64, Vec<u8>)>,
     pub(super) groups: Groups,
     /// The last chunk that [`Self::is_intact`] could not read.
     damaged_chunk: Option<usize>,
@@ -105,6 +107,7 @@ impl<R: Read + Seek> ContainerReader<R> {
             chunks: Vec::new(),
             frames: 0,
             header: Header::default(),
+            rest: None,
             cached: None,
             groups: Groups::default(),
             damaged_chunk: None,
@@ -126,9 +129,17 @@ impl<R: Read + Seek> ContainerReader<R> {
     /// # Errors
     /// Damage.
     pub fn rest(&mut self) -> Result<Model, Error> {
+        if let Some(rest) = &self.rest {
+            return Ok(rest.clone());
+        }
         let faces = self.rest_faces()?;
         let points = self.positions(tag::REST_POINTS, &faces)?;
-        Ok(Model { points, faces })
+        let rest = Model { points, faces };
+        // Decoding takes several times as long as reading numbers that are there as they are.
+        if self.entry(tag::REST_POINTS)?.header.codec == CODED {
+            self.rest = Some(rest.clone());
+        }
+        Ok(rest)
     }
 
     fn rest_faces(&mut self) -> Result<Polygons, Error> {
@@ -190,20 +201,24 @@ impl<R: Read + Seek> ContainerReader<R> {
         entry.map(|entry| self.raw(entry)).transpose()
     }
 
+    pub(super) fn chunk_of(&self, frame: usize) -> Result<Entry, Error> {
+        if frame >= self.frames {
+            return Err(Error::NoSuchFrame { frame, frames: self.frames });
+        }
+        let chunk = self.chunks.partition_point(|&k| self.entries[k].header.first as usize <= frame) - 1;
+        Ok(self.entries[self.chunks[chunk]])
+    }
+
     /// The stored rows of one frame, rows × 3. In any order; consecutive frames are fastest.
     ///
     /// # Errors
     /// A frame that does not exist; damage.
     pub fn read_frame(&mut self, frame: usize, out: &mut Vec<f32>) -> Result<(), Error> {
-        if frame >= self.frames {
-            return Err(Error::NoSuchFrame { frame, frames: self.frames });
-        }
-        let chunk = self.chunks.partition_point(|&k| self.entries[k].header.first as usize <= frame) - 1;
-        let entry = self.entries[self.chunks[chunk]];
-        if self.cached.as_ref().is_none_or(|(cached, _)| *cached != chunk) {
+        let entry = self.chunk_of(frame)?;
+        if self.cached.as_ref().is_none_or(|(cached, _)| *cached != entry.offset) {
             self.cached = None;
             let raw = if entry.header.codec == CODED { self.group(entry)? } else { self.raw(entry)? };
-            self.cached = Some((chunk, raw));
+            self.cached = Some((entry.offset, raw));
         }
         let Some((_, raw)) = &self.cached else { return Err(Error::NoSuchFrame { frame, frames: self.frames }) };
         let bytes = 12 * self.header.rows_per_frame as usize;

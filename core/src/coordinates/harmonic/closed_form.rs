@@ -5,14 +5,13 @@
 //! coordinates α, β follow from those of lower degree and from integrals of R along the edges.
 
 use super::basis::{MAX_DEGREE, MAX_FUNCTIONS, functions, place};
-use super::potential::{INVERSE_4PI, Tables};
+use super::potential::Tables;
 use super::quadrature::GAUSS_6;
 use super::triangle::Triangle;
+use crate::coordinates::layer::{INVERSE_4PI, edge_logarithm};
 use crate::mesh::{self, Point};
-use crate::simd::{LANES, Lanes, angle, dot, ln_ratio};
+use crate::simd::{LANES, Lanes, angle, dot};
 
-/// Largest ratio whose logarithm is taken, at edges.
-const LARGEST: f64 = 1.329_227_995_784_916e36;
 /// Farther from an edge than so many of its lengths, integrals along it are taken by quadrature.
 const FAR_FROM_EDGE: f64 = 1.5;
 
@@ -37,17 +36,7 @@ fn edge_integrals(
     let across = a[0] * outward[0] + a[1] * outward[1] + a[2] * outward[2];
     let start = a[0] * along[0] + a[1] * along[1] + a[2] * along[2];
     let [ra, rb] = [a[3], b[3]];
-    let far = ra + rb;
-    let c = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    let cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let product = ra * rb;
-    let sum = far + Lanes::splat(length);
-    let between = cosine.map(|c| if c < 0.0 { 1.0 } else { 0.0 });
-    let top = sum * sum * (between * (product - cosine) + between.map(|b| 1.0 - b));
-    let bottom = (between * dot(&c, &c) + between.map(|b| 1.0 - b) * (product + cosine)) * 2.0;
-    let least = top * (1.0 / LARGEST);
-    let bottom = bottom.zip(least, |a, b| if a < b { b } else { a });
-    let l = ln_ratio(top, bottom, Lanes::splat(length) / far);
+    let l = edge_logarithm(a, b, length).value;
     let mut powers = [Lanes::ZERO; MAX_DEGREE];
     if degree == 0 {
         return EdgeIntegrals { powers, l, distance: across };

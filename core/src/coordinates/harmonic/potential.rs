@@ -6,6 +6,7 @@ use super::basis::{Basis, MAX_FUNCTIONS, functions};
 use super::closed_form::closed_form;
 use super::quadrature::Rule;
 use super::triangle::Triangle;
+use crate::coordinates::layer::INVERSE_4PI;
 use crate::simd::{LANES, Lanes, dot, multiversion};
 
 /// Farther from the centre than so many radii, a triangle's potentials are taken by quadrature,
@@ -39,8 +40,6 @@ multiversion! {
     pub(super) fn potentials(tables: &Tables, triangle: &Triangle, degree: usize, x: &[Lanes; 3], out: &mut [Lanes; MAX_FUNCTIONS])
         = potentials_generic;
 }
-
-pub(super) const INVERSE_4PI: f64 = 1.0 / (4.0 * std::f64::consts::PI);
 
 #[inline(always)]
 fn potentials_generic(
