@@ -34,10 +34,16 @@ export default defineConfig({
     testTimeout: 20_000,
     projects: [
       { extends: true, test: { name: 'unit', include: ['src/**/*.test.ts'] } },
-      // Each file starts a browser that draws in software: two at once wait for each other until they time out.
+      // One browser that draws in software, for all files: two at once would wait for each other until they time out.
       {
         extends: true,
-        test: { name: 'browser', include: ['tests/**/*.test.ts'], maxWorkers: 1, sequence: { groupOrder: 1 } },
+        test: {
+          name: 'browser',
+          include: ['tests/**/*.test.ts'],
+          maxWorkers: 1,
+          isolate: false,
+          sequence: { groupOrder: 1 },
+        },
       },
     ],
   },

@@ -27,6 +27,8 @@ export interface StaticPart {
   readonly rowsPerFrame: number;
   /** Frames per second, if the file or session says. */
   readonly frameRate: number | null;
+  /** How many of the most unstable directions of Φ kept the shape of the rest cage, as far as known. */
+  readonly spectrum?: number;
   /** Figures about the encoding (`Report` in proto/src/report.rs), as far as known. */
   readonly report: Readonly<Record<string, unknown>> | null;
   /** Boundary elements that harmonic coordinates were solved on (`ELEM` in docs/FORMAT.md), where the file has them. */
@@ -89,14 +91,28 @@ export interface LiveStatus {
   readonly droppedFrames: number;
 }
 
+/** Residual layers, which can be left out of blocks while a capture plays over a slow connection. */
+export interface ResidualLayers {
+  /** Whether blocks are read without their residual. Once that ends, those that were read so are read again: the capture fires `replaced`. */
+  leftOut: boolean;
+  /** Bytes that all of them take. */
+  readonly bytes: number;
+  /** Bytes per second that the capture was read at of late; null before it is known. */
+  readonly bytesPerSecond: number | null;
+}
+
 /** A capture that is being looked at, from a file, a finished session or one that is still running. */
 export interface Capture {
   readonly name: string;
+  /** The same whenever this capture is opened; what the browser keeps of it is found by this. */
+  identity?: string;
   readonly static: StaticPart;
   /** Number of frames known so far. */
   readonly frames: number;
   /** Bytes that all frames take in the container, residuals included, where these are known. */
-  readonly frameBytes?: number;
+  readonly frameBytes?: number | undefined;
+  /** Residual layers, where the capture has some. */
+  readonly residuals?: ResidualLayers | null;
   /** Whether no more frames will come. */
   readonly complete: boolean;
   /** Errors of the frames known so far; may be shorter than `frames`. */

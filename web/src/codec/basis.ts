@@ -5,6 +5,7 @@
 import { cholesky, multiply, solveTransposed, transposedTimesSelf } from './dense';
 import { eigenvectors } from './eigen';
 import { CodedDataError } from './error';
+import { GramMatrix } from './gram';
 
 /** ε over the mean of the diagonal of the Gram matrix. */
 const FLOOR = 1e-2;
@@ -12,8 +13,6 @@ const FLOOR = 1e-2;
 const SPLIT = 1e-3;
 /** Most points whose coordinates make the basis. */
 const SAMPLE = 1 << 14;
-/** Columns of Φ whose products are summed together. */
-const TILE = 4;
 
 /** Every how many points one is sampled. */
 export function sampleStride(points: number): number {
@@ -22,42 +21,18 @@ export function sampleStride(points: number): number {
 
 /** Sums up `ΦᵀΦ` of the sampled points, some of them at a time, and makes bases of it. */
 export class CageBasis {
-  private readonly gram: Float64Array;
-  private points = 0;
+  private readonly gram: GramMatrix;
   private factor: Float64Array | null = null;
   private readonly inverses = new Map<boolean, Float64Array>();
 
   /** For frames of so many rows. */
   constructor(private readonly rows: number) {
-    this.gram = new Float64Array(rows * rows);
+    this.gram = new GramMatrix(rows);
   }
 
   /** Adds the coordinates of some points, points × columns; columns beyond the stored rows are left out. */
   add(coordinates: Float64Array, columns: number): void {
-    const { rows, gram } = this;
-    const count = Math.floor(coordinates.length / columns);
-    this.points += count;
-    const width = Math.ceil(rows / TILE) * TILE;
-    // Column by column, zeros behind the last, so that products are of contiguous numbers and of whole tiles.
-    const byColumn = new Float64Array(width * count);
-    for (let p = 0; p < count; p++) {
-      for (let j = 0; j < rows; j++) {
-        byColumn[j * count + p] = coordinates[p * columns + j];
-      }
-    }
-    const sums = new Float64Array(TILE * TILE);
-    for (let i = 0; i < width; i += TILE) {
-      for (let j = 0; j <= i; j += TILE) {
-        tile(byColumn, count, i, j, sums);
-        for (let k = 0; k < TILE * TILE; k++) {
-          const row = i + Math.floor(k / TILE);
-          const column = j + (k % TILE);
-          if (row < rows && column <= row) {
-            gram[row * rows + column] += sums[k];
-          }
-        }
-      }
-    }
+    this.gram.add(coordinates, columns);
   }
 
   /**
@@ -79,7 +54,7 @@ export class CageBasis {
   /** L of `ΦᵀΦ/n + εI = L Lᵀ`. */
   private factorise(): Float64Array {
     const { rows } = this;
-    const scaled = this.gram.map((x) => x / Math.max(this.points, 1));
+    const scaled = this.gram.lower.map((x) => x / Math.max(this.gram.points, 1));
     let trace = 0;
     for (let k = 0; k < rows; k++) {
       trace += scaled[k * rows + k];
@@ -93,46 +68,6 @@ export class CageBasis {
       throw new CodedDataError('the coordinates have no basis');
     }
     return factor;
-  }
-}
-
-/** Products of columns i … i + 3 with columns j … j + 3, which are of so many numbers each. */
-function tile(byColumn: Float64Array, count: number, i: number, j: number, out: Float64Array): void {
-  const i0 = i * count;
-  const i1 = i0 + count;
-  const i2 = i1 + count;
-  const i3 = i2 + count;
-  for (let column = 0; column < TILE; column += 2) {
-    const ja = (j + column) * count;
-    const jb = ja + count;
-    let a0 = 0;
-    let a1 = 0;
-    let a2 = 0;
-    let a3 = 0;
-    let b0 = 0;
-    let b1 = 0;
-    let b2 = 0;
-    let b3 = 0;
-    for (let p = 0; p < count; p++) {
-      const ya = byColumn[ja + p];
-      const yb = byColumn[jb + p];
-      const x0 = byColumn[i0 + p];
-      const x1 = byColumn[i1 + p];
-      const x2 = byColumn[i2 + p];
-      const x3 = byColumn[i3 + p];
-      a0 += x0 * ya;
-      b0 += x0 * yb;
-      a1 += x1 * ya;
-      b1 += x1 * yb;
-      a2 += x2 * ya;
-      b2 += x2 * yb;
-      a3 += x3 * ya;
-      b3 += x3 * yb;
-    }
-    out.set([a0, b0], column);
-    out.set([a1, b1], TILE + column);
-    out.set([a2, b2], 2 * TILE + column);
-    out.set([a3, b3], 3 * TILE + column);
   }
 }
 

@@ -62,6 +62,18 @@ export class BlockCache {
     this.done.clear();
   }
 
+  /** Forgets all blocks, to load them anew; those that somebody waits for still come to them. */
+  forget(): void {
+    for (const [first, pending] of this.pending) {
+      if (pending.waiting === 0) {
+        this.giveUp(first, pending);
+      } else {
+        this.remove(first, pending);
+      }
+    }
+    this.done.clear();
+  }
+
   private start(first: number): Pending {
     const running = this.pending.get(first);
     if (running !== undefined) {
@@ -70,8 +82,9 @@ export class BlockCache {
     const abort = new AbortController();
     const promise = this.load(first, abort.signal).then(
       (block) => {
-        this.remove(first, pending);
-        this.keep(block);
+        if (this.remove(first, pending)) {
+          this.keep(block);
+        }
         return block;
       },
       (error: unknown) => {
@@ -91,10 +104,9 @@ export class BlockCache {
     pending.abort.abort();
   }
 
-  private remove(first: number, pending: Pending): void {
-    if (this.pending.get(first) === pending) {
-      this.pending.delete(first);
-    }
+  /** Whether it was still to be kept. */
+  private remove(first: number, pending: Pending): boolean {
+    return this.pending.get(first) === pending && this.pending.delete(first);
   }
 
   private keep(block: FrameBlock): void {

@@ -36,6 +36,7 @@ export async function decodeStatic(
     cage: await decodeCage(head, sections.get('CTRI')!, sections.get('CVTX')!, codec),
     rowsPerFrame: head.rowsPerFrame,
     frameRate: head.frameRate,
+    spectrum: head.spectrum,
     report: null,
     ...(elements === undefined ? {} : { elements: decodePayload(elements.entry, elements.payload) }),
   };

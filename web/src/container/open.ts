@@ -10,6 +10,7 @@ import { checkSize, type Chunk, type Layout } from './layout';
 import { decodePayload } from './codecs';
 import { decodeStatic, type Section, STATIC_TAGS, type StaticTag } from './meshes';
 import { readContents, readSections, scanSections } from './sectionReader';
+import { ContainerResiduals, MeteredSource } from './residuals';
 import { checkPrelude, type Entry, PRELUDE_BYTES } from './section';
 import { EndsCache, type Source } from './source';
 import { decodeErrors, decodeFrameNumbers, decodeReport, NO_ERRORS } from './tail';
@@ -41,7 +42,8 @@ export interface ContainerCapture extends Capture {
  */
 export async function openContainer(source: Source, options: OpenOptions = {}): Promise<ContainerCapture> {
   const { signal, name = 'capture.cager', coordinates = null } = options;
-  const ends = await EndsCache.of(source, FIRST_BYTES, LAST_BYTES, signal);
+  const metered = new MeteredSource(source);
+  const ends = await EndsCache.of(metered, FIRST_BYTES, LAST_BYTES, signal);
   checkPrelude(await ends.read(0, Math.min(PRELUDE_BYTES, source.size), signal));
   const { layout, problem } = await readLayout(ends, signal);
   const head = await readHead(ends, layout, signal);
@@ -58,7 +60,7 @@ export async function openContainer(source: Source, options: OpenOptions = {}): 
   const codec = options.codec ?? createCodec();
   try {
     const part = await readStatic(ends, layout, head, codec, signal);
-    const capture = new FileCapture(name, head, part, layout, ends, codec, coordinates, problem);
+    const capture = new FileCapture(name, head, part, layout, ends, metered, codec, coordinates, problem);
     await capture.readTail(signal);
     return capture;
   } catch (error) {
@@ -106,6 +108,7 @@ class FileCapture implements ContainerCapture {
   static: StaticPart;
   readonly frames: number;
   readonly frameBytes: number;
+  readonly residuals: ContainerResiduals | null;
   readonly complete = true;
   readonly events = new EventTarget();
   errors: FrameErrors = NO_ERRORS;
@@ -119,6 +122,7 @@ class FileCapture implements ContainerCapture {
     part: StaticPart,
     private readonly layout: Layout,
     private readonly source: Source,
+    metered: MeteredSource,
     private readonly codec: Codec,
     coordinates: CoordinatesOf | null,
     public problem: string | null,
@@ -126,6 +130,8 @@ class FileCapture implements ContainerCapture {
     this.static = part;
     this.frames = layout.frames;
     this.frameBytes = layout.frameBytes;
+    const { residualBytes } = layout;
+    this.residuals = residualBytes > 0 ? new ContainerResiduals(residualBytes, metered, () => this.readAgain()) : null;
     this.blocks = new BlockDecoder(part, codec, coordinates);
     this.cache = new BlockCache((first, signal) => this.load(first, signal));
   }
@@ -188,7 +194,8 @@ class FileCapture implements ContainerCapture {
   private async load(first: number, signal: AbortSignal): Promise<FrameBlock> {
     const { frames, residual } = this.layout.chunkOf(first)!;
     try {
-      const sections = await this.readChunk({ frames, residual }, signal);
+      const isLeftOut = residual !== null && this.residuals?.leaveOut() === true;
+      const sections = await this.readChunk({ frames, residual: isLeftOut ? null : residual }, signal);
       const { block, problem } = await this.blocks.decode(sections.frames, sections.residual, this.source.size, signal);
       if (problem !== null) {
         this.report(problem);
@@ -198,6 +205,11 @@ class FileCapture implements ContainerCapture {
       this.report(error);
       throw error;
     }
+  }
+
+  private readAgain(): void {
+    this.cache.forget();
+    this.events.dispatchEvent(new Event('replaced'));
   }
 
   /** Reads the sections of a chunk; frames whose residual is damaged are read without it. */

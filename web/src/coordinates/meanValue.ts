@@ -1,8 +1,8 @@
 import type { TriangleMesh } from '../capture';
-import { angle } from './angle';
+import { angle, halfAngleOverSine, SMALL_ANGLE_COSINE } from './angle';
 import { integratedWeights } from './meanValueIntegral';
 import { diagonalOf, topologyOf } from './topology';
-import { pointAt, type Vector } from './vector';
+import { dot, norm, pointAt, scaled, type Vector } from './vector';
 
 /** Fills one row of Φ, the coordinates of the point (x, y, z), into `out` from `offset` on. */
 export type RowOf = (x: number, y: number, z: number, out: Float64Array, offset: number) => void;
@@ -31,28 +31,25 @@ export function meanValueRows(cage: TriangleMesh): RowOf {
   const nearVertex = VERTEX_TOLERANCE * diagonalOf(positions);
   const directions = new Float64Array(3 * vertices);
   const nearness = new Float64Array(vertices);
-  // Of each edge ½ θ n, and the factor that turns it into u_a × u_b.
+  // Of each edge u_a × u_b, and the factor that turns it into ½ θ n.
   const edgeTerms = new Float64Array(4 * edgeCount);
 
   function face(first: number, x: Vector, total: number): [number, number, number] {
-    const g = [0, 1, 2].map((i): Vector => {
+    const product = [0, 1, 2].map((i): Vector => {
       const [e, sign] = [4 * triangleEdges[first + i], signs[first + i]];
       return [sign * edgeTerms[e], sign * edgeTerms[e + 1], sign * edgeTerms[e + 2]];
     });
-    const back = [0, 1, 2].map((i) => edgeTerms[4 * triangleEdges[first + i] + 3]);
+    const g = product.map((v, i) => scaled(v, edgeTerms[4 * triangleEdges[first + i] + 3]));
     const near = [0, 1, 2].map((i) => nearness[triangles[first + i]]);
-    const mean = [0, 1, 2].map((k) => g[0][k] + g[1][k] + g[2][k]);
-    const u = 3 * triangles[first];
-    const det = (directions[u] * g[0][0] + directions[u + 1] * g[0][1] + directions[u + 2] * g[0][2]) * back[0];
-    const squares = (v: readonly number[]) => v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-    const loss2 = (squares(g[0]) + squares(g[1])) / (det * det);
-    if (Math.sqrt(squares(mean)) < LARGE && isInaccurate(loss2, Math.max(near[0], near[1], near[2]), total)) {
+    const mean: Vector = [g[0][0] + g[1][0] + g[2][0], g[0][1] + g[1][1] + g[2][1], g[0][2] + g[1][2] + g[2][2]];
+    const det = dot(pointAt(directions, triangles[first]), product[0]);
+    const loss2 = (dot(g[0], g[0]) + dot(g[1], g[1])) / (det * det);
+    if (norm(mean) < LARGE && isInaccurate(loss2, Math.max(near[0], near[1], near[2]), total)) {
       const corners = [0, 1, 2].map((i) => pointAt(positions, triangles[first + i]));
       const weights = integratedWeights([corners[0], corners[1], corners[2]], x);
       return [weights[0] / near[0], weights[1] / near[1], weights[2] / near[2]];
     }
-    const numerator = (i: number) => (mean[0] * g[i][0] + mean[1] * g[i][1] + mean[2] * g[i][2]) * back[i];
-    const numerators: [number, number, number] = [numerator(0), numerator(1), numerator(2)];
+    const numerators: [number, number, number] = [dot(mean, product[0]), dot(mean, product[1]), dot(mean, product[2])];
     const weights: [number, number, number] = [numerators[0] / det, numerators[1] / det, numerators[2] / det];
     // On the face itself only the ratios of the weights count.
     return weights.every(Number.isFinite)
@@ -102,8 +99,16 @@ export function meanValueRows(cage: TriangleMesh): RowOf {
       const cx = ay * bz - az * by;
       const cy = az * bx - ax * bz;
       const cz = ax * by - ay * bx;
-      const s = Math.sqrt(cx * cx + cy * cy + cz * cz);
+      const square = cx * cx + cy * cy + cz * cz;
       const t = ax * bx + ay * by + az * bz;
+      edgeTerms[4 * k] = cx;
+      edgeTerms[4 * k + 1] = cy;
+      edgeTerms[4 * k + 2] = cz;
+      if (t > SMALL_ANGLE_COSINE) {
+        edgeTerms[4 * k + 3] = halfAngleOverSine(square);
+        continue;
+      }
+      const s = Math.sqrt(square);
       if (s < EDGE_TOLERANCE && t < 0) {
         const toA = 1 / nearness[a / 3];
         const toB = 1 / nearness[b / 3];
@@ -112,13 +117,7 @@ export function meanValueRows(cage: TriangleMesh): RowOf {
         out[offset + b / 3] = toA / (toA + toB);
         return;
       }
-      const theta = angle(s, t);
-      const regular = theta * s > 0;
-      const half = regular ? (0.5 * theta) / s : 0.5;
-      edgeTerms[4 * k] = cx * half;
-      edgeTerms[4 * k + 1] = cy * half;
-      edgeTerms[4 * k + 2] = cz * half;
-      edgeTerms[4 * k + 3] = regular ? (2 * s) / theta : 2;
+      edgeTerms[4 * k + 3] = (0.5 * angle(s, t)) / s;
     }
     // The largest square of what the determinant of a face amplifies rounding by.
     let loss2 = 1;
@@ -126,32 +125,32 @@ export function meanValueRows(cage: TriangleMesh): RowOf {
       const e0 = 4 * triangleEdges[f];
       const e1 = 4 * triangleEdges[f + 1];
       const e2 = 4 * triangleEdges[f + 2];
-      const s0 = signs[f];
-      const s1 = signs[f + 1];
-      const s2 = signs[f + 2];
-      const g0x = s0 * edgeTerms[e0];
-      const g0y = s0 * edgeTerms[e0 + 1];
-      const g0z = s0 * edgeTerms[e0 + 2];
-      const g1x = s1 * edgeTerms[e1];
-      const g1y = s1 * edgeTerms[e1 + 1];
-      const g1z = s1 * edgeTerms[e1 + 2];
-      const g2x = s2 * edgeTerms[e2];
-      const g2y = s2 * edgeTerms[e2 + 1];
-      const g2z = s2 * edgeTerms[e2 + 2];
-      const mx = g0x + g1x + g2x;
-      const my = g0y + g1y + g2y;
-      const mz = g0z + g1z + g2z;
+      const h0 = signs[f] * edgeTerms[e0 + 3];
+      const h1 = signs[f + 1] * edgeTerms[e1 + 3];
+      const h2 = signs[f + 2] * edgeTerms[e2 + 3];
+      const c0x = edgeTerms[e0];
+      const c0y = edgeTerms[e0 + 1];
+      const c0z = edgeTerms[e0 + 2];
+      const c1x = edgeTerms[e1];
+      const c1y = edgeTerms[e1 + 1];
+      const c1z = edgeTerms[e1 + 2];
+      const c2x = edgeTerms[e2];
+      const c2y = edgeTerms[e2 + 1];
+      const c2z = edgeTerms[e2 + 2];
+      const mx = h0 * c0x + h1 * c1x + h2 * c2x;
+      const my = h0 * c0y + h1 * c1y + h2 * c2y;
+      const mz = h0 * c0z + h1 * c1z + h2 * c2z;
       const v0 = triangles[f];
       const v1 = triangles[f + 1];
       const v2 = triangles[f + 2];
-      const back0 = edgeTerms[e0 + 3];
-      const det = (directions[3 * v0] * g0x + directions[3 * v0 + 1] * g0y + directions[3 * v0 + 2] * g0z) * back0;
-      const inverse = 1 / det;
-      const own = (g0x * g0x + g0y * g0y + g0z * g0z + g1x * g1x + g1y * g1y + g1z * g1z) * inverse * inverse;
+      const inverse =
+        signs[f] / (directions[3 * v0] * c0x + directions[3 * v0 + 1] * c0y + directions[3 * v0 + 2] * c0z);
+      const squares = h0 * h0 * (c0x * c0x + c0y * c0y + c0z * c0z) + h1 * h1 * (c1x * c1x + c1y * c1y + c1z * c1z);
+      const own = squares * inverse * inverse;
       if (own > loss2) loss2 = own;
-      out[offset + v0] += (mx * g0x + my * g0y + mz * g0z) * back0 * inverse * nearness[v0];
-      out[offset + v1] += (mx * g1x + my * g1y + mz * g1z) * edgeTerms[e1 + 3] * inverse * nearness[v1];
-      out[offset + v2] += (mx * g2x + my * g2y + mz * g2z) * edgeTerms[e2 + 3] * inverse * nearness[v2];
+      out[offset + v0] += signs[f] * (mx * c0x + my * c0y + mz * c0z) * inverse * nearness[v0];
+      out[offset + v1] += signs[f + 1] * (mx * c1x + my * c1y + mz * c1z) * inverse * nearness[v1];
+      out[offset + v2] += signs[f + 2] * (mx * c2x + my * c2y + mz * c2z) * inverse * nearness[v2];
     }
     let total = 0;
     let nearest = 0;

@@ -9,6 +9,9 @@ const SLICE_ENTRIES = 1 << 17;
 /** More workers hardly help: the rows have to be copied into one array. */
 const MOST_WORKERS = 8;
 
+/** Milliseconds between reports: drawing each of them would take the processor from the computation. */
+const REPORT_EVERY = 200;
+
 /** What a computation of Φ reports and heeds. */
 export interface ComputeOptions {
   readonly signal?: AbortSignal;
@@ -34,7 +37,7 @@ export async function computePhi(capture: StaticPart, options: ComputeOptions = 
   const workers = Array.from({ length: count }, startWorker);
   try {
     await new Promise<void>((resolve, reject) => {
-      let [sent, done] = [0, 0];
+      let [sent, done, reported] = [0, 0, performance.now()];
       const sendNext = (worker: Worker) => {
         if (sent >= slices) return;
         const first = sent++ * slice;
@@ -49,7 +52,10 @@ export async function computePhi(capture: StaticPart, options: ComputeOptions = 
           }
           phi.set(data.rows, data.first * columns);
           done++;
-          onProgress?.(done / slices);
+          if (performance.now() - reported >= REPORT_EVERY) {
+            reported = performance.now();
+            onProgress?.(done / slices);
+          }
           if (done === slices) resolve();
           else sendNext(worker);
         };

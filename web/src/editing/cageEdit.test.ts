@@ -1,9 +1,11 @@
 import { describe, expect, it } from 'vitest';
 import type { FrameBlock } from '../capture';
 import { editedBlock, editedRows, fitted, weightAt, type CageEdit } from './cageEdit';
+import type { Motion } from './motion';
 
 const range = { first: 4, last: 12, easeIn: 3, easeOut: 2 };
-const edit: CageEdit = { id: 1, vertices: [1], offsets: Float64Array.of(0, 0, 0, 1, 2, 3), range, enabled: true };
+const grip = { chosen: [1], own: Float64Array.of(0, 1), mirror: null };
+const edit: CageEdit = { id: 1, grip, motion: { kind: 'move', by: [1, 2, 3] }, range, enabled: true };
 
 describe('the range of an edit', () => {
   it('comes in, stays whole and goes out without a jump, and touches no other frame', () => {
@@ -52,6 +54,21 @@ describe('edited frames', () => {
     expect([...editedRows(rows, 8, [edit, { ...edit, id: 2 }])]).toEqual([0, 0, 0, 2, 4, 6]);
   });
 
+  it('are rotated and scaled about the pivot that the chosen vertices have in each frame, and eased along the arc', () => {
+    const both = { chosen: [0, 1], own: Float64Array.of(1, 1), mirror: null };
+    const turned = (motion: Motion, frame: number, rows: Float32Array) =>
+      [...editedRows(rows, frame, [{ ...edit, grip: both, motion }])].map((x) => Number(x.toFixed(6)) + 0);
+    const half: Motion = { kind: 'rotate', rotation: [0, 0, 1, 0] };
+    expect(turned(half, 8, Float32Array.of(0, 0, 0, 2, 0, 0))).toEqual([2, 0, 0, 0, 0, 0]);
+    expect(turned(half, 8, Float32Array.of(5, 5, 1, 5, 9, 1))).toEqual([5, 9, 1, 5, 5, 1]);
+    const eased = turned(half, 12, Float32Array.of(-1, 0, 0, 1, 0, 0));
+    expect(Math.hypot(eased[3], eased[4])).toBeCloseTo(1, 5);
+    expect(Math.atan2(eased[4], eased[3])).toBeCloseTo(Math.PI * weightAt(range, 12), 5);
+    const larger: Motion = { kind: 'scale', factors: [4, 1, 1] };
+    expect(turned(larger, 8, Float32Array.of(0, 0, 0, 2, 1, 0))).toEqual([-3, 0, 0, 5, 1, 0]);
+    expect(turned(larger, 12, Float32Array.of(-1, 0, 0, 1, 0, 0))[3]).toBeCloseTo(4 ** weightAt(range, 12), 5);
+  });
+
   it('leave the block as it was, and have no residual', () => {
     const residual = {
       rank: 0,
@@ -67,6 +84,6 @@ describe('edited frames', () => {
     expect(edited.residual).toBeNull();
     for (let k = 0; k < 3; k++) expect(edited.cages[6 * k + 4]).toBeCloseTo(2 * weightAt(range, 3 + k), 6);
     expect(editedBlock(block, [], { rowsPerFrame: 2 })).toBe(block);
-    expect(editedBlock(block, [{ ...edit, offsets: new Float64Array(6) }], { rowsPerFrame: 2 })).toBe(block);
+    expect(editedBlock(block, [{ ...edit, motion: { kind: 'move', by: [0, 0, 0] } }], { rowsPerFrame: 2 })).toBe(block);
   });
 });

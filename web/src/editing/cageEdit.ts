@@ -1,4 +1,6 @@
 import type { FrameBlock, StaticPart } from '../capture';
+import { displace, type Grip } from './grip';
+import { isIdentity, type Motion } from './motion';
 
 /** Frames that an edit is kept over, counted from 0, both ends included. */
 export interface FrameRange {
@@ -10,13 +12,13 @@ export interface FrameRange {
   readonly easeOut: number;
 }
 
-/** Displacements of cage vertices over a range of frames. */
+/** A motion of cage vertices, kept over a range of frames. */
 export interface CageEdit {
   readonly id: number;
-  /** Vertices that were moved by hand; others follow by falloff and symmetry. */
-  readonly vertices: readonly number[];
-  /** What is added to each vertex of the cage where the edit is whole, x y z each in the capture's unit. */
-  readonly offsets: Float64Array;
+  /** Vertices that were chosen, and those that follow. */
+  readonly grip: Grip;
+  /** What happens to them where the edit is whole. */
+  readonly motion: Motion;
   readonly range: FrameRange;
   /** Whether it counts. */
   readonly enabled: boolean;
@@ -40,20 +42,21 @@ export function fitted(range: FrameRange, frames: number): FrameRange {
   return { first, last, easeIn, easeOut: whole(range.easeOut, last - first - easeIn) };
 }
 
-/** Adds edits to the rows of a frame, `rowsPerFrame × 3`, whose first rows are the cage's vertices. Rows that no edit changes come back as they are. */
+/**
+ * Does edits, one after another, to the rows of a frame, `rowsPerFrame × 3`, whose first rows are the cage's vertices. Rows that no edit changes come back
+ * as they are.
+ */
 export function editedRows(rows: Float32Array, frame: number, edits: readonly CageEdit[]): Float32Array {
-  let sums: Float64Array | null = null;
-  for (const { offsets, range, enabled } of edits) {
+  let edited: Float64Array | null = null;
+  for (const { grip, motion, range, enabled } of edits) {
     const weight = enabled ? weightAt(range, frame) : 0;
-    if (weight === 0) continue;
-    sums ??= Float64Array.from(rows);
-    for (let k = 0; k < offsets.length; k++) sums[k] += weight * offsets[k];
+    if (weight > 0) displace((edited ??= Float64Array.from(rows)), grip, motion, weight);
   }
-  return sums === null ? rows : Float32Array.from(sums);
+  return edited === null ? rows : Float32Array.from(edited);
 }
 
 /**
- * A block with edits added to its cages; the block itself stays as it is. A residual belongs to the cages as they were captured, so that a capture
+ * A block whose cages are edited; the block itself stays as it is. A residual belongs to the cages as they were captured, so that a capture
  * with edits has none in any frame, as `cager edit` writes it.
  */
 export function editedBlock(
@@ -73,8 +76,8 @@ export function editedBlock(
 }
 
 /** Whether an edit changes anything. */
-export function counts({ enabled, offsets }: CageEdit): boolean {
-  return enabled && offsets.some((x) => x !== 0);
+export function counts({ enabled, motion }: CageEdit): boolean {
+  return enabled && !isIdentity(motion);
 }
 
 function smoothstep(t: number): number {

@@ -1,13 +1,19 @@
 import { html, nothing } from 'lit';
 import type { Player } from '../viewer/player';
 import { counts, weightAt, type FrameRange } from './cageEdit';
+import { EditKeeper } from './editKeeper';
 import type { CageEditor } from './editor';
+import './keptOffer';
+
+/** What the timeline shows before there is an edit: a strip without a range. */
+const NO_FRAMES: FrameRange = { first: 0, last: -1, easeIn: 0, easeOut: 0 };
 
 /** What edit mode needs of the viewer around it. */
 export interface EditHost extends HTMLElement {
   readonly player: Player | null;
   readonly renderRoot: HTMLElement | DocumentFragment;
   requestUpdate(): void;
+  readonly updateComplete: Promise<boolean>;
   report(problem: string): void;
 }
 
@@ -17,8 +23,17 @@ export class EditMode {
   editor: CageEditor | null = null;
   /** Whether the cage was shown before. */
   private showedCage = false;
+  private keeper: EditKeeper | null = null;
 
-  constructor(private readonly host: EditHost) {}
+  constructor(private readonly host: EditHost) {
+    host.addEventListener('rangechange', (event) => this.setRange((event as CustomEvent<FrameRange>).detail));
+    host.addEventListener('rangeend', () => this.editor?.model.endStep());
+  }
+
+  /** To be called with every capture that is shown: looks for edits of it that were left. */
+  open(player: Player) {
+    this.keeper = new EditKeeper(player, () => this.host.requestUpdate());
+  }
 
   /** Part of a narrow picture's height that the panel takes, as its style says. */
   get panelShare(): number {
@@ -35,9 +50,9 @@ export class EditMode {
     return this.editor?.model.edits.some((edit) => counts(edit) && weightAt(edit.range, frame) > 0) ?? false;
   }
 
-  /** The range of the edit that is worked on. */
+  /** The range of the edit that is worked on; without frames where there is no such edit, null while nothing is edited. */
   get range(): FrameRange | null {
-    return this.isOn ? (this.editor?.model.active?.range ?? null) : null;
+    return this.isOn ? (this.editor?.model.active?.range ?? NO_FRAMES) : null;
   }
 
   /** Begins to edit, or ends it: what was edited stays in the picture. */
@@ -48,7 +63,7 @@ export class EditMode {
       this.isOn = false;
       this.editor?.hide();
       if (!this.showedCage) player.layers = { ...player.layers, cage: false };
-      this.host.requestUpdate();
+      await this.relayout();
       return;
     }
     try {
@@ -66,16 +81,31 @@ export class EditMode {
     player.layers = { ...player.layers, cage: true };
     this.editor.show();
     player.stage.canvas.focus({ preventScroll: true });
-    this.host.requestUpdate();
+    await this.relayout();
   }
 
-  /** The editor's panel. */
+  /** The editor's panel, and edits from before. */
   panel(name: string) {
+    return html`${this.offer()}${this.controls(name)}`;
+  }
+
+  private offer() {
+    const { keeper } = this;
+    if (!keeper?.offer) return nothing;
+    return html`<cager-kept-offer
+      .kept=${keeper.offer}
+      @takeup=${() => void this.takeUp()}
+      @throwaway=${() => keeper.throwAway()}
+    ></cager-kept-offer>`;
+  }
+
+  private controls(name: string) {
     if (!this.isOn || !this.editor) return nothing;
     const report = (event: CustomEvent<string>) => this.host.report(event.detail);
     return html`<cager-edit-panel
       .editor=${this.editor}
       .name=${name}
+      .keeping=${this.keeper?.keeping ?? 'kept'}
       @leave=${this.leave}
       @problem=${report}
     ></cager-edit-panel>`;
@@ -96,10 +126,11 @@ export class EditMode {
     if (this.isOn) this.editor?.recolor();
   }
 
-  /** Forgets the capture and its edits. */
+  /** Forgets the capture, and its edits once they are kept. */
   close() {
+    this.keeper?.close();
     this.editor?.dispose();
-    this.editor = null;
+    this.keeper = this.editor = null;
     this.isOn = false;
   }
 
@@ -107,5 +138,26 @@ export class EditMode {
     if (this.isOn) void this.toggle();
   };
 
-  private readonly follow = () => this.host.requestUpdate();
+  private readonly follow = () => {
+    if (this.editor) this.keeper?.note(this.editor.model.edits);
+    this.host.requestUpdate();
+  };
+
+  private async takeUp() {
+    if (!this.isOn) await this.toggle();
+    if (this.editor && this.keeper) this.editor.model.takeUp(this.keeper.take());
+    this.host.requestUpdate();
+  }
+
+  private setRange(range: FrameRange) {
+    const { active } = this.editor?.model ?? {};
+    if (active) this.editor?.model.setRange(active.id, range, this.editor.player.capture.frames);
+  }
+
+  /** Renders twice: how high the timeline is shows after the first time. */
+  private async relayout() {
+    this.host.requestUpdate();
+    await this.host.updateComplete;
+    this.host.requestUpdate();
+  }
 }

@@ -1,9 +1,9 @@
 import type { StaticPart } from '../capture';
 import { fitted, weightAt, type CageEdit, type FrameRange } from './cageEdit';
 import { CageGraph, type FalloffMeasure } from './falloff';
-import { Grip } from './grip';
+import { gripOf, weightsOf, type Grip } from './grip';
 import { History } from './history';
-import type { Vector } from './projection';
+import { combined, type Motion, type MotionKind } from './motion';
 import { AXES, mirrorOf, type Axis, type Mirror } from './symmetry';
 
 /** Frames that a new edit is kept over: the one that is shown, some around it with easing, or all. */
@@ -38,7 +38,7 @@ export class EditModel {
   private readonly madeWith = new Map<number, string>();
   private lastId = 0;
   private steps = 0;
-  private gripOf: { readonly key: string; readonly grip: Grip } | null = null;
+  private lastGrip: { readonly key: string; readonly grip: Grip } | null = null;
 
   /** @param diagonal length of the rest pose's diagonal, in the capture's unit */
   constructor(
@@ -90,45 +90,58 @@ export class EditModel {
   activate(id: number | null): void {
     this.shownId = id;
     const edit = this.active;
-    if (edit) this.selection = edit.vertices;
+    if (edit) this.selection = edit.grip.chosen;
     else this.onChange();
   }
 
   /** How much each vertex takes part when the chosen ones move. */
   get weights(): Float64Array {
-    return this.grip().weights;
+    return weightsOf(this.grip());
   }
 
   /**
-   * Begins to move the chosen vertices, seen in a frame where they follow wholly. What it returns moves them by a vector in the capture's unit, counted
-   * from where they are now, as often as it is called; all of it is one step.
+   * Begins to move, rotate or scale the chosen vertices, seen in a frame where they follow wholly. What it returns does so, counted from how they are now,
+   * as often as it is called; all of it is one step.
    *
    * @param step continues the step of this name, if the last change was one of it
    */
-  move(frame: number, frames: number, step = `move ${++this.steps}`): (by: Vector) => void {
+  begin(kind: MotionKind, frame: number, frames: number, step = `drag ${++this.steps}`): (motion: Motion) => void {
     const key = this.key();
     const grip = this.grip();
-    const vertices = this.chosen;
     const before = this.edits;
     const { active } = this;
-    const continued =
-      active?.enabled && this.madeWith.get(active.id) === key && weightAt(active.range, frame) === 1 ? active : null;
+    const isContinued =
+      active?.enabled &&
+      active.motion.kind === kind &&
+      this.madeWith.get(active.id) === key &&
+      weightAt(active.range, frame) === 1;
+    const continued = isContinued ? active : null;
     const id = continued?.id ?? ++this.lastId;
     const range = continued?.range ?? rangeAround(frame, frames, this.settings.reach);
     this.madeWith.set(id, key);
-    return (by) => {
-      const offsets = grip.offsets(by);
-      continued?.offsets.forEach((x, k) => (offsets[k] += x));
-      const edit: CageEdit = { id, vertices, offsets, range, enabled: true };
+    return (motion) => {
+      const whole = continued ? combined(continued.motion, motion) : motion;
+      const edit: CageEdit = { id, grip, motion: whole, range, enabled: true };
       const next = continued ? before.map((other) => (other.id === id ? edit : other)) : [...before, edit];
       this.shownId = id;
       this.change(next, step);
     };
   }
 
-  /** Sets the range of an edit; settings of the same range that follow each other are one step. */
+  /** Sets the range of an edit; settings of the same range that follow each other are one step, until it is ended. */
   setRange(id: number, range: FrameRange, frames: number): void {
     this.replace(id, { range: fitted(range, frames) }, `range ${id}`);
+  }
+
+  /** Ends a step: the next change is one of its own. */
+  endStep(): void {
+    this.history.endStep();
+  }
+
+  /** Takes up edits that were made before, below those there are; that can be undone. */
+  takeUp(edits: readonly CageEdit[]): void {
+    const earlier = edits.map((edit) => ({ ...edit, id: ++this.lastId }));
+    this.change([...earlier, ...this.edits], null);
   }
 
   setEnabled(id: number, enabled: boolean): void {
@@ -181,15 +194,15 @@ export class EditModel {
 
   private grip(): Grip {
     const key = this.key();
-    if (this.gripOf?.key !== key) {
+    if (this.lastGrip?.key !== key) {
       const { radius, measure, symmetry } = this.choices;
       const mirror = (symmetry && this.mirrors.get(symmetry)) ?? null;
-      this.gripOf = {
+      this.lastGrip = {
         key,
-        grip: new Grip(this.graph, this.chosen, { radius: radius * this.diagonal, measure, mirror }),
+        grip: gripOf(this.graph, this.chosen, { radius: radius * this.diagonal, measure, mirror }),
       };
     }
-    return this.gripOf.grip;
+    return this.lastGrip.grip;
   }
 }
 

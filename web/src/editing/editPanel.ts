@@ -8,6 +8,9 @@ import type { CageEditor } from './editor';
 import type { EditSettings, Reach } from './editModel';
 import { exportEdited, obstacle, type ExportKind } from './exporter';
 import { drawing } from './drawings';
+import type { Keeping } from './keptEdits';
+import { TOOL_KEYS } from './keys';
+import type { MotionKind } from './motion';
 import { AXES, type Axis } from './symmetry';
 
 /** Largest radius of the falloff, as a fraction of the rest pose's diagonal. */
@@ -16,6 +19,12 @@ const REACHES: readonly (readonly [Reach, string])[] = [
   ['frame', 'This frame'],
   ['around', 'Around it'],
   ['all', 'All frames'],
+];
+
+const TOOLS: readonly (readonly [MotionKind, string])[] = [
+  ['move', 'Move'],
+  ['rotate', 'Rotate'],
+  ['scale', 'Scale'],
 ];
 
 /**
@@ -31,6 +40,8 @@ export class EditPanel extends LitElement {
   @property({ attribute: false }) editor!: CageEditor;
   /** What exported files are named after. */
   @property() name = 'capture';
+  /** Whether the edits are there after a reload. */
+  @property() keeping: Keeping = 'kept';
   @state() private exporting: { kind: ExportKind; fraction: number; stop: AbortController } | null = null;
   private readonly refresh = () => this.requestUpdate();
 
@@ -59,7 +70,7 @@ export class EditPanel extends LitElement {
       </header>
       <p class="visually-hidden" role="status">${said}</p>
       <div class="body">
-        ${this.selectionRow()} ${this.settingRows(model.settings)}
+        ${this.selectionRow()} ${this.toolRow()} ${this.settingRows(model.settings)}
         <h3>Edits</h3>
         ${
           edits.length === 0
@@ -72,8 +83,9 @@ export class EditPanel extends LitElement {
         <details>
           <summary>Mouse and keys</summary>
           <p>
-            Drag a vertex, an arrow or a square. Shift and a click add a vertex, Shift and a drag choose all in a box. A
-            click beside the cage chooses none.
+            Drag a vertex, an arrow, a square or a ring. Shift and a click add a vertex, Shift and a drag choose all in
+            a box; Shift while a ring or an arrow is dragged goes by steps of 15° or a tenth. A click beside the cage
+            chooses none.
           </p>
           <dl>
             ${KEYS.map(
@@ -108,6 +120,30 @@ export class EditPanel extends LitElement {
       </button>
       <button ?disabled=${selection.length === 0} @click=${() => this.editor.select([])}>None</button>
     </div>`;
+  }
+
+  private toolRow() {
+    const { editor } = this;
+    const isAlone = editor.model.selection.length === 1 && editor.model.settings.radius === 0;
+    return html`<div class="segments tools" role="group" aria-label="What is done to them">
+        ${TOOLS.map(
+          ([tool, label]) =>
+            html`<button
+              aria-pressed=${editor.tool === tool}
+              title=${`${label} (${TOOL_KEYS[tool].toUpperCase()})`}
+              @click=${() => (editor.tool = tool)}
+            >
+              ${label}
+            </button>`,
+        )}
+      </div>
+      ${
+        isAlone && editor.tool !== 'move'
+          ? html`<p class="muted">
+              A single vertex is its own pivot: choose several, or set a falloff, so that others turn about it.
+            </p>`
+          : nothing
+      }`;
   }
 
   private settingRows(settings: EditSettings) {
@@ -174,6 +210,18 @@ export class EditPanel extends LitElement {
     const { static: part } = this.editor.player.capture;
     const isCoded = (part.report?.coding as { residual_step?: number } | undefined)?.residual_step !== undefined;
     return html`${
+      this.keeping === 'kept'
+        ? nothing
+        : html`<p class="muted">
+            ${
+              this.keeping === 'large'
+                ? 'These edits take too much room to be kept in the browser'
+                : 'This browser keeps nothing for this page'
+            }:
+            export them before you leave it.
+          </p>`
+    }
+    ${
       part.system === 'green-free'
         ? html`<p class="muted">
             Normals of this cage are stored beside its vertices and stay as they were captured: the model follows a
@@ -259,8 +307,9 @@ const KEYS = [
   ['Enter', 'choose the vertex in the middle'],
   ['Tab', 'the next vertex; with Shift the one before'],
   ['Alt ←', 'the vertex on the left; so in every direction'],
-  ['← ↑', 'move it; with Shift farther'],
-  ['Page ↑', 'move it away; Page ↓ nearer'],
+  ['Q R U', 'move, rotate, scale'],
+  ['← ↑', 'do so; with Shift farther'],
+  ['Page ↑', 'away or clockwise; Page ↓ back'],
   ['Esc', 'choose none; then done'],
 ] as const;
 

@@ -86,6 +86,9 @@ export const editPanelStyle = css`
   .segments {
     display: flex;
   }
+  .tools {
+    margin-top: var(--cager-space-2);
+  }
   .segments button {
     flex: 1 1 auto;
     padding: 0 4px;

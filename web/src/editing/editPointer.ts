@@ -1,5 +1,7 @@
 import type { CageEditor } from './editor';
-import { constraintAt, draggedBy, type Constraint } from './gizmo';
+import { constraintAt, type Constraint } from './gizmo';
+import { motionOf } from './gizmoDrag';
+import type { Motion, MotionKind } from './motion';
 import { vertexAt, verticesWithin, type Rectangle } from './picking';
 import type { Vector } from './projection';
 
@@ -20,7 +22,15 @@ interface Held {
 
 /** A press of the pointer and what becomes of it. */
 type Gesture =
-  | (Held & { readonly kind: 'move'; constraint: Constraint; move: ((by: Vector) => void) | null; at: Vector })
+  | (Held & {
+      readonly kind: 'drag';
+      readonly tool: MotionKind;
+      readonly constraint: Constraint;
+      readonly at: Vector;
+      /** Angle, factor or length; null before anything has moved. */
+      amount: number | null;
+      act: ((motion: Motion) => void) | null;
+    })
   | (Held & { readonly kind: 'band'; toX: number; toY: number })
   | (Held & { readonly kind: 'outside' });
 
@@ -56,7 +66,13 @@ export class EditPointer {
 
   /** What of the gizmo is pointed at or dragged. */
   get constraint(): Constraint | null {
-    return this.gesture?.kind === 'move' ? this.gesture.constraint : this.pointed;
+    return this.gesture?.kind === 'drag' ? this.gesture.constraint : this.pointed;
+  }
+
+  /** The angle or the factor of the drag that goes on; null where there is none. */
+  get amount(): { readonly kind: MotionKind; readonly amount: number } | null {
+    const { gesture } = this;
+    return gesture?.kind === 'drag' && gesture.amount !== null ? { kind: gesture.tool, amount: gesture.amount } : null;
   }
 
   /** The box that is drawn to choose what is in it. */
@@ -85,10 +101,14 @@ export class EditPointer {
     if (adds && vertex >= 0) {
       this.editor.select(selection.includes(vertex) ? selection.filter((v) => v !== vertex) : [...selection, vertex]);
     } else if (constraint) {
-      this.gesture = { ...held, kind: 'move', constraint, move: null, at: this.editor.middle() };
+      const { tool } = this.editor;
+      this.gesture = { ...held, kind: 'drag', tool, constraint, at: this.editor.middle(), amount: null, act: null };
     } else if (vertex >= 0) {
       if (!selection.includes(vertex)) this.editor.select([vertex]);
-      this.gesture = { ...held, kind: 'move', constraint: { kind: 'picture' }, move: null, at: this.editor.middle() };
+      // A vertex itself is always moved: it is its own pivot.
+      const constraint = { kind: 'picture' } as const;
+      const at = this.editor.middle();
+      this.gesture = { ...held, kind: 'drag', tool: 'move', constraint, at, amount: null, act: null };
     } else if (event.shiftKey) {
       this.gesture = { ...held, kind: 'band', toX: x, toY: y };
     } else {
@@ -117,12 +137,15 @@ export class EditPointer {
       this.editor.draw();
       return;
     }
-    if (!this.editor.projection || (!gesture.move && Math.hypot(x - gesture.x, y - gesture.y) < SLACK)) return;
-    if (!gesture.move) this.editor.settle();
-    gesture.move ??= this.editor.model.move(this.editor.frame, this.editor.player.transport.frames);
-    const [dx, dy, dz] = draggedBy(this.editor.projection, gesture.at, gesture.constraint, gesture, { x, y });
-    const { diagonal } = this.editor.model;
-    gesture.move([dx * diagonal, dy * diagonal, dz * diagonal]);
+    const { model, projection, frame, player } = this.editor;
+    if (!projection || (!gesture.act && Math.hypot(x - gesture.x, y - gesture.y) < SLACK)) return;
+    if (!gesture.act) this.editor.settle();
+    const { tool: kind, constraint, at } = gesture;
+    gesture.act ??= model.begin(kind, frame, player.transport.frames);
+    const drag = { kind, constraint, at, from: gesture, to: { x, y }, diagonal: model.diagonal };
+    const { motion, amount } = motionOf(projection, drag, gesture.amount ?? 0, event.shiftKey);
+    gesture.amount = amount;
+    gesture.act(motion);
   }
 
   private release(event: PointerEvent, isCancelled: boolean) {
@@ -142,9 +165,9 @@ export class EditPointer {
         ...verticesWithin(this.editor.places, rectangleOf({ ...gesture, toX: x, toY: y })),
       ]);
     }
-    if (gesture.kind === 'move' && gesture.move) {
+    if (gesture.kind === 'drag' && gesture.act) {
       if (isCancelled) this.editor.model.undo();
-      this.editor.sayMoved();
+      this.editor.sayChanged(gesture.tool);
     }
     this.editor.draw();
   }
@@ -161,7 +184,7 @@ export class EditPointer {
 
   /** Takes back what a pointer that is still down has done. */
   cancel() {
-    if (this.gesture?.kind === 'move' && this.gesture.move) this.editor.model.undo();
+    if (this.gesture?.kind === 'drag' && this.gesture.act) this.editor.model.undo();
     this.gesture = null;
     this.editor.draw();
   }

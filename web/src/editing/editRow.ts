@@ -2,12 +2,15 @@ import { html, nothing } from 'lit';
 import type { CageEdit, FrameRange } from './cageEdit';
 import { drawing } from './drawings';
 import type { CageEditor } from './editor';
+import { angleOf, type Motion } from './motion';
+import { degrees, timesAs } from './text';
 
 /** An edit in the list: whether it counts, its vertices and frames; of the one that is worked on, fields for its range. */
 export function editRow(editor: CageEditor, edit: CageEdit) {
   const { model } = editor;
-  const { id, vertices, range, enabled } = edit;
-  const name = vertices.length === 1 ? `Vertex ${vertices[0]}` : `${vertices.length} vertices`;
+  const { id, grip, motion, range, enabled } = edit;
+  const { chosen } = grip;
+  const name = chosen.length === 1 ? `Vertex ${chosen[0]}` : `${chosen.length} vertices`;
   const isActive = model.active?.id === id;
   const activate = () => model.activate(isActive ? null : id);
   return html`<li class=${isActive ? 'active' : nothing}>
@@ -19,7 +22,7 @@ export function editRow(editor: CageEditor, edit: CageEdit) {
         @change=${() => model.setEnabled(id, !enabled)}
       />
       <button class="quiet name" aria-expanded=${isActive} @click=${activate}>
-        <span>${name}</span>
+        <span>${name}<span class="muted">${amountOf(motion)}</span></span>
         <span class="muted figures">${range.first === range.last ? range.first : `${range.first}–${range.last}`}</span>
       </button>
       <button
@@ -33,6 +36,13 @@ export function editRow(editor: CageEditor, edit: CageEdit) {
     </div>
     ${isActive ? rangeFields(editor, edit) : nothing}
   </li>`;
+}
+
+/** How far an edit rotates or scales; nothing of one that moves. */
+function amountOf(motion: Motion): string {
+  if (motion.kind === 'rotate') return ` · ${degrees(angleOf(motion.rotation))}`;
+  if (motion.kind === 'scale') return ` · ${timesAs(motion.factors)}`;
+  return '';
 }
 
 function rangeFields({ model, player }: CageEditor, { id, range }: CageEdit) {

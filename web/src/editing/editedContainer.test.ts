@@ -15,10 +15,12 @@ const NAMES = ['definition3-mvc', 'definition3-green', 'definition3-green-free',
 const program = process.env.CAGER_BINARY;
 
 /** Moves a vertex in frame 1 of 3. */
-function editOf(vertices: number): CageEdit {
-  const offsets = new Float64Array(3 * vertices);
-  offsets.set([0.25, -0.5, 0.125], 15);
-  return { id: 1, vertices: [5], offsets, range: { first: 1, last: 1, easeIn: 0, easeOut: 0 }, enabled: true };
+function editOf(vertices: number, x = 0.25): CageEdit {
+  const own = new Float64Array(vertices);
+  own[5] = 1;
+  const grip = { chosen: [5], own, mirror: null };
+  const range = { first: 1, last: 1, easeIn: 0, easeOut: 0 };
+  return { id: 1, grip, motion: { kind: 'move', by: [x, -0.5, 0.125] }, range, enabled: true };
 }
 
 async function written(name: string, edits: readonly CageEdit[]): Promise<Uint8Array<ArrayBuffer>> {
@@ -92,9 +94,7 @@ describe.each(NAMES)('%s, edited', (name) => {
 });
 
 it('refuses a vertex beyond single precision', async () => {
-  const edit = editOf(26);
-  edit.offsets[15] = 1e39;
-  await expect(written('definition3-mvc', [edit])).rejects.toThrow(/move it closer/);
+  await expect(written('definition3-mvc', [editOf(26, 1e39)])).rejects.toThrow(/move it closer/);
 });
 
 it('a copy without edits keeps errors and figures', async () => {

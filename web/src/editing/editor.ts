@@ -5,10 +5,13 @@ import { counts, editedRows } from './cageEdit';
 import { EditModel } from './editModel';
 import { EditPointer } from './editPointer';
 import { gizmoAt, type Gizmo } from './gizmo';
-import { keyCommand, type KeyCommand } from './keys';
+import { meanOf } from './grip';
+import { keyCommand, keyMotion, type KeyCommand } from './keys';
+import type { Motion, MotionKind } from './motion';
 import { drawOverlay, type OverlayColors } from './overlay';
 import { placedVertices, vertexAt, vertexTowards, type PlacedVertex } from './picking';
-import { Projection, plus, type Vector } from './projection';
+import { Projection, type Vector } from './projection';
+import { degrees, timesAs } from './text';
 
 /** What the editor needs of the viewer around it. */
 export interface EditorHost extends HTMLElement {
@@ -18,6 +21,9 @@ export interface EditorHost extends HTMLElement {
 
 /** Milliseconds after which another press of an arrow key is a step of its own. */
 const PAUSE = 1200;
+
+/** What is said of vertices after something was done to them. */
+const DONE: Readonly<Record<MotionKind, string>> = { move: 'moved', rotate: 'rotated', scale: 'scaled' };
 
 /** Picks and moves vertices of a cage in the picture of a player, by pointer and by keys. */
 export class CageEditor extends EventTarget {
@@ -35,6 +41,7 @@ export class CageEditor extends EventTarget {
   private readonly pointer: EditPointer;
   private colors: OverlayColors | null = null;
   private lastKey = { step: 0, time: -Infinity };
+  private chosenTool: MotionKind = 'move';
 
   constructor(
     private readonly host: EditorHost,
@@ -58,6 +65,18 @@ export class CageEditor extends EventTarget {
     player.setFrameEdit(null);
   }
 
+  /** What arrows, rings and keys do to the chosen vertices. */
+  get tool(): MotionKind {
+    return this.chosenTool;
+  }
+
+  set tool(tool: MotionKind) {
+    this.chosenTool = tool;
+    const words = { move: 'Move', rotate: 'Rotate', scale: 'Scale' } as const;
+    this.say(`${words[tool]}.`);
+    this.draw();
+  }
+
   /** The frame that vertices are moved in. */
   get frame(): number {
     return Math.round(this.player.transport.position);
@@ -71,9 +90,9 @@ export class CageEditor extends EventTarget {
     this.projection = new Projection(stage.clipMatrix.elements, clientWidth, clientHeight);
     this.places = placedVertices(this.projection, stage.cageVertices, this.model.graph.cage.triangles);
     const { selection } = this.model;
-    this.gizmo = selection.length > 0 ? gizmoAt(this.projection, this.middle()) : null;
+    this.gizmo = selection.length > 0 ? gizmoAt(this.projection, this.middle(), this.tool) : null;
     this.colors ??= this.readColors();
-    const { hovered, constraint, band } = this.pointer;
+    const { hovered, constraint, band, amount } = this.pointer;
     const state = {
       vertices: this.places,
       selection: new Set(selection),
@@ -82,6 +101,7 @@ export class CageEditor extends EventTarget {
       gizmo: this.gizmo,
       constraint,
       band,
+      label: amount && labelOf(amount),
     };
     drawOverlay(this.canvas, state, this.colors);
   }
@@ -152,28 +172,25 @@ export class CageEditor extends EventTarget {
         if (next >= 0) this.select([next]);
         break;
       }
+      case 'tool':
+        this.tool = command.tool;
+        break;
       case 'nudge':
         this.nudge(command);
     }
   }
 
-  private nudge({ right, up, away, pixels }: KeyCommand & { kind: 'nudge' }) {
+  private nudge(command: KeyCommand & { kind: 'nudge' }) {
     if (!this.projection) return;
     this.settle();
     const now = performance.now();
     if (now - this.lastKey.time > PAUSE) this.lastKey.step++;
     this.lastKey.time = now;
-    const at = this.middle();
-    const axes = this.projection.axes(at);
-    const way = plus(plus(plus([0, 0, 0], axes.right, right), axes.up, up), axes.away, away);
-    const length = pixels * this.projection.unitsPerPixel(at) * this.model.diagonal;
-    const { frames } = this.player.transport;
-    this.model.move(
-      this.frame,
-      frames,
-      `key ${this.lastKey.step} ${this.frame}`,
-    )([way[0] * length, way[1] * length, way[2] * length]);
-    this.sayMoved();
+    const { model, tool, frame } = this;
+    const step = `key ${tool} ${this.lastKey.step} ${frame}`;
+    const motion: Motion = keyMotion(tool, command, this.projection, this.middle(), model.diagonal);
+    model.begin(tool, frame, this.player.transport.frames, step)(motion);
+    this.sayChanged(tool);
   }
 
   /** Chooses vertices and says so. */
@@ -182,9 +199,9 @@ export class CageEditor extends EventTarget {
     this.say(this.model.selection.length === 0 ? 'No vertex is chosen.' : `${this.named()} chosen.`);
   }
 
-  /** Tells screen readers that the chosen vertices were moved. */
-  sayMoved() {
-    this.say(`${this.named()} moved in frame ${this.frame}.`);
+  /** Tells screen readers what was done to the chosen vertices. */
+  sayChanged(how: MotionKind) {
+    this.say(`${this.named()} ${DONE[how]} in frame ${this.frame}.`);
   }
 
   /** Tells screen readers what was done. */
@@ -211,10 +228,7 @@ export class CageEditor extends EventTarget {
 
   /** The middle of the chosen vertices, in the scene's unit. */
   middle(): Vector {
-    const { cageVertices } = this.player.stage;
-    const { selection } = this.model;
-    const mean = (k: number) => selection.reduce((sum, v) => sum + cageVertices[3 * v + k], 0) / selection.length;
-    return [mean(0), mean(1), mean(2)];
+    return meanOf(this.player.stage.cageVertices, this.model.selection);
   }
 
   private nearestToMiddle(): number {
@@ -239,4 +253,10 @@ export class CageEditor extends EventTarget {
     const axes = [color('bad'), color('good'), color('accent')] as const;
     return { vertex: color('cage'), chosen: color('accent'), outline: color('stage'), axes };
   }
+}
+
+/** What is written beside the gizmo while it is dragged; nothing of lengths, which the picture shows. */
+function labelOf({ kind, amount }: { readonly kind: MotionKind; readonly amount: number }): string | null {
+  if (kind === 'move') return null;
+  return kind === 'rotate' ? degrees(amount) : timesAs([amount, amount, amount]);
 }

@@ -1,6 +1,8 @@
 import { describe, expect, it } from 'vitest';
 import { CageGraph, falloffWeights } from './falloff';
-import { Grip } from './grip';
+import { displace, gripOf, type Grip } from './grip';
+import { rotationAbout, type Motion } from './motion';
+import type { Vector } from './projection';
 import { mirrorOf } from './symmetry';
 
 /** A row of squares along x, bent to a U, whose ends are near each other in space and far on the surface. */
@@ -21,6 +23,13 @@ function strip(): CageGraph {
 }
 
 const graph = strip();
+/** How far each vertex of the rest cage goes. */
+const displacements = (grip: Grip, motion: Motion) => {
+  const rows = Float64Array.from(graph.cage.positions);
+  displace(rows, grip, motion, 1);
+  return rows.map((x, k) => x - graph.cage.positions[k]);
+};
+const moved = (grip: Grip, by: Vector) => displacements(grip, { kind: 'move', by });
 const alone = { radius: 0, measure: 'surface', mirror: null } as const;
 
 describe('falloff', () => {
@@ -57,20 +66,36 @@ describe('symmetry', () => {
 
   it('moves the partner the mirrored way, and keeps what is on the plane on it', () => {
     const mirror = mirrorOf(graph, 'x');
-    const offsets = new Grip(graph, [0], { ...alone, mirror }).offsets([0.5, 0.25, -1]);
+    const offsets = moved(gripOf(graph, [0], { ...alone, mirror }), [0.5, 0.25, -1]);
     expect([...offsets.slice(0, 3)]).toEqual([0.5, 0.25, -1]);
     expect([...offsets.slice(42, 45)]).toEqual([-0.5, 0.25, -1]);
     const across = mirrorOf(graph, 'z');
-    const shared = new Grip(graph, [2, 3], { ...alone, mirror: across }).offsets([1, 0, 1]);
+    const shared = moved(gripOf(graph, [2, 3], { ...alone, mirror: across }), [1, 0, 1]);
     expect([...shared.slice(6, 12)]).toEqual([1, 0, 0, 1, 0, 0]);
   });
 
   it('is mirrored in all vertices that follow', () => {
     const mirror = mirrorOf(graph, 'x');
-    const offsets = new Grip(graph, [0], { radius: 2.5, measure: 'surface', mirror }).offsets([1, 2, 3]);
+    const offsets = moved(gripOf(graph, [0], { radius: 2.5, measure: 'surface', mirror }), [1, 2, 3]);
     for (let v = 0; v < graph.vertices; v++) {
       const other = mirror.partner[v];
       [-1, 1, 1].forEach((sign, k) => expect(offsets[3 * other + k]).toBeCloseTo(sign * offsets[3 * v + k], 12));
+    }
+  });
+
+  it('mirrors rotations and scalings too', () => {
+    const grip = gripOf(graph, [0, 1, 2, 3], { radius: 0, measure: 'surface', mirror: mirrorOf(graph, 'x') });
+    const motions: Motion[] = [
+      { kind: 'rotate', rotation: rotationAbout([1, 2, 3], 0.7) },
+      { kind: 'scale', factors: [2, 0.5, 1.5] },
+    ];
+    for (const motion of motions) {
+      const ways = displacements(grip, motion);
+      expect(Math.hypot(...ways)).toBeGreaterThan(0.1);
+      for (const v of [0, 1, 2, 3]) {
+        const other = grip.mirror!.chosen[v];
+        [-1, 1, 1].forEach((sign, k) => expect(ways[3 * other + k]).toBeCloseTo(sign * ways[3 * v + k], 12));
+      }
     }
   });
 });

@@ -1,4 +1,4 @@
-import type { Constraint, Gizmo } from './gizmo';
+import { OUTER_RING, type Constraint, type Gizmo, type Ring } from './gizmo';
 import type { PlacedVertex, Rectangle } from './picking';
 
 /** Colours as canvases take them. */
@@ -22,6 +22,8 @@ export interface OverlayState {
   /** What of the gizmo is pointed at or dragged. */
   readonly constraint: Constraint | null;
   readonly band: Rectangle | null;
+  /** How far the drag goes, in words. */
+  readonly label: string | null;
 }
 
 const [SMALLEST_DOT, LARGEST_DOT] = [1.9, 4.5];
@@ -41,6 +43,7 @@ export function drawOverlay(canvas: HTMLCanvasElement, state: OverlayState, colo
   context.clearRect(0, 0, width, height);
   drawVertices(context, state, colors);
   if (state.gizmo) drawGizmo(context, state.gizmo, state.constraint, colors);
+  if (state.gizmo && state.label !== null) drawLabel(context, state.gizmo, state.label, colors);
   if (state.band) drawBand(context, state.band, colors);
 }
 
@@ -76,13 +79,14 @@ function dotSize(vertices: readonly (PlacedVertex | null)[]): number {
 
 function drawGizmo(
   context: CanvasRenderingContext2D,
-  { middle, arrows, squares }: Gizmo,
+  { kind: tool, middle, arrows, squares, rings }: Gizmo,
   constraint: Constraint | null,
   colors: OverlayColors,
 ): void {
-  const isHeld = (kind: Constraint['kind'], axis?: number) =>
-    constraint?.kind === kind && (axis === undefined || (constraint as { axis?: number }).axis === axis);
+  const isHeld = (kind: Constraint['kind'], axis: number | null = null) =>
+    constraint?.kind === kind && (axis === null || (constraint as { axis?: number }).axis === axis);
   context.lineJoin = context.lineCap = 'round';
+  for (const ring of rings) drawRing(context, ring, isHeld(ring.axis === null ? 'picture' : 'axis', ring.axis), colors);
   for (const { axis, corners, opacity } of squares) {
     if (opacity === 0) continue;
     context.globalAlpha = opacity * (isHeld('plane', axis) ? 0.85 : 0.4);
@@ -112,19 +116,55 @@ function drawGizmo(
       context.moveTo(from.x, from.y);
       context.lineTo(neck.x, neck.y);
       context.stroke();
-      polygon(context, [
-        tip,
-        { x: neck.x - wing * uy, y: neck.y + wing * ux },
-        { x: neck.x + wing * uy, y: neck.y - wing * ux },
-      ]);
+      const [left, right] = [-1, 1].map((side) => ({ x: neck.x + side * wing * uy, y: neck.y - side * wing * ux }));
+      const across = (corner: { x: number; y: number }) => ({ x: corner.x + 11 * ux, y: corner.y + 11 * uy });
+      // What moves has a point, what scales a block.
+      polygon(context, tool === 'scale' ? [left, right, across(right), across(left)] : [tip, left, right]);
       context.lineWidth = extra;
       if (extra > 0) context.stroke();
       context.fill();
     }
   }
   context.globalAlpha = 1;
+  if (tool === 'rotate') return;
   ring(context, middle.x, middle.y, 11, colors.outline, 4);
   ring(context, middle.x, middle.y, 11, colors.chosen, isHeld('picture') ? 3 : 2);
+}
+
+/** A ring to rotate by; what of it is behind the middle is faint. */
+function drawRing(context: CanvasRenderingContext2D, { axis, points }: Ring, isHeld: boolean, colors: OverlayColors) {
+  const color = axis === null ? colors.chosen : colors.axes[axis];
+  const width = isHeld ? 4 : axis === null ? 1.75 : 2.5;
+  for (const [stroke, extra, isBehind] of [
+    [color, 0, true],
+    [colors.outline, 2.5, false],
+    [color, 0, false],
+  ] as const) {
+    context.globalAlpha = isBehind ? 0.22 : 1;
+    context.strokeStyle = stroke;
+    context.lineWidth = width + extra;
+    context.beginPath();
+    points.forEach((from, k) => {
+      const to = points[(k + 1) % points.length];
+      if (from.isBehind !== isBehind) return;
+      context.moveTo(from.x, from.y);
+      context.lineTo(to.x, to.y);
+    });
+    context.stroke();
+  }
+  context.globalAlpha = 1;
+}
+
+/** The angle or the factor above the gizmo. */
+function drawLabel(context: CanvasRenderingContext2D, { middle }: Gizmo, label: string, colors: OverlayColors) {
+  context.font = `600 14px ${getComputedStyle(context.canvas).fontFamily}`;
+  context.textAlign = 'center';
+  const [x, y] = [middle.x, middle.y - OUTER_RING - 12];
+  context.strokeStyle = colors.outline;
+  context.lineWidth = 4;
+  context.strokeText(label, x, y);
+  context.fillStyle = colors.chosen;
+  context.fillText(label, x, y);
 }
 
 function drawBand(context: CanvasRenderingContext2D, band: Rectangle, colors: OverlayColors): void {

@@ -1,7 +1,10 @@
 import { Matrix4, PerspectiveCamera } from 'three';
 import { describe, expect, it } from 'vitest';
-import { constraintAt, draggedBy, gizmoAt } from './gizmo';
-import { keyCommand } from './keys';
+import { constraintAt, gizmoAt, type Constraint } from './gizmo';
+import { motionOf, type Point } from './gizmoDrag';
+import { keyCommand, TOOL_KEYS } from './keys';
+import { angleOf } from './motion';
+import { SHORTCUTS } from '../viewer/shortcuts';
 import { placedVertices, vertexAt, verticesWithin, vertexTowards } from './picking';
 import { dot, length, minus, plus, Projection, type Vector } from './projection';
 
@@ -63,6 +66,12 @@ describe('picking', () => {
   });
 });
 
+/** The way of a drag of the gizmo, in the scene's unit. */
+function draggedBy(view: Projection, at: Vector, constraint: Constraint, from: Point, to: Point): Vector {
+  const { motion } = motionOf(view, { kind: 'move', constraint, at, from, to, diagonal: 1 });
+  return motion.kind === 'move' ? motion.by : [NaN, NaN, NaN];
+}
+
 describe('the gizmo', () => {
   const view = projection();
   const gizmo = gizmoAt(view, [0.1, 0.2, 0])!;
@@ -102,6 +111,72 @@ describe('the gizmo', () => {
   });
 });
 
+describe('rotating and scaling', () => {
+  const at: Vector = [0.1, 0.2, 0];
+  const view = projection([0.4, 0.3, 3]);
+  const drag = { at, diagonal: 1 } as const;
+
+  it('a drag around a ring that is seen from the front turns as far as the pointer does, beyond half a turn too', () => {
+    const about = { kind: 'axis', axis: 2 } as const;
+    const around = (angle: number) => view.place(plus(at, [0.3 * Math.cos(angle), 0.3 * Math.sin(angle), 0]))!;
+    let before = 0;
+    for (let angle = 0; angle < 4; angle += 0.5) {
+      const from = around(0);
+      before = motionOf(view, { ...drag, kind: 'rotate', constraint: about, from, to: around(angle) }, before).amount;
+      expect(before).toBeCloseTo(angle, 6);
+    }
+    const stepped = { ...drag, kind: 'rotate', constraint: about, from: around(0), to: around(0.5) } as const;
+    expect(motionOf(view, stepped, 0, true).amount).toBeCloseTo(Math.PI / 6, 9);
+  });
+
+  it('a ring that is seen from its edge is pulled along, the way its front goes', () => {
+    const gizmo = gizmoAt(view, at, 'rotate')!;
+    const { middle } = gizmo;
+    expect(constraintAt(gizmo, middle.x + 82, middle.y)).toEqual({ kind: 'picture' });
+    const from = { x: middle.x, y: middle.y + 6 };
+    const to = { x: from.x + 31, y: from.y };
+    const { motion, amount } = motionOf(view, {
+      ...drag,
+      kind: 'rotate',
+      constraint: { kind: 'axis', axis: 1 },
+      from,
+      to,
+    });
+    // About the axis upwards, what is in front goes to the right.
+    expect(amount).toBeCloseTo(0.5, 1);
+    expect(motion.kind === 'rotate' && motion.rotation[1]).toBeCloseTo(Math.sin(amount / 2), 9);
+    expect(motion.kind === 'rotate' && angleOf(motion.rotation)).toBeCloseTo(amount, 9);
+  });
+
+  it('rings are hidden where they are behind the middle, and one can be taken', () => {
+    const gizmo = gizmoAt(projection([2, 1.2, 2]), at, 'rotate')!;
+    expect(gizmo.rings.map(({ points }) => points.some(({ isBehind }) => isBehind))).toEqual([true, true, true, false]);
+    const { axis, points } = gizmo.rings[1];
+    const [front] = points.filter(({ isBehind }) => !isBehind);
+    expect(constraintAt(gizmo, front.x, front.y)).toEqual({ kind: 'axis', axis });
+  });
+
+  it('an arrow that is pulled to twice its distance doubles along its axis alone', () => {
+    const gizmo = gizmoAt(view, at, 'scale')!;
+    const constraint = { kind: 'axis', axis: 0 } as const;
+    const [from, to] = [0.2, 0.4].map((x) => view.place(plus(at, [x, 0, 0]))!);
+    const { motion, amount } = motionOf(view, { ...drag, kind: 'scale', constraint, from, to });
+    expect(amount).toBeCloseTo(2, 6);
+    expect(motion).toEqual({ kind: 'scale', factors: [amount, 1, 1] });
+    const back = motionOf(view, { ...drag, kind: 'scale', constraint, from, to: { x: -900, y: from.y } });
+    expect(back.amount).toBeGreaterThan(0);
+    const { middle } = gizmo;
+    const larger = motionOf(view, {
+      ...drag,
+      kind: 'scale',
+      constraint: { kind: 'picture' },
+      from: middle,
+      to: { x: middle.x + 120, y: middle.y },
+    });
+    expect(larger.motion).toEqual({ kind: 'scale', factors: [2, 2, 2] });
+  });
+});
+
 describe('keys', () => {
   const key = (name: string, more: Partial<KeyboardEvent> = {}) => ({
     key: name,
@@ -119,6 +194,12 @@ describe('keys', () => {
     expect(keyCommand(key('Z', { metaKey: true, shiftKey: true }), elsewhere)).toEqual({ kind: 'redo' });
     expect(keyCommand(key('ArrowLeft'), elsewhere)).toBeNull();
     expect(keyCommand(key('c', { ctrlKey: true }), elsewhere)).toBeNull();
+  });
+
+  it('choose what is done, with letters that do nothing else in the viewer', () => {
+    expect(keyCommand(key('R'), { ...chosen, hasSelection: false })).toEqual({ kind: 'tool', tool: 'rotate' });
+    const taken = SHORTCUTS.flatMap(({ entries }) => entries.flatMap(({ keys }) => keys));
+    expect(Object.values(TOOL_KEYS).filter((letter) => taken.includes(letter))).toEqual([]);
   });
 
   it('leave Tab to the page while nothing is chosen', () => {

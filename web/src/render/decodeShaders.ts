@@ -1,7 +1,8 @@
-import { WIDTH } from './packing';
+import { WIDTH, WIDTH_BITS } from './packing';
 
+const FAN_BITS = 11;
 /** Texels per row of the list of fans. */
-export const FAN_WIDTH = 2048;
+export const FAN_WIDTH = 1 << FAN_BITS;
 /** Triangles around one point that count for its normal: more would take a frame's time for a single point. */
 const MOST_TRIANGLES = 256;
 
@@ -18,35 +19,57 @@ export const coverVertexShader = `void main() {
   gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);
 }`;
 
+/** Where the products of Φ come from: integers or full floats that the shader multiplies, or products that the page has computed. */
+export type PositionSource = 'integers' | 'floats' | 'products';
+
+const products = {
+  integers: multiplied('isampler2DArray', 'weights *= abs(weights);'),
+  floats: multiplied('sampler2DArray', ''),
+  products: `
+uniform sampler2D products;
+vec3 product(ivec2 at) {
+  return texelFetch(products, at, 0).xyz;
+}`,
+} satisfies Record<PositionSource, string>;
+
 /**
- * P = Φ·C for the point of each texel. The texture \`cage\` has the x of columns 4k … 4k+3 in texel (k, 0), y in (k, 1) and z in (k, 2), relative to the
- * mean of the vertices; `origin` is that mean. Offsets are what a residual layer adds, of two frames.
+ * Φ·C for a texel. The texture `cage` has the x of columns 4k … 4k+3 in texel (k, 0), y in (k, 1) and z in (k, 2), relative to the mean of the
+ * vertices.
  */
-export function positionShader(compact: boolean): string {
-  return `${header}
-uniform ${compact ? 'isampler2DArray' : 'sampler2DArray'} phi;
+function multiplied(sampler: string, expand: string): string {
+  return `
+uniform ${sampler} phi;
 uniform float scale;
 uniform sampler2D cage;
-uniform sampler2D offsetsBefore;
-uniform sampler2D offsetsAfter;
-uniform vec2 offsetWeights;
-uniform vec3 origin;
 uniform int blocks;
 uniform int bandsPerLayer;
-out vec4 position;
-void main() {
-  ivec2 at = ivec2(gl_FragCoord.xy);
+vec3 product(ivec2 at) {
   int layer = at.y / bandsPerLayer;
   int first = (at.y - layer * bandsPerLayer) * blocks;
   vec3 sum = vec3(0.0);
   for (int k = 0; k < blocks; k++) {
     vec4 weights = vec4(texelFetch(phi, ivec3(at.x, first + k, layer), 0));
-    ${compact ? 'weights *= abs(weights);' : ''}
+    ${expand}
     sum.x += dot(weights, texelFetch(cage, ivec2(k, 0), 0));
     sum.y += dot(weights, texelFetch(cage, ivec2(k, 1), 0));
     sum.z += dot(weights, texelFetch(cage, ivec2(k, 2), 0));
   }
-  sum = sum * scale + origin;
+  return sum * scale;
+}`;
+}
+
+/** P = Φ·C for the point of each texel: `origin` is what the cage is relative to, offsets are what a residual layer adds, of two frames. */
+export function positionShader(source: PositionSource): string {
+  return `${header}
+uniform sampler2D offsetsBefore;
+uniform sampler2D offsetsAfter;
+uniform vec2 offsetWeights;
+uniform vec3 origin;
+out vec4 position;
+${products[source]}
+void main() {
+  ivec2 at = ivec2(gl_FragCoord.xy);
+  vec3 sum = product(at) + origin;
   if (offsetWeights.x != 0.0) sum += offsetWeights.x * texelFetch(offsetsBefore, at, 0).xyz;
   if (offsetWeights.y != 0.0) sum += offsetWeights.y * texelFetch(offsetsAfter, at, 0).xyz;
   position = vec4(sum, 1.0);
@@ -60,7 +83,7 @@ uniform usampler2D fanStarts;
 uniform usampler2D fans;
 out vec4 normal;
 vec3 place(uint point) {
-  return texelFetch(positions, ivec2(point % ${WIDTH}u, point / ${WIDTH}u), 0).xyz;
+  return texelFetch(positions, ivec2(point & ${WIDTH - 1}u, point >> ${WIDTH_BITS}), 0).xyz;
 }
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
@@ -69,7 +92,7 @@ void main() {
   uint end = range.x + min(range.y, ${MOST_TRIANGLES}u);
   vec3 sum = vec3(0.0);
   for (uint k = range.x; k < end; k++) {
-    uvec2 others = texelFetch(fans, ivec2(k % ${FAN_WIDTH}u, k / ${FAN_WIDTH}u), 0).xy;
+    uvec2 others = texelFetch(fans, ivec2(k & ${FAN_WIDTH - 1}u, k >> ${FAN_BITS}), 0).xy;
     sum += cross(place(others.x) - own, place(others.y) - own);
   }
   float size = length(sum);

@@ -1,31 +1,23 @@
 import {
-  BufferAttribute,
-  BufferGeometry,
-  Camera,
   FloatType,
-  GLSL3,
   HalfFloatType,
-  Mesh,
-  NearestFilter,
-  NoBlending,
-  RawShaderMaterial,
-  RGBAFormat,
   Vector2,
   Vector3,
-  WebGLRenderTarget,
   type DataArrayTexture,
   type DataTexture,
-  type IUniform,
   type Texture,
   type WebGLRenderer,
+  type WebGLRenderTarget,
 } from 'three';
 import type { StaticPart } from '../capture';
 import { columnsOf } from '../coordinates/compute';
 import { TiedNormals } from '../coordinates/tiedNormals';
 import { diagonalOf } from '../coordinates/topology';
 import { fanTextures, floatTexture, phiTexture } from './dataTextures';
-import { coverVertexShader, normalShader, positionShader } from './decodeShaders';
+import { normalShader, positionShader } from './decodeShaders';
 import { cageSize, layoutOf, meanOf, packPhi, WIDTH, type PhiLayout } from './packing';
+import { Pass, target } from './pass';
+import { multiply, type ColumnValues } from './product';
 import type { Surface } from './surface';
 
 /** What is added to the positions of a frame by a residual layer: x y z and one unused number of each point. */
@@ -41,8 +33,12 @@ export interface Pose {
   readonly mix: number;
 }
 
+/** What multiplies Φ by cages: the graphics processor, or the page where the browser draws in software. */
+export type Multiplier = 'graphics' | 'page';
+
 /**
- * Decodes frames on the graphics processor: one pass multiplies Φ by a cage and writes positions into a texture, a second one writes normals.
+ * Decodes frames: one pass of the graphics processor multiplies Φ by a cage and writes positions into a texture, a second one writes normals. Until Φ is
+ * there, the textures have the rest pose.
  *
  * The textures are in units of the rest pose's diagonal, relative to the middle of its bounding box; {@link place} converts.
  */
@@ -61,20 +57,24 @@ export class Decoder {
   private readonly cageTexture: DataTexture;
   private readonly offsetTextures: readonly [DataTexture, DataTexture];
   private readonly shownOffsets: [Offsets, Offsets] = [null, null];
+  /** What the page has multiplied, and the rest pose before. */
+  private readonly products: DataTexture;
   private readonly positionTarget: WebGLRenderTarget;
   private readonly normalTarget: WebGLRenderTarget;
   private readonly positionUniforms;
-  private positionPass: Pass | null = null;
+  private positionPass: Pass;
   private readonly normalPass: Pass;
   private motionTarget: WebGLRenderTarget | null = null;
   private placed: PlacedFrame | null = null;
-  private phi: DataArrayTexture | null = null;
+  /** Φ, in the graphics processor's memory or in that of the page. */
+  private phi: DataArrayTexture | Float32Array | null = null;
   private isDisposed = false;
 
   constructor(
     private readonly renderer: WebGLRenderer,
     private readonly capture: StaticPart,
     surface: Surface,
+    private readonly multiplier: Multiplier,
   ) {
     const gl = renderer.getContext() as WebGL2RenderingContext;
     const limits = {
@@ -92,10 +92,12 @@ export class Decoder {
     const { bands } = this.layout;
     const offsetsOf = () => floatTexture(new Float32Array(4 * WIDTH * bands), WIDTH, bands);
     this.offsetTextures = [offsetsOf(), offsetsOf()];
+    this.products = offsetsOf();
     this.positionTarget = target(bands, FloatType);
     this.normalTarget = target(bands, HalfFloatType);
     this.positionUniforms = {
       phi: { value: null as DataArrayTexture | null },
+      products: { value: this.products },
       scale: { value: 1 },
       cage: { value: this.cageTexture },
       offsetsBefore: { value: this.offsetTextures[0] },
@@ -105,6 +107,7 @@ export class Decoder {
       blocks: { value: this.layout.blocks },
       bandsPerLayer: { value: this.layout.bandsPerLayer },
     };
+    this.positionPass = new Pass(positionShader('products'), this.positionUniforms);
     const fans = fanTextures(surface, bands, limits.size);
     this.normalPass = new Pass(normalShader, {
       positions: { value: this.positions },
@@ -136,15 +139,18 @@ export class Decoder {
     if (phi.length !== this.points * this.columns) {
       throw new Error('The coordinates are not those of this model and cage; reload the page.');
     }
+    if (this.multiplier === 'page') {
+      this.phi = phi;
+      return;
+    }
     const packed = await packPhi(phi, this.columns, cageSize(this.capture), this.layout);
     if (this.isDisposed) return;
     const compact = packed.texels instanceof Int16Array;
-    this.phi?.dispose();
-    this.phi = phiTexture(packed.texels, this.layout);
+    this.phi = this.positionUniforms.phi.value = phiTexture(packed.texels, this.layout);
     this.precision = { bits: compact ? 16 : 32, error: packed.error };
-    this.positionUniforms.phi.value = this.phi;
     this.positionUniforms.scale.value = compact ? packed.scale / 32767 ** 2 : 1;
-    this.positionPass = new Pass(positionShader(compact), this.positionUniforms);
+    this.positionPass.dispose();
+    this.positionPass = new Pass(positionShader(compact ? 'integers' : 'floats'), this.positionUniforms);
   }
 
   /** Converts a point of the capture, in its unit, to the unit of the textures; all three axes in place. */
@@ -154,14 +160,18 @@ export class Decoder {
 
   /** Computes positions and normals of a pose. Does nothing before Φ is there. */
   decode(pose: Pose) {
-    if (!this.positionPass) return;
+    if (!this.ready) return;
     this.fillColumns(pose.rows, this.values);
-    this.uploadCage(this.centre);
+    this.multiplyBy(this.centre);
     this.setOffsets(pose, 1 - pose.mix, pose.mix);
-    const shown = this.renderer.getRenderTarget();
-    this.positionPass.render(this.renderer, this.positionTarget);
-    this.normalPass.render(this.renderer, this.normalTarget);
-    this.renderer.setRenderTarget(shown);
+    this.draw(this.positionTarget, this.normalTarget);
+  }
+
+  /** Writes the rest pose into the textures, as long as Φ is not there. */
+  showRest() {
+    if (this.ready) return;
+    this.writeTexels(this.products, this.capture.rest);
+    this.draw(this.positionTarget, this.normalTarget);
   }
 
   /** Computes how far each point moves from one frame to the next, into a texture like {@link positions}; null before Φ is there. */
@@ -170,28 +180,22 @@ export class Decoder {
     rowsBefore: Float32Array,
     rowsAfter: Float32Array,
   ): Texture | null {
-    if (!this.positionPass) return null;
+    if (!this.ready) return null;
     this.motionTarget ??= target(this.bands, FloatType);
     const earlier = new Float64Array(this.values.length);
     this.fillColumns(rowsBefore, earlier);
     this.fillColumns(rowsAfter, this.values);
     for (let k = 0; k < earlier.length; k++) this.values[k] -= earlier[k];
-    this.uploadCage([0, 0, 0]);
+    this.multiplyBy([0, 0, 0]);
     this.setOffsets(pose, -1, 1);
-    const shown = this.renderer.getRenderTarget();
-    this.positionPass.render(this.renderer, this.motionTarget);
-    this.renderer.setRenderTarget(shown);
+    this.draw(this.motionTarget, null);
     return this.motionTarget.texture;
   }
 
   /** Takes a frame that is given as positions, x y z of each point in the capture's unit, and computes its normals; into textures of their own. */
   placeFrame(positions: Float32Array) {
     this.placed ??= placedFrame(this.bands, this.normalPass);
-    const texels = this.placed.positions.image.data as unknown as Float32Array;
-    for (let p = 0; p < this.points; p++) {
-      for (let k = 0; k < 3; k++) texels[4 * p + k] = (positions[3 * p + k] - this.centre[k]) / this.diagonal;
-    }
-    this.placed.positions.needsUpdate = true;
+    this.writeTexels(this.placed.positions, positions);
     const shown = this.renderer.getRenderTarget();
     this.placed.pass.render(this.renderer, this.placed.normals);
     this.renderer.setRenderTarget(shown);
@@ -215,14 +219,14 @@ export class Decoder {
 
   dispose() {
     this.isDisposed = true;
-    this.phi?.dispose();
-    for (const texture of [this.cageTexture, ...this.offsetTextures]) texture.dispose();
+    if (this.phi && !(this.phi instanceof Float32Array)) this.phi.dispose();
+    for (const texture of [this.cageTexture, this.products, ...this.offsetTextures]) texture.dispose();
     this.positionTarget.dispose();
     this.normalTarget.dispose();
     this.motionTarget?.dispose();
     this.placed?.normals.dispose();
     this.placed?.pass.dispose();
-    this.positionPass?.dispose();
+    this.positionPass.dispose();
     this.normalPass.dispose();
   }
 
@@ -232,21 +236,46 @@ export class Decoder {
     this.tiedNormals?.write(rows, values, this.capture.cage.positions.length);
   }
 
-  /** Uploads the values of all columns, those of vertices relative to their mean, and that mean relative to `zero`. */
-  private uploadCage(zero: readonly [number, number, number]) {
-    const { values, diagonal } = this;
+  /** Runs the pass that writes positions or movements, and the one that writes normals where there is a target for them. */
+  private draw(positions: WebGLRenderTarget, normals: WebGLRenderTarget | null) {
+    const shown = this.renderer.getRenderTarget();
+    this.positionPass.render(this.renderer, positions);
+    if (normals) this.normalPass.render(this.renderer, normals);
+    this.renderer.setRenderTarget(shown);
+  }
+
+  /** Writes positions, x y z of each point in the capture's unit, into a texture like {@link positions}. */
+  private writeTexels(texture: DataTexture, positions: ArrayLike<number>) {
+    const texels = texture.image.data as unknown as Float32Array;
+    for (let p = 0; p < this.points; p++) {
+      for (let k = 0; k < 3; k++) texels[4 * p + k] = (positions[3 * p + k] - this.centre[k]) / this.diagonal;
+    }
+    texture.needsUpdate = true;
+  }
+
+  /**
+   * Takes the values of all columns, those of vertices relative to their mean, and that mean relative to `zero`: for the graphics processor to multiply,
+   * or multiplied.
+   */
+  private multiplyBy(zero: readonly [number, number, number]) {
+    const { values, columns, diagonal, phi } = this;
     const vertices = this.capture.cage.positions.length / 3;
     const mean = meanOf(values, vertices);
-    const texels = this.cageTexture.image.data as unknown as Float32Array;
-    for (let column = 0; column < this.columns; column++) {
-      for (let k = 0; k < 3; k++) {
-        const value = values[3 * column + k] - (column < vertices ? mean[k] : 0);
-        texels[4 * this.layout.blocks * k + column] = value / diagonal;
-      }
-    }
-    this.cageTexture.needsUpdate = true;
+    const axes = [0, 1, 2].map((k) =>
+      Float64Array.from({ length: columns }, (_, column) => {
+        return (values[3 * column + k] - (column < vertices ? mean[k] : 0)) / diagonal;
+      }),
+    ) as unknown as ColumnValues;
     const [x, y, z] = [0, 1, 2].map((k) => (mean[k] - zero[k]) / diagonal);
     this.positionUniforms.origin.value.set(x, y, z);
+    if (phi instanceof Float32Array) {
+      multiply(phi, axes, this.products.image.data as unknown as Float32Array);
+      this.products.needsUpdate = true;
+      return;
+    }
+    const texels = this.cageTexture.image.data as unknown as Float32Array;
+    for (const [k, axis] of axes.entries()) texels.set(axis, 4 * this.layout.blocks * k);
+    this.cageTexture.needsUpdate = true;
   }
 
   private setOffsets({ before, after }: Pick<Pose, 'before' | 'after'>, weightBefore: number, weightAfter: number) {
@@ -275,49 +304,6 @@ function placedFrame(bands: number, like: Pass): PlacedFrame {
   const positions = floatTexture(new Float32Array(4 * WIDTH * bands), WIDTH, bands);
   const pass = new Pass(normalShader, { ...like.uniforms, positions: { value: positions } });
   return { positions, normals: target(bands, HalfFloatType), pass };
-}
-
-/** A fragment shader that runs once for every texel of a target. */
-class Pass {
-  readonly uniforms: Record<string, IUniform>;
-  private readonly mesh: Mesh<BufferGeometry, RawShaderMaterial>;
-  private readonly camera = new Camera();
-
-  constructor(fragmentShader: string, uniforms: Record<string, IUniform>) {
-    this.uniforms = uniforms;
-    const material = new RawShaderMaterial({
-      glslVersion: GLSL3,
-      vertexShader: coverVertexShader,
-      fragmentShader,
-      uniforms,
-      depthTest: false,
-      depthWrite: false,
-      blending: NoBlending,
-    });
-    this.mesh = new Mesh(new BufferGeometry().setIndex(new BufferAttribute(Uint32Array.of(0, 1, 2), 1)), material);
-    this.mesh.frustumCulled = false;
-  }
-
-  render(renderer: WebGLRenderer, into: WebGLRenderTarget) {
-    renderer.setRenderTarget(into);
-    renderer.render(this.mesh, this.camera);
-  }
-
-  dispose() {
-    for (const { value } of Object.values(this.uniforms)) (value as Partial<Texture> | null)?.dispose?.();
-    this.mesh.geometry.dispose();
-    this.mesh.material.dispose();
-  }
-}
-
-function target(bands: number, type: typeof FloatType | typeof HalfFloatType): WebGLRenderTarget {
-  return new WebGLRenderTarget(WIDTH, bands, {
-    type,
-    format: RGBAFormat,
-    minFilter: NearestFilter,
-    magFilter: NearestFilter,
-    depthBuffer: false,
-  });
 }
 
 function middleOf(positions: Float64Array): [number, number, number] {

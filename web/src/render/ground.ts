@@ -54,7 +54,6 @@ export class Ground {
           reach: { value: 4 },
           cell: { value: 0.1 },
           ink: this.ink,
-          grid: { value: true },
           shadow: { value: this.sharp.texture },
           shadowReach: { value: SHADOW_REACH },
           shadowStrength: this.strength,

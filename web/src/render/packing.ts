@@ -2,8 +2,13 @@ import type { StaticPart } from '../capture';
 import { MOST_PHI_BYTES } from '../coordinates/compute';
 import { diagonalOf } from '../coordinates/topology';
 
-/** Points per row of the textures that hold something for each point: point i is texel (i mod WIDTH, ⌊i / WIDTH⌋). */
-export const WIDTH = 1024;
+/** Binary logarithm of {@link WIDTH}. */
+export const WIDTH_BITS = 10;
+/**
+ * Points per row of the textures that hold something for each point: point i is texel (i mod WIDTH, ⌊i / WIDTH⌋). A power of two: shaders need no
+ * division, which software does for one vertex after another.
+ */
+export const WIDTH = 1 << WIDTH_BITS;
 /** Φ is kept in 16 bits where that moves no point farther than this fraction of the rest pose's diagonal. */
 export const COMPACT_TOLERANCE = 1e-4;
 /** Standard deviations of rounding that the estimate of its effect allows for. */

@@ -1,4 +1,4 @@
-import { WIDTH } from './packing';
+import { WIDTH, WIDTH_BITS } from './packing';
 
 const header = `precision highp float;
 precision highp int;
@@ -6,7 +6,7 @@ precision highp sampler2D;
 `;
 
 const lookUp = `
-ivec2 texelOf(int point) { return ivec2(point % ${WIDTH}, point / ${WIDTH}); }
+ivec2 texelOf(int point) { return ivec2(point & ${WIDTH - 1}, point >> ${WIDTH_BITS}); }
 `;
 
 /** Light to sRGB, with a shoulder that keeps highlights from clipping. */
@@ -85,8 +85,13 @@ void main() {
   vec3 light = vec3(1.04, 0.98, 0.90) * key * key * 0.86 + vec3(0.60, 0.74, 0.98) * fill * fill * 0.24;
   light += mix(vec3(0.13, 0.115, 0.105), vec3(0.33, 0.37, 0.43), up * 0.5 + 0.5) * 0.62;
   vec3 halfway = normalize(eye + vec3(0.42, 0.66, 0.62));
-  float gloss = pow(max(0.0, dot(normal, halfway)), 26.0) * 0.10;
-  float rim = pow(1.0 - facing, 3.5) * (0.24 + 0.28 * max(0.0, up)) * (heatShare > 0.0 ? 0.35 : 1.0);
+  // To the powers of 26 and of 3.5: a processor that draws multiplies in a fraction of the time of pow().
+  float towards = max(0.0, dot(normal, halfway));
+  float towards2 = towards * towards;
+  float towards8 = towards2 * towards2 * towards2 * towards2;
+  float gloss = towards2 * towards8 * towards8 * towards8 * 0.10;
+  float away = 1.0 - facing;
+  float rim = away * away * away * sqrt(max(0.0, away)) * (0.24 + 0.28 * max(0.0, up)) * (heatShare > 0.0 ? 0.35 : 1.0);
   vec3 lit = base * light * cavity + gloss + rim * vec3(0.80, 0.90, 1.0);
   shade = vec4(toned(lit), 1.0);
 }`;
@@ -120,18 +125,29 @@ void main() {
   gl_PointSize = pointSize;
 }`;
 
-/** The backdrop: a gradient from top to bottom, dithered against banding. */
-export const backdropShader = `${header}
+/** Squares along a side of the backdrop, whose colours are computed at their corners: at every pixel they would cost more than the model. */
+export const BACKDROP_SQUARES = 24;
+
+/** The backdrop: a gradient from top to bottom that is lighter behind the model. */
+export const backdropVertexShader = `${header}
 uniform vec3 top;
 uniform vec3 bottom;
-uniform vec2 size;
-out vec4 shade;
+out vec3 blended;
 void main() {
-  vec2 at = gl_FragCoord.xy / size;
+  ivec2 corner = ivec2(gl_VertexID % ${BACKDROP_SQUARES + 1}, gl_VertexID / ${BACKDROP_SQUARES + 1});
+  vec2 at = vec2(corner) / ${BACKDROP_SQUARES}.0;
   float share = smoothstep(0.0, 1.0, at.y);
   float centre = 1.0 - 0.55 * length((at - vec2(0.5, 0.62)) * vec2(1.0, 1.1));
-  vec3 blended = mix(bottom, top, clamp(share * 0.45 + centre * 0.62, 0.0, 1.0));
-  float noise = fract(sin(dot(gl_FragCoord.xy, vec2(12.9898, 78.233))) * 43758.5453) - 0.5;
+  blended = mix(bottom, top, clamp(share * 0.45 + centre * 0.62, 0.0, 1.0));
+  gl_Position = vec4(at * 2.0 - 1.0, 0.0, 1.0);
+}`;
+
+/** Dithers the backdrop against banding, by interleaved gradient noise (Jimenez 2014). */
+export const backdropFragmentShader = `${header}
+in vec3 blended;
+out vec4 shade;
+void main() {
+  float noise = fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715)))) - 0.5;
   shade = vec4(blended + noise / 255.0, 1.0);
 }`;
 
@@ -155,24 +171,23 @@ uniform vec3 middle;
 uniform float reach;
 uniform float cell;
 uniform vec3 ink;
-uniform bool grid;
 uniform sampler2D shadow;
 uniform float shadowReach;
 uniform float shadowStrength;
 in vec2 place;
 out vec4 shade;
-float lines(vec2 at, float width) {
-  vec2 step = fwidth(at);
-  vec2 near = abs(fract(at - 0.5) - 0.5) / step;
-  vec2 fade = 1.0 - smoothstep(0.25, 0.6, step);
-  vec2 cover = (1.0 - smoothstep(width - 0.5, width + 0.5, near)) * fade;
+float lines(vec2 at, vec2 pixel, float width) {
+  vec2 near = abs(fract(at - 0.5) - 0.5) / pixel;
+  vec2 cover = clamp(width + 0.5 - near, 0.0, 1.0) * clamp((0.6 - pixel) / 0.35, 0.0, 1.0);
   return max(cover.x, cover.y);
 }
 void main() {
-  float away = length(place - middle.xz) / reach;
-  float fade = 1.0 - smoothstep(0.12, 0.95, away);
-  float line = grid ? max(lines(place / cell, 0.5) * 0.20, lines(place / (cell * 5.0), 0.75) * 0.42) * fade : 0.0;
-  vec2 at = (place - middle.xz) / shadowReach;
+  vec2 fromMiddle = place - middle.xz;
+  float fade = 1.0 - smoothstep(0.12, 0.95, length(fromMiddle) / reach);
+  vec2 at = place / cell;
+  vec2 pixel = fwidth(at);
+  float line = max(lines(at, pixel, 0.5) * 0.20, lines(at * 0.2, pixel * 0.2, 0.75) * 0.42) * fade;
+  at = fromMiddle / shadowReach;
   float dark = 0.0;
   if (max(abs(at.x), abs(at.y)) < 1.0) dark = texture(shadow, at * 0.5 + 0.5).r * shadowStrength;
   float cover = dark + line * (1.0 - dark);
@@ -203,20 +218,20 @@ void main() {
   shade = vec4(vec3(exp(-max(0.0, above) * 5.0)), 1.0);
 }`;
 
+/** Places of a Gaussian blur, in texels, and the weight of each. */
+const taps = [-10, -8, -6, -4, -2, 0, 2, 4, 6, 8, 10].map((place) => ({ place, weight: Math.exp(-0.02 * place ** 2) }));
+const total = taps.reduce((sum, { weight }) => sum + weight, 0);
+
 /** One direction of a Gaussian blur. */
 export const blurShader = `${header}
 uniform sampler2D source;
 uniform vec2 way;
 out vec4 shade;
 void main() {
-  ivec2 size = textureSize(source, 0);
-  vec2 at = gl_FragCoord.xy / vec2(size);
+  vec2 texel = 1.0 / vec2(textureSize(source, 0));
+  vec2 at = gl_FragCoord.xy * texel;
+  vec2 one = way * texel;
   float sum = 0.0;
-  float total = 0.0;
-  for (int k = -10; k <= 10; k++) {
-    float weight = exp(-0.02 * float(k * k));
-    sum += weight * texture(source, at + way * float(k) / vec2(size)).r;
-    total += weight;
-  }
-  shade = vec4(vec3(sum / total), 1.0);
+${taps.map(({ place, weight }) => `  sum += ${(weight / total).toFixed(8)} * texture(source, at + one * ${place.toFixed(1)}).r;`).join('\n')}
+  shade = vec4(vec3(sum), 1.0);
 }`;

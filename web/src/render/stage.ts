@@ -2,12 +2,11 @@ import { Color, Group, Matrix3, Matrix4, Mesh, PerspectiveCamera, Scene, Vector2
 import type { StaticPart } from '../capture';
 import { CageView } from './cageView';
 import { eyeOf, FIELD_OF_VIEW, type Box, type CameraState } from './camera';
-import { coverVertexShader } from './decodeShaders';
 import { Decoder, type Pose } from './decoder';
 import { Ground } from './ground';
 import { numberedGeometry, shaderMaterial } from './materials';
 import { ModelView } from './modelView';
-import { backdropShader } from './sceneShaders';
+import { BACKDROP_SQUARES, backdropFragmentShader, backdropVertexShader } from './sceneShaders';
 import { surfaceOf } from './surface';
 
 /** What is drawn. */
@@ -61,9 +60,12 @@ export class Stage {
   private readonly backdropColors = {
     top: { value: new Color() },
     bottom: { value: new Color() },
-    size: { value: new Vector2() },
   };
   private readonly hasFaces: boolean;
+  /** What others draw together with the model, in its axes and in diagonals. */
+  readonly extras = new Group();
+  /** Called with the vertices of the cage whenever these have changed. */
+  onCage: (vertices: Float32Array) => void = () => undefined;
   /** Vertices of the cage as it is shown, x y z each, in diagonals and in the model's axes. */
   readonly cageVertices: Float32Array;
   private side: Side = 'decoded';
@@ -73,6 +75,13 @@ export class Stage {
   private picturesWithShadow = 0;
   private pose: Pose | null = null;
   private grounded = false;
+  private isAtRest = false;
+  private isCageAlone = false;
+  /** Whether something has changed since the last picture, which was drawn from {@link shownFrom}. */
+  private pictureIsOld = true;
+  private shownFrom: CameraState | null = null;
+  /** Whether a change of its size has emptied the canvas, which had a picture. */
+  wasEmptied = false;
   private up: 'y' | 'z' = 'y';
   /** The lowest vertex of the cage in all frames that are known, along either axis, and how far above it the model's lowest point is. */
   private readonly lowest = { y: Infinity, z: Infinity };
@@ -81,7 +90,7 @@ export class Stage {
   /** Throws one sentence for a person where the browser or the device cannot draw this. */
   constructor(
     readonly canvas: HTMLCanvasElement,
-    capture: StaticPart,
+    private readonly capture: StaticPart,
   ) {
     this.renderer = createRenderer(canvas);
     if (!this.renderer.extensions.has('EXT_color_buffer_float')) {
@@ -92,28 +101,38 @@ export class Stage {
     }
     const surface = surfaceOf(capture);
     this.hasFaces = surface.triangles.length > 0;
-    this.decoder = new Decoder(this.renderer, capture, surface);
+    this.decoder = new Decoder(this.renderer, capture, surface, isSoftwareRendered() ? 'page' : 'graphics');
     this.model = new ModelView(this.decoder, surface);
     this.cage = new CageView(capture.cage);
     this.ground = new Ground(this.decoder.positions, surface.triangles);
     this.backdrop = new Mesh(
-      numberedGeometry(Uint32Array.of(0, 1, 2)),
-      shaderMaterial(coverVertexShader, backdropShader, this.backdropColors, { depthTest: false, depthWrite: false }),
+      numberedGeometry(gridTriangles(BACKDROP_SQUARES)),
+      shaderMaterial(backdropVertexShader, backdropFragmentShader, this.backdropColors, {
+        depthTest: false,
+        depthWrite: false,
+      }),
     );
     this.backdrop.frustumCulled = false;
     this.cageVertices = new Float32Array(capture.cage.positions.length);
     this.upright.matrixAutoUpdate = false;
-    this.upright.add(this.model.group, this.cage.group);
+    this.upright.add(this.model.group, this.extras, this.cage.group);
     this.scene.add(this.backdrop, this.upright, this.ground.mesh);
-    this.showCage(capture.cage.positions);
-    this.putGroundBelow(this.cageVertices);
-    canvas.addEventListener('webglcontextrestored', () => this.setPose(this.pose));
+    this.showRest();
+    canvas.addEventListener('webglcontextrestored', () => {
+      this.isAtRest = false;
+      this.setPose(this.pose);
+    });
   }
 
   /** Takes what is in diagonals and in the model's axes to the clip space of the picture that was drawn last. */
   get clipMatrix(): Matrix4 {
     const { projectionMatrix, matrixWorldInverse } = this.camera;
     return new Matrix4().multiplyMatrices(projectionMatrix, matrixWorldInverse).multiply(this.upright.matrix);
+  }
+
+  /** Has the next picture drawn even if nothing has changed that the stage knows of. */
+  renew() {
+    this.pictureIsOld = true;
   }
 
   /** Whether edges need a finer picture to look smooth. */
@@ -123,11 +142,11 @@ export class Stage {
 
   setUp(axis: 'y' | 'z') {
     this.up = axis;
+    this.pictureIsOld = true;
     this.upright.matrix.copy(UPRIGHT[axis]);
     this.upright.matrixWorldNeedsUpdate = true;
-    this.grounded = false;
+    this.grounded = this.isAtRest = false;
     this.setPose(this.pose);
-    if (!this.decoder.ready) this.putGroundBelow(this.cageVertices);
   }
 
   /** Takes note of frames that have come: the ground is below all of them. Rows are those of frames one after another, `rowsPerFrame` each. */
@@ -143,17 +162,25 @@ export class Stage {
   }
 
   setLayers(layers: Layers) {
-    const { ready } = this.decoder;
-    this.model.surface.visible = ready && layers.model && this.hasFaces;
-    this.model.wireframe.visible = ready && layers.wireframe;
-    this.model.points.visible = ready && (layers.points || (layers.model && !this.hasFaces));
-    this.model.handles.visible = ready && layers.handles;
-    // Until the model is there, the cage stands for it.
-    this.cage.group.visible = layers.cage || !ready;
+    this.pictureIsOld = true;
+    const hasModel = !this.isCageAlone;
+    this.model.surface.visible = hasModel && layers.model && this.hasFaces;
+    this.model.wireframe.visible = hasModel && layers.wireframe;
+    this.model.points.visible = hasModel && (layers.points || (layers.model && !this.hasFaces));
+    this.model.handles.visible = hasModel && layers.handles;
+    // Until the model moves, the cage says that it will.
+    this.cage.group.visible = layers.cage || !this.decoder.ready;
     this.ground.mesh.visible = layers.ground;
   }
 
+  /** Shows cages without the model from now on, for captures whose Φ cannot be had. */
+  hideModel() {
+    this.isCageAlone = true;
+    this.setPose(this.pose);
+  }
+
   setColors(colors: StageColors) {
+    this.pictureIsOld = true;
     this.backdropColors.top.value.set(colors.top).convertLinearToSRGB();
     this.backdropColors.bottom.value.set(colors.bottom).convertLinearToSRGB();
     this.model.setColors(new Color(colors.model), new Color(colors.wire), 0.42, new Color(colors.handle));
@@ -164,21 +191,25 @@ export class Stage {
   /** Takes the original of the pose that is shown, x y z of each point in the capture's unit. */
   setOriginal(positions: Float32Array) {
     this.decoder.placeFrame(positions);
+    this.pictureIsOld = true;
   }
 
   /** Which side is drawn; the line between both is at `split`, a fraction of the picture's width. */
   setSide(side: Side, split: number) {
     this.side = side;
+    this.pictureIsOld = true;
     this.split = split;
   }
 
   setHandles(handles: Uint32Array) {
     this.model.setHandles(handles);
+    this.pictureIsOld = true;
   }
 
   /** Colours the model by a value of each point, from 0 to `largest`; null for its own colour. */
   setHeat(values: Float32Array | null, largest: number) {
     this.model.setHeat(values, largest);
+    this.pictureIsOld = true;
   }
 
   /** Colours the model by how far each point moves from one frame to the next, in diagonals. */
@@ -189,12 +220,18 @@ export class Stage {
     largest: number,
   ) {
     this.model.setHeat(this.decoder.decodeMotion(frames, rowsBefore, rowsAfter), largest);
+    this.pictureIsOld = true;
   }
 
-  /** Shows a pose; decodes it where Φ is there. */
+  /** Shows a pose, or the rest pose until Φ is there. */
   setPose(pose: Pose | null) {
     this.pose = pose;
-    if (!pose) return;
+    if (!pose || !(this.decoder.ready || this.isCageAlone)) {
+      if (!this.isAtRest) this.showRest();
+      return;
+    }
+    this.isAtRest = false;
+    this.pictureIsOld = true;
     this.showCage(pose.rows);
     if (!this.decoder.ready) return;
     this.decoder.decode(pose);
@@ -208,23 +245,28 @@ export class Stage {
 
   /** Takes the size of the canvas in CSS pixels, and how much of it is covered: the rest shows what the camera looks at. */
   resize(width: number, height: number, pixelRatio: number, covered: Covered) {
+    this.pictureIsOld = true;
     this.camera.setViewOffset(width, height, covered.right / 2, covered.bottom / 2, width, height);
     const size = `${width} ${height} ${pixelRatio}`;
     // Even an unchanged size would empty the canvas and make all its buffers anew.
     if (size === this.size) return;
     this.size = size;
+    this.wasEmptied = this.shownFrom !== null;
     this.renderer.setPixelRatio(pixelRatio);
     this.renderer.setSize(Math.max(1, width), Math.max(1, height), false);
     this.camera.aspect = Math.max(1, width) / Math.max(1, height);
-    this.renderer.getDrawingBufferSize(this.backdropColors.size.value);
-    const pixelsPerUnit = this.backdropColors.size.value.y / (2 * Math.tan(FIELD_OF_VIEW / 2));
+    const { y: lines } = this.renderer.getDrawingBufferSize(new Vector2());
+    const pixelsPerUnit = lines / (2 * Math.tan(FIELD_OF_VIEW / 2));
     this.model.setSizes(pixelsPerUnit, pixelRatio);
     this.cage.setSizes(pixelRatio);
   }
 
-  /** Draws a picture. Where pictures must come fast, the shadow follows the model only now and then. */
+  /** Draws a picture if it differs from the last one. Where pictures must come fast, the shadow follows the model only now and then. */
   draw(state: CameraState, hurried = false) {
     if (this.renderer.getContext().isContextLost()) return;
+    if (!this.pictureIsOld && state === this.shownFrom) return;
+    this.pictureIsOld = this.wasEmptied = false;
+    this.shownFrom = state;
     const { camera } = this;
     camera.position.set(...eyeOf(state));
     camera.lookAt(...state.target);
@@ -286,10 +328,22 @@ export class Stage {
     this.model.handles.visible = handles;
   }
 
+  private showRest() {
+    this.showCage(this.capture.cage.positions);
+    this.decoder.showRest();
+    this.isAtRest = true;
+    this.shadowIsOld = this.pictureIsOld = true;
+    if (this.grounded) return;
+    const positions = Float32Array.from(this.capture.rest);
+    this.decoder.place(positions);
+    this.putGroundBelow(positions);
+  }
+
   private showCage(vertices: ArrayLike<number>) {
     for (let k = 0; k < this.cageVertices.length; k++) this.cageVertices[k] = vertices[k];
     this.decoder.place(this.cageVertices);
     this.cage.setVertices(this.cageVertices);
+    this.onCage(this.cageVertices);
   }
 
   private putGroundBelow(positions: Float32Array) {
@@ -297,14 +351,16 @@ export class Stage {
     if (!Number.isFinite(low[1])) return;
     this.soleAboveCage = low[1] - boxOf(this.cageVertices, this.upright.matrix).low[1];
     this.ground.middle.set((low[0] + high[0]) / 2, low[1] - 0.002, (low[2] + high[2]) / 2);
+    this.shadowIsOld = this.pictureIsOld = true;
     this.lowerGround();
   }
 
   /** Keeps the ground below all frames that are known: the model's lowest point is about as far above the cage's as in the first one. */
   private lowerGround() {
     const level = this.lowest[this.up] + this.soleAboveCage - 0.002;
-    if (level < this.ground.middle.y) this.ground.middle.y = level;
-    this.shadowIsOld = true;
+    if (level >= this.ground.middle.y) return;
+    this.ground.middle.y = level;
+    this.shadowIsOld = this.pictureIsOld = true;
   }
 }
 
@@ -337,6 +393,15 @@ function probeRenderer(): boolean {
   const name = String(context.getParameter(details ? details.UNMASKED_RENDERER_WEBGL : context.RENDERER));
   context.getExtension('WEBGL_lose_context')?.loseContext();
   return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+}
+
+/** Triangles of a square of so many squares along a side; vertices are numbered row by row. */
+function gridTriangles(squares: number): Uint32Array {
+  const corners = [0, 1, squares + 1, squares + 1, 1, squares + 2];
+  return Uint32Array.from({ length: 6 * squares * squares }, (_, k) => {
+    const square = Math.floor(k / 6);
+    return square + Math.floor(square / squares) + corners[k % 6];
+  });
 }
 
 function boxOf(positions: Float32Array, turn: Matrix4): Box {

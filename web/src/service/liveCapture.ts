@@ -1,6 +1,6 @@
 /** A session that is still running, as a {@link Capture}: what is solved so far, live, until it is completed and read from its container. */
 
-import type { Capture, FrameBlock, FrameErrors, LiveStatus, StaticPart } from '../capture';
+import type { Capture, FrameBlock, FrameErrors, LiveStatus, ResidualLayers, StaticPart } from '../capture';
 import { persistently } from './backoff';
 import { CageRecordReader, RECORDS_MEDIA_TYPE } from './frameRecords';
 import { FrameStore, GrowingErrors } from './frameStore';
@@ -74,6 +74,14 @@ export class LiveCapture implements SessionCapture {
     return this.#finished?.frameNumbers ?? null;
   }
 
+  get frameBytes(): number | undefined {
+    return this.#finished?.frameBytes;
+  }
+
+  get residuals(): ResidualLayers | null {
+    return this.#finished?.residuals ?? null;
+  }
+
   get problem(): string | null {
     return this.#finished?.problem ?? this.#lastProblem ?? this.#follower.problem;
   }
@@ -134,6 +142,7 @@ export class LiveCapture implements SessionCapture {
         const finished = await persistently(opening, { signal, onRetry });
         this.#lastProblem = null;
         finished.events.addEventListener('change', () => this.#changed());
+        finished.events.addEventListener('replaced', () => this.events.dispatchEvent(new Event('replaced')));
         // The meshes are the same; whoever made buffers of them can keep these.
         this.static = { ...this.static, report: finished.static.report };
         this.frames = finished.frames;

@@ -76,6 +76,34 @@ export interface Progress {
   readonly coded?: number;
 }
 
+/** A cage that is designed from the motion of a capture. */
+export interface CageDesign {
+  readonly id: string;
+  readonly problem?: ProblemDetails | null;
+}
+
+/** What the events of a design say. */
+export interface DesignProgress {
+  readonly state: 'queued' | 'running' | 'completed' | 'failed';
+  /** What is being done, in a few words. */
+  readonly stage?: string | null;
+  /** How much of it is done, 0 to 1. */
+  readonly fraction: number;
+  /** Vertices of the best cage so far; null before there is one. */
+  readonly vertices?: number | null;
+  /** Its mean L2 error on frames that the design does not see, as a fraction of the diagonal. */
+  readonly error?: number | null;
+}
+
+/** What a cage is to be; what is left out has the service's default. */
+export interface DesignOptions {
+  frames?: number;
+  name?: string;
+  vertices?: number;
+  mean_error?: number;
+  time_limit_s?: number;
+}
+
 /** Choices for a new session; what is left out has the service's default. */
 export interface SessionOptions {
   name?: string;

@@ -5,7 +5,10 @@ import type { Session } from '../service/messages';
 import { ServiceProblem, sentenceOf } from '../service/problem';
 import { Service } from '../service/service';
 import { pageToken } from '../service/token';
+import { dialogStyle } from '../style/dialog';
+import { pageLayout } from '../style/pageLayout';
 import { controls, tokens } from '../style/tokens';
+import { currentJob } from '../upload/currentJob';
 import { cardsStyle } from './cardsStyle';
 import { downloadContainer } from './download';
 import { deleteDialog, deleteDialogStyle } from './deleteDialog';
@@ -37,7 +40,16 @@ const STATES: readonly (readonly [StateFilter, string])[] = [
  */
 @customElement('cager-sessions')
 export class Sessions extends LitElement {
-  static override styles = [tokens, controls, sessionsStyle, cardsStyle, emptyListStyle, deleteDialogStyle];
+  static override styles = [
+    tokens,
+    controls,
+    pageLayout,
+    dialogStyle,
+    sessionsStyle,
+    cardsStyle,
+    emptyListStyle,
+    deleteDialogStyle,
+  ];
 
   readonly #service = new Service();
   readonly #list = new SessionList(this.#service);
@@ -117,6 +129,7 @@ export class Sessions extends LitElement {
       running > 0 ? `${running} not finished` : '',
       failed > 0 ? `${failed} failed` : '',
     ];
+    const isUploading = (currentJob()?.stage ?? 'completed') !== 'completed';
     return html`
       <header>
         <h1>Sessions</h1>
@@ -128,7 +141,9 @@ export class Sessions extends LitElement {
             : html`<button type="button" class="quiet" @click=${() => pageToken.clear()}>Sign out</button>`
         }
         <a class="button" href="#/file">${glyphs.file} Open a file</a>
-        <a class="button primary" href="#/upload">${glyphs.upload} Upload a capture</a>
+        <a class="button primary" href="#/upload"
+          >${glyphs.upload} ${isUploading ? 'Back to the upload' : 'Upload a capture'}</a
+        >
       </header>
     `;
   }
@@ -284,6 +299,8 @@ export class Sessions extends LitElement {
       this.failure = sentenceOf(error);
     } finally {
       this.#fetchingOlder = false;
+      // What was rendered meanwhile may want still older ones.
+      this.requestUpdate();
     }
   }
 

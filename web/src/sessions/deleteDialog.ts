@@ -36,18 +36,10 @@ export function deleteDialog(session: Session, dialog: DeleteDialog) {
   `;
 }
 
+/** Its looks, beside {@link dialogStyle}. */
 export const deleteDialogStyle = css`
   dialog {
     max-width: min(460px, calc(100vw - 32px));
-    padding: var(--cager-space-5);
-    border: 1px solid var(--cager-line);
-    border-radius: var(--cager-radius-large);
-    background: var(--cager-surface);
-    color: var(--cager-text);
-    box-shadow: var(--cager-shadow);
-  }
-  dialog::backdrop {
-    background: rgb(0 0 0 / 0.5);
   }
   dialog h2 {
     margin: 0 0 var(--cager-space-2);

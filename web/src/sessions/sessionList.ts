@@ -4,7 +4,7 @@ import { Backoff } from '../service/backoff';
 import { followProgress } from '../service/events';
 import type { Progress, Session } from '../service/messages';
 import { ServiceProblem, isAbort, problemBehind } from '../service/problem';
-import type { Service } from '../service/service';
+import { type Service, sessionPath } from '../service/service';
 import { Rates } from './rates';
 
 const POLL_RUNNING_SECONDS = 3;
@@ -109,7 +109,12 @@ export class SessionList extends EventTarget {
 
   async #followOne(id: string, following: AbortController): Promise<void> {
     try {
-      await followProgress(this.service, id, (progress) => this.#progressed(id, progress), following.signal);
+      await followProgress(
+        this.service,
+        sessionPath(id),
+        (progress) => this.#progressed(id, progress),
+        following.signal,
+      );
       if (!following.signal.aborted) this.#take(await this.service.session(id, following.signal));
     } catch (error) {
       const problem = problemBehind(error);

@@ -1,31 +1,13 @@
 import { css } from 'lit';
 
-/** Looks of the list as a table, and of what is around it. Expects the tokens and controls of the page. */
+/** Looks of the list as a table, and of what is around it, beside {@link pageLayout}. */
 export const sessionsStyle = css`
-  :host {
-    display: block;
-    flex: 1;
-    min-height: 0;
-    overflow: auto;
-    background: var(--cager-background);
-  }
   .page {
     max-width: 1280px;
-    margin: 0 auto;
-    padding: var(--cager-space-6) var(--cager-space-5) var(--cager-space-7);
   }
   header {
-    display: flex;
     flex-wrap: wrap;
-    align-items: center;
-    gap: var(--cager-space-3);
     margin-bottom: var(--cager-space-5);
-  }
-  h1 {
-    margin: 0;
-    font-size: var(--cager-size-title);
-    line-height: 1.2;
-    letter-spacing: -0.01em;
   }
   .summary {
     display: flex;
@@ -212,25 +194,9 @@ export const sessionsStyle = css`
     }
   }
   progress {
-    display: block;
     width: 120px;
     height: 4px;
     margin-top: 5px;
-    border: 0;
-    border-radius: 2px;
-    overflow: hidden;
-    appearance: none;
-    background: var(--cager-line);
-  }
-  progress::-webkit-progress-bar {
-    background: var(--cager-line);
-  }
-  progress::-webkit-progress-value {
-    background: var(--cager-accent);
-    transition: width var(--cager-slow);
-  }
-  progress::-moz-progress-bar {
-    background: var(--cager-accent);
   }
   .small {
     color: var(--cager-muted);

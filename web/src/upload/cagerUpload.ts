@@ -5,24 +5,29 @@ import { Service } from '../service/service';
 import { pageToken } from '../service/token';
 import * as glyphs from '../sessions/glyphs';
 import '../sessions/signIn';
-import { counted, size } from '../sessions/text';
+import { pageLayout } from '../style/pageLayout';
 import { controls, tokens } from '../style/tokens';
 import { type Dropped, type Item, type Role, classify, reassigned } from './classify';
 import { currentJob, setCurrentJob } from './currentJob';
 import { droppedFiles, pickedFiles } from './drop';
+import { marksOf, withEarlierRoles } from './fileMarks';
+import {
+  type Interrupted,
+  type Misfit,
+  deleteInterrupted,
+  fittingOf,
+  goOnCard,
+  interruptedCard,
+  interruptedUploads,
+} from './interrupted';
 import { type JobActions, jobView } from './jobView';
+import { KeptUpload, newKey } from './keptUpload';
 import { extensionOf } from './meshes';
-import { type Choices, DEFAULT_CHOICES, optionsForm, optionsOf, sendsHandles } from './optionsForm';
+import { type Choices, DEFAULT_CHOICES, designOf, optionsForm, optionsOf, sendsHandles } from './optionsForm';
 import { type Plan, planOf } from './plan';
 import { type Stage, UploadJob } from './uploadJob';
+import { type ChoosingFiles, dropZone, itemRow, planSummary } from './uploadParts';
 import { uploadStyle } from './uploadStyle';
-
-const ROLE_WORDS: Readonly<Record<Role, string>> = {
-  rest: 'Rest pose',
-  cage: 'Cage',
-  frames: 'Frames',
-  unused: 'Not used',
-};
 
 /**
  * Takes files that are dropped on it, says what it takes them for, and has them encoded by the service beside the page. An upload goes on while the
@@ -30,7 +35,7 @@ const ROLE_WORDS: Readonly<Record<Role, string>> = {
  */
 @customElement('cager-upload')
 export class Upload extends LitElement {
-  static override styles = [tokens, controls, uploadStyle];
+  static override styles = [tokens, controls, pageLayout, uploadStyle];
 
   readonly #service = new Service();
 
@@ -42,6 +47,11 @@ export class Upload extends LitElement {
   @state() private choices: Choices = DEFAULT_CHOICES;
   @state() private isOver = false;
   @state() private wantsToken = false;
+  /** Uploads that were broken off. */
+  @state() private interrupted: readonly Interrupted[] = [];
+  /** The one whose files were dropped; else one whose files these seem to be, and why they are not. */
+  @state() private fitting: Interrupted | null = null;
+  @state() private misfit: Misfit | null = null;
   #furthest: Stage = 'creating';
   #planning = 0;
   #wasNamed = false;
@@ -53,6 +63,7 @@ export class Upload extends LitElement {
     currentJob()?.addEventListener('change', this.#jobChanged);
     // Asks for a token before somebody has chosen files in vain.
     void this.#service.sessions().catch(() => undefined);
+    void this.#lookForInterrupted();
   }
 
   override disconnectedCallback(): void {
@@ -71,56 +82,36 @@ export class Upload extends LitElement {
           <a class="button back" href="#/" aria-label="All sessions" title="All sessions">${glyphs.back}</a>
           <h1>Upload a capture</h1>
         </header>
-        ${job ? jobView(job, this.#furthest, this.#actions) : html`${this.#zone()}${this.#chosen()}`}
+        ${job ? jobView(job, this.#furthest, this.#actions) : html`${this.#interrupted()}${dropZone(this.isOver, this.items.length === 0, this.#choosing)}${this.#chosen()}`}
       </main>
     `;
   }
 
-  #zone() {
-    const isFirst = this.items.length === 0;
-    return html`
-      <div class="zone ${this.isOver ? 'over' : ''} ${isFirst ? '' : 'small'}">
-        ${
-          isFirst
-            ? html`${glyphs.upload}
-                <h2>Drop a rest pose, its frames and a cage here</h2>
-                <p class="muted">All at once or one after another. Nothing is sent before you start it.</p>`
-            : nothing
-        }
-        <div class="buttons">
-          <button type="button" class=${isFirst ? 'primary' : ''} @click=${() => this.#pick(false)}>
-            ${isFirst ? 'Choose files' : 'Add files'}
-          </button>
-          <button type="button" @click=${() => this.#pick(true)}>
-            ${isFirst ? 'Choose a folder' : 'Add a folder'}
-          </button>
-          ${isFirst ? nothing : html`<button type="button" class="quiet" @click=${this.#startOver}>Start over</button>`}
-        </div>
-      </div>
-      ${
-        isFirst
-          ? html`<ul class="kinds">
-              <li><b>Rest pose</b><span>The mesh that moves: .obj, .ply, .off, .stl or .glb</span></li>
-              <li><b>Frames</b><span>.npy (frames × points × 3), .pc2, or a folder with one .obj per frame</span></li>
-              <li>
-                <b>Cage, if you have one</b
-                ><span>A coarse closed mesh around the rest pose; otherwise one is made</span>
-              </li>
-            </ul>`
-          : nothing
-      }
-    `;
+  #interrupted() {
+    if (this.fitting) return nothing;
+    const { misfit } = this;
+    return this.interrupted.map((one) =>
+      interruptedCard(one, misfit?.of === one ? misfit.why : '', () => void this.#deleteInterrupted(one)),
+    );
   }
 
   #chosen() {
     if (this.items.length === 0) return this.#note();
+    const { fitting } = this;
+    if (fitting) {
+      return goOnCard(
+        fitting,
+        () => this.#goOn(fitting),
+        () => (this.fitting = null),
+      );
+    }
     return html`
       <form class="card" @submit=${this.#submit}>
         <h2>What these files are</h2>
         <ul class="items">
-          ${this.items.map((item) => this.#item(item))}
+          ${this.items.map((item) => itemRow(item, (role) => this.#reassign(item, role)))}
         </ul>
-        ${this.#note()} ${this.#summary()}
+        ${this.#note()} ${this.plan ? planSummary(this.plan, this.choices) : nothing}
         ${optionsForm(this.choices, Boolean(this.plan?.cage), (choices) => {
           this.#wasNamed ||= choices.name !== this.choices.name;
           this.choices = choices;
@@ -132,51 +123,21 @@ export class Upload extends LitElement {
     `;
   }
 
-  #item(item: Item) {
-    const bytes = item.files.reduce((sum, file) => sum + file.size, 0);
-    return html`
-      <li>
-        <span class="title ${item.role === 'unused' ? 'unused' : ''}" title=${item.name}>${item.name}</span>
-        <span class="muted figures">${size(bytes)}</span>
-        ${
-          item.choices.length > 1
-            ? html`<select
-                aria-label="What ${item.name} is"
-                .value=${item.role}
-                @change=${(event: Event) => this.#reassign(item, (event.target as HTMLSelectElement).value as Role)}
-              >
-                ${item.choices.map((role) => html`<option value=${role} ?selected=${role === item.role}>${ROLE_WORDS[role]}</option>`)}
-              </select>`
-            : html`<span class="muted">${ROLE_WORDS[item.role]}</span>`
-        }
-        ${item.remark ? html`<span class="remark">${item.remark}</span>` : nothing}
-      </li>
-    `;
-  }
-
   #note() {
     return this.finding
       ? html`<p class="note bad" role="alert">${glyphs.alert}<span>${this.finding}</span></p>`
       : nothing;
   }
 
-  #summary() {
-    if (!this.plan) return nothing;
-    const { frames, remarks } = this.plan;
-    const bytes = 12 * frames.frames * frames.points;
-    const isAll = this.choices.accuracy !== 'cages' || !sendsHandles(this.choices, bytes);
-    const sent = isAll
-      ? 'They are sent whole.'
-      : 'Only what the solver reads of them is sent; errors are not measured.';
-    const sentence = `${counted(frames.frames, 'frame')} of ${counted(frames.points, 'point')}, ${size(bytes)} in single precision. ${sent}`;
-    return html`<div class="note">
-      ${glyphs.file}
-      <p>${[sentence, ...remarks].join(' ')}</p>
-    </div>`;
-  }
+  readonly #choosing: ChoosingFiles = {
+    onFiles: () => this.#pick(false),
+    onFolder: () => this.#pick(true),
+    onStartOver: () => this.#startOver(),
+  };
 
   readonly #actions: JobActions = {
     stop: () => currentJob()?.stop(),
+    takeBest: () => currentJob()?.takeBest(),
     goOn: () => void currentJob()?.run(),
     discard: () => void this.#discard(),
     another: () => this.#startOver(),
@@ -195,21 +156,67 @@ export class Upload extends LitElement {
 
   #submit = (event: SubmitEvent): void => {
     event.preventDefault();
-    if (!this.plan) return;
-    const { frames, cage } = this.plan;
-    const options = optionsOf(this.choices, frames.frames, cage !== null);
-    const handles = sendsHandles(this.choices, 12 * frames.frames * frames.points);
-    const job = new UploadJob(this.#service, this.plan, options, handles);
+    void this.#begin();
+  };
+
+  async #begin(): Promise<void> {
+    const { plan, choices, items } = this;
+    if (!plan) return;
+    const record = {
+      key: newKey(),
+      service: this.#service.address(''),
+      begun: Date.now(),
+      choices,
+      marks: await marksOf(items),
+      frames: plan.frames.frames,
+      session: null,
+      design: null,
+    };
+    this.#run(plan, choices, new KeptUpload(record));
+  }
+
+  /** Goes on with an upload that was broken off, as it was asked for then. */
+  #goOn({ kept }: Interrupted): void {
+    if (this.plan) this.#run(this.plan, kept.present.choices, kept);
+  }
+
+  #run(plan: Plan, choices: Choices, kept: KeptUpload): void {
+    // Somebody may press twice.
+    if (currentJob()) return;
+    const { frames, cage } = plan;
+    const request = {
+      options: optionsOf(choices, frames.frames, cage !== null),
+      design: designOf(choices, cage !== null),
+      handlesOnly: sendsHandles(choices, 12 * frames.frames * frames.points),
+    };
+    const job = new UploadJob(this.#service, plan, request, kept);
     job.addEventListener('change', this.#jobChanged);
     setCurrentJob(job);
     void job.run();
-  };
+  }
+
+  async #lookForInterrupted(): Promise<void> {
+    this.interrupted = await interruptedUploads(this.#service, () => {
+      if (this.isConnected) void this.#lookForInterrupted();
+    });
+  }
+
+  async #deleteInterrupted(interrupted: Interrupted): Promise<void> {
+    try {
+      await deleteInterrupted(this.#service, interrupted);
+      this.misfit = null;
+      await this.#lookForInterrupted();
+    } catch (error) {
+      this.misfit = { of: interrupted, why: sentenceOf(error) };
+    }
+  }
 
   #startOver = (): void => {
     this.dropped = [];
     this.items = [];
     this.plan = null;
     this.finding = '';
+    this.fitting = this.misfit = null;
     this.choices = DEFAULT_CHOICES;
     this.#wasNamed = false;
     this.#putAway();
@@ -219,6 +226,7 @@ export class Upload extends LitElement {
     currentJob()?.removeEventListener('change', this.#jobChanged);
     setCurrentJob(null);
     this.requestUpdate();
+    void this.#lookForInterrupted();
   }
 
   #pick(folder: boolean): void {
@@ -253,6 +261,7 @@ export class Upload extends LitElement {
       // A file that is dropped again replaces the one before.
       this.dropped = [...this.dropped.filter(({ path }) => !paths.has(path)), ...taken];
       this.items = classify(this.dropped);
+      for (const { kept } of this.interrupted) this.items = withEarlierRoles(this.items, kept.present.marks);
       await this.#makePlan();
     } catch (error) {
       this.finding = sentenceOf(error);
@@ -268,8 +277,10 @@ export class Upload extends LitElement {
     this.#planning += 1;
     const planning = this.#planning;
     let [plan, finding]: [Plan | null, string] = [null, ''];
+    let [fitting, misfit]: [Interrupted | null, Misfit | null] = [null, null];
     try {
       plan = await planOf(this.items);
+      ({ fitting, misfit } = fittingOf(this.interrupted, await marksOf(this.items)));
     } catch (error) {
       finding = sentenceOf(error);
     }
@@ -277,6 +288,8 @@ export class Upload extends LitElement {
     if (planning !== this.#planning) return;
     this.plan = plan;
     this.finding = finding;
+    this.fitting = fitting;
+    this.misfit = misfit;
     if (plan && !this.#wasNamed) this.choices = { ...this.choices, name: this.#nameOf(plan) };
   }
 
@@ -301,6 +314,7 @@ export class Upload extends LitElement {
     this.wantsToken = false;
     const job = currentJob();
     // An upload that stopped for want of a token goes on with the new one.
+    void this.#lookForInterrupted();
     if (pageToken.token !== null && job?.stage === 'failed') void job.run();
     else void this.#service.sessions().catch((error: unknown) => this.#note401(error));
   };

@@ -23,13 +23,12 @@ export interface Item {
   readonly remark: string;
 }
 
-const ARRAYS = new Set(['npy', 'pc2']);
+const ARRAYS = new Set(['npy', 'pc2', 'mdd']);
 const MESHES = new Set(['obj', 'ply', 'off', 'stl', 'glb']);
 const NATURAL = new Intl.Collator('en', { numeric: true });
 
 /** Remarks on formats that the command line takes and this page does not. */
 const ELSEWHERE: Readonly<Record<string, string>> = {
-  mdd: 'Point caches .mdd can be encoded with the command line, cager encode --server.',
   cager: 'This is an encoded capture already: open it as a file.',
   npz: 'Save the array of positions alone, as .npy.',
 };

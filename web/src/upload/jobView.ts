@@ -3,17 +3,20 @@ import * as glyphs from '../sessions/glyphs';
 import type { Figures } from '../sessions/figures';
 import { count, counted, fraction, perSecond, ratio as times, size, span } from '../sessions/text';
 import { errorChart } from './errorChart';
+import { sampledFrames } from './motionCage';
 import type { Stage, UploadJob } from './uploadJob';
 
 /** What the buttons of a running upload do. */
 export interface JobActions {
   readonly stop: () => void;
+  readonly takeBest: () => void;
   readonly goOn: () => void;
   readonly discard: () => void;
   readonly another: () => void;
 }
 
 const STEPS: readonly (readonly [Stage, string])[] = [
+  ['designing', 'Design the cage'],
   ['creating', 'Send the meshes'],
   ['preparing', 'Prepare'],
   ['sending', 'Send frames'],
@@ -21,6 +24,7 @@ const STEPS: readonly (readonly [Stage, string])[] = [
 ];
 
 const TITLES: Readonly<Record<Stage, string>> = {
+  designing: 'Designing the cage',
   creating: 'Sending the rest pose',
   preparing: 'Preparing the cage',
   sending: 'Encoding',
@@ -34,14 +38,15 @@ const TITLES: Readonly<Record<Stage, string>> = {
 export function jobView(job: UploadJob, furthest: Stage, actions: JobActions) {
   const { session, plan, stage } = job;
   const total = plan.frames.frames;
-  const name = job.options.name ?? 'the capture';
+  const name = job.request.options.name ?? 'the capture';
+  const steps = STEPS.filter(([step]) => step !== 'designing' || job.request.design);
   const canWatch = session !== null && session.state !== 'preparing' && session.state !== 'failed';
-  const at = STEPS.findIndex(([step]) => step === (job.isActive ? stage : furthest));
+  const at = steps.findIndex(([step]) => step === (job.isActive ? stage : furthest));
   return html`
     <section class="card" aria-labelledby="job-title">
       <h2 id="job-title" class=${stage === 'completed' ? 'good' : ''}>${TITLES[stage]}: ${name}</h2>
       <ol class="steps">
-        ${STEPS.map(([, word], i) => {
+        ${steps.map(([, word], i) => {
           const isDone = stage === 'completed' || i < at;
           const isCurrent = job.isActive && i === at;
           return html`<li class=${isDone ? 'done' : ''} aria-current=${isCurrent ? 'step' : nothing}>
@@ -49,9 +54,13 @@ export function jobView(job: UploadJob, furthest: Stage, actions: JobActions) {
           </li>`;
         })}
       </ol>
-      <progress aria-label="Frames encoded" max=${total} value=${job.done}></progress>
+      ${
+        stage === 'designing'
+          ? html`<progress aria-label="Design of the cage" max="1" value=${job.design?.fraction ?? nothing}></progress>`
+          : html`<progress aria-label="Frames encoded" max=${total} value=${job.done}></progress>`
+      }
       <div class="figuresRow figures">
-        <span><b>${count(job.done)}</b> of ${counted(total, 'frame')}</span>
+        ${stage === 'designing' ? designFacts(job) : html`<span><b>${count(job.done)}</b> of ${counted(total, 'frame')}</span>`}
         ${stage === 'sending' ? html`<span>${perSecond(job.framesPerSecond)}</span><span>${size(job.bytesPerSecond)}/s</span>` : nothing}
         ${stage === 'sending' && job.secondsLeft !== null ? html`<span>${span(job.secondsLeft)} left</span>` : nothing}
         ${
@@ -80,10 +89,17 @@ export function jobView(job: UploadJob, furthest: Stage, actions: JobActions) {
               >`
             : nothing
         }
+        ${
+          stage === 'designing' && job.design?.vertices
+            ? html`<button type="button" @click=${actions.takeBest}>Go on with this cage</button>`
+            : nothing
+        }
         ${job.isActive ? html`<button type="button" @click=${actions.stop}>Stop</button>` : nothing}
         ${
           stage === 'stopped' || stage === 'failed'
-            ? html`<button type="button" @click=${actions.goOn}>${stage === 'stopped' ? 'Go on' : 'Try again'}</button>
+            ? html`<button type="button" class="primary" @click=${actions.goOn}>
+                  ${job.isAnew ? 'Start again' : stage === 'stopped' ? 'Go on' : 'Try again'}
+                </button>
                 <button type="button" @click=${actions.discard}>
                   ${session ? 'Delete what was sent' : 'Put it away'}
                 </button>`
@@ -91,8 +107,22 @@ export function jobView(job: UploadJob, furthest: Stage, actions: JobActions) {
         }
         ${stage === 'completed' ? html`<button type="button" @click=${actions.another}>Upload another capture</button>` : nothing}
       </div>
-      ${stage === 'sending' ? html`<p class="muted">You can look at it meanwhile; the upload goes on while this tab is open.</p>` : nothing}
+      ${stage === 'sending' ? html`<p class="muted">You can look at it meanwhile; the upload goes on while this tab is open, and can be taken up again after that.</p>` : nothing}
     </section>
+  `;
+}
+
+function designFacts({ design, plan }: UploadJob) {
+  if (!design) {
+    const sent = sampledFrames(plan.frames.frames, plan.frames.points).length;
+    return html`<span>Sending ${counted(sent, 'frame')} of the motion</span>`;
+  }
+  const { vertices, error, stage, state } = design;
+  return html`
+    ${state === 'queued' ? html`<span>Waiting for its turn</span>` : nothing}
+    ${vertices ? html`<span>cage of <b>${count(vertices)} vertices</b> so far</span>` : nothing}
+    ${typeof error === 'number' ? html`<span>mean error <b>${fraction(error)}</b></span>` : nothing}
+    ${stage ? html`<span>${stage}</span>` : nothing}
   `;
 }
 

@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest';
-import { DEFAULT_CHOICES, optionsOf, sendsHandles } from './optionsForm';
+import { DEFAULT_CHOICES, designOf, optionsOf, sendsHandles } from './optionsForm';
 
 test('what_is_left_empty_is_the_services_choice', () => {
   expect(optionsOf(DEFAULT_CHOICES, 12, true)).toEqual({ frames: 12, coordinates: 'mvc' });
@@ -17,6 +17,27 @@ test('choices_become_options', () => {
   });
   expect(optionsOf({ ...choices, accuracy: 'standard' }, 12, true)).toMatchObject({ quality: 'standard' });
   expect(optionsOf(choices, 12, true)).not.toHaveProperty('cage');
+});
+
+test('a_cage_is_designed_where_it_was_asked_for_and_none_was_given', () => {
+  const choices = {
+    ...DEFAULT_CHOICES,
+    name: 'walk',
+    cage: 'motion',
+    coordinates: 'green',
+    cageVertices: '200',
+  } as const;
+  expect(designOf(choices, false)).toEqual({ name: 'walk', vertices: 200 });
+  expect(designOf({ ...choices, cageGoal: 'error', cageError: '0.2', cageSeconds: '30' }, false)).toEqual({
+    name: 'walk',
+    mean_error: 0.002,
+    time_limit_s: 30,
+  });
+  expect(designOf(choices, true)).toBeNull();
+  expect(designOf(DEFAULT_CHOICES, false)).toBeNull();
+  // Its number of vertices is the design's, and so are the coordinates.
+  expect(optionsOf(choices, 12, false)).toEqual({ frames: 12, coordinates: 'mvc', name: 'walk' });
+  expect(optionsOf(choices, 12, true).coordinates).toBe('green');
 });
 
 test('handle_rows_are_sent_where_whole_frames_would_take_long', () => {

@@ -1,6 +1,6 @@
 import { html } from 'lit';
 import type { CoordinateSystem } from '../capture';
-import type { SessionOptions } from '../service/messages';
+import type { DesignOptions, SessionOptions } from '../service/messages';
 
 /** What somebody chose; empty texts are the service's defaults. */
 export interface Choices {
@@ -10,7 +10,14 @@ export interface Choices {
   /** Largest error in per cent of the diagonal, for the accuracy `bound`. */
   readonly bound: string;
   readonly frameRate: string;
+  /** Where a cage comes from that nobody gave: made around the rest pose, or designed from the motion. */
+  readonly cage: 'rest' | 'motion';
   readonly cageVertices: string;
+  /** Whether a designed cage has so many vertices, or as few as keep an error. */
+  readonly cageGoal: 'vertices' | 'error';
+  /** That error, in per cent of the diagonal. */
+  readonly cageError: string;
+  readonly cageSeconds: string;
   readonly send: 'auto' | 'all' | 'handles';
 }
 
@@ -20,7 +27,11 @@ export const DEFAULT_CHOICES: Choices = {
   accuracy: 'cages',
   bound: '0.1',
   frameRate: '',
+  cage: 'rest',
   cageVertices: '',
+  cageGoal: 'vertices',
+  cageError: '0.1',
+  cageSeconds: '',
   send: 'auto',
 };
 
@@ -29,15 +40,30 @@ const LARGE_BYTES = 64 << 20;
 
 /** The options of a session. */
 export function optionsOf(choices: Choices, frames: number, hasCage: boolean): SessionOptions {
-  const options: SessionOptions = { frames, coordinates: choices.coordinates };
+  const isDesigned = !hasCage && choices.cage === 'motion';
+  const options: SessionOptions = { frames, coordinates: isDesigned ? 'mvc' : choices.coordinates };
   const name = choices.name.trim();
   if (name !== '') options.name = name.slice(0, 200);
   const rate = Number(choices.frameRate);
   if (choices.frameRate.trim() !== '' && rate > 0) options.frame_rate = rate;
   const vertices = Number(choices.cageVertices);
-  if (!hasCage && choices.cageVertices.trim() !== '') options.cage = { vertices };
+  if (!hasCage && !isDesigned && choices.cageVertices.trim() !== '') options.cage = { vertices };
   if (choices.accuracy === 'bound') options.max_error = Number(choices.bound) / 100;
   else if (choices.accuracy !== 'cages') options.quality = choices.accuracy;
+  return options;
+}
+
+/** What the cage is to be that is designed from the motion; null where none is. */
+export function designOf(choices: Choices, hasCage: boolean): DesignOptions | null {
+  if (hasCage || choices.cage !== 'motion') return null;
+  const options: DesignOptions = {};
+  const [name, vertices, seconds] = [choices.name, choices.cageVertices, choices.cageSeconds].map((text) =>
+    text.trim(),
+  );
+  if (name !== '') options.name = name.slice(0, 200);
+  if (choices.cageGoal === 'error') options.mean_error = Number(choices.cageError) / 100;
+  else if (vertices !== '') options.vertices = Number(vertices);
+  if (seconds !== '') options.time_limit_s = Number(seconds);
   return options;
 }
 
@@ -53,6 +79,7 @@ export function optionsForm(choices: Choices, hasCage: boolean, onChange: (choic
   const option = (key: keyof Choices, value: string, word: string) =>
     html`<option value=${value} ?selected=${choices[key] === value}>${word}</option>`;
   const isCoded = choices.accuracy !== 'cages';
+  const isDesigned = !hasCage && choices.cage === 'motion';
   return html`
     <div class="options">
       <div class="field wide">
@@ -88,6 +115,7 @@ export function optionsForm(choices: Choices, hasCage: boolean, onChange: (choic
             </div>`
           : ''
       }
+      ${hasCage ? '' : cageFields(choices, set, option)}
       <div class="field">
         <label for="frame-rate">Frames per second</label>
         <input
@@ -106,28 +134,19 @@ export function optionsForm(choices: Choices, hasCage: boolean, onChange: (choic
       <div class="options">
         <div class="field">
           <label for="coordinates">Coordinates</label>
-          <select id="coordinates" @change=${set('coordinates')}>
+          <select
+            id="coordinates"
+            aria-describedby="coordinates-hint"
+            ?disabled=${isDesigned}
+            @change=${set('coordinates')}
+          >
             ${option('coordinates', 'mvc', 'Mean value')} ${option('coordinates', 'harmonic', 'Harmonic')}
             ${option('coordinates', 'green', 'Green')} ${option('coordinates', 'green-free', 'Green, free normals')}
           </select>
+          <span class="hint" id="coordinates-hint">
+            ${isDesigned ? 'Cages are designed for mean value coordinates.' : 'How points follow the cage.'}
+          </span>
         </div>
-        ${
-          hasCage
-            ? ''
-            : html`<div class="field">
-                <label for="cage-vertices">Vertices of the cage, at most</label>
-                <input
-                  id="cage-vertices"
-                  type="number"
-                  min="4"
-                  max="20000"
-                  step="1"
-                  placeholder="350"
-                  .value=${choices.cageVertices}
-                  @input=${set('cageVertices')}
-                />
-              </div>`
-        }
         <div class="field">
           <label for="send">What is sent</label>
           <select id="send" aria-describedby="send-hint" ?disabled=${isCoded} @change=${set('send')}>
@@ -141,4 +160,86 @@ export function optionsForm(choices: Choices, hasCage: boolean, onChange: (choic
       </div>
     </details>
   `;
+}
+
+type Set = (key: keyof Choices) => (event: Event) => void;
+type Option = (key: keyof Choices, value: string, word: string) => unknown;
+
+/** Where the cage comes from, and what it is to be. */
+function cageFields(choices: Choices, set: Set, option: Option) {
+  const isDesigned = choices.cage === 'motion';
+  const isError = isDesigned && choices.cageGoal === 'error';
+  const number = (key: 'cageVertices' | 'cageError' | 'cageSeconds', label: string, rest: NumberField) =>
+    html`<div class="field">
+      <label for=${key}>${label}</label>
+      <input
+        id=${key}
+        type="number"
+        min=${rest.min}
+        max=${rest.max}
+        step=${rest.step}
+        placeholder=${rest.placeholder}
+        ?required=${rest.isRequired}
+        .value=${choices[key]}
+        @input=${set(key)}
+      />
+    </div>`;
+  return html`
+    <div class="field">
+      <label for="cage">Cage</label>
+      <select id="cage" aria-describedby="cage-hint" @change=${set('cage')}>
+        ${option('cage', 'rest', 'Made around the rest pose')} ${option('cage', 'motion', 'Designed from the motion')}
+      </select>
+      <span class="hint" id="cage-hint">
+        ${isDesigned ? 'Several times more accurate; it takes about a minute more.' : 'Ready within seconds.'}
+      </span>
+    </div>
+    ${
+      isDesigned
+        ? html`<div class="field">
+            <label for="cage-goal">It has</label>
+            <select id="cage-goal" @change=${set('cageGoal')}>
+              ${option('cageGoal', 'vertices', 'a number of vertices')}
+              ${option('cageGoal', 'error', 'as few vertices as an error allows')}
+            </select>
+          </div>`
+        : ''
+    }
+    ${
+      isError
+        ? number('cageError', 'Mean error, in % of the diagonal', {
+            min: '0.0001',
+            max: '99',
+            step: 'any',
+            placeholder: '',
+            isRequired: true,
+          })
+        : number('cageVertices', 'Vertices of the cage, at most', {
+            min: '4',
+            max: '20000',
+            step: '1',
+            placeholder: '350',
+            isRequired: false,
+          })
+    }
+    ${
+      isDesigned
+        ? number('cageSeconds', 'Seconds for the design, at most', {
+            min: '1',
+            max: '86400',
+            step: 'any',
+            placeholder: 'as the service allows',
+            isRequired: false,
+          })
+        : ''
+    }
+  `;
+}
+
+interface NumberField {
+  readonly min: string;
+  readonly max: string;
+  readonly step: string;
+  readonly placeholder: string;
+  readonly isRequired: boolean;
 }

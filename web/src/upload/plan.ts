@@ -2,8 +2,9 @@
 
 import { counted } from '../sessions/text';
 import type { Item } from './classify';
-import type { FrameSource } from './frameSource';
+import { type FrameSource, UnusableFile } from './frameSource';
 import { ObjFrames, extensionOf, pointsOf } from './meshes';
+import { mddFrames } from './mdd';
 import { npyFrames } from './npy';
 import { pc2Frames } from './pc2';
 
@@ -27,7 +28,7 @@ export async function planOf(items: readonly Item[]): Promise<Plan> {
   const [framesItem, cageItem] = [having('frames'), having('cage')];
   if (!framesItem) {
     throw new Error(
-      'Frames are missing: drop an array (.npy), a point cache (.pc2), or a folder with one .obj per frame.',
+      'Frames are missing: drop an array (.npy), a point cache (.pc2 or .mdd), or a folder with one .obj per frame.',
     );
   }
   const frames = await framesOf(framesItem.files);
@@ -43,7 +44,6 @@ export async function planOf(items: readonly Item[]): Promise<Plan> {
       `${framesItem.name} has ${counted(frames.points, 'point')} in each frame and the rest pose ${rest.name} has ${counted(points, 'point')}: both have to be the same mesh, with its points in the same order.`,
     );
   }
-  if (!cageItem) remarks.push('There is no cage: the service makes one around the rest pose.');
   return { rest, cage: cageItem?.files[0] ?? null, frames, remarks };
 }
 
@@ -51,5 +51,7 @@ export async function planOf(items: readonly Item[]): Promise<Plan> {
 export async function framesOf(files: readonly File[]): Promise<FrameSource> {
   const extension = extensionOf(files[0].name);
   if (files.length > 1 || extension === 'obj') return ObjFrames.of(files);
-  return extension === 'npy' ? npyFrames(files[0]) : pc2Frames(files[0]);
+  const read = { npy: npyFrames, pc2: pc2Frames, mdd: mddFrames }[extension];
+  if (!read) throw new UnusableFile(files[0].name, 'frames are .npy, .pc2, .mdd or .obj files.');
+  return read(files[0]);
 }

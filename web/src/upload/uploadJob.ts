@@ -1,16 +1,25 @@
-/** Sends a capture to the service: a session, its frames, its completion. Goes on over broken connections, and after being stopped. */
+/** Sends a capture to the service: a cage's design, a session, its frames, its completion. Goes on over broken connections, and after being stopped. */
 
 import { Backoff, type Retry, pause, persistently } from '../service/backoff';
-import { type Session, type SessionOptions, unsolved } from '../service/messages';
+import {
+  type DesignOptions,
+  type DesignProgress,
+  type Session,
+  type SessionOptions,
+  unsolved,
+} from '../service/messages';
 import { ServiceProblem, isAbort, problemBehind, problemFrom, sentenceOf } from '../service/problem';
 import { type Service, sessionPath } from '../service/service';
 import { RateMeter } from '../service/measures';
 import { type Figures, containerFigures } from '../sessions/figures';
 import { FrameSender } from './frameSender';
+import { type KeptUpload, newKey } from './keptUpload';
+import { MotionCage } from './motionCage';
 import type { Plan } from './plan';
 
 /** Where an upload is. */
-export type Stage = 'creating' | 'preparing' | 'sending' | 'completing' | 'completed' | 'stopped' | 'failed';
+export type Stage =
+  'designing' | 'creating' | 'preparing' | 'sending' | 'completing' | 'completed' | 'stopped' | 'failed';
 
 /** Errors of the frames that are solved, as fractions of the diagonal; NaN where not known. */
 export interface Measured {
@@ -20,9 +29,18 @@ export interface Measured {
 
 const PREPARING_POLL_SECONDS = 0.5;
 
+/** What is asked of the service. */
+export interface UploadRequest {
+  readonly options: SessionOptions;
+  /** What the cage is to be that is designed first; null where none is. */
+  readonly design: DesignOptions | null;
+  /** Send handle rows alone where these are less. */
+  readonly handlesOnly: boolean;
+}
+
 /** One upload. Fires `change`. */
 export class UploadJob extends EventTarget {
-  stage: Stage = 'creating';
+  stage: Stage;
   /** The session, once the service made it. */
   session: Session | null = null;
   /** Why it stands still or failed, a sentence; empty while all is well. */
@@ -36,17 +54,19 @@ export class UploadJob extends EventTarget {
   readonly measured: Measured;
   readonly #frames = new RateMeter();
   readonly #bytes = new RateMeter();
-  readonly #key = crypto.randomUUID();
+  readonly #cage: MotionCage;
   #stopping = new AbortController();
 
+  /** @param kept what goes on after the page was closed; with a session or a design, this upload goes on with it */
   constructor(
     private readonly service: Service,
     readonly plan: Plan,
-    readonly options: SessionOptions,
-    /** Send handle rows alone where these are less. */
-    private readonly wantsHandlesOnly: boolean,
+    readonly request: UploadRequest,
+    private readonly kept: KeptUpload,
   ) {
     super();
+    this.stage = request.design ? 'designing' : 'creating';
+    this.#cage = new MotionCage(service, plan, kept, () => this.#changed());
     const unknown = (): Float32Array => new Float32Array(plan.frames.frames).fill(Number.NaN);
     this.measured = { l2: unknown(), linf: unknown() };
   }
@@ -74,40 +94,94 @@ export class UploadJob extends EventTarget {
     this.#stopping.abort();
   }
 
+  /** Goes on with the best cage that the design has found so far. */
+  takeBest(): void {
+    this.#cage.takeBest();
+  }
+
+  /** How far the design of the cage is. */
+  get design(): DesignProgress | null {
+    return this.#cage.progress;
+  }
+
   /** Stops, and deletes what the service has. */
   async discard(): Promise<void> {
     this.stop();
-    if (this.session) await this.service.remove(this.session.id);
+    const { session } = this.kept.present;
+    if (session !== null) await this.service.remove(session);
+    await this.#cage.putAway();
+    this.kept.forget();
   }
 
   /** Begins, or goes on. Ends with the stage `completed`, `stopped` or `failed`; never throws. */
   async run(): Promise<void> {
     this.#stopping = new AbortController();
     const { signal } = this.#stopping;
+    this.kept.set({});
+    this.kept.hold();
     try {
+      if (this.request.design && this.kept.present.session === null && !this.#cage.file) {
+        this.#enter('designing');
+        const retry = <T>(work: () => Promise<T>): Promise<T> => this.#retry(work, signal);
+        await this.#cage.design(this.request.design, retry, signal);
+      }
       this.#enter('creating');
-      this.session ??= await this.#retry(() => this.#create(signal), signal);
+      const { session } = this.kept.present;
+      this.session = await this.#retry(
+        () => (session === null ? this.#create(signal) : this.service.session(session, signal)),
+        signal,
+      );
+      this.kept.set({ session: this.session.id });
       this.#enter('preparing');
       await this.#prepared(this.session.id, signal);
+      await this.#cage.putAway();
       this.#enter('sending');
       await this.#send(this.session.id, signal);
       this.#enter('completing');
       const { id } = this.session;
       this.session = await this.#retry(() => this.service.complete(id, this.plan.frames.frames, signal), signal);
+      this.kept.forget();
       this.figures = await containerFigures(this.service, this.session).catch(() => null);
       this.#enter('completed');
     } catch (error) {
-      this.trouble = isAbort(error) ? '' : sentenceOf(error);
+      const isSignedOut = error instanceof ServiceProblem && error.status === 401;
+      if (this.stage === 'designing' && !isSignedOut) await this.#cage.putAway();
+      this.trouble = isAbort(error) ? '' : this.#sentence(error);
       this.#enter(isAbort(error) ? 'stopped' : 'failed');
+    } finally {
+      this.kept.release();
     }
+  }
+
+  /** What went wrong; of a session that is gone, what is to be done with its frames. */
+  #sentence(error: unknown): string {
+    const problem = problemBehind(error);
+    if (!(problem instanceof ServiceProblem && problem.isGone)) return sentenceOf(problem);
+    const { session } = this.kept.present;
+    if (session === null) return sentenceOf(problem);
+    // What is sent from now on is another upload.
+    this.kept.set({ session: null, design: null, key: newKey() });
+    this.session = null;
+    this.done = 0;
+    this.measured.l2.fill(Number.NaN);
+    this.measured.linf.fill(Number.NaN);
+    return 'The session was deleted while it was uploaded to, here or elsewhere. Start again to send all of it to a new one.';
+  }
+
+  /** Whether nothing of it is at the service any more, or yet. */
+  get isAnew(): boolean {
+    return this.kept.present.session === null;
   }
 
   async #create(signal: AbortSignal): Promise<Session> {
     const body = new FormData();
-    body.append('options', JSON.stringify(this.options));
+    const { key, design } = this.kept.present;
+    const cage = this.#cage.file ?? this.plan.cage;
+    const designed = cage === null && design !== null ? { cage: { id: design } } : {};
+    body.append('options', JSON.stringify({ ...this.request.options, ...designed }));
     body.append('rest', this.plan.rest);
-    if (this.plan.cage) body.append('cage', this.plan.cage);
-    const headers = { 'Idempotency-Key': this.#key };
+    if (cage) body.append('cage', cage);
+    const headers = { 'Idempotency-Key': key };
     return this.service.json<Session>('sessions', { method: 'POST', headers, body, signal });
   }
 
@@ -131,6 +205,7 @@ export class UploadJob extends EventTarget {
     const { frames } = this.plan;
     const sender = await this.#sender(id, signal);
     const backoff = new Backoff();
+    await this.#recall(id, signal);
     // Whatever broke off, what is missing then is what the service says.
     for (;;) {
       const session = await this.#retry(() => this.service.session(id, signal), signal);
@@ -152,11 +227,21 @@ export class UploadJob extends EventTarget {
     }
   }
 
+  /** Errors of the frames that were sent before, where they are not known here. */
+  async #recall(id: string, signal: AbortSignal): Promise<void> {
+    if (!this.session || this.session.frames.solved === 0 || this.done > 0) return;
+    for (const { frame, l2, linf } of await this.#retry(() => this.service.errors(id, signal), signal)) {
+      if (frame >= this.plan.frames.frames) continue;
+      this.measured.l2[frame] = l2 ?? Number.NaN;
+      this.measured.linf[frame] = linf ?? Number.NaN;
+    }
+  }
+
   async #sender(id: string, signal: AbortSignal): Promise<FrameSender> {
     const handles = await this.#retry(() => this.service.handles(id, signal), signal);
     const coded = this.session?.coding !== undefined;
     this.handlesOnly =
-      this.wantsHandlesOnly && !coded && this.session?.handles !== 'all' && handles.length < this.plan.frames.points;
+      this.request.handlesOnly && !coded && this.session?.handles !== 'all' && handles.length < this.plan.frames.points;
     return new FrameSender(
       this.service,
       sessionPath(id, 'frames'),

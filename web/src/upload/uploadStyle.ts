@@ -1,25 +1,11 @@
 import { css } from 'lit';
 
-/** Looks of the upload page. Expects the tokens and controls of the page. */
+/** Looks of the upload page, beside {@link pageLayout}. */
 export const uploadStyle = css`
-  :host {
-    display: block;
-    flex: 1;
-    min-height: 0;
-    overflow: auto;
-    background: var(--cager-background);
-  }
   .page {
     display: grid;
     gap: var(--cager-space-4);
     max-width: 820px;
-    margin: 0 auto;
-    padding: var(--cager-space-6) var(--cager-space-5) var(--cager-space-7);
-  }
-  header {
-    display: flex;
-    align-items: center;
-    gap: var(--cager-space-3);
   }
   .back {
     width: 36px;
@@ -27,12 +13,6 @@ export const uploadStyle = css`
     padding: 0;
     border-radius: 50%;
     color: var(--cager-text);
-  }
-  h1 {
-    margin: 0;
-    font-size: var(--cager-size-title);
-    line-height: 1.2;
-    letter-spacing: -0.01em;
   }
   h2 {
     margin: 0;
@@ -189,25 +169,8 @@ export const uploadStyle = css`
     color: var(--cager-good);
   }
   progress {
-    display: block;
     width: 100%;
     height: 8px;
-    border: 0;
-    border-radius: 4px;
-    overflow: hidden;
-    appearance: none;
-    background: var(--cager-line);
-  }
-  progress::-webkit-progress-bar {
-    background: var(--cager-line);
-  }
-  progress::-webkit-progress-value {
-    background: var(--cager-accent);
-    border-radius: 4px;
-    transition: width var(--cager-slow);
-  }
-  progress::-moz-progress-bar {
-    background: var(--cager-accent);
   }
   .figuresRow {
     display: flex;
@@ -222,7 +185,7 @@ export const uploadStyle = css`
   .steps {
     display: flex;
     flex-wrap: wrap;
-    gap: var(--cager-space-2) var(--cager-space-5);
+    gap: var(--cager-space-2) var(--cager-space-4);
     margin: 0;
     padding: 0;
     list-style: none;

@@ -1,10 +1,12 @@
 import { orbited, zoomed } from '../render/camera';
 import type { Layers } from '../render/stage';
 import type { CagerViewer } from './cagerViewer';
+import { numberAt, numberText } from './frameNumbers';
 import type { Heat } from './heatMap';
 import type { Player } from './player';
 import { recordTurntable, save } from './recording';
 import type { Action } from './shortcuts';
+import { sentence } from './text';
 import { sought, spedUp, started, stepped, worstFrame } from './transport';
 
 /** Angle and factor of one press of a key. */
@@ -52,7 +54,9 @@ export function perform(action: Action, viewer: CagerViewer) {
     turntable: () => void toggleRecording(viewer, player),
     fullscreen: () => void toggleFullscreen(viewer),
     figures: () => (viewer.figures = !viewer.figures),
-    edit: () => void viewer.editing.toggle(),
+    edit: () => void viewer.toggleEditing(),
+    spectrum: () => void viewer.toggleSpectrum(),
+    beside: () => viewer.toggleBeside(),
     help: () => viewer.openHelp(),
   };
   actions[action]();
@@ -77,10 +81,27 @@ function compare(player: Player) {
 
 async function savePicture(viewer: CagerViewer, player: Player) {
   try {
-    save(await player.picture(), `${stem(viewer)}-${viewer.frame}.png`);
+    save(
+      await pictureOf(viewer, player),
+      `${stem(viewer)}-${numberText(numberAt(player.transport.numbers, viewer.frame))}.png`,
+    );
   } catch (error) {
-    viewer.report(error instanceof Error ? error.message : String(error));
+    viewer.report(sentence(error));
   }
+}
+
+/** The picture, with that of the capture beside where there is one. */
+async function pictureOf(viewer: CagerViewer, player: Player): Promise<Blob> {
+  const second = viewer.pair.player;
+  if (!second) return player.picture();
+  const pictures = await Promise.all([player, second].map(async (each) => createImageBitmap(await each.picture())));
+  const [{ width, height }] = pictures;
+  const isWide = viewer.getAttribute('pictures') === 'columns';
+  const canvas = new OffscreenCanvas(isWide ? 2 * width : width, isWide ? height : 2 * height);
+  const context = canvas.getContext('2d')!;
+  for (const [k, picture] of pictures.entries())
+    context.drawImage(picture, isWide ? k * width : 0, isWide ? 0 : k * height);
+  return canvas.convertToBlob({ type: 'image/png' });
 }
 
 /** Begins to record a turn, or stops recording without saving anything. */
@@ -99,7 +120,7 @@ async function toggleRecording(viewer: CagerViewer, player: Player) {
     const { video, ending } = await recordTurntable(player, recording.signal, showProgress);
     save(video, `${stem(viewer)}.${ending}`);
   } catch (error) {
-    if (!recording.signal.aborted) viewer.report(error instanceof Error ? error.message : String(error));
+    if (!recording.signal.aborted) viewer.report(sentence(error));
   } finally {
     player.progress = null;
     viewer.recording = null;

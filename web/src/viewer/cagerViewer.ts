@@ -1,38 +1,32 @@
-import { html, LitElement, nothing, type PropertyValues } from 'lit';
-import { customElement, property, query, state } from 'lit/decorators.js';
 import type { Capture } from '../capture';
-import { openContainer } from '../container/open';
-import { checkPrelude, PRELUDE_BYTES } from '../container/section';
-import { blobSource, httpSource } from '../container/source';
-import { controls, tokens } from '../style/tokens';
+import { html, nothing, type PropertyValues } from 'lit';
+import { customElement, property, query, state } from 'lit/decorators.js';
 import { EditMode } from '../editing/editMode';
-import { perform, stem } from './actions';
-import { emptyState, notice, progressBox } from './messages';
-import { liveBadge, liveFrame, livePlace } from './liveBadge';
-import { panelStyle } from './panelStyle';
-import { figuresPanel, helpSheet, legend, toolbar, transportBar } from './parts';
-import { Player } from './player';
-import { canRecord } from './recording';
-import { actionOf, type Action } from './shortcuts';
-import { stageColors } from './stageColors';
-import { clock, fileNameOf, grouped, percent } from './text';
-import './timeline';
-import type { Timeline } from './timeline';
-import { sought, started } from './transport';
+import { controls, tokens } from '../style/tokens';
 import type { Dropped } from '../upload/classify';
-import { droppedFiles } from '../upload/drop';
+import { perform, stem } from './actions';
+import { BesideMode } from './besideMode';
+import { besideStyle } from './besideStyle';
+import { CaptureElement } from './captureElement';
 import { divider } from './comparisonParts';
 import { comparisonStyle } from './comparisonStyle';
+import { figuresPanel } from './figuresPanel';
+import { IncomingFiles } from './incomingFiles';
+import { Layout } from './layout';
+import { LiveBadge } from './liveBadge';
+import { emptyState, notice, progressBox } from './messages';
+import { panelStyle } from './panelStyle';
+import { deck, helpSheet, legend, titleBox, toolbar } from './parts';
+import type { Player } from './player';
 import { PointMarks } from './pointMarks';
+import { writeReadout } from './readout';
+import { canRecord } from './recording';
+import { actionOfKey, type Action } from './shortcuts';
+import { SpectrumMode } from './spectrumMode';
+import { followLooks, stageColors } from './stageColors';
+import { sentence } from './text';
+import type { Timeline } from './timeline';
 import { viewerStyle } from './viewerStyle';
-import { viewFromText, viewText, type ViewState } from './viewState';
-
-/** How long the view must rest before it is told to whoever keeps links. */
-const REST_MILLISECONDS = 300;
-/** CSS pixels below which the tools cover what matters. */
-const NARROW = 680;
-/** A finer picture than this costs more than it shows. */
-const FINEST_PIXEL_RATIO = 2;
 
 /**
  * Plays a capture: `<cager-viewer src="walk.cager" autoplay></cager-viewer>`, or one that is set as the property `capture`. A `.cager` file that is
@@ -47,68 +41,30 @@ const FINEST_PIXEL_RATIO = 2;
  * @fires viewchange with the view as text, when it rests, for links; set `view` to return to it
  * @fires problem with one sentence, when something failed
  * @fires filechosen with a container that somebody dropped or chose; whoever cancels it sees to the file
+ * @fires besidewanted when somebody wants to see another capture beside this one; whoever cancels it sets `beside`, else a file is asked for
+ * @fires besideclosed when somebody wants to see this capture alone again
  * @fires signin when somebody wants to sign in, to follow a session on
  */
 @customElement('cager-viewer')
-export class CagerViewer extends LitElement {
-  static override styles = [tokens, controls, viewerStyle, panelStyle, comparisonStyle];
+export class CagerViewer extends CaptureElement {
+  static override styles = [tokens, controls, viewerStyle, besideStyle, panelStyle, comparisonStyle];
 
-  @property() src: string | null = null;
-  @property() name: string | null = null;
-  @property({ type: Boolean }) autoplay = false;
-  /** The capture to play; whoever sets it closes it. */
-  @property({ attribute: false }) capture: Capture | null = null;
-  /** The view to go to, as `viewchange` tells it. */
-  @property() view = '';
-  @state() player: Player | null = null;
   @state() figures = false;
   @state() recording: AbortController | null = null;
-  @state() private opening: string | null = null;
-  @state() private problem: string | null = null;
-  /** Why nothing can be shown. */
-  @state() private failure: string | null = null;
-  @state() private dropping = false;
-  @query('canvas') private readonly canvas!: HTMLCanvasElement;
   @query('cager-timeline') private readonly timeline!: Timeline | null;
-  @query('dialog') private readonly sheet!: HTMLDialogElement;
+  @query('dialog.sheet') private readonly sheet!: HTMLDialogElement;
+  /** A second capture to show beside the first; whoever sets it closes it. */
+  @property({ attribute: false }) beside: Capture | null = null;
   readonly editing = new EditMode(this);
+  readonly spectrum = new SpectrumMode(this);
+  readonly pair = new BesideMode(this);
+  private readonly files = new IncomingFiles(this);
+  private readonly live = new LiveBadge(this);
+  private readonly layout = new Layout(this);
   private marks: PointMarks | null = null;
-  private opened: Capture | null = null;
-  private load = new AbortController();
   private removed = new AbortController();
   private look = 0;
-  private shownFrame = -1;
-  private deckHeight = 0;
-  private panelShare = 0;
-  private restTimer = 0;
-  /** Kind of the live place that the badge was rendered for last. */
-  private shownPlace = '';
-  private secondTimer = 0;
-  /** The file that is shown, where it is no address. */
-  private file: File | null = null;
-  private wasReady = false;
-  private cameraWasMoved = false;
-  private upAxis: 'y' | 'z' = 'y';
   private readonly sizes = new ResizeObserver(() => this.resize());
-
-  /** Plays a file without any server. */
-  async open(file: File): Promise<void> {
-    await this.openFrom(file.name, (signal) => openContainer(blobSource(file), { name: file.name, signal }), file);
-  }
-
-  /** Goes to a view as `viewchange` tells it. */
-  goTo(text: string) {
-    const { player } = this;
-    if (!player) {
-      this.view = text;
-      return;
-    }
-    const view = viewFromText(text);
-    this.take(view, player, false);
-    // A link without a frame is of the first one, or of a capture that plays.
-    if (view.frame === null && !player.transport.playing) player.transport = sought(player.transport, 0);
-    this.view = '';
-  }
 
   /** Takes the frames that the capture was encoded from, and shows how far it is from them. */
   async openOriginal(files: readonly Dropped[] | Promise<readonly Dropped[]>): Promise<void> {
@@ -116,52 +72,39 @@ export class CagerViewer extends LitElement {
     if (!player) return;
     try {
       await player.comparison.open(await files);
+      await this.pair.openOriginal(player.comparison.files);
       if (player.heatMap.kind !== 'error') player.setHeat('error');
       this.problem = null;
     } catch (error) {
-      this.report(error instanceof Error ? error.message : String(error));
+      this.report(sentence(error));
     }
   }
 
-  play() {
-    if (this.player) this.player.transport = started(this.player.transport);
+  /** Plays a file without any server, beside the capture that is open. */
+  openBeside(file: File): Promise<void> {
+    return this.pair.open(file);
   }
 
-  pause() {
-    if (this.player) this.player.transport = { ...this.player.transport, playing: false };
+  /** Shows the capture alone where there is another one beside it; else asks for one. */
+  toggleBeside() {
+    if (this.beside) {
+      this.pair.leave();
+      return;
+    }
+    const wanted = new CustomEvent('besidewanted', { bubbles: true, composed: true, cancelable: true });
+    if (this.dispatchEvent(wanted)) this.files.pickBeside();
   }
 
-  /** The frame that is shown; setting it goes there. */
-  get frame(): number {
-    return Math.floor(this.player?.transport.position ?? 0);
+  /** Begins or ends to edit the cage; its singular vectors are put away. */
+  toggleEditing(): Promise<void> {
+    this.spectrum.leave();
+    return this.editing.toggle();
   }
 
-  set frame(frame: number) {
-    if (this.player) this.player.transport = sought(this.player.transport, frame);
-  }
-
-  /** Which axis of the capture points up. */
-  get up(): 'y' | 'z' {
-    return this.upAxis;
-  }
-
-  set up(axis: 'y' | 'z') {
-    this.upAxis = axis;
-    this.player?.setUp(axis);
-    this.player?.frameAll();
-  }
-
-  /** Positions of a frame as they are decoded for the picture, x y z of each point. */
-  readPositions(frame: number): Promise<Float32Array> {
-    if (!this.player) return Promise.reject(new Error('There is no capture to read from; open one first.'));
-    return this.player.readPositions(frame);
-  }
-
-  /** Shows one sentence about something that went wrong, or takes it away. */
-  report(problem: string | null) {
-    this.problem = problem;
-    if (problem === null) return;
-    this.dispatchEvent(new CustomEvent<string>('problem', { detail: problem, bubbles: true, composed: true }));
+  /** Shows singular vectors on the cage, or puts them away; editing it ends. */
+  async toggleSpectrum(): Promise<void> {
+    if (this.editing.isOn) await this.editing.toggle();
+    await this.spectrum.toggle();
   }
 
   /** Shows the keyboard shortcuts. */
@@ -169,122 +112,88 @@ export class CagerViewer extends LitElement {
     this.sheet.showModal();
   }
 
-  /** What is written above the picture, and in file names. */
-  get heading(): string {
-    return this.name ?? this.player?.capture.name ?? this.opening ?? 'Capture';
-  }
-
   override connectedCallback() {
     super.connectedCallback();
     this.removed = new AbortController();
     const { signal } = this.removed;
     this.sizes.observe(this);
-    for (const feature of ['(prefers-color-scheme: dark)', '(prefers-contrast: more)']) {
-      matchMedia(feature).addEventListener('change', () => this.applyColors(), { signal });
-    }
-    const themes = new MutationObserver(() => this.applyColors());
-    themes.observe(document.documentElement, { attributeFilter: ['data-theme'] });
-    signal.addEventListener('abort', () => themes.disconnect());
+    followLooks(() => this.applyColors(), signal);
     this.addEventListener('keydown', this.pressKey, { signal });
-    this.addEventListener('dragover', (event) => this.dragOver(event), { signal });
-    this.addEventListener('dragleave', () => (this.dropping = false), { signal });
-    this.addEventListener('drop', (event) => this.dropFile(event), { signal });
-    // An element that was only moved still has its capture.
-    if (this.hasUpdated && !this.player && this.opening === null) this.reopen();
+    this.files.listen(signal);
   }
 
   override disconnectedCallback() {
     super.disconnectedCallback();
     this.removed.abort();
     this.sizes.disconnect();
-    clearTimeout(this.restTimer);
-    clearTimeout(this.secondTimer);
-    queueMicrotask(() => {
-      if (this.isConnected) return;
-      this.load.abort();
-      this.opening = null;
-      if (this.player) this.view = this.viewNow(this.player);
-      this.unload();
-    });
+    this.live.stop();
   }
 
   protected override updated(changed: PropertyValues) {
-    if (this.isConnected) this.follow(changed);
+    super.updated(changed);
+    this.pair.follow();
+    this.files.follow();
     // The canvas is replaced with every capture, so no binding of the template can reach it.
     this.canvas.hidden = !this.player;
     this.canvas.setAttribute(
       'aria-label',
       `${this.heading}: the model, drawn. Drag or use the keys A, D, W, X to turn it.`,
     );
-    if (this.measureDeck() !== this.deckHeight || this.editing.panelShare !== this.panelShare) this.resize();
+    if (this.layout.hasChanged(this.pair.player, this.panelShare)) this.resize();
     this.writePlace();
   }
 
   override render() {
-    const { player } = this;
+    const { player, opener } = this;
     return html`
-      <canvas tabindex="0" role="img" hidden></canvas>
-      ${player ? this.overlay(player) : emptyState(this.opening, this.failure, (file) => void this.choose(file))}
+      <div class="pane first">
+        <canvas tabindex="0" role="img" hidden></canvas>
+        ${player ? [divider(player), this.marks?.template] : nothing}
+      </div>
       ${
-        this.dropping
-          ? html`<div class="drop">
-              ${player ? 'Drop another capture to play it, or the original frames to compare with' : 'Drop a capture to play it'}
-            </div>`
-          : nothing
+        // A capture that is edited has the viewer for itself.
+        player && !this.editing.isOn ? this.pair.template() : nothing
       }
-      ${helpSheet(() => this.sheet.close())}
+      ${player ? this.overlay(player) : emptyState(opener.name, opener.failure, (file) => void this.files.choose(file))}
+      ${helpSheet(() => this.sheet.close())} ${this.files.template()}
     `;
   }
 
   private overlay(player: Player) {
-    const { capture, transport, progress } = player;
-    const { static: part } = capture;
+    const { capture, progress } = player;
     const act = (action: Action) => perform(action, this);
-    const hasErrors = capture.errors.linf.some(Number.isFinite);
+    const opening = this.opener.name;
     return html`
-      ${divider(player)} ${this.marks?.template}
       <div class="lead">
         <slot name="lead"></slot>
-        <div class="title glass">
-          <h1 title=${this.heading}>${this.heading}</h1>
-          <p class="figures">
-            ${grouped(part.rest.length / 3)} points, ${grouped(capture.frames)} frames<span class="more"
-              >, cage of ${grouped(part.cage.positions.length / 3)} vertices</span
-            >${this.editing.hasEdits ? ', edited' : nothing}
-          </p>
-        </div>
-        ${capture.complete ? nothing : this.liveBadge(player)}
+        ${titleBox(this.heading, player, this.editing.hasEdits)}
+        ${capture.complete ? nothing : this.live.template(player)}
       </div>
       ${toolbar(player, act, {
         figures: this.figures,
         editing: this.editing.isOn,
+        beside: this.beside !== null,
+        spectrum: this.spectrum.isOn,
         recording: this.recording !== null,
         recordable: canRecord(),
       })}
-      ${this.editing.panel(stem(this))} ${this.figures ? figuresPanel(player) : nothing}
-      ${legend(player, this.comparisonActs, this.editing.isOn)}
+      ${this.editing.panel(stem(this))} ${this.spectrum.panel(this.look)}
+      ${this.figures ? figuresPanel(player) : nothing} ${legend(player, this.comparisonActs, this.panelShare > 0)}
       ${this.problem !== null ? notice(this.problem, () => (this.problem = null)) : nothing}
       ${
-        this.opening !== null
-          ? progressBox(`Opening ${this.opening}`, null)
+        opening !== null
+          ? progressBox(`Opening ${opening}`, null)
           : progress
             ? progressBox(progress.doing, progress.fraction)
             : player.buffering
               ? progressBox('Loading', null)
               : nothing
       }
-      <div class="deck glass">
-        ${transportBar(player, act, (speed) => (player.transport = { ...transport, speed }), hasErrors)}
-        <cager-timeline
-          .frames=${capture.frames}
-          .errors=${capture.errors}
-          .frameNumbers=${capture.frameNumbers}
-          .range=${this.editing.range}
-          .look=${this.look}
-          .position=${transport.position}
-          @seek=${(event: CustomEvent<number>) => (player.transport = sought(player.transport, event.detail))}
-        ></cager-timeline>
-      </div>
+      ${deck(player, act, {
+        besideErrors: this.pair.errors,
+        range: this.editing.range,
+        look: this.look,
+      })}
     `;
   }
 
@@ -296,284 +205,76 @@ export class CagerViewer extends LitElement {
     },
   };
 
-  private liveBadge(player: Player) {
-    const place = livePlace(player.capture.live ?? null, player.transport, Date.now());
-    const goLive = () => (player.transport = started(sought(player.transport, liveFrame(player.transport))));
-    const signIn = () => this.dispatchEvent(new CustomEvent('signin', { bubbles: true, composed: true }));
-    clearTimeout(this.secondTimer);
-    if (place.kind === 'reconnecting') this.secondTimer = window.setTimeout(() => this.requestUpdate(), 1000);
-    return liveBadge(place, goLive, signIn);
-  }
-
-  /** Shows what `src`, `capture` and `view` say now. */
-  private follow(changed: PropertyValues) {
-    if (changed.has('src') && this.src !== null) this.openAddress(this.src);
-    else if (changed.get('src')) this.empty();
-    if (changed.has('capture') && this.capture) this.show(this.capture);
-    else if (changed.get('capture') && this.player?.capture === changed.get('capture')) this.empty();
-    if (changed.has('view') && this.view !== '' && this.player) this.goTo(this.view);
-  }
-
-  private reopen() {
-    if (this.file) void this.open(this.file);
-    else if (this.capture) this.show(this.capture);
-    else if (this.src !== null) this.openAddress(this.src);
-  }
-
-  private openAddress(src: string) {
-    const name = fileNameOf(src);
-    this.unload();
-    void this.openFrom(name, async (signal) => openContainer(await httpSource(src, { signal }), { name, signal }));
-  }
-
-  /** Plays a file that somebody dropped or chose, unless its first bytes say that it is no container. */
-  private async choose(file: File) {
-    try {
-      const source = blobSource(file);
-      checkPrelude(await source.read(0, Math.min(PRELUDE_BYTES, source.size)));
-    } catch (error) {
-      if (this.player || this.opening !== null) this.report(error instanceof Error ? error.message : String(error));
-      else this.fail(error);
-      return;
-    }
-    const chosen = new CustomEvent('filechosen', { detail: file, bubbles: true, composed: true, cancelable: true });
-    if (this.dispatchEvent(chosen)) await this.open(file);
-  }
-
-  /** Opens a capture and shows it in place of the present one, which stays if that fails. */
-  private async openFrom(name: string, open: (signal: AbortSignal) => Promise<Capture>, file: File | null = null) {
-    this.load.abort();
-    this.load = new AbortController();
-    const { signal } = this.load;
-    this.failure = null;
-    this.opening = name;
-    try {
-      const capture = await open(signal);
-      if (signal.aborted) {
-        capture.close();
-        return;
-      }
-      this.show(capture);
-      this.opened = capture;
-      this.file = file;
-    } catch (error) {
-      if (signal.aborted) return;
-      if (this.player) {
-        this.opening = null;
-        this.report(error instanceof Error ? error.message : String(error));
-      } else this.fail(error);
-    }
-  }
-
-  private show(capture: Capture) {
-    this.unload();
-    this.file = null;
-    this.failure = this.problem = this.opening = null;
-    // A canvas whose context was given up cannot be used again.
-    const canvas = this.canvas.cloneNode() as HTMLCanvasElement;
-    this.canvas.replaceWith(canvas);
-    canvas.addEventListener('dblclick', () => this.player?.frameAll());
-    try {
-      canvas.hidden = false;
-      this.begin(new Player(canvas, capture));
-      this.marks = new PointMarks(this.renderRoot);
-      this.marks.follow(canvas, this.player!);
-    } catch (error) {
-      this.fail(error);
-    }
-  }
-
-  private begin(player: Player) {
-    const view = viewFromText(this.view);
-    this.player = player;
+  protected override began(player: Player) {
     // Blurring what lies below is dear where no graphics processor does it.
     this.toggleAttribute('plain', player.stage.isJagged);
-    this.wasReady = false;
-    player.onProblem = (problem) => this.report(problem);
-    player.onState = () => {
-      this.requestUpdate();
-      this.announceReady();
-    };
-    player.onTick = () => this.tick();
-    player.controls.onGrab = () => {
-      this.cameraWasMoved = true;
-      this.canvas.focus();
-    };
+    this.marks = new PointMarks(this.canvas.parentElement!);
+    this.marks.follow(this.canvas, player);
     this.applyColors();
     this.resize();
-    this.take(view, player, true);
-    // It is the view of this capture, not of the next one.
-    this.view = '';
-    if (this.autoplay && view.frame === null && !matchMedia('(prefers-reduced-motion: reduce)').matches) this.play();
-    if (player.capture.problem !== null) this.report(player.capture.problem);
+    this.editing.open(player);
   }
 
-  /** Goes to a view; one that names a frame stands there. */
-  private take(view: ViewState, player: Player, atOnce: boolean) {
-    this.cameraWasMoved = view.camera !== null;
-    this.upAxis = view.up;
-    player.layers = view.layers;
-    player.setUp(view.up);
-    if (view.frame !== null) player.transport = { ...sought(player.transport, view.frame), playing: false };
-    if (view.camera) player.controls.go(view.camera, atOnce);
-    else player.goHome(atOnce);
-  }
-
-  /** Shows nothing, as if there never had been a capture. */
-  private empty() {
-    this.load.abort();
-    this.unload();
-    this.file = null;
-    this.failure = this.problem = this.opening = null;
-  }
-
-  private unload() {
+  protected override unload() {
     this.recording?.abort();
     this.editing.close();
-    this.player?.dispose();
-    this.player = null;
-    this.opened?.close();
-    this.opened = null;
-    clearTimeout(this.secondTimer);
+    this.spectrum.close();
+    this.pair.unload();
+    super.unload();
+    this.live.stop();
   }
 
-  private fail(error: unknown) {
-    this.unload();
-    this.opening = null;
-    this.failure = error instanceof Error ? error.message : String(error);
-    this.report(this.failure);
-  }
-
-  private announceReady() {
-    const { player } = this;
-    if (this.wasReady || !player?.stage.decoder.ready) return;
-    this.wasReady = true;
-    this.dispatchEvent(new CustomEvent('ready', { bubbles: true, composed: true }));
-  }
-
-  private tick() {
+  protected override tick() {
     const { player } = this;
     if (!player) return;
     if (this.timeline) this.timeline.position = player.transport.position;
     this.editing.draw();
     this.writePlace();
     this.marks?.place(player);
-    this.renewBadge(player);
-    if (this.frame !== this.shownFrame) {
-      this.shownFrame = this.frame;
-      this.dispatchEvent(new CustomEvent<number>('framechange', { detail: this.frame, bubbles: true, composed: true }));
-    }
-    clearTimeout(this.restTimer);
-    this.restTimer = window.setTimeout(() => this.tellView(), REST_MILLISECONDS);
+    this.live.follow(player);
+    this.pair.draw();
+    super.tick();
   }
 
-  private tellView() {
-    const { player } = this;
-    if (!player) return;
-    const detail = this.viewNow(player);
-    this.dispatchEvent(new CustomEvent<string>('viewchange', { detail, bubbles: true, composed: true }));
+  protected override tellView() {
+    super.tellView();
     if (this.figures) this.requestUpdate();
   }
 
-  private viewNow(player: Player): string {
-    return viewText({
-      frame: player.transport.playing || this.frame === 0 ? null : this.frame,
-      camera: this.cameraWasMoved ? player.controls.destination : null,
-      up: this.upAxis,
-      layers: player.layers,
-    });
-  }
-
-  /** Renders anew when playing comes near the newest frame of a running session, or falls behind it. */
-  private renewBadge({ capture, transport }: Player) {
-    const place = capture.complete ? '' : livePlace(capture.live ?? null, transport, Date.now()).kind;
-    if (place !== this.shownPlace) this.requestUpdate();
-    this.shownPlace = place;
-  }
-
-  /** Writes what changes with every picture: rendering the template sixty times a second would cost more. */
   private writePlace() {
-    const { player } = this;
-    if (!player) return;
-    const write = (selector: string, text: string) => {
-      const place = this.renderRoot.querySelector(selector);
-      if (place && place.textContent !== text) place.textContent = text;
-    };
-    const { capture, transport } = player;
-    const frame = Math.min(this.frame, Math.max(0, capture.frames - 1));
-    const last = Math.max(0, capture.frames - 1);
-    write('[data-place]', `${frame} / ${last}`);
-    write('[data-clock]', clock(frame / transport.rate));
-    // What was measured is not what is shown any more.
-    const isEdited = this.editing.changes(frame);
-    const figure = (value: number | undefined) =>
-      value === undefined || !Number.isFinite(value) || isEdited ? '–' : percent(value);
-    write('[data-l2]', figure(capture.errors.l2[frame]));
-    write('[data-linf]', figure(capture.errors.linf[frame]));
+    if (this.player) writeReadout(this.renderRoot, this.player, (frame) => this.editing.changes(frame));
   }
 
-  private applyColors() {
+  applyColors() {
     this.look++;
-    this.player?.stage.setColors(stageColors(this));
-    this.player?.refresh();
+    const colors = stageColors(this);
+    for (const player of [this.player, this.pair.player]) {
+      player?.stage.setColors(colors);
+      player?.refresh();
+    }
     this.editing.recolor();
   }
 
-  private measureDeck(): number {
-    const deck = this.renderRoot.querySelector('.deck');
-    const height = deck ? this.getBoundingClientRect().bottom - deck.getBoundingClientRect().top : 0;
-    this.style.setProperty('--deck-height', `${Math.round(height)}px`);
-    return Math.round(height);
+  /** Part of a narrow picture's height that a panel takes. */
+  private get panelShare(): number {
+    return Math.max(this.editing.panelShare, this.spectrum.panelShare);
   }
 
   private resize() {
-    const { clientWidth, clientHeight } = this;
-    if (clientWidth === 0 || clientHeight === 0) return;
-    const ratio = Math.min(FINEST_PIXEL_RATIO, devicePixelRatio);
-    this.deckHeight = this.measureDeck();
-    const tools = this.renderRoot.querySelector('.tools')?.clientWidth ?? 0;
-    // In a wide picture the tools stand beside the model anyway.
-    const isNarrow = clientWidth < NARROW;
-    const right = isNarrow ? tools + 12 : 0;
-    this.panelShare = this.editing.panelShare;
-    const bottom = this.deckHeight + (isNarrow ? Math.round(this.panelShare * clientHeight) : 0);
-    this.style.setProperty('--covered-height', `${bottom}px`);
-    this.player?.resize(clientWidth, clientHeight, ratio, { right, bottom });
-    if (!this.cameraWasMoved) this.player?.goHome(true);
+    this.layout.apply(this.player, this.pair.player, this.panelShare);
+    if (!this.link.cameraWasMoved) this.player?.goHome(true);
   }
 
   /** Does what a key asks for; a page that shows nothing else can hand it all key presses. */
   readonly pressKey = (event: KeyboardEvent) => {
-    if (event.defaultPrevented || this.sheet.open || this.editing.pressKey(event)) return;
-    const target = event.composedPath()[0] as HTMLElement;
-    const isControl = /^(BUTTON|A|INPUT|SELECT|LABEL)$/.test(target.tagName);
-    // Space and Enter press a button that has the focus; letters choose within a list.
-    if (isControl && (event.key === ' ' || event.key === 'Enter' || target.tagName === 'SELECT')) return;
-    if (!this.player) return;
-    const action = actionOf(event);
+    if (event.defaultPrevented || this.sheet.open || this.files.isAsking) return;
+    if (this.editing.pressKey(event) || this.spectrum.pressKey(event)) return;
+    const action = this.player && actionOfKey(event);
     if (!action) return;
     event.preventDefault();
-    if (action.startsWith('turn') || action.startsWith('zoom')) this.cameraWasMoved = true;
+    if (action.startsWith('turn') || action.startsWith('zoom')) this.link.cameraWasMoved = true;
     perform(action, this);
   };
-
-  private dragOver(event: DragEvent) {
-    if (!event.dataTransfer?.types.includes('Files')) return;
-    event.preventDefault();
-    this.dropping = true;
-  }
-
-  private dropFile(event: DragEvent) {
-    this.dropping = false;
-    const { dataTransfer } = event;
-    const file = dataTransfer?.files[0];
-    if (!file) return;
-    event.preventDefault();
-    // Beside an open capture, whatever is no capture itself can only be what it was encoded from.
-    if (this.player && !/\.cager$/i.test(file.name)) {
-      void this.openOriginal(droppedFiles(dataTransfer));
-    } else void this.choose(file);
-  }
 }
 
 declare global {

@@ -8,6 +8,8 @@ export class Comparison {
   /** Called when something else is to be shown. */
   onChange: () => void = () => undefined;
   original: Original | null = null;
+  /** The files of the original. */
+  files: readonly Dropped[] = [];
   private shownSide: Side = 'decoded';
   private place = 0.5;
 
@@ -41,11 +43,13 @@ export class Comparison {
     const original = await openOriginal(files, this.capture);
     await original.load(0);
     this.original = original;
+    this.files = files;
     this.onChange();
   }
 
   close() {
     this.original = null;
+    this.files = [];
     this.side = 'decoded';
   }
 

@@ -5,6 +5,7 @@ import type { Dropped } from '../upload/classify';
 import { pickedFiles } from '../upload/drop';
 import { glyph } from './glyphs';
 import type { MeasuredFrame } from './heatMap';
+import { pressLabel } from './messages';
 import type { Player } from './player';
 import { grouped, percent, threeDigits } from './text';
 
@@ -85,12 +86,7 @@ function chooser(label: string, acts: ComparisonActs) {
     const { files } = event.target as HTMLInputElement;
     if (files && files.length > 0) acts.open(pickedFiles(files));
   };
-  const press = (event: KeyboardEvent) => {
-    if (event.key !== 'Enter' && event.key !== ' ') return;
-    event.preventDefault();
-    (event.currentTarget as HTMLElement).click();
-  };
-  return html`<label class="button" tabindex="0" @keydown=${press}>
+  return html`<label class="button" tabindex="0" @keydown=${pressLabel}>
     ${glyph('file')} ${label}
     <input class="visually-hidden" type="file" multiple accept=".npy,.pc2,.obj" tabindex="-1" @change=${take} />
   </label>`;
@@ -103,7 +99,7 @@ export function divider({ comparison }: Player) {
     const line = event.currentTarget as HTMLElement;
     if (event.type === 'pointerdown') line.setPointerCapture(event.pointerId);
     if (!line.hasPointerCapture(event.pointerId)) return;
-    const { left, width } = line.parentElement?.getBoundingClientRect() ?? hostBox(line);
+    const { left, width } = line.parentElement!.getBoundingClientRect();
     comparison.split = (event.clientX - left) / width;
   };
   const press = (event: KeyboardEvent) => {
@@ -130,8 +126,4 @@ export function divider({ comparison }: Player) {
   >
     <span class="left">Original</span><span class="right">Decoded</span>
   </div>`;
-}
-
-function hostBox(line: HTMLElement): DOMRect {
-  return (line.getRootNode() as ShadowRoot).host.getBoundingClientRect();
 }

@@ -18,6 +18,8 @@ export interface MeasuredFrame extends PointErrors {
 export class HeatMap {
   /** Called when the colours have changed. */
   onChange: () => void = () => undefined;
+  /** Called when colours mean something else: those of the picture are to be computed anew. */
+  onRange: () => void = () => undefined;
   kind: Heat = 'none';
   /**
    * What the warmest colour stands for, in diagonals: the largest value so far, so that colours of frames can be compared. Of errors it is what all
@@ -26,6 +28,8 @@ export class HeatMap {
   largest = 0;
   /** Errors of the frame that is shown, where the map shows errors and the original is there. */
   measured: MeasuredFrame | null = null;
+  /** The map of a capture that is shown beside this one: colours of both mean the same. */
+  peer: HeatMap | null = null;
   private frame = -1;
 
   constructor(
@@ -67,15 +71,25 @@ export class HeatMap {
     const errors = pointErrors(places, positions, decoder.diagonal);
     decoder.place(places);
     this.measured = { ...errors, frame, places };
-    this.largest = Math.max(this.largest, errors.usual);
+    this.raise(errors.usual);
     this.stage.setHeat(errors.values, this.largest);
     this.onChange();
+  }
+
+  /** Widens the range of the colours, here and beside. */
+  private raise(value: number) {
+    const { peer } = this;
+    this.largest = Math.max(this.largest, value, peer?.kind === this.kind ? peer.largest : 0);
+    if (peer?.kind !== this.kind || peer.largest === this.largest) return;
+    peer.largest = this.largest;
+    peer.refresh();
+    peer.onRange();
   }
 
   private showMotion(frame: number, neighbour: number): boolean {
     const [here, there] = [this.store.peek(frame), neighbour < 0 ? null : this.store.peek(neighbour)];
     if (!here || !there) return false;
-    this.largest = Math.max(this.largest, this.farthestMove(here.rows, there.rows));
+    this.raise(this.farthestMove(here.rows, there.rows));
     this.stage.setMotion({ before: here.offsets, after: there.offsets }, here.rows, there.rows, this.largest);
     return true;
   }

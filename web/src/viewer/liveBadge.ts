@@ -1,7 +1,8 @@
 import { html, type TemplateResult } from 'lit';
 import type { LiveStatus } from '../capture';
+import type { Player } from './player';
 import { threeDigits } from './text';
-import type { Transport } from './transport';
+import { sought, started, type Transport } from './transport';
 
 /** What is shown counts as live while it is no more seconds than this behind the newest frame. */
 const LIVE_SECONDS = 2;
@@ -31,8 +32,37 @@ export function liveFrame({ frames, rate }: Transport): number {
   return Math.max(0, frames - 1 - Math.min(MARGIN_FRAMES, Math.floor(MARGIN_SECONDS * rate)));
 }
 
+/** The badge of a session that is still running. */
+export class LiveBadge {
+  /** Kind of the place that the badge was rendered for last. */
+  private shown = '';
+  private timer = 0;
+
+  constructor(private readonly host: HTMLElement & { requestUpdate(): void }) {}
+
+  template(player: Player): TemplateResult {
+    const place = livePlace(player.capture.live ?? null, player.transport, Date.now());
+    const goLive = () => (player.transport = started(sought(player.transport, liveFrame(player.transport))));
+    const signIn = () => this.host.dispatchEvent(new CustomEvent('signin', { bubbles: true, composed: true }));
+    this.stop();
+    if (place.kind === 'reconnecting') this.timer = window.setTimeout(() => this.host.requestUpdate(), 1000);
+    return liveBadge(place, goLive, signIn);
+  }
+
+  /** Renders anew when playing comes near the newest frame of a running session, or falls behind it. */
+  follow({ capture, transport }: Player) {
+    const place = capture.complete ? '' : livePlace(capture.live ?? null, transport, Date.now()).kind;
+    if (place !== this.shown) this.host.requestUpdate();
+    this.shown = place;
+  }
+
+  stop() {
+    clearTimeout(this.timer);
+  }
+}
+
 /** Says whether the picture is live, and what can be done where it is not. */
-export function liveBadge(place: LivePlace, goLive: () => void, signIn: () => void): TemplateResult {
+function liveBadge(place: LivePlace, goLive: () => void, signIn: () => void): TemplateResult {
   switch (place.kind) {
     case 'live':
       return html`<span class="live" role="status">LIVE</span>`;

@@ -9,6 +9,34 @@ export function notice(problem: string, close: () => void): TemplateResult {
   </div>`;
 }
 
+/** Asks what is to be done with a container that was dropped on an open capture. Whoever renders it opens it as a modal dialog. */
+export function dropQuestion(name: string, answer: (choice: 'instead' | 'beside' | null) => void): TemplateResult {
+  return html`<dialog
+    class="question"
+    aria-labelledby="question-title"
+    @close=${(event: Event) => {
+      const { returnValue } = event.target as HTMLDialogElement;
+      answer(returnValue === 'instead' || returnValue === 'beside' ? returnValue : null);
+    }}
+  >
+    <form method="dialog">
+      <h2 id="question-title">Open ${name}?</h2>
+      <div class="choices">
+        <button class="primary" value="instead" autofocus>Open instead</button>
+        <button value="beside">Show beside</button>
+        <button class="quiet" value="">Cancel</button>
+      </div>
+    </form>
+  </dialog>`;
+}
+
+/** What happens to files that are held above the viewer. */
+export function dropHint(isShowing: boolean): TemplateResult {
+  return html`<div class="drop">
+    ${isShowing ? 'Drop another capture to play it or to see it beside this one, or the original frames to compare with' : 'Drop a capture to play it'}
+  </div>`;
+}
+
 /** What is being done, and how much of it is done where somebody knows. */
 export function progressBox(doing: string, fraction: number | null): TemplateResult {
   return html`<div class="progress glass" role="status">
@@ -60,7 +88,7 @@ export function emptyState(
 }
 
 /** A label that looks like a button is pressed like one. */
-function pressLabel(event: KeyboardEvent) {
+export function pressLabel(event: KeyboardEvent) {
   if (event.key !== 'Enter' && event.key !== ' ') return;
   event.preventDefault();
   (event.currentTarget as HTMLElement).click();

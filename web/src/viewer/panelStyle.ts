@@ -1,7 +1,7 @@
 import { css } from 'lit';
+import { dialogStyle } from '../style/dialog';
 
-/** What lies above the picture for a while: figures, the empty state, the drop target, the sheet of shortcuts. */
-export const panelStyle = css`
+const ownStyle = css`
   .panel {
     position: absolute;
     top: var(--cager-space-3);
@@ -85,15 +85,15 @@ export const panelStyle = css`
   dialog {
     max-width: min(880px, calc(100vw - 24px));
     max-height: calc(100dvh - 24px);
-    padding: var(--cager-space-5);
-    border: 1px solid var(--cager-line);
-    border-radius: var(--cager-radius-large);
-    background: var(--cager-surface);
-    color: var(--cager-text);
-    box-shadow: var(--cager-shadow);
   }
-  dialog::backdrop {
-    background: rgb(0 0 0 / 0.45);
+  dialog.question h2 {
+    margin: 0 0 var(--cager-space-4);
+    overflow-wrap: anywhere;
+  }
+  .choices {
+    display: flex;
+    flex-wrap: wrap;
+    gap: var(--cager-space-2);
   }
   dialog header {
     display: flex;
@@ -149,3 +149,6 @@ export const panelStyle = css`
     }
   }
 `;
+
+/** What lies above the picture for a while: figures, the empty state, the drop target, the sheet of shortcuts. */
+export const panelStyle = [dialogStyle, ownStyle];

@@ -1,13 +1,16 @@
 import { html, nothing, type TemplateResult } from 'lit';
+import type { FrameErrors } from '../capture';
 import { heatGradient } from '../render/colorMap';
+import type { FrameRange } from '../editing/cageEdit';
 import type { Layers } from '../render/stage';
 import { comparisonPanel, type ComparisonActs } from './comparisonParts';
 import { glyph, type GlyphName } from './glyphs';
 import type { Heat } from './heatMap';
 import type { Player } from './player';
 import { keyLabel, SHORTCUTS, type Action } from './shortcuts';
-import { bitrate, grouped, percent, SYSTEM_NAMES } from './text';
-import { SPEEDS } from './transport';
+import { grouped, percent } from './text';
+import './timeline';
+import { sought, SPEEDS } from './transport';
 
 /** What the parts ask the viewer to do. */
 export type Act = (action: Action) => void;
@@ -45,7 +48,14 @@ function tool(action: Action, name: GlyphName, label: string, act: Act, pressed?
 export function toolbar(
   player: Player,
   act: Act,
-  shown: { figures: boolean; editing: boolean; recording: boolean; recordable: boolean },
+  shown: {
+    figures: boolean;
+    editing: boolean;
+    beside: boolean;
+    spectrum: boolean;
+    recording: boolean;
+    recordable: boolean;
+  },
 ) {
   const layers = Object.keys(LAYER_NAMES) as (keyof Layers)[];
   const possible = layers.filter((layer) => layer !== 'handles' || player.capture.handles !== undefined);
@@ -53,6 +63,8 @@ export function toolbar(
     ${possible.map((layer) => tool(layer, layer, LAYER_NAMES[layer], act, player.layers[layer]))}
     ${tool('heat', 'heat', HEAT_NAMES[player.heatMap.kind], act, player.heatMap.kind !== 'none')}
     ${tool('edit', 'edit', 'Edit the cage', act, shown.editing)}
+    ${tool('spectrum', 'spectrum', 'Singular values and vectors', act, shown.spectrum)}
+    ${tool('beside', 'beside', 'Compare with another capture', act, shown.beside)}
     <hr />
     ${tool('frame', 'frame', 'Frame the model', act)} ${tool('picture', 'camera', 'Save a picture', act)}
     ${
@@ -71,8 +83,47 @@ export function toolbar(
   </div>`;
 }
 
+/** Name and size of the capture. */
+export function titleBox(heading: string, { capture }: Player, isEdited: boolean) {
+  const { static: part, frames } = capture;
+  return html`<div class="title glass">
+    <h1 title=${heading}>${heading}</h1>
+    <p class="figures">
+      ${grouped(part.rest.length / 3)} points, ${grouped(frames)} frames<span class="more"
+        >, cage of ${grouped(part.cage.positions.length / 3)} vertices</span
+      >${isEdited ? ', edited' : nothing}
+    </p>
+  </div>`;
+}
+
+/** What the timeline shows beside the capture's own errors: those of a second capture, the range of an edit; `look` changes when colours do. */
+interface TimelineParts {
+  readonly besideErrors: FrameErrors | null;
+  readonly range: FrameRange | null;
+  readonly look: number;
+}
+
+/** The transport above the timeline. */
+export function deck(player: Player, act: Act, { besideErrors, range, look }: TimelineParts) {
+  const { capture, transport } = player;
+  const hasErrors = capture.errors.linf.some(Number.isFinite);
+  return html`<div class="deck glass">
+    ${transportBar(player, act, (speed) => (player.transport = { ...transport, speed }), hasErrors)}
+    <cager-timeline
+      .frames=${capture.frames}
+      .errors=${capture.errors}
+      .besideErrors=${besideErrors}
+      .frameNumbers=${capture.frameNumbers}
+      .range=${range}
+      .look=${look}
+      .position=${transport.position}
+      @seek=${(event: CustomEvent<number>) => (player.transport = sought(player.transport, event.detail))}
+    ></cager-timeline>
+  </div>`;
+}
+
 /** Play, step, speed, place and errors. */
-export function transportBar(player: Player, act: Act, onSpeed: (speed: number) => void, hasErrors: boolean) {
+function transportBar(player: Player, act: Act, onSpeed: (speed: number) => void, hasErrors: boolean) {
   const { transport } = player;
   return html`<div class="transport">
     <button
@@ -132,62 +183,10 @@ export function legend(player: Player, acts: ComparisonActs, beside: boolean) {
   </div>`;
 }
 
-/** Figures about the capture and the playing. */
-export function figuresPanel(player: Player) {
-  const { static: part, frames, frameBytes } = player.capture;
-  const { decoder } = player.stage;
-  const points = part.rest.length / 3;
-  const cageRate = part.rowsPerFrame * 12 * player.transport.rate;
-  const fileRate = frameBytes === undefined || frames === 0 ? null : (frameBytes / frames) * player.transport.rate;
-  const rawRate = points * 12 * player.transport.rate;
-  const row = (label: string, value: string) =>
-    html`<dt>${label}</dt>
-      <dd>${value}</dd>`;
-  const { bits, error } = decoder.precision;
-  const live = player.capture.live ?? null;
-  return html`<aside class="panel glass" aria-label="Figures">
-    <h2>Capture</h2>
-    <dl>
-      ${row('Points', grouped(points))} ${row('Polygons', grouped(part.cornerCounts.length))}
-      ${row('Frames', grouped(frames))}
-      ${row('Frames per second', `${player.transport.rate}${part.frameRate === null ? ' (assumed)' : ''}`)}
-    </dl>
-    <h2>Cage</h2>
-    <dl>
-      ${row('Vertices', grouped(part.cage.positions.length / 3))}
-      ${row('Triangles', grouped(part.cage.triangles.length / 3))} ${row('Unknowns', grouped(part.rowsPerFrame))}
-    </dl>
-    <p class="muted">${SYSTEM_NAMES[part.system]}</p>
-    <h2>Bytes while it plays</h2>
-    <dl>
-      ${fileRate === null ? nothing : row('Frames of this file', bitrate(fileRate))}
-      ${row('Cages before compression', bitrate(cageRate))} ${row('All points, not compressed', bitrate(rawRate))}
-    </dl>
-    ${
-      live
-        ? html`<h2>Live</h2>
-            <dl>
-              ${row('Behind the service', live.latencySeconds === null ? '–' : `${live.latencySeconds.toFixed(2)} s`)}
-              ${row('Arriving', bitrate(live.bitsPerSecond / 8))}
-              ${row('Frames arriving per second', live.framesPerSecond.toFixed(1))}
-              ${row('Frames not here yet', grouped(live.behindFrames))}
-              ${row('Frames waited for', grouped(live.lateFrames))}
-              ${row('Frames dropped', grouped(live.droppedFrames))}
-            </dl>`
-        : nothing
-    }
-    <h2>This browser</h2>
-    <dl>
-      ${row('Pictures per second', player.picturesPerSecond > 0 ? player.picturesPerSecond.toFixed(0) : '–')}
-      ${row('Frames passed over', grouped(player.dropped))} ${row('Weights', decoder.ready ? `${bits} bits` : '–')}
-      ${error > 0 ? row('Rounding moves a point by', `< ${percent(error)}`) : nothing}
-    </dl>
-  </aside>`;
-}
-
 /** All shortcuts, in a dialog. */
 export function helpSheet(close: () => void) {
   return html`<dialog
+    class="sheet"
     aria-labelledby="help-title"
     @click=${(event: Event) => event.target === event.currentTarget && close()}
   >

@@ -7,10 +7,13 @@ import { FrameStore, type FrameEdit } from '../render/frameStore';
 import type { Original } from '../originals/original';
 import { Stage, type Covered, type Layers } from '../render/stage';
 import { Comparison } from './comparison';
+import { followBandwidth } from './bandwidth';
+import { blendedRows, FrameFeed } from './frameFeed';
 import { HeatMap, type Heat } from './heatMap';
-import { Holes } from './holes';
 import { Quality } from './quality';
-import { advanced, framesAhead, framesAround, sought, standing, USUAL_RATE, type Transport } from './transport';
+import { Resolution } from './resolution';
+import { sentence } from './text';
+import { advanced, framesAhead, sought, standing, USUAL_RATE, type Transport } from './transport';
 import { USUAL_LAYERS } from './viewState';
 
 /** What is being done before the model can be seen; the fraction is null where nobody knows it. */
@@ -19,8 +22,22 @@ export interface Progress {
   readonly fraction: number | null;
 }
 
-/** Frames that are loaded ahead of the one that is shown. */
-const AHEAD = 24;
+/** Rows of a cage, `rowsPerFrame × 3`, that are drawn in place of those of a frame. */
+export interface Deformation {
+  /** Whether they change from picture to picture. */
+  readonly isMoving: boolean;
+  /** @param seconds of a clock that goes on while nothing plays */
+  rows(rows: Float32Array | Float64Array, seconds: number): Float64Array;
+}
+
+/** What is shown together with a capture, in step with it. */
+export interface Companion {
+  /** Whether what belongs to a place is there, or will never be; sees to it that it comes. */
+  prepare(transport: Transport): boolean;
+  /** Shows what belongs to the place that the player shows. */
+  show(): void;
+}
+
 /** Frames of the original that are read ahead. */
 const ORIGINALS_AHEAD = 3;
 /** Frames that a live capture is entered before its end, so that playing does not wait for every one. */
@@ -39,13 +56,14 @@ export class Player {
   readonly stage: Stage;
   readonly controls: CameraControls;
   readonly heatMap: HeatMap;
+  readonly resolution: Resolution;
   /** The original frames, where they are at hand. */
   readonly comparison: Comparison;
+  /** What is shown together with this capture. */
+  companion: Companion | null = null;
   progress: Progress | null = null;
   /** Whether the frame that should be shown has not come yet. */
   buffering = false;
-  /** Whether pictures stay as fine as they can be though something moves. */
-  keepsQuality = false;
   /** Frames that were passed over because pictures came too slowly. */
   dropped = 0;
   private readonly store: FrameStore;
@@ -53,31 +71,36 @@ export class Player {
   private state: Transport;
   private shownLayers = USUAL_LAYERS;
   private shownPosition = -1;
-  /** Frames that could not be loaded: they are not asked for again until somebody plays or seeks. */
-  private readonly holes = new Holes();
+  private readonly feed: FrameFeed;
   private captureProblem: string | null = null;
   private poseIsOld = true;
   private scheduled = 0;
   private lastTick = 0;
-  private covered: Covered = { right: 0, bottom: 0 };
-  private size = { width: 1, height: 1, pixelRatio: 1 };
-  private shownShare = 1;
   private isMoving = false;
   /** Whether Φ is there, or will never be. */
   private isPrepared = false;
-  private readonly quality = new Quality();
+  private readonly quality: Quality;
+  private deformation: Deformation | null = null;
+  private upAxis: 'y' | 'z' = 'y';
 
-  /** Throws one sentence for a person where the browser cannot draw the capture. */
+  /**
+   * Throws one sentence for a person where the browser cannot draw the capture.
+   *
+   * @param lead the player whose place and camera this one follows; without it, this one has its own
+   */
   constructor(
     canvas: HTMLCanvasElement,
     readonly capture: Capture,
+    private readonly lead: Player | null = null,
   ) {
     this.stage = new Stage(canvas, capture.static);
+    this.quality = new Quality(this.stage.isJagged);
+    this.resolution = new Resolution(this.stage);
     this.controls = new CameraControls(canvas);
     this.controls.onMove = () => this.wake();
     this.store = new FrameStore(capture);
     this.store.onArrival = () => this.wake();
-    this.store.onFailure = (frame, error) => this.failFrame(frame, error);
+    this.feed = new FrameFeed(capture, this.store, () => this.wake());
     this.store.onReplaced = () => this.replaceFrames();
     this.store.onBlock = ({ cages }) => this.stage.include(cages, capture.static.rowsPerFrame);
     this.heatMap = new HeatMap(capture, this.stage, this.store);
@@ -85,6 +108,7 @@ export class Player {
       this.onState();
       this.wake();
     };
+    this.heatMap.onRange = () => this.refresh();
     this.comparison = new Comparison(capture, this.stage);
     this.comparison.onChange = () => this.refresh();
     this.state = { ...standing(), rate: capture.static.frameRate ?? USUAL_RATE };
@@ -103,7 +127,7 @@ export class Player {
 
   set transport(transport: Transport) {
     this.state = transport;
-    this.holes.clear();
+    this.feed.holes.clear();
     this.onState();
     this.wake();
   }
@@ -124,7 +148,12 @@ export class Player {
     this.refresh();
   }
 
+  get up(): 'y' | 'z' {
+    return this.upAxis;
+  }
+
   setUp(axis: 'y' | 'z') {
+    this.upAxis = axis;
     this.stage.setUp(axis);
     this.refresh();
   }
@@ -141,11 +170,19 @@ export class Player {
     this.setHeat(this.heatMap.kind);
   }
 
+  /** Draws frames deformed; null draws them as they are. */
+  deform(deformation: Deformation | null) {
+    if (deformation === this.deformation) return;
+    this.deformation = deformation;
+    this.refresh();
+  }
+
   /** Shows all of the capture as it is now, from the side the camera is on or from the usual one. */
   frameAll(from: CameraState = this.controls.destination, atOnce = false) {
     const { clientWidth, clientHeight } = this.stage.canvas;
-    const free = Math.max(1, clientHeight - this.covered.bottom);
-    const fitting = framed(from, this.stage.bounds(), Math.max(1, clientWidth - this.covered.right) / free);
+    const { right, bottom } = this.resolution.covered;
+    const free = Math.max(1, clientHeight - bottom);
+    const fitting = framed(from, this.stage.bounds(), Math.max(1, clientWidth - right) / free);
     this.controls.go(zoomed(fitting, clientHeight / free), atOnce);
   }
 
@@ -156,18 +193,15 @@ export class Player {
 
   /** Takes the size of the canvas in CSS pixels, and how much of it is covered. */
   resize(width: number, height: number, pixelRatio: number, covered: Covered) {
-    this.covered = covered;
-    this.size = { width, height, pixelRatio: this.stage.isJagged ? 2 * pixelRatio : pixelRatio };
-    this.shownShare = 0;
-    this.setShare(this.isMoving ? this.quality.moving : 1);
-    // At once: the canvas is empty after a change of its size.
-    this.stage.draw(this.controls.camera);
+    this.resolution.resize(width, height, pixelRatio, covered, this.isMoving ? this.quality.moving : this.resting);
+    if (this.stage.wasEmptied) this.stage.draw(this.controls.camera);
     this.wake();
   }
 
   /** Draws anew, whatever has changed. */
   refresh() {
     this.poseIsOld = true;
+    this.stage.renew();
     this.onState();
     this.wake();
   }
@@ -184,7 +218,8 @@ export class Player {
 
   /** The picture as it is now. */
   picture(): Promise<Blob> {
-    this.setShare(1);
+    this.resolution.share = 1;
+    this.stage.renew();
     this.stage.draw(this.controls.camera);
     return new Promise((resolve, reject) => {
       this.stage.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error('The picture could not be made.'))));
@@ -195,25 +230,23 @@ export class Player {
     this.stop.abort();
     cancelAnimationFrame(this.scheduled);
     this.controls.dispose();
-    this.store.close();
+    this.feed.close();
     this.stage.dispose();
   }
 
   private async prepare() {
     const { signal } = this.stop;
-    const onProgress = (fraction: number) => this.report({ doing: this.progress?.doing ?? '', fraction });
     try {
-      const fetching = !canCompute(this.capture.static.system) && this.capture.coordinates !== undefined;
-      this.report({ doing: fetching ? 'Fetching coordinates' : 'Computing coordinates', fraction: 0 });
-      const phi = fetching
-        ? await this.capture.coordinates!(onProgress, signal)
-        : await computePhi(this.capture.static, { signal, onProgress });
-      await this.stage.decoder.setPhi(phi);
+      const doing = isFetched(this.capture) ? 'Fetching coordinates' : 'Computing coordinates';
+      const onProgress = (fraction: number) => this.report({ doing, fraction });
+      onProgress(0);
+      await this.stage.decoder.setPhi(await phiOf(this.capture, onProgress, signal));
       signal.throwIfAborted();
       this.stage.setLayers(this.shownLayers);
     } catch (error) {
       if (signal.aborted) return;
       // The cage can still be looked at.
+      this.stage.hideModel();
       this.layers = { ...this.shownLayers, cage: true };
       this.onProblem(sentence(error));
     }
@@ -238,8 +271,8 @@ export class Player {
   }
 
   private followCapture() {
-    const { frames, complete, problem } = this.capture;
-    this.state = sought({ ...this.state, frames, complete }, this.state.position);
+    const { frames, complete, problem, frameNumbers: numbers } = this.capture;
+    this.state = sought({ ...this.state, frames, complete, numbers }, this.state.position);
     if (problem !== this.captureProblem) this.onProblem(problem);
     this.captureProblem = problem;
     this.onState();
@@ -247,56 +280,73 @@ export class Player {
   }
 
   private wake() {
+    if (this.lead) {
+      this.lead.wake();
+      return;
+    }
     if (this.stop.signal.aborted || this.scheduled !== 0) return;
     this.scheduled = requestAnimationFrame((now) => this.tick(now));
   }
 
+  /** How fine pictures are at rest: less so where drawing them would take the processor from Φ. */
+  private get resting(): number {
+    return this.isPrepared || !this.stage.isJagged ? 1 : 0.5;
+  }
+
   private tick(now: number) {
     this.scheduled = 0;
+    followBandwidth(this.capture, this.state);
     const sinceLast = this.lastTick === 0 ? 0 : (now - this.lastTick) / 1000;
     const seconds = Math.min(LONGEST_STEP, sinceLast);
     const moved = this.controls.advance(seconds);
     const waited = this.buffering;
-    this.play(seconds);
+    this.poseIsOld ||= this.deformation?.isMoving === true;
+    this.play(seconds, now / 1000);
     const wasMoving = this.isMoving;
-    this.isMoving = moved || (this.state.playing && this.state.frames > 1 && this.isPrepared);
+    this.isMoving =
+      moved || this.deformation?.isMoving === true || (this.state.playing && this.state.frames > 1 && this.isPrepared);
     if (this.isMoving && wasMoving) this.quality.measure(sinceLast);
     // Pictures become fine again one picture after everything has come to rest.
-    this.setShare(this.isMoving || wasMoving ? this.quality.moving : 1);
-    this.stage.draw(this.controls.camera, this.shownShare < 1);
+    this.resolution.share = this.isMoving || wasMoving ? this.quality.moving : this.resting;
+    this.stage.draw(this.controls.camera, this.resolution.share < 1);
+    this.companion?.show();
     this.onTick(this.state.position);
     if (waited !== this.buffering) this.onState();
     this.lastTick = this.isMoving ? now : 0;
     if (this.isMoving || wasMoving) this.wake();
   }
 
-  private setShare(share: number) {
-    const wanted = this.keepsQuality ? 1 : share;
-    if (wanted === this.shownShare) return;
-    this.shownShare = wanted;
-    const { width, height, pixelRatio } = this.size;
-    this.stage.resize(width, height, pixelRatio * wanted, this.covered);
+  /** Whether the frames of a place are there, or will never be; asks for those that are missing. */
+  prepareFor(transport: Transport): boolean {
+    return this.feed.prepare(transport);
+  }
+
+  /** Shows a place of this capture as the lead shows its own: at once, from the same side and as fine. */
+  follow(lead: Player, transport: Transport) {
+    this.state = transport;
+    this.play(0);
+    this.resolution.share = lead.resolution.share;
+    this.stage.draw(lead.controls.camera, lead.resolution.share < 1);
   }
 
   /** Moves on if the frames are there, and sees to those that will be needed. */
-  private play(seconds: number) {
+  private play(seconds: number, now = 0) {
     // While Φ is computed, pictures would take the processor from it.
     const advancing = this.isPrepared ? advanced(this.state, seconds) : this.state;
-    const news = this.holes.news(Math.floor(advancing.position));
+    const news = this.feed.holes.news(Math.floor(advancing.position));
     if (news !== null) this.onProblem(news);
-    const next = advancing.playing ? this.holes.past(advancing) : advancing;
+    const next = advancing.playing ? this.feed.holes.past(advancing) : advancing;
     const original = this.wantedOriginal;
     // Between two frames there is nothing to compare.
-    const { before, after, mix } = this.soundFramesAround(original ? { ...next, smooth: false } : next);
-    const [here, there] = [this.store.peek(before), mix > 0 ? this.store.peek(after) : null];
-    this.store.prefetch([...framesAhead(next, AHEAD)].filter((frame) => !this.holes.at(frame)));
-    if (!here || (mix > 0 && !there)) {
-      const missing = here ? after : before;
-      this.buffering = next.frames > 0 && !this.holes.at(missing);
-      if (this.buffering) this.store.load(missing).catch((error: unknown) => this.failFrame(missing, error));
+    const found = this.feed.at(original ? { ...next, smooth: false } : next);
+    this.feed.prefetch(next);
+    if (typeof found === 'number') {
+      this.buffering = next.frames > 0 && !this.feed.holes.at(found);
+      if (this.buffering) this.feed.load(found);
       else this.stopAt(next);
       return;
     }
+    const { before, mix, here, there } = found;
     original?.prefetch(framesAhead(next, ORIGINALS_AHEAD));
     if (original && !original.peek(before)) {
       this.buffering = true;
@@ -306,7 +356,8 @@ export class Player {
       );
       return;
     }
-    this.buffering = false;
+    this.buffering = this.companion?.prepare(next) === false;
+    if (this.buffering) return;
     if (this.state.playing && next === advancing)
       this.dropped += Math.max(0, Math.floor(next.position) - Math.floor(this.state.position) - 1);
     const ended = this.state.playing && !next.playing;
@@ -315,18 +366,11 @@ export class Player {
     if (!this.poseIsOld && before + mix === this.shownPosition) return;
     this.poseIsOld = false;
     this.shownPosition = before + mix;
-    const rows = there ? blendedRows(here.rows, there.rows, mix) : here.rows;
     this.heatMap.update(before, this.state.frames);
+    const rows = this.deformation?.rows(blendedRows(found), now) ?? blendedRows(found);
     this.stage.setPose({ rows, before: here.offsets, after: there?.offsets ?? null, mix });
     this.comparison.update(before);
     this.heatMap.measure(before, original);
-  }
-
-  private failFrame(frame: number, error: unknown) {
-    if (this.stop.signal.aborted) return;
-    const { first, count } = this.capture.readTogether?.(frame) ?? { first: frame, count: 1 };
-    this.holes.add({ first, count, problem: sentence(error) });
-    this.wake();
   }
 
   /** Stops where playing cannot go on. */
@@ -336,14 +380,8 @@ export class Player {
     this.onState();
   }
 
-  /** Frames to blend; the one before a hole stands until it is over. */
-  private soundFramesAround(transport: Transport): ReturnType<typeof framesAround> {
-    const frames = framesAround(transport);
-    return frames.mix > 0 && this.holes.at(frames.after) ? { ...frames, after: frames.before, mix: 0 } : frames;
-  }
-
   private replaceFrames() {
-    this.holes.clear();
+    this.feed.holes.clear();
     this.heatMap.refresh();
     this.refresh();
   }
@@ -376,12 +414,13 @@ export class Player {
   }
 }
 
-function blendedRows(from: Float32Array, to: Float32Array, share: number): Float64Array {
-  const rows = new Float64Array(from.length);
-  for (let k = 0; k < rows.length; k++) rows[k] = from[k] + (to[k] - from[k]) * share;
-  return rows;
+/** Whether Φ comes from the service, since the page does not compute it. */
+function isFetched(capture: Capture): boolean {
+  return !canCompute(capture.static.system) && capture.coordinates !== undefined;
 }
 
-function sentence(error: unknown): string {
-  return error instanceof Error ? error.message : String(error);
+function phiOf(capture: Capture, onProgress: (fraction: number) => void, signal: AbortSignal): Promise<Float32Array> {
+  return isFetched(capture)
+    ? capture.coordinates!(onProgress, signal)
+    : computePhi(capture.static, { signal, onProgress });
 }

@@ -7,9 +7,14 @@ const PATIENCE = 0.7;
 
 /** Chooses how fine pictures are: coarser while something moves on a slow device, the finest when all rests. */
 export class Quality {
-  private step = 0;
+  private step: number;
   private waited = 0;
   private rate = 60;
+
+  /** @param isSlow whether pictures are known to take long, so that the first ones are coarse */
+  constructor(isSlow = false) {
+    this.step = isSlow ? 2 : 0;
+  }
 
   /** Share of the finest picture while something moves. */
   get moving(): number {

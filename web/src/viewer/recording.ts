@@ -29,7 +29,7 @@ export async function recordTurntable(
   recorder.addEventListener('dataavailable', ({ data }) => pieces.push(data));
   const stopped = new Promise<void>((resolve) => recorder.addEventListener('stop', () => resolve()));
   const start = player.controls.destination;
-  player.keepsQuality = true;
+  player.resolution.keepsFinest = true;
   recorder.start();
   try {
     await turn(signal, (fraction) => {
@@ -37,7 +37,7 @@ export async function recordTurntable(
       onProgress(fraction);
     });
   } finally {
-    player.keepsQuality = false;
+    player.resolution.keepsFinest = false;
     recorder.stop();
     for (const track of stream.getTracks()) track.stop();
     player.controls.go(start, true);

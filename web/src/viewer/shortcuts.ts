@@ -34,6 +34,8 @@ export type Action =
   | 'fullscreen'
   | 'figures'
   | 'edit'
+  | 'beside'
+  | 'spectrum'
   | 'help';
 
 interface Shortcut {
@@ -89,6 +91,8 @@ export const SHORTCUTS: readonly { readonly title: string; readonly entries: rea
       { action: 'compare', keys: ['o'], label: 'Original, decoded model, or both' },
       { action: 'figures', keys: ['i'], label: 'Figures' },
       { action: 'edit', keys: ['e'], label: 'Edit the cage' },
+      { action: 'beside', keys: ['b'], label: 'Another capture beside this one' },
+      { action: 'spectrum', keys: ['v'], label: 'Singular values and vectors of Φ' },
       { action: 'picture', keys: ['p'], label: 'Save a picture' },
       { action: 'turntable', keys: ['t'], label: 'Record a turntable video' },
       { action: 'help', keys: ['?'], label: 'This sheet' },
@@ -101,9 +105,18 @@ const ACTIONS = new Map(
 );
 
 /** What a key press asks for; nothing with a control, alt or command key, which belong to the browser. */
-export function actionOf(event: Pick<KeyboardEvent, 'key' | 'ctrlKey' | 'altKey' | 'metaKey'>): Action | null {
+function actionOf(event: Pick<KeyboardEvent, 'key' | 'ctrlKey' | 'altKey' | 'metaKey'>): Action | null {
   if (event.ctrlKey || event.altKey || event.metaKey) return null;
   return ACTIONS.get(event.key.length === 1 ? event.key.toLowerCase() : event.key) ?? null;
+}
+
+/** What a key press asks the viewer to do; null where it belongs to a control that has the focus, or to nobody. */
+export function actionOfKey(event: KeyboardEvent): Action | null {
+  const target = event.composedPath()[0] as HTMLElement;
+  const isControl = /^(BUTTON|A|INPUT|SELECT|LABEL)$/.test(target.tagName);
+  // Space and Enter press a button that has the focus; letters choose within a list.
+  if (isControl && (event.key === ' ' || event.key === 'Enter' || target.tagName === 'SELECT')) return null;
+  return actionOf(event);
 }
 
 /** The key for an action as it is written on keyboards. */

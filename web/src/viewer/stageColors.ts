@@ -16,3 +16,13 @@ export function stageColors(component: HTMLElement & { renderRoot: ParentNode & 
     shadow: Number(style.getPropertyValue('--cager-shadow-strength')) || 0,
   };
 }
+
+/** Calls back when the theme or the contrast changes, until the signal is aborted. */
+export function followLooks(onChange: () => void, signal: AbortSignal) {
+  for (const feature of ['(prefers-color-scheme: dark)', '(prefers-contrast: more)']) {
+    matchMedia(feature).addEventListener('change', onChange, { signal });
+  }
+  const themes = new MutationObserver(onChange);
+  themes.observe(document.documentElement, { attributeFilter: ['data-theme'] });
+  signal.addEventListener('abort', () => themes.disconnect());
+}

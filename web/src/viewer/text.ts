@@ -2,7 +2,8 @@
 export function percent(fraction: number): string {
   const value = 100 * fraction;
   if (value === 0) return '0 %';
-  const digits = Math.min(6, Math.max(0, 2 - Math.floor(Math.log10(Math.abs(value)))));
+  if (Math.abs(value) < 1e-4) return `${Number(value.toPrecision(3)).toExponential()} %`;
+  const digits = Math.max(0, 2 - Math.floor(Math.log10(Math.abs(value))));
   return `${Number(value.toFixed(digits))} %`;
 }
 
@@ -46,4 +47,9 @@ export function fileNameOf(address: string): string {
   } catch {
     return name;
   }
+}
+
+/** What went wrong, in one sentence. */
+export function sentence(error: unknown): string {
+  return error instanceof Error ? error.message : String(error);
 }

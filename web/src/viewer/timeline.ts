@@ -1,14 +1,17 @@
-import { css, html, LitElement, svg, unsafeCSS, type PropertyValues } from 'lit';
+import { html, LitElement, unsafeCSS, type PropertyValues } from 'lit';
 import { customElement, property, query } from 'lit/decorators.js';
-import uPlot from 'uplot';
+import type uPlot from 'uplot';
 import uPlotStyle from 'uplot/dist/uPlot.min.css?inline';
 import type { FrameErrors } from '../capture';
-import { weightAt, type FrameRange } from '../editing/cageEdit';
+import type { FrameRange } from '../editing/cageEdit';
+import { errorsChart } from './errorsChart';
+import { numberAt, numberText, placeOf, type FrameNumbers } from './frameNumbers';
 import { percent } from './text';
+import { timelineStyle } from './timelineStyle';
 import { controls } from '../style/tokens';
 
-/** Space left and right of the chart, for the labels of its axis and for half a thumb. */
-const [GUTTER, MARGIN] = [46, 12];
+/** Space beside the chart for half a thumb. */
+const MARGIN = 12;
 
 /**
  * The timeline: a bar to scrub on and, where errors are known, their chart above it.
@@ -17,119 +20,16 @@ const [GUTTER, MARGIN] = [46, 12];
  */
 @customElement('cager-timeline')
 export class Timeline extends LitElement {
-  static override styles = [
-    controls,
-    unsafeCSS(uPlotStyle),
-    css`
-      :host {
-        display: block;
-        touch-action: none;
-        user-select: none;
-      }
-      .slider {
-        position: relative;
-        cursor: pointer;
-        border-radius: var(--cager-radius-small);
-      }
-      .chart {
-        height: 58px;
-        pointer-events: none;
-      }
-      .u-wrap {
-        font-family: var(--cager-font);
-      }
-      .track {
-        position: relative;
-        height: 18px;
-      }
-      .rail,
-      .done {
-        position: absolute;
-        top: 7px;
-        left: 0;
-        height: 4px;
-        width: 100%;
-        border-radius: 2px;
-        background: color-mix(in srgb, var(--cager-muted) 32%, transparent);
-      }
-      .done {
-        background: var(--cager-accent);
-        transform-origin: left;
-      }
-      .thumb {
-        position: absolute;
-        top: 2px;
-        left: 0;
-        width: 14px;
-        height: 14px;
-        margin-left: -7px;
-        border-radius: 50%;
-        background: var(--cager-accent);
-        border: 2px solid var(--cager-surface);
-        box-shadow: 0 1px 4px rgb(0 0 0 / 0.35);
-        transition: scale var(--cager-fast);
-      }
-      .slider:hover .thumb {
-        scale: 1.2;
-      }
-      .range {
-        position: absolute;
-        top: 0;
-        left: 0;
-        width: 100%;
-        height: 9px;
-        overflow: visible;
-        fill: color-mix(in srgb, var(--cager-cage) 45%, transparent);
-        stroke: var(--cager-cage);
-        stroke-width: 1.25;
-        stroke-linejoin: round;
-      }
-      .needle,
-      .hover {
-        position: absolute;
-        top: 0;
-        bottom: 12px;
-        width: 1px;
-        background: var(--cager-accent);
-        pointer-events: none;
-      }
-      .hover {
-        background: var(--cager-line-strong);
-      }
-      .tip {
-        position: absolute;
-        bottom: calc(100% + 2px);
-        padding: 3px 8px;
-        border-radius: var(--cager-radius-small);
-        background: var(--cager-text);
-        color: var(--cager-background);
-        font-size: var(--cager-size-small);
-        white-space: nowrap;
-        translate: -50% 0;
-        pointer-events: none;
-        z-index: 2;
-      }
-      @media (max-height: 520px), (max-width: 560px) {
-        .chart {
-          height: 44px;
-        }
-      }
-      @container (max-width: 320px) or (max-height: 220px) {
-        .chart,
-        .needle,
-        .hover {
-          display: none;
-        }
-      }
-    `,
-  ];
+  static override styles = [controls, unsafeCSS(uPlotStyle), timelineStyle];
 
   /** Frames there are. */
   @property({ type: Number }) frames = 0;
   @property({ attribute: false }) errors: FrameErrors | null = null;
+  /** Errors of a capture that is shown beside this one, at the frames of this one. */
+  @property({ attribute: false }) besideErrors: FrameErrors | null = null;
   /** Numbers of the frames where they come from, if these are others. */
-  @property({ attribute: false }) frameNumbers: Float64Array | null = null;
-  /** Frames that an edit is kept over, drawn as high as it counts in each. */
+  @property({ attribute: false }) frameNumbers: FrameNumbers = null;
+  /** Frames that an edit is kept over, shown below to be dragged. */
   @property({ attribute: false }) range: FrameRange | null = null;
   /** Changes when colours do: the chart is drawn anew. */
   @property({ type: Number }) look = 0;
@@ -138,6 +38,7 @@ export class Timeline extends LitElement {
   private place = 0;
   private hovered: number | null = null;
   private chart: uPlot | null = null;
+  private gutter = MARGIN;
   private readonly sizes = new ResizeObserver(() => this.resize());
 
   /** The place in the capture that is shown, between two frames too. */
@@ -151,6 +52,11 @@ export class Timeline extends LitElement {
     if (this.hasUpdated) this.movePlace();
   }
 
+  /** The frame nearest to the place. */
+  private get frame(): number {
+    return Math.max(0, Math.min(this.frames - 1, Math.round(this.place)));
+  }
+
   override render() {
     const measured = this.isMeasured();
     return html`
@@ -159,9 +65,9 @@ export class Timeline extends LitElement {
         role="slider"
         tabindex="0"
         aria-label="Frame"
-        aria-valuemin="0"
-        aria-valuemax=${Math.max(0, this.frames - 1)}
-        aria-valuenow=${Math.round(this.place)}
+        aria-valuemin=${this.numberOf(0)}
+        aria-valuemax=${this.numberOf(this.frames - 1)}
+        aria-valuenow=${this.numberOf(this.frame)}
         @pointerdown=${this.grab}
         @pointermove=${this.move}
         @pointerleave=${this.leave}
@@ -171,12 +77,21 @@ export class Timeline extends LitElement {
         <div class="hover" hidden></div>
         <div class="tip figures" hidden></div>
         <div class="track">
-          ${this.range ? rangeDrawing(this.range, this.frames) : null}
           <div class="rail"></div>
           <div class="done"></div>
           <div class="thumb"></div>
         </div>
       </div>
+      ${
+        this.range
+          ? html`<cager-range-strip
+              .range=${this.range}
+              .frames=${this.frames}
+              .shareOf=${(frame: number) => this.shareOf(frame)}
+              .frameAt=${(event: PointerEvent) => this.frameAt(event)}
+            ></cager-range-strip>`
+          : null
+      }
     `;
   }
 
@@ -194,12 +109,14 @@ export class Timeline extends LitElement {
 
   protected override updated(changed: PropertyValues) {
     if (changed.has('look') || !this.chartPlace || !this.chart) this.drawChart();
-    else if (changed.has('errors') || changed.has('frames')) this.chart.setData(this.chartData());
+    else if (['errors', 'besideErrors', 'frames', 'frameNumbers'].some((name) => changed.has(name)))
+      this.chart.setData(this.chartData());
     this.resize();
   }
 
   private isMeasured(): boolean {
-    return this.frames > 1 && (this.errors?.linf.some(Number.isFinite) ?? false);
+    const isKnown = (errors: FrameErrors | null) => errors?.linf.some(Number.isFinite) ?? false;
+    return this.frames > 1 && (isKnown(this.errors) || isKnown(this.besideErrors));
   }
 
   private drawChart() {
@@ -207,90 +124,89 @@ export class Timeline extends LitElement {
     this.chart = null;
     if (!this.chartPlace) return;
     const style = getComputedStyle(this);
-    const color = (name: string) => resolvedColor(this.renderRoot, style.getPropertyValue(name));
-    const [worst, mean, text, line] = ['--cager-cage', '--cager-accent', '--cager-muted', '--cager-line'].map(color);
-    const options: uPlot.Options = {
-      width: Math.max(60, this.clientWidth),
-      height: this.chartPlace.clientHeight,
-      padding: [6, MARGIN, 8, 0],
-      cursor: { show: false },
-      legend: { show: false },
-      select: { show: false, left: 0, top: 0, width: 0, height: 0 },
-      scales: {
-        x: { time: false, range: () => [0, Math.max(1, this.frames - 1)] },
-        y: { range: (_, __, most) => [0, Math.max(most * 1.08, 1e-9)] },
-      },
-      axes: [
-        { show: false },
-        {
-          size: GUTTER,
-          gap: 4,
-          stroke: text,
-          font: `11px ${style.getPropertyValue('--cager-font')}`,
-          space: 16,
-          grid: { stroke: line, width: 1 },
-          ticks: { show: false },
-          values: (_, splits) => splits.map((value) => percent(value)),
-        },
-      ],
-      series: [
-        {},
-        { label: 'L∞', stroke: worst, width: 1.25, fill: withOpacity(worst, 0.1), points: { show: false } },
-        { label: 'L2', stroke: mean, width: 1.5, points: { show: false } },
-      ],
+    const color = (name: string) => resolvedColor(this.renderRoot, style.getPropertyValue(`--cager-${name}`));
+    const look = {
+      worst: color('cage'),
+      mean: color('accent'),
+      text: color('muted'),
+      line: color('line'),
+      font: `11px ${style.getPropertyValue('--cager-font')}`,
+      margin: MARGIN,
     };
-    this.chart = new uPlot(options, this.chartData(), this.chartPlace);
+    const onDraw = (gutter: number) => {
+      this.gutter = gutter;
+      this.placeTrack();
+    };
+    this.chart = errorsChart(this.chartPlace, this.chartData(), look, onDraw);
   }
 
   private chartData(): uPlot.AlignedData {
-    const { linf, l2 } = this.errors ?? { linf: new Float32Array(0), l2: new Float32Array(0) };
     const frames = Array.from({ length: this.frames }, (_, k) => k);
-    const series = (values: Float32Array) => frames.map((k) => (Number.isFinite(values[k]) ? values[k] : null));
-    return [frames, series(linf), series(l2)];
+    const series = (values: Float32Array | undefined) =>
+      frames.map((k) => (values && Number.isFinite(values[k]) ? values[k] : null));
+    const { errors, besideErrors } = this;
+    return [
+      frames.map((frame) => this.shareOf(frame)),
+      series(errors?.linf),
+      series(errors?.l2),
+      series(besideErrors?.linf),
+      series(besideErrors?.l2),
+    ];
   }
 
   private resize() {
     const width = this.clientWidth;
     if (width === 0) return;
     if (this.chart && this.chartPlace) this.chart.setSize({ width, height: this.chartPlace.clientHeight });
-    const track = this.renderRoot.querySelector<HTMLElement>('.track')!;
-    track.style.marginLeft = `${this.left()}px`;
-    track.style.marginRight = `${MARGIN}px`;
+    this.placeTrack();
+  }
+
+  private placeTrack() {
+    for (const { style } of this.renderRoot.querySelectorAll<HTMLElement>('.track, cager-range-strip')) {
+      style.marginLeft = `${this.left()}px`;
+      style.marginRight = `${MARGIN}px`;
+    }
     this.movePlace();
   }
 
   private left(): number {
-    return this.chartPlace?.clientHeight ? GUTTER : MARGIN;
+    return this.chartPlace?.clientHeight ? this.gutter : MARGIN;
+  }
+
+  /** Where a place is between the first frame and the last one, by their numbers. */
+  private shareOf(place: number): number {
+    const [first, at, last] = [0, place, this.frames - 1].map((k) => this.numberOf(k));
+    return last > first ? Math.min(1, (at - first) / (last - first)) : 0;
+  }
+
+  private numberOf(place: number): number {
+    return numberAt(this.frameNumbers, Math.max(0, place));
   }
 
   private movePlace() {
-    const share = this.frames > 1 ? Math.min(1, this.place / (this.frames - 1)) : 0;
+    const share = this.shareOf(this.place);
     const width = this.clientWidth - this.left() - MARGIN;
     const style = (name: string) => this.renderRoot.querySelector<HTMLElement>(name)!.style;
     style('.done').transform = `scaleX(${share})`;
     style('.thumb').transform = `translateX(${share * width}px)`;
     style('.needle').left = `${this.left() + share * width}px`;
-    const frame = Math.round(this.place);
-    this.slider.setAttribute('aria-valuenow', String(frame));
-    this.slider.setAttribute('aria-valuetext', this.description(frame));
+    this.slider.setAttribute('aria-valuenow', String(this.numberOf(this.frame)));
+    this.slider.setAttribute('aria-valuetext', this.description(this.frame));
   }
 
   private description(frame: number): string {
-    const number = this.frameNumbers?.[frame];
-    const own = number === undefined || number === frame ? '' : ` (number ${number})`;
-    const [l2, linf] = [this.errors?.l2[frame], this.errors?.linf[frame]];
-    const error =
-      l2 !== undefined && linf !== undefined && Number.isFinite(linf)
-        ? ` · L2 ${percent(l2)} · L∞ ${percent(linf)}`
-        : '';
-    return `frame ${frame}${own}${error}`;
+    const texts = [this.errors, this.besideErrors]
+      .map((errors) => errorsText(errors, frame))
+      .filter((text) => text !== '');
+    return [`frame ${numberText(this.numberOf(frame))}`, ...texts].join(this.besideErrors ? ' | ' : ' · ');
   }
 
   private frameAt(event: PointerEvent): number {
     const box = this.slider.getBoundingClientRect();
     const width = Math.max(1, box.width - this.left() - MARGIN);
     const share = Math.min(1, Math.max(0, (event.clientX - box.left - this.left()) / width));
-    return Math.round(share * Math.max(0, this.frames - 1));
+    const [first, last] = [0, this.frames - 1].map((k) => this.numberOf(k));
+    return Math.round(placeOf(this.frameNumbers, first + share * (last - first)));
   }
 
   private grab(event: PointerEvent) {
@@ -315,7 +231,7 @@ export class Timeline extends LitElement {
     tip.hidden = hover.hidden = this.hovered === null;
     if (this.hovered === null) return;
     const width = this.clientWidth - this.left() - MARGIN;
-    const at = this.left() + (this.hovered / (this.frames - 1)) * width;
+    const at = this.left() + this.shareOf(this.hovered) * width;
     tip.textContent = this.description(this.hovered);
     const half = tip.offsetWidth / 2;
     tip.style.left = `${Math.min(this.clientWidth - half, Math.max(half, at))}px`;
@@ -327,15 +243,9 @@ export class Timeline extends LitElement {
   }
 }
 
-/** The weight of an edit over the frames of a capture. */
-function rangeDrawing(range: FrameRange, frames: number) {
-  const { first, last } = range;
-  const points = [`${first},1`];
-  for (let frame = first; frame <= last; frame++) points.push(`${frame},${1 - weightAt(range, frame)}`);
-  points.push(`${last},1`);
-  return svg`<svg class="range" viewBox="0 0 ${Math.max(1, frames - 1)} 1" preserveAspectRatio="none" aria-hidden="true">
-    <polygon points=${points.join(' ')} vector-effect="non-scaling-stroke" />
-  </svg>`;
+function errorsText(errors: FrameErrors | null, frame: number): string {
+  const [l2, linf] = [errors?.l2[frame] ?? NaN, errors?.linf[frame] ?? NaN];
+  return Number.isFinite(linf) ? `L2 ${percent(l2)} · L∞ ${percent(linf)}` : '';
 }
 
 /** What the browser makes of a colour that depends on the theme, for canvases, which know no custom properties. */
@@ -346,8 +256,4 @@ export function resolvedColor(root: ParentNode & Node, color: string): string {
   const resolved = getComputedStyle(probe).color;
   probe.remove();
   return resolved;
-}
-
-function withOpacity(color: string, opacity: number): string {
-  return color.replace(/^rgb\((.*)\)$/, (_, channels: string) => `rgb(${channels.replaceAll(',', ' ')} / ${opacity})`);
 }

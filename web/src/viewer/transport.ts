@@ -1,3 +1,5 @@
+import { numberAt, placeOf, type FrameNumbers } from './frameNumbers';
+
 /** What plays: where, how fast, and what happens at the end. */
 export interface Transport {
   readonly playing: boolean;
@@ -12,6 +14,8 @@ export interface Transport {
   readonly position: number;
   /** Frames there are. */
   readonly frames: number;
+  /** Numbers of the frames, by which they are shown. */
+  readonly numbers: FrameNumbers;
   /** Whether no more will come. */
   readonly complete: boolean;
 }
@@ -30,22 +34,26 @@ export function standing(): Transport {
     rate: USUAL_RATE,
     position: 0,
     frames: 0,
+    numbers: null,
     complete: true,
   };
 }
 
 /**
- * Moves on by some seconds. At the end of a capture it begins anew or stops; at the end of one that is still growing it waits there.
+ * Moves on by some seconds; numbers that are missing between two frames take their time. At the end of a capture it begins anew or stops; at the end of one
+ * that is still growing it waits there.
  */
 export function advanced(transport: Transport, seconds: number): Transport {
   if (!transport.playing || transport.frames === 0) return transport;
-  const { frames, complete } = transport;
-  const position = transport.position + seconds * transport.rate * transport.speed;
+  const { frames, numbers, complete, loop } = transport;
+  const begin = numberAt(numbers, 0);
+  const number = numberAt(numbers, transport.position) + seconds * transport.rate * transport.speed;
   // Without a loop nothing lies between the last frame and the first one.
-  const end = complete && transport.loop ? frames : frames - 1;
-  if (position < end) return { ...transport, position };
+  const end = numberAt(numbers, complete && loop ? frames : frames - 1);
+  if (number < end) return { ...transport, position: placeOf(numbers, number) };
   if (!complete) return { ...transport, position: Math.max(0, frames - 1) };
-  if (transport.loop) return { ...transport, position: frames > 1 ? position % frames : 0 };
+  if (loop)
+    return { ...transport, position: frames > 1 ? placeOf(numbers, begin + ((number - begin) % (end - begin))) : 0 };
   return { ...transport, position: frames - 1, playing: false };
 }
 

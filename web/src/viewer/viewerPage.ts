@@ -1,15 +1,16 @@
 import { css, html, LitElement, nothing, type PropertyValues } from 'lit';
 import { customElement, property, query, state } from 'lit/decorators.js';
 import type { Capture } from '../capture';
-import { httpSource } from '../container/source';
-import { openSession } from '../service/live';
 import { problemBehind, ServiceProblem } from '../service/problem';
-import { Service, sessionPath } from '../service/service';
+import { Service } from '../service/service';
 import { pageToken } from '../service/token';
 import '../sessions/signIn';
 import { controls } from '../style/tokens';
 import './cagerViewer';
 import type { CagerViewer } from './cagerViewer';
+import './compareDialog';
+import type { CompareChoice, CompareDialog } from './compareDialog';
+import { sessionCapture } from './sessionCapture';
 
 /** The page of one capture: a session of the service, or a file. */
 @customElement('cager-viewer-page')
@@ -64,20 +65,29 @@ export class ViewerPage extends LitElement {
   /** The view to begin with. */
   @property() view = '';
   @state() private capture: Capture | null = null;
+  /** A session that is shown beside the capture. */
+  @state() private beside: Capture | null = null;
   @state() private waiting = '';
   @state() private failure: string | null = null;
   @state() private wantsToken = false;
   @query('cager-viewer') private readonly viewer!: CagerViewer | null;
+  @query('cager-compare-dialog') private readonly dialog!: CompareDialog | null;
   private readonly service = new Service();
   private opening = new AbortController();
+  private openingBeside = new AbortController();
+  /** The session that the link names to be shown beside the capture. */
+  private besideId: string | null = null;
+  /** The view as the viewer told it last. */
+  private shownView = '';
   private readonly retry = () => void this.openSession();
   private readonly tokenWanted = () => (this.wantsToken = true);
   private readonly passKey = (event: KeyboardEvent) => {
-    if (!this.wantsToken) this.viewer?.pressKey(event);
+    if (!this.wantsToken && this.dialog?.isOpen !== true) this.viewer?.pressKey(event);
   };
 
   /** Goes to another view of what is shown. */
   goTo(view: string) {
+    this.followBeside(view);
     if (this.viewer) this.viewer.goTo(view);
     else this.view = view;
   }
@@ -96,28 +106,37 @@ export class ViewerPage extends LitElement {
     pageToken.removeEventListener('wanted', this.tokenWanted);
     document.removeEventListener('keydown', this.passKey);
     this.opening.abort();
+    this.openingBeside.abort();
     this.capture?.close();
+    this.beside?.close();
   }
 
   protected override firstUpdated(changed: PropertyValues) {
+    this.followBeside(this.view);
     if (changed.has('file') && this.file) void this.viewer?.open(this.file);
   }
 
   override render() {
-    if (this.wantsToken && !this.capture) return html`<main><cager-sign-in></cager-sign-in></main>`;
-    if (this.session !== null && !this.capture) return this.message();
+    if (this.session !== null && !this.capture) {
+      return this.wantsToken ? html`<main><cager-sign-in></cager-sign-in></main>` : this.message();
+    }
     return html`<main>
       <cager-viewer
         autoplay
         ?inert=${this.wantsToken}
         .capture=${this.capture}
+        .beside=${this.beside}
         .view=${this.view}
         @signin=${this.tokenWanted}
+        @viewchange=${this.tellView}
+        @besidewanted=${this.askBeside}
+        @besideclosed=${() => this.setBeside(null)}
       >
         <a class="button back" slot="lead" href="#/" aria-label="All sessions" title="All sessions">
           <svg class="glyph" viewBox="0 0 24 24" aria-hidden="true"><path d="M14.5 6 8.500 12l6 6" /></svg>
         </a>
       </cager-viewer>
+      <cager-compare-dialog @compare=${this.compare}></cager-compare-dialog>
       ${
         this.wantsToken
           ? html`<div class="sign-in" role="dialog" aria-modal="true" aria-label="Sign in">
@@ -145,7 +164,73 @@ export class ViewerPage extends LitElement {
     this.wantsToken = false;
     if (!this.capture) void this.openSession();
     else this.viewer?.report(null);
+    if (this.besideId !== null && !this.beside) void this.openBeside(this.besideId);
   };
+
+  /** Tells the view with the session beside, for links. */
+  private readonly tellView = (event: CustomEvent<string>) => {
+    event.stopPropagation();
+    this.shownView = event.detail;
+    this.tellLink();
+  };
+
+  private tellLink() {
+    const view = new URLSearchParams(this.shownView);
+    view.delete('beside');
+    if (this.besideId !== null) view.set('beside', this.besideId);
+    const detail = view.toString().replaceAll('%2C', ',');
+    this.dispatchEvent(new CustomEvent('viewchange', { detail, bubbles: true, composed: true }));
+  }
+
+  private readonly askBeside = (event: Event) => {
+    event.preventDefault();
+    void this.dialog?.ask(this.service, this.session);
+  };
+
+  private readonly compare = (event: CustomEvent<CompareChoice>) => {
+    const { detail } = event;
+    if ('session' in detail) this.setBeside(detail.session);
+    else {
+      this.setBeside(null);
+      void this.viewer?.openBeside(detail.file);
+    }
+  };
+
+  /** Shows the session that a view names beside the capture; one that names none leaves a file there. */
+  private followBeside(view: string) {
+    this.shownView = view;
+    const wanted = new URLSearchParams(view).get('beside');
+    if (wanted !== this.besideId) this.setBeside(wanted);
+  }
+
+  private setBeside(id: string | null) {
+    this.openingBeside.abort();
+    this.besideId = id;
+    this.beside?.close();
+    this.beside = null;
+    this.tellLink();
+    if (id !== null) void this.openBeside(id);
+  }
+
+  private async openBeside(id: string) {
+    this.openingBeside.abort();
+    this.openingBeside = new AbortController();
+    const { signal } = this.openingBeside;
+    try {
+      const capture = await sessionCapture(id, { service: this.service, signal });
+      if (signal.aborted) capture.close();
+      else this.beside = capture;
+    } catch (error) {
+      if (signal.aborted) return;
+      const problem = problemBehind(error);
+      if (problem instanceof ServiceProblem && problem.status === 401) this.wantsToken = true;
+      else {
+        this.besideId = null;
+        this.tellLink();
+        this.viewer?.report(`The session to compare with: ${problem.message}`);
+      }
+    }
+  }
 
   private async openSession() {
     const { session, service } = this;
@@ -157,22 +242,11 @@ export class ViewerPage extends LitElement {
     this.wantsToken = false;
     try {
       const onWaiting = (sentence: string) => (this.waiting = sentence);
-      const capture: Capture = await openSession(session, { service, signal, onWaiting });
+      const capture = await sessionCapture(session, { service, signal, onWaiting });
       if (signal.aborted) {
         capture.close();
         return;
       }
-      capture.coordinates = async (onProgress, until) => (await service.coordinates(session, onProgress, until)).values;
-      const below = (path: string) => sessionPath(session, path);
-      capture.container ??= (until) => {
-        const headers = () => service.authorization();
-        return httpSource(service.address(below('capture.cager')), { headers, signal: until });
-      };
-      capture.decode = (cages, until) => {
-        const headers = { 'Content-Type': 'application/octet-stream' };
-        return service.request(below('decode'), { method: 'POST', headers, body: cages, signal: until ?? null });
-      };
-      capture.handles = (until) => service.handles(session, until);
       this.capture?.close();
       this.capture = capture;
     } catch (error) {

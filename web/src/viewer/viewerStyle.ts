@@ -12,6 +12,11 @@ export const viewerStyle = css`
     container-type: size;
     -webkit-tap-highlight-color: transparent;
   }
+  .pane {
+    position: absolute;
+    inset: 0;
+    overflow: hidden;
+  }
   canvas {
     position: absolute;
     inset: 0;

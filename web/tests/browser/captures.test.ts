@@ -2,7 +2,7 @@ import { readFile } from 'node:fs/promises';
 import type { Browser } from 'playwright-core';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import type { CagerViewer } from '../../src/viewer/cagerViewer';
-import { launch, openPage, type Watched } from './harness/browser';
+import { leave, openPage, sharedBrowser, type Watched } from './harness/browser';
 import { PageServer } from './harness/pageServer';
 import { chromium } from './harness/programs';
 import { dropOnViewer, inViewer, whenShown } from './harness/viewing';
@@ -17,12 +17,12 @@ describe.skipIf(chromium === undefined)('captures that follow one another', { ti
 
   beforeAll(async () => {
     server = await PageServer.start(() => 'http://127.0.0.1:1');
-    browser = await launch();
+    browser = await sharedBrowser();
     capture = await readFile(new URL('definition3-mvc.cager', golden));
   }, 120_000);
 
   afterAll(async () => {
-    await browser.close();
+    await leave(browser);
     server.close();
   });
 
@@ -48,6 +48,7 @@ describe.skipIf(chromium === undefined)('captures that follow one another', { ti
       await page.getByRole('button', { name: 'Close this message' }).click();
     }
     await dropOnViewer(page, { 'second.cager': capture });
+    await page.getByRole('button', { name: 'Open instead' }).click();
     await page.getByRole('img', { name: /^second\.cager: the model/ }).waitFor();
   });
 

@@ -8,12 +8,12 @@ import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
 import { diagonalOf } from '../../src/coordinates/topology';
 import { weightAt } from '../../src/editing/cageEdit';
 import type { CagerViewer } from '../../src/viewer/cagerViewer';
-import type { ViewerPage } from '../../src/viewer/viewerPage';
 import { seriousFindings } from './harness/axe';
 import { openPage, type Watched } from './harness/browser';
 import { cager, missing } from './harness/programs';
 import { Site } from './harness/site';
 import { SphereCapture } from './harness/sphere';
+import { whenShown } from './harness/viewing';
 import { parseNpy } from './npy';
 
 const FRAMES = 30;
@@ -49,10 +49,7 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
   async function editing(frame: number): Promise<Page> {
     watched = await openPage(site.browser, `${site.page}#/session/${session}?frame=${frame}`);
     const { page } = watched;
-    await page.waitForFunction(() => {
-      const viewer = document.querySelector<ViewerPage>('cager-viewer-page')?.renderRoot.querySelector('cager-viewer');
-      return viewer?.player?.stage.decoder.ready === true && viewer.player.progress === null;
-    });
+    await whenShown(page);
     await page.keyboard.press('e');
     await page.getByRole('region', { name: 'Edit the cage' }).waitFor();
     return page;
@@ -108,10 +105,11 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
   it('a falloff takes the neighbourhood along, symmetry the other side, and a box chooses all in it', async () => {
     const page = await editing(0);
     const movedVertices = async () => {
-      const offsets = await withViewer(page, (viewer) =>
-        Promise.resolve([...viewer.editing.editor!.model.edits.at(-1)!.offsets]),
-      );
-      return offsets.filter((_, k) => k % 3 === 0 && offsets.slice(k, k + 3).some((x) => x !== 0)).length;
+      const weights = await withViewer(page, (viewer) => {
+        const { own, mirror } = viewer.editing.editor!.model.edits.at(-1)!.grip;
+        return Promise.resolve([...own.map((weight, v) => Math.max(weight, mirror?.own[v] ?? 0))]);
+      });
+      return weights.filter((weight) => weight > 0).length;
     };
     await setRadius(page, 0);
     await dragVertex(page, 30, 0);
@@ -152,7 +150,7 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
       await field.fill(String(value));
       await field.press('Tab');
     }
-    await expect.poll(() => page.locator('cager-timeline .range').count()).toBe(1);
+    await expect.poll(() => page.locator('cager-range-strip polygon').count()).toBe(1);
     const frames = [5, 6, 8, 12, 16, 20, 21];
     const edited = await Promise.all(frames.map((frame) => readPositions(page, frame)));
     await page.getByRole('checkbox', { name: /^Vertex/ }).uncheck();
@@ -165,6 +163,167 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
       expect(moved[k] / whole, `frame ${frame}`).toBeCloseTo(weight, 3);
     });
     expect(watched?.errors).toEqual([]);
+  });
+
+  it('ranges are dragged below the timeline: ends, eases, and all of it', async () => {
+    const page = await editing(14);
+    const range = () => withViewer(page, ({ editing }) => Promise.resolve(editing.range!));
+    await page.locator('cager-range-strip .ground').waitFor();
+    const covered = () =>
+      withViewer(page, (viewer) => Promise.resolve(viewer.style.getPropertyValue('--covered-height')));
+    const before = await covered();
+    await dragVertex(page, 40, 20);
+    expect(await range()).toEqual({ first: 2, last: 26, easeIn: 12, easeOut: 12 });
+    // As much of the picture is covered as before, so that nothing jumps under the pointer.
+    expect(await covered()).toBe(before);
+    const strip = (await page.locator('cager-range-strip').boundingBox())!;
+    const placeOf = (frame: number, isUpper: boolean) => ({
+      x: strip.x + (strip.width * frame) / (FRAMES - 1),
+      y: strip.y + strip.height * (isUpper ? 0.25 : 0.75),
+    });
+    const drag = async (from: number, to: number, isUpper: boolean) => {
+      const [a, b] = [placeOf(from, isUpper), placeOf(to, isUpper)];
+      await page.mouse.move(a.x, a.y);
+      await page.mouse.down();
+      await page.mouse.move(b.x, b.y, { steps: 4 });
+      await page.mouse.up();
+    };
+    await drag(26, 22, false);
+    expect(await range()).toEqual({ first: 2, last: 22, easeIn: 12, easeOut: 8 });
+    await drag(14, 6, true);
+    expect(await range()).toEqual({ first: 2, last: 22, easeIn: 4, easeOut: 8 });
+    await drag(10, 12, false);
+    expect(await range()).toEqual({ first: 4, last: 24, easeIn: 4, easeOut: 8 });
+    expect(await page.getByRole('spinbutton', { name: 'Last' }).inputValue()).toBe('24');
+    // The capture stayed where it was, and each drag is one step back.
+    expect(await withViewer(page, (viewer) => Promise.resolve(viewer.frame))).toBe(14);
+    await page.keyboard.press('Control+z');
+    expect(await range()).toEqual({ first: 2, last: 22, easeIn: 4, easeOut: 8 });
+    expect(watched?.errors).toEqual([]);
+  });
+
+  it('vertices are rotated and scaled about their pivot by ring, arrow and keys, and exported so', async () => {
+    const page = await editing(12);
+    await setRadius(page, 0);
+    const chosen = await withViewer(page, ({ editing }) => {
+      const { editor } = editing;
+      const order = editor!.places.map((place, v) => ({ v, y: place!.y })).sort((a, b) => a.y - b.y);
+      editor!.select(order.slice(0, 12).map(({ v }) => v));
+      return Promise.resolve([...editor!.model.selection]);
+    });
+    await page.locator('cager-viewer canvas').first().focus();
+    await page.keyboard.press('r');
+    expect(await page.getByRole('button', { name: 'Rotate' }).getAttribute('aria-pressed')).toBe('true');
+    /** The cage as it was drawn last. */
+    const cage = () => withViewer(page, ({ player }) => Promise.resolve([...player!.stage.cageVertices]));
+    const sizeOf = (positions: readonly number[]) => {
+      const mean = [0, 1, 2].map((k) => chosen.reduce((sum, v) => sum + positions[3 * v + k], 0) / chosen.length);
+      return chosen.map((v) => Math.hypot(...mean.map((x, k) => positions[3 * v + k] - x)));
+    };
+    const before = await cage();
+    const grip = await withViewer(page, ({ editing, renderRoot }) => {
+      const { left, top } = renderRoot.querySelector('canvas')!.getBoundingClientRect();
+      const { rings, middle } = editing.editor!.gizmo!;
+      const [from] = rings[3].points;
+      return Promise.resolve({ x: left + from.x, y: top + from.y, middleX: left + middle.x, middleY: top + middle.y });
+    });
+    await page.mouse.move(grip.x, grip.y);
+    await page.mouse.down();
+    // A quarter of a turn clockwise.
+    const [dx, dy] = [grip.x - grip.middleX, grip.y - grip.middleY];
+    await page.mouse.move(grip.middleX - dy, grip.middleY + dx, { steps: 6 });
+    await page.mouse.up();
+    await expect.poll(async () => farthest(before, await cage())).toBeGreaterThan(0.02);
+    sizeOf(await cage()).forEach((size, k) => expect(size).toBeCloseTo(sizeOf(before)[k], 4));
+    await page.getByText('90°').waitFor();
+
+    await page.keyboard.press('u');
+    for (let k = 0; k < 3; k++) await page.keyboard.press('Shift+ArrowUp');
+    const growth = async () => {
+      const sizes = sizeOf(await cage());
+      return sizeOf(before).map((size, k) => sizes[k] / size);
+    };
+    await expect.poll(async () => Math.min(...(await growth()))).toBeCloseTo(1.1 ** 3, 3);
+    expect(Math.max(...(await growth()))).toBeCloseTo(1.1 ** 3, 3);
+    expect(await withViewer(page, ({ editing }) => Promise.resolve(editing.editor!.model.edits.length))).toBe(2);
+    expect(await seriousFindings(page)).toEqual([]);
+
+    const button = page.getByRole('button', { name: '.cager', exact: true });
+    const [saved] = await Promise.all([page.waitForEvent('download'), button.click()]);
+    const [path, output] = ['turned.cager', 'turned.npy'].map((name) => join(folder, name));
+    await saved.saveAs(path);
+    await run(cager!, ['decode', path, '-o', output, '--overwrite', '-q']);
+    const { values } = parseNpy(await readFile(output));
+    const original = await readFrames(session);
+    const length = 3 * sphere.points;
+    const of = (all: Float32Array | Float64Array, frame: number) => [
+      ...all.slice(frame * length, (frame + 1) * length),
+    ];
+    expect(farthest(await readPositions(page, 12), of(values, 12))).toBeLessThan(1e-4);
+    expect(of(values, FRAMES - 1)).toEqual(of(original, FRAMES - 1));
+    expect(farthest(of(values, 12), of(original, 12))).toBeGreaterThan(0.02);
+    const { stdout, stderr } = await run(cager!, ['inspect', path]);
+    expect(stdout + stderr).toMatch(/the cages were edited/);
+    expect(watched?.errors).toEqual([]);
+  });
+
+  it('edits are still there after a reload, to be taken up again or thrown away', async () => {
+    const page = await editing(12);
+    await dragVertex(page, 60, -30);
+    const edited = await readPositions(page, 12);
+    await page.waitForTimeout(600);
+    const reload = async () => {
+      await page.reload();
+      await whenShown(page);
+    };
+    await reload();
+    const plain = await readPositions(page, 12);
+    expect(farthest(plain, edited)).toBeGreaterThan(0.01);
+    await page.getByText(/An edit from .* is still in this browser/).waitFor();
+    // Known by the session's address: that of a running one has no container yet.
+    expect(await withViewer(page, ({ player }) => Promise.resolve(player!.capture.identity))).toMatch(session);
+    expect(await seriousFindings(page)).toEqual([]);
+    // Whoever edits before answering loses neither.
+    await page.keyboard.press('e');
+    await page.getByRole('region', { name: 'Edit the cage' }).waitFor();
+    await dragVertex(page, -40, 10);
+    await page.waitForTimeout(600);
+    await reload();
+    await page.getByText(/2 edits from .* are still in this browser/).waitFor();
+    await page.getByRole('button', { name: 'Take up again' }).click();
+    await page
+      .getByRole('checkbox', { name: /^Vertex/ })
+      .nth(1)
+      .waitFor();
+    await page
+      .getByRole('checkbox', { name: /^Vertex/ })
+      .nth(1)
+      .uncheck();
+    expect(await readPositions(page, 12)).toEqual(edited);
+    await page.waitForTimeout(600);
+    await reload();
+    await page.getByRole('button', { name: 'Throw away' }).click();
+    await page.waitForTimeout(300);
+    await reload();
+    await page.waitForTimeout(500);
+    expect(await page.locator('cager-kept-offer').count()).toBe(0);
+    expect(await readPositions(page, 12)).toEqual(plain);
+    expect(watched?.errors).toEqual([]);
+  });
+
+  it('a browser that keeps nothing says so, and edits all the same', async () => {
+    watched = await openPage(site.browser, 'about:blank');
+    const { page } = watched;
+    await page.addInitScript(() => Object.defineProperty(globalThis, 'indexedDB', { value: undefined }));
+    await page.goto(`${site.page}#/session/${session}?frame=12`);
+    await whenShown(page);
+    await page.keyboard.press('e');
+    await page.getByRole('region', { name: 'Edit the cage' }).waitFor();
+    const before = await readPositions(page, 12);
+    await dragVertex(page, 40, 20);
+    expect(farthest(before, await readPositions(page, 12))).toBeGreaterThan(0.01);
+    await page.getByText('export them before you leave').waitFor();
+    expect(watched.errors).toEqual([]);
   });
 
   it('works by keyboard alone, without a trap, and passes the checks of accessibility', async () => {

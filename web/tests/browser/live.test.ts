@@ -53,6 +53,7 @@ describe.skipIf(missing)('a session as a capture', { timeout: 60_000 }, () => {
     const finished = await state(watched);
     expect(finished).toMatchObject({ frames: 25, problem: null, measured: 25 });
     expect(finished.live!.state).toBe('ended');
+    expect(await watched.page.evaluate(() => window.parts.capture!.frameBytes)).toBeGreaterThan(0);
     expect(await cage(watched, 7)).toEqual(await solvedCage(client, id, 7));
     expect(watched.errors).toEqual([]);
     await watched.close();
@@ -193,6 +194,7 @@ describe.skipIf(missing)('a session as a capture', { timeout: 60_000 }, () => {
     expect(await page.evaluate(() => location.hash)).toContain(id);
     const file = await readFile(new URL('../../../tests/golden/definition3-mvc.cager', import.meta.url));
     await dropOnViewer(page, { 'walk.cager': file });
+    await page.getByRole('button', { name: 'Open instead' }).click();
     await page.getByRole('img', { name: /^walk\.cager: the model/ }).waitFor({ timeout: 20_000 });
     expect(await page.evaluate(() => location.hash)).toMatch(/^#\/file/);
     await site.service.run();

@@ -1,49 +1,21 @@
-import { readFile } from 'node:fs/promises';
-import type { Browser, Page } from 'playwright-core';
-import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
+import type { Page } from 'playwright-core';
+import { describe, expect, it } from 'vitest';
 import { openBytes } from '../../src/container/testSupport';
 import { diagonalOf } from '../../src/coordinates/topology';
 import { npyHeader } from '../../src/editing/decodedFrames';
 import { seriousFindings } from './harness/axe';
-import { launch, openPage, type Watched } from './harness/browser';
-import { PageServer } from './harness/pageServer';
 import { chromium } from './harness/programs';
-import { dropOnViewer, inViewer, whenShown } from './harness/viewing';
+import { dropOnViewer, FilePages, goldenBytes, inViewer } from './harness/viewing';
 import { parseNpy } from './npy';
 
-const golden = new URL('../../../tests/golden/', import.meta.url);
 /** The point that is moved in the original, and how far, as a fraction of the diagonal. */
 const [MOVED, DISTANCE] = [5, 0.03];
 /** What the picture's own rounding may add. */
 const ROUNDING = 1e-4;
 
 describe.skipIf(chromium === undefined)('a capture beside its original', { timeout: 90_000 }, () => {
-  let server: PageServer;
-  let browser: Browser;
-  let watched: Watched | null = null;
-
-  beforeAll(async () => {
-    // Files play without any service.
-    server = await PageServer.start(() => 'http://127.0.0.1:1');
-    browser = await launch();
-  }, 120_000);
-
-  afterAll(async () => {
-    await browser.close();
-    server.close();
-  });
-
-  afterEach(async () => {
-    await watched?.close();
-    watched = null;
-  });
-
-  async function opened(): Promise<Page> {
-    watched = await openPage(browser, `${server.base}#/file`);
-    await dropOnViewer(watched.page, { 'walk.cager': await encoded() });
-    await whenShown(watched.page);
-    return watched.page;
-  }
+  const pages = FilePages.ofSuite();
+  const opened = async () => pages.show({ 'walk.cager': await goldenBytes('definition3-mvc.cager') });
 
   it('says where the original could come from, and shows distances that are known', async () => {
     const page = await opened();
@@ -57,7 +29,7 @@ describe.skipIf(chromium === undefined)('a capture beside its original', { timeo
     await dropOnViewer(page, { 'walk.npy': bytes });
     await page.getByText('Distance from the original').waitFor();
     for (const frame of [0, 2]) {
-      await inViewer(page, (viewer, wanted) => void (viewer.frame = wanted), frame);
+      await inViewer(page, (viewer, wanted) => void (viewer.pause(), (viewer.frame = wanted)), frame);
       await expect.poll(async () => (await measured(page))?.frame).toBe(frame);
       const errors = (await measured(page))!;
       // The original has one point elsewhere in every frame, farther in later ones.
@@ -70,7 +42,7 @@ describe.skipIf(chromium === undefined)('a capture beside its original', { timeo
     }
     await page.getByText(new RegExp(`^Point ${MOVED}: (8\\.99|9|9\\.01) % `)).waitFor();
     expect(await seriousFindings(page)).toEqual([]);
-    expect(watched?.errors).toEqual([]);
+    expect(pages.errors).toEqual([]);
   });
 
   it('shows original and decoded model with one camera, and the line between them moves by keyboard', async () => {
@@ -91,7 +63,7 @@ describe.skipIf(chromium === undefined)('a capture beside its original', { timeo
     expect(both.equals(await canvas.screenshot())).toBe(false);
     await page.getByRole('button', { name: 'Put the original away' }).click();
     await expect.poll(() => page.getByRole('button', { name: 'Both' }).count()).toBe(0);
-    expect(watched?.errors).toEqual([]);
+    expect(pages.errors).toEqual([]);
   });
 
   it('says why frames of something else are not taken, and plays on', async () => {
@@ -106,7 +78,7 @@ describe.skipIf(chromium === undefined)('a capture beside its original', { timeo
       .getByRole('alert')
       .getByText(/These are no frames/)
       .waitFor();
-    expect(watched?.errors).toEqual([]);
+    expect(pages.errors).toEqual([]);
   });
 });
 
@@ -123,15 +95,10 @@ async function measured(page: Page) {
   return errors;
 }
 
-async function encoded(): Promise<Uint8Array> {
-  // Copied: a Buffer of Node lies somewhere within a larger one.
-  return Uint8Array.from(await readFile(new URL('definition3-mvc.cager', golden)));
-}
-
 /** What the program decodes, with one point moved along x: farther from frame to frame. */
 async function movedOriginal(): Promise<{ bytes: Uint8Array; points: number }> {
-  const decoded = parseNpy(await readFile(new URL('definition3-mvc.npy', golden)));
-  const diagonal = diagonalOf((await openBytes(await encoded())).static.rest);
+  const decoded = parseNpy(await goldenBytes('definition3-mvc.npy'));
+  const diagonal = diagonalOf((await openBytes(await goldenBytes('definition3-mvc.cager'))).static.rest);
   const [frames, points] = decoded.shape;
   const moved = Float32Array.from(decoded.values);
   for (let frame = 0; frame < frames; frame++) moved[3 * (points * frame + MOVED)] += DISTANCE * (1 + frame) * diagonal;

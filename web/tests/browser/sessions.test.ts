@@ -168,19 +168,25 @@ describe.skipIf(missing)('the list of sessions', { timeout: 60_000 }, () => {
     const small = new SphereCapture(1);
     const client = site.client();
     const oldest = await client.create(small, { name: 'oldest of many' });
-    for (let k = 0; k < 110; k += 1) await client.create(small, { name: `one of many ${k}` });
+    for (let k = 0; k < 490; k += 10) {
+      await Promise.all(Array.from({ length: 10 }, (_, i) => client.create(small, { name: `one of many ${k + i}` })));
+    }
+    for (let k = 490; k < 500; k += 1) await client.create(small, { name: `one of many ${k}` });
     const { page, errors, close } = await openPage(site.browser, `${site.page}#/`);
-    await row(page, 'one of many 109').waitFor();
+    await row(page, 'one of many 499').waitFor();
     expect(await page.locator('cager-sessions tbody').count()).toBe(25);
     await page.getByRole('button', { name: 'Older' }).click();
-    await row(page, 'one of many 84').waitFor();
-    expect(await row(page, 'one of many 109').count()).toBe(0);
+    await expect.poll(() => row(page, 'one of many 499').count()).toBe(0);
+    await page.getByText('26–50 of').waitFor();
     await page.getByRole('button', { name: 'Newer' }).click();
-    await row(page, 'one of many 109').waitFor();
-    // It is not on the first page that the service gives.
+    await row(page, 'one of many 499').waitFor();
+    // It is on the sixth page that the service gives: all of them are asked for at once, without waiting for the list to be renewed.
     await page.getByRole('searchbox').fill('oldest of');
-    await row(page, 'oldest of many').waitFor();
+    await row(page, 'oldest of many').waitFor({ timeout: 4000 });
     expect(await idOf(page, 'oldest of many')).toBe(oldest.id);
+    await page.getByRole('searchbox').fill('');
+    for (let k = 0; k < 20; k += 1) await page.getByRole('button', { name: 'Older' }).click();
+    await row(page, 'oldest of many').waitFor();
     expect(errors).toEqual([]);
     await close();
   });

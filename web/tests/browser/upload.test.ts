@@ -51,7 +51,7 @@ describe.skipIf(missing)('an upload', { timeout: 60_000 }, () => {
     const files = Object.fromEntries([8, 9, 10, 11].map((frame) => [`shot_${frame}.obj`, capture.frameObj(frame)]));
     await drop(page, files);
     await page.getByText('The first frame, shot_8.obj, is taken as the rest pose.').waitFor();
-    await page.getByText('the service makes one around the rest pose').waitFor();
+    await page.getByText('The service makes a cage around the rest pose').waitFor();
     await page.getByRole('button', { name: 'Encode' }).click();
     const id = await encoded(page);
     expect((await site.client().session(id)).frames.solved).toBe(4);
@@ -140,6 +140,95 @@ describe.skipIf(missing)('an upload', { timeout: 60_000 }, () => {
     await close();
   });
 
+  test('a_motion_designer_cache_is_encoded_as_the_same_numbers_in_numpys_format', async () => {
+    const numbers = capture.frames(0, FRAMES);
+    const mdd = Buffer.alloc(8 + 4 * FRAMES + 4 * numbers.length);
+    mdd.writeInt32BE(FRAMES, 0);
+    mdd.writeInt32BE(capture.points, 4);
+    numbers.forEach((value, k) => mdd.writeFloatBE(value, 8 + 4 * FRAMES + 4 * k));
+    const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`);
+    await drop(page, { 'rest.obj': capture.rest, 'cage.obj': capture.cage, 'wave.mdd': Uint8Array.from(mdd) });
+    await page.getByText(`${FRAMES} frames of 642 points`).waitFor();
+    await page.getByRole('button', { name: 'Encode' }).click();
+    const id = await encoded(page);
+    const whole = await site.client().encode(capture, { name: 'whole' }, FRAMES);
+    expect(await toldErrors(site, id)).toEqual(await toldErrors(site, whole));
+    expect(errors).toEqual([]);
+    await close();
+  });
+
+  test('a_cage_is_designed_from_the_motion_and_taken_by_the_session', async () => {
+    const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`, ['404']);
+    await drop(page, { 'rest.obj': capture.rest, 'wave.npy': capture.npy(FRAMES) });
+    await page.getByLabel('Cage', { exact: true }).selectOption('motion');
+    await page.getByLabel('Vertices of the cage, at most').fill('40');
+    await page.getByLabel('Seconds for the design, at most').fill('20');
+    expect(await seriousFindings(page)).toEqual([]);
+    await page.getByRole('button', { name: 'Encode' }).click();
+    await page.getByRole('heading', { name: 'Designing the cage: wave' }).waitFor();
+    await page.getByRole('button', { name: 'Stop' }).click();
+    await page.getByRole('heading', { name: 'Stopped: wave' }).waitFor();
+    expect(await designs(site)).toBe(0);
+    await page.getByRole('button', { name: 'Start again' }).click();
+    const id = await encoded(page);
+    const session = await site.client().session(id);
+    expect(session.cage_vertices).toBeLessThanOrEqual(40);
+    // The session keeps the cage, and nothing else is left at the service.
+    expect(await designs(site)).toBe(0);
+    const made = await encodedAroundRest(site, 40);
+    const mean = (errors: readonly FrameError[]) => errors.reduce((sum, { l2 }) => sum + l2, 0) / errors.length;
+    expect(mean(await toldErrors(site, id))).toBeLessThan(mean(await toldErrors(site, made)));
+    expect(errors).toEqual([]);
+    await close();
+  });
+
+  test('a_design_goes_on_after_a_reload_and_its_best_cage_so_far_can_be_taken', async () => {
+    const { page, close } = await openPage(site.browser, `${site.page}#/upload`, ['404']);
+    page.on('dialog', (dialog) => void dialog.accept());
+    const large = new SphereCapture(4);
+    const files = { 'rest.obj': large.rest, 'wave.npy': large.npy(24) };
+    await drop(page, files);
+    await page.getByLabel('Cage', { exact: true }).selectOption('motion');
+    await page.getByLabel('Vertices of the cage, at most').fill('300');
+    await page.getByRole('button', { name: 'Encode' }).click();
+    await expect.poll(() => designs(site), { timeout: 20_000 }).toBe(1);
+    await page.reload();
+    await page.getByRole('heading', { name: '“wave” was interrupted' }).waitFor();
+    await drop(page, files);
+    await page.getByRole('button', { name: 'Go on' }).click();
+    await page.getByRole('button', { name: 'Go on with this cage' }).click({ timeout: 30_000 });
+    const id = await encoded(page);
+    expect((await site.client().session(id)).frames.solved).toBe(24);
+    expect(await designs(site)).toBe(0);
+    await close();
+  });
+
+  test('a_session_that_is_deleted_during_its_upload_is_told_of_and_started_again', async () => {
+    const large = new SphereCapture(4);
+    const { page, close } = await openPage(site.browser, `${site.page}#/upload`, ['404', '410', 'ERR_']);
+    await slow(page, { uploadThroughput: 3 << 20 });
+    const files = { 'rest.obj': large.rest, 'cage.obj': large.cage, 'wave.npy': large.npy(4) };
+    await drop(page, files, { name: 'wave.npy', times: 200 });
+    await page.getByLabel('Name').fill('to be deleted');
+    await page.getByRole('button', { name: 'Encode' }).click();
+    const link = page.getByRole('link', { name: 'Watch it live' });
+    await link.waitFor();
+    const deleted = (await link.getAttribute('href'))!.replace('#/session/', '');
+    await expect.poll(async () => (await site.client().session(deleted)).frames.solved).toBeGreaterThan(0);
+    await site.client().call(`/${deleted}`, { method: 'DELETE' });
+    await page
+      .getByRole('alert')
+      .getByText(/The session was deleted while it was uploaded to/)
+      .waitFor();
+    expect(await seriousFindings(page)).toEqual([]);
+    await slow(page, {});
+    await page.getByRole('button', { name: 'Start again' }).click();
+    const id = await encoded(page);
+    expect(id).not.toBe(deleted);
+    expect((await site.client().session(id)).frames).toMatchObject({ solved: 800, missing: [] });
+    await close();
+  });
+
   test('an_upload_that_was_stopped_goes_on_or_is_deleted', async () => {
     const large = new SphereCapture(4);
     const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`);
@@ -168,6 +257,98 @@ describe.skipIf(missing)('an upload', { timeout: 60_000 }, () => {
   });
 });
 
+describe.skipIf(missing)('an upload that was broken off', { timeout: 60_000 }, () => {
+  const TOKEN = 'a-token-for-tests-alone';
+  let site: Site;
+
+  beforeAll(async () => {
+    site = await Site.start({ studio: TOKEN });
+  }, 120_000);
+
+  afterAll(() => site.close());
+
+  test('by_a_reload_goes_on_with_what_is_missing_when_the_same_files_are_dropped', async () => {
+    const large = new SphereCapture(4);
+    const frames = 800;
+    const files = { 'rest.obj': large.rest, 'cage.obj': large.cage, 'wave.npy': large.npy(4) };
+    const dropAll = (page: Page) => drop(page, files, { name: 'wave.npy', times: frames / 4 });
+    const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`, ['401']);
+    page.on('dialog', (dialog) => void dialog.accept());
+    await page.getByLabel('Access token').fill(TOKEN);
+    await page.keyboard.press('Enter');
+    await page.getByRole('heading', { name: 'Upload a capture' }).waitFor();
+    await slow(page, { uploadThroughput: 1 << 20 });
+    await dropAll(page);
+    await page.getByLabel('Name').fill('broken off');
+    await page.getByRole('button', { name: 'Encode' }).click();
+    await page.getByText('You can look at it meanwhile').waitFor();
+    const list = async () =>
+      ((await (await site.client(TOKEN).call('')).json()) as { sessions: { id: string; name: string }[] }).sessions;
+    const [{ id }] = await list();
+    await expect.poll(async () => (await site.client(TOKEN).session(id)).frames.solved).toBeGreaterThan(10);
+    await page.reload();
+
+    await page.getByRole('heading', { name: '“broken off” was interrupted' }).waitFor();
+    expect(await seriousFindings(page)).toEqual([]);
+    const kept = await page.evaluate(() => JSON.stringify(Object.entries(localStorage)));
+    expect(kept).toContain(id);
+    expect(kept).not.toContain(TOKEN);
+    await drop(page, { ...files, 'wave.npy': large.npy(5) });
+    await page.getByText(/The frames were wave\.npy \(.*\) then; wave\.npy \(.*\) is something else\./).waitFor();
+    await dropAll(page);
+    await page.getByRole('heading', { name: 'These are the files of “broken off”' }).waitFor();
+    expect(await seriousFindings(page)).toEqual([]);
+    const posted: number[] = [];
+    page.on('request', (request) => {
+      const first = /frames\?first=(\d+)/.exec(request.url());
+      if (first) posted.push(Number(first[1]));
+    });
+    await slow(page, {});
+    await page.getByRole('button', { name: 'Go on' }).click();
+    expect(await encoded(page)).toBe(id);
+    expect(Math.min(...posted)).toBeGreaterThan(10);
+    expect((await site.client(TOKEN).session(id)).frames).toMatchObject({ solved: frames, missing: [] });
+    expect((await list()).length).toBe(1);
+    expect(await page.evaluate(() => Object.keys(localStorage))).toEqual([]);
+    // All errors are shown, those that were measured before the reload too.
+    await page.getByRole('img', { name: /^Errors of the frames/ }).waitFor();
+    expect(errors).toEqual([]);
+    await close();
+  });
+
+  test('by_closing_the_page_can_be_deleted_from_another_one', async () => {
+    const large = new SphereCapture(4);
+    const { page, close } = await openPage(site.browser, `${site.page}#/upload`, ['401']);
+    page.on('dialog', (dialog) => void dialog.accept());
+    const signIn = async (tab: Page) => {
+      await tab.getByLabel('Access token').fill(TOKEN);
+      await tab.keyboard.press('Enter');
+      await tab.getByRole('heading', { name: 'Upload a capture' }).waitFor();
+    };
+    await signIn(page);
+    await slow(page, { uploadThroughput: 1 << 20 });
+    const files = { 'rest.obj': large.rest, 'cage.obj': large.cage, 'wave.npy': large.npy(4) };
+    await drop(page, files, { name: 'wave.npy', times: 400 });
+    await page.getByRole('button', { name: 'Encode' }).click();
+    await page.getByText('You can look at it meanwhile').waitFor();
+    const other = await page.context().newPage();
+    await other.goto(`${site.page}#/upload`);
+    await signIn(other);
+    // While a tab sends it, no other one offers to.
+    await other.waitForTimeout(500);
+    expect(await other.getByRole('heading', { name: /was interrupted/ }).count()).toBe(0);
+    const before = (await (await site.client(TOKEN).call('')).json()) as { sessions: unknown[] };
+    await page.close();
+    await other.reload();
+    await other.getByRole('heading', { name: '“wave” was interrupted' }).waitFor();
+    await other.getByRole('button', { name: 'Delete what was sent' }).click();
+    await expect.poll(() => other.getByRole('heading', { name: /was interrupted/ }).count()).toBe(0);
+    const after = (await (await site.client(TOKEN).call('')).json()) as { sessions: unknown[] };
+    expect(after.sessions.length).toBe(before.sessions.length - 1);
+    await close();
+  });
+});
+
 describe.skipIf(missing)('an upload to a service with little room', { timeout: 60_000 }, () => {
   let site: Site;
 
@@ -189,9 +370,42 @@ describe.skipIf(missing)('an upload to a service with little room', { timeout: 6
       .getByRole('alert')
       .getByText(/Delete sessions that are no longer needed/)
       .waitFor();
-    await site.client().call(`/${other}`, { method: 'DELETE' });
+    expect(await seriousFindings(page)).toEqual([]);
+    // The page makes room itself, and the upload waits meanwhile.
+    await page.getByRole('link', { name: 'All sessions' }).click();
+    await page.getByRole('button', { name: 'Delete other' }).click();
+    await page.getByRole('dialog').getByRole('button', { name: 'Delete', exact: true }).click();
+    await expect.poll(() => page.getByRole('button', { name: 'Delete other' }).count()).toBe(0);
+    await page.getByRole('link', { name: 'Back to the upload' }).click();
     await page.getByRole('button', { name: 'Try again' }).click();
-    await encoded(page);
+    const id = await encoded(page);
+    expect((await site.client().session(id)).frames).toMatchObject({ solved: 1000, missing: [] });
+    await close();
+  });
+});
+
+describe.skipIf(missing)('an upload to a service with as many sessions as it takes', { timeout: 60_000 }, () => {
+  let site: Site;
+
+  beforeAll(async () => {
+    site = await Site.start({}, ['tenant_max_sessions=1']);
+  }, 120_000);
+
+  afterAll(() => site.close());
+
+  test('says_so_and_begins_by_itself_once_one_was_deleted', async () => {
+    const small = new SphereCapture(2);
+    const { id: other } = await site.client().create(small, { name: 'other' });
+    const { page, close } = await openPage(site.browser, `${site.page}#/upload`, ['429']);
+    await drop(page, { 'rest.obj': small.rest, 'cage.obj': small.cage, 'wave.npy': small.npy(4) });
+    await page.getByRole('button', { name: 'Encode' }).click();
+    await page
+      .getByRole('alert')
+      .getByText(/Delete sessions that are no longer needed\. The upload tries again in \d+ s\./)
+      .waitFor();
+    await site.client().call(`/${other}`, { method: 'DELETE' });
+    const id = await encoded(page);
+    expect((await site.client().session(id)).frames.solved).toBe(4);
     await close();
   });
 });
@@ -255,6 +469,25 @@ async function roles(page: Page): Promise<Record<string, string>> {
 
 async function sessions(site: Site): Promise<number> {
   return ((await (await site.client().call('')).json()) as { sessions: unknown[] }).sessions.length;
+}
+
+/** A completed session whose cage was made around the rest pose. */
+async function encodedAroundRest(site: Site, vertices: number): Promise<string> {
+  const client = site.client();
+  const body = new FormData();
+  body.append('options', JSON.stringify({ cage: { vertices } }));
+  body.append('rest', new Blob([capture.rest]), 'rest.obj');
+  const { id } = (await (await client.call('', { method: 'POST', body })).json()) as { id: string };
+  await client.whenReady(id);
+  await client.post(id, capture, 0, FRAMES);
+  await client.complete(id, FRAMES);
+  return id;
+}
+
+/** Designs of cages at the service. */
+async function designs(site: Site): Promise<number> {
+  const response = await fetch(`${site.service.origin}/v1/cages`);
+  return ((await response.json()) as { cages: unknown[] }).cages.length;
 }
 
 interface FrameError {

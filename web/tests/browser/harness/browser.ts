@@ -16,6 +16,18 @@ export function launch(): Promise<Browser> {
   return launcher.launch({ executablePath: chromium!, args: FLAGS });
 }
 
+let shared: Promise<Browser> | undefined;
+
+/** The browser of all tests: starting one and compiling its shaders takes longer than most of them. It ends with their process. */
+export function sharedBrowser(): Promise<Browser> {
+  return (shared ??= launch());
+}
+
+/** Closes what tests of a file have left open in the browser. */
+export async function leave(browser: Browser): Promise<void> {
+  await Promise.all(browser.contexts().map((context) => context.close()));
+}
+
 /** A page in a context of its own, and what its console and its policy complained about. */
 export interface Watched {
   readonly page: Page;
@@ -26,7 +38,12 @@ export interface Watched {
 
 /** @param expected parts of messages that this test provokes, such as a status that it wants to see handled */
 export async function openPage(browser: Browser, url: string, expected: readonly string[] = []): Promise<Watched> {
-  const context = await browser.newContext({ acceptDownloads: true, viewport: { width: 1280, height: 800 } });
+  // Half as many pixels in each direction: drawing them is most of what tests would wait for.
+  const context = await browser.newContext({
+    acceptDownloads: true,
+    viewport: { width: 1280, height: 800 },
+    deviceScaleFactor: 0.5,
+  });
   const page = await context.newPage();
   const errors: string[] = [];
   const note = (text: string): void => {

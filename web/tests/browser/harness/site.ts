@@ -1,7 +1,7 @@
 /** A service, the page beside it and a browser: what most browser tests begin with. */
 
 import type { Browser } from 'playwright-core';
-import { launch } from './browser';
+import { leave, sharedBrowser } from './browser';
 import { builtPage } from './builtPage';
 import { TestClient } from './client';
 import { PageServer } from './pageServer';
@@ -20,7 +20,7 @@ export class Site {
     await builtPage();
     const service = await TestService.start(...options);
     const server = await PageServer.start(() => service.origin);
-    return new Site(service, server, await launch());
+    return new Site(service, server, await sharedBrowser());
   }
 
   /** Address of the page: that which the service itself serves where `CAGER_WEB_BASE` is `service`, else the one that was just built. */
@@ -33,7 +33,7 @@ export class Site {
   }
 
   async close(): Promise<void> {
-    await this.browser.close();
+    await leave(this.browser);
     this.server.close();
     await this.service.close();
   }

@@ -1,0 +1,50 @@
+import { expect, test } from 'vitest';
+import { classify } from './classify';
+import { difference, marksOf, shareNames, withEarlierRoles } from './fileMarks';
+import { sampledFrames } from './motionCage';
+
+const drop = (files: Record<string, string>) =>
+  classify(Object.entries(files).map(([path, content]) => ({ path, file: new File([content], path) })));
+const FILES = { 'rest.obj': 'v 0 0 0', 'walk.npy': 'numbers' };
+
+test('the_same_files_are_known_again_and_others_are_told_apart', async () => {
+  const earlier = await marksOf(drop(FILES));
+  expect(difference(await marksOf(drop({ ...FILES })), earlier)).toBeNull();
+  const later = await marksOf(drop({ ...FILES, 'walk.npy': 'NUMBERS' }));
+  expect(difference(later, earlier)).toBe(
+    'The frames were walk.npy (7 bytes) then; walk.npy (7 bytes) is something else.',
+  );
+  expect(difference(await marksOf(drop({ 'rest.obj': 'v 0 0 0' })), earlier)).toMatch(/missing here/);
+  expect(difference(await marksOf(drop({ ...FILES, 'cage.obj': 'v' })), earlier)).toBe(
+    'There was no file of a cage then; leave cage.obj out.',
+  );
+  expect(shareNames(later, earlier)).toBe(true);
+  expect(shareNames(await marksOf(drop({ 'other.npy': 'numbers' })), earlier)).toBe(false);
+});
+
+test('files_get_the_roles_that_they_had', async () => {
+  const items = drop({ 'a.obj': 'v 0 0 0\nv 1 1 1', 'b.obj': 'v 0 0 0', 'walk.npy': 'numbers' });
+  const swapped = items.map((item) => {
+    if (item.role === 'frames') return item;
+    return { ...item, role: item.role === 'rest' ? ('cage' as const) : ('rest' as const) };
+  });
+  const marks = await marksOf(swapped);
+  const again = withEarlierRoles(items, marks);
+  expect(Object.fromEntries(again.map(({ name, role }) => [name, role]))).toEqual({
+    'a.obj': 'cage',
+    'b.obj': 'rest',
+    'walk.npy': 'frames',
+  });
+  // As long as some are missing, the others may be something else.
+  expect(withEarlierRoles(items.slice(1), marks)).toEqual(items.slice(1));
+});
+
+test('a_design_sees_frames_of_all_of_the_motion', () => {
+  expect(sampledFrames(5, 100)).toEqual([0, 1, 2, 3, 4]);
+  const many = sampledFrames(10_001, 100);
+  expect([many.length, many[0], many.at(-1)]).toEqual([160, 0, 10_000]);
+  expect(new Set(many).size).toBe(160);
+  // Of two million points, 24 frames are half a gigabyte already.
+  expect(sampledFrames(1000, 2_000_000).length).toBe(24);
+  expect(sampledFrames(1, 100)).toEqual([0]);
+});

@@ -1,0 +1,70 @@
+/** What tells the files of one upload from those of another, without reading them whole. */
+
+import { crc32c } from '../container/crc32c';
+import { counted, size } from '../sessions/text';
+import type { Item, Role } from './classify';
+
+/** Bytes at the beginning of the first file and at the end of the last one that are looked at. */
+const END_BYTES = 1 << 16;
+
+/** Files with one role. */
+export interface FileMark {
+  readonly name: string;
+  readonly files: number;
+  /** Of all of them. */
+  readonly bytes: number;
+  /** CRC-32C of both ends. */
+  readonly checksum: number;
+}
+
+/** The files of an upload; what was not there is null. */
+export type FileMarks = Readonly<Record<Exclude<Role, 'unused'>, FileMark | null>>;
+
+const WERE = { rest: 'The rest pose was', cage: 'The cage was', frames: 'The frames were' } as const;
+const NAMES = { rest: 'a rest pose', cage: 'a cage', frames: 'frames' } as const;
+
+export async function marksOf(items: readonly Item[]): Promise<FileMarks> {
+  const mark = async (role: Role): Promise<FileMark | null> => {
+    const item = items.find((one) => one.role === role);
+    if (!item) return null;
+    const { name, files } = item;
+    const [first, last] = [files[0], files[files.length - 1]];
+    const head = await first.slice(0, END_BYTES).arrayBuffer();
+    const tail = await last.slice(Math.max(0, last.size - END_BYTES)).arrayBuffer();
+    const checksum = crc32c(new Uint8Array(tail), crc32c(new Uint8Array(head)));
+    const bytes = files.reduce((sum, file) => sum + file.size, 0);
+    return { name, files: files.length, bytes, checksum };
+  };
+  return { rest: await mark('rest'), cage: await mark('cage'), frames: await mark('frames') };
+}
+
+/** Why files are not those of an earlier upload, in a sentence; null where they are. */
+export function difference(marks: FileMarks, earlier: FileMarks): string | null {
+  for (const role of ['frames', 'rest', 'cage'] as const) {
+    const [now, then] = [marks[role], earlier[role]];
+    if (!now && !then) continue;
+    if (!then) return `There was no file of ${NAMES[role]} then; leave ${now!.name} out.`;
+    if (!now) return `${WERE[role]} ${described(then)} then, which is missing here.`;
+    const isSame = now.files === then.files && now.bytes === then.bytes && now.checksum === then.checksum;
+    if (!isSame) return `${WERE[role]} ${described(then)} then; ${described(now)} is something else.`;
+  }
+  return null;
+}
+
+/** Whether frames or rest poses have the same name. */
+export function shareNames(a: FileMarks, b: FileMarks): boolean {
+  return (['frames', 'rest'] as const).some((role) => a[role] !== null && a[role].name === b[role]?.name);
+}
+
+/** The items with the roles that files of these names had. */
+export function withEarlierRoles(items: readonly Item[], earlier: FileMarks): Item[] {
+  const roles = ['rest', 'cage', 'frames'] as const;
+  const roleOf = (item: Item): Role => roles.find((role) => earlier[role]?.name === item.name) ?? 'unused';
+  const isWhole = roles.every((role) => !earlier[role] || items.some((item) => roleOf(item) === role));
+  return isWhole ? items.map((item) => ({ ...item, role: roleOf(item) })) : [...items];
+}
+
+function described({ name, bytes }: FileMark): string {
+  const length = bytes < 1e6 ? counted(bytes, 'byte') : size(bytes);
+  return `${name} (${length})`;
+}

@@ -1,0 +1,149 @@
+/** Cages that the service designs from the motion of a capture. */
+
+import { followProgress } from '../service/events';
+import type { CageDesign, DesignOptions, DesignProgress } from '../service/messages';
+import { ServiceProblem, problemBehind, problemFrom } from '../service/problem';
+import type { Service } from '../service/service';
+import type { FrameSource } from './frameSource';
+import type { KeptUpload } from './keptUpload';
+
+/** A design looks at no more frames. */
+const MOST_FRAMES = 160;
+/** Of large models fewer frames are sent: they show as much of the motion. */
+const MOST_BYTES = 192 << 20;
+const LEAST_FRAMES = 24;
+
+/** Numbers of the frames that a design sees: evenly spaced, the first and the last among them. */
+export function sampledFrames(frames: number, points: number): number[] {
+  const room = Math.max(LEAST_FRAMES, Math.floor(MOST_BYTES / (12 * points)));
+  const sampled = Math.min(frames, MOST_FRAMES, room);
+  return Array.from({ length: sampled }, (_, k) => Math.round((k * (frames - 1)) / Math.max(1, sampled - 1)));
+}
+
+/** What a design is made of. */
+interface Motion {
+  readonly rest: File;
+  readonly frames: FrameSource;
+}
+
+/** The design of one upload. */
+export class MotionCage {
+  /** How far it is; null while none is at work. */
+  progress: DesignProgress | null = null;
+  /** The best cage so far, where somebody did not want to wait for the end. */
+  file: File | null = null;
+  #enough = new AbortController();
+
+  /** @param kept says which design is at work, also after the page was closed */
+  constructor(
+    private readonly service: Service,
+    private readonly motion: Motion,
+    private readonly kept: KeptUpload,
+    private readonly onProgress: () => void,
+  ) {}
+
+  /**
+   * Waits until the cage is designed; a design that is at work is gone on with.
+   *
+   * @param retry repeats what fails and may be repeated
+   * @throws ServiceProblem where there can be no cage
+   */
+  async design(options: DesignOptions, retry: <T>(work: () => Promise<T>) => Promise<T>, signal: AbortSignal) {
+    this.#enough = new AbortController();
+    const { key, design } = this.kept.present;
+    const begin = async (): Promise<string> => {
+      const id = await retry(() => beginDesign(this.service, this.motion, options, `${key}-cage`, signal));
+      this.kept.set({ design: id });
+      return id;
+    };
+    let id = design ?? (await begin());
+    try {
+      await this.#follow(id, signal).catch(async (error: unknown) => {
+        const problem = problemBehind(error);
+        if (design === null || !(problem instanceof ServiceProblem && problem.isGone)) throw problem;
+        id = await begin();
+        await this.#follow(id, signal);
+      });
+    } catch (error) {
+      if (signal.aborted || !this.#enough.signal.aborted) throw error;
+      this.file = await retry(() => bestCage(this.service, id, signal));
+      await this.putAway();
+    }
+    this.progress = null;
+  }
+
+  /** Goes on with the best cage so far. */
+  takeBest(): void {
+    this.#enough.abort();
+  }
+
+  /** Deletes the design, which stops it and makes room; a session that took its cage keeps that. */
+  async putAway(): Promise<void> {
+    const { design } = this.kept.present;
+    if (design === null) return;
+    await removeDesign(this.service, design);
+    this.kept.set({ design: null });
+    this.progress = null;
+  }
+
+  #follow(id: string, signal: AbortSignal): Promise<void> {
+    const hear = (progress: DesignProgress): void => {
+      this.progress = progress;
+      this.onProgress();
+    };
+    return followDesign(this.service, id, hear, AbortSignal.any([signal, this.#enough.signal]));
+  }
+}
+
+/** Begins a design, or finds the one that was begun with the same key; its identifier. */
+async function beginDesign(
+  service: Service,
+  { rest, frames }: Motion,
+  options: DesignOptions,
+  key: string,
+  signal: AbortSignal,
+): Promise<string> {
+  const numbers = sampledFrames(frames.frames, frames.points);
+  const pieces: Blob[] = [];
+  for (const frame of numbers) {
+    signal.throwIfAborted();
+    pieces.push(new Blob([(await frames.read(frame, 1)) as Float32Array<ArrayBuffer>]));
+  }
+  const body = new FormData();
+  body.append('options', JSON.stringify({ ...options, frames: numbers.length }));
+  body.append('rest', rest);
+  body.append('frames', new Blob(pieces), 'frames.f32');
+  const headers = { 'Idempotency-Key': key };
+  return (await service.json<CageDesign>('cages', { method: 'POST', headers, body, signal })).id;
+}
+
+/**
+ * Tells of a design until it is over.
+ *
+ * @throws ServiceProblem where it failed, or is gone
+ */
+async function followDesign(
+  service: Service,
+  id: string,
+  onProgress: (progress: DesignProgress) => void,
+  signal: AbortSignal,
+): Promise<void> {
+  await followProgress<DesignProgress>(service, pathOf(id), onProgress, signal);
+  const { problem } = await service.json<CageDesign>(pathOf(id), { cache: 'no-store', signal });
+  if (problem) throw problemFrom(problem);
+}
+
+/** The best cage so far, as a file to send. */
+async function bestCage(service: Service, id: string, signal: AbortSignal): Promise<File> {
+  const response = await service.request(`${pathOf(id)}/cage.obj`, { cache: 'no-store', signal });
+  return new File([await response.blob()], 'cage.obj');
+}
+
+/** Deletes a design; that it could not be is no failure. */
+export async function removeDesign(service: Service, id: string): Promise<void> {
+  await service.request(pathOf(id), { method: 'DELETE' }).catch(() => undefined);
+}
+
+function pathOf(id: string): string {
+  return `cages/${encodeURIComponent(id)}`;
+}

@@ -1,0 +1,94 @@
+import { html, nothing } from 'lit';
+import * as glyphs from '../sessions/glyphs';
+import { counted, size } from '../sessions/text';
+import type { Item, Role } from './classify';
+import { type Choices, sendsHandles } from './optionsForm';
+import type { Plan } from './plan';
+
+/** What the buttons of the drop zone do. */
+export interface ChoosingFiles {
+  readonly onFiles: () => void;
+  readonly onFolder: () => void;
+  readonly onStartOver: () => void;
+}
+
+const ROLE_WORDS: Readonly<Record<Role, string>> = {
+  rest: 'Rest pose',
+  cage: 'Cage',
+  frames: 'Frames',
+  unused: 'Not used',
+};
+
+/** Where files are dropped; large, with what they may be, as long as there are none. */
+export function dropZone(isOver: boolean, isFirst: boolean, { onFiles, onFolder, onStartOver }: ChoosingFiles) {
+  return html`
+    <div class="zone ${isOver ? 'over' : ''} ${isFirst ? '' : 'small'}">
+      ${
+        isFirst
+          ? html`${glyphs.upload}
+              <h2>Drop a rest pose, its frames and a cage here</h2>
+              <p class="muted">All at once or one after another. Nothing is sent before you start it.</p>`
+          : nothing
+      }
+      <div class="buttons">
+        <button type="button" class=${isFirst ? 'primary' : ''} @click=${onFiles}>
+          ${isFirst ? 'Choose files' : 'Add files'}
+        </button>
+        <button type="button" @click=${onFolder}>${isFirst ? 'Choose a folder' : 'Add a folder'}</button>
+        ${isFirst ? nothing : html`<button type="button" class="quiet" @click=${onStartOver}>Start over</button>`}
+      </div>
+    </div>
+    ${
+      isFirst
+        ? html`<ul class="kinds">
+            <li><b>Rest pose</b><span>The mesh that moves: .obj, .ply, .off, .stl or .glb</span></li>
+            <li>
+              <b>Frames</b><span>.npy (frames × points × 3), .pc2, .mdd, or a folder with one .obj per frame</span>
+            </li>
+            <li>
+              <b>Cage, if you have one</b><span>A coarse closed mesh around the rest pose; otherwise one is made</span>
+            </li>
+          </ul>`
+        : nothing
+    }
+  `;
+}
+
+/** A file, or a row of them, and what it is taken for. */
+export function itemRow(item: Item, onRole: (role: Role) => void) {
+  const bytes = item.files.reduce((sum, file) => sum + file.size, 0);
+  return html`
+    <li>
+      <span class="title ${item.role === 'unused' ? 'unused' : ''}" title=${item.name}>${item.name}</span>
+      <span class="muted figures">${size(bytes)}</span>
+      ${
+        item.choices.length > 1
+          ? html`<select
+              aria-label="What ${item.name} is"
+              .value=${item.role}
+              @change=${(event: Event) => onRole((event.target as HTMLSelectElement).value as Role)}
+            >
+              ${item.choices.map((role) => html`<option value=${role} ?selected=${role === item.role}>${ROLE_WORDS[role]}</option>`)}
+            </select>`
+          : html`<span class="muted">${ROLE_WORDS[item.role]}</span>`
+      }
+      ${item.remark ? html`<span class="remark">${item.remark}</span>` : nothing}
+    </li>
+  `;
+}
+
+/** What will be sent. */
+export function planSummary({ frames, cage, remarks }: Plan, choices: Choices) {
+  const bytes = 12 * frames.frames * frames.points;
+  const isAll = choices.accuracy !== 'cages' || !sendsHandles(choices, bytes);
+  const sentences = [
+    `${counted(frames.frames, 'frame')} of ${counted(frames.points, 'point')}, ${size(bytes)} in single precision.`,
+    isAll ? 'They are sent whole.' : 'Only what the solver reads of them is sent; errors are not measured.',
+    cage || choices.cage === 'motion' ? '' : 'The service makes a cage around the rest pose.',
+    ...remarks,
+  ];
+  return html`<div class="note">
+    ${glyphs.file}
+    <p>${sentences.filter(Boolean).join(' ')}</p>
+  </div>`;
+}

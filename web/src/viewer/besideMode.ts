@@ -1,0 +1,175 @@
+import { html, nothing } from 'lit';
+import type { Capture, FrameErrors } from '../capture';
+import type { Dropped } from '../upload/classify';
+import { Beside } from './beside';
+import { numberAt, numberText } from './frameNumbers';
+import { glyph } from './glyphs';
+import { openFile } from './opener';
+import type { Player } from './player';
+import { PointMarks } from './pointMarks';
+import { percent, sentence } from './text';
+
+/** What showing a second capture needs of the viewer around it. */
+export interface BesideHost extends HTMLElement {
+  readonly player: Player | null;
+  readonly renderRoot: ParentNode;
+  /** The second capture, where the page set one. */
+  beside: Capture | null;
+  requestUpdate(): void;
+  applyColors(): void;
+  report(problem: string): void;
+}
+
+/** A second capture in the viewer, beside the first one: its picture, its name and its errors. */
+export class BesideMode {
+  pair: Beside | null = null;
+  private shown: Capture | null = null;
+  private opened: Capture | null = null;
+  private marks: PointMarks | null = null;
+  private opening = new AbortController();
+
+  constructor(private readonly host: BesideHost) {}
+
+  /** Shows a file beside the capture, in place of what is there. */
+  async open(file: File) {
+    this.leave();
+    this.opening = new AbortController();
+    const { signal } = this.opening;
+    try {
+      const capture = await openFile(file, signal);
+      if (signal.aborted) {
+        capture.close();
+        return;
+      }
+      this.opened = this.host.beside = capture;
+    } catch (error) {
+      if (!signal.aborted) this.host.report(sentence(error));
+    }
+  }
+
+  /** Shows the first capture alone. */
+  leave() {
+    this.opening.abort();
+    this.unload();
+    this.closeFile();
+    if (!this.host.beside) return;
+    this.host.beside = null;
+    this.host.dispatchEvent(new CustomEvent('besideclosed', { bubbles: true, composed: true }));
+  }
+
+  /** The player of the second picture. */
+  get player(): Player | null {
+    return this.pair?.player ?? null;
+  }
+
+  /** Errors of the second capture at the frames of the first. */
+  get errors(): FrameErrors | null {
+    return this.pair?.errors ?? null;
+  }
+
+  /** Takes the frames that both captures were encoded from. */
+  async openOriginal(files: readonly Dropped[]) {
+    const { player } = this;
+    if (!player) return;
+    try {
+      await player.comparison.open(files);
+    } catch (error) {
+      this.host.report(`${player.capture.name}: ${sentence(error)}`);
+    }
+  }
+
+  /** To be called after every render: fills the second picture, or forgets it where there is none. */
+  follow() {
+    const { player, beside } = this.host;
+    const pane = this.host.renderRoot.querySelector<HTMLElement>('.pane.second');
+    if (!player || !beside || !pane) {
+      this.unload();
+      return;
+    }
+    if (this.shown === beside) return;
+    this.unload();
+    if (this.opened !== beside) this.closeFile();
+    this.shown = beside;
+    const canvas = document.createElement('canvas');
+    canvas.tabIndex = 0;
+    canvas.setAttribute('role', 'img');
+    canvas.setAttribute('aria-label', `${beside.name}: the model beside, drawn.`);
+    pane.prepend(canvas);
+    try {
+      this.pair = new Beside(canvas, beside, player);
+      this.begin(this.pair.player, player, pane);
+    } catch (error) {
+      this.leave();
+      this.host.report(sentence(error));
+    }
+  }
+
+  unload() {
+    this.pair?.player.stage.canvas.remove();
+    this.pair?.dispose();
+    this.pair = this.shown = this.marks = null;
+  }
+
+  /** The second picture, which {@link follow} fills. */
+  template() {
+    if (!this.host.beside) return nothing;
+    const { pair } = this;
+    const progress = pair?.player.progress;
+    return html`<div class="pane second">
+      ${this.marks?.template ?? nothing}
+      <section class="caption glass" aria-label="Capture beside">
+        <h2 title=${this.host.beside.name}>${this.host.beside.name}</h2>
+        <button
+          class="quiet icon"
+          title="Show the first capture alone"
+          aria-label="Show the first capture alone"
+          @click=${() => this.leave()}
+        >
+          ${glyph('close')}
+        </button>
+        <p class="figures">
+          <i class="dashes" title="Dashed in the timeline"></i
+          >${progress ? `${progress.doing} ${Math.round(100 * (progress.fraction ?? 0))} %` : nothing}
+          <span data-beside ?hidden=${Boolean(progress)}></span>
+        </p>
+      </section>
+    </div>`;
+  }
+
+  /** To be called after every picture. */
+  draw() {
+    const { pair, host } = this;
+    if (!pair) return;
+    this.marks?.place(pair.player);
+    const place = host.renderRoot.querySelector('[data-beside]');
+    const text = figures(pair, host.player!);
+    if (place && place.textContent !== text) place.textContent = text;
+  }
+
+  private closeFile() {
+    this.opened?.close();
+    this.opened = null;
+  }
+
+  private begin(player: Player, lead: Player, pane: HTMLElement) {
+    player.onProblem = (problem) => {
+      if (problem !== null) this.host.report(`${player.capture.name}: ${problem}`);
+    };
+    player.onState = () => this.host.requestUpdate();
+    player.controls.onGrab = () => lead.controls.onGrab();
+    this.marks = new PointMarks(pane);
+    this.marks.follow(player.stage.canvas, player);
+    if (lead.comparison.original) void this.openOriginal(lead.comparison.files);
+    this.host.applyColors();
+  }
+}
+
+/** Frame and errors of the second capture. */
+function figures({ frame, player }: Beside, lead: Player): string {
+  const { numbers, position } = lead.transport;
+  const number = numberText(numberAt(numbers, Math.floor(position)));
+  if (frame === null) return `No frame ${number} here`;
+  const { l2, linf } = player.capture.errors;
+  const errors = Number.isFinite(linf[frame]) ? ` · L2 ${percent(l2[frame])} · L∞ ${percent(linf[frame])}` : '';
+  return `frame ${number}${errors}`;
+}

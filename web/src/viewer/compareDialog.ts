@@ -1,0 +1,187 @@
+import { css, html, LitElement, nothing } from 'lit';
+import { customElement, query, state } from 'lit/decorators.js';
+import type { Session } from '../service/messages';
+import { problemBehind, sentenceOf, ServiceProblem } from '../service/problem';
+import type { Service } from '../service/service';
+import { nameOf } from '../sessions/row';
+import { controls } from '../style/tokens';
+import { dialogStyle } from '../style/dialog';
+import { glyph } from './glyphs';
+import { pressLabel } from './messages';
+import { grouped } from './text';
+
+/** What to show beside a capture: a session by its id, or a file. */
+export type CompareChoice = { readonly session: string } | { readonly file: File };
+
+/**
+ * Asks what to show beside a session: another one of the list, or a file.
+ *
+ * @fires compare with the {@link CompareChoice}
+ */
+@customElement('cager-compare-dialog')
+export class CompareDialog extends LitElement {
+  static override styles = [
+    controls,
+    dialogStyle,
+    css`
+      dialog {
+        width: min(520px, calc(100vw - 24px));
+        max-height: calc(100dvh - 24px);
+      }
+      header {
+        display: flex;
+        justify-content: space-between;
+        align-items: center;
+        margin-bottom: var(--cager-space-3);
+      }
+      h2 {
+        margin: 0;
+        font-size: 19px;
+      }
+      input[type='search'] {
+        width: 100%;
+      }
+      ul {
+        margin: var(--cager-space-2) 0;
+        padding: 0;
+        list-style: none;
+        max-height: min(46dvh, 360px);
+        overflow: auto;
+      }
+      li button {
+        display: grid;
+        grid-template-columns: minmax(0, 1fr) auto;
+        justify-content: stretch;
+        width: 100%;
+        min-height: 44px;
+        text-align: left;
+      }
+      li span {
+        overflow: hidden;
+        text-overflow: ellipsis;
+      }
+      small {
+        color: var(--cager-muted);
+        font-size: var(--cager-size-small);
+      }
+      footer {
+        display: flex;
+        flex-wrap: wrap;
+        gap: var(--cager-space-2);
+      }
+    `,
+  ];
+
+  @state() private sessions: readonly Session[] = [];
+  @state() private next: string | null = null;
+  @state() private isLoading = false;
+  @state() private problem: string | null = null;
+  @state() private wanted = '';
+  @query('dialog') private readonly dialog!: HTMLDialogElement;
+  private service: Service | null = null;
+  private shown: string | null = null;
+
+  /** Opens it, for what is to be shown beside session `shown`; null of a file. */
+  async ask(service: Service, shown: string | null) {
+    this.service = service;
+    this.shown = shown;
+    this.sessions = [];
+    this.next = null;
+    this.wanted = '';
+    await this.updateComplete;
+    this.dialog.showModal();
+    await this.load();
+  }
+
+  get isOpen(): boolean {
+    return this.hasUpdated && this.dialog.open;
+  }
+
+  override render() {
+    const { sessions, next, problem, isLoading } = this;
+    const wanted = this.wanted.toLowerCase();
+    const found = sessions.filter((session) => nameOf(session).toLowerCase().includes(wanted));
+    return html`<dialog aria-labelledby="compare-title">
+      <header>
+        <h2 id="compare-title">Compare with</h2>
+        <button class="quiet icon" aria-label="Close" @click=${() => this.dialog.close()}>${glyph('close')}</button>
+      </header>
+      <input
+        type="search"
+        placeholder="Name of a session"
+        aria-label="Name of a session"
+        autofocus
+        .value=${this.wanted}
+        @input=${(event: Event) => (this.wanted = (event.target as HTMLInputElement).value)}
+        @keydown=${(event: Event) => event.stopPropagation()}
+      />
+      <ul aria-label="Sessions">
+        ${found.map(
+          (session) =>
+            html`<li>
+              <button class="quiet" @click=${() => this.choose({ session: session.id })}>
+                <span>${nameOf(session)}</span>
+                <small class="figures"
+                  >${grouped(session.points ?? 0)} points, ${grouped(session.frames.solved)} frames</small
+                >
+              </button>
+            </li>`,
+        )}
+      </ul>
+      ${
+        problem !== null
+          ? html`<p role="alert">${problem}</p>`
+          : isLoading
+            ? html`<p class="muted" role="status">Loading sessions</p>`
+            : found.length === 0
+              ? html`<p class="muted" role="status">
+                  There is no other session${wanted === '' ? '' : ' of this name'}.
+                </p>`
+              : nothing
+      }
+      <footer>
+        ${next !== null ? html`<button @click=${() => void this.load()}>More sessions</button>` : nothing}
+        <label class="button" tabindex="0" @keydown=${pressLabel}>
+          ${glyph('file')} Open a file
+          <input class="visually-hidden" type="file" accept=".cager" tabindex="-1" @change=${this.takeFile} />
+        </label>
+      </footer>
+    </dialog>`;
+  }
+
+  private async load() {
+    if (!this.service || this.isLoading) return;
+    this.isLoading = true;
+    this.problem = null;
+    try {
+      const { sessions, next } = await this.service.sessions(this.next);
+      const others = sessions.filter(
+        ({ id, state }) => id !== this.shown && state !== 'failed' && state !== 'preparing',
+      );
+      this.sessions = [...this.sessions, ...others];
+      this.next = next;
+    } catch (error) {
+      const problem = problemBehind(error);
+      // The page asks for a token then, which a modal dialog would cover.
+      if (problem instanceof ServiceProblem && problem.status === 401) this.dialog.close();
+      else this.problem = sentenceOf(problem);
+    }
+    this.isLoading = false;
+  }
+
+  private readonly takeFile = (event: Event) => {
+    const file = (event.target as HTMLInputElement).files?.[0];
+    if (file) this.choose({ file });
+  };
+
+  private choose(detail: CompareChoice) {
+    this.dialog.close();
+    this.dispatchEvent(new CustomEvent('compare', { detail }));
+  }
+}
+
+declare global {
+  interface HTMLElementTagNameMap {
+    'cager-compare-dialog': CompareDialog;
+  }
+}

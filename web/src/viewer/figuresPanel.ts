@@ -1,0 +1,65 @@
+import { html, nothing } from 'lit';
+import type { Player } from './player';
+import { bitrate, grouped, percent, SYSTEM_NAMES } from './text';
+
+/** Figures about the capture and the playing. */
+export function figuresPanel(player: Player) {
+  const { static: part, frames, frameBytes } = player.capture;
+  const { decoder } = player.stage;
+  const points = part.rest.length / 3;
+  const cageRate = part.rowsPerFrame * 12 * player.transport.rate;
+  const fileRate = frameBytes === undefined || frames === 0 ? null : (frameBytes / frames) * player.transport.rate;
+  const rawRate = points * 12 * player.transport.rate;
+  const row = (label: string, value: string) =>
+    html`<dt>${label}</dt>
+      <dd>${value}</dd>`;
+  const { bits, error } = decoder.precision;
+  const { live = null, residuals = null } = player.capture;
+  const connection = residuals?.bytesPerSecond ?? null;
+  return html`<aside class="panel glass" aria-label="Figures">
+    <h2>Capture</h2>
+    <dl>
+      ${row('Points', grouped(points))} ${row('Polygons', grouped(part.cornerCounts.length))}
+      ${row('Frames', grouped(frames))}
+      ${row('Frames per second', `${player.transport.rate}${part.frameRate === null ? ' (assumed)' : ''}`)}
+    </dl>
+    <h2>Cage</h2>
+    <dl>
+      ${row('Vertices', grouped(part.cage.positions.length / 3))}
+      ${row('Triangles', grouped(part.cage.triangles.length / 3))} ${row('Unknowns', grouped(part.rowsPerFrame))}
+    </dl>
+    <p class="muted">${SYSTEM_NAMES[part.system]}</p>
+    <h2>Bytes while it plays</h2>
+    <dl>
+      ${fileRate === null ? nothing : row('Frames of this file', bitrate(fileRate))}
+      ${row('Cages before compression', bitrate(cageRate))} ${row('All points, not compressed', bitrate(rawRate))}
+      ${connection === null ? nothing : row('Connection', bitrate(connection))}
+    </dl>
+    ${
+      residuals?.leftOut
+        ? html`<p class="muted">
+            The connection is too slow for all of it: the cages play alone, and the residual is added when they stand.
+          </p>`
+        : nothing
+    }
+    ${
+      live
+        ? html`<h2>Live</h2>
+            <dl>
+              ${row('Behind the service', live.latencySeconds === null ? '–' : `${live.latencySeconds.toFixed(2)} s`)}
+              ${row('Arriving', bitrate(live.bitsPerSecond / 8))}
+              ${row('Frames arriving per second', live.framesPerSecond.toFixed(1))}
+              ${row('Frames not here yet', grouped(live.behindFrames))}
+              ${row('Frames waited for', grouped(live.lateFrames))}
+              ${row('Frames dropped', grouped(live.droppedFrames))}
+            </dl>`
+        : nothing
+    }
+    <h2>This browser</h2>
+    <dl>
+      ${row('Pictures per second', player.picturesPerSecond > 0 ? player.picturesPerSecond.toFixed(0) : '–')}
+      ${row('Frames passed over', grouped(player.dropped))} ${row('Weights', decoder.ready ? `${bits} bits` : '–')}
+      ${error > 0 ? row('Rounding moves a point by', `< ${percent(error)}`) : nothing}
+    </dl>
+  </aside>`;
+}
