@@ -5,6 +5,7 @@ import uPlotStyle from 'uplot/dist/uPlot.min.css?inline';
 import type { FrameErrors } from '../capture';
 import { weightAt, type FrameRange } from '../editing/cageEdit';
 import { percent } from './text';
+import { resolvedColor } from '../style/resolvedColor';
 import { controls } from '../style/tokens';
 
 /** Space left and right of the chart, for the labels of its axis and for half a thumb. */
@@ -336,16 +337,6 @@ function rangeDrawing(range: FrameRange, frames: number) {
   return svg`<svg class="range" viewBox="0 0 ${Math.max(1, frames - 1)} 1" preserveAspectRatio="none" aria-hidden="true">
     <polygon points=${points.join(' ')} vector-effect="non-scaling-stroke" />
   </svg>`;
-}
-
-/** What the browser makes of a colour that depends on the theme, for canvases, which know no custom properties. */
-export function resolvedColor(root: ParentNode & Node, color: string): string {
-  const probe = document.createElement('span');
-  probe.style.color = color;
-  root.appendChild(probe);
-  const resolved = getComputedStyle(probe).color;
-  probe.remove();
-  return resolved;
 }
 
 function withOpacity(color: string, opacity: number): string {
