@@ -131,7 +131,7 @@ viewer-figures: web ## sizes, times and memory of the viewer on the built-in dem
 	$(CARGO) build --release --locked --bin cager
 	cd web && CAGER_BINARY=$(abspath target/release/cager) node tools/run.js tools/figures.ts
 
-viewer-pictures: web ## pictures of the viewer, list and upload on the built-in demo: docs/pictures; needs Chromium
+viewer-pictures: web ## pictures of the viewer, list, upload and a report on the built-in demo: docs/pictures; needs Chromium
 	$(CARGO) build --release --locked --bin cager
 	cd web && CAGER_BINARY=$(abspath target/release/cager) node tools/run.js tools/pictures.ts
 

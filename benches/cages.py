@@ -47,7 +47,7 @@ def encoded(folder, capture, name, cage, frames=None):
 def made(folder, capture, kind, vertices, frames=None, tag=""):
     """Report of a cage of a kind, and its path."""
     name = f"{capture}-{kind}-{vertices}{tag}"
-    cage, report, picture = (os.path.join(folder, name + ending) for ending in (".obj", ".json", ".png"))
+    cage, report, picture = (os.path.join(folder, name + ending) for ending in (".obj", ".json", ".html"))
     if not os.path.exists(report):
         at = os.path.join(DATA, capture)
         command = ["cage", "--rest", f"{at}/rest.obj", "--vertices", str(vertices), "-o", cage, "--report", report, "--overwrite"]

@@ -1,4 +1,5 @@
-import type { Plugin } from 'vite';
+import { createHash } from 'node:crypto';
+import type { Plugin, UserConfig } from 'vite';
 import { defineConfig } from 'vitest/config';
 
 /** Adds `cager-viewer.js`, the one script with a fixed name: other pages load it to embed the viewer. It shares its parts with the page. */
@@ -10,8 +11,47 @@ const embeddable: Plugin = {
   },
 };
 
+/** Puts the script of a page into the page, and into its policy the script's hash: such a page is one file, which works from anywhere and asks for nothing. */
+const oneFile: Plugin = {
+  name: 'one-file',
+  apply: 'build',
+  enforce: 'post',
+  generateBundle(_, bundle) {
+    for (const page of Object.values(bundle)) {
+      if (page.type !== 'asset' || !page.fileName.endsWith('.html')) continue;
+      const source = /<script type="module"[^>]* src="\.\/([^"]+)"><\/script>/;
+      const html = String(page.source);
+      const name = source.exec(html)?.[1] ?? '';
+      const chunk = bundle[name];
+      if (!(name in bundle) || chunk.type !== 'chunk' || chunk.imports.length > 0)
+        this.error(`${page.fileName} has not one script alone`);
+      // What would end a script element, or begin a comment in it, only occurs in strings.
+      const script = chunk.code.replaceAll(/<(?=!--|\/?script)/gi, '\\x3c').trim();
+      const hash = createHash('sha256').update(script).digest('base64');
+      const policy = `default-src 'none'; script-src 'sha256-${hash}'; img-src blob: data:; base-uri 'none'; form-action 'none'`;
+      page.source = html
+        .replace('<head>', () => `<head>\n    <meta http-equiv="Content-Security-Policy" content="${policy}" />`)
+        .replace(source, () => `<script type="module">${script}</script>`);
+      Reflect.deleteProperty(bundle, name);
+    }
+  },
+};
+
+/** The page of reports, which `cager compare`, `demo` and `cage` fill with what they found: `vite build --mode report` adds it to the viewer. */
+const report: UserConfig = {
+  base: './',
+  plugins: [oneFile],
+  build: {
+    target: 'es2022',
+    emptyOutDir: false,
+    modulePreload: false,
+    chunkSizeWarningLimit: 1000,
+    rolldownOptions: { input: 'report.html', output: { codeSplitting: false } },
+  },
+};
+
 /** Paths are relative, so that the page works under any path prefix; file names carry a hash of their content, so that they can be cached for ever. */
-export default defineConfig({
+const page: UserConfig = {
   base: './',
   plugins: [embeddable],
   build: {
@@ -29,6 +69,10 @@ export default defineConfig({
     },
   },
   worker: { format: 'es' },
+};
+
+export default defineConfig(({ mode }) => ({
+  ...(mode === 'report' ? report : page),
   test: {
     environment: 'node',
     testTimeout: 20_000,
@@ -47,4 +91,4 @@ export default defineConfig({
       },
     ],
   },
-});
+}));

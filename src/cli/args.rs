@@ -6,10 +6,10 @@ use super::coding_args::{ErrorBound, Quality, TargetSize, Unit};
 use super::names;
 use super::outputs::OutputArgs;
 use super::transfer_args::{EditArgs, TransferArgs};
-use crate::compare::Up;
 use crate::config::{ServeFlags, bytes};
 use crate::decode::Layer;
 use crate::memory::Memory;
+use crate::report_page::Up;
 use cager_cages::Style;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::Handles;
@@ -312,7 +312,7 @@ pub(crate) struct CompareArgs {
     #[command(flatten)]
     pub(crate) checks: CheckArgs,
 
-    /// Axis that points up in the pictures [default: y, or z where the model stands along it].
+    /// Axis that points up in the report [default: y, or z where the model stands along it].
     #[arg(long, value_enum)]
     pub(crate) up: Option<Up>,
 
@@ -345,7 +345,7 @@ pub(crate) struct HealthArgs {
 /// Example: cager demo -o my-first-capture
 #[derive(Args, Debug)]
 pub(crate) struct DemoArgs {
-    /// Folder for the results: rest.obj, cage.obj, capture.cager, decoded.npy, report.json and errors.svg.
+    /// Folder for the results: rest.obj, cage.obj, capture.cager, decoded.npy, report.json and report.html.
     #[arg(short, long, value_name = "DIR", default_value = "cager-demo")]
     pub(crate) output: PathBuf,
 

@@ -8,7 +8,7 @@ use super::outputs::Outputs;
 use super::{grouped, tell, warn};
 use crate::design::{read_frames, report as design_report};
 use crate::frames::CaptureFiles;
-use crate::picture;
+use crate::report_page::{Contents, Kind, NO_PAGE, ReportPage, ShownCage, ShownMesh};
 use anyhow::{Result, bail};
 use cager_cages::{DesignOptions, EncloseError, EncloseOptions, General, Style, enclose, general};
 use cager_core::mesh::{Model, Polygons, TriMesh};
@@ -21,6 +21,8 @@ use std::time::{Duration, Instant};
 
 /// Farthest that a cage may be asked to keep from the points, as a fraction of the diagonal.
 const MOST_CLEARANCE: f64 = 0.5;
+/// Points of the model that its page draws at the most, about.
+const SHOWN_POINTS: usize = 40_000;
 
 /// What is written about a cage that was made.
 #[derive(Serialize)]
@@ -108,15 +110,15 @@ impl Targets {
         Ok(Self {
             output,
             report: args.report.as_ref().map(|path| outputs.text(path)).transpose()?,
-            picture: args.picture.as_ref().map(|path| outputs.binary(path, "cage.png")).transpose()?,
+            picture: args.picture.as_ref().map(|path| picture(path, &mut outputs)).transpose()?,
         })
     }
 
-    /// The report and the picture, where they are asked for, complete but for their names.
+    /// The report and the picture of models and a cage, where they are asked for, complete but for their names.
     pub(super) fn complete(
         &self,
         report: &impl Serialize,
-        picture: impl FnOnce() -> Vec<u8>,
+        (args, model, cage): (&CageArgs, &TriMesh, &TriMesh),
     ) -> Result<Vec<AtomicFile>> {
         let mut files = Vec::new();
         if let Some(target) = &self.report {
@@ -125,10 +127,41 @@ impl Targets {
             files.push(complete_file(target, &text)?);
         }
         if let Some(target) = &self.picture {
-            files.push(complete_file(target, &picture())?);
+            let geometry = CageGeometry {
+                mesh: ShownMesh::new(model, args.up, SHOWN_POINTS),
+                cage: ShownCage::new(cage),
+                name: self.output.as_ref().map(Target::path).or(args.check.as_deref()),
+            };
+            let program = env!("CARGO_PKG_VERSION");
+            let contents = Contents { kind: Kind::Cage, program, figures: report, geometry: &geometry };
+            let page = ReportPage::built_in().map(|page| page.with(&contents)).transpose()?;
+            files.push(complete_file(target, &page.unwrap_or_default())?);
         }
         Ok(files)
     }
+}
+
+/// What the page of a cage draws, and the file that holds the cage.
+#[derive(Serialize)]
+struct CageGeometry<'a> {
+    mesh: ShownMesh,
+    cage: ShownCage,
+    name: Option<&'a Path>,
+}
+
+/// Where a picture goes, which is a page.
+fn picture(path: &Path, outputs: &mut Outputs) -> Result<Target> {
+    let is_page = path.extension().is_some_and(|end| ["html", "htm"].iter().any(|page| end.eq_ignore_ascii_case(page)));
+    if !is_page && path.as_os_str() != "-" {
+        bail!(
+            "--picture: {} does not end with .html; the picture is a page for a browser, in which model and cage turn: name it cage.html, and save the view as PNG there",
+            path.display()
+        );
+    }
+    if ReportPage::built_in().is_none() {
+        bail!("--picture: {NO_PAGE}");
+    }
+    outputs.text(path)
 }
 
 /// What a cage is designed from, checked.
@@ -208,7 +241,7 @@ fn finish(
         warnings,
     };
     let mut complete = vec![complete_file(output, &cage_bytes(output, cage)?)?];
-    complete.extend(targets.complete(&report, || picture_of(args, &together(models), &mesh))?);
+    complete.extend(targets.complete(&report, (args, &together(models), &mesh))?);
     commit_together(complete)?;
     warn(&report.warnings);
     tell(&summary(&report, output.path()))
@@ -220,11 +253,6 @@ pub(super) fn cage_bytes(target: &Target, cage: &Model) -> Result<Vec<u8>> {
         return Ok(obj_bytes(cage));
     }
     Ok(model_bytes(target.path(), cage)?)
-}
-
-/// A picture of models in a cage, or beside it.
-pub(super) fn picture_of(args: &CageArgs, model: &TriMesh, cage: &TriMesh) -> Vec<u8> {
-    picture::of_cage(model, cage, args.up)
 }
 
 pub(super) fn complete_file(target: &Target, bytes: &[u8]) -> Result<AtomicFile> {

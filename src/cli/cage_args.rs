@@ -3,7 +3,7 @@
 use super::checks::CheckArgs;
 use super::names;
 use super::outputs::OutputArgs;
-use crate::compare::Up;
+use crate::report_page::Up;
 use cager_cages::Style;
 use clap::{ArgGroup, Args, ValueEnum};
 use std::path::PathBuf;
@@ -79,11 +79,11 @@ pub(crate) struct CageArgs {
     #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) time_limit: Option<u32>,
 
-    /// Write a picture of cage and model.
-    #[arg(long, value_name = "PICTURE.png")]
+    /// Write a page for a browser, in which model and cage turn.
+    #[arg(long, value_name = "PICTURE.html")]
     pub(crate) picture: Option<PathBuf>,
 
-    /// Axis that points up in the picture [default: y, or z where the model stands along it].
+    /// Axis that points up on that page [default: y, or z where the model stands along it].
     #[arg(long, value_enum, requires = "picture")]
     pub(crate) up: Option<Up>,
 

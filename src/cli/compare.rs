@@ -6,8 +6,9 @@ use super::dry_run::{read_all, tell_dry_run};
 use super::outputs::Outputs;
 use super::solver_options::{read_cage, with_input_name};
 use super::{human_bytes, plain, progress};
-use crate::compare::{CompareError, Figures, Job, Progress, compare, page, seconds};
+use crate::compare::{CompareError, Figures, Job, Progress, compare, seconds};
 use crate::frames::CaptureFiles;
+use crate::report_page::{Contents, Kind, NO_PAGE, ReportPage};
 use anyhow::Result;
 use cager_core::coordinates;
 use cager_core::coordinates::CoordinateSystem;
@@ -15,14 +16,19 @@ use cager_formats::{AtomicFile, commit_together, read_model};
 use indicatif::ProgressBar;
 use std::fmt::Write as _;
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 pub(super) fn run(args: &CompareArgs) -> Result<()> {
     let clock = Instant::now();
     let mut outputs = Outputs::new(args.outputs, [&args.rest, &args.cage, &args.frames])?;
-    let output = outputs.text(&args.output)?;
-    let json = args.json.as_ref().map(|path| outputs.text(path)).transpose()?;
+    // Without the page, the figures take the place of the report.
+    let page = ReportPage::built_in();
+    let (output, json) = match (&page, &args.json) {
+        (Some(_), json) => (outputs.text(&args.output)?, json.as_ref().map(|path| outputs.text(path)).transpose()?),
+        (None, Some(json)) => (outputs.text(json)?, None),
+        (None, None) => (outputs.text(&figures_path(&args.output))?, None),
+    };
     let rest = read_model(&args.rest)?;
     let cage = read_cage(&args.cage, args.flip_cage)?;
     let mut files = CaptureFiles::new(&args.frames, rest.points.len());
@@ -57,22 +63,36 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     bar.println(format!("about {} for {} coordinate system{plural}", progress::duration(expected), systems.len()));
     let result = compare(&job, &mut Progress { tell: &mut |step, done| show(&bar, step, done, expected) });
     bar.finish_and_clear();
-    let (figures, pictures) = result.map_err(|error| match error {
+    let (figures, geometry) = result.map_err(|error| match error {
         CompareError::Prepare(error) => with_input_name(&error, &args.rest, &args.cage),
         CompareError::Formats(error) => error.into(),
     })?;
 
-    report.write_all(page(&figures, &pictures).as_bytes())?;
-    let bytes = report.complete()?;
-    let mut outputs = vec![report];
-    if let Some(mut file) = json {
-        let mut text = serde_json::to_vec_pretty(&figures)?;
-        text.push(b'\n');
-        file.write_all(&text)?;
-        outputs.insert(0, file);
+    let mut figures_text = serde_json::to_vec_pretty(&figures)?;
+    figures_text.push(b'\n');
+    match &page {
+        Some(page) => {
+            let (kind, program) = (Kind::Comparison, figures.program);
+            report.write_all(&page.with(&Contents { kind, program, figures: &figures, geometry: &geometry })?)?;
+        }
+        None => {
+            report.write_all(&figures_text)?;
+            super::warn(&[format!("{}: holds the figures alone, since {NO_PAGE}", output.path().display())]);
+        }
     }
-    commit_together(outputs)?;
+    let bytes = report.complete()?;
+    let mut files = vec![report];
+    if let Some(mut file) = json {
+        file.write_all(&figures_text)?;
+        files.insert(0, file);
+    }
+    commit_together(files)?;
     super::tell(&summary(&figures, output.path(), bytes, clock.elapsed().as_secs_f64())?)
+}
+
+/// Where the figures go in place of a report.
+fn figures_path(report: &Path) -> PathBuf {
+    if report.as_os_str() == "-" { report.to_owned() } else { report.with_extension("json") }
 }
 
 /// Shows a step, and the time left: as long as little is done, more by what was `expected` of the whole than by what has passed.
@@ -132,7 +152,7 @@ mod tests {
         let bar = ProgressBar::hidden();
         show(&bar, "mvc: coordinates", 0.0, 60.0);
         assert_eq!(bar.prefix(), "about 60 s left");
-        show(&bar, "mvc: pictures", 1.0, 60.0);
+        show(&bar, "mvc: what is drawn", 1.0, 60.0);
         assert_eq!((bar.prefix().as_str(), bar.position()), ("about 1 s left", progress::STEPS));
     }
 }

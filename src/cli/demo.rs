@@ -1,13 +1,14 @@
 //! `cager demo`: the main job on a built-in capture, through a service.
 
 use super::args::DemoArgs;
+use super::demo_report::{self, Row};
 use super::encode_summary::write_report;
 use super::local_service::LocalService;
 use super::{grouped, human_bytes, interrupt, progress, tell};
 use crate::decode::{self, Decoding};
 use crate::encode::Encoded;
-use crate::plot::error_plot;
 use crate::remote::{EncodedRemotely, RemoteCage, RemoteJob, RemoteProgress, Steps, encode_remotely, mesh_file};
+use crate::report_page::{NO_PAGE, ReportPage};
 use anyhow::{Context, Result, ensure};
 use cager_client::FnFrames;
 use cager_client::messages::SessionOptions;
@@ -18,7 +19,7 @@ use cager_formats::{AtomicFile, Target, commit_together, open_frames, write_mode
 use cager_proto::report::Report;
 use std::fmt::Write as _;
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -69,13 +70,15 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
     let decode_seconds = clock.elapsed().as_secs_f64();
     compare(&capture, &decoded, &report)?;
 
-    let (l2, linf): (Vec<f64>, Vec<f64>) = report.error.per_frame.iter().map(|e| (e.l2, e.linf)).unzip();
-    let title =
-        format!("Built-in capture: {} points, cage of {} vertices", grouped(report.points), report.cage_vertices);
-    let mut plot = AtomicFile::create(folder.join("errors.svg"))?;
-    plot.write_all(error_plot(&title, &l2, &linf).as_bytes())?;
-    plot.commit()?;
-    tell(&table(&report, &steps, decode_seconds, folder)?)
+    let rows = rows(&report, &steps, decode_seconds);
+    let page_file = folder.join("report.html");
+    let page = ReportPage::built_in();
+    if let Some(page) = &page {
+        let mut file = AtomicFile::create(&page_file)?;
+        file.write_all(&demo_report::page(page, (&capture, &report, &rows), (&output, &decoded))?)?;
+        file.commit()?;
+    }
+    tell(&table(&rows, page.is_some().then_some(&page_file))?)
 }
 
 fn as_model(cage: &Cage) -> Model {
@@ -124,49 +127,65 @@ fn compare(capture: &Capture, decoded: &Path, report: &Report) -> Result<()> {
     Ok(())
 }
 
-fn table(report: &Report, steps: &Steps, decode_seconds: f64, folder: &Path) -> Result<String> {
+fn rows(report: &Report, steps: &Steps, decode_seconds: f64) -> Vec<Row> {
     let s = &report.seconds;
     let seconds = |s: f64| format!("{s:.3} s");
-    let mut out = String::new();
-    let mut row = |name: &str, value: String, note: &str| writeln!(out, "  {name:<24}{value:>14}   {note}");
-    row("points × frames", format!("{} × {}", grouped(report.points), report.frames), "")?;
-    row("cage vertices / faces", format!("{} / {}", report.cage_vertices, report.cage_faces), "")?;
-    row("capture", human_bytes(report.bytes.capture), "positions as f32 and one connectivity")?;
-    row("capture.cager", human_bytes(report.bytes.output), "rest pose and cage included")?;
-    row("ratio", format!("{:.1} ×", report.bytes.ratio), "")?;
+    let mut rows = Vec::new();
+    let mut row = |name, value: String, note: &str| rows.push(Row { name, value, note: note.to_owned() });
+    row("points × frames", format!("{} × {}", grouped(report.points), report.frames), "");
+    row("cage vertices / faces", format!("{} / {}", report.cage_vertices, report.cage_faces), "");
+    row("capture", human_bytes(report.bytes.capture), "positions as f32 and one connectivity");
+    row("capture.cager", human_bytes(report.bytes.output), "rest pose and cage included");
+    row("ratio", format!("{:.1} ×", report.bytes.ratio), "");
     row(
         "L2 mean / max",
         format!("{:.3} / {:.3} %", 100.0 * report.error.l2_mean, 100.0 * report.error.l2_max),
         "of the rest diagonal",
-    )?;
+    );
     row(
         "L∞ mean / max",
         format!("{:.3} / {:.3} %", 100.0 * report.error.linf_mean, 100.0 * report.error.linf_max),
         "of the rest diagonal",
-    )?;
-    row("affine reproduction", format!("{:.1e}", report.affine_reproduction_error), "of the rest diagonal")?;
+    );
+    row("affine reproduction", format!("{:.1e}", report.affine_reproduction_error), "of the rest diagonal");
     row(
         "condition number",
         format!("{:.1}", report.condition_number.handles),
         &format!("{:.1} over all points", report.condition_number.full),
-    )?;
-    row("coordinates", seconds(s.coordinates), "")?;
-    row("maxvol", seconds(s.maxvol), &format!("{} swaps", report.maxvol.swaps))?;
-    row("spectrum and operator", seconds(s.svd), "")?;
+    );
+    row("coordinates", seconds(s.coordinates), "");
+    row("maxvol", seconds(s.maxvol), &format!("{} swaps", report.maxvol.swaps));
+    row("spectrum and operator", seconds(s.svd), "");
     let step = |step: Duration| seconds(step.as_secs_f64());
     let per_frame = 1e3 * steps.upload.as_secs_f64() / report.frames as f64;
-    row("service: prepare", step(steps.prepare), "the three above, and sending rest pose and cage")?;
+    row("service: prepare", step(steps.prepare), "the three above, and sending rest pose and cage");
     row(
         "service: upload, solve",
         step(steps.upload),
         &format!("{per_frame:.3} ms per frame, made, sent, solved, measured, on disk"),
-    )?;
-    row("service: complete", step(steps.complete), "writing the container")?;
-    row("service: download", step(steps.download), "fetching and checking it")?;
-    row("encoding in all", seconds(s.total), "")?;
-    row("decoding in all", seconds(decode_seconds), "coordinates and writing decoded.npy included")?;
+    );
+    row("service: complete", step(steps.complete), "writing the container");
+    row("service: download", step(steps.download), "fetching and checking it");
+    row("encoding in all", seconds(s.total), "");
+    row("decoding in all", seconds(decode_seconds), "coordinates and writing decoded.npy included");
+    rows
+}
+
+/// The rows, and where the page is, if there is one.
+fn table(rows: &[Row], page: Option<&PathBuf>) -> Result<String> {
+    let mut out = String::new();
+    for Row { name, value, note } in rows {
+        writeln!(out, "  {name:<24}{value:>14}   {note}")?;
+    }
     writeln!(out, "All went through a real service over HTTP: started for it on this machine, and stopped again.")?;
     writeln!(out, "Decoded again and measured anew: the errors are those of the report.")?;
-    writeln!(out, "Look at {}: the errors of every frame.", folder.join("errors.svg").display())?;
+    match page {
+        Some(page) => writeln!(
+            out,
+            "Open {} in a browser: the errors of every frame, and the model moving in its cage.",
+            page.display()
+        )?,
+        None => writeln!(out, "There is no report.html, since {NO_PAGE}.")?,
+    }
     Ok(out)
 }

@@ -1,6 +1,6 @@
 //! `cager cage --check` and `--repair`: what is wrong with a cage, and what of it can be repaired.
 
-use super::cage::{Targets, cage_bytes, complete_file, picture_of};
+use super::cage::{Targets, cage_bytes, complete_file};
 use super::cage_args::CageArgs;
 use super::dry_run::tell_dry_run;
 use super::print;
@@ -83,7 +83,7 @@ fn check_cage(args: &CageArgs, targets: &Targets, rest: &Model, path: &Path) -> 
     let found = check(&mesh, rest);
     if !args.outputs.dry_run {
         let report = CheckReport::new(&found, Vec::new());
-        commit_together(targets.complete(&report, || picture_of(args, &TriMesh::from(rest), &mesh))?)?;
+        commit_together(targets.complete(&report, (args, &TriMesh::from(rest), &mesh))?)?;
     }
     print(&verdict(path, &found))?;
     if !found.usable() {
@@ -106,8 +106,7 @@ fn repair_cage(args: &CageArgs, (output, targets): (&Target, &Targets), rest: &M
         return tell_dry_run(output, "a repaired cage", &[targets.report.clone(), targets.picture.clone()]);
     }
     let mut files = vec![complete_file(output, &cage_bytes(output, &repaired.cage)?)?];
-    let picture = || picture_of(args, &TriMesh::from(rest), &TriMesh::from(&repaired.cage));
-    files.extend(targets.complete(&report, picture)?);
+    files.extend(targets.complete(&report, (args, &TriMesh::from(rest), &TriMesh::from(&repaired.cage)))?);
     commit_together(files)?;
     let mut text = String::new();
     for change in &repaired.changes {

@@ -8,6 +8,7 @@ mod coding_args;
 mod compare;
 mod decode;
 mod demo;
+mod demo_report;
 mod design;
 mod diagnosis;
 mod dry_run;
@@ -28,7 +29,6 @@ pub(crate) mod serve;
 mod solver_options;
 mod transfer_args;
 
-use crate::plot::grouped;
 use args::{Cli, Command};
 use clap::{CommandFactory, Parser};
 pub(crate) use global_args::{is_quiet, is_verbose, tell};
@@ -116,6 +116,19 @@ fn warn(warnings: &[String]) {
 /// Untrusted text with control characters replaced, so that it cannot control the terminal.
 fn plain(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
+}
+
+/// A whole number with its digits in groups of three, `1,234,567`.
+fn grouped(number: impl ToString + Copy) -> String {
+    let digits = number.to_string();
+    let mut out = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(digit);
+    }
+    out
 }
 
 /// A number of bytes with a unit people read.

@@ -2,67 +2,44 @@
 
 use cager_core::inversion::{Handles, SolverOptions};
 use cager_core::regularize::Regularizer;
+use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
 /// Spectrum thresholds of the paper's figures.
 const THRESHOLDS: [usize; 5] = [0, 5, 20, 50, 100];
 
 /// One way to invert.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Method {
-    /// Points read, as on the command line.
-    #[serde(serialize_with = "handles_name")]
+    /// Points read.
     pub(crate) handles: Handles,
-    /// Treatment of the spectrum, as on the command line.
-    #[serde(serialize_with = "regularizer_name")]
+    /// Treatment of the spectrum.
     pub(crate) regularizer: Regularizer,
     /// Spectrum threshold s.
     pub(crate) spectrum: usize,
     /// Weight λ; α for Tikhonov.
     pub(crate) lambda: f64,
-    /// Its colour: a class of the report's style sheet.
-    #[serde(skip)]
-    pub(crate) class: &'static str,
-    /// Whether the error curves show it; the tables show every method.
-    #[serde(skip)]
+    /// Whether curves, cages and models of it are shown; the tables show every method.
     pub(crate) curve: bool,
 }
 
-fn handles_name<S: Serializer>(handles: &Handles, out: S) -> Result<S::Ok, S::Error> {
-    out.serialize_str(handles.name())
-}
-
-fn regularizer_name<S: Serializer>(regularizer: &Regularizer, out: S) -> Result<S::Ok, S::Error> {
-    out.serialize_str(regularizer.name())
+/// With its name in words, and with names as on the command line.
+impl Serialize for Method {
+    fn serialize<S: Serializer>(&self, out: S) -> Result<S::Ok, S::Error> {
+        let mut fields = out.serialize_struct("Method", 6)?;
+        fields.serialize_field("name", &self.name())?;
+        fields.serialize_field("handles", self.handles.name())?;
+        fields.serialize_field("regularizer", self.regularizer.name())?;
+        fields.serialize_field("spectrum", &self.spectrum)?;
+        fields.serialize_field("lambda", &self.lambda)?;
+        fields.serialize_field("curve", &self.curve)?;
+        fields.end()
+    }
 }
 
 impl Method {
     fn new(handles: Handles, regularizer: Regularizer, spectrum: usize) -> Self {
-        let mut method = Self { handles, regularizer, spectrum, lambda: 1.0, class: "", curve: false };
-        method.class = method.colour();
-        method
-    }
-
-    /// One colour for each pair of points read and treatment, whatever the threshold.
-    fn colour(&self) -> &'static str {
-        match (self.handles, self.regularizer) {
-            (Handles::All, Regularizer::None) => "k-all",
-            (Handles::All, Regularizer::Global) => "k-all-global",
-            (Handles::All, _) => "k-all-sub",
-            (Handles::MaxVol, Regularizer::None) => "k-maxvol",
-            (Handles::MaxVol, Regularizer::Laplacian) => "k-cager",
-            (Handles::MaxVol, Regularizer::Global) => "k-maxvol-global",
-            (Handles::MaxVol, Regularizer::TruncatedSvd) => "k-truncated",
-            (Handles::MaxVol, Regularizer::Tikhonov) => "k-tikhonov",
-            (Handles::MaxVol, Regularizer::Differential) => "k-differential",
-            (Handles::MaxVol, Regularizer::Temporal) => "k-temporal",
-            (Handles::Spread { .. }, Regularizer::None) => "k-spread-data",
-            (Handles::Spread { .. }, Regularizer::Differential) => "k-usual",
-            (Handles::Spread { .. }, _) => "k-spread",
-            (Handles::Rectangular { .. }, Regularizer::None) => "k-rectangular-data",
-            (Handles::Rectangular { .. }, _) => "k-rectangular",
-            (Handles::MaxVol, Regularizer::Matrix) => "k-other",
-        }
+        Self { handles, regularizer, spectrum, lambda: 1.0, curve: false }
     }
 
     /// In words, for tables and legends.
@@ -80,17 +57,6 @@ impl Method {
             Regularizer::Global => format!("{read}, global λ = {}", self.lambda),
             other => format!("{read}, {} s = {s}", other.name()),
         }
-    }
-
-    /// As [`Self::name`], without the threshold.
-    pub(crate) fn family(&self) -> String {
-        let name = self.name();
-        name.split(" s = ").next().map_or(name.clone(), str::to_owned)
-    }
-
-    /// Whether its line is dashed, as a second mark beside its colour.
-    pub(crate) fn is_dashed(&self) -> bool {
-        !(self.regularizer == Regularizer::None || self.regularizer.is_sub_spectral())
     }
 
     /// The options of `cager encode` that choose it.

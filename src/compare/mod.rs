@@ -1,4 +1,4 @@
-//! `cager compare`: the paper's comparisons on one capture, as data and as a report.
+//! `cager compare`: the paper's comparisons on one capture, as figures and as what the report draws.
 //!
 //! The analysis of a coordinate system is computed once, and each choice of rows is decomposed once. Frames are processed in batches, each projected
 //! once for all methods that read the same rows.
@@ -6,29 +6,26 @@
 mod estimate;
 mod evaluation;
 mod figures;
+mod geometry;
 mod method_groups;
 mod methods;
 mod noise;
-mod page;
-mod pictures;
-pub(crate) mod render;
 mod sample;
 mod system;
 
 pub(crate) use estimate::seconds;
 pub(crate) use figures::Figures;
-pub(crate) use page::page;
-pub(crate) use pictures::Pictures;
-pub(crate) use render::Up;
+pub(crate) use geometry::Geometry;
 
+use crate::report_page::Up;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{Analysis, PrepareError};
-use cager_core::mesh::{Model, Point, TriMesh};
+use cager_core::mesh::{Model, TriMesh};
 use cager_formats::FrameReader;
 use evaluation::Shape;
 use figures::{System, claims, recommend};
-use pictures::{Painter, PictureInput};
+use geometry::GeometryBuilder;
 use sample::{Frame, Sample};
 
 /// Why there is no comparison.
@@ -58,7 +55,7 @@ pub(crate) struct Job<'a> {
     pub(crate) systems: &'a [&'static dyn CoordinateSystem],
     /// Frames to measure at the most.
     pub(crate) frames_at_most: usize,
-    /// The vertical axis of pictures, where it is not to be guessed.
+    /// The vertical axis, where it is not to be guessed.
     pub(crate) up: Option<Up>,
     /// Rest pose, cage and frames as they were given.
     pub(crate) names: [String; 3],
@@ -74,15 +71,14 @@ pub(crate) struct Progress<'a> {
 ///
 /// # Errors
 /// See [`CompareError`]. A system that cannot be computed for this cage is part of the result, unless none can.
-pub(crate) fn compare(job: &Job<'_>, progress: &mut Progress<'_>) -> Result<(Figures, Vec<Pictures>), CompareError> {
+pub(crate) fn compare(job: &Job<'_>, progress: &mut Progress<'_>) -> Result<(Figures, Geometry), CompareError> {
     let frames = job.frames;
     let sample = Sample::new(frames, job.frames_at_most);
     let shape = Shape::new(job.cage, &job.rest.points);
     let mesh = TriMesh::from(job.rest);
     let mut systems = Vec::new();
-    let mut pictures = Vec::new();
     let mut refused = None;
-    let mut painter: Option<Painter<'_>> = None;
+    let mut builder: Option<GeometryBuilder<'_>> = None;
     let mut motion = [f64::NAN; 2];
     let works: Vec<f64> = job.systems.iter().map(|system| estimate::work(job, *system)).collect();
     let all_work: f64 = works.iter().sum();
@@ -110,19 +106,19 @@ pub(crate) fn compare(job: &Job<'_>, progress: &mut Progress<'_>) -> Result<(Fig
             }
             Err(error) => return Err(error),
         };
-        if painter.is_none() {
-            motion = study.motion;
-            let input = PictureInput { mesh: &mesh, cage: job.cage, up: job.up };
-            painter = Some(Painter::new(input, job.open, &sample, &study.figures)?);
-        }
-        if let Some(painter) = &painter {
-            tell(&format!("{name}: pictures"), 0.9);
-            pictures.push(painter.paint(&study)?);
-        }
+        let geometry = match &mut builder {
+            Some(builder) => builder,
+            None => {
+                motion = study.motion;
+                builder.insert(GeometryBuilder::new(job, &mesh, &sample, &study.figures)?)
+            }
+        };
+        tell(&format!("{name}: what is drawn"), 0.9);
+        geometry.add(&study)?;
         let figures = Some(Box::new(study.figures));
         systems.push(System { name: name.to_owned(), refused: None, figures });
     }
-    let Some(painter) = painter else {
+    let Some(builder) = builder else {
         return Err(refused.unwrap_or(PrepareError::NoSolution { what: "choice of coordinates" }).into());
     };
     let capture = figures::Capture {
@@ -139,11 +135,12 @@ pub(crate) fn compare(job: &Job<'_>, progress: &mut Progress<'_>) -> Result<(Fig
         diagonal: shape.diagonal,
         motion_mean: motion[0],
         motion_max: motion[1],
-        shown: painter.shown(),
+        shown: builder.shown(),
         noise_radius: noise::RADIUS,
     };
     let (recommendation, claims) = (recommend(&systems), claims(&systems));
-    Ok((Figures { program: env!("CARGO_PKG_VERSION"), capture, systems, recommendation, claims }, pictures))
+    let figures = Figures { program: env!("CARGO_PKG_VERSION"), capture, systems, recommendation, claims };
+    Ok((figures, builder.finish()))
 }
 
 /// Reads these frames, ascending.
@@ -161,15 +158,11 @@ fn frames_of(reader: &mut dyn FrameReader, wanted: &[usize]) -> Result<Vec<Frame
     Ok(found)
 }
 
-/// Interleaved coordinates as points.
-fn as_points<T: Copy + Into<f64>>(coordinates: &[T]) -> Vec<Point> {
-    coordinates.as_chunks::<3>().0.iter().map(|p| p.map(Into::into)).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use cager_core::coordinates::{Coordinates, CoordinatesError, MeanValue};
+    use cager_core::mesh::Point;
     use cager_core::synthetic::{Capture, Options};
 
     /// A system that no cage is good enough for.
@@ -216,7 +209,7 @@ mod tests {
         }
     }
 
-    fn run(systems: &[&'static dyn CoordinateSystem]) -> Result<(Figures, Vec<Pictures>), CompareError> {
+    fn run(systems: &[&'static dyn CoordinateSystem]) -> Result<(Figures, Geometry), CompareError> {
         let capture = Capture::new(&Options { points: 400, frames: 5, cage_vertices: 40 });
         let cage = Cage::new(capture.cage.clone()).expect("a cage");
         let open = || Ok(Box::new(Made(capture.clone(), 0)) as Box<dyn FrameReader>);
@@ -235,14 +228,14 @@ mod tests {
     }
 
     #[test]
-    fn a_system_that_cannot_be_computed_has_a_section_that_says_why() {
-        let (figures, pictures) = run(&[&Never, &MeanValue]).expect("a comparison");
-        assert_eq!(figures.computed().map(|(name, _)| name).collect::<Vec<_>>(), ["mvc"]);
-        let html = page(&figures, &pictures);
-        let section = html.split("<h2 id=\"refused\">").nth(1).and_then(|rest| rest.split("<h2").next());
-        assert!(section.is_some_and(|s| s.contains("never") && s.contains("2 points lie outside the cage (3, 17)")));
-        let alone = page(&run(&[&MeanValue]).expect("a comparison").0, &pictures);
-        assert!(!alone.contains("id=\"refused\""));
+    fn a_system_that_cannot_be_computed_says_why() {
+        let (figures, geometry) = run(&[&Never, &MeanValue]).expect("a comparison");
+        let refused = figures.systems[0].refused.as_deref().expect("a reason");
+        assert!(refused.contains("2 points lie outside the cage (3, 17)"), "{refused}");
+        assert!(figures.systems[0].figures.is_none() && figures.systems[1].refused.is_none());
+        // What is drawn belongs to the systems that could be computed, in their order.
+        let geometry = serde_json::to_value(geometry).expect("JSON");
+        assert_eq!(geometry["systems"].as_array().map(Vec::len), Some(1));
     }
 
     #[test]

@@ -17,7 +17,7 @@ const BATCH_BYTES: usize = 256 << 20;
 /// Rows whose singular values are below this fraction of the largest are dependent to the working precision.
 const DEPENDENT: f64 = 1e-11;
 
-/// A system with its figures, and what its pictures need.
+/// A system with its figures, and what its geometry is made of.
 pub(super) struct SystemStudy<'a> {
     pub(super) figures: SystemFigures,
     pub(super) analysis: &'a Analysis,

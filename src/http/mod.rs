@@ -32,4 +32,5 @@ mod router;
 mod sessions;
 
 pub use admin::admin;
+pub(crate) use page::file as page_file;
 pub use router::{document, router, spare};

@@ -6,6 +6,7 @@ use axum::extract::Path;
 use axum::response::{IntoResponse, Response};
 use http::{HeaderMap, StatusCode, header};
 use rust_embed::{Embed, EmbeddedFile};
+use std::borrow::Cow;
 
 /// What the page may load: its own files, and pictures and films that it made itself. `style` attributes that scripts set are not meant by it.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; \
@@ -20,6 +21,11 @@ pub(super) const COMPONENT: &str = "cager-viewer.js";
 #[folder = "web/dist"]
 #[allow_missing = true]
 struct Files;
+
+/// A file of the page as it was built.
+pub(crate) fn file(name: &str) -> Option<Cow<'static, [u8]>> {
+    Files::get(name).map(|file| file.data)
+}
 
 /// The page.
 #[utoipa::path(
@@ -68,8 +74,8 @@ fn send(request: &HeaderMap, name: &str, file: EmbeddedFile, cached: &'static st
         return (StatusCode::NOT_MODIFIED, headers).into_response();
     }
     let data = match file.data {
-        std::borrow::Cow::Borrowed(data) => bytes::Bytes::from_static(data),
-        std::borrow::Cow::Owned(data) => data.into(),
+        Cow::Borrowed(data) => bytes::Bytes::from_static(data),
+        Cow::Owned(data) => data.into(),
     };
     (headers, [(header::CONTENT_TYPE, media_type(name))], data).into_response()
 }

@@ -1,6 +1,7 @@
 //! `cager cage`, and `cager encode` without a cage.
 
-use crate::support::{Dir, Small, as_model, mean, measure, quad_box, read_frames};
+use crate::refused::assert_sentence;
+use crate::support::{Dir, Small, as_model, has_report_page, mean, measure, quad_box, read_frames};
 use cager_cages::geometry::{outside, self_intersections};
 use cager_core::cage::Cage;
 use cager_core::mesh::{Model, TriMesh};
@@ -23,14 +24,19 @@ fn faults(cage: &Model, rest: &Model) -> Vec<String> {
 #[test]
 fn a_rest_pose_alone_gets_a_valid_cage_with_its_picture_and_report() {
     let (dir, small) = Dir::with_capture();
-    let line = "cage --rest rest.obj --vertices 50 -o made.obj --picture made.png --report made.json";
-    let said = dir.cager(line).succeeds().stdout;
+    let picture = if has_report_page() { "--picture made.html" } else { "" };
+    let line = format!("cage --rest rest.obj --vertices 50 -o made.obj --report made.json {picture}");
+    let said = dir.cager(line.trim()).succeeds().stdout;
     assert!(said.contains("made.obj: ") && said.contains("encloses every point and does not cut itself"), "{said}");
     let cage = read_cage(&dir, "made.obj");
     assert!((20..=50).contains(&cage.points.len()), "{}", cage.points.len());
     assert_eq!(faults(&cage, &small.rest), Vec::<String>::new());
-    assert!(dir.read("made.png").starts_with(b"\x89PNG"));
     let report = dir.json("made.json");
+    if has_report_page() {
+        let page = dir.report_page("made.html");
+        assert_eq!((&page["kind"], &page["figures"]["faces"]), (&"cage".into(), &report["faces"]));
+        assert_eq!(page["geometry"]["name"], "made.obj");
+    }
     assert_eq!(report["vertices"], cage.points.len());
     assert_eq!(report["points_outside"], 0);
     // The same again gives the same, and what exists stays.
@@ -40,6 +46,15 @@ fn a_rest_pose_alone_gets_a_valid_cage_with_its_picture_and_report() {
     assert!(refused.status == Some(1) && refused.stderr.contains("--overwrite"), "{refused:?}");
     dir.cager("cage --rest rest.obj --vertices 30 -o made.obj --overwrite").succeeds();
     assert_ne!(read_cage(&dir, "made.obj"), cage);
+}
+
+#[test]
+fn a_picture_is_a_page_and_says_so() {
+    let (dir, _) = Dir::with_capture();
+    let refused = dir.cager("cage --rest rest.obj -o made.obj --picture made.png").run();
+    assert_eq!(refused.status, Some(1));
+    assert_sentence("cage", &refused.stderr, &["made.png does not end with .html", "name it cage.html"]);
+    assert_eq!(dir.names(""), ["cage.obj", "frames.npy", "rest.obj"]);
 }
 
 #[test]

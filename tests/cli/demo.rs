@@ -1,6 +1,6 @@
 //! `cager demo`.
 
-use crate::support::Dir;
+use crate::support::{Dir, has_report_page};
 use cager_formats::read_model;
 
 #[test]
@@ -8,16 +8,23 @@ fn demo_in_an_empty_folder_writes_what_it_says() {
     let dir = Dir::new();
     let done = dir.cager("demo --points 600 --frames 20 --cage-vertices 60").succeeds();
     assert_eq!(dir.names(""), ["cager-demo"]);
-    let files = ["cage.obj", "capture.cager", "decoded.npy", "errors.svg", "report.json", "rest.obj"];
-    assert_eq!(dir.names("cager-demo"), files);
+    let mut files = vec!["cage.obj", "capture.cager", "decoded.npy", "report.html", "report.json", "rest.obj"];
     let help = dir.cager("demo --help").succeeds().stdout;
-    for file in files {
+    for file in &files {
         assert!(help.contains(file), "{file} is not announced in {help}");
     }
+    files.retain(|file| *file != "report.html" || has_report_page());
+    assert_eq!(dir.names("cager-demo"), files);
     let report = dir.json("cager-demo/report.json");
-    let svg = String::from_utf8(dir.read("cager-demo/errors.svg")).expect("UTF-8");
-    assert!(svg.trim_start().starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
-    for word in ["L2", "L∞", "ratio", "20", "errors.svg", "real service", "prepare", "upload", "complete", "download"]
+    if has_report_page() {
+        let page = dir.report_page("cager-demo/report.html");
+        assert_eq!((page["kind"].as_str(), page["figures"]["l2"].as_array().map(Vec::len)), (Some("demo"), Some(20)));
+        assert_eq!(page["geometry"]["frames"].as_array().map(Vec::len), Some(20));
+        for row in page["figures"]["rows"].as_array().expect("rows") {
+            assert!(done.stdout.contains(row["value"].as_str().expect("a value")), "{row}");
+        }
+    }
+    for word in ["L2", "L∞", "ratio", "20", "report.html", "real service", "prepare", "upload", "complete", "download"]
     {
         assert!(done.stdout.contains(word), "{word} is missing in {}", done.stdout);
     }

@@ -15,6 +15,11 @@ use tempfile::TempDir;
 /// What most tests encode, in a folder made by [`Dir::with_capture`].
 pub(crate) const ENCODE: &str = "encode --rest rest.obj --cage cage.obj --frames frames.npy -o out.cager --overwrite";
 
+/// Whether the program holds the page of its reports, which is built where Node is.
+pub(crate) fn has_report_page() -> bool {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("web/dist/report.html").exists()
+}
+
 /// A folder of its own for one test.
 pub(crate) struct Dir(TempDir);
 
@@ -55,6 +60,25 @@ impl Dir {
 
     pub(crate) fn json(&self, name: &str) -> Value {
         serde_json::from_slice(&self.read(name)).expect(name)
+    }
+
+    /// What a page of a report holds; checks that it is one file that asks for no other.
+    pub(crate) fn report_page(&self, name: &str) -> Value {
+        let html = String::from_utf8(self.read(name)).expect("UTF-8");
+        assert!(
+            html.starts_with("<!doctype html>") && html.contains("content=\"default-src 'none'; script-src 'sha256-")
+        );
+        // Outside its two scripts.
+        let mut markup = html.clone();
+        while let Some(start) = markup.find("<script type=") {
+            let end = start + markup[start..].find("</script>").expect("the end of a script");
+            markup.replace_range(start..end + "</script>".len(), "");
+        }
+        for reference in ["<script", "</script", "src=", "href=", "http:", "https:", "url(", "<b>"] {
+            assert!(!markup.contains(reference), "{reference} in {markup}");
+        }
+        let (_, rest) = html.split_once("<script type=\"application/json\" id=\"report\">").expect("the report");
+        serde_json::from_str(rest.split_once("</script>").expect("its end").0).expect("JSON")
     }
 
     pub(crate) fn model(&self, name: &str, model: &Model) {

@@ -13,7 +13,7 @@ import { Meter } from './meter';
 const FRAMES_AT_ONCE = 12;
 
 /** What `cager demo` writes: meshes as text, and positions of all frames. */
-interface Demo {
+export interface Demo {
   readonly rest: string;
   readonly cage: string;
   readonly shape: readonly number[];

@@ -1,9 +1,10 @@
-/** Takes the pictures of the page in docs/pictures, of the built-in demo. */
+/** Takes the pictures of the page and of a report in docs/pictures, of the built-in demo. */
 
 import { mkdir, writeFile } from 'node:fs/promises';
 import type { Browser, Page } from 'playwright-core';
 import type { ViewerPage } from '../src/viewer/viewerPage';
 import { launch } from '../tests/browser/harness/browser';
+import { DemoComparison } from './demoComparison';
 import { DemoSite } from './demoSite';
 import { indexedPng } from './indexedPng';
 
@@ -16,7 +17,7 @@ const READY_MS = 90_000;
 
 interface Picture {
   readonly name: string;
-  readonly fragment: string;
+  readonly url: string;
   readonly viewport: typeof DESKTOP;
   readonly colorScheme: 'light' | 'dark';
   /** What shows that the page is there. */
@@ -26,15 +27,17 @@ interface Picture {
 }
 
 const site = await DemoSite.start();
+const comparison = await DemoComparison.of(site.demo);
 const browser = await launch();
 try {
   const id = await site.session('walk_v012');
   await site.session('jump_v003', 48, false);
   await site.session('turn_v007', 24);
   await mkdir(FOLDER, { recursive: true });
-  const viewer = { fragment: `#/session/${id}?frame=${FRAME}`, shown: modelShown };
-  const list = { fragment: '#/', shown: (page: Page) => page.getByText('smaller').first().waitFor() };
-  const upload = { fragment: '#/upload', shown: (page: Page) => page.getByRole('heading').first().waitFor() };
+  const viewer = { url: `${site.page}#/session/${id}?frame=${FRAME}`, shown: modelShown };
+  const list = { url: `${site.page}#/`, shown: (page: Page) => page.getByText('smaller').first().waitFor() };
+  const upload = { url: `${site.page}#/upload`, shown: (page: Page) => page.getByRole('heading').first().waitFor() };
+  const report = { url: comparison.url, shown: cagesShown };
   const pictures: readonly Picture[] = [
     { name: 'viewer-light', ...viewer, viewport: DESKTOP, colorScheme: 'light', keys: ['4'] },
     { name: 'viewer-dark', ...viewer, viewport: DESKTOP, colorScheme: 'dark', keys: ['i'] },
@@ -42,17 +45,20 @@ try {
     { name: 'list-light', ...list, viewport: DESKTOP, colorScheme: 'light' },
     { name: 'list-phone', ...list, viewport: PHONE, colorScheme: 'dark' },
     { name: 'upload-dark', ...upload, viewport: DESKTOP, colorScheme: 'dark' },
+    { name: 'report-light', ...report, viewport: DESKTOP, colorScheme: 'light' },
+    { name: 'report-phone', ...report, viewport: PHONE, colorScheme: 'dark' },
   ];
   for (const picture of pictures) await take(browser, picture);
 } finally {
   await browser.close();
   await site.close();
+  await comparison.close();
 }
 
-async function take(browser: Browser, { name, fragment, viewport, colorScheme, shown, keys = [] }: Picture) {
+async function take(browser: Browser, { name, url, viewport, colorScheme, shown, keys = [] }: Picture) {
   const context = await browser.newContext({ viewport, colorScheme, reducedMotion: 'reduce' });
   const page = await context.newPage();
-  await page.goto(site.page + fragment);
+  await page.goto(url);
   await shown(page);
   for (const key of keys) await page.keyboard.press(key);
   // Pictures become fine again when everything rests.
@@ -71,6 +77,11 @@ async function modelShown(page: Page) {
     return player?.stage.decoder.ready === true && player.progress === null && !player.buffering;
   };
   await page.waitForFunction(isShown, undefined, { timeout: READY_MS });
+}
+
+/** Scrolls a report to the cages of its methods. */
+async function cagesShown(page: Page) {
+  await page.getByRole('link', { name: 'Cages' }).click();
 }
 
 /** The browser decodes its own picture. */

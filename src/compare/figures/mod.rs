@@ -1,4 +1,4 @@
-//! The results of a comparison as plain data: the content of `--json`, and of the tables and plots of the report.
+//! The results of a comparison as plain data: the content of `--json`, and of the tables and charts of the report.
 
 mod random;
 mod spectra;
@@ -8,8 +8,8 @@ mod vectors;
 
 pub(crate) use random::{DRAW_FRAMES, DRAWS, Draw, draws};
 pub(crate) use spectra::Spectra;
-pub(crate) use summary::{Choice, Claim, Recommendation, Smoothness, Verdict, claims, recommend};
-pub(crate) use swaps::{SwapTrace, Swaps};
+pub(crate) use summary::{Claim, Recommendation, claims, recommend};
+pub(crate) use swaps::Swaps;
 pub(crate) use vectors::Vectors;
 
 use super::evaluation::{PerFrame, Totals};
@@ -60,7 +60,7 @@ pub(crate) struct Capture {
     pub(crate) motion_mean: f64,
     /// The largest one.
     pub(crate) motion_max: f64,
-    /// The frame that the pictures show: that of the largest spike of full least squares.
+    /// The frame whose cages and models the report draws: that of the largest spike of full least squares.
     pub(crate) shown: usize,
     /// Radius of the noise of the noise test.
     pub(crate) noise_radius: f64,
@@ -151,12 +151,5 @@ impl SystemFigures {
     /// The first method for which this holds.
     pub(crate) fn method(&self, wanted: impl Fn(&Method) -> bool) -> Option<&MethodFigures> {
         self.methods.iter().find(|found| wanted(&found.method))
-    }
-}
-
-impl Figures {
-    /// The systems that could be computed.
-    pub(crate) fn computed(&self) -> impl Iterator<Item = (&str, &SystemFigures)> {
-        self.systems.iter().filter_map(|s| Some((s.name.as_str(), s.figures.as_deref()?)))
     }
 }

@@ -1,5 +1,5 @@
 import type { Player } from '../viewer/player';
-import { resolvedColor } from '../viewer/timeline';
+import { resolvedColor } from '../style/resolvedColor';
 import { sought } from '../viewer/transport';
 import { counts, editedRows } from './cageEdit';
 import { EditModel } from './editModel';

@@ -98,7 +98,8 @@ export function cameraFromText(text: string | null): CameraState | null {
   return zoomed(orbited(camera, (azimuth * Math.PI) / 180, (elevation * Math.PI) / 180), distance);
 }
 
-function axesOf({ azimuth, elevation }: CameraState) {
+/** Unit vectors to the right, upwards and towards the camera. */
+export function axesOf({ azimuth, elevation }: Pick<CameraState, 'azimuth' | 'elevation'>) {
   const [sa, ca, se, ce] = [Math.sin(azimuth), Math.cos(azimuth), Math.sin(elevation), Math.cos(elevation)];
   return { right: [ca, 0, -sa], up: [-se * sa, ce, -se * ca], back: [ce * sa, se, ce * ca] };
 }

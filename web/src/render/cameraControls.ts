@@ -20,7 +20,11 @@ export class CameraControls {
   private readonly stop = new AbortController();
   private readonly stillness = matchMedia('(prefers-reduced-motion: reduce)');
 
-  constructor(private readonly element: HTMLElement) {
+  /** @param wheelZooms whether the wheel zooms; where it does not, it scrolls the page, and zooms with the control key alone */
+  constructor(
+    private readonly element: HTMLElement,
+    private readonly wheelZooms: () => boolean = () => true,
+  ) {
     const options = { signal: this.stop.signal };
     element.addEventListener('pointerdown', (event) => this.grab(event), options);
     element.addEventListener('pointermove', (event) => this.drag(event), options);
@@ -86,6 +90,7 @@ export class CameraControls {
   }
 
   private wheel(event: WheelEvent) {
+    if (!event.ctrlKey && !this.wheelZooms()) return;
     event.preventDefault();
     const pixels = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 16 * event.deltaY : event.deltaY;
     // A pinch on a touchpad arrives as a wheel with the control key and small steps.

@@ -1,5 +1,5 @@
 /** Colours from dark violet over green to yellow whose lightness grows evenly, as sRGB: anchors at equal distances, in the manner of viridis. */
-const ANCHORS = [
+const ANCHORS = anchors([
   '440154',
   '482878',
   '3e4a89',
@@ -10,29 +10,77 @@ const ANCHORS = [
   '6dcd59',
   'b4de2c',
   'fde725',
-].map(
-  (hex): [number, number, number] =>
-    [0, 2, 4].map((k) => parseInt(hex.slice(k, k + 2), 16)) as [number, number, number],
-);
+]);
+/** Pale grey through yellow and orange to dark red, for small pictures of many models: what is right is as light as a model without a map. */
+const PALE_ANCHORS = anchors(['dadde1', 'f6e09a', 'f8b25a', 'e77335', 'b82e28', '6a031e']);
+/** Blue, pale grey and red, equally dark at both ends, for values on both sides of zero. */
+const SIGNED_ANCHORS = anchors(['1f4e96', '7fabd6', 'f1efec', 'ee9a78', 'a3231f']);
+
+type Rgb = [number, number, number];
+
+function anchors(colors: readonly string[]): Rgb[] {
+  return colors.map((hex) => [0, 2, 4].map((k) => parseInt(hex.slice(k, k + 2), 16)) as Rgb);
+}
 
 /** sRGB colour, 0 … 255 each, of a value between 0 and 1; what is beyond has the colour of the end, what is not a number is grey. */
-export function heatColor(value: number): [number, number, number] {
-  if (Number.isNaN(value)) return [128, 128, 128];
-  const place = Math.min(1, Math.max(0, value)) * (ANCHORS.length - 1);
-  const index = Math.min(ANCHORS.length - 2, Math.floor(place));
-  const [low, high] = [ANCHORS[index], ANCHORS[index + 1]];
-  const blend = (k: number) => Math.round(low[k] + (high[k] - low[k]) * (place - index));
-  return [blend(0), blend(1), blend(2)];
+export function heatColor(value: number): Rgb {
+  return between(ANCHORS, value);
 }
 
 /** The map as `count` RGBA texels. */
 export function heatTexels(count: number): Uint8Array<ArrayBuffer> {
-  const texels = new Uint8Array(4 * count);
-  for (let k = 0; k < count; k++) texels.set([...heatColor(k / (count - 1)), 255], 4 * k);
-  return texels;
+  return texels(ANCHORS, count);
 }
 
 /** The map as a CSS gradient, from left to right. */
 export function heatGradient(): string {
-  return `linear-gradient(90deg, ${ANCHORS.map((color) => `rgb(${color.join(' ')})`).join(', ')})`;
+  return gradient(ANCHORS);
+}
+
+/** The map of small pictures as `count` RGBA texels. */
+export function paleTexels(count: number): Uint8Array<ArrayBuffer> {
+  return texels(PALE_ANCHORS, count);
+}
+
+/** {@link paleTexels} as a CSS gradient. */
+export function paleGradient(): string {
+  return gradient(PALE_ANCHORS);
+}
+
+/** The map of values on both sides of zero, from the largest negative to the largest positive one, as `count` RGBA texels. */
+export function signedTexels(count: number): Uint8Array<ArrayBuffer> {
+  return texels(SIGNED_ANCHORS, count);
+}
+
+/** {@link signedTexels} as a CSS gradient. */
+export function signedGradient(): string {
+  return gradient(SIGNED_ANCHORS);
+}
+
+/** The same as a function `vec3 signedColor(float)` for shaders: the sRGB colour of a value between −1 and 1. */
+export const signedShader = `
+vec3 signedColor(float value) {
+  vec3 anchors[${SIGNED_ANCHORS.length}] = vec3[](${SIGNED_ANCHORS.map((color) => `vec3(${color.map((x) => (x / 255).toFixed(4)).join(', ')})`).join(', ')});
+  float place = (clamp(value, -1.0, 1.0) * 0.5 + 0.5) * ${(SIGNED_ANCHORS.length - 1).toFixed(1)};
+  int low = min(int(place), ${SIGNED_ANCHORS.length - 2});
+  return mix(anchors[low], anchors[low + 1], place - float(low));
+}`;
+
+function between(colors: readonly Rgb[], value: number): Rgb {
+  if (Number.isNaN(value)) return [128, 128, 128];
+  const place = Math.min(1, Math.max(0, value)) * (colors.length - 1);
+  const index = Math.min(colors.length - 2, Math.floor(place));
+  const [low, high] = [colors[index], colors[index + 1]];
+  const blend = (k: number) => Math.round(low[k] + (high[k] - low[k]) * (place - index));
+  return [blend(0), blend(1), blend(2)];
+}
+
+function texels(colors: readonly Rgb[], count: number): Uint8Array<ArrayBuffer> {
+  const found = new Uint8Array(4 * count);
+  for (let k = 0; k < count; k++) found.set([...between(colors, k / (count - 1)), 255], 4 * k);
+  return found;
+}
+
+function gradient(colors: readonly Rgb[]): string {
+  return `linear-gradient(90deg, ${colors.map((color) => `rgb(${color.join(' ')})`).join(', ')})`;
 }

@@ -1,6 +1,6 @@
 import { BufferAttribute, BufferGeometry, DynamicDrawUsage, FrontSide, Mesh } from 'three';
 import { shaderMaterial } from '../render/materials';
-import { divergingShader } from './diverging';
+import { signedShader } from '../render/colorMap';
 
 const vertexShader = `precision highp float;
 uniform mat4 modelViewMatrix;
@@ -22,12 +22,12 @@ uniform float opacity;
 in vec3 viewPosition;
 in float shown;
 out vec4 shade;
-${divergingShader}
+${signedShader}
 void main() {
   vec3 normal = normalize(cross(dFdx(viewPosition), dFdy(viewPosition)));
   float facing = abs(dot(normal, normalize(viewPosition)));
   float zero = 1.0 - smoothstep(0.6, 1.4, abs(shown) / max(1e-6, fwidth(shown)));
-  shade = vec4(diverging(shown) * (0.72 + 0.28 * facing) * (1.0 - 0.3 * zero), opacity);
+  shade = vec4(signedColor(shown) * (0.72 + 0.28 * facing) * (1.0 - 0.3 * zero), opacity);
 }`;
 
 /** Faces of a cage in colours of a value at each corner, between −1 and 1. */

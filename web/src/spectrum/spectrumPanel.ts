@@ -5,9 +5,9 @@ import uPlotStyle from 'uplot/dist/uPlot.min.css?inline';
 import { controls } from '../style/tokens';
 import { glyph } from '../viewer/glyphs';
 import { grouped, threeDigits } from '../viewer/text';
-import { resolvedColor } from '../viewer/timeline';
+import { resolvedColor } from '../style/resolvedColor';
 import { spectrumChart } from './chart';
-import { divergingGradient } from './diverging';
+import { signedGradient } from '../render/colorMap';
 import type { Spectrum } from './singular';
 import { spectrumPanelStyle } from './spectrumPanelStyle';
 import type { SpectrumView } from './spectrumView';
@@ -106,7 +106,7 @@ export class SpectrumPanel extends LitElement {
         <strong>σ<sub>${view.index + 1}</sub> = ${threeDigits(value)}</strong>
         <span class="muted">${threeDigits(value / values[0])} of the largest</span>
       </p>
-      <div class="bar" .style=${`background: ${divergingGradient()}`}></div>
+      <div class="bar" .style=${`background: ${signedGradient()}`}></div>
       <div class="ends figures"><span>−</span><span>0</span><span>+</span></div>
       ${
         system === 'green-free'

@@ -1,5 +1,5 @@
 import type { StageColors } from '../render/stage';
-import { resolvedColor } from './timeline';
+import { resolvedColor } from '../style/resolvedColor';
 
 /** Colours of the picture from the custom properties that hold for a component. */
 export function stageColors(component: HTMLElement & { renderRoot: ParentNode & Node }): StageColors {

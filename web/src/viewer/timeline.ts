@@ -7,6 +7,7 @@ import type { FrameRange } from '../editing/cageEdit';
 import { errorsChart } from './errorsChart';
 import { numberAt, numberText, placeOf, type FrameNumbers } from './frameNumbers';
 import { percent } from './text';
+import { resolvedColor } from '../style/resolvedColor';
 import { timelineStyle } from './timelineStyle';
 import { controls } from '../style/tokens';
 
@@ -246,14 +247,4 @@ export class Timeline extends LitElement {
 function errorsText(errors: FrameErrors | null, frame: number): string {
   const [l2, linf] = [errors?.l2[frame] ?? NaN, errors?.linf[frame] ?? NaN];
   return Number.isFinite(linf) ? `L2 ${percent(l2)} · L∞ ${percent(linf)}` : '';
-}
-
-/** What the browser makes of a colour that depends on the theme, for canvases, which know no custom properties. */
-export function resolvedColor(root: ParentNode & Node, color: string): string {
-  const probe = document.createElement('span');
-  probe.style.color = color;
-  root.appendChild(probe);
-  const resolved = getComputedStyle(probe).color;
-  probe.remove();
-  return resolved;
 }

@@ -1,0 +1,104 @@
+import { html, LitElement, nothing } from 'lit';
+import { customElement, property } from 'lit/decorators.js';
+import { controls } from '../style/tokens';
+import { grouped } from '../viewer/text';
+import type { CageFigures, Report } from './data';
+import { footer } from './footer';
+import { joined, RestPose } from './geometry/modelInCage';
+import { reportStyle } from './reportStyle';
+import { table } from './table';
+import { condition, percents, seconds } from './text';
+import type { View } from './views';
+
+/** The page of a cage that `cager cage` made, checked or repaired. */
+@customElement('report-cage')
+export class CageReportPage extends LitElement {
+  static override styles = [controls, reportStyle];
+
+  @property({ attribute: false }) report: (Report & { kind: 'cage' }) | null = null;
+  private views: readonly View[] = [];
+  private framed: Float32Array = new Float32Array(0);
+
+  override willUpdate() {
+    if (this.views.length > 0 || !this.report) return;
+    const rest = new RestPose(this.report.geometry);
+    const cage = { mesh: rest.cage, vertices: rest.cageVertices };
+    const model = { positions: rest.points, triangles: rest.triangles };
+    const solid = { positions: rest.cageVertices, triangles: rest.cage.triangles, flat: true };
+    this.framed = joined([rest.points, rest.cageVertices]);
+    this.views = [
+      { title: 'Model in the cage', note: '', drawing: () => ({ surface: model, cage }) },
+      { title: 'Cage', note: '', drawing: () => ({ surface: solid, cage }) },
+    ];
+    document.title = `Cage: ${this.report.geometry.name ?? 'standard output'}`;
+  }
+
+  override render() {
+    if (!this.report) return nothing;
+    const { figures, geometry, program } = this.report;
+    return html`
+      <main>
+        <h1>Cage ${geometry.name ?? ''}</h1>
+        <p class="lead">
+          ${grouped(figures.vertices)} vertices and ${grouped(figures.faces)} triangles around a model of
+          ${grouped(geometry.mesh.of)} points.
+        </p>
+        ${(['warnings', 'findings', 'changes'] as const).map((name) => sentences(name, figures[name] ?? []))}
+        <report-views
+          class="large-views"
+          .views=${this.views}
+          .framed=${this.framed}
+          label="Model and cage"
+        ></report-views>
+        <h2>Figures</h2>
+        ${table(['', ''], 1, counts(figures))} ${design(figures.design)}
+        ${footer(html`Written by <code>cager cage</code> ${program}.`)}
+      </main>
+    `;
+  }
+}
+
+function sentences(title: string, all: readonly string[]) {
+  return all.length === 0
+    ? nothing
+    : html`<h2>${title[0].toUpperCase()}${title.slice(1)}</h2>
+        <ul>
+          ${all.map((sentence) => html`<li>${sentence}</li>`)}
+        </ul>`;
+}
+
+/** Every number and every yes or no of the report. */
+function counts(figures: CageFigures): string[][] {
+  return Object.entries(figures).flatMap(([key, value]) => {
+    const name = key.replaceAll('_', ' ');
+    if (typeof value === 'boolean') return [[name, value ? 'yes' : 'no']];
+    if (typeof value !== 'number') return [];
+    if (key === 'seconds') return [['time', seconds(value)]];
+    if (key === 'condition_number') return [[name, condition(value)]];
+    if (key === 'outside_distance') return [[name, `${percents(value, 3)} % of the diagonal`]];
+    return [[name, grouped(value)]];
+  });
+}
+
+function design(found: CageFigures['design']) {
+  if (!found) return nothing;
+  return html`
+    <h2>Design</h2>
+    <p>
+      ${found.style[0].toUpperCase()}${found.style.slice(1)} cage, designed from ${found.frames} frames and judged by as
+      many others. Errors are mean distances in percent of the diagonal.
+    </p>
+    ${table(
+      ['stage', 'vertices', 'error seen %', 'error not seen %', 'condition', 'after'],
+      1,
+      found.stages.map((stage) => [
+        stage.name,
+        grouped(stage.vertices),
+        percents(stage.designed_error, 4),
+        percents(stage.held_back_error, 4),
+        condition(stage.condition_number ?? null),
+        seconds(stage.seconds),
+      ]),
+    )}
+  `;
+}

@@ -1,0 +1,91 @@
+import { html, nothing } from 'lit';
+import { grouped } from '../../viewer/text';
+import type { Choice, Comparison } from '../data';
+import { percents, quoted } from '../text';
+
+/** Title, facts and advice. */
+export function summary({ capture, recommendation }: Comparison) {
+  const measured = capture.measured.length;
+  const frames = `${grouped(capture.frames)} frame${capture.frames === 1 ? '' : 's'}`;
+  const sampled = measured === capture.frames ? frames : `${frames} (${measured} of them, evenly spaced, are measured)`;
+  const model =
+    capture.triangles === 0
+      ? `a cloud of ${grouped(capture.points)} points`
+      : `${grouped(capture.points)} points and ${grouped(capture.triangles)} triangles`;
+  const bound = `${(100 * (recommendation.accurate - 1)).toFixed(0)} %`;
+  return html`
+    <h1>Ways to invert this capture, compared</h1>
+    <p class="lead">
+      <b>${capture.source}</b>: ${sampled} of ${model}; cage <b>${capture.cage}</b> of ${grouped(capture.cage_vertices)}
+      vertices and ${grouped(capture.cage_faces)} faces. Lengths are percentages of the diagonal of the rest pose's
+      bounding box (${capture.diagonal.toFixed(4)} in the capture's unit).
+    </p>
+    <div class="cards">
+      ${
+        recommendation.editing &&
+        card(
+          capture,
+          'For cages that people or programs work with',
+          recommendation.editing,
+          `The smoothest cages among the methods whose mean L2 is at most ${bound} above the lowest of the same coordinates: mean L2 ${percents(recommendation.editing.l2_mean, 3)} %, and ${smoothness(recommendation.editing)}.`,
+        )
+      }
+      ${
+        recommendation.accuracy &&
+        card(
+          capture,
+          'For the lowest error',
+          recommendation.accuracy,
+          `The lowest mean L2 of all methods here: ${percents(recommendation.accuracy.l2_mean, 3)} %; ${smoothness(recommendation.accuracy)}.`,
+        )
+      }
+    </div>
+    ${
+      capture.motion_mean === null
+        ? nothing
+        : html`<p>
+            The model's own points have a mean second difference of ${percents(capture.motion_mean, 4)} %: cages far
+            above it shake where the model does not.
+          </p>`
+    }
+  `;
+}
+
+function smoothness({ smoothness, smoothness_of }: Choice): string {
+  const value = percents(smoothness, 4);
+  return smoothness_of === 'second-difference'
+    ? `a cage vertex's mean second difference in time is ${value} %`
+    : `a cage edge's length changes by ${value} % of the mean length of the rest cage's edges on average (no three frames that follow each other were measured, so nothing is known of time)`;
+}
+
+function card(capture: Comparison['capture'], title: string, choice: Choice, why: string) {
+  const command = [
+    `cager encode --rest ${quoted(capture.rest)}`,
+    `--cage ${quoted(capture.cage)}${capture.flip_cage ? ' --flip-cage' : ''}`,
+    `--frames ${quoted(capture.source)}`,
+    choice.flags,
+    '-o out.cager',
+  ].join(' \\\n  ');
+  const copy = (event: Event) => {
+    const button = event.currentTarget as HTMLButtonElement;
+    const say = (text: string) => (button.textContent = text);
+    navigator.clipboard.writeText(command).then(
+      () => say('Copied'),
+      () => say('Select the text to copy it'),
+    );
+  };
+  return html`<article class="card">
+    <h3>${title}</h3>
+    <p class="choice">${choice.system}: ${choice.method}</p>
+    <p>${why}</p>
+    <pre tabindex="0"><code>${command}</code></pre>
+    <button @click=${copy}>Copy the command</button>
+  </article>`;
+}
+
+/** Systems that cannot be used with this cage. */
+export function refused({ systems }: Comparison) {
+  return systems
+    .filter((system) => system.refused !== null)
+    .map(({ name, refused }) => html`<p class="note"><b>${name}</b>: ${refused}.</p>`);
+}
