@@ -315,7 +315,9 @@ pub fn decode(
     let batch = |points: usize| memory.frames(12 * points, BATCH);
     let keeps = |points: usize, columns: usize| memory.keeps(points, columns, frames.div_ceil(batch(points)));
     let known = match wanted.first() {
-        Some(&frame) if own && layer == Layer::All => container.read_ahead(frame).map_err(fail)?,
+        Some(&frame) if own && layer == Layer::All && !dry_run && !salvage => {
+            container.read_ahead(frame).map_err(fail)?
+        }
         _ => None,
     };
     let BoundModel { rest, decoder, outside } = bind(&mut container, input, model, known, keeps)?;

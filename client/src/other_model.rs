@@ -12,8 +12,10 @@ use reqwest::multipart::Form;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
-/// Fewest bytes of a point in any format of meshes.
-const LEAST_POINT_BYTES: u64 = 3;
+/// Most points of a file with so many bytes: a GLB may show a mesh many times.
+fn most_points(bytes: usize) -> u64 {
+    (1 << 16) + 2 * bytes as u64
+}
 
 /// Another model, moved.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,7 +45,7 @@ impl Client {
             let request = request.header(ACCEPT, "application/octet-stream").multipart(form);
             let response = self.send_counted(request, &sent).await?;
             let outside = number(response.headers(), "cager-outside")?;
-            let most = (model.bytes.len() as u64 / LEAST_POINT_BYTES + 1).saturating_mul(12 * frames as u64);
+            let most = most_points(model.bytes.len()).saturating_mul(12 * frames as u64);
             let bytes = whole(self, response, most).await?;
             if !bytes.len().is_multiple_of(12 * frames.max(1)) {
                 return Err(self.broken(format!("{} bytes are no {frames} whole frames", bytes.len())));

@@ -15,6 +15,7 @@ use cager_core::mesh::{Model, Polygons, TriMesh};
 use cager_formats::{AtomicFile, Target, commit_together, model_bytes, obj_bytes, read_model};
 use cager_proto::report::DesignReport;
 use serde::Serialize;
+use std::borrow::Cow;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -130,7 +131,7 @@ impl Targets {
             let geometry = CageGeometry {
                 mesh: ShownMesh::new(model, args.up, SHOWN_POINTS),
                 cage: ShownCage::new(cage),
-                name: self.output.as_ref().map(Target::path).or(args.check.as_deref()),
+                name: self.output.as_ref().map(Target::path).or(args.check.as_deref()).map(Path::to_string_lossy),
             };
             let program = env!("CARGO_PKG_VERSION");
             let contents = Contents { kind: Kind::Cage, program, figures: report, geometry: &geometry };
@@ -146,7 +147,7 @@ impl Targets {
 struct CageGeometry<'a> {
     mesh: ShownMesh,
     cage: ShownCage,
-    name: Option<&'a Path>,
+    name: Option<Cow<'a, str>>,
 }
 
 /// Where a picture goes, which is a page.

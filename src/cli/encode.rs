@@ -46,6 +46,9 @@ pub(super) fn run(args: &EncodeArgs) -> Result<()> {
     match (&args.server, &cage) {
         (None, Some(cage)) => encode_locally(args, &targets, &files, &rest, cage, None, clock),
         (None, None) => {
+            // What is wrong with it is told before minutes of design.
+            matrix(&args.solver)?;
+            spectrum_bound(&args.solver)?;
             let (cage, report) = designed(args, &files, &rest)?;
             encode_locally(args, &targets, &files, &rest, &cage, Some(report), clock)
         }

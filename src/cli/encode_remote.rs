@@ -2,7 +2,7 @@
 
 use super::args::{EncodeArgs, SolverArgs, SpectrumArg};
 use super::coding_args::goal;
-use super::encode::{Targets, checked_solver, finish, sized_design};
+use super::encode::{Targets, checked_solver, design_options, finish, sized_design};
 use super::solver_options::{designed_spectrum, matrix, solver_for, spectrum_bound};
 use super::{plain, progress, tell, warn};
 use crate::coding::Goal;
@@ -29,12 +29,8 @@ pub(super) fn run(
     cage: Option<&Cage>,
     clock: Instant,
 ) -> Result<()> {
-    // Here, since a service designs before it sees what the frames cost.
-    let design = match cage {
-        Some(_) => DesignOptions::default(),
-        None => sized_design(args, &files, rest)?,
-    };
-    let frames = FileFrames::open(files)?;
+    design_options(args, rest.points.len())?;
+    let frames = FileFrames::open(files.clone())?;
     if !counted_from_zero(&frames.numbers()) {
         warn(&["a service numbers frames from 0; encode here to keep the numbers of the files".to_owned()]);
     }
@@ -73,6 +69,11 @@ pub(super) fn run(
         frame_rate: frames.frame_rate(),
         frames: frames.frames(),
         ..coding_options(goal(args, rest, frames.frames().unwrap_or(1) as usize)?, args.coding.exact_rest)
+    };
+    // Here, since a service designs before it sees what the frames cost.
+    let design = match cage {
+        Some(_) => DesignOptions::default(),
+        None => sized_design(args, &files, rest)?,
     };
     let bar = progress::frames("encoding", frames.frames().unwrap_or(0) as usize);
     let job = RemoteJob {

@@ -26,6 +26,7 @@ const CAGE_REACH: f64 = 4.0;
 /// The same for points; and beyond the second, offsets of models are kept with 16 bits.
 const OFFSET_REACH: f64 = 50.0;
 const LARGE_OFFSET: f64 = 0.5;
+const LARGEST_OVER_MEAN: f64 = 12.0;
 
 /// Everything that is drawn, in the unit of the capture.
 #[derive(Serialize)]
@@ -217,7 +218,8 @@ impl<'a> GeometryBuilder<'a> {
         let squares = moved.as_chunks::<3>().0.iter().map(|p| p.iter().map(|x| x * x).sum::<f64>());
         let (sum, most) = squares.fold((0.0, 0.0), |(sum, most): (f64, f64), x| (sum + x, most.max(x)));
         let [l2, linf] = [sum / (moved.len() / 3) as f64, most].map(|x| x.sqrt() / self.diagonal);
-        let bits = if linf > LARGE_OFFSET { 16 } else { 8 };
+        // With 8 bits a step is 1/128 of the largest offset, which is to stay below most of the others.
+        let bits = if linf > LARGE_OFFSET || linf > LARGEST_OVER_MEAN * l2 { 16 } else { 8 };
         let shown = self.geometry.mesh.pick(&moved);
         (Quantised::new(&shown, bits, Box3::around_zero(OFFSET_REACH * self.diagonal)), [l2, linf])
     }

@@ -124,7 +124,8 @@ impl<R: Read + Seek> ContainerReader<R> {
     }
 
     /// Decodes what a frame of a coded file needs before its cage is read, the coordinates of the model beside the residual of its group: these are most
-    /// of the work, and each keeps a processor busy. The coordinates of all points, where the basis of the cages took them all.
+    /// of the work, and each keeps a processor busy. The coordinates of all points, where the basis of the cages took them all; nothing where there are no
+    /// coordinates, which whoever binds the model can say best.
     ///
     /// # Errors
     /// A frame that does not exist; damage.
@@ -134,7 +135,7 @@ impl<R: Read + Seek> ContainerReader<R> {
             return Ok(None);
         }
         let rotated = self.coded_entry(entry)?.is_rotated()?;
-        let binding = self.binding(entry.offset)?;
+        let Ok(binding) = self.binding(entry.offset) else { return Ok(None) };
         let rest = self.rest()?;
         let residual = match self.residual_entry(frame) {
             Some(entry) => Some((entry, self.coded_payload(entry)?)),
@@ -151,7 +152,7 @@ impl<R: Read + Seek> ContainerReader<R> {
                 })
             },
         );
-        let (basis, coordinates) = basis?;
+        let Ok((basis, coordinates)) = basis else { return Ok(None) };
         self.groups.basis = Some(basis);
         if let Some(found) = residual {
             let (hierarchy, residual) = found?;
@@ -209,7 +210,10 @@ impl<R: Read + Seek> ContainerReader<R> {
             let hierarchy = self.hierarchy()?;
             let (residual, after) = rayon::join(
                 || section.residual(hierarchy, entry.header.count, most),
-                || after.and_then(|(of, section)| Some((of, section.residual(hierarchy, of.header.count, most).ok()?))),
+                || {
+                    let (of, section) = after?;
+                    Some((of, section.residual(hierarchy, of.header.count, most.min(MOST_AHEAD)).ok()?))
+                },
             );
             self.groups.residuals.push((entry, residual?));
             self.groups.residuals.extend(after);
@@ -243,6 +247,9 @@ impl<R: Read + Seek> ContainerReader<R> {
         Ok(())
     }
 }
+
+/// Most numbers of a residual that is decoded before it is asked for: all of any group that this program writes.
+const MOST_AHEAD: usize = 1 << 24;
 
 /// Most numbers of a residual's components in a file of so many bytes: what reading them takes four times.
 pub fn most_residual_numbers(file_bytes: u64) -> usize {
