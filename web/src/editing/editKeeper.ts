@@ -1,6 +1,7 @@
+import { holdName } from '../heldName';
 import type { Player } from '../viewer/player';
 import type { CageEdit } from './cageEdit';
-import { identityOf, keepEdits, keptEdits, type KeptEdits, type Keeping } from './keptEdits';
+import { hasKeptEdits, identityOf, keepEdits, keptEdits, type KeptEdits, type Keeping } from './keptEdits';
 
 /** Milliseconds after the last change until edits are written. */
 const REST = 300;
@@ -15,7 +16,12 @@ export class EditKeeper {
   private key: string | null = null;
   private isChanged = false;
   private timer = 0;
-  private readonly found: Promise<void>;
+  private isClosed = false;
+  /** What is done last: looking for edits, then one writing after another. */
+  private last: Promise<void>;
+  private held: Promise<void> | null = null;
+  /** Lets other tabs keep edits of the capture. */
+  private readonly ending = new AbortController();
   private readonly flush = () => {
     if (document.hidden) void this.write();
   };
@@ -25,7 +31,7 @@ export class EditKeeper {
     private readonly player: Player,
     private readonly onChange: () => void,
   ) {
-    this.found = this.find();
+    this.last = this.find();
     // Also before a page is closed, and early enough for the database to write.
     document.addEventListener('visibilitychange', this.flush);
   }
@@ -55,31 +61,67 @@ export class EditKeeper {
 
   /** Writes what is still to be written, and ends. */
   close() {
+    this.isClosed = true;
     document.removeEventListener('visibilitychange', this.flush);
-    void this.write();
+    if (this.keeping === 'elsewhere') this.ending.abort();
+    void this.write().finally(() => this.ending.abort());
   }
 
   private async find() {
-    this.offer = await keptEdits(this.player.capture);
-    if (this.offer) this.onChange();
+    try {
+      // Captures are not read for what is not there.
+      if (!(await hasKeptEdits())) return;
+      this.key = await identityOf(this.player.capture);
+      if (this.key !== null && (await this.keptOf(this.key))) await this.hold(this.key);
+    } catch {
+      // What cannot be found now is looked for again before something is written.
+    }
   }
 
-  private async write() {
+  /** Holds the kept edits of the capture for this tab alone; what other tabs have kept until then is offered. */
+  private hold(key: string): Promise<void> {
+    return (this.held ??= holdName(`cager-edits ${key}`, this.ending.signal, this.wait).then(async () => {
+      this.offer = await this.keptOf(key);
+      if (this.offer) this.onChange();
+      this.say('kept');
+    }));
+  }
+
+  private readonly wait = () => {
+    if (this.isClosed) this.ending.abort();
+    else this.say('elsewhere');
+  };
+
+  private keptOf(key: string) {
+    return keptEdits(key, this.player.capture.static.cage.positions.length / 3);
+  }
+
+  /** Writes after everything that is being written, so that the newest edits are those that stay. */
+  private write(): Promise<void> {
     clearTimeout(this.timer);
-    await this.found;
+    return (this.last = this.last.then(() => this.writeNow()));
+  }
+
+  private async writeNow() {
     if (!this.isChanged) return;
-    this.isChanged = false;
-    // What is offered stays until it is answered.
-    const edits = [...(this.offer?.edits ?? []), ...this.edits];
     let keeping: Keeping = 'refused';
     try {
       this.key ??= await identityOf(this.player.capture);
-      if (this.key !== null) keeping = await keepEdits(this.key, edits);
+      if (this.key !== null) {
+        await this.hold(this.key);
+        this.isChanged = false;
+        // What is offered stays until it is answered.
+        keeping = await keepEdits(this.key, [...(this.offer?.edits ?? []), ...this.edits]);
+      }
     } catch {
-      // The source of the capture is gone: there is nothing to know it by.
+      // The source of the capture is gone, and there is nothing to know it by; or the page may hold no names.
     }
+    this.say(keeping);
+  }
+
+  private say(keeping: Keeping) {
     const isNews = keeping !== (this.keeping ?? 'kept');
     this.keeping = keeping;
-    if (isNews) this.onChange();
+    if (isNews && !this.isClosed) this.onChange();
   }
 }

@@ -216,7 +216,9 @@ export class EditPanel extends LitElement {
             ${
               this.keeping === 'large'
                 ? 'These edits take too much room to be kept in the browser'
-                : 'This browser keeps nothing for this page'
+                : this.keeping === 'elsewhere'
+                  ? 'These edits are not kept while another tab keeps its own of this capture'
+                  : 'This browser keeps nothing for this page'
             }:
             export them before you leave it.
           </p>`

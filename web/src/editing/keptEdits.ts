@@ -24,8 +24,11 @@ export interface KeptEdits {
   readonly edits: readonly CageEdit[];
 }
 
-/** `kept`: they are there after a reload. `large`: they take more room than one capture is given. `refused`: the browser keeps nothing here. */
-export type Keeping = 'kept' | 'large' | 'refused';
+/**
+ * `kept`: they are there after a reload. `large`: they take more room than one capture is given. `elsewhere`: another tab keeps its edits of the
+ * capture, and these would take their place. `refused`: the browser keeps nothing here.
+ */
+export type Keeping = 'kept' | 'large' | 'elsewhere' | 'refused';
 
 /** What a capture is known by when the page is loaded anew: the session, or the name, the length and the ends of its container. */
 export async function identityOf(capture: Capture): Promise<string | null> {
@@ -38,15 +41,19 @@ export async function identityOf(capture: Capture): Promise<string | null> {
   return ['file', capture.name, size, crc32c(tail, crc32c(head)).toString(16)].join(' ');
 }
 
-/** The edits of a capture that were kept; null where there are none that fit its cage. */
-export async function keptEdits(capture: Capture): Promise<KeptEdits | null> {
+/** Whether there are kept edits of any capture. */
+export async function hasKeptEdits(): Promise<boolean> {
   try {
-    // Captures are not read for what is not there.
-    const count = await inStore('readonly', (store) => store.count());
-    const key = count > 0 ? await identityOf(capture) : null;
-    if (key === null) return null;
+    return (await inStore('readonly', (store) => store.count())) > 0;
+  } catch {
+    return false;
+  }
+}
+
+/** The edits of a capture that were kept; null where there are none that fit its cage, which has so many vertices. */
+export async function keptEdits(key: string, vertices: number): Promise<KeptEdits | null> {
+  try {
     const found = await inStore('readonly', (store) => store.get(key) as IDBRequest<KeptEdits | undefined>);
-    const vertices = capture.static.cage.positions.length / 3;
     const edits = found?.edits.filter((edit) => isUsable(edit, vertices)) ?? [];
     return found && edits.length > 0 ? { ...found, edits } : null;
   } catch {

@@ -148,7 +148,9 @@ function blended(all: Float32Array, frames: number): (place: number) => Float32A
 function errorChart(title: string, label: string, color: string, errors: readonly Figure[]): ChartOptions {
   const known = errors.filter((error) => error !== null);
   const positive = known.filter((error) => error > 0);
-  const cover: Cover = Math.max(...positive) > LINEAR_SPAN * Math.min(...positive) ? 'log' : 'zero';
+  const largest = positive.reduce((a, b) => Math.max(a, b), 0);
+  const least = positive.reduce((a, b) => Math.min(a, b), Infinity);
+  const cover: Cover = largest > LINEAR_SPAN * least ? 'log' : 'zero';
   const mean = known.length === 0 ? null : (100 * known.reduce((sum, error) => sum + error, 0)) / known.length;
   const last = Math.max(0, errors.length - 1);
   return {

@@ -294,6 +294,7 @@ export class Views extends LitElement {
     for (const canvas of this.shown.keys()) this.visible.add(canvas);
     this.paint(1);
     const canvases = [...this.shown.keys()];
+    if (canvases.length === 0) return;
     const [width, height] = [canvases[0].width, canvases[0].height];
     const columns = Math.ceil(Math.sqrt(canvases.length));
     const sheet = document.createElement('canvas');

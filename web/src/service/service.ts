@@ -162,7 +162,7 @@ async function checkLength(response: Response, expected: number): Promise<void> 
 }
 
 /** Ends with the caller's signal, or after a while: a network that is lost answers nothing and ends nothing. */
-function patiently(signal: AbortSignal | undefined): AbortSignal {
+export function patiently(signal?: AbortSignal): AbortSignal {
   const timeout = AbortSignal.timeout(1000 * PATIENCE_SECONDS);
   return signal ? AbortSignal.any([signal, timeout]) : timeout;
 }

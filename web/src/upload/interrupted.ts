@@ -1,12 +1,12 @@
 import { html, nothing } from 'lit';
-import { type Session, unsolved } from '../service/messages';
+import { unsolved } from '../service/messages';
 import { ServiceProblem, problemBehind } from '../service/problem';
 import type { Service } from '../service/service';
 import * as glyphs from '../sessions/glyphs';
 import { age, count, counted } from '../sessions/text';
 import { type FileMark, type FileMarks, difference, shareNames } from './fileMarks';
 import { type KeptUpload, unfinishedUploads } from './keptUpload';
-import { removeDesign } from './motionCage';
+import { readDesign, removeDesign } from './motionCage';
 
 /** An upload that was broken off when its page was closed. */
 export interface Interrupted {
@@ -34,8 +34,9 @@ export function fittingOf(uploads: readonly Interrupted[], marks: FileMarks) {
 export async function interruptedUploads(service: Service, onFreed: () => void): Promise<Interrupted[]> {
   const found: Interrupted[] = [];
   for (const kept of await unfinishedUploads(service.address(''), onFreed)) {
-    const { session, frames } = kept.present;
-    const present = session === null ? null : await sessionOf(service, session);
+    const { session, design, frames } = kept.present;
+    if (session === null && design !== null && (await answerOf(readDesign(service, design))) === 'gone') continue;
+    const present = session === null ? null : await answerOf(service.session(session));
     if (present === 'gone') continue;
     if (present?.state === 'completed' || present?.state === 'failed') {
       kept.forget();
@@ -55,10 +56,10 @@ export async function deleteInterrupted(service: Service, { kept }: Interrupted)
   kept.forget();
 }
 
-/** A session; `gone` where it was deleted or belongs to another token, null where the service does not answer now. */
-async function sessionOf(service: Service, id: string): Promise<Session | 'gone' | null> {
+/** A session or a design; `gone` where it was deleted or belongs to another token, null where the service does not answer now. */
+async function answerOf<T>(asked: Promise<T>): Promise<T | 'gone' | null> {
   try {
-    return await service.session(id);
+    return await asked;
   } catch (error) {
     const problem = problemBehind(error);
     return problem instanceof ServiceProblem && problem.isGone ? 'gone' : null;

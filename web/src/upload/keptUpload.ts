@@ -1,5 +1,6 @@
 /** What is kept of an upload until it is over, so that it can go on after the page was closed. Never the token. */
 
+import { holdName } from '../heldName';
 import type { FileMarks } from './fileMarks';
 import type { Choices } from './optionsForm';
 
@@ -24,7 +25,7 @@ export interface UploadRecord {
 
 /** The record of one upload, in the storage of the page; in memory alone where the browser keeps nothing. */
 export class KeptUpload {
-  #release: () => void = () => undefined;
+  #sending = new AbortController();
 
   constructor(private record: UploadRecord) {}
 
@@ -43,15 +44,15 @@ export class KeptUpload {
     guarded(() => localStorage.removeItem(PREFIX + this.record.key));
   }
 
-  /** Says to the other tabs that this one sends it, until {@link release}; browsers let go of it when the page is closed. */
+  /** Says to the other tabs that this one sends it, until {@link release}. */
   hold(): void {
-    const held = new Promise<void>((resolve) => (this.#release = resolve));
-    // Without a secure connection there are no locks, and every tab offers to go on.
-    void (navigator.locks as LockManager | undefined)?.request(PREFIX + this.record.key, () => held);
+    this.#sending = new AbortController();
+    // Where browsers have no locks, or give none, every tab offers to go on.
+    holdName(PREFIX + this.record.key, this.#sending.signal).catch(() => undefined);
   }
 
   release(): void {
-    this.#release();
+    this.#sending.abort();
   }
 }
 

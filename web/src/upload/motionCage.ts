@@ -3,7 +3,7 @@
 import { followProgress } from '../service/events';
 import type { CageDesign, DesignOptions, DesignProgress } from '../service/messages';
 import { ServiceProblem, problemBehind, problemFrom } from '../service/problem';
-import type { Service } from '../service/service';
+import { type Service, patiently } from '../service/service';
 import type { FrameSource } from './frameSource';
 import type { KeptUpload } from './keptUpload';
 
@@ -137,6 +137,10 @@ async function followDesign(
 async function bestCage(service: Service, id: string, signal: AbortSignal): Promise<File> {
   const response = await service.request(`${pathOf(id)}/cage.obj`, { cache: 'no-store', signal });
   return new File([await response.blob()], 'cage.obj');
+}
+
+export function readDesign(service: Service, id: string): Promise<CageDesign> {
+  return service.json(pathOf(id), { cache: 'no-store', signal: patiently() });
 }
 
 /** Deletes a design; that it could not be is no failure. */

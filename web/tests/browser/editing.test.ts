@@ -311,6 +311,34 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
     expect(watched?.errors).toEqual([]);
   });
 
+  it('of two tabs with the same capture one keeps edits, and the other one says so until it is closed', async () => {
+    const first = await editing(12);
+    await dragVertex(first, 60, -30);
+    await first.waitForTimeout(600);
+    const context = first.context();
+    const open = async () => {
+      const page = await context.newPage();
+      await page.goto(`${site.page}#/session/${session}?frame=12`);
+      await whenShown(page);
+      return page;
+    };
+    const second = await open();
+    await second.keyboard.press('e');
+    const sentence = second.getByText('not kept while another tab keeps its own');
+    await sentence.waitFor();
+    await dragVertex(second, -40, 10);
+    await second.waitForTimeout(600);
+    expect(await second.locator('cager-kept-offer').count()).toBe(0);
+    await first.close();
+    // What the first tab kept is still there, and from now on the second one keeps its own beside it.
+    await second.getByText(/An edit from .* is still in this browser/).waitFor();
+    await expect.poll(() => sentence.count()).toBe(0);
+    await second.waitForTimeout(600);
+    await second.close();
+    await (await open()).getByText(/2 edits from .* are still in this browser/).waitFor();
+    expect(watched?.errors).toEqual([]);
+  });
+
   it('a browser that keeps nothing says so, and edits all the same', async () => {
     watched = await openPage(site.browser, 'about:blank');
     const { page } = watched;

@@ -259,10 +259,11 @@ describe.skipIf(missing)('an upload', { timeout: 60_000 }, () => {
 
 describe.skipIf(missing)('an upload that was broken off', { timeout: 60_000 }, () => {
   const TOKEN = 'a-token-for-tests-alone';
+  const OTHER_TOKEN = 'another-token-for-tests-alone';
   let site: Site;
 
   beforeAll(async () => {
-    site = await Site.start({ studio: TOKEN });
+    site = await Site.start({ studio: TOKEN, neighbour: OTHER_TOKEN });
   }, 120_000);
 
   afterAll(() => site.close());
@@ -316,15 +317,46 @@ describe.skipIf(missing)('an upload that was broken off', { timeout: 60_000 }, (
     await close();
   });
 
+  async function signIn(tab: Page, token = TOKEN): Promise<void> {
+    await tab.getByLabel('Access token').fill(token);
+    await tab.keyboard.press('Enter');
+    await tab.getByRole('heading', { name: 'Upload a capture' }).waitFor();
+  }
+
+  test('during_its_design_is_shown_to_those_alone_whose_design_it_is', async () => {
+    const large = new SphereCapture(4);
+    const { page, close } = await openPage(site.browser, `${site.page}#/upload`, ['401', '404']);
+    page.on('dialog', (dialog) => void dialog.accept());
+    await signIn(page);
+    await drop(page, { 'rest.obj': large.rest, 'wave.npy': large.npy(24) });
+    await page.getByLabel('Cage', { exact: true }).selectOption('motion');
+    await page.getByLabel('Vertices of the cage, at most').fill('300');
+    await page.getByRole('button', { name: 'Encode' }).click();
+    await expect
+      .poll(() => page.evaluate(() => JSON.stringify(Object.entries(localStorage))))
+      .toMatch(/\\"design\\":\\"/);
+    const context = page.context();
+    await page.close();
+    const open = async (token: string) => {
+      const tab = await context.newPage();
+      await tab.goto(`${site.page}#/upload`);
+      await signIn(tab, token);
+      return tab;
+    };
+    const other = await open(OTHER_TOKEN);
+    await other.waitForTimeout(500);
+    expect(await other.getByRole('heading', { name: /was interrupted/ }).count()).toBe(0);
+    const own = await open(TOKEN);
+    await own.getByRole('heading', { name: '“wave” was interrupted' }).waitFor();
+    await own.getByRole('button', { name: 'Forget it' }).click();
+    await expect.poll(() => own.getByRole('heading', { name: /was interrupted/ }).count()).toBe(0);
+    await close();
+  });
+
   test('by_closing_the_page_can_be_deleted_from_another_one', async () => {
     const large = new SphereCapture(4);
     const { page, close } = await openPage(site.browser, `${site.page}#/upload`, ['401']);
     page.on('dialog', (dialog) => void dialog.accept());
-    const signIn = async (tab: Page) => {
-      await tab.getByLabel('Access token').fill(TOKEN);
-      await tab.keyboard.press('Enter');
-      await tab.getByRole('heading', { name: 'Upload a capture' }).waitFor();
-    };
     await signIn(page);
     await slow(page, { uploadThroughput: 1 << 20 });
     const files = { 'rest.obj': large.rest, 'cage.obj': large.cage, 'wave.npy': large.npy(4) };

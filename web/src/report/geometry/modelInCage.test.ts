@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { RestPose, scaleTop } from './modelInCage';
+import { RestPose, joined, scaleTop } from './modelInCage';
 
 const base64 = (values: ArrayBufferView) =>
   Buffer.from(values.buffer, values.byteOffset, values.byteLength).toString('base64');
@@ -32,9 +32,17 @@ describe('the rest pose of a report', () => {
   });
 });
 
+it('positions are joined in their order', () => {
+  expect([...joined([Float32Array.of(1, 2, 3), new Float32Array(0), Float32Array.of(4, 5, 6)])]).toEqual([
+    1, 2, 3, 4, 5, 6,
+  ]);
+  expect(joined([]).length).toBe(0);
+});
+
 describe('the top of a colour scale', () => {
   it('is not set by a spike, nor by nothing', () => {
     expect(scaleTop([new Float32Array(1000).fill(0.5).fill(1e6, 0, 3)])).toBe(0.5);
+    expect(scaleTop([Float32Array.of(1, NaN), Float32Array.of(Infinity, 3)])).toBe(1);
     expect(scaleTop([])).toBe(1);
     expect(scaleTop([new Float32Array(4)])).toBe(1);
   });

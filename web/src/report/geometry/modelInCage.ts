@@ -68,9 +68,15 @@ function middleOf(positions: Float32Array): number[] {
   });
 }
 
-/** Positions one after another. */
+/** Numbers one list after another. */
 export function joined(all: readonly Float32Array[]): Float32Array {
-  return Float32Array.from(all.flatMap((positions) => [...positions]));
+  const found = new Float32Array(all.reduce((sum, { length }) => sum + length, 0));
+  let at = 0;
+  for (const positions of all) {
+    found.set(positions, at);
+    at += positions.length;
+  }
+  return found;
 }
 
 /** Length of each vector. */
@@ -82,7 +88,7 @@ export function lengths(vectors: Float32Array): Float32Array {
 
 /** The value that all but a hundredth of the given ones stay below, so that one spike does not darken the rest; 1 where all are 0. */
 export function scaleTop(values: readonly Float32Array[]): number {
-  const all = Float32Array.from(values.flatMap((of) => [...of]).filter(Number.isFinite)).sort();
+  const all = joined(values).filter(Number.isFinite).sort();
   const top = all.at(Math.floor((all.length - 1) * 0.99)) ?? 0;
   return top > 0 ? top : 1;
 }
