@@ -52,7 +52,7 @@ pub(super) fn run(args: &EncodeArgs) -> Result<()> {
             let (cage, report) = designed(args, &files, &rest)?;
             encode_locally(args, &targets, &files, &rest, &cage, Some(report), clock)
         }
-        (Some(address), cage) => encode_remote::run(args, &targets, address, files, &rest, cage.as_ref(), clock),
+        (Some(address), cage) => encode_remote::run(args, &targets, address, &files, &rest, cage.as_ref(), clock),
     }
 }
 

@@ -24,7 +24,7 @@ pub(super) fn run(
     args: &EncodeArgs,
     targets: &Targets,
     address: &str,
-    files: CaptureFiles,
+    files: &CaptureFiles,
     rest: &Model,
     cage: Option<&Cage>,
     clock: Instant,
@@ -73,7 +73,7 @@ pub(super) fn run(
     // Here, since a service designs before it sees what the frames cost.
     let design = match cage {
         Some(_) => DesignOptions::default(),
-        None => sized_design(args, &files, rest)?,
+        None => sized_design(args, files, rest)?,
     };
     let bar = progress::frames("encoding", frames.frames().unwrap_or(0) as usize);
     let job = RemoteJob {
