@@ -123,7 +123,7 @@ impl Coder for Encoder {
 const PAST: u32 = 2;
 
 /// Reads what the encoder of `constriction` wrote. A digit is 0 or 1, so that one comparison says which, where that crate's decoder for any alphabet divides by
-/// the range: half of the time of decoding. Past the end it goes on with zeros until it is checked; what reads checks that numbers are possible.
+/// the range. Past the end it goes on with zeros until it is checked; what reads checks that numbers are possible.
 pub(crate) struct Decoder<'a> {
     words: std::slice::Iter<'a, [u8; 4]>,
     /// Words read past the end.

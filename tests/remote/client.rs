@@ -67,7 +67,7 @@ async fn cages_can_be_followed_decoded_and_downloaded() {
     dir.cager("decode there.cager -o decoded.npy").succeeds();
     let decoded: Vec<f32> = read_frames(&dir.path("decoded.npy"), points).concat().iter().map(|&x| x as f32).collect();
     assert_eq!(decoded, positions);
-    // The same model as if it were another one, and one that is none.
+    // The session's own model as another one, and a file that is no model.
     let rest = MeshFile::new("other.obj", dir.read("rest.obj"));
     let moved = client.decode_model(id, &rest, &cages.concat()).await.expect("positions");
     assert_eq!((moved.outside, moved.positions), (0, positions));

@@ -1,6 +1,7 @@
 import { html, LitElement, nothing, type PropertyValues } from 'lit';
 import { customElement, property, state } from 'lit/decorators.js';
 import { glyph } from '../viewer/glyphs';
+import { picturePanelStyle } from '../style/picturePanel';
 import { controls } from '../style/tokens';
 import { editRow } from './editRow';
 import { editPanelStyle } from './editPanelStyle';
@@ -35,7 +36,7 @@ const TOOLS: readonly (readonly [MotionKind, string])[] = [
  */
 @customElement('cager-edit-panel')
 export class EditPanel extends LitElement {
-  static override styles = [controls, editPanelStyle];
+  static override styles = [controls, picturePanelStyle, editPanelStyle];
 
   @property({ attribute: false }) editor!: CageEditor;
   /** What exported files are named after. */

@@ -69,7 +69,7 @@ export class EditPointer {
     return this.gesture?.kind === 'drag' ? this.gesture.constraint : this.pointed;
   }
 
-  /** The angle or the factor of the drag that goes on; null where there is none. */
+  /** The angle or the factor of the drag that goes on; null without a drag. */
   get amount(): { readonly kind: MotionKind; readonly amount: number } | null {
     const { gesture } = this;
     return gesture?.kind === 'drag' && gesture.amount !== null ? { kind: gesture.tool, amount: gesture.amount } : null;

@@ -50,7 +50,7 @@ export async function hasKeptEdits(): Promise<boolean> {
   }
 }
 
-/** The edits of a capture that were kept; null where there are none that fit its cage, which has so many vertices. */
+/** The kept edits of a capture whose cage has so many vertices; null if nothing was kept, or for another cage. */
 export async function keptEdits(key: string, vertices: number): Promise<KeptEdits | null> {
   try {
     const found = await inStore('readonly', (store) => store.get(key) as IDBRequest<KeptEdits | undefined>);

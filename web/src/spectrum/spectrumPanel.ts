@@ -2,6 +2,7 @@ import { html, LitElement, nothing, unsafeCSS, type PropertyValues } from 'lit';
 import { customElement, property, query } from 'lit/decorators.js';
 import type uPlot from 'uplot';
 import uPlotStyle from 'uplot/dist/uPlot.min.css?inline';
+import { picturePanelStyle } from '../style/picturePanel';
 import { controls } from '../style/tokens';
 import { glyph } from '../viewer/glyphs';
 import { grouped, threeDigits } from '../viewer/text';
@@ -21,7 +22,7 @@ const AXES = ['x', 'y', 'z'] as const;
  */
 @customElement('cager-spectrum-panel')
 export class SpectrumPanel extends LitElement {
-  static override styles = [controls, unsafeCSS(uPlotStyle), spectrumPanelStyle];
+  static override styles = [controls, unsafeCSS(uPlotStyle), picturePanelStyle, spectrumPanelStyle];
 
   @property({ attribute: false }) view!: SpectrumView;
   /** Changes when colours do: the chart is drawn anew. */

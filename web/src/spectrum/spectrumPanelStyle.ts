@@ -1,47 +1,7 @@
 import { css } from 'lit';
 
-/** Beside the model in a wide picture, above the timeline in a narrow one; the viewer says how high that is. */
+/** What the panel of singular values holds. */
 export const spectrumPanelStyle = css`
-  :host {
-    position: absolute;
-    z-index: 2;
-    left: var(--cager-space-3);
-    top: calc(var(--cager-space-3) + 62px);
-    bottom: calc(var(--deck-height, 120px) + var(--cager-space-3));
-    width: 300px;
-    display: flex;
-    pointer-events: none;
-  }
-  .panel {
-    pointer-events: auto;
-    align-self: flex-start;
-    width: 100%;
-    max-height: 100%;
-    display: flex;
-    flex-direction: column;
-    background: color-mix(in srgb, var(--cager-surface) 95%, transparent);
-    border: 1px solid color-mix(in srgb, var(--cager-line) 75%, transparent);
-    border-radius: var(--cager-radius-large);
-    box-shadow: var(--cager-shadow);
-    font-size: 13px;
-  }
-  header {
-    display: flex;
-    align-items: center;
-    padding: 4px 4px 4px var(--cager-space-3);
-    border-bottom: 1px solid var(--cager-line);
-  }
-  h2 {
-    flex: 1;
-    margin: 0;
-    font-size: 14px;
-    font-weight: 650;
-  }
-  .body {
-    overflow: hidden auto;
-    padding: var(--cager-space-2) var(--cager-space-3) var(--cager-space-3);
-    min-height: 0;
-  }
   .chart {
     height: 132px;
     cursor: crosshair;

@@ -19,7 +19,7 @@ const ROLE_WORDS: Readonly<Record<Role, string>> = {
   unused: 'Not used',
 };
 
-/** Where files are dropped; large, with what they may be, as long as there are none. */
+/** Where files are dropped; large, with what they may be, until the first is there. */
 export function dropZone(isOver: boolean, isFirst: boolean, { onFiles, onFolder, onStartOver }: ChoosingFiles) {
   return html`
     <div class="zone ${isOver ? 'over' : ''} ${isFirst ? '' : 'small'}">

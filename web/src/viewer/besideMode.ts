@@ -78,7 +78,7 @@ export class BesideMode {
     }
   }
 
-  /** To be called after every render: fills the second picture, or forgets it where there is none. */
+  /** To be called after every render: fills the second picture, or forgets it when only one is shown. */
   follow() {
     const { player, beside } = this.host;
     const pane = this.host.renderRoot.querySelector<HTMLElement>('.pane.second');

@@ -18,7 +18,7 @@ export interface OpenerHost {
 
 /** Opens the captures of files and addresses; the one that was asked for last is shown. */
 export class Opener {
-  /** Name of the capture that is being opened; null while there is none. */
+  /** Name of the capture that is being opened; null otherwise. */
   name: string | null = null;
   /** Why nothing can be shown. */
   failure: string | null = null;
