@@ -14,6 +14,8 @@ const PHONE = { width: 390, height: 844 };
 /** Where the demo is well bent. */
 const FRAME = 40;
 const READY_MS = 90_000;
+/** Edits the cage: chooses a vertex and moves it. */
+const EDITING = ['e', 'Enter', 'Shift+ArrowUp', 'Shift+ArrowUp', 'Shift+ArrowUp'];
 
 interface Picture {
   readonly name: string;
@@ -42,6 +44,7 @@ try {
     { name: 'viewer-light', ...viewer, viewport: DESKTOP, colorScheme: 'light', keys: ['4'] },
     { name: 'viewer-dark', ...viewer, viewport: DESKTOP, colorScheme: 'dark', keys: ['i'] },
     { name: 'viewer-phone', ...viewer, viewport: PHONE, colorScheme: 'dark' },
+    { name: 'editing-light', ...viewer, viewport: DESKTOP, colorScheme: 'light', keys: EDITING },
     { name: 'list-light', ...list, viewport: DESKTOP, colorScheme: 'light' },
     { name: 'list-phone', ...list, viewport: PHONE, colorScheme: 'dark' },
     { name: 'upload-dark', ...upload, viewport: DESKTOP, colorScheme: 'dark' },
