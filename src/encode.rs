@@ -354,7 +354,7 @@ fn prepare(
         tell(step);
         ControlFlow::Continue(())
     };
-    let preparing = Preparing { term: job.term, stores_coordinates, next: &next };
+    let preparing = Preparing { term: job.term, stores_coordinates, next: &next, ..Preparing::default() };
     let term = preparing.term(options)?;
     let chosen_by = job.choose.as_ref().filter(|choose| !choose.samples.is_empty());
     let Some(ChooseSpectrum { samples, bound }) = chosen_by else {

@@ -2,6 +2,7 @@
 //! correlation of positions. Deformation changes these far less than a mix-up does.
 
 use cager_core::mesh::{Model, Point, bounds};
+use cager_core::vector::distance;
 use std::fmt;
 
 /// Number of evenly spaced frames to compare.
@@ -237,10 +238,6 @@ impl AxisScores {
     fn clearly(better: f64, worse: f64) -> bool {
         better > 0.8 && 1.0 - worse > 3.0 * (1.0 - better)
     }
-}
-
-fn distance(a: Point, b: Point) -> f64 {
-    (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
 }
 
 /// Lower quartile, median and upper quartile; `None` for an empty set or infinite values.

@@ -13,6 +13,7 @@ mod simd;
 mod spectrum;
 pub mod svd;
 pub mod synthetic;
+pub mod vector;
 
 /// Version of the preparation of solvers: stored solvers of another version are recomputed. Decoding a container depends on
 /// [`coordinates::DEFINITION`] alone.

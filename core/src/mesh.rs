@@ -1,5 +1,7 @@
 //! Meshes as plain data.
 
+use crate::vector::{cross, dot, norm, sub};
+
 /// A point or vector in space.
 pub type Point = [f64; 3];
 
@@ -123,7 +125,7 @@ pub fn bounds(points: &[Point]) -> (Point, Point) {
 /// Length of the bounding box's diagonal: the unit of every error in a report.
 pub fn diagonal(points: &[Point]) -> f64 {
     let (low, high) = bounds(points);
-    (0..3).map(|k| (high[k] - low[k]).powi(2)).sum::<f64>().sqrt()
+    norm(sub(high, low))
 }
 
 /// Generalised winding number of a closed triangle mesh around `x`: 1 inside, 0 outside (Van Oosterom and Strackee 1983).
@@ -163,20 +165,4 @@ fn distance2_to_segment(p: Point, q: Point, x: Point) -> f64 {
     let t = (dot(w, e) / dot(e, e).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
     let r = [w[0] - t * e[0], w[1] - t * e[1], w[2] - t * e[2]];
     dot(r, r)
-}
-
-pub(crate) fn sub(a: Point, b: Point) -> Point {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-pub(crate) fn dot(a: Point, b: Point) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-pub(crate) fn cross(a: Point, b: Point) -> Point {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-pub(crate) fn norm(a: Point) -> f64 {
-    dot(a, a).sqrt()
 }

@@ -267,7 +267,8 @@ mod tests {
     use std::collections::HashMap;
 
     use super::*;
-    use crate::mesh::{cross, dot, sub, winding_number};
+    use crate::mesh::winding_number;
+    use crate::vector::{cross, dot, sub};
 
     fn capture(points: usize, cage_vertices: usize) -> Capture {
         Capture::new(&Options { points, frames: 12, cage_vertices })

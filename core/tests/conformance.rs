@@ -9,6 +9,7 @@ mod common;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Coordinates, CoordinatesError, Green, Harmonic, MeanValue};
 use cager_core::mesh::{Point, diagonal, distance_to_surface, winding_number};
+use cager_core::vector::{along, combination, cross, mean, norm, sub};
 use common::{Random, cages, cages_of, thin_cages};
 use faer::Mat;
 
@@ -250,12 +251,12 @@ fn probes(promises: Promises, cage: &Cage) -> Vec<Point> {
             *w = 0.0;
         }
         let total: f64 = weights.iter().sum();
-        let on = [0, 1, 2].map(|c| (0..3).map(|i| weights[i] / total * face[i][c]).sum::<f64>());
+        let on = combination(weights.map(|w| w / total), face);
         points.push(on);
         for exponent in [-12, -11, -10, -8, -6, -4] {
             let direction = random.direction();
             let distance = size * 10f64.powi(exponent);
-            points.push([0, 1, 2].map(|c| on[c] + distance * direction[c]));
+            points.push(along(on, distance, direction));
         }
     }
     points.extend_from_slice(vertices);
@@ -336,7 +337,7 @@ const WEIGHTS: [f64; 3] = [0.2, 0.3, 0.5];
 
 /// A point on each face.
 fn points_on_faces(cage: &Cage) -> Vec<Point> {
-    let on = |corners: [Point; 3]| [0, 1, 2].map(|c| (0..3).map(|i| WEIGHTS[i] * corners[i][c]).sum::<f64>());
+    let on = |corners: [Point; 3]| combination(WEIGHTS, corners);
     cage.faces().iter().map(|face| on(face.vertices.map(|v| cage.vertices()[v as usize]))).collect()
 }
 
@@ -362,12 +363,12 @@ fn places_at_the_cage(promises: Promises, cage: &Cage) -> Vec<Vec<Point>> {
     for face in cage.faces() {
         let [a, b, c] = face.vertices.map(|v| vertices[v as usize]);
         for weights in [[0.2, 0.3, 0.5], [0.6, 0.4, 0.0], [0.0, 0.1, 0.9], [1.0, 0.0, 0.0]] {
-            let on = [0, 1, 2].map(|k| weights[0] * a[k] + weights[1] * b[k] + weights[2] * c[k]);
+            let on = combination(weights, [a, b, c]);
             let mut points: Vec<Point> = vec![on];
             for distance in [1e-15, 1e-13, 1e-12, 1e-11, 1e-9, 1e-8] {
                 for _ in 0..4 {
                     let direction = random.direction();
-                    points.push([0, 1, 2].map(|k| on[k] + distance * cage.diagonal() * direction[k]));
+                    points.push(along(on, distance * cage.diagonal(), direction));
                 }
             }
             places.push(defined(promises, cage, points));
@@ -394,14 +395,12 @@ fn places_in_planes(promises: Promises, cage: &Cage) -> Vec<Vec<Point>> {
     let mut places: Vec<Vec<Point>> = Vec::new();
     for face in cage.faces().iter().take(60) {
         let [a, b, c] = face.vertices.map(|v| cage.vertices()[v as usize]);
-        let e = [0, 1, 2].map(|k| b[k] - a[k]);
-        let f = [0, 1, 2].map(|k| c[k] - a[k]);
-        let n = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
-        let length = n.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let (e, f) = (sub(b, a), sub(c, a));
+        let n = cross(e, f);
+        let normal = n.map(|x| x / norm(n));
         for (s, t) in [(1.7, 0.4), (-0.6, 0.9), (0.3, -1.1), (2.3, 2.1), (-1.3, -0.2)] {
-            let on: Point = [0, 1, 2].map(|k| a[k] + s * e[k] + t * f[k]);
-            let beside = [1e-16, -1e-14, 1e-12, 1e-10, 1e-9]
-                .map(|h| [0, 1, 2].map(|k| on[k] + h * cage.diagonal() * n[k] / length));
+            let on: Point = along(along(a, s, e), t, f);
+            let beside = [1e-16, -1e-14, 1e-12, 1e-10, 1e-9].map(|h| along(on, h * cage.diagonal(), normal));
             let points = defined(promises, cage, std::iter::once(on).chain(beside).collect());
             if !points.is_empty() {
                 places.push(points);
@@ -432,9 +431,8 @@ fn is_continuous_across_planes_of_far_faces(promises: Promises, name: &str, plac
 #[test]
 fn harmonic_coordinates_do_not_exist_outside() {
     for (name, cage) in cages().into_iter().chain(thin_cages()) {
-        let inside =
-            [0, 1, 2].map(|k| cage.vertices().iter().map(|v| v[k]).sum::<f64>() / cage.vertices().len() as f64);
-        let out = [0, 1, 2].map(|k| 1.25 * cage.vertices()[0][k] - 0.25 * inside[k]);
+        let inside = mean(cage.vertices());
+        let out = along(inside, 1.25, sub(cage.vertices()[0], inside));
         let far = [9.0 * cage.diagonal(), 0.0, 0.0];
         let (vertices, triangles) = (cage.vertices(), &cage.mesh().triangles);
         let expected: Vec<u32> = [inside, out, inside, far]

@@ -17,7 +17,11 @@ const CHOICES: [Handles; 6] = [
 ];
 
 fn capture() -> (Capture, Cage) {
-    let capture = Capture::new(&Options { points: 2_000, frames: 40, cage_vertices: 100 });
+    capture_of(2_000, 100)
+}
+
+fn capture_of(points: usize, cage_vertices: usize) -> (Capture, Cage) {
+    let capture = Capture::new(&Options { points, frames: 40, cage_vertices });
     let cage = Cage::new(capture.cage.clone()).unwrap();
     (capture, cage)
 }
@@ -76,7 +80,7 @@ fn more_handles_that_are_spread_come_closer_to_all_points() {
 
 #[test]
 fn as_few_handles_as_unknowns_are_those_of_maximum_volume_and_as_many_as_points_are_all() {
-    let (capture, cage) = capture();
+    let (capture, cage) = capture_of(800, 60);
     let (m, n) = (cage.vertices().len(), capture.rest.points.len());
     let mut frame = Vec::new();
     capture.frame(9, &mut frame);

@@ -7,6 +7,7 @@ use cager_core::coordinates::{
     CoordinateSystem, Coordinates, CoordinatesError, ElementPlan, Green, Harmonic, Refinement,
 };
 use cager_core::mesh::{Point, TriMesh, bounds, distance_to_surface, winding_number};
+use cager_core::vector::{add, along, combination, dot, middle, norm, sub};
 use common::{Random, cages, octahedron};
 
 fn named(wanted: &str) -> Cage {
@@ -34,13 +35,11 @@ fn refined(found: &Coordinates) -> Refinement {
 
 /// The nearest place on a mesh is what a walk ends at: its hat functions are the data of the coordinates.
 fn hats_at(cage: &Cage, x: Point) -> ([u32; 3], [f64; 3]) {
-    let minus = |a: Point, b: Point| [0, 1, 2].map(|k| a[k] - b[k]);
-    let dot = |a: Point, b: Point| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let triangles = &cage.mesh().triangles;
     let distance = |t: &[u32; 3]| distance_to_surface(cage.vertices(), std::slice::from_ref(t), x);
     let nearest = triangles.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).expect("a face");
     let [a, b, c] = nearest.map(|v| cage.vertices()[v as usize]);
-    let (e, f, r) = (minus(b, a), minus(c, a), minus(x, a));
+    let (e, f, r) = (sub(b, a), sub(c, a), sub(x, a));
     let (ee, ef, ff, re, rf) = (dot(e, e), dot(e, f), dot(f, f), dot(r, e), dot(r, f));
     let area = ee * ff - ef * ef;
     let (s, t) = ((ff * re - ef * rf) / area, (ee * rf - ef * re) / area);
@@ -66,7 +65,7 @@ fn coordinates_are_what_random_walks_end_at() {
                     break;
                 }
                 let direction = random.direction();
-                x = [0, 1, 2].map(|k| x[k] + radius * direction[k]);
+                x = along(x, radius, direction);
             }
             let (face, weights) = hats_at(&cage, x);
             for (v, weight) in face.into_iter().zip(weights) {
@@ -98,9 +97,8 @@ fn ball(divisions: usize) -> Cage {
             let mut middle = |a: u32, b: u32| {
                 *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
                     let [p, q] = [a, b].map(|v| mesh.vertices[v as usize]);
-                    let sum = [0, 1, 2].map(|k| p[k] + q[k]);
-                    let length = sum.iter().map(|x| x * x).sum::<f64>().sqrt();
-                    next.vertices.push(sum.map(|x| x / length));
+                    let sum = add(p, q);
+                    next.vertices.push(sum.map(|x| x / norm(sum)));
                     next.vertices.len() as u32 - 1
                 })
             };
@@ -158,9 +156,9 @@ fn values_stay_between_zero_and_one_everywhere_and_meet_the_faces() {
             weights.iter_mut().take(k % 3).for_each(|w| *w = 0.0);
             let total: f64 = weights.iter().sum();
             let corner = |i: usize| cage.vertices()[t[i] as usize];
-            let on: Point = [0, 1, 2].map(|c| (0..3).map(|i| weights[i] / total * corner(i)[c]).sum());
+            let on: Point = combination(weights.map(|w| w / total), [0, 1, 2].map(corner));
             for share in [1e-7, 1e-5, 1e-3, 1e-1] {
-                points.push([0, 1, 2].map(|c| on[c] + share * (centre[c] - on[c])));
+                points.push(along(on, share, sub(centre, on)));
             }
         }
         let mut n = 0;
@@ -253,7 +251,7 @@ fn quartered(mesh: &TriMesh) -> (TriMesh, Vec<[u32; 2]>) {
         let [d, e, f] = [[a, b], [b, c], [c, a]].map(|[a, b]| {
             *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
                 let [p, q] = [a, b].map(|v| mesh.vertices[v as usize]);
-                out.vertices.push([0, 1, 2].map(|k| 0.5 * (p[k] + q[k])));
+                out.vertices.push(middle(p, q));
                 ends.push([a, b]);
                 out.vertices.len() as u32 - 1
             })

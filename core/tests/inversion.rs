@@ -9,6 +9,7 @@ use cager_core::inversion::{BATCH, Handles, PrepareError, Preparing, Solver, Sol
 use cager_core::mesh::Point;
 use cager_core::regularize::{Regularizer, SparseMatrix, Term};
 use cager_core::synthetic::{Capture, Options};
+use cager_core::vector::{along, sub};
 
 const HANDLES: [Handles; 4] =
     [Handles::MaxVol, Handles::Rectangular { count: None }, Handles::Spread { count: None }, Handles::All];
@@ -323,7 +324,7 @@ fn a_model_far_too_small_for_its_cage_is_still_followed_by_every_method() {
     let (capture, cage) = capture();
     for scale in [1e-1, 1e-2, 1e-3] {
         let centre = capture.rest.points[300];
-        let shrunk = |p: &Point| [0, 1, 2].map(|k| centre[k] + scale * (p[k] - centre[k]));
+        let shrunk = |p: &Point| along(centre, scale, sub(*p, centre));
         let points: Vec<Point> = capture.rest.points.iter().map(shrunk).collect();
         let moved: Vec<f64> =
             points.iter().flat_map(|p| [1.1 * p[0] + 0.2 * p[1], p[1] - 0.1 * p[0] + 3.0, p[2]]).collect();

@@ -4,6 +4,7 @@ use super::sample::{Frame, Sample};
 use cager_core::cage::Cage;
 use cager_core::inversion::{FactoredInversion, HandleSystem, ProjectedFrames};
 use cager_core::mesh::{Point, diagonal};
+use cager_core::vector::distance;
 use serde::Serialize;
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -24,7 +25,7 @@ impl Shape {
     pub(crate) fn new(cage: &Cage, points: &[Point]) -> Self {
         let edges: Vec<[u32; 2]> = cage.edges().iter().map(|edge| edge.vertices).collect();
         let rest = cage.vertices();
-        let lengths: Vec<f64> = edges.iter().map(|e| length(rest[e[0] as usize], rest[e[1] as usize])).collect();
+        let lengths: Vec<f64> = edges.iter().map(|e| distance(rest[e[0] as usize], rest[e[1] as usize])).collect();
         let mean_length = lengths.iter().sum::<f64>() / lengths.len() as f64;
         Self { edges, lengths, mean_length, diagonal: diagonal(points) }
     }
@@ -33,7 +34,7 @@ impl Shape {
     fn edge_change(&self, cage: &[f32]) -> [f64; 2] {
         let (mut sum, mut largest) = (0.0, 0.0f64);
         for (edge, rest) in self.edges.iter().zip(&self.lengths) {
-            let change = (length(vertex(cage, edge[0]), vertex(cage, edge[1])) - rest).abs() / self.mean_length;
+            let change = (distance(vertex(cage, edge[0]), vertex(cage, edge[1])) - rest).abs() / self.mean_length;
             sum += change;
             largest = largest.max(change);
         }
@@ -43,10 +44,6 @@ impl Shape {
 
 fn vertex(cage: &[f32], index: u32) -> Point {
     [0, 1, 2].map(|k| f64::from(cage[3 * index as usize + k]))
-}
-
-fn length(a: Point, b: Point) -> f64 {
-    (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
 }
 
 /// Results for every measured frame; lengths are fractions of the rest diagonal, and NaN is what does not exist.

@@ -1,6 +1,7 @@
 //! The vertical axis.
 
 use cager_core::mesh::{Point, bounds};
+use cager_core::vector::sub;
 use serde::Serialize;
 
 /// An axis so much longer than the two others is the vertical one, whatever the file says.
@@ -22,7 +23,7 @@ impl Up {
     /// A guess: y, unless the model stands along z.
     pub(crate) fn guess(points: &[Point]) -> Self {
         let (low, high) = bounds(points);
-        let extent = [0, 1, 2].map(|k| high[k] - low[k]);
+        let extent = sub(high, low);
         if extent[2] > STANDING * extent[0].max(extent[1]) { Self::Z } else { Self::Y }
     }
 }

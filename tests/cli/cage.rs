@@ -5,6 +5,7 @@ use crate::support::{Dir, Small, as_model, has_report_page, mean, measure, quad_
 use cager_cages::geometry::{outside, self_intersections};
 use cager_core::cage::Cage;
 use cager_core::mesh::{Model, TriMesh};
+use cager_core::vector::{self, along, sub};
 use cager_formats::read_model;
 
 fn read_cage(dir: &Dir, name: &str) -> Model {
@@ -157,9 +158,8 @@ fn check_names_everything_that_is_wrong_and_repair_puts_it_right() {
 fn a_repair_moves_a_cage_out_to_the_points_it_left_outside_and_keeps_its_quads() {
     let (dir, small) = Dir::with_capture();
     let mut tight = quad_box(&small.rest.points);
-    let n = tight.points.len() as f64;
-    let centre = [0, 1, 2].map(|k| tight.points.iter().map(|p| p[k]).sum::<f64>() / n);
-    tight.points.iter_mut().for_each(|p| *p = [0, 1, 2].map(|k| centre[k] + 0.86 * (p[k] - centre[k])));
+    let centre = vector::mean(&tight.points);
+    tight.points.iter_mut().for_each(|p| *p = along(centre, 0.86, sub(*p, centre)));
     dir.model("tight.obj", &tight);
     let checked = dir.cager("cage --rest rest.obj --check tight.obj").succeeds().stdout;
     assert!(checked.contains("points outside the cage"), "{checked}");

@@ -33,7 +33,7 @@ fn most_held(dir: &Dir, args: &str) -> u64 {
 
 #[test]
 fn a_million_points_take_little_memory_to_encode_and_decode() {
-    let capture = Capture::new(&Options { points: 1_000_000, frames: 5, cage_vertices: 330 });
+    let capture = Capture::new(&Options { points: 1_000_000, frames: 5, cage_vertices: 140 });
     let dir = Dir::new();
     dir.model("rest.ply", &capture.rest);
     dir.model("cage.obj", &as_model(&capture.cage));

@@ -3,6 +3,7 @@
 use crate::real_data::data;
 use crate::support::{Dir, mean, measure, polygons, read_frames};
 use cager_core::mesh::{Model, Point, diagonal};
+use cager_core::vector::{add, along, cross, norm, sub};
 use cager_formats::{open_frames, read_model, write_model};
 use std::path::Path;
 
@@ -84,7 +85,7 @@ fn garments_over_makehuman_follow_its_cages_within_a_tenth_of_the_error_of_the_b
     let lifted = |frame: &[f64], worn: &[u32], lift: f64| -> Vec<f64> {
         let points: &[Point] = frame.as_chunks().0;
         let normals = normals(&rest, points);
-        worn.iter().flat_map(|&i| [0, 1, 2].map(|k| points[i as usize][k] + lift * normals[i as usize][k])).collect()
+        worn.iter().flat_map(|&i| along(points[i as usize], lift, normals[i as usize])).collect()
     };
     let error_of = |worn: &[u32], lift: f64| {
         let truth: Vec<_> = truth.iter().map(|frame| lifted(frame, worn, lift)).collect();
@@ -118,15 +119,15 @@ fn normals(rest: &Model, points: &[Point]) -> Vec<Point> {
     for face in rest.faces.iter() {
         for k in 1..face.len() - 1 {
             let [a, b, c] = [face[0], face[k], face[k + 1]].map(|i| points[i as usize]);
-            let (u, v) = ([0, 1, 2].map(|k| b[k] - a[k]), [0, 1, 2].map(|k| c[k] - a[k]));
-            let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+            let (u, v) = (sub(b, a), sub(c, a));
+            let normal = cross(u, v);
             for i in [face[0], face[k], face[k + 1]] {
-                (0..3).for_each(|k| sums[i as usize][k] += normal[k]);
+                sums[i as usize] = add(sums[i as usize], normal);
             }
         }
     }
     let unit = |n: Point| {
-        let length = n.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+        let length = norm(n).max(f64::MIN_POSITIVE);
         n.map(|x| x / length)
     };
     sums.into_iter().map(unit).collect()

@@ -3,6 +3,7 @@
 use cager::decode;
 use cager_core::mesh::{Model, Point, Polygons, TriMesh, diagonal};
 use cager_core::synthetic::{Capture, Options};
+use cager_core::vector;
 use cager_formats::{FrameOptions, create_frames, open_frames, write_model};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -226,9 +227,8 @@ impl Small {
 
     /// The cage drawn towards its centre, so that it leaves points outside.
     pub(crate) fn shrunk_cage(&self) -> TriMesh {
-        let n = self.cage.vertices.len() as f64;
-        let centre = [0, 1, 2].map(|k| self.cage.vertices.iter().map(|v| v[k]).sum::<f64>() / n);
-        let shrink = |v: &Point| [0, 1, 2].map(|k| centre[k] + 0.9 * (v[k] - centre[k]));
+        let centre = vector::mean(&self.cage.vertices);
+        let shrink = |v: &Point| vector::along(centre, 0.9, vector::sub(*v, centre));
         TriMesh { vertices: self.cage.vertices.iter().map(shrink).collect(), triangles: self.cage.triangles.clone() }
     }
 }
@@ -323,13 +323,12 @@ pub(crate) fn measure(rest: &[Point], truth: &[Vec<f64>], found: &[Vec<f64>]) ->
     let (mut squared, mut spread) = (0.0, 0.0);
     for (a, b) in truth.iter().zip(found) {
         let (a, b): (&[Point], &[Point]) = (a.as_chunks().0, b.as_chunks().0);
-        let squares: Vec<f64> =
-            a.iter().zip(b).map(|(p, q)| (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>()).collect();
+        let squares: Vec<f64> = a.iter().zip(b).map(|(&p, &q)| vector::distance(p, q).powi(2)).collect();
         measured.l2.push((squares.iter().sum::<f64>() / n).sqrt() / size);
         measured.linf.push(squares.iter().fold(0.0, |x: f64, &y| x.max(y)).sqrt() / size);
-        let mean = [0, 1, 2].map(|k| a.iter().map(|p| p[k]).sum::<f64>() / n);
+        let mean = vector::mean(a);
         squared += squares.iter().sum::<f64>();
-        spread += a.iter().map(|p| (0..3).map(|k| (p[k] - mean[k]).powi(2)).sum::<f64>()).sum::<f64>();
+        spread += a.iter().map(|&p| vector::distance(p, mean).powi(2)).sum::<f64>();
     }
     measured.kg_percent = 100.0 * (squared / spread).sqrt();
     measured

@@ -1,7 +1,8 @@
 //! Validation of a mesh as a cage: closed, edge-manifold, consistently and outwardly oriented, without degenerate faces.
 
 use super::{Edge, Face};
-use crate::mesh::{Point, TriMesh, cross, dot, norm, sub, winding_number};
+use crate::mesh::{Point, TriMesh, winding_number};
+use crate::vector::{cross, dot, norm, sub};
 use std::collections::HashMap;
 use std::fmt::Write;
 

@@ -13,6 +13,7 @@ use super::{CoordinateSystem, Coordinates, CoordinatesError, PointwiseCoordinate
 use crate::cage::Cage;
 use crate::mesh::{self, Point};
 use crate::simd::{LANES, Lanes, zeros};
+use crate::vector;
 use faer::MatMut;
 use rayon::prelude::*;
 
@@ -141,7 +142,7 @@ fn rows_of(
 /// The point relative to a face's first corner.
 fn from_corner(layers: &Layers, face: &Frame, x: Point) -> Point {
     let corner = layers.vertices()[face.vertices[0] as usize];
-    mesh::sub(x, corner)
+    vector::sub(x, corner)
 }
 
 /// The nearest faces, several where a shared edge or vertex is nearest, and the weight of each. Weights fall with the angle between a face's normal
@@ -156,7 +157,7 @@ fn nearest_faces(layers: &Layers, x: Point, missing: f64) -> Vec<(usize, f64)> {
         if distance <= ON_CAGE {
             return 1.0;
         }
-        let height = mesh::dot(from_corner(layers, face, x), face.normal()) * missing.signum();
+        let height = vector::dot(from_corner(layers, face, x), face.normal()) * missing.signum();
         1.0 / ((1.0 - height / distance).max(0.0) + EQUALLY_NEAR)
     };
     let mut found: Vec<(usize, f64)> = layers

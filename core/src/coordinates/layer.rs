@@ -12,8 +12,9 @@
 //! whose rounding cancels even in faces a million times longer than wide.
 
 use crate::cage::{Cage, Face};
-use crate::mesh::{self, Point};
+use crate::mesh::Point;
 use crate::simd::{LANES, Lanes, angle, dot, ln_ratio, multiversion};
+use crate::vector;
 use faer::MatMut;
 
 /// Closer to the plane of a face than this fraction of its longest edge, a point lies in it.
@@ -56,21 +57,21 @@ pub(super) struct Frame {
 
 impl Frame {
     fn new(vertices: &[Point], face: &Face) -> Self {
-        let between = |a: u32, b: u32| mesh::sub(vertices[b as usize], vertices[a as usize]);
+        let between = |a: u32, b: u32| vector::sub(vertices[b as usize], vertices[a as usize]);
         let side = |i: usize| between(face.vertices[(i + 1) % 3], face.vertices[(i + 2) % 3]);
-        let lengths = [0, 1, 2].map(|i| mesh::norm(side(i)));
+        let lengths = [0, 1, 2].map(|i| vector::norm(side(i)));
         let top = (0..3).fold(0, |a, b| if lengths[b] > lengths[a] { b } else { a });
         let (first, second) = ((top + 1) % 3, (top + 2) % 3);
         let [v0, v1, v2] = [first, second, top].map(|i| face.vertices[i]);
         // The sides that meet opposite the longest edge are the shortest two: their product rounds least.
-        let product = mesh::cross(between(v2, v0), between(v2, v1));
-        let double_area = mesh::norm(product);
+        let product = vector::cross(between(v2, v0), between(v2, v1));
+        let double_area = vector::norm(product);
         let length = lengths[top];
         let along = between(v0, v1).map(|c| c / length);
         let normal = product.map(|c| c / double_area);
-        let axes = [along, mesh::cross(normal, along), normal];
+        let axes = [along, vector::cross(normal, along), normal];
         let height = double_area / length;
-        let reach = mesh::dot(between(v0, v2), along);
+        let reach = vector::dot(between(v0, v2), along);
         Self {
             vertices: [v0, v1, v2],
             edges: [first, second, top].map(|i| face.edges[i]),
@@ -94,7 +95,7 @@ impl Frame {
     /// Affine coordinates of `x` with respect to the face's corners, in the order of [`Self::vertices`], and the coefficient of its unit normal.
     /// Takes `x − v₀`, in the unit of [`Layers`].
     pub(super) fn affine_coordinates(&self, x: Point) -> ([f64; 3], f64) {
-        let [p, q, h] = self.axes.map(|axis| mesh::dot(axis, x));
+        let [p, q, h] = self.axes.map(|axis| vector::dot(axis, x));
         let across = q / self.height;
         let second = p / self.length - self.foot * across;
         ([1.0 - second - across, second, across], h)
@@ -119,7 +120,7 @@ impl Layers {
         let scale = 2f64.powi(-(cage.diagonal().log2() as i32).clamp(-1000, 1000));
         let vertices: Vec<Point> = cage.vertices().iter().map(|v| v.map(|c| c * scale)).collect();
         let faces = cage.faces().iter().map(|face| Frame::new(&vertices, face)).collect();
-        let length = |[a, b]: [u32; 2]| mesh::norm(mesh::sub(vertices[b as usize], vertices[a as usize]));
+        let length = |[a, b]: [u32; 2]| vector::norm(vector::sub(vertices[b as usize], vertices[a as usize]));
         let edges = cage.edges().iter().map(|e| (e.vertices, length(e.vertices))).collect();
         Self { vertices, scale, edges, faces, triangles: cage.mesh().triangles.clone() }
     }
@@ -293,12 +294,11 @@ mod tests {
 
     /// Integrates over a face by the centroids of 4^depth equal parts.
     fn integrate([a, b, c]: [Point; 3], depth: u32, f: &mut impl FnMut(Point)) {
-        let middle = |p: Point, q: Point| [0, 1, 2].map(|k| 0.5 * (p[k] + q[k]));
         if depth == 0 {
-            f([0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0));
+            f(vector::centroid([a, b, c]));
             return;
         }
-        let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+        let (ab, bc, ca) = (vector::middle(a, b), vector::middle(b, c), vector::middle(c, a));
         for part in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]] {
             integrate(part, depth - 1, f);
         }
@@ -316,19 +316,19 @@ mod tests {
             for (f, face) in cage.faces().iter().enumerate() {
                 let corners = face.vertices.map(|v| cage.vertices()[v as usize]);
                 let [a, b, c] = corners;
-                let sides = [b, c].map(|p| mesh::sub(p, a));
-                let normal = mesh::cross(sides[0], sides[1]);
-                let (double_area, parts) = (mesh::norm(normal), f64::from(4u32.pow(8)));
+                let sides = [b, c].map(|p| vector::sub(p, a));
+                let normal = vector::cross(sides[0], sides[1]);
+                let (double_area, parts) = (vector::norm(normal), f64::from(4u32.pow(8)));
                 let mut single = 0.0;
                 integrate(corners, 8, &mut |y| {
-                    let r = mesh::sub(y, *x);
-                    let share = INVERSE_4PI / mesh::norm(r) * 0.5 * double_area / parts;
+                    let r = vector::sub(y, *x);
+                    let share = INVERSE_4PI / vector::norm(r) * 0.5 * double_area / parts;
                     single += share;
-                    let seen = share * mesh::dot(r, normal) / double_area / mesh::dot(r, r);
+                    let seen = share * vector::dot(r, normal) / double_area / vector::dot(r, r);
                     for (i, &v) in face.vertices.iter().enumerate() {
-                        let across = mesh::sub(corners[(i + 2) % 3], corners[(i + 1) % 3]);
-                        let from = mesh::sub(y, corners[(i + 1) % 3]);
-                        let hat = mesh::dot(mesh::cross(across, from), normal) / (double_area * double_area);
+                        let across = vector::sub(corners[(i + 2) % 3], corners[(i + 1) % 3]);
+                        let from = vector::sub(y, corners[(i + 1) % 3]);
+                        let hat = vector::dot(vector::cross(across, from), normal) / (double_area * double_area);
                         double[v as usize] += hat * seen;
                     }
                 });

@@ -6,7 +6,8 @@
 //! face is stretched. The normal of a face collapsed to a line or a point is zero.
 
 use crate::cage::Cage;
-use crate::mesh::{Point, cross, dot, norm, sub};
+use crate::mesh::Point;
+use crate::vector::{cross, dot, norm, sub};
 
 /// Computes a cage's face normals from its vertices.
 #[derive(Clone, Debug, PartialEq)]

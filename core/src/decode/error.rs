@@ -2,6 +2,7 @@
 
 use crate::mesh::Point;
 use crate::simd::multiversion;
+use crate::vector::add;
 
 /// Errors of one frame against the capture.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -61,7 +62,7 @@ impl Sums {
             squared: a.squared + b.squared,
             largest: if b.largest > a.largest { b.largest } else { a.largest },
             at: if b.largest > a.largest { b.at } else { a.at },
-            first: [0, 1, 2].map(|k| a.first[k] + b.first[k]),
+            first: add(a.first, b.first),
             second: a.second + b.second,
         })
     }

@@ -86,7 +86,7 @@ impl Analysis {
             outside: (outside, outside_distance),
             refinement,
             plan,
-        } = coordinates(system, cage, points, required, preparing.stores_coordinates)?;
+        } = coordinates(system, cage, points, required, preparing)?;
         let coordinates_seconds = clock.elapsed().as_secs_f64();
 
         let clock = Instant::now();

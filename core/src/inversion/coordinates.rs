@@ -2,7 +2,7 @@
 
 use super::PrepareError;
 use super::operator::RequiredDecompositions;
-use super::prepare::{coordinates_fit, outside, reject_unreproduced_point, reproduction_error};
+use super::prepare::{Preparing, coordinates_fit, outside, reject_unreproduced_point, reproduction_error};
 use crate::cage::Cage;
 use crate::coordinates::{CoordinateSystem, ElementPlan, MeanValue, PointwiseCoordinates, Refinement};
 use crate::decode::{Decoder, for_each_chunk};
@@ -12,8 +12,6 @@ use crate::mesh::{Point, diagonal};
 use faer::Mat;
 use rayon::prelude::*;
 
-/// Largest number of entries of `Φ` up to which all points are analysed; with [`ROWS_PER_UNKNOWN`] rows per unknown or fewer they always are.
-const ENTRIES: usize = 1 << 25;
 /// Minimum number of points analysed per unknown.
 const ROWS_PER_UNKNOWN: usize = 8;
 
@@ -40,13 +38,13 @@ pub(super) struct AnalysisCoordinates {
 
 /// A sample of points spaced evenly along a space-filling curve; `None` where all points are analysed. It has at least as many points as the handles
 /// read, except with [`Handles::All`], for which the sample stands for all. Its density follows that of the model.
-fn sample(points: &[Point], unknowns: usize, required: RequiredDecompositions) -> Option<Vec<u32>> {
+fn sample(points: &[Point], unknowns: usize, required: RequiredDecompositions, entries: usize) -> Option<Vec<u32>> {
     let read = match required {
         RequiredDecompositions::Everything => return None,
         RequiredDecompositions::For(Handles::All) => 0,
         RequiredDecompositions::For(handles) => handles.count(points.len(), unknowns),
     };
-    let count = (ENTRIES / unknowns).max(ROWS_PER_UNKNOWN * unknowns).max(read);
+    let count = (entries / unknowns).max(ROWS_PER_UNKNOWN * unknowns).max(read);
     if points.len() <= count {
         return None;
     }
@@ -63,7 +61,7 @@ pub(super) fn coordinates(
     cage: &Cage,
     points: &[Point],
     required: RequiredDecompositions,
-    keeps: bool,
+    preparing: &Preparing<'_>,
 ) -> Result<AnalysisCoordinates, PrepareError> {
     let everything = required == RequiredDecompositions::Everything;
     let copies = if everything { 3 } else { 2 };
@@ -72,12 +70,14 @@ pub(super) fn coordinates(
         let gigabytes = (4 + 8 * copies) as f64 * 1e-9 * rows as f64 * columns as f64;
         PrepareError::OutOfMemory { points: points.len(), unknowns: m, gigabytes }
     };
-    let sampled = system.pointwise().and_then(|pointwise| Some((pointwise, sample(points, m, required)?)));
+    let sampled = system
+        .pointwise()
+        .and_then(|pointwise| Some((pointwise, sample(points, m, required, preparing.analysed_entries)?)));
     if let Some((pointwise, sample)) = sampled {
         if !coordinates_fit(sample.len(), columns, copies) {
             return Err(too_large(sample.len()));
         }
-        return of_sample(system, pointwise, cage, points, sample, keeps);
+        return of_sample(system, pointwise, cage, points, sample, preparing.stores_coordinates);
     }
     if !coordinates_fit(points.len(), columns, copies) {
         return Err(too_large(points.len()));

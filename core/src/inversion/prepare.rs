@@ -4,8 +4,9 @@ use super::operator::tall_product;
 use super::{Analysis, Handles, PrepareError, Solver, SolverOptions};
 use crate::cage::Cage;
 use crate::coordinates::{CoordinateSystem, ElementPlan, Refinement};
-use crate::mesh::{Point, diagonal, distance_to_surface, norm, winding_number};
+use crate::mesh::{Point, diagonal, distance_to_surface, winding_number};
 use crate::regularize::{Term, TermError};
+use crate::vector::norm;
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
@@ -109,13 +110,16 @@ pub struct Preparing<'a> {
     pub term: Option<&'a dyn Term>,
     /// Whether the decoder of a model of very many points stores their coordinates, four bytes per point and column, or recomputes them at every use.
     pub stores_coordinates: bool,
+    /// Largest number of entries of `Φ`, points × unknowns, up to which all points are analysed; of a model with more, a sample is. With eight points per
+    /// unknown or fewer all of them always are.
+    pub analysed_entries: usize,
     /// Called with the name of each step before it begins; `Break` ends the preparation with [`PrepareError::Stopped`].
     pub next: &'a dyn Fn(&'static str) -> ControlFlow<()>,
 }
 
 impl Default for Preparing<'_> {
     fn default() -> Self {
-        Self { term: None, stores_coordinates: true, next: &|_| ControlFlow::Continue(()) }
+        Self { term: None, stores_coordinates: true, analysed_entries: 1 << 25, next: &|_| ControlFlow::Continue(()) }
     }
 }
 

@@ -1,6 +1,7 @@
 //! What makes linear functions exact: every column of data is split into its best linear function and a rest.
 
 use crate::mesh::Point;
+use crate::vector::mean;
 #[cfg(test)]
 use faer::Mat;
 use faer::MatMut;
@@ -19,8 +20,7 @@ pub(super) struct AffineFit {
 
 impl AffineFit {
     pub(super) fn new(vertices: &[Point]) -> Self {
-        let count = vertices.len() as f64;
-        let centre = [0, 1, 2].map(|k| vertices.iter().map(|v| v[k]).sum::<f64>() / count);
+        let centre = mean(vertices);
         let rows: Vec<[f64; 4]> = vertices.iter().map(|v| row(*v, centre)).collect();
         // Orthonormal columns by Gram and Schmidt, twice, with the triangular factor.
         let mut q = rows.clone();

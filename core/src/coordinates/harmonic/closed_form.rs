@@ -9,8 +9,9 @@ use super::potential::Tables;
 use super::quadrature::GAUSS_6;
 use super::triangle::Triangle;
 use crate::coordinates::layer::{INVERSE_4PI, edge_logarithm};
-use crate::mesh::{self, Point};
+use crate::mesh::Point;
 use crate::simd::{LANES, Lanes, angle, dot};
+use crate::vector;
 
 /// Farther from an edge than so many of its lengths, integrals along it are taken by quadrature.
 const FAR_FROM_EDGE: f64 = 1.5;
@@ -134,7 +135,7 @@ pub(super) fn closed_form(
         let [ga, gb] = &triangle.gradients;
         let alpha = along(c0, ga) * -1.0;
         let beta = along(c0, gb) * -1.0;
-        let inner = |a: &Point, b: &Point| mesh::dot(*a, *b);
+        let inner = |a: &Point, b: &Point| vector::dot(*a, *b);
         let (gaa, gab, gbb) = (inner(ga, ga), inner(ga, gb), inner(gb, gb));
         let slopes = |g: &Point| [0, 1, 2].map(|e| inner(g, &triangle.outward[e]));
         let (sa, sb) = (slopes(ga), slopes(gb));

@@ -4,6 +4,7 @@ use super::basis::functions;
 use super::triangle::Triangle;
 use crate::mesh::{Point, distance2_to_triangle};
 use crate::simd::{LANES, Lanes, dot, multiversion};
+use crate::vector::{self, middle, sub};
 use rayon::prelude::*;
 
 /// One element.
@@ -33,7 +34,6 @@ impl Element {
 
     /// The parts that a cut gives.
     pub(super) fn parts(&self, cut: u8) -> Vec<Self> {
-        let middle = |p: Point, q: Point| [0, 1, 2].map(|k| 0.5 * (p[k] + q[k]));
         let first = if cut == QUARTERS { 0 } else { usize::from(cut % LATER) };
         let corner = |i: usize| self.triangle.corners[(first + i) % 3];
         let [a, b, c] = [0, 1, 2].map(corner);
@@ -56,7 +56,8 @@ impl Element {
         let corners = self.triangle.corners;
         let length2 = |i: usize| -> f64 {
             let (a, b) = (corners[(i + 1) % 3], corners[(i + 2) % 3]);
-            (0..3).map(|k| (a[k] - b[k]).powi(2)).sum()
+            let side = sub(a, b);
+            vector::dot(side, side)
         };
         (0..3).find(|&i| (1..3).all(|j| length2(i) > TIE * length2((i + j) % 3))).map(|top| top as u8)
     }

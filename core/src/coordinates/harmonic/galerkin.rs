@@ -7,8 +7,8 @@ use super::potential::{Tables, potentials};
 use super::quadrature::Rule;
 use super::triangle::Triangle;
 use crate::coordinates::layer::{INVERSE_4PI, Layers, group_potentials};
-use crate::mesh;
 use crate::simd::{LANES, Lanes, multiversion};
+use crate::vector;
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
@@ -106,7 +106,7 @@ fn block(
     scratch: &mut BlockScratch,
 ) {
     let (rows, columns) = (functions(outer_degree), functions(inner_degree));
-    let apart = mesh::norm([0, 1, 2].map(|k| outer.triangle.centre[k] - inner.triangle.centre[k]));
+    let apart = vector::norm(vector::sub(outer.triangle.centre, inner.triangle.centre));
     let near = apart < NEAR * (outer.triangle.radius + inner.triangle.radius);
     let rule = if near { &rules.near } else { &rules.far };
     let mut found = [Lanes::ZERO; MAX_FUNCTIONS];
@@ -162,7 +162,7 @@ pub(super) struct Operator {
 
 /// Whether the high unknowns of two elements feel each other and the other's low ones.
 pub(super) fn is_near(a: &Element, b: &Element) -> bool {
-    let apart = mesh::norm([0, 1, 2].map(|k| a.triangle.centre[k] - b.triangle.centre[k]));
+    let apart = vector::norm(vector::sub(a.triangle.centre, b.triangle.centre));
     apart < APART * (a.triangle.radius + b.triangle.radius)
 }
 

@@ -3,8 +3,9 @@
 
 use super::evaluate::Solution;
 use super::surface::{ClosestPoint, Side};
-use crate::mesh::{self, Point, distance2_to_triangle};
+use crate::mesh::{Point, distance2_to_triangle};
 use crate::simd::{LANES, Lanes};
+use crate::vector;
 use rayon::prelude::*;
 
 /// Points with their closest points of the surface and shares.
@@ -37,7 +38,7 @@ impl<'a> Near<'a> {
             // All elements that meet at the closest, so that the order of faces does not count.
             let meet = solution.unknowns.elements.iter().zip(&reaches).filter(|(element, _)| {
                 let triangle = &element.triangle;
-                let apart = mesh::norm([0, 1, 2].map(|k| triangle.centre[k] - closest.place[k]));
+                let apart = vector::norm(vector::sub(triangle.centre, closest.place));
                 apart <= triangle.radius + touching
                     && distance2_to_triangle(triangle.corners, closest.place) <= touching * touching
             });

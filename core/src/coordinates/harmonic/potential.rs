@@ -124,7 +124,8 @@ fn quadrature(
 mod tests {
     use super::super::basis::MAX_DEGREE;
     use super::*;
-    use crate::mesh::{self, Point};
+    use crate::mesh::Point;
+    use crate::vector;
 
     /// The same by brute force: the triangle divided until its parts are small against their distance.
     fn divided(
@@ -137,7 +138,7 @@ mod tests {
         depth: usize,
     ) {
         let part = Triangle::new(at.map(|p| whole.point(p[0], p[1])));
-        if depth < 40 && mesh::norm(mesh::sub(part.centre, x)) < 8.0 * part.radius {
+        if depth < 40 && vector::norm(vector::sub(part.centre, x)) < 8.0 * part.radius {
             let middle = |p: [f64; 2], q: [f64; 2]| [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])];
             let [a, b, c] = at;
             let (d, e, f) = (middle(a, b), middle(b, c), middle(c, a));
@@ -151,7 +152,7 @@ mod tests {
             let [a, b, c] = at;
             let p = [0, 1].map(|k| a[k] + node[0] * (b[k] - a[k]) + node[1] * (c[k] - a[k]));
             tables.basis.values(p, &mut values[..functions(degree)]);
-            let weight = INVERSE_4PI * part.area * node[2] / mesh::norm(mesh::sub(whole.point(p[0], p[1]), x));
+            let weight = INVERSE_4PI * part.area * node[2] / vector::norm(vector::sub(whole.point(p[0], p[1]), x));
             for k in 0..functions(degree) {
                 out[k] += weight * values[k];
             }
@@ -181,7 +182,7 @@ mod tests {
                 (0.2, 0.2, 12.0),
             ] {
                 let on = triangle.point(alpha, beta);
-                let x = [0, 1, 2].map(|k| on[k] + height * triangle.normal[k]);
+                let x = vector::along(on, height, triangle.normal);
                 let mut exact = [0.0; MAX_FUNCTIONS];
                 let unit = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
                 divided(&tables, &triangle, unit, MAX_DEGREE, x, &mut exact, 0);

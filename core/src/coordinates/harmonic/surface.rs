@@ -1,6 +1,7 @@
 //! The closest point of the cage's surface, and whether a point is inside, outside or on it.
 
 use crate::mesh::{self, Point};
+use crate::vector;
 use rayon::prelude::*;
 
 /// Nearer to the surface than this, over the cage's diagonal, a point counts as on it.
@@ -48,17 +49,17 @@ impl<'a> Surface<'a> {
         let (mut spheres, mut normals) = (Vec::new(), Vec::new());
         for f in 0..faces.len() {
             let p = corners(f);
-            let centre = [0, 1, 2].map(|k| (p[0][k] + p[1][k] + p[2][k]) / 3.0);
-            spheres.push((centre, p.iter().map(|&p| mesh::norm(mesh::sub(p, centre))).fold(0.0, f64::max)));
-            let normal = mesh::cross(mesh::sub(p[1], p[0]), mesh::sub(p[2], p[0]));
-            let length = mesh::norm(normal);
+            let centre = vector::centroid(p);
+            spheres.push((centre, p.iter().map(|&p| vector::norm(vector::sub(p, centre))).fold(0.0, f64::max)));
+            let normal = vector::cross(vector::sub(p[1], p[0]), vector::sub(p[2], p[0]));
+            let length = vector::norm(normal);
             let normal = normal.map(|c| c / length);
             normals.push(normal);
             for i in 0..3 {
-                let (a, b) = (mesh::sub(p[(i + 1) % 3], p[i]), mesh::sub(p[(i + 2) % 3], p[i]));
-                let angle = mesh::norm(mesh::cross(a, b)).atan2(mesh::dot(a, b));
+                let (a, b) = (vector::sub(p[(i + 1) % 3], p[i]), vector::sub(p[(i + 2) % 3], p[i]));
+                let angle = vector::norm(vector::cross(a, b)).atan2(vector::dot(a, b));
                 let sum = &mut vertex_normals[faces[f][i] as usize];
-                *sum = [0, 1, 2].map(|k| sum[k] + angle * normal[k]);
+                *sum = vector::along(*sum, angle, normal);
             }
         }
         let mut at_edge = vec![[u32::MAX; 2]; cage.edges().len()];
@@ -86,7 +87,7 @@ impl<'a> Surface<'a> {
 
     fn closest(&self, x: Point) -> ClosestPoint {
         // Centres are on the surface, so that the nearest of them bounds the distance.
-        let apart: Vec<f64> = self.spheres.iter().map(|(centre, _)| mesh::norm(mesh::sub(*centre, x))).collect();
+        let apart: Vec<f64> = self.spheres.iter().map(|(centre, _)| vector::norm(vector::sub(*centre, x))).collect();
         let mut best = apart.iter().copied().fold(f64::INFINITY, f64::min);
         let mut found: Option<([f64; 3], Point, usize)> = None;
         for (f, (_, radius)) in self.spheres.iter().enumerate() {
@@ -95,27 +96,27 @@ impl<'a> Surface<'a> {
             }
             let corners = self.faces[f].map(|v| self.vertices[v as usize]);
             let (weights, place) = nearest_in_triangle(corners, self.normals[f], x);
-            let distance = mesh::norm(mesh::sub(x, place));
+            let distance = vector::norm(vector::sub(x, place));
             if distance < best || found.is_none() {
                 best = distance.min(best);
                 found = Some((weights, place, f));
             }
         }
         let (weights, place, face) = found.unwrap_or_default();
-        let distance = mesh::norm(mesh::sub(x, place));
-        let away = mesh::sub(x, place);
+        let distance = vector::norm(vector::sub(x, place));
+        let away = vector::sub(x, place);
         let at: Vec<usize> = (0..3).filter(|&i| weights[i] != 0.0).collect();
         let normal = match at[..] {
             [corner] => self.vertex_normals[self.faces[face][corner] as usize],
             [a, b] => {
                 let other = self.normals[self.across[face][3 - a - b] as usize];
-                [0, 1, 2].map(|k| self.normals[face][k] + other[k])
+                vector::add(self.normals[face], other)
             }
             _ => self.normals[face],
         };
         let side = if distance <= self.thickness {
             Side::On
-        } else if mesh::dot(away, normal) > 0.0 {
+        } else if vector::dot(away, normal) > 0.0 {
             Side::Outside
         } else {
             Side::Inside
@@ -132,16 +133,16 @@ fn nearest_in_triangle(corners: [Point; 3], normal: Point, x: Point) -> ([f64; 3
     let mut least = f64::INFINITY;
     for i in 0..3 {
         let [j, k] = [(i + 1) % 3, (i + 2) % 3];
-        let (p, edge) = (corners[j], mesh::sub(corners[k], corners[j]));
-        let outward = mesh::cross(edge, normal);
-        let beyond = mesh::dot(outward, mesh::sub(x, p));
-        weights[i] = beyond / mesh::dot(outward, mesh::sub(corners[i], p));
+        let (p, edge) = (corners[j], vector::sub(corners[k], corners[j]));
+        let outward = vector::cross(edge, normal);
+        let beyond = vector::dot(outward, vector::sub(x, p));
+        weights[i] = beyond / vector::dot(outward, vector::sub(corners[i], p));
         if beyond > 0.0 {
-            let t = (mesh::dot(edge, mesh::sub(x, p)) / mesh::dot(edge, edge)).clamp(0.0, 1.0);
-            let place = [0, 1, 2].map(|c| p[c] + t * edge[c]);
-            let away = mesh::sub(x, place);
-            if mesh::dot(away, away) < least {
-                least = mesh::dot(away, away);
+            let t = (vector::dot(edge, vector::sub(x, p)) / vector::dot(edge, edge)).clamp(0.0, 1.0);
+            let place = vector::along(p, t, edge);
+            let away = vector::sub(x, place);
+            if vector::dot(away, away) < least {
+                least = vector::dot(away, away);
                 let mut at = [0.0; 3];
                 (at[j], at[k]) = (1.0 - t, t);
                 nearest = Some((at, place));
@@ -149,9 +150,9 @@ fn nearest_in_triangle(corners: [Point; 3], normal: Point, x: Point) -> ([f64; 3
         }
     }
     nearest.unwrap_or_else(|| {
-        let height = mesh::dot(normal, mesh::sub(x, corners[0]));
+        let height = vector::dot(normal, vector::sub(x, corners[0]));
         let total: f64 = weights.iter().sum();
-        (weights.map(|w| w / total), [0, 1, 2].map(|c| x[c] - height * normal[c]))
+        (weights.map(|w| w / total), vector::along(x, -height, normal))
     })
 }
 

@@ -1,6 +1,7 @@
 //! Triangles with what integrals over them need.
 
-use crate::mesh::{self, Point};
+use crate::mesh::Point;
+use crate::vector;
 
 /// A triangle with a polynomial density.
 #[derive(Clone, Debug)]
@@ -22,18 +23,21 @@ pub(super) struct Triangle {
 impl Triangle {
     pub(super) fn new(corners: [Point; 3]) -> Self {
         let [a, b, c] = corners;
-        let normal = mesh::cross(mesh::sub(b, a), mesh::sub(c, a));
-        let double_area = mesh::norm(normal);
+        let normal = vector::cross(vector::sub(b, a), vector::sub(c, a));
+        let double_area = vector::norm(normal);
         let normal = normal.map(|x| x / double_area);
-        let centre = [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0);
-        let radius = corners.iter().map(|&p| mesh::norm(mesh::sub(p, centre))).fold(0.0, f64::max);
-        let sides = [mesh::sub(b, a), mesh::sub(c, b), mesh::sub(c, a)];
-        let lengths = sides.map(mesh::norm);
+        let centre = vector::centroid(corners);
+        let radius = corners.iter().map(|&p| vector::norm(vector::sub(p, centre))).fold(0.0, f64::max);
+        let sides = [vector::sub(b, a), vector::sub(c, b), vector::sub(c, a)];
+        let lengths = sides.map(vector::norm);
         let along = [0, 1, 2].map(|e| sides[e].map(|x| x / lengths[e]));
-        let outward =
-            [mesh::cross(along[0], normal), mesh::cross(along[1], normal), mesh::cross(along[2], normal).map(|x| -x)];
-        let gradient = |opposite: Point| mesh::cross(normal, opposite).map(|x| x / double_area);
-        let gradients = [gradient(mesh::sub(a, c)), gradient(mesh::sub(b, a))];
+        let outward = [
+            vector::cross(along[0], normal),
+            vector::cross(along[1], normal),
+            vector::cross(along[2], normal).map(|x| -x),
+        ];
+        let gradient = |opposite: Point| vector::cross(normal, opposite).map(|x| x / double_area);
+        let gradients = [gradient(vector::sub(a, c)), gradient(vector::sub(b, a))];
         Self { corners, centre, radius, area: 0.5 * double_area, normal, gradients, along, outward, lengths }
     }
 

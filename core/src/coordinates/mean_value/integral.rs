@@ -2,7 +2,8 @@
 //! `w_i = h ∫ λ_i / |r|⁴ dA`, with `r` from the point to the face, `h` the height of the face's plane over the point and `λ_i` the
 //! barycentric coordinates. The integrands have one sign, so nothing cancels, however flat or far away the face appears.
 
-use crate::mesh::{Point, cross, distance2_to_triangle, dot, sub};
+use crate::mesh::{Point, distance2_to_triangle};
+use crate::vector::{along, cross, dot, middle, sub};
 
 /// Nodes and weights of Gauss's rule with eight points on [0, 1], exact to degree 15.
 const GAUSS: [[f64; 2]; 8] = [
@@ -46,8 +47,7 @@ fn integrate(corners: [Point; 3], barycentric: [Point; 3], share: f64, depth: u3
     let reach2 = distance2_to_triangle(corners, [0.0; 3]) * (SIDE_OVER_DISTANCE * SIDE_OVER_DISTANCE);
     if depth > 0 && dot(sides[top], sides[top]) > reach2 {
         let (i, j) = ((top + 1) % 3, (top + 2) % 3);
-        let middle = |of: &[Point; 3]| [0, 1, 2].map(|k| 0.5 * (of[i][k] + of[j][k]));
-        let middles = (middle(&corners), middle(&barycentric));
+        let middles = (middle(corners[i], corners[j]), middle(barycentric[i], barycentric[j]));
         for replaced in [i, j] {
             let (mut corners, mut barycentric) = (corners, barycentric);
             (corners[replaced], barycentric[replaced]) = middles;
@@ -59,9 +59,9 @@ fn integrate(corners: [Point; 3], barycentric: [Point; 3], share: f64, depth: u3
     let [bc, _, ab] = sides;
     let mut local = [0.0; 3];
     for [u, weight_u] in GAUSS {
-        let start: Point = [0, 1, 2].map(|k| a[k] + u * ab[k]);
+        let start: Point = along(a, u, ab);
         for [v, weight_v] in GAUSS {
-            let r = [0, 1, 2].map(|k| start[k] + u * v * bc[k]);
+            let r = along(start, u * v, bc);
             let r2 = dot(r, r);
             let value = weight_u * weight_v * u / (r2 * r2);
             local[0] += value * (1.0 - u);

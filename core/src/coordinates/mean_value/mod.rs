@@ -12,8 +12,9 @@ mod integral;
 
 use super::{CoordinateSystem, Coordinates, CoordinatesError, PointwiseCoordinates};
 use crate::cage::{Cage, Edge, Face};
-use crate::mesh::{self, Point};
+use crate::mesh::Point;
 use crate::simd::{LANES, Lanes, angle, cross, dot, multiversion, zeros};
+use crate::vector;
 use faer::MatMut;
 use rayon::prelude::*;
 
@@ -136,7 +137,7 @@ fn task_coordinates(
                 On::Nothing => {}
                 On::Vertex(vertex) => set_row(&mut rows, start + l, &[(vertex, 1.0)]),
                 On::Edge([a, b]) => {
-                    let [to_a, to_b] = [a, b].map(|v| mesh::norm(mesh::sub(at(l), cage.vertices()[v])));
+                    let [to_a, to_b] = [a, b].map(|v| vector::norm(vector::sub(at(l), cage.vertices()[v])));
                     set_row(&mut rows, start + l, &[(a, to_b / (to_a + to_b)), (b, to_a / (to_a + to_b))]);
                 }
             }
@@ -193,16 +194,16 @@ fn face_weights(cage: &Cage, scratch: &Scratch, face: &Face, x: Point, l: usize,
     let vertices = face.vertices.map(|v| v as usize);
     let edges = face.edges.map(|e| scratch.edges[e as usize].map(|c| c.0[l]));
     let g = [0, 1, 2].map(|i| [0, 1, 2].map(|k| face.signs[i] * edges[i][k]));
-    let mean = [0, 1, 2].map(|k| g[0][k] + g[1][k] + g[2][k]);
-    let det = mesh::dot(scratch.directions[vertices[0]].map(|c| c.0[l]), g[0]) * edges[0][3];
+    let mean = vector::add(vector::add(g[0], g[1]), g[2]);
+    let det = vector::dot(scratch.directions[vertices[0]].map(|c| c.0[l]), g[0]) * edges[0][3];
     let nearness = vertices.map(|v| scratch.nearness[v].0[l]);
-    let loss2 = (mesh::dot(g[0], g[0]) + mesh::dot(g[1], g[1])) / (det * det);
+    let loss2 = (vector::dot(g[0], g[0]) + vector::dot(g[1], g[1])) / (det * det);
     let nearest = nearness.iter().copied().fold(0.0, f64::max);
-    if mesh::norm(mean) < LARGE && is_inaccurate(loss2, nearest, total) {
+    if vector::norm(mean) < LARGE && is_inaccurate(loss2, nearest, total) {
         let weights = integral::face_weights(vertices.map(|v| cage.vertices()[v]), x);
         return [0, 1, 2].map(|i| weights[i] / nearness[i]);
     }
-    let numerators = [0, 1, 2].map(|i| mesh::dot(mean, g[i]) * edges[i][3]);
+    let numerators = [0, 1, 2].map(|i| vector::dot(mean, g[i]) * edges[i][3]);
     let weights = numerators.map(|n| n / det);
     // On the face itself, only the ratios of the weights count.
     if weights.iter().all(|w| w.is_finite()) { weights } else { numerators.map(|n| n * HUGE) }

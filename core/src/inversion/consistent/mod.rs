@@ -15,8 +15,9 @@ use crate::coordinates::TiedNormals;
 use crate::decode::Decoder;
 use crate::dense;
 use crate::mesh::Point;
+use crate::vector::{along, dot, sub};
 use faer::{Accum, Mat, MatRef, Par};
-use state::{FrameState, dot};
+use state::FrameState;
 
 use super::{BLOCK_ROWS, product_columns};
 
@@ -202,7 +203,7 @@ impl Consistent {
             for (f, frame) in frames.iter_mut().enumerate() {
                 for i in 0..count {
                     let p = point(f, first + i);
-                    let p = [0, 1, 2].map(|k| p[k] - frame.origin[k]);
+                    let p = sub(p, frame.origin);
                     frame.squared_positions += self.share * dot(p, p);
                     for k in 0..3 {
                         block[(i, 3 * f + k)] = self.share * p[k];
@@ -273,7 +274,7 @@ impl Consistent {
                     if !waits {
                         return Default::default();
                     }
-                    let moved = |(c, s): (&Point, &Point)| [0, 1, 2].map(|k| c[k] + length * s[k]);
+                    let moved = |(c, s): (&Point, &Point)| along(*c, length, *s);
                     let cage: Vec<Point> = frame.cage.iter().zip(step).map(moved).collect();
                     let values = frame.values(tied, &cage);
                     (cage, values)

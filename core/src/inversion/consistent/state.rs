@@ -4,6 +4,7 @@ use super::Outcome;
 use super::product_columns;
 use crate::coordinates::TiedNormals;
 use crate::mesh::Point;
+use crate::vector::{add, along, combination, dot, sub};
 use faer::{Mat, MatRef};
 
 /// State of one frame. Positions are relative to the centre of the initial cage, to keep precision far from the origin.
@@ -32,7 +33,7 @@ impl FrameState {
             }
         }
         let origin = origin.map(|c| c / cage.len() as f64);
-        let start: Vec<Point> = cage.iter().map(|p| [0, 1, 2].map(|k| p[k] - origin[k])).collect();
+        let start: Vec<Point> = cage.iter().map(|p| sub(*p, origin)).collect();
         Self {
             origin,
             cage: start.clone(),
@@ -55,18 +56,18 @@ impl FrameState {
     /// Data term of E.
     pub(super) fn data_energy(&self, values: &[Point], products: &[Point]) -> f64 {
         let terms = values.iter().zip(products).zip(&self.right_hand_side);
-        self.squared_positions + terms.map(|((&y, g), s)| dot(y, [0, 1, 2].map(|k| g[k] - 2.0 * s[k]))).sum::<f64>()
+        self.squared_positions + terms.map(|((&y, g), s)| dot(y, along(*g, -2.0, *s))).sum::<f64>()
     }
 
     pub(super) fn displacement(&self, cage: &[Point]) -> Vec<Point> {
-        cage.iter().zip(&self.start).map(|(c, s)| [0, 1, 2].map(|k| c[k] - s[k])).collect()
+        cage.iter().zip(&self.start).map(|(c, s)| sub(*c, *s)).collect()
     }
 
     /// Writes the refined cage back, relative to the origin of the capture.
     pub(super) fn write(&self, cage: &mut [Point]) {
         if self.steps > 0 {
             for (to, from) in cage.iter_mut().zip(&self.cage) {
-                *to = [0, 1, 2].map(|k| from[k] + self.origin[k]);
+                *to = add(*from, self.origin);
             }
         }
     }
@@ -88,11 +89,11 @@ impl ConjugateGradients {
     /// From a frame and half the gradient of the regularisation term of E.
     pub(super) fn new(tied: &TiedNormals, frame: &FrameState, regularization_gradient: &[Point]) -> Self {
         let derivatives = tied.derivatives(&frame.cage);
-        let difference = |(s, g): (&Point, &Point)| [0, 1, 2].map(|k| s[k] - g[k]);
+        let difference = |(s, g): (&Point, &Point)| sub(*s, *g);
         let open: Vec<Point> = frame.right_hand_side.iter().zip(&frame.products).map(difference).collect();
         let mut residual = transposed_jacobian_product(tied, &derivatives, &open);
         for (r, p) in residual.iter_mut().zip(regularization_gradient) {
-            *r = [0, 1, 2].map(|k| r[k] - p[k]);
+            *r = sub(*r, *p);
         }
         let zeros = vec![[0.0; 3]; residual.len()];
         Self { derivatives, step: zeros.clone(), direction: zeros, residual, size: 0.0, first_size: 0.0, done: false }
@@ -126,7 +127,7 @@ impl ConjugateGradients {
         }
         let beta = if first { 0.0 } else { size / self.size };
         for (d, z) in self.direction.iter_mut().zip(preconditioned) {
-            *d = [0, 1, 2].map(|k| z[k] + beta * d[k]);
+            *d = along(*z, beta, *d);
         }
         self.size = size;
     }
@@ -136,7 +137,7 @@ impl ConjugateGradients {
         let d = &self.direction;
         let of_face = |(&[a, b, c], derivative): (&[u32; 3], &[[Point; 3]; 2])| {
             let [a, b, c] = [a, b, c].map(|v| d[v as usize]);
-            let (u, v) = ([0, 1, 2].map(|k| b[k] - a[k]), [0, 1, 2].map(|k| c[k] - a[k]));
+            let (u, v) = (sub(b, a), sub(c, a));
             [0, 1, 2].map(|i| dot(derivative[0][i], u) + dot(derivative[1][i], v))
         };
         d.iter().copied().chain(tied.faces().iter().zip(&self.derivatives).map(of_face)).collect()
@@ -168,8 +169,7 @@ fn transposed_jacobian_product(tied: &TiedNormals, derivatives: &[[[Point; 3]; 2
     let vertices = w.len() - derivatives.len();
     let mut out = w[..vertices].to_vec();
     for ((&[a, b, c], derivative), w) in tied.faces().iter().zip(derivatives).zip(&w[vertices..]) {
-        let [u, v] =
-            derivative.map(|rows| [0, 1, 2].map(|k| rows[0][k] * w[0] + rows[1][k] * w[1] + rows[2][k] * w[2]));
+        let [u, v] = derivative.map(|rows| combination(*w, rows));
         for k in 0..3 {
             out[a as usize][k] -= u[k] + v[k];
             out[b as usize][k] += u[k];
@@ -206,8 +206,4 @@ pub(super) fn products<T: faer::traits::RealField + Copy>(
     let of_frame =
         |frame: &Vec<Point>| if frame.is_empty() { Vec::new() } else { place.next().map_or(Vec::new(), rows) };
     frames.iter().map(of_frame).collect()
-}
-
-pub(super) fn dot(a: Point, b: Point) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

@@ -1,6 +1,7 @@
 //! Where the meshes of a scene stand.
 
 use cager_core::mesh::Point;
+use cager_core::vector::{add, combination, cross, dot};
 use gltf::json::{Index, Node, Root};
 
 use super::dangling;
@@ -18,19 +19,18 @@ pub(super) struct Placement {
 }
 
 impl Placement {
-    pub(super) fn apply(&self, [x, y, z]: Point) -> Point {
+    pub(super) fn apply(&self, p: Point) -> Point {
         if self.transform == IDENTITY {
-            return [x, y, z];
+            return p;
         }
-        let [a, b, c, d] = &self.transform;
-        [0, 1, 2].map(|k| a[k] * x + b[k] * y + c[k] * z + d[k])
+        let [a, b, c, d] = self.transform;
+        add(combination(p, [a, b, c]), d)
     }
 
     /// Whether triangles turn around, so that they must be turned back.
     pub(super) fn mirrored(&self) -> bool {
-        let [a, b, c, _] = &self.transform;
-        let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
-        a[0] * cross[0] + a[1] * cross[1] + a[2] * cross[2] < 0.0
+        let [a, b, c, _] = self.transform;
+        dot(a, cross(b, c)) < 0.0
     }
 }
 
@@ -105,9 +105,7 @@ fn local(node: &Node) -> Affine {
 }
 
 fn compose(outer: &Affine, inner: &Affine) -> Affine {
-    let [a, b, c, d] = outer;
-    let turn = |[x, y, z]: [f64; 3]| [0, 1, 2].map(|k| a[k] * x + b[k] * y + c[k] * z);
-    let [i, j, k, moved] = inner;
-    let moved = turn(*moved);
-    [turn(*i), turn(*j), turn(*k), [0, 1, 2].map(|k| moved[k] + d[k])]
+    let [a, b, c, d] = *outer;
+    let [i, j, k, moved] = inner.map(|p| combination(p, [a, b, c]));
+    [i, j, k, add(moved, d)]
 }

@@ -17,10 +17,11 @@ const TYPES: Readonly<Record<string, string>> = {
 };
 
 export class PageServer {
-  /** Cuts the next answer to an address that ends so off after this many bytes, as a network does that breaks. */
-  cutNext: { readonly path: string; readonly bytes: number } | null = null;
+  /** The next answer to an address that ends so stops after this many bytes; {@link breakOff} then closes its connection. */
+  stopNext: { readonly path: string; readonly bytes: number } | null = null;
 
   readonly #passing = new Set<IncomingMessage>();
+  readonly #stopped = new Set<ServerResponse>();
   #isStalled = false;
 
   private constructor(
@@ -39,7 +40,7 @@ export class PageServer {
       // The page of parts lies deeper; both find the service beside themselves.
       const isPassed = ['v1/', 'tests/browser/page/v1/'].some((below) => path.startsWith(PREFIX + below));
       if (isPassed && found.#isStalled) return;
-      if (isPassed) pass(origin(), asked, answer, found.cutOf(path), found.#passing);
+      if (isPassed) pass(origin(), asked, answer, found.#lengthOf(path, answer), found.#passing);
       else send(folder, path, answer);
     });
     await new Promise<void>((resolve) => server.listen(0, '127.0.0.1', resolve));
@@ -59,11 +60,18 @@ export class PageServer {
     this.#isStalled = false;
   }
 
-  /** After how many bytes the answer to `path` is cut off. */
-  private cutOf(path: string): number {
-    if (!this.cutNext || !path.endsWith(this.cutNext.path)) return Infinity;
-    const { bytes } = this.cutNext;
-    this.cutNext = null;
+  /** Closes the connections of answers that were stopped. */
+  breakOff(): void {
+    this.#stopped.forEach((answer) => answer.destroy());
+    this.#stopped.clear();
+  }
+
+  /** After how many bytes the answer to `path` stops. */
+  #lengthOf(path: string, answer: ServerResponse): number {
+    if (!this.stopNext || !path.endsWith(this.stopNext.path)) return Infinity;
+    const { bytes } = this.stopNext;
+    this.stopNext = null;
+    this.#stopped.add(answer);
     return bytes;
   }
 
@@ -77,7 +85,7 @@ function pass(
   origin: string,
   asked: IncomingMessage,
   answer: ServerResponse,
-  cut: number,
+  length: number,
   passing: Set<IncomingMessage>,
 ): void {
   const url = (asked.url ?? '').replace(/^.*?\/v1\//, '/v1/');
@@ -87,10 +95,10 @@ function pass(
     answer.flushHeaders();
     passing.add(response);
     response.once('close', () => passing.delete(response));
-    let left = cut;
-    if (cut < Infinity) {
+    let left = length;
+    if (length < Infinity) {
       response.on('data', (piece: Buffer) => {
-        answer.write(piece.subarray(0, left), () => left <= 0 && answer.socket?.end());
+        if (left > 0) answer.write(piece.subarray(0, left));
         left -= piece.length;
       });
     } else response.pipe(answer);
