@@ -34,10 +34,10 @@ const JOINT_ERROR: f64 = 0.1;
 pub fn encode_cages(basis: &CageBasis, cages: &[&[f32]], step: f64, neighbours: Neighbours) -> Option<Vec<u8>> {
     let (rows, frames) = (basis.rows(), cages.len());
     assert!(frames <= MOST_FRAMES && cages.iter().all(|cage| cage.len() == 3 * rows));
-    // m × 3 T, to T × 3 m.
+    // m × 3 T, to 3 m × T.
     let y = basis.forward(cages);
-    let motion = Mat::from_fn(frames, 3 * rows, |t, value| y[(value / 3, 3 * t + value % 3)]);
-    let gram = linear::product(motion.as_ref(), motion.transpose());
+    let motion = Mat::from_fn(3 * rows, frames, |value, t| y[(value / 3, 3 * t + value % 3)]);
+    let gram = linear::gram(motion.as_ref());
     let most = frames.min(3 * rows);
     let mut chosen = Trajectories::choose(gram.as_ref(), 3 * rows, step, most)?;
     let exact = fit(chosen.values().as_ref(), motion.as_ref())?;
@@ -46,7 +46,7 @@ pub fn encode_cages(basis: &CageBasis, cages: &[&[f32]], step: f64, neighbours: 
         (steps <= f64::from(MOST)).then_some(steps.copysign(exact) as i32)
     };
     let width = 3 * rows;
-    let numbers = (0..chosen.count() * width).map(|at| in_steps(exact[(at / width, at % width)], ROUND_UP));
+    let numbers = (0..chosen.count() * width).map(|at| in_steps(exact[(at % width, at / width)], ROUND_UP));
     let mut whole: Vec<i32> = numbers.collect::<Option<_>>()?;
     for (frame, is_joined) in [(0, neighbours.before), (frames.saturating_sub(1), neighbours.after)] {
         // With as many trajectories as there can be every frame is as exact as a step.
@@ -57,7 +57,7 @@ pub fn encode_cages(basis: &CageBasis, cages: &[&[f32]], step: f64, neighbours: 
         let e = chosen.values();
         let of = |k: usize, value: usize| e[(frame, k)] * step * f64::from(whole[k * width + value]);
         let decoded = |value: usize| (0..chosen.count()).map(|k| of(k, value)).sum::<f64>();
-        let missing: Vec<f64> = (0..width).map(|value| motion[(frame, value)] - decoded(value)).collect();
+        let missing: Vec<f64> = (0..width).map(|value| motion[(value, frame)] - decoded(value)).collect();
         let rms = (missing.iter().map(|x| x * x).sum::<f64>() / width as f64).sqrt();
         let Some(height) = chosen.push_pulse(frame, JOINT_ERROR * 12f64.sqrt() * rms / step) else { continue };
         whole.extend(missing.iter().map(|x| in_steps(x / height, 0.5)).collect::<Option<Vec<_>>>()?);

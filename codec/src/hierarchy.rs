@@ -79,6 +79,27 @@ impl Hierarchy {
         self.order.len()
     }
 
+    /// About one in `every` of the vertices, in whole patches of the mesh, with the numbers that they have here, ascending: what costs as much to code,
+    /// for its size.
+    pub fn part(&self, every: usize) -> (Self, Vec<u32>) {
+        // A patch is what follows by the first parents from one vertex that is not predicted.
+        let (mut patches, mut patch) = (0, vec![0usize; self.points()]);
+        for (vertex, parents) in self.iter() {
+            patch[vertex] = parents.first().map_or(patches, |&parent| patch[parent as usize]);
+            patches += usize::from(parents.is_empty());
+        }
+        let is_chosen = |vertex: u32| patch[vertex as usize].is_multiple_of(every);
+        let vertices: Vec<u32> = (0..self.points() as u32).filter(|&vertex| is_chosen(vertex)).collect();
+        let number = |vertex: u32| vertices.partition_point(|&v| v < vertex) as u32;
+        let mut part = Self { order: Vec::new(), starts: vec![0], parents: Vec::new() };
+        for (vertex, parents) in self.iter().filter(|&(vertex, _)| is_chosen(vertex as u32)) {
+            part.order.push(number(vertex as u32));
+            part.parents.extend(parents.iter().filter(|&&parent| is_chosen(parent)).map(|&parent| number(parent)));
+            part.starts.push(part.parents.len() as u32);
+        }
+        (part, vertices)
+    }
+
     /// The vertices in order, each with those that predict it.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (usize, &[u32])> {
         self.order
@@ -131,5 +152,12 @@ mod tests {
             predicted += usize::from(!parents.is_empty());
         }
         assert!(known.iter().all(|&k| k) && predicted >= points - COARSEST - 7);
+        let (part, vertices) = hierarchy.part(4);
+        assert!(part.points() == vertices.len() && (points / 8..points / 2).contains(&vertices.len()));
+        for (v, parents) in part.iter() {
+            let (_, whole) = hierarchy.iter().find(|&(w, _)| w == vertices[v] as usize).unwrap();
+            assert!(parents.iter().all(|&p| whole.contains(&vertices[p as usize])) && parents.len() <= whole.len());
+        }
+        assert_eq!(hierarchy.part(1).0.parents.len(), hierarchy.parents.len());
     }
 }

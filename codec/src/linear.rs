@@ -1,15 +1,47 @@
-//! Decompositions by faer, sequential, so that results do not depend on the number of threads.
+//! Products and decompositions by faer, sequential or in blocks of a size of their own, so that results do not depend on the number of threads.
 
 use faer::diag::Diag;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::evd::{ComputeEigenvectors, self_adjoint_evd, self_adjoint_evd_scratch};
 use faer::linalg::matmul::matmul;
+use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::{Accum, Mat, MatRef, Par};
+use rayon::prelude::*;
+
+/// Fewest rows that one task multiplies, and most tasks.
+const BLOCK_ROWS: usize = 2048;
+const MOST_BLOCKS: usize = 16;
 
 /// `A · B`.
 pub(crate) fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     let mut out = Mat::zeros(a.nrows(), b.ncols());
     matmul(out.as_mut(), Accum::Replace, a, b, 1.0, Par::Seq);
+    out
+}
+
+fn block_rows(rows: usize) -> usize {
+    rows.div_ceil(MOST_BLOCKS).max(BLOCK_ROWS)
+}
+
+/// `Aᵀ A` of a matrix with many rows.
+pub(crate) fn gram(a: MatRef<'_, f64>) -> Mat<f64> {
+    let of_block = |rows: MatRef<'_, f64>| {
+        let mut part = Mat::zeros(a.ncols(), a.ncols());
+        let (full, lower) = (BlockStructure::Rectangular, BlockStructure::TriangularLower);
+        triangular::matmul(part.as_mut(), lower, Accum::Replace, rows.transpose(), full, rows, full, 1.0, Par::Seq);
+        part
+    };
+    let parts: Vec<Mat<f64>> = a.par_row_chunks(block_rows(a.nrows())).map(of_block).collect();
+    let sum = |i: usize, j: usize| parts.iter().map(|part| part[(i.max(j), i.min(j))]).sum();
+    Mat::from_fn(a.ncols(), a.ncols(), sum)
+}
+
+/// `A · B` of a matrix A with many rows.
+pub(crate) fn tall_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
+    let mut out = Mat::zeros(a.nrows(), b.ncols());
+    let block = block_rows(a.nrows());
+    let parts = out.par_row_chunks_mut(block).zip(a.par_row_chunks(block));
+    parts.for_each(|(out, a)| matmul(out, Accum::Replace, a, b, 1.0, Par::Seq));
     out
 }
 

@@ -48,8 +48,12 @@ pub fn encode_residual(hierarchy: &Hierarchy, group: &ResidualGroup<'_>) -> Opti
     let (points, frames) = (hierarchy.points(), group.captured.len());
     assert!(frames == group.of_cages.len() && frames <= MOST_FRAMES && points * frames <= MOST_POSITIONS);
     assert!(group.captured.iter().all(|frame| frame.len() == 3 * points));
-    let motion = Mat::from_fn(frames, 3 * points, |t, k| group.captured[t][k] - f64::from(group.of_cages[t][k]));
-    let gram = linear::product(motion.as_ref(), motion.transpose());
+    let mut motion = Mat::<f64>::zeros(3 * points, frames);
+    motion.par_col_iter_mut().enumerate().for_each(|(t, column)| {
+        let pairs = group.captured[t].iter().zip(&group.of_cages[t]);
+        column.iter_mut().zip(pairs).for_each(|(x, (&captured, &of_cage))| *x = captured - f64::from(of_cage));
+    });
+    let gram = linear::gram(motion.as_ref());
     let chosen = Trajectories::choose(
         gram.as_ref(),
         3 * points,
@@ -57,8 +61,7 @@ pub fn encode_residual(hierarchy: &Hierarchy, group: &ResidualGroup<'_>) -> Opti
         frames.min(group.most_numbers / (3 * points).max(1)),
     )?;
     let count = chosen.count();
-    // Values × components: each component is read several times.
-    let values = fit(chosen.values().as_ref(), motion.as_ref())?.transpose().to_owned();
+    let values = fit(chosen.values().as_ref(), motion.as_ref())?;
     drop(motion);
     let per_unit = PARTS as f64 / group.step;
     let most = f64::from(MOST) / per_unit;

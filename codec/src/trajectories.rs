@@ -99,16 +99,16 @@ impl Trajectories {
     }
 }
 
-/// A of least squares: components × values, for M frames × values.
+/// Aᵀ of least squares: values × components, for Mᵀ, values × frames.
 pub(crate) fn fit(trajectories: MatRef<'_, f64>, motion: MatRef<'_, f64>) -> Option<Mat<f64>> {
     let count = trajectories.ncols();
     let mut inner = linear::product(trajectories.transpose(), trajectories);
     for k in 0..count {
         inner[(k, k)] += 1e-9;
     }
-    let mut values = linear::product(trajectories.transpose(), motion);
-    linear::solve_cholesky(linear::cholesky(inner.as_ref())?.as_ref(), &mut values);
-    Some(values)
+    let mut shares = trajectories.transpose().to_owned();
+    linear::solve_cholesky(linear::cholesky(inner.as_ref())?.as_ref(), &mut shares);
+    Some(linear::tall_product(motion, shares.transpose()))
 }
 
 /// The orthonormal cosine transform (DCT-II) of so many values.

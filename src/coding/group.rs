@@ -33,6 +33,11 @@ pub(super) struct Encoded {
 }
 
 impl Encoded {
+    /// About the bytes of a group with all points, where this has a `part` of them.
+    pub(super) fn bytes_of_whole(&self, part: f64) -> f64 {
+        self.cages.len() as f64 + self.residual.as_ref().map_or(0.0, |residual| residual.len() as f64 / part)
+    }
+
     pub(super) fn bytes(&self) -> u64 {
         (self.cages.len() + self.residual.as_ref().map_or(0, |r| r.len() + SECTION)) as u64 + SECTION as u64
     }
@@ -75,8 +80,8 @@ pub(crate) struct GroupCoder {
     pub(super) diagonal: f64,
     pub(super) carried: Carried,
     pub(super) frames: Vec<Vec<f64>>,
-    cages: Vec<Vec<f32>>,
-    most: usize,
+    pub(super) cages: Vec<Vec<f32>>,
+    pub(super) most: usize,
 }
 
 impl GroupCoder {

@@ -64,6 +64,12 @@ impl GroupDecoder {
         Self { basis, hierarchy, decoder: solver.decoder().clone() }
     }
 
+    /// With about one in `every` of the points, in whole patches, and their numbers.
+    pub(super) fn part(&self, every: usize) -> (Self, Vec<u32>) {
+        let (hierarchy, points) = self.hierarchy.part(every);
+        (Self { basis: self.basis.clone(), hierarchy, decoder: self.decoder.of_points(&points) }, points)
+    }
+
     pub(super) fn points(&self) -> usize {
         self.decoder.points()
     }

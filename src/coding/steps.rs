@@ -1,12 +1,12 @@
 //! How large steps are: for a bound and a size by what the first frames cost, for a mean error and a size held in every group.
 
 use super::group::{CodedGroup, GroupCoder, Room};
-use super::{CodingError, Goal, HELD, MOST_HELD};
+use super::{CodingError, Goal};
+use std::sync::Arc;
 
-/// Frames that steps are chosen by.
-const TRIAL: usize = 32;
-/// Positions of frames that may be coded together.
-const MOST_TOGETHER: usize = MOST_HELD / HELD;
+/// Frames that steps are chosen by, and points of them where there are more than twice as many: fewer points had larger files in the end.
+const TRIAL_FRAMES: usize = 32;
+const TRIAL_POINTS: usize = 10_000;
 /// Step of the cage over that of the residual, both as what they move the points, where nothing was measured.
 const USUAL_RATIO: f64 = 1.6;
 /// Step of the residual over the largest error allowed, likewise.
@@ -18,25 +18,24 @@ const NEAR: f64 = 1.04;
 const MOST_TRIALS: usize = 20;
 
 impl GroupCoder {
-    /// Step and ratio by what the first frames cost.
+    /// Step and ratio by what the first frames cost, of some patches of a large model.
     pub(super) fn choose(&self) -> Result<(f64, f64), CodingError> {
-        let count = self.frames.len().min(TRIAL);
         match self.goal {
             Goal::Preview => Ok((2.8e-3 * self.diagonal / USUAL_RATIO * self.per_row(), USUAL_RATIO)),
             Goal::Standard => Ok((3e-3 * self.diagonal, USUAL_RATIO)),
             Goal::MaxError(error) => {
                 let unit = error * self.diagonal;
+                let trial = self.trial();
+                let part = trial.model.points() as f64 / self.model.points() as f64;
                 let size = |(step, ratio): (f64, f64)| {
-                    self.encode(count, step * unit, ratio).map(|group| (group.bytes(), (step, ratio)))
+                    let coded = trial.encode(trial.frames.len(), step * unit, ratio * part.sqrt());
+                    coded.map(|coded| (coded.bytes_of_whole(part), (step, ratio)))
                 };
-                // Two at once take twice the memory, of which a large group is all there is.
-                let is_small = 2 * count * self.model.points() <= MOST_TOGETHER;
                 let mut best = size((USUAL_STEP, USUAL_RATIO))?;
                 for (step, ratio) in [(1.0, 1.6), (1.4, 1.0)] {
                     let (_, from) = best;
                     let (more, less) = ((from.0 * step, from.1 * ratio), (from.0 / step, from.1 / ratio));
-                    let (more, less) =
-                        if is_small { rayon::join(|| size(more), || size(less)) } else { (size(more), size(less)) };
+                    let (more, less) = rayon::join(|| size(more), || size(less));
                     best = [more?, less?]
                         .into_iter()
                         .fold(best, |best, tried| if tried.0 < best.0 { tried } else { best });
@@ -48,6 +47,19 @@ impl GroupCoder {
             Goal::MeanError(error) => Ok((4.0 * error * self.diagonal, USUAL_RATIO)),
             Goal::Size(_) => Ok((1e-3 * self.diagonal, USUAL_RATIO)),
         }
+    }
+
+    /// A coder with what steps are chosen by.
+    fn trial(&self) -> Self {
+        let (model, points) = self.model.part((self.model.points() / TRIAL_POINTS).max(1));
+        let of_points = |frame: &Vec<f64>| {
+            points.iter().flat_map(|&i| frame[3 * i as usize..][..3].iter().copied()).collect::<Vec<f64>>()
+        };
+        let count = self.frames.len().min(TRIAL_FRAMES);
+        let mut trial = Self::new(self.goal, Arc::new(model), self.diagonal, self.most, self.carried);
+        trial.frames = self.frames[..count].iter().map(of_points).collect();
+        trial.cages = self.cages[..count].to_vec();
+        trial
     }
 
     /// Root of points over rows of a cage: a step of this times the unit moves the points by about the unit.

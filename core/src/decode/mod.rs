@@ -131,6 +131,12 @@ impl Decoder {
         self.phi.kept().map(|phi| phi.subrows(0, self.points))
     }
 
+    /// A decoder of some of the points, in this order.
+    #[must_use]
+    pub fn of_points(&self, points: &[u32]) -> Self {
+        Self { normals: self.normals.clone(), ..Self::from_single(self.rows(points), self.positions) }
+    }
+
     /// Some rows of `Φ`.
     pub(crate) fn rows(&self, rows: &[u32]) -> Mat<f32> {
         self.phi.rows(rows)
