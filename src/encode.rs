@@ -1,25 +1,27 @@
 //! Encoding: solves one cage per frame and measures the errors that a decoder will produce.
 
-use crate::capture::{CaptureWriter, Encoding, StoredError};
-use crate::coding::{
-    Carried, CodedGroup, CodingError, Goal, GroupCoder, GroupDecoder, GroupSpace, HELD, RestMeshes, group_frames,
-};
+mod batches;
+mod sink;
+
+use crate::capture::{CaptureWriter, Encoding};
+use crate::coding::{Carried, CodingError, Goal, GroupCoder, GroupDecoder, GroupSpace, HELD, RestMeshes, group_frames};
 use crate::memory::Memory;
+use batches::{Batch, BatchPlan, SolvedBatch, read_batches, solve};
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::decode::FrameError;
-use cager_core::inversion::{Analysis, BATCH, Convergence, PrepareError, Preparing, Solver, SolverOptions};
+use cager_core::inversion::{Analysis, PrepareError, Preparing, Solver, SolverOptions};
 use cager_core::mesh::{Model, diagonal};
 use cager_core::regularize::Term;
 use cager_formats::{Action, AtomicFile, FrameReader, Target};
 use cager_proto::container;
-use cager_proto::report::{Consistency, Report, Seconds, SpectrumChoice, WorstError};
+use cager_proto::report::{Consistency, Report, Seconds, SpectrumChoice};
 use rayon::prelude::*;
+use sink::{FrameSink, SinkError};
 use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::sync_channel;
 use std::time::Instant;
 
 /// Largest memory of sampled frames, in bytes; constant, because the choice that depends on them must be reproducible.
@@ -162,10 +164,6 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
     let clock = Instant::now();
     let path = job.output.path();
     let fail = |cause| EncodeError::container(path, cause);
-    let explain = |error| match error {
-        GroupError::Coding(error) => EncodeError::Coding(error),
-        GroupError::Container(cause) => fail(cause),
-    };
     // First, so that an unwritable output fails before the work.
     let file = AtomicFile::create(job.output)?;
     let meshes =
@@ -203,89 +201,32 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
     let mut writer = CaptureWriter::with_meshes(out, &encoding, coded).map_err(fail)?;
     let group_frames = group_frames(job.rest.points.len(), solver.decoder().unknowns());
     let group_frames = job.memory.frames(HELD * job.rest.points.len(), group_frames);
-    let mut coder = job.goal.zip(model).map(|(goal, model)| {
+    let coder = job.goal.zip(model).map(|(goal, model)| {
         let room = goal.room(writer.bytes(), job.frames.frames());
         GroupCoder::new(goal, Arc::new(model), unit, group_frames, Carried { room, ..Carried::default() })
     });
     writer.number_frames((0..job.frames.frames()).map(|frame| job.frames.number(frame)).collect());
     let found = solver.preparation();
-    let mut seconds = Seconds {
+    let seconds = Seconds {
         coordinates: found.coordinates_seconds,
         maxvol: found.maxvol_seconds,
         svd: found.svd_seconds,
         ..Seconds::default()
     };
-    let keeps = solver.decoder().coordinates().is_some();
-    let BatchPlan { size, concurrent } = BatchPlan::new(job.memory, job.frames.points(), keeps);
-    let mut convergence = Vec::new();
-    let mut worst = None;
-    std::thread::scope(|scope| -> Result<(), EncodeError> {
-        let (full, batches) = sync_channel(concurrent);
-        let (empty, recycled) = sync_channel(2 * concurrent + 2);
-        let frames = job.frames;
-        let reader = scope.spawn(move || read_batches(frames, size, &full, &recycled));
-        let mut done = 0;
-        let mut previous: Option<Vec<f32>> = None;
-        while let Ok(first) = batches.recv() {
-            let mut waiting = vec![first];
-            while waiting.len() < concurrent {
-                match batches.try_recv() {
-                    Ok(batch) => waiting.push(batch),
-                    Err(_) => break,
-                }
-            }
-            let solved: Vec<SolvedBatch> = if solver.follows_previous() {
-                let in_order = waiting.iter().map(|batch| {
-                    let solved = solve(&solver, batch, previous.as_deref(), coder.is_none());
-                    previous = solved.cages.last().cloned();
-                    solved
-                });
-                in_order.collect()
-            } else {
-                waiting.par_iter().map(|batch| solve(&solver, batch, None, coder.is_none())).collect()
-            };
-            if let Some(coder) = &mut coder {
-                for (batch, solved) in waiting.into_iter().zip(solved) {
-                    seconds.invert += solved.invert_seconds;
-                    convergence.extend(solved.convergence);
-                    for (frame, cage) in batch.into_iter().zip(solved.cages) {
-                        if coder.push(frame, cage) {
-                            close(coder, &mut writer, &mut worst, &mut seconds, solver.diagonal()).map_err(&explain)?;
-                        }
-                        done += 1;
-                    }
-                }
-                progress(EncodeProgress::Frames(done));
-                continue;
-            }
-            for batch in waiting {
-                // The reader may have stopped already.
-                let _ = empty.send(batch);
-            }
-            let clock = Instant::now();
-            for batch in solved {
-                seconds.invert += batch.invert_seconds;
-                seconds.measure += batch.measure_seconds;
-                convergence.extend(batch.convergence);
-                for (cage, error) in batch.cages.iter().zip(&batch.errors) {
-                    if worst.is_none_or(|worst: WorstError| error.linf > worst.distance) {
-                        worst = Some(WorstError { frame: done, point: Some(error.worst), distance: error.linf });
-                    }
-                    writer.write_frame(cage, &StoredError::new(error, solver.diagonal())).map_err(fail)?;
-                    done += 1;
-                }
-            }
-            seconds.write += clock.elapsed().as_secs_f64();
-            progress(EncodeProgress::Frames(done));
-        }
-        let outcome = reader.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-        seconds.read += outcome?;
-        if let Some(coder) = coder.as_mut().filter(|coder| !coder.is_empty()) {
-            close(coder, &mut writer, &mut worst, &mut seconds, solver.diagonal()).map_err(&explain)?;
-        }
-        Ok(())
-    })?;
-
+    let diagonal = solver.diagonal();
+    let mut sink = FrameSink { writer, coder, seconds, convergence: Vec::new(), worst: None, frames: 0, diagonal };
+    send_frames(
+        &solver,
+        job.memory,
+        job.frames,
+        &mut sink,
+        &|error| match error {
+            SinkError::Coding(error) => EncodeError::Coding(error),
+            SinkError::Container(cause) => fail(cause),
+        },
+        progress,
+    )?;
+    let FrameSink { mut writer, coder, mut seconds, convergence, worst, .. } = sink;
     let coded = job.goal.zip(coder.as_ref());
     let coding = |(goal, coder): (Goal, &GroupCoder)| {
         goal.coding(&coder.carried(), job.rest.points.len(), solver.diagonal(), group_frames)
@@ -310,34 +251,48 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
     Ok(Encoded { report, container })
 }
 
-/// Codes a group and writes it.
-fn close<W: Write>(
-    coder: &mut GroupCoder,
-    writer: &mut CaptureWriter<W>,
-    worst: &mut Option<WorstError>,
-    seconds: &mut Seconds,
-    diagonal: f64,
-) -> Result<(), GroupError> {
-    let clock = Instant::now();
-    let CodedGroup { cages, residual, errors, farthest } = coder.close()?;
-    let before = writer.frames();
-    for (frame, error) in errors.iter().enumerate() {
-        if worst.is_none_or(|worst| error.linf > worst.distance) {
-            *worst = Some(WorstError { frame: before + frame, point: Some(error.worst), distance: error.linf });
+/// Reads and solves all frames, and hands them over in their order.
+fn send_frames<W: Write>(
+    solver: &Solver,
+    memory: Memory,
+    frames: &mut dyn FrameReader,
+    sink: &mut FrameSink<W>,
+    explain: &dyn Fn(SinkError) -> EncodeError,
+    progress: &dyn Fn(EncodeProgress),
+) -> Result<(), EncodeError> {
+    let keeps = solver.decoder().coordinates().is_some();
+    let BatchPlan { size, concurrent } = BatchPlan::new(memory, frames.points(), keeps);
+    // Errors of coded frames are those of what is decoded, measured by the coder.
+    let measures = sink.coder.is_none();
+    std::thread::scope(|scope| {
+        let (full, batches) = sync_channel(concurrent);
+        let (empty, recycled) = sync_channel(2 * concurrent + 2);
+        let reader = scope.spawn(move || read_batches(frames, size, &full, &recycled));
+        let mut previous: Option<Vec<f32>> = None;
+        while let Ok(first) = batches.recv() {
+            let waiting: Vec<Batch> = std::iter::once(first).chain(batches.try_iter().take(concurrent - 1)).collect();
+            let solved: Vec<SolvedBatch> = if solver.follows_previous() {
+                let in_order = waiting.iter().map(|batch| {
+                    let solved = solve(solver, batch, previous.as_deref(), measures);
+                    previous = solved.cages.last().cloned();
+                    solved
+                });
+                in_order.collect()
+            } else {
+                waiting.par_iter().map(|batch| solve(solver, batch, None, measures)).collect()
+            };
+            for (batch, solved) in waiting.into_iter().zip(solved) {
+                if let Some(unused) = sink.take(batch, solved).map_err(explain)? {
+                    // The reader may have stopped already.
+                    let _ = empty.send(unused);
+                }
+            }
+            progress(EncodeProgress::Frames(sink.frames));
         }
-    }
-    seconds.measure += clock.elapsed().as_secs_f64();
-    let errors: Vec<StoredError> = errors.iter().map(|error| StoredError::new(error, diagonal)).collect();
-    Ok(writer.write_group(&cages, residual.as_deref(), &errors, farthest)?)
-}
-
-/// Why a group is not in the file.
-#[derive(Debug, thiserror::Error)]
-enum GroupError {
-    #[error(transparent)]
-    Coding(#[from] CodingError),
-    #[error(transparent)]
-    Container(#[from] container::Error),
+        let outcome = reader.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        sink.seconds.read += outcome?;
+        sink.close_group().map_err(explain)
+    })
 }
 
 /// The solver, its options, and how the spectrum threshold was selected.
@@ -369,77 +324,6 @@ fn prepare(
     Ok((handle_system.solver_with(options, term)?, options, Some(SpectrumChoice::new(&found, *bound))))
 }
 
-type Batch = Vec<Vec<f64>>;
-
-/// Batch size and number of batches solved concurrently. As many again are queued, and one is being read.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct BatchPlan {
-    size: usize,
-    concurrent: usize,
-}
-
-impl BatchPlan {
-    /// With coordinates in memory, one batch per thread; otherwise one batch, since computing coordinates uses all threads.
-    fn new(memory: Memory, points: usize, keeps: bool) -> Self {
-        let most = if keeps { rayon::current_num_threads() } else { 1 };
-        let frames = memory.frames(24 * points, BATCH * (2 * most + 1));
-        let concurrent = (frames.saturating_sub(1) / 2).clamp(1, most);
-        Self { size: (frames / (2 * concurrent + 1)).max(1), concurrent }
-    }
-}
-
-/// Reads all frames; returns the seconds spent reading, without waiting for the solver.
-fn read_batches(
-    frames: &mut dyn FrameReader,
-    size: usize,
-    full: &SyncSender<Batch>,
-    recycled: &Receiver<Batch>,
-) -> Result<f64, cager_formats::Error> {
-    let mut seconds = 0.0;
-    loop {
-        let clock = Instant::now();
-        let mut batch = recycled.try_recv().unwrap_or_default();
-        let mut filled = 0;
-        while filled < size {
-            if filled == batch.len() {
-                batch.push(Vec::new());
-            }
-            if !frames.read_next(&mut batch[filled])? {
-                break;
-            }
-            filled += 1;
-        }
-        batch.truncate(filled);
-        seconds += clock.elapsed().as_secs_f64();
-        if batch.is_empty() || full.send(batch).is_err() {
-            return Ok(seconds);
-        }
-    }
-}
-
-struct SolvedBatch {
-    cages: Vec<Vec<f32>>,
-    errors: Vec<FrameError>,
-    /// Empty where nothing was iterated.
-    convergence: Vec<Convergence>,
-    invert_seconds: f64,
-    measure_seconds: f64,
-}
-
-/// Solves a batch; `previous` is the cage of the frame before its first, `measures` whether errors are measured on these cages.
-fn solve(solver: &Solver, batch: &Batch, previous: Option<&[f32]>, measures: bool) -> SolvedBatch {
-    let frames: Vec<&[f64]> = batch.iter().map(Vec::as_slice).collect();
-    let clock = Instant::now();
-    let inverted = solver.invert_with_convergence(previous, &frames);
-    let invert_seconds = clock.elapsed().as_secs_f64();
-    let convergence = inverted.iter().filter_map(|inverted| inverted.convergence).collect();
-    let cages: Vec<Vec<f32>> = inverted.into_iter().map(|inverted| inverted.cage).collect();
-    let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
-    let errors = if measures { solver.decoder().measure(&views, &frames) } else { Vec::new() };
-    let measure_seconds = clock.elapsed().as_secs_f64() - invert_seconds;
-    SolvedBatch { cages, errors, convergence, invert_seconds, measure_seconds }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -463,23 +347,6 @@ mod tests {
             let more = self.left > 0;
             self.left = self.left.saturating_sub(1);
             Ok(more)
-        }
-    }
-
-    #[test]
-    fn frames_on_their_way_fit_into_memory_with_any_number_of_threads() {
-        for threads in [1, 2, 64] {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-            for (points, keeps) in [(100, true), (100, false), (1_000_000, true), (1_000_000, false)] {
-                let BatchPlan { size, concurrent } =
-                    pool.install(|| BatchPlan::new(Memory::at_most(1 << 30), points, keeps));
-                let most = (24 * points * size * (2 * concurrent + 1)) as u64;
-                assert!(
-                    (1..=BATCH).contains(&size) && concurrent >= 1 && most <= 1 << 28,
-                    "{threads} {points}: {most}"
-                );
-                assert!(points > 100 || size == BATCH && concurrent == if keeps { threads } else { 1 });
-            }
         }
     }
 

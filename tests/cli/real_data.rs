@@ -88,7 +88,9 @@ fn reproduces_the_reference(capture: &str) {
             ("kg_percent", e.kg_percent),
         ] {
             let wanted = expected["least_squares"][key].as_f64().expect(key);
-            worst = worst.max(close(&format!("{name}: {key}"), found, wanted, 1e-4));
+            // Cages are stored in single precision, which moves points by 1e-8 of the diagonal.
+            let limit = 1e-6 + 2e-8 / wanted;
+            worst = worst.max(close(&format!("{name}: {key}"), found, wanted, limit));
         }
         assert!(all.affine_reproduction_error <= 1e-10, "{name}: {:e}", all.affine_reproduction_error);
         let wanted = expected["cond_phi"].as_f64().expect("cond_phi");
@@ -105,7 +107,7 @@ fn reproduces_the_reference(capture: &str) {
             assert_eq!(report.rank, all.rank, "{name}");
             assert_eq!(report.handle_indices.len(), report.rank, "{name}");
             assert!(report.error.l2_mean >= all.error.l2_mean * (1.0 - 1e-6), "{name}: better than least squares");
-            assert!(report.maxvol.max_entry <= 1.1, "{name}: {}", report.maxvol.max_entry);
+            assert!(report.maxvol.max_entry <= 1.01, "{name}: {}", report.maxvol.max_entry);
             let condition = report.condition_number;
             assert!(condition.handles >= 1.0 && condition.handles <= 1.5 * wanted_handles(expected), "{name}");
         }
@@ -175,7 +177,8 @@ fn a_real_capture_through_the_program_has_the_errors_of_the_reference() {
     encode_files(&dir, line, &folder.join("rest.obj"), &folder.join("cage.obj"), &folder.join("frames.npy"));
     let (report, expected) = (dir.json("report.json"), &reference(&root)["supercages-arm/cage"]["least_squares"]);
     for key in ["l2_mean", "l2_max", "linf_mean", "linf_max", "kg_percent"] {
-        close(key, report["error"][key].as_f64().expect(key), expected[key].as_f64().expect(key), 1e-4);
+        let wanted = expected[key].as_f64().expect(key);
+        close(key, report["error"][key].as_f64().expect(key), wanted, 1e-6 + 2e-8 / wanted);
     }
     dir.cager("decode out.cager -o back.npy").succeeds();
     dir.cager("inspect out.cager").succeeds();

@@ -1,0 +1,80 @@
+//! Where solved frames go: into a container, as they are or coded group by group.
+
+use super::batches::{Batch, SolvedBatch};
+use crate::capture::{CaptureWriter, StoredError};
+use crate::coding::{CodedGroup, CodingError, GroupCoder};
+use cager_core::decode::FrameError;
+use cager_core::inversion::Convergence;
+use cager_proto::container;
+use cager_proto::report::{Seconds, WorstError};
+use std::io::Write;
+use std::time::Instant;
+
+/// A container that is being written, and what is found out on the way.
+pub(super) struct FrameSink<W: Write> {
+    pub(super) writer: CaptureWriter<W>,
+    /// Where frames are coded.
+    pub(super) coder: Option<GroupCoder>,
+    pub(super) seconds: Seconds,
+    pub(super) convergence: Vec<Convergence>,
+    pub(super) worst: Option<WorstError>,
+    /// Frames that came.
+    pub(super) frames: usize,
+    /// Of the rest pose: the unit of stored errors.
+    pub(super) diagonal: f64,
+}
+
+/// Why frames are not in the file.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum SinkError {
+    #[error(transparent)]
+    Coding(#[from] CodingError),
+    #[error(transparent)]
+    Container(#[from] container::Error),
+}
+
+impl<W: Write> FrameSink<W> {
+    /// Takes the next batch; gives it back where its frames are not kept.
+    pub(super) fn take(&mut self, batch: Batch, solved: SolvedBatch) -> Result<Option<Batch>, SinkError> {
+        self.seconds.invert += solved.invert_seconds;
+        self.seconds.measure += solved.measure_seconds;
+        self.convergence.extend(solved.convergence);
+        let count = batch.len();
+        let unused = if self.coder.is_some() {
+            for (frame, cage) in batch.into_iter().zip(solved.cages) {
+                if self.coder.as_mut().is_some_and(|coder| coder.push(frame, cage)) {
+                    self.close_group()?;
+                }
+            }
+            None
+        } else {
+            let clock = Instant::now();
+            for (k, (cage, error)) in solved.cages.iter().zip(&solved.errors).enumerate() {
+                self.look_at(self.frames + k, error);
+                self.writer.write_frame(cage, &StoredError::new(error, self.diagonal))?;
+            }
+            self.seconds.write += clock.elapsed().as_secs_f64();
+            Some(batch)
+        };
+        self.frames += count;
+        Ok(unused)
+    }
+
+    /// Codes the frames that wait for a group, where there are any, and writes it.
+    pub(super) fn close_group(&mut self) -> Result<(), SinkError> {
+        let Some(coder) = self.coder.as_mut().filter(|coder| !coder.is_empty()) else { return Ok(()) };
+        let clock = Instant::now();
+        let CodedGroup { cages, residual, errors, farthest } = coder.close()?;
+        let before = self.writer.frames();
+        errors.iter().enumerate().for_each(|(k, error)| self.look_at(before + k, error));
+        self.seconds.measure += clock.elapsed().as_secs_f64();
+        let errors: Vec<StoredError> = errors.iter().map(|error| StoredError::new(error, self.diagonal)).collect();
+        Ok(self.writer.write_group(&cages, residual.as_deref(), &errors, farthest)?)
+    }
+
+    fn look_at(&mut self, frame: usize, error: &FrameError) {
+        if self.worst.is_none_or(|worst| error.linf > worst.distance) {
+            self.worst = Some(WorstError { frame, point: Some(error.worst), distance: error.linf });
+        }
+    }
+}
