@@ -76,6 +76,7 @@ export default defineConfig(({ mode }) => ({
   test: {
     environment: 'node',
     testTimeout: 20_000,
+    expect: { poll: { timeout: 10_000 } },
     projects: [
       { extends: true, test: { name: 'unit', include: ['src/**/*.test.ts'] } },
       // One browser that draws in software, for all files: two at once would wait for each other until they time out.

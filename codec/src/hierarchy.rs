@@ -7,6 +7,8 @@ use cager_core::mesh::Polygons;
 
 /// Rounds end when so few vertices are left; these are not predicted.
 const COARSEST: usize = 48;
+/// Vertices of a patch of a [part](Hierarchy::part), about.
+const PATCH: usize = 512;
 
 /// Vertices from coarse to fine.
 #[derive(Clone, Debug)]
@@ -82,13 +84,29 @@ impl Hierarchy {
     /// About one in `every` of the vertices, in whole patches of the mesh, with the numbers that they have here, ascending: what costs as much to code,
     /// for its size.
     pub fn part(&self, every: usize) -> (Self, Vec<u32>) {
-        // A patch is what follows by the first parents from one vertex that is not predicted.
-        let (mut patches, mut patch) = (0, vec![0usize; self.points()]);
-        for (vertex, parents) in self.iter() {
-            patch[vertex] = parents.first().map_or(patches, |&parent| patch[parent as usize]);
-            patches += usize::from(parents.is_empty());
+        // A patch is what follows by the first parents from one of the coarsest vertices. Those that are not predicted come first; there may be one for each of
+        // many parts, so that others have to be begun with besides.
+        let roots = self.iter().filter(|(_, parents)| parents.is_empty()).count();
+        let patches = roots + self.points() / PATCH;
+        let mut patch = vec![0usize; self.points()];
+        for (place, (vertex, parents)) in self.iter().enumerate() {
+            let first = parents.first().filter(|_| place >= patches);
+            patch[vertex] = first.map_or(place, |&parent| patch[parent as usize]);
         }
-        let is_chosen = |vertex: u32| patch[vertex as usize].is_multiple_of(every);
+        let mut sizes = vec![0; self.points()];
+        patch.iter().for_each(|&patch| sizes[patch] += 1);
+        // One whenever fewer than one in `every` points were chosen so far.
+        let (mut seen, mut chosen) = (0, 0);
+        let is_patch_chosen: Vec<bool> = sizes
+            .iter()
+            .map(|&size| {
+                let is_chosen = chosen * every <= seen;
+                seen += size;
+                chosen += if is_chosen { size } else { 0 };
+                is_chosen
+            })
+            .collect();
+        let is_chosen = |vertex: u32| is_patch_chosen[patch[vertex as usize]];
         let vertices: Vec<u32> = (0..self.points() as u32).filter(|&vertex| is_chosen(vertex)).collect();
         let number = |vertex: u32| vertices.partition_point(|&v| v < vertex) as u32;
         let mut part = Self { order: Vec::new(), starts: vec![0], parents: Vec::new() };
@@ -152,12 +170,40 @@ mod tests {
             predicted += usize::from(!parents.is_empty());
         }
         assert!(known.iter().all(|&k| k) && predicted >= points - COARSEST - 7);
-        let (part, vertices) = hierarchy.part(4);
-        assert!(part.points() == vertices.len() && (points / 8..points / 2).contains(&vertices.len()));
-        for (v, parents) in part.iter() {
-            let (_, whole) = hierarchy.iter().find(|&(w, _)| w == vertices[v] as usize).unwrap();
-            assert!(parents.iter().all(|&p| whole.contains(&vertices[p as usize])) && parents.len() <= whole.len());
+    }
+
+    #[test]
+    fn a_part_has_its_share_of_the_points_whatever_else_is_there() {
+        let side = 120u32;
+        for (before, after) in [(0, 0), (60, 0), (0, 61), (400, 0)] {
+            let mut faces = Polygons::new();
+            for (i, j) in (0..side - 1).flat_map(|i| (0..side - 1).map(move |j| (i, j))) {
+                let at = |i: u32, j: u32| before + i * side + j;
+                faces.push(&[at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
+            }
+            let points = (before + side * side + after) as usize;
+            let hierarchy = Hierarchy::new(&faces, points);
+            let whole: Vec<&[u32]> = {
+                let mut parents: Vec<&[u32]> = vec![&[]; points];
+                hierarchy.iter().for_each(|(vertex, found)| parents[vertex] = found);
+                parents
+            };
+            for every in [2, 5] {
+                let (part, vertices) = hierarchy.part(every);
+                let share = points / every;
+                assert!(part.points() == vertices.len() && vertices.is_sorted());
+                assert!(
+                    (share / 2..2 * share).contains(&vertices.len()),
+                    "{before} {after}: {} of {points}",
+                    vertices.len()
+                );
+                for (vertex, parents) in part.iter() {
+                    let whole = whole[vertices[vertex] as usize];
+                    assert!(
+                        parents.len() <= whole.len() && parents.iter().all(|&p| whole.contains(&vertices[p as usize]))
+                    );
+                }
+            }
         }
-        assert_eq!(hierarchy.part(1).0.parents.len(), hierarchy.parents.len());
     }
 }

@@ -25,10 +25,12 @@ impl GroupCoder {
             Goal::Standard => Ok((3e-3 * self.diagonal, USUAL_RATIO)),
             Goal::MaxError(error) => {
                 let unit = error * self.diagonal;
-                let trial = self.trial();
+                let part = self.part();
+                let trial = part.as_ref().unwrap_or(self);
+                let count = trial.frames.len().min(TRIAL_FRAMES);
                 let part = trial.model.points() as f64 / self.model.points() as f64;
                 let size = |(step, ratio): (f64, f64)| {
-                    let coded = trial.encode(trial.frames.len(), step * unit, ratio * part.sqrt());
+                    let coded = trial.encode(count, step * unit, ratio * part.sqrt());
                     coded.map(|coded| (coded.bytes_of_whole(part), (step, ratio)))
                 };
                 let mut best = size((USUAL_STEP, USUAL_RATIO))?;
@@ -49,9 +51,13 @@ impl GroupCoder {
         }
     }
 
-    /// A coder with what steps are chosen by.
-    fn trial(&self) -> Self {
-        let (model, points) = self.model.part((self.model.points() / TRIAL_POINTS).max(1));
+    /// Of a large model, a coder with some patches of the first frames.
+    fn part(&self) -> Option<Self> {
+        let every = self.model.points() / TRIAL_POINTS;
+        if every < 2 {
+            return None;
+        }
+        let (model, points) = self.model.part(every);
         let of_points = |frame: &Vec<f64>| {
             points.iter().flat_map(|&i| frame[3 * i as usize..][..3].iter().copied()).collect::<Vec<f64>>()
         };
@@ -59,7 +65,7 @@ impl GroupCoder {
         let mut trial = Self::new(self.goal, Arc::new(model), self.diagonal, self.most, self.carried);
         trial.frames = self.frames[..count].iter().map(of_points).collect();
         trial.cages = self.cages[..count].to_vec();
-        trial
+        Some(trial)
     }
 
     /// Root of points over rows of a cage: a step of this times the unit moves the points by about the unit.

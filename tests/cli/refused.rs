@@ -1,7 +1,10 @@
 //! Bad input: one sentence that names the file and the place, exit status 1, and nothing left behind.
 
+mod cages;
+mod containers;
+
 use crate::support::{Dir, ENCODE, Small, as_model, npy, npy_f64, polygons, quad_box};
-use cager_core::mesh::{Model, Polygons, TriMesh};
+use cager_core::mesh::{Model, Polygons};
 
 /// Runs a command that must be refused with one line that has all these words, and must leave the folder as it was.
 #[track_caller]
@@ -28,120 +31,6 @@ pub(crate) fn assert_sentence(line: &str, stderr: &str, words: &[&str]) {
     if let Some(file) = words.first().filter(|word| word.contains('.') && !word.starts_with('-')) {
         assert_eq!(message.matches(file).count(), 1, "{file} is named more than once: {message}");
     }
-}
-
-/// Writes a changed cage and expects its refusal.
-#[track_caller]
-fn refused_cage(change: impl FnOnce(&mut TriMesh) -> Vec<String>) {
-    let (dir, mut small) = Dir::with_capture();
-    let words = change(&mut small.cage);
-    dir.model("cage.obj", &as_model(&small.cage));
-    let words: Vec<&str> = std::iter::once("cage.obj").chain(words.iter().map(String::as_str)).collect();
-    refused(&dir, &format!("{ENCODE} --report report.json"), &words);
-}
-
-fn edge(a: u32, b: u32) -> String {
-    format!("{}–{}", a.min(b), a.max(b))
-}
-
-#[test]
-fn open_cage_is_refused_with_its_boundary_edges() {
-    refused_cage(|cage| {
-        let [a, b, c] = cage.triangles.remove(7);
-        vec!["open".into(), "3 edges".into(), edge(a, b), edge(b, c), edge(c, a)]
-    });
-}
-
-#[test]
-fn inward_cage_is_refused_with_the_offer_to_flip_it_which_works() {
-    let (dir, small) = Dir::with_capture();
-    dir.cager(ENCODE).succeeds();
-    let good = dir.read("out.cager");
-    std::fs::remove_file(dir.path("out.cager")).expect("removed");
-    dir.model("cage.obj", &as_model(&small.cage.clone().flipped()));
-    refused(&dir, ENCODE, &["cage.obj", "inwards", "--flip-cage"]);
-    dir.cager(&format!("{ENCODE} --flip-cage")).succeeds();
-    assert!(dir.read("out.cager") == good, "a cage flipped back is another cage");
-    dir.model("cage.obj", &as_model(&small.cage));
-    std::fs::remove_file(dir.path("out.cager")).expect("removed");
-    refused(&dir, &format!("{ENCODE} --flip-cage"), &["cage.obj", "inwards"]);
-}
-
-#[test]
-fn inconsistently_oriented_cage_is_refused_with_the_faces_and_their_edge() {
-    refused_cage(|cage| {
-        cage.triangles[5].swap(1, 2);
-        vec!["face".into(), " 5 ".into(), "edge".into(), "same direction".into()]
-    });
-}
-
-#[test]
-fn one_inward_part_of_a_cage_is_refused_with_a_vertex_of_it() {
-    refused_cage(|cage| {
-        let n = cage.vertices.len() as u32;
-        let far: Vec<_> = cage.vertices.iter().map(|v| [v[0] + 10.0, v[1], v[2]]).collect();
-        let inward: Vec<_> = cage.triangles.iter().map(|t| [t[0] + n, t[2] + n, t[1] + n]).collect();
-        cage.vertices.extend(far);
-        cage.triangles.extend(inward);
-        vec!["vertex".into(), "inwards".into()]
-    });
-}
-
-#[test]
-fn non_manifold_edge_is_refused_with_its_faces() {
-    refused_cage(|cage| {
-        let [a, b, _] = cage.triangles[3];
-        let tip = cage.vertices.len() as u32;
-        cage.vertices.push([9.0, 9.0, 9.0]);
-        cage.triangles.push([a, b, tip]);
-        vec![edge(a, b), "3 faces".into(), cage.triangles.len().saturating_sub(1).to_string()]
-    });
-}
-
-#[test]
-fn duplicate_faces_are_refused_with_both() {
-    refused_cage(|cage| {
-        cage.triangles.push(cage.triangles[4]);
-        vec![format!("faces 4 and {}", cage.triangles.len() - 1)]
-    });
-}
-
-#[test]
-fn degenerate_triangle_is_refused_with_its_face_and_vertices() {
-    refused_cage(|cage| {
-        let [a, _, c] = cage.triangles[9];
-        cage.vertices[c as usize] = cage.vertices[a as usize];
-        let first = cage.triangles.iter().position(|t| t.contains(&a) && t.contains(&c)).expect("a face");
-        vec![format!("face {first} "), "no area".into(), a.to_string(), c.to_string()]
-    });
-    refused_cage(|cage| {
-        let [a, b, _] = cage.triangles[9];
-        cage.triangles[9] = [a, b, b];
-        vec!["face 9".into(), "no area".into()]
-    });
-}
-
-#[test]
-fn loose_vertex_and_too_small_cages_are_refused() {
-    refused_cage(|cage| {
-        cage.vertices.push([0.0; 3]);
-        vec![format!("vertex {}", cage.vertices.len() - 1)]
-    });
-    refused_cage(|cage| {
-        cage.triangles.truncate(1);
-        vec!["1 faces".into(), "at least 4".into()]
-    });
-}
-
-#[test]
-fn cage_without_faces_is_refused() {
-    let (dir, small) = Dir::with_capture();
-    dir.model("cage.ply", &Model { points: small.cage.vertices, faces: Polygons::new() });
-    refused(
-        &dir,
-        "encode --rest rest.obj --cage cage.ply --frames frames.npy -o out.cager --overwrite",
-        &["cage.ply", "no faces"],
-    );
 }
 
 #[test]
@@ -445,95 +334,6 @@ fn output_in_place_of_an_input_is_refused() {
     refused(&dir, &format!("{line} -o both --report both"), &["both", "two files"]);
     dir.write("both", "an old file");
     refused(&dir, &format!("{line} -o both --report ./both --overwrite"), &["both", "two files"]);
-}
-
-#[test]
-fn files_that_are_no_containers_are_refused() {
-    let (dir, _) = Dir::with_encoded();
-    dir.write(
-        "text.cager",
-        "Dear reader,\nthis is a letter, and not a short one: it goes on for more than a header.\n",
-    );
-    dir.write("short.cager", "hi");
-    dir.write("empty.cager", "");
-    dir.write("zeros.cager", [0; 4096]);
-    dir.write("newer.cager", {
-        let mut bytes = dir.read("out.cager");
-        bytes[8] = 200;
-        bytes
-    });
-    std::fs::create_dir(dir.path("folder.cager")).expect("a folder");
-    for file in ["text.cager", "short.cager", "empty.cager", "zeros.cager", "folder.cager", "rest.obj"] {
-        for line in [format!("inspect {file}"), format!("inspect --json {file}"), format!("decode {file} -o back.npy")]
-        {
-            refused(&dir, &line, &[file, "is not a .cager file"]);
-        }
-    }
-    for line in ["inspect newer.cager", "decode newer.cager -o back.npy"] {
-        refused(&dir, line, &["newer.cager"]);
-    }
-    for line in ["inspect gone.cager", "decode gone.cager -o back.npy", "decode rest.obj/x.cager -o back.npy"] {
-        refused(&dir, line, &["cager", "cannot be read", "check the path"]);
-    }
-}
-
-#[test]
-fn container_cut_anywhere_is_refused() {
-    let (dir, _) = Dir::with_encoded();
-    let whole = dir.read("out.cager");
-    let ends = [0, 1, 7, 8, 9, 15, 16, 17, 40, 63, 64, 65].into_iter();
-    let last = (1..=8).map(|k| whole.len() - k * k);
-    for length in ends.chain(last).chain((1..32).map(|k| k * whole.len() / 32)) {
-        damaged(&dir, &whole[..length], &format!("cut after {length} bytes"));
-    }
-    damaged(&dir, &[whole.as_slice(), b"\0"].concat(), "a byte in excess");
-    damaged(&dir, &[whole.as_slice(), whole.as_slice()].concat(), "twice over");
-}
-
-#[test]
-fn container_corrupted_anywhere_is_refused() {
-    let (dir, _) = Dir::with_encoded();
-    let whole = dir.read("out.cager");
-    let mut random = Random(0x9e37_79b9_7f4a_7c15);
-    for round in 0..200 {
-        // Half of the rounds hit the two ends, where the structure is.
-        let place = match round % 4 {
-            0 => random.below(whole.len().min(400)),
-            1 => whole.len() - 1 - random.below(whole.len().min(900)),
-            _ => random.below(whole.len()),
-        };
-        let change = 1 + random.below(255) as u8;
-        let mut bytes = whole.clone();
-        bytes[place] ^= change;
-        damaged(&dir, &bytes, &format!("byte {place} of {} changed by {change}", whole.len()));
-    }
-}
-
-/// Neither command believes these bytes.
-#[track_caller]
-fn damaged(dir: &Dir, bytes: &[u8], what: &str) {
-    dir.write("bad.cager", bytes);
-    for line in ["decode bad.cager -o back.npy", "inspect bad.cager"] {
-        let done = dir.cager(line).run();
-        assert_eq!(done.status, Some(1), "{what}: {line}: {done:?}");
-        assert_sentence(line, &done.stderr, &["bad.cager"]);
-        assert_eq!(done.stdout, "", "{what}: {line}");
-        assert!(!dir.path("back.npy").exists(), "{what}: {line} left an output");
-    }
-    let names = dir.names("");
-    assert_eq!(names, ["bad.cager", "cage.obj", "frames.npy", "out.cager", "report.json", "rest.obj"], "{what}");
-}
-
-/// xorshift64: the same places in every run.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, end: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 % end as u64) as usize
-    }
 }
 
 #[test]
