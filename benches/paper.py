@@ -29,11 +29,11 @@ METHODS = [
     ("all points", "all", "none", 0),
     ("all, global", "all", "global", 0),
     ("maxvol", "maxvol", "none", 0),
-    ("maxvol, s = 20", "maxvol", "laplacian", None),
+    ("maxvol, usual s", "maxvol", "laplacian", None),
     ("maxvol, global", "maxvol", "global", 0),
     ("maxvol, truncated", "maxvol", "truncated-svd", None),
-    ("rectangular, s = 20", "rectangular", "laplacian", None),
-    ("spread, s = 20", "spread", "laplacian", None),
+    ("rectangular, usual s", "rectangular", "laplacian", None),
+    ("spread, usual s", "spread", "laplacian", None),
     ("spread", "spread", "none", 0),
 ]
 
@@ -76,7 +76,7 @@ class Run:
         return [self.capture, f"`{self.cage}`", self.system]
 
     def method(self, handles, regularizer, s):
-        """The method; without a threshold, the one of the paper's that the cage is large enough for."""
+        """The method; without a threshold, with the one that the program chooses."""
         for m in self.found["methods"]:
             if m["handles"] == handles and m["regularizer"] == regularizer:
                 if m["spectrum"] == (s if s is not None else self.usual()):
@@ -84,7 +84,7 @@ class Run:
         return None
 
     def usual(self):
-        return 20 if self.found["unknowns"] >= 40 else self.found["unknowns"] // 4
+        return min(20, self.found["unknowns"] // 16)
 
     def total(self, method, key):
         found = self.method(*method)
@@ -171,7 +171,7 @@ STABILITY = [
     ("maxvol", "maxvol", "none", 0),
     *[(f"maxvol, s = {s}", "maxvol", "laplacian", s) for s in (5, 20, 50, 100)],
     ("maxvol, global", "maxvol", "global", 0),
-    ("spread, s = 20", "spread", "laplacian", None),
+    ("spread, usual s", "spread", "laplacian", None),
 ]
 
 
