@@ -59,7 +59,8 @@ impl House {
     /// As [`Self::new`], where the quiet tenant's times are known.
     async fn measured(settings: &[&str]) -> Self {
         let mut house = Self::new(settings).await;
-        house.undisturbed = house.rounds(Duration::from_millis(700)).await.show();
+        let time = (attack_time() / 3).max(Duration::from_millis(700));
+        house.undisturbed = house.rounds(time).await.show();
         house
     }
 

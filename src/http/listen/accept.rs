@@ -94,7 +94,7 @@ impl Acceptor {
         };
         // Frames are small and latency matters. Errors mean that the socket is closed.
         let _ = stream.set_nodelay(true);
-        let _ = socket2::SockRef::from(&stream).set_tcp_keepalive(&keep_alive());
+        let _ = socket2::SockRef::from(&stream).set_tcp_keepalive(&keep_alive(self.shared.limits.write_timeout));
         let entry = Arc::new(waiting.enter());
         let (tracker, shared) = (self.tracker.clone(), Arc::clone(&self.shared));
         self.tracker.spawn(async move {
@@ -154,9 +154,11 @@ fn admit(places: &Arc<Semaphore>, waiting: &IdleConnections) -> Option<PermitFut
     }
 }
 
-/// TCP keep-alive, so that streams to vanished peers end.
-fn keep_alive() -> TcpKeepalive {
-    TcpKeepalive::new().with_time(Duration::from_secs(60)).with_interval(Duration::from_secs(15)).with_retries(4)
+/// TCP keep-alive, so that streams that wait for news end when their client has vanished: after two minutes with the usual limit for a client
+/// that does not read, sooner with shorter ones.
+fn keep_alive(write_timeout: Duration) -> TcpKeepalive {
+    let interval = (write_timeout / 20).clamp(Duration::from_secs(1), Duration::from_secs(15));
+    TcpKeepalive::new().with_time(4 * interval).with_interval(interval).with_retries(4)
 }
 
 /// A connection's slot, counted in the metrics.

@@ -5,6 +5,8 @@ mod early;
 mod heads;
 mod slow;
 mod tls;
+#[cfg(target_os = "linux")]
+mod vanished;
 
 use axum::Router;
 use axum::body::{Body, Bytes};
@@ -74,6 +76,7 @@ fn app() -> Router {
         .route("/peer", get(async |ConnectInfo(peer): ConnectInfo<SocketAddr>| peer.to_string()))
         .route("/endless", get(async move || Body::from_stream(endless())))
         .route("/ticking", get(async move || ticking()))
+        .route("/silent", get(async || Body::from_stream(futures_util::stream::pending::<Result<Bytes, Infallible>>())))
         .route("/slow", get(async || tokio::time::sleep(ms(2000)).await))
         .route("/count", post(count))
         .route("/lazy", post(lazy))
