@@ -4,7 +4,8 @@
 use crate::entropy::{Bit, Coder, Decoder, Encoder, Integers, SIZES, size_class};
 use crate::error::{Error, Result};
 use cager_core::mesh::Polygons;
-use std::collections::{HashMap, VecDeque};
+use std::cmp::Reverse;
+use std::collections::VecDeque;
 
 /// Faces that meet at a vertex are counted up to this number.
 const VALENCES: usize = 9;
@@ -41,28 +42,33 @@ struct Walk {
 /// # Panics
 /// Where a corner is beyond them.
 pub fn encode_faces(faces: &Polygons, points: usize) -> Vec<u8> {
-    let [on, rings] = [false, true].map(|in_rings| encode_walk(faces, points, in_rings));
+    let list: Vec<&[u32]> = faces.iter().collect();
+    let mut edges = Vec::with_capacity(faces.indices().len());
+    for (f, face) in list.iter().enumerate() {
+        edges.extend((0..face.len()).map(|k| ([face[k], face[(k + 1) % face.len()]], f, Reverse(k))));
+    }
+    edges.sort_unstable();
+    let walk = |in_rings| encode_walk(&list, &edges, points, in_rings);
+    let (on, rings) = rayon::join(|| walk(false), || walk(true));
     if rings.len() < on.len() { rings } else { on }
 }
 
-fn encode_walk(faces: &Polygons, points: usize, in_rings: bool) -> Vec<u8> {
-    let list: Vec<&[u32]> = faces.iter().collect();
-    let mut by_edge: HashMap<(u32, u32), Vec<(usize, usize)>> = HashMap::new();
-    for (f, face) in list.iter().enumerate().rev() {
-        for k in 0..face.len() {
-            by_edge.entry((face[k], face[(k + 1) % face.len()])).or_default().push((f, k));
-        }
-    }
+/// A directed edge, its face, and at which corner of it it begins; the last corners of a face come first.
+type Edge = ([u32; 2], usize, Reverse<usize>);
+
+/// `edges` are those of the faces, sorted.
+fn encode_walk(list: &[&[u32]], edges: &[Edge], points: usize, in_rings: bool) -> Vec<u8> {
     let mut done = vec![false; list.len()];
     let mut coder = Encoder::default();
-    let mut walk = Walk::new(points, faces.indices().len(), coder.even(in_rings));
+    let mut walk = Walk::new(points, edges.len(), coder.even(in_rings));
     let mut next = 0;
     loop {
         while let Some((a, b)) = walk.gate() {
-            let candidates = by_edge.get(&(b, a)).map_or(&[][..], Vec::as_slice);
-            let found = candidates.iter().rev().find(|(f, _)| !done[*f]).copied();
+            let opposite = &edges[edges.partition_point(|(edge, ..)| *edge < [b, a])..];
+            let mut opposite = opposite.iter().take_while(|(edge, ..)| *edge == [b, a]);
+            let found = opposite.find(|(_, f, _)| !done[*f]).copied();
             if coder.bit(&mut walk.across, found.is_some())
-                && let Some((f, corner)) = found
+                && let Some((_, f, Reverse(corner))) = found
             {
                 done[f] = true;
                 let turned: Vec<u32> = (0..list[f].len()).map(|k| list[f][(corner + k) % list[f].len()]).collect();

@@ -2,6 +2,7 @@
 
 use crate::entropy::{Coder, Decoder, Encoder, Integers, MOST};
 use crate::error::{Error, Result};
+use rayon::prelude::*;
 
 /// The corrected vertices of a group, frame by frame, in whole steps.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -20,8 +21,7 @@ impl Corrections {
         if step.is_nan() || step <= 0.0 {
             return None;
         }
-        let mut frames = Vec::with_capacity(captured.len());
-        for (captured, decoded) in captured.iter().zip(decoded) {
+        let of_frame = |(captured, decoded): (&&[f64], &Vec<f32>)| {
             let mut found = Vec::new();
             for (vertex, (a, b)) in captured.chunks_exact(3).zip(decoded.chunks_exact(3)).enumerate() {
                 let far = |b: &[f32]| {
@@ -42,8 +42,9 @@ impl Corrections {
                     found.push((vertex as u32, steps));
                 }
             }
-            frames.push(found);
-        }
+            Some(found)
+        };
+        let frames = captured.par_iter().zip(decoded).map(of_frame).collect::<Option<_>>()?;
         Some(Self { step, frames })
     }
 

@@ -74,6 +74,11 @@ pub(crate) trait Coder {
         (0..count).rev().fold(0, |number, k| number << 1 | u32::from(self.even(value >> k & 1 == 1)))
     }
 
+    /// Whether what was read cannot be what an encoder wrote.
+    fn is_damaged(&self) -> bool {
+        false
+    }
+
     /// Codes a binary digit of probability 1/2.
     fn even(&mut self, value: bool) -> bool {
         self.bit(&mut Bit::default(), value)
@@ -158,7 +163,7 @@ impl<'a> Decoder<'a> {
 
     /// Whether all that was read can be what an encoder wrote.
     pub(crate) fn check(&self) -> Result<()> {
-        if self.damaged || self.past > PAST { Err(Error::Damaged("coded numbers are damaged")) } else { Ok(()) }
+        if self.is_damaged() { Err(Error::Damaged("coded numbers are damaged")) } else { Ok(()) }
     }
 }
 
@@ -182,6 +187,10 @@ impl Coder for Decoder<'_> {
         }
         model.meet(one);
         one
+    }
+
+    fn is_damaged(&self) -> bool {
+        self.damaged || self.past > PAST
     }
 }
 

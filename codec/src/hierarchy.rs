@@ -13,9 +13,11 @@ const PATCH: usize = 512;
 /// Vertices from coarse to fine.
 #[derive(Clone, Debug)]
 pub struct Hierarchy {
+    /// The vertex at each place.
     order: Vec<u32>,
-    starts: Vec<u32>,
+    /// The places of those that predict the vertex at place k are `parents[starts[k]..starts[k + 1]]`.
     parents: Vec<u32>,
+    starts: Vec<u32>,
 }
 
 impl Hierarchy {
@@ -66,11 +68,12 @@ impl Hierarchy {
             left.retain(|&v| !gone[v as usize]);
         }
         left.sort_unstable();
-        let mut hierarchy = Self { order: left, starts: vec![0], parents: Vec::new() };
-        hierarchy.starts.resize(hierarchy.order.len() + 1, 0);
-        for (v, parents) in removed.iter().rev() {
-            hierarchy.order.push(*v);
-            hierarchy.parents.extend(parents);
+        let mut hierarchy = Self { starts: vec![0; left.len() + 1], order: left, parents: Vec::new() };
+        hierarchy.order.extend(removed.iter().rev().map(|(v, _)| v));
+        let mut places = vec![0; points];
+        hierarchy.order.iter().enumerate().for_each(|(place, &v)| places[v as usize] = place as u32);
+        for (_, parents) in removed.iter().rev() {
+            hierarchy.parents.extend(parents.iter().map(|&parent| places[parent as usize]));
             hierarchy.starts.push(hierarchy.parents.len() as u32);
         }
         hierarchy
@@ -86,12 +89,13 @@ impl Hierarchy {
     pub fn part(&self, every: usize) -> (Self, Vec<u32>) {
         // A patch is what follows by the first parents from one of the coarsest vertices. Those that are not predicted come first; there may be one for each of
         // many parts, so that others have to be begun with besides.
-        let roots = self.iter().filter(|(_, parents)| parents.is_empty()).count();
+        let all = 0..self.points();
+        let roots = all.clone().filter(|&place| self.parents(place).is_empty()).count();
         let patches = roots + self.points() / PATCH;
         let mut patch = vec![0usize; self.points()];
-        for (place, (vertex, parents)) in self.iter().enumerate() {
-            let first = parents.first().filter(|_| place >= patches);
-            patch[vertex] = first.map_or(place, |&parent| patch[parent as usize]);
+        for place in all.clone() {
+            let first = self.parents(place).first().filter(|_| place >= patches);
+            patch[place] = first.map_or(place, |&parent| patch[parent as usize]);
         }
         let mut sizes = vec![0; self.points()];
         patch.iter().for_each(|&patch| sizes[patch] += 1);
@@ -106,24 +110,29 @@ impl Hierarchy {
                 is_chosen
             })
             .collect();
-        let is_chosen = |vertex: u32| is_patch_chosen[patch[vertex as usize]];
-        let vertices: Vec<u32> = (0..self.points() as u32).filter(|&vertex| is_chosen(vertex)).collect();
+        let places: Vec<usize> = all.filter(|&place| is_patch_chosen[patch[place]]).collect();
+        let mut vertices: Vec<u32> = places.iter().map(|&place| self.order[place]).collect();
+        vertices.sort_unstable();
         let number = |vertex: u32| vertices.partition_point(|&v| v < vertex) as u32;
-        let mut part = Self { order: Vec::new(), starts: vec![0], parents: Vec::new() };
-        for (vertex, parents) in self.iter().filter(|&(vertex, _)| is_chosen(vertex as u32)) {
-            part.order.push(number(vertex as u32));
-            part.parents.extend(parents.iter().filter(|&&parent| is_chosen(parent)).map(|&parent| number(parent)));
+        let order = places.iter().map(|&place| number(self.order[place])).collect();
+        let mut part = Self { order, starts: vec![0], parents: Vec::new() };
+        for &place in &places {
+            let parents = self.parents(place).iter();
+            part.parents.extend(parents.filter_map(|&p| Some(places.binary_search(&(p as usize)).ok()? as u32)));
             part.starts.push(part.parents.len() as u32);
         }
         (part, vertices)
     }
 
-    /// The vertices in order, each with those that predict it.
-    pub(crate) fn iter(&self) -> impl Iterator<Item = (usize, &[u32])> {
-        self.order
-            .iter()
-            .enumerate()
-            .map(|(k, &v)| (v as usize, &self.parents[self.starts[k] as usize..self.starts[k + 1] as usize]))
+    /// The vertices in order.
+    pub(crate) fn order(&self) -> &[u32] {
+        &self.order
+    }
+
+    /// The places of the vertices that predict the one at this place, all before it.
+    #[inline(always)]
+    pub(crate) fn parents(&self, place: usize) -> &[u32] {
+        &self.parents[self.starts[place] as usize..self.starts[place + 1] as usize]
     }
 }
 
@@ -162,14 +171,12 @@ mod tests {
         }
         let points = (side * side) as usize + 7;
         let hierarchy = Hierarchy::new(&faces, points);
-        let mut known = vec![false; points];
-        let mut predicted = 0;
-        for (v, parents) in hierarchy.iter() {
-            assert!(!known[v] && parents.iter().all(|&p| known[p as usize]));
-            known[v] = true;
-            predicted += usize::from(!parents.is_empty());
-        }
-        assert!(known.iter().all(|&k| k) && predicted >= points - COARSEST - 7);
+        let mut vertices = hierarchy.order().to_vec();
+        vertices.sort_unstable();
+        assert!(vertices.iter().enumerate().all(|(k, &v)| k == v as usize) && vertices.len() == points);
+        let parents = (0..points).map(|place| hierarchy.parents(place));
+        assert!(parents.clone().enumerate().all(|(place, parents)| parents.iter().all(|&p| (p as usize) < place)));
+        assert!(parents.filter(|parents| !parents.is_empty()).count() >= points - COARSEST - 7);
     }
 
     #[test]
@@ -183,11 +190,11 @@ mod tests {
             }
             let points = (before + side * side + after) as usize;
             let hierarchy = Hierarchy::new(&faces, points);
-            let whole: Vec<&[u32]> = {
-                let mut parents: Vec<&[u32]> = vec![&[]; points];
-                hierarchy.iter().for_each(|(vertex, found)| parents[vertex] = found);
-                parents
+            let names = |of: &Hierarchy, place: usize| -> Vec<u32> {
+                of.parents(place).iter().map(|&p| of.order()[p as usize]).collect()
             };
+            let mut whole = vec![Vec::new(); points];
+            (0..points).for_each(|place| whole[hierarchy.order()[place] as usize] = names(&hierarchy, place));
             for every in [2, 5] {
                 let (part, vertices) = hierarchy.part(every);
                 let share = points / every;
@@ -197,8 +204,8 @@ mod tests {
                     "{before} {after}: {} of {points}",
                     vertices.len()
                 );
-                for (vertex, parents) in part.iter() {
-                    let whole = whole[vertices[vertex] as usize];
+                for (place, &vertex) in part.order().iter().enumerate() {
+                    let (parents, whole) = (names(&part, place), &whole[vertices[vertex as usize] as usize]);
                     assert!(
                         parents.len() <= whole.len() && parents.iter().all(|&p| whole.contains(&vertices[p as usize]))
                     );

@@ -6,12 +6,14 @@
 
 mod basis;
 mod cage;
+mod components;
 mod connectivity;
 mod corrections;
 mod entropy;
 mod error;
 mod grid;
 mod hierarchy;
+mod histograms;
 mod linear;
 mod mesh;
 mod parallelograms;
@@ -25,7 +27,7 @@ pub use error::Error;
 pub use grid::{Grid, decode_positions, encode_positions};
 pub use hierarchy::Hierarchy;
 pub use mesh::CodedMesh;
-pub use residual::{Residual, ResidualGroup, encode_residual};
+pub use residual::{Residual, ResidualGroup, encode_residual, estimate_residual};
 
 /// Most positions of one group of frames, points times frames: what decoding one holds in memory follows from it.
 pub const MOST_POSITIONS: usize = 1 << 26;

@@ -1,30 +1,29 @@
 //! What the cage cannot say: the difference of a group's positions to those of its cages.
 //!
-//! `R ≈ E A` as for cages ([`crate::trajectories`]); the numbers A of each component are predicted from coarse to fine on the mesh ([`Hierarchy`]) and coded in whole
-//! steps; then single vertices are corrected, so that with a bound none is farther from where it was captured.
+//! `R ≈ E A` as for cages ([`crate::trajectories`]), A in whole steps ([`Components`]); then single vertices are corrected, so that with a bound none is farther
+//! from where it was captured.
 
 use crate::cage::step_and_count;
+use crate::components::{Component, Components, Models, PARTS, pieces};
 use crate::corrections::Corrections;
-use crate::entropy::{Coder, Decoder, Encoder, Integers, MOST, SIZES, size_class};
+use crate::entropy::{Decoder, Encoder, Integers, MOST};
 use crate::error::{Error, Result};
 use crate::hierarchy::Hierarchy;
+use crate::histograms::Histograms;
 use crate::trajectories::{Trajectories, fit};
 use crate::{MOST_FRAMES, MOST_POSITIONS, linear};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use rayon::prelude::*;
-use std::sync::LazyLock;
 
 /// Bytes before the coded numbers: the step as f64, the number of components as u16, the step of corrections as f64, the bytes of the components as u32.
 const HEAD: usize = 22;
-/// Parts of a step in which predictions are counted.
-const PARTS: i64 = 16;
-/// What is added before numbers are rounded down: small ones cost more than they are worth, measured at the same error of the whole file.
-const ROUND_UP: i64 = 5;
+/// Added to the number of components where the vertices are in two parts. The bytes of the second part as u32 follow the head.
+const PARTED: u16 = 1 << 15;
+/// Fewest numbers in two parts: of fewer, models of their own take more than is gained by coding both at once.
+const PARTED_NUMBERS: usize = 1 << 18;
 /// Points that one task adds up.
 const BLOCK: usize = 2048;
-/// Components that are looked at together before they are coded.
-const AT_A_TIME: usize = 8;
 
 /// A group to encode: for each frame, where its points are and where its cage takes them, points × 3.
 pub struct ResidualGroup<'a> {
@@ -45,69 +44,91 @@ pub struct ResidualGroup<'a> {
 /// # Panics
 /// Where frames have another number of points, or there are too many of them.
 pub fn encode_residual(hierarchy: &Hierarchy, group: &ResidualGroup<'_>) -> Option<Vec<u8>> {
-    let (points, frames) = (hierarchy.points(), group.captured.len());
-    assert!(frames == group.of_cages.len() && frames <= MOST_FRAMES && points * frames <= MOST_POSITIONS);
-    assert!(group.captured.iter().all(|frame| frame.len() == 3 * points));
-    let mut motion = Mat::<f64>::zeros(3 * points, frames);
-    motion.par_col_iter_mut().enumerate().for_each(|(t, column)| {
-        let pairs = group.captured[t].iter().zip(&group.of_cages[t]);
-        column.iter_mut().zip(pairs).for_each(|(x, (&captured, &of_cage))| *x = captured - f64::from(of_cage));
-    });
-    let gram = linear::gram(motion.as_ref());
-    let chosen = Trajectories::choose(
-        gram.as_ref(),
-        3 * points,
-        group.step,
-        frames.min(group.most_numbers / (3 * points).max(1)),
-    )?;
-    let count = chosen.count();
-    let values = fit(chosen.values().as_ref(), motion.as_ref())?;
-    drop(motion);
-    let per_unit = PARTS as f64 / group.step;
-    let most = f64::from(MOST) / per_unit;
-    let mut coder = Encoder::default();
-    chosen.code(&mut coder, frames, count);
-    let mut decoded = Residual::new(&chosen, points);
-    let mut components = Components::new(hierarchy);
-    let target_of = |k: usize| {
-        let parts = |x: f64| (x.abs() < most).then_some((per_unit * x + 0.5f64.copysign(x)) as i64);
-        let (vertices, _) = values.col_as_slice(k).as_chunks::<3>();
-        let target = vertices.iter().map(|&[x, y, z]| Some([parts(x)?, parts(y)?, parts(z)?]));
-        let target: Vec<[i64; 3]> = target.collect::<Option<_>>()?;
-        let predicts = cost(hierarchy, &target, true) < cost(hierarchy, &target, false);
-        Some((target, predicts))
-    };
-    // While some components are coded, what does not depend on them is found for the next.
-    let all: Vec<usize> = (0..count).collect();
-    let mut chunks = all.chunks(AT_A_TIME);
-    let mut next =
-        || chunks.next().map(|some| (some, some.par_iter().map(|&k| target_of(k)).collect::<Option<Vec<_>>>()));
-    let mut found = next();
-    while let Some((some, targets)) = found {
-        let targets = targets?;
-        let code = || {
-            for (&k, (target, predicts)) in some.iter().zip(&targets) {
-                decoded.set(k, components.code(&mut coder, target, *predicts), group.step);
-            }
-        };
-        (found, ()) = rayon::join(&mut next, code);
-    }
-    let coded = coder.into_bytes();
-    let corrections = match group.bound {
-        None => Corrections::default(),
-        Some(bound) => {
-            let mut positions: Vec<Vec<f32>> = group.of_cages.to_vec();
-            decoded.add(0, &mut positions);
-            Corrections::find(group.captured, &positions, bound - decoded.rounding())?
-        }
-    };
+    let Contents { count, is_parted, coders, corrections, .. } = Contents::<Integers>::new(hierarchy, group)?;
+    let [coarse, fine] = coders.map(Encoder::into_bytes);
     let mut bytes = group.step.to_le_bytes().to_vec();
-    bytes.extend((count as u16).to_le_bytes());
+    bytes.extend((count as u16 | if is_parted { PARTED } else { 0 }).to_le_bytes());
     bytes.extend(corrections.step().to_le_bytes());
-    bytes.extend((coded.len() as u32).to_le_bytes());
-    bytes.extend(coded);
+    bytes.extend((coarse.len() as u32).to_le_bytes());
+    if is_parted {
+        bytes.extend((fine.len() as u32).to_le_bytes());
+    }
+    bytes.extend(coarse);
+    bytes.extend(fine);
     bytes.extend(corrections.encode());
     Some(bytes)
+}
+
+/// About how many bytes [`encode_residual`] would give, in less time.
+///
+/// # Panics
+/// As there.
+pub fn estimate_residual(hierarchy: &Hierarchy, group: &ResidualGroup<'_>) -> Option<f64> {
+    let Contents { coders: [coder, _], components, corrections, .. } = Contents::<Histograms>::new(hierarchy, group)?;
+    let bits: f64 = components.models().map(Histograms::bits).sum();
+    Some((HEAD + coder.into_bytes().len() + corrections.encode().len()) as f64 + bits / 8.0)
+}
+
+/// What a residual is put together from.
+struct Contents<'a, M> {
+    /// Number of components.
+    count: usize,
+    /// Whether the vertices are in two parts.
+    is_parted: bool,
+    /// Trajectories, and what models of type M write.
+    coders: [Encoder; 2],
+    components: Components<'a, M>,
+    corrections: Corrections,
+}
+
+impl<'a, M: Models> Contents<'a, M> {
+    fn new(hierarchy: &'a Hierarchy, group: &ResidualGroup<'_>) -> Option<Self> {
+        let (points, frames) = (hierarchy.points(), group.captured.len());
+        assert!(frames == group.of_cages.len() && frames <= MOST_FRAMES && points * frames <= MOST_POSITIONS);
+        assert!(group.captured.iter().all(|frame| frame.len() == 3 * points));
+        let mut motion = Mat::<f64>::zeros(3 * points, frames);
+        motion.par_col_iter_mut().enumerate().for_each(|(t, column)| {
+            let pairs = group.captured[t].iter().zip(&group.of_cages[t]);
+            column.iter_mut().zip(pairs).for_each(|(x, (&captured, &of_cage))| *x = captured - f64::from(of_cage));
+        });
+        let gram = linear::gram(motion.as_ref());
+        let most = frames.min(group.most_numbers / (3 * points).max(1));
+        let chosen = Trajectories::choose(gram.as_ref(), 3 * points, group.step, most)?;
+        let count = chosen.count();
+        let values = fit(chosen.values().as_ref(), motion.as_ref())?;
+        drop(motion);
+        let per_unit = PARTS as f64 / group.step;
+        let most = f64::from(MOST) / per_unit;
+        let mut coders: [Encoder; 2] = Default::default();
+        chosen.code(&mut coders[0], frames, count);
+        let mut decoded = Residual::new(&chosen, points);
+        let component_of = |k: usize| {
+            let parts = |x: f64| (x.abs() < most).then_some((per_unit * x + 0.5f64.copysign(x)) as i64);
+            let (vertices, _) = values.col_as_slice(k).as_chunks::<3>();
+            let target = hierarchy.order().iter().map(|&v| vertices[v as usize]);
+            let target = target.map(|[x, y, z]| Some([parts(x)?, parts(y)?, parts(z)?]));
+            let target: Vec<[i64; 3]> = target.collect::<Option<_>>()?;
+            Some(Component::near(hierarchy, target))
+        };
+        let is_parted = 3 * points * count >= PARTED_NUMBERS;
+        let mut components = Components::<M>::new(hierarchy, is_parted);
+        // While some components are coded, what does not depend on them is found for the next.
+        let mut pieces = pieces(points, count);
+        let next = || pieces.next().unwrap_or(0..0).into_par_iter().map(component_of).collect();
+        let mut done = 0..;
+        components.code(&mut coders, next, |component| {
+            done.next().into_iter().for_each(|k| decoded.set(k, hierarchy, &component.found, group.step));
+        })?;
+        let corrections = match group.bound {
+            None => Corrections::default(),
+            Some(bound) => {
+                let mut positions: Vec<Vec<f32>> = group.of_cages.to_vec();
+                decoded.add(0, &mut positions);
+                Corrections::find(group.captured, &positions, bound - decoded.rounding())?
+            }
+        };
+        Some(Self { count, is_parted, coders, components, corrections })
+    }
 }
 
 /// What is added to the positions of a group's cages.
@@ -129,10 +150,13 @@ impl Residual {
         }
     }
 
-    fn set(&mut self, component: usize, parts: &[[i64; 3]], step: f64) {
+    /// Takes the numbers of a component, in parts of a step, in the order of the hierarchy.
+    fn set(&mut self, component: usize, hierarchy: &Hierarchy, parts: &[[i64; 3]], step: f64) {
         let unit = step / PARTS as f64;
-        let column = self.values.col_mut(component).iter_mut();
-        column.zip(parts.as_flattened()).for_each(|(value, &parts)| *value = (parts as f64 * unit) as f32);
+        let (vertices, _) = self.values.col_as_slice_mut(component).as_chunks_mut::<3>();
+        for (&vertex, parts) in hierarchy.order().iter().zip(parts) {
+            vertices[vertex as usize] = parts.map(|parts| (parts as f64 * unit) as f32);
+        }
     }
 
     /// What [`encode_residual`] wrote, for a group of as many frames, where that are at most so many numbers of components.
@@ -146,21 +170,31 @@ impl Residual {
         }
         let (head, rest) = bytes.split_first_chunk::<HEAD>().ok_or(Error::Damaged("a residual is cut"))?;
         let (step, count) = step_and_count(&std::array::from_fn(|k| head[k]));
+        let (count, is_parted) = (count & !usize::from(PARTED), count & usize::from(PARTED) != 0);
         let correction = f64::from_le_bytes(std::array::from_fn(|k| head[10 + k]));
-        let length = u32::from_le_bytes(std::array::from_fn(|k| head[18 + k])) as usize;
+        let coarse = u32::from_le_bytes(std::array::from_fn(|k| head[18 + k])) as usize;
+        let (fine, rest) = match rest.split_first_chunk::<4>() {
+            Some((bytes, rest)) if is_parted => (u32::from_le_bytes(*bytes) as usize, rest),
+            _ => (0, rest),
+        };
         let too_many = count > frames.min(3 * points) || (3 * points).saturating_mul(count) > most;
         let impossible = too_many || [step, correction].iter().any(|x| !x.is_finite());
-        let Some((coded, corrected)) = rest.split_at_checked(length).filter(|_| !impossible) else {
+        let parts =
+            rest.split_at_checked(coarse).and_then(|(coarse, rest)| Some((coarse, rest.split_at_checked(fine)?)));
+        let Some((coarse, (fine, corrected))) = parts.filter(|_| !impossible) else {
             return Err(Error::Damaged("a residual has impossible counts"));
         };
-        let mut coder = Decoder::new(coded)?;
-        let trajectories = Trajectories::default().code(&mut coder, frames, count);
+        let mut coders = [Decoder::new(coarse)?, Decoder::new(fine)?];
+        let trajectories = Trajectories::default().code(&mut coders[0], frames, count);
         let mut residual = Self::new(&trajectories, points);
-        let mut components = Components::new(hierarchy);
-        for k in 0..count {
-            residual.set(k, components.code(&mut coder, &[], false), step);
-            coder.check()?;
-        }
+        let mut pieces = pieces(points, count);
+        let next = || Some(pieces.next().unwrap_or(0..0).map(|_| Component::default()).collect());
+        let mut done = 0..;
+        let mut components = Components::<Integers>::new(hierarchy, is_parted);
+        components.code(&mut coders, next, |component| {
+            done.next().into_iter().for_each(|k| residual.set(k, hierarchy, &component.found, step));
+        });
+        coders.iter().try_for_each(Decoder::check)?;
         residual.corrections = Corrections::decode(corrected, frames, points, correction)?;
         Ok(residual)
     }
@@ -216,96 +250,6 @@ impl Residual {
     pub fn is_needed(&self) -> bool {
         self.values.ncols() > 0 || self.corrected() > 0
     }
-}
-
-/// Codes component after component, in parts of a step.
-struct Components<'a> {
-    hierarchy: &'a Hierarchy,
-    models: [Integers; 2],
-    flag: crate::entropy::Bit,
-    /// Sizes of the numbers of the component before.
-    before: Vec<[u32; 3]>,
-    sizes: Vec<[u32; 3]>,
-    /// The numbers of this component.
-    found: Vec<[i64; 3]>,
-}
-
-impl<'a> Components<'a> {
-    fn new(hierarchy: &'a Hierarchy) -> Self {
-        let points = hierarchy.points();
-        let models = [Integers::new(3 * SIZES), Integers::new(3 * SIZES)];
-        Self {
-            hierarchy,
-            models,
-            flag: Default::default(),
-            before: vec![[0; 3]; points],
-            sizes: vec![[0; 3]; points],
-            found: vec![[0; 3]; points],
-        }
-    }
-
-    /// Codes the numbers nearest to `target`, as differences to their prediction or not; gives what a decoder makes of them.
-    fn code(&mut self, coder: &mut impl Coder, target: &[[i64; 3]], predicts: bool) -> &[[i64; 3]] {
-        let predicts = coder.bit(&mut self.flag, predicts);
-        let models = &mut self.models[usize::from(predicts)];
-        let found = &mut self.found;
-        for (vertex, parents) in self.hierarchy.iter() {
-            let near = parents.len().max(1) as u64;
-            let mut around = [0u64; 3];
-            for &parent in parents {
-                let sizes = &self.sizes[parent as usize];
-                (0..3).for_each(|k| around[k] += u64::from(sizes[k]));
-            }
-            let expected = if predicts { mean(found, parents) } else { [0; 3] };
-            let mut beside = 0;
-            for k in 0..3 {
-                let around = (16 * around[k] / near).min(1 << 20) as u32;
-                let context = size_class(around + 6 * self.before[vertex][k] + beside);
-                let value = target.get(vertex).map_or(0, |target| rounded(target[k] - expected[k]));
-                let value = models.code(coder, SIZES * k + context, value);
-                found[vertex][k] = expected[k] + PARTS * i64::from(value);
-                let size = value.unsigned_abs().min(1 << 16);
-                self.sizes[vertex][k] = size;
-                beside = beside / 2 + 5 * size;
-            }
-        }
-        std::mem::swap(&mut self.before, &mut self.sizes);
-        found
-    }
-}
-
-/// About how many binary digits the numbers of a component take.
-fn cost(hierarchy: &Hierarchy, target: &[[i64; 3]], predicts: bool) -> f64 {
-    static DIGITS: LazyLock<[f64; 256]> =
-        LazyLock::new(|| std::array::from_fn(|size| (1.0 + 2.0 * size as f64).log2()));
-    let mut found = vec![[0i64; 3]; target.len()];
-    let mut cost = 0.0;
-    for (vertex, parents) in hierarchy.iter() {
-        let expected = if predicts { mean(&found, parents) } else { [0; 3] };
-        for k in 0..3 {
-            let value = rounded(target[vertex][k] - expected[k]);
-            found[vertex][k] = expected[k] + PARTS * i64::from(value);
-            let size = value.unsigned_abs();
-            cost += DIGITS.get(size as usize).copied().unwrap_or_else(|| (1.0 + 2.0 * f64::from(size)).log2());
-        }
-    }
-    cost
-}
-
-/// Rounded to whole steps; less than 11/16 of a step is dropped.
-fn rounded(parts: i64) -> i32 {
-    let steps = (parts.abs() + ROUND_UP) / PARTS * parts.signum();
-    steps.clamp(-i64::from(MOST), i64::from(MOST)) as i32
-}
-
-/// What a vertex is predicted from its parents: their means, rounded down; without parents 0.
-fn mean(found: &[[i64; 3]], parents: &[u32]) -> [i64; 3] {
-    let mut sums = [0; 3];
-    for &parent in parents {
-        (0..3).for_each(|k| sums[k] += found[parent as usize][k]);
-    }
-    let count = parents.len().max(1) as i64;
-    sums.map(|sum| sum.div_euclid(count))
 }
 
 #[cfg(test)]
@@ -366,6 +310,30 @@ mod tests {
                     assert!(near, "{name}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn coarse_and_fine_vertices_come_back_from_words_of_their_own() {
+        let hierarchy = Hierarchy::new(&mesh(90), 8_100);
+        let mut random = fastrand::Rng::with_seed(8);
+        let frames: Vec<Vec<f64>> = (0..12).map(|_| (0..24_300).map(|_| random.f64()).collect()).collect();
+        let captured: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
+        let of_cages = vec![vec![0.0f32; 24_300]; frames.len()];
+        let (step, bound, most_numbers) = (0.006, Some(0.01), usize::MAX);
+        let group = ResidualGroup { captured: &captured, of_cages: &of_cages, step, bound, most_numbers };
+        let bytes = encode_residual(&hierarchy, &group).unwrap();
+        assert_eq!(bytes[9] >> 7, 1, "in two parts");
+        let mut decoded = of_cages.clone();
+        let residual = Residual::decode(&hierarchy, 12, &bytes, usize::MAX).unwrap();
+        residual.add(0, &mut decoded);
+        assert!(largest(&captured, &decoded) <= 0.01);
+        // Components alone are as near as their steps: few vertices are left to correct.
+        assert!(residual.corrected() < 12 * 8_100 / 20, "{}", residual.corrected());
+        let about = estimate_residual(&hierarchy, &group).unwrap() / bytes.len() as f64;
+        assert!((about - 1.0).abs() < 0.05, "{about}");
+        for cut in [20, 24, 25, 30, 1_000, bytes.len() / 2, bytes.len() - 8] {
+            assert!(Residual::decode(&hierarchy, 12, &bytes[..cut], usize::MAX).is_err(), "{cut}");
         }
     }
 

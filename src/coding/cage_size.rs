@@ -72,7 +72,7 @@ impl CageSizes<'_> {
         }
         let cost: Result<f64, CodingError> = match self.goal {
             Goal::Size(_) => coder.close().map(|group| group.mean()),
-            _ => coder.usual_bytes().map(|bytes| other as f64 + bytes as f64 * self.total as f64 / most as f64),
+            _ => coder.usual_bytes().map(|bytes| other as f64 + bytes * self.total as f64 / most as f64),
         };
         cost.ok()
     }

@@ -1,7 +1,7 @@
 //! Groups of frames: collected, coded, and read back to measure what they decode to.
 
 use super::{CodingError, Goal, GroupDecoder, slack};
-use cager_codec::{Neighbours, Residual, ResidualGroup, encode_cages, encode_residual};
+use cager_codec::{Hierarchy, Neighbours, Residual, ResidualGroup, encode_cages, encode_residual, estimate_residual};
 use cager_core::decode::FrameError;
 use cager_proto::container::most_residual_numbers;
 use rayon::prelude::*;
@@ -33,11 +33,6 @@ pub(super) struct Encoded {
 }
 
 impl Encoded {
-    /// About the bytes of a group with all points, where this has a `part` of them.
-    pub(super) fn bytes_of_whole(&self, part: f64) -> f64 {
-        self.cages.len() as f64 + self.residual.as_ref().map_or(0.0, |residual| residual.len() as f64 / part)
-    }
-
     pub(super) fn bytes(&self) -> u64 {
         (self.cages.len() + self.residual.as_ref().map_or(0, |r| r.len() + SECTION)) as u64 + SECTION as u64
     }
@@ -162,32 +157,48 @@ impl GroupCoder {
     /// The bytes of the first frames that were collected.
     pub(super) fn encode(&self, count: usize, residual: f64, ratio: f64) -> Result<Encoded, CodingError> {
         let steps = self.goal.steps((residual, ratio), self.model.points());
+        let mut encoded = self.encode_cages(count, steps.cage)?;
+        if let Some(step) = steps.residual {
+            encoded.residual = Some(self.residual_of(&encoded.positions, step, encode_residual)?);
+        }
+        Ok(encoded)
+    }
+
+    /// About the bytes of the first frames with all points, where this has a `part` of them.
+    pub(super) fn estimate(&self, count: usize, residual: f64, ratio: f64, part: f64) -> Result<f64, CodingError> {
+        let steps = self.goal.steps((residual, ratio), self.model.points());
+        let encoded = self.encode_cages(count, steps.cage)?;
+        let bytes = steps.residual.map(|step| self.residual_of(&encoded.positions, step, estimate_residual));
+        Ok(encoded.cages.len() as f64 + bytes.transpose()?.unwrap_or(0.0) / part)
+    }
+
+    /// The first frames without a residual.
+    fn encode_cages(&self, count: usize, step: f64) -> Result<Encoded, CodingError> {
         let cages: Vec<&[f32]> = self.cages[..count].iter().map(Vec::as_slice).collect();
         // Cages that travel very far are counted in larger steps; the residual says the rest.
         let is_full = self.frames.len() >= self.most;
         let neighbours = Neighbours { before: self.carried.frames > 0, after: count == self.frames.len() && is_full };
-        let coded =
-            (0..16).find_map(|k| encode_cages(&self.model.basis, &cages, steps.cage * f64::from(1 << k), neighbours));
+        let coded = (0..16).find_map(|k| encode_cages(&self.model.basis, &cages, step * f64::from(1 << k), neighbours));
         let coded = coded.ok_or_else(|| self.uncountable())?;
         // From here on what a decoder has.
         let decoded = self.model.cages(count, &coded).map_err(|_| self.uncountable())?;
         let positions = self.model.positions(&decoded);
         let extents = decoded.iter().map(|cage| f64::from(cage.iter().fold(0.0f32, |far, x| far.max(x.abs()))));
         let farthest = extents.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default();
-        let mut residual = None;
-        if let Some(step) = steps.residual {
-            let captured: Vec<&[f64]> = self.frames[..count].iter().map(Vec::as_slice).collect();
-            let group = ResidualGroup {
-                captured: &captured,
-                of_cages: &positions,
-                step,
-                bound: self.bound(),
-                most_numbers: most_residual_numbers(0),
-            };
-            let bytes = encode_residual(&self.model.hierarchy, &group).ok_or_else(|| self.uncountable())?;
-            residual = Some(bytes);
-        }
-        Ok(Encoded { cages: coded, residual, positions, farthest })
+        Ok(Encoded { cages: coded, residual: None, positions, farthest })
+    }
+
+    /// What `code` makes of that which the positions of cages leave of the first frames.
+    fn residual_of<T>(
+        &self,
+        positions: &[Vec<f32>],
+        step: f64,
+        code: impl Fn(&Hierarchy, &ResidualGroup<'_>) -> Option<T>,
+    ) -> Result<T, CodingError> {
+        let captured: Vec<&[f64]> = self.frames[..positions.len()].iter().map(Vec::as_slice).collect();
+        let (bound, most_numbers) = (self.bound(), most_residual_numbers(0));
+        let group = ResidualGroup { captured: &captured, of_cages: positions, step, bound, most_numbers };
+        code(&self.model.hierarchy, &group).ok_or_else(|| self.uncountable())
     }
 
     /// Reads the bytes of a group back and measures what they decode to.

@@ -30,8 +30,8 @@ impl GroupCoder {
                 let count = trial.frames.len().min(TRIAL_FRAMES);
                 let part = trial.model.points() as f64 / self.model.points() as f64;
                 let size = |(step, ratio): (f64, f64)| {
-                    let coded = trial.encode(count, step * unit, ratio * part.sqrt());
-                    coded.map(|coded| (coded.bytes_of_whole(part), (step, ratio)))
+                    let bytes = trial.estimate(count, step * unit, ratio * part.sqrt(), part);
+                    bytes.map(|bytes| (bytes, (step, ratio)))
                 };
                 let mut best = size((USUAL_STEP, USUAL_RATIO))?;
                 for (step, ratio) in [(1.0, 1.6), (1.4, 1.0)] {
@@ -73,11 +73,10 @@ impl GroupCoder {
         (self.model.points() as f64 / self.model.basis.rows() as f64).sqrt()
     }
 
-    /// Bytes of the frames that wait, in the steps where [`Self::choose`] begins for a bound.
-    pub(super) fn usual_bytes(&self) -> Result<u64, CodingError> {
-        let Goal::MaxError(error) = self.goal else { return Ok(0) };
-        let step = USUAL_STEP * error * self.diagonal;
-        self.encode(self.frames.len(), step, USUAL_RATIO).map(|group| group.bytes())
+    /// About the bytes of the frames that wait, in the steps where [`Self::choose`] begins for a bound.
+    pub(super) fn usual_bytes(&self) -> Result<f64, CodingError> {
+        let Goal::MaxError(error) = self.goal else { return Ok(0.0) };
+        self.estimate(self.frames.len(), USUAL_STEP * error * self.diagonal, USUAL_RATIO, 1.0)
     }
 
     /// What `tried` gives in the step where its figure, over what is allowed, is nearly 1 and not above; the figure grows with the step, or falls where

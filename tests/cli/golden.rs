@@ -1,7 +1,8 @@
 //! Files that earlier versions of the program wrote, with the positions that they decoded to: they decode to the same for ever.
 //!
 //! `tests/golden/definitionN-SYSTEM.cager` was written by a program whose coordinates are of definition N, and the array beside it by its
-//! `cager decode`; `-elements` is with the boundary elements in the file, `coded-SYSTEM` of codec 3. The model has 120 points in a cage of 26 vertices, and three frames.
+//! `cager decode`; `-elements` is with the boundary elements in the file, `coded-SYSTEM` of codec 3, `coded-parted-SYSTEM` with a residual in two
+//! parts. The model has 120 points in a cage of 26 vertices, and three frames.
 
 use crate::support::Dir;
 use std::path::{Path, PathBuf};
@@ -34,8 +35,8 @@ fn files_of_every_version_decode_to_what_they_always_did() {
         assert!(files.iter().any(|file| file.file_stem().is_some_and(|stem| *stem == *name)), "{name} is missing");
     }
     assert!(files.iter().any(|file| file.file_stem().is_some_and(|stem| *stem == *"definition3-harmonic-elements")));
-    for system in ["mvc", "green", "harmonic"] {
-        let name = format!("coded-{system}");
+    for kind in ["mvc", "green", "harmonic", "parted-mvc"] {
+        let name = format!("coded-{kind}");
         assert!(files.iter().any(|file| file.file_stem().is_some_and(|stem| *stem == *name)), "{name} is missing");
     }
     let dir = Dir::new();

@@ -74,7 +74,10 @@ fn seeds() -> Vec<Vec<u8>> {
     };
     let mut intact = file(3, true);
     intact[0] = 0;
-    vec![intact, file(3, true), file(0, false), coded(&header, &rest, &cage)]
+    // Its residual is in two parts.
+    let mut parted = include_bytes!("../../../tests/golden/coded-parted-mvc.cager").to_vec();
+    parted.insert(0, 1);
+    vec![intact, file(3, true), file(0, false), coded(&header, &rest, &cage), parted]
 }
 
 /// A file of coded meshes, cages and residual.

@@ -13,6 +13,8 @@ import { decodeTrajectories } from './trajectories';
 const MOST_POSITIONS = 2 ** 26;
 /** Step (f64), number of components (u16), step of corrections (f64), and bytes of the components (u32). */
 const HEAD_BYTES = 22;
+/** Added to the number of components where the vertices are in two parts; the bytes of the second one (u32) then follow the head. */
+const PARTED = 1 << 15;
 /** Parts of a step in which predictions are counted. */
 const PARTS = 16;
 
@@ -27,22 +29,26 @@ export function decodeResidual(bytes: Uint8Array, hierarchy: Hierarchy, frames: 
   if (frames > MOST_FRAMES || points * frames > MOST_POSITIONS) {
     throw new CodedDataError('a group has too many positions');
   }
-  if (bytes.length < HEAD_BYTES) {
+  const isHead = (parted: boolean) => bytes.length >= HEAD_BYTES + (parted ? 4 : 0);
+  if (!isHead(false) || !isHead((bytes[9] & 0x80) !== 0)) {
     throw new CodedDataError('a residual is cut');
   }
-  const head = new DataView(bytes.buffer, bytes.byteOffset, HEAD_BYTES);
+  const head = new DataView(bytes.buffer, bytes.byteOffset, bytes.length);
   const step = head.getFloat64(0, true);
-  const rank = head.getUint16(8, true);
+  const parted = (head.getUint16(8, true) & PARTED) !== 0;
+  const rank = head.getUint16(8, true) % PARTED;
   const correctionStep = head.getFloat64(10, true);
-  const middle = HEAD_BYTES + head.getUint32(18, true);
-  const tooMany = rank > Math.min(frames, 3 * points) || 3 * points * rank > mostNumbers || middle > bytes.length;
+  const first = HEAD_BYTES + (parted ? 4 : 0);
+  const second = first + head.getUint32(18, true);
+  const end = second + (parted ? head.getUint32(HEAD_BYTES, true) : 0);
+  const tooMany = rank > Math.min(frames, 3 * points) || 3 * points * rank > mostNumbers || end > bytes.length;
   if (tooMany || !Number.isFinite(step) || !Number.isFinite(correctionStep)) {
     throw new CodedDataError('a residual has impossible counts');
   }
-  const decoder = new RangeDecoder(bytes.subarray(HEAD_BYTES, middle));
+  const decoder = new RangeDecoder(bytes.subarray(first, second));
   const trajectories = Float32Array.from(decodeTrajectories(decoder, frames, rank));
   const shapes = new Float32Array(rank * 3 * points);
-  const components = new Components(decoder, hierarchy);
+  const components = new Components(decoder, parted ? new RangeDecoder(bytes.subarray(second, end)) : null, hierarchy);
   const unit = step / PARTS;
   for (let k = 0; k < rank; k++) {
     const parts = components.next();
@@ -50,36 +56,27 @@ export function decodeResidual(bytes: Uint8Array, hierarchy: Hierarchy, frames: 
       shapes[out] = parts[at] * unit;
     }
   }
-  return { rank, trajectories, shapes, ...decodeCorrections(bytes.subarray(middle), frames, points, correctionStep) };
+  return { rank, trajectories, shapes, ...decodeCorrections(bytes.subarray(end), frames, points, correctionStep) };
 }
 
-/** Reads component after component. */
-class Components {
+/** Some of the vertices, coded by models of their own. */
+class Part {
   private readonly predicted = new IntegerModels(3 * SIZE_CLASSES);
   private readonly plain = new IntegerModels(3 * SIZE_CLASSES);
-  private readonly kind = new BinaryModels(1);
-  private readonly found: Float64Array;
-  /** Sizes of the numbers of the component before, and of this one. */
-  private before: Uint32Array;
-  private sizes: Uint32Array;
 
+  /** From the place `start` in the order of the hierarchy to before `end`. */
   constructor(
     private readonly decoder: RangeDecoder,
     private readonly hierarchy: Hierarchy,
-  ) {
-    const values = 3 * hierarchy.order.length;
-    this.found = new Float64Array(values);
-    this.before = new Uint32Array(values);
-    this.sizes = new Uint32Array(values);
-  }
+    private readonly start: number,
+    private readonly end: number,
+  ) {}
 
-  /** Values of the next component in parts of a step, x y z of each point. */
-  next(): Float64Array {
-    const { decoder, found, before, sizes } = this;
+  /** Reads the part's numbers of a component. `before` and `sizes` are sizes of the numbers of the component before, and of this one. */
+  read(predicts: boolean, found: Float64Array, before: Uint32Array, sizes: Uint32Array): void {
     const { order, starts, parents } = this.hierarchy;
-    const predicts = decoder.bit(this.kind, 0) === 1;
     const models = predicts ? this.predicted : this.plain;
-    for (let place = 0; place < order.length; place++) {
+    for (let place = this.start; place < this.end; place++) {
       const start = starts[place];
       const end = starts[place + 1];
       const count = end - start;
@@ -99,12 +96,44 @@ class Components {
           expected = predicts ? Math.floor(sum / count) : 0;
         }
         const context = SIZE_CLASSES * axis + sizeClass(around + 6 * before[at] + beside);
-        const value = models.signed(decoder, context);
+        const value = models.signed(this.decoder, context);
         found[at] = expected + PARTS * value;
         const size = Math.min(Math.abs(value), 1 << 16);
         sizes[at] = size;
         beside = (beside >> 1) + 5 * size;
       }
+    }
+  }
+}
+
+/** Reads component after component, of all vertices at once or of a first and a second half by two decoders. */
+class Components {
+  private readonly kind = new BinaryModels(1);
+  private readonly parts: Part[];
+  private readonly found: Float64Array;
+  /** Sizes of the numbers of the component before, and of this one. */
+  private before: Uint32Array;
+  private sizes: Uint32Array;
+
+  constructor(
+    private readonly decoder: RangeDecoder,
+    second: RangeDecoder | null,
+    hierarchy: Hierarchy,
+  ) {
+    const points = hierarchy.order.length;
+    const middle = second === null ? points : Math.floor(points / 2);
+    this.parts = [new Part(decoder, hierarchy, 0, middle), new Part(second ?? decoder, hierarchy, middle, points)];
+    this.found = new Float64Array(3 * points);
+    this.before = new Uint32Array(3 * points);
+    this.sizes = new Uint32Array(3 * points);
+  }
+
+  /** Values of the next component in parts of a step, x y z of each point. */
+  next(): Float64Array {
+    const { found, before, sizes } = this;
+    const predicts = this.decoder.bit(this.kind, 0) === 1;
+    for (const part of this.parts) {
+      part.read(predicts, found, before, sizes);
     }
     this.before = sizes;
     this.sizes = before;
