@@ -1,5 +1,5 @@
 //! The numbers of a residual's components: in whole steps, predicted from coarse to fine on the mesh ([`Hierarchy`]), each in the context of how large those
-//! around it are. Vertices may be coded in two parts, coarse and fine, each in words of its own, so that two threads code them: the fine part of a component
+//! around it are. Vertices may be coded in two parts, coarse and fine, each by a range coder of its own, so that two threads code them: the fine part of a component
 //! while the coarse part of a later one is under way.
 
 use crate::entropy::{Bit, Coder, Integers, MOST, SIZES, size_class};
@@ -11,8 +11,9 @@ use std::sync::LazyLock;
 pub(crate) const PARTS: i64 = 16;
 /// What is added before numbers are rounded down: small ones cost more than they are worth, measured at the same error of the whole file.
 const ROUND_UP: i64 = 5;
-/// Components that one part of the vertices is ahead of the other, and about how many points these have together at most.
+/// Components that one part of the vertices is ahead of the other, at most.
 const AT_A_TIME: usize = 4;
+/// Points that these have together, unless one component has more.
 const POINTS_AT_A_TIME: usize = 1 << 17;
 
 /// What whole numbers are coded by, in some contexts.
@@ -34,7 +35,7 @@ impl Models for Integers {
     }
 }
 
-/// One component, vertex by vertex in the order of the hierarchy.
+/// The numbers of one component, in the order of the hierarchy's vertices.
 #[derive(Default)]
 pub(crate) struct Component {
     /// What its numbers are to be near, in parts of a step; empty where they are read.

@@ -210,7 +210,7 @@ struct Context {
 }
 
 /// Sizes from 1 to this are coded in unary.
-const UNARY: u32 = 14;
+pub(crate) const UNARY: u32 = 14;
 /// Largest size of a number.
 pub(crate) const MOST: u32 = 1 << 28;
 

@@ -69,7 +69,7 @@ pub fn estimate_residual(hierarchy: &Hierarchy, group: &ResidualGroup<'_>) -> Op
     Some((HEAD + coder.into_bytes().len() + corrections.encode().len()) as f64 + bits / 8.0)
 }
 
-/// What a residual is put together from.
+/// A residual, coded or estimated.
 struct Contents<'a, M> {
     /// Number of components.
     count: usize,
@@ -173,9 +173,11 @@ impl Residual {
         let (count, is_parted) = (count & !usize::from(PARTED), count & usize::from(PARTED) != 0);
         let correction = f64::from_le_bytes(std::array::from_fn(|k| head[10 + k]));
         let coarse = u32::from_le_bytes(std::array::from_fn(|k| head[18 + k])) as usize;
-        let (fine, rest) = match rest.split_first_chunk::<4>() {
-            Some((bytes, rest)) if is_parted => (u32::from_le_bytes(*bytes) as usize, rest),
-            _ => (0, rest),
+        let (fine, rest) = if is_parted {
+            let (bytes, rest) = rest.split_first_chunk::<4>().ok_or(Error::Damaged("a residual is cut"))?;
+            (u32::from_le_bytes(*bytes) as usize, rest)
+        } else {
+            (0, rest)
         };
         let too_many = count > frames.min(3 * points) || (3 * points).saturating_mul(count) > most;
         let impossible = too_many || [step, correction].iter().any(|x| !x.is_finite());
@@ -314,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn coarse_and_fine_vertices_come_back_from_words_of_their_own() {
+    fn coarse_and_fine_vertices_come_back_from_two_streams() {
         let hierarchy = Hierarchy::new(&mesh(90), 8_100);
         let mut random = fastrand::Rng::with_seed(8);
         let frames: Vec<Vec<f64>> = (0..12).map(|_| (0..24_300).map(|_| random.f64()).collect()).collect();
@@ -335,6 +337,11 @@ mod tests {
         for cut in [20, 24, 25, 30, 1_000, bytes.len() / 2, bytes.len() - 8] {
             assert!(Residual::decode(&hierarchy, 12, &bytes[..cut], usize::MAX).is_err(), "{cut}");
         }
+        // Nothing but a head without the length of the second part.
+        let mut head = bytes[..HEAD].to_vec();
+        head[8..10].copy_from_slice(&PARTED.to_le_bytes());
+        head[18..22].fill(0);
+        assert!(Residual::decode(&hierarchy, 12, &head, usize::MAX).is_err());
     }
 
     #[test]

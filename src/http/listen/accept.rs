@@ -157,7 +157,7 @@ fn admit(places: &Arc<Semaphore>, waiting: &IdleConnections) -> Option<PermitFut
 /// TCP keep-alive, so that streams that wait for news end when their client has vanished: after two minutes with the usual limit for a client
 /// that does not read, sooner with shorter ones.
 fn keep_alive(write_timeout: Duration) -> TcpKeepalive {
-    let interval = (write_timeout / 20).clamp(Duration::from_secs(1), Duration::from_secs(15));
+    let interval = Duration::from_secs((write_timeout.as_secs() / 20).clamp(1, 15));
     TcpKeepalive::new().with_time(4 * interval).with_interval(interval).with_retries(4)
 }
 

@@ -42,6 +42,6 @@ async fn a_stream_without_news_ends_when_its_client_has_vanished() {
         assert!(vanished.elapsed() < HANG, "the service goes on for a client that is not there");
         tokio::time::sleep(ms(50)).await;
     }
-    assert!(vanished.elapsed() > ms(2000), "one lost packet is no reason to give up");
+    assert!(vanished.elapsed() > ms(6000), "one lost packet is no reason to give up");
     assert!(is_held(server.address, address(&there)), "a client that only waits is not disturbed");
 }
