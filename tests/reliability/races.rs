@@ -173,12 +173,14 @@ async fn a_session_with_a_damaged_log_is_failed_and_disturbs_no_other() {
     inside.post(&bad.id, 0, SMALL.many(0..60)).await;
     let posted = inside.post(&good.id, 0, SMALL.many(0..60)).await;
     inside.restart(Loss::Nothing).await;
-    // Once more, so that the log is closed while it is changed; the first process has marked its length.
+    // Changed while no process has it open; the one before has marked its length.
     let log = inside.folder("sessions").join(&bad.id).join("frames.log");
-    let mut bytes = std::fs::read(&log).expect("the log");
-    bytes[5000] ^= 1;
-    std::fs::write(&log, bytes).expect("the log");
-    inside.restart(Loss::Nothing).await;
+    let damage = || {
+        let mut bytes = std::fs::read(&log).expect("the log");
+        bytes[5000] ^= 1;
+        std::fs::write(&log, bytes).expect("the log");
+    };
+    inside.restart_with(Loss::Nothing, |_| damage()).await;
     for _ in 0..3 {
         let now = inside.client().session(&bad.id).await.expect("the session is told of");
         assert_eq!(now.state, SessionState::Failed);
