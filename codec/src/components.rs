@@ -198,7 +198,7 @@ fn mean(found: &[[i64; 3]], parents: &[u32]) -> [i64; 3] {
     divided(sums, parents.len())
 }
 
-/// Numbers over a count, or as they are where that is 0, rounded down. In floating point, which is several times faster than dividing whole numbers: below 2²⁸ times the
+/// Numbers over a count, or as they are where that is 0, rounded down. In floating point, which is faster than dividing whole numbers: below 2²⁸ times the
 /// count, as encoders have them, a quotient that is no whole number is farther from the next one than it is rounded by.
 #[inline(always)]
 fn divided(numbers: [i64; 3], count: usize) -> [i64; 3] {

@@ -7,7 +7,7 @@ use crate::entropy::{Coder, UNARY};
 const PLACES: usize = 2 * UNARY as usize + 3;
 
 /// What an adaptive model spends beyond the entropy of a binary digit, measured on normal numbers.
-const ADAPTION: f64 = 0.008;
+const ADAPTATION: f64 = 0.008;
 
 /// Counts of numbers in some contexts.
 pub(crate) struct Histograms {
@@ -24,7 +24,7 @@ impl Histograms {
     /// Binary digits that the numbers take, half of log₂ of the count for each number that is to be learned included.
     pub(crate) fn bits(&self) -> f64 {
         self.digits
-            + ADAPTION * self.modelled
+            + ADAPTATION * self.modelled
             + entropy(&self.beyond)
             + self.contexts.iter().map(|counts| entropy(counts)).sum::<f64>()
     }
@@ -38,7 +38,7 @@ fn entropy(counts: &[u32]) -> f64 {
 
 impl Models for Histograms {
     fn new(contexts: usize) -> Self {
-        Self { contexts: vec![[0; PLACES]; contexts], beyond: [0; 64], digits: 0.0, modelled: 0.0 }
+        Self { contexts: vec![[0; PLACES]; contexts], beyond: [0; 2 * 32], digits: 0.0, modelled: 0.0 }
     }
 
     fn code(&mut self, _: &mut impl Coder, context: usize, value: i32) -> i32 {
