@@ -224,8 +224,9 @@ pub fn preparation_warnings(options: SolverOptions, solver: &Solver) -> Vec<Stri
             cager_core::coordinates::Refinement::TOLERANCE
         ));
     }
-    let strong = found.singular_values.iter().filter(|&&s| s >= WEAK_SINGULAR_VALUE * found.singular_values[0]).count();
-    let weak = unknowns - strong;
+    let sigma = &found.singular_values;
+    let weak = unknowns - sigma.len() + sigma.iter().filter(|&&s| s < WEAK_SINGULAR_VALUE * sigma[0]).count();
+    let strong = unknowns - weak;
     if weak > 0 {
         let consequence = match options.regularizer {
             Regularizer::Laplacian => "it is smoothed there".to_owned(),

@@ -163,6 +163,13 @@ pub(crate) fn solve_upper(r: MatRef<'_, f64>, x: &mut Mat<f64>) {
     });
 }
 
+/// `L⁻¹ X` in place, for a lower triangular L.
+pub(crate) fn solve_lower(l: MatRef<'_, f64>, x: &mut Mat<f64>) {
+    in_column_blocks(x.as_mut(), l.nrows() * l.nrows(), |columns| {
+        faer::linalg::triangular_solve::solve_lower_triangular_in_place(l, columns, Par::Seq);
+    });
+}
+
 /// `A · B`.
 pub(crate) fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     let mut out = Mat::zeros(a.nrows(), b.ncols());

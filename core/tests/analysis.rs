@@ -186,3 +186,43 @@ fn many_unknowns_are_prepared_to_the_same_bits_by_any_threads_and_as_an_analysis
         assert_eq!(a.singular_values, c.singular_values, "{handles:?}");
     }
 }
+
+#[test]
+fn the_last_directions_alone_give_the_cages_of_the_whole_decomposition() {
+    let capture = Capture::new(&Options { points: 3_200, frames: 9, cage_vertices: 1_040 });
+    let cage = Cage::new(capture.cage.clone()).unwrap();
+    let points: &[Point] = &capture.rest.points;
+    let everything = Analysis::new(&MeanValue, &cage, points).unwrap();
+    let unknowns = everything.coordinates().ncols();
+    assert!(unknowns >= 1024, "the sizes where only the directions that a term acts on are computed");
+    let mut frame = Vec::new();
+    capture.frame(5, &mut frame);
+    for (handles, regularizer, spectrum) in [
+        (Handles::MaxVol, Regularizer::Laplacian, 20),
+        (Handles::Spread { count: None }, Regularizer::Differential, 20),
+        (Handles::Spread { count: None }, Regularizer::Differential, 0),
+        (Handles::All, Regularizer::Temporal, 9),
+        (Handles::All, Regularizer::None, 0),
+    ] {
+        let options = SolverOptions { handles, regularizer, spectrum, lambda: 1.0 };
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| Solver::prepare(&MeanValue, &cage, points, options).unwrap())
+        };
+        let (alone, whole) = (with(2), everything.solver(options).unwrap());
+        assert_eq!(alone.operator(), with(1).operator(), "{options:?}");
+        let [found, wanted] = [&alone, &whole].map(|solver| solver.invert_after(None, &[frame.as_slice()]).concat());
+        for (found, wanted) in found.iter().zip(&wanted) {
+            assert!((found - wanted).abs() < 1e-6 * alone.diagonal() as f32, "{options:?}: {found} {wanted}");
+        }
+        let (a, b) = (alone.preparation(), whole.preparation());
+        assert!((a.condition_handles / b.condition_handles - 1.0).abs() < 1e-9, "{options:?}");
+        assert!((a.condition_full / b.condition_full - 1.0).abs() < 1e-9, "{options:?}");
+        // The values that are known are those of the whole decomposition.
+        let known = a.singular_values.iter().zip(&b.singular_values).filter(|(found, _)| !found.is_nan());
+        assert_eq!((a.singular_values.len(), known.clone().count()), (unknowns, 1 + spectrum.max(1)));
+        for (found, wanted) in known {
+            assert!((found / wanted - 1.0).abs() < 1e-9, "{options:?}: {found} {wanted}");
+        }
+    }
+}

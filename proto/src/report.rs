@@ -62,7 +62,9 @@ pub struct Report {
     pub condition_number: ConditionNumber,
     /// Numerical rank of `Φ`.
     pub rank: usize,
-    /// Singular values of the inverted matrix, descending.
+    /// Singular values of the inverted matrix, descending; NaN, in JSON `null`, where they were not computed: of 1,024 unknowns or more
+    /// all between the first one and those that the regularisation acts on.
+    #[serde(deserialize_with = "numbers_or_null")]
     pub singular_values: Vec<f64>,
     /// How the handles of maximum volume were found.
     pub maxvol: MaxVol,
@@ -423,6 +425,11 @@ impl Seconds {
 
 /// JSON has no infinity and no NaN, and serde_json writes null for them: a capture that stands still has such figures, and
 /// its file must open.
+fn numbers_or_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
+    let numbers: Vec<Option<f64>> = Deserialize::deserialize(deserializer)?;
+    Ok(numbers.into_iter().map(|number| number.unwrap_or(f64::NAN)).collect())
+}
+
 fn number_or_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }

@@ -3,8 +3,9 @@
 
 use super::coordinates::{AnalysisCoordinates, coordinates};
 use super::handle_system::HandleSystem;
-use super::operator::{Decomposition, RequiredDecompositions, Spectra};
+use super::operator::Decomposition;
 use super::prepare::{check, check_options, reject_far_points};
+use super::spectra::{RequiredDecompositions, Spectra};
 use super::{Preparation, PrepareError, Preparing, Solver, SolverOptions};
 use crate::cage::Cage;
 use crate::coordinates::CoordinateSystem;
@@ -51,7 +52,7 @@ impl Analysis {
         Self::of(system, cage, points, RequiredDecompositions::Everything, &Preparing::default())
     }
 
-    /// As [`Self::new`], computing only what solvers with these options need. A model of very many points is analysed on a sample.
+    /// As [`Self::new`], computing only what solvers with these handles need. A model of very many points is analysed on a sample.
     ///
     /// # Errors
     /// As [`Solver::prepare`].
@@ -64,6 +65,25 @@ impl Analysis {
     ) -> Result<Self, PrepareError> {
         check(points, system.unknowns(cage), options)?;
         Self::of(system, cage, points, RequiredDecompositions::For(options.handles), preparing)
+    }
+
+    /// As [`Self::for_options`], for the solver with these options alone.
+    pub(super) fn for_solver(
+        system: &dyn CoordinateSystem,
+        cage: &Cage,
+        points: &[Point],
+        options: SolverOptions,
+        preparing: &Preparing<'_>,
+    ) -> Result<Self, PrepareError> {
+        check(points, system.unknowns(cage), options)?;
+        let tied = system.tied_normals(cage).is_some();
+        // An unregularised start is regularised nevertheless, in as many directions as are ill-conditioned.
+        let required = if tied {
+            RequiredDecompositions::For(options.handles)
+        } else {
+            RequiredDecompositions::of_solver(options)
+        };
+        Self::of(system, cage, points, required, preparing)
     }
 
     fn of(

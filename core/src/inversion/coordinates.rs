@@ -1,8 +1,8 @@
 //! Coordinates for an analysis: of all points of a model, or of a sample of a very large one.
 
 use super::PrepareError;
-use super::operator::RequiredDecompositions;
 use super::prepare::{Preparing, coordinates_fit, outside, reject_unreproduced_point, reproduction_error};
+use super::spectra::RequiredDecompositions;
 use crate::cage::Cage;
 use crate::coordinates::{CoordinateSystem, ElementPlan, MeanValue, PointwiseCoordinates, Refinement};
 use crate::decode::{Decoder, for_each_chunk};
@@ -36,13 +36,12 @@ pub(super) struct AnalysisCoordinates {
     pub(super) plan: Option<ElementPlan>,
 }
 
-/// A sample of points spaced evenly along a space-filling curve; `None` where all points are analysed. It has at least as many points as the handles
+/// A sample of points spaced evenly along a space-filling curve; `None` where all points are analysed, as for every choice of handles. It has at least as many points as the handles
 /// read, except with [`Handles::All`], for which the sample stands for all. Its density follows that of the model.
 fn sample(points: &[Point], unknowns: usize, required: RequiredDecompositions, entries: usize) -> Option<Vec<u32>> {
-    let read = match required {
-        RequiredDecompositions::Everything => return None,
-        RequiredDecompositions::For(Handles::All) => 0,
-        RequiredDecompositions::For(handles) => handles.count(points.len(), unknowns),
+    let read = match required.handles()? {
+        Handles::All => 0,
+        handles => handles.count(points.len(), unknowns),
     };
     let count = (entries / unknowns).max(ROWS_PER_UNKNOWN * unknowns).max(read);
     if points.len() <= count {

@@ -83,7 +83,7 @@ impl Factors {
         if self.mixed.nrows() > 0 {
             dense::multiply(q.as_mut().subrows_mut(low, self.mixed.nrows()), self.mixed.as_ref(), x.as_ref());
         }
-        dense::product(handle_system.decomposition.v.as_ref(), q.as_ref())
+        handle_system.decomposition.directions.to_cage(q.as_ref())
     }
 
     fn invert(

@@ -2,7 +2,7 @@
 
 use super::consistent::Consistent;
 use super::factored::FactoredInversion;
-use super::operator::{Decomposition, failed, padded_to_tiles};
+use super::operator::{Decomposition, Directions, failed, padded_to_tiles};
 use super::prepare::check_options;
 use super::target::RegularizationTarget;
 use super::translations::{with_unit_row_sums, with_zero_row_sums};
@@ -10,7 +10,10 @@ use super::{Analysis, PrepareError, Solver, SolverOptions};
 use crate::decode::Decoder;
 use crate::dense;
 use crate::mesh::Point;
-use crate::regularize::{CageLaplacian, Reference, Regularizer, SpectralMap, Spectrum, Term, TermError, spectral_map};
+use crate::regularize::{
+    CageLaplacian, Reference, RegularizationOperator, Regularizer, SpectralMap, Spectrum, Term, TermError, last_map,
+    spectral_map,
+};
 use faer::Mat;
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
@@ -26,12 +29,6 @@ pub struct HandleSystem<'a> {
     gram: OnceLock<Mat<f64>>,
 }
 
-/// A regularisation term for the cage of this analysis.
-pub(super) struct RegularizationOperator {
-    pub(super) delta: Mat<f64>,
-    pub(super) reference: Reference,
-}
-
 impl<'a> HandleSystem<'a> {
     pub(super) fn new(analysis: &'a Analysis, decomposition: Decomposition, seconds: f64) -> Self {
         Self { analysis, decomposition, seconds, gram: OnceLock::new() }
@@ -43,8 +40,8 @@ impl<'a> HandleSystem<'a> {
     }
 
     /// Singular values of the matrix that is inverted, descending.
-    pub fn singular_values(&self) -> &[f64] {
-        &self.decomposition.sigma
+    pub fn singular_values(&self) -> Vec<f64> {
+        self.decomposition.directions.values()
     }
 
     /// The solver with these options; their handles are checked, but this system's are used. The weight λ is relative to the mean square error of the
@@ -71,7 +68,7 @@ impl<'a> HandleSystem<'a> {
         let (handles, reads_all) = self.points_read();
         let mut preparation = analysis.preparation.clone();
         preparation.condition_handles = self.decomposition.condition;
-        preparation.singular_values = self.decomposition.sigma.clone();
+        preparation.singular_values = self.singular_values();
         preparation.svd_seconds += self.seconds + clock.elapsed().as_secs_f64();
         Ok(Solver {
             handles,
@@ -125,7 +122,7 @@ impl<'a> HandleSystem<'a> {
         let regularization_operator =
             self.regularization_operator(if unregularized { &CageLaplacian } else { term })?;
         let map = if unregularized {
-            let sigma = &self.decomposition.sigma;
+            let sigma = self.singular_values();
             let ill_conditioned = sigma.iter().filter(|&&x| x < ILL_CONDITIONED * sigma[0]).count();
             self.map(&regularization_operator, Regularizer::Laplacian, ill_conditioned.min(m / 4), 1.0)?
         } else {
@@ -159,22 +156,25 @@ impl<'a> HandleSystem<'a> {
         lambda: f64,
     ) -> Result<SpectralMap, PrepareError> {
         let found = &self.decomposition;
-        let unknowns = found.v.ncols();
-        let spectrum = Spectrum {
-            sigma: &found.sigma[..found.rank],
-            v: found.v.as_ref(),
-            delta: regularization_operator.delta.as_ref(),
-            reference: regularization_operator.reference,
-        };
+        let unknowns = self.analysis.phi.ncols();
         let squared = if regularizer == Regularizer::Tikhonov { lambda * lambda } else { lambda };
         let weight = squared * found.rows as f64 / unknowns as f64;
-        spectral_map(&spectrum, regularizer, s, weight).ok_or(failed("regularised solve"))
+        let map = match &found.directions {
+            Directions::All { sigma, v } => {
+                let spectrum = Spectrum { sigma: &sigma[..found.rank], v: v.as_ref(), term: regularization_operator };
+                spectral_map(&spectrum, regularizer, s, weight)
+            }
+            Directions::Last(last) => {
+                last_map(last, regularization_operator, if regularizer.is_sub_spectral() { s } else { 0 }, weight)
+            }
+        };
+        map.ok_or(failed("regularised solve"))
     }
 
     /// The regularisation target: a constant for the rest cage, a matrix for the previous frame's cage.
     pub(super) fn target(&self, map: &SpectralMap, reference: Reference) -> RegularizationTarget {
         let Some(target) = &map.target else { return RegularizationTarget::None };
-        let to_cage = dense::product(self.decomposition.v.as_ref(), target.as_ref());
+        let to_cage = self.decomposition.directions.to_cage(target.as_ref());
         let positions = self.analysis.decoder.positions();
         let operator = with_zero_row_sums(to_cage, positions);
         let rest = &self.analysis.rest;

@@ -12,6 +12,7 @@ mod options;
 mod parts;
 mod prepare;
 mod solve;
+mod spectra;
 mod target;
 mod threshold;
 mod translations;

@@ -30,7 +30,8 @@ pub struct Preparation {
     pub condition_full: f64,
     /// Condition number of the rows read, over their rank; of `Φ□` where every point is read.
     pub condition_handles: f64,
-    /// Singular values of the inverted matrix, descending: of `Φ` for spread handles and where every point is read, otherwise of the rows read.
+    /// Singular values of the inverted matrix, descending: of `Φ` for spread handles and where every point is read, otherwise of the rows read. Of
+    /// 1,024 unknowns or more the first one and those that the term acts on alone; the others are NaN.
     pub singular_values: Vec<f64>,
     /// Swaps of maxvol after its start.
     pub swaps: usize,
@@ -97,7 +98,7 @@ impl Solver {
         let term = preparing.term(options)?;
         // A term that does not fit the cage is refused before anything is computed.
         term.delta(cage, system.unknowns(cage))?;
-        let analysis = Analysis::for_options(system, cage, points, options, preparing)?;
+        let analysis = Analysis::for_solver(system, cage, points, options, preparing)?;
         preparing.next("operator")?;
         analysis.handle_system(options.handles)?.solver_with(options, term)
     }

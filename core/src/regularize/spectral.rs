@@ -2,6 +2,7 @@
 
 use super::{Reference, Regularizer, WEAK_SINGULAR_VALUE};
 use crate::dense;
+use crate::svd::LastDirections;
 use faer::{Mat, MatRef};
 
 /// Input of [`spectral_map`]: a decomposition and a regularisation term.
@@ -10,8 +11,13 @@ pub(crate) struct Spectrum<'a> {
     pub(crate) sigma: &'a [f64],
     /// Right singular vectors, m × m; the last m − r span the null space.
     pub(crate) v: MatRef<'a, f64>,
-    /// Regularisation term Δ, rows × m.
-    pub(crate) delta: MatRef<'a, f64>,
+    pub(crate) term: &'a RegularizationOperator,
+}
+
+/// A regularisation term for a cage.
+pub(crate) struct RegularizationOperator {
+    /// Δ, rows × m.
+    pub(crate) delta: Mat<f64>,
     /// What `Δ C` should be.
     pub(crate) reference: Reference,
 }
@@ -66,36 +72,87 @@ fn sub_spectral(spectrum: &Spectrum<'_>, s: usize, weight: f64) -> Option<Spectr
     if s == 0 {
         return Some(SpectralMap { data, target: None });
     }
-    let delta_v = dense::product(spectrum.delta, spectrum.v);
+    let delta_v = dense::product(spectrum.term.delta.as_ref(), spectrum.v);
     let (delta_low, delta_high) = (delta_v.as_ref().subcols(0, low), delta_v.as_ref().subcols(low, s));
-    let mut system = dense::product(delta_high.transpose(), delta_high);
-    // Diagonal entry that rounding alone leaves for a direction in the null space of Δ.
-    let rounding_level = weight * (1e-14 * spectrum.delta.norm_l2()).powi(2);
     let coupling = dense::product(delta_high.transpose(), delta_low);
-    // The right-hand sides of the data, and after them those of the reference.
-    let target_columns = if spectrum.reference == Reference::Origin { 0 } else { m };
-    let mut right = Mat::zeros(s, r + target_columns);
+    let mut right = Mat::zeros(s, r);
     for i in 0..s {
-        for j in 0..s {
-            system[(i, j)] *= weight;
-        }
         for k in 0..low {
             right[(i, k)] = -weight * coupling[(i, k)] / spectrum.sigma[k];
         }
         if low + i < r {
-            let sigma = spectrum.sigma[low + i];
-            system[(i, i)] += sigma * sigma;
-            right[(i, low + i)] = sigma;
+            right[(i, low + i)] = spectrum.sigma[low + i];
         }
     }
-    if target_columns > 0 {
-        let target = dense::product(delta_high.transpose(), spectrum.delta);
-        for (i, j) in (0..m).flat_map(|j| (0..s).map(move |i| (i, j))) {
-            right[(i, r + j)] = weight * target[(i, j)];
+    let (high, target) = place(delta_high, &spectrum.sigma[low.min(r)..], right, spectrum.term, weight)?;
+    for j in 0..r {
+        for i in 0..s {
+            data[(low + i, j)] = high[(i, j)];
         }
     }
-    let high = match dense::solve_definite_within(system.clone(), right.clone(), 1e-13, rounding_level) {
-        Some(high) => high,
+    let target = target.map(|high| Mat::from_fn(m, m, |i, j| if i < low { 0.0 } else { high[(i - low, j)] }));
+    Some(SpectralMap { data, target })
+}
+
+/// As [`spectral_map`] for a term that acts on the last s of the given directions, as a map to cages from an orthonormal basis of the columns
+/// of A: with `A = Q M` it is `C = data · (Qᵀ H) + target · C₀`. The others' part is `M⁻¹ (Qᵀ H)` without its component in them.
+///
+/// `None` where a factorisation fails.
+pub(crate) fn last_map(
+    last: &LastDirections,
+    term: &RegularizationOperator,
+    s: usize,
+    weight: f64,
+) -> Option<SpectralMap> {
+    let mut data = last.inverse.clone();
+    if s == 0 {
+        return Some(SpectralMap { data, target: None });
+    }
+    let skipped = last.sigma.len() - s;
+    let (u, v) = (last.u.as_ref().subcols(skipped, s), last.v.as_ref().subcols(skipped, s));
+    let sigma = &last.sigma[skipped..];
+    // V_highᵀ M⁻¹ = Σ_high⁻¹ U_highᵀ
+    let component = Mat::from_fn(s, u.nrows(), |i, j| u[(j, i)] / sigma[i]);
+    let delta_high = dense::product(term.delta.as_ref(), v);
+    let seen = dense::product(delta_high.transpose(), term.delta.as_ref());
+    let mut right = dense::product(seen.as_ref(), data.as_ref());
+    right -= dense::product(dense::product(seen.as_ref(), v).as_ref(), component.as_ref());
+    for (i, j) in (0..u.nrows()).flat_map(|j| (0..s).map(move |i| (i, j))) {
+        right[(i, j)] = sigma[i] * u[(j, i)] - weight * right[(i, j)];
+    }
+    let (high, target) = place(delta_high.as_ref(), sigma, right, term, weight)?;
+    data += dense::product(v, (high - component).as_ref());
+    let target = target.map(|high| dense::product(v, high.as_ref()));
+    Some(SpectralMap { data, target })
+}
+
+/// Minimises `w‖Δ V_high q_high − …‖² + ‖Σ_high q_high − …‖²` for the right-hand sides of the data, s columns of normal equations each, and for that of
+/// the reference, `w (Δ V_high)ᵀ Δ C₀`, where the term has one. `sigma` has fewer than s values where the last directions span the null space.
+fn place(
+    delta_high: MatRef<'_, f64>,
+    sigma: &[f64],
+    data: Mat<f64>,
+    term: &RegularizationOperator,
+    weight: f64,
+) -> Option<(Mat<f64>, Option<Mat<f64>>)> {
+    let (s, m, r) = (delta_high.ncols(), term.delta.ncols(), data.ncols());
+    let mut system = dense::product(delta_high.transpose(), delta_high);
+    for (i, j) in (0..s).flat_map(|j| (0..s).map(move |i| (i, j))) {
+        system[(i, j)] *= weight;
+    }
+    for (i, sigma) in sigma.iter().enumerate() {
+        system[(i, i)] += sigma * sigma;
+    }
+    // Diagonal entry that rounding alone leaves for a direction in the null space of Δ.
+    let rounding_level = weight * (1e-14 * term.delta.norm_l2()).powi(2);
+    // The right-hand sides of the data, and after them those of the reference.
+    let mut right = data;
+    if term.reference != Reference::Origin {
+        let target = dense::product(delta_high.transpose(), term.delta.as_ref());
+        right.resize_with(s, r + m, |i, j| weight * target[(i, j - r)]);
+    }
+    let solved = match dense::solve_definite_within(system.clone(), right.clone(), 1e-13, rounding_level) {
+        Some(solved) => solved,
         // Neither Δ nor any point determines the position of some connected component: add a small multiple of the identity, which keeps it near the
         // origin.
         None => {
@@ -106,12 +163,6 @@ fn sub_spectral(spectrum: &Spectrum<'_>, s: usize, weight: f64) -> Option<Spectr
             dense::solve_definite(system, right)?
         }
     };
-    for j in 0..r {
-        for i in 0..s {
-            data[(low + i, j)] = high[(i, j)];
-        }
-    }
-    let target =
-        (target_columns > 0).then(|| Mat::from_fn(m, m, |i, j| if i < low { 0.0 } else { high[(i - low, r + j)] }));
-    Some(SpectralMap { data, target })
+    let target = (solved.ncols() > r).then(|| solved.subcols(r, m).to_owned());
+    Some((solved.subcols(0, r).to_owned(), target))
 }

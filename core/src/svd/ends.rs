@@ -7,33 +7,30 @@ use faer::{Mat, MatRef};
 /// Steps that the method takes at the most.
 const STEPS: usize = 240;
 /// It ends when as many steps change the value by less than this fraction.
-const SETTLED: f64 = 1e-13;
+const SETTLED: f64 = 1e-11;
 const UNCHANGED: usize = 4;
 
 /// Largest and smallest singular value of `R A` from the upper triangular R, m × m, and from A, m × m, with its inverse.
 pub(crate) fn ends(factor: MatRef<'_, f64>, a: MatRef<'_, f64>, inverse: MatRef<'_, f64>) -> [f64; 2] {
-    let m = a.ncols();
-    let (first, last) = rayon::join(
-        || {
-            largest(m, |x| {
-                let image = dense::product(factor, dense::product(a, x).as_ref());
-                dense::product(a.transpose(), dense::product(factor.transpose(), image.as_ref()).as_ref())
-            })
-        },
-        || {
-            largest(m, |x| {
-                let mut image = dense::product(inverse.transpose(), x);
-                faer::linalg::triangular_solve::solve_lower_triangular_in_place(
-                    factor.transpose(),
-                    image.as_mut(),
-                    faer::Par::Seq,
-                );
-                dense::solve_upper(factor, &mut image);
-                dense::product(inverse, image.as_ref())
-            })
-        },
-    );
-    [first.sqrt(), 1.0 / last.sqrt()]
+    let last = || {
+        largest(a.ncols(), |x| {
+            let mut image = dense::product(inverse.transpose(), x);
+            dense::solve_lower(factor.transpose(), &mut image);
+            dense::solve_upper(factor, &mut image);
+            dense::product(inverse, image.as_ref())
+        })
+    };
+    let (first, last) = rayon::join(|| first_value(factor, a), last);
+    [first, 1.0 / last.sqrt()]
+}
+
+/// Largest singular value of `R A`, both m × m.
+pub(crate) fn first_value(factor: MatRef<'_, f64>, a: MatRef<'_, f64>) -> f64 {
+    let squared = largest(a.ncols(), |x| {
+        let image = dense::product(factor, dense::product(a, x).as_ref());
+        dense::product(a.transpose(), dense::product(factor.transpose(), image.as_ref()).as_ref())
+    });
+    squared.sqrt()
 }
 
 /// Largest eigenvalue of a symmetric positive operator on vectors of length m, given as columns.

@@ -2,8 +2,10 @@
 //! bits do not depend on the number of threads.
 
 mod ends;
+mod last;
 
-pub(crate) use ends::ends;
+pub(crate) use ends::{ends, first_value};
+pub(crate) use last::{LastDirections, last_directions};
 
 use faer::diag::Diag;
 use faer::dyn_stack::{MemBuffer, MemStack};
