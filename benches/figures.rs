@@ -163,7 +163,7 @@ fn write(capture: &Capture, cage: &Cage, folder: &Path) -> anyhow::Result<Vec<Ve
     }
     std::fs::create_dir_all(folder)?;
     write_model(&folder.join("rest.obj"), &capture.rest)?;
-    write_model(&folder.join("cage.obj"), &Model { points: cage.vertices().to_vec(), faces })?;
+    write_model(&folder.join("cage.obj"), &Model { points: cage.vertices().to_vec(), faces, ..Model::default() })?;
     let (n, count) = (capture.rest.points.len(), capture.frames());
     let mut writer = create_frames(folder.join("frames.npy"), n, count, &Polygons::new(), &FrameOptions::default())?;
     let mut frame = Vec::new();

@@ -40,7 +40,7 @@ pub fn write_cages(
     let mesh = container.cage().map_err(fail)?;
     let mut faces = Polygons::new();
     mesh.triangles.iter().for_each(|triangle| faces.push(triangle));
-    let cage = Model { points: mesh.vertices, faces };
+    let cage = Model { points: mesh.vertices, faces, ..Model::default() };
     let rest = (*output != Target::StandardOutput).then(|| rest_cage_path(output.path()));
     let mut rest_file = match &rest {
         Some(path) => rest_file(path, output.replaces(), &obj_bytes(&cage))?,

@@ -281,7 +281,6 @@ fn factor(ratio: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use cager_core::mesh::Polygons;
 
     /// A bent and uneven tube standing along y, as a mesh of quads.
     fn tube() -> Model {
@@ -310,7 +309,7 @@ mod tests {
 
     fn found(change: impl Fn(usize, Point) -> Point) -> [Vec<Mismatch>; 2] {
         let mesh = tube();
-        let cloud = Model { points: mesh.points.clone(), faces: Polygons::new() };
+        let cloud = Model { points: mesh.points.clone(), ..Model::default() };
         let frames = frames(&mesh, change);
         [mismatches(&mesh, &frames), mismatches(&cloud, &frames)]
     }
@@ -331,7 +330,7 @@ mod tests {
 
     #[test]
     fn tiny_parts_and_too_few_points_are_no_mistake() {
-        let one = Model { points: vec![[1.0, 2.0, 3.0]], faces: Polygons::new() };
+        let one = Model { points: vec![[1.0, 2.0, 3.0]], ..Model::default() };
         assert!(mismatches(&one, &[vec![4.0, 5.0, 6.0]]).is_empty());
         assert!(mismatches(&Model::default(), &[Vec::new()]).is_empty());
         assert!(mismatches(&tube(), &[]).is_empty());

@@ -21,7 +21,7 @@ fn quad_cube(half: f64) -> Model {
     for quad in [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]] {
         faces.push(&quad);
     }
-    Model { points, faces }
+    Model { points, faces, ..Model::default() }
 }
 
 #[test]
@@ -114,7 +114,7 @@ fn no_input_is_too_broken() {
     for mesh in [TriMesh::default(), nan] {
         let findings = check(&mesh, &Model::default());
         assert!(!findings.usable());
-        let mut broken = Model { points: mesh.vertices.clone(), faces: Polygons::new() };
+        let mut broken = Model { points: mesh.vertices.clone(), ..Model::default() };
         mesh.triangles.iter().for_each(|t| broken.faces.push(t));
         let _ = check(&mesh, &ball());
         let remaining = repair(&broken, &ball()).remaining;

@@ -28,6 +28,11 @@ impl CodedMesh {
         let ordered = decode_faces(&faces, points, mesh.faces.len(), mesh.faces.indices().len())?;
         let positions = encode_positions(grid, &ordered, &mesh.points);
         let points = decode_positions(&positions, &ordered, points)?;
-        Ok(Self { mesh: Model { points, faces: ordered }, faces, positions })
+        Ok(Self { mesh: Model { points, faces: ordered, colors: mesh.colors.clone() }, faces, positions })
+    }
+
+    /// Bytes that it takes in a file at the most; colours are not coded.
+    pub fn most_bytes(&self) -> usize {
+        self.faces.len() + self.positions.len() + 3 * self.mesh.colors.len()
     }
 }

@@ -81,6 +81,8 @@ pub struct Model {
     pub points: Vec<Point>,
     /// Polygonal faces, kept as they were read.
     pub faces: Polygons,
+    /// Colours of the points, red, green and blue in sRGB; empty where there are none.
+    pub colors: Vec<[u8; 3]>,
 }
 
 /// A triangle mesh: the form a cage has.

@@ -239,7 +239,7 @@ fn figure(points: usize) -> Model {
             }
         }
     }
-    Model { points: positions, faces }
+    Model { points: positions, faces, ..Model::default() }
 }
 
 /// Heights of `rings` slices, evenly spaced along the silhouette, poles not included.

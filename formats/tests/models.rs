@@ -63,6 +63,60 @@ fn a_point_cloud_is_a_model_without_faces() {
 }
 
 #[test]
+fn colours_come_with_the_points_where_every_point_has_one() {
+    let head = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n";
+    let channels = |kind: &str| ["red", "green", "blue", "alpha"].map(|c| format!("property {kind} {c}\n")).concat();
+    let ply = |kind: &str, values: &str| format!("{head}{}end_header\n{values}", channels(kind));
+    for (name, text) in [
+        ("a.obj", "v 1 2 3 1 0.2 0\nv 4 5 6 0 0 0.502\n".to_owned()),
+        ("a.obj", "v 1 2 3 255 51 0\nv 4 5 6 0 0 128\n".to_owned()),
+        ("a.ply", ply("uchar", "1 2 3 255 51 0 255\n4 5 6 0 0 128 255\n")),
+        ("a.ply", ply("ushort", "1 2 3 65535 13107 0 9\n4 5 6 0 0 32896 9\n")),
+        ("a.ply", ply("float", "1 2 3 1 0.2 0 1\n4 5 6 0 0 0.502 1\n")),
+    ] {
+        let model = read(name, &text).unwrap();
+        assert_eq!(model.colors, [[255, 51, 0], [0, 0, 128]], "{text}");
+        assert_eq!(model.points, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
+    }
+    for (name, text) in [
+        ("a.obj", "v 1 2 3 1 0 0\nv 4 5 6\n".to_owned()),
+        ("a.obj", "v 1 2 3 1 0 0\nv 4 5 6 1 0 x\n".to_owned()),
+        ("a.obj", "v 1 2 3 1 0 0\nv 4 5 6 1 0 nan\n".to_owned()),
+        ("a.obj", "v 1 2 3 1 0 0 1\nv 4 5 6 1 0 0 1\n".to_owned()),
+        ("a.ply", format!("{head}property uchar red\nend_header\n1 2 3 255\n4 5 6 0\n")),
+        ("a.ply", ply("int", "1 2 3 255 51 0 255\n4 5 6 0 0 128 255\n")),
+    ] {
+        let model = read(name, &text).unwrap();
+        assert!(model.colors.is_empty() && model.points.len() == 2, "{text}");
+    }
+}
+
+#[test]
+fn colours_of_a_glb_are_light_and_unreadable_ones_are_left_out() {
+    let nodes = r#","scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}]"#;
+    let colored = |accessor: &str, bytes: &[u8]| {
+        let views = r#"{"buffer":0,"byteOffset":48,"byteLength":24}"#;
+        let json = glb_json(nodes)
+            .replace("\"byteLength\":72", &format!("\"byteLength\":{}", 72 + bytes.len()))
+            .replace(views, &format!(r#"{views},{{"buffer":0,"byteOffset":72,"byteLength":{}}}"#, bytes.len()))
+            .replace(r#""SCALAR"}]"#, &format!(r#""SCALAR"}},{{"bufferView":2,"count":4,{accessor}}}]"#))
+            .replace(r#""POSITION":0"#, r#""POSITION":0,"COLOR_0":2"#);
+        let mut data = glb_data();
+        data.extend(bytes);
+        read("a.glb", glb_file(&json, &data)).unwrap()
+    };
+    let bytes: Vec<u8> = [[0, 55, 255, 7]; 4].concat();
+    let model = colored(r#""componentType":5121,"normalized":true,"type":"VEC4""#, &bytes);
+    assert_eq!((model.points.len(), model.colors), (4, vec![[0, 128, 255]; 4]));
+    let floats: Vec<u8> = [0.0f32, 0.2159, 4.0].map(f32::to_le_bytes).concat().repeat(4);
+    assert_eq!(colored(r#""componentType":5126,"type":"VEC3""#, &floats).colors, [[0, 128, 255]; 4]);
+    // Beyond the data, and of another type.
+    for accessor in [r#""componentType":5126,"type":"VEC4""#, r#""componentType":5120,"type":"VEC3""#] {
+        assert_eq!(colored(accessor, &floats[..16]), tetrahedron(), "{accessor}");
+    }
+}
+
+#[test]
 fn a_face_that_repeats_a_vertex_is_kept() {
     assert_eq!(read("a.obj", "v 0 0 0\nv 1 0 0\nf 1 2 2\n").unwrap().faces, polygons(&[&[0, 1, 1]]));
 }

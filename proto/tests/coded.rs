@@ -19,7 +19,7 @@ fn coded() -> (Vec<u8>, Vec<Vec<f32>>) {
     let cage = tetrahedron();
     let mut faces = Polygons::new();
     cage.triangles.iter().for_each(|triangle| faces.push(triangle));
-    let cage = CodedMesh::new(&Model { points: cage.vertices, faces }, 1e-3).unwrap();
+    let cage = CodedMesh::new(&Model { points: cage.vertices, faces, ..Model::default() }, 1e-3).unwrap();
     let rest = CodedMesh::new(&small_model(), 1e-3).unwrap();
     let mesh = TriMesh { vertices: cage.mesh.points.clone(), triangles: cage.mesh.faces.triangulated() };
     let checked = Cage::new(mesh.clone()).unwrap();

@@ -72,14 +72,18 @@ fn meshes_and_frames() -> impl Strategy<Value = (Model, TriMesh, Vec<Vec<f32>>)>
         (faces, triangles, frames).prop_map(move |(faces, triangles, frames)| {
             let mut polygons = Polygons::new();
             faces.iter().for_each(|f| polygons.push(f));
-            (Model { points: rest.clone(), faces: polygons }, TriMesh { vertices: cage.clone(), triangles }, frames)
+            (
+                Model { points: rest.clone(), faces: polygons, ..Model::default() },
+                TriMesh { vertices: cage.clone(), triangles },
+                frames,
+            )
         })
     })
 }
 
 #[test]
 fn point_cloud_comes_back_without_faces() {
-    let rest = Model { points: small_model().points, faces: Polygons::new() };
+    let rest = Model { points: small_model().points, ..Model::default() };
     let bytes = support::write(&rest, &tetrahedron(), 2, None);
     let mut reader = open(&bytes).unwrap();
     reader.verify().unwrap();
@@ -134,6 +138,24 @@ fn errors_and_header_come_back_with_the_counts_of_the_meshes() {
     assert_eq!((found.points, found.rest_faces, found.rest_corners), (4, 4, 12));
     assert_eq!((found.cage_vertices, found.cage_faces, found.rows_per_frame), (4, 4, 4));
     assert_eq!((found.coordinates.as_str(), found.lambda, found.frame_rate), ("mvc", 1.0, None));
+}
+
+#[test]
+fn colours_come_back_or_are_absent_and_are_there_once_for_every_point() {
+    let rest = Model { colors: vec![[255, 0, 7], [1, 2, 3], [0; 3], [9, 8, 200]], ..small_model() };
+    let bytes = support::write(&rest, &tetrahedron(), 2, None);
+    let mut reader = open(&bytes).unwrap();
+    reader.verify().unwrap();
+    assert_eq!(reader.rest().unwrap(), rest);
+    let parts = take_apart(&bytes);
+    let place = parts.iter().position(|p| p.tag == *b"rcol").unwrap();
+    let twice = [parts[place].clone(), parts[place].clone()].to_vec();
+    let wider = vec![Part { width: 3, ..parts[place].clone() }];
+    for wrong in [twice, wider, vec![Part::raw(*b"rcol", 1, &[1; 11])]] {
+        let mut parts = parts.clone();
+        parts.splice(place..=place, wrong);
+        assert!(matches!(open(&put_together(&parts)), Err(Error::Corrupt { .. })));
+    }
 }
 
 #[test]
@@ -268,7 +290,7 @@ fn meshes_that_no_reader_would_take_are_not_written() {
 #[test]
 fn data_that_compresses_beyond_what_readers_expand_can_be_read() {
     // A flat point cloud: two kilobytes once compressed, more than readers expand so small a file to.
-    let rest = Model { points: vec![[0.5; 3]; 2 << 20], faces: Polygons::new() };
+    let rest = Model { points: vec![[0.5; 3]; 2 << 20], ..Model::default() };
     let bytes = support::write(&rest, &tetrahedron(), 1, None);
     let mut reader = open(&bytes).unwrap();
     reader.verify().unwrap();

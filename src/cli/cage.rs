@@ -106,7 +106,7 @@ impl Targets {
         let output = args.output.as_ref().map(|path| outputs.text(path)).transpose()?;
         if let Some(output) = &output {
             // Fails early for an extension that is not written; any model will do.
-            cage_bytes(output, &Model { points: vec![[0.0; 3]], faces: Polygons::new() })?;
+            cage_bytes(output, &Model { points: vec![[0.0; 3]], ..Model::default() })?;
         }
         Ok(Self {
             output,
@@ -207,7 +207,7 @@ fn designed(
     warnings.extend(found.warnings);
     // An artist's cage keeps its quads.
     let cage = match start {
-        Some((_, model)) => Model { points: found.cage.vertices, faces: model.faces },
+        Some((_, model)) => Model { points: found.cage.vertices, faces: model.faces, ..Model::default() },
         None => of_triangles(found.cage),
     };
     Ok((cage, Some(report)))
@@ -218,7 +218,7 @@ fn of_triangles(mesh: TriMesh) -> Model {
     for triangle in &mesh.triangles {
         faces.push(triangle);
     }
-    Model { points: mesh.vertices, faces }
+    Model { points: mesh.vertices, faces, ..Model::default() }
 }
 
 fn finish(

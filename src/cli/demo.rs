@@ -86,7 +86,7 @@ fn as_model(cage: &Cage) -> Model {
     for triangle in &cage.mesh().triangles {
         faces.push(triangle);
     }
-    Model { points: cage.vertices().to_vec(), faces }
+    Model { points: cage.vertices().to_vec(), faces, ..Model::default() }
 }
 
 /// The frames of the built-in capture, made as they are sent.

@@ -58,8 +58,7 @@ impl CageSizes<'_> {
         let rest = &meshes.rest.mesh;
         let solver = prepare(&meshes.checked, rest).ok()?;
         let model = GroupDecoder::new(self.system, &meshes.checked, rest, &solver).ok()?;
-        let bytes = |mesh: &cager_codec::CodedMesh| mesh.faces.len() + mesh.positions.len();
-        let other = (bytes(&meshes.rest) + bytes(&meshes.cage)) as u64;
+        let other = (meshes.rest.most_bytes() + meshes.cage.most_bytes()) as u64;
         let most = group_frames(rest.points.len(), solver.decoder().unknowns()).min(self.frames.len());
         let most = self.memory.frames(HELD * rest.points.len(), most);
         let carried = Carried { room: self.goal.room(other, self.total), ..Carried::default() };

@@ -27,7 +27,7 @@ impl RestMeshes {
             Goal::Standard => (3e-4, coded(3e-4)?),
             Goal::Size(bytes) => {
                 // A third of the file, if that is not too coarse.
-                let fits = |mesh: &CodedMesh| (mesh.faces.len() + mesh.positions.len()) as u64 <= bytes / 3;
+                let fits = |mesh: &CodedMesh| mesh.most_bytes() as u64 <= bytes / 3;
                 let steps = [5e-5, 1e-4, 2e-4, 4e-4, 8e-4].into_iter();
                 let mut tried = steps.filter_map(|step| Some((step, coded(step)?)));
                 let mut last = None;

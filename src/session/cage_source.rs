@@ -170,7 +170,7 @@ pub(crate) fn check_extent(rest: &Model) -> Result<(), ApiError> {
 pub(crate) fn obj_of(mesh: &TriMesh) -> Vec<u8> {
     let mut faces = Polygons::new();
     mesh.triangles.iter().for_each(|triangle| faces.push(triangle));
-    cager_formats::obj_bytes(&Model { points: mesh.vertices.clone(), faces })
+    cager_formats::obj_bytes(&Model { points: mesh.vertices.clone(), faces, ..Model::default() })
 }
 
 /// Error detail for a vertex count outside the allowed range.

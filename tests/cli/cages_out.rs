@@ -1,9 +1,11 @@
 //! Cages out of a container, edited, and back: `decode --cages`, `decode --with-cages`, `edit`.
 
 use crate::refused::refused;
-use crate::support::{Dir, as_model, read_cages, read_frames};
+use crate::support::{Dir, ENCODE, Small, as_model, read_cages, read_frames};
 use cager_core::mesh::TriMesh;
 use cager_formats::{FrameOptions, create_frames, read_model};
+use cager_proto::container::ContainerReader;
+use std::io::Cursor;
 
 /// The cages of a file in double precision.
 fn stored(dir: &Dir, name: &str) -> Vec<Vec<f64>> {
@@ -49,6 +51,26 @@ fn cages_are_written_in_every_format_with_the_rest_cage_and_its_faces_beside_the
     refused(&dir, "decode out.cager --cages -o other.npy", &["other.cage.obj", "another file", "--overwrite"]);
     dir.cager("decode out.cager --cages -o other.npy --overwrite").succeeds();
     assert_eq!(dir.read("other.cage.obj"), dir.read("cages.cage.obj"));
+}
+
+#[test]
+fn files_keep_the_colours_of_the_rest_pose_coded_welded_and_edited() {
+    let (dir, mut small) = (Dir::new(), Small::new());
+    small.rest.colors = (0..small.rest.points.len()).map(|k| [k as u8, (k / 256) as u8, 255]).collect();
+    dir.model("rest.obj", &small.rest);
+    dir.model("cage.obj", &as_model(&small.cage));
+    dir.frames("frames.npy", &small.frames);
+    let colors = |name: &str| {
+        let mut reader = ContainerReader::open(Cursor::new(dir.read(name))).expect("a container");
+        reader.rest().expect("a model").colors
+    };
+    for options in ["", " --weld", " --max-error 1e-2", " --target-size 30KB"] {
+        dir.cager(&format!("{ENCODE}{options}")).succeeds();
+        assert_eq!(colors("out.cager"), small.rest.colors, "{options}");
+        dir.cager("decode out.cager --cages -o cages.npy --overwrite").succeeds();
+        dir.cager("edit out.cager --with-cages cages.npy -o edited.cager --overwrite").succeeds();
+        assert_eq!(colors("edited.cager"), small.rest.colors, "{options}");
+    }
 }
 
 #[test]

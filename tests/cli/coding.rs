@@ -157,6 +157,7 @@ fn the_rest_pose_comes_back_with_its_polygons_and_the_order_of_its_points() {
     small.rest = Model {
         points: small.rest.points.clone(),
         faces: polygons(kept.chain([vec![0, 5, 9, 2], vec![3, 8, 1, 7, 6]])),
+        ..Model::default()
     };
     dir.model("rest.obj", &small.rest);
     let rest = || decode::open(&dir.path("out.cager")).expect("a container").rest().expect("a rest pose");
@@ -244,7 +245,7 @@ fn a_large_plane_is_read_again() {
     let squares = (0..side - 1).flat_map(|i| (0..side - 1).map(move |j| (i, j)));
     let faces = polygons(squares.map(|(i, j)| vec![at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]));
     let points = (0..side * side).map(|k| [f64::from(k / side), f64::from(k % side), 0.0]).collect();
-    let rest = Model { points, faces };
+    let rest = Model { points, faces, ..Model::default() };
     dir.model("rest.obj", &rest);
     dir.model("cage.obj", &crate::support::quad_box(&rest.points));
     let frame: Vec<f64> = rest.points.as_flattened().to_vec();

@@ -4,7 +4,7 @@ use crate::refused::assert_sentence;
 use crate::support::{Dir, Small, close, has_report_page, npy_f64};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use cager_core::mesh::{Model, Polygons};
+use cager_core::mesh::Model;
 use serde_json::Value;
 
 const COMPARE: &str =
@@ -200,7 +200,7 @@ fn long_captures_are_measured_at_even_distances() {
 #[test]
 fn a_point_cloud_of_one_frame_is_compared_too() {
     let (dir, small) = Dir::with_capture();
-    dir.model("rest.obj", &Model { points: small.rest.points.clone(), faces: Polygons::new() });
+    dir.model("rest.obj", &Model { points: small.rest.points.clone(), ..Model::default() });
     dir.frames("frames.npy", &small.frames[3..4]);
     dir.cager(COMPARE).succeeds();
     let figures = dir.json("figures.json");

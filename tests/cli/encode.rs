@@ -3,7 +3,7 @@
 use crate::support::{
     Dir, ENCODE, as_model, close, largest, mean, measure, npy_f64, polygons, quad_box, read_cages, read_frames,
 };
-use cager_core::mesh::{Model, Polygons, winding_number};
+use cager_core::mesh::{Model, winding_number};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -50,7 +50,7 @@ fn doubles_are_not_narrowed_before_the_inversion() {
     let far = |x: &f64| x + 1000.0;
     let moved = |points: &[[f64; 3]]| points.iter().map(|p| p.map(|x| far(&x))).collect::<Vec<_>>();
     let frames: Vec<Vec<f64>> = small.frames.iter().map(|f| f.iter().map(far).collect()).collect();
-    dir.model("rest.obj", &Model { points: moved(&small.rest.points), faces: Polygons::new() });
+    dir.model("rest.obj", &Model { points: moved(&small.rest.points), ..Model::default() });
     let mut cage = small.cage;
     cage.vertices = moved(&cage.vertices);
     dir.model("cage.obj", &as_model(&cage));
@@ -254,7 +254,7 @@ fn unknowns_that_the_points_leave_open_are_a_warning() {
     // Only 40 places: the other points stand on top of these.
     let n = small.rest.points.len();
     let points: Vec<_> = (0..n).map(|i| small.rest.points[i % 40 * (n / 40)]).collect();
-    dir.model("rest.obj", &Model { points: points.clone(), faces: Polygons::new() });
+    dir.model("rest.obj", &Model { points: points.clone(), ..Model::default() });
     dir.write("frames.npy", npy_f64(&[points.as_flattened().to_vec()]));
     for handles in ["maxvol", "rectangular", "spread", "all"] {
         let done = dir.cager(&format!("{ENCODE} --report report.json --spectrum 0 --handles {handles}")).succeeds();
@@ -270,7 +270,7 @@ fn unknowns_that_the_points_leave_open_are_a_warning() {
 #[test]
 fn point_cloud_is_a_rest_pose() {
     let (dir, small) = Dir::with_capture();
-    let cloud = Model { points: small.rest.points.clone(), faces: Polygons::new() };
+    let cloud = Model { points: small.rest.points.clone(), ..Model::default() };
     dir.model("cloud.ply", &cloud);
     let line = "encode --rest cloud.ply --cage cage.obj --frames frames.npy -o cloud.cager --report report.json";
     dir.cager(line).succeeds();
@@ -475,7 +475,11 @@ fn half_a_model_in_the_cage_of_the_whole_is_encoded_well_with_the_default_option
     let (low, high) = cager_core::mesh::bounds(&small.rest.points);
     let upper: Vec<usize> =
         (0..small.rest.points.len()).filter(|&i| small.rest.points[i][2] > 0.5 * (low[2] + high[2])).collect();
-    let rest = Model { points: upper.iter().map(|&i| small.rest.points[i]).collect(), faces: polygons([]) };
+    let rest = Model {
+        points: upper.iter().map(|&i| small.rest.points[i]).collect(),
+        faces: polygons([]),
+        ..Model::default()
+    };
     let frames: Vec<Vec<f64>> =
         small.frames.iter().map(|f| upper.iter().flat_map(|&i| f[3 * i..3 * i + 3].to_vec()).collect()).collect();
     dir.model("rest.ply", &rest);

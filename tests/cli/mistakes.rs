@@ -2,7 +2,7 @@
 
 use crate::refused::assert_sentence;
 use crate::support::{Dir, ENCODE, Small, as_model, npy, npy_f64, quad_box, read_frames, split};
-use cager_core::mesh::{Model, Point, Polygons};
+use cager_core::mesh::{Model, Point};
 
 /// Every point of every frame changed.
 fn changed(small: &Small, change: impl Fn(Point) -> Point) -> Vec<Vec<f64>> {
@@ -58,7 +58,7 @@ fn a_capture_with_its_points_in_another_order_is_refused_unless_forced() {
     let (dir, small) = Dir::with_capture();
     dir.frames("frames.npy", &shuffled(&small));
     refused_unless_forced(&dir, ENCODE, &["frames.npy", "another order", "times longer in frame 0"]);
-    dir.model("cloud.ply", &Model { points: small.rest.points.clone(), faces: Polygons::new() });
+    dir.model("cloud.ply", &Model { points: small.rest.points.clone(), ..Model::default() });
     let line = "encode --rest cloud.ply --cage cage.obj --frames frames.npy -o cloud.cager";
     refused_unless_forced(&dir, line, &["frames.npy", "cloud.ply", "another order"]);
 }

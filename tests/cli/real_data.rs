@@ -404,8 +404,11 @@ fn no_real_capture_is_taken_for_a_mistake_and_every_mixed_up_one_is() {
         };
         // Any other frame as the rest pose is as good.
         for k in 0..10 {
-            let posed =
-                Model { points: all[k * (all.len() - 1) / 9].as_chunks().0.to_vec(), faces: rest.faces.clone() };
+            let posed = Model {
+                points: all[k * (all.len() - 1) / 9].as_chunks().0.to_vec(),
+                faces: rest.faces.clone(),
+                ..Model::default()
+            };
             assert_eq!(mismatches(&posed, &some(&|frame, i| frame[i])), [], "{name}");
         }
         let larger = mismatches(&rest, &some(&|frame, i| frame[i].map(|x| 100.0 * x)));

@@ -90,7 +90,7 @@ fn garments_over_makehuman_follow_its_cages_within_a_tenth_of_the_error_of_the_b
     let error_of = |worn: &[u32], lift: f64| {
         let truth: Vec<_> = truth.iter().map(|frame| lifted(frame, worn, lift)).collect();
         let points = lifted(rest.points.as_flattened(), worn, lift).as_chunks().0.to_vec();
-        error(&dir, &rest, &Model { points, faces: polygons([]) }, &truth)
+        error(&dir, &rest, &Model { points, faces: polygons([]), ..Model::default() }, &truth)
     };
     // A suit all over, and a garment from the knees to the shoulders.
     let (low, high) = cager_core::mesh::bounds(&rest.points);

@@ -36,7 +36,7 @@ pub(crate) fn assert_sentence(line: &str, stderr: &str, words: &[&str]) {
 #[test]
 fn fewer_points_than_unknowns_are_refused_with_both_numbers() {
     let (dir, small) = Dir::with_capture();
-    dir.model("rest.obj", &Model { points: small.rest.points[..50].to_vec(), faces: Polygons::new() });
+    dir.model("rest.obj", &Model { points: small.rest.points[..50].to_vec(), ..Model::default() });
     let frames: Vec<Vec<f64>> = small.frames.iter().map(|f| f[..150].to_vec()).collect();
     dir.frames("few.npy", &frames);
     let m = format!("{} unknowns", small.cage.vertices.len());
@@ -54,7 +54,7 @@ fn points_in_one_place_or_too_far_apart_are_refused() {
     far.points[7] = [1e200, 0.0, 0.0];
     dir.model("rest.obj", &far);
     refused(&dir, ENCODE, &["rest.obj", "too large"]);
-    dir.model("rest.obj", &Model { points: vec![[0.0, 0.0, 1.0]; small.rest.points.len()], faces: Polygons::new() });
+    dir.model("rest.obj", &Model { points: vec![[0.0, 0.0, 1.0]; small.rest.points.len()], ..Model::default() });
     refused(&dir, ENCODE, &["rest.obj", "same place"]);
 }
 

@@ -222,7 +222,7 @@ impl Small {
 
     /// One frame as a mesh.
     pub(crate) fn posed(&self, frame: usize) -> Model {
-        Model { points: self.frames[frame].as_chunks().0.to_vec(), faces: self.rest.faces.clone() }
+        Model { points: self.frames[frame].as_chunks().0.to_vec(), faces: self.rest.faces.clone(), ..Model::default() }
     }
 
     /// The cage drawn towards its centre, so that it leaves points outside.
@@ -235,7 +235,11 @@ impl Small {
 
 /// A mesh as files hold it.
 pub(crate) fn as_model(mesh: &TriMesh) -> Model {
-    Model { points: mesh.vertices.clone(), faces: polygons(mesh.triangles.iter().map(|t| t.to_vec())) }
+    Model {
+        points: mesh.vertices.clone(),
+        faces: polygons(mesh.triangles.iter().map(|t| t.to_vec())),
+        ..Model::default()
+    }
 }
 
 pub(crate) fn polygons(all: impl IntoIterator<Item = Vec<u32>>) -> Polygons {
@@ -252,7 +256,7 @@ pub(crate) fn quad_box(points: &[Point]) -> Model {
     let margin = 0.05 * diagonal(points);
     let corner = |i: usize| [0, 1, 2].map(|k| if i >> k & 1 == 0 { low[k] - margin } else { high[k] + margin });
     let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    Model { points: (0..8).map(corner).collect(), faces: polygons(quads.map(|q| q.to_vec())) }
+    Model { points: (0..8).map(corner).collect(), faces: polygons(quads.map(|q| q.to_vec())), ..Model::default() }
 }
 
 /// A NumPy file by hand, so that any type and order can be made.
@@ -278,7 +282,10 @@ pub(crate) fn split(model: &Model) -> (Model, Vec<usize>) {
         faces.push((from.len() as u32..(from.len() + face.len()) as u32).collect());
         from.extend(face.iter().map(|&v| v as usize));
     }
-    (Model { points: from.iter().map(|&v| model.points[v]).collect(), faces: polygons(faces) }, from)
+    (
+        Model { points: from.iter().map(|&v| model.points[v]).collect(), faces: polygons(faces), ..Model::default() },
+        from,
+    )
 }
 
 pub(crate) fn npy_f64(frames: &[Vec<f64>]) -> Vec<u8> {

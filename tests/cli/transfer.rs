@@ -14,7 +14,7 @@ fn remeshed(rest: &Model) -> Model {
         (0..face.len()).map(move |k| vec![corner(k, face), corner(k + 1, face), centre])
     });
     let faces = polygons(faces);
-    Model { points, faces }
+    Model { points, faces, ..Model::default() }
 }
 
 fn centres(rest: &Model, frame: &[f64]) -> Vec<f64> {

@@ -65,7 +65,8 @@ pub(crate) fn write_capture(folder: &Path) {
     let mut faces = Polygons::new();
     capture.cage.triangles.iter().for_each(|triangle| faces.push(triangle));
     write_model(&folder.join("rest.obj"), &capture.rest).expect("rest.obj");
-    write_model(&folder.join("cage.obj"), &Model { points: capture.cage.vertices.clone(), faces }).expect("cage.obj");
+    write_model(&folder.join("cage.obj"), &Model { points: capture.cage.vertices.clone(), faces, ..Model::default() })
+        .expect("cage.obj");
     let (mut all, mut frame) = (Vec::new(), Vec::new());
     for t in 0..FRAMES {
         capture.frame(t, &mut frame);

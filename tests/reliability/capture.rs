@@ -149,7 +149,7 @@ fn obj(folder: &Path, model: &Model) -> Vec<u8> {
 fn as_model(mesh: &TriMesh) -> Model {
     let mut faces = Polygons::new();
     mesh.triangles.iter().for_each(|triangle| faces.push(triangle));
-    Model { points: mesh.vertices.clone(), faces }
+    Model { points: mesh.vertices.clone(), faces, ..Model::default() }
 }
 
 struct Narrow<'a> {

@@ -71,7 +71,8 @@ pub(crate) async fn ready(client: &Client, dir: &Dir) -> Session {
 
 /// A folder with the rest pose and the cage, and frames in single precision.
 pub(crate) fn capture() -> (Dir, usize, Vec<f32>) {
-    let (dir, small) = (Dir::new(), Small::new());
+    let (dir, mut small) = (Dir::new(), Small::new());
+    small.rest.colors = (0..small.rest.points.len()).map(|k| [k as u8, 100, 255]).collect();
     dir.model("rest.obj", &small.rest);
     dir.model("cage.obj", &as_model(&small.cage));
     dir.frames("frames.npy", &small.frames);

@@ -222,7 +222,7 @@ impl Repairing {
     fn model(&self) -> Model {
         let mut faces = Polygons::new();
         self.faces.iter().for_each(|face| faces.push(face));
-        Model { points: self.points.iter().map(DVec3::to_array).collect(), faces }
+        Model { points: self.points.iter().map(DVec3::to_array).collect(), faces, ..Model::default() }
     }
 }
 

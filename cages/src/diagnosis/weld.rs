@@ -32,10 +32,12 @@ pub fn weld(model: &Model) -> Option<Welded> {
         return None;
     }
     let mut kept = Vec::with_capacity(points.len() - merged);
+    let mut colors = Vec::new();
     let mut target = vec![0; points.len()];
     for (v, &first) in same.iter().enumerate() {
         target[v] = if first as usize == v {
             kept.push(model.points[v]);
+            colors.extend(model.colors.get(v));
             kept.len() as u32 - 1
         } else {
             target[first as usize]
@@ -46,7 +48,7 @@ pub fn weld(model: &Model) -> Option<Welded> {
         let corners: Vec<u32> = face.iter().map(|&v| target[v as usize]).collect();
         merged_faces.push(&corners);
     }
-    Some(Welded { model: Model { points: kept, faces: merged_faces }, target, merged })
+    Some(Welded { model: Model { points: kept, faces: merged_faces, colors }, target, merged })
 }
 
 /// For each vertex, the first one in its place, where both lie on open borders; otherwise itself.

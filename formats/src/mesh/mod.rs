@@ -1,5 +1,6 @@
 //! Models from and to mesh files.
 
+mod colors;
 mod glb;
 mod obj;
 mod off;

@@ -2,9 +2,10 @@
 
 use cager_core::mesh::Model;
 
+use super::colors::Colors;
 use super::{Contents, no_such_vertex, too_few_corners};
 use crate::error::Fault;
-use crate::text::{Lines, integer, point, quoted, words};
+use crate::text::{self, Lines, integer, point, quoted, words};
 
 pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Model, Fault> {
     let model = scan(bytes, contents, None)?;
@@ -19,7 +20,7 @@ pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Model, Fault> {
 
 /// One pass over the file; with `points`, stops at the first face that names a later vertex.
 fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Model, Fault> {
-    let mut model = Model::default();
+    let (mut model, mut colors) = (Model::default(), Colors::default());
     let mut face = Vec::new();
     let mut lines = Lines::new(bytes);
     while let Some(line) = lines.next() {
@@ -40,6 +41,13 @@ fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Model
         if is_vertex {
             let point = point(&mut words, || format!("line {number}"))?;
             model.points.push(point);
+            // Written after the position by many programs (x y z r g b), outside of the specification.
+            if contents == Contents::PointsAndFaces
+                && let [Some(red), Some(green), Some(blue), None] = [(); 4].map(|()| words.next().map(text::number))
+                && let (Some(red), Some(green), Some(blue)) = (red, green, blue)
+            {
+                colors.push([red, green, blue].map(|x| x as f32));
+            }
         } else {
             face.clear();
             for word in words {
@@ -51,6 +59,7 @@ fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Model
             model.faces.push(&face);
         }
     }
+    model.colors = colors.finish(model.points.len());
     Ok(model)
 }
 

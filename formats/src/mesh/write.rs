@@ -70,8 +70,14 @@ pub fn obj_bytes(model: &Model) -> Vec<u8> {
 }
 
 fn write_obj<W: Write>(out: &mut W, model: &Model) -> io::Result<()> {
-    for [x, y, z] in &model.points {
-        writeln!(out, "v {x:?} {y:?} {z:?}")?;
+    for (k, [x, y, z]) in model.points.iter().enumerate() {
+        match model.colors.get(k) {
+            Some(color) => {
+                let [red, green, blue] = color.map(|x| f64::from(x) / 255.0);
+                writeln!(out, "v {x:?} {y:?} {z:?} {red:.4} {green:.4} {blue:.4}")?;
+            }
+            None => writeln!(out, "v {x:?} {y:?} {z:?}")?,
+        }
     }
     write_obj_faces(out, model.faces.iter())
 }

@@ -19,7 +19,7 @@ pub fn polygons(faces: &[&[u32]]) -> Polygons {
 }
 
 pub fn tetrahedron() -> Model {
-    Model { points: POINTS.to_vec(), faces: polygons(&FACES.each_ref().map(<[u32; 3]>::as_slice)) }
+    Model { points: POINTS.to_vec(), faces: polygons(&FACES.each_ref().map(<[u32; 3]>::as_slice)), ..Model::default() }
 }
 
 pub fn read(name: &str, bytes: impl AsRef<[u8]>) -> Result<Model, Error> {

@@ -50,7 +50,8 @@ fn seeds() -> Vec<Vec<u8>> {
     };
     let mut faces = Polygons::new();
     faces.push(&[0, 1, 2, 3]);
-    let rest = Model { points: cage.vertices.iter().map(|p| p.map(|x| 0.1 + x / 3.0)).collect(), faces };
+    let rest =
+        Model { points: cage.vertices.iter().map(|p| p.map(|x| 0.1 + x / 3.0)).collect(), faces, ..Model::default() };
     let header = Header {
         coordinates_definition: 1,
         coordinates: "mvc".to_owned(),
@@ -84,7 +85,8 @@ fn seeds() -> Vec<Vec<u8>> {
 fn coded(header: &Header, rest: &Model, cage: &TriMesh) -> Vec<u8> {
     let mut faces = Polygons::new();
     cage.triangles.iter().for_each(|triangle| faces.push(triangle));
-    let coded_cage = CodedMesh::new(&Model { points: cage.vertices.clone(), faces }, 0.01).expect("a mesh");
+    let coded_cage =
+        CodedMesh::new(&Model { points: cage.vertices.clone(), faces, ..Model::default() }, 0.01).expect("a mesh");
     let coded_rest = CodedMesh::new(rest, 0.01).expect("a mesh");
     let mesh = TriMesh { vertices: coded_cage.mesh.points.clone(), triangles: coded_cage.mesh.faces.triangulated() };
     let checked = Cage::new(mesh.clone()).expect("a cage");

@@ -89,6 +89,7 @@ pub(crate) mod tag {
     pub(crate) const HEADER: [u8; 4] = *b"HEAD";
     pub(crate) const REST_POINTS: [u8; 4] = *b"RPTS";
     pub(crate) const REST_FACES: [u8; 4] = *b"RFAC";
+    pub(crate) const REST_COLORS: [u8; 4] = *b"rcol";
     pub(crate) const CAGE_VERTICES: [u8; 4] = *b"CVTX";
     pub(crate) const CAGE_FACES: [u8; 4] = *b"CTRI";
     pub(crate) const ELEMENTS: [u8; 4] = *b"ELEM";
@@ -98,10 +99,11 @@ pub(crate) mod tag {
     pub(crate) const NUMBERS: [u8; 4] = *b"fnum";
     pub(crate) const REPORT: [u8; 4] = *b"summ";
     pub(crate) const RESIDUAL: [u8; 4] = *b"resi";
-    pub(crate) const KNOWN: [[u8; 4]; 12] = [
+    pub(crate) const KNOWN: [[u8; 4]; 13] = [
         HEADER,
         REST_POINTS,
         REST_FACES,
+        REST_COLORS,
         CAGE_VERTICES,
         CAGE_FACES,
         ELEMENTS,

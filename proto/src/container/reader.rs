@@ -134,7 +134,9 @@ impl<R: Read + Seek> ContainerReader<R> {
         }
         let faces = self.rest_faces()?;
         let points = self.positions(tag::REST_POINTS, &faces)?;
-        let rest = Model { points, faces };
+        let colors = self.entries.iter().find(|e| e.header.tag == tag::REST_COLORS).copied();
+        let colors = colors.map_or(Ok(Vec::new()), |entry| self.raw(entry))?;
+        let rest = Model { points, faces, colors: colors.as_chunks().0.to_vec() };
         // Decoding takes several times as long as reading numbers that are there as they are.
         if self.entry(tag::REST_POINTS)?.header.codec == CODED {
             self.rest = Some(rest.clone());

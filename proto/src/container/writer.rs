@@ -80,6 +80,9 @@ impl<W: Write> ContainerWriter<W> {
                 rest.faces.arities().iter().chain(rest.faces.indices()).flat_map(|i| i.to_le_bytes()).collect();
             writer.section(tag::REST_FACES, DIFFERENCE, 4, 1, &numbers)?;
         }
+        if !rest.colors.is_empty() {
+            writer.section(tag::REST_COLORS, PLANES, 1, 0, rest.colors.as_flattened())?;
+        }
         writer.positions(tag::CAGE_VERTICES, &cage.vertices, coded_cage)?;
         if let Some(coded) = coded_cage {
             writer.coded(tag::CAGE_FACES, &coded.faces, 12 * cage.triangles.len(), (0, 0))?;

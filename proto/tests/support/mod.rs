@@ -26,7 +26,7 @@ pub fn small_model() -> Model {
     for triangle in &cage.triangles {
         faces.push(triangle);
     }
-    Model { points: cage.vertices.iter().map(|p| p.map(|x| 0.1 + x / 3.0)).collect(), faces }
+    Model { points: cage.vertices.iter().map(|p| p.map(|x| 0.1 + x / 3.0)).collect(), faces, ..Model::default() }
 }
 
 pub fn header(rows: u32) -> Header {

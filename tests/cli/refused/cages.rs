@@ -2,7 +2,7 @@
 
 use super::refused;
 use crate::support::{Dir, ENCODE, as_model};
-use cager_core::mesh::{Model, Polygons, TriMesh};
+use cager_core::mesh::{Model, TriMesh};
 
 /// Writes a changed cage and expects its refusal.
 #[track_caller]
@@ -110,7 +110,7 @@ fn loose_vertex_and_too_small_cages_are_refused() {
 #[test]
 fn cage_without_faces_is_refused() {
     let (dir, small) = Dir::with_capture();
-    dir.model("cage.ply", &Model { points: small.cage.vertices, faces: Polygons::new() });
+    dir.model("cage.ply", &Model { points: small.cage.vertices, ..Model::default() });
     refused(
         &dir,
         "encode --rest rest.obj --cage cage.ply --frames frames.npy -o out.cager --overwrite",

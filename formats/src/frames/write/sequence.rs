@@ -43,7 +43,7 @@ impl SequenceWriter {
         }
         let folder = AtomicDir::create(&announced.path, |name| target.replaces() && names.number(name).is_some())?;
         let format = if names.extension_is("ply") {
-            Format::Ply(Model { points: Vec::new(), faces: faces.clone() })
+            Format::Ply(Model { points: Vec::new(), faces: faces.clone(), ..Model::default() })
         } else {
             let mut text = Vec::new();
             write_obj_faces(&mut text, faces.iter()).map_err(|cause| Error::write(&announced.path, cause))?;

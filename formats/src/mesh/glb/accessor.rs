@@ -30,6 +30,37 @@ impl Buffers<'_> {
         Ok(points)
     }
 
+    /// The colours of an accessor in linear light, which must have no more than `most`; an opacity is passed over.
+    pub(super) fn colors(&self, index: usize, most: usize, place: &str) -> Result<Vec<[f32; 3]>, Fault> {
+        let mut colors = Vec::new();
+        let bytes = |b: &[u8]| [0, 1, 2].map(|k| f32::from(b[k]) / 255.0);
+        let words = |b: &[u8]| [0, 1, 2].map(|k| f32::from(u16::from_le_bytes([b[2 * k], b[2 * k + 1]])) / 65535.0);
+        let floats =
+            |b: &[u8]| [0, 1, 2].map(|k| f32::from_le_bytes([b[4 * k], b[4 * k + 1], b[4 * k + 2], b[4 * k + 3]]));
+        match self.kind(index, place)? {
+            (ComponentType::U8, Type::Vec3) => {
+                self.for_each(index, most, place, |b: &[u8; 3]| colors.push(bytes(b)))?
+            }
+            (ComponentType::U8, Type::Vec4) => {
+                self.for_each(index, most, place, |b: &[u8; 4]| colors.push(bytes(b)))?
+            }
+            (ComponentType::U16, Type::Vec3) => {
+                self.for_each(index, most, place, |b: &[u8; 6]| colors.push(words(b)))?
+            }
+            (ComponentType::U16, Type::Vec4) => {
+                self.for_each(index, most, place, |b: &[u8; 8]| colors.push(words(b)))?
+            }
+            (ComponentType::F32, Type::Vec3) => {
+                self.for_each(index, most, place, |b: &[u8; 12]| colors.push(floats(b)))?
+            }
+            (ComponentType::F32, Type::Vec4) => {
+                self.for_each(index, most, place, |b: &[u8; 16]| colors.push(floats(b)))?
+            }
+            _ => {}
+        }
+        Ok(colors)
+    }
+
     /// The vertex indices of an accessor, which must have no more than `most`.
     pub(super) fn indices(&self, index: usize, most: usize, place: &str) -> Result<Vec<u32>, Fault> {
         let mut indices = Vec::new();

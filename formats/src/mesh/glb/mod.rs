@@ -15,6 +15,7 @@ use gltf::json::validation::Checked;
 use gltf::json::{Mesh, Root};
 
 use super::check_face;
+use super::colors::{Colors, srgb};
 use crate::error::Fault;
 use accessor::Buffers;
 use scene::Placement;
@@ -26,12 +27,15 @@ pub(super) fn read(bytes: &[u8]) -> Result<Model, Fault> {
         root: &root,
         buffers: Buffers { root: &root, binary: chunks.binary },
         model: Model::default(),
+        colors: Colors::default(),
         most: MOST_FREE + MOST_PER_BYTE * bytes.len(),
     };
     for placement in scene::placements(&root)? {
         builder.place(&placement)?;
     }
-    Ok(builder.model)
+    let Builder { mut model, colors, .. } = builder;
+    model.colors = colors.finish(model.points.len());
+    Ok(model)
 }
 
 /// Points, corners and primitives that any file may have.
@@ -43,6 +47,7 @@ struct Builder<'a> {
     root: &'a Root,
     buffers: Buffers<'a>,
     model: Model,
+    colors: Colors,
     /// Nodes may repeat a mesh, and primitives an accessor, any number of times in a few bytes each.
     most: usize,
 }
@@ -85,6 +90,9 @@ impl Builder<'_> {
             Some(&known) => known,
             None => {
                 let added = self.add_points(positions.value(), placement, place)?;
+                if let Some(colors) = primitive.attributes.get(&Checked::Valid(Semantic::Colors(0))) {
+                    self.add_colors(colors.value(), added.1, place);
+                }
                 placed.insert(positions.value(), added);
                 added
             }
@@ -115,6 +123,14 @@ impl Builder<'_> {
             self.model.points.push(point);
         }
         Ok((base, points.len()))
+    }
+
+    /// Colours that cannot be read leave the model without any.
+    fn add_colors(&mut self, index: usize, points: usize, place: &str) {
+        let colors = self.buffers.colors(index, points, place).unwrap_or_default();
+        if colors.len() == points {
+            colors.into_iter().for_each(|color| self.colors.push(color.map(|x| srgb(x.clamp(0.0, 1.0)))));
+        }
     }
 
     fn add_triangles(

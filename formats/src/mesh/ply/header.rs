@@ -96,6 +96,23 @@ impl Element {
         Ok(columns)
     }
 
+    /// Columns of red, green and blue, and the value of full light in each; `None` where one is missing.
+    pub(super) fn colors(&self) -> Option<[(usize, f64); 3]> {
+        let mut columns = [(0, 1.0); 3];
+        for (column, name) in columns.iter_mut().zip(["red", "green", "blue"]) {
+            let at = self.properties.iter().position(|property| property.name == name)?;
+            let Kind::Scalar(scalar) = self.properties[at].kind else { return None };
+            let most = match scalar {
+                Scalar::U8 => 255.0,
+                Scalar::U16 => 65535.0,
+                Scalar::F32 | Scalar::F64 => 1.0,
+                _ => return None,
+            };
+            *column = (at, most);
+        }
+        Some(columns)
+    }
+
     /// Column of the list of vertices of each face.
     pub(super) fn corners(&self) -> Result<usize, Fault> {
         let is_corners = |property: &Property| {

@@ -5,6 +5,7 @@ mod values;
 
 use cager_core::mesh::Model;
 
+use super::colors::Colors;
 use super::{Contents, check_face, no_such_vertex};
 use crate::error::Fault;
 use header::{Element, Encoding, Header, Kind};
@@ -24,7 +25,7 @@ fn read_elements<V: Values>(header: &Header<'_>, contents: Contents, mut values:
     let points = header.vertices()?;
     for element in &header.elements {
         match element.name.as_str() {
-            "vertex" => read_points(element, &mut values, &mut model)?,
+            "vertex" => read_points(element, contents, &mut values, &mut model)?,
             "face" if contents == Contents::PointsAndFaces => read_faces(element, points, &mut values, &mut model)?,
             _ => skip(element, &mut values)?,
         }
@@ -32,13 +33,20 @@ fn read_elements<V: Values>(header: &Header<'_>, contents: Contents, mut values:
     Ok(model)
 }
 
-fn read_points<V: Values>(element: &Element, values: &mut V, model: &mut Model) -> Result<(), Fault> {
+fn read_points<V: Values>(
+    element: &Element,
+    contents: Contents,
+    values: &mut V,
+    model: &mut Model,
+) -> Result<(), Fault> {
     let columns = element.coordinates()?;
+    let color_columns = element.colors().filter(|_| contents == Contents::PointsAndFaces);
+    let mut colors = Colors::default();
     // Three scalars take at least three bytes.
     let most = (values.remaining() / 3) as u64;
     model.points.reserve_exact(element.count.min(most) as usize);
     for k in 0..element.count {
-        let mut point = [0.0; 3];
+        let (mut point, mut color) = ([0.0; 3], [0.0; 3]);
         for (column, property) in element.properties.iter().enumerate() {
             let value = match property.kind {
                 Kind::Scalar(scalar) => values.next(scalar),
@@ -48,6 +56,9 @@ fn read_points<V: Values>(element: &Element, values: &mut V, model: &mut Model) 
             if let Some(axis) = columns.iter().position(|&c| c == column) {
                 point[axis] = value;
             }
+            if let Some((channel, most)) = color_columns.and_then(|columns| channel_of(columns, column)) {
+                color[channel] = (value / most) as f32;
+            }
         }
         if !point.iter().all(|x| x.is_finite()) {
             return Err(Fault::invalid(format!(
@@ -55,8 +66,18 @@ fn read_points<V: Values>(element: &Element, values: &mut V, model: &mut Model) 
             )));
         }
         model.points.push(point);
+        if color_columns.is_some() {
+            colors.push(color);
+        }
     }
+    model.colors = colors.finish(model.points.len());
     Ok(())
+}
+
+/// Which channel a column has, and the value of its full light.
+fn channel_of(columns: [(usize, f64); 3], column: usize) -> Option<(usize, f64)> {
+    let channel = columns.iter().position(|&(c, _)| c == column)?;
+    Some((channel, columns[channel].1))
 }
 
 fn read_faces<V: Values>(element: &Element, points: u64, values: &mut V, model: &mut Model) -> Result<(), Fault> {

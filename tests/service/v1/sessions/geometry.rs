@@ -16,7 +16,7 @@ fn faces(all: impl IntoIterator<Item = Vec<u32>>) -> Polygons {
 fn cage_with(change: impl Fn(Vec<Vec<u32>>) -> Vec<Vec<u32>>) -> Mesh {
     let model = &Capture::small().cage.model;
     let all = model.faces.iter().map(<[u32]>::to_vec).collect();
-    Mesh::new(Model { points: model.points.clone(), faces: faces(change(all)) })
+    Mesh::new(Model { points: model.points.clone(), faces: faces(change(all)), ..Model::default() })
 }
 
 fn inward() -> Mesh {
@@ -56,7 +56,7 @@ async fn a_cage_that_is_open_is_refused_with_the_edge() {
     });
     let problem = app.refusal(form_of(&capture.rest, &open, &json!({}))).await;
     says(&problem, &["cage.obj", "edge"]);
-    let points = Mesh::new(Model { points: capture.cage.model.points.clone(), faces: Polygons::new() });
+    let points = Mesh::new(Model { points: capture.cage.model.points.clone(), ..Model::default() });
     says(&app.refusal(form_of(&capture.rest, &points, &json!({}))).await, &["cage.obj", "faces"]);
 }
 
@@ -86,7 +86,7 @@ async fn options_that_do_not_go_with_the_cage_are_refused_at_once() {
     let problem = app.refusal(form(capture, &json!({"spectrum": unknowns + 1}))).await;
     assert_eq!(problem.word(), "invalid-options");
     assert!(problem.detail.contains(&format!("{unknowns} unknowns")), "{}", problem.detail);
-    let few = Mesh::new(Model { points: capture.rest.model.points[..3].to_vec(), faces: Polygons::new() });
+    let few = Mesh::new(Model { points: capture.rest.model.points[..3].to_vec(), ..Model::default() });
     says(&app.refusal(form_of(&few, &capture.cage, &json!({}))).await, &["3 points", "fewer"]);
     assert!(app.get("/v1/sessions").await.json::<cager_proto::messages::SessionList>().sessions.is_empty());
 }
@@ -143,7 +143,7 @@ async fn a_session_whose_frames_are_damaged_says_so_wherever_it_is_used() {
 async fn polygons_of_the_cage_and_points_without_faces_are_fine() {
     let app = TestApp::start();
     let capture = Capture::small();
-    let cloud = Mesh::new(Model { points: capture.rest.model.points.clone(), faces: Polygons::new() });
+    let cloud = Mesh::new(Model { points: capture.rest.model.points.clone(), ..Model::default() });
     let form = form_of(&cloud, &capture.cage, &json!({}));
     let session: Session = app.create_with(form, None).await.is(201);
     app.prepared(&session.id).await;

@@ -1,7 +1,7 @@
 //! Sessions whose cage is not sent.
 
 use crate::support::{Capture, Mesh, TestApp, file, form, text};
-use cager_core::mesh::{Model, Polygons};
+use cager_core::mesh::Model;
 use cager_proto::messages::{CacheUse, Session};
 use futures_util::future::join_all;
 use reqwest::multipart::Form;
@@ -92,7 +92,7 @@ async fn what_contradicts_itself_or_cannot_be_enclosed_is_said_at_once() {
         }
     }
     // More vertices than points: known as soon as the cage is there.
-    let few = Mesh::new(Model { points: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 1.0]], faces: Polygons::new() });
+    let few = Mesh::new(Model { points: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 1.0]], ..Model::default() });
     let refused = app.create_with(Form::new().part("rest", file("rest.obj", &few.obj)), None).await;
     assert_eq!(refused.status, 422, "{}", refused.text());
     assert!(app.get("/v1/sessions").await.text().contains("\"sessions\":[]"));
