@@ -32,33 +32,22 @@ impl Buffers<'_> {
 
     /// The colours of an accessor in linear light, which must have no more than `most`; an opacity is passed over.
     pub(super) fn colors(&self, index: usize, most: usize, place: &str) -> Result<Vec<[f32; 3]>, Fault> {
-        let mut colors = Vec::new();
-        let bytes = |b: &[u8]| [0, 1, 2].map(|k| f32::from(b[k]) / 255.0);
-        let words = |b: &[u8]| [0, 1, 2].map(|k| f32::from(u16::from_le_bytes([b[2 * k], b[2 * k + 1]])) / 65535.0);
-        let floats =
-            |b: &[u8]| [0, 1, 2].map(|k| f32::from_le_bytes([b[4 * k], b[4 * k + 1], b[4 * k + 2], b[4 * k + 3]]));
-        match self.kind(index, place)? {
-            (ComponentType::U8, Type::Vec3) => {
-                self.for_each(index, most, place, |b: &[u8; 3]| colors.push(bytes(b)))?
-            }
-            (ComponentType::U8, Type::Vec4) => {
-                self.for_each(index, most, place, |b: &[u8; 4]| colors.push(bytes(b)))?
-            }
-            (ComponentType::U16, Type::Vec3) => {
-                self.for_each(index, most, place, |b: &[u8; 6]| colors.push(words(b)))?
-            }
-            (ComponentType::U16, Type::Vec4) => {
-                self.for_each(index, most, place, |b: &[u8; 8]| colors.push(words(b)))?
-            }
-            (ComponentType::F32, Type::Vec3) => {
-                self.for_each(index, most, place, |b: &[u8; 12]| colors.push(floats(b)))?
-            }
-            (ComponentType::F32, Type::Vec4) => {
-                self.for_each(index, most, place, |b: &[u8; 16]| colors.push(floats(b)))?
-            }
-            _ => {}
-        }
-        Ok(colors)
+        let (component, shape) = self.kind(index, place)?;
+        let (size, value): (usize, fn(&[u8]) -> f32) = match component {
+            ComponentType::U8 => (1, |b| f32::from(b[0]) / 255.0),
+            ComponentType::U16 => (2, |b| f32::from(u16::from_le_bytes([b[0], b[1]])) / 65535.0),
+            ComponentType::F32 => (4, |b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])),
+            _ => return Ok(Vec::new()),
+        };
+        let channels = match shape {
+            Type::Vec3 => 3,
+            Type::Vec4 => 4,
+            _ => return Ok(Vec::new()),
+        };
+        let Elements { bytes, stride, count } = self.elements(index, size * channels, most, place)?;
+        // The last element may be shorter than the stride, but has all its channels.
+        let color = |element: &[u8]| [0, 1, 2].map(|k| value(&element[k * size..]));
+        Ok(bytes.chunks(stride).take(count).map(color).collect())
     }
 
     /// The vertex indices of an accessor, which must have no more than `most`.
