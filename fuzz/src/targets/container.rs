@@ -50,8 +50,8 @@ fn seeds() -> Vec<Vec<u8>> {
     };
     let mut faces = Polygons::new();
     faces.push(&[0, 1, 2, 3]);
-    let rest =
-        Model { points: cage.vertices.iter().map(|p| p.map(|x| 0.1 + x / 3.0)).collect(), faces, ..Model::default() };
+    let points = cage.vertices.iter().map(|p| p.map(|x| 0.1 + x / 3.0)).collect();
+    let rest = Model { points, faces, colors: vec![[200, 0, 7]; 4] };
     let header = Header {
         coordinates_definition: 1,
         coordinates: "mvc".to_owned(),
