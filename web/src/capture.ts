@@ -22,6 +22,8 @@ export interface StaticPart {
   readonly cornerCounts: Uint32Array;
   /** Point indices of all corners, polygon by polygon. */
   readonly corners: Uint32Array;
+  /** Red, green and blue of each point of the model, in sRGB, where the file has them (`rcol` in docs/FORMAT.md). */
+  readonly colors?: Uint8Array;
   readonly cage: TriangleMesh;
   /** Rows of three numbers of one frame: what the coordinate system's columns multiply. */
   readonly rowsPerFrame: number;

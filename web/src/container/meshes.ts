@@ -10,8 +10,7 @@ import type { Head } from './head';
 import { CODEC, type Entry } from './section';
 
 /** Sections before the frames that model and cage are made of. */
-export const STATIC_TAGS = ['RPTS', 'RFAC', 'CVTX', 'CTRI', 'ELEM'] as const;
-export type StaticTag = (typeof STATIC_TAGS)[number];
+export const STATIC_TAGS: readonly string[] = ['RPTS', 'RFAC', 'CVTX', 'CTRI', 'ELEM'];
 
 /** A section and its payload as it is in the file, whose checksum and sizes were checked. */
 export interface Section {
@@ -22,7 +21,7 @@ export interface Section {
 /** Decodes what does not change from frame to frame. */
 export async function decodeStatic(
   head: Head,
-  sections: ReadonlyMap<StaticTag, Section>,
+  sections: ReadonlyMap<string, Section>,
   codec: Codec,
 ): Promise<StaticPart> {
   const polygons = await decodeModelFaces(head, sections.get('RFAC'), codec);

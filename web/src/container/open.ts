@@ -8,7 +8,7 @@ import { ContainerError, damaged, isDamage, isTolerable } from './error';
 import { checkHeadSection, type Head, parseHead } from './head';
 import { checkSize, type Chunk, type Layout } from './layout';
 import { decodePayload } from './codecs';
-import { decodeStatic, type Section, STATIC_TAGS, type StaticTag } from './meshes';
+import { decodeStatic, type Section, STATIC_TAGS } from './meshes';
 import { readContents, readSections, scanSections } from './sectionReader';
 import { ContainerResiduals, MeteredSource } from './residuals';
 import { checkPrelude, type Entry, PRELUDE_BYTES } from './section';
@@ -59,8 +59,9 @@ export async function openContainer(source: Source, options: OpenOptions = {}): 
   }
   const codec = options.codec ?? createCodec();
   try {
-    const part = await readStatic(ends, layout, head, codec, signal);
-    const capture = new FileCapture(name, head, part, layout, ends, metered, codec, coordinates, problem);
+    const { part, problem: colorProblem } = await readStatic(ends, layout, head, codec, signal);
+    const found = problem ?? colorProblem;
+    const capture = new FileCapture(name, head, part, layout, ends, metered, codec, coordinates, found);
     await capture.readTail(signal);
     return capture;
   } catch (error) {
@@ -91,17 +92,33 @@ async function readHead(source: Source, layout: Layout, signal?: AbortSignal): P
   return parseHead(decodePayload(entry, payload), entry.offset);
 }
 
+/** Model and cage; without colours where these are damaged or of a later program, and what is wrong with them then. */
 async function readStatic(
   source: Source,
   layout: Layout,
   head: Head,
   codec: Codec,
   signal?: AbortSignal,
-): Promise<StaticPart> {
-  const entries = STATIC_TAGS.map((tag) => layout.get(tag)).filter((entry) => entry !== undefined);
-  entries.sort((a, b) => a.offset - b.offset);
-  const sections = await readSections(source, entries, signal);
-  return decodeStatic(head, new Map(sections.map((found) => [found.entry.fields.tag as StaticTag, found])), codec);
+): Promise<{ part: StaticPart; problem: string | null }> {
+  const read = async (tags: readonly string[]): Promise<StaticPart> => {
+    const entries = tags.map((tag) => layout.get(tag)).filter((entry) => entry !== undefined);
+    entries.sort((a, b) => a.offset - b.offset);
+    const sections = new Map<string, Section>();
+    for (const section of await readSections(source, entries, signal)) {
+      sections.set(section.entry.fields.tag, section);
+    }
+    const colors = sections.get('rcol');
+    const part = await decodeStatic(head, sections, codec);
+    return colors === undefined ? part : { ...part, colors: decodePayload(colors.entry, colors.payload) };
+  };
+  try {
+    return { part: await read([...STATIC_TAGS, 'rcol']), problem: null };
+  } catch (error) {
+    if (layout.get('rcol') === undefined || !isTolerable(error, 'rcol')) {
+      throw error;
+    }
+    return { part: await read(STATIC_TAGS), problem: (error as Error).message };
+  }
 }
 
 class FileCapture implements ContainerCapture {

@@ -7,11 +7,11 @@ import { decodePayload } from './codecs';
 import { checksumDamage, damaged, isDamage, isTolerable } from './error';
 import { checkHeadSection, type Head, parseHead } from './head';
 import { checkSize } from './layout';
-import { decodeStatic, type Section, STATIC_TAGS, type StaticTag } from './meshes';
+import { decodeStatic, type Section, STATIC_TAGS } from './meshes';
 import { type Entry } from './section';
 import { type Arrival, SectionParser } from './sectionParser';
 import { decodeErrors, decodeFrameNumbers, decodeReport, NO_ERRORS } from './tail';
-import { KNOWN_TAGS } from './tag';
+import { isRequired, KNOWN_TAGS } from './tag';
 
 export interface StreamOptions {
   /** As in `OpenOptions`. */
@@ -36,6 +36,8 @@ export interface StreamEnd {
   readonly errors: FrameErrors;
   readonly frameNumbers: Float64Array | null;
   readonly report: Readonly<Record<string, unknown>> | null;
+  /** As in the static part, which has them where they came before its end. */
+  readonly colors: Uint8Array | null;
 }
 
 /**
@@ -44,7 +46,7 @@ export interface StreamEnd {
  */
 export class ContainerStream {
   private readonly parser = new SectionParser();
-  private readonly statics = new Map<StaticTag, Section>();
+  private readonly statics = new Map<string, Section>();
   private codec: Codec | null = null;
   private head: Head | null = null;
   private part: StaticPart | null = null;
@@ -53,6 +55,7 @@ export class ContainerStream {
   private errors = NO_ERRORS;
   private frameNumbers: Float64Array | null = null;
   private report: StaticPart['report'] = null;
+  private colors: Uint8Array | null = null;
   private problem: string | null = null;
   private isStopped = false;
   private work: Promise<void> = Promise.resolve();
@@ -83,8 +86,8 @@ export class ContainerStream {
     if (!complete) {
       this.note(damaged(this.parser.received, 'the file was cut'));
     }
-    const { problem, errors, frameNumbers, report } = this;
-    return { complete, problem, frames: this.parser.layout.frames, errors, frameNumbers, report };
+    const { problem, errors, frameNumbers, report, colors } = this;
+    return { complete, problem, frames: this.parser.layout.frames, errors, frameNumbers, report, colors };
   }
 
   /** Ends the codec. */
@@ -139,7 +142,8 @@ export class ContainerStream {
       checkHeadSection(entry);
     } else if (KNOWN_TAGS.has(tag)) {
       checkSize(entry, this.headBefore(entry.offset), this.parser.layout.frames, this.fileBytes());
-      if (!isStatic(tag)) {
+      // Colours may be among the sections of the static part, or anywhere else.
+      if (!STATIC_TAGS.includes(tag) && tag !== 'rcol') {
         await this.emitStatic();
       }
     }
@@ -151,9 +155,9 @@ export class ContainerStream {
       if (!isIntact) {
         throw checksumDamage(section.entry.offset);
       }
-      await (tag === 'HEAD' || isStatic(tag) ? this.takeStatic(section) : this.takeOther(section));
+      await (tag === 'HEAD' || STATIC_TAGS.includes(tag) ? this.takeStatic(section) : this.takeOther(section));
     } catch (error) {
-      if (!isTolerable(error, tag) || this.part === null) {
+      if (!isTolerable(error, tag) || (this.part === null && isRequired(tag))) {
         throw error;
       }
       this.note(error as Error);
@@ -166,7 +170,7 @@ export class ContainerStream {
       this.head = parseHead(decodePayload(entry, payload), entry.offset);
       return;
     }
-    this.statics.set(entry.fields.tag as StaticTag, section);
+    this.statics.set(entry.fields.tag, section);
     // Harmonic coordinates may have one more section, behind the others.
     const last = this.headBefore(entry.offset).system === 'harmonic' ? 'ELEM' : 'CTRI';
     if (entry.fields.tag === last) {
@@ -187,13 +191,14 @@ export class ContainerStream {
       throw damaged(layout.end, `the section ${missing} was cut`);
     }
     this.codec ??= this.options.codec ?? createCodec();
-    this.part = await decodeStatic(head, this.statics, this.codec);
+    const part = await decodeStatic(head, this.statics, this.codec);
+    this.part = this.colors === null ? part : { ...part, colors: this.colors };
     this.statics.clear();
     this.blocks = new BlockDecoder(this.part, this.codec, this.options.coordinates ?? null);
     this.options.onStatic(this.part);
   }
 
-  /** Takes an intact section behind the static part. */
+  /** Takes an intact section that is not needed for the static part. */
   private async takeOther(section: Section): Promise<void> {
     const { tag, first } = section.entry.fields;
     if (tag === 'resi') {
@@ -210,6 +215,8 @@ export class ContainerStream {
       this.errors = decodeErrors(section);
     } else if (tag === 'fnum') {
       this.frameNumbers = decodeFrameNumbers(section);
+    } else if (tag === 'rcol') {
+      this.colors = decodePayload(section.entry, section.payload);
     } else {
       this.report = decodeReport(section);
     }
@@ -231,8 +238,4 @@ export class ContainerStream {
   private note(damage: Error): void {
     this.problem ??= damage.message;
   }
-}
-
-function isStatic(tag: string): boolean {
-  return (STATIC_TAGS as readonly string[]).includes(tag);
 }

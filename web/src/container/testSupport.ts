@@ -142,6 +142,13 @@ export function putTogether(parts: readonly Part[]): Uint8Array<ArrayBuffer> {
   return bytes;
 }
 
+/** The container with one more section, right behind the one with a tag. */
+export function withPart(bytes: Uint8Array, part: Part, behind: string): Uint8Array<ArrayBuffer> {
+  const parts = takeApart(bytes);
+  const place = parts.findIndex(({ header }) => parseFields(header, 0).tag === behind);
+  return putTogether([...parts.slice(0, place + 1), part, ...parts.slice(place + 1)]);
+}
+
 /** Where the first section with this tag begins. */
 export function offsetOf(bytes: Uint8Array, tag: string): number {
   let at = PRELUDE_BYTES;

@@ -4,7 +4,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { describe, expect, it } from 'vitest';
 import { bytesSource } from '../container/source';
-import { allBlocks, goldenBytes, openBytes, positionsOf, takeApart } from '../container/testSupport';
+import { allBlocks, goldenBytes, openBytes, positionsOf, rawPart, takeApart, withPart } from '../container/testSupport';
 import { parseFields } from '../container/section';
 import { diagonalOf } from '../coordinates/topology';
 import { editedBlock, type CageEdit } from './cageEdit';
@@ -102,6 +102,16 @@ it('a copy without edits keeps errors and figures', async () => {
   const after = await openBytes(await written('definition3-mvc', []));
   expect(after.errors).toEqual(before.errors);
   expect(after.static.report).toEqual(before.static.report);
+});
+
+it('keeps the colours of the model', async () => {
+  const name = 'coded-mvc';
+  const colors = Uint8Array.from({ length: 3 * 120 }, (_, k) => (7 * k) % 256);
+  const bytes = withPart(goldenBytes(name), rawPart('rcol', colors), 'RFAC');
+  const { container } = await writeEdited(bytesSource(bytes), await openBytes(bytes), [editOf(26)]);
+  const after = await openBytes(new Uint8Array(await container.arrayBuffer()));
+  expect(after.problem).toBeNull();
+  expect(after.static.colors).toEqual(colors);
 });
 
 it('the header of a NumPy file is padded to a multiple of 64 bytes and names the shape', () => {

@@ -7,6 +7,8 @@ import {
   RGBAIntegerFormat,
   RGIntegerFormat,
   ShortType,
+  SRGBColorSpace,
+  UnsignedByteType,
   UnsignedIntType,
 } from 'three';
 import type { PhiLayout } from './packing';
@@ -36,6 +38,18 @@ export function pointValueTexture(values: Float32Array, bands: number): DataText
   const data = new Float32Array(WIDTH * bands);
   data.set(values.subarray(0, data.length));
   const texture = new DataTexture(data, WIDTH, bands, RedFormat, FloatType);
+  texture.needsUpdate = true;
+  return texture;
+}
+
+/** The colour of each point, in the arrangement of {@link pointValueTexture}; shaders read it as light. */
+export function pointColorTexture(colors: Uint8Array, bands: number): DataTexture {
+  const data = new Uint8Array(4 * WIDTH * bands);
+  for (let p = 0; p < colors.length / 3; p++) {
+    for (let k = 0; k < 3; k++) data[4 * p + k] = colors[3 * p + k];
+  }
+  const texture = new DataTexture(data, WIDTH, bands, RGBAFormat, UnsignedByteType);
+  texture.colorSpace = SRGBColorSpace;
   texture.needsUpdate = true;
   return texture;
 }

@@ -48,6 +48,8 @@ export function modelUniforms() {
     heatShare: { value: 0 },
     heatColors: { value: heatTexture() },
     color: { value: new Color() },
+    colors: { value: null },
+    hasColors: { value: false },
     skyDirection: { value: new Vector3(0, 1, 0) },
   } satisfies Record<string, IUniform>;
 }

@@ -1,5 +1,5 @@
 import { Group, LineSegments, Mesh, Points, type Color, type DataTexture, type Texture, type Vector3 } from 'three';
-import { pointValueTexture } from './dataTextures';
+import { pointColorTexture, pointValueTexture } from './dataTextures';
 import type { Decoder } from './decoder';
 import { ink, modelUniforms, numberedGeometry, shaderMaterial } from './materials';
 import { inkFragmentShader, modelFragmentShader, modelVertexShader } from './sceneShaders';
@@ -19,14 +19,19 @@ export class ModelView {
   private readonly handleSize = { value: 1 };
   private heat: DataTexture | null = null;
   private hasHeat = false;
+  private readonly colors: DataTexture | null;
 
+  /** @param colors red, green and blue of each point, in sRGB */
   constructor(
     private readonly decoder: Decoder,
     surface: Surface,
+    colors: Uint8Array | undefined,
   ) {
     const uniforms = this.uniforms as Record<string, { value: unknown }>;
     uniforms.positions.value = decoder.positions satisfies Texture;
     uniforms.normals.value = decoder.normals;
+    this.colors = colors ? pointColorTexture(colors, decoder.bands) : null;
+    uniforms.colors.value = this.colors;
     const all = Uint32Array.from({ length: decoder.points }, (_, p) => p);
     const still = { towards: { value: 0 }, asPoints: { value: false }, pointSize: { value: 1 } };
     const shaded = (own: Record<string, { value: unknown }>) =>
@@ -70,6 +75,11 @@ export class ModelView {
     this.uniforms.heatShare.value = this.hasHeat ? 1 : 0;
   }
 
+  /** Shows the model in the colours of its points where it has any, or in one colour. */
+  showColors(isShown: boolean) {
+    this.uniforms.hasColors.value = isShown && this.colors !== null;
+  }
+
   /** Shows the frame that the decoder was given as positions, in the model's own colour; or what it decoded. */
   showPlaced(isPlaced: boolean) {
     const placed = isPlaced ? this.decoder.placedTextures : null;
@@ -104,5 +114,6 @@ export class ModelView {
     }
     this.uniforms.heatColors.value.dispose();
     this.heat?.dispose();
+    this.colors?.dispose();
   }
 }

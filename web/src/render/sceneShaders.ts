@@ -26,11 +26,15 @@ uniform sampler2D normals;
 uniform sampler2D heat;
 uniform float heatScale;
 uniform float heatShare;
+uniform vec3 color;
+uniform sampler2D colors;
+uniform bool hasColors;
 uniform float pointSize;
 uniform float towards;
 out vec3 viewPosition;
 out vec3 viewNormal;
 out float heatValue;
+out vec3 ownColor;
 ${lookUp}
 void main() {
   ivec2 at = texelOf(gl_VertexID);
@@ -38,6 +42,7 @@ void main() {
   viewPosition = place.xyz;
   viewNormal = mat3(modelViewMatrix) * texelFetch(normals, at, 0).xyz;
   heatValue = heatShare > 0.0 ? length(texelFetch(heat, at, 0).xyz) * heatScale : 0.0;
+  ownColor = hasColors ? texelFetch(colors, at, 0).rgb : color;
   place.xyz *= 1.0 - towards;
   gl_Position = projectionMatrix * place;
   gl_PointSize = pointSize / max(0.05, -place.z);
@@ -45,14 +50,15 @@ void main() {
 
 /** Soft studio light fixed to the camera, and a slight darkening of hollows. */
 export const modelFragmentShader = `${header}
-uniform vec3 color;
 uniform vec3 skyDirection;
 uniform sampler2D heatColors;
 uniform float heatShare;
+uniform bool hasColors;
 uniform bool asPoints;
 in vec3 viewPosition;
 in vec3 viewNormal;
 in float heatValue;
+in vec3 ownColor;
 out vec4 shade;
 ${tone}
 void main() {
@@ -69,7 +75,7 @@ void main() {
     normal = -normal;
   }
   normal = normalize(normal);
-  vec3 base = color;
+  vec3 base = ownColor;
   if (heatShare > 0.0) {
     vec3 mapped = isnan(heatValue) ? vec3(0.5) : texture(heatColors, vec2(clamp(heatValue, 0.0, 1.0) * 0.996 + 0.002, 0.5)).rgb;
     base = mix(base, pow(mapped, vec3(2.2)), heatShare);
@@ -91,7 +97,7 @@ void main() {
   float towards8 = towards2 * towards2 * towards2 * towards2;
   float gloss = towards2 * towards8 * towards8 * towards8 * 0.10;
   float away = 1.0 - facing;
-  float rim = away * away * away * sqrt(max(0.0, away)) * (0.24 + 0.28 * max(0.0, up)) * (heatShare > 0.0 ? 0.35 : 1.0);
+  float rim = away * away * away * sqrt(max(0.0, away)) * (0.24 + 0.28 * max(0.0, up)) * (heatShare > 0.0 || hasColors ? 0.35 : 1.0);
   vec3 lit = base * light * cavity + gloss + rim * vec3(0.80, 0.90, 1.0);
   shade = vec4(toned(lit), 1.0);
 }`;

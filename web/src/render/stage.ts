@@ -17,6 +17,8 @@ export interface Layers {
   readonly cage: boolean;
   readonly handles: boolean;
   readonly ground: boolean;
+  /** Colours of the model's points, where it has any. */
+  readonly colors: boolean;
 }
 
 /** Colours of the picture, as CSS colours in sRGB. */
@@ -102,7 +104,7 @@ export class Stage {
     const surface = surfaceOf(capture);
     this.hasFaces = surface.triangles.length > 0;
     this.decoder = new Decoder(this.renderer, capture, surface, isSoftwareRendered() ? 'page' : 'graphics');
-    this.model = new ModelView(this.decoder, surface);
+    this.model = new ModelView(this.decoder, surface, capture.colors);
     this.cage = new CageView(capture.cage);
     this.ground = new Ground(this.decoder.positions, surface.triangles);
     this.backdrop = new Mesh(
@@ -168,6 +170,7 @@ export class Stage {
     this.model.wireframe.visible = hasModel && layers.wireframe;
     this.model.points.visible = hasModel && (layers.points || (layers.model && !this.hasFaces));
     this.model.handles.visible = hasModel && layers.handles;
+    this.model.showColors(layers.colors);
     // Until the model moves, the cage says that it will.
     this.cage.group.visible = layers.cage || !this.decoder.ready;
     this.ground.mesh.visible = layers.ground;

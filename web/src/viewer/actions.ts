@@ -48,6 +48,7 @@ export function perform(action: Action, viewer: CagerViewer) {
     cage: () => toggle('cage'),
     handles: () => toggle('handles'),
     ground: () => toggle('ground'),
+    colors: () => toggle('colors'),
     heat: () => player.setHeat(nextHeat(player)),
     compare: () => compare(player),
     picture: () => void savePicture(viewer, player),

@@ -170,6 +170,7 @@ export class CagerViewer extends CaptureElement {
         ${capture.complete ? nothing : this.live.template(player)}
       </div>
       ${toolbar(player, act, {
+        colors: [player, this.pair.player].some((shown) => shown?.capture.static.colors !== undefined),
         figures: this.figures,
         editing: this.editing.isOn,
         beside: this.beside !== null,

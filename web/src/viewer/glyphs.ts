@@ -14,6 +14,7 @@ const DRAWINGS = {
   cage: svg`<path d="M12 3 20 7.5v9L12 21l-8-4.5v-9z"/><path d="M4 7.5 12 12l8-4.5M12 12v9"/><g fill="currentColor" stroke="none"><circle cx="12" cy="3" r="1.7"/><circle cx="20" cy="7.5" r="1.7"/><circle cx="20" cy="16.5" r="1.7"/><circle cx="12" cy="21" r="1.7"/><circle cx="4" cy="16.5" r="1.7"/><circle cx="4" cy="7.5" r="1.7"/></g>`,
   handles: svg`<circle cx="12" cy="12" r="2.6" fill="currentColor"/><circle cx="12" cy="12" r="6.5"/><path d="M12 2.5v3M12 18.5v3M2.5 12h3M18.5 12h3"/>`,
   ground: svg`<path d="M3 17.5 8 9h8l5 8.5zM5.6 13h12.8M10.5 9 9 17.5M13.5 9l1.5 8.5"/>`,
+  colors: svg`<path d="M12 3.5a8.5 8.5 0 0 0 0 17c1.3 0 1.9-.9 1.6-2-.4-1.5.4-2.7 2-2.7h2.2c1.7 0 2.7-1.3 2.7-3.3C20.5 7.3 16.7 3.5 12 3.5z"/><g fill="currentColor" stroke="none"><circle cx="7.4" cy="12.6" r="1.4"/><circle cx="9.6" cy="8.3" r="1.4"/><circle cx="14.2" cy="7.6" r="1.4"/><circle cx="17" cy="11.2" r="1.4"/></g>`,
   heat: svg`<path d="M12 3.5c1 3.5 5.5 5.5 5.5 10.5a5.5 5.5 0 0 1-11 0c0-2 .8-3.3 2-4.5.2 1.5.8 2.3 1.7 2.7C10 9 10.5 6 12 3.5z"/>`,
   frame: svg`<path d="M4 8.5V5.5A1.5 1.5 0 0 1 5.5 4h3M15.5 4h3A1.5 1.5 0 0 1 20 5.5v3M20 15.5v3a1.5 1.5 0 0 1-1.5 1.5h-3M8.5 20h-3A1.5 1.5 0 0 1 4 18.5v-3"/><circle cx="12" cy="12" r="3.3"/>`,
   camera: svg`<path d="M4 8.5A1.5 1.5 0 0 1 5.5 7H8l1.5-2.5h5L16 7h2.5A1.5 1.5 0 0 1 20 8.5v9a1.5 1.5 0 0 1-1.5 1.5h-13A1.5 1.5 0 0 1 4 17.5z"/><circle cx="12" cy="13" r="3.5"/>`,

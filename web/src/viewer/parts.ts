@@ -22,6 +22,7 @@ const LAYER_NAMES: Readonly<Record<keyof Layers, string>> = {
   cage: 'Cage',
   handles: 'Handles',
   ground: 'Ground',
+  colors: 'Colours',
 };
 
 const HEAT_NAMES: Readonly<Record<Heat, string>> = {
@@ -49,6 +50,7 @@ export function toolbar(
   player: Player,
   act: Act,
   shown: {
+    colors: boolean;
     figures: boolean;
     editing: boolean;
     beside: boolean;
@@ -58,7 +60,11 @@ export function toolbar(
   },
 ) {
   const layers = Object.keys(LAYER_NAMES) as (keyof Layers)[];
-  const possible = layers.filter((layer) => layer !== 'handles' || player.capture.handles !== undefined);
+  const isPossible: Partial<Record<keyof Layers, boolean>> = {
+    handles: player.capture.handles !== undefined,
+    colors: shown.colors,
+  };
+  const possible = layers.filter((layer) => isPossible[layer] ?? true);
   return html`<div class="tools glass" role="toolbar" aria-label="View" aria-orientation="vertical">
     ${possible.map((layer) => tool(layer, layer, LAYER_NAMES[layer], act, player.layers[layer]))}
     ${tool('heat', 'heat', HEAT_NAMES[player.heatMap.kind], act, player.heatMap.kind !== 'none')}

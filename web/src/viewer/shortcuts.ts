@@ -27,6 +27,7 @@ export type Action =
   | 'cage'
   | 'handles'
   | 'ground'
+  | 'colors'
   | 'heat'
   | 'compare'
   | 'picture'
@@ -87,6 +88,7 @@ export const SHORTCUTS: readonly { readonly title: string; readonly entries: rea
       { action: 'cage', keys: ['4', 'c'], label: 'Cage' },
       { action: 'handles', keys: ['5'], label: 'Handles' },
       { action: 'ground', keys: ['6', 'g'], label: 'Ground' },
+      { action: 'colors', keys: ['7'], label: 'Colours' },
       { action: 'heat', keys: ['h'], label: 'Heat map' },
       { action: 'compare', keys: ['o'], label: 'Original, decoded model, or both' },
       { action: 'figures', keys: ['i'], label: 'Figures' },

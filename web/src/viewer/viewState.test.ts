@@ -8,7 +8,7 @@ describe('view in a link', () => {
       frame: 17,
       camera: { target: [0.1, 0.2, -0.3], azimuth: 0.5, elevation: -0.25, distance: 2.5 },
       up: 'z',
-      layers: { ...USUAL_LAYERS, cage: true, ground: false },
+      layers: { ...USUAL_LAYERS, cage: true, ground: false, colors: false },
     } as const;
     const read = viewFromText(viewText(view));
     expect(read).toMatchObject({ frame: 17, up: 'z', layers: view.layers });

@@ -16,6 +16,7 @@ export const USUAL_LAYERS: Layers = {
   cage: false,
   handles: false,
   ground: true,
+  colors: true,
 };
 
 const LETTERS: Readonly<Record<keyof Layers, string>> = {
@@ -25,6 +26,7 @@ const LETTERS: Readonly<Record<keyof Layers, string>> = {
   cage: 'c',
   handles: 'h',
   ground: 'g',
+  colors: 'k',
 };
 const NAMES = Object.keys(LETTERS) as (keyof Layers)[];
 
