@@ -36,7 +36,8 @@ pub fn edit(
 ) -> Result<Edited, DecodeError> {
     let fail = |cause| DecodeError::container(input, cause);
     let refused = |cause: container::Error| written(output.path(), cause);
-    let (rest, cage) = (container.rest().map_err(fail)?, container.cage().map_err(fail)?);
+    let (mut rest, cage) = (container.rest().map_err(fail)?, container.cage().map_err(fail)?);
+    rest.colors = container.colors().map_err(fail)?;
     let report = container.report().map_err(fail)?;
     // The residual belongs to the cages as they were; without it the errors are others.
     let loses = container.has_residual();

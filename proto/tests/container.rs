@@ -146,9 +146,15 @@ fn colours_come_back_or_are_absent_and_are_there_once_for_every_point() {
     let bytes = support::write(&rest, &tetrahedron(), 2, None);
     let mut reader = open(&bytes).unwrap();
     reader.verify().unwrap();
-    assert_eq!(reader.rest().unwrap(), rest);
+    assert_eq!((reader.rest().unwrap(), reader.colors().unwrap()), (small_model(), rest.colors));
     let parts = take_apart(&bytes);
     let place = parts.iter().position(|p| p.tag == *b"rcol").unwrap();
+    // Damaged ones do not keep the positions from being decoded.
+    let mut damaged = bytes.clone();
+    let header = bytes.windows(4).position(|window| window == b"rcol").unwrap();
+    damaged[header + 40] ^= 1;
+    let mut reader = open(&damaged).unwrap();
+    assert!(reader.colors().is_err() && reader.rest().is_ok() && reader.verify().is_err());
     let twice = [parts[place].clone(), parts[place].clone()].to_vec();
     let wider = vec![Part { width: 3, ..parts[place].clone() }];
     for wrong in [twice, wider, vec![Part::raw(*b"rcol", 1, &[1; 11])]] {

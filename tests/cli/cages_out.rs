@@ -62,7 +62,7 @@ fn files_keep_the_colours_of_the_rest_pose_coded_welded_and_edited() {
     dir.frames("frames.npy", &small.frames);
     let colors = |name: &str| {
         let mut reader = ContainerReader::open(Cursor::new(dir.read(name))).expect("a container");
-        reader.rest().expect("a model").colors
+        reader.colors().expect("colours")
     };
     for options in ["", " --weld", " --max-error 1e-2", " --target-size 30KB"] {
         dir.cager(&format!("{ENCODE}{options}")).succeeds();

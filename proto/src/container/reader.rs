@@ -124,7 +124,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         self.frames
     }
 
-    /// The model in its rest pose.
+    /// The model in its rest pose, without its [`colors`](Self::colors).
     ///
     /// # Errors
     /// Damage.
@@ -134,14 +134,22 @@ impl<R: Read + Seek> ContainerReader<R> {
         }
         let faces = self.rest_faces()?;
         let points = self.positions(tag::REST_POINTS, &faces)?;
-        let colors = self.entries.iter().find(|e| e.header.tag == tag::REST_COLORS).copied();
-        let colors = colors.map_or(Ok(Vec::new()), |entry| self.raw(entry))?;
-        let rest = Model { points, faces, colors: colors.as_chunks().0.to_vec() };
+        let rest = Model { points, faces, ..Model::default() };
         // Decoding takes several times as long as reading numbers that are there as they are.
         if self.entry(tag::REST_POINTS)?.header.codec == CODED {
             self.rest = Some(rest.clone());
         }
         Ok(rest)
+    }
+
+    /// Colours of the model's points; empty where the file has none. Positions decode without them.
+    ///
+    /// # Errors
+    /// Damage.
+    pub fn colors(&mut self) -> Result<Vec<[u8; 3]>, Error> {
+        let entry = self.entries.iter().find(|e| e.header.tag == tag::REST_COLORS).copied();
+        let colors = entry.map_or(Ok(Vec::new()), |entry| self.raw(entry))?;
+        Ok(colors.as_chunks().0.to_vec())
     }
 
     fn rest_faces(&mut self) -> Result<Polygons, Error> {
@@ -302,6 +310,7 @@ impl<R: Read + Seek> ContainerReader<R> {
     /// The first damage found.
     pub fn verify(&mut self) -> Result<(), Error> {
         self.cage()?;
+        self.colors()?;
         self.elements()?;
         self.report()?;
         let mut cage = Vec::new();
