@@ -107,11 +107,14 @@ describe.skipIf(missing)('a session as a capture', { timeout: 60_000 }, () => {
   });
 
   test('a_session_whose_frames_are_coded_is_followed_and_ends_with_its_residual', async () => {
-    const { id } = await client.create(capture, { name: 'coded', max_error: 1e-3 });
+    const red = { cage: capture.cage, rest: capture.rest.replace(/^v .*$/gm, '$& 1 0 0.2') };
+    const { id } = await client.create(red, { name: 'coded', max_error: 1e-3 });
     await client.whenReady(id);
     await client.post(id, capture, 0, 6);
     const watched = await openPage(site.browser, site.server.parts);
     await opened(watched, id);
+    const colors = await watched.page.evaluate(() => [...window.parts.capture!.static.colors!.slice(0, 6)]);
+    expect(colors).toEqual([255, 0, 51, 255, 0, 51]);
     await client.post(id, capture, 6, 6);
     await eventually(watched, 'frames', 12);
     await client.complete(id, 12);

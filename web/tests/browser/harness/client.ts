@@ -13,7 +13,10 @@ export class TestClient {
     private readonly token = '',
   ) {}
 
-  async create(capture: SphereCapture, options: SessionOptions & { handles?: string }): Promise<Session> {
+  async create(
+    capture: Pick<SphereCapture, 'rest' | 'cage'>,
+    options: SessionOptions & { handles?: string },
+  ): Promise<Session> {
     const body = new FormData();
     body.append('options', JSON.stringify(options));
     body.append('rest', new Blob([capture.rest]), 'rest.obj');
