@@ -31,8 +31,8 @@ impl CodedMesh {
         Ok(Self { mesh: Model { points, faces: ordered, colors: mesh.colors.clone() }, faces, positions })
     }
 
-    /// Bytes that it takes in a file at the most; colours are not coded.
-    pub fn most_bytes(&self) -> usize {
-        self.faces.len() + self.positions.len() + 3 * self.mesh.colors.len()
+    /// Bytes that its polygons and positions take; colours are not coded.
+    pub fn bytes(&self) -> usize {
+        self.faces.len() + self.positions.len()
     }
 }

@@ -197,12 +197,13 @@ fn the_last_directions_alone_give_the_cages_of_the_whole_decomposition() {
     assert!(unknowns >= 1024, "the sizes where only the directions that a term acts on are computed");
     let mut frame = Vec::new();
     capture.frame(5, &mut frame);
-    for (handles, regularizer, spectrum) in [
-        (Handles::MaxVol, Regularizer::Laplacian, 20),
-        (Handles::Spread { count: None }, Regularizer::Differential, 20),
-        (Handles::All, Regularizer::None, 0),
+    for (handles, regularizer, spectrum, lambda) in [
+        (Handles::MaxVol, Regularizer::Laplacian, 20, 1.0),
+        (Handles::Spread { count: None }, Regularizer::Differential, 20, 1.0),
+        (Handles::All, Regularizer::None, 0, 1.0),
+        (Handles::MaxVol, Regularizer::Differential, 20, 0.0),
     ] {
-        let options = SolverOptions { handles, regularizer, spectrum, lambda: 1.0 };
+        let options = SolverOptions { handles, regularizer, spectrum, lambda };
         let with = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| Solver::prepare(&MeanValue, &cage, points, options).unwrap())
@@ -220,7 +221,8 @@ fn the_last_directions_alone_give_the_cages_of_the_whole_decomposition() {
         assert!((a.condition_full / b.condition_full - 1.0).abs() < 1e-9, "{options:?}");
         // The values that are known are those of the whole decomposition.
         let known = a.singular_values.iter().zip(&b.singular_values).filter(|(found, _)| !found.is_nan());
-        assert_eq!((a.singular_values.len(), known.clone().count()), (unknowns, 1 + spectrum.max(1)));
+        let last = if lambda > 0.0 { spectrum.max(1) } else { 1 };
+        assert_eq!((a.singular_values.len(), known.clone().count()), (unknowns, 1 + last));
         for (found, wanted) in known {
             assert!((found / wanted - 1.0).abs() < 1e-9, "{options:?}: {found} {wanted}");
         }

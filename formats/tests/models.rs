@@ -84,6 +84,7 @@ fn colours_come_with_the_points_where_every_point_has_one() {
         ("a.obj", "v 1 2 3 1 0 0\nv 4 5 6 1 0 nan\n".to_owned()),
         ("a.obj", "v 1 2 3 1 0 0 1\nv 4 5 6 1 0 0 1\n".to_owned()),
         ("a.ply", format!("{head}property uchar red\nend_header\n1 2 3 255\n4 5 6 0\n")),
+        ("a.ply", ply("uchar", "1 2 3 300 51 0 255\n4 5 6 0 0 128 255\n")),
         ("a.ply", ply("int", "1 2 3 255 51 0 255\n4 5 6 0 0 128 255\n")),
     ] {
         let model = read(name, &text).unwrap();
@@ -204,13 +205,20 @@ fn glb_features_that_are_not_read_are_named() {
         message(read("a.glb", glb_file(&json.replace(from, to), &glb_data())))
     };
     let draco = r#""extensionsRequired":["KHR_draco_mesh_compression"],"asset""#;
-    assert!(with(r#""asset""#, draco).contains("KHR_draco_mesh_compression; export the mesh without compression"));
+    assert!(with(r#""asset""#, draco).contains("\"KHR_draco_mesh_compression\"; export the mesh without compression"));
     let sparse =
         r#""count":4,"sparse":{"count":1,"indices":{"bufferView":1,"componentType":5123},"values":{"bufferView":0}}"#;
     assert!(with(r#""count":4"#, sparse).contains("accessor 0 is sparse"));
     assert!(with("5126", "5122").contains("without quantization"));
     assert!(with(r#"{"byteLength":72}"#, r#"{"byteLength":72,"uri":"x.bin"}"#).contains("another file"));
     assert!(with(r#""bufferView":0,"#, "").contains("accessor 0 has no data of its own"));
+}
+
+#[test]
+fn a_long_text_in_a_glb_is_not_repeated_in_full() {
+    let text =
+        message(read("a.glb", glb_file(&glb_json(&format!(",\"nodes\":[\"{}\"]", "b".repeat(5000))), &glb_data())));
+    assert!(text.len() < 400 && text.contains("is not glTF 2.0") && text.contains('…'), "{text}");
 }
 
 #[test]

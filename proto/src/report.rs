@@ -62,8 +62,8 @@ pub struct Report {
     pub condition_number: ConditionNumber,
     /// Numerical rank of `Φ`.
     pub rank: usize,
-    /// Singular values of the inverted matrix, descending; NaN, in JSON `null`, where they were not computed: of 1,024 unknowns or more
-    /// all between the first one and those that the regularisation acts on.
+    /// Singular values of the inverted matrix, descending; NaN, in JSON `null`, where they were not computed. Of 1,024 unknowns or more, of
+    /// which few are regularised, only the first and the last are; containers then have none of them.
     #[serde(deserialize_with = "numbers_or_null")]
     pub singular_values: Vec<f64>,
     /// How the handles of maximum volume were found.
@@ -138,7 +138,11 @@ impl Report {
         let mut value = serde_json::to_value(self)?;
         if let Some(report) = value.as_object_mut() {
             let short = self.coding.is_some();
-            let left_out = |key: &str| ELSEWHERE.contains(&key) || short && LONG.contains(&key);
+            // Earlier programs read numbers alone.
+            let partial = self.singular_values.iter().any(|x| x.is_nan());
+            let left_out = |key: &str| {
+                ELSEWHERE.contains(&key) || short && LONG.contains(&key) || partial && key == "singular_values"
+            };
             report.retain(|key, _| !left_out(key));
         }
         if let Some(error) = value["error"].as_object_mut() {
@@ -425,11 +429,12 @@ impl Seconds {
 
 /// JSON has no infinity and no NaN, and serde_json writes null for them: a capture that stands still has such figures, and
 /// its file must open.
+fn number_or_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
+}
+
+/// The same for numbers of which some were not computed.
 fn numbers_or_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
     let numbers: Vec<Option<f64>> = Deserialize::deserialize(deserializer)?;
     Ok(numbers.into_iter().map(|number| number.unwrap_or(f64::NAN)).collect())
-}
-
-fn number_or_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }

@@ -230,13 +230,18 @@ fn report_with_figures_that_are_not_finite_can_be_read() {
     let mut report = Report::default();
     report.error.kg_percent = f64::NAN;
     report.condition_number.full = f64::INFINITY;
-    report.singular_values = vec![2.0, f64::NAN, 0.5];
     let bytes = support::write(&small_model(), &tetrahedron(), 1, Some(&report));
     let mut reader = open(&bytes).unwrap();
     reader.verify().unwrap();
     let found = reader.report().unwrap();
     assert!(found.error.kg_percent.is_nan() && found.condition_number.full.is_nan());
     assert_eq!(found.error.l2_max, 0.0);
+    // Earlier programs read numbers alone: where some were not computed, files have none.
+    report.singular_values = vec![2.0, f64::NAN, 0.5];
+    let bytes = support::write(&small_model(), &tetrahedron(), 1, Some(&report));
+    assert!(open(&bytes).unwrap().report().unwrap().singular_values.is_empty());
+    let json = serde_json::to_vec(&report).unwrap();
+    let found: Report = serde_json::from_slice(&json).unwrap();
     assert!(matches!(found.singular_values[..], [2.0, unknown, 0.5] if unknown.is_nan()));
 }
 

@@ -7,6 +7,7 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{BATCH, PrepareError, Solver};
 use cager_core::mesh::{Model, diagonal};
+use cager_proto::container::colors_bytes;
 use std::sync::Arc;
 
 /// Numbers of vertices that are compared.
@@ -58,7 +59,7 @@ impl CageSizes<'_> {
         let rest = &meshes.rest.mesh;
         let solver = prepare(&meshes.checked, rest).ok()?;
         let model = GroupDecoder::new(self.system, &meshes.checked, rest, &solver).ok()?;
-        let other = (meshes.rest.most_bytes() + meshes.cage.most_bytes()) as u64;
+        let other = (meshes.rest.bytes() + meshes.cage.bytes() + colors_bytes(&rest.colors)) as u64;
         let most = group_frames(rest.points.len(), solver.decoder().unknowns()).min(self.frames.len());
         let most = self.memory.frames(HELD * rest.points.len(), most);
         let carried = Carried { room: self.goal.room(other, self.total), ..Carried::default() };

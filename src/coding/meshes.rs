@@ -5,6 +5,7 @@ use cager_codec::CodedMesh;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::mesh::{Model, TriMesh, diagonal};
+use cager_proto::container::colors_bytes;
 
 /// The meshes at rest as a coded file holds them.
 pub(crate) struct RestMeshes {
@@ -27,7 +28,8 @@ impl RestMeshes {
             Goal::Standard => (3e-4, coded(3e-4)?),
             Goal::Size(bytes) => {
                 // A third of the file, if that is not too coarse.
-                let fits = |mesh: &CodedMesh| mesh.most_bytes() as u64 <= bytes / 3;
+                let bytes = bytes.saturating_sub(colors_bytes(&rest.colors) as u64);
+                let fits = |mesh: &CodedMesh| mesh.bytes() as u64 <= bytes / 3;
                 let steps = [5e-5, 1e-4, 2e-4, 4e-4, 8e-4].into_iter();
                 let mut tried = steps.filter_map(|step| Some((step, coded(step)?)));
                 let mut last = None;

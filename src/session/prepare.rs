@@ -14,6 +14,7 @@ use cager_core::inversion::{Handles, PrepareError, Preparing, Solver, SolverOpti
 use cager_core::mesh::{Model, TriMesh, diagonal};
 use cager_core::regularize::{Regularizer, SparseMatrix, Term};
 use cager_formats::{MeshFormat, read_matrix_bytes, read_model_bytes};
+use cager_proto::container::colors_bytes;
 use cager_proto::messages::SessionOptions;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -217,7 +218,10 @@ pub(crate) fn check(geometry: &Geometry, choices: &Choices, max_bytes: u64) -> R
 /// Refuses a goal that no frame could meet.
 fn check_goal(goal: Goal, geometry: &Geometry, rows: usize, frames: u32) -> Result<(), ApiError> {
     let farthest = geometry.rest.points.iter().flatten().fold(0.0f64, |far, x| far.max(x.abs()));
-    let meshes = geometry.coded.as_ref().map_or(0, |(rest, cage)| (rest.most_bytes() + cage.most_bytes()) as u64);
+    let meshes = geometry
+        .coded
+        .as_ref()
+        .map_or(0, |(rest, cage)| (rest.bytes() + cage.bytes() + colors_bytes(&rest.mesh.colors)) as u64);
     let checked = match goal {
         _ if rows > MOST_ROWS => Err(CodingError::TooManyRows { rows, most: MOST_ROWS }),
         goal => goal.check_size(meshes, frames as usize).and_then(|()| goal.check_precision(geometry.unit, farthest)),

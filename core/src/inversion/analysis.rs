@@ -2,7 +2,7 @@
 //! options.
 
 use super::coordinates::{AnalysisCoordinates, coordinates};
-use super::handle_system::HandleSystem;
+use super::handle_system::{HandleSystem, without_idle_term};
 use super::operator::Decomposition;
 use super::prepare::{check, check_options, reject_far_points};
 use super::spectra::{RequiredDecompositions, Spectra};
@@ -81,7 +81,7 @@ impl Analysis {
         let required = if tied {
             RequiredDecompositions::For(options.handles)
         } else {
-            RequiredDecompositions::of_solver(options)
+            RequiredDecompositions::of_solver(without_idle_term(options))
         };
         Self::of(system, cage, points, required, preparing)
     }

@@ -11,8 +11,8 @@ use crate::decode::Decoder;
 use crate::dense;
 use crate::mesh::Point;
 use crate::regularize::{
-    CageLaplacian, Reference, RegularizationOperator, Regularizer, SpectralMap, Spectrum, Term, TermError, last_map,
-    spectral_map,
+    CageLaplacian, Reference, RegularizationOperator, Regularizer, SpectralMap, Spectrum, Term, TermError,
+    WEAK_SINGULAR_VALUE, last_map, spectral_map,
 };
 use faer::Mat;
 use std::sync::{Arc, OnceLock};
@@ -165,7 +165,8 @@ impl<'a> HandleSystem<'a> {
                 spectral_map(&spectrum, regularizer, s, weight)
             }
             Directions::Last(last) => {
-                last_map(last, regularization_operator, if regularizer.is_sub_spectral() { s } else { 0 }, weight)
+                let s = if regularizer.is_sub_spectral() { s.max(last.below(WEAK_SINGULAR_VALUE)) } else { 0 };
+                last_map(last, regularization_operator, s, weight)
             }
         };
         map.ok_or(failed("regularised solve"))
@@ -193,7 +194,7 @@ impl<'a> HandleSystem<'a> {
 const ILL_CONDITIONED: f64 = 1e-2;
 
 /// Drops the regularisation term where λ is zero, which makes it the same as a threshold of zero.
-fn without_idle_term(options: SolverOptions) -> SolverOptions {
+pub(super) fn without_idle_term(options: SolverOptions) -> SolverOptions {
     if options.lambda > 0.0 {
         return options;
     }

@@ -31,7 +31,7 @@ pub struct Preparation {
     /// Condition number of the rows read, over their rank; of `Φ□` where every point is read.
     pub condition_handles: f64,
     /// Singular values of the inverted matrix, descending: of `Φ` for spread handles and where every point is read, otherwise of the rows read. Of
-    /// 1,024 unknowns or more the first one and those that the term acts on alone; the others are NaN.
+    /// 1,024 unknowns or more, of which few are regularised, only the first one and the last are computed; the others are NaN.
     pub singular_values: Vec<f64>,
     /// Swaps of maxvol after its start.
     pub swaps: usize,

@@ -38,6 +38,7 @@ impl RequiredDecompositions {
     /// The number of directions that a term acts on, where a full decomposition takes longer than their own.
     fn last(self, unknowns: usize) -> Option<usize> {
         match self {
+            Self::Last(Handles::Rectangular { .. }, _) => None,
             Self::Last(_, count) if unknowns >= LAST_ALONE && count <= unknowns / MOST_LAST => Some(count.max(1)),
             _ => None,
         }
@@ -49,7 +50,7 @@ pub(super) const ENDS_ALONE: usize = 512;
 /// From this many unknowns on, only the directions that a term acts on are computed.
 const LAST_ALONE: usize = 1024;
 /// They are found on their own only where they are at most this part of all.
-const MOST_LAST: usize = 16;
+const MOST_LAST: usize = 32;
 
 /// Decompositions of the handles of maximum volume and of all points.
 #[derive(Clone)]
@@ -113,7 +114,7 @@ impl Spectra {
         };
         let handles_ends = match (&handles, required.handles()) {
             (Some(svd), _) => [svd.sigma[0], svd.sigma[rank - 1]],
-            (None, Some(Handles::MaxVol)) if !whole_frames => ends_of_last.unwrap_or([f64::NAN; 2]),
+            (None, Some(Handles::MaxVol)) => ends_of_last.unwrap_or([f64::NAN; 2]),
             (None, Some(Handles::All)) => svd::ends(Mat::identity(m, m).as_ref(), basis.square.as_ref(), inverse),
             (None, _) => [f64::NAN; 2],
         };

@@ -1,6 +1,6 @@
 //! The last singular values of a square matrix with their vectors, from its inverse: Rayleigh and Ritz's method on a block Krylov
-//! space of `(MᵀM)⁻¹` (Golub and Underwood 1977). Where a term acts on twenty of 3,000 directions it takes some dozens of products
-//! of the inverse with a vector for each of the twenty.
+//! space of `(MᵀM)⁻¹` (Golub and Underwood 1977). For twenty of 3,000 directions it takes some 256 products of the inverse and of its
+//! transpose with a vector.
 
 use super::svd;
 use crate::dense;
@@ -35,6 +35,11 @@ impl LastDirections {
     /// The largest and the smallest singular value.
     pub(crate) fn ends(&self) -> [f64; 2] {
         [self.first, self.sigma[self.sigma.len() - 1]]
+    }
+
+    /// How many of them are below this fraction of the largest.
+    pub(crate) fn below(&self, fraction: f64) -> usize {
+        self.sigma.iter().filter(|&&x| x < fraction * self.first).count()
     }
 
     /// All singular values, descending, NaN between the first and the last s.

@@ -1,5 +1,14 @@
 //! Colours of vertices, from what files say of them.
 
+/// What the values of colours are.
+#[derive(Clone, Copy)]
+pub(super) enum Scale {
+    /// Fractions of full light.
+    Fractions,
+    /// Fractions, or of 255: the file does not say.
+    Unsaid,
+}
+
 /// The colours of vertices as they are read; none at all where one vertex has none, or one that is no colour.
 #[derive(Default)]
 pub(super) struct Colors {
@@ -11,15 +20,21 @@ impl Colors {
         self.found.push(color);
     }
 
-    /// In sRGB for so many points: values are fractions, or of 255 where one is larger than 1.
-    pub(super) fn finish(self, points: usize) -> Vec<[u8; 3]> {
+    /// In sRGB for so many points. Where the file does not say what the values are, they are of 255 if one is above 2, or if all are whole
+    /// and one is above 1; fractions that rounding or strong light put above 1 are full light.
+    pub(super) fn finish(self, points: usize, scale: Scale) -> Vec<[u8; 3]> {
         let all = || self.found.iter().flatten().copied();
-        let most = all().fold(0.0, f32::max);
-        if self.found.len() != points || !all().all(|x| (0.0..=255.0).contains(&x)) {
+        let largest = all().fold(0.0, f32::max);
+        let of_bytes = largest > 2.0 || largest > 1.0 && all().all(|x| x.fract() == 0.0);
+        let (most, full) = match scale {
+            Scale::Fractions => (1.0, 1.0),
+            Scale::Unsaid if of_bytes => (255.0, 255.0),
+            Scale::Unsaid => (2.0, 1.0),
+        };
+        if self.found.len() != points || !all().all(|x| (0.0..=most).contains(&x)) {
             return Vec::new();
         }
-        let scale = if most > 1.0 { 1.0 } else { 255.0 };
-        self.found.iter().map(|color| color.map(|x| (scale * x).round() as u8)).collect()
+        self.found.iter().map(|color| color.map(|x| (255.0 / full * x).round() as u8)).collect()
     }
 }
 
@@ -32,24 +47,30 @@ pub(super) fn srgb(linear: f32) -> f32 {
 mod tests {
     use super::*;
 
-    fn finished(colors: &[[f32; 3]], points: usize) -> Vec<[u8; 3]> {
+    fn finished(colors: &[[f32; 3]], points: usize, scale: Scale) -> Vec<[u8; 3]> {
         let mut found = Colors::default();
         colors.iter().for_each(|&color| found.push(color));
-        found.finish(points)
+        found.finish(points, scale)
     }
 
     #[test]
     fn fractions_and_bytes_are_told_apart() {
-        assert_eq!(finished(&[[0.0, 0.5, 1.0], [1.0; 3]], 2), [[0, 128, 255], [255; 3]]);
-        assert_eq!(finished(&[[0.0, 1.0, 200.0], [255.0; 3]], 2), [[0, 1, 200], [255; 3]]);
+        let unsaid = |colors: &[[f32; 3]]| finished(colors, colors.len(), Scale::Unsaid);
+        assert_eq!(unsaid(&[[0.0, 0.5, 1.0], [1.0; 3]]), [[0, 128, 255], [255; 3]]);
+        assert_eq!(unsaid(&[[0.0, 1.0, 200.0], [255.0; 3]]), [[0, 1, 200], [255; 3]]);
+        assert_eq!(unsaid(&[[0.0, 1.0, 2.0]]), [[0, 1, 2]]);
+        assert_eq!(unsaid(&[[0.0, 0.5, 1.000_001]]), [[0, 128, 255]]);
     }
 
     #[test]
     fn what_is_no_colour_or_not_there_for_every_point_is_left_out() {
-        assert!(finished(&[[0.5; 3]], 2).is_empty());
+        assert!(finished(&[[0.5; 3]], 2, Scale::Unsaid).is_empty());
         for bad in [f32::NAN, -0.1, 256.0, f32::INFINITY] {
-            assert!(finished(&[[0.5; 3], [0.5, bad, 0.5]], 2).is_empty(), "{bad}");
+            for scale in [Scale::Unsaid, Scale::Fractions] {
+                assert!(finished(&[[0.5; 3], [0.5, bad, 0.5]], 2, scale).is_empty(), "{bad}");
+            }
         }
+        assert!(finished(&[[0.5, 1.18, 0.5]], 1, Scale::Fractions).is_empty());
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use cager_core::mesh::Model;
 
-use super::colors::Colors;
+use super::colors::{Colors, Scale};
 use super::{Contents, no_such_vertex, too_few_corners};
 use crate::error::Fault;
 use crate::text::{self, Lines, integer, point, quoted, words};
@@ -59,7 +59,7 @@ fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Model
             model.faces.push(&face);
         }
     }
-    model.colors = colors.finish(model.points.len());
+    model.colors = colors.finish(model.points.len(), Scale::Unsaid);
     Ok(model)
 }
 

@@ -13,7 +13,7 @@ mod writer;
 pub use coded::most_residual_numbers;
 pub use error::Error;
 pub use reader::{ContainerReader, SectionInfo};
-pub use writer::ContainerWriter;
+pub use writer::{ContainerWriter, colors_bytes};
 
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! Writing a container, frame by frame.
 
 use super::codec::{self, CODED, DIFFERENCE, PLANES, RAW};
-use super::section::{self, SectionHeader};
+use super::section::{self, HEADER_BYTES, SectionHeader};
 use super::{CHUNK_FRAMES, Error, HEADER_LIMIT, Header, counted_from_zero, tag};
 use crate::report::Report;
 use crate::wire;
@@ -21,6 +21,15 @@ pub struct ContainerWriter<W: Write> {
     pending_frames: usize,
     errors: Vec<u8>,
     contents: Vec<u8>,
+}
+
+/// Bytes that colours of points take in a container.
+pub fn colors_bytes(colors: &[[u8; 3]]) -> usize {
+    if colors.is_empty() {
+        return 0;
+    }
+    let raw = colors.as_flattened();
+    HEADER_BYTES + codec::encode(PLANES, raw, 1, 0).map_or(raw.len(), |(_, payload)| payload.len())
 }
 
 impl<W: Write> ContainerWriter<W> {

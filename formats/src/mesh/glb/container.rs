@@ -3,6 +3,7 @@
 use gltf::json::Root;
 
 use crate::error::Fault;
+use crate::text::quoted;
 
 pub(super) struct Chunks<'a> {
     pub(super) json: &'a [u8],
@@ -37,6 +38,8 @@ pub(super) fn split(bytes: &[u8]) -> Result<Chunks<'_>, Fault> {
 
 /// Parses the JSON; the indices in it are not checked.
 pub(super) fn document(json: &[u8]) -> Result<Root, Fault> {
+    /// Characters of the reason that are shown.
+    const SHOWN: usize = 160;
     // Three bytes of JSON make an object of some hundred, so that their number is bounded before any is made.
     const MOST_OBJECTS: usize = 100_000;
     if json.iter().filter(|&&b| b == b'{').count() > MOST_OBJECTS {
@@ -44,10 +47,16 @@ pub(super) fn document(json: &[u8]) -> Result<Root, Fault> {
             "describes more than {MOST_OBJECTS} objects; export the mesh alone, without its scene"
         )));
     }
-    let root: Root = gltf::json::deserialize::from_slice(json)
-        .map_err(|cause| Fault::damaged(format!("has JSON that is not glTF 2.0 ({cause}); export the mesh again")))?;
+    let root: Root = gltf::json::deserialize::from_slice(json).map_err(|cause| {
+        // It may repeat a text of the file, of any length.
+        let cause = cause.to_string();
+        let shown: String = cause.chars().take(SHOWN).collect();
+        let more = if shown.len() < cause.len() { "…" } else { "" };
+        Fault::damaged(format!("has JSON that is not glTF 2.0 ({shown}{more}); export the mesh again"))
+    })?;
     let compressed = |name: &&String| name.contains("compression") || name.contains("quantization");
     if let Some(name) = root.extensions_required.iter().find(compressed) {
+        let name = quoted(name.as_bytes());
         return Err(Fault::unsupported(format!("needs the extension {name}; export the mesh without compression")));
     }
     Ok(root)

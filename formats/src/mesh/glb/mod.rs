@@ -15,7 +15,7 @@ use gltf::json::validation::Checked;
 use gltf::json::{Mesh, Root};
 
 use super::check_face;
-use super::colors::{Colors, srgb};
+use super::colors::{Colors, Scale, srgb};
 use crate::error::Fault;
 use accessor::Buffers;
 use scene::Placement;
@@ -34,7 +34,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Model, Fault> {
         builder.place(&placement)?;
     }
     let Builder { mut model, colors, .. } = builder;
-    model.colors = colors.finish(model.points.len());
+    model.colors = colors.finish(model.points.len(), Scale::Fractions);
     Ok(model)
 }
 
@@ -90,6 +90,7 @@ impl Builder<'_> {
             Some(&known) => known,
             None => {
                 let added = self.add_points(positions.value(), placement, place)?;
+                // Of primitives that share their points, the first one's.
                 if let Some(colors) = primitive.attributes.get(&Checked::Valid(Semantic::Colors(0))) {
                     self.add_colors(colors.value(), added.1, place);
                 }

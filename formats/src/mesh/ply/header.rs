@@ -1,6 +1,7 @@
 //! The header: which elements follow, and what each is made of.
 
 use crate::error::Fault;
+use crate::mesh::colors::Scale;
 use crate::text::{Lines, integer, quoted, words};
 
 pub(super) struct Header<'a> {
@@ -96,9 +97,10 @@ impl Element {
         Ok(columns)
     }
 
-    /// Columns of red, green and blue, and the value of full light in each; `None` where one is missing.
-    pub(super) fn colors(&self) -> Option<[(usize, f64); 3]> {
+    /// Columns of red, green and blue, and the value of full light in each; `None` where one is missing, or of another kind.
+    pub(super) fn colors(&self) -> Option<([(usize, f64); 3], Scale)> {
         let mut columns = [(0, 1.0); 3];
+        let mut floats = 0;
         for (column, name) in columns.iter_mut().zip(["red", "green", "blue"]) {
             let at = self.properties.iter().position(|property| property.name == name)?;
             let Kind::Scalar(scalar) = self.properties[at].kind else { return None };
@@ -108,9 +110,14 @@ impl Element {
                 Scalar::F32 | Scalar::F64 => 1.0,
                 _ => return None,
             };
+            floats += usize::from(scalar.is_float());
             *column = (at, most);
         }
-        Some(columns)
+        match floats {
+            0 => Some((columns, Scale::Fractions)),
+            3 => Some((columns, Scale::Unsaid)),
+            _ => None,
+        }
     }
 
     /// Column of the list of vertices of each face.

@@ -40,7 +40,8 @@ fn read_points<V: Values>(
     model: &mut Model,
 ) -> Result<(), Fault> {
     let columns = element.coordinates()?;
-    let color_columns = element.colors().filter(|_| contents == Contents::PointsAndFaces);
+    let said = element.colors().filter(|_| contents == Contents::PointsAndFaces);
+    let color_columns = said.map(|(columns, _)| columns);
     let mut colors = Colors::default();
     // Three scalars take at least three bytes.
     let most = (values.remaining() / 3) as u64;
@@ -70,7 +71,9 @@ fn read_points<V: Values>(
             colors.push(color);
         }
     }
-    model.colors = colors.finish(model.points.len());
+    if let Some((_, scale)) = said {
+        model.colors = colors.finish(model.points.len(), scale);
+    }
     Ok(())
 }
 

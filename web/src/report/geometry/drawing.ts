@@ -101,6 +101,7 @@ class SurfaceView {
     this.geometry.setAttribute('heat', new BufferAttribute(new Float32Array(positions.length / 3), 1));
     this.uniforms = {
       color: { value: new Vector3() },
+      hasColors: { value: false },
       skyDirection: { value: new Vector3(0, 1, 0) },
       heatColors: { value: colorTexture(signed ?? false) },
       heatShare: { value: values ? 1 : 0 },
