@@ -54,7 +54,7 @@ fn cages_are_written_in_every_format_with_the_rest_cage_and_its_faces_beside_the
 }
 
 #[test]
-fn files_keep_the_colours_of_the_rest_pose_coded_welded_and_edited() {
+fn files_keep_the_colours_of_the_rest_pose_coded_and_edited() {
     let (dir, mut small) = (Dir::new(), Small::new());
     small.rest.colors = (0..small.rest.points.len()).map(|k| [k as u8, (k / 256) as u8, 255]).collect();
     dir.model("rest.obj", &small.rest);
@@ -64,7 +64,7 @@ fn files_keep_the_colours_of_the_rest_pose_coded_welded_and_edited() {
         let mut reader = ContainerReader::open(Cursor::new(dir.read(name))).expect("a container");
         reader.colors().expect("colours")
     };
-    for options in ["", " --weld", " --max-error 1e-2", " --target-size 30KB"] {
+    for options in ["", " --max-error 1e-2", " --target-size 30KB"] {
         dir.cager(&format!("{ENCODE}{options}")).succeeds();
         assert_eq!(colors("out.cager"), small.rest.colors, "{options}");
         dir.cager("decode out.cager --cages -o cages.npy --overwrite").succeeds();

@@ -282,10 +282,9 @@ pub(crate) fn split(model: &Model) -> (Model, Vec<usize>) {
         faces.push((from.len() as u32..(from.len() + face.len()) as u32).collect());
         from.extend(face.iter().map(|&v| v as usize));
     }
-    (
-        Model { points: from.iter().map(|&v| model.points[v]).collect(), faces: polygons(faces), ..Model::default() },
-        from,
-    )
+    let points = from.iter().map(|&v| model.points[v]).collect();
+    let colors = from.iter().filter_map(|&v| model.colors.get(v).copied()).collect();
+    (Model { points, faces: polygons(faces), colors }, from)
 }
 
 pub(crate) fn npy_f64(frames: &[Vec<f64>]) -> Vec<u8> {

@@ -2,7 +2,10 @@
 
 use crate::server::{Server, capture};
 use crate::support::{Dir, ENCODE, Small, npy_f64, read_frames, split};
+use cager_proto::container::ContainerReader;
 use serde_json::Value;
+use std::collections::HashSet;
+use std::io::Cursor;
 
 /// A token and its SHA-256.
 const TOKEN: &str = "open-sesame-open-sesame-open-sesame";
@@ -76,7 +79,8 @@ fn a_capture_in_doubles_is_sent_in_singles() {
 fn seams_are_welded_before_anything_is_sent() {
     let (dir, ..) = capture();
     let server = Server::start(&dir);
-    let small = Small::new();
+    let mut small = Small::new();
+    small.rest.colors = (0..small.rest.points.len()).map(|k| [k as u8, (k / 256) as u8, 255]).collect();
     let (rest, from) = split(&small.rest);
     dir.model("rest.obj", &rest);
     let seamed = |frame: &Vec<f64>| from.iter().flat_map(|&v| [0, 1, 2].map(|k| frame[3 * v + k])).collect();
@@ -86,6 +90,11 @@ fn seams_are_welded_before_anything_is_sent() {
     dir.write("frames.npy", npy_f64(&rounded));
     dir.cager(&format!("{ENCODE} --weld")).succeeds();
     let here = dir.read("out.cager");
+    // Each point keeps the colour of the first of those that became it.
+    let mut seen = HashSet::new();
+    let firsts = from.iter().filter(|&&v| seen.insert(v)).map(|&v| small.rest.colors[v]);
+    let found = ContainerReader::open(Cursor::new(&here)).expect("a container").colors().expect("colours");
+    assert_eq!(found, firsts.collect::<Vec<_>>());
     dir.cager(&format!("{ENCODE} --weld --server {}", server.address())).succeeds();
     assert!(dir.read("out.cager") == here, "other bytes");
 }

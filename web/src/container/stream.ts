@@ -36,8 +36,6 @@ export interface StreamEnd {
   readonly errors: FrameErrors;
   readonly frameNumbers: Float64Array | null;
   readonly report: Readonly<Record<string, unknown>> | null;
-  /** As in the static part, which has them where they came before its end. */
-  readonly colors: Uint8Array | null;
 }
 
 /**
@@ -86,8 +84,8 @@ export class ContainerStream {
     if (!complete) {
       this.note(damaged(this.parser.received, 'the file was cut'));
     }
-    const { problem, errors, frameNumbers, report, colors } = this;
-    return { complete, problem, frames: this.parser.layout.frames, errors, frameNumbers, report, colors };
+    const { problem, errors, frameNumbers, report } = this;
+    return { complete, problem, frames: this.parser.layout.frames, errors, frameNumbers, report };
   }
 
   /** Ends the codec. */
