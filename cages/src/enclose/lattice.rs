@@ -1,178 +1,282 @@
-//! Level sets on a body-centred cubic lattice by marching tetrahedra (Labelle and Shewchuk 2007, without warping): a closed manifold
-//! whatever the values are, as long as those at the border are positive.
+//! A body-centred cubic lattice that is finer where asked: an octree's cubes with tetrahedra between their centres and corners (Labelle
+//! and Shewchuk 2007, without warping). Cubes that touch differ by one level at most, so that the tetrahedra fit together.
 
 use crate::geometry::Aabb;
 use glam::DVec3;
+use std::collections::{HashMap, HashSet};
 
-/// Two cubic grids, the second at the cell centres of the first, with the tetrahedra between them. No edge is longer than the
-/// spacing.
+/// A cube is halved so many times at most.
+pub(super) const LEVELS: u32 = 3;
+
+/// Side of the largest cubes in the unit of integer coordinates, half the side of the smallest.
+const LARGEST: u32 = 2 << LEVELS;
+
+/// Corners of a cube's face, along the two axes after the face's.
+const FACE: [[u32; 2]; 4] = [[0, 0], [1, 0], [1, 1], [0, 1]];
+
+type Place = [u32; 3];
+
+/// Nodes and the tetrahedra between them. No edge is longer than the spacing, nor than the side of the cubes that it joins.
 #[derive(Clone, Debug)]
 pub(super) struct Lattice {
-    origin: DVec3,
-    spacing: f64,
-    cells: [usize; 3],
+    pub(super) positions: Vec<DVec3>,
+    /// Positively oriented.
+    pub(super) tetrahedra: Vec<[u32; 4]>,
+    /// A node beside the border.
+    pub(super) outermost: u32,
 }
 
 impl Lattice {
-    /// A lattice over a box.
-    pub(super) fn over(bounds: &Aabb, spacing: f64) -> Self {
-        let cells = (bounds.size() / spacing).ceil().max(DVec3::splat(2.0)).to_array().map(|c| c as usize);
-        let used = DVec3::from_array(cells.map(|c| c as f64)) * spacing;
-        Self { origin: bounds.center() - 0.5 * used, spacing, cells }
+    /// The lattice of some cubes.
+    pub(super) fn of(cubes: &Octree) -> Self {
+        let leaves = cubes.leaves();
+        let nodes = Nodes::of(&leaves);
+        Self {
+            positions: nodes.places.iter().map(|&place| cubes.position(place)).collect(),
+            tetrahedra: cubes.tetrahedra(&leaves, &nodes),
+            outermost: nodes.index(leaves[0].center()),
+        }
     }
 
-    /// Number of nodes.
-    pub(super) fn len(&self) -> usize {
-        self.corners() + self.cells.iter().product::<usize>()
+    /// Nodes joined to each by an edge, as the end of each node's list and the lists.
+    pub(super) fn neighbours(&self) -> (Vec<usize>, Vec<u32>) {
+        let mut edges: Vec<(u32, u32)> = self
+            .tetrahedra
+            .iter()
+            .flat_map(|t| (0..4).flat_map(move |i| (0..4).filter(move |&j| j != i).map(move |j| (t[i], t[j]))))
+            .collect();
+        edges.sort_unstable();
+        edges.dedup();
+        let ends = (0..self.positions.len() as u32).map(|node| edges.partition_point(|e| e.0 <= node)).collect();
+        (ends, edges.into_iter().map(|e| e.1).collect())
+    }
+}
+
+/// A cube: how often the largest was halved to it, and where it is among those of its size.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct Cube {
+    level: u32,
+    at: Place,
+}
+
+impl Cube {
+    fn side(self) -> u32 {
+        LARGEST >> self.level
     }
 
-    /// Where a node is.
-    pub(super) fn position(&self, node: usize) -> DVec3 {
-        let (at, half) = self.place(node);
-        let at = DVec3::from_array(at.map(|i| i as f64));
-        self.origin + self.spacing * (at + DVec3::splat(if half { 0.5 } else { 0.0 }))
+    fn low(self) -> Place {
+        self.at.map(|i| i * self.side())
     }
 
-    /// The nodes joined to one by an edge, at most 14.
-    pub(super) fn neighbours(&self, node: usize) -> impl Iterator<Item = usize> + '_ {
-        let (at, half) = self.place(node);
-        let along = (0..6).filter_map(move |i| {
-            let axis = i / 2;
-            let mut to = at;
-            to[axis] = if i % 2 == 0 { at[axis].checked_sub(1)? } else { at[axis] + 1 };
-            let end = self.cells[axis] - usize::from(half);
-            (to[axis] <= end).then(|| self.node(to, half))
-        });
-        let across = (0..8_usize).filter_map(move |i| {
-            let mut to = at;
-            for axis in 0..3 {
-                let step = i >> axis & 1;
-                to[axis] = if half { at[axis] + step } else { (at[axis] + step).checked_sub(1)? };
-                if !half && to[axis] >= self.cells[axis] {
-                    return None;
-                }
+    fn center(self) -> Place {
+        self.low().map(|i| i + self.side() / 2)
+    }
+
+    fn parent(self) -> Option<Self> {
+        Some(Self { level: self.level.checked_sub(1)?, at: self.at.map(|i| i / 2) })
+    }
+
+    fn children(self) -> [Self; 8] {
+        std::array::from_fn(|c| Self {
+            level: self.level + 1,
+            at: std::array::from_fn(|k| 2 * self.at[k] + (c as u32 >> k & 1)),
+        })
+    }
+
+    fn corners(self) -> [Place; 8] {
+        let low = self.low();
+        std::array::from_fn(|c| std::array::from_fn(|k| low[k] + self.side() * (c as u32 >> k & 1)))
+    }
+
+    /// Corners of the face towards greater (1) or lesser (0) coordinates along an axis.
+    fn face(self, axis: usize, towards: u32) -> [Place; 4] {
+        FACE.map(|step| {
+            let mut corner = self.low();
+            corner[axis] += towards * self.side();
+            (0..2).for_each(|k| corner[(axis + 1 + k) % 3] += step[k] * self.side());
+            corner
+        })
+    }
+}
+
+/// Cubes over a box, some of them halved, again and again.
+#[derive(Clone, Debug)]
+pub(super) struct Octree {
+    origin: DVec3,
+    unit: f64,
+    /// Number of largest cubes along each axis.
+    cells: [u32; 3],
+    halved: HashSet<Cube>,
+}
+
+impl Octree {
+    /// Cubes over a box that are all as large as the spacing.
+    pub(super) fn uniform(bounds: &Aabb, spacing: f64) -> Self {
+        let cells = (bounds.size() / spacing).ceil().max(DVec3::splat(2.0)).to_array().map(|c| c as u32);
+        let origin = bounds.center() - 0.5 * spacing * DVec3::from_array(cells.map(f64::from));
+        Self { origin, unit: spacing / f64::from(LARGEST), cells, halved: HashSet::new() }
+    }
+
+    /// Halves all cubes that are too large, by their centre and side; false where it gave up because more than `most` were.
+    pub(super) fn refine(&mut self, most: usize, is_too_large: impl Fn(DVec3, f64) -> bool) -> bool {
+        let mut waiting: Vec<Cube> = self.roots().collect();
+        while let Some(cube) = waiting.pop() {
+            let side = self.unit * f64::from(cube.side());
+            let is_halved = self.halved.contains(&cube);
+            if is_halved || cube.level < LEVELS && is_too_large(self.position(cube.center()), side) {
+                self.halve(cube);
+                waiting.extend(cube.children());
             }
-            Some(self.node(to, !half))
-        });
-        along.chain(across)
-    }
-
-    /// The nodes in a box, and some around it.
-    pub(super) fn nodes_in(&self, bounds: &Aabb) -> Vec<usize> {
-        let low = ((bounds.low - self.origin) / self.spacing).floor().max(DVec3::ZERO).to_array().map(|x| x as usize);
-        let high = ((bounds.high - self.origin) / self.spacing).ceil().max(DVec3::ZERO).to_array().map(|x| x as usize);
-        let mut nodes = Vec::new();
-        for half in [false, true] {
-            let end: [usize; 3] = std::array::from_fn(|k| high[k].min(self.cells[k] - usize::from(half)));
-            for k in low[2]..=end[2] {
-                for j in low[1]..=end[1] {
-                    nodes.extend((low[0]..=end[0]).map(|i| self.node([i, j, k], half)));
-                }
+            if self.halved.len() > most {
+                return false;
             }
         }
-        nodes
+        true
     }
 
-    /// The closed surface between nodes with negative and with other values, facing the latter.
-    pub(super) fn surface(&self, values: &[f64]) -> (Vec<DVec3>, Vec<[u32; 3]>) {
-        let mut keyed = Vec::new();
-        self.for_each_tetrahedron(values, |tetrahedron| self.cut(tetrahedron, values, &mut keyed));
-        let mut keys: Vec<u64> = keyed.iter().flatten().copied().collect();
-        keys.sort_unstable();
-        keys.dedup();
-        let vertices = keys.iter().map(|&key| self.crossing(key, values)).collect();
-        let index = |key: u64| keys.partition_point(|&k| k < key) as u32;
-        (vertices, keyed.iter().map(|t| t.map(index)).collect())
+    fn position(&self, place: Place) -> DVec3 {
+        self.origin + self.unit * DVec3::from_array(place.map(f64::from))
     }
 
-    /// Calls `found` with every tetrahedron, positively oriented, that has values of both signs.
-    fn for_each_tetrahedron(&self, values: &[f64], mut found: impl FnMut([usize; 4])) {
+    fn roots(&self) -> impl Iterator<Item = Cube> + use<> {
+        let [x, y, z] = self.cells;
+        (0..z).flat_map(move |k| (0..y).flat_map(move |j| (0..x).map(move |i| Cube { level: 0, at: [i, j, k] })))
+    }
+
+    /// Halves a cube, after those around it that are larger.
+    fn halve(&mut self, cube: Cube) {
+        if !self.halved.insert(cube) {
+            return;
+        }
+        for step in 0..27_u32 {
+            let step = [step % 3, step / 3 % 3, step / 9].map(|s| s as i32 - 1);
+            if let Some(larger) = self.beside(cube, step).and_then(Cube::parent) {
+                self.halve(larger);
+            }
+        }
+    }
+
+    /// The cube of the same size so many steps on.
+    fn beside(&self, cube: Cube, step: [i32; 3]) -> Option<Cube> {
+        let mut at = cube.at;
+        for k in 0..3 {
+            at[k] = at[k].checked_add_signed(step[k]).filter(|&i| i < self.cells[k] << cube.level)?;
+        }
+        Some(Cube { level: cube.level, at })
+    }
+
+    /// The cubes that are not halved.
+    fn leaves(&self) -> Vec<Cube> {
+        let mut leaves = Vec::new();
+        for root in self.roots() {
+            let mut waiting = vec![root];
+            while let Some(cube) = waiting.pop() {
+                if self.halved.contains(&cube) { waiting.extend(cube.children()) } else { leaves.push(cube) }
+            }
+        }
+        leaves
+    }
+
+    fn tetrahedra(&self, leaves: &[Cube], nodes: &Nodes) -> Vec<[u32; 4]> {
+        let mut found = Vec::with_capacity(12 * leaves.len());
         for axis in 0..3 {
-            let mut count = self.cells;
-            count[axis] -= 1;
-            for k in 0..count[2] {
-                for j in 0..count[1] {
-                    for i in 0..count[0] {
-                        let mut next = [i, j, k];
-                        next[axis] += 1;
-                        let centers = [self.node([i, j, k], true), self.node(next, true)];
-                        let corners = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|step| {
-                            let mut corner = next;
-                            corner[(axis + 1) % 3] += step[0];
-                            corner[(axis + 2) % 3] += step[1];
-                            self.node(corner, false)
-                        });
-                        let negative = |n: usize| values[n] < 0.0;
-                        let inside = centers.iter().chain(&corners).filter(|&&n| negative(n)).count();
-                        if inside == 0 || inside == 6 {
-                            continue;
-                        }
-                        for c in 0..4 {
-                            found([centers[0], centers[1], corners[c], corners[(c + 1) % 4]]);
-                        }
+            for &cube in leaves {
+                for towards in [1, 0] {
+                    let mut step = [0; 3];
+                    step[axis] = 2 * towards as i32 - 1;
+                    if let Some(next) = self.beside(cube, step) {
+                        self.join(
+                            cube,
+                            next,
+                            axis,
+                            towards,
+                            |t| {
+                                let t = positive(t);
+                                found.push(t.map(|place| nodes.index(place)));
+                            },
+                            nodes,
+                        );
                     }
                 }
             }
         }
+        found
     }
 
-    fn cut(&self, t: [usize; 4], values: &[f64], triangles: &mut Vec<[u64; 3]>) {
-        let key = |p: usize, q: usize| {
-            let (p, q) = (t[p] as u64, t[q] as u64);
-            p.min(q) << 32 | p.max(q)
-        };
-        let inside = (0..4).fold(0, |bits, i| bits | usize::from(values[t[i]] < 0.0) << i);
-        // Even permutations, so that the tetrahedron stays positively oriented.
-        let single = |i: usize| [[0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]][i];
-        match inside.count_ones() {
-            1 => {
-                let [p, q, r, s] = single(inside.trailing_zeros() as usize);
-                triangles.push([key(p, q), key(p, r), key(p, s)]);
+    /// The tetrahedra between the centre of a cube and the face towards `next`, the cube of the same size there. Those between cubes of
+    /// one size span both, and are found from the lesser of the two.
+    fn join(
+        &self,
+        cube: Cube,
+        next: Cube,
+        axis: usize,
+        towards: u32,
+        mut found: impl FnMut([Place; 4]),
+        nodes: &Nodes,
+    ) {
+        let center = cube.center();
+        let corners = cube.face(axis, towards);
+        let edges = || (0..4).map(|c| [corners[c], corners[(c + 1) % 4]]);
+        if self.halved.contains(&next) {
+            let apex = middle([corners[0], corners[2]]);
+            for [a, b] in edges() {
+                let between = middle([a, b]);
+                found([center, apex, a, between]);
+                found([center, apex, between, b]);
             }
-            3 => {
-                let [p, q, r, s] = single((!inside & 15).trailing_zeros() as usize);
-                triangles.push([key(p, q), key(p, s), key(p, r)]);
+        } else if let Some(larger) = next.parent().filter(|larger| !self.halved.contains(larger)) {
+            // The quarter of the larger face is cut from its centre outwards.
+            let other = larger.center();
+            let is_apex = |c: &usize| (1..3).all(|k| corners[*c][(axis + k) % 3] == other[(axis + k) % 3]);
+            let first = (0..4).find(is_apex).unwrap_or(0);
+            let corner = |k: usize| corners[(first + k) % 4];
+            found([center, corner(0), corner(1), corner(2)]);
+            found([center, corner(0), corner(2), corner(3)]);
+        } else if towards == 1 {
+            for [a, b] in edges() {
+                let between = middle([a, b]);
+                if !self.halved.is_empty() && nodes.indices.contains_key(&between) {
+                    found([center, next.center(), a, between]);
+                    found([center, next.center(), between, b]);
+                } else {
+                    found([center, next.center(), a, b]);
+                }
             }
-            2 => {
-                let [p, q, r, s] = match inside {
-                    0b0011 => [0, 1, 2, 3],
-                    0b1100 => [2, 3, 0, 1],
-                    0b0101 => [0, 2, 3, 1],
-                    0b1010 => [1, 3, 2, 0],
-                    0b1001 => [0, 3, 1, 2],
-                    _ => [1, 2, 0, 3],
-                };
-                let quad = [key(p, r), key(p, s), key(q, s), key(q, r)];
-                let [a, b, c, d] = quad.map(|k| self.crossing(k, values));
-                let first = a.distance_squared(c) <= b.distance_squared(d);
-                let order = if first { [[0, 1, 2], [0, 2, 3]] } else { [[0, 1, 3], [1, 2, 3]] };
-                triangles.extend(order.map(|o| o.map(|i| quad[i])));
-            }
-            _ => {}
         }
     }
+}
 
-    /// Where the surface crosses an edge, kept away from its ends so that no triangle is degenerate.
-    fn crossing(&self, key: u64, values: &[f64]) -> DVec3 {
-        let ends = [(key >> 32) as usize, (key & 0xffff_ffff) as usize];
-        let [p, q] = ends.map(|n| values[n]);
-        let t = (p / (p - q)).clamp(0.12, 0.88);
-        self.position(ends[0]).lerp(self.position(ends[1]), t)
+/// Corners of the cubes, then their centres, each in the order of their places.
+struct Nodes {
+    places: Vec<Place>,
+    indices: HashMap<Place, u32>,
+}
+
+impl Nodes {
+    fn of(leaves: &[Cube]) -> Self {
+        let ordered = |mut places: Vec<Place>| {
+            places.sort_unstable_by_key(|p| [p[2], p[1], p[0]]);
+            places.dedup();
+            places
+        };
+        let mut places = ordered(leaves.iter().flat_map(|cube| cube.corners()).collect());
+        places.extend(ordered(leaves.iter().map(|cube| cube.center()).collect()));
+        let indices = places.iter().enumerate().map(|(i, &place)| (place, i as u32)).collect();
+        Self { places, indices }
     }
 
-    fn corners(&self) -> usize {
-        self.cells.iter().map(|c| c + 1).product()
+    fn index(&self, place: Place) -> u32 {
+        self.indices[&place]
     }
+}
 
-    fn node(&self, at: [usize; 3], half: bool) -> usize {
-        let [nx, ny] = [0, 1].map(|k| self.cells[k] + usize::from(!half));
-        at[0] + nx * (at[1] + ny * at[2]) + if half { self.corners() } else { 0 }
-    }
+fn middle([a, b]: [Place; 2]) -> Place {
+    std::array::from_fn(|k| u32::midpoint(a[k], b[k]))
+}
 
-    fn place(&self, node: usize) -> ([usize; 3], bool) {
-        let half = node >= self.corners();
-        let index = if half { node - self.corners() } else { node };
-        let [nx, ny] = [0, 1].map(|k| self.cells[k] + usize::from(!half));
-        ([index % nx, index / nx % ny, index / (nx * ny)], half)
-    }
+/// A tetrahedron with its last two corners in the order that makes its volume positive.
+fn positive(t: [Place; 4]) -> [Place; 4] {
+    let at = |i: usize| DVec3::from_array(t[i].map(f64::from));
+    let [a, b, c] = [at(1) - at(0), at(2) - at(0), at(3) - at(0)];
+    if a.cross(b).dot(c) > 0.0 { t } else { [t[0], t[1], t[3], t[2]] }
 }

@@ -1,7 +1,9 @@
 //! A cage around a model, from its rest pose alone.
 
 mod fair;
+mod gaps;
 mod lattice;
+mod level_set;
 mod offset;
 mod patch;
 mod quadric;
@@ -12,7 +14,7 @@ use crate::geometry::{Surface, self_intersections};
 use cager_core::mesh::{Model, TriMesh};
 use fair::fair;
 use glam::DVec3;
-use offset::offset_surface;
+use offset::{offset_around, offset_surface};
 use patch::EnclosedPoints;
 use rayon::prelude::*;
 use simplify::Simplifier;
@@ -26,8 +28,8 @@ pub struct EncloseOptions {
     /// Least distance of the model's points to the cage, as a fraction of the diagonal; chosen where it is `None`, usually a fifth of
     /// the offset.
     pub clearance: Option<f64>,
-    /// One closed surface for each connected part of the model, instead of one around all. Parts closer together than about two
-    /// hundredths of the diagonal share one.
+    /// One closed surface for each connected part of the model, instead of one around all. Parts too close together for the
+    /// offset share one.
     pub per_part: bool,
 }
 
@@ -65,8 +67,8 @@ pub enum EncloseError {
 }
 
 /// A closed, outward-oriented cage around a model, free of self-intersection, with no point of the model outside: an offset surface,
-/// simplified under quadric error metrics with validity kept at every collapse. The offset grows until the number of vertices is
-/// reached. Runs on the current rayon pool; the result does not depend on it.
+/// simplified under quadric error metrics with validity kept at every collapse. The offset is smaller beside thin gaps, so that limbs
+/// stay apart, and grows until the number of vertices is reached. Runs on the current rayon pool; the result does not depend on it.
 ///
 /// # Errors
 /// See [`EncloseError`].
@@ -109,6 +111,11 @@ fn first_offset(vertices: usize) -> f64 {
     (0.012 * (350.0 / vertices as f64).powf(0.45)).clamp(0.009, 0.06)
 }
 
+/// Cubes of the lattice that may be halved to keep gaps open; a finer surface would take too long to simplify.
+fn most_halved(vertices: usize) -> usize {
+    (800 + 4 * vertices).min(2_500)
+}
+
 /// A valid cage at one offset, or how many vertices were left.
 fn enclose_at(
     source: &NormalizedModel,
@@ -117,15 +124,17 @@ fn enclose_at(
     options: &EncloseOptions,
 ) -> Result<TriMesh, usize> {
     let most_parts = options.vertices / if options.per_part { LEAST } else { VERTICES_PER_PART };
-    let surface = offset_surface(source, offset, options.per_part, most_parts.max(1));
+    let (offset, cubes) = offset_around(source, offset, 2.0 * clearance, most_halved(options.vertices));
+    let surface = offset_surface(source, &offset, &cubes, options.per_part, most_parts.max(1));
     let (positions, faces) = surface.ok_or(usize::MAX)?;
     // A closed surface of V vertices and F faces has V − F/2 = 2 (components − handles).
     let handles = (faces.len() / 2).saturating_sub(positions.len());
     if handles * VERTICES_PER_PART > options.vertices {
         return Err(usize::MAX);
     }
-    let kept = clearance.max(DEFAULT_CLEARANCE * offset) + source.sampling_radius;
-    let enclosed = EnclosedPoints::new(source.samples.clone(), kept);
+    let kept = |p: DVec3| clearance.max(DEFAULT_CLEARANCE * offset.at(p));
+    let (samples, clearances) = source.samples(&offset, kept);
+    let enclosed = EnclosedPoints::new(samples, clearances);
     let mut simplifier = Simplifier::new(positions, faces, &enclosed);
     if !simplifier.simplify(options.vertices) {
         return Err(simplifier.len());

@@ -1,9 +1,11 @@
 //! The offset surface of a model: the boundary of all points closer than a distance, with cavities filled, holes closed by the winding number, and
 //! components joined by tubes.
 
-use super::lattice::Lattice;
+use super::gaps::{Offset, balls_in_gaps};
+use super::lattice::{LEVELS, Lattice, Octree};
+use super::level_set::level_set;
 use super::source::NormalizedModel;
-use crate::geometry::distance::{closest_on_segment, point_triangle2};
+use crate::geometry::distance::closest_on_segment;
 use crate::geometry::{Aabb, GeneralizedWinding};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -13,18 +15,40 @@ use std::collections::VecDeque;
 /// at points of the model: below 4/√5 every point of the model is inside.
 const SPACING: f64 = 1.3;
 
+/// The offset that keeps gaps of the model open, the thinner ones only as far as at most `most` cubes of the lattice have to be halved for
+/// it, and the lattice's cubes. It is at least `least` where it is below `largest`.
+pub(super) fn offset_around(source: &NormalizedModel, largest: f64, least: f64, most: usize) -> (Offset, Octree) {
+    let spacing = SPACING * largest;
+    let bounds = source.surface.tree.bounds().grown(largest + 2.0 * spacing);
+    let mut found = (Offset::uniform(largest), Octree::uniform(&bounds, spacing));
+    let balls = balls_in_gaps(source, largest);
+    for levels in 1..=LEVELS {
+        let offset = Offset::around(&balls, largest, levels, least);
+        let mut cubes = found.1.clone();
+        let is_too_large = |center: DVec3, side: f64| {
+            let offset = offset.at(center);
+            side > 1.001 * SPACING * offset && source.surface.distance_within(center, offset + side).is_some()
+        };
+        if !cubes.refine(most, is_too_large) {
+            break;
+        }
+        found = (offset, cubes);
+    }
+    found
+}
+
 /// A closed surface at a distance from the model; one component, or with `per_part` as many as there are. `None` where it would have
 /// more than `most_parts` before they are joined.
 pub(super) fn offset_surface(
     source: &NormalizedModel,
-    distance: f64,
+    offset: &Offset,
+    cubes: &Octree,
     per_part: bool,
     most_parts: usize,
 ) -> Option<(Vec<DVec3>, Vec<[u32; 3]>)> {
-    let spacing = SPACING * distance;
-    let bounds = source.surface.tree.bounds().grown(distance + 2.0 * spacing);
-    let lattice = Lattice::over(&bounds, spacing);
-    let mut values = distances(source, &lattice, distance, spacing);
+    let distance = offset.largest;
+    let lattice = Lattice::of(cubes);
+    let mut values = distances(source, &lattice, offset);
     // Each round joins all parts that were apart; a second one is rare.
     for _ in 0..4 {
         fill_cavities(&lattice, &mut values);
@@ -39,19 +63,18 @@ pub(super) fn offset_surface(
             add_tube(source, &lattice, [from, to], distance, &mut values);
         }
     }
-    Some(lattice.surface(&values))
+    Some(level_set(&lattice, &values))
 }
 
-/// Distance less `distance` at every node, negative inside.
-fn distances(source: &NormalizedModel, lattice: &Lattice, distance: f64, spacing: f64) -> Vec<f64> {
-    let reach = distance + 1.1 * spacing;
+/// Distance less the offset at every node, negative inside.
+fn distances(source: &NormalizedModel, lattice: &Lattice, offset: &Offset) -> Vec<f64> {
+    let spacing = SPACING * offset.largest;
     let within = source.surface.tree.bounds();
     let winding = source.open.then(|| GeneralizedWinding::new(&source.surface));
-    let value = |node: usize| {
-        let p = lattice.position(node);
-        let limit = reach * reach;
-        let nearest = source.surface.tree.nearest(p, limit, |f| point_triangle2(p, source.surface.corners(f)));
-        let value = nearest.map_or(reach, |(_, d2)| d2.sqrt()) - distance;
+    let value = |&p: &DVec3| {
+        let offset = offset.at(p);
+        let reach = offset + 1.1 * spacing;
+        let value = source.surface.distance_within(p, reach).unwrap_or(reach) - offset;
         match &winding {
             Some(winding) if value >= 0.0 && within.distance2(p) == 0.0 => {
                 value.min(8.0 * spacing * (0.5 - winding.at(p).abs()))
@@ -59,24 +82,28 @@ fn distances(source: &NormalizedModel, lattice: &Lattice, distance: f64, spacing
             _ => value,
         }
     };
-    (0..lattice.len()).into_par_iter().with_min_len(512).map(value).collect()
+    lattice.positions.par_iter().with_min_len(512).map(value).collect()
+}
+
+/// Groups of nodes of one sign that edges of the lattice join: for each node, the first of its group.
+fn groups(lattice: &Lattice, values: &[f64]) -> Vec<u32> {
+    let mut group: Vec<u32> = (0..values.len() as u32).collect();
+    for t in &lattice.tetrahedra {
+        for (i, j) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
+            if (values[t[i] as usize] < 0.0) == (values[t[j] as usize] < 0.0) {
+                join(&mut group, [t[i], t[j]]);
+            }
+        }
+    }
+    (0..values.len() as u32).map(|node| root(&mut group, node)).collect()
 }
 
 /// Marks as inside everything that cannot be reached from the border.
 fn fill_cavities(lattice: &Lattice, values: &mut [f64]) {
-    let mut reached = vec![false; values.len()];
-    reached[0] = true;
-    let mut stack = vec![0];
-    while let Some(node) = stack.pop() {
-        for next in lattice.neighbours(node) {
-            if !reached[next] && values[next] >= 0.0 {
-                reached[next] = true;
-                stack.push(next);
-            }
-        }
-    }
-    for (value, reached) in values.iter_mut().zip(reached) {
-        if !reached && *value >= 0.0 {
+    let group = groups(lattice, values);
+    let outside = group[lattice.outermost as usize];
+    for (value, group) in values.iter_mut().zip(group) {
+        if group != outside && *value >= 0.0 {
             *value = -1e-3;
         }
     }
@@ -87,37 +114,27 @@ const NONE: u32 = u32::MAX;
 /// Labels the connected parts of the inside. Parts that hold nothing of the model, which winding numbers of badly oriented faces produce, are
 /// discarded.
 fn components(lattice: &Lattice, source: &NormalizedModel, distance: f64, values: &mut [f64]) -> (Vec<u32>, u32) {
+    let group = groups(lattice, values);
+    let mut holds_model = vec![false; values.len()];
+    for node in 0..values.len() {
+        let holds = &mut holds_model[group[node] as usize];
+        *holds =
+            *holds || values[node] < 0.0 && source.surface.distance_within(lattice.positions[node], distance).is_some();
+    }
     let mut labels = vec![NONE; values.len()];
     let mut parts = 0;
-    for start in 0..values.len() {
-        if values[start] >= 0.0 || labels[start] != NONE {
+    for node in 0..values.len() {
+        let first = group[node] as usize;
+        if values[node] >= 0.0 {
             continue;
         }
-        labels[start] = parts;
-        let mut members = vec![start];
-        let mut done = 0;
-        let mut holds_model = false;
-        while done < members.len() {
-            let node = members[done];
-            done += 1;
-            holds_model = holds_model || {
-                let p = lattice.position(node);
-                source.surface.distance_within(p, distance).is_some()
-            };
-            for next in lattice.neighbours(node) {
-                if labels[next] == NONE && values[next] < 0.0 {
-                    labels[next] = parts;
-                    members.push(next);
-                }
-            }
-        }
-        if holds_model {
+        if !holds_model[first] {
+            values[node] = distance;
+        } else if first == node {
+            labels[node] = parts;
             parts += 1;
         } else {
-            for node in members {
-                labels[node] = NONE;
-                values[node] = distance;
-            }
+            labels[node] = labels[first];
         }
     }
     (labels, parts)
@@ -129,15 +146,17 @@ fn shortest_links(lattice: &Lattice, labels: &[u32], parts: u32) -> Vec<[usize; 
         labels.iter().enumerate().map(|(i, &l)| if l == NONE { NONE } else { i as u32 }).collect();
     let mut queue: VecDeque<usize> = (0..labels.len()).filter(|&i| labels[i] != NONE).collect();
     let mut links = Vec::new();
+    let (ends, neighbours) = lattice.neighbours();
     while let Some(node) = queue.pop_front() {
         let from = origin[node];
-        for next in lattice.neighbours(node) {
-            let to = origin[next];
+        for &next in &neighbours[node.checked_sub(1).map_or(0, |before| ends[before])..ends[node]] {
+            let to = origin[next as usize];
             if to == NONE {
-                origin[next] = from;
-                queue.push_back(next);
+                origin[next as usize] = from;
+                queue.push_back(next as usize);
             } else if labels[from as usize] < labels[to as usize] {
-                let length = lattice.position(from as usize).distance_squared(lattice.position(to as usize));
+                let [a, b] = [from, to].map(|node| lattice.positions[node as usize]);
+                let length = a.distance_squared(b);
                 links.push((length, labels[from as usize], labels[to as usize], from, to));
             }
         }
@@ -146,13 +165,18 @@ fn shortest_links(lattice: &Lattice, labels: &[u32], parts: u32) -> Vec<[usize; 
     let mut group: Vec<u32> = (0..parts).collect();
     let mut tree = Vec::new();
     for (_, a, b, from, to) in links {
-        let (a, b) = (root(&mut group, a), root(&mut group, b));
-        if a != b {
-            group[a.max(b) as usize] = a.min(b);
+        if join(&mut group, [a, b]) {
             tree.push([from as usize, to as usize]);
         }
     }
     tree
+}
+
+/// Joins the groups of two members; says whether they were apart.
+fn join(group: &mut [u32], members: [u32; 2]) -> bool {
+    let [a, b] = members.map(|member| root(group, member));
+    group[a.max(b) as usize] = a.min(b);
+    a != b
 }
 
 fn root(group: &mut [u32], mut part: u32) -> u32 {
@@ -165,14 +189,14 @@ fn root(group: &mut [u32], mut part: u32) -> u32 {
 
 /// Puts a tube as thick as the offset between the points of the model nearest to two nodes.
 fn add_tube(source: &NormalizedModel, lattice: &Lattice, nodes: [usize; 2], distance: f64, values: &mut [f64]) {
-    let ends = nodes.map(|n| lattice.position(n));
+    let ends = nodes.map(|n| lattice.positions[n]);
     let nearest = ends.map(|p| source.surface.nearest(p).map_or(p, |n| n.point));
     for [a, b] in [[ends[0], nearest[0]], [nearest[0], nearest[1]], [nearest[1], ends[1]]] {
         let around = Aabb::around([a, b]).grown(3.0 * distance);
-        for node in lattice.nodes_in(&around) {
-            let p = lattice.position(node);
-            let value = a.lerp(b, closest_on_segment(p, a, b)).distance(p) - distance;
-            values[node] = values[node].min(value);
+        for (value, &p) in values.iter_mut().zip(&lattice.positions) {
+            if around.distance2(p) == 0.0 {
+                *value = value.min(a.lerp(b, closest_on_segment(p, a, b)).distance(p) - distance);
+            }
         }
     }
 }

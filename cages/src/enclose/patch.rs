@@ -14,18 +14,25 @@ pub(super) struct EnclosedPoints {
     points: Vec<DVec3>,
     /// Trees over some of the points, by which most faults are found, and over the others.
     trees: [Bvh; 2],
-    clearance: f64,
+    /// How far each must stay from the surface, and the largest of these.
+    clearances: Vec<f64>,
+    largest_clearance: f64,
 }
 
 /// One point of so many is looked at first.
 const STRIDE: usize = 8;
 
 impl EnclosedPoints {
-    pub(super) fn new(mut points: Vec<DVec3>, clearance: f64) -> Self {
+    /// Points with the distance that each keeps.
+    pub(super) fn new(mut points: Vec<DVec3>, mut clearances: Vec<f64>) -> Self {
         let some = points.len().div_ceil(STRIDE);
-        (0..some).for_each(|i| points.swap(i, i * STRIDE));
+        for i in 0..some {
+            points.swap(i, i * STRIDE);
+            clearances.swap(i, i * STRIDE);
+        }
         let boxes: Vec<Aabb> = points.iter().map(|&p| Aabb { low: p, high: p }).collect();
-        Self { trees: [Bvh::new(&boxes[..some]), Bvh::new(&boxes[some..])], points, clearance }
+        let largest_clearance = clearances.iter().copied().fold(0.0, f64::max);
+        Self { trees: [Bvh::new(&boxes[..some]), Bvh::new(&boxes[some..])], points, clearances, largest_clearance }
     }
 }
 
@@ -114,13 +121,15 @@ impl PatchMesh {
         enclosed: &EnclosedPoints,
     ) -> Result<(), Violation> {
         let old: Vec<[DVec3; 3]> = replacement.old.iter().map(|&f| self.corners(f)).collect();
-        let clearance = enclosed.clearance;
-        let boxes: Vec<Aabb> = new.iter().map(|&t| Aabb::around(t).grown(clearance)).collect();
+        let grown = |&t: &[DVec3; 3]| Aabb::around(t).grown(enclosed.largest_clearance);
+        let boxes: Vec<Aabb> = new.iter().map(grown).collect();
         let around = boxes.iter().fold(Aabb::around(old.iter().flatten().copied()), |b, t| b.union(t));
         let some = enclosed.points.len().div_ceil(STRIDE);
         let (first, others) = enclosed.points.split_at(some);
-        for (tree, points) in enclosed.trees.iter().zip([first, others]) {
-            let worst = uncovered(tree, points, [&old, new], &boxes, &around, clearance);
+        let (first_clearances, other_clearances) = enclosed.clearances.split_at(some);
+        let halves = [(first, first_clearances), (others, other_clearances)];
+        for (tree, points) in enclosed.trees.iter().zip(halves) {
+            let worst = uncovered(tree, points, [&old, new], &boxes, &around);
             if worst > 0.0 {
                 return Err(Violation::Uncovered(worst));
             }
@@ -197,18 +206,17 @@ pub(super) fn normal([a, b, c]: [DVec3; 3]) -> DVec3 {
 }
 
 /// How far the worst of some points is outside or too close once `old` faces have become `new`; `boxes` are those of the new, grown by
-/// the clearance, and `around` is around all.
+/// the largest clearance, and `around` is around all.
 fn uncovered(
     tree: &Bvh,
-    points: &[DVec3],
+    (points, clearances): (&[DVec3], &[f64]),
     [old, new]: [&[[DVec3; 3]]; 2],
     boxes: &[Aabb],
     around: &Aabb,
-    clearance: f64,
 ) -> f64 {
     let mut worst = 0.0_f64;
     tree.visit(around, |i| {
-        let p = points[i as usize];
+        let (p, clearance) = (points[i as usize], clearances[i as usize]);
         if around.distance2(p) > 0.0 {
             return true;
         }

@@ -1,9 +1,11 @@
 //! A model normalised for enclosing: centred, with unit diagonal, and with loose points as degenerate triangles.
 
 use super::EncloseError;
+use super::gaps::Offset;
 use crate::geometry::Surface;
 use cager_core::mesh::{Model, bounds, diagonal};
 use glam::DVec3;
+use rayon::prelude::*;
 use std::collections::HashSet;
 
 /// While a cage is simplified, at most this many points are tested; larger models are subsampled.
@@ -18,10 +20,10 @@ pub(super) struct NormalizedModel {
     pub(super) surface: Surface,
     /// Whether faces have free edges.
     pub(super) open: bool,
-    /// Points checked in place of the model while a cage is simplified.
-    pub(super) samples: Vec<DVec3>,
-    /// Every point is this close to a sample.
-    pub(super) sampling_radius: f64,
+    /// Points on large faces, which stay inside too.
+    on_faces: Vec<DVec3>,
+    /// Offset of the first cage that is tried.
+    spacing: f64,
     center: DVec3,
     scale: f64,
 }
@@ -50,13 +52,23 @@ impl NormalizedModel {
         triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
         let surface_area = triangles.iter().map(|t| area(t.map(|v| points[v as usize]))).sum::<f64>();
         let spacing_on_faces = (2.5 * spacing).max((surface_area / 10_000.0).sqrt());
-        let (mut samples, sampling_radius) = thin(&points, spacing);
+        let mut on_faces = Vec::new();
         for t in &triangles {
-            sample_face(t.map(|v| points[v as usize]), spacing_on_faces, &mut samples);
+            sample_face(t.map(|v| points[v as usize]), spacing_on_faces, &mut on_faces);
         }
         triangles.extend((0..points.len() as u32).filter(|&v| !used[v as usize]).map(|v| [v; 3]));
         let surface = Surface::new(points.clone(), triangles);
-        Ok(Self { points, surface, open, samples, sampling_radius, center, scale })
+        Ok(Self { points, surface, open, on_faces, spacing, center, scale })
+    }
+
+    /// Points checked in place of the model while a cage is simplified, with the distance to the cage that keeps the whole model at
+    /// `clearance` of its place.
+    pub(super) fn samples(&self, offset: &Offset, clearance: impl Fn(DVec3) -> f64) -> (Vec<DVec3>, Vec<f64>) {
+        let (mut points, radii) = thin(&self.points, self.spacing, offset);
+        let mut clearances: Vec<f64> = points.iter().zip(radii).map(|(&p, radius)| clearance(p) + radius).collect();
+        points.extend(&self.on_faces);
+        clearances.extend(self.on_faces.iter().map(|&p| clearance(p)));
+        (points, clearances)
     }
 
     /// Back in the model's own frame of reference.
@@ -69,15 +81,23 @@ fn area([a, b, c]: [DVec3; 3]) -> f64 {
     0.5 * (b - a).cross(c - a).length()
 }
 
-/// One point per voxel where there are too many, with how far a point may be from the one that stands for it.
-fn thin(points: &[DVec3], spacing: f64) -> (Vec<DVec3>, f64) {
+/// One point per voxel where there are too many, and for each how far a point may be from it that it stands for. Voxels are smaller near
+/// thin gaps.
+fn thin(points: &[DVec3], spacing: f64, offset: &Offset) -> (Vec<DVec3>, Vec<f64>) {
     if points.len() <= CHECKED_POINTS {
-        return (points.to_vec(), 0.0);
+        return (points.to_vec(), vec![0.0; points.len()]);
     }
-    let voxel = 0.2 * spacing;
+    let halvings: Vec<i32> = points.par_iter().map(|&p| (offset.largest / offset.at(p)).log2().ceil() as i32).collect();
     let mut seen = HashSet::new();
-    let first = |p: &&DVec3| seen.insert((**p / voxel).floor().to_array().map(|x| x as i64));
-    (points.iter().filter(first).copied().collect(), voxel * 3.0_f64.sqrt())
+    let mut kept = (Vec::new(), Vec::new());
+    for (&p, halvings) in points.iter().zip(halvings) {
+        let voxel = 0.2 * spacing * 0.5_f64.powi(halvings);
+        if seen.insert((halvings, (p / voxel).floor().to_array().map(|x| x as i64))) {
+            kept.0.push(p);
+            kept.1.push(voxel * 3.0_f64.sqrt());
+        }
+    }
+    kept
 }
 
 /// Points on a face that is large beside the spacing, so that it stays inside too.

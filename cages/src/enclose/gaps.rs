@@ -1,0 +1,190 @@
+//! Thin gaps between parts of a model, and an offset that leaves them open.
+
+use super::source::NormalizedModel;
+use crate::geometry::{Aabb, Bvh, GeneralizedWinding, Surface};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::collections::{HashMap, HashSet};
+
+/// Balls up to so many times the largest offset are looked for in gaps.
+const LARGEST_BALL: f64 = 1.15;
+
+/// A ball in a gap touches the surface on both sides: at the least, the cosine between its touching points lies below this.
+const OPPOSITE: f64 = -0.6;
+
+/// Gaps shorter than this many times the largest offset stay closed: few vertices could not follow both sides.
+const LEAST_EXTENT: f64 = 3.0;
+
+/// How fast the offset grows with the distance from a gap. Below 1, every point within the offset is joined with the model by a straight
+/// line within it.
+const GROWTH: f64 = 0.5;
+
+/// The offset of a cage from the model: the largest everywhere but near thin gaps, where it is a half to a quarter of the gap's half width.
+#[derive(Debug)]
+pub(super) struct Offset {
+    pub(super) largest: f64,
+    gaps: Vec<Gaps>,
+}
+
+/// Places in gaps that ask for the same offset.
+#[derive(Debug)]
+struct Gaps {
+    offset: f64,
+    centers: Vec<DVec3>,
+    tree: Bvh,
+}
+
+/// A ball that touches the model without containing any of it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ball {
+    center: DVec3,
+    radius: f64,
+}
+
+impl Offset {
+    /// The same offset everywhere.
+    pub(super) fn uniform(largest: f64) -> Self {
+        Self { largest, gaps: Vec::new() }
+    }
+
+    /// The offset that leaves gaps open, those too thin for it to be at least `least` and at most `levels` times halved excepted.
+    pub(super) fn around(balls: &[Ball], largest: f64, levels: u32, least: f64) -> Self {
+        let mut gaps = Vec::new();
+        for level in 1..=levels {
+            let offset = largest / f64::from(1 << level);
+            let asked = |b: &&Ball| b.radius >= 2.0 * offset && (level == 1 || b.radius < 4.0 * offset);
+            let centers: Vec<DVec3> = balls.iter().filter(asked).map(|b| b.center).collect();
+            if !centers.is_empty() && offset >= least {
+                let boxes: Vec<Aabb> = centers.iter().map(|&c| Aabb { low: c, high: c }).collect();
+                gaps.push(Gaps { offset, tree: Bvh::new(&boxes), centers });
+            }
+        }
+        Self { largest, gaps }
+    }
+
+    /// The offset for the surface near a place.
+    pub(super) fn at(&self, p: DVec3) -> f64 {
+        self.gaps.iter().fold(self.largest, |offset, gaps| {
+            // Within two offsets of the centre, where the gap's sides are, the offset is as small as asked for.
+            let reach = 2.0 * gaps.offset + (offset - gaps.offset).max(0.0) / GROWTH;
+            let nearest = gaps.tree.nearest(p, reach * reach, |i| gaps.centers[i as usize].distance_squared(p));
+            nearest
+                .map_or(offset, |(_, d2)| offset.min(gaps.offset + GROWTH * (d2.sqrt() - 2.0 * gaps.offset).max(0.0)))
+        })
+    }
+}
+
+/// Balls outside the model that touch two opposite sides, in gaps that are not too short.
+pub(super) fn balls_in_gaps(source: &NormalizedModel, largest: f64) -> Vec<Ball> {
+    let winding = GeneralizedWinding::new(&source.surface);
+    let touching = |&(point, normal): &(DVec3, DVec3)| {
+        let ball = |outwards: DVec3| {
+            let ball = ball_between(&source.surface, point, outwards, LARGEST_BALL * largest)?;
+            (winding.at(ball.center).abs() < 0.25).then_some(ball)
+        };
+        [ball(normal), ball(-normal)]
+    };
+    let samples = samples(&source.surface, 0.5 * largest);
+    let balls: Vec<Ball> =
+        samples.par_iter().with_min_len(256).flat_map_iter(|s| touching(s).into_iter().flatten()).collect();
+    long_gaps(&balls, largest)
+}
+
+/// Points on the surface with their normals, at most one for each direction in a cube of the spacing.
+fn samples(surface: &Surface, spacing: f64) -> Vec<(DVec3, DVec3)> {
+    let mut seen = HashSet::new();
+    let mut samples = Vec::new();
+    for f in 0..surface.triangles.len() as u32 {
+        let [a, b, c] = surface.corners(f);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        if normal == DVec3::ZERO {
+            continue;
+        }
+        let side = normal.to_array().map(|x| (2.0 * x).round() as i8);
+        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+        let n = ((longest / spacing).ceil() as u32).clamp(1, 100);
+        for i in 0..n {
+            for j in 0..n - i {
+                let [s, t] = [i, j].map(|k| (f64::from(k) + 1.0 / 3.0) / f64::from(n));
+                let point = a + s * (b - a) + t * (c - a);
+                let cube = (point / spacing).floor().to_array().map(|x| x as i32);
+                if seen.insert((cube, side)) {
+                    samples.push((point, normal));
+                }
+            }
+        }
+    }
+    samples
+}
+
+/// The ball on one side of the surface that touches it at a point and, opposite, at another, by shrinking from a radius (Ma, Bae and
+/// Choi 2012). `None` where there is no such ball.
+fn ball_between(surface: &Surface, point: DVec3, normal: DVec3, largest: f64) -> Option<Ball> {
+    let mut radius = largest;
+    let mut other = None;
+    for _ in 0..16 {
+        let Some(hit) = surface.nearest_within(point + radius * normal, radius * (1.0 - 1e-3)) else { break };
+        let across = hit.point - point;
+        let next = across.length_squared() / (2.0 * across.dot(normal));
+        if !(next > 0.0 && next < radius) {
+            return None;
+        }
+        radius = next;
+        other = Some(hit.point);
+    }
+    let center = point + radius * normal;
+    let cosine = (point - center).dot(other? - center) / (radius * radius);
+    (cosine < OPPOSITE).then_some(Ball { center, radius })
+}
+
+/// The balls of gaps that are long enough.
+fn long_gaps(balls: &[Ball], largest: f64) -> Vec<Ball> {
+    let cube = |b: &Ball| (b.center / largest).floor().to_array().map(|x| x as i32);
+    let mut cubes: HashMap<[i32; 3], Vec<usize>> = HashMap::new();
+    for (i, ball) in balls.iter().enumerate() {
+        cubes.entry(cube(ball)).or_default().push(i);
+    }
+    let mut kept = vec![false; balls.len()];
+    for ball in balls {
+        // Each gap is taken out of the map by the first of its balls.
+        let mut waiting = vec![cube(ball)];
+        let mut members = Vec::new();
+        while let Some(at) = waiting.pop() {
+            let Some(found) = cubes.remove(&at) else { continue };
+            members.extend(found);
+            waiting.extend((0..27).map(|s| [at[0] + s % 3 - 1, at[1] + s / 3 % 3 - 1, at[2] + s / 9 - 1]));
+        }
+        let extent = Aabb::around(members.iter().map(|&i| balls[i].center)).size();
+        if !members.is_empty() && extent.length() >= LEAST_EXTENT * largest {
+            members.iter().for_each(|&i| kept[i] = true);
+        }
+    }
+    balls.iter().zip(kept).filter(|(_, kept)| *kept).map(|(b, _)| *b).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn short_gaps_stay_closed() {
+        let chain = |x: f64, length: f64| {
+            (0..=20).map(move |i| Ball { center: DVec3::new(x, length * f64::from(i) / 20.0, 0.0), radius: 0.005 })
+        };
+        let balls: Vec<Ball> = chain(0.0, 0.029).chain(chain(0.5, 0.031)).collect();
+        let kept = long_gaps(&balls, 0.01);
+        assert_eq!(kept.len(), 21);
+        assert!(kept.iter().all(|b| b.center.x > 0.4));
+    }
+
+    #[test]
+    fn a_ball_between_two_sheets_touches_both_and_none_lies_beside_one() {
+        let sheet = |z: f64| [[-1.0, -1.0, z], [3.0, -1.0, z], [-1.0, 3.0, z]].map(DVec3::from);
+        let vertices = [sheet(0.0), sheet(0.3)].concat();
+        let surface = Surface::new(vertices, vec![[0, 1, 2], [3, 4, 5]]);
+        let ball = ball_between(&surface, DVec3::ZERO, DVec3::Z, 1.0).unwrap();
+        assert!((ball.radius - 0.15).abs() < 1e-9 && ball.center.distance(DVec3::new(0.0, 0.0, 0.15)) < 1e-9);
+        assert!(ball_between(&surface, DVec3::ZERO, -DVec3::Z, 1.0).is_none());
+        assert!(ball_between(&surface, DVec3::ZERO, DVec3::Z, 0.1).is_none());
+    }
+}
