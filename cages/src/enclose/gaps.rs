@@ -1,6 +1,7 @@
 //! Thin gaps between parts of a model, and an offset that leaves them open.
 
-use super::source::NormalizedModel;
+use super::lattice::LEVELS;
+use super::source::{NormalizedModel, area};
 use crate::geometry::{Aabb, Bvh, GeneralizedWinding, Surface};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -11,6 +12,9 @@ const LARGEST_BALL: f64 = 1.15;
 
 /// A ball in a gap touches the surface on both sides: at the least, the cosine between its touching points lies below this.
 const OPPOSITE: f64 = -0.6;
+
+/// About so many samples of the surface are taken at most; crumpled soups have much of it.
+const MOST_SAMPLES: f64 = 40_000.0;
 
 /// Gaps shorter than this many times the largest offset stay closed: few vertices could not follow both sides.
 const LEAST_EXTENT: f64 = 3.0;
@@ -47,10 +51,10 @@ impl Offset {
         Self { largest, gaps: Vec::new() }
     }
 
-    /// The offset that leaves gaps open, those too thin for it to be at least `least` and at most `levels` times halved excepted.
-    pub(super) fn around(balls: &[Ball], largest: f64, levels: u32, least: f64) -> Self {
+    /// The offset that leaves gaps open, but for those so thin that it would have to be below `least` or an eighth of the largest.
+    pub(super) fn around(balls: &[Ball], largest: f64, least: f64) -> Self {
         let mut gaps = Vec::new();
-        for level in 1..=levels {
+        for level in 1..=LEVELS {
             let offset = largest / f64::from(1 << level);
             let asked = |b: &&Ball| b.radius >= 2.0 * offset && (level == 1 || b.radius < 4.0 * offset);
             let centers: Vec<DVec3> = balls.iter().filter(asked).map(|b| b.center).collect();
@@ -92,6 +96,8 @@ pub(super) fn balls_in_gaps(source: &NormalizedModel, largest: f64) -> Vec<Ball>
 
 /// Points on the surface with their normals, at most one for each direction in a cube of the spacing.
 fn samples(surface: &Surface, spacing: f64) -> Vec<(DVec3, DVec3)> {
+    let area = (0..surface.triangles.len() as u32).map(|f| area(surface.corners(f))).sum::<f64>();
+    let spacing = spacing.max((area / MOST_SAMPLES).sqrt());
     let mut seen = HashSet::new();
     let mut samples = Vec::new();
     for f in 0..surface.triangles.len() as u32 {

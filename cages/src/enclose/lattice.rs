@@ -122,8 +122,7 @@ impl Octree {
         let mut waiting: Vec<Cube> = self.roots().collect();
         while let Some(cube) = waiting.pop() {
             let side = self.unit * f64::from(cube.side());
-            let is_halved = self.halved.contains(&cube);
-            if is_halved || cube.level < LEVELS && is_too_large(self.position(cube.center()), side) {
+            if cube.level < LEVELS && is_too_large(self.position(cube.center()), side) {
                 self.halve(cube);
                 waiting.extend(cube.children());
             }

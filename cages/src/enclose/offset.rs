@@ -2,7 +2,7 @@
 //! components joined by tubes.
 
 use super::gaps::{Offset, balls_in_gaps};
-use super::lattice::{LEVELS, Lattice, Octree};
+use super::lattice::{Lattice, Octree};
 use super::level_set::level_set;
 use super::source::NormalizedModel;
 use crate::geometry::distance::closest_on_segment;
@@ -15,26 +15,19 @@ use std::collections::VecDeque;
 /// at points of the model: below 4/√5 every point of the model is inside.
 const SPACING: f64 = 1.3;
 
-/// The offset that keeps gaps of the model open, the thinner ones only as far as at most `most` cubes of the lattice have to be halved for
-/// it, and the lattice's cubes. It is at least `least` where it is below `largest`.
+/// The offset that keeps gaps of the model open, at least `least` where it is below `largest`, and the lattice's cubes. Where more than
+/// `most` cubes would have to be halved for it, as in a model that is crumpled all over, it is the same everywhere.
 pub(super) fn offset_around(source: &NormalizedModel, largest: f64, least: f64, most: usize) -> (Offset, Octree) {
     let spacing = SPACING * largest;
     let bounds = source.surface.tree.bounds().grown(largest + 2.0 * spacing);
-    let mut found = (Offset::uniform(largest), Octree::uniform(&bounds, spacing));
-    let balls = balls_in_gaps(source, largest);
-    for levels in 1..=LEVELS {
-        let offset = Offset::around(&balls, largest, levels, least);
-        let mut cubes = found.1.clone();
-        let is_too_large = |center: DVec3, side: f64| {
-            let offset = offset.at(center);
-            side > 1.001 * SPACING * offset && source.surface.distance_within(center, offset + side).is_some()
-        };
-        if !cubes.refine(most, is_too_large) {
-            break;
-        }
-        found = (offset, cubes);
-    }
-    found
+    let uniform = Octree::uniform(&bounds, spacing);
+    let offset = Offset::around(&balls_in_gaps(source, largest), largest, least);
+    let mut cubes = uniform.clone();
+    let is_too_large = |center: DVec3, side: f64| {
+        let offset = offset.at(center);
+        side > 1.001 * SPACING * offset && source.surface.distance_within(center, offset + side).is_some()
+    };
+    if cubes.refine(most, is_too_large) { (offset, cubes) } else { (Offset::uniform(largest), uniform) }
 }
 
 /// A closed surface at a distance from the model; one component, or with `per_part` as many as there are. `None` where it would have

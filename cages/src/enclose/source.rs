@@ -77,7 +77,8 @@ impl NormalizedModel {
     }
 }
 
-fn area([a, b, c]: [DVec3; 3]) -> f64 {
+/// Area of a triangle.
+pub(super) fn area([a, b, c]: [DVec3; 3]) -> f64 {
     0.5 * (b - a).cross(c - a).length()
 }
 
