@@ -50,9 +50,11 @@ test: viewer ## run every test; those on real captures where these are at hand, 
 	@$(MAKE) --no-print-directory page-test
 	@if [ -d "$(CAPTURES)" ]; then $(MAKE) --no-print-directory captures; fi
 
-# The program that the tests before have built serves the page to a browser.
+# The program that the tests before have built serves the page to a browser. Where none is installed, one is fetched, once.
 page-test:
 ifdef NPM
+	@$(MAKE) --no-print-directory web/node_modules
+	@cd web && node tools/run.js tools/chromium.ts
 	cd web && CAGER_BINARY=$(abspath target/debug/cager) npm test --silent
 else
 	@echo "Node is not here, so the tests of the viewer are left out"

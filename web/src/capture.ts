@@ -46,6 +46,8 @@ export interface FrameBlock {
   readonly cages: Float32Array;
   /** What is added to the positions decoded from the cages, where the block has a residual layer. */
   readonly residual: Residual | null;
+  /** Whether these are cages as they were solved, of frames that are still to be coded: {@link Capture.hasFinal} says when they are. */
+  readonly isPreliminary?: boolean;
 }
 
 /**
@@ -95,7 +97,10 @@ export interface LiveStatus {
 
 /** Residual layers, which can be left out of blocks while a capture plays over a slow connection. */
 export interface ResidualLayers {
-  /** Whether blocks are read without their residual. Once that ends, those that were read so are read again: the capture fires `replaced`. */
+  /**
+   * Whether blocks are read without their residual. Once that ends, those that were read so are read again: the capture fires `replaced`, or says
+   * that they were preliminary.
+   */
   leftOut: boolean;
   /** Bytes that all of them take. */
   readonly bytes: number;
@@ -123,6 +128,8 @@ export interface Capture {
   readonly frameNumbers: Float64Array | null;
   /** The block that has frame `frame`; waits for frames that are still to come where the capture is not complete. */
   block(frame: number, signal?: AbortSignal): Promise<FrameBlock>;
+  /** Whether {@link block} gives a frame as it was coded from now on, where it was preliminary before; fires `change` when that may differ. */
+  hasFinal?(frame: number): boolean;
   /** Φ, points × columns, from the service; for coordinate systems that the page does not compute itself. */
   coordinates?(onProgress?: (fraction: number) => void, signal?: AbortSignal): Promise<Float32Array>;
   /** Point numbers of the handles, where they are known. */

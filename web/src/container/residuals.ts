@@ -1,16 +1,14 @@
 import type { ResidualLayers } from '../capture';
 import type { Source } from './source';
+import { Throughput } from './throughput';
 
-/** Seconds of reading before the rate is known, and after which what was read before counts half. */
-const [LEAST_SECONDS, MEMORY_SECONDS] = [0.5, 4];
 /** What is read sooner was in memory. */
 const NO_SECONDS = 0.005;
 
 /** A source whose reading is timed; time in which nothing is read does not count. */
 export class MeteredSource implements Source {
   readonly size: number;
-  private bytes = 0;
-  private seconds = 0;
+  private readonly throughput = new Throughput();
   private reading = 0;
   private since = 0;
 
@@ -20,7 +18,7 @@ export class MeteredSource implements Source {
 
   /** Bytes per second of late; null before it is known, as of files that are read at once. */
   get bytesPerSecond(): number | null {
-    return this.seconds < LEAST_SECONDS ? null : this.bytes / this.seconds;
+    return this.throughput.bytesPerSecond;
   }
 
   async read(offset: number, length: number, signal?: AbortSignal): Promise<Uint8Array> {
@@ -38,12 +36,8 @@ export class MeteredSource implements Source {
   private count(length: number, began: number) {
     const now = performance.now();
     if (now - began < 1000 * NO_SECONDS) return;
-    this.seconds += (now - this.since) / 1000;
+    this.throughput.add(length, (now - this.since) / 1000);
     this.since = now;
-    this.bytes += length;
-    if (this.seconds < MEMORY_SECONDS) return;
-    this.seconds /= 2;
-    this.bytes /= 2;
   }
 }
 

@@ -22,7 +22,7 @@ import { KNOWN_TAGS } from './tag';
 /** What arrived: a section's header, all of it, or the end of the container. The payload of an unknown section is not kept. */
 export type Arrival =
   | { readonly kind: 'header'; readonly entry: Entry }
-  | { readonly kind: 'section'; readonly section: Section; readonly isIntact: boolean }
+  | { readonly kind: 'section'; readonly section: Section; readonly header: Uint8Array; readonly isIntact: boolean }
   | { readonly kind: 'unknown'; readonly entry: Entry; readonly isIntact: boolean }
   | { readonly kind: 'end' };
 
@@ -120,10 +120,10 @@ export class SectionParser {
   }
 
   private endSection(payload: Uint8Array): Arrival {
-    const { offset, fields } = this.header!;
+    const { offset, bytes: header, fields } = this.header!;
     this.state = 'header';
     const isIntact = crc32c(payload) === fields.payloadCrc;
-    return { kind: 'section', section: { entry: { offset, fields }, payload }, isIntact };
+    return { kind: 'section', section: { entry: { offset, fields }, payload }, header, isIntact };
   }
 
   private passOver(): Arrival | null {

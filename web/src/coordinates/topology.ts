@@ -56,3 +56,17 @@ export function diagonalOf(positions: ArrayLike<number>): number {
   }
   return Math.sqrt(sum);
 }
+
+/** The middle of the bounding box of points, x y z each. */
+export function middleOf(positions: Float64Array): [number, number, number] {
+  const middle: [number, number, number] = [0, 0, 0];
+  for (let axis = 0; axis < 3; axis++) {
+    let [low, high] = [Infinity, -Infinity];
+    for (let k = axis; k < positions.length; k += 3) {
+      low = Math.min(low, positions[k]);
+      high = Math.max(high, positions[k]);
+    }
+    if (high >= low) middle[axis] = low / 2 + high / 2;
+  }
+  return middle;
+}

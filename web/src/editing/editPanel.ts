@@ -3,6 +3,7 @@ import { customElement, property, state } from 'lit/decorators.js';
 import { glyph } from '../viewer/glyphs';
 import { picturePanelStyle } from '../style/picturePanel';
 import { controls } from '../style/tokens';
+import { editNotes } from './editNotes';
 import { editRow } from './editRow';
 import { editPanelStyle } from './editPanelStyle';
 import type { CageEditor } from './editor';
@@ -11,6 +12,7 @@ import { exportEdited, obstacle, type ExportKind } from './exporter';
 import { drawing } from './drawings';
 import type { Keeping } from './keptEdits';
 import { TOOL_KEYS } from './keys';
+import { mouseAndKeys } from './mouseAndKeys';
 import type { MotionKind } from './motion';
 import { AXES, type Axis } from './symmetry';
 
@@ -80,22 +82,7 @@ export class EditPanel extends LitElement {
                 ${edits.map((edit) => editRow(this.editor, edit))}
               </ul>`
         }
-        ${this.notes()}
-        <details>
-          <summary>Mouse and keys</summary>
-          <p>
-            Drag a vertex, an arrow, a square or a ring. Shift and a click add a vertex, Shift and a drag choose all in
-            a box; Shift while a ring or an arrow is dragged goes by steps of 15° or a tenth. A click beside the cage
-            chooses none.
-          </p>
-          <dl>
-            ${KEYS.map(
-              ([key, text]) =>
-                html`<dt><kbd>${key}</kbd></dt>
-                  <dd>${text}</dd>`,
-            )}
-          </dl>
-        </details>
+        ${editNotes(this.editor.player.capture.static, this.keeping)} ${mouseAndKeys}
       </div>
       ${this.exportRow()}
     </section>`;
@@ -207,42 +194,6 @@ export class EditPanel extends LitElement {
     </button>`;
   }
 
-  private notes() {
-    const { static: part } = this.editor.player.capture;
-    const isCoded = (part.report?.coding as { residual_step?: number } | undefined)?.residual_step !== undefined;
-    return html`${
-      this.keeping === 'kept'
-        ? nothing
-        : html`<p class="muted">
-            ${
-              this.keeping === 'large'
-                ? 'These edits take too much room to be kept in the browser'
-                : this.keeping === 'elsewhere'
-                  ? 'These edits are not kept while another tab keeps its own of this capture'
-                  : 'This browser keeps nothing for this page'
-            }:
-            export them before you leave it.
-          </p>`
-    }
-    ${
-      part.system === 'green-free'
-        ? html`<p class="muted">
-            Normals of this cage are stored beside its vertices and stay as they were captured: the model follows a
-            moved vertex, but does not turn or swell with the faces around it. Encode with
-            <code>--coordinates green</code> for that.
-          </p>`
-        : nothing
-    }
-    ${
-      isCoded
-        ? html`<p class="muted">
-            The corrections that this file stores beside its cages belong to the cages as they were: an edited capture
-            is shown and exported without them.
-          </p>`
-        : nothing
-    }`;
-  }
-
   private exportRow() {
     const { exporting } = this;
     if (exporting) {
@@ -305,16 +256,6 @@ export class EditPanel extends LitElement {
     if (/^(INPUT|SELECT)$/.test(target.tagName) && event.key !== 'Escape') event.stopPropagation();
   }
 }
-
-const KEYS = [
-  ['Enter', 'choose the vertex in the middle'],
-  ['Tab', 'the next vertex; with Shift the one before'],
-  ['Alt ←', 'the vertex on the left; so in every direction'],
-  ['Q R U', 'move, rotate, scale'],
-  ['← ↑', 'do so; with Shift farther'],
-  ['Page ↑', 'away or clockwise; Page ↓ back'],
-  ['Esc', 'choose none; then done'],
-] as const;
 
 declare global {
   interface HTMLElementTagNameMap {

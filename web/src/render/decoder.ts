@@ -12,11 +12,12 @@ import {
 import type { StaticPart } from '../capture';
 import { columnsOf } from '../coordinates/compute';
 import { TiedNormals } from '../coordinates/tiedNormals';
-import { diagonalOf } from '../coordinates/topology';
+import { diagonalOf, middleOf } from '../coordinates/topology';
 import { fanTextures, floatTexture, phiTexture } from './dataTextures';
 import { normalShader, positionShader } from './decodeShaders';
 import { cageSize, layoutOf, meanOf, packPhi, WIDTH, type PhiLayout } from './packing';
 import { Pass, target } from './pass';
+import { placedFrame, type PlacedFrame } from './placedFrame';
 import { multiply, type ColumnValues } from './product';
 import type { Surface } from './surface';
 
@@ -291,30 +292,4 @@ export class Decoder {
     (this.offsetTextures[which].image.data as unknown as Float32Array).set(offsets);
     this.offsetTextures[which].needsUpdate = true;
   }
-}
-
-/** A frame that is given as positions: these, the normals that follow, and the pass that computes them. */
-interface PlacedFrame {
-  readonly positions: DataTexture;
-  readonly normals: WebGLRenderTarget;
-  readonly pass: Pass;
-}
-
-function placedFrame(bands: number, like: Pass): PlacedFrame {
-  const positions = floatTexture(new Float32Array(4 * WIDTH * bands), WIDTH, bands);
-  const pass = new Pass(normalShader, { ...like.uniforms, positions: { value: positions } });
-  return { positions, normals: target(bands, HalfFloatType), pass };
-}
-
-function middleOf(positions: Float64Array): [number, number, number] {
-  const middle: [number, number, number] = [0, 0, 0];
-  for (let axis = 0; axis < 3; axis++) {
-    let [low, high] = [Infinity, -Infinity];
-    for (let k = axis; k < positions.length; k += 3) {
-      low = Math.min(low, positions[k]);
-      high = Math.max(high, positions[k]);
-    }
-    if (high >= low) middle[axis] = low / 2 + high / 2;
-  }
-  return middle;
 }

@@ -95,3 +95,40 @@ test('a paused picture of a large model comes to rest, and a far frame can be re
   await settled();
   expect(AnsweringWorker.frames).toBe(asked);
 });
+
+test('preliminary frames are shown until their final ones can be', async () => {
+  vi.stubGlobal('Worker', AnsweringWorker);
+  vi.stubGlobal('document', { baseURI: 'http://localhost/' });
+  vi.stubGlobal('location', { origin: 'http://localhost' });
+  let answer: (() => void) | null = null;
+  const [solved, coded] = [new Float32Array(3 * 8).fill(1), new Float32Array(3 * 6).fill(2)];
+  const preliminary = { first: 0, count: 8, cages: solved, residual: null, isPreliminary: true };
+  const final = { first: 0, count: 6, cages: coded, residual: NO_RESIDUAL };
+  let isFinal = false;
+  const capture = captureOf(1, 8, () => {
+    if (!isFinal) return Promise.resolve(preliminary);
+    return new Promise((resolve) => (answer = () => resolve(final)));
+  });
+  capture.hasFinal = (frame) => isFinal && frame < 6;
+  const store = new FrameStore(capture);
+  const onReplaced = vi.fn();
+  store.onReplaced = onReplaced;
+  await store.load(3);
+  isFinal = true;
+  const ahead = [3, 4, 5, 6, 7];
+  store.prefetch(ahead);
+  await settled();
+  expect(store.peek(3)?.rows[0]).toBe(1);
+  answer!();
+  await Promise.resolve();
+  store.onArrival = () => {
+    store.prefetch(ahead);
+    expect(store.peek(3)).not.toBeNull();
+  };
+  await settled();
+  await settled();
+  expect(ahead.map((frame) => store.peek(frame)?.rows[0])).toEqual([2, 2, 2, 1, 1]);
+  expect(store.peek(3)?.offsets).not.toBeNull();
+  expect(onReplaced).toHaveBeenCalledOnce();
+  expect((await store.frame(0)).rows[0]).toBe(2);
+});

@@ -22,7 +22,8 @@ const OFFSET_BYTES = 96 * 2 ** 20;
 const LEAST_OFFSETS = 8;
 
 /**
- * Frames of a capture that are in memory or on their way. Blocks are asked for one after another; residual layers are added up in a worker.
+ * Frames of a capture that are in memory or on their way. Blocks are asked for one after another; residual layers are added up in a worker. Preliminary
+ * blocks are shown until the final ones, which are asked for as soon as there are some, can be.
  */
 export class FrameStore {
   /** Called whenever a frame that was missing has come. */
@@ -35,10 +36,15 @@ export class FrameStore {
   onBlock: (block: FrameBlock) => void = () => undefined;
   /** Changes frames as they are taken out; null leaves them as they are. Edited ones have no offsets, which belong to cages as they were captured. */
   edit: FrameEdit | null = null;
-  private readonly blocks = new Map<number, FrameBlock>();
+  /** In the order of their last use. */
+  private readonly blocks = new Set<FrameBlock>();
+  /** First frames of the final blocks that are shown in place of preliminary ones. */
+  private readonly shownFinal = new Set<number>();
   private readonly offsets = new Map<number, Float32Array>();
   private readonly asked = new Set<number>();
   private readonly loading = new Map<number, Promise<FrameBlock>>();
+  /** Loads the final block of a frame that is there from a preliminary one. */
+  private finishing: Promise<void> | null = null;
   private readonly atWorker = new Set<number>();
   private waiting: (() => void)[] = [];
   private readonly stop = new AbortController();
@@ -58,14 +64,11 @@ export class FrameStore {
 
   /** The frame, if all of it is here. */
   peek(frame: number): FrameData | null {
-    const block = this.blockOf(frame);
-    if (!block) return null;
-    const width = 3 * this.capture.static.rowsPerFrame;
-    const rows = block.cages.subarray((frame - block.first) * width, (frame - block.first + 1) * width);
-    if (this.edit) return { rows: this.edit(frame, rows), offsets: null };
-    if (!block.residual) return { rows, offsets: null };
-    const offsets = this.offsets.get(frame);
-    return offsets ? { rows, offsets } : null;
+    const final = this.find(frame, false);
+    const data = final && this.dataOf(final, frame);
+    if (data || (final && this.shownFinal.has(final.first))) return data;
+    const preliminary = this.find(frame, true);
+    return preliminary && this.dataOf(preliminary, frame);
   }
 
   /** Sees to it that a frame comes; resolves when its block has. */
@@ -86,9 +89,10 @@ export class FrameStore {
     try {
       for (;;) {
         await this.load(frame);
-        const data = this.peek(frame);
+        const block = this.blockOf(frame);
+        const data = block && this.dataOf(block, frame);
         if (data) return data;
-        await new Promise<void>((resolve) => this.waiting.push(resolve));
+        if (block) await new Promise<void>((resolve) => this.waiting.push(resolve));
       }
     } finally {
       const others = this.awaited.get(frame)! - 1;
@@ -109,8 +113,11 @@ export class FrameStore {
       if (block) {
         const isNear = k < this.near.length;
         if (isNear && block.residual && !this.offsets.has(frame)) this.requestOffsets(block, block.residual, frame);
+      } else if (this.find(frame, true)) {
+        this.finish(frame);
       } else {
-        if (this.loading.size === 0) this.load(frame).catch((error: unknown) => this.onFailure(frame, error));
+        if (this.loading.size === (this.finishing ? 1 : 0))
+          this.load(frame).catch((error: unknown) => this.onFailure(frame, error));
         return;
       }
     }
@@ -134,18 +141,56 @@ export class FrameStore {
       this.worker.terminate();
       this.worker = null;
     }
-    for (const kept of [this.blocks, this.offsets, this.asked, this.loading, this.atWorker]) kept.clear();
+    const { blocks, offsets, asked, loading, atWorker, shownFinal } = this;
+    for (const kept of [blocks, offsets, asked, loading, atWorker, shownFinal]) kept.clear();
+    this.finishing = null;
   }
 
+  /** The block of a frame that needs no other one: a preliminary one only as long as there is no final one. */
   private blockOf(frame: number): FrameBlock | null {
-    for (const [first, block] of this.blocks) {
-      if (frame < first || frame >= first + block.count) continue;
+    return this.find(frame, false) ?? (this.capture.hasFinal?.(frame) ? null : this.find(frame, true));
+  }
+
+  private find(frame: number, isPreliminary: boolean): FrameBlock | null {
+    for (const block of this.blocks) {
+      const { first, count } = block;
+      if (frame < first || frame >= first + count || (block.isPreliminary ?? false) !== isPreliminary) continue;
       // Moved to the end, as the one used last.
-      this.blocks.delete(first);
-      this.blocks.set(first, block);
+      this.blocks.delete(block);
+      this.blocks.add(block);
       return block;
     }
     return null;
+  }
+
+  private dataOf({ first, cages, residual }: FrameBlock, frame: number): FrameData | null {
+    const width = 3 * this.capture.static.rowsPerFrame;
+    const rows = cages.subarray((frame - first) * width, (frame - first + 1) * width);
+    if (this.edit) return { rows: this.edit(frame, rows), offsets: null };
+    if (!residual) return { rows, offsets: null };
+    const offsets = this.offsets.get(frame);
+    return offsets ? { rows, offsets } : null;
+  }
+
+  /** Loads the final block of a frame, one at a time; the preliminary one is shown meanwhile. */
+  private finish(frame: number) {
+    if (this.finishing) return;
+    const finishing = this.load(frame)
+      // Where it does not come, the frame stays as it is.
+      .catch(() => undefined)
+      .finally(() => {
+        if (this.finishing === finishing) this.finishing = null;
+      });
+    this.finishing = finishing;
+  }
+
+  /** A final block can be shown: whatever shows frames of it from preliminary ones is to show them anew. */
+  private showFinal(final: FrameBlock) {
+    if (this.shownFinal.has(final.first)) return;
+    this.shownFinal.add(final.first);
+    const replaces = (block: FrameBlock) =>
+      block.isPreliminary && block.first < final.first + final.count && final.first < block.first + block.count;
+    if ([...this.blocks].some(replaces)) this.onReplaced();
   }
 
   private request(frame: number): Promise<FrameBlock> {
@@ -169,15 +214,21 @@ export class FrameStore {
 
   private keep(block: FrameBlock) {
     this.onBlock(block);
-    this.blocks.set(block.first, block);
-    let bytes = 0;
-    for (const held of this.blocks.values()) bytes += bytesOf(held);
-    for (const [first, held] of this.blocks) {
+    let bytes = bytesOf(block);
+    for (const held of this.blocks) {
+      if (held.first === block.first && held.isPreliminary === block.isPreliminary) this.blocks.delete(held);
+      else bytes += bytesOf(held);
+    }
+    this.blocks.add(block);
+    for (const held of this.blocks) {
       if (bytes <= BLOCK_BYTES || held === block) break;
       bytes -= bytesOf(held);
-      this.blocks.delete(first);
-      if (this.atWorker.delete(first)) this.send({ kind: 'forget', block: first });
+      this.blocks.delete(held);
+      if (held.isPreliminary) continue;
+      this.shownFinal.delete(held.first);
+      if (this.atWorker.delete(held.first)) this.send({ kind: 'forget', block: held.first });
     }
+    if (!block.isPreliminary && !block.residual) this.showFinal(block);
   }
 
   private requestOffsets(block: FrameBlock, residual: Residual, frame: number) {
@@ -195,6 +246,8 @@ export class FrameStore {
     this.asked.delete(frame);
     this.offsets.set(frame, offsets);
     this.evictOffsets();
+    const final = this.find(frame, false);
+    if (final) this.showFinal(final);
     this.arrived();
   }
 

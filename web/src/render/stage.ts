@@ -1,13 +1,14 @@
-import { Color, Group, Matrix3, Matrix4, Mesh, PerspectiveCamera, Scene, Vector2, Vector3, WebGLRenderer } from 'three';
+import { Color, Group, Matrix3, Matrix4, PerspectiveCamera, Scene, Vector2, Vector3, type WebGLRenderer } from 'three';
 import type { StaticPart } from '../capture';
+import { Backdrop } from './backdrop';
+import { boxOf } from './box';
 import { CageView } from './cageView';
 import { eyeOf, FIELD_OF_VIEW, type Box, type CameraState } from './camera';
 import { Decoder, type Pose } from './decoder';
 import { Ground } from './ground';
-import { numberedGeometry, shaderMaterial } from './materials';
 import { ModelView } from './modelView';
-import { BACKDROP_SQUARES, backdropFragmentShader, backdropVertexShader } from './sceneShaders';
 import { surfaceOf } from './surface';
+import { createRenderer, isSoftwareRendered } from './webgl';
 
 /** What is drawn. */
 export interface Layers {
@@ -58,11 +59,7 @@ export class Stage {
   private readonly model: ModelView;
   private readonly cage: CageView;
   private readonly ground: Ground;
-  private readonly backdrop: Mesh;
-  private readonly backdropColors = {
-    top: { value: new Color() },
-    bottom: { value: new Color() },
-  };
+  private readonly backdrop = new Backdrop();
   private readonly hasFaces: boolean;
   /** What others draw together with the model, in its axes and in diagonals. */
   readonly extras = new Group();
@@ -95,30 +92,16 @@ export class Stage {
     private readonly capture: StaticPart,
   ) {
     this.renderer = createRenderer(canvas);
-    if (!this.renderer.extensions.has('EXT_color_buffer_float')) {
-      this.renderer.dispose();
-      throw new Error(
-        'This device cannot compute in floating point on its graphics processor; open the capture on another one.',
-      );
-    }
     const surface = surfaceOf(capture);
     this.hasFaces = surface.triangles.length > 0;
     this.decoder = new Decoder(this.renderer, capture, surface, isSoftwareRendered() ? 'page' : 'graphics');
     this.model = new ModelView(this.decoder, surface, capture.colors);
     this.cage = new CageView(capture.cage);
     this.ground = new Ground(this.decoder.positions, surface.triangles);
-    this.backdrop = new Mesh(
-      numberedGeometry(gridTriangles(BACKDROP_SQUARES)),
-      shaderMaterial(backdropVertexShader, backdropFragmentShader, this.backdropColors, {
-        depthTest: false,
-        depthWrite: false,
-      }),
-    );
-    this.backdrop.frustumCulled = false;
     this.cageVertices = new Float32Array(capture.cage.positions.length);
     this.upright.matrixAutoUpdate = false;
     this.upright.add(this.model.group, this.extras, this.cage.group);
-    this.scene.add(this.backdrop, this.upright, this.ground.mesh);
+    this.scene.add(this.backdrop.mesh, this.upright, this.ground.mesh);
     this.showRest();
     canvas.addEventListener('webglcontextrestored', () => {
       this.isAtRest = false;
@@ -184,8 +167,7 @@ export class Stage {
 
   setColors(colors: StageColors) {
     this.pictureIsOld = true;
-    this.backdropColors.top.value.set(colors.top).convertLinearToSRGB();
-    this.backdropColors.bottom.value.set(colors.bottom).convertLinearToSRGB();
+    this.backdrop.setColors(colors.top, colors.bottom);
     this.model.setColors(new Color(colors.model), new Color(colors.wire), 0.42, new Color(colors.handle));
     this.cage.setColor(new Color(colors.cage));
     this.ground.setColors(new Color(colors.grid), colors.shadow);
@@ -365,59 +347,4 @@ export class Stage {
     this.ground.middle.y = level;
     this.shadowIsOld = this.pictureIsOld = true;
   }
-}
-
-function createRenderer(canvas: HTMLCanvasElement): WebGLRenderer {
-  const antialias = !isSoftwareRendered();
-  const context = canvas.getContext('webgl2', { antialias, alpha: false, powerPreference: 'high-performance' });
-  if (!context) {
-    throw new Error(
-      'This browser has no WebGL 2, which draws the model: turn on hardware acceleration in its settings, or use a newer one.',
-    );
-  }
-  const renderer = new WebGLRenderer({ canvas, context });
-  renderer.autoClear = false;
-  renderer.sortObjects = false;
-  return renderer;
-}
-
-/** Whether the processor does the work of a graphics processor: smoothing edges then costs more than a picture at twice the size when all rests. */
-function isSoftwareRendered(): boolean {
-  softwareRendered ??= probeRenderer();
-  return softwareRendered;
-}
-
-let softwareRendered: boolean | null = null;
-
-function probeRenderer(): boolean {
-  const context = new OffscreenCanvas(1, 1).getContext('webgl2');
-  if (!context) return false;
-  const details = context.getExtension('WEBGL_debug_renderer_info');
-  const name = String(context.getParameter(details ? details.UNMASKED_RENDERER_WEBGL : context.RENDERER));
-  context.getExtension('WEBGL_lose_context')?.loseContext();
-  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
-}
-
-/** Triangles of a square of so many squares along a side; vertices are numbered row by row. */
-function gridTriangles(squares: number): Uint32Array {
-  const corners = [0, 1, squares + 1, squares + 1, 1, squares + 2];
-  return Uint32Array.from({ length: 6 * squares * squares }, (_, k) => {
-    const square = Math.floor(k / 6);
-    return square + Math.floor(square / squares) + corners[k % 6];
-  });
-}
-
-function boxOf(positions: Float32Array, turn: Matrix4): Box {
-  const low: [number, number, number] = [Infinity, Infinity, Infinity];
-  const high: [number, number, number] = [-Infinity, -Infinity, -Infinity];
-  const point = new Vector3();
-  for (let k = 0; k < positions.length; k += 3) {
-    point.set(positions[k], positions[k + 1], positions[k + 2]).applyMatrix4(turn);
-    for (let axis = 0; axis < 3; axis++) {
-      const value = point.getComponent(axis);
-      low[axis] = Math.min(low[axis], value);
-      high[axis] = Math.max(high[axis], value);
-    }
-  }
-  return { low, high };
 }

@@ -2,7 +2,7 @@ import { html, LitElement, nothing, type PropertyValues } from 'lit';
 import { customElement, property, state } from 'lit/decorators.js';
 import { repeat } from 'lit/directives/repeat.js';
 import { Color } from 'three';
-import { HOME, nearlySame, orbited, zoomed, type CameraState } from '../render/camera';
+import { HOME, nearlySame, type CameraState } from '../render/camera';
 import { CameraControls } from '../render/cameraControls';
 import { resolvedColor } from '../style/resolvedColor';
 import { controls } from '../style/tokens';
@@ -11,7 +11,9 @@ import { Quality } from '../viewer/quality';
 import { stageColors } from '../viewer/stageColors';
 import { DrawingScene, type Drawing, type DrawingColors } from './geometry/drawing';
 import { fitted, homeView, pictureShape } from './geometry/framing';
+import { keyedCamera } from './geometry/keyedCamera';
 import { Painter } from './geometry/painter';
+import { saveSideBySide } from './savedSheet';
 import { viewsStyle } from './viewsStyle';
 
 /** One of the pictures of a group. */
@@ -37,8 +39,6 @@ export interface Moments {
   /** Name of a moment. */
   readonly name: (place: number) => string;
 }
-
-const [TURN, STEP] = [Math.PI / 18, 1.12];
 
 /** Views of models and cages beside each other, which turn and play in step. */
 @customElement('report-views')
@@ -215,18 +215,9 @@ export class Views extends LitElement {
   private turn(event: KeyboardEvent) {
     const found = this.shown.get(event.currentTarget as HTMLCanvasElement);
     if (!found || event.ctrlKey || event.metaKey || event.altKey) return;
-    const camera = found.controls.destination;
-    const next: Record<string, () => CameraState> = {
-      ArrowLeft: () => orbited(camera, -TURN, 0),
-      ArrowRight: () => orbited(camera, TURN, 0),
-      ArrowUp: () => orbited(camera, 0, TURN),
-      ArrowDown: () => orbited(camera, 0, -TURN),
-      '+': () => zoomed(camera, 1 / STEP),
-      '=': () => zoomed(camera, 1 / STEP),
-      '-': () => zoomed(camera, STEP),
-    };
+    const next = keyedCamera(found.controls.destination, event.key);
     if (event.key === 'Home') this.home();
-    else if (event.key in next) found.controls.go(next[event.key]());
+    else if (next) found.controls.go(next);
     else return;
     event.preventDefault();
   }
@@ -295,22 +286,10 @@ export class Views extends LitElement {
     this.paint(1);
     const canvases = [...this.shown.keys()];
     if (canvases.length === 0) return;
-    const [width, height] = [canvases[0].width, canvases[0].height];
-    const columns = Math.ceil(Math.sqrt(canvases.length));
-    const sheet = document.createElement('canvas');
-    [sheet.width, sheet.height] = [columns * width, Math.ceil(canvases.length / columns) * height];
-    const context = sheet.getContext('2d')!;
-    context.fillStyle = resolvedColor(this.renderRoot, getComputedStyle(this).getPropertyValue('--cager-surface'));
-    context.fillRect(0, 0, sheet.width, sheet.height);
-    canvases.forEach((canvas, k) => context.drawImage(canvas, (k % columns) * width, Math.floor(k / columns) * height));
-    sheet.toBlob((blob) => {
-      if (!blob) return;
-      const link = document.createElement('a');
-      link.href = URL.createObjectURL(blob);
-      link.download = 'cager.png';
-      link.click();
-      setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-    });
+    saveSideBySide(
+      canvases,
+      resolvedColor(this.renderRoot, getComputedStyle(this).getPropertyValue('--cager-surface')),
+    );
   }
 }
 

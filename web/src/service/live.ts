@@ -1,15 +1,15 @@
 /** Opens a session as a capture, whatever state it is in. */
 
-import type { Capture, StaticPart } from '../capture';
+import type { Capture } from '../capture';
 import { openContainer } from '../container/open';
 import { httpSource, type Source } from '../container/source';
-import { ContainerStream } from '../container/stream';
 import { type Retry, pause, persistently } from './backoff';
 import { basisRows } from './basisRows';
-import { LiveCapture, type SessionCapture } from './liveCapture';
+import { LiveCapture, type OpenFinished, type SessionCapture } from './liveCapture';
 import type { Session } from './messages';
 import { ServiceProblem, problemBehind, problemFrom } from './problem';
-import { Service, piecesOf, sessionPath } from './service';
+import { openRunning } from './runningContainer';
+import { Service, sessionPath } from './service';
 import { pageToken } from './token';
 
 export type { SessionCapture } from './liveCapture';
@@ -28,7 +28,8 @@ const ATTEMPTS = 5;
 
 /**
  * Opens the session `id` of the service beside the page. A completed one is read from its container by ranges. Of a running one the static part comes
- * from the front of its container, and its cages as they are solved; when it is completed, the same capture goes on as that of its container.
+ * from the front of its container, and its cages as they are solved, with coded groups as they close; when it is completed, the same capture goes on as that
+ * of its container.
  *
  * @throws ServiceProblem where there is no such session, it failed, or the service wants a token; its message is a sentence to show
  */
@@ -37,13 +38,18 @@ export async function openSession(id: string, options: OpenSessionOptions = {}):
   const onRetry = ({ problem }: Retry): void => onWaiting?.(problem.message);
   const retried = <T>(work: () => Promise<T>): Promise<T> =>
     persistently(work, { signal, onRetry, attempts: ATTEMPTS });
-  const open = (session: Session, until: AbortSignal): Promise<Capture> => openFinished(service, session, until);
+  const open: OpenFinished = (...finished) => openFinished(service, ...finished);
   const session = await whenPrepared(() => retried(() => service.session(id, signal)), onWaiting, signal);
   if (session.state === 'completed') return Object.assign(await retried(() => open(session, signal)), { live: null });
-  const part = await retried(() => readStatic(service, id, signal));
+  const running = await retried(() => openRunning(service, id, signal));
   onWaiting?.('');
-  // Frames were solved while the static part came.
-  return new LiveCapture(service, await retried(() => service.session(id, signal)), part, open);
+  try {
+    // Frames were solved while the static part came.
+    return new LiveCapture(service, await retried(() => service.session(id, signal)), running, open);
+  } catch (error) {
+    running.connection.stop.abort();
+    throw error;
+  }
 }
 
 /** Waits until a session is prepared. */
@@ -61,15 +67,20 @@ async function whenPrepared(
   }
 }
 
-/** The capture in a completed session's container, read by ranges. */
-async function openFinished(service: Service, session: Session, signal: AbortSignal): Promise<Capture> {
+/** The capture in a completed session's container, read by ranges as far as it is not here already. */
+async function openFinished(
+  service: Service,
+  session: Session,
+  signal: AbortSignal,
+  known: (source: Source) => Source = (source) => source,
+): Promise<Capture> {
   const url = service.address(sessionPath(session.id, 'capture.cager'));
   try {
     const source = await httpSource(url, { headers: () => service.authorization(), signal });
     // The page cannot compute these coordinates, and coded cages are decoded with them.
     const coordinates = session.coordinates === 'harmonic' ? basisRows(service, session.id, signal) : null;
     const name = session.name ?? session.id;
-    return await openContainer(steady(source), { name, signal, ...(coordinates && { coordinates }) });
+    return await openContainer(known(steady(source)), { name, signal, ...(coordinates && { coordinates }) });
   } catch (error) {
     throw told(error);
   }
@@ -90,26 +101,4 @@ function told(error: unknown): Error {
   const problem = problemBehind(error);
   if (problem instanceof ServiceProblem && problem.status === 401) pageToken.refused();
   return problem;
-}
-
-/** Model and cage of a running session: what its container begins with. The rest of it is not read. */
-async function readStatic(service: Service, id: string, signal: AbortSignal): Promise<StaticPart> {
-  const response = await service.request(`${sessionPath(id, 'capture.cager')}?follow=true`, {
-    cache: 'no-store',
-    signal,
-  });
-  const found: StaticPart[] = [];
-  const stream = new ContainerStream({
-    onStatic: (part) => found.push(part),
-    onBlock: () => undefined,
-  });
-  try {
-    for await (const piece of piecesOf(response)) {
-      await stream.push(piece);
-      if (found.length > 0) return found[0];
-    }
-    throw new ServiceProblem('unreachable', 0);
-  } finally {
-    stream.close();
-  }
 }

@@ -1,12 +1,15 @@
 /** A session that is still running, as a {@link Capture}: what is solved so far, live, until it is completed and read from its container. */
 
 import type { Capture, FrameBlock, FrameErrors, LiveStatus, ResidualLayers, StaticPart } from '../capture';
+import type { Source } from '../container/source';
 import { persistently } from './backoff';
+import { ClosedGroups } from './closedGroups';
 import { CageRecordReader, RECORDS_MEDIA_TYPE } from './frameRecords';
 import { FrameStore, GrowingErrors } from './frameStore';
 import { LiveFollower } from './liveFollower';
 import { type Session, solvedFromStart } from './messages';
 import { isAbort, sentenceOf } from './problem';
+import type { RunningContainer } from './runningContainer';
 import { type Service, piecesOf, sessionPath } from './service';
 
 /** A capture of a session; `live` while it is followed. */
@@ -15,10 +18,24 @@ export interface SessionCapture extends Capture {
   readonly live: LiveStatus | null;
 }
 
+/**
+ * Opens a completed session's container.
+ *
+ * @param known gives a source that reads what is here already from memory
+ */
+export type OpenFinished = (
+  session: Session,
+  signal: AbortSignal,
+  known?: (source: Source) => Source,
+) => Promise<Capture>;
+
 /** Least seconds between two looks at the errors of all frames. */
 const ERRORS_SECONDS = 5;
 
-/** Follows a session from the end of what is solved; earlier frames are fetched when they are looked at. */
+/**
+ * Follows a session from the end of what is solved; earlier frames are fetched when they are looked at. Where frames are coded, groups of them come as
+ * they close, residuals included, and take the place of the cages that were solved.
+ */
 export class LiveCapture implements SessionCapture {
   readonly events = new EventTarget();
   readonly name: string;
@@ -27,10 +44,12 @@ export class LiveCapture implements SessionCapture {
   complete = false;
   readonly #service: Service;
   readonly #id: string;
-  readonly #openFinished: (session: Session, signal: AbortSignal) => Promise<Capture>;
+  readonly #openFinished: OpenFinished;
   readonly #store: FrameStore;
   readonly #measured = new GrowingErrors();
   readonly #follower: LiveFollower;
+  /** Null where frames are not coded. */
+  readonly #groups: ClosedGroups | null;
   readonly #fetching = new Map<number, Promise<void>>();
   readonly #closing = new AbortController();
   #finished: Capture | null = null;
@@ -40,12 +59,7 @@ export class LiveCapture implements SessionCapture {
   #errorsFetched = { coded: -1, skipped: -1, at: -Infinity };
 
   /** @param openFinished opens the container, once there is one */
-  constructor(
-    service: Service,
-    session: Session,
-    part: StaticPart,
-    openFinished: (session: Session, signal: AbortSignal) => Promise<Capture>,
-  ) {
+  constructor(service: Service, session: Session, { part, connection }: RunningContainer, openFinished: OpenFinished) {
     this.#service = service;
     this.#id = session.id;
     this.#openFinished = openFinished;
@@ -60,9 +74,14 @@ export class LiveCapture implements SessionCapture {
         this.frames = record.frame + 1;
       },
       skipped: (end) => (this.frames = end),
-      looked: (look) => void this.#fetchErrors(look),
+      looked: (look) => {
+        this.#groups?.looked(look);
+        void this.#fetchErrors(look);
+      },
       changed: () => this.#changed(),
     });
+    this.#groups = session.coding ? this.#followGroups(service, session, connection) : null;
+    if (!this.#groups) connection.stop.abort();
     void this.#run();
   }
 
@@ -75,11 +94,13 @@ export class LiveCapture implements SessionCapture {
   }
 
   get frameBytes(): number | undefined {
-    return this.#finished?.frameBytes;
+    if (this.#finished) return this.#finished.frameBytes;
+    const bytes = this.#groups?.bytesPerFrame ?? null;
+    return bytes === null ? undefined : bytes * this.frames;
   }
 
   get residuals(): ResidualLayers | null {
-    return this.#finished?.residuals ?? null;
+    return this.#finished ? (this.#finished.residuals ?? null) : this.#groups;
   }
 
   get problem(): string | null {
@@ -107,8 +128,10 @@ export class LiveCapture implements SessionCapture {
       signal?.throwIfAborted();
       this.#closing.signal.throwIfAborted();
       if (this.#finished) return this.#finished.block(frame, signal);
+      const coded = await this.#groups?.block(frame, signal);
+      if (coded) return coded;
       const block = this.#store.block(frame);
-      if (block) return block;
+      if (block) return { ...block, isPreliminary: this.#groups !== null };
       if (frame < this.frames) await this.#fetchAround(frame);
       else if (this.complete)
         throw new RangeError(this.problem ?? `The capture has ${this.frames} frames, so there is no frame ${frame}.`);
@@ -121,11 +144,16 @@ export class LiveCapture implements SessionCapture {
   }
 
   readTogether(frame: number): { readonly first: number; readonly count: number } {
-    return this.#finished?.readTogether?.(frame) ?? { first: frame, count: 1 };
+    return this.#finished?.readTogether?.(frame) ?? this.#groups?.of(frame) ?? { first: frame, count: 1 };
+  }
+
+  hasFinal(frame: number): boolean {
+    return Boolean(this.#finished ?? this.#groups?.of(frame));
   }
 
   close(): void {
     this.#closing.abort();
+    this.#groups?.close();
     this.#finished?.close();
   }
 
@@ -134,7 +162,8 @@ export class LiveCapture implements SessionCapture {
     try {
       const session = await this.#follower.run(signal);
       if (session) {
-        const opening = () => this.#openFinished(session, signal);
+        const known = (source: Source): Source => this.#groups?.source(source, session.coding?.frames ?? 0) ?? source;
+        const opening = () => this.#openFinished(session, signal, known);
         const onRetry = ({ problem }: { problem: Error }): void => {
           this.#lastProblem = problem.message;
           this.#changed();
@@ -147,6 +176,7 @@ export class LiveCapture implements SessionCapture {
         this.static = { ...this.static, report: finished.static.report };
         this.frames = finished.frames;
         this.#finished = finished;
+        this.#groups?.close();
         // Coded cages are not quite the solved ones, and have residuals that belong to them.
         this.events.dispatchEvent(new Event('replaced'));
       }
@@ -156,6 +186,16 @@ export class LiveCapture implements SessionCapture {
     }
     this.complete = true;
     this.#changed();
+  }
+
+  #followGroups(service: Service, session: Session, connection: RunningContainer['connection']): ClosedGroups {
+    return new ClosedGroups(service, session, this.static, connection, {
+      arrived: () => this.#changed(),
+      failed: (error) => {
+        this.#lastProblem ??= sentenceOf(error);
+        this.#changed();
+      },
+    });
   }
 
   /** Fetches the frames of the chunk that has `frame`, once for all who wait for it. */

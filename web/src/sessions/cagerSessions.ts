@@ -8,31 +8,23 @@ import { pageToken } from '../service/token';
 import { dialogStyle } from '../style/dialog';
 import { pageLayout } from '../style/pageLayout';
 import { controls, tokens } from '../style/tokens';
-import { currentJob } from '../upload/currentJob';
 import { cardsStyle } from './cardsStyle';
 import { downloadContainer } from './download';
 import { deleteDialog, deleteDialogStyle } from './deleteDialog';
 import { emptyList, emptyListStyle } from './emptyList';
 import { FigureLoader } from './figures';
 import { isFiltering, matches, type StateFilter } from './filter';
-import * as glyphs from './glyphs';
+import { filterBar } from './filterBar';
+import { listHeader, listNotices } from './listHeader';
 import { nameOf, row, tableHead } from './row';
 import { SessionList, isUnfinished } from './sessionList';
 import { sessionsStyle } from './sessionsStyle';
 import './signIn';
-import { counted } from './text';
 
 const PAGE_ROWS = 25;
 /** HTTP/1.1 has six connections to a host, for all tabs together: most sessions are polled there instead. */
 const STREAMS_OF_HTTP1 = 2;
 const STREAMS_OF_HTTP2 = 16;
-
-const STATES: readonly (readonly [StateFilter, string])[] = [
-  ['all', 'All'],
-  ['running', 'Running'],
-  ['completed', 'Completed'],
-  ['failed', 'Failed'],
-];
 
 /**
  * The sessions of the service beside the page: newest first, kept up to date while the page is seen, to be searched, opened, downloaded and
@@ -100,7 +92,11 @@ export class Sessions extends LitElement {
     const isEmpty = this.#list.loaded && sessions.length === 0;
     return html`
       <main class="page">
-        ${this.#header(sessions)} ${this.#notices()}
+        ${listHeader(sessions, this.#list.hasOlder)}
+        ${listNotices(this.#list.trouble, this.failure, {
+          onRetry: () => this.#list.refresh(),
+          onClose: () => (this.failure = ''),
+        })}
         ${isEmpty ? emptyList() : html`${this.#filters()}${this.#table(sessions)}`} ${this.#confirmation()}
         <p class="visually-hidden" role="status">${this.said}</p>
       </main>
@@ -121,86 +117,9 @@ export class Sessions extends LitElement {
     this.#list.follow(isOn ? ids : []);
   }
 
-  #header(sessions: readonly Session[]) {
-    const running = sessions.filter(isUnfinished).length;
-    const failed = sessions.filter((session) => session.state === 'failed').length;
-    const summary = [
-      `${counted(sessions.length, 'session')}${this.#list.hasOlder ? ' and older ones' : ''}`,
-      running > 0 ? `${running} not finished` : '',
-      failed > 0 ? `${failed} failed` : '',
-    ];
-    const isUploading = (currentJob()?.stage ?? 'completed') !== 'completed';
-    return html`
-      <header>
-        <h1>Sessions</h1>
-        <span class="summary">${sessions.length > 0 ? summary.filter(Boolean).join(' · ') : nothing}</span>
-        <span class="spacer"></span>
-        ${
-          pageToken.token === null
-            ? nothing
-            : html`<button type="button" class="quiet" @click=${() => pageToken.clear()}>Sign out</button>`
-        }
-        <a class="button" href="#/file">${glyphs.file} Open a file</a>
-        <a class="button primary" href="#/upload"
-          >${glyphs.upload} ${isUploading ? 'Back to the upload' : 'Upload a capture'}</a
-        >
-      </header>
-    `;
-  }
-
-  #notices() {
-    const { trouble } = this.#list;
-    return html`
-      ${
-        trouble
-          ? html`<div class="notice" role="alert">
-              ${glyphs.alert}
-              <p>${sentenceOf(trouble.problem)} ${trouble.retryAt === null ? '' : 'The list goes on by itself.'}</p>
-              <button type="button" @click=${() => this.#list.refresh()}>Try now</button>
-            </div>`
-          : nothing
-      }
-      ${
-        this.failure
-          ? html`<div class="notice" role="alert">
-              ${glyphs.alert}
-              <p>${this.failure}</p>
-              <button type="button" class="quiet icon" aria-label="Close" @click=${() => (this.failure = '')}>
-                ${glyphs.cross}
-              </button>
-            </div>`
-          : nothing
-      }
-    `;
-  }
-
   #filters() {
-    return html`
-      <div class="bar">
-        <div class="search">
-          ${glyphs.search}
-          <input
-            type="search"
-            aria-label="Search sessions by name, identifier or coordinates"
-            placeholder="Search"
-            .value=${this.text}
-            @input=${(event: InputEvent) => this.#filter((event.target as HTMLInputElement).value, this.states)}
-          />
-        </div>
-        <div class="states" role="group" aria-label="State">
-          ${STATES.map(
-            ([state, word]) =>
-              html`<button
-                type="button"
-                aria-pressed=${this.states === state ? 'true' : 'false'}
-                @click=${() => this.#filter(this.text, state)}
-              >
-                ${word}
-              </button>`,
-          )}
-        </div>
-      </div>
-    `;
+    const filter = { text: this.text, state: this.states };
+    return filterBar(filter, ({ text, state }) => this.#filter(text, state));
   }
 
   #table(sessions: readonly Session[]) {

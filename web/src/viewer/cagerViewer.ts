@@ -26,6 +26,7 @@ import { SpectrumMode } from './spectrumMode';
 import { followLooks, stageColors } from './stageColors';
 import { sentence } from './text';
 import type { Timeline } from './timeline';
+import { viewerSizesStyle } from './viewerSizesStyle';
 import { viewerStyle } from './viewerStyle';
 
 /**
@@ -47,7 +48,7 @@ import { viewerStyle } from './viewerStyle';
  */
 @customElement('cager-viewer')
 export class CagerViewer extends CaptureElement {
-  static override styles = [tokens, controls, viewerStyle, besideStyle, panelStyle, comparisonStyle];
+  static override styles = [tokens, controls, viewerStyle, viewerSizesStyle, besideStyle, panelStyle, comparisonStyle];
 
   @state() figures = false;
   @state() recording: AbortController | null = null;

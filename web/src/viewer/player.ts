@@ -1,6 +1,4 @@
 import type { Capture } from '../capture';
-import { canCompute } from '../coordinates/compute';
-import { computePhi } from '../coordinates/pool';
 import { framed, HOME, zoomed, type CameraState } from '../render/camera';
 import { CameraControls } from '../render/cameraControls';
 import { FrameStore, type FrameEdit } from '../render/frameStore';
@@ -10,6 +8,7 @@ import { Comparison } from './comparison';
 import { followBandwidth } from './bandwidth';
 import { blendedRows, FrameFeed } from './frameFeed';
 import { HeatMap, type Heat } from './heatMap';
+import { isFetched, phiOf } from './phi';
 import { Quality } from './quality';
 import { Resolution } from './resolution';
 import { sentence } from './text';
@@ -412,15 +411,4 @@ export class Player {
       'The graphics processor was taken away from the page; the picture comes back as soon as it is free.',
     );
   }
-}
-
-/** Whether Φ comes from the service, since the page does not compute it. */
-function isFetched(capture: Capture): boolean {
-  return !canCompute(capture.static.system) && capture.coordinates !== undefined;
-}
-
-function phiOf(capture: Capture, onProgress: (fraction: number) => void, signal: AbortSignal): Promise<Float32Array> {
-  return isFetched(capture)
-    ? capture.coordinates!(onProgress, signal)
-    : computePhi(capture.static, { signal, onProgress });
 }

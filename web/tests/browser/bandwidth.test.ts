@@ -1,23 +1,12 @@
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
 import { openPage, slow } from './harness/browser';
+import { NoisyCapture } from './harness/noisyCapture';
 import { missing } from './harness/programs';
 import { Site } from './harness/site';
-import { SphereCapture } from './harness/sphere';
 import { inViewer, whenShown } from './harness/viewing';
 
 /** More frames than are read with the model, at a rate that needs more than the connection has. */
 const [FRAMES, FRAME_RATE, BYTES_PER_SECOND] = [600, 240, 25_000];
-
-/** A capture with noise in every frame, which only a residual can follow. */
-class NoisyCapture extends SphereCapture {
-  override frames(first: number, count: number) {
-    let state = first + 1;
-    return super.frames(first, count).map((x) => {
-      state = (48_271 * state) % 2_147_483_647;
-      return x + 3e-3 * (state / 2_147_483_647 - 0.5);
-    });
-  }
-}
 
 describe.skipIf(missing)('a slow connection', { timeout: 90_000 }, () => {
   let site: Site;

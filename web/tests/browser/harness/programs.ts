@@ -2,18 +2,12 @@
 
 import { existsSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
+import { findChromium } from './chromium';
 
 const here = (path: string): string => fileURLToPath(new URL(`../../../${path}`, import.meta.url));
 
 /** Chromium or a relative of it; `CHROMIUM` names another one. */
-export const chromium = firstOf([
-  process.env.CHROMIUM,
-  '/usr/bin/chromium',
-  '/usr/bin/chromium-browser',
-  '/usr/bin/google-chrome',
-  '/Applications/Google Chrome.app/Contents/MacOS/Google Chrome',
-  '/Applications/Chromium.app/Contents/MacOS/Chromium',
-]);
+export const chromium = findChromium();
 
 /** The program `cager`; `CAGER_BINARY` names another one than what the build leaves. */
 export const cager = firstOf([
@@ -27,7 +21,7 @@ export const missing: string | null = chromium
   ? cager
     ? null
     : 'the program cager was not found; build it, or set CAGER_BINARY'
-  : 'no Chromium was found; install it, or set CHROMIUM';
+  : 'no Chromium was found; install it, set CHROMIUM, or let `make page-test` fetch one';
 
 if (missing) process.stderr.write(`Browser tests are skipped: ${missing}.\n`);
 

@@ -1,0 +1,39 @@
+import { html, nothing } from 'lit';
+import type { StaticPart } from '../capture';
+import type { Keeping } from './keptEdits';
+
+/** What somebody who edits a capture has to know: whether the edits are kept, and what they do not change. */
+export function editNotes(part: StaticPart, keeping: Keeping) {
+  const isCoded = (part.report?.coding as { residual_step?: number } | undefined)?.residual_step !== undefined;
+  return html`${
+    keeping === 'kept'
+      ? nothing
+      : html`<p class="muted">
+          ${
+            keeping === 'large'
+              ? 'These edits take too much room to be kept in the browser'
+              : keeping === 'elsewhere'
+                ? 'These edits are not kept while another tab keeps its own of this capture'
+                : 'This browser keeps nothing for this page'
+          }:
+          export them before you leave it.
+        </p>`
+  }
+  ${
+    part.system === 'green-free'
+      ? html`<p class="muted">
+          Normals of this cage are stored beside its vertices and stay as they were captured: the model follows a moved
+          vertex, but does not turn or swell with the faces around it. Encode with
+          <code>--coordinates green</code> for that.
+        </p>`
+      : nothing
+  }
+  ${
+    isCoded
+      ? html`<p class="muted">
+          The corrections that this file stores beside its cages belong to the cages as they were: an edited capture is
+          shown and exported without them.
+        </p>`
+      : nothing
+  }`;
+}

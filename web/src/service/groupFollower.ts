@@ -1,0 +1,111 @@
+/** Receives the coded groups of a running session as they close, over broken connections. */
+
+import { ChunkStream, type StoredChunk } from '../container/chunkStream';
+import { Throughput } from '../container/throughput';
+import { Backoff } from './backoff';
+import { endOf } from './groupStore';
+import type { Session } from './messages';
+import { connect, type ContainerConnection } from './runningContainer';
+import type { Service } from './service';
+
+/** A connection that brought nothing for so long, though groups have closed, is taken for dead: a lost network does not end it. */
+const SILENT_SECONDS = 15;
+/** Bytes that may be sent again whenever a connection broke. */
+const FREE_BYTES = 4 << 20;
+
+/**
+ * Follows one session's container. The service sends that from its front only, so a connection that takes the place of a broken one is sent again
+ * what is here already. One is made where groups have closed meanwhile, and where it is sent no more again, but for a few megabytes, than it and
+ * the one before bring that is new: however often connections break, about three times the container is received in all.
+ */
+export class GroupFollower {
+  readonly throughput = new Throughput();
+  /** Frames of the groups that came. */
+  frames = 0;
+  /** Bytes that a frame takes in them; null before it is known. */
+  bytesPerFrame: number | null = null;
+  #connection: ContainerConnection | null = null;
+  #isPaused = false;
+  /** Bytes of the container that are known, and how many of them the last connection brought. */
+  #bytes = 0;
+  #newBytes = 0;
+  #lastPieceAt = 0;
+  /** When the next connection may be made, of `performance.now()`. */
+  #earliest = 0;
+  readonly #backoff = new Backoff();
+
+  /** @param connection by which the static part came */
+  constructor(
+    private readonly service: Service,
+    private readonly id: string,
+    private readonly onGroup: (group: StoredChunk) => void,
+    connection: ContainerConnection,
+    private readonly freeBytes = FREE_BYTES,
+  ) {
+    void this.#receive(connection);
+  }
+
+  /** Whether nothing is to be received for now. */
+  get isPaused(): boolean {
+    return this.#isPaused;
+  }
+
+  set isPaused(isPaused: boolean) {
+    this.#isPaused = isPaused;
+    if (isPaused) this.#connection?.stop.abort();
+  }
+
+  /** A look at the session: where nothing follows it and groups have closed, they are asked for. */
+  looked({ coding }: Session): void {
+    if (!coding || coding.frames <= this.frames) return;
+    const now = performance.now();
+    if (this.#connection) {
+      if (now - this.#lastPieceAt > 1000 * SILENT_SECONDS) this.#connection.stop.abort();
+      return;
+    }
+    const waiting = coding.bytes * (1 - this.frames / coding.frames);
+    if (this.#isPaused || now < this.#earliest || this.#bytes > this.freeBytes + this.#newBytes + waiting) return;
+    this.#newBytes = 0;
+    void this.#receive(connect(this.service, this.id));
+  }
+
+  close(): void {
+    this.isPaused = true;
+  }
+
+  /** Reads a connection until it ends, whyever. */
+  async #receive(connection: ContainerConnection): Promise<void> {
+    const stream = new ChunkStream();
+    this.#connection = connection;
+    this.#lastPieceAt = performance.now();
+    try {
+      for (const piece of connection.begun) this.#take(stream, piece);
+      for await (const piece of connection.pieces) {
+        const now = performance.now();
+        // Between two groups the service has nothing to send.
+        if (stream.isWithinSection) this.throughput.add(piece.length, (now - this.#lastPieceAt) / 1000);
+        this.#lastPieceAt = now;
+        this.#take(stream, piece);
+      }
+    } catch {
+      // Looks at the session ask again, and whoever follows its cages says what is wrong.
+    } finally {
+      connection.stop.abort();
+      this.#connection = null;
+      this.#earliest = performance.now() + 1000 * this.#backoff.next();
+    }
+  }
+
+  #take(stream: ChunkStream, piece: Uint8Array): void {
+    for (const group of stream.push(piece)) {
+      if (endOf(group) <= this.frames) continue;
+      this.frames = endOf(group);
+      this.#backoff.reset();
+      this.onGroup(group);
+    }
+    this.bytesPerFrame = stream.bytesPerFrame ?? this.bytesPerFrame;
+    const more = Math.max(0, stream.received - this.#bytes);
+    this.#bytes += more;
+    this.#newBytes += more;
+  }
+}

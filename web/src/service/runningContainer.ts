@@ -1,0 +1,70 @@
+/** The container of a running session, which the service sends as it grows. */
+
+import type { StaticPart } from '../capture';
+import { ContainerStream } from '../container/stream';
+import { ServiceProblem } from './problem';
+import { type Service, piecesOf, sessionPath } from './service';
+
+/** A connection by which the container arrives, from its front on. */
+export interface ContainerConnection {
+  /** The pieces that are read already. */
+  readonly begun: readonly Uint8Array[];
+  /** Those that follow. */
+  readonly pieces: AsyncGenerator<Uint8Array, void, undefined>;
+  /** Ends it. */
+  readonly stop: AbortController;
+}
+
+/** Model and cage of a running session: what its container begins with. */
+export interface RunningContainer {
+  readonly part: StaticPart;
+  /** Stopped by whoever does not read on. */
+  readonly connection: ContainerConnection;
+}
+
+/** Asks for the container from its front; the request is made when the first piece is asked for. */
+export function connect(service: Service, id: string): ContainerConnection {
+  const stop = new AbortController();
+  const path = `${sessionPath(id, 'capture.cager')}?follow=true`;
+  async function* pieces(): AsyncGenerator<Uint8Array, void, undefined> {
+    yield* piecesOf(await service.request(path, { cache: 'no-store', signal: stop.signal }));
+  }
+  return { begun: [], pieces: pieces(), stop };
+}
+
+/** Reads a running session's container as far as its model and cage, or a little further. */
+export async function openRunning(service: Service, id: string, signal: AbortSignal): Promise<RunningContainer> {
+  const { pieces, stop } = connect(service, id);
+  const abort = (): void => stop.abort(signal.reason);
+  signal.addEventListener('abort', abort);
+  const found: StaticPart[] = [];
+  let onStatic = (): void => undefined;
+  const decoded = new Promise<void>((resolve) => (onStatic = resolve));
+  const stream = new ContainerStream({
+    onStatic: (part) => {
+      found.push(part);
+      onStatic();
+    },
+    onBlock: () => undefined,
+  });
+  try {
+    signal.throwIfAborted();
+    const begun: Uint8Array[] = [];
+    while (found.length === 0) {
+      const { done, value } = await pieces.next();
+      if (done) throw new ServiceProblem('unreachable', 0);
+      begun.push(value);
+      const pushed = stream.push(value);
+      // Frames that came with it are not decoded here.
+      pushed.catch(() => undefined);
+      await Promise.race([pushed, decoded]);
+    }
+    return { part: found[0], connection: { begun, pieces, stop } };
+  } catch (error) {
+    stop.abort();
+    throw error;
+  } finally {
+    signal.removeEventListener('abort', abort);
+    stream.close();
+  }
+}

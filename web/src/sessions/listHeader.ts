@@ -1,0 +1,64 @@
+import { html, nothing } from 'lit';
+import type { Session } from '../service/messages';
+import { sentenceOf } from '../service/problem';
+import { pageToken } from '../service/token';
+import { currentJob } from '../upload/currentJob';
+import * as glyphs from './glyphs';
+import { isUnfinished, type SessionList } from './sessionList';
+import { counted } from './text';
+
+/** How many sessions there are, and what else can be done than look at one. */
+export function listHeader(sessions: readonly Session[], hasOlder: boolean) {
+  const running = sessions.filter(isUnfinished).length;
+  const failed = sessions.filter((session) => session.state === 'failed').length;
+  const summary = [
+    `${counted(sessions.length, 'session')}${hasOlder ? ' and older ones' : ''}`,
+    running > 0 ? `${running} not finished` : '',
+    failed > 0 ? `${failed} failed` : '',
+  ];
+  const isUploading = (currentJob()?.stage ?? 'completed') !== 'completed';
+  return html`
+    <header>
+      <h1>Sessions</h1>
+      <span class="summary">${sessions.length > 0 ? summary.filter(Boolean).join(' · ') : nothing}</span>
+      <span class="spacer"></span>
+      ${
+        pageToken.token === null
+          ? nothing
+          : html`<button type="button" class="quiet" @click=${() => pageToken.clear()}>Sign out</button>`
+      }
+      <a class="button" href="#/file">${glyphs.file} Open a file</a>
+      <a class="button primary" href="#/upload"
+        >${glyphs.upload} ${isUploading ? 'Back to the upload' : 'Upload a capture'}</a
+      >
+    </header>
+  `;
+}
+
+/** Why the list is not up to date, and why something that was asked for did not happen. */
+export function listNotices(
+  trouble: SessionList['trouble'],
+  failure: string,
+  { onRetry, onClose }: { readonly onRetry: () => void; readonly onClose: () => void },
+) {
+  return html`
+    ${
+      trouble
+        ? html`<div class="notice" role="alert">
+            ${glyphs.alert}
+            <p>${sentenceOf(trouble.problem)} ${trouble.retryAt === null ? '' : 'The list goes on by itself.'}</p>
+            <button type="button" @click=${onRetry}>Try now</button>
+          </div>`
+        : nothing
+    }
+    ${
+      failure
+        ? html`<div class="notice" role="alert">
+            ${glyphs.alert}
+            <p>${failure}</p>
+            <button type="button" class="quiet icon" aria-label="Close" @click=${onClose}>${glyphs.cross}</button>
+          </div>`
+        : nothing
+    }
+  `;
+}
