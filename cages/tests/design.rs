@@ -272,3 +272,15 @@ fn motion_that_tears_the_model_apart_and_a_model_that_does_not_move_still_give_a
         assert_eq!(found.warnings.iter().any(|w| w.contains("tear the model apart")), warned, "{:?}", found.warnings);
     }
 }
+
+#[test]
+fn a_stop_is_heard_while_the_rest_pose_is_enclosed() {
+    let capture = capture();
+    let mut asked = 0;
+    let stopped = design(&capture.rest, &capture.frames, None, &DesignOptions::default(), &mut |progress| {
+        assert_eq!(progress.stage, "enclosing the rest pose");
+        asked += 1;
+        if asked > 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    assert!(matches!(stopped, Err(DesignError::Stopped)), "{stopped:?}");
+}

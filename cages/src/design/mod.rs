@@ -15,8 +15,9 @@ use self::contact::{Distances, Obstacles};
 use self::run::{Best, Defects, Run};
 use self::samples::Samples;
 use self::symmetry::Symmetry;
+use crate::enclose::enclose_unless;
 use crate::geometry::outside;
-use crate::{EncloseError, EncloseOptions, enclose};
+use crate::{EncloseError, EncloseOptions};
 use cager_core::cage::{Cage, CageError};
 use cager_core::mesh::{Model, TriMesh, diagonal};
 use std::ops::ControlFlow;
@@ -205,7 +206,8 @@ pub fn design(
         return Err(DesignError::BadGoal(error));
     }
     let clock = Instant::now();
-    if watch(Progress { stage: "enclosing the rest pose", fraction: 0.0, error: None, better: None }).is_break() {
+    let enclosing = Progress { stage: "enclosing the rest pose", fraction: 0.0, error: None, better: None };
+    if watch(enclosing).is_break() {
         return Err(DesignError::Stopped);
     }
     let vertices = match (start, options.goal) {
@@ -218,7 +220,13 @@ pub fn design(
     }
     let mesh = match start {
         Some(mesh) => mesh.clone(),
-        None => enclose(rest, &EncloseOptions { vertices, ..EncloseOptions::default() })?,
+        None => {
+            let options = EncloseOptions { vertices, ..EncloseOptions::default() };
+            enclose_unless(rest, &options, &mut || watch(enclosing).is_break()).map_err(|e| match e {
+                EncloseError::Stopped => DesignError::Stopped,
+                other => other.into(),
+            })?
+        }
     };
     let symmetry = match options.symmetry {
         Some(axis) => Some(Symmetry::new(&mesh, axis).map_err(|vertex| DesignError::NotSymmetric { vertex, axis })?),

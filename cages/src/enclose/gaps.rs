@@ -13,8 +13,8 @@ const LARGEST_BALL: f64 = 1.15;
 /// A ball in a gap touches the surface on both sides: at the least, the cosine between its touching points lies below this.
 const OPPOSITE: f64 = -0.6;
 
-/// About so many samples of the surface are taken at most; crumpled soups have much of it.
-const MOST_SAMPLES: f64 = 40_000.0;
+/// A surface that would take more samples than this is crumpled, and its gaps stay closed.
+const MOST_SAMPLES: f64 = 100_000.0;
 
 /// Gaps shorter than this many times the largest offset stay closed: few vertices could not follow both sides.
 const LEAST_EXTENT: f64 = 3.0;
@@ -80,6 +80,12 @@ impl Offset {
 
 /// Balls outside the model that touch two opposite sides, in gaps that are not too short.
 pub(super) fn balls_in_gaps(source: &NormalizedModel, largest: f64) -> Vec<Ball> {
+    let spacing = 0.5 * largest;
+    let triangles = 0..source.surface.triangles.len() as u32;
+    let area = triangles.map(|f| area(source.surface.corners(f))).sum::<f64>();
+    if area > MOST_SAMPLES * spacing * spacing {
+        return Vec::new();
+    }
     let winding = GeneralizedWinding::new(&source.surface);
     let touching = |&(point, normal): &(DVec3, DVec3)| {
         let ball = |outwards: DVec3| {
@@ -88,7 +94,7 @@ pub(super) fn balls_in_gaps(source: &NormalizedModel, largest: f64) -> Vec<Ball>
         };
         [ball(normal), ball(-normal)]
     };
-    let samples = samples(&source.surface, 0.5 * largest);
+    let samples = samples(&source.surface, spacing);
     let balls: Vec<Ball> =
         samples.par_iter().with_min_len(256).flat_map_iter(|s| touching(s).into_iter().flatten()).collect();
     long_gaps(&balls, largest)
@@ -96,8 +102,6 @@ pub(super) fn balls_in_gaps(source: &NormalizedModel, largest: f64) -> Vec<Ball>
 
 /// Points on the surface with their normals, at most one for each direction in a cube of the spacing.
 fn samples(surface: &Surface, spacing: f64) -> Vec<(DVec3, DVec3)> {
-    let area = (0..surface.triangles.len() as u32).map(|f| area(surface.corners(f))).sum::<f64>();
-    let spacing = spacing.max((area / MOST_SAMPLES).sqrt());
     let mut seen = HashSet::new();
     let mut samples = Vec::new();
     for f in 0..surface.triangles.len() as u32 {

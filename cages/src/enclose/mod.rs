@@ -56,6 +56,9 @@ pub enum EncloseError {
         "all points of the rest pose lie in one place, so there is nothing to enclose; check the file's unit and contents"
     )]
     NoExtent,
+    /// The caller had it stopped.
+    #[error("the making of the cage was stopped")]
+    Stopped,
     /// Too few vertices to enclose this model.
     #[error("a cage of at most {vertices} vertices cannot enclose this model; ask for at least {least}")]
     TooFewVertices {
@@ -73,6 +76,15 @@ pub enum EncloseError {
 /// # Errors
 /// See [`EncloseError`].
 pub fn enclose(model: &Model, options: &EncloseOptions) -> Result<TriMesh, EncloseError> {
+    enclose_unless(model, options, &mut || false)
+}
+
+/// [`enclose`], given up once `stopped` says so; it is asked every few hundredths of a second.
+pub(crate) fn enclose_unless(
+    model: &Model,
+    options: &EncloseOptions,
+    stopped: &mut dyn FnMut() -> bool,
+) -> Result<TriMesh, EncloseError> {
     let clearance = options.clearance.filter(|c| c.is_finite()).unwrap_or(0.0).clamp(0.0, LARGEST_CLEARANCE);
     let mut offset = first_offset(options.vertices).max(2.0 * clearance);
     let source = NormalizedModel::new(model, offset)?;
@@ -81,7 +93,10 @@ pub fn enclose(model: &Model, options: &EncloseOptions) -> Result<TriMesh, Enclo
     }
     let mut least = usize::MAX;
     while offset < LARGEST_OFFSET.max(4.0 * clearance) {
-        match enclose_at(&source, offset, clearance, options) {
+        if stopped() {
+            return Err(EncloseError::Stopped);
+        }
+        match enclose_at(&source, offset, clearance, options, stopped) {
             Ok(cage) => return Ok(cage),
             Err(reached) => least = least.min(reached),
         }
@@ -113,7 +128,7 @@ fn first_offset(vertices: usize) -> f64 {
 
 /// Cubes of the lattice that may be halved to keep gaps open; a finer surface would take too long to simplify.
 fn most_halved(vertices: usize) -> usize {
-    (800 + 4 * vertices).min(2_500)
+    (1_200 + 3 * vertices).min(2_500)
 }
 
 /// A valid cage at one offset, or how many vertices were left.
@@ -122,6 +137,7 @@ fn enclose_at(
     offset: f64,
     clearance: f64,
     options: &EncloseOptions,
+    stopped: &mut dyn FnMut() -> bool,
 ) -> Result<TriMesh, usize> {
     let most_parts = options.vertices / if options.per_part { LEAST } else { VERTICES_PER_PART };
     let (offset, cubes) = offset_around(source, offset, 2.0 * clearance, most_halved(options.vertices));
@@ -136,7 +152,7 @@ fn enclose_at(
     let (samples, clearances) = source.samples(&offset, kept);
     let enclosed = EnclosedPoints::new(samples, clearances);
     let mut simplifier = Simplifier::new(positions, faces, &enclosed);
-    if !simplifier.simplify(options.vertices) {
+    if !simplifier.simplify(options.vertices, stopped) {
         return Err(simplifier.len());
     }
     fair(&mut simplifier.mesh, &simplifier.quadrics, &enclosed);

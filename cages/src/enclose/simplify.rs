@@ -20,6 +20,9 @@ struct Limits {
 const LIMITS: [Limits; 3] =
     [Limits { turn: 0.5, quality: 0.3 }, Limits { turn: 0.2, quality: 0.15 }, Limits { turn: -0.2, quality: 0.04 }];
 
+/// Collapses that are tried between two questions whether to stop.
+const STOP_EVERY: usize = 500;
+
 /// How many times dearer a collapse is under the next limits.
 const PRICE: f64 = 8.0;
 
@@ -94,12 +97,14 @@ impl<'a> Simplifier<'a> {
         self.vertices
     }
 
-    /// Collapses edges until at most `target` vertices are left. Says whether it came that far.
-    pub(super) fn simplify(&mut self, target: usize) -> bool {
+    /// Collapses edges until at most `target` vertices are left. Says whether it came that far, which it does not where it was stopped.
+    pub(super) fn simplify(&mut self, target: usize, stopped: &mut dyn FnMut() -> bool) -> bool {
         while self.vertices > target {
             let before = self.vertices;
             let goal = target.max(before * 6 / 10);
-            self.collapse_cheapest(goal);
+            if !self.collapse_cheapest(goal, stopped) {
+                return false;
+            }
             self.compact();
             if self.vertices > goal && before - self.vertices < before / 50 + 1 {
                 return false;
@@ -108,13 +113,19 @@ impl<'a> Simplifier<'a> {
         true
     }
 
-    fn collapse_cheapest(&mut self, goal: usize) {
+    /// Collapses edges until `goal` vertices are left or none can be collapsed; false where it was stopped.
+    fn collapse_cheapest(&mut self, goal: usize, stopped: &mut dyn FnMut() -> bool) -> bool {
         let mut heap = BinaryHeap::new();
         for v in 0..self.mesh.positions.len() as u32 {
             self.propose_around(v, |w| v < w, &mut heap);
         }
+        let mut tried = 0;
         while self.vertices > goal {
-            let Some(candidate) = heap.pop() else { return };
+            let Some(candidate) = heap.pop() else { break };
+            tried += 1;
+            if tried % STOP_EVERY == 0 && stopped() {
+                return false;
+            }
             let [u, v] = candidate.edge;
             if [u, v].map(|w| self.versions[w as usize]) != candidate.versions {
                 continue;
@@ -150,6 +161,7 @@ impl<'a> Simplifier<'a> {
                 }
             }
         }
+        true
     }
 
     fn propose_around(&self, v: u32, wanted: impl Fn(u32) -> bool, heap: &mut BinaryHeap<Candidate>) {
