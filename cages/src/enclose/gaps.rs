@@ -14,7 +14,7 @@ const LARGEST_BALL: f64 = 1.15;
 const OPPOSITE: f64 = -0.6;
 
 /// A surface that would take more samples than this is crumpled, and its gaps stay closed.
-const MOST_SAMPLES: f64 = 100_000.0;
+const MOST_SAMPLES: usize = 100_000;
 
 /// Gaps shorter than this many times the largest offset stay closed: few vertices could not follow both sides.
 const LEAST_EXTENT: f64 = 3.0;
@@ -78,14 +78,9 @@ impl Offset {
     }
 }
 
-/// Balls outside the model that touch two opposite sides, in gaps that are not too short.
-pub(super) fn balls_in_gaps(source: &NormalizedModel, largest: f64) -> Vec<Ball> {
-    let spacing = 0.5 * largest;
-    let triangles = 0..source.surface.triangles.len() as u32;
-    let area = triangles.map(|f| area(source.surface.corners(f))).sum::<f64>();
-    if area > MOST_SAMPLES * spacing * spacing {
-        return Vec::new();
-    }
+/// Balls outside the model that touch two opposite sides, in gaps that are not too short. `None` where the model is crumpled.
+pub(super) fn balls_in_gaps(source: &NormalizedModel, largest: f64) -> Option<Vec<Ball>> {
+    let samples = samples(&source.surface, 0.5 * largest)?;
     let winding = GeneralizedWinding::new(&source.surface);
     let touching = |&(point, normal): &(DVec3, DVec3)| {
         let ball = |outwards: DVec3| {
@@ -94,14 +89,17 @@ pub(super) fn balls_in_gaps(source: &NormalizedModel, largest: f64) -> Vec<Ball>
         };
         [ball(normal), ball(-normal)]
     };
-    let samples = samples(&source.surface, spacing);
     let balls: Vec<Ball> =
         samples.par_iter().with_min_len(256).flat_map_iter(|s| touching(s).into_iter().flatten()).collect();
-    long_gaps(&balls, largest)
+    Some(long_gaps(&balls, largest))
 }
 
-/// Points on the surface with their normals, at most one for each direction in a cube of the spacing.
-fn samples(surface: &Surface, spacing: f64) -> Vec<(DVec3, DVec3)> {
+/// Points on the surface with their normals, at most one for each direction in a cube of the spacing; `None` where there are too many.
+fn samples(surface: &Surface, spacing: f64) -> Option<Vec<(DVec3, DVec3)>> {
+    let area = (0..surface.triangles.len() as u32).map(|f| area(surface.corners(f))).sum::<f64>();
+    if area > MOST_SAMPLES as f64 * spacing * spacing {
+        return None;
+    }
     let mut seen = HashSet::new();
     let mut samples = Vec::new();
     for f in 0..surface.triangles.len() as u32 {
@@ -123,8 +121,11 @@ fn samples(surface: &Surface, spacing: f64) -> Vec<(DVec3, DVec3)> {
                 }
             }
         }
+        if samples.len() > MOST_SAMPLES {
+            return None;
+        }
     }
-    samples
+    Some(samples)
 }
 
 /// The ball on one side of the surface that touches it at a point and, opposite, at another, by shrinking from a radius (Ma, Bae and

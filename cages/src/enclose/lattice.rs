@@ -38,17 +38,25 @@ impl Lattice {
         }
     }
 
-    /// Nodes joined to each by an edge, as the end of each node's list and the lists.
+    /// Nodes joined to each by an edge, as where each node's list begins, and where the last ends, and the lists. They name a node as often
+    /// as there are tetrahedra around the edge to it.
     pub(super) fn neighbours(&self) -> (Vec<usize>, Vec<u32>) {
-        let mut edges: Vec<(u32, u32)> = self
-            .tetrahedra
-            .iter()
-            .flat_map(|t| (0..4).flat_map(move |i| (0..4).filter(move |&j| j != i).map(move |j| (t[i], t[j]))))
-            .collect();
-        edges.sort_unstable();
-        edges.dedup();
-        let ends = (0..self.positions.len() as u32).map(|node| edges.partition_point(|e| e.0 <= node)).collect();
-        (ends, edges.into_iter().map(|e| e.1).collect())
+        let mut starts = vec![0; self.positions.len() + 1];
+        self.tetrahedra.iter().flatten().for_each(|&node| starts[node as usize + 1] += 3);
+        for node in 1..starts.len() {
+            starts[node] += starts[node - 1];
+        }
+        let mut lists = vec![0; 12 * self.tetrahedra.len()];
+        let mut next = starts.clone();
+        for t in &self.tetrahedra {
+            for k in 0..4 {
+                let at = &mut next[t[k] as usize];
+                (1..4).for_each(|step| lists[*at + step - 1] = t[(k + step) % 4]);
+                *at += 3;
+            }
+        }
+        starts.windows(2).for_each(|ends| lists[ends[0]..ends[1]].sort_unstable());
+        (starts, lists)
     }
 }
 

@@ -14,7 +14,7 @@ use crate::geometry::{Surface, self_intersections};
 use cager_core::mesh::{Model, TriMesh};
 use fair::fair;
 use glam::DVec3;
-use offset::{offset_around, offset_surface};
+use offset::{offset_surface, offset_with_gaps, uniform_offset};
 use patch::EnclosedPoints;
 use rayon::prelude::*;
 use simplify::Simplifier;
@@ -71,7 +71,8 @@ pub enum EncloseError {
 
 /// A closed, outward-oriented cage around a model, free of self-intersection, with no point of the model outside: an offset surface,
 /// simplified under quadric error metrics with validity kept at every collapse. The offset is smaller beside thin gaps, so that limbs
-/// stay apart, and grows until the number of vertices is reached. Runs on the current rayon pool; the result does not depend on it.
+/// stay apart, and grows until the number of vertices is reached. Gaps stay closed in a point cloud, which has no sides, and in a model
+/// that is crumpled all over. Runs on the current rayon pool; the result does not depend on it.
 ///
 /// # Errors
 /// See [`EncloseError`].
@@ -92,11 +93,12 @@ pub(crate) fn enclose_unless(
         return Err(EncloseError::TooFewVertices { vertices: options.vertices, least: LEAST });
     }
     let mut least = usize::MAX;
+    let mut crumpled = false;
     while offset < LARGEST_OFFSET.max(4.0 * clearance) {
         if stopped() {
             return Err(EncloseError::Stopped);
         }
-        match enclose_at(&source, offset, clearance, options, stopped) {
+        match enclose_at(&source, offset, clearance, options, &mut crumpled, stopped) {
             Ok(cage) => return Ok(cage),
             Err(reached) => least = least.min(reached),
         }
@@ -131,16 +133,21 @@ fn most_halved(vertices: usize) -> usize {
     (1_200 + 3 * vertices).min(2_500)
 }
 
-/// A valid cage at one offset, or how many vertices were left.
+/// A valid cage at one offset, or how many vertices were left. Where gaps prove too many to be kept open, the model is `crumpled`, and
+/// at larger offsets they are not looked for again.
 fn enclose_at(
     source: &NormalizedModel,
     offset: f64,
     clearance: f64,
     options: &EncloseOptions,
+    crumpled: &mut bool,
     stopped: &mut dyn FnMut() -> bool,
 ) -> Result<TriMesh, usize> {
     let most_parts = options.vertices / if options.per_part { LEAST } else { VERTICES_PER_PART };
-    let (offset, cubes) = offset_around(source, offset, 2.0 * clearance, most_halved(options.vertices));
+    let with_gaps =
+        if *crumpled { None } else { offset_with_gaps(source, offset, 2.0 * clearance, most_halved(options.vertices)) };
+    *crumpled = with_gaps.is_none();
+    let (offset, cubes) = with_gaps.unwrap_or_else(|| uniform_offset(source, offset));
     let surface = offset_surface(source, &offset, &cubes, options.per_part, most_parts.max(1));
     let (positions, faces) = surface.ok_or(usize::MAX)?;
     // A closed surface of V vertices and F faces has V − F/2 = 2 (components − handles).

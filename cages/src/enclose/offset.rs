@@ -6,28 +6,38 @@ use super::lattice::{Lattice, Octree};
 use super::level_set::level_set;
 use super::source::NormalizedModel;
 use crate::geometry::distance::closest_on_segment;
-use crate::geometry::{Aabb, GeneralizedWinding};
+use crate::geometry::{Aabb, Bvh, GeneralizedWinding};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::VecDeque;
 
-/// Spacing of the lattice over the offset. A distance interpolated in a tetrahedron is at most its circumradius, √5/4 of the spacing,
-/// at points of the model: below 4/√5 every point of the model is inside.
+/// Side of the lattice's cubes over the offset. A distance interpolated in a tetrahedron is at most its circumradius, √5/4 of the side, at
+/// points of the model: below 4/√5 every point of the model is inside. The offset at a cube's centre stands for that around it, which
+/// is at most 0.43 of the side less; what this leaves uncovered is found when the cage is verified.
 const SPACING: f64 = 1.3;
 
-/// The offset that keeps gaps of the model open, at least `least` where it is below `largest`, and the lattice's cubes. Where more than
-/// `most` cubes would have to be halved for it, as in a model that is crumpled all over, it is the same everywhere.
-pub(super) fn offset_around(source: &NormalizedModel, largest: f64, least: f64, most: usize) -> (Offset, Octree) {
+/// The same offset everywhere, and the lattice's cubes.
+pub(super) fn uniform_offset(source: &NormalizedModel, largest: f64) -> (Offset, Octree) {
     let spacing = SPACING * largest;
     let bounds = source.surface.tree.bounds().grown(largest + 2.0 * spacing);
-    let uniform = Octree::uniform(&bounds, spacing);
-    let offset = Offset::around(&balls_in_gaps(source, largest), largest, least);
-    let mut cubes = uniform.clone();
+    (Offset::uniform(largest), Octree::uniform(&bounds, spacing))
+}
+
+/// The offset that keeps gaps of the model open, at least `least` where it is below `largest`, and the lattice's cubes. `None` where more
+/// than `most` cubes would have to be halved for it, or too many places looked at, as in a model that is crumpled all over.
+pub(super) fn offset_with_gaps(
+    source: &NormalizedModel,
+    largest: f64,
+    least: f64,
+    most: usize,
+) -> Option<(Offset, Octree)> {
+    let offset = Offset::around(&balls_in_gaps(source, largest)?, largest, least);
+    let (_, mut cubes) = uniform_offset(source, largest);
     let is_too_large = |center: DVec3, side: f64| {
         let offset = offset.at(center);
         side > 1.001 * SPACING * offset && source.surface.distance_within(center, offset + side).is_some()
     };
-    if cubes.refine(most, is_too_large) { (offset, cubes) } else { (Offset::uniform(largest), uniform) }
+    cubes.refine(most, is_too_large).then_some((offset, cubes))
 }
 
 /// A closed surface at a distance from the model; one component, or with `per_part` as many as there are. `None` where it would have
@@ -52,9 +62,7 @@ pub(super) fn offset_surface(
         if parts <= 1 || per_part {
             break;
         }
-        for [from, to] in shortest_links(&lattice, &labels, parts) {
-            add_tube(source, &lattice, [from, to], distance, &mut values);
-        }
+        add_tubes(source, &lattice, &shortest_links(&lattice, &labels, parts), distance, &mut values);
     }
     Some(level_set(&lattice, &values))
 }
@@ -139,10 +147,10 @@ fn shortest_links(lattice: &Lattice, labels: &[u32], parts: u32) -> Vec<[usize; 
         labels.iter().enumerate().map(|(i, &l)| if l == NONE { NONE } else { i as u32 }).collect();
     let mut queue: VecDeque<usize> = (0..labels.len()).filter(|&i| labels[i] != NONE).collect();
     let mut links = Vec::new();
-    let (ends, neighbours) = lattice.neighbours();
+    let (starts, neighbours) = lattice.neighbours();
     while let Some(node) = queue.pop_front() {
         let from = origin[node];
-        for &next in &neighbours[node.checked_sub(1).map_or(0, |before| ends[before])..ends[node]] {
+        for &next in &neighbours[starts[node]..starts[node + 1]] {
             let to = origin[next as usize];
             if to == NONE {
                 origin[next as usize] = from;
@@ -180,16 +188,23 @@ fn root(group: &mut [u32], mut part: u32) -> u32 {
     part
 }
 
-/// Puts a tube as thick as the offset between the points of the model nearest to two nodes.
-fn add_tube(source: &NormalizedModel, lattice: &Lattice, nodes: [usize; 2], distance: f64, values: &mut [f64]) {
-    let ends = nodes.map(|n| lattice.positions[n]);
-    let nearest = ends.map(|p| source.surface.nearest(p).map_or(p, |n| n.point));
-    for [a, b] in [[ends[0], nearest[0]], [nearest[0], nearest[1]], [nearest[1], ends[1]]] {
-        let around = Aabb::around([a, b]).grown(3.0 * distance);
-        for (value, &p) in values.iter_mut().zip(&lattice.positions) {
-            if around.distance2(p) == 0.0 {
+/// Puts tubes as thick as the offset between the points of the model nearest to the nodes of each link.
+fn add_tubes(source: &NormalizedModel, lattice: &Lattice, links: &[[usize; 2]], distance: f64, values: &mut [f64]) {
+    let segments_of = |nodes: &[usize; 2]| {
+        let ends = nodes.map(|n| lattice.positions[n]);
+        let nearest = ends.map(|p| source.surface.nearest(p).map_or(p, |n| n.point));
+        [[ends[0], nearest[0]], [nearest[0], nearest[1]], [nearest[1], ends[1]]]
+    };
+    let segments: Vec<[DVec3; 2]> = links.iter().flat_map(segments_of).collect();
+    let boxes: Vec<Aabb> = segments.iter().map(|&ends| Aabb::around(ends).grown(3.0 * distance)).collect();
+    let tubes = Bvh::new(&boxes);
+    values.par_iter_mut().zip(&lattice.positions).with_min_len(4096).for_each(|(value, &p)| {
+        tubes.visit(&Aabb { low: p, high: p }, |tube| {
+            if boxes[tube as usize].distance2(p) == 0.0 {
+                let [a, b] = segments[tube as usize];
                 *value = value.min(a.lerp(b, closest_on_segment(p, a, b)).distance(p) - distance);
             }
-        }
-    }
+            true
+        });
+    });
 }

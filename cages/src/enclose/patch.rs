@@ -81,7 +81,8 @@ impl PatchMesh {
     }
 
     pub(super) fn corners(&self, face: u32) -> [DVec3; 3] {
-        self.faces[face as usize].map(|v| self.positions[v as usize])
+        let [a, b, c] = self.faces[face as usize];
+        [self.positions[a as usize], self.positions[b as usize], self.positions[c as usize]]
     }
 
     /// Vertices joined to one by an edge, ascending.

@@ -118,10 +118,9 @@ impl Bvh {
                     }
                 }
             } else {
-                let children = [2 * node + 1, 2 * node + 2].map(|c| (c as u32, self.boxes[c].distance2(p)));
-                let nearer = usize::from(children[1].1 < children[0].1);
-                stack[height] = children[1 - nearer];
-                stack[height + 1] = children[nearer];
+                let child = |c: usize| (c as u32, self.boxes[c].distance2(p));
+                let (left, right) = (child(2 * node + 1), child(2 * node + 2));
+                (stack[height], stack[height + 1]) = if right.1 < left.1 { (left, right) } else { (right, left) };
                 height += 2;
             }
         }

@@ -4,6 +4,7 @@
 use glam::DVec3;
 
 /// The point of a triangle nearest to `p`, as weights of the corners.
+#[inline]
 pub fn closest_on_triangle(p: DVec3, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let normal = ab.cross(ac);
@@ -15,25 +16,29 @@ pub fn closest_on_triangle(p: DVec3, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
         let (v, w) = (beta / area2, gamma / area2);
         return [1.0 - v - w, v, w];
     }
-    let on_edges = [[a, b], [b, c], [c, a]].map(|[s, e]| {
+    let on_edge = |s: DVec3, e: DVec3| {
         let t = closest_on_segment(p, s, e);
         ((s + t * (e - s)).distance_squared(p), t)
-    });
-    let nearest = (1..3).fold(0, |best, k| if on_edges[k].0 < on_edges[best].0 { k } else { best });
-    let t = on_edges[nearest].1;
-    let mut weights = [0.0; 3];
-    weights[nearest] = 1.0 - t;
-    weights[(nearest + 1) % 3] = t;
-    weights
+    };
+    let ((ab2, t), (bc2, u), (ca2, v)) = (on_edge(a, b), on_edge(b, c), on_edge(c, a));
+    if ab2 <= bc2 && ab2 <= ca2 {
+        [1.0 - t, t, 0.0]
+    } else if bc2 <= ca2 {
+        [0.0, 1.0 - u, u]
+    } else {
+        [v, 0.0, 1.0 - v]
+    }
 }
 
 /// Squared distance from `p` to a triangle.
+#[inline]
 pub fn point_triangle2(p: DVec3, triangle: [DVec3; 3]) -> f64 {
     let [u, v, w] = closest_on_triangle(p, triangle);
     (u * triangle[0] + v * triangle[1] + w * triangle[2]).distance_squared(p)
 }
 
 /// Parameter in 0..=1 of the point of segment `a`–`b` nearest to `p`.
+#[inline]
 pub fn closest_on_segment(p: DVec3, a: DVec3, b: DVec3) -> f64 {
     let d = b - a;
     ((p - a).dot(d) / d.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)

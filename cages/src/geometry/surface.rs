@@ -42,8 +42,10 @@ impl Surface {
     }
 
     /// Corners of a triangle.
+    #[inline]
     pub fn corners(&self, face: u32) -> [DVec3; 3] {
-        self.triangles[face as usize].map(|v| self.vertices[v as usize])
+        let [a, b, c] = self.triangles[face as usize];
+        [self.vertices[a as usize], self.vertices[b as usize], self.vertices[c as usize]]
     }
 
     /// The nearest point of the surface; `None` for a surface without triangles.

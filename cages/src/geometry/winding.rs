@@ -77,8 +77,8 @@ impl<'a> GeneralizedWinding<'a> {
 }
 
 /// Signed solid angle of a triangle seen from `p` (Van Oosterom and Strackee 1983); positive from behind.
-pub fn solid_angle(p: DVec3, corners: [DVec3; 3]) -> f64 {
-    let [a, b, c] = corners.map(|q| q - p);
+pub fn solid_angle(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
+    let (a, b, c) = (a - p, b - p, c - p);
     let (la, lb, lc) = (a.length(), b.length(), c.length());
     2.0 * a.dot(b.cross(c)).atan2(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb)
 }
