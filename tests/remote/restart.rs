@@ -18,9 +18,14 @@ async fn an_upload_outlives_kills_of_the_service_and_ends_with_identical_bytes()
     let client = server.client();
     let session = ready(&client, &dir).await;
 
+    let kills = Arc::new(AtomicU32::new(0));
+    let killed = Arc::clone(&kills);
     let frame = move |number: u32, out: &mut Vec<f32>| {
-        // As slow as a capture that is made while it is sent.
+        // As slow as a capture that is made while it is sent; its end waits for the kills.
         std::thread::sleep(Duration::from_millis(40));
+        while number >= 8 * (killed.load(Ordering::Relaxed) + 1) {
+            std::thread::sleep(Duration::from_millis(5));
+        }
         out.extend_from_slice(&values[number as usize * 3 * points..][..3 * points]);
         Ok(true)
     };
@@ -46,6 +51,7 @@ async fn an_upload_outlives_kills_of_the_service_and_ends_with_identical_bytes()
             tokio::time::sleep(Duration::from_millis(5)).await;
         }
         server.kill();
+        kills.fetch_add(1, Ordering::Relaxed);
         tokio::time::sleep(Duration::from_millis(100)).await;
         server = Server::start_at(&dir, &place, &[]);
     }
