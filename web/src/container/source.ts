@@ -61,12 +61,12 @@ export async function httpSource(url: string, { headers, signal }: HttpSourceOpt
   }
   const start = rangeOf(first);
   if (start === null) {
-    return bytesSource(await bodyOf(first));
+    return bytesSource(await bodyOf(first, signal));
   }
   const size = start.size;
   const etag = first.headers.get('ETag');
   const isStrong = etag !== null && !etag.startsWith('W/');
-  const prefix = await bodyOf(first);
+  const prefix = await bodyOf(first, signal);
   if (start.offset !== 0 || prefix.length !== Math.min(size, FIRST_BYTES)) {
     throw changed();
   }
@@ -86,7 +86,7 @@ export async function httpSource(url: string, { headers, signal }: HttpSourceOpt
         await response.body?.cancel();
         throw changed();
       }
-      const bytes = await bodyOf(response);
+      const bytes = await bodyOf(response, signal);
       if (bytes.length !== length) {
         throw changed();
       }
@@ -100,7 +100,7 @@ async function request(url: string, headers: Headers, signal: AbortSignal | unde
   try {
     response = await fetch(url, { headers, signal: signal ?? null });
   } catch (error) {
-    throw problemBehind(error);
+    throw problemBehind(error, signal);
   }
   if (!response.ok && response.status !== 416) {
     throw await problemOf(response);
@@ -108,14 +108,14 @@ async function request(url: string, headers: Headers, signal: AbortSignal | unde
   return response;
 }
 
-async function bodyOf(response: Response): Promise<Uint8Array> {
+async function bodyOf(response: Response, signal: AbortSignal | undefined): Promise<Uint8Array> {
   if (response.status === 416) {
     throw changed();
   }
   try {
     return new Uint8Array(await response.arrayBuffer());
   } catch (error) {
-    throw problemBehind(error);
+    throw problemBehind(error, signal);
   }
 }
 

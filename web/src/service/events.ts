@@ -27,7 +27,7 @@ export async function followProgress<T extends { readonly state: string } = Prog
       if (last !== '') headers.set('Last-Event-ID', last);
       const response = await service.request(`${path}/events`, { headers, cache: 'no-store', signal });
       const [parser, text] = [new EventParser(), new TextDecoder()];
-      for await (const piece of piecesOf(response)) {
+      for await (const piece of piecesOf(response, signal)) {
         for (const event of parser.push(text.decode(piece, { stream: true }))) {
           backoff.reset();
           last = event.id || last;

@@ -220,7 +220,7 @@ export class LiveCapture implements SessionCapture {
         const reader = new CageRecordReader(this.static.rowsPerFrame);
         let received = 0;
         const response = await this.#service.request(path, { headers, cache: 'no-store', signal });
-        for await (const piece of piecesOf(response)) {
+        for await (const piece of piecesOf(response, signal)) {
           this.#follower.bytes.add(piece.length);
           for (const { frame, rows } of reader.push(piece)) {
             if (frame < first || frame >= first + count)

@@ -121,7 +121,7 @@ export class LiveFollower {
     void this.#lookOn(left, AbortSignal.any([either, looking.signal]));
     const reader = new CageRecordReader(this.rows);
     try {
-      for await (const piece of piecesOf(response)) {
+      for await (const piece of piecesOf(response, either)) {
         this.#backoff.reset();
         this.bytes.add(piece.length);
         for (const record of reader.push(piece)) this.#take(record);

@@ -1,5 +1,6 @@
 import { expect, test } from 'vitest';
-import { ServiceProblem, problemBehind, problemOf, sentenceOf } from './problem';
+import { ServiceProblem, isAbort, problemBehind, problemOf, sentenceOf } from './problem';
+import { piecesOf } from './service';
 
 function answer(status: number, body: unknown, headers: Record<string, string> = {}): Response {
   return new Response(JSON.stringify(body), {
@@ -47,4 +48,22 @@ test('answers_of_proxies_and_broken_networks_are_sentences_too', async () => {
   expect(sentenceOf(new Error('the file has no points'))).toBe('The file has no points.');
   expect(sentenceOf(new Error('walk.npy has 3 points'))).toBe('walk.npy has 3 points.');
   expect(sentenceOf(new ServiceProblem('unreachable', 0))).toContain('does not answer');
+});
+
+test('an_aborted_request_failed_for_the_reason_of_its_abort_whatever_the_browser_says', async () => {
+  const said = new DOMException('BodyStreamBuffer was aborted', 'AbortError');
+  const silent = new ServiceProblem('unreachable', 0);
+  expect(problemBehind(said, AbortSignal.abort(silent))).toBe(silent);
+  const late = AbortSignal.abort(new DOMException('signal timed out', 'TimeoutError'));
+  expect(problemBehind(said, late)).toMatchObject({ word: 'unreachable', passes: true });
+  expect(problemBehind(said, new AbortController().signal)).toBe(said);
+  expect(isAbort(problemBehind(said, AbortSignal.abort()))).toBe(true);
+
+  const left = new AbortController();
+  const body = new ReadableStream({
+    start: (stream) => left.signal.addEventListener('abort', () => stream.error(said)),
+  });
+  const read = piecesOf(new Response(body), left.signal).next();
+  left.abort(silent);
+  await expect(read).rejects.toBe(silent);
 });

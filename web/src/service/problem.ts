@@ -88,8 +88,13 @@ export function problemFrom(details: ProblemDetails, status = details.status ?? 
   return new ServiceProblem(word, status, details, retryAfter);
 }
 
-/** What a failed `fetch` or a broken stream means; errors that are problems already, and aborts, stay what they are. */
-export function problemBehind(error: unknown): Error {
+/**
+ * What a failed `fetch` or a broken stream means; errors that are problems already, and aborts, stay what they are.
+ *
+ * @param signal of the request. Where it was aborted its reason counts: browsers differ in the error that reading a body ends with then.
+ */
+export function problemBehind(failure: unknown, signal?: AbortSignal | null): Error {
+  const error: unknown = signal?.aborted ? signal.reason : failure;
   if (error instanceof ServiceProblem || isAbort(error)) return error as Error;
   // Browsers report every failure of the network as a TypeError without a stable text.
   if (error instanceof TypeError || error instanceof DOMException) return new ServiceProblem('unreachable', 0);

@@ -27,7 +27,7 @@ export function connect(service: Service, id: string): ContainerConnection {
   const stop = new AbortController();
   const path = `${sessionPath(id, 'capture.cager')}?follow=true`;
   async function* pieces(): AsyncGenerator<Uint8Array, void, undefined> {
-    yield* piecesOf(await service.request(path, { cache: 'no-store', signal: stop.signal }));
+    yield* piecesOf(await service.request(path, { cache: 'no-store', signal: stop.signal }), stop.signal);
   }
   return { begun: [], pieces: pieces(), stop };
 }

@@ -44,7 +44,7 @@ export class Service {
     try {
       response = await fetch(this.address(path), { ...init, headers });
     } catch (error) {
-      throw problemBehind(error);
+      throw problemBehind(error, init.signal);
     }
     if (response.ok) return response;
     const problem = await problemOf(response);
@@ -69,7 +69,7 @@ export class Service {
     try {
       return (await response.json()) as T;
     } catch (error) {
-      throw problemBehind(error);
+      throw problemBehind(error, init.signal);
     }
   }
 
@@ -116,7 +116,7 @@ export class Service {
       headers: { Accept: 'application/octet-stream' },
       signal: signal ?? null,
     });
-    return new Uint32Array(await bodyOf(response));
+    return new Uint32Array(await bodyOf(response, signal));
   }
 
   /**
@@ -140,7 +140,7 @@ export class Service {
         [filled, tag] = [0, response.headers.get('etag') ?? ''];
         bytes = new Uint8Array(4 * rows * columns);
       }
-      for await (const piece of piecesOf(response)) {
+      for await (const piece of piecesOf(response, signal)) {
         if (filled + piece.length > bytes.length) throw new Error('The service sent more coordinates than it said.');
         bytes.set(piece, filled);
         filled += piece.length;
@@ -173,17 +173,20 @@ export function sessionPath(id: string, below?: string): string {
   return below === undefined ? path : `${path}/${below}`;
 }
 
-/** The body of an answer. */
-export async function bodyOf(response: Response): Promise<ArrayBuffer> {
+/** The body of an answer to a request with this signal. */
+export async function bodyOf(response: Response, signal: AbortSignal | undefined): Promise<ArrayBuffer> {
   try {
     return await response.arrayBuffer();
   } catch (error) {
-    throw problemBehind(error);
+    throw problemBehind(error, signal);
   }
 }
 
-/** The pieces of a body as they arrive; what breaks off is a problem like any other. */
-export async function* piecesOf(response: Response): AsyncGenerator<Uint8Array, void, undefined> {
+/** The pieces of an answer's body as they arrive; what breaks off is a problem like any other, and an abort of the request's signal has its reason. */
+export async function* piecesOf(
+  response: Response,
+  signal: AbortSignal | undefined,
+): AsyncGenerator<Uint8Array, void, undefined> {
   const reader = response.body?.getReader();
   if (!reader) return;
   try {
@@ -193,7 +196,7 @@ export async function* piecesOf(response: Response): AsyncGenerator<Uint8Array, 
       yield value;
     }
   } catch (error) {
-    throw problemBehind(error);
+    throw problemBehind(error, signal);
   } finally {
     // Whoever stops reading ends the request; of a body that ended this does nothing.
     await reader.cancel().catch(() => undefined);

@@ -16,7 +16,7 @@ export async function downloadContainer(
   const total = Number(response.headers.get('content-length'));
   const pieces: BlobPart[] = [];
   let received = 0;
-  for await (const piece of piecesOf(response)) {
+  for await (const piece of piecesOf(response, undefined)) {
     pieces.push(piece as Uint8Array<ArrayBuffer>);
     received += piece.length;
     if (total > 0) onProgress(Math.min(1, received / total));

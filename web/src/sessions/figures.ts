@@ -162,7 +162,7 @@ async function readTail(service: Service, id: string, bytes: number): Promise<Ta
   const headers = { Range: `bytes=-${bytes}` };
   const response = await service.request(sessionPath(id, 'capture.cager'), { headers });
   const range = /^bytes (\d+)-\d+\/(\d+)$/.exec(response.headers.get('content-range') ?? '');
-  const body = new Uint8Array(await bodyOf(response));
+  const body = new Uint8Array(await bodyOf(response, undefined));
   const total = range ? Number(range[2]) : body.length;
   return { bytes: body, first: range ? Number(range[1]) : 0, total };
 }
