@@ -3,6 +3,7 @@
 //! Large products and solves are distributed over the current rayon pool in blocks of columns that depend on the shape alone, so that results are
 //! bit-identical for any number of threads; everything else is sequential unless noted.
 
+use crate::simd::zeros;
 use crate::svd::{Svd, svd};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::matmul::matmul;
@@ -15,17 +16,25 @@ const BLOCK_COLUMNS: usize = 192;
 /// Products and solves with fewer multiplications run as a single task.
 const PARALLEL_THRESHOLD: usize = 1 << 26;
 
-/// Pivoted rows of a tall matrix.
-pub(crate) struct PivotedRows {
-    /// Rows in pivot order, one per column.
-    pub(crate) rows: Vec<u32>,
+/// LU factors of a tall matrix, n × m.
+pub(crate) struct Pivoted<T> {
+    /// L below the diagonal, whose entries are one, and U above, n × m.
+    pub(crate) factors: Mat<T>,
+    /// The rows of the matrix in the order of those of L.
+    pub(crate) order: Vec<u32>,
     /// Smallest pivot relative to the largest, both absolute; NaN where a column vanished.
     pub(crate) smallest: f64,
 }
 
-/// LU with partial pivoting of an n × m matrix, n ≥ m, done in place; returns the rows chosen as pivots. Runs on the rayon pool, with bit-identical
-/// results for any number of threads.
-pub(crate) fn pivoted_rows<T: faer::traits::RealField + Copy + Into<f64>>(mut a: Mat<T>) -> PivotedRows {
+impl<T> Pivoted<T> {
+    /// The rows chosen as pivots, one per column.
+    pub(crate) fn rows(&self) -> &[u32] {
+        &self.order[..self.factors.ncols()]
+    }
+}
+
+/// LU with partial pivoting of an n × m matrix, n ≥ m, done in place. Runs on the rayon pool, with bit-identical results for any number of threads.
+pub(crate) fn pivoted<T: faer::traits::RealField + Copy + Into<f64>>(mut a: Mat<T>) -> Pivoted<T> {
     let (n, m) = a.shape();
     let mut forward = vec![0usize; n];
     let mut backward = vec![0usize; n];
@@ -44,7 +53,7 @@ pub(crate) fn pivoted_rows<T: faer::traits::RealField + Copy + Into<f64>>(mut a:
     let smallest = pivots.iter().fold(f64::INFINITY, |low, &p| if p < low { p } else { low });
     let largest = pivots.iter().copied().fold(0.0, f64::max);
     let smallest = if pivots.iter().any(|p| p.is_nan()) { f64::NAN } else { smallest / largest };
-    PivotedRows { rows: forward[..m].iter().map(|&r| r as u32).collect(), smallest }
+    Pivoted { factors: a, order: forward.into_iter().map(|r| r as u32).collect(), smallest }
 }
 
 /// Inverse of a square matrix, and the natural logarithm of its absolute determinant.
@@ -170,9 +179,36 @@ pub(crate) fn solve_lower(l: MatRef<'_, f64>, x: &mut Mat<f64>) {
     });
 }
 
+/// The inverse of an upper triangular R.
+pub(crate) fn upper_inverse(r: MatRef<'_, f64>) -> Mat<f64> {
+    let mut inverse = Mat::<f64>::identity(r.nrows(), r.nrows());
+    inverse.as_mut().par_col_chunks_mut(BLOCK_COLUMNS).enumerate().for_each(|(block, columns)| {
+        // Below them everything stays zero.
+        let rows = block * BLOCK_COLUMNS + columns.ncols();
+        let columns = columns.subrows_mut(0, rows);
+        faer::linalg::triangular_solve::solve_upper_triangular_in_place(
+            r.submatrix(0, 0, rows, rows),
+            columns,
+            Par::Seq,
+        );
+    });
+    inverse
+}
+
+/// The lower triangle of the square matrix `A · B`; zeros above it, but for squares on the diagonal.
+pub(crate) fn lower_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
+    let n = a.nrows();
+    let mut out = zeros(n, n);
+    out.as_mut().par_col_chunks_mut(BLOCK_COLUMNS).enumerate().for_each(|(block, columns)| {
+        let (first, count) = (block * BLOCK_COLUMNS, columns.ncols());
+        multiply(columns.subrows_mut(first, n - first), a.subrows(first, n - first), b.subcols(first, count));
+    });
+    out
+}
+
 /// `A · B`.
 pub(crate) fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
-    let mut out = Mat::zeros(a.nrows(), b.ncols());
+    let mut out = zeros(a.nrows(), b.ncols());
     if a.nrows() * a.ncols() * b.ncols() < PARALLEL_THRESHOLD || b.ncols() <= BLOCK_COLUMNS {
         multiply(out.as_mut(), a, b);
         return out;
@@ -190,8 +226,16 @@ pub(crate) fn multiply<T: faer::traits::ComplexField>(out: MatMut<'_, T>, a: Mat
 }
 
 /// The given rows of a matrix, in the given order.
-pub(crate) fn rows_of<T: Copy>(a: MatRef<'_, T>, rows: &[u32]) -> Mat<T> {
-    Mat::from_fn(rows.len(), a.ncols(), |i, j| a[(rows[i] as usize, j)])
+pub(crate) fn rows_of<T: Copy + Default + Send>(a: MatRef<'_, T>, rows: &[u32]) -> Mat<T> {
+    let mut out = zeros(rows.len(), a.ncols());
+    for j in 0..a.ncols() {
+        let to = out.col_as_slice_mut(j);
+        match a.col(j).try_as_col_major() {
+            Some(from) => to.iter_mut().zip(rows).for_each(|(x, &i)| *x = from.as_slice()[i as usize]),
+            None => to.iter_mut().zip(rows).for_each(|(x, &i)| *x = a[(i as usize, j)]),
+        }
+    }
+    out
 }
 
 /// Rows of products whose results must not depend on the width are padded to a multiple of this: at the edges of small matrices the kernels sum in

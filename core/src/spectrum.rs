@@ -57,7 +57,11 @@ pub(crate) fn deficient_basis(phi: MatRef<'_, f64>) -> Option<RowBasis> {
 
 impl RowBasis {
     /// Upper triangular R with `BᵀB = RᵀR`, so that `R Φ□` has the singular values and right vectors of `Φ`.
-    pub(crate) fn gram_factor(&self) -> Option<Mat<f64>> {
-        Some(dense::cholesky(self.handles.gram.clone())?.transpose().to_owned())
+    pub(crate) fn gram_factor(&self, phi: MatRef<'_, f64>) -> Option<Mat<f64>> {
+        let gram = match &self.handles.gram {
+            Some(gram) => gram.clone(),
+            None => maxvol::maxima_and_gram(phi, self.to_basis.as_ref(), f64::INFINITY).1,
+        };
+        Some(dense::cholesky(gram)?.transpose().to_owned())
     }
 }

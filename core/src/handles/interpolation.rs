@@ -6,24 +6,28 @@
 //! `N = B Ĝ + k Ω⁻¹ (I − B_S Ĝ)`, `Ĝ = (B_Sᵀ Ω⁻¹ B_S)⁻¹ B_Sᵀ Ω⁻¹`, `N B_S = B`,
 //!
 //! takes the place of the frame in least squares over all points. B is any basis of the columns of `Φ`, S are the samples, Ω is their covariance and
-//! k that of all points with them. Only `Bᵀ N`, r × K, is computed.
+//! k that of all points with them. N itself, n × K, is never computed.
 
 use super::farthest::morton_order;
 use crate::dense;
 use crate::mesh::{Point, bounds, diagonal};
-use crate::simd::{LANES, Lanes, multiversion};
-use faer::{Mat, MatRef};
+use crate::simd::{LANES, Lanes, multiversion, zeros};
+use faer::reborrow::{Reborrow, ReborrowMut};
+use faer::{Mat, MatMut, MatRef};
 use rayon::prelude::*;
 
 /// Support of the covariance, as a multiple of the fill distance.
 const SUPPORT: f64 = 6.0;
 /// Nugget: variance of the uncorrelated part of the residual relative to the smooth part. Keeps the system regular for coincident samples.
 const NUGGET: f64 = 1e-2;
-const BLOCK_ROWS: usize = 256;
-/// Typical number of samples within the support of a block.
-const NEAR_SAMPLES: usize = 512;
-/// Memory for partial sums, unless two of them already exceed it.
-const PARTS_BYTES: usize = 64 << 20;
+/// Points of one block, whose covariances are zero except with the samples near it.
+const BLOCK_ROWS: usize = 128;
+/// Blocks whose covariances are held at the same time.
+const BLOCKS_TOGETHER: usize = 64;
+/// Columns of one task of a product with the covariances, at the most.
+const MOST_COLUMNS: usize = 192;
+/// Samples of one task when covariances are computed.
+const TASK_SAMPLES: usize = 64;
 
 /// Covariance of residuals as a function of distance.
 #[derive(Clone, Copy)]
@@ -42,93 +46,95 @@ pub(crate) struct Samples<'a> {
     pub(crate) reach: f64,
 }
 
-/// A basis `L = wide · to_basis` of the columns of `Φ`, n × r, and its relation to the basis B that is the identity at the first r samples.
+/// Least squares over all points with a basis B of the columns of `Φ`, the identity at the first r samples, for some coefficients x of its solution.
 pub(crate) struct Drift<'a> {
-    /// n × m; L itself where `to_basis` is `None`.
+    /// A matrix L with the same columns' span, n × l.
     pub(crate) wide: MatRef<'a, f64>,
-    /// m × r.
-    pub(crate) to_basis: Option<MatRef<'a, f64>>,
-    /// B at the samples after the first r, (K − r) × r.
+    /// D: B at the samples after the first r, (K − r) × r.
     pub(crate) others: MatRef<'a, f64>,
-    /// `LᵀB`, r × r.
-    pub(crate) gram: MatRef<'a, f64>,
+    /// S: the coefficients x of B itself, x × r.
+    pub(crate) of_basis: MatRef<'a, f64>,
+    /// Takes `Lᵀ F` to the coefficients of the least squares solution for F: l × columns to x × columns.
+    pub(crate) least_squares: &'a dyn Fn(Mat<f64>) -> Mat<f64>,
 }
 
-/// `Lᵀ N`, r × K.
+/// The coefficients that least squares over all points gives for the prediction from the samples, transposed: K × x.
 ///
 /// With `B_S = [I; D]` the contrasts `W = [−D, I]` annihilate every cage deformation, and `N = [B, 0] + (k − B Ω₁) Wᵀ (W Ω Wᵀ)⁻¹ W` is the same
-/// prediction, from K − r equations; Ω₁ are the first r rows of Ω.
+/// prediction, from K − r equations; Ω₁ are the first r rows of Ω. The coefficients are `[S − Z D, Z]` with Z those of `(k − B Ω₁) Wᵀ (W Ω Wᵀ)⁻¹`.
 ///
 /// `None` where the factorisation fails.
 pub(crate) fn interpolated(samples: &Samples<'_>, drift: &Drift<'_>) -> Option<Mat<f64>> {
     let (p, r) = drift.others.shape();
-    let k = p + r;
+    let mut map = zeros(r + p, drift.of_basis.nrows());
+    map.as_mut().subrows_mut(0, r).copy_from(drift.of_basis.transpose());
     if p == 0 {
-        return Some(drift.gram.to_owned());
+        return Some(map);
     }
     // The fill distance is zero where every point coincides with a sample.
     let reach = samples.reach.max(1e-9 * diagonal(samples.points));
     let covariance = Covariance { inverse_support: 1.0 / (SUPPORT * reach) };
     let places: Vec<Point> = samples.rows.iter().map(|&i| samples.points[i as usize]).collect();
-    let mut rest = covariances(covariance, &places[r..], &places);
-    for i in 0..p {
-        rest[(i, r + i)] += NUGGET;
+    // W Ω, (K − r) × K; few pairs of samples lie within each other's support.
+    let mut contrasts = covariances(covariance, &places[r..], &places);
+    contrasts -= with_all_points(covariance, &places[..r], &places, drift.others.transpose().to_owned().as_ref());
+    for (contrasts, others) in contrasts.col_iter_mut().zip(drift.others.col_iter()) {
+        contrasts.iter_mut().zip(others.iter()).for_each(|(contrast, x)| *contrast -= NUGGET * x);
     }
-    // A Ω₁; few pairs of samples lie within each other's support.
-    let with_first = |a: MatRef<'_, f64>| {
-        let mut product = with_all_points(covariance, &places[..r], &places, a.transpose());
-        for j in 0..r {
-            for i in 0..a.nrows() {
-                product[(i, j)] += NUGGET * a[(i, j)];
-            }
-        }
-        product
-    };
+    for i in 0..p {
+        contrasts[(i, r + i)] += NUGGET;
+    }
+    let (first, others) = contrasts.as_ref().split_at_col(r);
     let cross = with_all_points(covariance, samples.points, &places, drift.wide);
-    let cross = drift.to_basis.map_or_else(|| cross.clone(), |t| dense::product(t.transpose(), cross.as_ref()));
-
-    let contrasts = |rows: Mat<f64>| {
-        let (left, right) = (rows.as_ref().subcols(0, r), rows.as_ref().subcols(r, p));
-        right - dense::product(left, drift.others.transpose())
-    };
-    let cross_contrasts = contrasts(cross - with_first(drift.gram));
-    let contrast_covariance = contrasts(rest - with_first(drift.others));
-    let weights = dense::solve_definite(contrast_covariance, cross_contrasts.transpose().to_owned())?;
-    let mut map = Mat::zeros(r, k);
-    map.as_mut().subcols_mut(0, r).copy_from(drift.gram - dense::product(weights.transpose(), drift.others));
-    map.as_mut().subcols_mut(r, p).copy_from(weights.transpose());
+    let (cross_first, cross_others) = cross.as_ref().split_at_col(r);
+    // Lᵀ k Wᵀ, and the coefficients of B Ω₁ Wᵀ.
+    let seen = (drift.least_squares)(difference(cross_others, dense::product(cross_first, drift.others.transpose())));
+    let right = difference(seen.transpose(), dense::product(first, drift.of_basis.transpose()));
+    let covariance_of_contrasts = difference(others, dense::lower_product(first, drift.others.transpose()));
+    let weights = dense::solve_definite(covariance_of_contrasts, right)?;
+    map.as_mut().subrows_mut(r, p).copy_from(&weights);
+    let (mut of_first, weights) = map.as_mut().split_at_row_mut(r);
+    of_first -= dense::product(drift.others.transpose(), weights.as_ref());
     Some(map)
+}
+
+/// `A − B`, in the place of B.
+fn difference(a: MatRef<'_, f64>, mut b: Mat<f64>) -> Mat<f64> {
+    faer::zip!(&mut b, a).for_each(|faer::unzip!(b, a)| *b = a - *b);
+    b
 }
 
 /// `wideᵀ k`, columns of `wide` × K, with the covariance k of `points` (all, or some samples) with the samples. They are taken in blocks along a
 /// space-filling curve, each with the samples within its support, and summed in that order, so that the result does not depend on the threads.
 fn with_all_points(covariance: Covariance, points: &[Point], samples: &[Point], wide: MatRef<'_, f64>) -> Mat<f64> {
     let m = wide.ncols();
-    let mut sum = Mat::zeros(m, samples.len());
+    let columns = (m / 16).next_multiple_of(LANES).clamp(LANES, MOST_COLUMNS);
+    let mut sum = zeros(m, samples.len());
     let order = morton_order(points);
     let blocks: Vec<&[u32]> = order.chunks(BLOCK_ROWS).collect();
-    let together = (PARTS_BYTES / (8 * m * samples.len().min(NEAR_SAMPLES))).clamp(2, 64);
-    for blocks in blocks.chunks(together) {
-        let parts: Vec<(Vec<usize>, Mat<f64>)> = blocks
+    for blocks in blocks.chunks(BLOCKS_TOGETHER) {
+        let weights: Vec<(Vec<usize>, Mat<f64>)> = blocks
             .par_iter()
             .map(|block| {
                 let own: Vec<Point> = block.iter().map(|&i| points[i as usize]).collect();
                 let near = covariance.within_support(&own, samples);
                 let places: Vec<Point> = near.iter().map(|&j| samples[j]).collect();
                 let weights = covariances(covariance, &own, &places);
-                let rows = dense::rows_of(wide, block);
-                let mut part = Mat::zeros(m, near.len());
-                dense::multiply(part.as_mut(), rows.transpose(), weights.as_ref());
-                (near, part)
+                (near, weights)
             })
             .collect();
-        for (near, part) in &parts {
-            for (k, &j) in near.iter().enumerate() {
-                for (sum, x) in sum.col_mut(j).iter_mut().zip(part.col(k).iter()) {
-                    *sum += x;
+        sum.as_mut().par_row_chunks_mut(columns).enumerate().for_each_init(Vec::new, |part, (chunk, mut sum)| {
+            let wide = wide.subcols(chunk * columns, sum.nrows());
+            for (block, (near, weights)) in blocks.iter().zip(&weights) {
+                let rows = dense::rows_of(wide, block);
+                part.resize(sum.nrows() * near.len(), 0.0);
+                let mut part = MatMut::from_column_major_slice_mut(part, sum.nrows(), near.len());
+                dense::multiply(part.rb_mut(), rows.transpose(), weights.as_ref());
+                for (part, &j) in part.rb().col_iter().zip(near) {
+                    sum.rb_mut().col_mut(j).iter_mut().zip(part.iter()).for_each(|(sum, x)| *sum += x);
                 }
             }
-        }
+        });
     }
     sum
 }
@@ -152,14 +158,18 @@ fn covariances(covariance: Covariance, points: &[Point], samples: &[Point]) -> M
             places[i / LANES][k].0[i % LANES] = p[k];
         }
     }
-    let mut out = Mat::zeros(points.len(), samples.len());
-    let mut column = vec![Lanes::ZERO; places.len()];
-    for (j, sample) in samples.iter().enumerate() {
-        fill(&places, sample, covariance.inverse_support, &mut column);
-        for (out, value) in out.col_as_slice_mut(j).iter_mut().zip(column.iter().flat_map(|group| &group.0)) {
-            *out = *value;
-        }
-    }
+    let mut out = zeros(points.len(), samples.len());
+    out.as_mut().par_col_chunks_mut(TASK_SAMPLES).zip(samples.par_chunks(TASK_SAMPLES)).for_each(
+        |(columns, samples)| {
+            let mut column = vec![Lanes::ZERO; places.len()];
+            for (out, sample) in columns.col_iter_mut().zip(samples) {
+                fill(&places, sample, covariance.inverse_support, &mut column);
+                for (out, value) in out.iter_mut().zip(column.iter().flat_map(|group| &group.0)) {
+                    *out = *value;
+                }
+            }
+        },
+    );
     out
 }
 

@@ -119,10 +119,10 @@ impl Analysis {
 
         let clock = Instant::now();
         preparing.next("singular values")?;
-        let mut spectra = Spectra::of(&basis, required)?;
+        let mut spectra = Spectra::of(phi.as_ref(), &basis, required)?;
         if basis.rank == m && spectra.full_ends[2] <= RANK_TOLERANCE * spectra.full_ends[0] {
             basis = deficient_basis(phi.as_ref()).ok_or(no_handles)?;
-            spectra = Spectra::of(&basis, required)?;
+            spectra = Spectra::of(phi.as_ref(), &basis, required)?;
         }
         let rank = basis.rank;
         let preparation = Preparation {

@@ -45,11 +45,12 @@ impl From<Solver> for FactoredInversion {
 
 impl FactoredInversion {
     pub(super) fn new(handle_system: &HandleSystem<'_>, map: &SpectralMap, target: RegularizationTarget) -> Self {
-        let (m, r) = map.data.shape();
-        let is_scaled = |&i: &usize| i < r && (0..r).all(|j| i == j || map.data[(i, j)] == 0.0);
+        let data = map.data.matrix();
+        let (m, r) = data.shape();
+        let is_scaled = |&i: &usize| i < r && (0..r).all(|j| i == j || data[(i, j)] == 0.0);
         let low = (0..m).take_while(is_scaled).count();
-        let scales = (0..low).map(|i| map.data[(i, i)]).collect();
-        let mixed = map.data.subrows(low, m - low).to_owned();
+        let scales = (0..low).map(|i| data[(i, i)]).collect();
+        let mixed = data.subrows(low, m - low).to_owned();
         let mut factors = Factors { scales, mixed, missing: vec![0.0; m], target };
         let ones = Mat::from_fn(handle_system.rows_read(), 1, |_, _| 1.0);
         let sums = factors.cages(

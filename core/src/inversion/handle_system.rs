@@ -63,7 +63,7 @@ impl<'a> HandleSystem<'a> {
         let clock = Instant::now();
         let analysis = self.analysis;
         let (map, target, consistent) = self.parts(options, term)?;
-        let operator = self.decomposition.operator(analysis.phi.as_ref(), map.data.as_ref());
+        let operator = self.decomposition.operator(analysis.phi.as_ref(), &map.data);
         let operator = padded_to_tiles(with_unit_row_sums(operator, analysis.decoder.positions()));
         let (handles, reads_all) = self.points_read();
         let mut preparation = analysis.preparation.clone();

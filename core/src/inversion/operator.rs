@@ -8,6 +8,7 @@ use crate::handles::farthest::farthest_points;
 use crate::handles::interpolation::{Drift, Samples, interpolated};
 use crate::handles::rectangular::rectangular_rows;
 use crate::mesh::Point;
+use crate::regularize::DataMap;
 use crate::simd::zeros;
 use crate::spectrum::{RANK_TOLERANCE, RowBasis};
 use crate::svd::{self, LastDirections, Svd};
@@ -41,7 +42,7 @@ impl Directions {
 }
 
 /// A choice of handles with the decomposition of what is inverted: `Uᵀ` as a matrix on the rows read, Σ and V. Where only the last directions are
-/// known, `Qᵀ` for an orthonormal basis Q of its columns takes the place of `Uᵀ`, and the identity that of V.
+/// known, the inversion without a term takes the place of `Uᵀ`, and the identity that of V.
 pub(super) struct Decomposition {
     /// The rows read; where every point is read, those of maximum volume.
     pub(super) handles: Vec<u32>,
@@ -57,16 +58,16 @@ pub(super) struct Decomposition {
 
 /// A matrix L with `Uᵀ H = Lᵀ H`, explicit or in factors.
 enum LeftFactor {
-    /// The identity.
-    Identity,
     /// L, one row per row read × r.
     Rows(Mat<f64>),
-    /// `L = Φ T R⁻¹ U`: U, r × r, or the identity; R, here the factor of [`RowBasis::gram_factor`]; and T = `to_basis`, m × r.
-    Implicit { u: Option<Mat<f64>>, factor: Mat<f64>, to_basis: Mat<f64> },
+    /// `L = Φ T R⁻¹ U`: U, r × r; R, the factor of [`RowBasis::gram_factor`]; and T = `to_basis`, m × r.
+    Implicit { u: Mat<f64>, factor: Mat<f64>, to_basis: Mat<f64> },
+    /// `L = Φ (RᵀR)⁻¹`: R with `RᵀR = ΦᵀΦ`.
+    Normal(Mat<f64>),
 }
 
 /// Condition number of `Φ` up to which the rounding of `Φ□⁻¹` in B is negligible for least squares over all points.
-pub(super) const GRAM_IS_SAFE: f64 = 1e6;
+const GRAM_IS_SAFE: f64 = 1e6;
 
 impl Decomposition {
     /// Decomposes the system of a choice of handles.
@@ -86,7 +87,7 @@ impl Decomposition {
                         handles: basis.handles.rows.clone(),
                         reads_all: false,
                         rows: basis.rank,
-                        left: LeftFactor::Identity,
+                        left: LeftFactor::Rows(basis.handles.inverse.transpose().to_owned()),
                         rank: basis.rank,
                         directions: Directions::Last(last.clone()),
                         condition: first / smallest,
@@ -123,26 +124,21 @@ impl Decomposition {
 
     fn of_all(phi: MatRef<'_, f64>, basis: &RowBasis, spectra: &Spectra) -> Result<Self, PrepareError> {
         let rank = basis.rank;
-        let implicit = |u: Option<Mat<f64>>| {
-            let factor = basis.gram_factor().ok_or(failed("factorisation of the handles"))?;
-            Ok::<_, PrepareError>(LeftFactor::Implicit { u, factor, to_basis: basis.to_basis.clone() })
-        };
         let (left, directions) = match whole(phi, rank, spectra)? {
             FullSvd::Direct(Svd { u, sigma, v }) => {
                 (LeftFactor::Rows(u.subcols(0, rank).to_owned()), Directions::All { sigma, v })
             }
             FullSvd::Compressed(Svd { u, sigma, v }) => {
-                let directions = Directions::All { sigma: sigma.clone(), v: v.clone() };
-                (implicit(Some(u.subcols(0, rank).to_owned()))?, directions)
+                let (u, factor) = (u.subcols(0, rank).to_owned(), spectra.gram_factor.clone());
+                let factor = factor.ok_or(failed("factorisation of the handles"))?;
+                let left = LeftFactor::Implicit { u, factor, to_basis: basis.to_basis.clone() };
+                (left, Directions::All { sigma: sigma.clone(), v: v.clone() })
             }
-            FullSvd::Last(last) => (implicit(None)?, Directions::Last(last.clone())),
+            FullSvd::Last(last, factor) => (LeftFactor::Normal(factor.to_owned()), Directions::Last(last.clone())),
         };
         let [first, last] = match spectra.handles_ends {
             // Not computed with the other decompositions.
-            [first, _] if first.is_nan() => {
-                let m = phi.ncols();
-                svd::ends(Mat::identity(m, m).as_ref(), basis.square.as_ref(), basis.handles.inverse.as_ref())
-            }
+            [first, _] if first.is_nan() => svd::ends(None, basis.square.as_ref(), basis.handles.inverse.as_ref()),
             known => known,
         };
         let condition = first / last;
@@ -163,55 +159,63 @@ impl Decomposition {
         let samples = Samples { points, rows: &handles, reach };
         let (first, others) = handles.split_at(rank);
         let full = whole(phi, rank, spectra)?;
-        let (map, others) = if let FullSvd::Direct(svd) = &full {
-            let u = svd.u.as_ref().subcols(0, rank);
-            let (inverse, _) = dense::inverse(dense::rows_of(u, first).as_ref());
-            let others = dense::product(dense::rows_of(u, others).as_ref(), inverse.as_ref());
-            let drift = Drift { wide: u, to_basis: None, others: others.as_ref(), gram: inverse.as_ref() };
-            (interpolated(&samples, &drift), others)
-        } else {
-            let (to_basis, gram) = (basis.to_basis.as_ref(), basis.handles.gram.as_ref());
-            let others = dense::product(dense::rows_of(phi, others).as_ref(), to_basis);
-            let drift = Drift { wide: phi, to_basis: Some(to_basis), others: others.as_ref(), gram };
-            (interpolated(&samples, &drift), others)
+        let interpolate = |wide, others: MatRef<'_, f64>, of_basis, least_squares: &dyn Fn(Mat<f64>) -> Mat<f64>| {
+            let left = interpolated(&samples, &Drift { wide, others, of_basis, least_squares });
+            left.ok_or(failed("interpolation between the handles"))
         };
-
-        let mut map = map.ok_or(failed("interpolation between the handles"))?;
-        let factor = || basis.gram_factor().ok_or(failed("factorisation of the handles"));
-        let directions = match full {
-            FullSvd::Direct(Svd { sigma, v, .. }) => Directions::All { sigma, v },
-            // Uᵀ N = (R⁻¹ U')ᵀ Bᵀ N
-            FullSvd::Compressed(Svd { u, sigma, v }) => {
-                let mut left = u.subcols(0, rank).to_owned();
-                dense::solve_upper(factor()?.as_ref(), &mut left);
-                map = dense::product(left.transpose(), map.as_ref());
-                Directions::All { sigma: sigma.clone(), v: v.clone() }
+        let of_others = || dense::product(dense::rows_of(phi, others).as_ref(), basis.to_basis.as_ref());
+        let (left, others, directions) = match full {
+            FullSvd::Direct(Svd { u, sigma, v }) => {
+                let u = u.as_ref().subcols(0, rank);
+                let (inverse, _) = dense::inverse(dense::rows_of(u, first).as_ref());
+                let others = dense::product(dense::rows_of(u, others).as_ref(), inverse.as_ref());
+                let left = interpolate(u, others.as_ref(), inverse.as_ref(), &|seen| seen)?;
+                (left, others, Directions::All { sigma, v })
             }
-            FullSvd::Last(last) => {
-                dense::solve_lower(factor()?.transpose(), &mut map);
-                Directions::Last(last.clone())
+            // Coefficients in the left singular vectors B R⁻¹ U' of Φ.
+            FullSvd::Compressed(Svd { u, sigma, v }) => {
+                let others = of_others();
+                let factor = spectra.gram_factor.as_ref().ok_or(failed("factorisation of the handles"))?;
+                let u = u.as_ref().subcols(0, rank);
+                let of_basis = dense::product(u.transpose(), factor.as_ref());
+                let least_squares = |seen: Mat<f64>| {
+                    let mut of_basis = dense::product(basis.to_basis.transpose(), seen.as_ref());
+                    dense::solve_lower(factor.transpose(), &mut of_basis);
+                    dense::product(u.transpose(), of_basis.as_ref())
+                };
+                let left = interpolate(phi, others.as_ref(), of_basis.as_ref(), &least_squares)?;
+                (left, others, Directions::All { sigma: sigma.clone(), v: v.clone() })
+            }
+            FullSvd::Last(last, factor) => {
+                let others = of_others();
+                let least_squares = |seen| normal_solution(factor, seen);
+                let left = interpolate(phi, others.as_ref(), basis.to_basis.as_ref(), &least_squares)?;
+                (left, others, Directions::Last(last.clone()))
             }
         };
         let condition = condition_of(phi, &handles, others.as_ref(), basis)
             .ok_or(failed("singular value decomposition of the rows"))?;
-        let left = LeftFactor::Rows(map.transpose().to_owned());
+        let left = LeftFactor::Rows(left);
         Ok(Self { handles, reads_all: false, rows: phi.nrows(), left, rank, directions, condition })
     }
 
     /// `Rᵀ`, one row per row read × m, for `q = data · Uᵀ H`.
-    pub(super) fn operator(&self, phi: MatRef<'_, f64>, data: MatRef<'_, f64>) -> Mat<f64> {
-        let to_cage = self.directions.to_cage(data);
+    pub(super) fn operator(&self, phi: MatRef<'_, f64>, data: &DataMap) -> Mat<f64> {
+        if let (LeftFactor::Rows(left), DataMap::Update(out, of)) = (&self.left, data) {
+            let of_left = dense::product(left.as_ref(), of.transpose());
+            return dense::product(of_left.as_ref(), out.transpose()) + left;
+        }
+        let to_cage = self.directions.to_cage(data.matrix().as_ref());
         match &self.left {
-            LeftFactor::Identity => to_cage.transpose().to_owned(),
             LeftFactor::Rows(left) if self.reads_all => tall_product(left.as_ref(), to_cage.transpose()),
             LeftFactor::Rows(left) => dense::product(left.as_ref(), to_cage.transpose()),
             LeftFactor::Implicit { u, factor, to_basis } => {
-                let mut inverse = match u {
-                    Some(u) => dense::product(u.as_ref(), to_cage.transpose()),
-                    None => to_cage.transpose().to_owned(),
-                };
+                let mut inverse = dense::product(u.as_ref(), to_cage.transpose());
                 dense::solve_upper(factor.as_ref(), &mut inverse);
                 tall_product(phi, dense::product(to_basis.as_ref(), inverse.as_ref()).as_ref())
+            }
+            LeftFactor::Normal(factor) => {
+                tall_product(phi, normal_solution(factor.as_ref(), to_cage.transpose().to_owned()).as_ref())
             }
         }
     }
@@ -219,18 +223,22 @@ impl Decomposition {
     /// `Uᵀ H` of the rows read H, K × columns.
     pub(super) fn project(&self, phi: MatRef<'_, f64>, read: MatRef<'_, f64>) -> Mat<f64> {
         match &self.left {
-            LeftFactor::Identity => read.to_owned(),
             LeftFactor::Rows(left) => dense::product(left.transpose(), read),
             LeftFactor::Implicit { u, factor, to_basis } => {
                 let mut of_basis = dense::product(to_basis.transpose(), dense::product(phi.transpose(), read).as_ref());
                 dense::solve_lower(factor.transpose(), &mut of_basis);
-                match u {
-                    Some(u) => dense::product(u.transpose(), of_basis.as_ref()),
-                    None => of_basis,
-                }
+                dense::product(u.transpose(), of_basis.as_ref())
             }
+            LeftFactor::Normal(factor) => normal_solution(factor.as_ref(), dense::product(phi.transpose(), read)),
         }
     }
+}
+
+/// `(RᵀR)⁻¹ X`.
+fn normal_solution(factor: MatRef<'_, f64>, mut x: Mat<f64>) -> Mat<f64> {
+    dense::solve_lower(factor.transpose(), &mut x);
+    dense::solve_upper(factor, &mut x);
+    x
 }
 
 /// The decomposition of all of `Φ`.
@@ -239,14 +247,14 @@ enum FullSvd<'a> {
     Direct(Svd),
     /// Of `R Φ□`: `Φ = B Φ□` and `BᵀB = RᵀR`, so that the left singular vectors of `Φ` are `B R⁻¹ U`.
     Compressed(&'a Svd),
-    /// Of `R Φ□`, the last directions alone.
-    Last(&'a LastDirections),
+    /// The last directions alone, with an upper triangular R for which `RᵀR = ΦᵀΦ`.
+    Last(&'a LastDirections, MatRef<'a, f64>),
 }
 
 fn whole<'a>(phi: MatRef<'_, f64>, rank: usize, spectra: &'a Spectra) -> Result<FullSvd<'a>, PrepareError> {
     let what = "singular value decomposition of the coordinates";
-    if let Some(last) = &spectra.last {
-        return Ok(FullSvd::Last(last));
+    if let (Some(last), Some(factor)) = (&spectra.last, &spectra.normal_factor) {
+        return Ok(FullSvd::Last(last, factor.as_ref()));
     }
     match &spectra.full {
         Some(full) if full.sigma[0] <= GRAM_IS_SAFE * full.sigma[rank - 1] => Ok(FullSvd::Compressed(full)),
@@ -258,8 +266,8 @@ fn whole<'a>(phi: MatRef<'_, f64>, rank: usize, spectra: &'a Spectra) -> Result<
 fn condition_of(phi: MatRef<'_, f64>, handles: &[u32], others: MatRef<'_, f64>, basis: &RowBasis) -> Option<f64> {
     let (m, rank) = (phi.ncols(), basis.rank);
     if m >= ENDS_ALONE && rank == m {
-        let factor = dense::cholesky(Mat::<f64>::identity(m, m) + dense::product(others.transpose(), others))?;
-        let [first, last] = svd::ends(factor.transpose(), basis.square.as_ref(), basis.handles.inverse.as_ref());
+        let factor = dense::cholesky(Mat::<f64>::identity(m, m) + dense::lower_product(others.transpose(), others))?;
+        let [first, last] = svd::ends(Some(factor.transpose()), basis.square.as_ref(), basis.handles.inverse.as_ref());
         return Some(first / last);
     }
     let values = svd::singular_values(dense::upper_factor(dense::rows_of(phi, handles)).as_ref())?;

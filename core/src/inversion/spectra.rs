@@ -1,13 +1,13 @@
 //! The decompositions that an analysis computes, and which of them its solvers need.
 
-use super::operator::{GRAM_IS_SAFE, failed};
+use super::operator::failed;
 use super::{PrepareError, SolverOptions};
 use crate::dense;
 use crate::handles::Handles;
 use crate::regularize::{Regularizer, WEAK_SINGULAR_VALUE};
 use crate::spectrum::RowBasis;
 use crate::svd::{self, LastDirections, Svd};
-use faer::Mat;
+use faer::{Mat, MatRef};
 
 /// Which decompositions to compute.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -52,6 +52,9 @@ const LAST_ALONE: usize = 1024;
 /// They are found on their own only where they are at most this part of all.
 const MOST_LAST: usize = 32;
 
+/// Condition number of `Φ` up to which its normal equations keep ten of sixteen digits, or, of the direction that the points determine least, six.
+const NORMAL_IS_SAFE: f64 = 1e5;
+
 /// Decompositions of the handles of maximum volume and of all points.
 #[derive(Clone)]
 pub(super) struct Spectra {
@@ -63,32 +66,48 @@ pub(super) struct Spectra {
     pub(super) full_sigma: Vec<f64>,
     /// The largest of them, the smallest over the rank, and the last of all.
     pub(super) full_ends: [f64; 3],
-    /// Of `R Φ□`, with R from [`RowBasis::gram_factor`]; only where least squares sums over all points.
+    /// R from [`RowBasis::gram_factor`], except where the normal equations take its place.
+    pub(super) gram_factor: Option<Mat<f64>>,
+    /// Of `R Φ□`; only where least squares sums over all points.
     pub(super) full: Option<Svd>,
-    /// The last directions of what is inverted, `Φ□` or `R Φ□`, in place of its whole decomposition.
+    /// The last directions of what is inverted, `Φ□` or `Φ`, in place of its whole decomposition.
     pub(super) last: Option<LastDirections>,
+    /// Upper triangular R with `ΦᵀΦ = RᵀR`, where the last directions are those of `Φ`.
+    pub(super) normal_factor: Option<Mat<f64>>,
 }
 
 impl Spectra {
-    pub(super) fn of(basis: &RowBasis, required: RequiredDecompositions) -> Result<Self, PrepareError> {
+    pub(super) fn of(
+        phi: MatRef<'_, f64>,
+        basis: &RowBasis,
+        required: RequiredDecompositions,
+    ) -> Result<Self, PrepareError> {
         let m = basis.square.ncols();
         let (rank, large) = (basis.rank, m >= ENDS_ALONE && basis.rank == m);
         let no_spectrum = failed("singular value decomposition of the coordinates");
         let whole_frames = matches!(required.handles(), None | Some(Handles::All | Handles::Spread { .. }));
-        let factor = basis.gram_factor();
         let inverse = basis.handles.inverse.as_ref();
-        let last = match required.last(m).filter(|_| large) {
-            Some(count) => last_directions(basis, factor.as_ref().filter(|_| whole_frames), count),
+        let count_of_last = required.last(m).filter(|_| large);
+        let normal = count_of_last.and_then(|_| Normal::of(phi));
+        let last = match count_of_last {
+            Some(count) if whole_frames => normal.as_ref().and_then(|normal| normal.last_directions(count)),
+            Some(count) => enough(svd::last_directions(inverse, svd::first_value(&[basis.square.as_ref()]), count)),
             None => None,
         };
+        let ends_of_all = match &last {
+            Some(last) if whole_frames => Some(last.ends()),
+            Some(_) => normal.as_ref().and_then(Normal::ends),
+            None => None,
+        };
+        let gram_factor = if ends_of_all.is_some() { None } else { basis.gram_factor(phi) };
         let vectors_of_handles = !large || last.is_none() && matches!(required.handles(), None | Some(Handles::MaxVol));
         let values_of_all = !large || required == RequiredDecompositions::Everything;
         let vectors_of_all = whole_frames && last.is_none();
         let whole = || {
-            let factor = factor.as_ref()?;
             if !vectors_of_all && !values_of_all {
                 return Some((Vec::new(), None));
             }
+            let factor = gram_factor.as_ref()?;
             let compressed = dense::product(factor.as_ref(), basis.square.as_ref());
             if vectors_of_all {
                 svd::svd(compressed.as_ref()).map(|svd| (svd.sigma.clone(), Some(svd)))
@@ -103,40 +122,57 @@ impl Spectra {
             None => None,
         };
         let (full_sigma, full) = full.ok_or(no_spectrum.clone())?;
-        let ends_of_last = last.as_ref().map(LastDirections::ends);
-        let full_ends = match (full_sigma.last(), ends_of_last) {
+        let full_ends = match (full_sigma.last(), ends_of_all) {
             (Some(&last), _) => [full_sigma[0], full_sigma[rank - 1], last],
-            (None, Some([first, last])) if whole_frames => [first, last, last],
+            (None, Some([first, last])) => [first, last, last],
             _ => {
-                let [first, last] = svd::ends(factor.ok_or(no_spectrum)?.as_ref(), basis.square.as_ref(), inverse);
+                let factor = gram_factor.as_ref().ok_or(no_spectrum)?;
+                let [first, last] = svd::ends(Some(factor.as_ref()), basis.square.as_ref(), inverse);
                 [first, last, last]
             }
         };
         let handles_ends = match (&handles, required.handles()) {
             (Some(svd), _) => [svd.sigma[0], svd.sigma[rank - 1]],
-            (None, Some(Handles::MaxVol)) => ends_of_last.unwrap_or([f64::NAN; 2]),
-            (None, Some(Handles::All)) => svd::ends(Mat::identity(m, m).as_ref(), basis.square.as_ref(), inverse),
+            (None, Some(Handles::MaxVol)) => last.as_ref().map_or([f64::NAN; 2], LastDirections::ends),
+            (None, Some(Handles::All)) => svd::ends(None, basis.square.as_ref(), inverse),
             (None, _) => [f64::NAN; 2],
         };
-        Ok(Self { handles, handles_ends, full_sigma, full_ends, full, last })
+        let normal_factor = normal.filter(|_| whole_frames && last.is_some()).map(|normal| normal.factor);
+        Ok(Self { handles, handles_ends, full_sigma, full_ends, gram_factor, full, last, normal_factor })
     }
 }
 
-/// The last directions of `R Φ□`, or without R of `Φ□`; `None` where they do not converge, or where they would not be enough: where more
-/// directions are weak, or where [`GRAM_IS_SAFE`] is exceeded.
-fn last_directions(basis: &RowBasis, factor: Option<&Mat<f64>>, count: usize) -> Option<LastDirections> {
-    let (square, mut inverse) = (basis.square.as_ref(), basis.handles.inverse.clone());
-    let first = match factor {
-        // X R = Φ□⁻¹, transposed.
-        Some(factor) => {
-            let mut transposed = inverse.transpose().to_owned();
-            dense::solve_lower(factor.transpose(), &mut transposed);
-            inverse = transposed.transpose().to_owned();
-            svd::first_value(factor.as_ref(), square)
-        }
-        None => svd::first_value(Mat::identity(square.ncols(), square.ncols()).as_ref(), square),
-    };
-    let last = svd::last_directions(inverse, first, count)?;
-    let is_safe = factor.is_none() || first <= GRAM_IS_SAFE * last.sigma[count - 1];
-    (is_safe && last.sigma[0] >= WEAK_SINGULAR_VALUE * first).then_some(last)
+/// The normal equations of `Φ`.
+struct Normal {
+    /// Upper triangular R with `ΦᵀΦ = RᵀR`, which has the singular values and right vectors of `Φ`.
+    factor: Mat<f64>,
+    inverse: Mat<f64>,
+}
+
+impl Normal {
+    fn of(phi: MatRef<'_, f64>) -> Option<Self> {
+        let factor = dense::cholesky(dense::lower_product(phi.transpose(), phi))?.transpose().to_owned();
+        let inverse = dense::upper_inverse(factor.as_ref());
+        Some(Self { factor, inverse })
+    }
+
+    /// Largest and smallest singular value; `None` where [`NORMAL_IS_SAFE`] is exceeded.
+    fn ends(&self) -> Option<[f64; 2]> {
+        Some(svd::ends(None, self.factor.as_ref(), self.inverse.as_ref())).filter(is_safe)
+    }
+
+    /// `None` also where [`NORMAL_IS_SAFE`] is exceeded.
+    fn last_directions(&self, count: usize) -> Option<LastDirections> {
+        let first = svd::first_value(&[self.factor.as_ref()]);
+        enough(svd::last_directions(self.inverse.as_ref(), first, count)).filter(|last| is_safe(&last.ends()))
+    }
+}
+
+fn is_safe(&[first, last]: &[f64; 2]) -> bool {
+    first <= NORMAL_IS_SAFE * last
+}
+
+/// The last directions where they are all that a term acts on: where no more are weak.
+fn enough(last: Option<LastDirections>) -> Option<LastDirections> {
+    last.filter(|last| last.sigma[0] >= WEAK_SINGULAR_VALUE * last.first)
 }

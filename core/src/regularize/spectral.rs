@@ -22,12 +22,32 @@ pub(crate) struct RegularizationOperator {
     pub(crate) reference: Reference,
 }
 
-/// `q = data · (Uᵀ H) + target · C₀`.
+/// `q = data · x + target · C₀` for the coefficients `x = Uᵀ H` in the left singular vectors; of [`last_map`], for the cage x without a term.
 pub(crate) struct SpectralMap {
     /// m × r.
-    pub(crate) data: Mat<f64>,
+    pub(crate) data: DataMap,
     /// m × m; `None` where the term has no reference or regularises no direction.
     pub(crate) target: Option<Mat<f64>>,
+}
+
+/// A linear map of coefficients.
+pub(crate) enum DataMap {
+    /// As a matrix.
+    Matrix(Mat<f64>),
+    /// The identity plus the product of two matrices, m × s and s × m.
+    Update(Mat<f64>, Mat<f64>),
+}
+
+impl DataMap {
+    /// As a matrix.
+    pub(crate) fn matrix(&self) -> Mat<f64> {
+        match self {
+            Self::Matrix(map) => map.clone(),
+            Self::Update(left, right) => {
+                Mat::<f64>::identity(left.nrows(), left.nrows()) + dense::product(left.as_ref(), right.as_ref())
+            }
+        }
+    }
 }
 
 /// The map for a threshold s. `weight` multiplies the term beside a sum over all rows of A; for Tikhonov it is what is added to the
@@ -45,7 +65,7 @@ pub(crate) fn spectral_map(
     let null_dimension = m - r;
     let diagonal = |f: &dyn Fn(usize, f64) -> f64| {
         let data = Mat::from_fn(m, r, |i, j| if i == j { f(i, spectrum.sigma[i]) } else { 0.0 });
-        SpectralMap { data, target: None }
+        SpectralMap { data: DataMap::Matrix(data), target: None }
     };
     match regularizer {
         Regularizer::TruncatedSvd => Some(diagonal(&|k, sigma| if k < m - s { 1.0 / sigma } else { 0.0 })),
@@ -70,7 +90,7 @@ fn sub_spectral(spectrum: &Spectrum<'_>, s: usize, weight: f64) -> Option<Spectr
         data[(k, k)] = 1.0 / spectrum.sigma[k];
     }
     if s == 0 {
-        return Some(SpectralMap { data, target: None });
+        return Some(SpectralMap { data: DataMap::Matrix(data), target: None });
     }
     let delta_v = dense::product(spectrum.term.delta.as_ref(), spectrum.v);
     let (delta_low, delta_high) = (delta_v.as_ref().subcols(0, low), delta_v.as_ref().subcols(low, s));
@@ -91,11 +111,11 @@ fn sub_spectral(spectrum: &Spectrum<'_>, s: usize, weight: f64) -> Option<Spectr
         }
     }
     let target = target.map(|high| Mat::from_fn(m, m, |i, j| if i < low { 0.0 } else { high[(i - low, j)] }));
-    Some(SpectralMap { data, target })
+    Some(SpectralMap { data: DataMap::Matrix(data), target })
 }
 
-/// As [`spectral_map`] for a term that acts on the last s of the given directions, as a map to cages from an orthonormal basis of the columns
-/// of A: with `A = Q M` it is `C = data · (Qᵀ H) + target · C₀`. The others' part is `M⁻¹ (Qᵀ H)` without its component in them.
+/// As [`spectral_map`] for a term that acts on the last s of the given directions, as a map from cages without a term to cages with it: the others'
+/// part stays, and `U_highᵀ H` is `Σ_high V_highᵀ` times the cage.
 ///
 /// `None` where a factorisation fails.
 pub(crate) fn last_map(
@@ -104,26 +124,22 @@ pub(crate) fn last_map(
     s: usize,
     weight: f64,
 ) -> Option<SpectralMap> {
-    let mut data = last.inverse.clone();
-    if s == 0 {
-        return Some(SpectralMap { data, target: None });
-    }
     let skipped = last.sigma.len() - s;
-    let (u, v) = (last.u.as_ref().subcols(skipped, s), last.v.as_ref().subcols(skipped, s));
-    let sigma = &last.sigma[skipped..];
-    // V_highᵀ M⁻¹ = Σ_high⁻¹ U_highᵀ
-    let component = Mat::from_fn(s, u.nrows(), |i, j| u[(j, i)] / sigma[i]);
-    let delta_high = dense::product(term.delta.as_ref(), v);
-    let seen = dense::product(delta_high.transpose(), term.delta.as_ref());
-    let mut right = dense::product(seen.as_ref(), data.as_ref());
-    right -= dense::product(dense::product(seen.as_ref(), v).as_ref(), component.as_ref());
-    for (i, j) in (0..u.nrows()).flat_map(|j| (0..s).map(move |i| (i, j))) {
-        right[(i, j)] = sigma[i] * u[(j, i)] - weight * right[(i, j)];
+    let (sigma, v) = (&last.sigma[skipped..], last.v.as_ref().subcols(skipped, s));
+    let mut update = Mat::zeros(s, v.nrows());
+    let mut target = None;
+    if s > 0 {
+        let delta_high = dense::product(term.delta.as_ref(), v);
+        let seen = dense::product(delta_high.transpose(), term.delta.as_ref());
+        let mut right = dense::product(dense::product(seen.as_ref(), v).as_ref(), v.transpose());
+        for (i, j) in (0..v.nrows()).flat_map(|j| (0..s).map(move |i| (i, j))) {
+            right[(i, j)] = sigma[i] * sigma[i] * v[(j, i)] - weight * (seen[(i, j)] - right[(i, j)]);
+        }
+        let (high, of_reference) = place(delta_high.as_ref(), sigma, right, term, weight)?;
+        update = high - v.transpose();
+        target = of_reference.map(|high| dense::product(v, high.as_ref()));
     }
-    let (high, target) = place(delta_high.as_ref(), sigma, right, term, weight)?;
-    data += dense::product(v, (high - component).as_ref());
-    let target = target.map(|high| dense::product(v, high.as_ref()));
-    Some(SpectralMap { data, target })
+    Some(SpectralMap { data: DataMap::Update(v.to_owned(), update), target })
 }
 
 /// Minimises `w‖Δ V_high q_high − …‖² + ‖Σ_high q_high − …‖²` for the right-hand sides of the data, s columns of normal equations each, and for that of

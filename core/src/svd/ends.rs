@@ -10,25 +10,31 @@ const STEPS: usize = 240;
 const SETTLED: f64 = 1e-11;
 const UNCHANGED: usize = 4;
 
-/// Largest and smallest singular value of `R A` from the upper triangular R, m × m, and from A, m × m, with its inverse.
-pub(crate) fn ends(factor: MatRef<'_, f64>, a: MatRef<'_, f64>, inverse: MatRef<'_, f64>) -> [f64; 2] {
+/// Largest and smallest singular value of `R A` from the upper triangular R, m × m, the identity where it is left out, and from A, m × m, with its inverse.
+pub(crate) fn ends(factor: Option<MatRef<'_, f64>>, a: MatRef<'_, f64>, inverse: MatRef<'_, f64>) -> [f64; 2] {
     let last = || {
         largest(a.ncols(), |x| {
             let mut image = dense::product(inverse.transpose(), x);
-            dense::solve_lower(factor.transpose(), &mut image);
-            dense::solve_upper(factor, &mut image);
+            if let Some(factor) = factor {
+                dense::solve_lower(factor.transpose(), &mut image);
+                dense::solve_upper(factor, &mut image);
+            }
             dense::product(inverse, image.as_ref())
         })
     };
-    let (first, last) = rayon::join(|| first_value(factor, a), last);
+    let first = || match factor {
+        Some(factor) => first_value(&[a, factor]),
+        None => first_value(&[a]),
+    };
+    let (first, last) = rayon::join(first, last);
     [first, 1.0 / last.sqrt()]
 }
 
-/// Largest singular value of `R A`, both m × m.
-pub(crate) fn first_value(factor: MatRef<'_, f64>, a: MatRef<'_, f64>) -> f64 {
-    let squared = largest(a.ncols(), |x| {
-        let image = dense::product(factor, dense::product(a, x).as_ref());
-        dense::product(a.transpose(), dense::product(factor.transpose(), image.as_ref()).as_ref())
+/// Largest singular value of the product of these matrices, m × m, of which the first is multiplied by a vector first.
+pub(crate) fn first_value(factors: &[MatRef<'_, f64>]) -> f64 {
+    let squared = largest(factors[0].ncols(), |x| {
+        let image = factors.iter().fold(x.to_owned(), |x, a| dense::product(*a, x.as_ref()));
+        factors.iter().rev().fold(image, |x, a| dense::product(a.transpose(), x.as_ref()))
     });
     squared.sqrt()
 }
@@ -122,7 +128,7 @@ mod tests {
             });
             let inverse = dense::inverse(a.as_ref()).0;
             let all = singular_values(dense::product(factor.as_ref(), a.as_ref()).as_ref()).unwrap();
-            let [first, last] = ends(factor.as_ref(), a.as_ref(), inverse.as_ref());
+            let [first, last] = ends(Some(factor.as_ref()), a.as_ref(), inverse.as_ref());
             assert!((first / all[0] - 1.0).abs() < 1e-12, "{m}: {first} {}", all[0]);
             assert!((last / all[m - 1] - 1.0).abs() < 1e-9, "{m}: {last} {}", all[m - 1]);
         }

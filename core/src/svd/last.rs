@@ -16,13 +16,9 @@ const SETTLED: f64 = 1e-13;
 /// Directions of a new block shorter than this fraction of its longest lie in the space already.
 const DEPENDENT: f64 = 1e-10;
 
-/// The last singular values of `M`, `uᵀ M = σ vᵀ` to rounding.
+/// The last singular values of `M` with their right vectors.
 #[derive(Clone, Debug)]
 pub(crate) struct LastDirections {
-    /// `M⁻¹`, m × m.
-    pub(crate) inverse: Mat<f64>,
-    /// Left singular vectors, m × s.
-    pub(crate) u: Mat<f64>,
     /// Singular values, descending: s.
     pub(crate) sigma: Vec<f64>,
     /// Right singular vectors, m × s.
@@ -44,7 +40,7 @@ impl LastDirections {
 
     /// All singular values, descending, NaN between the first and the last s.
     pub(crate) fn values(&self) -> Vec<f64> {
-        let mut values = vec![f64::NAN; self.inverse.ncols() - self.sigma.len()];
+        let mut values = vec![f64::NAN; self.v.nrows() - self.sigma.len()];
         if let Some(first) = values.first_mut() {
             *first = self.first;
         }
@@ -54,7 +50,7 @@ impl LastDirections {
 }
 
 /// The last `count` singular values of M and their vectors, from `M⁻¹` and the first of the values. `None` where they do not converge.
-pub(crate) fn last_directions(inverse: Mat<f64>, first: f64, count: usize) -> Option<LastDirections> {
+pub(crate) fn last_directions(inverse: MatRef<'_, f64>, first: f64, count: usize) -> Option<LastDirections> {
     let m = inverse.ncols();
     let width = (count + MARGIN).min(m);
     let mut state = 0x9e37_79b9_7f4a_7c15u64;
@@ -82,13 +78,13 @@ pub(crate) fn last_directions(inverse: Mat<f64>, first: f64, count: usize) -> Op
         let settled = known.len() == count
             && known.iter().zip(values).all(|(before, now)| (before - now).abs() <= SETTLED * values[0]);
         if settled || space.ncols() == m {
-            let last = |a: MatRef<'_, f64>| Mat::from_fn(m, count, |i, j| a[(i, count - 1 - j)]);
             let v = dense::product(space.as_ref(), ritz.v.as_ref().subcols(0, count));
+            let v = Mat::from_fn(m, count, |i, j| v[(i, count - 1 - j)]);
             let sigma = values.iter().rev().map(|x| 1.0 / x).collect();
-            return Some(LastDirections { u: last(ritz.u.as_ref()), sigma, v: last(v.as_ref()), first, inverse });
+            return Some(LastDirections { sigma, v, first });
         }
         known = values.to_vec();
-        block = tall_product(inverse.as_ref(), image.as_ref());
+        block = tall_product(inverse, image.as_ref());
     }
     None
 }
@@ -114,22 +110,23 @@ mod tests {
             let (left, right) = (noise(7), noise(13));
             let scaled = Mat::from_fn(m, m, |i, k| left[(i, k)] * value(k));
             let a = dense::product(scaled.as_ref(), right.transpose());
-            let found = last_directions(dense::inverse(a.as_ref()).0, value(0), count).unwrap();
+            let found = last_directions(dense::inverse(a.as_ref()).0.as_ref(), value(0), count).unwrap();
             let wanted: Vec<f64> = (m - count..m).map(value).collect();
             for (x, y) in found.sigma.iter().zip(&wanted) {
                 assert!((x / y - 1.0).abs() < 1e-10, "{m} {count}: {x} {y}");
             }
-            let rows = dense::product(found.u.transpose(), a.as_ref());
-            for (k, &sigma) in found.sigma.iter().enumerate() {
-                for i in 0..m {
-                    assert!((rows[(k, i)] - sigma * found.v[(i, k)]).abs() < 1e-11, "{m} {count}");
-                }
+            let images = dense::product(a.as_ref(), found.v.as_ref());
+            let squares = dense::product(images.transpose(), images.as_ref());
+            for (i, j) in (0..count).flat_map(|i| (0..count).map(move |j| (i, j))) {
+                let expected = if i == j { found.sigma[i] * found.sigma[i] } else { 0.0 };
+                let off = (squares[(i, j)] - expected).abs() / (found.sigma[i] * found.sigma[j]);
+                assert!(off < 1e-9, "{m} {count}: {off:e}");
             }
             let unit = |a: &Mat<f64>| {
                 let gram = dense::product(a.transpose(), a.as_ref());
                 (0..count).all(|i| (0..count).all(|j| (gram[(i, j)] - f64::from(u8::from(i == j))).abs() < 1e-9))
             };
-            assert!(unit(&found.u) && unit(&found.v), "{m} {count}");
+            assert!(unit(&found.v), "{m} {count}");
         }
     }
 }

@@ -1,0 +1,172 @@
+//! Rows of maximum volume: the handles (Goreinov, Oseledets, Savostyanov, Tyrtyshnikov and Zamarashkin 2010).
+//!
+//! With `B = Φ Φ□⁻¹`, replacing handle j by row i of `Φ` multiplies the volume of `Φ□` by `|B_ij|`. Rows are swapped until no entry exceeds 1 + τ.
+//! The swaps run in single precision on the candidate rows, which have an entry near one or above; a pass over all of `Φ` in double precision with a
+//! fresh factorisation then confirms the result or finds further candidates.
+
+mod many_columns;
+mod passes;
+mod swaps;
+
+pub(crate) use passes::maxima_and_gram;
+
+use crate::dense;
+use crate::simd;
+use crate::spectrum::RANK_TOLERANCE;
+use faer::{Mat, MatRef};
+use passes::row_maxima;
+use rayon::prelude::*;
+use swaps::{CandidateRows, candidates};
+
+/// Default tolerance τ: swaps end when no entry of B exceeds 1.01.
+pub const TOLERANCE: f64 = 0.01;
+/// From this many columns on swaps end at [`LOOSE_TOLERANCE`].
+const MANY_COLUMNS: usize = 1536;
+/// Tolerance for many columns: each swap costs more there, and a basis this well conditioned is enough to interpolate and decompose by.
+const LOOSE_TOLERANCE: f64 = 1.0;
+/// From this many columns on, and up to [`MANY_COLUMNS`], the first round of swaps is hardly ever the last.
+const SEVERAL_ROUNDS: usize = 512;
+/// Pivots of LU above this fraction of the largest: far enough from dependent for single precision.
+const SINGLE_IS_SAFE: f64 = 1e-4;
+/// Bound on confirming passes; the growth of the volume keeps their number far below it.
+const MAX_PASSES: usize = 64;
+
+/// One exchange: the row of the matrix that became a handle, and which handle it replaced.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Swap {
+    /// The new row.
+    pub row: u32,
+    /// Position of the replaced one among the picked rows.
+    pub position: u32,
+    /// `|B_ij|`, by which the volume grew.
+    pub growth: f64,
+}
+
+/// The handles picked from a tall matrix.
+#[derive(Clone, Debug)]
+pub struct MaxVol {
+    /// Picked rows, one per column of the matrix.
+    pub rows: Vec<u32>,
+    /// Rows the search started from: those of pivoted LU, or what was given.
+    pub start: Vec<u32>,
+    /// Number of swaps after the start.
+    pub swaps: usize,
+    /// These swaps, in order.
+    pub trace: Vec<Swap>,
+    /// `ln |det Φ□|` of the picked rows.
+    pub log_volume: f64,
+    /// The same for the rows the search started from.
+    pub start_log_volume: f64,
+    /// Largest `|B_ij|` over all rows after the last swap: from a fresh factorisation, or, where a tolerance of one allows it, in single precision.
+    pub max_entry: f64,
+    /// `Bᵀ B`, m × m, symmetric; `None` where the swaps were confirmed in single precision.
+    pub(crate) gram: Option<Mat<f64>>,
+    /// `Φ□⁻¹`, m × m.
+    pub(crate) inverse: Mat<f64>,
+}
+
+/// The matrix has no m linearly independent rows to the working precision.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("the coordinate matrix has dependent columns (smallest pivot {smallest:.1e} of the largest)")]
+pub struct DependentColumns {
+    /// Smallest pivot of the LU factorisation, relative to the largest.
+    pub smallest: f64,
+}
+
+/// Tolerance τ for a cage of so many unknowns: [`TOLERANCE`], and a looser one from 1,536 unknowns on.
+pub fn tolerance(unknowns: usize) -> f64 {
+    if unknowns < MANY_COLUMNS { TOLERANCE } else { LOOSE_TOLERANCE }
+}
+
+/// Picks m rows of the n × m matrix `phi`, n ≥ m, such that no single exchange enlarges their volume by more than 1 + τ.
+///
+/// Deterministic: ties go to the smallest row, then the smallest column, and the threads of the pool do not matter.
+///
+/// # Errors
+/// [`DependentColumns`] where the columns are numerically dependent.
+pub fn maxvol(phi: MatRef<'_, f64>, tolerance: f64) -> Result<MaxVol, DependentColumns> {
+    if phi.ncols() >= MANY_COLUMNS
+        && tolerance >= LOOSE_TOLERANCE
+        && let Some(found) = many_columns::search(phi, tolerance)
+    {
+        return Ok(found);
+    }
+    Ok(search(phi, start_rows(phi)?, tolerance))
+}
+
+/// As [`maxvol`], from m given rows instead of those of pivoted LU.
+///
+/// # Errors
+/// [`DependentColumns`] where these rows are dependent, or so close to it that swaps in single precision would follow rounding.
+///
+/// # Panics
+/// Where there are not as many rows as columns.
+pub fn maxvol_from(phi: MatRef<'_, f64>, start: Vec<u32>, tolerance: f64) -> Result<MaxVol, DependentColumns> {
+    assert_eq!(start.len(), phi.ncols(), "as many rows as columns");
+    let smallest = dense::pivoted(dense::rows_of(phi, &start)).smallest;
+    if smallest > SINGLE_IS_SAFE { Ok(search(phi, start, tolerance)) } else { Err(DependentColumns { smallest }) }
+}
+
+fn search(phi: MatRef<'_, f64>, start: Vec<u32>, tolerance: f64) -> MaxVol {
+    let mut rows = start.clone();
+    let mut trace = Vec::new();
+    let (mut inverse, mut log_volume) = dense::inverse(dense::rows_of(phi, &rows).as_ref());
+    let start_log_volume = log_volume;
+    let found = |rows, trace: Vec<Swap>, log_volume, max_entry, gram, inverse| {
+        let swaps = trace.len();
+        MaxVol { rows, start, swaps, trace, log_volume, start_log_volume, max_entry, gram: Some(gram), inverse }
+    };
+    let mut row_max = row_maxima(phi, inverse.as_ref());
+    for pass in 0..MAX_PASSES {
+        let candidates = CandidateRows::computed(phi, candidates(&row_max), &rows, inverse.as_ref());
+        let done = candidates.swap(&mut rows, tolerance);
+        let swapped = !done.is_empty();
+        trace.extend(done);
+        (inverse, log_volume) = dense::inverse(dense::rows_of(phi, &rows).as_ref());
+        // A pass that is about to find more rows to swap need not be exact.
+        let several = (SEVERAL_ROUNDS..MANY_COLUMNS).contains(&phi.ncols());
+        if swapped && (pass > 0 || several) {
+            row_max = row_maxima(phi, inverse.as_ref());
+            if row_max.iter().any(|&x| x > (1.0 + tolerance) as f32) {
+                continue;
+            }
+        }
+        let (maxima, gram) = maxima_and_gram(phi, inverse.as_ref(), 1.0 + tolerance);
+        let max_entry = maxima.iter().copied().fold(0.0, f64::max);
+        if max_entry <= 1.0 + tolerance {
+            return found(rows, trace, log_volume, max_entry, gram, inverse);
+        }
+        row_max = maxima.iter().map(|&x| x as f32).collect();
+    }
+    // Not converged: reports show the largest entry.
+    let (maxima, gram) = maxima_and_gram(phi, inverse.as_ref(), f64::INFINITY);
+    let max_entry = maxima.iter().copied().fold(0.0, f64::max);
+    found(rows, trace, log_volume, max_entry, gram, inverse)
+}
+
+/// Rows that LU with partial pivoting picks. Single precision decides the pivots as well as double does, in half the time,
+/// as long as the columns are far from dependent.
+///
+/// # Errors
+/// [`DependentColumns`] where the columns are numerically dependent.
+pub fn start_rows(phi: MatRef<'_, f64>) -> Result<Vec<u32>, DependentColumns> {
+    let single = dense::pivoted(to_single(phi));
+    if single.smallest > SINGLE_IS_SAFE {
+        return Ok(single.rows().to_vec());
+    }
+    let double = dense::pivoted(phi.to_owned());
+    if double.smallest > RANK_TOLERANCE {
+        return Ok(double.rows().to_vec());
+    }
+    Err(DependentColumns { smallest: double.smallest })
+}
+
+fn to_single(phi: MatRef<'_, f64>) -> Mat<f32> {
+    let mut single = simd::zeros(phi.nrows(), phi.ncols());
+    single.as_mut().par_col_chunks_mut(1).enumerate().for_each(|(j, mut column)| {
+        for (s, &x) in column.as_mut().col_mut(0).iter_mut().zip(phi.col(j).iter()) {
+            *s = x as f32;
+        }
+    });
+    single
+}
