@@ -65,6 +65,21 @@ fn soups_clouds_sheets_and_lines_are_enclosed() {
 }
 
 #[test]
+fn slivers_as_long_as_the_model_are_enclosed() {
+    let sides = 600;
+    let mut tube = Model::default();
+    for z in [0.0, 2.0] {
+        let angle = |i: u32| f64::from(i) / f64::from(sides) * std::f64::consts::TAU;
+        tube.points.extend((0..sides).map(|i| [angle(i).cos(), angle(i).sin(), z]));
+    }
+    for i in 0..sides {
+        let j = (i + 1) % sides;
+        tube.faces.push(&[i, j, sides + j, sides + i]);
+    }
+    assert_enclosed("tube", &tube, &[350]);
+}
+
+#[test]
 fn parallel_limbs_stay_apart() {
     let limbs = limbs(0.18, 24);
     assert_enclosed("limbs", &limbs, &[50, 350]);
@@ -135,10 +150,12 @@ fn clearance_is_kept() {
 
 #[test]
 fn the_same_model_gives_the_same_bits_on_any_number_of_threads() {
-    let torus = model(&torus([0.0; 3], 1.0, 0.3, 2));
+    // With a gap to keep open and a part to be joined.
+    let mut parts = limbs(0.04, 24);
+    append(&mut parts, &torus([3.0, 0.0, 0.0], 0.5, 0.2, 2));
     let on = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| enclose(&torus, &options(200)).unwrap())
+        pool.install(|| enclose(&parts, &options(350)).unwrap())
     };
     let bits = |mesh: &TriMesh| mesh.vertices.iter().flatten().map(|x| x.to_bits()).collect::<Vec<_>>();
     let (one, three) = (on(1), on(3));

@@ -13,8 +13,12 @@ const LARGEST_BALL: f64 = 1.15;
 /// A ball in a gap touches the surface on both sides: at the least, the cosine between its touching points lies below this.
 const OPPOSITE: f64 = -0.6;
 
-/// A surface that would take more samples than this is crumpled, and its gaps stay closed.
+/// A surface of an area that would take more samples than this is crumpled, and its gaps stay closed.
 const MOST_SAMPLES: usize = 100_000;
+/// Samples that this area may have: a cube of a smooth surface has one for each of some directions.
+const MOST_SIDES: usize = 2;
+/// Places tried beyond one a face. Slivers as long as the model have many more than samples.
+const MOST_TRIES: usize = 2_000_000;
 
 /// Gaps shorter than this many times the largest offset stay closed: few vertices could not follow both sides.
 const LEAST_EXTENT: f64 = 3.0;
@@ -102,6 +106,7 @@ fn samples(surface: &Surface, spacing: f64) -> Option<Vec<(DVec3, DVec3)>> {
     }
     let mut seen = HashSet::new();
     let mut samples = Vec::new();
+    let mut tries = 0;
     for f in 0..surface.triangles.len() as u32 {
         let [a, b, c] = surface.corners(f);
         let normal = (b - a).cross(c - a).normalize_or_zero();
@@ -111,6 +116,10 @@ fn samples(surface: &Surface, spacing: f64) -> Option<Vec<(DVec3, DVec3)>> {
         let side = normal.to_array().map(|x| (2.0 * x).round() as i8);
         let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
         let n = ((longest / spacing).ceil() as u32).clamp(1, 100);
+        tries += n as usize * (n as usize + 1) / 2 - 1;
+        if samples.len() > MOST_SIDES * MOST_SAMPLES || tries > MOST_TRIES {
+            return None;
+        }
         for i in 0..n {
             for j in 0..n - i {
                 let [s, t] = [i, j].map(|k| (f64::from(k) + 1.0 / 3.0) / f64::from(n));
@@ -120,9 +129,6 @@ fn samples(surface: &Surface, spacing: f64) -> Option<Vec<(DVec3, DVec3)>> {
                     samples.push((point, normal));
                 }
             }
-        }
-        if samples.len() > MOST_SAMPLES {
-            return None;
         }
     }
     Some(samples)

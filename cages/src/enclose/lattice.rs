@@ -17,7 +17,7 @@ const FACE: [[u32; 2]; 4] = [[0, 0], [1, 0], [1, 1], [0, 1]];
 type Place = [u32; 3];
 
 /// Nodes and the tetrahedra between them. No edge is longer than the spacing, nor than the side of the cubes that it joins.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Lattice {
     pub(super) positions: Vec<DVec3>,
     /// Positively oriented.
@@ -108,7 +108,7 @@ impl Cube {
 }
 
 /// Cubes over a box, some of them halved, again and again.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Octree {
     origin: DVec3,
     unit: f64,

@@ -31,6 +31,10 @@ pub(super) fn offset_with_gaps(
     least: f64,
     most: usize,
 ) -> Option<(Offset, Octree)> {
+    // No gap can be kept open at a half of it.
+    if 0.5 * largest < least {
+        return Some(uniform_offset(source, largest));
+    }
     let offset = Offset::around(&balls_in_gaps(source, largest)?, largest, least);
     let (_, mut cubes) = uniform_offset(source, largest);
     let is_too_large = |center: DVec3, side: f64| {
@@ -150,7 +154,9 @@ fn shortest_links(lattice: &Lattice, labels: &[u32], parts: u32) -> Vec<[usize; 
     let (starts, neighbours) = lattice.neighbours();
     while let Some(node) = queue.pop_front() {
         let from = origin[node];
-        for &next in &neighbours[starts[node]..starts[node + 1]] {
+        // Ascending, and each as often as tetrahedra share the edge.
+        for edge in neighbours[starts[node]..starts[node + 1]].chunk_by(|a, b| a == b) {
+            let next = edge[0];
             let to = origin[next as usize];
             if to == NONE {
                 origin[next as usize] = from;

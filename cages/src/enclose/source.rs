@@ -8,7 +8,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::HashSet;
 
-/// While a cage is simplified, at most this many points are tested; larger models are subsampled.
+/// While a cage is simplified, about this many points of the model are tested; larger models are subsampled.
 const CHECKED_POINTS: usize = 60_000;
 
 /// The model in a frame of reference where it is centred and its diagonal is one.
@@ -55,6 +55,11 @@ impl NormalizedModel {
         let mut on_faces = Vec::new();
         for t in &triangles {
             sample_face(t.map(|v| points[v as usize]), spacing_on_faces, &mut on_faces);
+        }
+        // Of slivers there are many more than their area needs.
+        if on_faces.len() > CHECKED_POINTS {
+            let mut seen = HashSet::new();
+            on_faces.retain(|p| seen.insert((2.0 * p / spacing_on_faces).floor().to_array().map(|x| x as i64)));
         }
         triangles.extend((0..points.len() as u32).filter(|&v| !used[v as usize]).map(|v| [v; 3]));
         let surface = Surface::new(points.clone(), triangles);
