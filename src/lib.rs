@@ -22,6 +22,7 @@ mod http_client;
 mod idempotency;
 pub mod memory;
 pub mod mismatch;
+mod preparation_warnings;
 pub mod problem;
 pub mod remote;
 mod report_page;

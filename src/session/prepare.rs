@@ -1,8 +1,8 @@
 //! From uploaded files to a prepared solver: parsing, validation, preparation. All functions block.
 
 use super::solver_cache::Prepared;
-use crate::capture::preparation_warnings;
 use crate::coding::{CodingError, Goal, RestMeshes};
+use crate::preparation_warnings::preparation_warnings;
 use crate::problem::{self, ApiError};
 use crate::store::Content;
 use cager_cages::diagnosis::weld;

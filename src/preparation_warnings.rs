@@ -1,0 +1,90 @@
+//! What people should know of a prepared solver.
+
+use cager_core::inversion::{Handles, Solver, SolverOptions};
+use cager_core::regularize::{Regularizer, WEAK_SINGULAR_VALUE};
+
+/// Warnings that follow from the preparation.
+pub(crate) fn preparation_warnings(options: SolverOptions, solver: &Solver) -> Vec<String> {
+    let found = solver.preparation();
+    let unknowns = solver.decoder().unknowns();
+    let mut warnings = Vec::new();
+    if !found.outside.is_empty() {
+        let (outside, points) = (found.outside.len(), solver.decoder().points());
+        let what = if 2 * outside > points {
+            "see what `cager cage --check` says of it, above all of units and axes"
+        } else {
+            "points outside follow the cage too, but an enlarged cage usually gives lower errors"
+        };
+        warnings.push(format!(
+            "{outside} of {points} points lie outside the cage, by up to {:.2} % of the rest diagonal; {what}",
+            100.0 * found.outside_distance
+        ));
+    }
+    if let Some(refined) = found.refinement.filter(|refined| !refined.reached()) {
+        warnings.push(format!(
+            "the coordinates may be off by {:.1e} after {} refinements to {} boundary elements, more than the {:.0e} aimed at, as happens in cages much thinner than wide and where points are very near to a cage's long edges; make the cage roomier, or use mean value coordinates (mvc)",
+            refined.change,
+            refined.refinements,
+            refined.elements,
+            cager_core::coordinates::Refinement::TOLERANCE
+        ));
+    }
+    let (read, points) = (solver.handles().len(), solver.decoder().points());
+    // Where every point is read, these are the handles of maximum volume.
+    if options.handles == Handles::All && read > unknowns && read < points {
+        warnings
+            .push(format!("of so many points a sample is analysed: with handles `all`, {read} of {points} are read"));
+    }
+    let sigma = &found.singular_values;
+    let weak = unknowns - sigma.len() + sigma.iter().filter(|&&s| s < WEAK_SINGULAR_VALUE * sigma[0]).count();
+    let strong = unknowns - weak;
+    if weak > 0 {
+        let consequence = match options.regularizer {
+            Regularizer::Laplacian => "it is smoothed there".to_owned(),
+            Regularizer::Global if options.lambda > 0.0 => "it is smoothed there".to_owned(),
+            Regularizer::Differential => "it keeps the shape of the rest cage there".to_owned(),
+            Regularizer::Temporal => "it keeps the previous frame's shape there".to_owned(),
+            Regularizer::Matrix => "it follows the matrix there".to_owned(),
+            Regularizer::Tikhonov => "what they leave open is damped".to_owned(),
+            Regularizer::TruncatedSvd if options.spectrum >= weak => "what they leave open is dropped".to_owned(),
+            _ => format!(
+                "it follows the rounding of the data there, so expect spikes, or use --regularizer differential --spectrum {weak}"
+            ),
+        };
+        warnings.push(format!(
+            "the points determine only {strong} of the cage's {unknowns} unknowns, as where parts of it are far from all of them; {consequence}"
+        ));
+    }
+    if found.affine_reproduction_error > 1e-10 {
+        warnings.push(format!(
+            "the coordinates reproduce the rest pose to {:.1e} of its diagonal only, as happens far outside a cage, above all a very thin one; check that both files belong together",
+            found.affine_reproduction_error
+        ));
+    }
+    warnings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cager_core::cage::Cage;
+    use cager_core::coordinates::MeanValue;
+    use cager_core::inversion::Preparing;
+    use cager_core::synthetic::{Capture, Options};
+
+    #[test]
+    fn all_points_of_a_sampled_model_are_those_of_the_sample() {
+        let capture = Capture::new(&Options { points: 3_000, frames: 1, cage_vertices: 40 });
+        let cage = Cage::new(capture.cage.clone()).unwrap();
+        let warnings = |handles, analysed_entries| {
+            let options = SolverOptions { handles, ..SolverOptions::default() };
+            let preparing = Preparing { analysed_entries, ..Preparing::default() };
+            let solver = Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, options, &preparing).unwrap();
+            preparation_warnings(options, &solver).concat()
+        };
+        let sampled = warnings(Handles::All, 40_000);
+        assert!(sampled.contains("are read"), "{sampled}");
+        assert!(!warnings(Handles::All, 1 << 25).contains("are read"));
+        assert!(!warnings(Handles::default(), 40_000).contains("are read"));
+    }
+}
