@@ -55,7 +55,7 @@ pub(crate) struct Drift<'a> {
     /// S: the coefficients x of B itself, x × r.
     pub(crate) of_basis: MatRef<'a, f64>,
     /// Takes `Lᵀ F` to the coefficients of the least squares solution for F: l × columns to x × columns.
-    pub(crate) least_squares: &'a dyn Fn(Mat<f64>) -> Mat<f64>,
+    pub(crate) least_squares: &'a (dyn Fn(Mat<f64>) -> Mat<f64> + Sync),
 }
 
 /// The coefficients that least squares over all points gives for the prediction from the samples, transposed: K × x.

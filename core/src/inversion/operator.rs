@@ -159,18 +159,21 @@ impl Decomposition {
         let samples = Samples { points, rows: &handles, reach };
         let (first, others) = handles.split_at(rank);
         let full = whole(phi, rank, spectra)?;
-        let interpolate = |wide, others: MatRef<'_, f64>, of_basis, least_squares: &dyn Fn(Mat<f64>) -> Mat<f64>| {
-            let left = interpolated(&samples, &Drift { wide, others, of_basis, least_squares });
-            left.ok_or(failed("interpolation between the handles"))
+        let interpolate = |drift: Drift<'_>| {
+            let condition = || condition_of(phi, &handles, drift.others, basis);
+            let (left, condition) = rayon::join(|| interpolated(&samples, &drift), condition);
+            let left = LeftFactor::Rows(left.ok_or(failed("interpolation between the handles"))?);
+            Ok::<_, PrepareError>((left, condition.ok_or(failed("singular value decomposition of the rows"))?))
         };
         let of_others = || dense::product(dense::rows_of(phi, others).as_ref(), basis.to_basis.as_ref());
-        let (left, others, directions) = match full {
+        let ((left, condition), directions) = match full {
             FullSvd::Direct(Svd { u, sigma, v }) => {
                 let u = u.as_ref().subcols(0, rank);
                 let (inverse, _) = dense::inverse(dense::rows_of(u, first).as_ref());
                 let others = dense::product(dense::rows_of(u, others).as_ref(), inverse.as_ref());
-                let left = interpolate(u, others.as_ref(), inverse.as_ref(), &|seen| seen)?;
-                (left, others, Directions::All { sigma, v })
+                let (others, of_basis) = (others.as_ref(), inverse.as_ref());
+                let drift = Drift { wide: u, others, of_basis, least_squares: &|seen| seen };
+                (interpolate(drift)?, Directions::All { sigma, v })
             }
             // Coefficients in the left singular vectors B R⁻¹ U' of Φ.
             FullSvd::Compressed(Svd { u, sigma, v }) => {
@@ -183,19 +186,18 @@ impl Decomposition {
                     dense::solve_lower(factor.transpose(), &mut of_basis);
                     dense::product(u.transpose(), of_basis.as_ref())
                 };
-                let left = interpolate(phi, others.as_ref(), of_basis.as_ref(), &least_squares)?;
-                (left, others, Directions::All { sigma: sigma.clone(), v: v.clone() })
+                let (others, of_basis) = (others.as_ref(), of_basis.as_ref());
+                let drift = Drift { wide: phi, others, of_basis, least_squares: &least_squares };
+                (interpolate(drift)?, Directions::All { sigma: sigma.clone(), v: v.clone() })
             }
             FullSvd::Last(last, factor) => {
                 let others = of_others();
                 let least_squares = |seen| normal_solution(factor, seen);
-                let left = interpolate(phi, others.as_ref(), basis.to_basis.as_ref(), &least_squares)?;
-                (left, others, Directions::Last(last.clone()))
+                let (others, of_basis) = (others.as_ref(), basis.to_basis.as_ref());
+                let drift = Drift { wide: phi, others, of_basis, least_squares: &least_squares };
+                (interpolate(drift)?, Directions::Last(last.clone()))
             }
         };
-        let condition = condition_of(phi, &handles, others.as_ref(), basis)
-            .ok_or(failed("singular value decomposition of the rows"))?;
-        let left = LeftFactor::Rows(left);
         Ok(Self { handles, reads_all: false, rows: phi.nrows(), left, rank, directions, condition })
     }
 
