@@ -66,7 +66,7 @@ fn soups_clouds_sheets_and_lines_are_enclosed() {
 
 #[test]
 fn slivers_as_long_as_the_model_are_enclosed() {
-    let sides = 600;
+    let sides = 200;
     let mut tube = Model::default();
     for z in [0.0, 2.0] {
         let angle = |i: u32| f64::from(i) / f64::from(sides) * std::f64::consts::TAU;

@@ -91,6 +91,10 @@ describe.skipIf(missing)('two captures in step', { timeout: 90_000 }, () => {
       null,
     );
     expect(looks[1]).toEqual(looks[0]);
+    // The place is that of a frame which may still have to come.
+    await expect
+      .poll(() => inViewer(page, (viewer) => [viewer.player!.buffering, viewer.pair.player!.buffering], null))
+      .toEqual([false, false]);
     // What the second picture shows is what its own capture decodes to.
     const [shown, alone] = await inViewer(
       page,
