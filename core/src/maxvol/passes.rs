@@ -47,10 +47,10 @@ pub(super) fn row_maxima(phi: MatRef<'_, f64>, inverse: MatRef<'_, f64>) -> Vec<
     maxima
 }
 
-/// Largest `|B_ij|` of every row, and `Bᵀ B`, from a given `Φ□⁻¹`, without ever holding B. Once an entry exceeds `limit` the
+/// Largest `|B_ij|` of every row, and `Bᵀ B`, from a given `Φ□⁻¹`, or what takes its place where `Φ` has a smaller rank, without ever holding B. Once an entry exceeds `limit` the
 /// Gram matrix is of no use and is left unfinished.
 pub(crate) fn maxima_and_gram(phi: MatRef<'_, f64>, inverse: MatRef<'_, f64>, limit: f64) -> (Vec<f64>, Mat<f64>) {
-    let (n, m) = phi.shape();
+    let (n, m) = (phi.nrows(), inverse.ncols());
     let block_rows = block_rows(m);
     let mut maxima = vec![0.0f64; n];
     let groups = (GRAM_BYTES / (8 * m * m)).clamp(4, 16);
@@ -107,4 +107,21 @@ fn add_gram(gram: &mut Mat<f64>, b: MatRef<'_, f64>) {
         1.0,
         Par::Seq,
     );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_gram_matrix_is_that_of_the_basis_whatever_its_rank() {
+        let phi = Mat::from_fn(700, 9, |i, j| ((i * 31 + j * 17 + i * j) % 23) as f64 - 11.0);
+        for rank in [9, 5] {
+            let to_basis = Mat::from_fn(9, rank, |i, j| ((3 * i + 7 * j) % 5) as f64 - 2.0);
+            let (maxima, gram) = maxima_and_gram(phi.as_ref(), to_basis.as_ref(), f64::INFINITY);
+            let b = dense::product(phi.as_ref(), to_basis.as_ref());
+            assert_eq!(gram, dense::product(b.transpose(), b.as_ref()), "integers are exact");
+            assert_eq!(maxima[3], b.as_ref().row(3).norm_max());
+        }
+    }
 }
