@@ -77,7 +77,7 @@ async function modelShown(page: Page) {
   const isShown = () => {
     const viewer = document.querySelector<ViewerPage>('cager-viewer-page')?.renderRoot.querySelector('cager-viewer');
     const player = viewer?.player;
-    return player?.stage.decoder.ready === true && player.progress === null && !player.buffering;
+    return player?.stage.decoder.ready === true && player.progress === null && !player.playback.buffering;
   };
   await page.waitForFunction(isShown, undefined, { timeout: READY_MS });
 }

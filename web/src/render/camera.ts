@@ -1,3 +1,5 @@
+import type { PerspectiveCamera } from 'three';
+
 /** A camera that turns around a point. Lengths are in units of the rest pose's diagonal, angles in radians. */
 export interface CameraState {
   readonly target: readonly [number, number, number];
@@ -110,4 +112,14 @@ function wrapped(angle: number): number {
 
 function rounded(value: number, digits: number): number {
   return Number(value.toFixed(digits));
+}
+
+/** Has a camera look from where a state says. */
+export function aim(camera: PerspectiveCamera, state: CameraState) {
+  camera.position.set(...eyeOf(state));
+  camera.lookAt(...state.target);
+  camera.near = state.distance * 0.02;
+  camera.far = state.distance + 40;
+  camera.updateProjectionMatrix();
+  camera.updateMatrixWorld();
 }

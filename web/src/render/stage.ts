@@ -3,45 +3,15 @@ import type { StaticPart } from '../capture';
 import { Backdrop } from './backdrop';
 import { boxOf } from './box';
 import { CageView } from './cageView';
-import { eyeOf, FIELD_OF_VIEW, type Box, type CameraState } from './camera';
+import { aim, FIELD_OF_VIEW, type Box, type CameraState } from './camera';
 import { Decoder, type Pose } from './decoder';
+import type { Covered, Layers, Side, StageColors } from './drawn';
 import { Ground } from './ground';
+import { GroundLevel } from './groundLevel';
 import { ModelView } from './modelView';
+import { drawSide } from './sides';
 import { surfaceOf } from './surface';
 import { createRenderer, isSoftwareRendered } from './webgl';
-
-/** What is drawn. */
-export interface Layers {
-  readonly model: boolean;
-  readonly wireframe: boolean;
-  readonly points: boolean;
-  readonly cage: boolean;
-  readonly handles: boolean;
-  readonly ground: boolean;
-  /** Colours of the model's points, where it has any. */
-  readonly colors: boolean;
-}
-
-/** Colours of the picture, as CSS colours in sRGB. */
-export interface StageColors {
-  readonly top: string;
-  readonly bottom: string;
-  readonly model: string;
-  readonly wire: string;
-  readonly cage: string;
-  readonly handle: string;
-  readonly grid: string;
-  readonly shadow: number;
-}
-
-/** What of a capture whose original is there is drawn: what is decoded, the original, or the original to the left of a line. */
-export type Side = 'decoded' | 'original' | 'both';
-
-/** CSS pixels of the canvas that something lies above. */
-export interface Covered {
-  readonly right: number;
-  readonly bottom: number;
-}
 
 /** Pictures that may show the same shadow where they must come fast. */
 const SHADOW_EVERY = 6;
@@ -82,9 +52,7 @@ export class Stage {
   /** Whether a change of its size has emptied the canvas, which had a picture. */
   wasEmptied = false;
   private up: 'y' | 'z' = 'y';
-  /** The lowest vertex of the cage in all frames that are known, along either axis, and how far above it the model's lowest point is. */
-  private readonly lowest = { y: Infinity, z: Infinity };
-  private soleAboveCage = 0;
+  private readonly groundLevel = new GroundLevel();
 
   /** Throws one sentence for a person where the browser or the device cannot draw this. */
   constructor(
@@ -139,8 +107,7 @@ export class Stage {
     const { diagonal, centre } = this.decoder;
     for (let first = 0; first < cages.length; first += 3 * rowsPerFrame) {
       for (let k = first; k < first + this.cageVertices.length; k += 3) {
-        this.lowest.y = Math.min(this.lowest.y, (cages[k + 1] - centre[1]) / diagonal);
-        this.lowest.z = Math.min(this.lowest.z, (cages[k + 2] - centre[2]) / diagonal);
+        this.groundLevel.include((cages[k + 1] - centre[1]) / diagonal, (cages[k + 2] - centre[2]) / diagonal);
       }
     }
     this.lowerGround();
@@ -253,12 +220,7 @@ export class Stage {
     this.pictureIsOld = this.wasEmptied = false;
     this.shownFrom = state;
     const { camera } = this;
-    camera.position.set(...eyeOf(state));
-    camera.lookAt(...state.target);
-    camera.near = state.distance * 0.02;
-    camera.far = state.distance + 40;
-    camera.updateProjectionMatrix();
-    camera.updateMatrixWorld();
+    aim(camera, state);
     this.model.setSky(new Vector3(0, 1, 0).transformDirection(camera.matrixWorldInverse));
     const isDue = !hurried || ++this.picturesWithShadow >= SHADOW_EVERY;
     if (isDue && this.shadowIsOld && this.ground.mesh.visible && this.model.surface.visible) {
@@ -268,10 +230,9 @@ export class Stage {
     }
     this.renderer.setRenderTarget(null);
     this.renderer.clear();
-    const hasOriginal = this.decoder.placedTextures !== null;
-    if (this.side === 'decoded' || !hasOriginal) this.renderer.render(this.scene, camera);
-    else if (this.side === 'original') this.drawOriginal();
-    else this.drawBoth();
+    const side = this.decoder.placedTextures ? this.side : 'decoded';
+    const drawDecoded = () => this.renderer.render(this.scene, camera);
+    drawSide(this.renderer, side, this.split, drawDecoded, () => this.drawOriginal());
   }
 
   /** A box around the model as it is now, or around the cage before there is one. */
@@ -288,18 +249,6 @@ export class Stage {
     this.ground.dispose();
     this.decoder.dispose();
     this.renderer.dispose();
-  }
-
-  private drawBoth() {
-    const { renderer } = this;
-    const { x: width, y: height } = renderer.getSize(new Vector2());
-    const line = Math.round(width * this.split);
-    renderer.setScissorTest(true);
-    renderer.setScissor(line, 0, width - line, height);
-    renderer.render(this.scene, this.camera);
-    renderer.setScissor(0, 0, line, height);
-    this.drawOriginal();
-    renderer.setScissorTest(false);
   }
 
   /** The original has neither a cage nor handles. */
@@ -334,15 +283,15 @@ export class Stage {
   private putGroundBelow(positions: Float32Array) {
     const { low, high } = boxOf(positions, this.upright.matrix);
     if (!Number.isFinite(low[1])) return;
-    this.soleAboveCage = low[1] - boxOf(this.cageVertices, this.upright.matrix).low[1];
-    this.ground.middle.set((low[0] + high[0]) / 2, low[1] - 0.002, (low[2] + high[2]) / 2);
+    const level = this.groundLevel.see(low[1], boxOf(this.cageVertices, this.upright.matrix).low[1]);
+    this.ground.middle.set((low[0] + high[0]) / 2, level, (low[2] + high[2]) / 2);
     this.shadowIsOld = this.pictureIsOld = true;
     this.lowerGround();
   }
 
-  /** Keeps the ground below all frames that are known: the model's lowest point is about as far above the cage's as in the first one. */
+  /** Keeps the ground below all frames that are known. */
   private lowerGround() {
-    const level = this.lowest[this.up] + this.soleAboveCage - 0.002;
+    const level = this.groundLevel.below(this.up);
     if (level >= this.ground.middle.y) return;
     this.ground.middle.y = level;
     this.shadowIsOld = this.pictureIsOld = true;

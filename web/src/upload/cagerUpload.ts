@@ -7,9 +7,10 @@ import * as glyphs from '../sessions/glyphs';
 import '../sessions/signIn';
 import { pageLayout } from '../style/pageLayout';
 import { controls, tokens } from '../style/tokens';
+import { captureName, jobOf, newUpload } from './beginning';
 import { type Dropped, type Item, type Role, classify, reassigned } from './classify';
 import { currentJob, setCurrentJob } from './currentJob';
-import { droppedFiles, pickedFiles } from './drop';
+import { droppedFiles, pickFiles } from './drop';
 import { marksOf, withEarlierRoles } from './fileMarks';
 import {
   type Interrupted,
@@ -21,11 +22,11 @@ import {
   interruptedUploads,
 } from './interrupted';
 import { type JobActions, jobView } from './jobView';
-import { KeptUpload, newKey } from './keptUpload';
+import type { KeptUpload } from './keptUpload';
 import { extensionOf } from './meshes';
-import { type Choices, DEFAULT_CHOICES, designOf, optionsForm, optionsOf, sendsHandles } from './optionsForm';
+import { type Choices, DEFAULT_CHOICES, optionsForm } from './optionsForm';
 import { type Plan, planOf } from './plan';
-import { type Stage, UploadJob } from './uploadJob';
+import type { Stage } from './uploadJob';
 import { type ChoosingFiles, dropZone, itemRow, planSummary } from './uploadParts';
 import { uploadStyle } from './uploadStyle';
 
@@ -101,7 +102,7 @@ export class Upload extends LitElement {
     if (fitting) {
       return goOnCard(
         fitting,
-        () => this.#goOn(fitting),
+        () => this.plan && this.#run(this.plan, fitting.kept),
         () => (this.fitting = null),
       );
     }
@@ -130,8 +131,8 @@ export class Upload extends LitElement {
   }
 
   readonly #choosing: ChoosingFiles = {
-    onFiles: () => this.#pick(false),
-    onFolder: () => this.#pick(true),
+    onFiles: () => pickFiles(false, (files) => void this.#take(files)),
+    onFolder: () => pickFiles(true, (files) => void this.#take(files)),
     onStartOver: () => this.#startOver(),
   };
 
@@ -161,35 +162,13 @@ export class Upload extends LitElement {
 
   async #begin(): Promise<void> {
     const { plan, choices, items } = this;
-    if (!plan) return;
-    const record = {
-      key: newKey(),
-      service: this.#service.address(''),
-      begun: Date.now(),
-      choices,
-      marks: await marksOf(items),
-      frames: plan.frames.frames,
-      session: null,
-      design: null,
-    };
-    this.#run(plan, choices, new KeptUpload(record));
+    if (plan) this.#run(plan, await newUpload(this.#service, plan, choices, items));
   }
 
-  /** Goes on with an upload that was broken off, as it was asked for then. */
-  #goOn({ kept }: Interrupted): void {
-    if (this.plan) this.#run(this.plan, kept.present.choices, kept);
-  }
-
-  #run(plan: Plan, choices: Choices, kept: KeptUpload): void {
+  #run(plan: Plan, kept: KeptUpload): void {
     // Somebody may press twice.
     if (currentJob()) return;
-    const { frames, cage } = plan;
-    const request = {
-      options: optionsOf(choices, frames.frames, cage !== null),
-      design: designOf(choices, cage !== null),
-      handlesOnly: sendsHandles(choices, 12 * frames.frames * frames.points),
-    };
-    const job = new UploadJob(this.#service, plan, request, kept);
+    const job = jobOf(this.#service, plan, kept);
     job.addEventListener('change', this.#jobChanged);
     setCurrentJob(job);
     void job.run();
@@ -229,15 +208,6 @@ export class Upload extends LitElement {
     void this.#lookForInterrupted();
   }
 
-  #pick(folder: boolean): void {
-    const input = document.createElement('input');
-    input.type = 'file';
-    input.multiple = true;
-    input.webkitdirectory = folder;
-    input.addEventListener('change', () => void this.#take(Promise.resolve(pickedFiles(input.files!))));
-    input.click();
-  }
-
   #dragOver = (event: DragEvent): void => {
     if (currentJob() || !event.dataTransfer?.types.includes('Files')) return;
     event.preventDefault();
@@ -254,7 +224,7 @@ export class Upload extends LitElement {
     void this.#take(droppedFiles(event.dataTransfer));
   };
 
-  async #take(files: Promise<Dropped[]>): Promise<void> {
+  async #take(files: Dropped[] | Promise<Dropped[]>): Promise<void> {
     try {
       const taken = await files;
       const paths = new Set(taken.map(({ path }) => path));
@@ -290,14 +260,7 @@ export class Upload extends LitElement {
     this.finding = finding;
     this.fitting = fitting;
     this.misfit = misfit;
-    if (plan && !this.#wasNamed) this.choices = { ...this.choices, name: this.#nameOf(plan) };
-  }
-
-  /** The folder that was dropped, or the file of the frames, says best what it is. */
-  #nameOf(plan: Plan): string {
-    const path = this.dropped.find(({ path }) => path.includes('/'))?.path;
-    const frames = this.items.find((item) => item.role === 'frames')?.files[0];
-    return path?.split('/')[0] ?? (frames ?? plan.rest).name.replace(/\.[^.]*$/, '');
+    if (plan && !this.#wasNamed) this.choices = { ...this.choices, name: captureName(plan, this.dropped, this.items) };
   }
 
   #jobChanged = (): void => {

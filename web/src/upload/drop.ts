@@ -14,6 +14,16 @@ export async function droppedFiles(transfer: DataTransfer): Promise<Dropped[]> {
   return found;
 }
 
+/** Has the browser ask for files, or for a folder of them. */
+export function pickFiles(folder: boolean, take: (files: Dropped[]) => void): void {
+  const input = document.createElement('input');
+  input.type = 'file';
+  input.multiple = true;
+  input.webkitdirectory = folder;
+  input.addEventListener('change', () => take(pickedFiles(input.files!)));
+  input.click();
+}
+
 /** Files of an `<input type="file">`. */
 export function pickedFiles(files: FileList): Dropped[] {
   return [...files].map((file) => ({ file, path: file.webkitRelativePath || file.name }));

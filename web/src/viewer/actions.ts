@@ -1,5 +1,5 @@
 import { orbited, zoomed } from '../render/camera';
-import type { Layers } from '../render/stage';
+import type { Layers } from '../render/drawn';
 import type { CagerViewer } from './cagerViewer';
 import { numberAt, numberText } from './frameNumbers';
 import type { Heat } from './heatMap';

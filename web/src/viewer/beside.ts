@@ -1,6 +1,7 @@
 import type { Capture, FrameErrors } from '../capture';
 import { numberAt, placeOf, type FrameNumbers } from './frameNumbers';
-import { Player, type Companion } from './player';
+import type { Companion } from './playback';
+import { Player } from './player';
 import type { Transport } from './transport';
 
 /** A number this far from that of a frame is its number. */
@@ -25,7 +26,7 @@ export class Beside implements Companion {
     };
     heatMap.peer = lead.heatMap;
     lead.heatMap.peer = heatMap;
-    lead.companion = this;
+    lead.playback.companion = this;
     lead.refresh();
   }
 
@@ -52,7 +53,7 @@ export class Beside implements Companion {
   }
 
   prepare(transport: Transport): boolean {
-    return this.player.prepareFor(this.transportAt(transport));
+    return this.player.playback.prepare(this.transportAt(transport));
   }
 
   show() {
@@ -65,7 +66,7 @@ export class Beside implements Companion {
   }
 
   dispose() {
-    this.lead.companion = null;
+    this.lead.playback.companion = null;
     this.lead.heatMap.peer = null;
     this.player.dispose();
   }

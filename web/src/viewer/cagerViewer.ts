@@ -187,7 +187,7 @@ export class CagerViewer extends CaptureElement {
           ? progressBox(`Opening ${opening}`, null)
           : progress
             ? progressBox(progress.doing, progress.fraction)
-            : player.buffering
+            : player.playback.buffering
               ? progressBox('Loading', null)
               : nothing
       }

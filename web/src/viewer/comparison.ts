@@ -1,6 +1,7 @@
 import type { Capture } from '../capture';
 import type { Original } from '../originals/original';
-import type { Side, Stage } from '../render/stage';
+import type { Side } from '../render/drawn';
+import type { Stage } from '../render/stage';
 import type { Dropped } from '../upload/classify';
 
 /** The capture beside the frames that it was encoded from, where somebody has given them to the page. */

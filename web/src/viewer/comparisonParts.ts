@@ -1,6 +1,6 @@
 import { html, nothing, type TemplateResult } from 'lit';
 import { heatGradient } from '../render/colorMap';
-import type { Side } from '../render/stage';
+import type { Side } from '../render/drawn';
 import type { Dropped } from '../upload/classify';
 import { pickedFiles } from '../upload/drop';
 import { glyph } from './glyphs';

@@ -58,7 +58,8 @@ export function figuresPanel(player: Player) {
     <h2>This browser</h2>
     <dl>
       ${row('Pictures per second', player.picturesPerSecond > 0 ? player.picturesPerSecond.toFixed(0) : '–')}
-      ${row('Frames passed over', grouped(player.dropped))} ${row('Weights', decoder.ready ? `${bits} bits` : '–')}
+      ${row('Frames passed over', grouped(player.playback.dropped))}
+      ${row('Weights', decoder.ready ? `${bits} bits` : '–')}
       ${error > 0 ? row('Rounding moves a point by', `< ${percent(error)}`) : nothing}
     </dl>
   </aside>`;

@@ -2,7 +2,7 @@ import { html, nothing, type TemplateResult } from 'lit';
 import type { FrameErrors } from '../capture';
 import { heatGradient } from '../render/colorMap';
 import type { FrameRange } from '../editing/cageEdit';
-import type { Layers } from '../render/stage';
+import type { Layers } from '../render/drawn';
 import { comparisonPanel, type ComparisonActs } from './comparisonParts';
 import { glyph, type GlyphName } from './glyphs';
 import type { Heat } from './heatMap';

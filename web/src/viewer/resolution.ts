@@ -1,4 +1,5 @@
-import type { Covered, Stage } from '../render/stage';
+import type { Covered } from '../render/drawn';
+import type { Stage } from '../render/stage';
 
 /** How fine the pictures of a stage are: coarser ones come faster while something moves. */
 export class Resolution {

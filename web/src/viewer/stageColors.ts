@@ -1,4 +1,4 @@
-import type { StageColors } from '../render/stage';
+import type { StageColors } from '../render/drawn';
 import { resolvedColor } from '../style/resolvedColor';
 
 /** Colours of the picture from the custom properties that hold for a component. */

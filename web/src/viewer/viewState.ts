@@ -1,5 +1,5 @@
 import { cameraFromText, cameraText, type CameraState } from '../render/camera';
-import type { Layers } from '../render/stage';
+import type { Layers } from '../render/drawn';
 
 /** What a link says about the view: everything in it is optional. */
 export interface ViewState {

@@ -93,7 +93,9 @@ describe.skipIf(missing)('two captures in step', { timeout: 90_000 }, () => {
     expect(looks[1]).toEqual(looks[0]);
     // The place is that of a frame which may still have to come.
     await expect
-      .poll(() => inViewer(page, (viewer) => [viewer.player!.buffering, viewer.pair.player!.buffering], null))
+      .poll(() =>
+        inViewer(page, (viewer) => [viewer.player!.playback.buffering, viewer.pair.player!.playback.buffering], null),
+      )
       .toEqual([false, false]);
     // What the second picture shows is what its own capture decodes to.
     const [shown, alone] = await inViewer(

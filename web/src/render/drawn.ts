@@ -1,0 +1,32 @@
+/** What is drawn. */
+export interface Layers {
+  readonly model: boolean;
+  readonly wireframe: boolean;
+  readonly points: boolean;
+  readonly cage: boolean;
+  readonly handles: boolean;
+  readonly ground: boolean;
+  /** Colours of the model's points, where it has any. */
+  readonly colors: boolean;
+}
+
+/** Colours of the picture, as CSS colours in sRGB. */
+export interface StageColors {
+  readonly top: string;
+  readonly bottom: string;
+  readonly model: string;
+  readonly wire: string;
+  readonly cage: string;
+  readonly handle: string;
+  readonly grid: string;
+  readonly shadow: number;
+}
+
+/** What of a capture whose original is there is drawn: what is decoded, the original, or the original to the left of a line. */
+export type Side = 'decoded' | 'original' | 'both';
+
+/** CSS pixels of the canvas that something lies above. */
+export interface Covered {
+  readonly right: number;
+  readonly bottom: number;
+}

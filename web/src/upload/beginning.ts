@@ -1,0 +1,47 @@
+/** The beginning of an upload, from files and what was chosen for them. */
+
+import type { Service } from '../service/service';
+import type { Dropped, Item } from './classify';
+import { marksOf } from './fileMarks';
+import { KeptUpload, newKey } from './keptUpload';
+import { type Choices, designOf, optionsOf, sendsHandles } from './optionsForm';
+import type { Plan } from './plan';
+import { UploadJob } from './uploadJob';
+
+/** The record of an upload that begins now. */
+export async function newUpload(
+  service: Service,
+  plan: Plan,
+  choices: Choices,
+  items: readonly Item[],
+): Promise<KeptUpload> {
+  return new KeptUpload({
+    key: newKey(),
+    service: service.address(''),
+    begun: Date.now(),
+    choices,
+    marks: await marksOf(items),
+    frames: plan.frames.frames,
+    session: null,
+    design: null,
+  });
+}
+
+/** Sends a plan as it was asked for when its upload began. */
+export function jobOf(service: Service, plan: Plan, kept: KeptUpload): UploadJob {
+  const { choices } = kept.present;
+  const { frames, cage } = plan;
+  const request = {
+    options: optionsOf(choices, frames.frames, cage !== null),
+    design: designOf(choices, cage !== null),
+    handlesOnly: sendsHandles(choices, 12 * frames.frames * frames.points),
+  };
+  return new UploadJob(service, plan, request, kept);
+}
+
+/** A name for a capture: the folder that was dropped, or the file of the frames, says best what it is. */
+export function captureName(plan: Plan, dropped: readonly Dropped[], items: readonly Item[]): string {
+  const path = dropped.find(({ path }) => path.includes('/'))?.path;
+  const frames = items.find((item) => item.role === 'frames')?.files[0];
+  return path?.split('/')[0] ?? (frames ?? plan.rest).name.replace(/\.[^.]*$/, '');
+}

@@ -1,0 +1,208 @@
+import type { Capture } from '../capture';
+import type { Original } from '../originals/original';
+import { FrameStore, type FrameEdit } from '../render/frameStore';
+import type { Stage } from '../render/stage';
+import { Comparison } from './comparison';
+import { blendedRows, FrameFeed, type Blend } from './frameFeed';
+import { HeatMap } from './heatMap';
+import { sentence } from './text';
+import { framesAhead, sought, standing, USUAL_RATE, type Transport } from './transport';
+
+/** Rows of a cage, `rowsPerFrame × 3`, that are drawn in place of those of a frame. */
+export interface Deformation {
+  /** Whether they change from picture to picture. */
+  readonly isMoving: boolean;
+  /** @param seconds of a clock that goes on while nothing plays */
+  rows(rows: Float32Array | Float64Array, seconds: number): Float64Array;
+}
+
+/** What is shown together with a capture, in step with it. */
+export interface Companion {
+  /** Whether what belongs to a place is there, or will never be; sees to it that it comes. */
+  prepare(transport: Transport): boolean;
+  /** Shows what belongs to the place that is shown of the capture. */
+  show(): void;
+}
+
+/** Whom a playback tells what has happened. */
+export interface PlaybackListener {
+  /** Another picture is due. */
+  wake(): void;
+  /** What is drawn has changed where the place has not. */
+  refresh(): void;
+  /** Anything but the place has changed. */
+  changed(): void;
+  /** Something went wrong, in one sentence; null when it is over. */
+  problem(problem: string | null): void;
+}
+
+/** Frames of the original that are read ahead. */
+const ORIGINALS_AHEAD = 3;
+/** Frames that a live capture is entered before its end, so that playing does not wait for every one. */
+const LIVE_MARGIN = 15;
+
+/** The place of a capture that is shown: moves on when its frames are there, fetches them, and poses the stage. */
+export class Playback {
+  readonly heatMap: HeatMap;
+  /** The original frames, where they are at hand. */
+  readonly comparison: Comparison;
+  /** What is shown together with this capture. */
+  companion: Companion | null = null;
+  deformation: Deformation | null = null;
+  /** Whether the frame that should be shown has not come yet. */
+  buffering = false;
+  /** Frames that were passed over because pictures came too slowly. */
+  dropped = 0;
+  /** Whether the frame that is shown is to be posed anew. */
+  poseIsOld = true;
+  private readonly store: FrameStore;
+  private readonly feed: FrameFeed;
+  private state: Transport;
+  private shownPosition = -1;
+  private captureProblem: string | null = null;
+  private isClosed = false;
+
+  constructor(
+    private readonly capture: Capture,
+    private readonly stage: Stage,
+    private readonly listener: PlaybackListener,
+  ) {
+    this.store = new FrameStore(capture);
+    this.store.onArrival = () => listener.wake();
+    this.store.onReplaced = () => this.replaceFrames();
+    this.store.onBlock = ({ cages }) => stage.include(cages, capture.static.rowsPerFrame);
+    this.feed = new FrameFeed(capture, this.store, () => listener.wake());
+    this.heatMap = new HeatMap(capture, stage, this.store);
+    this.heatMap.onChange = () => {
+      listener.changed();
+      listener.wake();
+    };
+    this.heatMap.onRange = () => listener.refresh();
+    this.comparison = new Comparison(capture, stage);
+    this.comparison.onChange = () => listener.refresh();
+    this.state = { ...standing(), rate: capture.static.frameRate ?? USUAL_RATE };
+    this.followCapture();
+    if (!capture.complete) this.state = sought(this.state, capture.frames - LIVE_MARGIN);
+  }
+
+  get transport(): Transport {
+    return this.state;
+  }
+
+  /** Goes to a place, and asks anew for frames that did not come before. */
+  go(transport: Transport) {
+    this.state = transport;
+    this.feed.holes.clear();
+  }
+
+  /** Shows frames with other rows than the capture has; null shows the capture itself. */
+  setFrameEdit(edit: FrameEdit | null) {
+    this.store.edit = edit;
+  }
+
+  /** Rows of a frame and its points' offsets. */
+  frame(frame: number): ReturnType<FrameStore['frame']> {
+    return this.store.frame(frame);
+  }
+
+  /** Takes note of frames that the capture has got, and of what happened to it. */
+  followCapture() {
+    const { frames, complete, problem, frameNumbers: numbers } = this.capture;
+    this.state = sought({ ...this.state, frames, complete, numbers }, this.state.position);
+    if (problem !== this.captureProblem) this.listener.problem(problem);
+    this.captureProblem = problem;
+    this.listener.changed();
+    this.listener.wake();
+  }
+
+  /** Whether the frames of a place are there, or will never be; asks for those that are missing. */
+  prepare(transport: Transport): boolean {
+    return this.feed.prepare(transport);
+  }
+
+  /** Goes to a place that somebody else has moved on to, whether or not its frames are there. */
+  follow(transport: Transport) {
+    this.state = transport;
+    this.moveTo(transport, 0);
+  }
+
+  /** Moves on to a place if its frames are there, and sees to those that will be needed; `now` is the time of a {@link Deformation} in seconds. */
+  moveTo(advancing: Transport, now: number) {
+    const news = this.feed.holes.news(Math.floor(advancing.position));
+    if (news !== null) this.listener.problem(news);
+    const next = advancing.playing ? this.feed.holes.past(advancing) : advancing;
+    const original = this.wantedOriginal;
+    // Between two frames there is nothing to compare.
+    const found = this.feed.at(original ? { ...next, smooth: false } : next);
+    this.feed.prefetch(next);
+    if (typeof found === 'number') {
+      this.buffering = next.frames > 0 && !this.feed.holes.at(found);
+      if (this.buffering) this.feed.load(found);
+      else this.stopAt(next);
+      return;
+    }
+    original?.prefetch(framesAhead(next, ORIGINALS_AHEAD));
+    const lacksOriginal = original !== null && !original.peek(found.before);
+    if (lacksOriginal) this.loadOriginal(original, found.before);
+    this.buffering = lacksOriginal || this.companion?.prepare(next) === false;
+    if (this.buffering) return;
+    if (this.state.playing && next === advancing)
+      this.dropped += Math.max(0, Math.floor(next.position) - Math.floor(this.state.position) - 1);
+    const ended = this.state.playing && !next.playing;
+    this.state = next;
+    if (ended) this.listener.changed();
+    this.pose(found, original, now);
+  }
+
+  close() {
+    this.isClosed = true;
+    this.feed.close();
+  }
+
+  private pose(found: Blend, original: Original | null, now: number) {
+    const { before, mix, here, there } = found;
+    if (!this.poseIsOld && before + mix === this.shownPosition) return;
+    this.poseIsOld = false;
+    this.shownPosition = before + mix;
+    this.heatMap.update(before, this.state.frames);
+    const rows = this.deformation?.rows(blendedRows(found), now) ?? blendedRows(found);
+    this.stage.setPose({ rows, before: here.offsets, after: there?.offsets ?? null, mix });
+    this.comparison.update(before);
+    this.heatMap.measure(before, original);
+  }
+
+  /** Stops where playing cannot go on. */
+  private stopAt(next: Transport) {
+    if (!this.state.playing || next.playing) return;
+    this.state = next;
+    this.listener.changed();
+  }
+
+  private replaceFrames() {
+    this.feed.holes.clear();
+    this.heatMap.refresh();
+    this.listener.refresh();
+  }
+
+  /** The original, where what is shown needs it. */
+  private get wantedOriginal(): Original | null {
+    const { original, side } = this.comparison;
+    return side !== 'decoded' || this.heatMap.kind === 'error' ? original : null;
+  }
+
+  private loadOriginal(original: Original, frame: number) {
+    original.load(frame).then(
+      () => this.listener.wake(),
+      (error: unknown) => this.failOriginal(error),
+    );
+  }
+
+  private failOriginal(error: unknown) {
+    if (this.isClosed || !this.comparison.original) return;
+    this.buffering = false;
+    this.comparison.close();
+    this.heatMap.show('none');
+    this.listener.refresh();
+    this.listener.problem(sentence(error));
+  }
+}
