@@ -1,6 +1,6 @@
 //! After a restart, however it came, the service goes on where it was.
 
-use crate::support::{Capture, OCTETS, Raw, TestApp, chunked, lines};
+use crate::support::{Capture, OCTETS, Raw, TestApp, chunked, eventually, lines};
 use cager_proto::messages::{CacheUse, SessionState};
 use serde_json::Value;
 use std::path::Path;
@@ -35,6 +35,7 @@ async fn a_new_session_on_the_same_pair_prepares_nothing_after_a_restart() {
     let mut app = TestApp::start();
     let capture = Capture::small();
     app.ready(capture).await;
+    app.solver_stored().await;
     app.kill();
     let app = app.again();
     let session = app.ready(capture).await;
@@ -115,7 +116,7 @@ async fn a_damaged_container_is_found_written_again_and_counted_once() {
     std::fs::write(&file, bytes).expect("a container");
     let app = app.again();
     let found = async || (app.session(&session.id).await.state == SessionState::Ready).then_some(());
-    crate::support::eventually("that the damage is found", found).await;
+    eventually("that the damage is found", found).await;
     app.complete(&session.id, 40).await.expect(200);
     assert!(app.container(&session.id).await == expected, "the same bytes");
     assert_eq!(app.metric(stored).await, before);

@@ -63,6 +63,13 @@ impl TestApp {
         self.place.path().join("data/sessions").join(id).join(name)
     }
 
+    /// Waits until a solver is on disk: the service writes it in the background.
+    pub(crate) async fn solver_stored(&self) {
+        let folder = self.place.path().join("data/prepared");
+        let stored = async || std::fs::read_dir(&folder).expect("a folder").next();
+        eventually("that the solver is on disk", stored).await.expect("a file");
+    }
+
     /// Starts a service with these settings, each `KEY=VALUE`.
     pub(crate) fn with(settings: &[&str]) -> Self {
         let flags = settings.iter().flat_map(|setting| ["--set".to_owned(), (*setting).to_owned()]).collect();

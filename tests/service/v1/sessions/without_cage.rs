@@ -45,6 +45,7 @@ async fn the_same_again_prepares_nothing_also_after_a_restart() {
     app.prepared(&first.id).await;
     let again: Session = app.create_with(parts(Capture::small(), &options), None).await.is(201);
     assert_eq!(app.prepared(&again.id).await.cache, Some(CacheUse::Hit));
+    app.solver_stored().await;
     app.kill();
     let app = app.again();
     let later: Session = app.create_with(parts(Capture::small(), &options), None).await.is(201);
