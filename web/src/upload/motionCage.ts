@@ -12,6 +12,8 @@ const MOST_FRAMES = 160;
 /** Of large models fewer frames are sent: they show as much of the motion. */
 const MOST_BYTES = 192 << 20;
 const LEAST_FRAMES = 24;
+/** How long a request that begins a design may still be answered after nobody wants it, in milliseconds. */
+const ANSWER_MS = 2000;
 
 /** Numbers of the frames that a design sees: evenly spaced, the first and the last among them. */
 export function sampledFrames(frames: number, points: number): number[] {
@@ -114,7 +116,15 @@ async function beginDesign(
   body.append('rest', rest);
   body.append('frames', new Blob(pieces), 'frames.f32');
   const headers = { 'Idempotency-Key': key };
-  return (await service.json<CageDesign>('cages', { method: 'POST', headers, body, signal })).id;
+  return (await service.json<CageDesign>('cages', { method: 'POST', headers, body, signal: answered(signal) })).id;
+}
+
+/** Aborted a little after another one, so that what the service has just begun is known, and can be deleted. */
+function answered(signal: AbortSignal): AbortSignal {
+  const late = new AbortController();
+  const abort = (): unknown => setTimeout(() => late.abort(signal.reason), ANSWER_MS);
+  signal.addEventListener('abort', abort, { once: true });
+  return late.signal;
 }
 
 /**
