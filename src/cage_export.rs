@@ -48,7 +48,7 @@ pub fn write_cages(
     };
 
     let rows = cage.points.len();
-    let options = frame_options(&mut container, there, range, timing).map_err(fail)?;
+    let options = frame_options(&mut container, there, range, timing, false).map_err(fail)?;
     let mut writer = create_frames(output, rows, range.count(), &cage.faces, &options)?;
     let mut frame = Vec::new();
     for place in 0..range.count() {

@@ -177,6 +177,8 @@ pub struct Decoded {
     pub outside: usize,
     /// Frames of the file that were left out because they are damaged, from 0.
     pub damaged: Vec<usize>,
+    /// Whether the numbers of the file's frames are damaged, so that they are counted from 0.
+    pub numbers_lost: bool,
 }
 
 /// A model in its rest pose with its decoder, and the number of its points outside the rest cage.
@@ -258,7 +260,8 @@ fn bind(
     Ok(BoundModel { rest, decoder, outside: found.outside.len() })
 }
 
-/// Frame rate and frame numbers of the output; `timing` overrides the container's.
+/// Frame rate and frame numbers of the output; `timing` overrides the container's, whose frames are counted from 0 where their numbers are damaged and
+/// may be lost.
 ///
 /// # Errors
 /// Damage.
@@ -267,9 +270,13 @@ pub(crate) fn frame_options(
     there: usize,
     range: FrameRange,
     timing: Timing,
+    may_be_lost: bool,
 ) -> Result<FrameOptions, container::Error> {
     let fps = timing.fps.or(container.header().frame_rate).unwrap_or(FrameOptions::default().fps);
-    let mut found = container.frame_numbers()?;
+    let mut found = match container.frame_numbers() {
+        Err(container::Error::Corrupt { .. }) if may_be_lost => Vec::new(),
+        found => found?,
+    };
     if found.len() != there {
         found = (0..there).map(|frame| frame as f64).collect();
     }
@@ -299,7 +306,8 @@ pub fn decode(
     let taken = range.unwrap_or(FrameRange::all(there));
     let mut wanted: Vec<usize> =
         if there == 0 { Vec::new() } else { (0..taken.count()).map(|k| taken.frame(k)).collect() };
-    let mut options = frame_options(&mut container, there, taken, timing).map_err(fail)?;
+    let mut options = frame_options(&mut container, there, taken, timing, salvage).map_err(fail)?;
+    let numbers_lost = salvage && container.frame_numbers().is_err();
     let mut damaged = Vec::new();
     if salvage && edited.is_none() {
         damaged = wanted.clone();
@@ -352,5 +360,5 @@ pub fn decode(
     if !dry_run {
         writer.finish()?;
     }
-    Ok(Decoded { points: rest.points.len(), frames, outside, damaged })
+    Ok(Decoded { points: rest.points.len(), frames, outside, damaged, numbers_lost })
 }

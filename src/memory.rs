@@ -1,6 +1,6 @@
 //! Memory limits for encoding and decoding.
 
-/// Limit of the memory used in addition to the model. What does not fit is computed in parts, with the same result.
+/// Limit of the memory used in addition to the model. What does not fit is computed in parts, with the same result; groups of coded frames are shorter where a whole one does not fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Memory {
     bytes: u64,

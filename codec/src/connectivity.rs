@@ -3,6 +3,7 @@
 
 use crate::entropy::{Bit, Coder, Decoder, Encoder, Integers, SIZES, size_class};
 use crate::error::{Error, Result};
+use crate::open_edges::{NEWEST, OpenEdges};
 use cager_core::mesh::Polygons;
 use std::cmp::Reverse;
 use std::collections::VecDeque;
@@ -15,10 +16,13 @@ const CORNERS: usize = VALENCES * VALENCES + 1;
 /// What the walk knows of the mesh.
 struct Walk {
     /// Ends of the directed edges that wait for their opposite, by where these begin, and the other way round.
-    leaving: Vec<Vec<u32>>,
-    arriving: Vec<Vec<u32>>,
+    leaving: Vec<OpenEdges>,
+    arriving: Vec<OpenEdges>,
     met: Vec<bool>,
     faces: Vec<u8>,
+    /// The last face, counted from 1, that each vertex is a corner of, and the face that is coded.
+    of_face: Vec<u32>,
+    face: u32,
     gates: VecDeque<(u32, u32)>,
     /// Whether the walk goes round what it has seen, or on from where it is.
     in_rings: bool,
@@ -59,14 +63,19 @@ type Edge = ([u32; 2], usize, Reverse<usize>);
 /// `edges` are those of the faces, sorted.
 fn encode_walk(list: &[&[u32]], edges: &[Edge], points: usize, in_rings: bool) -> Vec<u8> {
     let mut done = vec![false; list.len()];
+    // Of equal edges, by where the first of them is, how many have a face that is done.
+    let mut past = vec![0; edges.len()];
     let mut coder = Encoder::default();
     let mut walk = Walk::new(points, edges.len(), coder.even(in_rings));
     let mut next = 0;
     loop {
         while let Some((a, b)) = walk.gate() {
-            let opposite = &edges[edges.partition_point(|(edge, ..)| *edge < [b, a])..];
-            let mut opposite = opposite.iter().take_while(|(edge, ..)| *edge == [b, a]);
-            let found = opposite.find(|(_, f, _)| !done[*f]).copied();
+            let begin = edges.partition_point(|(edge, ..)| *edge < [b, a]);
+            let equal = |at: usize| edges.get(at).filter(|(edge, ..)| *edge == [b, a]);
+            while equal(begin + past.get(begin).unwrap_or(&0)).is_some_and(|(_, f, _)| done[*f]) {
+                past[begin] += 1;
+            }
+            let found = equal(begin + past.get(begin).unwrap_or(&0)).copied();
             if coder.bit(&mut walk.across, found.is_some())
                 && let Some((_, f, Reverse(corner))) = found
             {
@@ -129,10 +138,12 @@ pub fn decode_faces(bytes: &[u8], points: usize, count: usize, corners: usize) -
 impl Walk {
     fn new(points: usize, corners: usize, in_rings: bool) -> Self {
         Self {
-            leaving: vec![Vec::new(); points],
-            arriving: vec![Vec::new(); points],
+            leaving: std::iter::repeat_with(OpenEdges::default).take(points).collect(),
+            arriving: std::iter::repeat_with(OpenEdges::default).take(points).collect(),
             met: vec![false; points],
             faces: vec![0; points],
+            of_face: vec![0; points],
+            face: 0,
             gates: VecDeque::new(),
             in_rings,
             last: 0,
@@ -153,7 +164,7 @@ impl Walk {
     /// The next edge that still waits for a face.
     fn gate(&mut self) -> Option<(u32, u32)> {
         while let Some((a, b)) = if self.in_rings { self.gates.pop_front() } else { self.gates.pop_back() } {
-            if self.leaving[a as usize].contains(&b) {
+            if self.leaving[a as usize].contains(b) {
                 return Some((a, b));
             }
         }
@@ -162,10 +173,9 @@ impl Walk {
 
     /// The edge from a to b waits no longer.
     fn close(&mut self, a: u32, b: u32) -> bool {
-        let remove = |list: &mut Vec<u32>, x: u32| list.iter().rposition(|&y| y == x).map(|at| list.remove(at));
-        let was_open = remove(&mut self.leaving[a as usize], b).is_some();
+        let was_open = self.leaving[a as usize].remove(b);
         if was_open {
-            remove(&mut self.arriving[b as usize], a);
+            self.arriving[b as usize].remove(a);
         }
         was_open
     }
@@ -181,6 +191,8 @@ impl Walk {
         self.corners_left = left;
         let mut face = gate.map_or_else(Vec::new, |(a, b)| vec![b, a]);
         face.truncate(self.arity as usize);
+        self.face += 1;
+        face.iter().for_each(|&v| self.of_face[v as usize] = self.face);
         while face.len() < self.arity as usize {
             let closes = face.len() + 1 == self.arity as usize && gate.is_some();
             let vertex = self.corner(coder, &face, closes, given.get(face.len()).copied().unwrap_or(0));
@@ -188,6 +200,7 @@ impl Walk {
                 return vec![vertex];
             }
             face.push(vertex);
+            self.of_face[vertex as usize] = self.face;
         }
         for (k, &from) in face.iter().enumerate() {
             let to = face[(k + 1) % face.len()];
@@ -209,9 +222,11 @@ impl Walk {
         // Vertices that an open edge leads from to the last corner, or to from the first one.
         let mut near: Vec<u32> = Vec::with_capacity(4);
         let mut both = false;
-        let back: &[u32] = if closes { newest(&self.leaving[first as usize]) } else { &[] };
-        for &x in newest(&self.arriving[previous as usize]).iter().rev() {
-            if back.contains(&x) && !face.contains(&x) {
+        let is_corner = |x: u32| self.of_face[x as usize] == self.face;
+        let (mut scratch, mut other) = ([0; NEWEST], [0; NEWEST]);
+        let back = if closes { self.leaving[first as usize].newest(&mut scratch) } else { &[] };
+        for &x in self.arriving[previous as usize].newest(&mut other).iter().rev() {
+            if back.contains(&x) && !is_corner(x) {
                 near.insert(0, x);
                 both = true;
             } else {
@@ -219,7 +234,7 @@ impl Walk {
             }
         }
         near.extend(back.iter().rev());
-        near.retain(|x| !face.contains(x));
+        near.retain(|&x| !is_corner(x));
         let mut k = 0;
         while k < near.len() {
             if near[..k].contains(&near[k]) {
@@ -317,11 +332,6 @@ impl Unmet {
     }
 }
 
-/// The last of a vertex's open edges: around a hub there may be very many.
-fn newest(edges: &[u32]) -> &[u32] {
-    &edges[edges.len().saturating_sub(16)..]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -373,6 +383,21 @@ mod tests {
             .collect();
         let bytes = check(&triangles.iter().map(|t| &t[..]).collect::<Vec<_>>(), (side * side) as usize);
         assert!(8 * bytes < 3 * triangles.len() / 2, "{bytes} bytes of {} triangles", triangles.len());
+    }
+
+    #[test]
+    fn hubs_large_polygons_and_repeated_faces_take_no_longer_than_others() {
+        let begin = std::time::Instant::now();
+        let count = 400_000u32;
+        let fan: Vec<[u32; 3]> = (0..count).map(|k| [0, 2 * k + 1, 2 * k + 2]).collect();
+        check(&fan.iter().map(|t| &t[..]).collect::<Vec<_>>(), 2 * count as usize + 1);
+        let mut round = Polygons::new();
+        round.push(&(0..count).collect::<Vec<_>>());
+        round.push(&(0..count).rev().collect::<Vec<_>>());
+        let bytes = encode_faces(&round, count as usize);
+        assert_eq!(decode_faces(&bytes, count as usize, 2, 2 * count as usize).unwrap().len(), 2);
+        check(&vec![&[0, 1, 2][..]; count as usize], 3);
+        assert!(begin.elapsed().as_secs() < 10, "{:?}", begin.elapsed());
     }
 
     #[test]

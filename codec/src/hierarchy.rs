@@ -4,6 +4,7 @@
 //! them that has the fewest. It depends on the faces alone, in whole numbers.
 
 use cager_core::mesh::Polygons;
+use std::collections::BTreeSet;
 
 /// Rounds end when so few vertices are left; these are not predicted.
 const COARSEST: usize = 48;
@@ -23,26 +24,25 @@ pub struct Hierarchy {
 impl Hierarchy {
     /// Of the vertices of these faces; without an edge a vertex is not predicted.
     pub fn new(faces: &Polygons, points: usize) -> Self {
-        let mut near: Vec<Vec<u32>> = vec![Vec::new(); points];
+        let mut lists: Vec<Vec<u32>> = vec![Vec::new(); points];
         for face in faces.iter() {
             for (k, &a) in face.iter().enumerate() {
                 let b = face[(k + 1) % face.len()];
                 if a != b {
-                    near[a as usize].push(b);
-                    near[b as usize].push(a);
+                    lists[a as usize].push(b);
+                    lists[b as usize].push(a);
                 }
             }
         }
-        for list in &mut near {
-            list.sort_unstable();
-            list.dedup();
-        }
-        let mut left: Vec<u32> = (0..points as u32).collect();
-        let mut by_size: Vec<u64> = Vec::with_capacity(points);
-        let mut removed: Vec<(u32, Vec<u32>)> = Vec::with_capacity(points);
+        let mut near: Vec<Near> = lists.into_iter().map(Near::new).collect();
+        // Who has no neighbours never gets any again: rounds are over the others alone.
+        let (mut left, mut alone): (Vec<u32>, Vec<u32>) = (0..points as u32).partition(|&v| near[v as usize].len() > 0);
+        let mut by_size: Vec<u64> = Vec::with_capacity(left.len());
+        let mut removed: Vec<(u32, Vec<u32>)> = Vec::with_capacity(left.len());
         let mut blocked = vec![0u32; points];
+        let mut gone = vec![false; points];
         let mut round = 0;
-        while left.len() > COARSEST {
+        while left.len() + alone.len() > COARSEST && !left.is_empty() {
             round += 1;
             // The number of neighbours, then the vertex, as one number.
             by_size.clear();
@@ -50,23 +50,26 @@ impl Hierarchy {
             by_size.sort_unstable();
             let before = removed.len();
             for v in by_size.iter().map(|&numbers| numbers as u32) {
-                if blocked[v as usize] != round && !near[v as usize].is_empty() {
-                    near[v as usize].iter().for_each(|&w| blocked[w as usize] = round);
+                if blocked[v as usize] != round {
+                    near[v as usize].for_each(|w| blocked[w as usize] = round);
                     blocked[v as usize] = round;
+                    gone[v as usize] = true;
                     removed.push((v, Vec::new()));
                 }
             }
-            if removed.len() == before {
-                break;
-            }
-            let mut gone = vec![false; points];
             for (v, parents) in &mut removed[before..] {
-                gone[*v as usize] = true;
-                *parents = std::mem::take(&mut near[*v as usize]);
+                *parents = std::mem::replace(&mut near[*v as usize], Near::Few(Vec::new())).into_vec();
                 join(&mut near, *v, parents);
             }
-            left.retain(|&v| !gone[v as usize]);
+            left.retain(|&v| {
+                let is_alone = near[v as usize].len() == 0;
+                if is_alone && !gone[v as usize] {
+                    alone.push(v);
+                }
+                !is_alone
+            });
         }
+        left.extend(alone);
         left.sort_unstable();
         let mut hierarchy = Self { starts: vec![0; left.len() + 1], order: left, parents: Vec::new() };
         hierarchy.order.extend(removed.iter().rev().map(|(v, _)| v));
@@ -136,23 +139,83 @@ impl Hierarchy {
     }
 }
 
-/// Takes v from the lists of its neighbours and joins these to the one that has the fewest.
-fn join(near: &mut [Vec<u32>], v: u32, neighbours: &[u32]) {
-    for &w in neighbours {
-        let list = &mut near[w as usize];
-        if let Ok(place) = list.binary_search(&v) {
-            list.remove(place);
+/// The neighbours of a vertex, ascending. Of a hub there may be as many as the mesh has vertices, so that taking one from a plain list would take as long.
+enum Near {
+    Few(Vec<u32>),
+    Many(BTreeSet<u32>),
+}
+
+/// Most neighbours in a plain list.
+const FEW: usize = 128;
+
+impl Near {
+    fn new(mut list: Vec<u32>) -> Self {
+        list.sort_unstable();
+        list.dedup();
+        if list.len() <= FEW { Self::Few(list) } else { Self::Many(list.into_iter().collect()) }
+    }
+
+    fn len(&self) -> usize {
+        match self {
+            Self::Few(list) => list.len(),
+            Self::Many(set) => set.len(),
         }
+    }
+
+    fn for_each(&self, f: impl FnMut(u32)) {
+        match self {
+            Self::Few(list) => list.iter().copied().for_each(f),
+            Self::Many(set) => set.iter().copied().for_each(f),
+        }
+    }
+
+    fn into_vec(self) -> Vec<u32> {
+        match self {
+            Self::Few(list) => list,
+            Self::Many(set) => set.into_iter().collect(),
+        }
+    }
+
+    fn remove(&mut self, v: u32) {
+        match self {
+            Self::Few(list) => {
+                if let Ok(place) = list.binary_search(&v) {
+                    list.remove(place);
+                }
+            }
+            Self::Many(set) => {
+                set.remove(&v);
+            }
+        }
+    }
+
+    fn insert(&mut self, v: u32) {
+        match self {
+            Self::Few(list) => {
+                if let Err(place) = list.binary_search(&v) {
+                    list.insert(place, v);
+                    if list.len() > FEW {
+                        *self = Self::Many(std::mem::take(list).into_iter().collect());
+                    }
+                }
+            }
+            Self::Many(set) => {
+                set.insert(v);
+            }
+        }
+    }
+}
+
+/// Takes v from the lists of its neighbours and joins these to the one that has the fewest.
+fn join(near: &mut [Near], v: u32, neighbours: &[u32]) {
+    for &w in neighbours {
+        near[w as usize].remove(v);
     }
     let Some(&hub) = neighbours.iter().min_by_key(|&&w| (near[w as usize].len(), w)) else { return };
     for &w in neighbours {
         if w != hub {
-            for (a, b) in [(hub, w), (w, hub)] {
-                let list = &mut near[a as usize];
-                if let Err(place) = list.binary_search(&b) {
-                    list.insert(place, b);
-                }
-            }
+            near[hub as usize].insert(w);
+            near[w as usize].insert(hub);
         }
     }
 }
@@ -212,5 +275,19 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn hubs_and_vertices_alone_take_no_longer_than_others() {
+        let begin = std::time::Instant::now();
+        let (leaves, clique) = (500_000u32, 300);
+        let mut faces = Polygons::new();
+        (0..leaves).for_each(|k| faces.push(&[0, 2 * k + 1, 2 * k + 2]));
+        let first = 2 * leaves + 1;
+        (0..clique).for_each(|a| (0..a).for_each(|b| faces.push(&[first + a, first + b])));
+        let points = (first + clique + 500_000) as usize;
+        let hierarchy = Hierarchy::new(&faces, points);
+        assert_eq!(hierarchy.points(), points);
+        assert!(begin.elapsed().as_secs() < 10, "{:?}", begin.elapsed());
     }
 }

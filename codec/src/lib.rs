@@ -16,6 +16,7 @@ mod hierarchy;
 mod histograms;
 mod linear;
 mod mesh;
+mod open_edges;
 mod parallelograms;
 mod residual;
 mod trajectories;

@@ -55,16 +55,25 @@ fn decoders_that_compute_their_coordinates_have_the_bits_of_those_that_keep_them
         let found = decoders.map(|decoder| {
             let mut out = vec![Vec::new()];
             decoder.decode(&[&bent], &mut out);
-            (out, decoder.measure(&[&bent], &[&points.concat()]))
+            (out, decoder.measure(&[&bent], &[&points.concat()]), decoder.largest_sum(&[&bent]))
         });
         assert!(found[0] == found[1] && found[0] == found[2], "{}", system.name());
         // The point that is named is the worst.
-        let (out, errors) = &found[0];
+        let (out, errors, largest_sum) = &found[0];
         let distance =
             |(p, q): (&[f32], &[f64; 3])| (0..3).map(|k| (f64::from(p[k]) - q[k]).powi(2)).sum::<f64>().sqrt();
         let distances: Vec<f64> = out[0].chunks_exact(3).zip(points).map(distance).collect();
         let worst = distances.iter().copied().fold(0.0, f64::max);
         assert!((distances[errors[0].worst as usize] - worst).abs() < 1e-12 && (worst - errors[0].linf).abs() < 1e-12);
+        // The sum of the sizes of what is added up for it, which is that of the decoder's columns only where these are all vertices.
+        if columns == cage.vertices().len() {
+            let centre = [0, 1, 2].map(|k| bent.iter().skip(k).step_by(3).sum::<f32>() / columns as f32);
+            let size = |row: &[f32]| (0..3).map(|k| (row[k] - centre[k]).abs()).fold(0.0, f32::max);
+            let sizes: Vec<f64> = bent.chunks_exact(3).map(size).map(f64::from).collect();
+            let sums = phi.row_iter().map(|row| row.iter().zip(&sizes).map(|(x, size)| x.abs() * size).sum::<f64>());
+            let wanted = sums.fold(0.0, f64::max);
+            assert!((largest_sum / wanted - 1.0).abs() < 1e-4, "{largest_sum} {wanted}");
+        }
     }
 }
 

@@ -104,8 +104,8 @@ pub(crate) struct EncodeArgs {
     #[command(flatten)]
     pub(crate) solver: SolverArgs,
 
-    /// Memory for frames and coordinates, such as 1GB; what does not fit is computed in parts, to the same result. The model itself and
-    /// its analysis, half a gigabyte with a cage of 350 vertices, come on top [default: half of what is free].
+    /// Memory for frames and coordinates, such as 1GB; what does not fit is computed in parts, to the same result, but groups of coded
+    /// frames are shorter where a whole one does not fit. The model itself and its analysis, half a gigabyte with a cage of 350 vertices, come on top [default: half of what is free].
     #[arg(long, value_name = "SIZE", value_parser = memory, hide_default_value = true)]
     pub(crate) memory: Option<Memory>,
 

@@ -74,6 +74,9 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
             args.input.display()
         )]);
     }
+    if found.numbers_lost {
+        warn(&[format!("{}: the numbers of its frames are damaged; they are counted from 0", args.input.display())]);
+    }
     if dry_run {
         return tell_dry_run(&output, &size(found.frames, found.points, "points"), &[]);
     }

@@ -4,7 +4,7 @@ use super::args::{SolverArgs, SpectrumArg};
 use super::{grouped, warn};
 use anyhow::{Context, Result, bail};
 use cager_cages::diagnosis::weld;
-use cager_core::cage::Cage;
+use cager_core::cage::{Cage, CageError};
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{Handles, PrepareError, SolverOptions, default_spectrum};
 use cager_core::mesh::TriMesh;
@@ -27,6 +27,9 @@ pub(super) fn read_cage(path: &Path, flip: bool) -> Result<Cage> {
     }
     let mesh = TriMesh::from(&model);
     let cage = Cage::new(if flip { mesh.flipped() } else { mesh });
+    if flip && matches!(cage, Err(CageError::Inward { .. })) {
+        bail!("{}: turned around, the faces of the cage point inwards; leave out --flip-cage", path.display());
+    }
     let polygon_of = model.faces.polygon_of_triangle();
     cage.map_err(|error| error.renumbered(|triangle| polygon_of[triangle] as usize))
         .with_context(|| path.display().to_string())

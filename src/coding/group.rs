@@ -6,7 +6,7 @@ use cager_core::decode::FrameError;
 use cager_proto::container::most_residual_numbers;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Steps of the numbers, in the capture's unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,12 +77,14 @@ pub(crate) struct GroupCoder {
     pub(super) frames: Vec<Vec<f64>>,
     pub(super) cages: Vec<Vec<f32>>,
     pub(super) most: usize,
+    /// See [`slack`], of the frames that wait.
+    slack: OnceLock<f64>,
 }
 
 impl GroupCoder {
     /// For groups of at most `most` frames of a prepared model. `diagonal` is the unit of errors.
     pub(crate) fn new(goal: Goal, model: Arc<GroupDecoder>, diagonal: f64, most: usize, carried: Carried) -> Self {
-        Self { goal, model, diagonal, carried, frames: Vec::new(), cages: Vec::new(), most }
+        Self { goal, model, diagonal, carried, frames: Vec::new(), cages: Vec::new(), most, slack: OnceLock::new() }
     }
 
     /// What the groups so far leave to the next.
@@ -101,6 +103,7 @@ impl GroupCoder {
     fn clear(&mut self) {
         self.frames.clear();
         self.cages.clear();
+        self.slack = OnceLock::new();
     }
 
     /// Adds a frame; true where the group is full and to be [closed](Self::close).
@@ -117,7 +120,7 @@ impl GroupCoder {
 
     /// Codes what was collected and begins the next group.
     pub(crate) fn close(&mut self) -> Result<CodedGroup, CodingError> {
-        self.goal.check_precision(self.diagonal, self.farthest())?;
+        self.goal.check_precision(self.diagonal, self.slack())?;
         let (residual, ratio) = match self.carried.chosen {
             Some(chosen) => chosen,
             None => self.choose()?,
@@ -136,12 +139,15 @@ impl GroupCoder {
     /// What a decoded position may be off, less what machines may differ by in rounding.
     fn bound(&self) -> Option<f64> {
         let Goal::MaxError(asked) = self.goal else { return None };
-        Some(asked * self.diagonal - slack(self.diagonal, self.farthest()))
+        Some(asked * self.diagonal - self.slack())
     }
 
-    /// Largest number of these frames.
-    fn farthest(&self) -> f64 {
-        self.frames.iter().flatten().fold(0.0f64, |far, x| far.max(x.abs()))
+    /// What machines may differ by in these frames.
+    fn slack(&self) -> f64 {
+        *self.slack.get_or_init(|| {
+            let farthest = self.frames.iter().flatten().fold(0.0f64, |far, x| far.max(x.abs()));
+            slack(self.diagonal, self.model.largest_sum(&self.cages), farthest)
+        })
     }
 
     pub(super) fn uncountable(&self) -> CodingError {

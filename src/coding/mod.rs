@@ -38,18 +38,23 @@ impl Goal {
     /// The quality for what is to be worked on later.
     pub const MASTER: Self = Self::MaxError(1e-4);
 
-    /// Refuses an error that positions in single precision cannot hold where numbers are as large as `farthest`.
+    /// Refuses an error that positions in single precision cannot hold where [machines differ](slack) by so much.
     ///
     /// # Errors
     /// [`CodingError::BelowPrecision`].
-    pub(crate) fn check_precision(self, diagonal: f64, farthest: f64) -> Result<(), CodingError> {
+    pub(crate) fn check_precision(self, diagonal: f64, slack: f64) -> Result<(), CodingError> {
         let (asked, times) = match self {
             Self::MaxError(error) => (error, 4.0),
             Self::MeanError(error) => (error, 1.0),
             _ => return Ok(()),
         };
-        let least = times * slack(diagonal, farthest) / diagonal;
-        if asked < least { Err(CodingError::BelowPrecision { asked, least }) } else { Ok(()) }
+        let least = times * slack / diagonal;
+        if asked < least {
+            // As it is printed, so that who asks for that is not refused.
+            let unit = 10f64.powf(least.log10().floor() - 1.0);
+            return Err(CodingError::BelowPrecision { asked, least: (least / unit).ceil() * unit });
+        }
+        Ok(())
     }
 
     /// The steps for a step of the residual and that of the cage over it, for a model of so many points.
@@ -87,16 +92,18 @@ impl Goal {
     }
 }
 
-/// What positions may differ by from machine to machine where numbers are as large as `farthest`.
-fn slack(diagonal: f64, farthest: f64) -> f64 {
-    1e-6 * diagonal + f64::from(f32::EPSILON) * farthest
+/// What positions may differ by from machine to machine, where the sizes of what is [added up](cager_core::decode::Decoder::largest_sum) for a
+/// coordinate are at most `sum` together, and coordinates at most `farthest`: the sums by their rounding, and the coordinates by a unit in the last place
+/// of each of three.
+pub(crate) fn slack(diagonal: f64, sum: f64, farthest: f64) -> f64 {
+    1e-6 * diagonal.max(sum) + 2.0 * f64::from(f32::EPSILON) * farthest
 }
 
 /// Bytes that coding a group holds, and of these for each position of a frame: as captured, of its cage, as a residual, decoded.
 const MOST_HELD: usize = 512 << 20;
 pub(crate) const HELD: usize = 112;
 
-/// Most frames of a group. The same on every machine, so that files are.
+/// Most frames of a group. The same on every machine, so that files are wherever a group fits into memory.
 pub(crate) fn group_frames(points: usize, rows: usize) -> usize {
     container::group_frames(points, rows).min(MOST_HELD / (HELD * points.max(1))).max(1)
 }
@@ -141,6 +148,16 @@ pub enum CodingError {
     /// Coordinates of the points that the basis of the cages is made from.
     #[error(transparent)]
     Coordinates(#[from] CoordinatesError),
+    /// A model with very many points.
+    #[error(
+        "models of {points} points cannot be coded, only up to {most}; encode without a target for error, size or quality, or take a part of the model"
+    )]
+    TooManyPoints {
+        /// Points.
+        points: usize,
+        /// Most that can be.
+        most: usize,
+    },
     /// A cage with very many vertices.
     #[error(
         "cages of {rows} rows cannot be coded, only up to {most}; encode without a target for error, size or quality, or take a smaller cage"
@@ -151,4 +168,23 @@ pub enum CodingError {
         /// Most that can be.
         most: usize,
     },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_least_error_that_is_told_is_not_refused() {
+        for farthest in [0.0, 0.5, 3.7, 130.0, 9_876.5] {
+            for goal in [Goal::MaxError, Goal::MeanError] {
+                let slack = slack(1.7, 0.9, farthest);
+                let told = match goal(1e-9).check_precision(1.7, slack) {
+                    Err(CodingError::BelowPrecision { least, .. }) => format!("{least:.1e}"),
+                    other => panic!("{other:?}"),
+                };
+                assert_eq!(goal(told.parse().unwrap()).check_precision(1.7, slack), Ok(()), "{told}");
+            }
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! What groups of one model are coded and decoded with.
 
 use super::CodingError;
-use cager_codec::{CageBasis, Error, Hierarchy, MOST_ROWS, Residual, decode_cages};
+use cager_codec::{CageBasis, Error, Hierarchy, MOST_POSITIONS, MOST_ROWS, Residual, decode_cages};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, ElementPlan};
 use cager_core::decode::Decoder;
@@ -28,6 +28,9 @@ impl GroupSpace {
         let rows = system.unknowns(cage);
         if rows > MOST_ROWS {
             return Err(CodingError::TooManyRows { rows, most: MOST_ROWS });
+        }
+        if rest.points.len() > MOST_POSITIONS {
+            return Err(CodingError::TooManyPoints { points: rest.points.len(), most: MOST_POSITIONS });
         }
         let basis = CageBasis::of(system, cage, &rest.points, plan, None)?;
         let (basis, _) = basis.ok_or(CodingError::Uncountable { first: 0, last: 0 })?;
@@ -90,6 +93,11 @@ impl GroupDecoder {
             self.decoder.decode(&cages, positions);
         }
         positions
+    }
+
+    /// See [`Decoder::largest_sum`].
+    pub(super) fn largest_sum(&self, cages: &[Vec<f32>]) -> f64 {
+        self.decoder.largest_sum(&cages.iter().map(Vec::as_slice).collect::<Vec<_>>())
     }
 
     /// Adds a group's residual to all its positions.

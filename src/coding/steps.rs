@@ -152,7 +152,8 @@ impl GroupCoder {
     /// In the bytes that belong to these of the frames that are left.
     pub(super) fn code_to_size(&mut self, asked: u64) -> Result<CodedGroup, CodingError> {
         let room = self.carried.room.unwrap_or_default();
-        let part = self.frames.len() as f64 / room.frames.max(1) as f64;
+        // Frames may come that were not expected.
+        let part = self.frames.len() as f64 / room.frames.max(self.frames.len()) as f64;
         let share = (room.bytes as f64 * part) as u64;
         let found = self.for_step(false, |coder, step, ratio| {
             let group = coder.encode(coder.frames.len(), step, ratio)?;
@@ -160,7 +161,8 @@ impl GroupCoder {
             Ok((group, bytes as f64 / share.max(1) as f64))
         })?;
         if let Some(group) = found {
-            let (bytes, frames) = (room.bytes - group.bytes(), room.frames.saturating_sub(self.frames.len()));
+            let (bytes, frames) =
+                (room.bytes.saturating_sub(group.bytes()), room.frames.saturating_sub(self.frames.len()));
             self.carried.room = Some(Room { bytes, frames, other: room.other + group.bytes() });
             return self.finish(group);
         }

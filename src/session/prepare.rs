@@ -1,7 +1,7 @@
 //! From uploaded files to a prepared solver: parsing, validation, preparation. All functions block.
 
 use super::solver_cache::Prepared;
-use crate::coding::{CodingError, Goal, RestMeshes};
+use crate::coding::{CodingError, Goal, RestMeshes, slack};
 use crate::preparation_warnings::preparation_warnings;
 use crate::problem::{self, ApiError};
 use crate::store::Content;
@@ -224,7 +224,9 @@ fn check_goal(goal: Goal, geometry: &Geometry, rows: usize, frames: u32) -> Resu
         .map_or(0, |(rest, cage)| (rest.bytes() + cage.bytes() + colors_bytes(&rest.mesh.colors)) as u64);
     let checked = match goal {
         _ if rows > MOST_ROWS => Err(CodingError::TooManyRows { rows, most: MOST_ROWS }),
-        goal => goal.check_size(meshes, frames as usize).and_then(|()| goal.check_precision(geometry.unit, farthest)),
+        goal => goal
+            .check_size(meshes, frames as usize)
+            .and_then(|()| goal.check_precision(geometry.unit, slack(geometry.unit, 0.0, farthest))),
     };
     checked.map_err(|error| cannot_be_coded(goal, &error))
 }

@@ -287,6 +287,17 @@ fn what_is_intact_of_a_damaged_or_cut_file_is_decoded() {
         let found = read_frames(&dir.path(&format!("{name}.npy")), points);
         assert!(found == whole[..256], "{name}: {} frames", found.len());
     }
+    // Frames whose numbers alone are damaged.
+    dir.cager(&format!("{ENCODE} --max-error 1e-3 --start 101")).succeeds();
+    let mut bytes = dir.read("out.cager");
+    let end = bytes.windows(4).rposition(|window| window == b"TOC_").expect("a table of contents");
+    let numbers = bytes[..end].windows(4).rposition(|window| window == b"fnum").expect("numbers");
+    bytes[numbers + 70] ^= 1;
+    dir.write("numbers.cager", &bytes);
+    assert_eq!(dir.cager("decode numbers.cager -o numbers.npy").run().status, Some(1));
+    let said = dir.cager("decode numbers.cager -o numbers.npy --salvage").succeeds().stderr;
+    assert!(said.contains("the numbers of its frames are damaged"), "{said}");
+    assert!(read_frames(&dir.path("numbers.npy"), points) == whole);
     // Without any frame, or without the whole model.
     dir.write("cut.cager", &bytes[..200]);
     let output = dir.cager("decode cut.cager -o none.npy --salvage").run();

@@ -31,7 +31,7 @@ impl FrameError {
         for (at, (a, b)) in decoded.chunks_exact(3).zip(captured.chunks_exact(3)).enumerate() {
             let squared = (0..3).map(|k| (f64::from(a[k]) - b[k]).powi(2)).sum::<f64>();
             sums.squared += squared;
-            if squared > sums.largest {
+            if squared > sums.largest || squared.is_nan() {
                 (sums.largest, sums.at) = (squared, at);
             }
             for k in 0..3 {

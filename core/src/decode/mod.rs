@@ -10,7 +10,7 @@ pub(crate) use phi::for_each_chunk;
 use crate::cage::Cage;
 use crate::coordinates::{PointwiseCoordinates, TiedNormals};
 use crate::dense;
-use crate::inversion::product_columns;
+use crate::inversion::{BATCH, product_columns};
 use crate::mesh::Point;
 use error::{Sums, block_sums};
 use faer::{Mat, MatRef};
@@ -186,6 +186,34 @@ impl Decoder {
                 },
             );
         });
+    }
+
+    /// The largest sum of sizes that [`Self::decode`] adds up for a coordinate of a point in any of these cages, or more: its rounding errors are a fraction of it.
+    ///
+    /// # Panics
+    /// Where the lengths do not fit.
+    pub fn largest_sum(&self, cages: &[&[f32]]) -> f64 {
+        let mut sizes = vec![0.0f32; self.columns()];
+        for cages in cages.chunks(BATCH) {
+            let (columns, _) = self.values(cages);
+            let sized = |j: usize| columns.row(j).iter().fold(0.0f32, |most, x| most.max(x.abs()));
+            sizes.iter_mut().enumerate().for_each(|(j, size)| *size = size.max(sized(j)));
+        }
+        let mut largest = 0.0f32;
+        self.phi.for_each_part(|_, phi| {
+            let blocks = (0..phi.nrows()).into_par_iter().step_by(BLOCK_ROWS);
+            let of_block = |first: usize| {
+                let rows = BLOCK_ROWS.min(phi.nrows() - first);
+                let mut sums = vec![0.0f32; rows];
+                for (j, &size) in sizes.iter().enumerate() {
+                    let column = phi.col(j).subrows(first, rows);
+                    sums.iter_mut().zip(column.iter()).for_each(|(sum, x)| *sum += x.abs() * size);
+                }
+                sums.into_iter().fold(0.0, f32::max)
+            };
+            largest = largest.max(blocks.map(of_block).reduce(|| 0.0, f32::max));
+        });
+        f64::from(largest)
     }
 
     /// Errors of up to [`BATCH`](crate::inversion::BATCH) frames: what [`Self::decode`] gives for these cages against the capture's own positions.

@@ -16,7 +16,8 @@ use std::io::{Read, Seek};
 /// What decoding groups needs, computed where the first is read.
 #[derive(Default)]
 pub(super) struct Groups {
-    basis: Option<CageBasis>,
+    /// Unrotated and rotated, as each group says which it has.
+    bases: [Option<CageBasis>; 2],
     hierarchy: Option<Hierarchy>,
     /// The residuals decoded last, each with the entry that it was read from.
     residuals: Vec<(Entry, Residual)>,
@@ -93,10 +94,10 @@ impl<R: Read + Seek> ContainerReader<R> {
     pub(super) fn group(&mut self, entry: Entry) -> Result<Vec<u8>, Error> {
         let section = self.coded_entry(entry)?;
         let rotated = section.is_rotated()?;
-        if self.groups.basis.as_ref().is_none_or(|basis| basis.rotated() != rotated) {
-            self.groups.basis = Some(self.binding(entry.offset)?.basis(rotated)?.0);
+        if self.groups.bases[usize::from(rotated)].is_none() {
+            self.groups.bases[usize::from(rotated)] = Some(self.binding(entry.offset)?.basis(rotated)?.0);
         }
-        let Some(basis) = &self.groups.basis else {
+        let Some(basis) = &self.groups.bases[usize::from(rotated)] else {
             return Err(Error::corrupt(entry.offset, "a group without a basis"));
         };
         let frames = entry.header.count as usize;
@@ -153,7 +154,7 @@ impl<R: Read + Seek> ContainerReader<R> {
             },
         );
         let Ok((basis, coordinates)) = basis else { return Ok(None) };
-        self.groups.basis = Some(basis);
+        self.groups.bases[usize::from(rotated)] = Some(basis);
         if let Some(found) = residual {
             let (hierarchy, residual) = found?;
             self.groups.hierarchy = Some(hierarchy);
@@ -189,8 +190,10 @@ impl<R: Read + Seek> ContainerReader<R> {
         Ok(())
     }
 
+    /// It comes right before the frames that it belongs to.
     fn residual_entry(&self, frame: usize) -> Option<Entry> {
-        self.sections_of(tag::RESIDUAL).find(|entry| covers(&entry.header, frame))
+        let before = self.place_of(frame)?.checked_sub(1)?;
+        self.entries.get(before).filter(|entry| entry.header.tag == tag::RESIDUAL).copied()
     }
 
     /// Decodes the residual of a frame's group, if there is one.

@@ -99,6 +99,9 @@ impl<R: Read + Seek> ContainerReader<R> {
         }
         if whole {
             self.entry(tag::ERRORS)?;
+            if let Some(last) = self.entries.last().filter(|last| last.header.tag == tag::RESIDUAL) {
+                return Err(Error::corrupt(last.offset, "a residual is not followed by its frames"));
+            }
         }
         let most_faces = usize::from(self.header.rest_faces > 0);
         if most_faces == 0 && self.header.rest_corners > 0 {

@@ -212,11 +212,14 @@ impl<R: Read + Seek> ContainerReader<R> {
     }
 
     pub(super) fn chunk_of(&self, frame: usize) -> Result<Entry, Error> {
-        if frame >= self.frames {
-            return Err(Error::NoSuchFrame { frame, frames: self.frames });
-        }
-        let chunk = self.chunks.partition_point(|&k| self.entries[k].header.first as usize <= frame) - 1;
-        Ok(self.entries[self.chunks[chunk]])
+        let place = self.place_of(frame).ok_or(Error::NoSuchFrame { frame, frames: self.frames })?;
+        Ok(self.entries[place])
+    }
+
+    /// Where the section of a frame's cage is among all.
+    pub(super) fn place_of(&self, frame: usize) -> Option<usize> {
+        let chunk = self.chunks.partition_point(|&k| self.entries[k].header.first as usize <= frame);
+        self.chunks.get(chunk.checked_sub(1)?).filter(|_| frame < self.frames).copied()
     }
 
     /// The stored rows of one frame, rows × 3. In any order; consecutive frames are fastest.

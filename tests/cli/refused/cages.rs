@@ -38,7 +38,7 @@ fn inward_cage_is_refused_with_the_offer_to_flip_it_which_works() {
     assert!(dir.read("out.cager") == good, "a cage flipped back is another cage");
     dir.model("cage.obj", &as_model(&small.cage));
     std::fs::remove_file(dir.path("out.cager")).expect("removed");
-    refused(&dir, &format!("{ENCODE} --flip-cage"), &["cage.obj", "inwards"]);
+    refused(&dir, &format!("{ENCODE} --flip-cage"), &["cage.obj", "inwards", "leave out --flip-cage"]);
 }
 
 #[test]
