@@ -84,6 +84,9 @@ pub fn decode_cages(basis: &CageBasis, frames: usize, bytes: &[u8]) -> Result<Ve
     if frames > MOST_FRAMES || count > frames.min(3 * rows) || !(step.is_finite() && step > 0.0) {
         return Err(Error::Damaged("a group of cages has impossible counts"));
     }
+    if is_rotated(bytes)? != basis.rotated() {
+        return Err(Error::Damaged("a group of cages is in another basis"));
+    }
     let mut coder = Decoder::new(coded)?;
     let trajectories = Trajectories::default().code(&mut coder, frames, count);
     let whole = code_values(&mut coder, rows, count, &[]);

@@ -7,7 +7,7 @@ const FEW: usize = 128;
 /// Ends that are looked at where the walk asks what lies near.
 pub(crate) const NEWEST: usize = 16;
 
-/// A list from which the last of equal ends is taken.
+/// The open edges of a vertex; of several to the same end the newest is removed first.
 pub(crate) enum OpenEdges {
     Few(Vec<u32>),
     Many(Box<Indexed>),
@@ -47,7 +47,7 @@ impl OpenEdges {
         }
     }
 
-    /// Takes the last that is equal; false where there is none.
+    /// Removes the newest edge to this end; false where there is none.
     pub(crate) fn remove(&mut self, end: u32) -> bool {
         match self {
             Self::Few(list) => list.iter().rposition(|&x| x == end).map(|at| list.remove(at)).is_some(),

@@ -147,7 +147,7 @@ impl Decoder {
         self.coordinates().map_or(0, |phi| 4 * phi.nrows() * phi.ncols())
     }
 
-    /// Positions of up to [`BATCH`](crate::inversion::BATCH) frames, each n × 3 interleaved, from their cages, each m × 3 interleaved.
+    /// Positions of up to [`BATCH`] frames, each n × 3 interleaved, from their cages, each m × 3 interleaved.
     ///
     /// The result of a frame is bit-identical whatever the other frames of the batch.
     ///
@@ -216,7 +216,7 @@ impl Decoder {
         f64::from(largest)
     }
 
-    /// Errors of up to [`BATCH`](crate::inversion::BATCH) frames: what [`Self::decode`] gives for these cages against the capture's own positions.
+    /// Errors of up to [`BATCH`] frames: what [`Self::decode`] gives for these cages against the capture's own positions.
     ///
     /// # Panics
     /// Where the lengths do not fit.
