@@ -3,6 +3,8 @@
 //! `figures FOLDER` writes rest.obj, cage.obj and frames.npy there first, so that other programs measure the same data.
 //! `figures --growth POINTS CAGE_VERTICES` prepares once and prints times and sizes.
 
+use anyhow::Context;
+use cager_codec::{CageBasis, Neighbours, decode_cages, encode_cages};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Coordinates, Green, Harmonic, MeanValue, Refinement};
 use cager_core::inversion::{BATCH, Solver, SolverOptions};
@@ -20,6 +22,10 @@ const POINTS: usize = 20_000;
 const FRAMES: usize = 499;
 const CAGE_VERTICES: usize = 330;
 const RUNS: usize = 9;
+/// Step of coded cages over the diagonal and the root of their rows: that of `--quality preview`.
+const CAGE_STEP: f64 = 2.8e-3;
+/// Frames of a group of coded cages.
+const GROUP: usize = 256;
 /// Runs of what takes seconds.
 const FEW_RUNS: usize = 3;
 
@@ -114,11 +120,23 @@ fn figures(folder: &Path) -> anyhow::Result<Value> {
             solver.decoder().decode(&views, &mut out[..views.len()]);
         }
     });
+    let (basis, _) = CageBasis::of(&MeanValue, &cage, points, None, None)?.context("a basis")?;
+    let views: Vec<&[f32]> = cages.iter().flatten().map(Vec::as_slice).collect();
+    let step = CAGE_STEP * mesh::diagonal(points) / (basis.rows() as f64).sqrt();
+    let groups = || views.chunks(GROUP).map(|group| encode_cages(&basis, group, step, Neighbours::default()));
+    let code_cages = timed(|| groups().collect::<Vec<_>>());
+    let coded: Vec<Vec<u8>> = groups().collect::<Option<_>>().context("cages that can be coded")?;
+    let read_cages = timed(|| {
+        for (group, bytes) in views.chunks(GROUP).zip(&coded) {
+            black_box(decode_cages(&basis, group.len(), bytes)).ok();
+        }
+    });
     Ok(json!({
         "points": points.len(),
         "cage_vertices": cage.vertices().len(),
         "cage_faces": cage.faces().len(),
         "frames": frames.len(),
+        "coded_cages_bytes": coded.iter().map(Vec::len).sum::<usize>(),
         "threads": rayon::current_num_threads(),
         "log_volume": handles.log_volume,
         "swaps": handles.swaps,
@@ -135,6 +153,8 @@ fn figures(folder: &Path) -> anyhow::Result<Value> {
             "green_invert_batched": per_frame(green_invert, frames.len()),
             "invert_measure": per_frame(invert_measure, frames.len()),
             "decode": per_frame(decode, frames.len()),
+            "code_cages": per_frame(code_cages, frames.len()),
+            "read_cages": per_frame(read_cages, frames.len()),
         },
     }))
 }

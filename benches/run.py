@@ -164,6 +164,12 @@ def table(results):
         f"{harmonic['change']:.1e} at most, about. Green coordinates whose normals follow from the vertices take "
         f"{seconds(ours['green_invert_batched']['median'])} per frame to invert.",
     ]
+    cages = o("code_cages"), o("read_cages")
+    lines += [
+        "",
+        f"Coding cages alone, in the steps of `--quality preview` and groups of 256 frames, takes {seconds(cages[0])} per frame, reading them back {seconds(cages[1])}: "
+        f"{1 / cages[0]:,.0f} and {1 / cages[1]:,.0f} frames/s (target 5,000), by one thread.",
+    ]
     lines += ["", "| growth | preparation | peak memory | prepared solver |", "|---|---|---|---|"]
     for g in results["growth"]:
         lines.append(

@@ -1,7 +1,7 @@
 //! Writes solved frames to a container and computes the report; shared by `encode` and the service, so that both produce the same bytes.
 
 use crate::preparation_warnings::preparation_warnings;
-use cager_codec::CodedMesh;
+use cager_codec::{CodedMesh, rounded_error};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, DEFINITION};
 use cager_core::inversion::{Solver, SolverOptions};
@@ -174,7 +174,15 @@ impl<W: Write> CaptureWriter<W> {
         if !self.report.frame_numbers.is_empty() {
             self.writer.add_frame_numbers(&self.report.frame_numbers)?;
         }
-        Ok((self.writer.finish(Some(&self.report))?, self.report))
+        let out = self.writer.finish(Some(&self.report))?;
+        if self.report.coding.is_some() {
+            // As readers of the file have them.
+            let rounded = |error: f64| f64::from(rounded_error(error as f32));
+            for frame in &mut self.report.error.per_frame {
+                *frame = FrameError { l2: rounded(frame.l2), linf: rounded(frame.linf) };
+            }
+        }
+        Ok((out, self.report))
     }
 }
 

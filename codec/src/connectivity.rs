@@ -1,109 +1,183 @@
 //! Polygons by a walk over the mesh, from a face across an edge to the next: most corners are then vertices whose edges still wait for a face, or
-//! are met for the first time. Any list of polygons can be coded; vertices keep their numbers, faces come in the order of the walk.
+//! are met for the first time. The walk counts vertices as it meets them; the numbers that the mesh gives them follow ([`crate::vertex_order`]). Any list of polygons
+//! can be coded; vertices keep their numbers, faces come in the order of the walk.
 
+use crate::adjacency::Adjacency;
 use crate::entropy::{Bit, Coder, Decoder, Encoder, Integers, SIZES, size_class};
 use crate::error::{Error, Result};
+use crate::fenwick::Counted;
+use crate::mesh::MeshVersion;
 use crate::open_edges::{NEWEST, OpenEdges};
+use crate::vertex_order::{MOST_FAR_POINTS, code_order};
 use cager_core::mesh::Polygons;
 use std::cmp::Reverse;
 use std::collections::VecDeque;
 
-/// Faces that meet at a vertex are counted up to this number.
-const VALENCES: usize = 9;
-/// Contexts of whether a corner is met for the first time: both ends' faces, and where an edge on either side leads to the same vertex.
-const CORNERS: usize = VALENCES * VALENCES + 1;
+/// Faces at a vertex are told apart up to this number.
+const MOST_FACES: u32 = 8;
+/// Pairs of such numbers.
+const PAIRS: usize = (MOST_FACES as usize + 1).pow(2);
+/// Open edges are told apart by the faces to come at their ends up to this number.
+const MOST_TO_COME: u32 = 15;
+/// Open edges of a vertex that are sorted anew with it, in either direction: ordinary meshes have no more.
+const MOST_NEARER: usize = 4;
+/// Vertices that a corner is looked for among, those that open edges lead to.
+const MOST_NEAR: usize = 8;
 
 /// What the walk knows of the mesh.
 struct Walk {
     /// Ends of the directed edges that wait for their opposite, by where these begin, and the other way round.
     leaving: Vec<OpenEdges>,
     arriving: Vec<OpenEdges>,
-    met: Vec<bool>,
-    faces: Vec<u8>,
+    /// The vertices that were met, in order, and the place of each in it.
+    met: Vec<u32>,
+    turns: Vec<u32>,
+    /// Faces that each vertex still is a corner of; of [`MeshVersion::First`] those that it was of.
+    faces: Vec<u32>,
     /// The last face, counted from 1, that each vertex is a corner of, and the face that is coded.
     of_face: Vec<u32>,
     face: u32,
-    gates: VecDeque<(u32, u32)>,
-    /// Whether the walk goes round what it has seen, or on from where it is.
-    in_rings: bool,
-    last: u32,
-    before: u32,
+    gates: Gates,
     arity: u32,
     /// Corners that are not coded yet: a damaged face has no more.
     corners_left: usize,
-    across: Bit,
+    across: Vec<Bit>,
     more: Bit,
     same_arity: Bit,
     first_time: Vec<Bit>,
     place: Vec<Bit>,
     arities: Integers,
-    numbers: Integers,
-    unmet: Unmet,
+    face_counts: Integers,
+    names: Names,
 }
 
-/// Codes polygons over this many points, by the shorter of two walks.
+/// Edges at which the walk may go on; some wait no longer.
+enum Gates {
+    /// By how few faces are to come at one of their ends, which is then complete soon; those that were opened or came nearer first before others.
+    Fewest(Vec<VecDeque<(u32, u32)>>),
+    /// The newest first.
+    Newest(Vec<(u32, u32)>),
+    /// The oldest first.
+    Oldest(VecDeque<(u32, u32)>),
+}
+
+/// The turn of vertices that were not met yet.
+const UNMET: u32 = u32::MAX;
+
+/// What vertices are called that are met for the first time.
+enum Names {
+    /// What the faces call them that are encoded; the faces at each.
+    Given(Vec<u32>),
+    /// By their turn.
+    Turns,
+    /// By the numbers of the mesh, which are read where they are met.
+    Numbers(Box<Numbers>),
+}
+
+/// Faces as they were coded, without the numbers of their vertices yet.
+pub(crate) struct WalkedFaces {
+    coder: Encoder,
+    /// The faces in the order of the walk.
+    pub(crate) faces: Polygons,
+    /// The turn of each vertex, and which are joined, by their turns.
+    turns: Vec<u32>,
+    adjacency: Adjacency,
+}
+
+/// Codes polygons over this many points.
 ///
 /// # Panics
 /// Where a corner is beyond them.
 pub fn encode_faces(faces: &Polygons, points: usize) -> Vec<u8> {
-    let list: Vec<&[u32]> = faces.iter().collect();
-    let mut edges = Vec::with_capacity(faces.indices().len());
-    for (f, face) in list.iter().enumerate() {
-        edges.extend((0..face.len()).map(|k| ([face[k], face[(k + 1) % face.len()]], f, Reverse(k))));
-    }
-    edges.sort_unstable();
-    let walk = |in_rings| encode_walk(&list, &edges, points, in_rings);
-    let (on, rings) = rayon::join(|| walk(false), || walk(true));
-    if rings.len() < on.len() { rings } else { on }
+    WalkedFaces::new(faces, points).into_bytes()
 }
 
 /// A directed edge, its face, and at which corner of it it begins; the last corners of a face come first.
 type Edge = ([u32; 2], usize, Reverse<usize>);
 
-/// `edges` are those of the faces, sorted.
-fn encode_walk(list: &[&[u32]], edges: &[Edge], points: usize, in_rings: bool) -> Vec<u8> {
-    let mut done = vec![false; list.len()];
-    // Of equal edges, by where the first of them is, how many have a face that is done.
-    let mut past = vec![0; edges.len()];
-    let mut coder = Encoder::default();
-    let mut walk = Walk::new(points, edges.len(), coder.even(in_rings));
-    let mut next = 0;
-    loop {
-        while let Some((a, b)) = walk.gate() {
-            let begin = edges.partition_point(|(edge, ..)| *edge < [b, a]);
-            let equal = |at: usize| edges.get(at).filter(|(edge, ..)| *edge == [b, a]);
-            while equal(begin + past.get(begin).unwrap_or(&0)).is_some_and(|(_, f, _)| done[*f]) {
-                past[begin] += 1;
+impl WalkedFaces {
+    pub(crate) fn new(faces: &Polygons, points: usize) -> Self {
+        let list: Vec<&[u32]> = faces.iter().collect();
+        let mut edges: Vec<Edge> = Vec::with_capacity(faces.indices().len());
+        for (f, face) in list.iter().enumerate() {
+            edges.extend((0..face.len()).map(|k| ([face[k], face[(k + 1) % face.len()]], f, Reverse(k))));
+        }
+        let (adjacency, ()) = rayon::join(|| Adjacency::new(faces, points), || edges.sort_unstable());
+        let mut counts = vec![0; points];
+        faces.indices().iter().for_each(|&v| counts[v as usize] += 1);
+        let mut done = vec![false; list.len()];
+        // Of equal edges, by where the first of them is, how many have a face that is done.
+        let mut past = vec![0; edges.len()];
+        let mut coder = Encoder::default();
+        let mut walk = Walk::new(points, edges.len(), Gates::fewest(), Names::Given(counts));
+        let mut found = Polygons::new();
+        let mut next = 0;
+        loop {
+            while let Some((a, b)) = walk.gate() {
+                let begin = edges.partition_point(|(edge, ..)| *edge < [b, a]);
+                let equal = |at: usize| edges.get(at).filter(|(edge, ..)| *edge == [b, a]);
+                while equal(begin + past.get(begin).unwrap_or(&0)).is_some_and(|(_, f, _)| done[*f]) {
+                    past[begin] += 1;
+                }
+                let across = equal(begin + past.get(begin).unwrap_or(&0)).copied();
+                if walk.code_across(&mut coder, (a, b), across.is_some())
+                    && let Some((_, f, Reverse(corner))) = across
+                {
+                    done[f] = true;
+                    let turned: Vec<u32> = (0..list[f].len()).map(|k| list[f][(corner + k) % list[f].len()]).collect();
+                    found.push(&walk.face(&mut coder, Some((a, b)), &turned));
+                } else {
+                    walk.close(a, b);
+                }
             }
-            let found = equal(begin + past.get(begin).unwrap_or(&0)).copied();
-            if coder.bit(&mut walk.across, found.is_some())
-                && let Some((_, f, Reverse(corner))) = found
-            {
-                done[f] = true;
-                let turned: Vec<u32> = (0..list[f].len()).map(|k| list[f][(corner + k) % list[f].len()]).collect();
-                walk.face(&mut coder, Some((a, b)), &turned);
-            } else {
-                walk.close(a, b);
+            while next < list.len() && done[next] {
+                next += 1;
             }
+            if !coder.bit(&mut walk.more, next < list.len()) {
+                break;
+            }
+            done[next] = true;
+            found.push(&walk.face(&mut coder, None, list[next]));
         }
-        while next < list.len() && done[next] {
-            next += 1;
-        }
-        if !coder.bit(&mut walk.more, next < list.len()) {
-            return coder.into_bytes();
-        }
-        done[next] = true;
-        walk.face(&mut coder, None, list[next]);
+        walk.meet_the_rest();
+        Self { coder, faces: found, adjacency: adjacency.renamed(&walk.turns), turns: walk.turns }
+    }
+
+    /// The bytes, with the numbers of the vertices in the way that is shorter.
+    pub(crate) fn into_bytes(self) -> Vec<u8> {
+        let Self { coder, turns, adjacency, .. } = self;
+        let with_order = |is_far: bool| {
+            let mut coder = coder.clone();
+            coder.even(is_far);
+            code_order(&mut coder, &adjacency, is_far, Some(&turns));
+            coder.into_bytes()
+        };
+        let is_small = adjacency.points() <= MOST_FAR_POINTS;
+        let (near, far) = rayon::join(|| with_order(false), || is_small.then(|| with_order(true)));
+        far.filter(|far| far.len() < near.len()).unwrap_or(near)
     }
 }
 
-/// The polygons that [`encode_faces`] wrote: `count` faces with `corners` corners in all.
+/// The polygons that [`encode_faces`] wrote, or that earlier programs did: `count` faces with `corners` corners in all.
 ///
 /// # Errors
 /// Bytes that the encoder did not write.
-pub fn decode_faces(bytes: &[u8], points: usize, count: usize, corners: usize) -> Result<Polygons> {
+pub fn decode_faces(
+    bytes: &[u8],
+    version: MeshVersion,
+    points: usize,
+    count: usize,
+    corners: usize,
+) -> Result<Polygons> {
     let mut coder = Decoder::new(bytes)?;
-    let mut walk = Walk::new(points, corners, coder.even(false));
+    let (gates, names) = match version {
+        MeshVersion::First => {
+            let gates = if coder.even(false) { Gates::Oldest(VecDeque::new()) } else { Gates::Newest(Vec::new()) };
+            (gates, Names::Numbers(Box::new(Numbers::new(points))))
+        }
+        MeshVersion::Second => (Gates::fewest(), Names::Turns),
+    };
+    let mut walk = Walk::new(points, corners, gates, names);
     let mut faces = Polygons::new();
     let (mut found, mut read) = (0, 0);
     let mut add = |face: Vec<u32>| {
@@ -116,7 +190,7 @@ pub fn decode_faces(bytes: &[u8], points: usize, count: usize, corners: usize) -
     };
     loop {
         while let Some((a, b)) = walk.gate() {
-            if coder.bit(&mut walk.across, false) {
+            if walk.code_across(&mut coder, (a, b), false) {
                 add(walk.face(&mut coder, Some((a, b)), &[]))?;
             } else {
                 walk.close(a, b);
@@ -127,6 +201,17 @@ pub fn decode_faces(bytes: &[u8], points: usize, count: usize, corners: usize) -
         }
         add(walk.face(&mut coder, None, &[]))?;
     }
+    if version == MeshVersion::Second {
+        let is_far = coder.even(false);
+        if is_far && points > MOST_FAR_POINTS {
+            return Err(Error::Damaged("the order of so many vertices cannot have been written"));
+        }
+        let order = code_order(&mut coder, &Adjacency::new(&faces, points), is_far, None);
+        let order = order.ok_or(Error::Damaged("vertices are not those that the faces name"))?;
+        let mut numbers = vec![0; points];
+        order.iter().enumerate().for_each(|(number, &vertex)| numbers[vertex as usize] = number as u32);
+        faces = faces.renamed(&numbers);
+    }
     coder.check()?;
     if (found, read) == (count, corners) {
         Ok(faces)
@@ -136,39 +221,72 @@ pub fn decode_faces(bytes: &[u8], points: usize, count: usize, corners: usize) -
 }
 
 impl Walk {
-    fn new(points: usize, corners: usize, in_rings: bool) -> Self {
+    fn new(points: usize, corners: usize, gates: Gates, names: Names) -> Self {
         Self {
             leaving: std::iter::repeat_with(OpenEdges::default).take(points).collect(),
             arriving: std::iter::repeat_with(OpenEdges::default).take(points).collect(),
-            met: vec![false; points],
+            met: Vec::new(),
+            turns: vec![UNMET; points],
             faces: vec![0; points],
             of_face: vec![0; points],
             face: 0,
-            gates: VecDeque::new(),
-            in_rings,
-            last: 0,
-            before: 0,
+            gates,
             arity: 3,
             corners_left: corners,
-            across: Bit::default(),
+            across: vec![Bit::default(); 9],
             more: Bit::default(),
             same_arity: Bit::default(),
-            first_time: vec![Bit::default(); CORNERS],
-            place: vec![Bit::default(); 2 * 8],
+            first_time: vec![Bit::default(); 2 * PAIRS],
+            place: vec![Bit::default(); 8 * MOST_NEAR],
             arities: Integers::new(1),
-            numbers: Integers::new(SIZES),
-            unmet: Unmet::new(points),
+            face_counts: Integers::new(1),
+            names,
         }
     }
 
     /// The next edge that still waits for a face.
     fn gate(&mut self) -> Option<(u32, u32)> {
-        while let Some((a, b)) = if self.in_rings { self.gates.pop_front() } else { self.gates.pop_back() } {
+        while let Some((a, b)) = self.gates.pop() {
             if self.leaving[a as usize].contains(b) {
                 return Some((a, b));
             }
         }
         None
+    }
+
+    fn is_first_version(&self) -> bool {
+        matches!(self.names, Names::Numbers(_))
+    }
+
+    /// Fewest faces that are to come at an end of an edge.
+    fn to_come(&self, (a, b): (u32, u32)) -> u32 {
+        self.faces[a as usize].min(self.faces[b as usize])
+    }
+
+    /// Sorts the open edges of a vertex anew where none of their ends has fewer faces to come.
+    fn come_nearer(&mut self, v: u32) {
+        let faces = self.faces[v as usize];
+        if faces >= MOST_TO_COME {
+            return;
+        }
+        let mut scratch = [0; NEWEST];
+        for &x in last_few(self.leaving[v as usize].newest(&mut scratch)) {
+            if self.faces[x as usize] >= faces {
+                self.gates.push((v, x), faces);
+            }
+        }
+        for &x in last_few(self.arriving[v as usize].newest(&mut scratch)) {
+            if self.faces[x as usize] >= faces {
+                self.gates.push((x, v), faces);
+            }
+        }
+    }
+
+    /// Codes whether a face follows across a gate.
+    fn code_across(&mut self, coder: &mut impl Coder, (a, b): (u32, u32), follows: bool) -> bool {
+        let to_come = |v: u32| self.faces[v as usize].min(2) as usize;
+        let context = if self.is_first_version() { 0 } else { 3 * to_come(a) + to_come(b) };
+        coder.bit(&mut self.across[context], follows)
     }
 
     /// The edge from a to b waits no longer.
@@ -196,21 +314,32 @@ impl Walk {
         while face.len() < self.arity as usize {
             let closes = face.len() + 1 == self.arity as usize && gate.is_some();
             let vertex = self.corner(coder, &face, closes, given.get(face.len()).copied().unwrap_or(0));
-            if vertex as usize >= self.met.len() {
+            if vertex as usize >= self.turns.len() {
                 return vec![vertex];
             }
             face.push(vertex);
             self.of_face[vertex as usize] = self.face;
         }
+        let (mut opened, mut nearer) = (Vec::with_capacity(face.len()), Vec::with_capacity(face.len()));
         for (k, &from) in face.iter().enumerate() {
             let to = face[(k + 1) % face.len()];
             if !self.close(to, from) {
                 self.leaving[from as usize].push(to);
                 self.arriving[to as usize].push(from);
-                self.gates.push_back((from, to));
+                opened.push((from, to));
             }
-            self.faces[from as usize] = self.faces[from as usize].saturating_add(1);
+            let faces = self.faces[from as usize];
+            if self.is_first_version() {
+                self.faces[from as usize] = faces + 1;
+            } else if faces > 0 {
+                self.faces[from as usize] = faces - 1;
+                nearer.push(from);
+            }
         }
+        for gate in opened {
+            self.gates.push(gate, self.to_come(gate));
+        }
+        nearer.into_iter().for_each(|v| self.come_nearer(v));
         face
     }
 
@@ -243,91 +372,125 @@ impl Walk {
                 k += 1;
             }
         }
-        near.truncate(8);
-        let valence = |v: u32| usize::from(self.faces[v as usize]).min(VALENCES - 1);
-        let context = if both { CORNERS - 1 } else { VALENCES * valence(previous) + valence(first) };
-        let new = !self.met.get(given as usize).copied().unwrap_or(false);
+        near.truncate(MOST_NEAR);
+        let faces = |v: u32| self.faces[v as usize].min(MOST_FACES);
+        let pair = ((MOST_FACES + 1) * faces(previous) + faces(first)) as usize;
+        let ends = usize::from(faces(previous) == 1) + 2 * usize::from(faces(first) == 1);
+        let (context, ends) = match (both, self.is_first_version()) {
+            (true, true) => (PAIRS, 0),
+            (false, true) => (pair, 0),
+            (both, false) => (PAIRS * usize::from(both) + pair, ends),
+        };
+        let new = self.is_unmet(given);
         if coder.bit(&mut self.first_time[context], new) {
             return self.new_vertex(coder, previous.max(first), given);
         }
+        let context = MOST_NEAR * (2 * ends + usize::from(both));
         for (k, &x) in near.iter().enumerate() {
-            if !coder.bit(&mut self.place[8 * usize::from(both) + k], x != given) {
+            if !coder.bit(&mut self.place[context + k], x != given) {
                 return x;
             }
         }
-        coder.bits(32, given)
+        self.met_vertex(coder, given)
     }
 
     /// A corner of the first face of a part.
     fn any(&mut self, coder: &mut impl Coder, given: u32) -> u32 {
-        let new = !self.met.get(given as usize).copied().unwrap_or(false);
+        let new = self.is_unmet(given);
         if coder.bit(&mut self.first_time[0], new) {
-            self.new_vertex(coder, self.last, given)
+            let last = self.met.last().copied().unwrap_or(0);
+            self.new_vertex(coder, last, given)
         } else {
-            coder.bits(32, given)
+            self.met_vertex(coder, given)
         }
     }
 
-    /// A vertex met for the first time, by how many others that are not met yet lie between it and one that was.
+    fn is_unmet(&self, vertex: u32) -> bool {
+        self.turns.get(vertex as usize).is_none_or(|&turn| turn == UNMET)
+    }
+
+    /// A vertex met for the first time, `near` another.
     fn new_vertex(&mut self, coder: &mut impl Coder, near: u32, given: u32) -> u32 {
-        let expected = self.unmet.before(near);
-        let difference = self.unmet.before(given) as i32 - expected as i32;
-        let context = size_class(self.before.min(1 << 16) * 2);
-        let difference = self.numbers.code(coder, context, difference);
-        self.before = (self.before + difference.unsigned_abs().min(1 << 20)) / 2;
-        let vertex = self.unmet.take(expected.wrapping_add(difference as u32));
-        if let Some(met) = self.met.get_mut(vertex as usize) {
-            *met = true;
-            self.last = vertex;
+        let turn = self.met.len() as u32;
+        let (vertex, faces) = match &mut self.names {
+            Names::Given(faces) => (given, faces[given as usize]),
+            Names::Turns => (turn, 1),
+            Names::Numbers(numbers) => (numbers.read(coder, near), 0),
+        };
+        if !self.is_first_version() && (vertex as usize) < self.faces.len() {
+            // Of the first face of all it is a corner now.
+            self.faces[vertex as usize] = self.face_counts.natural(coder, 0, faces - 1).saturating_add(1);
+        }
+        if let Some(place) = self.turns.get_mut(vertex as usize) {
+            *place = turn;
+            self.met.push(vertex);
         }
         vertex
     }
+
+    /// A vertex that was met, but that nothing leads to.
+    fn met_vertex(&mut self, coder: &mut impl Coder, given: u32) -> u32 {
+        if let Names::Numbers(_) = self.names {
+            return coder.bits(32, 0);
+        }
+        let turn = self.turns.get(given as usize).copied().unwrap_or(0);
+        let turn = coder.bits(u32::BITS - (self.met.len() as u32).leading_zeros(), turn);
+        self.met.get(turn as usize).copied().unwrap_or(UNMET)
+    }
+
+    /// Gives the vertices of no face the last turns.
+    fn meet_the_rest(&mut self) {
+        let unmet = self.turns.iter_mut().filter(|turn| **turn == UNMET);
+        unmet.zip(self.met.len() as u32..).for_each(|(turn, next)| *turn = next);
+    }
 }
 
-/// Vertices that are not met yet, counted in a Fenwick tree.
-struct Unmet {
-    sums: Vec<u32>,
-    left: u32,
+fn last_few(ends: &[u32]) -> &[u32] {
+    &ends[ends.len().saturating_sub(MOST_NEARER)..]
 }
 
-impl Unmet {
+impl Gates {
+    fn fewest() -> Self {
+        Self::Fewest(vec![VecDeque::new(); MOST_TO_COME as usize + 1])
+    }
+
+    fn push(&mut self, gate: (u32, u32), to_come: u32) {
+        match self {
+            Self::Fewest(queues) => queues[to_come.min(MOST_TO_COME) as usize].push_back(gate),
+            Self::Newest(list) => list.push(gate),
+            Self::Oldest(queue) => queue.push_back(gate),
+        }
+    }
+
+    fn pop(&mut self) -> Option<(u32, u32)> {
+        match self {
+            Self::Fewest(queues) => queues.iter_mut().find_map(VecDeque::pop_front),
+            Self::Newest(list) => list.pop(),
+            Self::Oldest(queue) => queue.pop_front(),
+        }
+    }
+}
+
+/// Reads the numbers of vertices where they are met, by how many others that are not met yet lie between one and one that was: [`MeshVersion::First`].
+struct Numbers {
+    models: Integers,
+    unmet: Counted,
+    before: u32,
+}
+
+impl Numbers {
     fn new(points: usize) -> Self {
-        let sums = (0..=points as u32).map(|k| k & k.wrapping_neg()).collect();
-        Self { sums, left: points as u32 }
+        Self { models: Integers::new(SIZES), unmet: Counted::all(points), before: 0 }
     }
 
-    /// How many have a number below this one.
-    fn before(&self, vertex: u32) -> u32 {
-        let mut at = (vertex as usize).min(self.sums.len() - 1);
-        let mut count = 0;
-        while at > 0 {
-            count += self.sums[at];
-            at &= at - 1;
-        }
-        count
-    }
-
-    /// Takes out the one with so many before it; beyond the last there is no vertex.
-    fn take(&mut self, rank: u32) -> u32 {
-        if rank >= self.left {
-            return u32::MAX;
-        }
-        let (mut at, mut rest) = (0, rank);
-        let mut reach = self.sums.len().next_power_of_two();
-        while reach > 0 {
-            if at + reach < self.sums.len() && self.sums[at + reach] <= rest {
-                at += reach;
-                rest -= self.sums[at];
-            }
-            reach /= 2;
-        }
-        self.left -= 1;
-        let vertex = at as u32;
-        at += 1;
-        while at < self.sums.len() {
-            self.sums[at] -= 1;
-            at += at & at.wrapping_neg();
-        }
+    /// Beyond the last vertex there is none.
+    fn read(&mut self, coder: &mut impl Coder, near: u32) -> u32 {
+        let expected = self.unmet.before(near);
+        let context = size_class(self.before.min(1 << 16) * 2);
+        let difference = self.models.code(coder, context, 0);
+        self.before = (self.before + difference.unsigned_abs().min(1 << 20)) / 2;
+        let Some(vertex) = self.unmet.find(expected.wrapping_add(difference as u32)) else { return UNMET };
+        self.unmet.remove(vertex);
         vertex
     }
 }
@@ -350,7 +513,7 @@ mod tests {
         faces.iter().for_each(|face| polygons.push(face));
         let bytes = encode_faces(&polygons, points);
         let corners = polygons.indices().len();
-        let back = decode_faces(&bytes, points, faces.len(), corners).unwrap();
+        let back = decode_faces(&bytes, MeshVersion::Second, points, faces.len(), corners).unwrap();
         assert_eq!(normal(&back), normal(&polygons));
         bytes.len()
     }
@@ -395,7 +558,7 @@ mod tests {
         round.push(&(0..count).collect::<Vec<_>>());
         round.push(&(0..count).rev().collect::<Vec<_>>());
         let bytes = encode_faces(&round, count as usize);
-        assert_eq!(decode_faces(&bytes, count as usize, 2, 2 * count as usize).unwrap().len(), 2);
+        assert_eq!(decode_faces(&bytes, MeshVersion::Second, count as usize, 2, 2 * count as usize).unwrap().len(), 2);
         check(&vec![&[0, 1, 2][..]; count as usize], 3);
         assert!(begin.elapsed().as_secs() < 10, "{:?}", begin.elapsed());
     }
@@ -405,8 +568,10 @@ mod tests {
         let mut random = fastrand::Rng::with_seed(8);
         for _ in 0..300 {
             let bytes: Vec<u8> = (0..4 * random.usize(..60)).map(|_| random.u8(..)).collect();
-            if let Ok(faces) = decode_faces(&bytes, 20, random.usize(..30), random.usize(..90)) {
-                assert!(faces.indices().iter().all(|&v| v < 20));
+            for version in [MeshVersion::First, MeshVersion::Second] {
+                if let Ok(faces) = decode_faces(&bytes, version, 20, random.usize(..30), random.usize(..90)) {
+                    assert!(faces.indices().iter().all(|&v| v < 20));
+                }
             }
         }
     }

@@ -104,7 +104,7 @@ impl EncoderModel<PRECISION> for Probability {
 }
 
 /// Writes.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Encoder(DefaultRangeEncoder);
 
 impl Encoder {

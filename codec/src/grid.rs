@@ -1,8 +1,11 @@
 //! Positions of a mesh at rest, on a grid.
 
+use crate::adjacency::Adjacency;
 use crate::entropy::{Coder, Decoder, Encoder, Integers, MOST, SIZES, size_class};
 use crate::error::{Error, Result};
+use crate::mesh::MeshVersion;
 use crate::parallelograms::Predictions;
+use crate::prediction_weights::{PredictionWeights, WEIGHTS_BYTES};
 use cager_core::mesh::{Point, Polygons, bounds};
 
 /// Bytes before the coded numbers: origin and step as f64.
@@ -43,32 +46,87 @@ impl Grid {
 /// Codes the positions of the grid nearest to these points.
 pub fn encode_positions(grid: Grid, faces: &Polygons, points: &[Point]) -> Vec<u8> {
     let mut bytes: Vec<u8> = grid.origin.iter().chain([&grid.step]).flat_map(|x| x.to_le_bytes()).collect();
-    let mut coder = Encoder::default();
     let given: Vec<[i32; 3]> = points.iter().map(|&point| grid.steps(point)).collect();
-    code(&mut coder, faces, points.len(), &given);
+    let (predictions, adjacency) = (Predictions::new(faces, points.len()), Adjacency::new(faces, points.len()));
+    let weights = PredictionWeights::fit(&predictions, &adjacency, &given);
+    bytes.extend(weights.to_bytes());
+    let mut coder = Encoder::default();
+    code(&mut coder, &predictions, &adjacency, weights, &given);
     bytes.extend(coder.into_bytes());
     bytes
 }
 
-/// The positions that [`encode_positions`] wrote, for the same faces in the same order.
+/// The positions that [`encode_positions`] wrote, or that earlier programs did, for the same faces in the same order.
 ///
 /// # Errors
 /// Bytes that the encoder did not write.
-pub fn decode_positions(bytes: &[u8], faces: &Polygons, points: usize) -> Result<Vec<Point>> {
-    let (head, coded) = bytes.split_first_chunk::<HEAD>().ok_or(Error::Damaged("positions are cut"))?;
+pub fn decode_positions(bytes: &[u8], version: MeshVersion, faces: &Polygons, points: usize) -> Result<Vec<Point>> {
+    const CUT: Error = Error::Damaged("positions are cut");
+    let (head, coded) = bytes.split_first_chunk::<HEAD>().ok_or(CUT)?;
     let number = |k: usize| f64::from_le_bytes(std::array::from_fn(|byte| head[8 * k + byte]));
     let grid = Grid { origin: [number(0), number(1), number(2)], step: number(3) };
-    let mut coder = Decoder::new(coded)?;
-    let steps = code(&mut coder, faces, points, &[]);
-    coder.check()?;
-    Ok(steps.into_iter().map(|steps| grid.position(steps)).collect())
+    let predictions = Predictions::new(faces, points);
+    let steps = match version {
+        MeshVersion::First => {
+            let mut coder = Decoder::new(coded)?;
+            let steps = read_first(&mut coder, &predictions, points);
+            coder.check().map(|()| steps)
+        }
+        MeshVersion::Second => {
+            let (weights, coded) = coded.split_first_chunk::<WEIGHTS_BYTES>().ok_or(CUT)?;
+            let mut coder = Decoder::new(coded)?;
+            let weights = PredictionWeights::from_bytes(*weights);
+            let steps = code(&mut coder, &predictions, &Adjacency::new(faces, points), weights, &[]);
+            coder.check().map(|()| steps)
+        }
+    };
+    Ok(steps?.into_iter().map(|steps| grid.position(steps)).collect())
 }
 
-fn code(coder: &mut impl Coder, faces: &Polygons, points: usize, given: &[[i32; 3]]) -> Vec<[i32; 3]> {
+/// Codes steps by weighted predictions. How far those of neighbours were off says how large a number will be.
+fn code(
+    coder: &mut impl Coder,
+    predictions: &Predictions,
+    adjacency: &Adjacency,
+    weights: PredictionWeights,
+    given: &[[i32; 3]],
+) -> Vec<[i32; 3]> {
+    let points = adjacency.points();
+    let mut found = vec![[0i32; 3]; points];
+    // How far each was off; of those that are not known yet nothing.
+    let mut off: Vec<Option<[u32; 3]>> = vec![None; points];
+    let mut models = Integers::new(3 * SIZES);
+    let mut before = 0;
+    let mut known = Vec::new();
+    for (vertex, triples, near) in predictions.iter() {
+        known.clear();
+        known.extend(adjacency.of(vertex).iter().copied().filter(|&w| off[w as usize].is_some()));
+        let mut sizes = [0; 3];
+        let mut so_far = 0;
+        let expected = weights.expected(&found, triples, &known, (near != vertex).then_some(near));
+        for k in 0..3 {
+            let of = |w: &u32| off[*w as usize].map_or(0, |off| u64::from(off[k]));
+            let around = 6 * known.iter().map(of).sum::<u64>() / known.len().max(1) as u64;
+            let around = around.min(1 << 20) as u32 + 5 * (before / 8) + 5 * so_far;
+            let context = SIZES * triples.len().min(2) + size_class(around.min(1 << 20));
+            let value = given.get(vertex).map_or(0, |steps| steps[k] - expected[k]);
+            let value = models.code(coder, context, value);
+            found[vertex][k] = value.saturating_add(expected[k]);
+            sizes[k] = value.unsigned_abs().min(1 << 16);
+            so_far += sizes[k];
+        }
+        before = (before + 8 * so_far / 3) / 2;
+        off[vertex] = Some(sizes);
+    }
+    found
+}
+
+/// Reads steps that were predicted by the mean of parallelograms: [`MeshVersion::First`].
+fn read_first(coder: &mut impl Coder, predictions: &Predictions, points: usize) -> Vec<[i32; 3]> {
     let mut found = vec![[0i32; 3]; points];
     let mut models = Integers::new(3 * SIZES);
     let mut around = 0;
-    for (vertex, triples, near) in Predictions::new(faces, points).iter() {
+    for (vertex, triples, near) in predictions.iter() {
         let at = |v: u32, k: usize| i64::from(found[v as usize][k]);
         let mut met = [0; 3];
         let mut size = 0;
@@ -80,9 +138,8 @@ fn code(coder: &mut impl Coder, faces: &Polygons, points: usize, given: &[[i32; 
             };
             let most = i64::from(MOST);
             let expected = expected.clamp(-most, most) as i32;
-            let value = given.get(vertex).map_or(0, |steps| steps[k] - expected);
             let context = SIZES * triples.len().min(2) + size_class((around + 6 * size).min(1 << 20));
-            let value = models.code(coder, context, value);
+            let value = models.code(coder, context, 0);
             met[k] = value.saturating_add(expected);
             size += value.unsigned_abs().min(1 << 16);
         }
@@ -105,7 +162,7 @@ mod tests {
         for step in [10.0, 1e-2, 1e-4] {
             let grid = Grid::new(&points, step).unwrap();
             let bytes = encode_positions(grid, &faces, &points);
-            let back = decode_positions(&bytes, &faces, points.len()).unwrap();
+            let back = decode_positions(&bytes, MeshVersion::Second, &faces, points.len()).unwrap();
             for (&a, b) in points.iter().zip(&back) {
                 assert_eq!(grid.nearest(a), *b);
                 assert!((0..3).all(|k| (a[k] - b[k]).abs() <= 0.5 * step + 1e-5));
@@ -121,8 +178,10 @@ mod tests {
         let mut random = fastrand::Rng::with_seed(6);
         for _ in 0..200 {
             let bytes: Vec<u8> = (0..4 * random.usize(..40)).map(|_| random.u8(..)).collect();
-            if let Ok(points) = decode_positions(&bytes, &Polygons::new(), 50) {
-                assert_eq!(points.len(), 50);
+            for version in [MeshVersion::First, MeshVersion::Second] {
+                if let Ok(points) = decode_positions(&bytes, version, &Polygons::new(), 50) {
+                    assert_eq!(points.len(), 50);
+                }
             }
         }
     }

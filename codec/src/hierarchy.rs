@@ -3,6 +3,7 @@
 //! Independent vertices are taken away round by round, those of few neighbours first; the neighbours of one that is gone are joined to the one of
 //! them that has the fewest. It depends on the faces alone, in whole numbers.
 
+use crate::adjacency::Adjacency;
 use cager_core::mesh::Polygons;
 use std::collections::BTreeSet;
 
@@ -24,17 +25,8 @@ pub struct Hierarchy {
 impl Hierarchy {
     /// Of the vertices of these faces; without an edge a vertex is not predicted.
     pub fn new(faces: &Polygons, points: usize) -> Self {
-        let mut lists: Vec<Vec<u32>> = vec![Vec::new(); points];
-        for face in faces.iter() {
-            for (k, &a) in face.iter().enumerate() {
-                let b = face[(k + 1) % face.len()];
-                if a != b {
-                    lists[a as usize].push(b);
-                    lists[b as usize].push(a);
-                }
-            }
-        }
-        let mut near: Vec<Near> = lists.into_iter().map(Near::new).collect();
+        let adjacency = Adjacency::new(faces, points);
+        let mut near: Vec<Near> = (0..points).map(|v| Near::new(adjacency.of(v))).collect();
         // Who has no neighbours never gets any again: rounds are over the others alone.
         let (mut left, mut alone): (Vec<u32>, Vec<u32>) = (0..points as u32).partition(|&v| near[v as usize].len() > 0);
         let mut by_size: Vec<u64> = Vec::with_capacity(left.len());
@@ -149,10 +141,8 @@ enum Near {
 const FEW: usize = 128;
 
 impl Near {
-    fn new(mut list: Vec<u32>) -> Self {
-        list.sort_unstable();
-        list.dedup();
-        if list.len() <= FEW { Self::Few(list) } else { Self::Many(list.into_iter().collect()) }
+    fn new(list: &[u32]) -> Self {
+        if list.len() <= FEW { Self::Few(list.to_vec()) } else { Self::Many(list.iter().copied().collect()) }
     }
 
     fn len(&self) -> usize {

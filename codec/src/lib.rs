@@ -4,6 +4,7 @@
 //! Every number is decoded by an entropy decoder of whole numbers, whose predictions and models are whole numbers too. Floating point comes
 //! after it, so machines that round differently decode the same numbers and positions that differ by rounding alone.
 
+mod adjacency;
 mod basis;
 mod cage;
 mod components;
@@ -11,6 +12,8 @@ mod connectivity;
 mod corrections;
 mod entropy;
 mod error;
+mod fenwick;
+mod frame_errors;
 mod grid;
 mod hierarchy;
 mod histograms;
@@ -18,16 +21,19 @@ mod linear;
 mod mesh;
 mod open_edges;
 mod parallelograms;
+mod prediction_weights;
 mod residual;
 mod trajectories;
+mod vertex_order;
 
 pub use basis::CageBasis;
 pub use cage::{Neighbours, decode_cages, encode_cages, is_rotated};
 pub use connectivity::{decode_faces, encode_faces};
 pub use error::Error;
+pub use frame_errors::{decode_errors, encode_errors, rounded_error};
 pub use grid::{Grid, decode_positions, encode_positions};
 pub use hierarchy::Hierarchy;
-pub use mesh::CodedMesh;
+pub use mesh::{CodedMesh, MeshVersion};
 pub use residual::{Residual, ResidualGroup, encode_residual, estimate_residual};
 
 /// Most positions of one group of frames, points times frames: what decoding one holds in memory follows from it.

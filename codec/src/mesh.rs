@@ -1,18 +1,27 @@
 //! A mesh at rest: its polygons, and its positions on a grid.
 
-use crate::connectivity::{decode_faces, encode_faces};
+use crate::connectivity::{WalkedFaces, decode_faces};
 use crate::error::{Error, Result};
 use crate::grid::{Grid, decode_positions, encode_positions};
-use cager_core::mesh::Model;
+use cager_core::mesh::{Model, Point, Polygons};
+
+/// How a mesh was coded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MeshVersion {
+    /// Codec 3 of a container: the numbers of vertices come within the faces, and positions are predicted by parallelograms alone.
+    First,
+    /// Codec 4: numbers come after the faces, and what predicts positions is weighted.
+    Second,
+}
 
 /// A mesh as bytes, and what they decode to: the same vertices and polygons, the polygons in another order.
 #[derive(Clone, Debug)]
 pub struct CodedMesh {
     /// What the bytes decode to.
     pub mesh: Model,
-    /// The polygons, [`encode_faces`].
+    /// The polygons, as [`encode_faces`](crate::encode_faces) gives them.
     pub faces: Vec<u8>,
-    /// The positions, [`encode_positions`].
+    /// The positions, as [`encode_positions`](crate::encode_positions) gives them.
     pub positions: Vec<u8>,
 }
 
@@ -22,13 +31,36 @@ impl CodedMesh {
     /// # Errors
     /// No points, or positions too far apart to be counted in these steps.
     pub fn new(mesh: &Model, step: f64) -> Result<Self> {
-        let points = mesh.points.len();
-        let grid = Grid::new(&mesh.points, step).ok_or(Error::Damaged("positions too far apart for this step"))?;
-        let faces = encode_faces(&mesh.faces, points);
-        let ordered = decode_faces(&faces, points, mesh.faces.len(), mesh.faces.indices().len())?;
-        let positions = encode_positions(grid, &ordered, &mesh.points);
-        let points = decode_positions(&positions, &ordered, points)?;
-        Ok(Self { mesh: Model { points, faces: ordered, colors: mesh.colors.clone() }, faces, positions })
+        let grid = Self::grid(mesh, step)?;
+        let mut walked = WalkedFaces::new(&mesh.faces, mesh.points.len());
+        let ordered = std::mem::take(&mut walked.faces);
+        let (faces, positions) = rayon::join(|| walked.into_bytes(), || encode_positions(grid, &ordered, &mesh.points));
+        Ok(Self::of(mesh, grid, ordered, faces, positions))
+    }
+
+    /// The same mesh with positions in other steps.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn in_steps(&self, mesh: &Model, step: f64) -> Result<Self> {
+        let grid = Self::grid(mesh, step)?;
+        let positions = encode_positions(grid, &self.mesh.faces, &mesh.points);
+        Ok(Self::of(mesh, grid, self.mesh.faces.clone(), self.faces.clone(), positions))
+    }
+
+    fn grid(mesh: &Model, step: f64) -> Result<Grid> {
+        Grid::new(&mesh.points, step).ok_or(Error::Damaged("positions too far apart for this step"))
+    }
+
+    fn of(mesh: &Model, grid: Grid, ordered: Polygons, faces: Vec<u8>, positions: Vec<u8>) -> Self {
+        let points: Vec<Point> = mesh.points.iter().map(|&point| grid.nearest(point)).collect();
+        let (version, count) = (MeshVersion::Second, points.len());
+        debug_assert_eq!(
+            decode_faces(&faces, version, count, ordered.len(), ordered.indices().len()),
+            Ok(ordered.clone())
+        );
+        debug_assert_eq!(decode_positions(&positions, version, &ordered, count), Ok(points.clone()));
+        Self { mesh: Model { points, faces: ordered, colors: mesh.colors.clone() }, faces, positions }
     }
 
     /// Bytes that its polygons and positions take; colours are not coded.

@@ -7,6 +7,8 @@ use faer::{Mat, MatRef};
 
 /// Components whose energy per value is below this fraction of that of rounding to whole steps are left out.
 const WORTH: f64 = 0.3 / 12.0;
+/// Part of a step from which an entry of E is rounded away from 0: small ones cost more than they are worth.
+const ROUND_UP: f64 = 0.35;
 /// Largest number of binary digits of an entry of E.
 const MOST_DIGITS: u32 = 26;
 
@@ -40,7 +42,8 @@ impl Trajectories {
         let whole = |k: usize| {
             let unit = (digits[k] as f64).exp2();
             let column = waves.col(k);
-            (0..frames).map(move |t| (column[t] * unit).round() as i32).collect::<Vec<i32>>()
+            let whole = move |x: f64| (x.abs() + ROUND_UP).floor().copysign(x) as i32;
+            (0..frames).map(move |t| whole(column[t] * unit)).collect::<Vec<i32>>()
         };
         Some(Self { frames, waves: (0..count).flat_map(whole).collect(), digits })
     }

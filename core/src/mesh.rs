@@ -56,6 +56,17 @@ impl Polygons {
         })
     }
 
+    /// The same faces of points with other names.
+    ///
+    /// # Panics
+    /// Where a point has none.
+    pub fn renamed(&self, names: &[u32]) -> Self {
+        Self {
+            arities: self.arities.clone(),
+            indices: self.indices.iter().map(|&point| names[point as usize]).collect(),
+        }
+    }
+
     /// For every triangle of [`Self::triangulated`], the face it came from.
     pub fn polygon_of_triangle(&self) -> Vec<u32> {
         let faces = self.arities.iter().enumerate();

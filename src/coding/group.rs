@@ -39,6 +39,10 @@ impl Encoded {
 }
 
 impl CodedGroup {
+    pub(super) fn bytes(&self) -> usize {
+        self.cages.len() + self.residual.as_ref().map_or(0, |residual| residual.len() + SECTION)
+    }
+
     pub(super) fn mean(&self) -> f64 {
         self.errors.iter().map(|error| error.l2).sum::<f64>() / self.errors.len().max(1) as f64
     }

@@ -74,7 +74,7 @@ impl Goal {
     /// What the size leaves for so many frames after the `written` bytes of the meshes.
     pub(crate) fn room(self, written: u64, frames: usize) -> Option<Room> {
         let Self::Size(bytes) = self else { return None };
-        let other = written + AROUND + 8 * frames as u64;
+        let other = written + AROUND + 5 * frames as u64;
         Some(Room { bytes: bytes.saturating_sub(other), frames, other })
     }
 
@@ -108,7 +108,7 @@ pub(crate) fn group_frames(points: usize, rows: usize) -> usize {
     container::group_frames(points, rows).min(MOST_HELD / (HELD * points.max(1))).max(1)
 }
 
-/// Bytes of a file after its frames but for eight of each: the report and the table of contents, about.
+/// Bytes of a file after its frames but for five of each: the report and the table of contents, about.
 const AROUND: u64 = 1500;
 
 /// Why frames cannot be coded as asked for.

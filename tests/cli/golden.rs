@@ -2,7 +2,7 @@
 //!
 //! `tests/golden/definitionN-SYSTEM.cager` was written by a program whose coordinates are of definition N, and the array beside it by its
 //! `cager decode`; `-elements` is with the boundary elements in the file, `coded-SYSTEM` of codec 3, `coded-parted-SYSTEM` with a residual in two
-//! parts. The model has 120 points in a cage of 26 vertices, and three frames.
+//! parts, `static-SYSTEM` with meshes and errors of codec 4. The model has 120 points in a cage of 26 vertices, and three frames.
 
 use crate::support::Dir;
 use std::path::{Path, PathBuf};
@@ -35,8 +35,7 @@ fn files_of_every_version_decode_to_what_they_always_did() {
         assert!(files.iter().any(|file| file.file_stem().is_some_and(|stem| *stem == *name)), "{name} is missing");
     }
     assert!(files.iter().any(|file| file.file_stem().is_some_and(|stem| *stem == *"definition3-harmonic-elements")));
-    for kind in ["mvc", "green", "harmonic", "parted-mvc"] {
-        let name = format!("coded-{kind}");
+    for name in ["coded-mvc", "coded-green", "coded-harmonic", "coded-parted-mvc", "static-mvc", "static-green"] {
         assert!(files.iter().any(|file| file.file_stem().is_some_and(|stem| *stem == *name)), "{name} is missing");
     }
     let dir = Dir::new();

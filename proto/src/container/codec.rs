@@ -12,6 +12,13 @@ pub(crate) const PLANES: u8 = 1;
 pub(crate) const DIFFERENCE: u8 = 2;
 /// Whole numbers of the `cager-codec` crate; what they are depends on the section.
 pub(crate) const CODED: u8 = 3;
+/// Whole numbers of a mesh at rest, where files of earlier programs have [`CODED`], and of the errors of frames.
+pub(crate) const CODED_STATIC: u8 = 4;
+
+/// Whether a section is whole numbers.
+pub(crate) fn is_coded(codec: u8) -> bool {
+    [CODED, CODED_STATIC].contains(&codec)
+}
 
 const LEVEL: i32 = 3;
 /// zstd's window at this level is 2 MiB; a file that asks for much more is not ours.

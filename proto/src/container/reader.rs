@@ -136,7 +136,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         let points = self.positions(tag::REST_POINTS, &faces)?;
         let rest = Model { points, faces, ..Model::default() };
         // Decoding takes several times as long as reading numbers that are there as they are.
-        if self.entry(tag::REST_POINTS)?.header.codec == CODED {
+        if codec::is_coded(self.entry(tag::REST_POINTS)?.header.codec) {
             self.rest = Some(rest.clone());
         }
         Ok(rest)
@@ -249,8 +249,11 @@ impl<R: Read + Seek> ContainerReader<R> {
     /// # Errors
     /// Damage; a file that was cut before them.
     pub fn errors(&mut self) -> Result<Vec<FrameError>, Error> {
-        let entry = self.entry(tag::ERRORS)?;
-        let raw = self.raw(entry)?;
+        if let Some(coded) = self.coded(tag::ERRORS)? {
+            let errors = coded.errors(self.frames)?.into_iter();
+            return Ok(errors.map(|[l2, linf]| FrameError { l2: l2.into(), linf: linf.into() }).collect());
+        }
+        let raw = self.raw(self.entry(tag::ERRORS)?)?;
         let error = |b: &[u8]| FrameError { l2: f32_at(b, 0).into(), linf: f32_at(b, 4).into() };
         Ok(raw.chunks_exact(8).map(error).collect())
     }

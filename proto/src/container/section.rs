@@ -70,7 +70,7 @@ impl SectionHeader {
         let (times, more) = match tag {
             tag::HEADER => return HEADER_LIMIT as u64,
             // Decoding whole numbers takes several times what they become.
-            _ if codec == codec::CODED => (16, 2 << 20),
+            _ if codec::is_coded(codec) => (16, 2 << 20),
             // Two bytes of JSON may become an empty text of 24 bytes.
             tag::REPORT => (16, 4 << 20),
             _ => (48, 12 << 20),

@@ -1,11 +1,11 @@
 //! Writing a container, frame by frame.
 
-use super::codec::{self, CODED, DIFFERENCE, PLANES, RAW};
+use super::codec::{self, CODED, CODED_STATIC, DIFFERENCE, PLANES, RAW};
 use super::section::{self, HEADER_BYTES, SectionHeader};
 use super::{CHUNK_FRAMES, Error, HEADER_LIMIT, Header, counted_from_zero, tag};
 use crate::report::Report;
 use crate::wire;
-use cager_codec::CodedMesh;
+use cager_codec::{CodedMesh, encode_errors, rounded_error};
 use cager_core::mesh::{Model, Point, TriMesh};
 use std::io::Write;
 
@@ -20,6 +20,8 @@ pub struct ContainerWriter<W: Write> {
     pending: Vec<u8>,
     pending_frames: usize,
     errors: Vec<u8>,
+    /// Whether frames came in groups.
+    is_coded: bool,
     contents: Vec<u8>,
 }
 
@@ -75,6 +77,7 @@ impl<W: Write> ContainerWriter<W> {
             pending: Vec::new(),
             pending_frames: 0,
             errors: Vec::new(),
+            is_coded: false,
             contents: Vec::new(),
         };
         writer.put(&section::prelude())?;
@@ -154,6 +157,7 @@ impl<W: Write> ContainerWriter<W> {
         if first.checked_add(frames.1).is_none() || self.pending_frames > 0 {
             return Err(Error::TooLarge("a file holds at most 4,294,967,295 frames".to_owned()));
         }
+        self.is_coded = true;
         // Before the cages, so that cages that are there have all that belongs to them.
         if let Some(residual) = residual {
             self.coded(tag::RESIDUAL, residual, residual.len(), frames)?;
@@ -188,8 +192,7 @@ impl<W: Write> ContainerWriter<W> {
     /// An output that refuses.
     pub fn finish(mut self, report: Option<&Report>) -> Result<W, Error> {
         self.flush_chunk()?;
-        let errors = std::mem::take(&mut self.errors);
-        self.section(tag::ERRORS, PLANES, 4, 0, &errors)?;
+        self.write_errors()?;
         if let Some(report) = report {
             let text = report.stored().map_err(|e| Error::TooLarge(e.to_string()))?;
             self.section(tag::REPORT, PLANES, 1, 0, &text)?;
@@ -200,6 +203,20 @@ impl<W: Write> ContainerWriter<W> {
         let file_bytes = self.offset + section::FOOTER_BYTES as u64;
         self.put(&section::footer(contents_offset, file_bytes))?;
         Ok(self.out)
+    }
+
+    fn write_errors(&mut self) -> Result<(), Error> {
+        let mut errors = std::mem::take(&mut self.errors);
+        if self.is_coded {
+            let number = |bytes: &[u8; 4]| rounded_error(f32::from_le_bytes(*bytes));
+            let rounded: Vec<f32> = errors.as_chunks().0.iter().map(number).collect();
+            let coded = encode_errors(rounded.as_chunks().0);
+            if coded.len() < errors.len() {
+                return self.coded(tag::ERRORS, &coded, errors.len(), (0, 0));
+            }
+            errors = rounded.iter().flat_map(|error| error.to_le_bytes()).collect();
+        }
+        self.section(tag::ERRORS, PLANES, 4, 0, &errors)
     }
 
     fn flush_chunk(&mut self) -> Result<(), Error> {
@@ -253,8 +270,12 @@ impl<W: Write> ContainerWriter<W> {
     }
 
     fn coded(&mut self, tag: [u8; 4], payload: &[u8], raw_bytes: usize, frames: (u32, u32)) -> Result<(), Error> {
-        let width = if tag == tag::RESIDUAL { 1 } else { 4 };
-        self.payload((tag, CODED, width), payload, raw_bytes, frames)
+        let (codec, width) = match tag {
+            tag::RESIDUAL => (CODED, 1),
+            tag::FRAMES => (CODED, 4),
+            _ => (CODED_STATIC, 4),
+        };
+        self.payload((tag, codec, width), payload, raw_bytes, frames)
     }
 
     fn payload(

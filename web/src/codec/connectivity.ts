@@ -1,21 +1,28 @@
 /**
  * Faces of a mesh, found by a walk from a face across an edge to the next: most corners are then vertices whose edges still wait for a face, or are met for the
- * first time. `codec/src/connectivity.rs` is the reference.
+ * first time; docs/FORMAT.md, "Faces".
  */
 
+import { adjacency } from './adjacency';
 import { CodedDataError } from './error';
-import { IntegerModels, SIZE_CLASSES, sizeClass } from './integers';
+import { FewestToComeFirst, type Gate, type Gates, MOST_TO_COME, NewestFirst, OldestFirst } from './gates';
+import { IntegerModels } from './integers';
+import type { MeshVersion } from './meshVersion';
+import { OpenEdges } from './openEdges';
 import type { Polygons } from './polygons';
 import { BinaryModels, RangeDecoder } from './rangeDecoder';
-import { UnmetVertices } from './unmetVertices';
+import { Numbers, Turns, type VertexNames } from './vertexNames';
+import { MOST_FAR_POINTS, decodeOrder } from './vertexOrder';
 
-/** Faces that meet at a vertex are counted up to this number. */
+/** Faces at a vertex are told apart up to this number less one. */
 const VALENCES = 9;
-/** The context of a corner that open edges on both sides lead to; the others are pairs of valences. */
-const BETWEEN_OPEN_EDGES = VALENCES * VALENCES;
-/** Open edges of a vertex that are looked at: around a hub there may be very many. */
-const NEWEST = 16;
+/** Pairs of such numbers. */
+const PAIRS = VALENCES * VALENCES;
+/** Open edges of a vertex that are sorted anew with it, in either direction: ordinary meshes have no more. */
+const MOST_NEARER = 4;
+/** Vertices that a corner is looked for among, those that open edges lead to. */
 const MOST_NEAR = 8;
+const MOST_COUNT = 0xffffffff;
 
 const WRONG_COUNTS = 'faces are not those that the header counts';
 
@@ -24,93 +31,121 @@ const WRONG_COUNTS = 'faces are not those that the header counts';
  *
  * @throws {CodedDataError} for bytes that the encoder did not write.
  */
-export function decodeFaces(bytes: Uint8Array, points: number, faces: number, corners: number): Polygons {
+export function decodeFaces(
+  bytes: Uint8Array,
+  version: MeshVersion,
+  points: number,
+  faces: number,
+  corners: number,
+): Polygons {
   const decoder = new RangeDecoder(bytes);
-  return new Walk(decoder, points, faces, corners).run();
+  if (version === 'first') {
+    const gates = decoder.bits(1) === 1 ? new OldestFirst() : new NewestFirst();
+    return new Walk(decoder, version, gates, new Numbers(points), points, faces, corners).run();
+  }
+  const names = new Turns(points);
+  const polygons = new Walk(decoder, version, new FewestToComeFirst(), names, points, faces, corners).run();
+  const isFar = decoder.bits(1) === 1;
+  if (isFar && points > MOST_FAR_POINTS) {
+    throw new CodedDataError('the order of so many vertices cannot have been written');
+  }
+  const numbers = new Uint32Array(points);
+  decodeOrder(decoder, adjacency(polygons, points), isFar).forEach((vertex, number) => (numbers[vertex] = number));
+  return { counts: polygons.counts, corners: polygons.corners.map((vertex) => numbers[vertex]) };
 }
 
 class Walk {
-  private readonly inRings: boolean;
+  private readonly isFirst: boolean;
   /** Ends of the directed edges that wait for their opposite, by where these begin, and the other way round. */
-  private readonly leaving: number[][];
-  private readonly arriving: number[][];
-  private readonly facesAt: Uint8ClampedArray;
-  /** Directed edges; those before `nextGate` are done. */
-  private readonly gates: [number, number][] = [];
-  private nextGate = 0;
+  private readonly leaving: OpenEdges[];
+  private readonly arriving: OpenEdges[];
+  /** Faces that each vertex still is a corner of; of the first version those that it was of. */
+  private readonly facesAt: Uint32Array;
+  /** The last face, counted from 1, that each vertex is a corner of. */
+  private readonly faceOf: Uint32Array;
+  /** The vertex that was met last. */
   private last = 0;
-  private before = 0;
   private arity = 3;
   private readonly counts: Uint32Array;
   private readonly corners: Uint32Array;
   private facesRead = 0;
   private cornersRead = 0;
-  private readonly across = new BinaryModels(1);
+  private readonly across = new BinaryModels(9);
   private readonly more = new BinaryModels(1);
   private readonly sameArity = new BinaryModels(1);
-  private readonly firstTime = new BinaryModels(BETWEEN_OPEN_EDGES + 1);
-  private readonly place = new BinaryModels(2 * MOST_NEAR);
+  private readonly firstTime = new BinaryModels(2 * PAIRS);
+  private readonly place = new BinaryModels(8 * MOST_NEAR);
   private readonly arities = new IntegerModels(1);
-  private readonly numbers = new IntegerModels(SIZE_CLASSES);
-  private readonly unmet: UnmetVertices;
+  private readonly faceCounts = new IntegerModels(1);
 
   constructor(
     private readonly decoder: RangeDecoder,
+    version: MeshVersion,
+    private readonly gates: Gates,
+    private readonly names: VertexNames,
     private readonly points: number,
     faces: number,
     corners: number,
   ) {
-    this.inRings = decoder.bits(1) === 1;
-    this.leaving = Array.from({ length: points }, () => []);
-    this.arriving = Array.from({ length: points }, () => []);
-    this.facesAt = new Uint8ClampedArray(points);
+    this.isFirst = version === 'first';
+    this.leaving = Array.from({ length: points }, () => new OpenEdges());
+    this.arriving = Array.from({ length: points }, () => new OpenEdges());
+    this.facesAt = new Uint32Array(points);
+    this.faceOf = new Uint32Array(points);
     this.counts = new Uint32Array(faces);
     this.corners = new Uint32Array(corners);
-    this.unmet = new UnmetVertices(points);
   }
 
   run(): Polygons {
-    for (;;) {
+    do {
       for (let gate = this.gate(); gate !== null; gate = this.gate()) {
-        if (this.decoder.bit(this.across, 0) === 1) {
+        if (this.decoder.bit(this.across, this.acrossContext(gate)) === 1) {
           this.face(gate);
         } else {
           this.close(gate[0], gate[1]);
         }
       }
-      if (this.decoder.bit(this.more, 0) === 0) {
-        break;
-      }
-      this.face(null);
-    }
+    } while (this.part());
     if (this.facesRead !== this.counts.length || this.cornersRead !== this.corners.length) {
       throw new CodedDataError(WRONG_COUNTS);
     }
     return { counts: this.counts, corners: this.corners };
   }
 
+  /** Reads the first face of another part of the mesh; false where there is none. */
+  private part(): boolean {
+    const follows = this.decoder.bit(this.more, 0) === 1;
+    if (follows) {
+      this.face(null);
+    }
+    return follows;
+  }
+
   /** The next edge that still waits for a face. */
-  private gate(): readonly [number, number] | null {
-    while (this.gates.length > this.nextGate) {
-      const gate = this.inRings ? this.gates[this.nextGate++] : this.gates.pop()!;
-      if (this.leaving[gate[0]].includes(gate[1])) {
+  private gate(): Gate | null {
+    for (let gate = this.gates.take(); gate !== null; gate = this.gates.take()) {
+      if (this.leaving[gate[0]].has(gate[1])) {
         return gate;
       }
     }
     return null;
   }
 
+  private acrossContext([from, to]: Gate): number {
+    return this.isFirst ? 0 : 3 * Math.min(this.facesAt[from], 2) + Math.min(this.facesAt[to], 2);
+  }
+
   /** The edge waits no longer; false if it did not. */
   private close(from: number, to: number): boolean {
-    const wasOpen = removeLast(this.leaving[from], to);
+    const wasOpen = this.leaving[from].remove(to);
     if (wasOpen) {
-      removeLast(this.arriving[to], from);
+      this.arriving[to].remove(from);
     }
     return wasOpen;
   }
 
   /** Reads a face, which begins with the opposite of the gate's edge where there is a gate, and takes it into the walk. */
-  private face(gate: readonly [number, number] | null): void {
+  private face(gate: Gate | null): void {
     if (this.decoder.bit(this.sameArity, 0) === 1) {
       this.arity = this.arities.natural(this.decoder, 0);
     }
@@ -118,7 +153,9 @@ class Walk {
     if (this.arity === 0 || this.arity > room || this.facesRead === this.counts.length) {
       throw new CodedDataError(WRONG_COUNTS);
     }
+    this.counts[this.facesRead++] = this.arity;
     const face = gate === null ? [] : [gate[1], gate[0]].slice(0, this.arity);
+    face.forEach((vertex) => (this.faceOf[vertex] = this.facesRead));
     while (face.length < this.arity) {
       const closes = gate !== null && face.length + 1 === this.arity;
       const vertex = this.corner(face, closes);
@@ -126,90 +163,131 @@ class Walk {
         throw new CodedDataError(WRONG_COUNTS);
       }
       face.push(vertex);
+      this.faceOf[vertex] = this.facesRead;
     }
-    for (let k = 0; k < face.length; k++) {
-      const from = face[k];
-      const to = face[(k + 1) % face.length];
-      if (!this.close(to, from)) {
-        this.leaving[from].push(to);
-        this.arriving[to].push(from);
-        this.gates.push([from, to]);
-      }
-      this.facesAt[from]++;
-    }
-    this.counts[this.facesRead++] = face.length;
     this.corners.set(face, this.cornersRead);
     this.cornersRead += face.length;
+    this.join(face);
+  }
+
+  /** Closes the edges of a face that waited for it and opens the others. */
+  private join(face: readonly number[]): void {
+    const opened: Gate[] = [];
+    const nearer: number[] = [];
+    for (let k = 0; k < face.length; k++) {
+      const from = face[k];
+      const to = face[k + 1 < face.length ? k + 1 : 0];
+      if (!this.close(to, from)) {
+        this.leaving[from].add(to);
+        this.arriving[to].add(from);
+        opened.push([from, to]);
+      }
+      if (this.isFirst) {
+        this.facesAt[from]++;
+      } else if (this.facesAt[from] > 0) {
+        this.facesAt[from]--;
+        nearer.push(from);
+      }
+    }
+    for (const [from, to] of opened) {
+      this.gates.add(from, to, Math.min(this.facesAt[from], this.facesAt[to]));
+    }
+    nearer.forEach((vertex) => this.comeNearer(vertex));
+  }
+
+  /** Sorts the open edges of a vertex anew where none of their ends has fewer faces to come. */
+  private comeNearer(vertex: number): void {
+    const toCome = this.facesAt[vertex];
+    if (toCome >= MOST_TO_COME) {
+      return;
+    }
+    for (const end of this.leaving[vertex].newest().slice(-MOST_NEARER)) {
+      if (this.facesAt[end] >= toCome) {
+        this.gates.add(vertex, end, toCome);
+      }
+    }
+    for (const end of this.arriving[vertex].newest().slice(-MOST_NEARER)) {
+      if (this.facesAt[end] >= toCome) {
+        this.gates.add(end, vertex, toCome);
+      }
+    }
   }
 
   /** Reads the vertex after those of `face`; `closes` says that an edge leads from it back to the gate. */
   private corner(face: readonly number[], closes: boolean): number {
     if (face.length === 0) {
-      return this.decoder.bit(this.firstTime, 0) === 1 ? this.newVertex(this.last) : this.decoder.bits(32);
+      const isNew = this.decoder.bit(this.firstTime, 0) === 1;
+      return isNew ? this.newVertex(this.last) : this.names.again(this.decoder);
     }
     const first = face[0];
     const previous = face[face.length - 1];
-    const { near, both } = this.near(face, closes);
-    const context = both ? BETWEEN_OPEN_EDGES : VALENCES * this.valence(previous) + this.valence(first);
-    if (this.decoder.bit(this.firstTime, context) === 1) {
+    const { near, both } = this.near(previous, first, closes);
+    if (this.decoder.bit(this.firstTime, this.firstTimeContext(previous, first, both)) === 1) {
       return this.newVertex(Math.max(previous, first));
     }
-    const base = both ? MOST_NEAR : 0;
+    const base = MOST_NEAR * (2 * this.lastOnes(previous, first) + (both ? 1 : 0));
     for (let k = 0; k < near.length; k++) {
       if (this.decoder.bit(this.place, base + k) === 0) {
         return near[k];
       }
     }
-    return this.decoder.bits(32);
+    return this.names.again(this.decoder);
   }
 
   /** Vertices that an open edge leads from to the last corner, or to from the first one, the likeliest first; whether one is both. */
-  private near(face: readonly number[], closes: boolean): { near: number[]; both: boolean } {
-    const back = closes ? this.leaving[face[0]].slice(-NEWEST) : [];
-    const arriving = this.arriving[face[face.length - 1]].slice(-NEWEST);
+  private near(previous: number, first: number, closes: boolean): { near: number[]; both: boolean } {
+    const back = closes ? this.leaving[first].newest() : [];
+    const arriving = this.arriving[previous].newest();
     const ofBoth: number[] = [];
     const ofOne: number[] = [];
     for (let k = arriving.length - 1; k >= 0; k--) {
-      const x = arriving[k];
-      if (!face.includes(x)) {
-        (back.includes(x) ? ofBoth : ofOne).push(x);
-      }
+      (back.includes(arriving[k]) && !this.isCorner(arriving[k]) ? ofBoth : ofOne).push(arriving[k]);
     }
-    const both = ofBoth.length > 0;
     const near: number[] = [];
-    for (const x of [...ofBoth.reverse(), ...ofOne, ...back.reverse()]) {
-      if (near.length < MOST_NEAR && !face.includes(x) && !near.includes(x)) {
+    for (const x of [...ofBoth.reverse(), ...ofOne, ...[...back].reverse()]) {
+      if (near.length < MOST_NEAR && !this.isCorner(x) && !near.includes(x)) {
         near.push(x);
       }
     }
-    return { near, both };
+    return { near, both: ofBoth.length > 0 };
+  }
+
+  /** Whether a vertex is a corner of the face that is read. */
+  private isCorner(vertex: number): boolean {
+    return this.faceOf[vertex] === this.facesRead;
+  }
+
+  private firstTimeContext(previous: number, first: number, both: boolean): number {
+    const pair = VALENCES * this.valence(previous) + this.valence(first);
+    if (this.isFirst) {
+      return both ? PAIRS : pair;
+    }
+    return (both ? PAIRS : 0) + pair;
   }
 
   private valence(vertex: number): number {
     return Math.min(this.facesAt[vertex], VALENCES - 1);
   }
 
-  /** Reads a vertex met for the first time, by how many others that are not met yet lie between it and one that was. */
+  /** Which of two vertices have this face alone to come: 1 and 2, added up. */
+  private lastOnes(previous: number, first: number): number {
+    if (this.isFirst) {
+      return 0;
+    }
+    return (this.facesAt[previous] === 1 ? 1 : 0) + (this.facesAt[first] === 1 ? 2 : 0);
+  }
+
+  /** Reads a vertex met for the first time, near another. */
   private newVertex(near: number): number {
-    const expected = this.unmet.before(near);
-    const context = sizeClass(Math.min(this.before, 1 << 16) * 2);
-    const difference = this.numbers.signed(this.decoder, context);
-    this.before = (this.before + Math.min(Math.abs(difference), 1 << 20)) >> 1;
-    const vertex = this.unmet.take(expected + difference);
+    const vertex = this.names.first(this.decoder, near);
     if (vertex === null) {
       throw new CodedDataError(WRONG_COUNTS);
+    }
+    if (!this.isFirst) {
+      // Of the face that is read it is a corner now.
+      this.facesAt[vertex] = Math.min(this.faceCounts.natural(this.decoder, 0) + 1, MOST_COUNT);
     }
     this.last = vertex;
     return vertex;
   }
-}
-
-/** Removes the last occurrence of `x` from a list; false if the list does not contain it. */
-function removeLast(list: number[], x: number): boolean {
-  const at = list.lastIndexOf(x);
-  if (at < 0) {
-    return false;
-  }
-  list.splice(at, 1);
-  return true;
 }

@@ -1,12 +1,14 @@
 /** Everything that the coded sections of one capture need between one and the next: synchronous, for a worker. */
 
-import type { CoordinateSystem, Residual, TriangleMesh } from '../capture';
+import type { CoordinateSystem, FrameErrors, Residual, TriangleMesh } from '../capture';
 import { columnsOf, computeCoordinates } from '../coordinates/compute';
 import { CageBasis } from './basis';
 import { cagesOf, decodeCageNumbers } from './cages';
 import { decodeFaces } from './connectivity';
 import { CodedDataError } from './error';
+import { decodeFrameErrors } from './frameErrors';
 import { type Hierarchy, vertexHierarchy } from './hierarchy';
+import type { MeshVersion } from './meshVersion';
 import { type Polygons } from './polygons';
 import { decodePositions } from './positions';
 import { decodeResidual } from './residual';
@@ -18,13 +20,18 @@ export class GroupDecoder {
   private basis: CageBasis | null = null;
 
   /** {@link decodeFaces} */
-  faces(bytes: Uint8Array, points: number, faces: number, corners: number): Polygons {
-    return decodeFaces(bytes, points, faces, corners);
+  faces(bytes: Uint8Array, version: MeshVersion, points: number, faces: number, corners: number): Polygons {
+    return decodeFaces(bytes, version, points, faces, corners);
   }
 
   /** {@link decodePositions} */
-  positions(bytes: Uint8Array, faces: Polygons, points: number): Float64Array {
-    return decodePositions(bytes, faces, points);
+  positions(bytes: Uint8Array, version: MeshVersion, faces: Polygons, points: number): Float64Array {
+    return decodePositions(bytes, version, faces, points);
+  }
+
+  /** {@link decodeFrameErrors} */
+  errors(bytes: Uint8Array, frames: number): FrameErrors {
+    return decodeFrameErrors(bytes, frames);
   }
 
   /** Says which mesh residuals are of. */

@@ -4,6 +4,7 @@
  * `codec/src/hierarchy.rs` is the reference.
  */
 
+import { adjacency } from './adjacency';
 import type { Polygons } from './polygons';
 
 /** Rounds end when so few vertices are left; these are not predicted. */
@@ -63,21 +64,9 @@ export function vertexHierarchy(faces: Polygons, points: number): Hierarchy {
 }
 
 /** Vertices that an edge leads to, ascending. */
-function neighbours({ counts, corners }: Polygons, points: number): number[][] {
-  const near: number[][] = Array.from({ length: points }, () => []);
-  let first = 0;
-  for (const count of counts) {
-    for (let k = 0; k < count; k++) {
-      const a = corners[first + k];
-      const b = corners[first + ((k + 1) % count)];
-      if (a !== b) {
-        near[a].push(b);
-        near[b].push(a);
-      }
-    }
-    first += count;
-  }
-  return near.map((list) => list.sort((a, b) => a - b).filter((v, k) => k === 0 || v !== list[k - 1]));
+function neighbours(faces: Polygons, points: number): number[][] {
+  const { starts, items } = adjacency(faces, points);
+  return Array.from({ length: points }, (_, v) => [...items.subarray(starts[v], starts[v + 1]).sort()]);
 }
 
 /** These vertices by their number of neighbours, equal ones in their order. */

@@ -3,7 +3,8 @@
 import type { GroupDecoder } from './groupDecoder';
 
 /** Names of the methods of {@link GroupDecoder}. */
-export type Method = 'faces' | 'positions' | 'setModel' | 'computeBasis' | 'addCoordinates' | 'cages' | 'residual';
+export type Method =
+  'faces' | 'positions' | 'errors' | 'setModel' | 'computeBasis' | 'addCoordinates' | 'cages' | 'residual';
 
 export interface Call {
   readonly id: number;

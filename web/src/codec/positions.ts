@@ -1,13 +1,18 @@
-/** Positions of a mesh at rest on a grid, predicted by parallelograms; docs/FORMAT.md, "Faces and positions of meshes". */
+/** Positions of a mesh at rest on a grid, predicted along its faces; docs/FORMAT.md, "Positions". */
 
 import { CodedDataError } from './error';
 import { IntegerModels, MOST, SIZE_CLASSES, sizeClass } from './integers';
-import { parallelogramPredictions } from './parallelograms';
+import type { MeshVersion } from './meshVersion';
+import { parallelogramPredictions, type Predictions } from './parallelograms';
 import type { Polygons } from './polygons';
+import { PredictionWeights, WEIGHTS_BYTES } from './predictionWeights';
 import { RangeDecoder } from './rangeDecoder';
+import { MeanPredictor, type StepPredictor, WeightedPredictor } from './stepPredictors';
 
 /** Origin (three f64) and step (f64) of the grid. */
-const HEAD_BYTES = 32;
+const GRID_BYTES = 32;
+/** Sizes of numbers count up to this. */
+const MOST_SIZE = 1 << 16;
 
 /**
  * Decodes the positions of so many points, x y z each, that the encoder wrote for the same faces in the same order. Damaged bytes may give positions that are
@@ -15,16 +20,38 @@ const HEAD_BYTES = 32;
  *
  * @throws {CodedDataError} for bytes that the encoder did not write.
  */
-export function decodePositions(bytes: Uint8Array, faces: Polygons, points: number): Float64Array {
-  if (bytes.length < HEAD_BYTES) {
+export function decodePositions(
+  bytes: Uint8Array,
+  version: MeshVersion,
+  faces: Polygons,
+  points: number,
+): Float64Array {
+  const headBytes = GRID_BYTES + (version === 'first' ? 0 : WEIGHTS_BYTES);
+  if (bytes.length < headBytes) {
     throw new CodedDataError('positions are cut');
   }
-  const head = new DataView(bytes.buffer, bytes.byteOffset, HEAD_BYTES);
-  const steps = decodeSteps(new RangeDecoder(bytes.subarray(HEAD_BYTES)), faces, points);
-  const step = head.getFloat64(24, true);
-  const positions = new Float64Array(3 * points);
+  const decoder = new RangeDecoder(bytes.subarray(headBytes));
+  const predictions = parallelogramPredictions(faces, points);
+  const found = new Int32Array(3 * points);
+  const predictor =
+    version === 'first'
+      ? new MeanPredictor(predictions, found)
+      : new WeightedPredictor(
+          new PredictionWeights(bytes.subarray(GRID_BYTES, headBytes)),
+          predictions,
+          faces,
+          points,
+          found,
+        );
+  readSteps(decoder, predictions, predictor, found);
+  return onGrid(new DataView(bytes.buffer, bytes.byteOffset, GRID_BYTES), found);
+}
+
+function onGrid(grid: DataView, steps: Int32Array): Float64Array {
+  const step = grid.getFloat64(24, true);
+  const positions = new Float64Array(steps.length);
   for (let k = 0; k < 3; k++) {
-    const origin = head.getFloat64(8 * k, true);
+    const origin = grid.getFloat64(8 * k, true);
     for (let at = k; at < positions.length; at += 3) {
       positions[at] = Math.fround(origin + steps[at] * step);
     }
@@ -32,33 +59,34 @@ export function decodePositions(bytes: Uint8Array, faces: Polygons, points: numb
   return positions;
 }
 
-function decodeSteps(decoder: RangeDecoder, faces: Polygons, points: number): Int32Array {
-  const { order, starts, triples, near } = parallelogramPredictions(faces, points);
-  const found = new Int32Array(3 * points);
+/** Reads the steps of all points to `found`, where the predictor finds those it needs. */
+function readSteps(
+  decoder: RangeDecoder,
+  { order, starts, near }: Predictions,
+  predictor: StepPredictor,
+  found: Int32Array,
+): void {
   const models = new IntegerModels(3 * SIZE_CLASSES);
-  let around = 0;
-  for (let place = 0; place < points; place++) {
+  const sizes = new Uint32Array(3);
+  for (let place = 0; place < order.length; place++) {
     const vertex = order[place];
     const count = starts[place + 1] - starts[place];
-    let size = 0;
+    predictor.begin(place);
+    let sum = 0;
     for (let k = 0; k < 3; k++) {
       let expected = 0;
       if (count > 0) {
-        let sum = 0;
-        for (let t = 3 * starts[place]; t < 3 * starts[place + 1]; t += 3) {
-          sum += found[3 * triples[t] + k] + found[3 * triples[t + 1] + k] - found[3 * triples[t + 2] + k];
-        }
-        expected = Math.floor(sum / count);
+        expected = predictor.expected(k);
       } else if (near[place] !== vertex) {
         expected = found[3 * near[place] + k];
       }
       expected = Math.max(-MOST, Math.min(MOST, expected));
-      const context = SIZE_CLASSES * Math.min(count, 2) + sizeClass(around + 6 * size);
+      const context = SIZE_CLASSES * Math.min(count, 2) + sizeClass(predictor.around(k, sum));
       const value = models.signed(decoder, context);
       found[3 * vertex + k] = value + expected;
-      size += Math.min(Math.abs(value), 1 << 16);
+      sizes[k] = Math.min(Math.abs(value), MOST_SIZE);
+      sum += sizes[k];
     }
-    around = (around + Math.floor((8 * size) / 3)) >> 1;
+    predictor.end(sizes, sum);
   }
-  return found;
 }

@@ -50,7 +50,7 @@ async function streamComplaint(bytes: Uint8Array): Promise<string | null> {
   }
 }
 
-describe.each(['coded-mvc', 'definition3-mvc'])('the file %s', (name) => {
+describe.each(['coded-mvc', 'static-mvc', 'definition3-mvc'])('the file %s', (name) => {
   const intact = goldenBytes(name);
 
   it('is without a problem when it is whole', async () => {
@@ -93,7 +93,7 @@ describe.each(['coded-mvc', 'definition3-mvc'])('the file %s', (name) => {
     const fields = [4, 5, 6, 8, 12, 24, 28];
     for (let place = 0; place < count; place++) {
       for (const field of fields) {
-        for (const value of [0, 1, 3, 0x7f, 0xff]) {
+        for (const value of [0, 1, 3, 4, 0x7f, 0xff]) {
           const parts = takeApart(intact);
           parts[place].header.fill(value, field, field < 8 ? field + 1 : field + 4);
           const bytes = putTogether(parts);
@@ -174,6 +174,19 @@ describe('a file of another program', () => {
     expect(await streamComplaint(bytes)).toMatch(/codec 9/);
   });
 
+  it.each([
+    ['FRAM', 4, /codec 4 of the section FRAM/],
+    ['resi', 4, /a residual is not followed by its frames/],
+    ['ERRS', 3, /codec 3 of the section ERRS/],
+    ['RPTS', 5, /codec 5 of the section RPTS/],
+  ])('with the section %s in codec %i, which it never has, is refused', async (tag, codec, sentence) => {
+    const changed = takeApart(goldenBytes('static-green'));
+    changed.find(({ header }) => parseFields(header, 0).tag === tag)!.header[4] = codec;
+    const bytes = putTogether(changed);
+    expect(await complaint(bytes)).toMatch(sentence);
+    expect(await streamComplaint(bytes)).toMatch(sentence);
+  });
+
   it('of a newer version is refused by its number', async () => {
     const bytes = goldenBytes('definition3-mvc');
     bytes[8] = 2;
@@ -194,11 +207,15 @@ describe('a file of another program', () => {
     expect(await complaint(putTogether(changed))).toMatch(/definition 4/);
   });
 
-  it('that declares more than it can hold is refused before memory is taken', async () => {
-    const [head, points, ...others] = takeApart(goldenBytes('definition3-mvc'));
+  // Coded sections, of 200,000 points as any, may become 2 MiB and 16 times the file.
+  it.each([
+    ['definition3-mvc', 2n ** 32n - 1n],
+    ['coded-mvc', 200_000n],
+    ['static-mvc', 200_000n],
+  ])('like %s that declares more than it can hold is refused before memory is taken', async (name, most) => {
+    const [head, points, ...others] = takeApart(goldenBytes(name));
     const count = viewOf(head.payload).byteLength - 1 - 4 - 8 * 5;
     expect(Number(viewOf(head.payload).getBigUint64(count, true))).toBe(120);
-    const most = 2n ** 32n - 1n;
     viewOf(head.payload).setBigUint64(count, most, true);
     viewOf(points.header).setBigUint64(24, 3n * BigInt(points.header[5]) * most, true);
     expect(await complaint(putTogether([head, points, ...others]))).toMatch(/more bytes than the file can hold/);

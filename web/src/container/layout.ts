@@ -2,7 +2,7 @@
 
 import { damaged, unknownFeature } from './error';
 import type { Head } from './head';
-import { CODEC, type Entry, HEADER_BYTES, PRELUDE_BYTES, type SectionFields } from './section';
+import { CODEC, type Entry, HEADER_BYTES, isCoded, PRELUDE_BYTES, type SectionFields } from './section';
 import { KNOWN_TAGS, isRequired } from './tag';
 
 const MOST_FRAMES = 2 ** 32 - 1;
@@ -152,7 +152,7 @@ function mostRawBytes({ tag, codec }: Pick<SectionFields, 'tag' | 'codec'>, file
   if (tag === 'summ') {
     return 4 * MIB + 16 * fileBytes;
   }
-  return codec === CODEC.coded ? 2 * MIB + 16 * fileBytes : 12 * MIB + 48 * fileBytes;
+  return isCoded(codec) ? 2 * MIB + 16 * fileBytes : 12 * MIB + 48 * fileBytes;
 }
 
 /** Most numbers of a residual's components in a file of so many bytes. */

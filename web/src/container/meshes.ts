@@ -3,11 +3,12 @@
 import type { StaticPart, TriangleMesh } from '../capture';
 import type { Codec } from '../codec/client';
 import { CodedDataError } from '../codec/error';
+import type { MeshVersion } from '../codec/meshVersion';
 import { NO_POLYGONS, type Polygons } from '../codec/polygons';
 import { decodePayload } from './codecs';
 import { damaged } from './error';
 import type { Head } from './head';
-import { CODEC, type Entry } from './section';
+import { CODEC, type Entry, isCoded } from './section';
 
 /** Sections before the frames that model and cage are made of. */
 export const STATIC_TAGS: readonly string[] = ['RPTS', 'RFAC', 'CVTX', 'CTRI', 'ELEM'];
@@ -46,9 +47,9 @@ async function decodeModelFaces(head: Head, section: Section | undefined, codec:
     return NO_POLYGONS;
   }
   const { entry, payload } = section;
-  if (entry.fields.codec === CODEC.coded) {
-    const args: [Uint8Array, number, number, number] = [payload, head.points, head.restFaces, head.restCorners];
-    return located(entry, codec.call('faces', args));
+  const version = meshVersion(entry);
+  if (version !== null) {
+    return located(entry, codec.call('faces', [payload, version, head.points, head.restFaces, head.restCorners]));
   }
   const words = new Uint32Array(decodePayload(entry, payload).buffer);
   const counts = words.slice(0, head.restFaces);
@@ -63,13 +64,14 @@ async function decodeModelFaces(head: Head, section: Section | undefined, codec:
 async function decodeCage(head: Head, faces: Section, vertices: Section, codec: Codec): Promise<TriangleMesh> {
   const { entry, payload } = faces;
   const { cageVertices, cageFaces } = head;
-  if (entry.fields.codec !== CODEC.coded) {
+  const version = meshVersion(entry);
+  if (version === null) {
     const triangles = new Uint32Array(decodePayload(entry, payload).buffer);
     checkIndices(triangles, cageVertices, entry);
     return { positions: await decodePoints(vertices, NO_POLYGONS, cageVertices, codec), triangles };
   }
-  const args: [Uint8Array, number, number, number] = [payload, cageVertices, cageFaces, 3 * cageFaces];
-  const polygons = await located(entry, codec.call('faces', args));
+  const call = codec.call('faces', [payload, version, cageVertices, cageFaces, 3 * cageFaces]);
+  const polygons = await located(entry, call);
   if (polygons.counts.some((count) => count !== 3)) {
     throw damaged(entry.offset, 'the cage has faces that are no triangles');
   }
@@ -84,8 +86,9 @@ async function decodePoints(
   codec: Codec,
 ): Promise<Float64Array> {
   let positions: Float64Array;
-  if (entry.fields.codec === CODEC.coded) {
-    positions = await located(entry, codec.call('positions', [payload, faces, count]));
+  const version = meshVersion(entry);
+  if (version !== null) {
+    positions = await located(entry, codec.call('positions', [payload, version, faces, count]));
   } else {
     const { buffer } = decodePayload(entry, payload);
     positions = entry.fields.width === 4 ? Float64Array.from(new Float32Array(buffer)) : new Float64Array(buffer);
@@ -95,6 +98,14 @@ async function decodePoints(
     throw damaged(entry.offset, `position ${Math.floor(bad / 3)} is not finite`);
   }
   return positions;
+}
+
+/** How a section of a mesh was coded; null where it was not. */
+function meshVersion({ fields }: Entry): MeshVersion | null {
+  if (!isCoded(fields.codec)) {
+    return null;
+  }
+  return fields.codec === CODEC.coded ? 'first' : 'second';
 }
 
 /** Says where in the file damage of coded numbers is. */

@@ -183,7 +183,10 @@ class FileCapture implements ContainerCapture {
 
   /** Reads errors, numbers and the report; what of them is damaged stays empty. */
   async readTail(signal?: AbortSignal): Promise<void> {
-    await this.readOptional('ERRS', (section) => (this.errors = decodeErrors(section)), signal);
+    const takeErrors = async (section: Section) => {
+      this.errors = await decodeErrors(section, this.frames, this.codec);
+    };
+    await this.readOptional('ERRS', takeErrors, signal);
     await this.readOptional('fnum', (section) => (this.frameNumbers = decodeFrameNumbers(section)), signal);
     await this.readOptional(
       'summ',
@@ -192,14 +195,14 @@ class FileCapture implements ContainerCapture {
     );
   }
 
-  private async readOptional(tag: string, take: (section: Section) => void, signal?: AbortSignal): Promise<void> {
+  private async readOptional(tag: string, take: (section: Section) => unknown, signal?: AbortSignal): Promise<void> {
     const entry = this.layout.get(tag);
     if (entry === undefined) {
       return;
     }
     try {
       const [section] = await readSections(this.source, [entry], signal);
-      take(section);
+      await take(section);
     } catch (error) {
       if (!isTolerable(error, tag)) {
         throw error;

@@ -210,7 +210,7 @@ export class ContainerStream {
         this.note(problem);
       }
     } else if (tag === 'ERRS') {
-      this.errors = decodeErrors(section);
+      this.errors = await decodeErrors(section, this.parser.layout.frames, this.codec!);
     } else if (tag === 'fnum') {
       this.frameNumbers = decodeFrameNumbers(section);
     } else if (tag === 'rcol') {

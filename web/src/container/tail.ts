@@ -1,14 +1,19 @@
 /** The sections after the frames: errors, numbers and the report. */
 
 import type { FrameErrors } from '../capture';
+import type { Codec } from '../codec/client';
 import { decodePayload } from './codecs';
 import { damaged } from './error';
-import type { Section } from './meshes';
+import { located, type Section } from './meshes';
+import { CODEC } from './section';
 
 export const NO_ERRORS: FrameErrors = { l2: new Float32Array(0), linf: new Float32Array(0) };
 
-/** `ERRS`: errors of all frames. */
-export function decodeErrors({ entry, payload }: Section): FrameErrors {
+/** `ERRS`: errors of all of so many frames. */
+export async function decodeErrors({ entry, payload }: Section, frames: number, codec: Codec): Promise<FrameErrors> {
+  if (entry.fields.codec === CODEC.codedStatic) {
+    return located(entry, codec.call('errors', [payload, frames]));
+  }
   const pairs = new Float32Array(decodePayload(entry, payload).buffer);
   const take = (place: number) => Float32Array.from({ length: pairs.length / 2 }, (_, k) => pairs[2 * k + place]);
   return { l2: take(0), linf: take(1) };

@@ -3,6 +3,7 @@ import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'no
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { describe, expect, it } from 'vitest';
+import { LocalCodec } from '../codec/localCodec';
 import { bytesSource } from '../container/source';
 import { allBlocks, goldenBytes, openBytes, positionsOf, rawPart, takeApart, withPart } from '../container/testSupport';
 import { parseFields } from '../container/section';
@@ -11,7 +12,15 @@ import { editedBlock, type CageEdit } from './cageEdit';
 import { npyHeader } from './decodedFrames';
 import { writeEdited } from './editedContainer';
 
-const NAMES = ['definition3-mvc', 'definition3-green', 'definition3-green-free', 'definition2-mvc', 'coded-mvc'];
+const NAMES = [
+  'definition3-mvc',
+  'definition3-green',
+  'definition3-green-free',
+  'definition2-mvc',
+  'coded-mvc',
+  'static-mvc',
+];
+const isCoded = (name: string) => /^(coded|static)/.test(name);
 const program = process.env.CAGER_BINARY;
 
 /** Moves a vertex in frame 1 of 3. */
@@ -25,7 +34,9 @@ function editOf(vertices: number, x = 0.25): CageEdit {
 
 async function written(name: string, edits: readonly CageEdit[]): Promise<Uint8Array<ArrayBuffer>> {
   const capture = await openBytes(goldenBytes(name));
-  const { container } = await writeEdited(bytesSource(goldenBytes(name)), capture, edits);
+  const { container } = await writeEdited(bytesSource(goldenBytes(name)), capture, edits, {
+    codec: new LocalCodec(),
+  });
   return new Uint8Array(await container.arrayBuffer());
 }
 
@@ -40,7 +51,7 @@ describe.each(NAMES)('%s, edited', (name) => {
     expect({ ...after.static, report: null }).toEqual({ ...before.static, report: null });
     const expected = (await allBlocks(before)).map((block) => editedBlock(block, [edit], before.static));
     expect(await allBlocks(after)).toEqual(expected);
-    const losesAll = name.startsWith('coded');
+    const losesAll = isCoded(name);
     expect([...after.errors.linf].map(Number.isNaN)).toEqual([losesAll, true, losesAll]);
     if (!losesAll) expect(after.errors.l2[2]).toBe(before.errors.l2[2]);
     const report = after.static.report as { error: Record<string, unknown>; coding?: unknown; warnings: string[] };
@@ -75,12 +86,12 @@ describe.each(NAMES)('%s, edited', (name) => {
       expect(farthest / diagonal).toBeLessThan(1e-6);
       const source = join(folder, 'source.cager');
       writeFileSync(source, goldenBytes(name));
-      const original = decode(source, ...(name.startsWith('coded') ? ['--layer', 'cages'] : []));
+      const original = decode(source, ...(isCoded(name) ? ['--layer', 'cages'] : []));
       const points = after.head.points * 3;
       for (const frame of [0, 2]) {
         const [a, b] = [decoded, original].map((all) => all.slice(frame * points, (frame + 1) * points));
         // Coded cages are decoded to numbers that differ by rounding between programs.
-        if (name.startsWith('coded')) {
+        if (isCoded(name)) {
           expect(a.reduce((far, x, k) => Math.max(far, Math.abs(x - b[k])), 0) / diagonal).toBeLessThan(1e-6);
         } else {
           expect(a).toEqual(b);

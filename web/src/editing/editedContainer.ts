@@ -1,5 +1,7 @@
-import type { Capture, StaticPart } from '../capture';
+import type { Capture, FrameErrors, StaticPart } from '../capture';
+import { type Codec, createCodec } from '../codec/client';
 import { damaged } from '../container/error';
+import type { Section } from '../container/meshes';
 import { readContents, readSections } from '../container/sectionReader';
 import type { Source } from '../container/source';
 import { decodeErrors, decodeReport } from '../container/tail';
@@ -19,19 +21,26 @@ export interface WrittenContainer {
   readonly changed: number;
 }
 
+export interface EditedOptions {
+  readonly signal?: AbortSignal;
+  /** Hears the part that is done, 0 to 1. */
+  readonly onProgress?: (fraction: number) => void;
+  /** What decodes coded errors, closed after that; by default a worker. */
+  readonly codec?: Codec;
+}
+
 /**
  * Writes a container again with edited cages, by the rules of `cager edit`: model, cage and numbers of frames are taken over, frames are stored as they are,
  * a residual is left out since it belongs to the cages as they were, and errors that no longer hold become NaN.
  *
  * @param source the container that holds `capture`'s frames
- * @param onProgress hears the part that is done, 0 to 1
  * @throws {ContainerError} where the container is damaged
  */
 export async function writeEdited(
   source: Source,
   capture: Pick<Capture, 'block'> & { readonly static: Pick<StaticPart, 'rowsPerFrame'> },
   edits: readonly CageEdit[],
-  { signal, onProgress }: { signal?: AbortSignal; onProgress?: (fraction: number) => void } = {},
+  { signal, onProgress, codec }: EditedOptions = {},
 ): Promise<WrittenContainer> {
   const layout = await readContents(source, signal);
   const read = async (tag: string) => {
@@ -48,7 +57,7 @@ export async function writeEdited(
   const { frames } = layout;
   const known = await read('ERRS');
   if (!known) throw damaged(layout.end, 'the section ERRS is missing');
-  const { l2, linf } = decodeErrors(known);
+  const { l2, linf } = await errorsOf(known, frames, codec);
   const losesResidual = layout.chunks.some(({ residual }) => residual !== null);
   const errors = new Float32Array(2 * frames);
   let changed = 0;
@@ -69,6 +78,14 @@ export async function writeEdited(
     writer.add({ tag: 'summ' }, new TextEncoder().encode(JSON.stringify(report)));
   }
   return { container: writer.finish(), changed };
+}
+
+async function errorsOf(section: Section, frames: number, codec: Codec = createCodec()): Promise<FrameErrors> {
+  try {
+    return await decodeErrors(section, frames, codec);
+  } finally {
+    codec.close();
+  }
 }
 
 interface Chunk {

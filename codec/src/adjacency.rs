@@ -1,0 +1,51 @@
+//! Which vertices a mesh's edges join.
+
+use cager_core::mesh::Polygons;
+
+/// The neighbours of each vertex along the edges of polygons, each once, ascending unless they were [renamed](Self::renamed).
+pub(crate) struct Adjacency {
+    starts: Vec<u32>,
+    items: Vec<u32>,
+}
+
+impl Adjacency {
+    /// Of the vertices of these faces.
+    pub(crate) fn new(faces: &Polygons, points: usize) -> Self {
+        let mut edges: Vec<[u32; 2]> = Vec::with_capacity(2 * faces.indices().len());
+        for face in faces.iter() {
+            for (k, &a) in face.iter().enumerate() {
+                let b = face[(k + 1) % face.len()];
+                if a != b {
+                    edges.extend([[a, b], [b, a]]);
+                }
+            }
+        }
+        edges.sort_unstable();
+        edges.dedup();
+        let mut starts = vec![0; points + 1];
+        edges.iter().for_each(|[a, _]| starts[*a as usize + 1] += 1);
+        (0..points).for_each(|k| starts[k + 1] += starts[k]);
+        Self { starts, items: edges.into_iter().map(|[_, b]| b).collect() }
+    }
+
+    /// The same with other names of the vertices; the neighbours come in another order.
+    pub(crate) fn renamed(&self, names: &[u32]) -> Self {
+        let mut starts = vec![0; self.starts.len()];
+        (0..self.points()).for_each(|v| starts[names[v] as usize + 1] = self.of(v).len() as u32);
+        (0..self.points()).for_each(|k| starts[k + 1] += starts[k]);
+        let mut items = vec![0; self.items.len()];
+        for v in 0..self.points() {
+            let begin = starts[names[v] as usize] as usize;
+            items[begin..].iter_mut().zip(self.of(v)).for_each(|(to, &w)| *to = names[w as usize]);
+        }
+        Self { starts, items }
+    }
+
+    pub(crate) fn points(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    pub(crate) fn of(&self, vertex: usize) -> &[u32] {
+        &self.items[self.starts[vertex] as usize..self.starts[vertex + 1] as usize]
+    }
+}

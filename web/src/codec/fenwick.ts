@@ -1,0 +1,80 @@
+/** A set of numbers below a limit that is counted in a Fenwick tree. */
+export class CountedSet {
+  private readonly sums: Uint32Array;
+  /** The largest power of two that is not above the limit. */
+  private readonly reach: number;
+  private size = 0;
+
+  /** Of none of the numbers. */
+  constructor(limit: number) {
+    this.sums = new Uint32Array(limit + 1);
+    let reach = 1;
+    while (2 * reach <= limit) {
+      reach *= 2;
+    }
+    this.reach = reach;
+  }
+
+  /** Of all of them. */
+  static all(limit: number): CountedSet {
+    const set = new CountedSet(limit);
+    for (let k = 1; k <= limit; k++) {
+      set.sums[k] = k & -k;
+    }
+    set.size = limit;
+    return set;
+  }
+
+  /** How many are in the set. */
+  get count(): number {
+    return this.size;
+  }
+
+  /** How many of the set are below this number. */
+  before(number: number): number {
+    let count = 0;
+    for (let at = Math.min(number, this.sums.length - 1); at > 0; at &= at - 1) {
+      count += this.sums[at];
+    }
+    return count;
+  }
+
+  /** The number of the set that has so many of it below; null where there is none. */
+  find(rank: number): number | null {
+    if (rank < 0 || rank >= this.size) {
+      return null;
+    }
+    const { sums } = this;
+    let at = 0;
+    let rest = rank;
+    for (let reach = this.reach; reach >= 1; reach /= 2) {
+      if (at + reach < sums.length && sums[at + reach] <= rest) {
+        at += reach;
+        rest -= sums[at];
+      }
+    }
+    return at;
+  }
+
+  /** Adds a number that is not in the set. */
+  add(number: number): void {
+    this.size++;
+    for (let at = number + 1; at < this.sums.length; at += at & -at) {
+      this.sums[at]++;
+    }
+  }
+
+  /** Takes a number out that is in the set. */
+  remove(number: number): void {
+    this.size--;
+    for (let at = number + 1; at < this.sums.length; at += at & -at) {
+      this.sums[at]--;
+    }
+  }
+
+  /** Takes all numbers out. */
+  clear(): void {
+    this.size = 0;
+    this.sums.fill(0);
+  }
+}
