@@ -196,6 +196,9 @@ fn single(cage: &[Point]) -> Vec<f32> {
     cage.as_flattened().iter().map(|&x| x as f32).collect()
 }
 
+/// Columns of a tile of the kernels that multiply matrices.
+const TILE_COLUMNS: usize = 4;
+
 /// Columns of the product of a batch of frames.
 ///
 /// Fewer frames take a narrower product. Widths are whole tiles of the kernels, which then sum over the unknowns in the same order (there is a test
@@ -205,5 +208,5 @@ fn single(cage: &[Point]) -> Vec<f32> {
 /// Where more frames come than a batch holds.
 pub(crate) fn product_columns(frames: usize) -> usize {
     assert!(frames <= BATCH, "at most {BATCH} frames in a batch");
-    3 * frames.max(1).next_multiple_of(BATCH / 4)
+    (3 * frames.max(1)).next_multiple_of(TILE_COLUMNS)
 }
