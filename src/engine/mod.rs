@@ -47,7 +47,7 @@ impl Engine {
     /// # Errors
     /// Threads cannot be started.
     pub fn new(workers: usize) -> std::io::Result<Self> {
-        let pool = threads::pool("solve", workers, threads::NICE_COMPUTE)?;
+        let pool = threads::pool("solve", workers, threads::NICE_SOLVE)?;
         let slots = pool.current_num_threads();
         let shared = Arc::new(Shared { state: Mutex::new(Schedule::new(slots)), changed: Condvar::new(), pool });
         let dispatching = Arc::clone(&shared);

@@ -91,7 +91,7 @@ impl Solvers {
     /// # Errors
     /// Threads cannot be started.
     pub(crate) fn new(store: Store, config: &ServeConfig) -> std::io::Result<Self> {
-        let pool = threads::pool("prepare", config.workers, threads::NICE_COMPUTE)?;
+        let pool = threads::pool("prepare", config.workers, threads::NICE_PREPARE)?;
         Ok(Self {
             inner: Mutex::default(),
             store,
