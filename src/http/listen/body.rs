@@ -5,7 +5,6 @@ use bytes::Bytes;
 use http_body::{Body, Frame, SizeHint};
 use hyper::body::Incoming;
 use std::error::Error;
-use std::fmt;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -17,19 +16,12 @@ use tokio::time::{Instant, Sleep, sleep};
 const PIECE_BYTES: usize = 64 << 10;
 
 /// The client stopped sending within a request body. It is the source of the body's error.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the request body stopped coming for {} s; send it again", after.as_secs_f64())]
 pub struct BodyTimeout {
     /// How long was waited.
     pub after: Duration,
 }
-
-impl fmt::Display for BodyTimeout {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "the request body stopped coming for {} s; send it again", self.after.as_secs_f64())
-    }
-}
-
-impl Error for BodyTimeout {}
 
 /// Whether the root cause of an error while reading a request body is a [`BodyTimeout`], which means 408.
 pub fn is_body_timeout(error: &(dyn Error + 'static)) -> bool {

@@ -95,16 +95,11 @@ struct Certificate {
     loaded: Mutex<Loaded>,
 }
 
+#[derive(Debug)]
 struct Loaded {
     key: Arc<CertifiedKey>,
     stamp: Stamp,
     looked: Instant,
-}
-
-impl std::fmt::Debug for Loaded {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Loaded").field("stamp", &self.stamp).finish_non_exhaustive()
-    }
 }
 
 impl ResolvesServerCert for Certificate {
