@@ -8,6 +8,7 @@ use cager_core::inversion::{Solver, SolverOptions};
 use cager_core::mesh::Model;
 use cager_proto::container::{self, ContainerWriter, Header, counted_from_zero};
 use cager_proto::report::{Coding, ConditionNumber, FrameError, MaxVol, Report};
+use serde::{Deserialize, Serialize};
 use std::io::Write;
 
 /// What containers and reports say they were written by.
@@ -31,7 +32,7 @@ pub struct Encoding<'a> {
 }
 
 /// Errors of a frame as they are stored, with the sums that the error of the whole capture needs.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct StoredError {
     /// `sqrt(mean |e|²)` over the rest diagonal; NaN if not measured.
     pub l2: f32,

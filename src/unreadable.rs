@@ -136,10 +136,7 @@ impl Service {
             return Ok(false);
         }
         let (store, removed) = (self.store.clone(), id.to_owned());
-        let deleted = blocking(move || match kind {
-            Kind::Session => store.delete_session(&removed),
-            Kind::CageJob => store.delete_cage_job(&removed),
-        });
+        let deleted = blocking(move || store.delete(kind, &removed));
         deleted.await?.map_err(|error| storage_error(&error))?;
         self.unread.forget(kind, id);
         Ok(true)

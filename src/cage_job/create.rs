@@ -156,7 +156,7 @@ impl Service {
         if !unfinished && error.is_none() {
             self.store.forget_cage_job_input(&id);
         }
-        let job = Arc::new(CageJob::new(meta, phase, self.store.cage_job_bytes(&id)));
+        let job = Arc::new(CageJob::new(meta, phase, self.store.bytes(Kind::CageJob, &id)));
         self.cage_jobs.insert(Arc::clone(&job));
         if unfinished {
             tokio::spawn(Arc::clone(self).run_cage_job(job));
@@ -169,7 +169,7 @@ impl Service {
         let (store, id, kept) = (self.store.clone(), job.meta.id.clone(), outcome.clone());
         let stored = blocking(move || {
             let stored = store.finish_cage_job(&id, &kept, cage.as_deref());
-            stored.map(|()| store.cage_job_bytes(&id))
+            stored.map(|()| store.bytes(Kind::CageJob, &id))
         });
         match stored.await {
             _ if job.deleted().is_cancelled() => return,
@@ -212,7 +212,7 @@ impl Service {
         let work = tokio::spawn(async move {
             let (store, id) = (service.store.clone(), job.meta.id.clone());
             let _unread = service.unread.hold(Kind::CageJob, &id).await;
-            blocking(move || store.delete_cage_job(&id)).await?.map_err(|error| storage_error(&error))?;
+            blocking(move || store.delete(Kind::CageJob, &id)).await?.map_err(|error| storage_error(&error))?;
             service.unread.forget(Kind::CageJob, &job.meta.id);
             service.cage_jobs.remove(&job.meta.id);
             job.deleted.cancel();
@@ -250,20 +250,16 @@ fn check(new: &NewCageJob, tenant: &str, max_seconds: u64, max_bytes: u64) -> Re
         return Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(max_bytes));
     }
     samples::read(&mut *reader, count, |_| ())?;
-    let mut hasher = blake3::Hasher::new();
     let extension = |name: &str| name.rsplit_once('.').map_or("", |(_, ending)| ending).to_ascii_lowercase();
-    for part in [
+    let key = ContentKey::of([
         format!("cage design {design:?} {points} {frame_count} {count}").as_bytes(),
         tenant.as_bytes(),
         extension(&new.rest_name).as_bytes(),
-        blake3::hash(&new.rest).as_bytes(),
+        blake3::hash(&new.rest).as_bytes().as_slice(),
         extension(&new.frames_name).as_bytes(),
         frames.digest().as_bytes(),
-    ] {
-        hasher.update(&(part.len() as u64).to_le_bytes());
-        hasher.update(part);
-    }
-    Ok(Checked { key: ContentKey(*hasher.finalize().as_bytes()), points: points as u32, frame_count })
+    ]);
+    Ok(Checked { key, points: points as u32, frame_count })
 }
 
 fn fingerprint(key: &ContentKey, options: &CageOptions) -> String {

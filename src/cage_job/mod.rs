@@ -12,7 +12,7 @@ pub(crate) use run::{DesignPool, local_designer};
 
 use crate::problem::{self, ApiError};
 use crate::session::lock;
-use crate::store::{CageJobMeta, Store, StoreError};
+use crate::store::{CageJobMeta, Kind, Store, StoreError};
 use bytes::Bytes;
 use cager_cages::Progress as DesignProgress;
 use cager_core::mesh::TriMesh;
@@ -264,7 +264,7 @@ impl CageJob {
         );
         tracing::error!(job = %self.meta.id, %error, "a cage job is damaged and put in quarantine");
         metrics::counter!("cager_quarantined_total").increment(1);
-        if let Err(error) = store.quarantine_cage_job(&self.meta.id, what) {
+        if let Err(error) = store.quarantine(Kind::CageJob, &self.meta.id, what) {
             tracing::error!(job = %self.meta.id, %error, "it could not be moved");
         }
         self.set_phase(Phase::Failed(failed.problem.clone()));

@@ -91,7 +91,7 @@ pub async fn new_session(
     let parts = multipart::read(service, &tenant, request).await?;
     Choices::of(&parts.options)?;
     let uploaded = parts.uploaded;
-    Ok((uploaded.rest.len(), uploaded.cage.map_or(0, |cage| cage.bytes.len())))
+    Ok((uploaded.rest.bytes.len(), uploaded.cage.map_or(0, |cage| cage.bytes.len())))
 }
 
 /// Reads the multipart body that asks for a cage; gives the bytes of rest pose and frames.

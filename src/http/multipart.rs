@@ -9,7 +9,7 @@ use crate::config::MULTIPART_OVERHEAD_BYTES;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::cage_source::Uploaded;
-use crate::store::{CageFile, MatrixFile};
+use crate::store::NamedFile;
 use axum::body::{Body, BodyDataStream};
 use axum::extract::multipart::{Field, MultipartError};
 use axum::extract::{FromRequest, Multipart, Request};
@@ -23,16 +23,12 @@ const OPTIONS_BYTES: usize = 64 << 10;
 pub(super) const NAME_CHARACTERS: usize = 200;
 /// Name of the part with the matrix of the regularizer `matrix`.
 const MATRIX: &str = "regularizer_matrix";
+
 /// Parsed parts, with the permit for their memory.
 pub(crate) struct Parts {
     pub(crate) uploaded: Uploaded,
     pub(crate) options: SessionOptions,
     pub(crate) room: Held,
-}
-
-struct File {
-    name: String,
-    bytes: Vec<u8>,
 }
 
 /// What the headers of a form say.
@@ -125,16 +121,11 @@ async fn read_parts(service: &Service, mut body: Multipart) -> Result<(Uploaded,
         }
     }
     let rest = rest.ok_or_else(|| bad("part rest is missing; send the rest pose as a file".to_owned()))?;
-    let uploaded = Uploaded {
-        rest_name: rest.name,
-        rest: rest.bytes,
-        cage: cage.map(|File { name, bytes }| CageFile { name, bytes }),
-        matrix: matrix.map(|File { name, bytes }| MatrixFile { name, bytes }),
-    };
+    let uploaded = Uploaded { rest, cage, matrix };
     Ok((uploaded, options.unwrap_or_default()))
 }
 
-async fn read_file(service: &Service, part: &str, mut field: Field<'_>, left: &mut u64) -> Result<File, ApiError> {
+async fn read_file(service: &Service, part: &str, mut field: Field<'_>, left: &mut u64) -> Result<NamedFile, ApiError> {
     let name = file_name(&field);
     // There is one format of matrices, so that their names say nothing.
     let name = if part == MATRIX && name.is_empty() { format!("{MATRIX}.mtx") } else { name };
@@ -152,7 +143,7 @@ async fn read_file(service: &Service, part: &str, mut field: Field<'_>, left: &m
         })?;
         bytes.extend_from_slice(&chunk);
     }
-    Ok(File { name, bytes })
+    Ok(NamedFile { name, bytes })
 }
 
 /// The file name of a part, without folders and control characters.

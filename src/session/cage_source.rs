@@ -6,7 +6,7 @@ use super::prepare::read_part;
 use crate::admission::Budget;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{CageFile, Content, ContentKey, MatrixFile};
+use crate::store::{Content, ContentKey, NamedFile};
 use cager_cages::{EncloseError, EncloseOptions, enclose};
 use cager_core::mesh::{Model, Polygons, TriMesh, bounds};
 use cager_proto::messages::{CageSource, SessionOptions};
@@ -25,10 +25,9 @@ const NAME: &str = "cage.obj";
 
 /// The files of a request that creates a session.
 pub(crate) struct Uploaded {
-    pub(crate) rest_name: String,
-    pub(crate) rest: Vec<u8>,
-    pub(crate) cage: Option<CageFile>,
-    pub(crate) matrix: Option<MatrixFile>,
+    pub(crate) rest: NamedFile,
+    pub(crate) cage: Option<NamedFile>,
+    pub(crate) matrix: Option<NamedFile>,
 }
 
 /// Makes cages around rest poses, each once however many requests ask for it, and remembers the latest.
@@ -36,7 +35,7 @@ pub(crate) struct CageMaker {
     places: Arc<Budget>,
     /// One lock per shard of digests (first byte modulo 16), taken while a cage is made.
     locks: [tokio::sync::Mutex<()>; 16],
-    recent: Mutex<VecDeque<(ContentKey, CageFile)>>,
+    recent: Mutex<VecDeque<(ContentKey, NamedFile)>>,
 }
 
 impl CageMaker {
@@ -45,11 +44,11 @@ impl CageMaker {
         Self { places, locks: Default::default(), recent: Mutex::default() }
     }
 
-    fn recent(&self, made: &ContentKey) -> Option<CageFile> {
+    fn recent(&self, made: &ContentKey) -> Option<NamedFile> {
         lock(&self.recent).iter().find(|(key, _)| key == made).map(|(_, cage)| cage.clone())
     }
 
-    fn keep(&self, made: ContentKey, cage: CageFile) {
+    fn keep(&self, made: ContentKey, cage: NamedFile) {
         let mut recent = lock(&self.recent);
         recent.push_front((made, cage));
         recent.truncate(RECENT_CAGES);
@@ -67,7 +66,7 @@ impl Service {
         uploaded: Uploaded,
         options: &SessionOptions,
     ) -> Result<(Content, Option<ContentKey>), ApiError> {
-        let Uploaded { rest_name, rest, cage, matrix } = uploaded;
+        let Uploaded { rest, cage, matrix } = uploaded;
         let (rest, cage, made) = match (cage, options.cage.clone()) {
             (Some(cage), None) => (rest, cage, None),
             (Some(_), Some(_)) => {
@@ -79,37 +78,36 @@ impl Service {
             (None, Some(CageSource { id: Some(id), .. })) => (rest, self.designed_cage(tenant, &id).await?, None),
             (None, source) => {
                 let vertices = source.and_then(|source| source.vertices);
-                let (rest, cage, made) = self.made_cage(tenant, &rest_name, rest, vertices).await?;
+                let (rest, cage, made) = self.made_cage(tenant, rest, vertices).await?;
                 (rest, cage, Some(made))
             }
         };
-        Ok((Content { rest_name, rest, cage_name: cage.name, cage: cage.bytes, matrix }, made))
+        Ok((Content { rest, cage, matrix }, made))
     }
 
-    async fn designed_cage(&self, tenant: &str, id: &str) -> Result<CageFile, ApiError> {
+    async fn designed_cage(&self, tenant: &str, id: &str) -> Result<NamedFile, ApiError> {
         let job = self.cage_jobs.find(tenant, id).map_err(|_| {
             refuse(&format!("id: there is no cage design {:?}; list yours at /v1/cages", shortened(id)))
         })?;
         let store = self.store.clone();
         let bytes = blocking(move || job.completed_cage(&store)).await??;
-        Ok(CageFile { name: NAME.to_owned(), bytes: bytes.to_vec() })
+        Ok(NamedFile { name: NAME.to_owned(), bytes: bytes.to_vec() })
     }
 
     /// A cage enclosing the rest pose: from the recent ones, from a session of the same tenant with the same inputs, or made now.
     async fn made_cage(
         &self,
         tenant: &str,
-        rest_name: &str,
-        rest: Vec<u8>,
+        rest: NamedFile,
         vertices: Option<u32>,
-    ) -> Result<(Vec<u8>, CageFile, ContentKey), ApiError> {
+    ) -> Result<(NamedFile, NamedFile, ContentKey), ApiError> {
         if let Some(vertices) = vertices.filter(|vertices| !VERTICES.contains(vertices)) {
             return Err(refuse(&vertices_detail(vertices)));
         }
         let (rest, made) = {
-            let (tenant, name) = (tenant.to_owned(), rest_name.to_owned());
+            let tenant = tenant.to_owned();
             blocking(move || {
-                let made = digest(&tenant, &name, &rest, vertices);
+                let made = digest(&tenant, &rest, vertices);
                 (rest, made)
             })
             .await?
@@ -126,13 +124,14 @@ impl Service {
             }
         }
         let _place = self.cage_maker.places.take(tenant, 1).await;
-        let (pool, name) = (self.solvers.pool(), rest_name.to_owned());
+        let pool = self.solvers.pool();
         let (rest, cage) = blocking(move || {
-            let cage = read_part("rest", &name, &rest).and_then(|model| pool.install(|| make(&model, vertices)));
+            let cage =
+                read_part("rest", &rest.name, &rest.bytes).and_then(|model| pool.install(|| make(&model, vertices)));
             (rest, cage)
         })
         .await?;
-        let cage = CageFile { name: NAME.to_owned(), bytes: obj_of(&cage?) };
+        let cage = NamedFile { name: NAME.to_owned(), bytes: obj_of(&cage?) };
         self.cage_maker.keep(made, cage.clone());
         Ok((rest, cage, made))
     }
@@ -187,14 +186,8 @@ fn shortened(id: &str) -> String {
 }
 
 /// BLAKE3 digest of everything that a made cage depends on. It includes the tenant, so that one tenant cannot detect another's uploads.
-fn digest(tenant: &str, rest_name: &str, rest: &[u8], vertices: Option<u32>) -> ContentKey {
-    let extension = rest_name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
-    let mut hasher = blake3::Hasher::new();
-    for part in
-        ["made cage".as_bytes(), tenant.as_bytes(), extension.as_bytes(), rest, format!("{vertices:?}").as_bytes()]
-    {
-        hasher.update(&(part.len() as u64).to_le_bytes());
-        hasher.update(part);
-    }
-    ContentKey(*hasher.finalize().as_bytes())
+fn digest(tenant: &str, rest: &NamedFile, vertices: Option<u32>) -> ContentKey {
+    let extension = rest.name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
+    let vertices = format!("{vertices:?}");
+    ContentKey::of([b"made cage", tenant.as_bytes(), extension.as_bytes(), &rest.bytes, vertices.as_bytes()])
 }

@@ -1,11 +1,9 @@
 //! Group commit of solved frames: everything queued for a session is appended and synced once, then its uploads are notified.
 
-use super::frames::Digests;
 use super::upload::Permits;
 use super::{Phase, Session};
-use crate::capture::StoredError;
 use crate::problem::{self, ApiError};
-use crate::store::{FrameLog, LogRecord, StoreError};
+use crate::store::{FrameLog, LogEntry, LogRecord, StoreError};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -16,9 +14,8 @@ const RECORD_BYTES: usize = 96;
 
 /// A solved frame that is not on disk yet.
 pub(crate) struct SolvedFrame {
-    pub(crate) frame: u32,
-    pub(crate) digests: Digests,
-    pub(crate) error: StoredError,
+    /// What the log will say of it.
+    pub(crate) entry: LogEntry,
     pub(crate) cage: Vec<f32>,
     /// As it was posted, where it has to wait on disk until its group is coded.
     pub(crate) posted: Option<Vec<u8>>,
@@ -110,19 +107,8 @@ impl Session {
         if solved.is_empty() {
             return;
         }
-        let mut records: Vec<LogRecord<'_>> = solved
-            .iter()
-            .map(|s| LogRecord {
-                frame: s.frame,
-                l2: s.error.l2,
-                linf: s.error.linf,
-                squared: s.error.squared,
-                spread: s.error.spread,
-                handle_digest: s.digests.handles,
-                full_digest: s.digests.full,
-                cage: &s.cage,
-            })
-            .collect();
+        let mut records: Vec<LogRecord<'_>> =
+            solved.iter().map(|s| LogRecord { entry: s.entry, cage: &s.cage }).collect();
         let mut log = super::lock(&self.log);
         if let Phase::Failed(problem) = self.status().phase {
             // The session's files are in quarantine.
@@ -133,16 +119,12 @@ impl Session {
         }
         let outcome = self.open_log(&mut log).and_then(|log| {
             // Opening the log may have found some of these frames on disk; they are not written again.
-            records.retain(|record| {
-                let frames = self.frames();
-                let known = frames.entry(record.frame);
-                known.is_none_or(|known| known.full_digest.is_none() && record.full_digest.is_some())
-            });
+            records.retain(|record| self.frames().adds_information(&record.entry));
             // First what has to be coded: a frame that the log has, has been posted as its digest there says.
             let posted: Vec<(u32, &[u8])> = solved
                 .iter()
-                .filter_map(|s| Some((s.frame, s.posted.as_deref()?)))
-                .filter(|(frame, _)| records.iter().any(|record| record.frame == *frame))
+                .filter_map(|s| Some((s.entry.frame, s.posted.as_deref()?)))
+                .filter(|(frame, _)| records.iter().any(|record| record.entry.frame == *frame))
                 .collect();
             if !posted.is_empty() {
                 self.keep_frames(&posted)?;
@@ -157,10 +139,10 @@ impl Session {
         match outcome {
             Ok(entries) => {
                 let measured = entries.iter().filter(|entry| entry.full_digest.is_some()).count();
-                metrics::counter!("cager_frames_total", "tenant" => self.meta.tenant.clone(), "rows" => "all")
-                    .increment(measured as u64);
-                metrics::counter!("cager_frames_total", "tenant" => self.meta.tenant.clone(), "rows" => "handles")
-                    .increment((entries.len() - measured) as u64);
+                for (rows, count) in [("all", measured), ("handles", entries.len() - measured)] {
+                    metrics::counter!("cager_frames_total", "tenant" => self.meta.tenant.clone(), "rows" => rows)
+                        .increment(count as u64);
+                }
                 for entry in entries {
                     let uploads = self.frames().solved(entry);
                     uploads.iter().for_each(|upload| upload.answer(entry.frame));
@@ -183,13 +165,14 @@ impl Session {
             return solved;
         }
         let there = |frame: u32, before: &[SolvedFrame]| {
-            before.iter().any(|s| s.frame == frame) || self.frames().entry(frame).is_some()
+            before.iter().any(|s| s.entry.frame == frame) || self.frames().entry(frame).is_some()
         };
-        let orphan = (0..solved.len()).find(|&k| solved[k].frame > 0 && !there(solved[k].frame - 1, &solved[..k]));
+        let orphan =
+            (0..solved.len()).find(|&k| solved[k].entry.frame > 0 && !there(solved[k].entry.frame - 1, &solved[..k]));
         let (written, orphans) = solved.split_at(orphan.unwrap_or(solved.len()));
         if let Some(first) = orphans.first() {
             self.bytes.fetch_sub(stored_bytes(orphans), Relaxed);
-            self.give_up(orphans, &super::solve::predecessor_missing(first.frame));
+            self.give_up(orphans, &super::solve::predecessor_missing(first.entry.frame));
         }
         written
     }
@@ -197,13 +180,13 @@ impl Session {
     /// Fails the uploads that wait for these frames.
     fn give_up(&self, solved: &[SolvedFrame], error: &ApiError) {
         for s in solved {
-            let uploads = self.frames().release_claim(s.frame);
-            uploads.iter().for_each(|upload| upload.fail(error.clone().frame(s.frame)));
+            let uploads = self.frames().release_claim(s.entry.frame);
+            uploads.iter().for_each(|upload| upload.fail(error.clone().frame(s.entry.frame)));
         }
     }
 
     /// The open log. Opening it adds frames found in it to the session's frames.
-    fn open_log<'a>(&self, log: &'a mut Option<FrameLog>) -> Result<&'a mut FrameLog, StoreError> {
+    pub(super) fn open_log<'a>(&self, log: &'a mut Option<FrameLog>) -> Result<&'a mut FrameLog, StoreError> {
         if log.is_none() {
             *log = Some(self.load_log()?);
         }

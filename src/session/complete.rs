@@ -10,7 +10,7 @@ use super::{Phase, Session};
 use crate::coding::{CodingError, Goal};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{CageFile, Completion, StoreError};
+use crate::store::{Completion, StoreError};
 use crate::telemetry::traces::TraceSpan;
 use crate::webhooks::{Event, PendingMessage, Webhooks};
 use cager_core::cage::Cage;
@@ -222,8 +222,7 @@ impl Session {
             return Ok(self.geometry()?.cage);
         }
         let file = self.store.content_cage(&self.meta.key).map_err(|error| self.storage_error(&error))?;
-        let CageFile { name, bytes } = file.ok_or_else(|| self.missing_content_error())?;
-        prepare::read_cage(&name, &bytes, &choices)
+        prepare::read_cage(&file.ok_or_else(|| self.missing_content_error())?, &choices)
     }
 }
 

@@ -1,7 +1,9 @@
 //! A session's container, written as its frames come.
 
 use super::Session;
+use super::groups::StoredGroup;
 use super::prepare::{Choices, Geometry};
+use super::solve::numbers;
 use super::solver_cache::Prepared;
 use crate::capture::{CaptureWriter, Encoding, StoredError};
 use crate::coding::Carried;
@@ -66,20 +68,17 @@ impl<W: Write> ContainerFrames<W> {
                 return Ok(false);
             };
             let stored = session.read_group(group.first)?;
-            let written =
-                self.writer.write_group(&stored.cages, stored.residual.as_deref(), &stored.errors(), stored.farthest);
+            let StoredGroup { cages, residual, errors, farthest, .. } = &stored;
+            let written = self.writer.write_group(cages, residual.as_deref(), errors, *farthest);
             self.carried = stored.carried;
             return written.map(|()| true).map_err(plain);
         }
         let entries = session.frames().run(next, READ_FRAMES.min((end - next) as usize));
         let mut bytes = Vec::new();
         session.read_cages(&entries, &mut bytes)?;
-        let mut cage = Vec::new();
         for (entry, bytes) in entries.iter().zip(bytes.chunks_exact((bytes.len() / entries.len().max(1)).max(1))) {
-            cage.clear();
-            cage.extend(bytes.as_chunks().0.iter().map(|&b| f32::from_le_bytes(b)));
             let error = StoredError { l2: entry.l2, linf: entry.linf, squared: entry.squared, spread: entry.spread };
-            self.writer.write_frame(&cage, &error).map_err(plain)?;
+            self.writer.write_frame(&numbers(bytes), &error).map_err(plain)?;
         }
         Ok(!entries.is_empty())
     }

@@ -13,7 +13,7 @@ use crate::auth::Tenant;
 use crate::idempotency::once;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{Content, ContentKey, Idempotency, Kind, SessionMeta};
+use crate::store::{Content, ContentKey, Idempotency, Kind, NamedFile, SessionMeta};
 use crate::webhooks::Event;
 use cager_proto::messages::{CacheUse, PreparationSeconds, SessionOptions};
 use http::StatusCode;
@@ -271,7 +271,7 @@ impl Service {
         session.set_deleting(true);
         let deleted = blocking({
             let store = store.clone();
-            move || store.delete_session(&removed)
+            move || store.delete(Kind::Session, &removed)
         });
         deleted
             .await?
@@ -305,8 +305,7 @@ pub(super) const OUTCOME: &str = "outcome";
 
 /// BLAKE3 digest of everything a solver depends on. It includes the tenant, so that one tenant's upload is never a cache hit for another.
 fn content_key(tenant: &str, content: &Content, options: &SessionOptions, choices: &Choices) -> ContentKey {
-    let mut hasher = blake3::Hasher::new();
-    let extension = |name: &str| name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
+    let extension = |file: &NamedFile| file.name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
     // Defaults are written out, so that an omitted option and its default give the same key; not those of `spectrum` and `handle_count`, which depend
     // on the cage.
     let solving = SessionOptions {
@@ -322,22 +321,18 @@ fn content_key(tenant: &str, content: &Content, options: &SessionOptions, choice
         ..options.clone()
     };
     let solving = serde_json::to_vec(&solving).unwrap_or_default();
-    for part in [
-        format!("cager solver {}", cager_core::SOLVER_VERSION).as_bytes(),
+    let version = format!("cager solver {}", cager_core::SOLVER_VERSION);
+    let (rest, cage) = (extension(&content.rest), extension(&content.cage));
+    let parts: [&[u8]; 7] = [
+        version.as_bytes(),
         tenant.as_bytes(),
-        extension(&content.rest_name).as_bytes(),
-        &content.rest,
-        extension(&content.cage_name).as_bytes(),
-        &content.cage,
+        rest.as_bytes(),
+        &content.rest.bytes,
+        cage.as_bytes(),
+        &content.cage.bytes,
         &solving,
-    ]
-    .into_iter()
-    .chain(content.matrix.as_ref().map(|matrix| matrix.bytes.as_slice()))
-    {
-        hasher.update(&(part.len() as u64).to_le_bytes());
-        hasher.update(part);
-    }
-    ContentKey(*hasher.finalize().as_bytes())
+    ];
+    ContentKey::of(parts.into_iter().chain(content.matrix.as_ref().map(|matrix| matrix.bytes.as_slice())))
 }
 
 fn fingerprint(key: &ContentKey, options: &SessionOptions) -> String {

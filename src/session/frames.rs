@@ -20,6 +20,13 @@ pub(crate) struct Digests {
 }
 
 impl Digests {
+    /// The entry of a frame with these digests and errors, whose place in the log is not known yet.
+    pub(super) fn entry(self, frame: u32, error: &StoredError) -> LogEntry {
+        let &StoredError { l2, linf, squared, spread } = error;
+        let (handle_digest, full_digest) = (self.handles, self.full);
+        LogEntry { frame, offset: 0, l2, linf, squared, spread, handle_digest, full_digest }
+    }
+
     fn of(entry: &LogEntry) -> Self {
         Self { handles: entry.handle_digest, full: entry.full_digest }
     }
@@ -243,16 +250,8 @@ mod tests {
     use super::*;
 
     fn entry(frame: u32) -> LogEntry {
-        LogEntry {
-            frame,
-            offset: u64::from(frame),
-            l2: 0.0,
-            linf: 0.0,
-            squared: 0.0,
-            spread: 0.0,
-            handle_digest: [1; 16],
-            full_digest: Some([2; 16]),
-        }
+        let error = StoredError { l2: 0.0, linf: 0.0, squared: 0.0, spread: 0.0 };
+        Digests { handles: [1; 16], full: Some([2; 16]) }.entry(frame, &error)
     }
 
     #[test]

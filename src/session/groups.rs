@@ -4,13 +4,14 @@ use super::container_frames::ContainerFrames;
 use super::create::blocking;
 use super::facts::Facts;
 use super::prepare::{Choices, Geometry, cannot_be_coded};
+use super::solve::numbers;
 use super::solver_cache::Prepared;
 use super::{Phase, Session};
 use crate::capture::StoredError;
 use crate::coding::{Carried, Goal, GroupCoder, GroupDecoder, group_frames};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{LogEntry, StoreError};
+use crate::store::{Kind, LogEntry, StoreError};
 use cager_proto::messages::CodedFrames;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -47,18 +48,11 @@ pub(crate) struct CodedGroup {
 pub(crate) struct StoredGroup {
     pub(crate) cages: Vec<u8>,
     pub(crate) residual: Option<Vec<u8>>,
-    /// Errors of what the frames decode to, as [`StoredError`].
-    errors: Vec<(f32, f32, f64, f64)>,
+    /// Errors of what the frames decode to.
+    pub(crate) errors: Vec<StoredError>,
     /// The frame whose cage lies farthest from the origin, and how far.
     pub(crate) farthest: (usize, f64),
     pub(crate) carried: Carried,
-}
-
-impl StoredGroup {
-    pub(crate) fn errors(&self) -> Vec<StoredError> {
-        let error = |&(l2, linf, squared, spread)| StoredError { l2, linf, squared, spread };
-        self.errors.iter().map(error).collect()
-    }
 }
 
 impl Groups {
@@ -143,7 +137,7 @@ impl Session {
             if group.errors.is_empty() {
                 return Err(StoreError::damaged(&self.store.log_path(&self.meta.id), "a group has no frames"));
             }
-            self.frames().set_errors(first, &group.errors());
+            self.frames().set_errors(first, &group.errors);
             found.add(first, &group, bytes);
             // The process may have ended before it did.
             self.remove_coded(first, found.frames())?;
@@ -226,8 +220,6 @@ impl Session {
                 }
             });
             read.map_err(|error| self.fail_if_damaged(error))?;
-            let numbers =
-                |bytes: &[u8]| -> Vec<f32> { bytes.as_chunks().0.iter().map(|&b| f32::from_le_bytes(b)).collect() };
             coder.push(numbers(&frame).into_iter().map(f64::from).collect(), numbers(cage));
         }
         let coded = coder.close().map_err(|error| {
@@ -239,18 +231,17 @@ impl Session {
             self.touch();
             error
         })?;
-        let stored = |error| StoredError::new(error, diagonal);
-        let errors: Vec<StoredError> = coded.errors.iter().map(stored).collect();
+        let errors = coded.errors.iter().map(|error| StoredError::new(error, diagonal)).collect();
         let group = StoredGroup {
             cages: coded.cages,
             residual: coded.residual,
-            errors: errors.iter().map(|e| (e.l2, e.linf, e.squared, e.spread)).collect(),
+            errors,
             farthest: coded.farthest,
             carried: coder.carried(),
         };
         let put = self.store.put_group(&self.meta.id, first, &group).map_err(|error| self.storage_error(&error))?;
         self.bytes.fetch_add(put, Relaxed);
-        self.frames().set_errors(first, &errors);
+        self.frames().set_errors(first, &group.errors);
         {
             let mut groups = super::lock(&self.groups);
             groups.failed = None;
@@ -431,7 +422,13 @@ impl Session {
         if let Err(error) = removed.and_then(|()| self.store.remove_groups_from(&self.meta.id, frames)) {
             tracing::warn!(session = %self.meta.id, %error, "frames that are not in the container still take space");
         }
-        self.bytes.store(self.store.session_bytes(&self.meta.id) + self.store.content_bytes(&self.meta.key), Relaxed);
+        self.count_bytes();
+    }
+
+    /// Counts the bytes of its files and content on disk anew. Blocks.
+    pub(super) fn count_bytes(&self) {
+        let own = self.store.bytes(Kind::Session, &self.meta.id);
+        self.bytes.store(own + self.store.content_bytes(&self.meta.key), Relaxed);
     }
 
     /// Forgets what coding keeps in memory.

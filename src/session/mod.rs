@@ -22,7 +22,7 @@ use crate::coding::{Goal, GroupCoder, GroupDecoder};
 use crate::engine::Lane;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{Completion, FrameLog, LogEntry, LogReader, SessionMeta, Store, StoreError};
+use crate::store::{Completion, FrameLog, Kind, LogEntry, LogReader, SessionMeta, Store, StoreError};
 use crate::webhooks::Webhooks;
 use cager_core::regularize::Regularizer;
 use cager_proto::messages::Problem;
@@ -226,9 +226,9 @@ impl Session {
             _ => {}
         }
         let mut log = lock(&self.log);
-        let opened = match log.is_none() && !self.loaded.load(Ordering::Acquire) {
-            true => self.load_log().map(|opened| *log = Some(opened)),
-            false => Ok(()),
+        let opened = match self.loaded.load(Ordering::Acquire) {
+            true => Ok(()),
+            false => self.open_log(&mut log).map(|_| ()),
         };
         drop(log);
         opened.map_err(|error| self.fail_if_damaged(error))
@@ -240,10 +240,7 @@ impl Session {
     /// Storage errors.
     pub(crate) fn make_log(&self) -> Result<(), StoreError> {
         let mut log = lock(&self.log);
-        if log.is_none() && !self.is_deleted() {
-            *log = Some(self.load_log()?);
-        }
-        Ok(())
+        if self.is_deleted() { Ok(()) } else { self.open_log(&mut log).map(|_| ()) }
     }
 
     /// As [`Self::load`], on the blocking pool.
@@ -312,7 +309,7 @@ impl Session {
         *lock(&self.reader) = None;
         tracing::error!(session = %self.meta.id, path = %path.display(), what, "the frame log is damaged; the session is moved to quarantine");
         metrics::counter!("cager_quarantined_total").increment(1);
-        if let Err(error) = self.store.quarantine_session(&self.meta.id, what) {
+        if let Err(error) = self.store.quarantine(Kind::Session, &self.meta.id, what) {
             tracing::error!(session = %self.meta.id, %error, "it could not be moved");
         }
         self.webhooks.send_unrecorded(self);
@@ -374,12 +371,8 @@ impl Session {
         if self.has_failed() || !self.store.log_needs_rewrite(&self.meta.id) {
             return;
         }
-        let mut log = lock(&self.log);
-        if log.is_none() {
-            match self.load_log() {
-                Ok(opened) => *log = Some(opened),
-                Err(error) => tracing::warn!(session = %self.meta.id, %error, "the frame log cannot be made safe yet"),
-            }
+        if let Err(error) = self.open_log(&mut lock(&self.log)) {
+            tracing::warn!(session = %self.meta.id, %error, "the frame log cannot be made safe yet");
         }
     }
 

@@ -4,7 +4,7 @@ use super::solver_cache::Prepared;
 use crate::coding::{CodingError, Goal, RestMeshes, slack};
 use crate::preparation_warnings::preparation_warnings;
 use crate::problem::{self, ApiError};
-use crate::store::Content;
+use crate::store::{Content, NamedFile};
 use cager_cages::diagnosis::weld;
 use cager_codec::{CodedMesh, MOST_ROWS};
 use cager_core::cage::Cage;
@@ -156,8 +156,8 @@ fn read_matrix(content: &Content, choices: &Choices) -> Result<Option<SparseMatr
 /// # Errors
 /// Bytes that cannot be read; a cage that cannot be used.
 pub(crate) fn read(content: &Content, choices: &Choices) -> Result<Geometry, ApiError> {
-    let rest = read_part("rest", &content.rest_name, &content.rest)?;
-    let cage = read_cage(&content.cage_name, &content.cage, choices)?;
+    let rest = read_part("rest", &content.rest.name, &content.rest.bytes)?;
+    let cage = read_cage(&content.cage, choices)?;
     let matrix = read_matrix(content, choices)?;
     let given = diagonal(&rest.points);
     let goal = choices.goal.filter(|_| !choices.exact_rest);
@@ -177,7 +177,8 @@ pub(crate) fn read(content: &Content, choices: &Choices) -> Result<Geometry, Api
 ///
 /// # Errors
 /// As [`read`].
-pub(crate) fn read_cage(name: &str, bytes: &[u8], choices: &Choices) -> Result<Cage, ApiError> {
+pub(crate) fn read_cage(file: &NamedFile, choices: &Choices) -> Result<Cage, ApiError> {
+    let NamedFile { name, bytes } = file;
     let model = read_part("cage", name, bytes)?;
     if model.faces.is_empty() {
         return Err(geometry(format!(

@@ -74,9 +74,7 @@ impl Session {
             Err(error) => tracing::warn!(session = %self.meta.id, %error, "the container could not be checked"),
         }
     }
-}
 
-impl Session {
     /// Refuses a solver whose handles differ from those that the session started with, since clients may have sent rows of the old ones;
     /// another version of the program may choose other handles when it prepares again. Acknowledged frames stay.
     ///
@@ -154,8 +152,7 @@ impl Service {
 
     fn found(&self, meta: SessionMeta, status: Status) -> Arc<Session> {
         let session = Session::new(meta, self, status, false);
-        let bytes = self.store.session_bytes(&session.meta.id) + self.store.content_bytes(&session.meta.key);
-        session.bytes.store(bytes, Relaxed);
+        session.count_bytes();
         Arc::new(session)
     }
 }

@@ -33,18 +33,15 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
             continue;
         }
         if job.rows == Rows::Handles && session.goal().is_some() {
-            let frame = job.frame;
-            let detail = format!(
-                "frame {frame}: has handle rows only, and an error, a size or a quality was asked for; post it whole"
-            );
-            job.fail(ApiError::new(problem::INVALID_FRAME, detail).frame(frame));
+            let detail = "has handle rows only, and an error, a size or a quality was asked for; post it whole";
+            let detail = format!("frame {}: {detail}", job.frame);
+            job.refuse(problem::INVALID_FRAME, detail);
             continue;
         }
         if let Some(row) = first_not_finite(&job.bytes) {
             let what = if job.rows == Rows::All { "point" } else { "handle" };
-            let (frame, detail) =
-                (job.frame, format!("frame {}: {what} {row} is not finite; export this frame again", job.frame));
-            job.fail(ApiError::new(problem::INVALID_FRAME, detail).frame(frame));
+            let detail = format!("frame {}: {what} {row} is not finite; export this frame again", job.frame);
+            job.refuse(problem::INVALID_FRAME, detail);
             continue;
         }
         let digests = digests(prepared, &job);
@@ -65,10 +62,9 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
                 upload.answer(frame);
             }
             Claim::Sealed => {
-                let frame = job.frame;
                 let detail =
-                    format!("frame {frame} comes after the session was completed; make a new session for more");
-                job.fail(ApiError::new(problem::SESSION_COMPLETED, detail).frame(frame));
+                    format!("frame {} comes after the session was completed; make a new session for more", job.frame);
+                job.refuse(problem::SESSION_COMPLETED, detail);
             }
             Claim::Conflict => {
                 let error = conflict(job.frame);
@@ -136,8 +132,6 @@ fn measure(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<(FrameJob, Dig
             fail_all(session, vec![(job, digests)], guard, &error);
             continue;
         }
-        let numbers =
-            |bytes: &[u8]| -> Vec<f32> { bytes.as_chunks().0.iter().map(|&b| f32::from_le_bytes(b)).collect() };
         let (cage, points) = (numbers(&bytes), numbers(&job.bytes));
         let errors = prepared.solver.decoder().measure(&[&cage], &[&points]);
         let error = StoredError::new(&errors[0], prepared.solver.diagonal());
@@ -166,7 +160,7 @@ fn predecessor(session: &Session, frame: u32) -> Result<Option<Vec<f32>>, ApiErr
     let Some(entry) = session.frames().entry(before).copied() else { return Err(predecessor_missing(frame)) };
     let mut bytes = Vec::new();
     session.read_cages(&[entry], &mut bytes)?;
-    Ok(Some(bytes.as_chunks().0.iter().map(|&b| f32::from_le_bytes(b)).collect()))
+    Ok(Some(numbers(&bytes)))
 }
 
 /// The error for a frame whose predecessor is not solved.
@@ -194,13 +188,13 @@ fn solve_batch(
     previous: Option<&[f32]>,
     guard: ClaimGuard<'_>,
 ) {
-    let mut numbers = FRAME_BUFFERS.take();
-    numbers.resize_with(numbers.len().max(jobs.len()), Vec::new);
-    for ((job, _), numbers) in jobs.iter().zip(&mut numbers) {
-        numbers.clear();
-        numbers.extend(job.bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])));
+    let mut buffers = FRAME_BUFFERS.take();
+    buffers.resize_with(buffers.len().max(jobs.len()), Vec::new);
+    for ((job, _), buffer) in jobs.iter().zip(&mut buffers) {
+        buffer.clear();
+        buffer.extend(job.bytes.as_chunks().0.iter().map(|&b| f32::from_le_bytes(b)));
     }
-    let views: Vec<&[f32]> = numbers[..jobs.len()].iter().map(Vec::as_slice).collect();
+    let views: Vec<&[f32]> = buffers[..jobs.len()].iter().map(Vec::as_slice).collect();
     let solver = &prepared.solver;
     let (cages, errors) = match rows {
         Rows::All => {
@@ -211,8 +205,8 @@ fn solve_batch(
         }
         Rows::Handles => (solver.invert_handles_after(previous, &views), vec![StoredError::NOT_MEASURED; jobs.len()]),
     };
-    if numbers.iter().map(Vec::capacity).sum::<usize>() <= MAX_RETAINED_VALUES {
-        FRAME_BUFFERS.set(numbers);
+    if buffers.iter().map(Vec::capacity).sum::<usize>() <= MAX_RETAINED_VALUES {
+        FRAME_BUFFERS.set(buffers);
     }
     if solver.follows_previous() {
         let last = jobs.last().zip(cages.last()).map(|((job, _), cage)| (job.frame, cage.clone()));
@@ -246,7 +240,7 @@ fn finish(
             if let (None, Some(permits)) = (&posted, &mut permits) {
                 permits.solving = None;
             }
-            solved.push(SolvedFrame { frame, digests, error, cage, posted, _permits: permits });
+            solved.push(SolvedFrame { entry: digests.entry(frame, &error), cage, posted, _permits: permits });
         }
         job.disarm();
     }
@@ -268,6 +262,11 @@ impl Drop for ClaimGuard<'_> {
             }
         }
     }
+}
+
+/// Little-endian numbers.
+pub(super) fn numbers(bytes: &[u8]) -> Vec<f32> {
+    bytes.as_chunks().0.iter().map(|&b| f32::from_le_bytes(b)).collect()
 }
 
 fn first_not_finite(bytes: &[u8]) -> Option<usize> {

@@ -6,7 +6,7 @@ use crate::admission::{Budget, Held};
 use crate::config::ServeConfig;
 use crate::engine::threads;
 use crate::problem::{self, ApiError};
-use crate::store::{CageFile, Content, ContentKey, Store};
+use crate::store::{Content, ContentKey, Store};
 use crate::telemetry::traces::TraceSpan;
 use cager_core::inversion::{Solver, SolverOptions};
 use cager_proto::messages::{CacheUse, PreparationSeconds};
@@ -155,15 +155,10 @@ impl Solvers {
             return Ok(SolverResponse { prepared, cache: CacheUse::Hit, seconds: PreparationSeconds::default() });
         }
         let (mut flight, mine) = self.join_or_start(wanted);
-        loop {
-            if let Some(result) = flight.borrow_and_update().clone() {
-                // For callers that joined a running preparation it counts as a cache hit.
-                return result.map(|got| if mine { got } else { SolverResponse { cache: CacheUse::Hit, ..got } });
-            }
-            if flight.changed().await.is_err() {
-                return Err(ApiError::internal(&"a preparation ended without a result"));
-            }
-        }
+        let result = flight.wait_for(Option::is_some).await.ok().and_then(|result| result.clone());
+        let got = result.unwrap_or_else(|| Err(ApiError::internal(&"a preparation ended without a result")))?;
+        // For callers that joined a running preparation it counts as a cache hit.
+        Ok(if mine { got } else { SolverResponse { cache: CacheUse::Hit, ..got } })
     }
 
     /// Joins the running preparation of the content or starts one; and whether it was started here.
@@ -257,8 +252,7 @@ impl Solvers {
             }
         };
         let file = self.store.content_cage(key).map_err(|error| super::commit::storage_error(&error))?;
-        let CageFile { name, bytes } = file.ok_or_else(deleted)?;
-        let cage = prepare::read_cage(&name, &bytes, choices)?;
+        let cage = prepare::read_cage(&file.ok_or_else(deleted)?, choices)?;
         let options = choices.solver_options(choices.system.unknowns(&cage));
         metrics::counter!("cager_cache_total", "result" => "disk").increment(1);
         let total = clock.elapsed().as_secs_f64();

@@ -179,14 +179,17 @@ impl FrameJob {
         self.disarmed = true;
     }
 
+    pub(super) fn refuse(self, kind: problem::Kind, detail: String) {
+        let error = ApiError::new(kind, detail).frame(self.frame);
+        self.fail(error);
+    }
+
     pub(super) fn fail(self, error: ApiError) {
         let upload = Arc::clone(&self.upload);
         self.disarm();
         upload.fail(error);
     }
-}
 
-impl FrameJob {
     pub(super) fn leave_queue(&mut self) {
         if let Some(queued) = self.queued.take() {
             queued.fetch_sub(1, Ordering::Relaxed);

@@ -2,7 +2,7 @@
 
 use super::disk::{Disk, DiskFile};
 use super::{Quarantined, StoreError};
-use std::ffi::OsString;
+use std::borrow::Cow;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -14,6 +14,13 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 pub(crate) struct Files {
     pub(crate) disk: Arc<dyn Disk>,
     pub(crate) root: PathBuf,
+    pub(crate) sessions: PathBuf,
+    pub(crate) cages: PathBuf,
+    pub(crate) contents: PathBuf,
+    pub(crate) prepared: PathBuf,
+    pub(crate) trash: PathBuf,
+    pub(crate) quarantine: PathBuf,
+    pub(crate) tmp: PathBuf,
     /// Unique per process, so that names never collide with those of an earlier run.
     run: u128,
     next: AtomicU64,
@@ -22,43 +29,10 @@ pub(crate) struct Files {
 impl Files {
     pub(crate) fn new(root: &Path, disk: Arc<dyn Disk>) -> Self {
         let run = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos());
-        Self { disk, root: root.to_owned(), run, next: AtomicU64::new(0) }
-    }
-
-    pub(crate) fn sessions(&self) -> PathBuf {
-        self.root.join("sessions")
-    }
-
-    pub(crate) fn session(&self, id: &str) -> PathBuf {
-        self.sessions().join(id)
-    }
-
-    pub(crate) fn cages(&self) -> PathBuf {
-        self.root.join("cages")
-    }
-
-    pub(crate) fn cage_job(&self, id: &str) -> PathBuf {
-        self.cages().join(id)
-    }
-
-    pub(crate) fn contents(&self) -> PathBuf {
-        self.root.join("contents")
-    }
-
-    pub(crate) fn prepared(&self) -> PathBuf {
-        self.root.join("prepared")
-    }
-
-    pub(crate) fn trash(&self) -> PathBuf {
-        self.root.join("trash")
-    }
-
-    pub(crate) fn quarantine(&self) -> PathBuf {
-        self.root.join("quarantine")
-    }
-
-    pub(crate) fn tmp(&self) -> PathBuf {
-        self.root.join("tmp")
+        let [sessions, cages, contents, prepared, trash, quarantine, tmp] =
+            ["sessions", "cages", "contents", "prepared", "trash", "quarantine", "tmp"].map(|name| root.join(name));
+        let (root, next) = (root.to_owned(), AtomicU64::new(0));
+        Self { disk, root, sessions, cages, contents, prepared, trash, quarantine, tmp, run, next }
     }
 
     fn unique(&self, name: &str) -> String {
@@ -67,7 +41,7 @@ impl Files {
 
     /// A path in `tmp/` that nothing else has.
     pub(crate) fn temporary(&self, name: &str) -> PathBuf {
-        self.tmp().join(self.unique(name))
+        self.tmp.join(self.unique(name))
     }
 
     /// Creates `path` with `bytes` and syncs the file, but not its folder.
@@ -109,8 +83,7 @@ impl Files {
         place: &Path,
         fill: impl FnOnce(&Path) -> Result<(), StoreError>,
     ) -> Result<(), StoreError> {
-        let name = place.file_name().map_or_else(|| "unnamed".into(), |name| name.to_string_lossy());
-        let staging = self.temporary(&name);
+        let staging = self.temporary(&name_of(place));
         let prepare = || {
             self.disk.create_dir(&staging).map_err(|e| StoreError::of(&staging, "create", e))?;
             fill(&staging)?;
@@ -141,28 +114,36 @@ impl Files {
 
     /// Whether a file or folder exists at `path`.
     pub(crate) fn exists(&self, path: &Path) -> Result<bool, StoreError> {
-        match self.disk.open(path) {
-            Ok(_) => Ok(true),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
-            Err(error) => Err(StoreError::of(path, "open", error)),
-        }
+        self.open(path).map(|file| file.is_some())
+    }
+
+    /// Opens a file for reading; `None` if it does not exist.
+    pub(crate) fn open(&self, path: &Path) -> Result<Option<Arc<dyn DiskFile>>, StoreError> {
+        unless_missing(self.disk.open(path)).map_err(|e| StoreError::of(path, "open", e))
+    }
+
+    /// As [`Self::open`], where a missing file is damage.
+    pub(crate) fn open_expected(&self, path: &Path) -> Result<Arc<dyn DiskFile>, StoreError> {
+        self.open(path)?.ok_or_else(|| StoreError::damaged(path, "it is missing"))
+    }
+
+    /// Removes a file, unless it does not exist.
+    pub(crate) fn remove_file(&self, path: &Path) -> Result<(), StoreError> {
+        let removed = unless_missing(self.disk.remove_file(path));
+        removed.map(|_| ()).map_err(|e| StoreError::of(path, "remove", e))
     }
 
     /// Moves a file or folder to `trash/`, durably, then removes it. On `Ok` it does not come back, even if removing it has to be finished
     /// at the next start. A missing path is no error.
     pub(crate) fn delete_durably(&self, path: &Path) -> Result<(), StoreError> {
-        let trash = self.trash();
-        let name = path.file_name().map_or_else(|| "unnamed".into(), |name| name.to_string_lossy());
-        let away = trash.join(self.unique(&name));
-        let moved = match self.disk.rename(path, &away) {
-            Ok(()) => true,
-            // An earlier call may have moved it without syncing; the syncs below make up for that.
-            Err(error) if error.kind() == io::ErrorKind::NotFound => false,
-            Err(error) => return Err(StoreError::of(path, "delete", error)),
-        };
-        self.sync_dir(&trash)?;
+        let away = self.trash.join(self.unique(&name_of(path)));
+        // Where it is missing, an earlier call may have moved it without syncing; the syncs below make up for that.
+        let moved = unless_missing(self.disk.rename(path, &away)).map_err(|e| StoreError::of(path, "delete", e))?;
+        self.sync_dir(&self.trash)?;
         self.sync_dir(parent(path))?;
-        if moved && let Err(error) = self.remove_tree(&away) {
+        if moved.is_some()
+            && let Err(error) = self.remove_tree(&away)
+        {
             tracing::warn!(%error, "the space of something deleted is freed at the next start only");
         }
         Ok(())
@@ -170,30 +151,26 @@ impl Files {
 
     /// Moves a damaged file or folder to `quarantine/` and writes a note about the damage beside it.
     pub(crate) fn move_to_quarantine(&self, path: &Path, why: &str) -> Result<Quarantined, StoreError> {
-        let folder = self.quarantine();
-        let name: OsString = path.file_name().map_or_else(|| "unnamed".into(), OsString::from);
-        let mut target = folder.join(&name);
+        let mut target = self.quarantine.join(path.file_name().unwrap_or_default());
         if self.exists(&target)? {
-            target = folder.join(self.unique(&name.to_string_lossy()));
+            target = self.quarantine.join(self.unique(&name_of(path)));
         }
         self.disk.rename(path, &target).map_err(|e| StoreError::of(path, "quarantine", e))?;
-        self.sync_dir(&folder)?;
+        self.sync_dir(&self.quarantine)?;
         self.sync_dir(parent(path))?;
         let mut note = target.clone().into_os_string();
         note.push(".why.txt");
         if let Err(error) = self.write_new(Path::new(&note), format!("{why}\n").as_bytes()) {
             tracing::debug!(%error, "no note beside something quarantined");
         }
-        Ok(Quarantined { name: name.to_string_lossy().into_owned(), path: target, why: why.to_owned() })
+        Ok(Quarantined { name: name_of(path).into_owned(), path: target, why: why.to_owned() })
     }
 
     /// Removes a file or a folder recursively.
     pub(crate) fn remove_tree(&self, path: &Path) -> Result<(), StoreError> {
-        match self.disk.remove_file(path) {
-            Ok(()) => return Ok(()),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-            // EISDIR, or EPERM under POSIX; the calls below report the error unless it is a folder.
-            Err(_) => {}
+        // EISDIR, or EPERM under POSIX, for a folder; the calls below report any other error.
+        if unless_missing(self.disk.remove_file(path)).is_ok() {
+            return Ok(());
         }
         self.clear(path)?;
         self.disk.remove_dir(path).map_err(|e| StoreError::of(path, "remove", e))
@@ -213,11 +190,7 @@ impl Files {
 
     /// Reads a whole file; `None` if it does not exist. A length above `limit` is reported as damage before memory is allocated.
     pub(crate) fn read(&self, path: &Path, limit: u64) -> Result<Option<Vec<u8>>, StoreError> {
-        let file = match self.disk.open(path) {
-            Ok(file) => file,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(StoreError::of(path, "open", error)),
-        };
+        let Some(file) = self.open(path)? else { return Ok(None) };
         let bytes = file.length().map_err(|e| StoreError::of(path, "read", e))?;
         if bytes > limit {
             return Err(StoreError::damaged(path, format!("it has {bytes} bytes where {limit} are the most")));
@@ -226,6 +199,33 @@ impl Files {
         file.read_exact_at(&mut content, 0).map_err(|e| StoreError::of(path, "read", e))?;
         Ok(Some(content))
     }
+
+    /// Reads a file of this length and this digest, BLAKE3, hexadecimal; anything else is damage.
+    pub(crate) fn read_verified(&self, path: &Path, bytes: u64, digest: &str) -> Result<Vec<u8>, StoreError> {
+        let found = self.read(path, bytes)?.ok_or_else(|| StoreError::damaged(path, "it is missing"))?;
+        if found.len() as u64 != bytes || blake3::hash(&found).to_hex().as_str() != digest {
+            return Err(StoreError::damaged(path, "its content does not match its checksum"));
+        }
+        Ok(found)
+    }
+
+    /// Bytes of the files in a folder; 0 where there is none.
+    pub(crate) fn folder_bytes(&self, folder: &Path) -> u64 {
+        self.disk.list(folder).map_or(0, |all| all.iter().map(|entry| entry.bytes).sum())
+    }
+}
+
+/// `None` where there is no such file.
+fn unless_missing<T>(outcome: io::Result<T>) -> io::Result<Option<T>> {
+    match outcome {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        other => other.map(Some),
+    }
+}
+
+/// Name of a file or folder.
+fn name_of(path: &Path) -> Cow<'_, str> {
+    path.file_name().map_or_else(|| "unnamed".into(), |name| name.to_string_lossy())
 }
 
 /// The parent folder; `.` for a bare name.

@@ -1,13 +1,11 @@
 //! Sessions whose frames are coded in groups: frames as they came, until their group is coded, and coded groups.
 
-use super::files::Files;
-use super::names::check_id;
-use super::{Store, StoreError};
+use super::{Kind, Store, StoreError};
 use cager_proto::wire;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Most bytes of a group's file.
 const MOST_GROUP_BYTES: usize = 1 << 30;
@@ -18,8 +16,8 @@ const FRAMES: &str = "frames-";
 const GROUP: &str = "group-";
 
 impl Store {
-    fn part(&self, id: &str, kind: &str, first: u32) -> PathBuf {
-        self.log_path(id).with_file_name(format!("{kind}{first:010}"))
+    fn part(&self, id: &str, kind: &str, first: u32) -> Result<PathBuf, StoreError> {
+        Ok(self.folder(Kind::Session, id)?.join(format!("{kind}{first:010}")))
     }
 
     /// Writes frames, `stride` bytes each, into the file that begins with frame `first`; durable on `Ok`, with `is_known` where the file's name
@@ -35,8 +33,7 @@ impl Store {
         stride: usize,
         frames: &[(u32, &[u8])],
     ) -> Result<(), StoreError> {
-        check_id(id)?;
-        let (files, path) = (self.files(), self.part(id, FRAMES, first));
+        let (files, path) = (self.files(), self.part(id, FRAMES, first)?);
         let file = match files.disk.open_for_writing(&path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound && !is_known => files.create(&path)?,
             opened => opened.map_err(|e| StoreError::of(&path, "open", e))?,
@@ -54,8 +51,7 @@ impl Store {
     /// # Errors
     /// [`StoreError::Damaged`] where it is gone.
     pub fn read_frame(&self, id: &str, first: u32, frame: u32, bytes: &mut [u8]) -> Result<(), StoreError> {
-        check_id(id)?;
-        let path = self.part(id, FRAMES, first);
+        let path = self.part(id, FRAMES, first)?;
         let offset = u64::from(frame - first) * bytes.len() as u64;
         let read = self.files().disk.open(&path).and_then(|file| file.read_exact_at(bytes, offset));
         read.map_err(|error| match error.kind() {
@@ -71,9 +67,8 @@ impl Store {
     /// # Errors
     /// [`StoreError::BadId`], or another I/O error.
     pub fn remove_frames(&self, id: &str, first: Option<u32>) -> Result<(), StoreError> {
-        check_id(id)?;
         match first {
-            Some(first) => self.files().remove_tree(&self.part(id, FRAMES, first)),
+            Some(first) => self.files().remove_tree(&self.part(id, FRAMES, first)?),
             None => self.remove_parts(id, |name| name.starts_with(FRAMES)),
         }
     }
@@ -83,8 +78,7 @@ impl Store {
     /// # Errors
     /// [`StoreError::BadId`], [`StoreError::Full`].
     pub fn put_group<T: Serialize>(&self, id: &str, first: u32, group: &T) -> Result<u64, StoreError> {
-        check_id(id)?;
-        let path = self.part(id, GROUP, first);
+        let path = self.part(id, GROUP, first)?;
         let encoded = wire::encode::<_, MOST_GROUP_BYTES>(group);
         let mut bytes = encoded.map_err(|e| StoreError::of(&path, "write", io::Error::other(e)))?;
         let digest = blake3::hash(&bytes);
@@ -98,15 +92,13 @@ impl Store {
     /// # Errors
     /// [`StoreError::Damaged`], [`StoreError::BadId`].
     pub fn group<T: DeserializeOwned>(&self, id: &str, first: u32) -> Result<Option<(T, u64)>, StoreError> {
-        check_id(id)?;
-        let path = self.part(id, GROUP, first);
+        let path = self.part(id, GROUP, first)?;
         let Some(file) = self.files().read(&path, (MOST_GROUP_BYTES + DIGEST) as u64)? else { return Ok(None) };
         let damaged = |what: String| StoreError::damaged(&path, what);
-        let (bytes, digest) = file
-            .split_at_checked(file.len().saturating_sub(DIGEST))
-            .filter(|(bytes, digest)| blake3::hash(bytes).as_bytes() == digest)
+        let (bytes, _) = file
+            .split_last_chunk::<DIGEST>()
+            .filter(|(bytes, digest)| blake3::hash(bytes) == **digest)
             .ok_or_else(|| damaged("its content does not match its checksum".to_owned()))?;
-        debug_assert_eq!(digest.len(), DIGEST);
         let group = wire::decode::<_, MOST_GROUP_BYTES>(bytes).map_err(|error| damaged(error.to_string()))?;
         Ok(Some((group, file.len() as u64)))
     }
@@ -116,15 +108,13 @@ impl Store {
     /// # Errors
     /// [`StoreError::BadId`], or another I/O error.
     pub fn remove_groups_from(&self, id: &str, from: u32) -> Result<(), StoreError> {
-        check_id(id)?;
         let later = |name: &str| name.strip_prefix(GROUP).and_then(|n| n.parse().ok()).is_some_and(|n: u32| n >= from);
         self.remove_parts(id, later)
     }
 
     fn remove_parts(&self, id: &str, is_one: impl Fn(&str) -> bool) -> Result<(), StoreError> {
-        let files: &Files = self.files();
-        let folder: &Path = &files.session(id);
-        for entry in files.list(folder)? {
+        let (files, folder) = (self.files(), self.folder(Kind::Session, id)?);
+        for entry in files.list(&folder)? {
             if entry.name.to_str().is_some_and(&is_one) {
                 files.remove_tree(&folder.join(&entry.name))?;
             }

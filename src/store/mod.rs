@@ -43,8 +43,8 @@ mod spool;
 #[cfg(test)]
 mod tests;
 
-pub use cage_jobs::{CageJobMeta, StoredPart};
-pub use content::{CageFile, Content, MatrixFile};
+pub use cage_jobs::CageJobMeta;
+pub use content::{Content, NamedFile, StoredPart};
 pub use disk::{Disk, LocalDisk};
 pub use error::StoreError;
 pub use log::{FrameLog, LogEntry, LogReader, LogRecord};
@@ -116,24 +116,17 @@ impl Store {
         let lock = disk.lock(&lock_path).map_err(|e| StoreError::of(&lock_path, "lock", e))?;
         let lock = lock.ok_or_else(|| StoreError::Locked { path: root.to_owned() })?;
         let files = Files::new(root, disk);
-        for folder in [
-            files.sessions(),
-            files.cages(),
-            files.contents(),
-            files.prepared(),
-            files.quarantine(),
-            files.trash(),
-            files.tmp(),
-        ] {
-            make_folder(&*files.disk, &folder)?;
+        let kept = [&files.trash, &files.sessions, &files.cages, &files.contents, &files.prepared];
+        for folder in kept.into_iter().chain([&files.quarantine, &files.tmp]) {
+            make_folder(&*files.disk, folder)?;
         }
         // Renames that an earlier process did not live to sync are made durable before they are relied on.
-        for folder in [files.trash(), files.sessions(), files.cages(), files.contents(), files.prepared()] {
-            files.sync_dir(&folder)?;
+        for folder in kept {
+            files.sync_dir(folder)?;
         }
-        for folder in [files.trash(), files.tmp()] {
+        for folder in [&files.trash, &files.tmp] {
             // Leftovers do no harm.
-            if let Err(error) = files.clear(&folder) {
+            if let Err(error) = files.clear(folder) {
                 tracing::warn!(%error, "something deleted still takes space");
             }
         }

@@ -9,7 +9,7 @@ use std::sync::{MutexGuard, PoisonError};
 
 impl Store {
     fn prepared_path(&self, key: &ContentKey) -> PathBuf {
-        self.files().prepared().join(format!("{key}.solver"))
+        self.files().prepared.join(format!("{key}.solver"))
     }
 
     /// Stores a prepared solver; durable on `Ok`. An existing file is kept.
@@ -20,20 +20,16 @@ impl Store {
         let files = self.files();
         let place = self.prepared_path(key);
         if files.exists(&place)? {
-            return files.sync_dir(&files.prepared());
+            return files.sync_dir(&files.prepared);
         }
         let staging = files.temporary("solver");
         let make = || {
             let file = files.create(&staging)?;
             solver_file::write(&*file, key, solver).map_err(|e| StoreError::of(&place, "write", e))?;
             files.sync_file(&*file, &place)?;
-            let _one_at_a_time = self.publishing();
-            if files.exists(&place)? {
-                files.discard(&staging);
-                return Ok(());
+            if self.publish_unless_there(&staging, &place)? {
+                self.used(&place);
             }
-            files.publish(&staging, &place)?;
-            self.used(&place);
             Ok(())
         };
         make().inspect_err(|_| files.discard(&staging))
@@ -51,17 +47,13 @@ impl Store {
     /// I/O errors.
     pub fn prepared(&self, key: &ContentKey) -> Result<Option<Solver>, StoreError> {
         let place = self.prepared_path(key);
-        let file = match self.files().disk.open(&place) {
-            Ok(file) => file,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(StoreError::of(&place, "open", error)),
-        };
+        let Some(file) = self.files().open(&place)? else { return Ok(None) };
         let found = match solver_file::read(&*file, key) {
             Ok(Some(solver)) => Ok(solver),
             Ok(None) => {
                 tracing::debug!(%key, "a solver file has another format version; the solver is prepared again");
-                self.forget_prepared(&place)?;
-                return Ok(None);
+                let _one_at_a_time = self.publishing();
+                return self.files().remove_file(&place).map(|()| None);
             }
             Err(error) if error.kind() == io::ErrorKind::InvalidData => {
                 Err(StoreError::damaged(&place, error.to_string()))
@@ -81,22 +73,13 @@ impl Store {
         }
     }
 
-    fn forget_prepared(&self, place: &Path) -> Result<(), StoreError> {
-        let _one_at_a_time = self.publishing();
-        match self.files().disk.remove_file(place) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(StoreError::of(place, "remove", error)),
-            _ => Ok(()),
-        }
-    }
-
     /// Removes prepared solvers, least recently used first, until they take at most `budget_bytes`; returns the number of bytes freed.
     ///
     /// # Errors
     /// I/O errors.
     pub fn trim_prepared(&self, budget_bytes: u64) -> Result<u64, StoreError> {
         let files = self.files();
-        let folder = files.prepared();
-        let mut entries = files.list(&folder)?;
+        let mut entries = files.list(&files.prepared)?;
         entries.sort_by(|a, b| (a.modified, &a.name).cmp(&(b.modified, &b.name)));
         let total: u64 = entries.iter().map(|entry| entry.bytes).sum();
         let mut freed = 0;
@@ -104,12 +87,8 @@ impl Store {
             if total - freed <= budget_bytes {
                 break;
             }
-            let path = folder.join(&entry.name);
-            match files.disk.remove_file(&path) {
-                Ok(()) => freed += entry.bytes,
-                Err(error) if error.kind() == io::ErrorKind::NotFound => freed += entry.bytes,
-                Err(error) => return Err(StoreError::of(&path, "remove", error)),
-            }
+            files.remove_file(&files.prepared.join(&entry.name))?;
+            freed += entry.bytes;
         }
         // Not synced: a file that reappears after a power cut is removed by the next trim.
         Ok(freed)
@@ -120,6 +99,16 @@ impl Store {
         if let Err(error) = self.files().disk.touch(place) {
             tracing::debug!(%error, path = %place.display(), "the last use was not noted");
         }
+    }
+
+    /// Moves a synced file or folder to its place, durably, unless something is there; and whether it did.
+    pub(super) fn publish_unless_there(&self, staging: &Path, place: &Path) -> Result<bool, StoreError> {
+        let _one_at_a_time = self.publishing();
+        if self.files().exists(place)? {
+            self.files().discard(staging);
+            return Ok(false);
+        }
+        self.files().publish(staging, place).map(|()| true)
     }
 
     pub(super) fn publishing(&self) -> MutexGuard<'_, ()> {

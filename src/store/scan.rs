@@ -4,7 +4,7 @@ use super::files::Files;
 use super::names::check_id;
 use super::{Quarantined, Store, StoreError, is_session_id, meta};
 use serde::de::DeserializeOwned;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Kinds of objects that have a folder of their own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -21,6 +21,14 @@ impl Kind {
         match self {
             Self::Session => "session",
             Self::CageJob => "cage job",
+        }
+    }
+
+    /// The folder that contains all objects of the kind.
+    fn all(self, files: &Files) -> &Path {
+        match self {
+            Self::Session => &files.sessions,
+            Self::CageJob => &files.cages,
         }
     }
 }
@@ -46,9 +54,6 @@ pub(crate) trait FolderMeta: DeserializeOwned {
 
     /// Id; also the name of its folder.
     fn id(&self) -> &str;
-
-    /// The folder that contains all objects of the kind.
-    fn all(files: &Files) -> PathBuf;
 }
 
 /// Result of scanning the folders of one kind.
@@ -60,9 +65,9 @@ pub(super) struct FolderScan<M> {
 
 /// Reads the metadata of all objects of a kind. Damaged ones are moved to quarantine; unreadable ones stay in place.
 pub(super) fn find<M: FolderMeta>(files: &Files) -> Result<FolderScan<M>, StoreError> {
-    let all = M::all(files);
+    let all = M::KIND.all(files);
     let mut found = FolderScan { metas: Vec::new(), quarantined: Vec::new(), unread: Vec::new() };
-    for entry in files.list(&all)? {
+    for entry in files.list(all)? {
         let name = entry.name.to_string_lossy().into_owned();
         let path = all.join(&entry.name);
         let read = if entry.is_dir && is_session_id(&name) {
@@ -88,7 +93,7 @@ pub(super) fn find<M: FolderMeta>(files: &Files) -> Result<FolderScan<M>, StoreE
 }
 
 fn read<M: FolderMeta>(files: &Files, id: &str) -> Result<M, StoreError> {
-    let (folder, kind) = (M::all(files).join(id), M::KIND.name());
+    let (folder, kind) = (M::KIND.all(files).join(id), M::KIND.name());
     match meta::read::<M>(files, &folder.join(M::FILE), kind)? {
         Some(meta) if meta.id() == id => Ok(meta),
         Some(meta) => Err(StoreError::damaged(&folder, format!("its metadata belongs to the {kind} {}", meta.id()))),
@@ -97,15 +102,43 @@ fn read<M: FolderMeta>(files: &Files, id: &str) -> Result<M, StoreError> {
 }
 
 impl Store {
+    /// The folder of an object, whether or not it exists.
+    ///
+    /// # Errors
+    /// [`StoreError::BadId`].
+    pub(super) fn folder(&self, kind: Kind, id: &str) -> Result<PathBuf, StoreError> {
+        check_id(id).map(|()| kind.all(self.files()).join(id))
+    }
+
     /// Reads the metadata of one object; `None` if its folder does not exist. Nothing is moved to quarantine.
     ///
     /// # Errors
     /// [`StoreError::BadId`], [`StoreError::Damaged`], or another I/O error.
     pub(crate) fn reload_meta<M: FolderMeta>(&self, id: &str) -> Result<Option<M>, StoreError> {
-        check_id(id)?;
-        match self.files().exists(&M::all(self.files()).join(id))? {
+        match self.files().exists(&self.folder(M::KIND, id)?)? {
             true => read(self.files(), id).map(Some),
             false => Ok(None),
         }
+    }
+
+    /// Deletes an object, if it exists. On `Ok` the deletion is durable; after an error it is either gone or still there as a whole.
+    ///
+    /// # Errors
+    /// [`StoreError::BadId`], or another I/O error.
+    pub fn delete(&self, kind: Kind, id: &str) -> Result<(), StoreError> {
+        self.files().delete_durably(&self.folder(kind, id)?)
+    }
+
+    /// Moves a damaged object to `quarantine/`, with a note of what is wrong.
+    ///
+    /// # Errors
+    /// [`StoreError::BadId`], or another I/O error.
+    pub fn quarantine(&self, kind: Kind, id: &str, why: &str) -> Result<(), StoreError> {
+        self.files().move_to_quarantine(&self.folder(kind, id)?, why).map(|_| ())
+    }
+
+    /// Bytes of an object's files; 0 where there is none.
+    pub fn bytes(&self, kind: Kind, id: &str) -> u64 {
+        self.folder(kind, id).map_or(0, |folder| self.files().folder_bytes(&folder))
     }
 }

@@ -1,14 +1,12 @@
 //! Sessions: metadata, container, completion mark and notes.
 
 use super::disk::DiskFile;
-use super::files::Files;
-use super::names::check_id;
 use super::scan::{FolderMeta, Kind};
-use super::{ContentKey, Store, StoreError, is_session_id, meta};
+use super::{ContentKey, Store, StoreError, StoredFile, meta};
 use cager_proto::messages::SessionOptions;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use std::io::{self, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -72,10 +70,6 @@ impl FolderMeta for SessionMeta {
     fn id(&self) -> &str {
         &self.id
     }
-
-    fn all(files: &Files) -> PathBuf {
-        files.sessions()
-    }
 }
 
 const META: &str = "session.json";
@@ -90,29 +84,9 @@ impl Store {
     /// # Errors
     /// `AlreadyExists` as [`StoreError::Io`] where the id is taken; [`StoreError::BadId`], [`StoreError::Full`].
     pub fn create_session(&self, meta: &SessionMeta) -> Result<(), StoreError> {
-        check_id(&meta.id)?;
-        let files = self.files();
-        let place = files.session(&meta.id);
+        let (files, place) = (self.files(), self.folder(Kind::Session, &meta.id)?);
         let bytes = meta::wrap(&place.join(META), "session", meta)?;
         files.publish_folder(&place, |staging| files.write_new(&staging.join(META), &bytes))
-    }
-
-    /// Deletes a session, if it exists. On `Ok` the deletion is durable; after an error the session is either gone or still there as a whole.
-    ///
-    /// # Errors
-    /// [`StoreError::BadId`], or another I/O error.
-    pub fn delete_session(&self, id: &str) -> Result<(), StoreError> {
-        check_id(id)?;
-        self.files().delete_durably(&self.files().session(id))
-    }
-
-    /// Moves a damaged session to `quarantine/`, with a note of what is wrong.
-    ///
-    /// # Errors
-    /// [`StoreError::BadId`], or another I/O error.
-    pub fn quarantine_session(&self, id: &str, why: &str) -> Result<(), StoreError> {
-        check_id(id)?;
-        self.files().move_to_quarantine(&self.files().session(id), why).map(|_| ())
     }
 
     /// Atomically writes the session's container, replacing an existing one; durable on `Ok`. A [`StoreError`] inside the [`io::Error`]
@@ -125,20 +99,16 @@ impl Store {
         id: &str,
         write: &mut dyn FnMut(&mut dyn Write) -> io::Result<()>,
     ) -> Result<Container, StoreError> {
-        check_id(id)?;
-        let files = self.files();
-        let place = files.session(id).join(CONTAINER);
+        let (files, place) = (self.files(), self.folder(Kind::Session, id)?.join(CONTAINER));
         let staging = files.temporary("container");
         let mut make = || {
             let file = files.create(&staging)?;
-            let mut out = HashingWriter {
-                file: &file,
-                buffer: Vec::new(),
-                bytes: 0,
-                digest: blake3::Hasher::new(),
-                broken: false,
-            };
-            write(&mut out).and_then(|()| out.flush()).map_err(|e| StoreError::of(&place, "write", e))?;
+            let mut out = HashingWriter { file: &file, bytes: 0, digest: blake3::Hasher::new(), broken: false };
+            let mut buffered = BufWriter::with_capacity(BUFFER_BYTES, &mut out);
+            let written = write(&mut buffered).and_then(|()| buffered.flush());
+            // What a failed write left in the buffer is of no use.
+            drop(buffered.into_parts());
+            written.map_err(|e| StoreError::of(&place, "write", e))?;
             let container = Container { bytes: out.bytes, digest: out.digest.finalize().to_hex().to_string() };
             files.sync_file(&*file, &place)?;
             files.publish(&staging, &place)?;
@@ -152,8 +122,7 @@ impl Store {
     /// # Errors
     /// [`StoreError::BadId`], [`StoreError::Full`].
     pub fn complete(&self, id: &str, completion: &Completion) -> Result<(), StoreError> {
-        check_id(id)?;
-        let path = self.files().session(id).join(COMPLETE);
+        let path = self.folder(Kind::Session, id)?.join(COMPLETE);
         self.files().replace(&path, &meta::wrap(&path, "completion", completion)?)
     }
 
@@ -162,8 +131,7 @@ impl Store {
     /// # Errors
     /// [`StoreError::Damaged`], [`StoreError::BadId`], or another I/O error.
     pub fn completion(&self, id: &str) -> Result<Option<Completion>, StoreError> {
-        check_id(id)?;
-        let folder = self.files().session(id);
+        let folder = self.folder(Kind::Session, id)?;
         let found: Option<Completion> = meta::read(self.files(), &folder.join(COMPLETE), "completion")?;
         if found.is_some() {
             // An earlier process may have renamed the mark without syncing the folder; old entries have been written back since.
@@ -181,12 +149,9 @@ impl Store {
     /// # Errors
     /// [`StoreError::BadId`], or another I/O error.
     pub fn container_bytes(&self, id: &str) -> Result<u64, StoreError> {
-        check_id(id)?;
-        let path = self.container_path(id);
-        match self.files().disk.open(&path).and_then(|file| file.length()) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(0),
-            length => length.map_err(|e| StoreError::of(&path, "read", e)),
-        }
+        let path = self.folder(Kind::Session, id)?.join(CONTAINER);
+        let file = self.files().open(&path)?;
+        file.map_or(Ok(0), |file| file.length().map_err(|e| StoreError::of(&path, "read", e)))
     }
 
     /// Verifies length and digest of the session's container, reading all of it.
@@ -194,21 +159,14 @@ impl Store {
     /// # Errors
     /// [`StoreError::BadId`], or another I/O error.
     pub fn container_is_whole(&self, id: &str, completion: &Completion) -> Result<bool, StoreError> {
-        check_id(id)?;
-        let path = self.container_path(id);
+        let path = self.folder(Kind::Session, id)?.join(CONTAINER);
         let failed = |e| StoreError::of(&path, "read", e);
         let file = self.files().disk.open(&path).map_err(failed)?;
-        let (mut digest, mut buffer, mut offset) = (blake3::Hasher::new(), vec![0; BUFFER_BYTES], 0);
-        loop {
-            let read = file.read_at(&mut buffer, offset).map_err(failed)?;
-            if read == 0 {
-                break;
-            }
-            digest.update(&buffer[..read]);
-            offset += read as u64;
-        }
+        let (mut digest, file) = (blake3::Hasher::new(), StoredFile::open(file).map_err(failed)?);
+        let bytes = file.bytes();
+        digest.update_reader(file).map_err(failed)?;
         let digest = digest.finalize().to_hex();
-        Ok(offset == completion.container_bytes && digest.as_str() == completion.container_digest)
+        Ok(bytes == completion.container_bytes && digest.as_str() == completion.container_digest)
     }
 
     /// Atomically stores a note about the session, replacing an earlier one of that name; durable on `Ok`. `name` is a file name without
@@ -217,8 +175,7 @@ impl Store {
     /// # Errors
     /// [`StoreError::BadId`], [`StoreError::Full`].
     pub fn put_note<T: Serialize>(&self, id: &str, name: &'static str, note: &T) -> Result<(), StoreError> {
-        check_id(id)?;
-        let path = self.files().session(id).join(name).with_extension("json");
+        let path = self.folder(Kind::Session, id)?.join(name).with_extension("json");
         self.files().replace(&path, &meta::wrap(&path, name, note)?)
     }
 
@@ -227,29 +184,19 @@ impl Store {
     /// # Errors
     /// [`StoreError::Damaged`], [`StoreError::BadId`].
     pub fn note<T: DeserializeOwned>(&self, id: &str, name: &'static str) -> Result<Option<T>, StoreError> {
-        check_id(id)?;
-        meta::read(self.files(), &self.files().session(id).join(name).with_extension("json"), name)
+        meta::read(self.files(), &self.folder(Kind::Session, id)?.join(name).with_extension("json"), name)
     }
 
     /// Path of the session's container, whether or not it exists. For an invalid id it is a path where nothing exists.
     pub fn container_path(&self, id: &str) -> PathBuf {
-        let id = if is_session_id(id) { id } else { ".no-session" };
-        self.files().session(id).join(CONTAINER)
-    }
-
-    /// Bytes of the session's files; 0 where there is none.
-    pub fn session_bytes(&self, id: &str) -> u64 {
-        if !is_session_id(id) {
-            return 0;
-        }
-        self.files().disk.list(&self.files().session(id)).map_or(0, |all| all.iter().map(|e| e.bytes).sum())
+        let folder = self.folder(Kind::Session, id).unwrap_or_else(|_| self.files().sessions.join(".no-session"));
+        folder.join(CONTAINER)
     }
 }
 
 /// A writer that computes the digest of what it writes.
 struct HashingWriter<'a> {
     file: &'a Arc<dyn DiskFile>,
-    buffer: Vec<u8>,
     bytes: u64,
     digest: blake3::Hasher,
     /// Set after a failed write: the file has a gap.
@@ -259,36 +206,18 @@ struct HashingWriter<'a> {
 /// Bytes gathered before a write.
 const BUFFER_BYTES: usize = 1 << 18;
 
-impl HashingWriter<'_> {
-    fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
+impl Write for HashingWriter<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if self.broken {
             return Err(io::Error::other("an earlier write failed"));
         }
         self.file.write_all_at(bytes, self.bytes).inspect_err(|_| self.broken = true)?;
         self.digest.update(bytes);
         self.bytes += bytes.len() as u64;
-        Ok(())
-    }
-}
-
-impl Write for HashingWriter<'_> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if self.buffer.len() + bytes.len() > BUFFER_BYTES {
-            self.flush()?;
-        }
-        if bytes.len() >= BUFFER_BYTES {
-            self.put(bytes)?;
-        } else {
-            self.buffer.extend_from_slice(bytes);
-        }
         Ok(bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        let buffer = std::mem::take(&mut self.buffer);
-        self.put(&buffer)?;
-        self.buffer = buffer;
-        self.buffer.clear();
         Ok(())
     }
 }

@@ -3,7 +3,7 @@
 use super::{byte, mend};
 use crate::Target;
 use crate::disk::MemoryDisk;
-use cager::store::{Content, ContentKey, LogRecord, SessionMeta, Store};
+use cager::store::{Content, ContentKey, LogEntry, LogRecord, NamedFile, SessionMeta, Store};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::inversion::{Solver, SolverOptions};
@@ -46,16 +46,17 @@ pub(super) const LOG: Target = Target {
 
 fn record(frame: u32, cage: &[f32]) -> LogRecord<'_> {
     let full_digest = frame.is_multiple_of(2).then_some([3; 16]);
-    LogRecord {
+    let entry = LogEntry {
         frame,
+        offset: 0,
         l2: 0.5,
         linf: f32::NAN,
         squared: 1.0,
         spread: 2.0,
         handle_digest: [frame as u8; 16],
         full_digest,
-        cage,
-    }
+    };
+    LogRecord { entry, cage }
 }
 
 fn log(mut bytes: &[u8]) {
@@ -83,7 +84,7 @@ fn log(mut bytes: &[u8]) {
     drop(log);
     let (_, again) = store.open_log(ID, rows).expect("a log that was just written");
     assert_eq!(again.len(), entries.len() + 1);
-    let same = |(a, b): (&cager::store::LogEntry, &cager::store::LogEntry)| (a.frame, a.offset) == (b.frame, b.offset);
+    let same = |(a, b): (&LogEntry, &LogEntry)| (a.frame, a.offset) == (b.frame, b.offset);
     assert!(entries.iter().zip(&again).all(same), "other frames the second time");
 }
 
@@ -186,10 +187,8 @@ pub(super) const SMALL_FILES: Target = Target {
         let completion = cager::store::Completion { frames: 6, container_bytes: 7, container_digest: "00".into() };
         store.complete(ID, &completion).expect("a completion");
         let content = Content {
-            rest_name: "a.obj".into(),
-            rest: vec![1],
-            cage_name: "b.obj".into(),
-            cage: vec![2],
+            rest: NamedFile { name: "a.obj".into(), bytes: vec![1] },
+            cage: NamedFile { name: "b.obj".into(), bytes: vec![2] },
             matrix: None,
         };
         store.put_content(&KEY, &content).expect("content");

@@ -14,7 +14,7 @@
 //! or from another offset fails its checksum. Each mark lies in a sector of its own: a torn write of one affects neither the header nor the
 //! other mark.
 
-use super::{LogEntry, LogRecord};
+use super::LogEntry;
 use crate::store::disk::DiskFile;
 use std::io;
 
@@ -115,21 +115,21 @@ impl Layout {
         crc32c::crc32c_append(crc32c::crc32c_append(self.seed, &offset.to_le_bytes()), record)
     }
 
-    pub(super) fn write_record(&self, record: &LogRecord<'_>, durable: u64, offset: u64, out: &mut Vec<u8>) {
+    pub(super) fn write_record(&self, entry: &LogEntry, cage: &[f32], durable: u64, out: &mut Vec<u8>) {
         let start = out.len();
         out.reserve(self.stride() as usize);
-        out.extend_from_slice(&record.frame.to_le_bytes());
-        let flags = if record.full_digest.is_some() { HAS_FULL_DIGEST } else { 0 };
+        out.extend_from_slice(&entry.frame.to_le_bytes());
+        let flags = if entry.full_digest.is_some() { HAS_FULL_DIGEST } else { 0 };
         out.extend_from_slice(&flags.to_le_bytes());
-        out.extend_from_slice(&record.l2.to_le_bytes());
-        out.extend_from_slice(&record.linf.to_le_bytes());
-        out.extend_from_slice(&record.squared.to_le_bytes());
-        out.extend_from_slice(&record.spread.to_le_bytes());
+        out.extend_from_slice(&entry.l2.to_le_bytes());
+        out.extend_from_slice(&entry.linf.to_le_bytes());
+        out.extend_from_slice(&entry.squared.to_le_bytes());
+        out.extend_from_slice(&entry.spread.to_le_bytes());
         out.extend_from_slice(&durable.to_le_bytes());
-        out.extend_from_slice(&record.handle_digest);
-        out.extend_from_slice(&record.full_digest.unwrap_or_default());
-        out.extend(record.cage.iter().flat_map(|x| x.to_le_bytes()));
-        out.extend_from_slice(&self.record_crc(offset, &out[start..]).to_le_bytes());
+        out.extend_from_slice(&entry.handle_digest);
+        out.extend_from_slice(&entry.full_digest.unwrap_or_default());
+        out.extend(cage.iter().flat_map(|x| x.to_le_bytes()));
+        out.extend_from_slice(&self.record_crc(entry.offset, &out[start..]).to_le_bytes());
     }
 
     /// Parses the record at `offset`, with the durable length that it recorded; `None` if its checksum does not match.

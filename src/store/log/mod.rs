@@ -8,8 +8,7 @@
 //! If a power cut loses the mark of the last group, later damage to that group is taken for a torn write. Opening the log therefore syncs
 //! and marks everything that it finds.
 
-use super::names::check_id;
-use super::{LogRegistry, Store, StoreError};
+use super::{Kind, LogRegistry, Store, StoreError};
 use crate::store::disk::DiskFile;
 use crate::store::files::timed;
 use format::{BLOCK_BYTES, Layout};
@@ -30,20 +29,8 @@ pub use reader::LogReader;
 /// A solved frame.
 #[derive(Clone, Copy, Debug)]
 pub struct LogRecord<'a> {
-    /// Number of the frame.
-    pub frame: u32,
-    /// `sqrt(mean |e|²)`; NaN where it was not measured.
-    pub l2: f32,
-    /// `max |e|`; NaN where it was not measured.
-    pub linf: f32,
-    /// `Σ |e|²`.
-    pub squared: f64,
-    /// `Σ |p − p̄|²` of the frame about its own centroid.
-    pub spread: f64,
-    /// Digest of the handle rows received.
-    pub handle_digest: [u8; 16],
-    /// Digest of all rows; `None` if only handle rows were received.
-    pub full_digest: Option<[u8; 16]>,
+    /// What the log says of it; appending sets the offset.
+    pub entry: LogEntry,
     /// The cage, m × 3 interleaved.
     pub cage: &'a [f32],
 }
@@ -87,13 +74,15 @@ pub struct FrameLog {
     only: WriterGuard,
 }
 
+/// Name of the file.
+const LOG: &str = "frames.log";
 /// Buffers larger than this are freed after an append.
 const MAX_RETAINED_BUFFER_BYTES: usize = 4 << 20;
 
 impl Store {
     /// Path of the session's log, whether or not it exists. For an invalid id it is a path where nothing exists.
     pub fn log_path(&self, id: &str) -> PathBuf {
-        self.container_path(id).with_file_name("frames.log")
+        self.container_path(id).with_file_name(LOG)
     }
 
     /// Whether the session has a log.
@@ -101,8 +90,7 @@ impl Store {
     /// # Errors
     /// [`StoreError::BadId`], or another I/O error.
     pub fn has_log(&self, id: &str) -> Result<bool, StoreError> {
-        check_id(id)?;
-        self.files().exists(&self.log_path(id))
+        self.files().exists(&self.folder(Kind::Session, id)?.join(LOG))
     }
 
     /// Opens a session's log for cages of `rows` rows, creating it if it is missing; returns its frames in the order of the log, each once.
@@ -112,9 +100,7 @@ impl Store {
     /// [`StoreError::Damaged`] if acknowledged records are damaged or missing, or the log has cages of another size; the file is not
     /// changed then. `ResourceBusy` as [`StoreError::Io`] if the log is open already. [`StoreError::BadId`].
     pub fn open_log(&self, id: &str, rows: u32) -> Result<(FrameLog, Vec<LogEntry>), StoreError> {
-        check_id(id)?;
-        let files = self.files();
-        let path = files.session(id).join("frames.log");
+        let (files, path) = (self.files(), self.folder(Kind::Session, id)?.join(LOG));
         let mut only = WriterGuard::new(self, id, &path)?;
         let layout = Layout::new(id, rows);
         if !files.exists(&path)? {
@@ -138,16 +124,13 @@ impl Store {
         };
         Ok((log, recovered.entries))
     }
-}
 
-impl Store {
     /// Opens a session's log for reading frames whose entries are known.
     ///
     /// # Errors
     /// [`StoreError::Damaged`] if it is missing or has cages of another size, [`StoreError::BadId`], or another I/O error.
     pub fn log_reader(&self, id: &str, rows: u32) -> Result<LogReader, StoreError> {
-        check_id(id)?;
-        let path = self.log_path(id);
+        let path = self.folder(Kind::Session, id)?.join(LOG);
         let file = self.files().disk.open(&path).map_err(|error| match error.kind() {
             io::ErrorKind::NotFound => StoreError::damaged(&path, "the frame log is gone".to_owned()),
             _ => StoreError::of(&path, "open", error),
@@ -190,8 +173,8 @@ impl FrameLog {
         buffer.clear();
         let mut offset = self.durable;
         let entries = records.iter().map(|record| {
-            self.layout.write_record(record, self.durable, offset, &mut buffer);
-            let entry = record.entry(offset);
+            let entry = LogEntry { offset, ..record.entry };
+            self.layout.write_record(&entry, record.cage, self.durable, &mut buffer);
             offset += self.layout.stride();
             entry
         });
@@ -257,13 +240,6 @@ impl FrameLog {
         if let Err(error) = self.layout.write_mark(&*self.file, self.marks, self.durable) {
             tracing::debug!(%error, path = %self.path.display(), "a frame log's length was not marked");
         }
-    }
-}
-
-impl LogRecord<'_> {
-    fn entry(&self, offset: u64) -> LogEntry {
-        let Self { frame, l2, linf, squared, spread, handle_digest, full_digest, cage: _ } = *self;
-        LogEntry { frame, offset, l2, linf, squared, spread, handle_digest, full_digest }
     }
 }
 

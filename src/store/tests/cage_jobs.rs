@@ -2,7 +2,7 @@
 
 use super::{EIO, ENOSPC, Given, KEY};
 use crate::store::faults::{Fault, Loss};
-use crate::store::{CageJobMeta, Opened, Store, StoreError, StoredPart};
+use crate::store::{CageJobMeta, Kind, Opened, Store, StoreError, StoredPart};
 use cager_proto::cage_messages::CageOptions;
 use std::io::{self, Read as _};
 
@@ -10,11 +10,6 @@ const REST: &[u8] = b"v 0 0 0\n";
 const PIECES: [&[u8]; 2] = [&[1; 5000], &[2; 3000]];
 const CAGE: &[u8] = b"v 1 2 3\nf 1 2 3\n";
 const OUTCOME: &str = "a cage";
-
-fn part(name: &str, bytes: &[u8]) -> StoredPart {
-    let blake3 = blake3::hash(bytes).to_hex().to_string();
-    StoredPart { name: name.into(), bytes: bytes.len() as u64, blake3 }
-}
 
 fn meta(id: &str) -> CageJobMeta {
     CageJobMeta {
@@ -25,8 +20,8 @@ fn meta(id: &str) -> CageJobMeta {
         options: CageOptions { mean_error: Some(0.1 + 0.2), name: Some("Käfig".into()), ..CageOptions::default() },
         points: 1,
         frame_count: 7,
-        rest: part("rest.obj", REST),
-        frames: part("frames", &PIECES.concat()),
+        rest: StoredPart::of("rest.obj", REST),
+        frames: StoredPart::of("frames", &PIECES.concat()),
         idempotency: None,
     }
 }
@@ -63,7 +58,7 @@ fn live(given: &Given, told: &mut Told) -> Result<(), StoreError> {
     twice(|| store.count_cage_job_attempt("a"))?;
     twice(|| store.finish_cage_job("a", &OUTCOME, Some(CAGE)))?;
     told.finished = true;
-    twice(|| store.delete_cage_job("b"))?;
+    twice(|| store.delete(Kind::CageJob, "b"))?;
     told.deleted = true;
     Ok(())
 }
@@ -84,7 +79,7 @@ fn look(given: &Given, told: &Told, what: &str) {
         match outcome {
             Some(outcome) => {
                 assert_eq!(outcome, OUTCOME, "{what}");
-                let cage = part("cage.obj", CAGE);
+                let cage = StoredPart::of("cage.obj", CAGE);
                 assert_eq!(store.cage_job_cage(id, cage.bytes, &cage.blake3).unwrap(), CAGE, "{what}");
             }
             None => {
@@ -111,17 +106,17 @@ fn a_job_keeps_its_input_until_it_is_over_and_its_cage_from_then_on() {
     let given = Given::new();
     let store = given.open().store;
     create(&store, "a").unwrap();
-    assert!(store.cage_job_bytes("a") > 8000);
+    assert!(store.bytes(Kind::CageJob, "a") > 8000);
     assert_eq!([store.count_cage_job_attempt("a").unwrap(), store.count_cage_job_attempt("a").unwrap()], [1, 2]);
     store.finish_cage_job("a", &OUTCOME, Some(CAGE)).unwrap();
-    assert!(store.cage_job_bytes("a") < 2000);
+    assert!(store.bytes(Kind::CageJob, "a") < 2000);
     assert!(matches!(store.cage_job_rest(&meta("a")), Err(StoreError::Damaged { .. })));
     store.create_finished_cage_job(&meta("b"), &OUTCOME, CAGE).unwrap();
     drop(store);
     look(&given, &Told { created: vec!["a"], finished: true, deleted: false }, "two finished jobs");
     // What is over cannot become so again where it was deleted.
     let store = given.open().store;
-    store.delete_cage_job("a").unwrap();
+    store.delete(Kind::CageJob, "a").unwrap();
     assert!(store.finish_cage_job("a", &OUTCOME, Some(CAGE)).is_err());
     assert!(store.create_cage_job(&meta("../a"), REST, store.spool().unwrap()).is_err());
 }

@@ -3,7 +3,7 @@
 use super::{EIO, ENOSPC, Given, KEY, ROWS, SOLVER, completion, content, meta, write_frames};
 use crate::store::faults::{Fault, Loss};
 use crate::store::log::tests::{append, frames};
-use crate::store::{FrameLog, Opened, Store, StoreError};
+use crate::store::{FrameLog, Kind, Opened, Store, StoreError};
 use std::io;
 use std::sync::Arc;
 
@@ -58,7 +58,7 @@ fn live(given: &Given, told: &mut Told) -> Result<(), ()> {
     assert_eq!((container.bytes, container.digest), (completion().container_bytes, completion().container_digest));
     twice(errors, || store.complete("a", &completion()))?;
     told.complete = true;
-    twice(errors, || store.delete_session("b"))?;
+    twice(errors, || store.delete(Kind::Session, "b"))?;
     told.deleted = true;
     twice(errors, || store.probe())
 }
@@ -213,14 +213,14 @@ fn a_deletion_may_be_interrupted_anywhere() {
     };
     let (given, store) = prepare();
     let before = given.disk.operations();
-    store.delete_session("b").unwrap();
+    store.delete(Kind::Session, "b").unwrap();
     let count = given.disk.operations() - before;
     assert!(count > 5);
     for nth in 1..=count {
         for loss in [Loss::Nothing, Loss::Everything, Loss::Torn(nth), Loss::Torn(nth + 1000)] {
             let (given, store) = prepare();
             given.disk.fail(None, nth, Fault::Stop);
-            let told = store.delete_session("b").is_ok();
+            let told = store.delete(Kind::Session, "b").is_ok();
             drop(store);
             given.disk.restart(loss).unwrap();
             let Opened { store, sessions, quarantined, .. } = given.open();

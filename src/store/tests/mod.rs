@@ -1,7 +1,7 @@
 //! What the store's tests share.
 
 use super::faults::FaultyDisk;
-use super::{Completion, Content, ContentKey, Idempotency, MatrixFile, Opened, SessionMeta, Store};
+use super::{Completion, Content, ContentKey, Idempotency, NamedFile, Opened, SessionMeta, Store};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_core::inversion::{Handles, Solver, SolverOptions};
@@ -63,11 +63,9 @@ pub(crate) const KEY: ContentKey = ContentKey([0xa7; 32]);
 
 pub(crate) fn content() -> Content {
     Content {
-        rest_name: "rest.obj".into(),
-        rest: vec![1; 5000],
-        cage_name: "cage.ply".into(),
-        cage: vec![2; 70],
-        matrix: Some(MatrixFile { name: "d.mtx".into(), bytes: vec![3; 40] }),
+        rest: NamedFile { name: "rest.obj".into(), bytes: vec![1; 5000] },
+        cage: NamedFile { name: "cage.ply".into(), bytes: vec![2; 70] },
+        matrix: Some(NamedFile { name: "d.mtx".into(), bytes: vec![3; 40] }),
     }
 }
 

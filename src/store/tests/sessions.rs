@@ -2,7 +2,7 @@
 
 use super::{EIO, ENOSPC, Given, ROWS, completion, meta};
 use crate::store::faults::{Fault, Op};
-use crate::store::{LocalDisk, Opened, SessionMeta, Store, StoreError};
+use crate::store::{Kind, LocalDisk, Opened, SessionMeta, Store, StoreError};
 use std::io;
 use std::sync::Arc;
 
@@ -34,7 +34,7 @@ fn a_damaged_session_is_set_aside_and_blocks_nobody() {
         assert!(names == ["Not an id", "b", "c", "d", "stray"] || names == ["stray"], "{names:?}");
     }
     let Opened { store, .. } = Store::open(given.root(), Arc::new(LocalDisk)).unwrap();
-    store.quarantine_session("e", "its log is damaged").unwrap();
+    store.quarantine(Kind::Session, "e", "its log is damaged").unwrap();
     let note = std::fs::read_to_string(given.root().join("quarantine/e.why.txt")).unwrap();
     assert_eq!(note, "its log is damaged\n");
 }
@@ -72,8 +72,8 @@ fn names_from_outside_touch_no_path() {
     for id in ["", ".", "..", "a/b", "../x", "A", "a.b", "a\0", &"a".repeat(65), "ä"] {
         let refused = [
             store.create_session(&SessionMeta { id: id.into(), ..meta("a") }),
-            store.delete_session(id),
-            store.quarantine_session(id, "?"),
+            store.delete(Kind::Session, id),
+            store.quarantine(Kind::Session, id, "?"),
             store.open_log(id, ROWS).map(|_| ()),
             store.write_container(id, &mut |_| Ok(())).map(|_| ()),
             store.complete(id, &completion()),
@@ -81,7 +81,7 @@ fn names_from_outside_touch_no_path() {
         ];
         assert!(refused.iter().all(|r| matches!(r, Err(StoreError::BadId { .. }))), "{id:?}: {refused:?}");
         assert!(store.container_path(id).starts_with(given.root().join("sessions/.no-session")));
-        assert_eq!(store.session_bytes(id), 0);
+        assert_eq!(store.bytes(Kind::Session, id), 0);
     }
     store.create_session(&meta(&"a-0".repeat(21))).unwrap();
 }
@@ -112,7 +112,7 @@ fn a_container_is_replaced_whole_or_not_at_all() {
         .unwrap();
     assert_eq!(std::fs::read(store.container_path("a")).unwrap(), big);
     assert_eq!(container.digest, blake3::hash(&big).to_hex().as_str());
-    assert!(store.session_bytes("a") > container.bytes);
+    assert!(store.bytes(Kind::Session, "a") > container.bytes);
     let damage = || StoreError::Damaged { path: "x".into(), what: "y".into() };
     let failed = store.write_container("a", &mut |out| {
         out.write_all(b"half")?;

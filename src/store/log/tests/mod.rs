@@ -20,16 +20,17 @@ pub(crate) fn cage(frame: u32) -> Vec<f32> {
 fn record(frame: u32, cage: &[f32]) -> LogRecord<'_> {
     let f = f64::from(frame);
     let measured = frame.is_multiple_of(2);
-    LogRecord {
+    let entry = LogEntry {
         frame,
+        offset: 0,
         l2: if measured { frame as f32 + 0.5 } else { f32::NAN },
         linf: if measured { frame as f32 + 0.75 } else { f32::NAN },
         squared: f * 3.0,
         spread: f * 7.0,
         handle_digest: [frame as u8; 16],
         full_digest: measured.then_some([!(frame as u8); 16]),
-        cage,
-    }
+    };
+    LogRecord { entry, cage }
 }
 
 pub(crate) fn append(log: &mut FrameLog, frames: &[u32]) -> Result<Vec<LogEntry>, StoreError> {
@@ -48,7 +49,7 @@ pub(crate) fn frames(log: &FrameLog, entries: &[LogEntry]) -> Vec<u32> {
         let cage = cage(entry.frame);
         let raw: Vec<u8> = cage.iter().flat_map(|x| x.to_le_bytes()).collect();
         assert_eq!(bytes, raw, "cage of frame {}", entry.frame);
-        let right = record(entry.frame, &cage);
+        let right = record(entry.frame, &cage).entry;
         assert_eq!(entry.l2.to_bits(), right.l2.to_bits());
         assert_eq!(entry.linf.to_bits(), right.linf.to_bits());
         assert_eq!((entry.squared, entry.spread), (right.squared, right.spread));
