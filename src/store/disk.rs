@@ -120,39 +120,32 @@ impl dyn DiskFile + '_ {
     ///
     /// # Errors
     /// The system's; some bytes may have been written.
-    pub fn write_all_at(&self, mut bytes: &[u8], mut offset: u64) -> io::Result<()> {
-        while !bytes.is_empty() {
-            match self.write_at(bytes, offset) {
-                Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
-                Ok(written) => {
-                    bytes = &bytes[written..];
-                    offset += written as u64;
-                }
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(error) => return Err(error),
-            }
-        }
-        Ok(())
+    pub fn write_all_at(&self, bytes: &[u8], offset: u64) -> io::Result<()> {
+        whole(bytes.len(), io::ErrorKind::WriteZero, |done| self.write_at(&bytes[done..], offset + done as u64))
     }
 
     /// Fills `bytes` from `offset` on.
     ///
     /// # Errors
     /// `UnexpectedEof` where the file ends before, or another I/O error.
-    pub fn read_exact_at(&self, mut bytes: &mut [u8], mut offset: u64) -> io::Result<()> {
-        while !bytes.is_empty() {
-            match self.read_at(bytes, offset) {
-                Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
-                Ok(read) => {
-                    bytes = &mut bytes[read..];
-                    offset += read as u64;
-                }
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(error) => return Err(error),
-            }
-        }
-        Ok(())
+    pub fn read_exact_at(&self, bytes: &mut [u8], offset: u64) -> io::Result<()> {
+        let length = bytes.len();
+        whole(length, io::ErrorKind::UnexpectedEof, |done| self.read_at(&mut bytes[done..], offset + done as u64))
     }
+}
+
+/// Repeats a step, which is told what is done and gives how much more it has done, until all is; `end` is the error where it does nothing.
+fn whole(length: usize, end: io::ErrorKind, mut step: impl FnMut(usize) -> io::Result<usize>) -> io::Result<()> {
+    let mut done = 0;
+    while done < length {
+        match step(done) {
+            Ok(0) => return Err(end.into()),
+            Ok(more) => done += more,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
 }
 
 /// The system's own files.

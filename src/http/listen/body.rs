@@ -42,13 +42,14 @@ pub(super) struct RequestBody {
 }
 
 impl RequestBody {
-    pub(super) fn new(inner: Incoming, state: Arc<State>, in_flight: Arc<InFlight>, timeout: Duration) -> Self {
+    pub(super) fn new(inner: Incoming, in_flight: &Arc<InFlight>, timeout: Duration) -> Self {
+        let state = Arc::clone(in_flight.state());
         // A request without a body is complete.
         let empty = inner.is_end_stream();
         if empty {
             state.body_ended();
         }
-        let in_flight = (!empty).then_some(in_flight);
+        let in_flight = (!empty).then(|| Arc::clone(in_flight));
         Self { inner, state, in_flight, timeout, clock: None, waiting: false, unfinished: Arc::default() }
     }
 

@@ -46,15 +46,7 @@ impl hyper::service::Service<Request<Incoming>> for Requests {
             let (response, close) = match refusal(&request, head, &this.limits) {
                 Some(problem) => (problem, true),
                 None => {
-                    let upload = |body| {
-                        RequestBody::new(
-                            body,
-                            Arc::clone(&this.state),
-                            Arc::clone(&in_flight),
-                            this.limits.body_timeout,
-                        )
-                    };
-                    let mut request = request.map(upload);
+                    let mut request = request.map(|body| RequestBody::new(body, &in_flight, this.limits.body_timeout));
                     let unfinished = request.body().unfinished();
                     request.extensions_mut().insert(ConnectInfo(this.peer));
                     let Ok(response) = this.app.clone().call(request.map(Body::new)).await;

@@ -231,6 +231,10 @@ pub(super) struct InFlight {
 }
 
 impl InFlight {
+    pub(super) fn state(&self) -> &Arc<State> {
+        &self.state
+    }
+
     fn lock(&self) -> MutexGuard<'_, Option<Instant>> {
         self.unread_since.lock().unwrap_or_else(PoisonError::into_inner)
     }
