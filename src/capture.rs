@@ -48,6 +48,12 @@ impl StoredError {
     /// Of a frame of which only handle rows are known.
     pub const NOT_MEASURED: Self = Self { l2: f32::NAN, linf: f32::NAN, squared: f64::NAN, spread: f64::NAN };
 
+    /// Of a frame that was coded and measured: to the digits that files keep of it.
+    pub fn of_coded(error: &cager_core::decode::FrameError, diagonal: f64) -> Self {
+        let exact = Self::new(error, diagonal);
+        Self { l2: rounded_error(exact.l2), linf: rounded_error(exact.linf), ..exact }
+    }
+
     /// Of a measured frame.
     pub fn new(error: &cager_core::decode::FrameError, diagonal: f64) -> Self {
         let stored = |x: f64| (x / diagonal) as f32;
@@ -175,15 +181,7 @@ impl<W: Write> CaptureWriter<W> {
         if !self.report.frame_numbers.is_empty() {
             self.writer.add_frame_numbers(&self.report.frame_numbers)?;
         }
-        let out = self.writer.finish(Some(&self.report))?;
-        if self.report.coding.is_some() {
-            // As readers of the file have them.
-            let rounded = |error: f64| f64::from(rounded_error(error as f32));
-            for frame in &mut self.report.error.per_frame {
-                *frame = FrameError { l2: rounded(frame.l2), linf: rounded(frame.linf) };
-            }
-        }
-        Ok((out, self.report))
+        Ok((self.writer.finish(Some(&self.report))?, self.report))
     }
 }
 

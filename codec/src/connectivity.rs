@@ -85,10 +85,8 @@ pub(crate) struct WalkedFaces {
 }
 
 /// Codes polygons over this many points.
-///
-/// # Panics
-/// Where a corner is beyond them.
-pub fn encode_faces(faces: &Polygons, points: usize) -> Vec<u8> {
+#[cfg(test)]
+fn encode_faces(faces: &Polygons, points: usize) -> Vec<u8> {
     WalkedFaces::new(faces, points).into_bytes()
 }
 
@@ -139,7 +137,7 @@ impl WalkedFaces {
             done[next] = true;
             found.push(&walk.face(&mut coder, None, list[next]));
         }
-        walk.meet_the_rest();
+        walk.number_isolated_vertices();
         Self { coder, faces: found, adjacency: adjacency.renamed(&walk.turns), turns: walk.turns }
     }
 
@@ -158,7 +156,7 @@ impl WalkedFaces {
     }
 }
 
-/// The polygons that [`encode_faces`] wrote, or that earlier programs did: `count` faces with `corners` corners in all.
+/// The polygons of coded bytes, this program's or earlier ones': `count` faces with `corners` corners in all.
 ///
 /// # Errors
 /// Bytes that the encoder did not write.
@@ -201,6 +199,7 @@ pub fn decode_faces(
         }
         add(walk.face(&mut coder, None, &[]))?;
     }
+    drop(walk);
     if version == MeshVersion::Second {
         let is_far = coder.even(false);
         if is_far && points > MOST_FAR_POINTS {
@@ -264,7 +263,7 @@ impl Walk {
     }
 
     /// Sorts the open edges of a vertex anew where none of their ends has fewer faces to come.
-    fn come_nearer(&mut self, v: u32) {
+    fn requeue_open_edges(&mut self, v: u32) {
         let faces = self.faces[v as usize];
         if faces >= MOST_TO_COME {
             return;
@@ -339,7 +338,7 @@ impl Walk {
         for gate in opened {
             self.gates.push(gate, self.to_come(gate));
         }
-        nearer.into_iter().for_each(|v| self.come_nearer(v));
+        nearer.into_iter().for_each(|v| self.requeue_open_edges(v));
         face
     }
 
@@ -439,7 +438,7 @@ impl Walk {
     }
 
     /// Gives the vertices of no face the last turns.
-    fn meet_the_rest(&mut self) {
+    fn number_isolated_vertices(&mut self) {
         let unmet = self.turns.iter_mut().filter(|turn| **turn == UNMET);
         unmet.zip(self.met.len() as u32..).for_each(|(turn, next)| *turn = next);
     }

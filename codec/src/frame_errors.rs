@@ -27,7 +27,9 @@ pub fn decode_errors(bytes: &[u8], frames: usize) -> Result<Vec<[f32; 2]>> {
     let errors = code(&mut coder, frames, &[]);
     coder.check()?;
     let is_error = |&error: &f32| error.is_nan() || error >= 0.0;
-    errors.filter(|errors| errors.iter().flatten().all(is_error)).ok_or(Error::Damaged("errors of frames are none"))
+    errors
+        .filter(|errors| errors.iter().flatten().all(is_error))
+        .ok_or(Error::Damaged("an error of a frame is negative or out of range"))
 }
 
 fn code(coder: &mut impl Coder, frames: usize, given: &[[f32; 2]]) -> Option<Vec<[f32; 2]>> {

@@ -28,7 +28,7 @@ mod vertex_order;
 
 pub use basis::CageBasis;
 pub use cage::{Neighbours, decode_cages, encode_cages, is_rotated};
-pub use connectivity::{decode_faces, encode_faces};
+pub use connectivity::decode_faces;
 pub use error::Error;
 pub use frame_errors::{decode_errors, encode_errors, rounded_error};
 pub use grid::{Grid, decode_positions, encode_positions};

@@ -19,9 +19,9 @@ pub enum MeshVersion {
 pub struct CodedMesh {
     /// What the bytes decode to.
     pub mesh: Model,
-    /// The polygons, as [`encode_faces`](crate::encode_faces) gives them.
+    /// The polygons, for [`decode_faces`].
     pub faces: Vec<u8>,
-    /// The positions, as [`encode_positions`](crate::encode_positions) gives them.
+    /// The positions, for [`decode_positions`].
     pub positions: Vec<u8>,
 }
 

@@ -37,7 +37,7 @@ impl PredictionWeights {
 
     /// Those that fit positions in steps best.
     pub(crate) fn fit(predictions: &Predictions, adjacency: &Adjacency, given: &[[i32; 3]]) -> Self {
-        let every = (given.len() / SAMPLE).max(1);
+        let every = given.len().div_ceil(SAMPLE).max(1);
         let mut is_known = vec![false; given.len()];
         // Both differences, and what they are to add up to.
         let mut rows: [Vec<[f64; 3]>; CLASSES] = Default::default();

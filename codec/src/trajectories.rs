@@ -7,7 +7,7 @@ use faer::{Mat, MatRef};
 
 /// Components whose energy per value is below this fraction of that of rounding to whole steps are left out.
 const WORTH: f64 = 0.3 / 12.0;
-/// Part of a step from which an entry of E is rounded away from 0: small ones cost more than they are worth.
+/// Added to the size of an entry of E before it is rounded down: small ones cost more than they are worth.
 const ROUND_UP: f64 = 0.35;
 /// Largest number of binary digits of an entry of E.
 const MOST_DIGITS: u32 = 26;

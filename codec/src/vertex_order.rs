@@ -8,7 +8,7 @@ use crate::entropy::{Bit, Coder, SIZES, size_class};
 use crate::fenwick::Counted;
 
 /// Vertices with more neighbours move none of them when one of these is numbered.
-const MOST_PASSED_ON: usize = 32;
+const MOST_PASSED_ON: usize = 16;
 /// Most points for which neighbours of neighbours are moved too: that takes several times as long.
 pub(crate) const MOST_FAR_POINTS: usize = 1 << 17;
 

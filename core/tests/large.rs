@@ -68,10 +68,12 @@ fn decoders_that_compute_their_coordinates_have_the_bits_of_those_that_keep_them
         // The sum of the sizes of what is added up for it, which is that of the decoder's columns only where these are all vertices.
         if columns == cage.vertices().len() {
             let centre = [0, 1, 2].map(|k| bent.iter().skip(k).step_by(3).sum::<f32>() / columns as f32);
-            let size = |row: &[f32]| (0..3).map(|k| (row[k] - centre[k]).abs()).fold(0.0, f32::max);
-            let sizes: Vec<f64> = bent.chunks_exact(3).map(size).map(f64::from).collect();
-            let sums = phi.row_iter().map(|row| row.iter().zip(&sizes).map(|(x, size)| x.abs() * size).sum::<f64>());
-            let wanted = sums.fold(0.0, f64::max);
+            let of_axis = |k: usize| {
+                let sizes: Vec<f64> = bent.chunks_exact(3).map(|row| f64::from((row[k] - centre[k]).abs())).collect();
+                let sum = |row: faer::RowRef<'_, f64>| row.iter().zip(&sizes).map(|(x, size)| x.abs() * size).sum();
+                phi.row_iter().map(sum).fold(0.0, f64::max)
+            };
+            let wanted = (0..3).map(of_axis).fold(0.0, f64::max);
             assert!((largest_sum / wanted - 1.0).abs() < 1e-4, "{largest_sum} {wanted}");
         }
     }

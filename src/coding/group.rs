@@ -34,13 +34,17 @@ pub(super) struct Encoded {
 
 impl Encoded {
     pub(super) fn bytes(&self) -> u64 {
-        (self.cages.len() + self.residual.as_ref().map_or(0, |r| r.len() + SECTION)) as u64 + SECTION as u64
+        bytes_of(&self.cages, self.residual.as_ref())
     }
 }
 
+fn bytes_of(cages: &[u8], residual: Option<&Vec<u8>>) -> u64 {
+    (cages.len() + SECTION + residual.map_or(0, |residual| residual.len() + SECTION)) as u64
+}
+
 impl CodedGroup {
-    pub(super) fn bytes(&self) -> usize {
-        self.cages.len() + self.residual.as_ref().map_or(0, |residual| residual.len() + SECTION)
+    pub(super) fn bytes(&self) -> u64 {
+        bytes_of(&self.cages, self.residual.as_ref())
     }
 
     pub(super) fn mean(&self) -> f64 {

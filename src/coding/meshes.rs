@@ -84,3 +84,37 @@ fn coded_cage(
     let fine = || checked(coarse.in_steps(&model, fine_step).ok()?);
     checked(coarse.clone()).filter(is_sound).or_else(fine)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cager_core::coordinates::MeanValue;
+
+    /// A box with a point at each corner.
+    fn corners(size: [f64; 3]) -> Vec<Point> {
+        (0..8).map(|k| std::array::from_fn(|axis| if k >> axis & 1 == 1 { size[axis] } else { 0.0 })).collect()
+    }
+
+    #[test]
+    fn a_cage_close_to_its_model_keeps_every_point_inside() {
+        const SIDES: [[u32; 4]; 6] =
+            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let triangles: Vec<[u32; 3]> = SIDES.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        let mut finer = 0;
+        for k in 0..40 {
+            let size = [1.0 + 0.0011 * f64::from(k), 0.9 + 0.0007 * f64::from(k), 0.8 + 0.0003 * f64::from(k)];
+            let rest = Model { points: corners(size), ..Model::default() };
+            // A ten thousandth around the model, where steps are a thousandth.
+            let around = |p: &Point| std::array::from_fn(|axis| p[axis] + if p[axis] > 0.0 { 1e-4 } else { -1e-4 });
+            let vertices: Vec<Point> = rest.points.iter().map(around).collect();
+            let cage = Cage::new(TriMesh { vertices, triangles: triangles.clone() }).unwrap();
+            let unit = diagonal(&rest.points);
+            let (coded, checked) = coded_cage(&cage, 1e-3, unit, &rest.points, &MeanValue).unwrap();
+            assert!(outside(checked.mesh(), &rest.points).is_empty(), "{k}");
+            let moved = |(a, b): (&Point, &Point)| (0..3).map(|axis| (a[axis] - b[axis]).abs()).fold(0.0, f64::max);
+            let farthest = coded.mesh.points.iter().zip(cage.vertices()).map(moved).fold(0.0, f64::max);
+            finer += usize::from(farthest <= 0.5e-4 * unit + 1e-6);
+        }
+        assert!((1..40).contains(&finer), "{finer}");
+    }
+}

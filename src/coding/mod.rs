@@ -44,7 +44,7 @@ impl Goal {
     /// [`CodingError::BelowPrecision`].
     pub(crate) fn check_precision(self, diagonal: f64, slack: f64) -> Result<(), CodingError> {
         let (asked, times) = match self {
-            Self::MaxError(error) => (error, 4.0),
+            Self::MaxError(error) => (error, 3.0),
             Self::MeanError(error) => (error, 1.0),
             _ => return Ok(()),
         };

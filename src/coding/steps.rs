@@ -147,8 +147,10 @@ impl GroupCoder {
         let is_usual = |&(_, ratio): &(f64, f64)| self.carried.frames == 0 && ratio == USUAL_RATIO;
         let Some((step, _)) = self.carried.chosen.filter(is_usual) else { return Ok(usual) };
         self.carried.chosen = Some((step * (USUAL_RATIO / FINER_CAGES).sqrt(), FINER_CAGES));
-        let finer = self.code_in_ratio(goal)?;
-        if finer.bytes() < usual.bytes() {
+        // It only may save bytes: what cannot be coded in it is coded in the usual one.
+        if let Ok(finer) = self.code_in_ratio(goal)
+            && finer.bytes() < usual.bytes()
+        {
             return Ok(finer);
         }
         self.carried.chosen = Some((step, USUAL_RATIO));

@@ -66,10 +66,13 @@ impl<W: Write> FrameSink<W> {
         let clock = Instant::now();
         let CodedGroup { cages, residual, errors, farthest } = coder.close()?;
         let before = self.writer.frames();
-        errors.iter().enumerate().for_each(|(k, error)| self.look_at(before + k, error));
+        let stored: Vec<StoredError> = errors.iter().map(|error| StoredError::of_coded(error, self.diagonal)).collect();
+        // By what readers of the file will know, who take the first of equal ones.
+        for (k, (error, stored)) in errors.iter().zip(&stored).enumerate() {
+            self.look_at(before + k, &FrameError { linf: f64::from(stored.linf) * self.diagonal, ..*error });
+        }
         self.seconds.measure += clock.elapsed().as_secs_f64();
-        let errors: Vec<StoredError> = errors.iter().map(|error| StoredError::new(error, self.diagonal)).collect();
-        Ok(self.writer.write_group(&cages, residual.as_deref(), &errors, farthest)?)
+        Ok(self.writer.write_group(&cages, residual.as_deref(), &stored, farthest)?)
     }
 
     fn look_at(&mut self, frame: usize, error: &FrameError) {

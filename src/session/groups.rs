@@ -231,7 +231,7 @@ impl Session {
             self.touch();
             error
         })?;
-        let errors = coded.errors.iter().map(|error| StoredError::new(error, diagonal)).collect();
+        let errors = coded.errors.iter().map(|error| StoredError::of_coded(error, diagonal)).collect();
         let group = StoredGroup {
             cages: coded.cages,
             residual: coded.residual,

@@ -193,23 +193,27 @@ impl Decoder {
     /// # Panics
     /// Where the lengths do not fit.
     pub fn largest_sum(&self, cages: &[&[f32]]) -> f64 {
-        let mut sizes = vec![0.0f32; self.columns()];
+        // Of each column, along each axis.
+        let mut sizes = vec![[0.0f32; 3]; self.columns()];
         for cages in cages.chunks(BATCH) {
             let (columns, _) = self.values(cages);
-            let sized = |j: usize| columns.row(j).iter().fold(0.0f32, |most, x| most.max(x.abs()));
-            sizes.iter_mut().enumerate().for_each(|(j, size)| *size = size.max(sized(j)));
+            for (j, sizes) in sizes.iter_mut().enumerate() {
+                columns.row(j).iter().enumerate().for_each(|(at, x)| sizes[at % 3] = sizes[at % 3].max(x.abs()));
+            }
         }
         let mut largest = 0.0f32;
         self.phi.for_each_part(|_, phi| {
             let blocks = (0..phi.nrows()).into_par_iter().step_by(BLOCK_ROWS);
             let of_block = |first: usize| {
                 let rows = BLOCK_ROWS.min(phi.nrows() - first);
-                let mut sums = vec![0.0f32; rows];
-                for (j, &size) in sizes.iter().enumerate() {
+                let mut sums = vec![[0.0f32; 3]; rows];
+                for (j, sizes) in sizes.iter().enumerate() {
                     let column = phi.col(j).subrows(first, rows);
-                    sums.iter_mut().zip(column.iter()).for_each(|(sum, x)| *sum += x.abs() * size);
+                    for (sums, x) in sums.iter_mut().zip(column.iter()) {
+                        sums.iter_mut().zip(sizes).for_each(|(sum, size)| *sum += x.abs() * size);
+                    }
                 }
-                sums.into_iter().fold(0.0, f32::max)
+                sums.as_flattened().iter().copied().fold(0.0, f32::max)
             };
             largest = largest.max(blocks.map(of_block).reduce(|| 0.0, f32::max));
         });

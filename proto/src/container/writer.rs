@@ -5,7 +5,7 @@ use super::section::{self, HEADER_BYTES, SectionHeader};
 use super::{CHUNK_FRAMES, Error, HEADER_LIMIT, Header, counted_from_zero, tag};
 use crate::report::Report;
 use crate::wire;
-use cager_codec::{CodedMesh, encode_errors, rounded_error};
+use cager_codec::{CodedMesh, encode_errors};
 use cager_core::mesh::{Model, Point, TriMesh};
 use std::io::Write;
 
@@ -206,15 +206,13 @@ impl<W: Write> ContainerWriter<W> {
     }
 
     fn write_errors(&mut self) -> Result<(), Error> {
-        let mut errors = std::mem::take(&mut self.errors);
+        let errors = std::mem::take(&mut self.errors);
         if self.is_coded {
-            let number = |bytes: &[u8; 4]| rounded_error(f32::from_le_bytes(*bytes));
-            let rounded: Vec<f32> = errors.as_chunks().0.iter().map(number).collect();
-            let coded = encode_errors(rounded.as_chunks().0);
+            let numbers: Vec<f32> = errors.as_chunks().0.iter().map(|&bytes| f32::from_le_bytes(bytes)).collect();
+            let coded = encode_errors(numbers.as_chunks().0);
             if coded.len() < errors.len() {
                 return self.coded(tag::ERRORS, &coded, errors.len(), (0, 0));
             }
-            errors = rounded.iter().flat_map(|error| error.to_le_bytes()).collect();
         }
         self.section(tag::ERRORS, PLANES, 4, 0, &errors)
     }

@@ -192,11 +192,11 @@ class Walk {
     for (const [from, to] of opened) {
       this.gates.add(from, to, Math.min(this.facesAt[from], this.facesAt[to]));
     }
-    nearer.forEach((vertex) => this.comeNearer(vertex));
+    nearer.forEach((vertex) => this.requeueOpenEdges(vertex));
   }
 
   /** Sorts the open edges of a vertex anew where none of their ends has fewer faces to come. */
-  private comeNearer(vertex: number): void {
+  private requeueOpenEdges(vertex: number): void {
     const toCome = this.facesAt[vertex];
     if (toCome >= MOST_TO_COME) {
       return;

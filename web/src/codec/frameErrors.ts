@@ -45,7 +45,7 @@ class ErrorSeries {
     this.around = (this.around + Math.min(Math.abs(difference), MOST_SIZE)) >> 1;
     this.words[frame] = this.before << LEFT_OUT;
     if (this.before < 0 || this.before >= NUMBERS || this.errors[frame] < 0) {
-      throw new CodedDataError('errors of frames are none');
+      throw new CodedDataError('an error of a frame is negative or out of range');
     }
   }
 }

@@ -3,7 +3,7 @@
 /** Gates are told apart by the faces to come at their ends up to this number. */
 export const MOST_TO_COME = 15;
 
-/** Numbers of gates that were taken which are dropped at once, unless that are all. */
+/** Entries of gates that were taken are dropped from the front of the list when they are so many, and half of it. */
 const LEAST_DROPPED = 1 << 10;
 
 export type Gate = readonly [from: number, to: number];

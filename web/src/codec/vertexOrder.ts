@@ -10,7 +10,7 @@ import { SIZE_CLASSES, sizeClass } from './integers';
 import { BinaryModels, type RangeDecoder } from './rangeDecoder';
 
 /** Vertices with more neighbours move none of them when one of these is numbered. */
-const MOST_PASSED_ON = 32;
+const MOST_PASSED_ON = 16;
 /** Most points for which neighbours of neighbours are moved too. */
 export const MOST_FAR_POINTS = 1 << 17;
 /** Most binary digits of a place below its leading 1. */

@@ -210,7 +210,8 @@ export class ContainerStream {
         this.note(problem);
       }
     } else if (tag === 'ERRS') {
-      this.errors = await decodeErrors(section, this.parser.layout.frames, this.codec!);
+      this.codec ??= this.options.codec ?? createCodec();
+      this.errors = await decodeErrors(section, this.parser.layout.frames, this.codec);
     } else if (tag === 'fnum') {
       this.frameNumbers = decodeFrameNumbers(section);
     } else if (tag === 'rcol') {
