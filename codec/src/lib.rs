@@ -14,6 +14,7 @@ mod entropy;
 mod error;
 mod fenwick;
 mod frame_errors;
+mod gates;
 mod grid;
 mod hierarchy;
 mod histograms;
@@ -24,7 +25,9 @@ mod parallelograms;
 mod prediction_weights;
 mod residual;
 mod trajectories;
+mod vertex_names;
 mod vertex_order;
+mod walk;
 
 pub use basis::CageBasis;
 pub use cage::{Neighbours, decode_cages, encode_cages, is_rotated};

@@ -1,0 +1,272 @@
+//! The walk over a mesh, from a face across an edge to the next, as encoder and decoder take it.
+
+use crate::entropy::{Bit, Coder, Integers};
+use crate::gates::{Gates, MOST_TO_COME};
+use crate::open_edges::{NEWEST, OpenEdges};
+use crate::vertex_names::{Names, UNMET};
+
+/// Faces at a vertex are told apart up to this number.
+const MOST_FACES: u32 = 8;
+/// Pairs of such numbers.
+const PAIRS: usize = (MOST_FACES as usize + 1).pow(2);
+/// Open edges of a vertex that are sorted anew with it, in either direction: ordinary meshes have no more.
+const MOST_NEARER: usize = 4;
+/// Vertices that a corner is looked for among, those that open edges lead to.
+const MOST_NEAR: usize = 8;
+
+/// What the walk knows of the mesh.
+pub(crate) struct Walk {
+    /// Ends of the directed edges that wait for their opposite, by where these begin, and the other way round.
+    leaving: Vec<OpenEdges>,
+    arriving: Vec<OpenEdges>,
+    /// The vertices that were met, in order, and the place of each in it.
+    met: Vec<u32>,
+    pub(crate) turns: Vec<u32>,
+    /// Faces that each vertex still is a corner of; of [`crate::mesh::MeshVersion::First`] those that it was of.
+    faces: Vec<u32>,
+    /// The last face, counted from 1, that each vertex is a corner of, and the face that is coded.
+    of_face: Vec<u32>,
+    face: u32,
+    gates: Gates,
+    arity: u32,
+    /// Corners that are not coded yet: a damaged face has no more.
+    corners_left: usize,
+    across: Vec<Bit>,
+    /// Whether faces follow that begin anywhere.
+    pub(crate) more: Bit,
+    same_arity: Bit,
+    first_time: Vec<Bit>,
+    place: Vec<Bit>,
+    arities: Integers,
+    face_counts: Integers,
+    names: Names,
+}
+
+impl Walk {
+    pub(crate) fn new(points: usize, corners: usize, gates: Gates, names: Names) -> Self {
+        Self {
+            leaving: std::iter::repeat_with(OpenEdges::default).take(points).collect(),
+            arriving: std::iter::repeat_with(OpenEdges::default).take(points).collect(),
+            met: Vec::new(),
+            turns: vec![UNMET; points],
+            faces: vec![0; points],
+            of_face: vec![0; points],
+            face: 0,
+            gates,
+            arity: 3,
+            corners_left: corners,
+            across: vec![Bit::default(); 9],
+            more: Bit::default(),
+            same_arity: Bit::default(),
+            first_time: vec![Bit::default(); 2 * PAIRS],
+            place: vec![Bit::default(); 8 * MOST_NEAR],
+            arities: Integers::new(1),
+            face_counts: Integers::new(1),
+            names,
+        }
+    }
+
+    /// The next edge that still waits for a face.
+    pub(crate) fn gate(&mut self) -> Option<(u32, u32)> {
+        while let Some((a, b)) = self.gates.pop() {
+            if self.leaving[a as usize].contains(b) {
+                return Some((a, b));
+            }
+        }
+        None
+    }
+
+    fn is_first_version(&self) -> bool {
+        matches!(self.names, Names::Numbers(_))
+    }
+
+    /// Fewest faces that are to come at an end of an edge.
+    fn to_come(&self, (a, b): (u32, u32)) -> u32 {
+        self.faces[a as usize].min(self.faces[b as usize])
+    }
+
+    /// Sorts the open edges of a vertex anew where none of their ends has fewer faces to come.
+    fn requeue_open_edges(&mut self, v: u32) {
+        let faces = self.faces[v as usize];
+        if faces >= MOST_TO_COME {
+            return;
+        }
+        let mut scratch = [0; NEWEST];
+        for &x in last_few(self.leaving[v as usize].newest(&mut scratch)) {
+            if self.faces[x as usize] >= faces {
+                self.gates.push((v, x), faces);
+            }
+        }
+        for &x in last_few(self.arriving[v as usize].newest(&mut scratch)) {
+            if self.faces[x as usize] >= faces {
+                self.gates.push((x, v), faces);
+            }
+        }
+    }
+
+    /// Codes whether a face follows across a gate.
+    pub(crate) fn code_across(&mut self, coder: &mut impl Coder, (a, b): (u32, u32), follows: bool) -> bool {
+        let to_come = |v: u32| self.faces[v as usize].min(2) as usize;
+        let context = if self.is_first_version() { 0 } else { 3 * to_come(a) + to_come(b) };
+        coder.bit(&mut self.across[context], follows)
+    }
+
+    /// The edge from a to b waits no longer.
+    pub(crate) fn close(&mut self, a: u32, b: u32) -> bool {
+        let was_open = self.leaving[a as usize].remove(b);
+        if was_open {
+            self.arriving[b as usize].remove(a);
+        }
+        was_open
+    }
+
+    /// Codes a face, which begins with the opposite of the gate's edge where there is a gate, and takes it into the walk. Damaged bytes may name
+    /// vertices that do not exist or too many corners; the face is then none of this mesh.
+    pub(crate) fn face(&mut self, coder: &mut impl Coder, gate: Option<(u32, u32)>, given: &[u32]) -> Vec<u32> {
+        let arity = given.len() as u32;
+        if coder.bit(&mut self.same_arity, arity != self.arity) {
+            self.arity = self.arities.natural(coder, 0, arity);
+        }
+        let Some(left) = self.corners_left.checked_sub(self.arity as usize) else { return Vec::new() };
+        self.corners_left = left;
+        let mut face = gate.map_or_else(Vec::new, |(a, b)| vec![b, a]);
+        face.truncate(self.arity as usize);
+        self.face += 1;
+        face.iter().for_each(|&v| self.of_face[v as usize] = self.face);
+        while face.len() < self.arity as usize {
+            let closes = face.len() + 1 == self.arity as usize && gate.is_some();
+            let vertex = self.corner(coder, &face, closes, given.get(face.len()).copied().unwrap_or(0));
+            if vertex as usize >= self.turns.len() {
+                return vec![vertex];
+            }
+            face.push(vertex);
+            self.of_face[vertex as usize] = self.face;
+        }
+        let (mut opened, mut nearer) = (Vec::with_capacity(face.len()), Vec::with_capacity(face.len()));
+        for (k, &from) in face.iter().enumerate() {
+            let to = face[(k + 1) % face.len()];
+            if !self.close(to, from) {
+                self.leaving[from as usize].push(to);
+                self.arriving[to as usize].push(from);
+                opened.push((from, to));
+            }
+            let faces = self.faces[from as usize];
+            if self.is_first_version() {
+                self.faces[from as usize] = faces + 1;
+            } else if faces > 0 {
+                self.faces[from as usize] = faces - 1;
+                nearer.push(from);
+            }
+        }
+        for gate in opened {
+            self.gates.push(gate, self.to_come(gate));
+        }
+        nearer.into_iter().for_each(|v| self.requeue_open_edges(v));
+        face
+    }
+
+    /// Codes the vertex after those of `face`; `closes` says that an edge leads from it back to the gate.
+    fn corner(&mut self, coder: &mut impl Coder, face: &[u32], closes: bool, given: u32) -> u32 {
+        let (Some(&previous), Some(&first)) = (face.last(), face.first()) else {
+            return self.any(coder, given);
+        };
+        // Vertices that an open edge leads from to the last corner, or to from the first one.
+        let mut near: Vec<u32> = Vec::with_capacity(4);
+        let mut both = false;
+        let is_corner = |x: u32| self.of_face[x as usize] == self.face;
+        let (mut scratch, mut other) = ([0; NEWEST], [0; NEWEST]);
+        let back = if closes { self.leaving[first as usize].newest(&mut scratch) } else { &[] };
+        for &x in self.arriving[previous as usize].newest(&mut other).iter().rev() {
+            if back.contains(&x) && !is_corner(x) {
+                near.insert(0, x);
+                both = true;
+            } else {
+                near.push(x);
+            }
+        }
+        near.extend(back.iter().rev());
+        near.retain(|&x| !is_corner(x));
+        let mut k = 0;
+        while k < near.len() {
+            if near[..k].contains(&near[k]) {
+                near.remove(k);
+            } else {
+                k += 1;
+            }
+        }
+        near.truncate(MOST_NEAR);
+        let faces = |v: u32| self.faces[v as usize].min(MOST_FACES);
+        let pair = ((MOST_FACES + 1) * faces(previous) + faces(first)) as usize;
+        let ends = usize::from(faces(previous) == 1) + 2 * usize::from(faces(first) == 1);
+        let (context, ends) = match (both, self.is_first_version()) {
+            (true, true) => (PAIRS, 0),
+            (false, true) => (pair, 0),
+            (both, false) => (PAIRS * usize::from(both) + pair, ends),
+        };
+        let new = self.is_unmet(given);
+        if coder.bit(&mut self.first_time[context], new) {
+            return self.new_vertex(coder, previous.max(first), given);
+        }
+        let context = MOST_NEAR * (2 * ends + usize::from(both));
+        for (k, &x) in near.iter().enumerate() {
+            if !coder.bit(&mut self.place[context + k], x != given) {
+                return x;
+            }
+        }
+        self.met_vertex(coder, given)
+    }
+
+    /// A corner of the first face of a part.
+    fn any(&mut self, coder: &mut impl Coder, given: u32) -> u32 {
+        let new = self.is_unmet(given);
+        if coder.bit(&mut self.first_time[0], new) {
+            let last = self.met.last().copied().unwrap_or(0);
+            self.new_vertex(coder, last, given)
+        } else {
+            self.met_vertex(coder, given)
+        }
+    }
+
+    fn is_unmet(&self, vertex: u32) -> bool {
+        self.turns.get(vertex as usize).is_none_or(|&turn| turn == UNMET)
+    }
+
+    /// A vertex met for the first time, `near` another.
+    fn new_vertex(&mut self, coder: &mut impl Coder, near: u32, given: u32) -> u32 {
+        let turn = self.met.len() as u32;
+        let (vertex, faces) = match &mut self.names {
+            Names::Given(faces) => (given, faces[given as usize]),
+            Names::Turns => (turn, 1),
+            Names::Numbers(numbers) => (numbers.read(coder, near), 0),
+        };
+        if !self.is_first_version() && (vertex as usize) < self.faces.len() {
+            // Of the first face of all it is a corner now.
+            self.faces[vertex as usize] = self.face_counts.natural(coder, 0, faces - 1).saturating_add(1);
+        }
+        if let Some(place) = self.turns.get_mut(vertex as usize) {
+            *place = turn;
+            self.met.push(vertex);
+        }
+        vertex
+    }
+
+    /// A vertex that was met, but that nothing leads to.
+    fn met_vertex(&mut self, coder: &mut impl Coder, given: u32) -> u32 {
+        if let Names::Numbers(_) = self.names {
+            return coder.bits(32, 0);
+        }
+        let turn = self.turns.get(given as usize).copied().unwrap_or(0);
+        let turn = coder.bits(u32::BITS - (self.met.len() as u32).leading_zeros(), turn);
+        self.met.get(turn as usize).copied().unwrap_or(UNMET)
+    }
+
+    /// Gives the vertices of no face the last turns.
+    pub(crate) fn number_isolated_vertices(&mut self) {
+        let unmet = self.turns.iter_mut().filter(|turn| **turn == UNMET);
+        unmet.zip(self.met.len() as u32..).for_each(|(turn, next)| *turn = next);
+    }
+}
+
+fn last_few(ends: &[u32]) -> &[u32] {
+    &ends[ends.len().saturating_sub(MOST_NEARER)..]
+}
