@@ -24,10 +24,14 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     let mut outputs = Outputs::new(args.outputs, [&args.rest, &args.cage, &args.frames])?;
     // Without the page, the figures take the place of the report.
     let page = ReportPage::built_in();
+    let figures = args.json.clone().unwrap_or_else(|| figures_path(&args.output));
+    if page.is_none() && (args.json.is_some() || figures != args.output) && args.output.as_os_str() != "-" {
+        // Refused for the same reasons as where it is written.
+        outputs.text(&args.output)?;
+    }
     let (output, json) = match (&page, &args.json) {
         (Some(_), json) => (outputs.text(&args.output)?, json.as_ref().map(|path| outputs.text(path)).transpose()?),
-        (None, Some(json)) => (outputs.text(json)?, None),
-        (None, None) => (outputs.text(&figures_path(&args.output))?, None),
+        (None, _) => (outputs.text(&figures)?, None),
     };
     let rest = read_model(&args.rest)?;
     let cage = read_cage(&args.cage, args.flip_cage)?;
