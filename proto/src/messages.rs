@@ -33,7 +33,8 @@ pub struct SessionOptions {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(pattern = "^(mvc|harmonic|green|green-free)$"))]
     pub coordinates: Option<String>,
-    /// Points the inversion reads: `spread` (where it is left out), `maxvol`, `rectangular` or `all`.
+    /// Points the inversion reads: `spread`, `maxvol`, `rectangular` or `all`. Where it is left out `spread`, or `all` where frames are coded, but for
+    /// `green` coordinates.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(pattern = "^(maxvol|rectangular|spread|all)$"))]
     pub handles: Option<String>,
@@ -52,10 +53,11 @@ pub struct SessionOptions {
     )]
     pub regularizer: Option<String>,
     /// Spectrum threshold: how many of the last singular directions are regularised; 20, or a sixteenth of the unknowns where that
-    /// is less, where it is left out.
+    /// is less, where it is left out. Where frames are coded and neither it, `lambda` nor a `regularizer` is given, all are, with a `lambda` of
+    /// 0.001, but for `green` coordinates.
     #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "threshold")]
     pub spectrum: Option<u32>,
-    /// Weight of the regularisation.
+    /// Weight of the regularisation; 1 where it is left out, but see `spectrum`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(minimum = 0))]
     pub lambda: Option<f64>,

@@ -186,9 +186,9 @@ pub(crate) struct SolverArgs {
     #[arg(long, value_parser = names::coordinates(), default_value = "mvc")]
     pub(crate) coordinates: &'static dyn CoordinateSystem,
 
-    /// Points the inversion reads.
-    #[arg(long, value_parser = names::handles(), default_value = Handles::default().name())]
-    pub(crate) handles: Handles,
+    /// Points the inversion reads [default: spread; all where frames are coded, but for green coordinates].
+    #[arg(long, value_parser = names::handles())]
+    pub(crate) handles: Option<Handles>,
 
     /// How many points rectangular and spread read: from the number of the cage's unknowns to that of the model's points
     /// [default: twice the unknowns].
@@ -205,7 +205,8 @@ pub(crate) struct SolverArgs {
     pub(crate) regularizer_matrix: Option<PathBuf>,
 
     /// Spectrum threshold: how many of the last singular directions are regularised; "all" of them; or "auto": as many as
-    /// --spectrum-bound allows, measured on frames of the capture [default: 20, or a sixteenth of the unknowns where that is less].
+    /// --spectrum-bound allows, measured on frames of the capture [default: 20, or a sixteenth of the unknowns where that is less; where frames are
+    /// coded, but for green coordinates, all with a λ of 0.001, unless λ or another treatment is given].
     #[arg(long, value_name = "S", value_parser = spectrum, allow_negative_numbers = true)]
     pub(crate) spectrum: Option<SpectrumArg>,
 
@@ -214,9 +215,9 @@ pub(crate) struct SolverArgs {
     pub(crate) spectrum_bound: Option<f64>,
 
     /// Weight of the regularisation beside the mean square error of the points, whichever points are read; 0 is the same as --spectrum 0
-    /// (for tikhonov it is the damping α).
-    #[arg(long, value_name = "L", default_value_t = 1.0, allow_negative_numbers = true)]
-    pub(crate) lambda: f64,
+    /// (for tikhonov it is the damping α) [default: 1, but see --spectrum].
+    #[arg(long, value_name = "L", allow_negative_numbers = true)]
+    pub(crate) lambda: Option<f64>,
 }
 
 /// Turn a .cager file back into positions, or into its cages; move other models by them.

@@ -6,11 +6,9 @@ use super::coding_args::goal;
 use super::dry_run::{read_files, size, tell_dry_run};
 use super::encode_summary::{summary, write_report};
 use super::outputs::Outputs;
-use super::solver_options::{
-    designed_spectrum, matrix, read_cage, solver, solver_for, spectrum_bound, with_input_name,
-};
+use super::solver_options::{designed_spectrum, inversion_choices, matrix, read_cage, spectrum_bound, with_input_name};
 use super::{design, encode_remote, grouped, human_bytes, progress, tell, warn};
-use crate::coding::{CAGE_SIZE_FRAMES, CageSizes, Goal};
+use crate::coding::{CAGE_SIZE_FRAMES, CageSizes, Goal, InversionChoices};
 use crate::design::{read_frames, report as design_report};
 use crate::encode::{self, ChooseSpectrum, EncodeProgress, Encoded, Job, sample_frames};
 use crate::frames::CaptureFiles;
@@ -20,7 +18,7 @@ use anyhow::{Context, Result, bail};
 use cager_cages::{DesignOptions, Style};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
-use cager_core::inversion::{PrepareError, Solver, SolverOptions, check_options, default_spectrum};
+use cager_core::inversion::{PrepareError, Solver, SolverOptions, check_options};
 use cager_core::mesh::Model;
 use cager_core::regularize::{Regularizer, SparseMatrix, Term};
 use cager_formats::{AtomicFile, FrameReader, Target, commit_together, read_model};
@@ -102,7 +100,7 @@ fn dry_run(
         }
         None => {
             design_options(args, rest.points.len())?;
-            solver_for(&args.solver, |_| 0)?;
+            inversion_choices(&args.solver, false, 0)?;
             if args.server.is_some() {
                 designed_spectrum(&args.solver)?;
             }
@@ -160,12 +158,13 @@ fn best_cage_size(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Resu
     let (Some(goal), None, None) = (goal, args.design.cage_vertices, args.design.mean_error) else { return Ok(None) };
     let frames = sample_frames(reader.as_mut(), CAGE_SIZE_FRAMES, true).map_err(|error| name_files(error, args))?;
     let memory = args.memory.unwrap_or_else(Memory::half_of_free);
-    let (system, _) = solver_for(&args.solver, |_| 0)?;
+    let system = args.solver.coordinates;
+    inversion_choices(&args.solver, false, 0)?;
     let sizes = CageSizes { goal, rest, system, frames: &frames, total, memory };
     let bar = progress::steps();
     bar.set_message("trying cages of several sizes");
     let best = sizes.best(|cage, rest| {
-        let options = SolverOptions { spectrum: default_spectrum(system.unknowns(cage)), ..SolverOptions::default() };
+        let options = InversionChoices::coded(system).options(system.unknowns(cage));
         Solver::prepare(system, cage, &rest.points, options)
     });
     bar.finish_and_clear();
@@ -184,7 +183,7 @@ fn encode_locally(
     let memory = args.memory.unwrap_or_else(Memory::half_of_free);
     let mut frames = files.open()?;
     let read_seconds = clock.elapsed().as_secs_f64();
-    let (system, options) = solver(&args.solver, cage)?;
+    let (system, options) = solver(args, rest, cage)?;
     let matrix = matrix(&args.solver)?;
     let choose = match (args.solver.spectrum, spectrum_bound(&args.solver)?) {
         (Some(SpectrumArg::Auto), bound) => {
@@ -231,6 +230,15 @@ fn choosing_frames(frames: &mut dyn FrameReader, first_ones: bool) -> Result<Vec
     sample_frames(frames, if first_ones { 96 } else { 24 }, first_ones)
 }
 
+/// What the arguments say of the inversion, and what is usual for this rest pose and cage.
+fn solver(args: &EncodeArgs, rest: &Model, cage: &Cage) -> Result<(&'static dyn CoordinateSystem, SolverOptions)> {
+    let system = args.solver.coordinates;
+    let unknowns = system.unknowns(cage);
+    // The number of frames says how large a file may be, not whether it is coded.
+    let is_coded = goal(args, rest, 1)?.is_some();
+    Ok((system, inversion_choices(&args.solver, is_coded, unknowns)?.options(unknowns)))
+}
+
 /// [`solver`] for this rest pose and cage, with all checked that needs no coordinates.
 pub(super) fn checked_solver(
     args: &EncodeArgs,
@@ -238,7 +246,7 @@ pub(super) fn checked_solver(
     cage: &Cage,
     matrix: Option<&SparseMatrix>,
 ) -> Result<(&'static dyn CoordinateSystem, SolverOptions)> {
-    let (system, options) = solver(&args.solver, cage)?;
+    let (system, options) = solver(args, rest, cage)?;
     let delta = matrix.map_or(Ok(()), |matrix| matrix.delta(cage, system.unknowns(cage)).map(|_| ()));
     match delta.map_err(PrepareError::from).and_then(|()| Solver::check(system, cage, &rest.points, options)) {
         // A service knows its own memory.

@@ -3,7 +3,7 @@
 use super::args::{EncodeArgs, SolverArgs, SpectrumArg};
 use super::coding_args::goal;
 use super::encode::{Targets, checked_solver, design_options, finish, sized_design};
-use super::solver_options::{designed_spectrum, matrix, solver_for, spectrum_bound};
+use super::solver_options::{designed_spectrum, inversion_choices, matrix, spectrum_bound};
 use super::{plain, progress, tell, warn};
 use crate::coding::Goal;
 use crate::frames::CaptureFiles;
@@ -38,15 +38,15 @@ pub(super) fn run(
     let matrix = matrix(&args.solver)?;
     spectrum_bound(&args.solver)?;
     refuse_choosing(&args.solver)?;
-    let (system, options, spectrum) = match cage {
+    let spectrum = match cage {
         Some(cage) => {
-            let (system, options) = checked_solver(args, rest, cage, matrix.as_ref())?;
+            let (_, options) = checked_solver(args, rest, cage, matrix.as_ref())?;
             // The threshold was checked above; regularizers without one ignore it.
-            (system, options, Some(u32::try_from(options.spectrum).unwrap_or(u32::MAX)))
+            args.solver.spectrum.map(|_| u32::try_from(options.spectrum).unwrap_or(u32::MAX))
         }
         None => {
-            let (system, options) = solver_for(&args.solver, |_| 0)?;
-            (system, options, designed_spectrum(&args.solver)?)
+            inversion_choices(&args.solver, false, 0)?;
+            designed_spectrum(&args.solver)?
         }
     };
     let handle_count = args.solver.handle_count.map(u32::try_from).transpose();
@@ -59,12 +59,12 @@ pub(super) fn run(
             .file_stem()
             .filter(|&name| name != "-")
             .map(|name| name.to_string_lossy().chars().take(200).collect()),
-        coordinates: Some(system.name().to_owned()),
-        handles: Some(options.handles.name().to_owned()),
+        coordinates: Some(args.solver.coordinates.name().to_owned()),
+        handles: args.solver.handles.map(|handles| handles.name().to_owned()),
         handle_count: handle_count.context("--handle-count: is larger than any number of points")?,
-        regularizer: Some(options.regularizer.name().to_owned()),
+        regularizer: Some(args.solver.regularizer.name().to_owned()),
         spectrum,
-        lambda: Some(options.lambda),
+        lambda: args.solver.lambda,
         flip_cage: args.flip_cage,
         frame_rate: frames.frame_rate(),
         frames: frames.frames(),

@@ -2,11 +2,11 @@
 
 use super::args::{SolverArgs, SpectrumArg};
 use super::{grouped, warn};
+use crate::coding::InversionChoices;
 use anyhow::{Context, Result, bail};
 use cager_cages::diagnosis::weld;
 use cager_core::cage::{Cage, CageError};
-use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{Handles, PrepareError, SolverOptions, default_spectrum};
+use cager_core::inversion::{Handles, PrepareError};
 use cager_core::mesh::TriMesh;
 use cager_core::regularize::{Regularizer, SparseMatrix};
 use cager_formats::{read_matrix, read_model};
@@ -35,33 +35,25 @@ pub(super) fn read_cage(path: &Path, flip: bool) -> Result<Cage> {
         .with_context(|| path.display().to_string())
 }
 
-pub(super) fn solver(args: &SolverArgs, cage: &Cage) -> Result<(&'static dyn CoordinateSystem, SolverOptions)> {
-    solver_for(args, |system| system.unknowns(cage))
-}
-
-/// As [`solver`], for a cage of so many unknowns.
-pub(super) fn solver_for(
-    args: &SolverArgs,
-    unknowns: impl FnOnce(&'static dyn CoordinateSystem) -> usize,
-) -> Result<(&'static dyn CoordinateSystem, SolverOptions)> {
-    let system = args.coordinates;
-    let unknowns = unknowns(system);
-    let options = SolverOptions {
-        handles: Handles::by_name(args.handles.name(), args.handle_count)
-            .context("--handle-count: maxvol and all read a number of points of their own; leave it out")?,
-        regularizer: args.regularizer,
-        spectrum: match args.spectrum {
-            None => default_spectrum(unknowns),
-            Some(SpectrumArg::Threshold(s)) => s,
-            Some(SpectrumArg::All) => unknowns,
-            Some(SpectrumArg::Auto) => 0,
-        },
-        lambda: args.lambda,
-    };
-    if matches!(args.spectrum, Some(SpectrumArg::Auto)) && !options.regularizer.has_threshold() {
-        bail!("--spectrum auto: {} has no threshold to choose; leave it out", options.regularizer.name());
+/// What the arguments say of the inversion, for a cage of so many unknowns.
+pub(super) fn inversion_choices(args: &SolverArgs, is_coded: bool, unknowns: usize) -> Result<InversionChoices> {
+    let SolverArgs { coordinates: system, handles, handle_count, regularizer, lambda, .. } = *args;
+    if matches!(args.spectrum, Some(SpectrumArg::Auto)) && !regularizer.has_threshold() {
+        bail!("--spectrum auto: {} has no threshold to choose; leave it out", regularizer.name());
     }
-    Ok((system, options))
+    let given = match (handles, handle_count) {
+        (None, None) => None,
+        (handles, count) => Some(
+            Handles::by_name(handles.unwrap_or_default().name(), count)
+                .context("--handle-count: maxvol and all read a number of points of their own; leave it out")?,
+        ),
+    };
+    let spectrum = args.spectrum.map(|spectrum| match spectrum {
+        SpectrumArg::Threshold(s) => s,
+        SpectrumArg::All => unknowns,
+        SpectrumArg::Auto => 0,
+    });
+    Ok(InversionChoices { system, handles: given, regularizer, spectrum, lambda, is_coded })
 }
 
 /// The threshold for a cage that is not known yet; none where the service chooses.

@@ -5,12 +5,14 @@
 
 mod cage_size;
 mod group;
+mod inversion;
 mod meshes;
 mod model;
 mod steps;
 
 pub(crate) use cage_size::{CageSizes, FRAMES as CAGE_SIZE_FRAMES};
 pub(crate) use group::{Carried, CodedGroup, GroupCoder, Room};
+pub(crate) use inversion::InversionChoices;
 pub(crate) use meshes::RestMeshes;
 pub(crate) use model::{GroupDecoder, GroupSpace};
 
@@ -44,7 +46,7 @@ impl Goal {
     /// [`CodingError::BelowPrecision`].
     pub(crate) fn check_precision(self, diagonal: f64, slack: f64) -> Result<(), CodingError> {
         let (asked, times) = match self {
-            Self::MaxError(error) => (error, 3.0),
+            Self::MaxError(error) => (error, 2.0),
             Self::MeanError(error) => (error, 1.0),
             _ => return Ok(()),
         };

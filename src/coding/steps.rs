@@ -2,9 +2,10 @@
 
 use super::group::{CodedGroup, GroupCoder, Room};
 use super::{CodingError, Goal};
+use std::ops::Range;
 use std::sync::Arc;
 
-/// Frames that steps are chosen by, and points of them where there are more than twice as many: fewer points had larger files in the end.
+/// Frames that steps are chosen by, at most, and points of them where there are more than twice as many: fewer points had larger files in the end.
 const TRIAL_FRAMES: usize = 32;
 const TRIAL_POINTS: usize = 10_000;
 /// Step of the cage over that of the residual, both as what they move the points, where nothing was measured.
@@ -19,24 +20,32 @@ const NEAR: f64 = 1.02;
 /// Most steps that are tried for a group.
 const MOST_TRIALS: usize = 20;
 
+/// Of so many frames those that steps are chosen by: a run in either half, since a capture may begin more calmly than it goes on.
+fn trial_frames(count: usize) -> [Range<usize>; 2] {
+    let middle_of = |half: Range<usize>| {
+        let run = half.len().min(TRIAL_FRAMES / 2);
+        let first = half.start + (half.len() - run) / 2;
+        first..first + run
+    };
+    [middle_of(0..count / 2), middle_of(count / 2..count)]
+}
+
 impl GroupCoder {
-    /// Step and ratio by what the first frames cost, of some patches of a large model.
+    /// Step and ratio by what some frames cost, of some patches of a large model.
     pub(super) fn choose(&self) -> Result<(f64, f64), CodingError> {
         match self.goal {
             Goal::Preview => Ok((2.8e-3 * self.diagonal / USUAL_RATIO * self.per_row(), USUAL_RATIO)),
             Goal::Standard => Ok((3e-3 * self.diagonal, USUAL_RATIO)),
             Goal::MaxError(error) => {
                 let unit = error * self.diagonal;
-                let part = self.part();
-                let trial = part.as_ref().unwrap_or(self);
-                let count = trial.frames.len().min(TRIAL_FRAMES);
+                let trial = self.trial();
                 let part = trial.model.points() as f64 / self.model.points() as f64;
                 let size = |(step, ratio): (f64, f64)| {
-                    let bytes = trial.estimate(count, step * unit, ratio * part.sqrt(), part);
+                    let bytes = trial.estimate(trial.frames.len(), step * unit, ratio * part.sqrt(), part);
                     bytes.map(|bytes| (bytes, (step, ratio)))
                 };
                 let mut best = size((USUAL_STEP, USUAL_RATIO))?;
-                for (step, ratio) in [(1.0, 1.6), (1.4, 1.0)] {
+                for (step, ratio) in [(1.4, 1.0), (1.0, 1.6)] {
                     let (_, from) = best;
                     let (more, less) = ((from.0 * step, from.1 * ratio), (from.0 / step, from.1 / ratio));
                     let (more, less) = rayon::join(|| size(more), || size(less));
@@ -53,21 +62,25 @@ impl GroupCoder {
         }
     }
 
-    /// Of a large model, a coder with some patches of the first frames.
-    fn part(&self) -> Option<Self> {
+    /// A coder with the frames that steps are chosen by, and of a large model with some patches.
+    fn trial(&self) -> Self {
         let every = self.model.points() / TRIAL_POINTS;
-        if every < 2 {
-            return None;
-        }
-        let (model, points) = self.model.part(every);
-        let of_points = |frame: &Vec<f64>| {
-            points.iter().flat_map(|&i| frame[3 * i as usize..][..3].iter().copied()).collect::<Vec<f64>>()
+        let (model, points) = if every < 2 {
+            (Arc::clone(&self.model), None)
+        } else {
+            let (model, points) = self.model.part(every);
+            (Arc::new(model), Some(points))
         };
-        let count = self.frames.len().min(TRIAL_FRAMES);
-        let mut trial = Self::new(self.goal, Arc::new(model), self.diagonal, self.most, self.carried);
-        trial.frames = self.frames[..count].iter().map(of_points).collect();
-        trial.cages = self.cages[..count].to_vec();
-        Some(trial)
+        let of_points = |frame: &Vec<f64>| match &points {
+            Some(points) => points.iter().flat_map(|&i| frame[3 * i as usize..][..3].iter().copied()).collect(),
+            None => frame.clone(),
+        };
+        let mut trial = Self::new(self.goal, model, self.diagonal, self.most, self.carried);
+        for range in trial_frames(self.frames.len()) {
+            trial.frames.extend(self.frames[range.clone()].iter().map(of_points));
+            trial.cages.extend_from_slice(&self.cages[range]);
+        }
+        trial
     }
 
     /// Root of points over rows of a cage: a step of this times the unit moves the points by about the unit.

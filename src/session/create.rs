@@ -307,7 +307,9 @@ pub(super) const OUTCOME: &str = "outcome";
 fn content_key(tenant: &str, content: &Content, options: &SessionOptions, choices: &Choices) -> ContentKey {
     let extension = |file: &NamedFile| file.name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
     // Defaults are written out, so that an omitted option and its default give the same key; not those of `spectrum` and `handle_count`, which depend
-    // on the cage.
+    // on the cage, and not where frames are coded, where they depend on what else was given.
+    let is_coded = choices.goal.is_some();
+    let inversion = choices.inversion;
     let solving = SessionOptions {
         name: None,
         frame_rate: None,
@@ -315,9 +317,9 @@ fn content_key(tenant: &str, content: &Content, options: &SessionOptions, choice
         // The cage's bytes are hashed below, whatever their source.
         cage: None,
         coordinates: Some(choices.system.name().to_owned()),
-        handles: Some(choices.handles.name().to_owned()),
-        regularizer: Some(choices.regularizer.name().to_owned()),
-        lambda: Some(choices.lambda),
+        handles: if is_coded { options.handles.clone() } else { Some(inversion.handles().name().to_owned()) },
+        regularizer: Some(inversion.regularizer.name().to_owned()),
+        lambda: if is_coded { options.lambda } else { Some(inversion.lambda()) },
         ..options.clone()
     };
     let solving = serde_json::to_vec(&solving).unwrap_or_default();

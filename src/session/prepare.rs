@@ -1,7 +1,7 @@
 //! From uploaded files to a prepared solver: parsing, validation, preparation. All functions block.
 
 use super::solver_cache::Prepared;
-use crate::coding::{CodingError, Goal, RestMeshes, slack};
+use crate::coding::{CodingError, Goal, InversionChoices, RestMeshes, slack};
 use crate::preparation_warnings::preparation_warnings;
 use crate::problem::{self, ApiError};
 use crate::store::{Content, NamedFile};
@@ -10,7 +10,7 @@ use cager_codec::{CodedMesh, MOST_ROWS};
 use cager_core::cage::Cage;
 use cager_core::coordinates;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{Handles, PrepareError, Preparing, Solver, SolverOptions, check_options, default_spectrum};
+use cager_core::inversion::{Handles, PrepareError, Preparing, Solver, SolverOptions, check_options};
 use cager_core::mesh::{Model, TriMesh, diagonal};
 use cager_core::regularize::{Regularizer, SparseMatrix, Term};
 use cager_formats::{MeshFormat, read_matrix_bytes, read_model_bytes};
@@ -23,10 +23,7 @@ use std::path::Path;
 #[derive(Clone, Copy)]
 pub(crate) struct Choices {
     pub(crate) system: &'static dyn CoordinateSystem,
-    pub(crate) handles: Handles,
-    pub(crate) regularizer: Regularizer,
-    pub(crate) spectrum: Option<u32>,
-    pub(crate) lambda: f64,
+    pub(crate) inversion: InversionChoices,
     pub(crate) flip_cage: bool,
     /// What the container is to meet; without it frames are stored as they are solved for.
     pub(crate) goal: Option<Goal>,
@@ -68,29 +65,23 @@ impl Choices {
         let Some(handles) = Handles::by_name(wanted, options.handle_count.map(|count| count as usize)) else {
             return refuse(format!("handle_count: {wanted} has a fixed number of handles; leave it out"));
         };
+        let handles = (options.handles.is_some() || options.handle_count.is_some()).then_some(handles);
         let wanted = options.regularizer.as_deref().unwrap_or(Regularizer::default().name());
         let Some(regularizer) = Regularizer::by_name(wanted) else {
             let names: Vec<&str> = Regularizer::ALL.iter().map(|r| r.name()).collect();
             return refuse(format!("regularizer: {wanted:?} is not available; give one of {}", names.join(", ")));
         };
-        let lambda = options.lambda.unwrap_or(SolverOptions::default().lambda);
-        if !(lambda.is_finite() && lambda >= 0.0) {
+        if let Some(lambda) = options.lambda
+            && !(lambda.is_finite() && lambda >= 0.0)
+        {
             return refuse(format!("lambda: is {lambda}; give a finite number of at least 0"));
         }
-        let (spectrum, flip_cage, exact_rest) = (options.spectrum, options.flip_cage, options.exact_rest);
+        let spectrum = options.spectrum.map(|threshold| threshold as usize);
+        let SessionOptions { lambda, flip_cage, exact_rest, .. } = *options;
         let goal = goal(options)?;
+        let inversion = InversionChoices { system, handles, regularizer, spectrum, lambda, is_coded: goal.is_some() };
         let frames = options.frames.unwrap_or(0);
-        Ok(Self { system, handles, regularizer, spectrum, lambda, flip_cage, goal, exact_rest, frames })
-    }
-
-    /// The solver's options for a cage of so many unknowns.
-    pub(crate) fn solver_options(&self, unknowns: usize) -> SolverOptions {
-        SolverOptions {
-            handles: self.handles,
-            regularizer: self.regularizer,
-            spectrum: self.spectrum.map_or_else(|| default_spectrum(unknowns), |s| s as usize),
-            lambda: self.lambda,
-        }
+        Ok(Self { system, inversion, flip_cage, goal, exact_rest, frames })
     }
 }
 
@@ -141,7 +132,7 @@ pub(crate) struct Geometry {
 
 fn read_matrix(content: &Content, choices: &Choices) -> Result<Option<SparseMatrix>, ApiError> {
     let refuse = |detail: String| Err(ApiError::new(problem::INVALID_OPTIONS, format!("regularizer_matrix: {detail}")));
-    match (&content.matrix, choices.regularizer) {
+    match (&content.matrix, choices.inversion.regularizer) {
         (Some(file), Regularizer::Matrix) => {
             read_matrix_bytes(Path::new(&file.name), &file.bytes).map(Some).or_else(|error| refuse(error.to_string()))
         }
@@ -200,7 +191,7 @@ pub(crate) fn read_cage(file: &NamedFile, choices: &Choices) -> Result<Cage, Api
 /// `INVALID_GEOMETRY`, `INVALID_OPTIONS`.
 pub(crate) fn check(geometry: &Geometry, choices: &Choices, max_bytes: u64) -> Result<(), ApiError> {
     let unknowns = choices.system.unknowns(&geometry.cage);
-    let options = choices.solver_options(unknowns);
+    let options = choices.inversion.options(unknowns);
     // Report a handle count beyond the points before one beyond the memory. With too few points the options are not at fault.
     if geometry.rest.points.len() >= unknowns {
         match check_options(geometry.rest.points.len(), unknowns, options) {
@@ -259,7 +250,7 @@ pub(crate) fn prepare(
     wanted: &dyn Fn() -> bool,
 ) -> Result<Option<Prepared>, ApiError> {
     let unknowns = choices.system.unknowns(&geometry.cage);
-    let options = choices.solver_options(unknowns);
+    let options = choices.inversion.options(unknowns);
     check_memory(geometry, choices, options, max_bytes)?;
     let term = geometry.matrix.as_ref().map(|matrix| matrix as &dyn Term);
     let next = |_| if wanted() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
@@ -386,7 +377,7 @@ mod tests {
         let checked = |system: &str, max_bytes: u64| {
             let options = SessionOptions { coordinates: Some(system.to_owned()), ..SessionOptions::default() };
             let choices = Choices::of(&options).expect("options");
-            let columns = choices.solver_options(choices.system.unknowns(&geometry.cage));
+            let columns = choices.inversion.options(choices.system.unknowns(&geometry.cage));
             let other = check_model(2000, choices.system, &geometry.cage, max_bytes);
             (check_memory(&geometry, &choices, columns, max_bytes), other)
         };

@@ -253,7 +253,7 @@ impl Solvers {
         };
         let file = self.store.content_cage(key).map_err(|error| super::commit::storage_error(&error))?;
         let cage = prepare::read_cage(&file.ok_or_else(deleted)?, choices)?;
-        let options = choices.solver_options(choices.system.unknowns(&cage));
+        let options = choices.inversion.options(choices.system.unknowns(&cage));
         metrics::counter!("cager_cache_total", "result" => "disk").increment(1);
         let total = clock.elapsed().as_secs_f64();
         let seconds = PreparationSeconds { queued, read: total - queued, total, ..PreparationSeconds::default() };

@@ -1,8 +1,10 @@
 //! Sessions as the API returns them.
 
 use super::frames::RANGES;
+use super::prepare::Choices;
 use super::{Phase, Session, lock};
-use cager_core::inversion::{Handles, SolverOptions};
+use crate::coding::InversionChoices;
+use cager_core::inversion::SolverOptions;
 use cager_core::regularize::Regularizer;
 use cager_proto::messages::{FrameCounts, Progress, Session as View, SessionState};
 use std::sync::atomic::Ordering;
@@ -39,6 +41,8 @@ impl Session {
                 missing_next: missing.next,
             }
         };
+        let usual = SolverOptions::default();
+        let inversion = Choices::of(options).ok().map(|choices| choices.inversion);
         let or = |given: &Option<String>, default: &str| given.clone().unwrap_or_else(|| default.to_owned());
         let problem = match &status.phase {
             Phase::Failed(problem) => Some((**problem).clone()),
@@ -55,10 +59,10 @@ impl Session {
             cage_vertices: facts.map(|f| f.cage_vertices),
             cage_faces: facts.map(|f| f.cage_faces),
             coordinates: or(&options.coordinates, "mvc"),
-            handles: or(&options.handles, Handles::default().name()),
+            handles: inversion.map_or(usual.handles, InversionChoices::handles).name().to_owned(),
             regularizer: or(&options.regularizer, Regularizer::default().name()),
             spectrum: facts.map(|f| f.spectrum).or(options.spectrum),
-            lambda: options.lambda.unwrap_or(SolverOptions::default().lambda),
+            lambda: inversion.map_or(usual.lambda, InversionChoices::lambda),
             condition_number: facts.map(|f| f.condition_number),
             rank: facts.map(|f| f.rank),
             affine_reproduction_error: facts.map(|f| f.affine_reproduction_error),

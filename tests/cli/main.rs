@@ -23,6 +23,7 @@ mod memory;
 mod mistakes;
 mod outputs;
 mod ranges;
+mod real_coding;
 mod real_data;
 mod real_green;
 mod real_harmonic;

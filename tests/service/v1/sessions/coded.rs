@@ -3,7 +3,7 @@
 use crate::support::{Api, Capture, HANG, OCTETS, TestApp, eventually, form, piece, within};
 use cager_core::mesh::diagonal;
 use cager_proto::container::ContainerReader;
-use cager_proto::messages::Session;
+use cager_proto::messages::{CacheUse, Session};
 use http::Method;
 use serde_json::{Value, json};
 use std::io::Cursor;
@@ -247,6 +247,19 @@ async fn damage_to_what_waits_or_is_coded_is_found() {
         std::fs::write(&path, bytes).expect("written");
         app.complete(&id, GROUP + 10).await.problem(409, "session-failed");
     }
+}
+
+#[tokio::test]
+async fn cages_that_are_coded_follow_all_points_unless_told_otherwise() {
+    let app = TestApp::start();
+    let coded = session(&app, &json!({ "max_error": 1e-2 })).await;
+    assert_eq!((coded.handles.as_str(), coded.spectrum, coded.lambda), ("all", coded.unknowns, 1e-3));
+    // A weight that is given is for the usual spectrum, so this is another solver.
+    let given = session(&app, &json!({ "max_error": 1e-2, "handles": "all", "lambda": 1e-3 })).await;
+    assert_eq!((given.handles.as_str(), given.lambda, given.cache), ("all", 1e-3, Some(CacheUse::Miss)));
+    assert!(given.spectrum < coded.spectrum, "{:?}", given.spectrum);
+    let green = session(&app, &json!({ "max_error": 1e-2, "coordinates": "green" })).await;
+    assert_eq!((green.handles.as_str(), green.spectrum, green.lambda), ("spread", given.spectrum, 1.0));
 }
 
 #[tokio::test]
