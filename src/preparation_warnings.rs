@@ -32,8 +32,7 @@ pub(crate) fn preparation_warnings(options: SolverOptions, solver: &Solver) -> V
     let (read, points) = (solver.handles().len(), solver.decoder().points());
     // Where every point is read, these are the handles of maximum volume.
     if options.handles == Handles::All && read > unknowns && read < points {
-        warnings
-            .push(format!("of so many points a sample is analysed: with handles `all`, {read} of {points} are read"));
+        warnings.push(format!("of so many points a sample is analysed: {read} of {points} are read"));
     }
     let sigma = &found.singular_values;
     let weak = unknowns - sigma.len() + sigma.iter().filter(|&&s| s < WEAK_SINGULAR_VALUE * sigma[0]).count();

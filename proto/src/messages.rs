@@ -33,8 +33,8 @@ pub struct SessionOptions {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(pattern = "^(mvc|harmonic|green|green-free)$"))]
     pub coordinates: Option<String>,
-    /// Points the inversion reads: `spread`, `maxvol`, `rectangular` or `all`. Where it is left out `spread`, or `all` where frames are coded, but for
-    /// `green` coordinates.
+    /// Points the inversion reads: `spread`, `maxvol`, `rectangular` or `all`. Where it is left out `spread`, or `all` where frames are coded
+    /// (except with `green`).
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(pattern = "^(maxvol|rectangular|spread|all)$"))]
     pub handles: Option<String>,
@@ -53,8 +53,8 @@ pub struct SessionOptions {
     )]
     pub regularizer: Option<String>,
     /// Spectrum threshold: how many of the last singular directions are regularised; 20, or a sixteenth of the unknowns where that
-    /// is less, where it is left out. Where frames are coded and neither it, `lambda` nor a `regularizer` is given, all are, with a `lambda` of
-    /// 0.001, but for `green` coordinates.
+    /// is less, where it is left out. Where frames are coded (except with `green`) and neither it, `lambda` nor another regularizer than `differential` is
+    /// given, all are, with a `lambda` of 0.001.
     #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "threshold")]
     pub spectrum: Option<u32>,
     /// Weight of the regularisation; 1 where it is left out, but see `spectrum`.

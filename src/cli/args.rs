@@ -186,7 +186,7 @@ pub(crate) struct SolverArgs {
     #[arg(long, value_parser = names::coordinates(), default_value = "mvc")]
     pub(crate) coordinates: &'static dyn CoordinateSystem,
 
-    /// Points the inversion reads [default: spread; all where frames are coded, but for green coordinates].
+    /// Points the inversion reads [default: spread; all where frames are coded, except with green].
     #[arg(long, value_parser = names::handles())]
     pub(crate) handles: Option<Handles>,
 
@@ -206,7 +206,7 @@ pub(crate) struct SolverArgs {
 
     /// Spectrum threshold: how many of the last singular directions are regularised; "all" of them; or "auto": as many as
     /// --spectrum-bound allows, measured on frames of the capture [default: 20, or a sixteenth of the unknowns where that is less; where frames are
-    /// coded, but for green coordinates, all with a λ of 0.001, unless λ or another treatment is given].
+    /// coded, except with green, all with a λ of 0.001, unless λ or another regulariser is given].
     #[arg(long, value_name = "S", value_parser = spectrum, allow_negative_numbers = true)]
     pub(crate) spectrum: Option<SpectrumArg>,
 
@@ -215,7 +215,7 @@ pub(crate) struct SolverArgs {
     pub(crate) spectrum_bound: Option<f64>,
 
     /// Weight of the regularisation beside the mean square error of the points, whichever points are read; 0 is the same as --spectrum 0
-    /// (for tikhonov it is the damping α) [default: 1, but see --spectrum].
+    /// (for tikhonov it is the damping α) [default: 1; with the default spectrum of frames that are coded 0.001].
     #[arg(long, value_name = "L", allow_negative_numbers = true)]
     pub(crate) lambda: Option<f64>,
 }

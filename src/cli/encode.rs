@@ -6,7 +6,9 @@ use super::coding_args::goal;
 use super::dry_run::{read_files, size, tell_dry_run};
 use super::encode_summary::{summary, write_report};
 use super::outputs::Outputs;
-use super::solver_options::{designed_spectrum, inversion_choices, matrix, read_cage, spectrum_bound, with_input_name};
+use super::solver_options::{
+    check_inversion, designed_spectrum, inversion_choices, matrix, read_cage, spectrum_bound, with_input_name,
+};
 use super::{design, encode_remote, grouped, human_bytes, progress, tell, warn};
 use crate::coding::{CAGE_SIZE_FRAMES, CageSizes, Goal, InversionChoices};
 use crate::design::{read_frames, report as design_report};
@@ -88,7 +90,8 @@ fn dry_run(
     }
     let what = match cage {
         Some(cage) => {
-            let (system, _) = checked_solver(args, rest, cage, matrix.as_ref())?;
+            checked_options(args, rest, cage, matrix.as_ref())?;
+            let system = args.solver.coordinates;
             let frames = read_files(files)?;
             match goal(args, rest, frames)? {
                 None => format!("cages of {}, and the rest pose", size(frames, system.unknowns(cage), "unknowns")),
@@ -100,7 +103,7 @@ fn dry_run(
         }
         None => {
             design_options(args, rest.points.len())?;
-            inversion_choices(&args.solver, false, 0)?;
+            check_inversion(&args.solver)?;
             if args.server.is_some() {
                 designed_spectrum(&args.solver)?;
             }
@@ -159,7 +162,7 @@ fn best_cage_size(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Resu
     let frames = sample_frames(reader.as_mut(), CAGE_SIZE_FRAMES, true).map_err(|error| name_files(error, args))?;
     let memory = args.memory.unwrap_or_else(Memory::half_of_free);
     let system = args.solver.coordinates;
-    inversion_choices(&args.solver, false, 0)?;
+    check_inversion(&args.solver)?;
     let sizes = CageSizes { goal, rest, system, frames: &frames, total, memory };
     let bar = progress::steps();
     bar.set_message("trying cages of several sizes");
@@ -183,7 +186,7 @@ fn encode_locally(
     let memory = args.memory.unwrap_or_else(Memory::half_of_free);
     let mut frames = files.open()?;
     let read_seconds = clock.elapsed().as_secs_f64();
-    let (system, options) = solver(args, rest, cage)?;
+    let (system, options) = (args.solver.coordinates, solver_options(args, rest, cage)?);
     let matrix = matrix(&args.solver)?;
     let choose = match (args.solver.spectrum, spectrum_bound(&args.solver)?) {
         (Some(SpectrumArg::Auto), bound) => {
@@ -231,29 +234,28 @@ fn choosing_frames(frames: &mut dyn FrameReader, first_ones: bool) -> Result<Vec
 }
 
 /// What the arguments say of the inversion, and what is usual for this rest pose and cage.
-fn solver(args: &EncodeArgs, rest: &Model, cage: &Cage) -> Result<(&'static dyn CoordinateSystem, SolverOptions)> {
-    let system = args.solver.coordinates;
-    let unknowns = system.unknowns(cage);
+fn solver_options(args: &EncodeArgs, rest: &Model, cage: &Cage) -> Result<SolverOptions> {
+    let unknowns = args.solver.coordinates.unknowns(cage);
     // The number of frames says how large a file may be, not whether it is coded.
     let is_coded = goal(args, rest, 1)?.is_some();
-    Ok((system, inversion_choices(&args.solver, is_coded, unknowns)?.options(unknowns)))
+    Ok(inversion_choices(&args.solver, is_coded, unknowns)?.options(unknowns))
 }
 
-/// [`solver`] for this rest pose and cage, with all checked that needs no coordinates.
-pub(super) fn checked_solver(
+/// [`solver_options`] for this rest pose and cage, with all checked that needs no coordinates.
+pub(super) fn checked_options(
     args: &EncodeArgs,
     rest: &Model,
     cage: &Cage,
     matrix: Option<&SparseMatrix>,
-) -> Result<(&'static dyn CoordinateSystem, SolverOptions)> {
-    let (system, options) = solver(args, rest, cage)?;
+) -> Result<SolverOptions> {
+    let (system, options) = (args.solver.coordinates, solver_options(args, rest, cage)?);
     let delta = matrix.map_or(Ok(()), |matrix| matrix.delta(cage, system.unknowns(cage)).map(|_| ()));
     match delta.map_err(PrepareError::from).and_then(|()| Solver::check(system, cage, &rest.points, options)) {
         // A service knows its own memory.
         Err(PrepareError::HandlesOutOfMemory { .. }) if args.server.is_some() => {}
         checked => checked.map_err(|error| name_file(&error, args))?,
     }
-    Ok((system, options))
+    Ok(options)
 }
 
 pub(super) fn finish(

@@ -2,8 +2,8 @@
 
 use super::args::{EncodeArgs, SolverArgs, SpectrumArg};
 use super::coding_args::goal;
-use super::encode::{Targets, checked_solver, design_options, finish, sized_design};
-use super::solver_options::{designed_spectrum, inversion_choices, matrix, spectrum_bound};
+use super::encode::{Targets, checked_options, design_options, finish, sized_design};
+use super::solver_options::{check_inversion, designed_spectrum, matrix, spectrum_bound};
 use super::{plain, progress, tell, warn};
 use crate::coding::Goal;
 use crate::frames::CaptureFiles;
@@ -29,7 +29,9 @@ pub(super) fn run(
     cage: Option<&Cage>,
     clock: Instant,
 ) -> Result<()> {
-    design_options(args, rest.points.len())?;
+    if cage.is_none() {
+        design_options(args, rest.points.len())?;
+    }
     let frames = FileFrames::open(files.clone())?;
     if !counted_from_zero(&frames.numbers()) {
         warn(&["a service numbers frames from 0; encode here to keep the numbers of the files".to_owned()]);
@@ -40,12 +42,12 @@ pub(super) fn run(
     refuse_choosing(&args.solver)?;
     let spectrum = match cage {
         Some(cage) => {
-            let (_, options) = checked_solver(args, rest, cage, matrix.as_ref())?;
+            let options = checked_options(args, rest, cage, matrix.as_ref())?;
             // The threshold was checked above; regularizers without one ignore it.
             args.solver.spectrum.map(|_| u32::try_from(options.spectrum).unwrap_or(u32::MAX))
         }
         None => {
-            inversion_choices(&args.solver, false, 0)?;
+            check_inversion(&args.solver)?;
             designed_spectrum(&args.solver)?
         }
     };

@@ -56,6 +56,11 @@ pub(super) fn inversion_choices(args: &SolverArgs, is_coded: bool, unknowns: usi
     Ok(InversionChoices { system, handles: given, regularizer, spectrum, lambda, is_coded })
 }
 
+/// Refuses arguments that no cage could be solved for with.
+pub(super) fn check_inversion(args: &SolverArgs) -> Result<()> {
+    inversion_choices(args, false, 0).map(drop)
+}
+
 /// The threshold for a cage that is not known yet; none where the service chooses.
 pub(super) fn designed_spectrum(args: &SolverArgs) -> Result<Option<u32>> {
     match args.spectrum {

@@ -1,4 +1,4 @@
-//! How large steps are: for a bound and a size by what the first frames cost, for a mean error and a size held in every group.
+//! How large steps are: for a bound by what some frames of the first group cost, for a mean error and a size held in every group.
 
 use super::group::{CodedGroup, GroupCoder, Room};
 use super::{CodingError, Goal};
@@ -199,5 +199,20 @@ impl GroupCoder {
         }
         let coarsest = self.encode(self.frames.len(), 2.0 * self.diagonal, USUAL_RATIO)?.bytes();
         Err(CodingError::TooSmall { asked, least: room.other + (coarsest as f64 / part).ceil() as u64 })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_trial_has_a_run_of_frames_in_either_half_or_all_there_are() {
+        for count in [0, 1, 2, 3, 31, 32, 33, 34, 63, 64, 175, 256] {
+            let [first, second] = trial_frames(count);
+            assert_eq!(first.len() + second.len(), count.min(TRIAL_FRAMES), "{count}");
+            assert!(first.end <= second.start && second.end <= count, "{count}: {first:?} {second:?}");
+        }
+        assert_eq!(trial_frames(175), [35..51, 123..139]);
     }
 }

@@ -10,6 +10,7 @@ use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{Completion, Kind, SessionMeta, Store, StoreError};
 use crate::unreadable;
+use cager_core::inversion::SolverOptions;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
@@ -94,6 +95,20 @@ impl Session {
     }
 }
 
+/// First version of solvers for which what is usual depends on whether frames are coded.
+const USUAL_DEPENDS_ON_CODING: u32 = 5;
+
+/// With what an earlier version meant by options that were left out.
+fn as_it_was_meant(mut meta: SessionMeta) -> SessionMeta {
+    let is_coded = Choices::of(&meta.options).is_ok_and(|choices| choices.goal.is_some());
+    if is_coded && meta.solver_version < USUAL_DEPENDS_ON_CODING {
+        let SolverOptions { handles, lambda, .. } = SolverOptions::default();
+        meta.options.handles.get_or_insert_with(|| handles.name().to_owned());
+        meta.options.lambda.get_or_insert(lambda);
+    }
+    meta
+}
+
 impl Service {
     /// Resumes a session found on disk. If its files cannot be read, it is registered as failed so that it can be deleted, and resumed when
     /// this is called again.
@@ -101,6 +116,7 @@ impl Service {
     /// # Errors
     /// I/O errors.
     pub(crate) fn resume(self: &Arc<Self>, meta: SessionMeta) -> Result<(), StoreError> {
+        let meta = as_it_was_meant(meta);
         let outcome = match self.store.note(&meta.id, OUTCOME) {
             Err(error @ StoreError::Damaged { .. }) => {
                 tracing::warn!(session = %meta.id, %error, "the outcome of the preparation is damaged; the session is prepared again");

@@ -35,6 +35,11 @@ fn a_service_gives_the_bytes_and_the_report_that_this_machine_gives() {
         " --quality preview --coordinates green",
         " --quality standard --exact-rest",
         " --mean-error 1e-3",
+        " --mean-error 1e-3 --coordinates green-free",
+        " --max-error 1e-3 --handles spread",
+        " --max-error 1e-3 --lambda 0.5",
+        " --max-error 1e-3 --spectrum 3",
+        " --max-error 1e-3 --regularizer laplacian",
         " --target-size 20KB",
     ] {
         dir.cager(&format!("{ENCODE} --report here.json{options}")).succeeds();

@@ -1,8 +1,8 @@
 //! After a restart, however it came, the service goes on where it was.
 
-use crate::support::{Capture, OCTETS, Raw, TestApp, chunked, eventually, lines};
-use cager_proto::messages::{CacheUse, SessionState};
-use serde_json::Value;
+use crate::support::{Capture, OCTETS, Raw, TestApp, chunked, eventually, form, lines};
+use cager_proto::messages::{CacheUse, Session, SessionState};
+use serde_json::{Value, json};
 use std::path::Path;
 
 #[tokio::test]
@@ -173,4 +173,31 @@ async fn a_session_whose_handles_are_others_after_an_upgrade_says_so_and_keeps_i
     let problem = app.post(&path, OCTETS, capture.raw(10..11)).await.problem(409, "session-failed");
     assert!(problem.detail.contains("upgraded"), "{}", problem.detail);
     assert!(app.cages(&session.id).await == cages, "what was answered stays");
+}
+
+#[tokio::test]
+async fn a_session_that_codes_frames_goes_on_as_it_began_after_what_is_usual_changed() {
+    let mut app = TestApp::start();
+    let capture = Capture::small();
+    let usual_then = json!({ "max_error": 1e-2, "handles": "spread", "lambda": 1.0 });
+    let made = async |app: &TestApp| {
+        let created: Session = app.create_with(form(capture, &usual_then), None).await.is(201);
+        app.prepared(&created.id).await
+    };
+    let (session, whole) = (made(&app).await, made(&app).await);
+    app.upload(&whole.id, 0, capture.raw(0..20)).await;
+    app.complete(&whole.id, 20).await.expect(200);
+    let expected = app.container(&whole.id).await;
+    app.upload(&session.id, 0, capture.raw(0..10)).await;
+    app.kill();
+    age(&app, &session.id);
+    rewrite(&app.session_file(&session.id, "session.json"), |body| {
+        body["options"] = json!({ "max_error": 1e-2 });
+    });
+    let app = app.again();
+    let view = app.session(&session.id).await;
+    assert_eq!((view.handles.as_str(), view.spectrum, view.lambda), ("spread", session.spectrum, 1.0));
+    app.upload(&session.id, 10, capture.raw(10..20)).await;
+    app.complete(&session.id, 20).await.expect(200);
+    assert!(app.container(&session.id).await == expected);
 }

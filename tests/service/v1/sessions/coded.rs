@@ -258,6 +258,14 @@ async fn cages_that_are_coded_follow_all_points_unless_told_otherwise() {
     let given = session(&app, &json!({ "max_error": 1e-2, "handles": "all", "lambda": 1e-3 })).await;
     assert_eq!((given.handles.as_str(), given.lambda, given.cache), ("all", 1e-3, Some(CacheUse::Miss)));
     assert!(given.spectrum < coded.spectrum, "{:?}", given.spectrum);
+    app.upload(&coded.id, 0, long().raw(0..20)).await;
+    app.complete(&coded.id, 20).await.expect(200);
+    let bytes = app.container(&coded.id).await.to_vec();
+    let report = ContainerReader::open(Cursor::new(bytes)).expect("a container").report().expect("a report");
+    assert_eq!(
+        (report.handles.as_str(), Some(report.spectrum), report.lambda),
+        ("all", coded.spectrum.map(|s| s as usize), 1e-3)
+    );
     let green = session(&app, &json!({ "max_error": 1e-2, "coordinates": "green" })).await;
     assert_eq!((green.handles.as_str(), green.spectrum, green.lambda), ("spread", given.spectrum, 1.0));
 }

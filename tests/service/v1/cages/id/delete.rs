@@ -18,6 +18,9 @@ async fn a_design_that_runs_stops_within_a_second_and_the_next_begins() {
         eventually("it comes to that", async || (app.cage_job(id).await.state == state).then_some(())).await;
     };
     is(&running.id, CageState::Running).await;
+    // It is running before its work has begun.
+    let work = async |begun| ((slow.begun.load(SeqCst), slow.running.load(SeqCst)) == (begun, 1)).then_some(());
+    eventually("its work begins", async || work(1).await).await;
     let mut events = app.open(&format!("/v1/cages/{}/events", running.id)).await;
     let clock = Instant::now();
     // One that waits goes as well.
@@ -31,9 +34,7 @@ async fn a_design_that_runs_stops_within_a_second_and_the_next_begins() {
         heard.push_str(std::str::from_utf8(&more).expect("UTF-8"));
     }
     assert!(heard.ends_with("event: deleted\ndata: {}\n\n"), "{heard}");
-    // It is running before its work has begun.
-    let begun = async || ((slow.begun.load(SeqCst), slow.running.load(SeqCst)) == (2, 1)).then_some(());
-    eventually("the last one works, and the first no longer", begun).await;
+    eventually("the last one works, and the first no longer", async || work(2).await).await;
 }
 
 #[tokio::test]
