@@ -13,7 +13,7 @@ import { inViewer, whenShown } from './harness/viewing';
 import { parseNpy } from './npy';
 
 /** Most that a point may be off, in diagonals. */
-const MAX_ERROR = 3e-4;
+const MAX_ERROR = 2e-4;
 /** Frames of a group of this capture, as the service says. */
 const GROUP = 256;
 /** What opening a completed session's container reads of its ends. */
