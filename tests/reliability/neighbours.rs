@@ -236,7 +236,8 @@ async fn large_preparations_leave_a_place_to_others() {
     let session = quiet.create(&small.session("small", Some("small"))).await.expect("a session");
     quiet.wait_ready(&session.id, HANG).await.expect("a session that is ready");
     println!("prepared beside large ones after {:.2?}", clock.elapsed());
-    assert!(clock.elapsed() < Duration::from_secs(4), "{:.2?}", clock.elapsed());
+    // In one queue it takes more than two seconds.
+    assert!(clock.elapsed() < Duration::from_millis(1500), "{:.2?}", clock.elapsed());
     let large = client.sessions().await.expect("sessions");
     let preparing = large.iter().filter(|s| s.state == cager_client::messages::SessionState::Preparing).count();
     assert!(preparing > 0, "the large ones were over before the small one");
