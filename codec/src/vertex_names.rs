@@ -28,7 +28,7 @@ impl Numbers {
         Self { models: Integers::new(SIZES), unmet: Counted::all(points), before: 0 }
     }
 
-    /// Beyond the last vertex there is none.
+    /// The number of the next new vertex, met beside `near`; [`UNMET`] where no vertex has what was read.
     pub(crate) fn read(&mut self, coder: &mut impl Coder, near: u32) -> u32 {
         let expected = self.unmet.before(near);
         let context = size_class(self.before.min(1 << 16) * 2);
