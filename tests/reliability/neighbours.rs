@@ -105,12 +105,13 @@ impl House {
         let stop = Arc::new(AtomicBool::new(false));
         let (watching, address) = (Arc::clone(&stop), self.server.address);
         let health = std::thread::spawn(move || watch_health(address, &watching));
-        let (mut rounds, mut highest) = (Times(Vec::new()), before);
+        let mut rounds = Times(Vec::new());
+        self.server.forget_peak();
         let clock = Instant::now();
         while clock.elapsed() < attack_time() {
             rounds.0.extend(self.rounds(Duration::from_millis(250)).await.0);
-            highest = highest.max(self.server.rss());
         }
+        let highest = self.server.peak();
         stop.store(true, Ordering::Relaxed);
         let mut health = tokio::task::spawn_blocking(|| health.join()).await.expect("a thread").expect("health");
         let undisturbed = &self.undisturbed;
@@ -243,29 +244,45 @@ async fn large_preparations_leave_a_place_to_others() {
     assert!(preparing > 0, "the large ones were over before the small one");
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn many_completions_at_once_leave_the_service_alive() {
-    let house = House::measured(&[]).await;
+/// Sessions of a large model that want nothing but their completion.
+async fn filled(house: &House, large: &Reference) -> Vec<Session> {
     let client = house.server.client().with_token(LOUD);
-    let bodies = house.reference.many(0..house.reference.count());
     let mut sessions = Vec::new();
-    for k in 0..40 {
-        let session = client.create(&house.reference.session(&format!("c{k}"), Some(&format!("c{k}")))).await;
-        let session = client.wait_ready(&session.expect("a session").id, HANG).await.expect("it is ready");
-        let url = house.server.url(&house.path(&session, "/frames"));
-        let post = house.http.post(url).bearer_auth(LOUD).header("content-type", OCTETS).body(bodies.clone());
-        assert_eq!(post.send().await.expect("an answer").text().await.expect("records").lines().count(), 12);
+    for _ in 0..80 {
+        let mut new = large.session("large", None);
+        new.idempotency_key = None;
+        let session = client.create(&new).await.expect("a session");
+        client.wait_ready(&session.id, HANG).await.expect("it is ready");
+        let post = house.http.post(house.server.url(&house.path(&session, "/frames"))).bearer_auth(LOUD);
+        let done = post.header("content-type", OCTETS).body(large.bytes(0)).send().await.expect("an answer");
+        assert_eq!(done.text().await.expect("records").lines().count(), 1);
         sessions.push(session);
     }
-    let mut completing = JoinSet::new();
-    for session in sessions {
-        let client = client.clone();
-        completing.spawn(async move { client.complete(&session.id, 12).await.map(|_| ()) });
+    sessions
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn many_completions_at_once_leave_the_service_alive() {
+    let mut house = House::measured(&[]).await;
+    let large = Reference::new(40_000, 60, 1);
+    // As many at once again and again, while the attack lasts.
+    let pause = Duration::from_secs(5);
+    let mut waves = Vec::new();
+    for _ in 0..attack_time().as_millis().div_ceil(pause.as_millis()) {
+        waves.push(filled(&house, &large).await);
     }
-    house.goes_on("completions", 200.0).await;
-    for done in completing.join_all().await {
-        done.expect("it is completed");
-    }
+    house.before = house.server.rss();
+    let client = house.server.client().with_token(LOUD);
+    let began = tokio::time::Instant::now();
+    let attack = async {
+        for (wave, sessions) in (0..).zip(&waves) {
+            tokio::time::sleep_until(began + wave * pause).await;
+            let done = join_all(sessions.iter().map(|session| client.complete(&session.id, 1))).await;
+            done.into_iter().for_each(|done| drop(done.expect("it is completed")));
+        }
+    };
+    // Each of them reads its model.
+    tokio::join!(house.goes_on("completions", 100.0), attack);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -94,8 +94,22 @@ impl Server {
 
     /// Memory in use, in MiB.
     pub(crate) fn rss(&self) -> f64 {
+        self.memory("VmRSS:")
+    }
+
+    /// Most memory in use since the last [`Self::forget_peak`], in MiB.
+    pub(crate) fn peak(&self) -> f64 {
+        self.memory("VmHWM:")
+    }
+
+    /// Lets [`Self::peak`] begin anew.
+    pub(crate) fn forget_peak(&self) {
+        std::fs::write(format!("/proc/{}/clear_refs", self.child.id()), "5").expect("clear_refs");
+    }
+
+    fn memory(&self, field: &str) -> f64 {
         let status = self.proc("status");
-        let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).expect("VmRSS");
+        let line = status.lines().find_map(|line| line.strip_prefix(field)).expect(field);
         line.trim().trim_end_matches(" kB").parse::<f64>().expect("a number") / 1024.0
     }
 
