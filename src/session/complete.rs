@@ -2,8 +2,7 @@
 
 use super::container_frames::ContainerFrames;
 use super::create::blocking;
-use super::frames::SealError;
-use super::intervals::Missing;
+use super::frames::{Missing, SealError};
 use super::prepare::{self, Choices, Geometry, cannot_be_coded};
 use super::solver_cache::Prepared;
 use super::{Phase, Session};

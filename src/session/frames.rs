@@ -1,9 +1,9 @@
 //! The frames of a session: those on disk and those being solved.
 
-use super::intervals::{IntervalSet, Missing};
 use super::upload::Upload;
 use crate::capture::StoredError;
 use crate::store::LogEntry;
+use rangemap::RangeSet;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
@@ -68,11 +68,20 @@ pub(crate) enum Claim {
 #[derive(Default)]
 pub(crate) struct Frames {
     solved: BTreeMap<u32, LogEntry>,
-    /// The keys of `solved` as intervals, so that missing ranges are found without visiting every frame.
-    runs: IntervalSet,
+    /// The keys of `solved` as ranges, so that missing ones are found without visiting every frame.
+    runs: RangeSet<u64>,
     pending: HashMap<u32, Pending>,
     /// Whether new frames are refused.
     sealed: bool,
+}
+
+/// A page of the frames that are missing.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub(crate) struct Missing {
+    /// Ranges `[a, b)`, ascending.
+    pub(crate) ranges: Vec<[u32; 2]>,
+    /// Where to continue, if the page does not list all of them.
+    pub(crate) next: Option<u32>,
 }
 
 /// Why a session cannot be sealed.
@@ -146,7 +155,7 @@ impl Frames {
     /// Removes solved frames numbered `frames` and above.
     pub(crate) fn discard_from(&mut self, frames: u32) {
         self.solved.split_off(&frames);
-        self.runs.truncate(frames);
+        self.runs.remove(u64::from(frames)..u64::MAX);
     }
 
     /// Refuses new frames from here on.
@@ -169,7 +178,7 @@ impl Frames {
         if self.adds_information(&entry) {
             self.solved.insert(entry.frame, entry);
         }
-        self.runs.insert(entry.frame);
+        self.runs.insert(u64::from(entry.frame)..u64::from(entry.frame) + 1);
         self.pending.remove(&entry.frame).map_or_else(Vec::new, |pending| pending.waiting)
     }
 
@@ -221,7 +230,7 @@ impl Frames {
 
     /// Number of consecutive solved frames from `first` on.
     pub(crate) fn run_length(&self, first: u32) -> u64 {
-        self.runs.length_from(first)
+        self.runs.get(&u64::from(first)).map_or(0, |run| run.end - u64::from(first))
     }
 
     /// Number of solved frames.
@@ -241,7 +250,14 @@ impl Frames {
 
     /// At most `most` ranges of unsolved frames in `from..end`; `end` defaults to the highest solved frame.
     pub(crate) fn missing(&self, from: u32, end: Option<u32>, most: usize) -> Missing {
-        self.runs.missing(from, end.or(self.highest()).unwrap_or(0), most)
+        let span = u64::from(from)..u64::from(end.or(self.highest()).unwrap_or(0));
+        if span.is_empty() {
+            return Missing::default();
+        }
+        let gaps = self.runs.gaps(&span).map(|gap| [gap.start as u32, gap.end as u32]);
+        let mut ranges: Vec<[u32; 2]> = gaps.take(most + 1).collect();
+        let next = if ranges.len() > most { ranges.pop() } else { None };
+        Missing { ranges, next: next.map(|[first, _]| first) }
     }
 }
 
@@ -262,6 +278,11 @@ mod tests {
         assert_eq!(frames.missing(0, Some(4), 9).ranges, [[0, 3]]);
         assert_eq!(Frames::default().missing(0, Some(2), 9).ranges, [[0, 2]]);
         assert!(Frames::default().missing(0, None, 9).ranges.is_empty());
+        assert_eq!(frames.missing(4, Some(4), 9), Missing::default());
+        assert_eq!(frames.missing(1, Some(10), 2), Missing { ranges: vec![[1, 3], [5, 7]], next: Some(8) });
+        let highest = Frames::new([u32::MAX - 1, u32::MAX].map(entry).to_vec());
+        assert_eq!(highest.missing(5, None, 9).ranges, [[5, u32::MAX - 1]]);
+        assert_eq!(highest.missing(u32::MAX, None, 9), Missing::default());
     }
 
     #[test]

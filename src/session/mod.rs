@@ -8,7 +8,6 @@ pub(crate) mod create;
 pub(crate) mod facts;
 pub(crate) mod frames;
 pub(crate) mod groups;
-mod intervals;
 pub(crate) mod prepare;
 pub(crate) mod registry;
 mod resume;
@@ -235,9 +234,6 @@ impl Session {
     }
 
     /// Creates the log if it is missing. Blocks.
-    ///
-    /// # Errors
-    /// Storage errors.
     pub(crate) fn make_log(&self) -> Result<(), StoreError> {
         let mut log = lock(&self.log);
         if self.is_deleted() { Ok(()) } else { self.open_log(&mut log).map(|_| ()) }

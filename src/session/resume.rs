@@ -112,9 +112,6 @@ fn as_it_was_meant(mut meta: SessionMeta) -> SessionMeta {
 impl Service {
     /// Resumes a session found on disk. If its files cannot be read, it is registered as failed so that it can be deleted, and resumed when
     /// this is called again.
-    ///
-    /// # Errors
-    /// I/O errors.
     pub(crate) fn resume(self: &Arc<Self>, meta: SessionMeta) -> Result<(), StoreError> {
         let meta = as_it_was_meant(meta);
         let outcome = match self.store.note(&meta.id, OUTCOME) {

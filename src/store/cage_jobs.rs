@@ -51,9 +51,6 @@ const CAGE_BYTES: u64 = 64 << 20;
 
 impl Store {
     /// Creates a job with its input, atomically; durable on `Ok`.
-    ///
-    /// # Errors
-    /// [`StoreError::BadId`], [`StoreError::Full`].
     pub fn create_cage_job(&self, meta: &CageJobMeta, rest: &[u8], frames: Spool) -> Result<(), StoreError> {
         let (files, place) = (self.files(), self.folder(Kind::CageJob, &meta.id)?);
         let bytes = meta::wrap(&place.join(META), "cage job", meta)?;
@@ -65,9 +62,6 @@ impl Store {
     }
 
     /// Creates a finished job without input, atomically; durable on `Ok`.
-    ///
-    /// # Errors
-    /// As [`Self::create_cage_job`].
     pub fn create_finished_cage_job<T: Serialize>(
         &self,
         meta: &CageJobMeta,
@@ -108,9 +102,6 @@ impl Store {
     }
 
     /// Durably increments the number of attempts and returns it, so that a design that crashes the process is not retried at every start.
-    ///
-    /// # Errors
-    /// [`StoreError::Full`], or another I/O error.
     pub fn count_cage_job_attempt(&self, id: &str) -> Result<u32, StoreError> {
         self.set_cage_job_attempts(id, |before| before + 1)
     }

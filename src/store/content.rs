@@ -2,6 +2,7 @@
 
 use super::{ContentKey, Store, StoreError, meta};
 use serde::{Deserialize, Serialize};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// A rest pose as it was uploaded, and its cage, uploaded or made by the service.
@@ -73,9 +74,6 @@ impl Store {
     }
 
     /// Stores content; durable on `Ok`. Content that exists under the key is kept, unless it is damaged.
-    ///
-    /// # Errors
-    /// [`StoreError::Full`], or another I/O error.
     pub fn put_content(&self, key: &ContentKey, content: &Content) -> Result<(), StoreError> {
         let files = self.files();
         let place = self.content_path(key);
@@ -88,19 +86,19 @@ impl Store {
             return Ok(());
         }
         let bytes = meta::wrap(&place.join(DESCRIPTION), "content", &description)?;
-        let staging = files.temporary("content");
-        let make = || {
-            files.disk.create_dir(&staging).map_err(|e| StoreError::of(&staging, "create", e))?;
+        let made = files.publish_folder(&place, |staging| {
             files.write_new(&staging.join("rest"), &content.rest.bytes)?;
             files.write_new(&staging.join("cage"), &content.cage.bytes)?;
             if let Some(matrix) = &content.matrix {
                 files.write_new(&staging.join("matrix"), &matrix.bytes)?;
             }
-            files.write_new(&staging.join(DESCRIPTION), &bytes)?;
-            files.sync_dir(&staging)?;
-            self.publish_unless_there(&staging, &place).map(|_| ())
-        };
-        make().inspect_err(|_| files.discard(&staging))
+            files.write_new(&staging.join(DESCRIPTION), &bytes)
+        });
+        match made {
+            // Another thread has stored the same.
+            Err(StoreError::Io { cause, .. }) if cause.kind() == io::ErrorKind::AlreadyExists => Ok(()),
+            made => made,
+        }
     }
 
     /// Content by its key; `None` if there is none. Damaged content is moved to quarantine, so that the next upload replaces it.
@@ -114,9 +112,6 @@ impl Store {
     }
 
     /// Only the cage of a content, since a rest pose may be large. Otherwise as [`Self::content`].
-    ///
-    /// # Errors
-    /// As [`Self::content`].
     pub fn content_cage(&self, key: &ContentKey) -> Result<Option<NamedFile>, StoreError> {
         let place = self.content_path(key);
         let found = self.describe(&place).and_then(|description| {
@@ -126,18 +121,11 @@ impl Store {
     }
 
     /// Removes content, if it exists. A prepared solver of the key is kept.
-    ///
-    /// # Errors
-    /// I/O errors.
     pub fn remove_content(&self, key: &ContentKey) -> Result<(), StoreError> {
-        let _one_at_a_time = self.publishing();
         self.files().delete_durably(&self.content_path(key))
     }
 
     /// The keys of all content.
-    ///
-    /// # Errors
-    /// I/O errors.
     pub fn contents(&self) -> Result<Vec<ContentKey>, StoreError> {
         let entries = self.files().list(&self.files().contents)?;
         Ok(entries.iter().filter_map(|entry| entry.name.to_str()?.parse().ok()).collect())

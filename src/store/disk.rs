@@ -22,7 +22,7 @@ pub struct Entry {
     pub modified: SystemTime,
 }
 
-/// Folders and files.
+/// Folders and files. Every call fails as the system does.
 pub trait Disk: Send + Sync + Debug {
     /// Makes a file that is not there yet, for reading and writing.
     ///
@@ -30,14 +30,8 @@ pub trait Disk: Send + Sync + Debug {
     /// `AlreadyExists`, or another I/O error.
     fn create_new(&self, path: &Path) -> io::Result<Arc<dyn DiskFile>>;
     /// Opens a file that is there, for reading.
-    ///
-    /// # Errors
-    /// I/O errors.
     fn open(&self, path: &Path) -> io::Result<Arc<dyn DiskFile>>;
     /// Opens a file that is there, for reading and writing.
-    ///
-    /// # Errors
-    /// I/O errors.
     fn open_for_writing(&self, path: &Path) -> io::Result<Arc<dyn DiskFile>>;
     /// Makes a folder.
     ///
@@ -45,58 +39,28 @@ pub trait Disk: Send + Sync + Debug {
     /// `AlreadyExists`, or another I/O error.
     fn create_dir(&self, path: &Path) -> io::Result<()>;
     /// Renames a file, replacing an existing target, or a folder.
-    ///
-    /// # Errors
-    /// I/O errors.
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
     /// Removes a file.
-    ///
-    /// # Errors
-    /// I/O errors.
     fn remove_file(&self, path: &Path) -> io::Result<()>;
     /// Removes an empty folder.
-    ///
-    /// # Errors
-    /// I/O errors.
     fn remove_dir(&self, path: &Path) -> io::Result<()>;
     /// The entries of a folder, in no particular order.
-    ///
-    /// # Errors
-    /// I/O errors.
     fn list(&self, path: &Path) -> io::Result<Vec<Entry>>;
     /// Makes the entries of a folder durable (fsync).
-    ///
-    /// # Errors
-    /// I/O errors.
     fn sync_dir(&self, path: &Path) -> io::Result<()>;
     /// Sets a file's time of last change to now.
-    ///
-    /// # Errors
-    /// I/O errors.
     fn touch(&self, path: &Path) -> io::Result<()>;
     /// Creates and locks a file exclusively, until the handle is dropped; `None` if another process holds the lock.
-    ///
-    /// # Errors
-    /// I/O errors.
     fn lock(&self, path: &Path) -> io::Result<Option<File>>;
     /// Bytes that may still be written to the file system of `path`.
-    ///
-    /// # Errors
-    /// I/O errors.
     fn free_bytes(&self, path: &Path) -> io::Result<u64>;
 }
 
-/// An open file with positioned reads and writes, so that readers and a writer can share it.
+/// An open file with positioned reads and writes, so that readers and a writer can share it. Every call fails as the system does.
 pub trait DiskFile: Send + Sync + Debug {
     /// Writes some of `bytes` at `offset`; gives how many.
-    ///
-    /// # Errors
-    /// I/O errors.
     fn write_at(&self, bytes: &[u8], offset: u64) -> io::Result<usize>;
     /// Reads some bytes at `offset`; gives how many, 0 at the end of the file.
-    ///
-    /// # Errors
-    /// I/O errors.
     fn read_at(&self, bytes: &mut [u8], offset: u64) -> io::Result<usize>;
     /// Makes data and length durable (fdatasync).
     ///
@@ -104,14 +68,8 @@ pub trait DiskFile: Send + Sync + Debug {
     /// I/O errors. Everything written since the last success may be lost, and calling it again would not report that.
     fn sync_data(&self) -> io::Result<()>;
     /// Cuts or extends the file.
-    ///
-    /// # Errors
-    /// I/O errors.
     fn set_len(&self, bytes: u64) -> io::Result<()>;
     /// Length in bytes.
-    ///
-    /// # Errors
-    /// I/O errors.
     fn length(&self) -> io::Result<u64>;
 }
 

@@ -22,9 +22,6 @@ impl Store {
 
     /// Writes frames, `stride` bytes each, into the file that begins with frame `first`; durable on `Ok`, with `is_known` where the file's name
     /// was durable before. They have no checksum: the log has their digests.
-    ///
-    /// # Errors
-    /// [`StoreError::BadId`], [`StoreError::Full`].
     pub fn put_frames(
         &self,
         id: &str,
@@ -63,9 +60,6 @@ impl Store {
     }
 
     /// Removes all files of frames, or the one that begins with `first`.
-    ///
-    /// # Errors
-    /// [`StoreError::BadId`], or another I/O error.
     pub fn remove_frames(&self, id: &str, first: Option<u32>) -> Result<(), StoreError> {
         match first {
             Some(first) => self.files().remove_tree(&self.part(id, FRAMES, first)?),
@@ -74,9 +68,6 @@ impl Store {
     }
 
     /// Stores a coded group, atomically; durable on `Ok`. Returns the bytes of its file.
-    ///
-    /// # Errors
-    /// [`StoreError::BadId`], [`StoreError::Full`].
     pub fn put_group<T: Serialize>(&self, id: &str, first: u32, group: &T) -> Result<u64, StoreError> {
         let path = self.part(id, GROUP, first)?;
         let encoded = wire::encode::<_, MOST_GROUP_BYTES>(group);
@@ -104,9 +95,6 @@ impl Store {
     }
 
     /// Removes coded groups that begin with `from` or later.
-    ///
-    /// # Errors
-    /// [`StoreError::BadId`], or another I/O error.
     pub fn remove_groups_from(&self, id: &str, from: u32) -> Result<(), StoreError> {
         let later = |name: &str| name.strip_prefix(GROUP).and_then(|n| n.parse().ok()).is_some_and(|n: u32| n >= from);
         self.remove_parts(id, later)

@@ -1,4 +1,6 @@
 //! Persistent data: sessions with their frame logs and containers, uploaded content, cage jobs and prepared solvers. All calls block.
+//! What takes an id refuses those that are none ([`StoreError::BadId`]), what writes may find no space ([`StoreError::Full`]), and anything may
+//! fail as the disk does ([`StoreError::Io`]); only further errors are named below.
 //!
 //! ```text
 //! lock             locked while a process uses the folder
@@ -66,8 +68,6 @@ struct Inner {
     lock: Arc<File>,
     /// Which logs are open, and which need rewriting.
     logs: Arc<Mutex<LogRegistry>>,
-    /// Makes "create unless it exists" atomic for shared content.
-    publishing: Mutex<()>,
 }
 
 #[derive(Debug, Default)]
@@ -138,7 +138,7 @@ impl Store {
         sessions.sort_by(|a, b| (a.created_ms, &a.id).cmp(&(b.created_ms, &b.id)));
         cage_jobs.sort_by(|a, b| (a.created_ms, &a.id).cmp(&(b.created_ms, &b.id)));
         quarantined.sort_by(|a, b| a.name.cmp(&b.name));
-        let inner = Inner { files, lock: Arc::new(lock), logs: Arc::default(), publishing: Mutex::new(()) };
+        let inner = Inner { files, lock: Arc::new(lock), logs: Arc::default() };
         Ok(Opened { store: Self { inner: Arc::new(inner) }, sessions, cage_jobs, quarantined, unread })
     }
 
@@ -152,9 +152,6 @@ impl Store {
     }
 
     /// Checks that the store can write and sync.
-    ///
-    /// # Errors
-    /// [`StoreError::Full`], or another I/O error.
     pub fn probe(&self) -> Result<(), StoreError> {
         let files = self.files();
         let path = files.temporary("probe");

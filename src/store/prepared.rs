@@ -5,7 +5,6 @@ use super::{ContentKey, Store, StoreError};
 use cager_core::inversion::Solver;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{MutexGuard, PoisonError};
 
 impl Store {
     fn prepared_path(&self, key: &ContentKey) -> PathBuf {
@@ -13,9 +12,6 @@ impl Store {
     }
 
     /// Stores a prepared solver; durable on `Ok`. An existing file is kept.
-    ///
-    /// # Errors
-    /// [`StoreError::Full`], or another I/O error.
     pub fn put_prepared(&self, key: &ContentKey, solver: &Solver) -> Result<(), StoreError> {
         let files = self.files();
         let place = self.prepared_path(key);
@@ -27,9 +23,9 @@ impl Store {
             let file = files.create(&staging)?;
             solver_file::write(&*file, key, solver).map_err(|e| StoreError::of(&place, "write", e))?;
             files.sync_file(&*file, &place)?;
-            if self.publish_unless_there(&staging, &place)? {
-                self.used(&place);
-            }
+            // One that another thread has put there meanwhile is as good.
+            files.publish(&staging, &place)?;
+            self.used(&place);
             Ok(())
         };
         make().inspect_err(|_| files.discard(&staging))
@@ -42,9 +38,6 @@ impl Store {
 
     /// Loads a prepared solver, bitwise equal to the stored one; `None` if there is none. A damaged file is moved to quarantine, and a file
     /// of another format version is removed; both count as none.
-    ///
-    /// # Errors
-    /// I/O errors.
     pub fn prepared(&self, key: &ContentKey) -> Result<Option<Solver>, StoreError> {
         let place = self.prepared_path(key);
         let Some(file) = self.files().open(&place)? else { return Ok(None) };
@@ -52,7 +45,6 @@ impl Store {
             Ok(Some(solver)) => Ok(solver),
             Ok(None) => {
                 tracing::debug!(%key, "a solver file has another format version; the solver is prepared again");
-                let _one_at_a_time = self.publishing();
                 return self.files().remove_file(&place).map(|()| None);
             }
             Err(error) if error.kind() == io::ErrorKind::InvalidData => {
@@ -74,9 +66,6 @@ impl Store {
     }
 
     /// Removes prepared solvers, least recently used first, until they take at most `budget_bytes`; returns the number of bytes freed.
-    ///
-    /// # Errors
-    /// I/O errors.
     pub fn trim_prepared(&self, budget_bytes: u64) -> Result<u64, StoreError> {
         let files = self.files();
         let mut entries = files.list(&files.prepared)?;
@@ -101,25 +90,9 @@ impl Store {
         }
     }
 
-    /// Moves a synced file or folder to its place, durably, unless something is there; and whether it did.
-    pub(super) fn publish_unless_there(&self, staging: &Path, place: &Path) -> Result<bool, StoreError> {
-        let _one_at_a_time = self.publishing();
-        if self.files().exists(place)? {
-            self.files().discard(staging);
-            return Ok(false);
-        }
-        self.files().publish(staging, place).map(|()| true)
-    }
-
-    pub(super) fn publishing(&self) -> MutexGuard<'_, ()> {
-        // It guards no data, so poisoning is harmless.
-        self.inner.publishing.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Moves the content or solver file at `place` to quarantine if `found` says that it is damaged.
     pub(super) fn quarantine_if_damaged<T>(&self, place: &Path, found: Result<T, StoreError>) -> Result<T, StoreError> {
         if let Err(error @ StoreError::Damaged { .. }) = &found {
-            let _one_at_a_time = self.publishing();
             match self.files().move_to_quarantine(place, &error.to_string()) {
                 Err(error) if !error.is_not_found() => return Err(error),
                 _ => {}

@@ -103,9 +103,6 @@ fn read<M: FolderMeta>(files: &Files, id: &str) -> Result<M, StoreError> {
 
 impl Store {
     /// The folder of an object, whether or not it exists.
-    ///
-    /// # Errors
-    /// [`StoreError::BadId`].
     pub(super) fn folder(&self, kind: Kind, id: &str) -> Result<PathBuf, StoreError> {
         check_id(id).map(|()| kind.all(self.files()).join(id))
     }
@@ -122,17 +119,11 @@ impl Store {
     }
 
     /// Deletes an object, if it exists. On `Ok` the deletion is durable; after an error it is either gone or still there as a whole.
-    ///
-    /// # Errors
-    /// [`StoreError::BadId`], or another I/O error.
     pub fn delete(&self, kind: Kind, id: &str) -> Result<(), StoreError> {
         self.files().delete_durably(&self.folder(kind, id)?)
     }
 
     /// Moves a damaged object to `quarantine/`, with a note of what is wrong.
-    ///
-    /// # Errors
-    /// [`StoreError::BadId`], or another I/O error.
     pub fn quarantine(&self, kind: Kind, id: &str, why: &str) -> Result<(), StoreError> {
         self.files().move_to_quarantine(&self.folder(kind, id)?, why).map(|_| ())
     }

@@ -1,6 +1,5 @@
 //! Sessions: metadata, container, completion mark and notes.
 
-use super::disk::DiskFile;
 use super::scan::{FolderMeta, Kind};
 use super::{ContentKey, Store, StoreError, StoredFile, meta};
 use cager_proto::messages::SessionOptions;
@@ -8,7 +7,6 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::io::{self, BufWriter, Write};
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::Duration;
 
 /// Metadata of a session, fixed at its creation.
@@ -75,6 +73,8 @@ impl FolderMeta for SessionMeta {
 const META: &str = "session.json";
 const COMPLETE: &str = "complete.json";
 const CONTAINER: &str = "capture.cager";
+/// Bytes of a container gathered before a write.
+const BUFFER_BYTES: usize = 1 << 18;
 /// Age after which the kernel has written a folder entry back.
 const WRITEBACK_AGE: Duration = Duration::from_secs(600);
 
@@ -99,28 +99,20 @@ impl Store {
         id: &str,
         write: &mut dyn FnMut(&mut dyn Write) -> io::Result<()>,
     ) -> Result<Container, StoreError> {
-        let (files, place) = (self.files(), self.folder(Kind::Session, id)?.join(CONTAINER));
-        let staging = files.temporary("container");
-        let mut make = || {
-            let file = files.create(&staging)?;
-            let mut out = HashingWriter { file: &file, bytes: 0, digest: blake3::Hasher::new(), broken: false };
-            let mut buffered = BufWriter::with_capacity(BUFFER_BYTES, &mut out);
-            let written = write(&mut buffered).and_then(|()| buffered.flush());
-            // What a failed write left in the buffer is of no use.
-            drop(buffered.into_parts());
-            written.map_err(|e| StoreError::of(&place, "write", e))?;
-            let container = Container { bytes: out.bytes, digest: out.digest.finalize().to_hex().to_string() };
-            files.sync_file(&*file, &place)?;
-            files.publish(&staging, &place)?;
-            Ok(container)
-        };
-        make().inspect_err(|_| files.discard(&staging))
+        let folder = self.folder(Kind::Session, id)?;
+        let (place, mut spool) = (folder.join(CONTAINER), self.spool()?);
+        let mut buffered = BufWriter::with_capacity(BUFFER_BYTES, &mut spool);
+        let written = write(&mut buffered).and_then(|()| buffered.flush());
+        // What a failed write left in the buffer is of no use.
+        drop(buffered.into_parts());
+        written.map_err(|e| StoreError::of(&place, "write", e))?;
+        let container = Container { bytes: spool.bytes(), digest: spool.digest().to_hex().to_string() };
+        spool.move_to(&place)?;
+        self.files().sync_dir(&folder)?;
+        Ok(container)
     }
 
     /// Writes the completion mark, durably.
-    ///
-    /// # Errors
-    /// [`StoreError::BadId`], [`StoreError::Full`].
     pub fn complete(&self, id: &str, completion: &Completion) -> Result<(), StoreError> {
         let path = self.folder(Kind::Session, id)?.join(COMPLETE);
         self.files().replace(&path, &meta::wrap(&path, "completion", completion)?)
@@ -145,9 +137,6 @@ impl Store {
     }
 
     /// Length of the session's container; 0 where there is none.
-    ///
-    /// # Errors
-    /// [`StoreError::BadId`], or another I/O error.
     pub fn container_bytes(&self, id: &str) -> Result<u64, StoreError> {
         let path = self.folder(Kind::Session, id)?.join(CONTAINER);
         let file = self.files().open(&path)?;
@@ -155,9 +144,6 @@ impl Store {
     }
 
     /// Verifies length and digest of the session's container, reading all of it.
-    ///
-    /// # Errors
-    /// [`StoreError::BadId`], or another I/O error.
     pub fn container_is_whole(&self, id: &str, completion: &Completion) -> Result<bool, StoreError> {
         let path = self.folder(Kind::Session, id)?.join(CONTAINER);
         let failed = |e| StoreError::of(&path, "read", e);
@@ -171,9 +157,6 @@ impl Store {
 
     /// Atomically stores a note about the session, replacing an earlier one of that name; durable on `Ok`. `name` is a file name without
     /// extension.
-    ///
-    /// # Errors
-    /// [`StoreError::BadId`], [`StoreError::Full`].
     pub fn put_note<T: Serialize>(&self, id: &str, name: &'static str, note: &T) -> Result<(), StoreError> {
         let path = self.folder(Kind::Session, id)?.join(name).with_extension("json");
         self.files().replace(&path, &meta::wrap(&path, name, note)?)
@@ -191,33 +174,5 @@ impl Store {
     pub fn container_path(&self, id: &str) -> PathBuf {
         let folder = self.folder(Kind::Session, id).unwrap_or_else(|_| self.files().sessions.join(".no-session"));
         folder.join(CONTAINER)
-    }
-}
-
-/// A writer that computes the digest of what it writes.
-struct HashingWriter<'a> {
-    file: &'a Arc<dyn DiskFile>,
-    bytes: u64,
-    digest: blake3::Hasher,
-    /// Set after a failed write: the file has a gap.
-    broken: bool,
-}
-
-/// Bytes gathered before a write.
-const BUFFER_BYTES: usize = 1 << 18;
-
-impl Write for HashingWriter<'_> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if self.broken {
-            return Err(io::Error::other("an earlier write failed"));
-        }
-        self.file.write_all_at(bytes, self.bytes).inspect_err(|_| self.broken = true)?;
-        self.digest.update(bytes);
-        self.bytes += bytes.len() as u64;
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
     }
 }

@@ -1,90 +1,73 @@
-//! A prepared solver as a file in the safetensors format: each array by its name, a matrix as the list of its columns, and last the
-//! CRC-32C of all that comes before. Converted a column at a time, which stays in the cache, so that loading runs at the speed of
+//! A prepared solver as a file in the safetensors format: what is no matrix as bytes, each matrix as the list of its columns, and last
+//! the CRC-32C of all that comes before. Converted a column at a time, which stays in the cache, so that loading runs at the speed of
 //! memory.
 
 use super::ContentKey;
 use super::disk::DiskFile;
-use cager_core::coordinates::{ElementPlan, Refinement, TiedNormals};
+use cager_core::coordinates::TiedNormals;
 use cager_core::inversion::{Preparation, RegularizationTarget, Solver, SolverParts, TiedParts};
+use cager_proto::wire;
 use faer::traits::ComplexField;
 use faer::{ColRef, Mat, MatRef};
 use safetensors::Dtype;
 use safetensors::tensor::{Metadata, TensorInfo};
+use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::io;
 
 /// Version of the format; versions up to 4 were not safetensors files and begin with [`OLD_FORMAT`].
-const VERSION: &str = "5";
+const VERSION: &str = "6";
 const OLD_FORMAT: &[u8] = b"CGRSOLV";
 const HEADER_BYTES: u64 = 1 << 16;
 const CHECKSUM: &str = "crc32c";
 
+/// Most bytes of [`Facts`].
+const MOST_FACTS: usize = 1 << 30;
+
+/// What a solver is made of beside matrices.
+#[derive(Deserialize, Serialize)]
+struct Facts {
+    positions: u64,
+    reads_all: bool,
+    diagonal: f64,
+    handles: Vec<u32>,
+    /// The first frame's predecessor, where frames depend on it.
+    first: Option<Vec<f32>>,
+    /// Of normals that follow from the vertices: faces, weights and the weight of the start.
+    tied: Option<(Vec<[u32; 3]>, Vec<[f64; 3]>, f64)>,
+    preparation: Preparation,
+}
+
 pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> io::Result<()> {
-    // Named one by one, so that a new field is not forgotten here.
-    let Preparation {
-        rank,
-        affine_reproduction_error,
-        condition_full,
-        condition_handles,
-        singular_values,
-        swaps,
-        log_volume,
-        max_entry,
-        outside,
-        outside_distance,
-        refinement,
-        plan,
-        coordinates_seconds,
-        maxvol_seconds,
-        svd_seconds,
-    } = solver.preparation();
     let decoder = solver.decoder();
     let no_coordinates = || io::Error::new(io::ErrorKind::InvalidInput, "a solver without its coordinates");
     let phi = decoder.coordinates().ok_or_else(no_coordinates)?;
-    // Counts are exact as doubles.
-    let numbers = [
-        decoder.positions() as f64,
-        f64::from(u8::from(solver.reads_all())),
-        solver.diagonal(),
-        *rank as f64,
-        *affine_reproduction_error,
-        *condition_full,
-        *condition_handles,
-        *swaps as f64,
-        *log_volume,
-        *max_entry,
-        *outside_distance,
-        *coordinates_seconds,
-        *maxvol_seconds,
-        *svd_seconds,
-    ];
-    let refinement = refinement.as_ref().map(|found| [found.elements as f64, found.refinements as f64, found.change]);
-    let tied = solver.tied();
-    let mut arrays = vec![
-        Array::new("numbers", column(&numbers)),
-        Array::new("handles", column(solver.handles())),
-        Array::new("outside", column(outside)),
-        Array::new("singular_values", column(singular_values)),
-        Array::new("operator", solver.operator()),
-    ];
-    arrays.extend(refinement.as_ref().map(|numbers| Array::new("refinement", column(numbers))));
-    arrays.extend(plan.as_ref().map(|plan| Array::new("elements", column(plan.as_bytes()))));
+    let (mut first, mut matrices) = (None, vec![Array::new("operator", solver.operator())]);
     match solver.regularization_target() {
         RegularizationTarget::None => {}
-        RegularizationTarget::Constant(offset) => arrays.push(Array::new("constant", offset.as_ref())),
-        RegularizationTarget::Previous { operator, first } => {
-            arrays.extend([Array::new("previous", operator.as_ref()), Array::new("first", column(first))]);
+        RegularizationTarget::Constant(offset) => matrices.push(Array::new("constant", offset.as_ref())),
+        RegularizationTarget::Previous { operator, first: cage } => {
+            matrices.push(Array::new("previous", operator.as_ref()));
+            first = Some(cage.clone());
         }
     }
-    if let Some((normals, gram, weight)) = &tied {
-        arrays.extend([
-            Array::new("normal_faces", column(normals.faces().as_flattened())),
-            Array::new("normal_weights", column(normals.weights().as_flattened())),
-            Array::new("gram", *gram),
-            Array::new("start_weight", column(std::slice::from_ref(weight))),
-        ]);
-    }
-    arrays.push(Array::new("phi", phi));
+    let tied = solver.tied().map(|(normals, gram, weight)| {
+        matrices.push(Array::new("gram", gram));
+        (normals.faces().to_vec(), normals.weights().to_vec(), weight)
+    });
+    matrices.push(Array::new("phi", phi));
+    let facts = Facts {
+        positions: decoder.positions() as u64,
+        reads_all: solver.reads_all(),
+        diagonal: solver.diagonal(),
+        handles: solver.handles().to_vec(),
+        first,
+        tied,
+        preparation: solver.preparation().clone(),
+    };
+    let facts = wire::encode::<_, MOST_FACTS>(&facts).map_err(io::Error::other)?;
+    let mut arrays = vec![Array::new("facts", column(&facts))];
+    arrays.extend(matrices);
 
     let mut out = Out { file, piece: header(key, &arrays)?, offset: 0, crc: 0 };
     out.flush()?;
@@ -148,83 +131,34 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Option<S
 
     let (start, crc) = (header.len() as u64, crc32c::crc32c(&header));
     let mut source = In { file, metadata, start, offset: start, piece: Vec::new(), crc };
-    let numbers: Vec<f64> = source.vector("numbers")?;
-    let handles = source.vector("handles")?;
-    let outside = source.vector("outside")?;
-    let singular_values = source.vector("singular_values")?;
+    let facts: Vec<u8> = source.vector("facts")?;
     let operator = source.matrix("operator")?;
-    let refinement =
-        match source.has("refinement") {
-            true => source.vector::<f64>("refinement")?.first_chunk().map(|&[elements, refinements, change]| {
-                Refinement { elements: elements as usize, refinements: refinements as usize, change }
-            }),
-            false => None,
-        };
-    let mut plan = None;
-    if source.has("elements") {
-        plan = Some(ElementPlan::from_bytes(source.vector("elements")?));
-    }
-    let target = if source.has("constant") {
-        RegularizationTarget::Constant(source.matrix("constant")?)
-    } else if source.has("previous") {
-        RegularizationTarget::Previous { operator: source.matrix("previous")?, first: source.vector("first")? }
-    } else {
-        RegularizationTarget::None
-    };
-    let no_fit = || damage("its parts do not fit together");
-    let Ok(
-        [
-            positions,
-            reads_all,
-            diagonal,
-            rank,
-            affine_reproduction_error,
-            condition_full,
-            condition_handles,
-            swaps,
-            log_volume,
-            max_entry,
-            outside_distance,
-            coordinates_seconds,
-            maxvol_seconds,
-            svd_seconds,
-        ],
-    ) = <[f64; 14]>::try_from(numbers)
-    else {
-        return Err(no_fit());
-    };
-    let mut tied = None;
-    if source.has("gram") {
-        let (faces, weights): (Vec<u32>, Vec<f64>) = (source.vector("normal_faces")?, source.vector("normal_weights")?);
-        let (faces, weights) = (faces.as_chunks().0.to_vec(), weights.as_chunks().0.to_vec());
-        let gram = source.matrix("gram")?;
-        let weight = source.vector("start_weight")?.first().copied().unwrap_or_default();
-        let normals = TiedNormals::from_parts(faces, weights, positions as usize).ok_or_else(no_fit)?;
-        tied = Some(TiedParts { normals, gram, weight });
-    }
+    let constant = source.has("constant").then(|| source.matrix("constant")).transpose()?;
+    let previous = source.has("previous").then(|| source.matrix("previous")).transpose()?;
+    let gram = source.has("gram").then(|| source.matrix("gram")).transpose()?;
     let phi = source.matrix("phi")?;
     let crc = source.crc;
     if source.vector::<u32>(CHECKSUM)? != [crc] {
         return Err(damage("its content does not match its checksum"));
     }
-    let preparation = Preparation {
-        rank: rank as usize,
-        affine_reproduction_error,
-        condition_full,
-        condition_handles,
-        singular_values,
-        swaps: swaps as usize,
-        log_volume,
-        max_entry,
-        outside,
-        outside_distance,
-        refinement,
-        plan,
-        coordinates_seconds,
-        maxvol_seconds,
-        svd_seconds,
+    let no_fit = || damage("its parts do not fit together");
+    let facts = wire::decode::<_, MOST_FACTS>(&facts).map_err(|_| no_fit())?;
+    let Facts { positions, reads_all, diagonal, handles, first, tied, preparation } = facts;
+    let positions = positions as usize;
+    let target = match (constant, previous, first) {
+        (Some(offset), None, None) => RegularizationTarget::Constant(offset),
+        (None, Some(operator), Some(first)) => RegularizationTarget::Previous { operator, first },
+        (None, None, None) => RegularizationTarget::None,
+        _ => return Err(no_fit()),
     };
-    let (reads_all, positions) = (reads_all != 0.0, positions as usize);
+    let tied = match (tied, gram) {
+        (Some((faces, weights, weight)), Some(gram)) => {
+            let normals = TiedNormals::from_parts(faces, weights, positions).ok_or_else(no_fit)?;
+            Some(TiedParts { normals, gram, weight })
+        }
+        (None, None) => None,
+        _ => return Err(no_fit()),
+    };
     let parts = SolverParts { handles, reads_all, operator, target, phi, positions, tied, diagonal, preparation };
     Solver::from_parts(parts).ok_or_else(no_fit).map(Some)
 }

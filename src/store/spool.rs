@@ -1,12 +1,12 @@
-//! Files received in pieces: written to `tmp/` with their digest, then moved into place or removed.
+//! Files that come in pieces: written to `tmp/` with their digest, then moved into place or removed.
 
 use super::disk::DiskFile;
 use super::{Store, StoreError};
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A file being received; removed on drop unless it was moved into place.
+/// A file being written; removed on drop unless it was moved into place.
 #[derive(Debug)]
 pub struct Spool {
     store: Store,
@@ -14,28 +14,36 @@ pub struct Spool {
     file: Arc<dyn DiskFile>,
     bytes: u64,
     digest: blake3::Hasher,
+    /// Set after a failed write: the file has a gap.
+    broken: bool,
     taken: bool,
 }
 
 impl Store {
     /// A new empty file for what arrives.
-    ///
-    /// # Errors
-    /// [`StoreError::Full`], or another I/O error.
     pub fn spool(&self) -> Result<Spool, StoreError> {
         let path = self.files().temporary("spool");
         let file = self.files().create(&path)?;
-        Ok(Spool { store: self.clone(), path, file, bytes: 0, digest: blake3::Hasher::new(), taken: false })
+        Ok(Spool {
+            store: self.clone(),
+            path,
+            file,
+            bytes: 0,
+            digest: blake3::Hasher::new(),
+            broken: false,
+            taken: false,
+        })
     }
 }
 
 impl Spool {
-    /// Appends bytes. After an error the spool is unusable.
-    ///
-    /// # Errors
-    /// [`StoreError::Full`], or another I/O error.
-    pub fn write(&mut self, bytes: &[u8]) -> Result<(), StoreError> {
-        self.file.write_all_at(bytes, self.bytes).map_err(|e| StoreError::of(&self.path, "write", e))?;
+    /// Appends bytes. After an error all further calls fail.
+    pub fn append(&mut self, bytes: &[u8]) -> Result<(), StoreError> {
+        let written = match self.broken {
+            true => Err(io::Error::other("an earlier write failed")),
+            false => self.file.write_all_at(bytes, self.bytes).inspect_err(|_| self.broken = true),
+        };
+        written.map_err(|e| StoreError::of(&self.path, "write", e))?;
         self.digest.update(bytes);
         self.bytes += bytes.len() as u64;
         Ok(())
@@ -56,12 +64,23 @@ impl Spool {
         StoredFile { file: Arc::clone(&self.file), bytes: self.bytes, at: 0 }
     }
 
-    /// Syncs the file and moves it into a folder that is not visible yet.
+    /// Syncs the file and moves it into a folder, which the caller syncs.
     pub(super) fn move_to(mut self, place: &Path) -> Result<(), StoreError> {
         let files = self.store.files();
         files.sync_file(&*self.file, &self.path)?;
         files.disk.rename(&self.path, place).map_err(|e| StoreError::of(place, "put in place", e))?;
         self.taken = true;
+        Ok(())
+    }
+}
+
+impl Write for Spool {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.append(bytes)?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
         Ok(())
     }
 }

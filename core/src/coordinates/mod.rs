@@ -16,6 +16,7 @@ pub use normals::TiedNormals;
 use crate::cage::Cage;
 use crate::mesh::Point;
 use faer::Mat;
+use serde::{Deserialize, Serialize};
 
 /// Coordinates of all points of a model.
 #[derive(Clone, Debug)]
@@ -41,7 +42,7 @@ pub fn supports_definition(definition: u32) -> bool {
 }
 
 /// How a numerical solution was refined.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Refinement {
     /// Boundary elements of the last solution.
     pub elements: usize,

@@ -9,6 +9,7 @@ use crate::regularize::{Term, TermError};
 use crate::vector::norm;
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
 /// Coordinates with a larger affine reproduction error, over the diagonal, are rejected.
@@ -20,7 +21,7 @@ const FAR: f64 = 1e5;
 const ON_THE_CAGE: f64 = 1e-9;
 
 /// Results of the preparation.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Deserialize, Serialize)]
 pub struct Preparation {
     /// Numerical rank of `Φ`, at most m.
     pub rank: usize,

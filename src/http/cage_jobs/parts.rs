@@ -144,7 +144,7 @@ impl Receiver<'_> {
             let piece = waiting.split().freeze();
             let written;
             (spool, written) = blocking(move || {
-                let written = spool.write(&piece);
+                let written = spool.append(&piece);
                 (spool, written)
             })
             .await?;

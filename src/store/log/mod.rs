@@ -86,9 +86,6 @@ impl Store {
     }
 
     /// Whether the session has a log.
-    ///
-    /// # Errors
-    /// [`StoreError::BadId`], or another I/O error.
     pub fn has_log(&self, id: &str) -> Result<bool, StoreError> {
         self.files().exists(&self.folder(Kind::Session, id)?.join(LOG))
     }

@@ -36,7 +36,7 @@ struct Told {
 
 fn create(store: &Store, id: &str) -> Result<(), StoreError> {
     let mut spool = store.spool()?;
-    PIECES.iter().try_for_each(|piece| spool.write(piece))?;
+    PIECES.iter().try_for_each(|piece| spool.append(piece))?;
     assert_eq!((spool.bytes(), spool.digest()), (8000, blake3::hash(&PIECES.concat())));
     match store.create_cage_job(&meta(id), REST, spool) {
         // Made at the first attempt, where even taking it back had failed.

@@ -7,9 +7,10 @@ use super::patch::{DAMPING, PATCH};
 use super::solve::{Steps, TURNS};
 use super::{LEAST_DEGREE, LOW_DEGREES};
 use crate::mesh::Point;
+use serde::{Deserialize, Serialize};
 
 /// The boundary elements that harmonic coordinates were solved on, and how.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub struct ElementPlan {
     bytes: Vec<u8>,
 }
