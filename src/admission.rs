@@ -5,7 +5,7 @@
 //! has no such limit.
 
 use crate::problem::{self, ApiError};
-use crate::session::lock;
+use crate::sync::lock;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex};
 use tokio::sync::oneshot;

@@ -25,6 +25,7 @@ pub use file::AccessError;
 pub(crate) use file::is_name;
 pub use provider::OidcSettings;
 
+use crate::sync::lock;
 use file::{Entries, Stamp};
 use http::HeaderMap;
 use http::header::AUTHORIZATION;
@@ -303,7 +304,7 @@ impl Access {
         let Some(path) = &self.tokens.path else { return Ok(None) };
         let stamp = Stamp::of(path);
         {
-            let mut seen = self.tokens.seen.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut seen = lock(&self.tokens.seen);
             if *seen == stamp {
                 return Ok(None);
             }

@@ -1,5 +1,6 @@
 //! Errors of the service as problem details (RFC 9457): one place for their kinds, titles and statuses.
 
+use crate::store::StoreError;
 use cager_proto::messages::Problem;
 use http::StatusCode;
 
@@ -119,6 +120,30 @@ impl ApiError {
     /// The HTTP status.
     pub fn status(&self) -> StatusCode {
         StatusCode::from_u16(self.problem.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR)
+    }
+}
+
+/// The response for a storage error.
+impl From<StoreError> for ApiError {
+    fn from(error: StoreError) -> Self {
+        match error {
+            StoreError::Full { .. } => Self::new(
+                STORAGE_FULL,
+                "the service's disk is full; no acknowledged frame is lost, so try again when the operator has freed space",
+            )
+            .retry_after(60),
+            StoreError::Io { .. } => {
+                tracing::error!(%error, "a file of the store cannot be read or written");
+                let detail = "the service's disk failed to read or write; no acknowledged frame is lost, so try again when the operator has checked the disk";
+                Self::new(STORAGE_FAILED, detail).retry_after(10)
+            }
+            StoreError::Damaged { .. } => {
+                tracing::error!(%error, "a file of the store is damaged");
+                let detail = "stored data of this session is damaged; upload the capture to a new session, or ask the operator to restore it from a backup";
+                Self::new(SESSION_FAILED, detail)
+            }
+            other => Self::internal(&other),
+        }
     }
 }
 

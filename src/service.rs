@@ -6,13 +6,13 @@ use crate::cage_job::registry::CageJobs;
 use crate::cage_job::{DesignPool, Designer, local_designer};
 use crate::config::ServeConfig;
 use crate::engine::{Engine, threads};
+use crate::preparation::CageMaker;
+use crate::preparation::Solvers;
 use crate::problem::{self, ApiError};
-use crate::session::cage_source::CageMaker;
 use crate::session::commit::Committer;
-use crate::session::create::blocking;
 use crate::session::registry::Registry;
-use crate::session::solver_cache::Solvers;
 use crate::store::{ContentKey, Disk, Store, StoreError};
+use crate::sync::blocking;
 use crate::unreadable::UnreadableFiles;
 use crate::webhooks::{Webhooks, WebhooksError};
 use std::collections::BTreeSet;
@@ -146,7 +146,7 @@ impl Service {
             unread.add(left.kind, &left.name, None, &format!("{}: {}", left.path.display(), left.why));
         }
         let engine = Engine::new(config.workers).map_err(StartError::Threads)?;
-        let solvers = Solvers::new(opened.store.clone(), &config).map_err(StartError::Threads)?;
+        let solvers = Arc::new(Solvers::new(opened.store.clone(), &config).map_err(StartError::Threads)?);
         let container_writers =
             threads::pool("complete", MAX_CONCURRENT_COMPLETIONS as usize, threads::NICE_BACKGROUND);
         let coders = threads::pool("code", config.workers, threads::NICE_BACKGROUND);
@@ -155,13 +155,13 @@ impl Service {
             webhooks,
             store: opened.store,
             engine,
-            solvers: Arc::new(solvers),
             committer: Committer::start(COMMIT_THREADS).map_err(StartError::Threads)?,
             registry: Arc::default(),
             cage_jobs: CageJobs::default(),
             unread,
             designs: DesignPool::new(&config, designer).map_err(StartError::Threads)?,
-            cage_maker: CageMaker::new(config.budget(config.max_preparing as u64)),
+            cage_maker: CageMaker::new(config.budget(config.max_preparing as u64), solvers.pool()),
+            solvers,
             reading: Semaphore::new(MAX_CONCURRENT_PARSING),
             requests: config.budget(config.max_requests as u64),
             streams: config.budget(config.max_streams as u64),
@@ -277,7 +277,7 @@ impl Service {
         let probe = blocking(move || store.probe()).await?;
         *probed = probe.is_ok().then(Instant::now);
         probe.map_err(|error| match error {
-            full @ StoreError::Full { .. } => crate::session::commit::storage_error(&full),
+            full @ StoreError::Full { .. } => full.into(),
             other => {
                 tracing::error!(error = %other, "not ready");
                 ApiError::new(problem::STORAGE_FAILED, "the data folder takes no writes; the log has the reason")

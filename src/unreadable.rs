@@ -2,10 +2,9 @@
 
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::session::commit::storage_error;
-use crate::session::create::blocking;
-use crate::session::lock;
 use crate::store::{CageJobMeta, Kind, SessionMeta, StoreError};
+use crate::sync::blocking;
+use crate::sync::lock;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
@@ -137,7 +136,7 @@ impl Service {
         }
         let (store, removed) = (self.store.clone(), id.to_owned());
         let deleted = blocking(move || store.delete(kind, &removed));
-        deleted.await?.map_err(|error| storage_error(&error))?;
+        deleted.await??;
         self.unread.forget(kind, id);
         Ok(true)
     }

@@ -7,7 +7,7 @@ use super::file::is_name;
 use super::signatures::{self, ALGORITHMS};
 use super::{Denied, Scope};
 use crate::http_client::Client;
-use crate::session::lock;
+use crate::sync::lock;
 use jsonwebtoken::errors::ErrorKind;
 use jsonwebtoken::jwk::{Jwk, KeyOperations, PublicKeyUse};
 use jsonwebtoken::{Algorithm, DecodingKey, Validation, decode, decode_header};

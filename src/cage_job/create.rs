@@ -5,14 +5,13 @@ use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::config::ServeConfig;
 use crate::idempotency::once;
+use crate::preparation::check_extent;
+use crate::preparation::read_part;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::session::cage_source::check_extent;
-use crate::session::commit::storage_error;
-use crate::session::create::blocking;
-use crate::session::prepare::read_part;
 use crate::session::registry::Reserved;
 use crate::store::{CageJobMeta, ContentKey, Idempotency, Kind, Spool, StoreError, StoredPart};
+use crate::sync::blocking;
 use crate::unreadable;
 use cager_proto::cage_messages::CageOptions;
 use std::sync::Arc;
@@ -111,7 +110,7 @@ impl Service {
         self.reserve_more(tenant, &mut reserved, meta.rest.bytes)?;
         let bytes = meta.rest.bytes + meta.frames.bytes;
         let (store, kept) = (self.store.clone(), meta.clone());
-        blocking(move || store.create_cage_job(&kept, &rest, frames)).await?.map_err(|error| storage_error(&error))?;
+        blocking(move || store.create_cage_job(&kept, &rest, frames)).await??;
         let job = Arc::new(CageJob::new(meta, Phase::Queued, bytes));
         self.cage_jobs.insert(Arc::clone(&job));
         drop(reserved);
@@ -177,7 +176,7 @@ impl Service {
             Ok(Err(error)) => {
                 tracing::warn!(job = %job.meta.id, %error, "the outcome of a cage job could not be kept; a restart designs it again");
                 if matches!(outcome, Outcome::Completed(_)) {
-                    return job.set_phase(Phase::Failed(storage_error(&error).problem));
+                    return job.set_phase(Phase::Failed(ApiError::from(error).problem));
                 }
             }
             Err(error) => return job.set_phase(Phase::Failed(error.problem)),
@@ -212,7 +211,7 @@ impl Service {
         let work = tokio::spawn(async move {
             let (store, id) = (service.store.clone(), job.meta.id.clone());
             let _unread = service.unread.hold(Kind::CageJob, &id).await;
-            blocking(move || store.delete(Kind::CageJob, &id)).await?.map_err(|error| storage_error(&error))?;
+            blocking(move || store.delete(Kind::CageJob, &id)).await??;
             service.unread.forget(Kind::CageJob, &job.meta.id);
             service.cage_jobs.remove(&job.meta.id);
             job.deleted.cancel();

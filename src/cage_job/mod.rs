@@ -11,8 +11,8 @@ pub use run::Designer;
 pub(crate) use run::{DesignPool, local_designer};
 
 use crate::problem::{self, ApiError};
-use crate::session::lock;
 use crate::store::{CageJobMeta, Kind, Store, StoreError};
+use crate::sync::lock;
 use bytes::Bytes;
 use cager_cages::Progress as DesignProgress;
 use cager_core::mesh::TriMesh;
@@ -69,7 +69,7 @@ struct Best {
 
 impl Best {
     fn new(mesh: &TriMesh) -> Self {
-        let obj = crate::session::cage_source::obj_of(mesh);
+        let obj = crate::preparation::obj_of(mesh);
         let digest = blake3::hash(&obj).to_hex().to_string();
         Self { obj: obj.into(), digest, vertices: mesh.vertices.len() as u32, faces: mesh.triangles.len() as u32 }
     }
@@ -240,7 +240,7 @@ impl CageJob {
         match self.phase() {
             Phase::Completed(found) => {
                 let obj = store.cage_job_cage(&self.meta.id, found.cage_bytes, &found.cage_digest);
-                let obj = obj.map_err(|error| self.fail_if_damaged(store, &error))?;
+                let obj = obj.map_err(|error| self.fail_if_damaged(store, error))?;
                 Ok(Cage::Final { obj: obj.into(), digest: found.cage_digest })
             }
             Phase::Failed(problem) => Err(ApiError::new(problem::CAGE_FAILED, problem.detail)),
@@ -251,12 +251,12 @@ impl CageJob {
     }
 
     /// The response for a storage error; damage fails the job and quarantines it.
-    fn fail_if_damaged(&self, store: &Store, error: &StoreError) -> ApiError {
+    fn fail_if_damaged(&self, store: &Store, error: StoreError) -> ApiError {
         if self.deleted.is_cancelled() {
             return ApiError::new(problem::NOT_FOUND, "the cage design was deleted");
         }
-        let StoreError::Damaged { what, .. } = error else {
-            return crate::session::commit::storage_error(error);
+        let StoreError::Damaged { what, .. } = &error else {
+            return error.into();
         };
         let failed = ApiError::new(
             problem::CAGE_FAILED,

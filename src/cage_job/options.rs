@@ -1,7 +1,7 @@
 //! Validation of the options of a cage design.
 
+use crate::preparation::{VERTICES, vertices_detail};
 use crate::problem::{self, ApiError};
-use crate::session::cage_source::{VERTICES, vertices_detail};
 use cager_cages::{DesignOptions, Goal, Style};
 use cager_proto::cage_messages::{CageOptions, CageStyle};
 use std::time::Duration;

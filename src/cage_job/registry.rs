@@ -3,7 +3,7 @@
 use super::{CageJob, Phase};
 use crate::idempotency::{Keyed, Requests};
 use crate::problem::{self, ApiError};
-use crate::session::lock;
+use crate::sync::lock;
 use cager_proto::cage_messages::CageState;
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering::Relaxed;

@@ -4,11 +4,11 @@ use super::{Best, CageJob, Finished, Outcome, Phase, options, samples};
 use crate::admission::{Budget, Held};
 use crate::config::ServeConfig;
 use crate::engine::threads;
+use crate::preparation::read_part;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::session::create::blocking;
-use crate::session::prepare::read_part;
 use crate::store::StoreError;
+use crate::sync::blocking;
 use cager_cages::{Design, DesignError, DesignOptions, Progress, design};
 use cager_core::mesh::Model;
 use cager_proto::cage_messages::{CageError, CageStage};
@@ -151,7 +151,7 @@ impl Service {
 
     fn design_with(&self, job: &Arc<CageJob>, clock: Instant) -> Result<(Finished, Vec<u8>), ApiError> {
         let meta = &job.meta;
-        let damaged = |error: StoreError| job.fail_if_damaged(&self.store, &error);
+        let damaged = |error: StoreError| job.fail_if_damaged(&self.store, error);
         if self.store.count_cage_job_attempt(&meta.id).map_err(damaged)? > MAX_ATTEMPTS {
             let detail = format!(
                 "the service ended {MAX_ATTEMPTS} times while this cage was designed, so it is given up; try a lighter model, or fewer frames"

@@ -6,11 +6,12 @@
 mod schedule;
 pub(crate) mod threads;
 
+use crate::sync::lock;
 use cager_core::inversion::BATCH;
 use schedule::{Next, Schedule};
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak};
+use std::sync::{Arc, Condvar, Mutex, PoisonError, Weak};
 use std::time::Instant;
 
 /// A pool of solving threads and the queue before it.
@@ -166,11 +167,6 @@ fn dispatch(shared: &Arc<Shared>) {
             Next::Stopped => return,
         }
     }
-}
-
-/// Locks, ignoring poisoning: a panic while locked leaves no half-finished update.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]

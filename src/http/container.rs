@@ -9,9 +9,10 @@ use crate::auth::Tenant;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::container_frames::ContainerFrames;
-use crate::session::create::blocking;
-use crate::session::{Phase, Session, lock};
+use crate::session::{Phase, Session};
 use crate::store::{Completion, StoreError};
+use crate::sync::blocking;
+use crate::sync::lock;
 use axum::body::Body;
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};
@@ -77,7 +78,7 @@ async fn whole(
 ) -> Result<Response, ApiError> {
     let path = service.store.container_path(&session.meta.id);
     let opened = blocking(move || File::open(&path).map_err(|error| StoreError::of(&path, "open", error))).await?;
-    let file = Mutex::new(opened.map_err(|error| session.storage_error(&error))?);
+    let file = Mutex::new(opened.map_err(|error| session.storage_error(error))?);
     let read = move |range: Range<u64>| -> io::Result<Bytes> {
         let mut file = lock(&file);
         let mut bytes = vec![0; (range.end - range.start) as usize];

@@ -8,7 +8,8 @@ use crate::admission::Held;
 use crate::engine::Lane;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::session::{Session, gone, lock};
+use crate::session::{Session, gone};
+use crate::sync::lock;
 use axum::body::Body;
 use axum::extract::{Request, State};
 use axum::response::{IntoResponse, Response};
@@ -244,9 +245,8 @@ impl Decoding {
             }
         };
         let (spool, length) = (Arc::clone(&self.spool), (count * self.frame_bytes) as usize);
-        let bytes = crate::session::create::blocking(move || spool.read(at, length))
-            .await?
-            .map_err(|error| ApiError::internal(&error))?;
+        let bytes =
+            crate::sync::blocking(move || spool.read(at, length)).await?.map_err(|error| ApiError::internal(&error))?;
         let mut replies = Vec::new();
         for cage in bytes.chunks_exact(self.frame_bytes as usize) {
             let cage: Vec<f32> = cage.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();

@@ -6,7 +6,7 @@ use crate::auth::Tenant;
 use crate::config::MULTIPART_OVERHEAD_BYTES;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::session::lock;
+use crate::sync::lock;
 use axum::body::Body;
 use axum::extract::Request;
 use futures_util::StreamExt as _;

@@ -4,10 +4,11 @@ use super::upload::Permits;
 use super::{Phase, Session};
 use crate::problem::{self, ApiError};
 use crate::store::{FrameLog, LogEntry, LogRecord, StoreError};
+use crate::sync::lock;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// Approximate size of a log record without its cage, in bytes.
 const RECORD_BYTES: usize = 96;
@@ -64,13 +65,13 @@ fn stored_bytes(solved: &[SolvedFrame]) -> u64 {
 
 fn run(queue: &Mutex<Receiver<Arc<Session>>>) {
     loop {
-        let next = queue.lock().unwrap_or_else(PoisonError::into_inner).recv();
+        let next = lock(queue).recv();
         let Ok(session) = next else { return };
-        let solved = std::mem::take(&mut super::lock(&session.waiting).solved);
+        let solved = std::mem::take(&mut lock(&session.waiting).solved);
         if catch_unwind(AssertUnwindSafe(|| session.write(&solved))).is_err() {
             session.give_up(&solved, &ApiError::internal(&"writing frames panicked"));
         }
-        let mut waiting = super::lock(&session.waiting);
+        let mut waiting = lock(&session.waiting);
         waiting.busy = !waiting.solved.is_empty();
         if waiting.busy {
             drop(waiting);
@@ -87,7 +88,7 @@ impl Session {
         }
         // Counted before writing, so that a slow disk cannot let a tenant exceed its quota.
         self.bytes.fetch_add(stored_bytes(&solved), Relaxed);
-        let mut waiting = super::lock(&self.waiting);
+        let mut waiting = lock(&self.waiting);
         waiting.solved.extend(solved);
         if !waiting.busy {
             waiting.busy = true;
@@ -109,7 +110,7 @@ impl Session {
         }
         let mut records: Vec<LogRecord<'_>> =
             solved.iter().map(|s| LogRecord { entry: s.entry, cage: &s.cage }).collect();
-        let mut log = super::lock(&self.log);
+        let mut log = lock(&self.log);
         if let Phase::Failed(problem) = self.status().phase {
             // The session's files are in quarantine.
             drop(log);
@@ -191,27 +192,5 @@ impl Session {
             *log = Some(self.load_log()?);
         }
         Ok(log.as_mut().expect("it was just opened"))
-    }
-}
-
-/// The response for a storage error.
-pub(crate) fn storage_error(error: &StoreError) -> ApiError {
-    match error {
-        StoreError::Full { .. } => ApiError::new(
-            problem::STORAGE_FULL,
-            "the service's disk is full; no acknowledged frame is lost, so try again when the operator has freed space",
-        )
-        .retry_after(60),
-        StoreError::Io { .. } => {
-            tracing::error!(%error, "a file of the store cannot be read or written");
-            let detail = "the service's disk failed to read or write; no acknowledged frame is lost, so try again when the operator has checked the disk";
-            ApiError::new(problem::STORAGE_FAILED, detail).retry_after(10)
-        }
-        StoreError::Damaged { .. } => {
-            tracing::error!(%error, "a file of the store is damaged");
-            let detail = "stored data of this session is damaged; upload the capture to a new session, or ask the operator to restore it from a backup";
-            ApiError::new(problem::SESSION_FAILED, detail)
-        }
-        other => ApiError::internal(other),
     }
 }

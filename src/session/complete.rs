@@ -1,15 +1,15 @@
 //! Completing a session: writes its container once; from then on the session does not change.
 
 use super::container_frames::ContainerFrames;
-use super::create::blocking;
 use super::frames::{Missing, SealError};
-use super::prepare::{self, Choices, Geometry, cannot_be_coded};
-use super::solver_cache::Prepared;
 use super::{Phase, Session};
 use crate::coding::{CodingError, Goal};
+use crate::preparation::Prepared;
+use crate::preparation::{self, Choices, Geometry, cannot_be_coded};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{Completion, StoreError};
+use crate::sync::blocking;
 use crate::telemetry::traces::TraceSpan;
 use crate::webhooks::{Event, PendingMessage, Webhooks};
 use cager_core::cage::Cage;
@@ -202,9 +202,9 @@ impl Session {
     /// # Errors
     /// Storage errors; `SESSION_DELETED`.
     pub(crate) fn geometry(&self) -> Result<Geometry, ApiError> {
-        let content = self.store.content(&self.meta.key).map_err(|error| self.storage_error(&error))?;
+        let content = self.store.content(&self.meta.key).map_err(|error| self.storage_error(error))?;
         let content = content.ok_or_else(|| self.missing_content_error())?;
-        prepare::read(&content, &Choices::of(&self.meta.options)?)
+        preparation::read(&content, &Choices::of(&self.meta.options)?)
     }
 
     fn missing_content_error(&self) -> ApiError {
@@ -220,8 +220,8 @@ impl Session {
         if choices.goal.is_some() {
             return Ok(self.geometry()?.cage);
         }
-        let file = self.store.content_cage(&self.meta.key).map_err(|error| self.storage_error(&error))?;
-        prepare::read_cage(&file.ok_or_else(|| self.missing_content_error())?, &choices)
+        let file = self.store.content_cage(&self.meta.key).map_err(|error| self.storage_error(error))?;
+        preparation::read_cage(&file.ok_or_else(|| self.missing_content_error())?, &choices)
     }
 }
 
@@ -235,7 +235,7 @@ struct Written {
 }
 
 fn write(session: &Session, prepared: &Prepared, frames: u32, webhooks: &Webhooks) -> Result<Written, ApiError> {
-    let stored = |error: StoreError| session.storage_error(&error);
+    let stored = |error: StoreError| session.storage_error(error);
     let geometry = session.geometry()?;
     let mut write = |out: &mut dyn Write| -> io::Result<()> {
         let out = BufWriter::with_capacity(1 << 20, out);

@@ -2,11 +2,11 @@
 
 use super::Session;
 use super::groups::StoredGroup;
-use super::prepare::{Choices, Geometry};
 use super::solve::numbers;
-use super::solver_cache::Prepared;
 use crate::capture::{CaptureWriter, Encoding, StoredError};
 use crate::coding::Carried;
+use crate::preparation::Prepared;
+use crate::preparation::{Choices, Geometry};
 use cager_proto::container;
 use std::io::{self, Write};
 

@@ -2,18 +2,19 @@
 
 use super::cage_source::Uploaded;
 use super::facts::{Facts, Outcome};
-use super::prepare::{self, Choices, Geometry};
 use super::resume::CompletionState;
 use super::solve;
-use super::solver_cache::{Prepared, SolverRequest, SolverResponse};
 use super::upload::FrameJob;
 use super::{LiveLane, Phase, Session, Status};
 use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::idempotency::once;
+use crate::preparation::{self, Choices, Geometry, content_key};
+use crate::preparation::{Prepared, SolverRequest, SolverResponse};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{Content, ContentKey, Idempotency, Kind, NamedFile, SessionMeta};
+use crate::store::{Content, ContentKey, Idempotency, Kind, SessionMeta};
+use crate::sync::blocking;
 use crate::webhooks::Event;
 use cager_proto::messages::{CacheUse, PreparationSeconds, SessionOptions};
 use http::StatusCode;
@@ -111,9 +112,7 @@ impl Service {
         {
             let _content = self.registry.content_lock(&key).await;
             let (store, meta) = (self.store.clone(), session.meta.clone());
-            blocking(move || store.put_content(&key, &content).and_then(|()| store.create_session(&meta)))
-                .await?
-                .map_err(|error| super::commit::storage_error(&error))?;
+            blocking(move || store.put_content(&key, &content).and_then(|()| store.create_session(&meta))).await??;
             self.registry.insert(Arc::clone(&session));
             drop(room);
         }
@@ -144,12 +143,12 @@ impl Service {
         }
         let _one_of_few = self.reading.acquire().await;
         let (content, geometry) = blocking(move || {
-            let geometry = prepare::read(&content, &choices);
+            let geometry = preparation::read(&content, &choices);
             (content, geometry)
         })
         .await?;
         let geometry = Arc::new(geometry?);
-        prepare::check(&geometry, &choices, self.config.max_prepare_bytes)?;
+        preparation::check(&geometry, &choices, self.config.max_prepare_bytes)?;
         let soon = self.solvers.in_flight() <= self.config.max_preparing;
         Ok((content, soon.then_some(geometry)))
     }
@@ -273,10 +272,7 @@ impl Service {
             let store = store.clone();
             move || store.delete(Kind::Session, &removed)
         });
-        deleted
-            .await?
-            .map_err(|error| super::commit::storage_error(&error))
-            .inspect_err(|_| session.set_deleting(false))?;
+        deleted.await?.inspect_err(|_| session.set_deleting(false))?;
         // It may have been registered again since it was looked up.
         self.registry.remove(&id).iter().chain([session]).for_each(|session| session.mark_deleted());
         self.unread.forget(Kind::Session, &id);
@@ -303,48 +299,9 @@ fn wanted(session: &Session, choices: Choices, geometry: Option<Arc<Geometry>>) 
 /// Name of the note that stores the [`Outcome`].
 pub(super) const OUTCOME: &str = "outcome";
 
-/// BLAKE3 digest of everything a solver depends on. It includes the tenant, so that one tenant's upload is never a cache hit for another.
-fn content_key(tenant: &str, content: &Content, options: &SessionOptions, choices: &Choices) -> ContentKey {
-    let extension = |file: &NamedFile| file.name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
-    // Defaults are written out, so that an omitted option and its default give the same key; not those of `spectrum` and `handle_count`, which depend
-    // on the cage, and not where frames are coded, where they depend on what else was given.
-    let is_coded = choices.goal.is_some();
-    let inversion = choices.inversion;
-    let solving = SessionOptions {
-        name: None,
-        frame_rate: None,
-        frames: None,
-        // The cage's bytes are hashed below, whatever their source.
-        cage: None,
-        coordinates: Some(choices.system.name().to_owned()),
-        handles: if is_coded { options.handles.clone() } else { Some(inversion.handles().name().to_owned()) },
-        regularizer: Some(inversion.regularizer.name().to_owned()),
-        lambda: if is_coded { options.lambda } else { Some(inversion.lambda()) },
-        ..options.clone()
-    };
-    let solving = serde_json::to_vec(&solving).unwrap_or_default();
-    let version = format!("cager solver {}", cager_core::SOLVER_VERSION);
-    let (rest, cage) = (extension(&content.rest), extension(&content.cage));
-    let parts: [&[u8]; 7] = [
-        version.as_bytes(),
-        tenant.as_bytes(),
-        rest.as_bytes(),
-        &content.rest.bytes,
-        cage.as_bytes(),
-        &content.cage.bytes,
-        &solving,
-    ];
-    ContentKey::of(parts.into_iter().chain(content.matrix.as_ref().map(|matrix| matrix.bytes.as_slice())))
-}
-
 fn fingerprint(key: &ContentKey, options: &SessionOptions) -> String {
     let mut hasher = blake3::Hasher::new();
     hasher.update(&key.0);
     hasher.update(&serde_json::to_vec(options).unwrap_or_default());
     hasher.finalize().to_hex().to_string()
-}
-
-/// Runs a blocking closure on tokio's blocking pool.
-pub(crate) async fn blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, ApiError> {
-    tokio::task::spawn_blocking(work).await.map_err(|error| ApiError::internal(&error))
 }

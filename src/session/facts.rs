@@ -1,6 +1,6 @@
 //! Sizes and diagnostics of a prepared session, stored beside it so that they are known after a restart without loading the solver.
 
-use super::solver_cache::Prepared;
+use crate::preparation::Prepared;
 use cager_proto::messages::{CacheUse, ConditionNumber, PreparationSeconds, Problem};
 use serde::{Deserialize, Serialize};
 

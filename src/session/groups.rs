@@ -1,17 +1,17 @@
 //! Sessions made with a goal for error, size or quality: their frames wait on disk until their group is whole, and are then coded.
 
 use super::container_frames::ContainerFrames;
-use super::create::blocking;
 use super::facts::Facts;
-use super::prepare::{Choices, Geometry, cannot_be_coded};
 use super::solve::numbers;
-use super::solver_cache::Prepared;
 use super::{Phase, Session};
 use crate::capture::StoredError;
 use crate::coding::{Carried, Goal, GroupCoder, GroupDecoder, group_frames};
+use crate::preparation::Prepared;
+use crate::preparation::{Choices, Geometry, cannot_be_coded};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{Kind, LogEntry, StoreError};
+use crate::sync::{blocking, lock};
 use cager_proto::messages::CodedFrames;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -81,13 +81,13 @@ impl Session {
 
     /// Frames that are coded, in sessions whose frames are.
     pub(crate) fn coded_frames(&self) -> Option<u32> {
-        self.goal.map(|_| super::lock(&self.groups).frames())
+        self.goal.map(|_| lock(&self.groups).frames())
     }
 
     /// What of the frames is coded, as the API says it.
     pub(crate) fn coding_view(&self, facts: Option<&Facts>) -> Option<CodedFrames> {
         self.goal?;
-        let groups = super::lock(&self.groups);
+        let groups = lock(&self.groups);
         Some(CodedFrames {
             group_frames: facts.map(|facts| group_frames(facts.points as usize, facts.unknowns as usize) as u32),
             frames: groups.frames(),
@@ -98,7 +98,7 @@ impl Session {
 
     /// The coded group that a frame belongs to.
     pub(crate) fn coded_group(&self, frame: u32) -> Option<CodedGroup> {
-        super::lock(&self.groups).of(frame)
+        lock(&self.groups).of(frame)
     }
 
     /// Reads a coded group. Blocks.
@@ -122,7 +122,7 @@ impl Session {
     /// # Errors
     /// What completing would answer.
     pub(crate) fn check_coding(&self) -> Result<(), ApiError> {
-        super::lock(&self.groups).failed.as_ref().map_or(Ok(()), |(_, error)| Err(error.clone()))
+        lock(&self.groups).failed.as_ref().map_or(Ok(()), |(_, error)| Err(error.clone()))
     }
 
     /// Finds the coded groups on disk. The frames of the log are known already. Blocks.
@@ -146,7 +146,7 @@ impl Session {
             self.store.remove_frames(&self.meta.id, None)?;
             self.store.remove_groups_from(&self.meta.id, declared)?;
         }
-        *super::lock(&self.groups) = found;
+        *lock(&self.groups) = found;
         Ok(())
     }
 
@@ -162,7 +162,7 @@ impl Session {
         let (frame_bytes, most) = self.frame_bytes();
         let mut removed = 0;
         for file in (first / most * most..end).step_by(most as usize).filter(|file| file + most <= end) {
-            super::lock(&self.groups).named.remove(&file);
+            lock(&self.groups).named.remove(&file);
             self.store.remove_frames(&self.meta.id, Some(file))?;
             removed += frame_bytes as u64 * u64::from(most);
         }
@@ -176,9 +176,9 @@ impl Session {
         frames.sort_unstable_by_key(|(frame, _)| *frame);
         for together in frames.chunk_by(|a, b| a.0 / most == b.0 / most) {
             let first = together[0].0 / most * most;
-            let is_known = super::lock(&self.groups).named.contains(&first);
+            let is_known = lock(&self.groups).named.contains(&first);
             self.store.put_frames(&self.meta.id, first, is_known, frame_bytes, together)?;
-            super::lock(&self.groups).named.insert(first);
+            lock(&self.groups).named.insert(first);
         }
         Ok(())
     }
@@ -188,7 +188,7 @@ impl Session {
         self.facts()?;
         let (_, most) = self.frame_bytes();
         let (first, count) = {
-            let groups = super::lock(&self.groups);
+            let groups = lock(&self.groups);
             let first = groups.frames();
             let count = end.map_or(most, |end| most.min(end.saturating_sub(first)));
             // With fewer frames it might go.
@@ -227,7 +227,7 @@ impl Session {
             let last = first + (entries.len() as u32 - 1);
             error.problem.detail = format!("frames {first} to {last}: {}", error.problem.detail);
             tracing::info!(session = %self.meta.id, detail = %error.problem.detail, "frames cannot be coded");
-            super::lock(&self.groups).failed = Some((entries.len() as u32, error.clone()));
+            lock(&self.groups).failed = Some((entries.len() as u32, error.clone()));
             self.touch();
             error
         })?;
@@ -239,11 +239,11 @@ impl Session {
             farthest: coded.farthest,
             carried: coder.carried(),
         };
-        let put = self.store.put_group(&self.meta.id, first, &group).map_err(|error| self.storage_error(&error))?;
+        let put = self.store.put_group(&self.meta.id, first, &group).map_err(|error| self.storage_error(error))?;
         self.bytes.fetch_add(put, Relaxed);
         self.frames().set_errors(first, &group.errors);
         {
-            let mut groups = super::lock(&self.groups);
+            let mut groups = lock(&self.groups);
             groups.failed = None;
             groups.add(first, &group, put);
         }
@@ -266,7 +266,7 @@ impl Session {
         let geometry = self.geometry()?;
         let model = self.group_decoder(prepared, &geometry, goal)?;
         let most = group_frames(prepared.solver.decoder().points(), prepared.solver.decoder().unknowns());
-        let mut carried = super::lock(&self.groups).carried;
+        let mut carried = lock(&self.groups).carried;
         if carried.frames == 0 {
             let meshes = ContainerFrames::begin(self, prepared, &geometry, io::sink());
             let meshes = meshes.map_err(|error| ApiError::internal(&error))?;
@@ -282,7 +282,7 @@ impl Session {
         goal: Goal,
     ) -> Result<Arc<GroupDecoder>, ApiError> {
         let system = Choices::of(&self.meta.options)?.system;
-        let mut kept = super::lock(&self.group_decoder);
+        let mut kept = lock(&self.group_decoder);
         if let Some(decoder) = kept.upgrade() {
             return Ok(decoder);
         }
@@ -297,7 +297,7 @@ impl Session {
     /// # Errors
     /// Content that is gone; coordinates that cannot be computed.
     pub(crate) fn decoder_of_groups(&self, prepared: &Prepared, goal: Goal) -> Result<Arc<GroupDecoder>, ApiError> {
-        if let Some(decoder) = super::lock(&self.group_decoder).upgrade() {
+        if let Some(decoder) = lock(&self.group_decoder).upgrade() {
             return Ok(decoder);
         }
         self.group_decoder(prepared, &self.geometry()?, goal)
@@ -417,7 +417,7 @@ impl Session {
             return;
         }
         // First out of the list, so that what is read meanwhile is not taken for damaged.
-        super::lock(&self.groups).coded.retain(|group| group.first < frames);
+        lock(&self.groups).coded.retain(|group| group.first < frames);
         let removed = self.store.remove_frames(&self.meta.id, None);
         if let Err(error) = removed.and_then(|()| self.store.remove_groups_from(&self.meta.id, frames)) {
             tracing::warn!(session = %self.meta.id, %error, "frames that are not in the container still take space");

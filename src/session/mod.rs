@@ -8,20 +8,20 @@ pub(crate) mod create;
 pub(crate) mod facts;
 pub(crate) mod frames;
 pub(crate) mod groups;
-pub(crate) mod prepare;
 pub(crate) mod registry;
 mod resume;
 pub(crate) mod retention;
 pub(crate) mod solve;
-pub(crate) mod solver_cache;
 pub(crate) mod upload;
 mod view;
 
 use crate::coding::{Goal, GroupCoder, GroupDecoder};
 use crate::engine::Lane;
+use crate::preparation::Choices;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{Completion, FrameLog, Kind, LogEntry, LogReader, SessionMeta, Store, StoreError};
+use crate::sync::lock;
 use crate::webhooks::Webhooks;
 use cager_core::regularize::Regularizer;
 use cager_proto::messages::Problem;
@@ -29,9 +29,8 @@ use commit::{CommitQueue, Committer};
 use facts::Facts;
 use frames::Frames;
 use groups::Groups;
-use prepare::Choices;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::sync::{Arc, Mutex, MutexGuard, Weak};
 use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 use upload::FrameJob;
@@ -205,8 +204,8 @@ impl Session {
     }
 
     /// The response for a storage error.
-    pub(crate) fn storage_error(&self, error: &StoreError) -> ApiError {
-        if self.deleting.load(Ordering::SeqCst) || self.is_deleted() { gone() } else { commit::storage_error(error) }
+    pub(crate) fn storage_error(&self, error: StoreError) -> ApiError {
+        if self.deleting.load(Ordering::SeqCst) || self.is_deleted() { gone() } else { error.into() }
     }
 
     /// Reads the frames in the log, once. Blocks.
@@ -338,7 +337,7 @@ impl Session {
             StoreError::Damaged { path, what } if !self.deleting.load(Ordering::SeqCst) && !self.is_deleted() => {
                 self.quarantine(&path, &what)
             }
-            error => self.storage_error(&error),
+            error => self.storage_error(error),
         }
     }
 
@@ -409,9 +408,4 @@ impl Session {
 /// The error that ends requests to a deleted session.
 pub(crate) fn gone() -> ApiError {
     ApiError::new(problem::SESSION_DELETED, "the session was deleted")
-}
-
-/// Locks, ignoring poisoning: a panic while locked leaves no half-finished update.
-pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -4,6 +4,7 @@ use super::Session;
 use crate::idempotency::{Keyed, Requests};
 use crate::problem::{self, ApiError};
 use crate::store::ContentKey;
+use crate::sync::lock;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex};
@@ -45,7 +46,7 @@ impl Reserved {
     /// # Errors
     /// Those of `allowed`.
     pub(crate) fn extend<E>(&mut self, bytes: u64, allowed: impl FnOnce((u64, u64)) -> Result<(), E>) -> Result<(), E> {
-        let mut inner = super::lock(&self.registry.inner);
+        let mut inner = lock(&self.registry.inner);
         allowed(inner.usage_of(&self.tenant))?;
         if let Some((_, reserved)) = inner.reserved.get_mut(&self.tenant) {
             *reserved += bytes;
@@ -57,7 +58,7 @@ impl Reserved {
 
 impl Drop for Reserved {
     fn drop(&mut self) {
-        let mut inner = super::lock(&self.registry.inner);
+        let mut inner = lock(&self.registry.inner);
         if let Some((count, bytes)) = inner.reserved.get_mut(&self.tenant) {
             *count -= 1;
             *bytes -= self.bytes;
@@ -70,7 +71,7 @@ impl Drop for Reserved {
 
 impl Registry {
     pub(crate) fn insert(&self, session: Arc<Session>) {
-        let mut inner = super::lock(&self.inner);
+        let mut inner = lock(&self.inner);
         let meta = &session.meta;
         if let Some(idempotency) = &meta.idempotency {
             inner.requests.made(&meta.tenant, idempotency, &meta.id);
@@ -79,7 +80,7 @@ impl Registry {
     }
 
     pub(crate) fn remove(&self, id: &str) -> Option<Arc<Session>> {
-        let mut inner = super::lock(&self.inner);
+        let mut inner = lock(&self.inner);
         let session = inner.sessions.remove(id)?;
         if let Some(idempotency) = &session.meta.idempotency {
             inner.requests.forget(&session.meta.tenant, idempotency);
@@ -92,7 +93,7 @@ impl Registry {
     /// # Errors
     /// 404 where there is none.
     pub(crate) fn find(&self, tenant: &str, id: &str) -> Result<Arc<Session>, ApiError> {
-        let inner = super::lock(&self.inner);
+        let inner = lock(&self.inner);
         inner.sessions.get(id).filter(|session| session.meta.tenant == tenant).cloned().ok_or_else(|| {
             ApiError::new(problem::NOT_FOUND, "there is no session with this id; list them at /v1/sessions")
         })
@@ -103,14 +104,14 @@ impl Registry {
     /// # Errors
     /// 404 where there is none.
     pub(crate) fn find_any(&self, id: &str) -> Result<Arc<Session>, ApiError> {
-        let found = super::lock(&self.inner).sessions.get(id).cloned();
+        let found = lock(&self.inner).sessions.get(id).cloned();
         found.ok_or_else(|| ApiError::new(problem::NOT_FOUND, "there is no session with this id"))
     }
 
     /// At most `most` sessions that follow the id `after`, newest first; of all tenants if `tenant` is `None`.
     pub(crate) fn page(&self, tenant: Option<&str>, after: Option<&str>, most: usize) -> Vec<Arc<Session>> {
         use std::ops::Bound::{Excluded, Unbounded};
-        let inner = super::lock(&self.inner);
+        let inner = lock(&self.inner);
         let older = inner.sessions.range::<str, _>((Unbounded, after.map_or(Unbounded, Excluded))).rev();
         older
             .map(|(_, session)| session)
@@ -121,12 +122,12 @@ impl Registry {
     }
 
     pub(crate) fn all(&self) -> Vec<Arc<Session>> {
-        super::lock(&self.inner).sessions.values().cloned().collect()
+        lock(&self.inner).sessions.values().cloned().collect()
     }
 
     /// Number of a tenant's sessions and their bytes, including those being created.
     pub(crate) fn usage_of(&self, tenant: &str) -> (u64, u64) {
-        super::lock(&self.inner).usage_of(tenant)
+        lock(&self.inner).usage_of(tenant)
     }
 
     /// Atomically reserves quota for a session or cage job of `bytes` bytes if `allowed` accepts the usage so far (count and bytes of sessions).
@@ -139,7 +140,7 @@ impl Registry {
         bytes: u64,
         allowed: impl FnOnce((u64, u64)) -> Result<(), E>,
     ) -> Result<Reserved, E> {
-        let mut inner = super::lock(&self.inner);
+        let mut inner = lock(&self.inner);
         allowed(inner.usage_of(tenant))?;
         let entry = inner.reserved.entry(tenant.to_owned()).or_default();
         *entry = (entry.0 + 1, entry.1 + bytes);
@@ -148,13 +149,13 @@ impl Registry {
 
     /// Key of one of the tenant's contents whose cage was made from inputs with this digest.
     pub(crate) fn made_cage(&self, tenant: &str, made: &ContentKey) -> Option<ContentKey> {
-        let inner = super::lock(&self.inner);
+        let inner = lock(&self.inner);
         let mut mine = inner.sessions.values().filter(|session| session.meta.tenant == tenant);
         mine.find(|session| session.meta.made_cage.as_ref() == Some(made)).map(|session| session.meta.key)
     }
 
     pub(crate) fn uses_content(&self, key: &ContentKey) -> bool {
-        super::lock(&self.inner).sessions.values().any(|session| session.meta.key == *key)
+        lock(&self.inner).sessions.values().any(|session| session.meta.key == *key)
     }
 
     /// Taken while content is stored or removed.
@@ -165,10 +166,10 @@ impl Registry {
 
 impl Keyed<Session> for Arc<Registry> {
     fn requests<R>(&self, work: impl FnOnce(&mut Requests) -> R) -> R {
-        work(&mut super::lock(&self.inner).requests)
+        work(&mut lock(&self.inner).requests)
     }
 
     fn made(&self, id: &str) -> Option<Arc<Session>> {
-        super::lock(&self.inner).sessions.get(id).cloned()
+        lock(&self.inner).sessions.get(id).cloned()
     }
 }

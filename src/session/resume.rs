@@ -3,9 +3,9 @@
 use super::create::OUTCOME;
 use super::facts::Outcome;
 use super::frames::Frames;
-use super::prepare::Choices;
-use super::solver_cache::Prepared;
 use super::{Phase, Session, Status};
+use crate::preparation::Choices;
+use crate::preparation::Prepared;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{Completion, Kind, SessionMeta, Store, StoreError};

@@ -1,10 +1,10 @@
 //! Storage quotas of tenants and deletion of expired sessions and cage jobs.
 
-use super::create::blocking;
 use super::registry::Reserved;
 use crate::auth::Tenant;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
+use crate::sync::blocking;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};

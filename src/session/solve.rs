@@ -3,10 +3,11 @@
 use super::Session;
 use super::commit::SolvedFrame;
 use super::frames::{Claim, Digests};
-use super::solver_cache::Prepared;
 use super::upload::{FrameJob, Rows};
 use crate::capture::StoredError;
+use crate::preparation::Prepared;
 use crate::problem::{self, ApiError};
+use crate::sync::lock;
 use std::cell::RefCell;
 use std::sync::Arc;
 use std::time::Instant;
@@ -152,7 +153,7 @@ fn fail_all(session: &Session, run: Vec<(FrameJob, Digests)>, mut guard: ClaimGu
 /// The cage of the previous frame; `None` for frame 0.
 fn predecessor(session: &Session, frame: u32) -> Result<Option<Vec<f32>>, ApiError> {
     let Some(before) = frame.checked_sub(1) else { return Ok(None) };
-    if let Some((last, cage)) = &*super::lock(&session.last_solved)
+    if let Some((last, cage)) = &*lock(&session.last_solved)
         && *last == before
     {
         return Ok(Some(cage.clone()));
@@ -210,7 +211,7 @@ fn solve_batch(
     }
     if solver.follows_previous() {
         let last = jobs.last().zip(cages.last()).map(|((job, _), cage)| (job.frame, cage.clone()));
-        *super::lock(&session.last_solved) = last.filter(|(_, cage)| cage.iter().all(|x| x.is_finite()));
+        *lock(&session.last_solved) = last.filter(|(_, cage)| cage.iter().all(|x| x.is_finite()));
     }
     finish(session, jobs, cages, errors, guard);
 }

@@ -3,6 +3,7 @@
 use super::Session;
 use crate::admission::Held;
 use crate::problem::{self, ApiError};
+use crate::sync::lock;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
@@ -43,7 +44,7 @@ pub(crate) enum UploadEvent {
 
 impl Upload {
     fn with<T>(&self, f: impl FnOnce(&mut State) -> T) -> T {
-        let result = f(&mut super::lock(&self.state));
+        let result = f(&mut lock(&self.state));
         self.changed.notify_one();
         result
     }
@@ -97,7 +98,7 @@ impl Upload {
 
     /// Waits until no more frames will be submitted. For one caller at a time.
     pub(crate) async fn closed(&self) {
-        while !super::lock(&self.state).closed {
+        while !lock(&self.state).closed {
             self.changed.notified().await;
         }
     }
@@ -106,7 +107,7 @@ impl Upload {
     pub(crate) async fn next(&self, most: usize) -> UploadEvent {
         loop {
             {
-                let mut state = super::lock(&self.state);
+                let mut state = lock(&self.state);
                 if !state.answers.is_empty() {
                     let count = most.min(state.answers.len());
                     return UploadEvent::Frames(state.answers.drain(..count).collect());

@@ -1,9 +1,10 @@
 //! Sessions as the API returns them.
 
 use super::frames::RANGES;
-use super::prepare::Choices;
-use super::{Phase, Session, lock};
+use super::{Phase, Session};
 use crate::coding::InversionChoices;
+use crate::preparation::Choices;
+use crate::sync::lock;
 use cager_core::inversion::SolverOptions;
 use cager_core::regularize::Regularizer;
 use cager_proto::messages::{FrameCounts, Progress, Session as View, SessionState};

@@ -33,9 +33,16 @@ struct Facts {
     handles: Vec<u32>,
     /// The first frame's predecessor, where frames depend on it.
     first: Option<Vec<f32>>,
-    /// Of normals that follow from the vertices: faces, weights and the weight of the start.
-    tied: Option<(Vec<[u32; 3]>, Vec<[f64; 3]>, f64)>,
+    tied: Option<Tied>,
     preparation: Preparation,
+}
+
+/// Of normals that follow from the vertices.
+#[derive(Deserialize, Serialize)]
+struct Tied {
+    faces: Vec<[u32; 3]>,
+    weights: Vec<[f64; 3]>,
+    start_weight: f64,
 }
 
 pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> io::Result<()> {
@@ -51,9 +58,9 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
             first = Some(cage.clone());
         }
     }
-    let tied = solver.tied().map(|(normals, gram, weight)| {
+    let tied = solver.tied().map(|(normals, gram, start_weight)| {
         matrices.push(Array::new("gram", gram));
-        (normals.faces().to_vec(), normals.weights().to_vec(), weight)
+        Tied { faces: normals.faces().to_vec(), weights: normals.weights().to_vec(), start_weight }
     });
     matrices.push(Array::new("phi", phi));
     let facts = Facts {
@@ -152,9 +159,9 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Option<S
         _ => return Err(no_fit()),
     };
     let tied = match (tied, gram) {
-        (Some((faces, weights, weight)), Some(gram)) => {
+        (Some(Tied { faces, weights, start_weight }), Some(gram)) => {
             let normals = TiedNormals::from_parts(faces, weights, positions).ok_or_else(no_fit)?;
-            Some(TiedParts { normals, gram, weight })
+            Some(TiedParts { normals, gram, weight: start_weight })
         }
         (None, None) => None,
         _ => return Err(no_fit()),

@@ -2,10 +2,11 @@
 
 use crate::service::Service;
 use crate::store::Kind;
+use crate::sync::lock;
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
 use metrics_process::Collector;
 use std::collections::BTreeMap;
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, OnceLock};
 use std::time::Duration;
 use tokio_util::sync::CancellationToken;
 
@@ -67,7 +68,7 @@ pub(crate) fn observe(service: &Service) {
     metrics::gauge!("cager_uptime_seconds").set(service.started.elapsed().as_secs_f64());
     // A tenant without sessions is reported as 0, not with its last value.
     static SEEN: Mutex<BTreeMap<String, (usize, u64)>> = Mutex::new(BTreeMap::new());
-    let mut seen = SEEN.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut seen = lock(&SEEN);
     seen.values_mut().for_each(|usage| *usage = (0, 0));
     seen.extend(service.usage().into_iter().map(|(tenant, sessions, bytes)| (tenant, (sessions, bytes))));
     for (tenant, (sessions, bytes)) in &*seen {

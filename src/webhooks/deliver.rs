@@ -4,6 +4,7 @@ use super::file::Hook;
 use super::{Event, NOTE, PendingMessage};
 use crate::http_client::Client;
 use crate::store::Store;
+use crate::sync::lock;
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use bytes::Bytes;
@@ -11,7 +12,7 @@ use http::StatusCode;
 use reqwest::header;
 use ring::hmac;
 use std::sync::atomic::Ordering::Relaxed;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, SystemTime};
 
 const MINUTE: u64 = 60;
@@ -70,7 +71,7 @@ impl Message {
     }
 
     fn due(&self) -> MutexGuard<'_, PendingMessage> {
-        self.left.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.left)
     }
 
     /// The same for every attempt.

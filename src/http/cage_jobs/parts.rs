@@ -7,11 +7,10 @@ use crate::config::MULTIPART_OVERHEAD_BYTES;
 use crate::http::multipart::{NAME_CHARACTERS, bad, broken, file_name, form, read_options};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::session::commit::storage_error;
-use crate::session::create::blocking;
-use crate::session::lock;
 use crate::session::registry::Reserved;
 use crate::store::Spool;
+use crate::sync::blocking;
+use crate::sync::lock;
 use axum::body::Body;
 use axum::extract::multipart::Field;
 use axum::extract::{Multipart, Request};
@@ -125,7 +124,7 @@ impl Receiver<'_> {
         }
         let limit = self.service.config.max_frames_bytes;
         let store = self.service.store.clone();
-        let mut spool = blocking(move || store.spool()).await?.map_err(|error| storage_error(&error))?;
+        let mut spool = blocking(move || store.spool()).await??;
         let mut waiting = BytesMut::new();
         loop {
             let chunk = self.chunk(&mut field).await?;
@@ -148,7 +147,7 @@ impl Receiver<'_> {
                 (spool, written)
             })
             .await?;
-            written.map_err(|error| storage_error(&error))?;
+            written?;
             if ended {
                 return Ok((if name.is_empty() { "frames".to_owned() } else { name }, spool));
             }

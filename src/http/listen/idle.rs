@@ -2,8 +2,9 @@
 //! two requests, unless the last one has just ended; in each group the longest idle first. One that was just accepted comes last: its request may
 //! be on its way.
 
+use crate::sync::lock;
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
@@ -34,10 +35,6 @@ pub(super) struct IdleEntry {
 }
 
 impl IdleConnections {
-    fn lock(&self) -> MutexGuard<'_, List> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Adds a connection that has sent nothing.
     pub(super) fn enter(self: &Arc<Self>) -> IdleEntry {
         let entry =
@@ -48,7 +45,7 @@ impl IdleConnections {
 
     /// Closes the first connection of the list; false if none may be closed.
     pub(super) fn displace(&self) -> bool {
-        let mut list = self.lock();
+        let mut list = lock(&self.0);
         let of_kind = |has_asked: bool, grace: Duration| {
             let (&key, (since, _)) = list.connections.range((has_asked, 0)..=(has_asked, u64::MAX)).next()?;
             (since.elapsed() >= grace).then_some(key)
@@ -62,23 +59,19 @@ impl IdleConnections {
 }
 
 impl IdleEntry {
-    fn place(&self) -> MutexGuard<'_, Option<(bool, u64)>> {
-        self.place.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// The connection is idle; `has_asked` says whether it has sent a request before.
     pub(super) fn wait(&self, has_asked: bool) {
-        let mut list = self.waiting.lock();
+        let mut list = lock(&self.waiting.0);
         let place = (has_asked, list.next);
         list.next += 1;
         list.connections.insert(place, (Instant::now(), self.displaced.clone()));
-        *self.place() = Some(place);
+        *lock(&self.place) = Some(place);
     }
 
     /// The connection has a request in progress.
     pub(super) fn work(&self) {
-        let mut list = self.waiting.lock();
-        if let Some(place) = self.place().take() {
+        let mut list = lock(&self.waiting.0);
+        if let Some(place) = lock(&self.place).take() {
             list.connections.remove(&place);
         }
     }

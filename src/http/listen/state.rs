@@ -3,7 +3,8 @@
 use super::Limits;
 use super::head::{Head, HeadScanner, Scan};
 use super::idle::IdleEntry;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use crate::sync::lock;
+use std::sync::{Arc, Mutex, Weak};
 use std::time::Duration;
 use tokio::time::Instant;
 
@@ -99,13 +100,9 @@ impl State {
         Arc::new(Self { facts, entry })
     }
 
-    fn facts(&self) -> MutexGuard<'_, Facts> {
-        self.facts.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Bytes were read; an empty slice is the end of the stream.
     pub(super) fn read(&self, bytes: &[u8]) {
-        let mut facts = self.facts();
+        let mut facts = lock(&self.facts);
         if bytes.is_empty() {
             facts.may_linger = false;
             return;
@@ -139,7 +136,7 @@ impl State {
 
     /// The socket took bytes.
     pub(super) fn wrote(&self) {
-        let mut facts = self.facts();
+        let mut facts = lock(&self.facts);
         facts.blocked_since = None;
         // Pings are answered on an idle HTTP/2 connection too: there, only responses count.
         if !facts.http2 {
@@ -149,27 +146,27 @@ impl State {
 
     /// The socket has nothing left to take.
     pub(super) fn flushed(&self) {
-        self.facts().blocked_since = None;
+        lock(&self.facts).blocked_since = None;
     }
 
     /// The socket takes no more.
     pub(super) fn blocked(&self) {
-        self.facts().blocked_since.get_or_insert_with(Instant::now);
+        lock(&self.facts).blocked_since.get_or_insert_with(Instant::now);
     }
 
     /// Reading or writing failed, or the connection is to be cut.
     pub(super) fn abandon(&self) {
-        self.facts().may_linger = false;
+        lock(&self.facts).may_linger = false;
     }
 
     /// Whether the client may still be sending when the connection is closed.
     pub(super) fn may_linger(&self) -> bool {
-        self.facts().may_linger
+        lock(&self.facts).may_linger
     }
 
     /// A request begins. Gives its header's scan, if it had one.
     pub(super) fn begin(self: &Arc<Self>) -> (Option<Head>, Arc<InFlight>) {
-        let mut facts = self.facts();
+        let mut facts = lock(&self.facts);
         self.entry.work();
         facts.requests += 1;
         facts.in_flight += 1;
@@ -184,27 +181,27 @@ impl State {
 
     /// A piece of a request body came.
     pub(super) fn body_progressed(&self) {
-        self.facts().progress = Instant::now();
+        lock(&self.facts).progress = Instant::now();
     }
 
     /// A request is there to its end, so that nothing unread is left of it.
     pub(super) fn body_ended(&self) {
-        self.facts().may_linger = false;
+        lock(&self.facts).may_linger = false;
     }
 
     /// Whether no request is on its way.
     pub(super) fn is_idle(&self) -> bool {
-        self.facts().in_flight == 0
+        lock(&self.facts).in_flight == 0
     }
 
     /// The time limit that has been exceeded, if any.
     pub(super) fn exceeded_limit(&self, limits: &Limits) -> Option<Reason> {
         let now = Instant::now();
         let past = |since: Instant, limit: Duration| now.saturating_duration_since(since) >= limit;
-        let facts = self.facts();
+        let facts = lock(&self.facts);
         // In HTTP/2 a stalled response does not block the socket, and its memory is released only by closing the connection, whatever
         // progress other streams make. In HTTP/1.1 every byte written belongs to the one response.
-        let unread = facts.open.iter().filter_map(|open| open.upgrade()?.unread_since());
+        let unread = facts.open.iter().filter_map(|open| *lock(&open.upgrade()?.unread_since));
         let unread = unread.min().map(|since| if facts.http2 { since } else { since.max(facts.progress) });
         let blocked = facts.blocked_since.map(|since| since.max(facts.progress));
         if let Some(since) = blocked.into_iter().chain(unread).min() {
@@ -235,23 +232,15 @@ impl InFlight {
         &self.state
     }
 
-    fn lock(&self) -> MutexGuard<'_, Option<Instant>> {
-        self.unread_since.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn unread_since(&self) -> Option<Instant> {
-        *self.lock()
-    }
-
     /// Records that a chunk was handed to the protocol (`true`) or the next one was requested (`false`).
     pub(super) fn unread(&self, unread: bool) {
-        *self.lock() = unread.then(Instant::now);
-        self.state.facts().progress = Instant::now();
+        *lock(&self.unread_since) = unread.then(Instant::now);
+        lock(&self.state.facts).progress = Instant::now();
     }
 
     /// A client that still sends need not read.
     pub(super) fn body_progressed(&self) {
-        if let Some(since) = &mut *self.lock() {
+        if let Some(since) = &mut *lock(&self.unread_since) {
             *since = Instant::now();
         }
     }
@@ -259,7 +248,7 @@ impl InFlight {
 
 impl Drop for InFlight {
     fn drop(&mut self) {
-        let mut facts = self.state.facts();
+        let mut facts = lock(&self.state.facts);
         facts.in_flight -= 1;
         facts.idle_since = Instant::now();
         if facts.in_flight == 0 {

@@ -11,11 +11,12 @@
 use super::{Kind, LogRegistry, Store, StoreError};
 use crate::store::disk::DiskFile;
 use crate::store::files::timed;
+use crate::sync::lock;
 use format::{BLOCK_BYTES, Layout};
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 mod format;
 mod reader;
@@ -144,7 +145,7 @@ impl Store {
 
     /// Whether a failed sync may have lost data that reads still return; true until the log is reopened successfully.
     pub fn log_needs_rewrite(&self, id: &str) -> bool {
-        self.inner.logs.lock().unwrap_or_else(PoisonError::into_inner).needs_rewrite.contains(id)
+        lock(&self.inner.logs).needs_rewrite.contains(id)
     }
 }
 
@@ -254,7 +255,7 @@ impl WriterGuard {
     fn new(store: &Store, id: &str, path: &Path) -> Result<Self, StoreError> {
         let logs = store.inner.logs.clone();
         let needs_rewrite = {
-            let mut known = logs.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut known = lock(&logs);
             if !known.open.insert(id.to_owned()) {
                 return Err(StoreError::of(path, "open", io::ErrorKind::ResourceBusy.into()));
             }
@@ -266,7 +267,7 @@ impl WriterGuard {
 
 impl Drop for WriterGuard {
     fn drop(&mut self) {
-        let mut known = self.logs.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut known = lock(&self.logs);
         known.open.remove(&self.id);
         if self.needs_rewrite {
             known.needs_rewrite.insert(std::mem::take(&mut self.id));

@@ -1,30 +1,20 @@
 //! Cache of prepared solvers by content key: in memory up to a budget, then on disk. Concurrent requests for the same key share one
 //! preparation.
 
-use super::prepare::{self, Choices, Geometry};
+use super::{Choices, Geometry, Prepared};
 use crate::admission::{Budget, Held};
 use crate::config::ServeConfig;
 use crate::engine::threads;
 use crate::problem::{self, ApiError};
 use crate::store::{Content, ContentKey, Store};
+use crate::sync::lock;
 use crate::telemetry::traces::TraceSpan;
-use cager_core::inversion::{Solver, SolverOptions};
 use cager_proto::messages::{CacheUse, PreparationSeconds};
 use opentelemetry::Context;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 use tokio::sync::{Semaphore, watch};
-
-/// A prepared solver with its warnings, cage sizes and the digest of its handles.
-pub(crate) struct Prepared {
-    pub(crate) solver: Solver,
-    pub(crate) options: SolverOptions,
-    pub(crate) handles_digest: String,
-    pub(crate) cage_vertices: u32,
-    pub(crate) cage_faces: u32,
-    pub(crate) warnings: Vec<String>,
-}
 
 /// A prepared solver, whether it came from a cache, and what obtaining it took.
 #[derive(Clone)]
@@ -116,7 +106,7 @@ impl Solvers {
 
     /// The solver of a content if it is in memory.
     pub(crate) fn in_memory(&self, key: &ContentKey) -> Option<Arc<Prepared>> {
-        let mut inner = super::lock(&self.inner);
+        let mut inner = lock(&self.inner);
         inner.clock += 1;
         let clock = inner.clock;
         let kept = inner.kept.get_mut(key)?;
@@ -132,7 +122,7 @@ impl Solvers {
 
     /// Drops all solvers from the cache; returns their size in bytes.
     pub(crate) fn evict(&self) -> u64 {
-        let mut inner = super::lock(&self.inner);
+        let mut inner = lock(&self.inner);
         inner.kept.clear();
         metrics::gauge!("cager_cache_bytes", "cache" => "solvers").set(0.0);
         std::mem::take(&mut inner.bytes)
@@ -140,12 +130,12 @@ impl Solvers {
 
     /// Number of preparations that run or wait.
     pub(crate) fn in_flight(&self) -> usize {
-        super::lock(&self.inner).flights.len()
+        lock(&self.inner).flights.len()
     }
 
     /// Number of a tenant's preparations that run or wait.
     pub(crate) fn in_flight_of(&self, tenant: &str) -> usize {
-        super::lock(&self.inner).flights.values().filter(|flight| flight.tenant == tenant).count()
+        lock(&self.inner).flights.values().filter(|flight| flight.tenant == tenant).count()
     }
 
     /// The solver of a content: from memory, from disk, or prepared now. If all callers give up, the preparation is cancelled before its
@@ -163,7 +153,7 @@ impl Solvers {
 
     /// Joins the running preparation of the content or starts one; and whether it was started here.
     fn join_or_start(self: &Arc<Self>, wanted: SolverRequest) -> (ResultReceiver, bool) {
-        let mut inner = super::lock(&self.inner);
+        let mut inner = lock(&self.inner);
         if let Some(flight) = inner.flights.get(&wanted.key) {
             metrics::counter!("cager_cache_total", "result" => "joined").increment(1);
             return (flight.sender.subscribe(), false);
@@ -190,7 +180,7 @@ impl Solvers {
         if let Ok(got) = &result {
             self.keep(key, &got.prepared);
         }
-        super::lock(&self.inner).flights.remove(&key);
+        lock(&self.inner).flights.remove(&key);
         let fresh = result.as_ref().ok().filter(|got| got.cache == CacheUse::Miss).map(|got| Arc::clone(&got.prepared));
         // All receivers may be gone.
         let _ = sender.send(Some(result));
@@ -202,7 +192,7 @@ impl Solvers {
 
     /// Removes a preparation that no caller waits for; false if one has joined.
     fn cancel_if_unawaited(&self, key: &ContentKey, sender: &ResultSender) -> bool {
-        let mut inner = super::lock(&self.inner);
+        let mut inner = lock(&self.inner);
         let off = sender.receiver_count() == 0;
         if off {
             inner.flights.remove(key);
@@ -251,13 +241,13 @@ impl Solvers {
                 return Ok(None);
             }
         };
-        let file = self.store.content_cage(key).map_err(|error| super::commit::storage_error(&error))?;
-        let cage = prepare::read_cage(&file.ok_or_else(deleted)?, choices)?;
+        let file = self.store.content_cage(key)?;
+        let cage = super::read_cage(&file.ok_or_else(deleted)?, choices)?;
         let options = choices.inversion.options(choices.system.unknowns(&cage));
         metrics::counter!("cager_cache_total", "result" => "disk").increment(1);
         let total = clock.elapsed().as_secs_f64();
         let seconds = PreparationSeconds { queued, read: total - queued, total, ..PreparationSeconds::default() };
-        let prepared = Arc::new(prepare::with_solver(solver, &cage, options));
+        let prepared = Arc::new(super::with_solver(solver, &cage, options));
         Ok(Some(SolverResponse { prepared, cache: CacheUse::Hit, seconds }))
     }
 
@@ -275,10 +265,10 @@ impl Solvers {
         metrics::counter!("cager_cache_total", "result" => "miss").increment(1);
         let geometry = match geometry {
             Some(geometry) => geometry,
-            None => Arc::new(prepare::read(&self.content(key)?, choices)?),
+            None => Arc::new(super::read(&self.content(key)?, choices)?),
         };
         let read = clock.elapsed().as_secs_f64();
-        let prepared = self.pool.install(|| prepare::prepare(&geometry, choices, self.max_bytes, wanted))?;
+        let prepared = self.pool.install(|| super::prepare(&geometry, choices, self.max_bytes, wanted))?;
         let Some(prepared) = prepared else { return Ok(None) };
         let found = prepared.solver.preparation();
         let seconds = PreparationSeconds {
@@ -294,7 +284,7 @@ impl Solvers {
     }
 
     fn content(&self, key: &ContentKey) -> Result<Content, ApiError> {
-        let content = self.store.content(key).map_err(|error| super::commit::storage_error(&error))?;
+        let content = self.store.content(key)?;
         content.ok_or_else(deleted)
     }
 
@@ -308,7 +298,7 @@ impl Solvers {
 
     fn keep(&self, key: ContentKey, prepared: &Arc<Prepared>) {
         let bytes = prepared.solver.size_bytes() as u64;
-        let mut inner = super::lock(&self.inner);
+        let mut inner = lock(&self.inner);
         inner.clock += 1;
         let used = inner.clock;
         if bytes <= self.budget_bytes {

@@ -1,0 +1,70 @@
+//! From uploaded files and options to a prepared solver, and the cache of these; knows no sessions.
+
+mod cage_maker;
+mod checks;
+mod choices;
+mod geometry;
+mod solvers;
+
+pub(crate) use cage_maker::{
+    CAGE_NAME, CageMaker, Enclosed, VERTICES, check_extent, obj_of, refuse_cage, vertices_detail,
+};
+pub(crate) use checks::{cannot_be_coded, check, check_model};
+pub(crate) use choices::{Choices, content_key};
+pub(crate) use geometry::{Geometry, read, read_cage, read_part};
+pub(crate) use solvers::{SolverRequest, SolverResponse, Solvers};
+
+use crate::preparation_warnings::preparation_warnings;
+use crate::problem::ApiError;
+use cager_core::cage::Cage;
+use cager_core::inversion::{PrepareError, Preparing, Solver, SolverOptions};
+use cager_core::regularize::Term;
+use checks::{check_memory, refused};
+use std::ops::ControlFlow;
+
+/// A prepared solver with its warnings, cage sizes and the digest of its handles.
+pub(crate) struct Prepared {
+    pub(crate) solver: Solver,
+    pub(crate) options: SolverOptions,
+    pub(crate) handles_digest: String,
+    pub(crate) cage_vertices: u32,
+    pub(crate) cage_faces: u32,
+    pub(crate) warnings: Vec<String>,
+}
+
+/// Prepares the solver. `wanted` is called before each step; returns `None` once it is false.
+///
+/// # Errors
+/// `INVALID_GEOMETRY`, `INVALID_OPTIONS`.
+pub(crate) fn prepare(
+    geometry: &Geometry,
+    choices: &Choices,
+    max_bytes: u64,
+    wanted: &dyn Fn() -> bool,
+) -> Result<Option<Prepared>, ApiError> {
+    let unknowns = choices.system.unknowns(&geometry.cage);
+    let options = choices.inversion.options(unknowns);
+    check_memory(geometry, choices, options, max_bytes)?;
+    let term = geometry.matrix.as_ref().map(|matrix| matrix as &dyn Term);
+    let next = |_| if wanted() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
+    let preparing = Preparing { term, next: &next, ..Preparing::default() };
+    match Solver::prepare_with(choices.system, &geometry.cage, &geometry.rest.points, options, &preparing) {
+        Ok(solver) => Ok(Some(with_solver(solver, &geometry.cage, options))),
+        Err(PrepareError::Stopped) => Ok(None),
+        Err(error) => Err(refused(&error)),
+    }
+}
+
+/// A prepared solver with its warnings, cage sizes and the digest of its handles.
+pub(crate) fn with_solver(solver: Solver, cage: &Cage, options: SolverOptions) -> Prepared {
+    let warnings = preparation_warnings(options, &solver);
+    let handles: Vec<u8> = solver.handles().iter().flat_map(|handle| handle.to_le_bytes()).collect();
+    Prepared {
+        handles_digest: blake3::hash(&handles).to_hex().to_string(),
+        solver,
+        options,
+        cage_vertices: cage.vertices().len() as u32,
+        cage_faces: cage.faces().len() as u32,
+        warnings,
+    }
+}
