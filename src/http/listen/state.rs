@@ -198,10 +198,12 @@ impl State {
     pub(super) fn exceeded_limit(&self, limits: &Limits) -> Option<Reason> {
         let now = Instant::now();
         let past = |since: Instant, limit: Duration| now.saturating_duration_since(since) >= limit;
+        // Dropped after the lock is released, since the last one takes it.
+        let open: Vec<_> = lock(&self.facts).open.iter().filter_map(Weak::upgrade).collect();
         let facts = lock(&self.facts);
         // In HTTP/2 a stalled response does not block the socket, and its memory is released only by closing the connection, whatever
         // progress other streams make. In HTTP/1.1 every byte written belongs to the one response.
-        let unread = facts.open.iter().filter_map(|open| *lock(&open.upgrade()?.unread_since));
+        let unread = open.iter().filter_map(|open| *lock(&open.unread_since));
         let unread = unread.min().map(|since| if facts.http2 { since } else { since.max(facts.progress) });
         let blocked = facts.blocked_since.map(|since| since.max(facts.progress));
         if let Some(since) = blocked.into_iter().chain(unread).min() {
@@ -254,5 +256,31 @@ impl Drop for InFlight {
         if facts.in_flight == 0 {
             self.state.entry.wait(true);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Barrier;
+
+    #[test]
+    fn a_request_may_end_while_its_connection_is_looked_at() {
+        let state = State::new(Arc::new(Arc::<super::super::idle::IdleConnections>::default().enter()));
+        let (together, limits) = (Barrier::new(2), Limits::default());
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                for _ in 0..100_000 {
+                    let (_, request) = state.begin();
+                    together.wait();
+                    drop(request);
+                }
+            });
+            for _ in 0..100_000 {
+                together.wait();
+                assert_eq!(state.exceeded_limit(&limits), None);
+            }
+        });
+        assert!(state.is_idle());
     }
 }
