@@ -1,7 +1,8 @@
 //! Idempotency keys (`Idempotency-Key`) by tenant.
 
 use crate::problem::{self, ApiError};
-use crate::store::Idempotency;
+use crate::store::{ContentKey, Idempotency};
+use serde::Serialize;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -31,6 +32,14 @@ pub(crate) trait Keyed<T> {
     fn requests<R>(&self, work: impl FnOnce(&mut Requests) -> R) -> R;
     /// The object with this id.
     fn made(&self, id: &str) -> Option<Arc<T>>;
+}
+
+/// A request with a key for this content and these options.
+pub(crate) fn request(key: Option<String>, content: &ContentKey, options: &impl Serialize) -> Option<Idempotency> {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(&content.0);
+    hasher.update(&serde_json::to_vec(options).unwrap_or_default());
+    Some(Idempotency { key: key?, fingerprint: hasher.finalize().to_hex().to_string() })
 }
 
 /// Creates an object, at most once per key.

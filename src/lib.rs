@@ -32,6 +32,7 @@ mod session;
 mod speed;
 pub mod store;
 mod sync;
+mod tasks;
 pub mod telemetry;
 pub mod timing;
 mod unreadable;

@@ -3,8 +3,8 @@
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{CageJobMeta, Kind, SessionMeta, StoreError};
-use crate::sync::blocking;
 use crate::sync::lock;
+use crate::tasks::blocking;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};

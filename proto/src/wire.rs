@@ -2,8 +2,8 @@
 //!
 //! The layout is bincode's "legacy" one, the same as bincode 1 wrote by default: little-endian, integers at their full
 //! width, `bool` one byte, enums a `u32` variant number, `Option` one byte 0 or 1 before the value, strings and
-//! sequences a `u64` length before their elements, structs and tuples their fields back to back, no padding. Large arrays
-//! do not go through here: they travel as raw little-endian numbers.
+//! sequences a `u64` length before their elements, structs and tuples their fields back to back, no padding. Matrices and
+//! positions do not go through here: they travel as raw little-endian numbers.
 //!
 //! # Why the version is pinned, and how to leave
 //!

@@ -4,14 +4,13 @@ use super::{CageJob, Finished, Outcome, Phase, options, samples};
 use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::config::ServeConfig;
-use crate::idempotency::once;
-use crate::preparation::check_extent;
-use crate::preparation::read_part;
+use crate::idempotency::{once, request};
+use crate::preparation::{check_extent, read_part};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::registry::Reserved;
 use crate::store::{CageJobMeta, ContentKey, Idempotency, Kind, Spool, StoreError, StoredPart};
-use crate::sync::blocking;
+use crate::tasks::{blocking, to_the_end};
 use crate::unreadable;
 use cager_proto::cage_messages::CageOptions;
 use std::sync::Arc;
@@ -50,8 +49,7 @@ impl Service {
         new: NewCageJob,
     ) -> Result<Arc<CageJob>, ApiError> {
         let (service, tenant) = (Arc::clone(self), Arc::clone(tenant));
-        let work = tokio::spawn(async move { service.create_cage_job_for(&tenant, new).await });
-        work.await.map_err(|error| ApiError::internal(&error))?
+        to_the_end(async move { service.create_cage_job_for(&tenant, new).await }).await
     }
 
     async fn create_cage_job_for(self: &Arc<Self>, tenant: &Tenant, new: NewCageJob) -> Result<Arc<CageJob>, ApiError> {
@@ -65,8 +63,7 @@ impl Service {
             .await?;
             (new, checked?)
         };
-        let fingerprint = fingerprint(&checked.key, &new.options);
-        let request = new.idempotency_key.clone().map(|key| Idempotency { key, fingerprint });
+        let request = request(new.idempotency_key.clone(), &checked.key, &new.options);
         let make = |request| self.create_new_cage_job(tenant, new, checked, request);
         once(&self.cage_jobs, &tenant.name, request, make).await
     }
@@ -208,7 +205,7 @@ impl Service {
     /// Storage errors.
     pub(crate) async fn delete_cage_job(self: &Arc<Self>, job: &Arc<CageJob>) -> Result<(), ApiError> {
         let (service, job) = (Arc::clone(self), Arc::clone(job));
-        let work = tokio::spawn(async move {
+        to_the_end(async move {
             let (store, id) = (service.store.clone(), job.meta.id.clone());
             let _unread = service.unread.hold(Kind::CageJob, &id).await;
             blocking(move || store.delete(Kind::CageJob, &id)).await??;
@@ -217,8 +214,8 @@ impl Service {
             job.deleted.cancel();
             job.touch();
             Ok(())
-        });
-        work.await.map_err(|error| ApiError::internal(&error))?
+        })
+        .await
     }
 }
 
@@ -259,11 +256,4 @@ fn check(new: &NewCageJob, tenant: &str, max_seconds: u64, max_bytes: u64) -> Re
         frames.digest().as_bytes(),
     ]);
     Ok(Checked { key, points: points as u32, frame_count })
-}
-
-fn fingerprint(key: &ContentKey, options: &CageOptions) -> String {
-    let mut hasher = blake3::Hasher::new();
-    hasher.update(&key.0);
-    hasher.update(&serde_json::to_vec(options).unwrap_or_default());
-    hasher.finalize().to_hex().to_string()
 }

@@ -8,7 +8,7 @@ use crate::preparation::read_part;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::StoreError;
-use crate::sync::blocking;
+use crate::tasks::blocking;
 use cager_cages::{Design, DesignError, DesignOptions, Progress, design};
 use cager_core::mesh::Model;
 use cager_proto::cage_messages::{CageError, CageStage};

@@ -5,7 +5,7 @@ use super::frames::{not_acceptable, prepared};
 use super::openapi;
 use crate::problem::ApiError;
 use crate::service::Service;
-use crate::sync::blocking;
+use crate::tasks::blocking;
 use axum::Json;
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};

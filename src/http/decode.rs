@@ -245,8 +245,9 @@ impl Decoding {
             }
         };
         let (spool, length) = (Arc::clone(&self.spool), (count * self.frame_bytes) as usize);
-        let bytes =
-            crate::sync::blocking(move || spool.read(at, length)).await?.map_err(|error| ApiError::internal(&error))?;
+        let bytes = crate::tasks::blocking(move || spool.read(at, length))
+            .await?
+            .map_err(|error| ApiError::internal(&error))?;
         let mut replies = Vec::new();
         for cage in bytes.chunks_exact(self.frame_bytes as usize) {
             let cage: Vec<f32> = cage.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();

@@ -8,7 +8,7 @@ use crate::preparation::Prepared;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::{Session, gone};
-use crate::sync::blocking;
+use crate::tasks::blocking;
 use axum::body::Body;
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;

@@ -4,7 +4,7 @@ use super::extract::RequestedSession;
 use super::frames::result_of;
 use super::openapi;
 use crate::problem::ApiError;
-use crate::sync::blocking;
+use crate::tasks::blocking;
 use axum::response::{IntoResponse, Response};
 use cager_proto::messages::FrameErrors;
 use http::header::CONTENT_TYPE;

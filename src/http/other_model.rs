@@ -8,7 +8,7 @@ use crate::preparation::{Choices, check_model, read_part};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::Session;
-use crate::sync::blocking;
+use crate::tasks::blocking;
 use axum::extract::{Multipart, Request};
 use bytes::Bytes;
 use cager_core::decode::Decoder;

@@ -1,4 +1,4 @@
-//! From uploaded files and options to a prepared solver, and the cache of these; knows no sessions.
+//! From uploaded files and options to a prepared solver, and the cache of these.
 
 mod cage_maker;
 mod checks;

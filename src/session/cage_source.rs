@@ -4,7 +4,7 @@ use crate::preparation::{CAGE_NAME, Enclosed, refuse_cage};
 use crate::problem::ApiError;
 use crate::service::Service;
 use crate::store::{Content, ContentKey, NamedFile};
-use crate::sync::blocking;
+use crate::tasks::blocking;
 use cager_proto::messages::{CageSource, SessionOptions};
 
 /// The files of a request that creates a session.
@@ -39,7 +39,7 @@ impl Service {
                 let vertices = source.and_then(|source| source.vertices);
                 let stored = async |made| {
                     let (store, key) = (self.store.clone(), self.registry.made_cage(tenant, &made)?);
-                    // An unreadable cage is made again.
+                    // One that cannot be read is made again, whatever the reason.
                     blocking(move || store.content_cage(&key)).await.ok()?.ok()?
                 };
                 let Enclosed { rest, cage, made } = self.cage_maker.enclose(tenant, rest, vertices, stored).await?;

@@ -28,14 +28,7 @@ pub(crate) struct SolvedFrame {
 #[derive(Default)]
 pub(crate) struct CommitQueue {
     solved: Vec<SolvedFrame>,
-    busy: bool,
-}
-
-impl CommitQueue {
-    /// Whether frames are being written or queued.
-    pub(crate) fn is_busy(&self) -> bool {
-        self.busy
-    }
+    pub(super) busy: bool,
 }
 
 /// Handle to the threads that append to frame logs and sync them.

@@ -4,18 +4,16 @@ use super::container_frames::ContainerFrames;
 use super::frames::{Missing, SealError};
 use super::{Phase, Session};
 use crate::coding::{CodingError, Goal};
-use crate::preparation::Prepared;
-use crate::preparation::{self, Choices, Geometry, cannot_be_coded};
+use crate::preparation::{self, Choices, Geometry, Prepared, cannot_be_coded};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{Completion, StoreError};
-use crate::sync::blocking;
+use crate::tasks::{blocking, to_the_end};
 use crate::telemetry::traces::TraceSpan;
 use crate::webhooks::{Event, PendingMessage, Webhooks};
 use cager_core::cage::Cage;
 use cager_proto::messages::Complete;
 use opentelemetry::Context;
-use opentelemetry::trace::FutureExt as _;
 use std::io::{self, BufWriter, Write};
 use std::sync::Arc;
 use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
@@ -36,8 +34,7 @@ impl Service {
             let _step = TraceSpan::begin("complete", &Context::current());
             service.complete_alone(&session, request).await
         };
-        let work = tokio::spawn(work.with_current_context());
-        work.await.map_err(|error| ApiError::internal(&error))?
+        to_the_end(work).await
     }
 
     async fn complete_alone(self: &Arc<Self>, session: &Arc<Session>, request: Complete) -> Result<(), ApiError> {

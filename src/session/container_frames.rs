@@ -5,8 +5,7 @@ use super::groups::StoredGroup;
 use super::solve::numbers;
 use crate::capture::{CaptureWriter, Encoding, StoredError};
 use crate::coding::Carried;
-use crate::preparation::Prepared;
-use crate::preparation::{Choices, Geometry};
+use crate::preparation::{Choices, Geometry, Prepared};
 use cager_proto::container;
 use std::io::{self, Write};
 

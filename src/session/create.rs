@@ -8,13 +8,12 @@ use super::upload::FrameJob;
 use super::{LiveLane, Phase, Session, Status};
 use crate::admission::Held;
 use crate::auth::Tenant;
-use crate::idempotency::once;
-use crate::preparation::{self, Choices, Geometry, content_key};
-use crate::preparation::{Prepared, SolverRequest, SolverResponse};
+use crate::idempotency::{once, request};
+use crate::preparation::{self, Choices, Geometry, Prepared, SolverRequest, SolverResponse, content_key};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{Content, ContentKey, Idempotency, Kind, SessionMeta};
-use crate::sync::blocking;
+use crate::tasks::{blocking, to_the_end};
 use crate::webhooks::Event;
 use cager_proto::messages::{CacheUse, PreparationSeconds, SessionOptions};
 use http::StatusCode;
@@ -51,9 +50,7 @@ impl Service {
         new: NewSession,
     ) -> Result<Arc<Session>, ApiError> {
         let (service, tenant) = (Arc::clone(self), Arc::clone(tenant));
-        let work = async move { service.create_for(&tenant, new).await };
-        let work = tokio::spawn(work.with_current_context());
-        work.await.map_err(|error| ApiError::internal(&error))?
+        to_the_end(async move { service.create_for(&tenant, new).await }).await
     }
 
     async fn create_for(self: &Arc<Self>, tenant: &Tenant, new: NewSession) -> Result<Arc<Session>, ApiError> {
@@ -64,8 +61,7 @@ impl Service {
             let (tenant, options) = (tenant.name.clone(), options.clone());
             blocking(move || (content_key(&tenant, &content, &options, &choices), content)).await?
         };
-        let fingerprint = fingerprint(&key, &options);
-        let request = idempotency_key.map(|key| Idempotency { key, fingerprint });
+        let request = request(idempotency_key, &key, &options);
         let checked = Checked { key, content, made_cage, options, choices };
         once(&self.registry, &tenant.name, request, |request| self.create_new(tenant, checked, request)).await
     }
@@ -258,8 +254,7 @@ impl Service {
     /// stay registered and accept frames that a restart would lose.
     pub(crate) async fn delete(self: &Arc<Self>, session: &Arc<Session>) -> Result<(), ApiError> {
         let (service, session) = (Arc::clone(self), Arc::clone(session));
-        let work = tokio::spawn(async move { service.delete_alone(&session).await });
-        work.await.map_err(|error| ApiError::internal(&error))?
+        to_the_end(async move { service.delete_alone(&session).await }).await
     }
 
     async fn delete_alone(&self, session: &Arc<Session>) -> Result<(), ApiError> {
@@ -298,10 +293,3 @@ fn wanted(session: &Session, choices: Choices, geometry: Option<Arc<Geometry>>) 
 
 /// Name of the note that stores the [`Outcome`].
 pub(super) const OUTCOME: &str = "outcome";
-
-fn fingerprint(key: &ContentKey, options: &SessionOptions) -> String {
-    let mut hasher = blake3::Hasher::new();
-    hasher.update(&key.0);
-    hasher.update(&serde_json::to_vec(options).unwrap_or_default());
-    hasher.finalize().to_hex().to_string()
-}

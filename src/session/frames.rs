@@ -283,6 +283,11 @@ mod tests {
         let highest = Frames::new([u32::MAX - 1, u32::MAX].map(entry).to_vec());
         assert_eq!(highest.missing(5, None, 9).ranges, [[5, u32::MAX - 1]]);
         assert_eq!(highest.missing(u32::MAX, None, 9), Missing::default());
+        let mut frames = Frames::new((0..9).map(entry).collect());
+        frames.discard_from(4);
+        assert_eq!((frames.run_length(2), frames.run_length(4), frames.highest()), (2, 0, Some(3)));
+        frames.solved(entry(5));
+        assert_eq!(frames.missing(0, Some(7), 9).ranges, [[4, 5], [6, 7]]);
     }
 
     #[test]

@@ -6,12 +6,12 @@ use super::solve::numbers;
 use super::{Phase, Session};
 use crate::capture::StoredError;
 use crate::coding::{Carried, Goal, GroupCoder, GroupDecoder, group_frames};
-use crate::preparation::Prepared;
-use crate::preparation::{Choices, Geometry, cannot_be_coded};
+use crate::preparation::{Choices, Geometry, Prepared, cannot_be_coded};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{Kind, LogEntry, StoreError};
-use crate::sync::{blocking, lock};
+use crate::sync::lock;
+use crate::tasks::blocking;
 use cager_proto::messages::CodedFrames;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -110,10 +110,7 @@ impl Session {
         match found {
             Some((group, _)) => Ok(group),
             None if self.coded_group(first).is_none() => Err(left_out(first)),
-            None => {
-                let what = format!("group {first} is gone");
-                Err(self.fail_if_damaged(StoreError::damaged(&self.store.log_path(&self.meta.id), what)))
-            }
+            None => Err(self.fail_if_damaged(self.damaged(format!("group {first} is gone")))),
         }
     }
 
@@ -135,7 +132,7 @@ impl Session {
             let first = found.frames();
             let Some((group, bytes)) = self.store.group::<StoredGroup>(&self.meta.id, first)? else { break };
             if group.errors.is_empty() {
-                return Err(StoreError::damaged(&self.store.log_path(&self.meta.id), "a group has no frames"));
+                return Err(self.damaged("a group has no frames"));
             }
             self.frames().set_errors(first, &group.errors);
             found.add(first, &group, bytes);
@@ -214,10 +211,7 @@ impl Session {
             let read = self.store.read_frame(&self.meta.id, entry.frame / most * most, entry.frame, &mut frame);
             let read = read.and_then(|()| match entry.full_digest {
                 Some(digest) if blake3::hash(&frame).as_bytes()[..16] == digest => Ok(()),
-                _ => {
-                    let what = format!("frame {} does not match its checksum", entry.frame);
-                    Err(StoreError::damaged(&self.store.log_path(&self.meta.id), what))
-                }
+                _ => Err(self.damaged(format!("frame {} does not match its checksum", entry.frame))),
             });
             read.map_err(|error| self.fail_if_damaged(error))?;
             coder.push(numbers(&frame).into_iter().map(f64::from).collect(), numbers(cage));

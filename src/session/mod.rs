@@ -203,7 +203,7 @@ impl Session {
         self.deleting.store(deleting, Ordering::SeqCst);
     }
 
-    /// The response for a storage error.
+    /// The response for a storage error. Not by `?`, which would not know that the session is being deleted.
     pub(crate) fn storage_error(&self, error: StoreError) -> ApiError {
         if self.deleting.load(Ordering::SeqCst) || self.is_deleted() { gone() } else { error.into() }
     }
@@ -251,8 +251,7 @@ impl Session {
     fn load_log(&self) -> Result<FrameLog, StoreError> {
         let rows = self.facts().map_or(0, |facts| facts.unknowns);
         if self.has_log.load(Ordering::Acquire) && !self.store.has_log(&self.meta.id)? {
-            let path = self.store.log_path(&self.meta.id);
-            return Err(StoreError::Damaged { path, what: "the frame log is gone".to_owned() });
+            return Err(self.damaged("the frame log is gone"));
         }
         let (log, mut entries) = self.store.open_log(&self.meta.id, rows)?;
         self.has_log.store(true, Ordering::Release);
@@ -263,8 +262,7 @@ impl Session {
         if let Some(frames) = self.declared()
             && entries.len() < frames as usize
         {
-            let what = format!("{} of {frames} frames are there", entries.len());
-            return Err(StoreError::Damaged { path: self.store.log_path(&self.meta.id), what });
+            return Err(self.damaged(format!("{} of {frames} frames are there", entries.len())));
         }
         *lock(&self.reader) = Some(log.reader());
         // In a log that was loaded before, new entries are frames that reached the disk although their append reported an error.
@@ -282,6 +280,11 @@ impl Session {
         }
         self.loaded.store(true, Ordering::Release);
         Ok(log)
+    }
+
+    /// Damage of its frames.
+    fn damaged(&self, what: impl Into<String>) -> StoreError {
+        StoreError::damaged(&self.store.log_path(&self.meta.id), what)
     }
 
     /// Marks the session as failed and moves its files to quarantine. The caller holds none of its locks.
@@ -373,7 +376,7 @@ impl Session {
 
     /// Closes files of a session that nobody uses.
     pub(crate) fn close_files_if_idle(&self) {
-        let idle = lock(&self.lane).strong_count() == 0 && !lock(&self.waiting).is_busy();
+        let idle = lock(&self.lane).strong_count() == 0 && !lock(&self.waiting).busy;
         if idle && let Ok(mut log) = self.log.try_lock() {
             *lock(&self.reader) = None;
             *log = None;

@@ -4,7 +4,7 @@ use super::registry::Reserved;
 use crate::auth::Tenant;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::sync::blocking;
+use crate::tasks::blocking;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};

@@ -81,7 +81,7 @@ impl Store {
     /// The rest pose of a job that is not finished.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`], or another I/O error.
+    /// [`StoreError::Damaged`].
     pub fn cage_job_rest(&self, meta: &CageJobMeta) -> Result<Vec<u8>, StoreError> {
         self.cage_job_part(&meta.id, REST, meta.rest.bytes, &meta.rest.blake3)
     }
@@ -89,7 +89,7 @@ impl Store {
     /// The frames of a job that is not finished. Their digest is not verified, since only a sample is read; each frame read is validated.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`] where the length differs, or another I/O error.
+    /// [`StoreError::Damaged`] where the length differs.
     pub fn cage_job_frames(&self, meta: &CageJobMeta) -> Result<StoredFile, StoreError> {
         let path = self.folder(Kind::CageJob, &meta.id)?.join(FRAMES);
         let file = StoredFile::open(self.files().open_expected(&path)?);
@@ -109,7 +109,7 @@ impl Store {
     /// Decrements the number of attempts after an orderly stop.
     ///
     /// # Errors
-    /// [`StoreError::Full`], or another I/O error; not found where the job was deleted.
+    /// Not found where the job was deleted.
     pub fn uncount_cage_job_attempt(&self, id: &str) -> Result<(), StoreError> {
         self.set_cage_job_attempts(id, |before| before.saturating_sub(1)).map(|_| ())
     }
@@ -125,7 +125,7 @@ impl Store {
     /// Stores the outcome of a job and its cage, if any, and removes its input; durable on `Ok`.
     ///
     /// # Errors
-    /// [`StoreError::BadId`], [`StoreError::Full`]; not found where the job was deleted.
+    /// Not found where the job was deleted.
     pub fn finish_cage_job<T: Serialize>(&self, id: &str, outcome: &T, cage: Option<&[u8]>) -> Result<(), StoreError> {
         let (files, folder) = (self.files(), self.folder(Kind::CageJob, id)?);
         if let Some(cage) = cage {
@@ -140,7 +140,7 @@ impl Store {
     /// The outcome of a job; `None` if it is not finished.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`], [`StoreError::BadId`].
+    /// [`StoreError::Damaged`].
     pub fn cage_job_outcome<T: DeserializeOwned>(&self, id: &str) -> Result<Option<T>, StoreError> {
         meta::read(self.files(), &self.folder(Kind::CageJob, id)?.join(OUTCOME), "cage outcome")
     }
@@ -148,7 +148,7 @@ impl Store {
     /// The cage of a completed job, an OBJ file of this length and digest.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`], or another I/O error.
+    /// [`StoreError::Damaged`].
     pub fn cage_job_cage(&self, id: &str, bytes: u64, digest: &str) -> Result<Vec<u8>, StoreError> {
         self.cage_job_part(id, CAGE, bytes.min(CAGE_BYTES), digest)
     }

@@ -73,7 +73,8 @@ impl Store {
         self.files().contents.join(key.to_string())
     }
 
-    /// Stores content; durable on `Ok`. Content that exists under the key is kept, unless it is damaged.
+    /// Stores content; durable on `Ok`. Content that exists under the key is kept, unless it is damaged. Callers take turns by key, and with
+    /// [`Self::remove_content`].
     pub fn put_content(&self, key: &ContentKey, content: &Content) -> Result<(), StoreError> {
         let files = self.files();
         let place = self.content_path(key);
@@ -96,7 +97,9 @@ impl Store {
         });
         match made {
             // Another thread has stored the same.
-            Err(StoreError::Io { cause, .. }) if cause.kind() == io::ErrorKind::AlreadyExists => Ok(()),
+            Err(StoreError::Io { cause, .. }) if cause.kind() == io::ErrorKind::AlreadyExists => {
+                files.sync_dir(&files.contents)
+            }
             made => made,
         }
     }
@@ -104,7 +107,7 @@ impl Store {
     /// Content by its key; `None` if there is none. Damaged content is moved to quarantine, so that the next upload replaces it.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`], or another I/O error.
+    /// [`StoreError::Damaged`].
     pub fn content(&self, key: &ContentKey) -> Result<Option<Content>, StoreError> {
         let place = self.content_path(key);
         let found = self.read_content(&place);

@@ -81,7 +81,7 @@ impl Store {
     /// The coded group that begins with `first`, and the bytes of its file; `None` if it has not been stored.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`], [`StoreError::BadId`].
+    /// [`StoreError::Damaged`].
     pub fn group<T: DeserializeOwned>(&self, id: &str, first: u32) -> Result<Option<(T, u64)>, StoreError> {
         let path = self.part(id, GROUP, first)?;
         let Some(file) = self.files().read(&path, (MOST_GROUP_BYTES + DIGEST) as u64)? else { return Ok(None) };

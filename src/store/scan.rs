@@ -110,7 +110,7 @@ impl Store {
     /// Reads the metadata of one object; `None` if its folder does not exist. Nothing is moved to quarantine.
     ///
     /// # Errors
-    /// [`StoreError::BadId`], [`StoreError::Damaged`], or another I/O error.
+    /// [`StoreError::Damaged`].
     pub(crate) fn reload_meta<M: FolderMeta>(&self, id: &str) -> Result<Option<M>, StoreError> {
         match self.files().exists(&self.folder(M::KIND, id)?)? {
             true => read(self.files(), id).map(Some),

@@ -82,7 +82,7 @@ impl Store {
     /// Creates a session, atomically; durable on `Ok`.
     ///
     /// # Errors
-    /// `AlreadyExists` as [`StoreError::Io`] where the id is taken; [`StoreError::BadId`], [`StoreError::Full`].
+    /// [`StoreError::Io`] with `AlreadyExists` where the id is taken.
     pub fn create_session(&self, meta: &SessionMeta) -> Result<(), StoreError> {
         let (files, place) = (self.files(), self.folder(Kind::Session, &meta.id)?);
         let bytes = meta::wrap(&place.join(META), "session", meta)?;
@@ -93,7 +93,7 @@ impl Store {
     /// that `write` returns is unwrapped.
     ///
     /// # Errors
-    /// Those of `write`; [`StoreError::BadId`], [`StoreError::Full`].
+    /// Those of `write`.
     pub fn write_container(
         &self,
         id: &str,
@@ -121,7 +121,7 @@ impl Store {
     /// Reads the completion mark; `None` if there is none. A mark that is returned is durable.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`], [`StoreError::BadId`], or another I/O error.
+    /// [`StoreError::Damaged`].
     pub fn completion(&self, id: &str) -> Result<Option<Completion>, StoreError> {
         let folder = self.folder(Kind::Session, id)?;
         let found: Option<Completion> = meta::read(self.files(), &folder.join(COMPLETE), "completion")?;
@@ -165,7 +165,7 @@ impl Store {
     /// A note of the session; None where there is none.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`], [`StoreError::BadId`].
+    /// [`StoreError::Damaged`].
     pub fn note<T: DeserializeOwned>(&self, id: &str, name: &'static str) -> Result<Option<T>, StoreError> {
         meta::read(self.files(), &self.folder(Kind::Session, id)?.join(name).with_extension("json"), name)
     }

@@ -6,7 +6,7 @@ use crate::http::openapi;
 use crate::http::ranged::Immutable;
 use crate::problem::ApiError;
 use crate::service::Service;
-use crate::sync::blocking;
+use crate::tasks::blocking;
 use axum::extract::State;
 use axum::response::Response;
 use bytes::Bytes;

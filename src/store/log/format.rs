@@ -51,10 +51,6 @@ impl Layout {
         Self { header, rows, seed }
     }
 
-    pub(super) fn rows(&self) -> u32 {
-        self.rows
-    }
-
     pub(super) fn cage_values(&self) -> usize {
         3 * self.rows as usize
     }

@@ -96,7 +96,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::Damaged`] if acknowledged records are damaged or missing, or the log has cages of another size; the file is not
-    /// changed then. `ResourceBusy` as [`StoreError::Io`] if the log is open already. [`StoreError::BadId`].
+    /// changed then. `ResourceBusy` as [`StoreError::Io`] if the log is open already.
     pub fn open_log(&self, id: &str, rows: u32) -> Result<(FrameLog, Vec<LogEntry>), StoreError> {
         let (files, path) = (self.files(), self.folder(Kind::Session, id)?.join(LOG));
         let mut only = WriterGuard::new(self, id, &path)?;
@@ -126,7 +126,7 @@ impl Store {
     /// Opens a session's log for reading frames whose entries are known.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`] if it is missing or has cages of another size, [`StoreError::BadId`], or another I/O error.
+    /// [`StoreError::Damaged`] if it is missing or has cages of another size.
     pub fn log_reader(&self, id: &str, rows: u32) -> Result<LogReader, StoreError> {
         let path = self.folder(Kind::Session, id)?.join(LOG);
         let file = self.files().disk.open(&path).map_err(|error| match error.kind() {
@@ -154,7 +154,7 @@ impl FrameLog {
     /// restored, all further appends fail until the log is reopened.
     ///
     /// # Errors
-    /// [`StoreError::Full`]; [`StoreError::Io`] with `InvalidInput` where a cage has another number of rows.
+    /// [`StoreError::Io`] with `InvalidInput` where a cage has another number of rows.
     pub fn append(&mut self, records: &[LogRecord<'_>]) -> Result<Vec<LogEntry>, StoreError> {
         if self.poisoned {
             let cause = io::Error::other("an earlier error could not be undone; the log has to be reopened");

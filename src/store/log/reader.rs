@@ -23,15 +23,10 @@ impl LogReader {
         Self { file, path, layout }
     }
 
-    /// Rows of a cage, m.
-    pub fn rows(&self) -> u32 {
-        self.layout.rows()
-    }
-
     /// Appends the cages of `entries` to `out`, each m × 3 `f32`, little-endian. On an error `out` is unchanged.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`] if a record fails its checksum, or another I/O error.
+    /// [`StoreError::Damaged`] if a record fails its checksum.
     pub fn read_cages(&self, entries: &[LogEntry], out: &mut Vec<u8>) -> Result<(), StoreError> {
         let before = out.len();
         self.read(entries, out).inspect_err(|_| out.truncate(before))

@@ -3,7 +3,7 @@
 use super::faults::FaultyDisk;
 use super::{Completion, Content, ContentKey, Idempotency, NamedFile, Opened, SessionMeta, Store};
 use cager_core::cage::Cage;
-use cager_core::coordinates::MeanValue;
+use cager_core::coordinates;
 use cager_core::inversion::{Handles, Solver, SolverOptions};
 use cager_core::synthetic::{Capture, Options};
 use cager_proto::messages::SessionOptions;
@@ -70,13 +70,13 @@ pub(crate) fn content() -> Content {
 }
 
 pub(crate) fn prepare(handles: Handles) -> Solver {
-    prepare_with(SolverOptions { handles, ..SolverOptions::PAPER })
+    prepare_with("mvc", SolverOptions { handles, ..SolverOptions::PAPER })
 }
 
-pub(crate) fn prepare_with(options: SolverOptions) -> Solver {
+pub(crate) fn prepare_with(system: &str, options: SolverOptions) -> Solver {
     let capture = Capture::new(&Options { points: 400, frames: 2, cage_vertices: 40 });
     let cage = Cage::new(capture.cage.clone()).unwrap();
-    Solver::prepare(&MeanValue, &cage, &capture.rest.points, options).unwrap()
+    Solver::prepare(coordinates::by_name(system).unwrap(), &cage, &capture.rest.points, options).unwrap()
 }
 
 pub(crate) static SOLVER: LazyLock<Solver> = LazyLock::new(|| prepare(Handles::MaxVol));

@@ -24,14 +24,18 @@ fn a_solver_comes_back_the_same_to_the_bit() {
     let store = given.open().store;
     let spread = Handles::Spread { count: None };
     let kinds = [
-        (Handles::MaxVol, Regularizer::Laplacian),
-        (Handles::All, Regularizer::Laplacian),
-        (spread, Regularizer::Differential),
-        (spread, Regularizer::Temporal),
+        ("mvc", Handles::MaxVol, Regularizer::Laplacian),
+        ("mvc", Handles::All, Regularizer::Laplacian),
+        ("mvc", spread, Regularizer::Differential),
+        ("mvc", spread, Regularizer::Temporal),
+        ("green", spread, Regularizer::Laplacian),
+        ("harmonic", spread, Regularizer::Laplacian),
     ];
-    for (i, (handles, regularizer)) in kinds.into_iter().enumerate() {
+    for (i, (system, handles, regularizer)) in kinds.into_iter().enumerate() {
         let key = ContentKey([i as u8; 32]);
-        let solver = prepare_with(SolverOptions { handles, regularizer, ..SolverOptions::PAPER });
+        let solver = prepare_with(system, SolverOptions { handles, regularizer, ..SolverOptions::PAPER });
+        assert_eq!(solver.tied().is_some(), system == "green");
+        assert_eq!(solver.preparation().plan.is_some(), system == "harmonic");
         assert!(store.prepared(&key).unwrap().is_none());
         store.put_prepared(&key, &solver).unwrap();
         let found = store.prepared(&key).unwrap().unwrap();
