@@ -113,6 +113,17 @@ impl Server {
         line.trim().trim_end_matches(" kB").parse::<f64>().expect("a number") / 1024.0
     }
 
+    /// Bytes on disk of files that are open and have no name, in MiB.
+    pub(crate) fn unnamed_files(&self) -> f64 {
+        let open = std::fs::read_dir(format!("/proc/{}/fd", self.child.id())).expect("its files");
+        let unnamed = open.flatten().filter(|file| {
+            let target = std::fs::read_link(file.path()).unwrap_or_default();
+            target.is_absolute() && target.to_string_lossy().ends_with(" (deleted)")
+        });
+        let bytes: u64 = unnamed.filter_map(|file| Some(std::fs::metadata(file.path()).ok()?.len())).sum();
+        bytes as f64 / f64::from(1 << 20)
+    }
+
     /// Processor time used so far; `stat` counts it in hundredths of a second.
     pub(crate) fn cpu(&self) -> Duration {
         let stat = self.proc("stat");
