@@ -67,7 +67,7 @@ captures: ## run the tests that need the real captures in CAGER_CAPTURES (../sha
 		$(CARGO) test --workspace --locked --tests -- --ignored; \
 	fi
 
-proxies: ## uploads through nginx, HAProxy and Caddy as docs/OPERATIONS.md has them; those that are not installed are left out
+proxies: ## uploads through nginx, HAProxy, Caddy and Traefik as docs/OPERATIONS.md has them; those that are not installed are left out
 	CAGER_PROXY_UPLOADS=30 $(CARGO) test --locked --test service proxies -- --nocapture --test-threads 1
 
 blender: $(BLENDER) ## the round trip through Blender itself; installs bpy, which needs Python 3.11

@@ -15,8 +15,8 @@ pub struct ServeFlags {
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub listen: Option<String>,
 
-    /// Address and port for operators: health, metrics, tenants, sessions of all [default: none].
-    #[arg(long, value_name = "ADDRESS:PORT")]
+    /// Address and port for operators: health, metrics, tenants, sessions of all [default: none; without a value 127.0.0.1:8081].
+    #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:8081")]
     pub admin_listen: Option<String>,
 
     /// Folder of sessions and prepared solvers [default: cager-data].

@@ -42,6 +42,9 @@ fn later_layers_override_earlier_ones() {
     assert_eq!(config.origins["workers"], Origin::Flag("--workers".to_owned()));
     assert_eq!(config.origins["max_requests"], Origin::Environment("CAGER_MAX_REQUESTS".to_owned()));
     assert!(!config.origins.contains_key("frame_bytes"));
+    assert_eq!(config.admin_listen, None);
+    let config = load("", &[], "--admin-listen --workers 4").unwrap();
+    assert_eq!(config.admin_listen, Some("127.0.0.1:8081".parse().unwrap()), "operators of this machine");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Persistent data: sessions with their frame logs and containers, uploaded content, cage jobs and prepared solvers. All calls block.
-//! What takes an id refuses those that are none ([`StoreError::BadId`]), what writes may find no space ([`StoreError::Full`]), and anything may
-//! fail as the disk does ([`StoreError::Io`]); only further errors are named below.
+//! Calls with an id that is not valid fail with [`StoreError::BadId`], calls that write may fail with [`StoreError::Full`], and any call may
+//! fail as the disk does, with [`StoreError::Io`]; the documentation of each names only further errors.
 //!
 //! ```text
 //! lock             locked while a process uses the folder

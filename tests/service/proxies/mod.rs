@@ -139,3 +139,13 @@ async fn the_client_gets_through_haproxy() {
 async fn the_client_gets_through_caddy() {
     the_client_arrives(Kind::Caddy).await;
 }
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn uploads_through_traefik_do_not_stall() {
+    plain_uploads_arrive(Kind::Traefik).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_client_gets_through_traefik() {
+    the_client_arrives(Kind::Traefik).await;
+}

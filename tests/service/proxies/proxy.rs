@@ -11,6 +11,7 @@ pub(super) enum Kind {
     Nginx,
     Haproxy,
     Caddy,
+    Traefik,
 }
 
 /// Whether requests and answers are gathered before they are passed on.
@@ -49,6 +50,7 @@ impl Proxy {
             Kind::Nginx => command.arg("-p").arg(place.path()).arg("-e").arg("stderr").arg("-c").arg(&file),
             Kind::Haproxy => command.arg("-db").arg("-f").arg(&file),
             Kind::Caddy => command.args(["run", "--adapter", "caddyfile", "--config"]).arg(&file),
+            Kind::Traefik => command.arg(format!("--configFile={}", split(&file).display())),
         };
         command.env("HOME", place.path()).env("XDG_DATA_HOME", place.path()).env("XDG_CONFIG_HOME", place.path());
         let streams = command.stdin(Stdio::null()).stdout(log.try_clone().expect("a log")).stderr(log);
@@ -56,6 +58,9 @@ impl Proxy {
         for address in [tls, plain] {
             eventually("the proxy listens", async || tokio::net::TcpStream::connect(address).await.ok()).await;
         }
+        let health = format!("{}/healthz", proxy.plain_url());
+        let passes = async || reqwest::get(&health).await.ok().filter(|answer| answer.status() == 200);
+        eventually("the proxy passes requests on", passes).await;
         Some(proxy)
     }
 
@@ -97,6 +102,7 @@ impl Kind {
             Self::Nginx => "nginx",
             Self::Haproxy => "haproxy",
             Self::Caddy => "caddy",
+            Self::Traefik => "traefik",
         }
     }
 
@@ -109,6 +115,13 @@ impl Kind {
             ],
             Self::Haproxy => &[("option http-no-delay", "option http-buffer-request")],
             Self::Caddy => &[("flush_interval -1", "buffer_requests\n            buffer_responses")],
+            Self::Traefik => &[
+                ("      service: cager\n", "      service: cager\n      middlewares: [gather]\n"),
+                (
+                    "  services:\n",
+                    "  middlewares:\n    gather:\n      buffering: {memRequestBodyBytes: 1048576}\n  services:\n",
+                ),
+            ],
         }
     }
 }
@@ -154,6 +167,21 @@ fn configuration(
             let open = block.replace(site, &format!("http://{plain} {{"));
             format!("{{\n    admin off\n    auto_https off\n    skip_install_trust\n}}\n{block}\n{open}")
         }
+        Kind::Traefik => {
+            let dynamic = place.join("dynamic.yaml").display().to_string();
+            replaced.push(("/etc/traefik/cager.yaml".into(), dynamic));
+            replaced.push(("/etc/ssl/cager.pem".into(), certificate.clone()));
+            replaced.push(("/etc/ssl/cager.key".into(), certificate));
+            replaced.push((
+                "  websecure:\n    address: \":443\"".into(),
+                format!("  open:\n    address: \"{plain}\"\n  websecure:\n    address: \"{tls}\""),
+            ));
+            replaced.push(("Host(`cager.example.org`) && ".into(), String::new()));
+            // A router has either TLS or not.
+            let router =
+                "    cager:\n      rule: \"!Path(`/metrics`)\"\n      entryPoints: [open]\n      service: cager\n";
+            block.replacen("  routers:\n", &format!("  routers:\n{}", router.replacen("cager:", "open:", 1)), 1)
+        }
     };
     if buffering == Buffering::On {
         replaced.extend(kind.buffered().iter().map(|&(from, to)| (from.to_owned(), to.to_owned())));
@@ -162,6 +190,16 @@ fn configuration(
         assert!(text.contains(&from), "{from:?} is missing in the configuration of {}", kind.program());
         text.replace(&from, &to)
     })
+}
+
+/// The two files that Traefik reads; gives the first.
+fn split(file: &Path) -> PathBuf {
+    let text = std::fs::read_to_string(file).expect("a configuration");
+    let (fixed, dynamic) = text.split_once("---\n").expect("two parts");
+    std::fs::write(file.with_file_name("dynamic.yaml"), dynamic).expect("a file");
+    let place = file.with_file_name("static.yaml");
+    std::fs::write(&place, fixed).expect("a file");
+    place
 }
 
 fn installed(program: &str) -> Option<PathBuf> {
