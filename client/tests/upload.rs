@@ -14,9 +14,13 @@ use support::service::{Fault, HANDLES, POINTS, Service, capture, frame, frame_by
 
 /// Uploads as many frames; returns also the frames that were reported, as they came.
 async fn upload(client: &Client, frames: u32) -> (Result<Uploaded, ClientError>, Vec<u32>) {
+    upload_over(1, client, frames).await
+}
+
+async fn upload_over(connections: usize, client: &Client, frames: u32) -> (Result<Uploaded, ClientError>, Vec<u32>) {
     let mut reported = Vec::new();
     let mut on_frame = |result: FrameResult| reported.push(result.frame);
-    let options = UploadOptions { on_frame: Some(&mut on_frame), ..UploadOptions::default() };
+    let options = UploadOptions { on_frame: Some(&mut on_frame), connections, ..UploadOptions::default() };
     let source = MemoryFrames::new(POINTS as usize, capture(frames));
     let uploaded = client.upload(&session(SessionState::Ready), source, options).await;
     (uploaded, reported)
@@ -44,6 +48,17 @@ async fn an_undisturbed_upload_is_one_request() {
     assert_eq!(service.posts().len(), 1);
     assert_whole(&service, 300);
     assert_each_once(reported, 300);
+}
+
+#[tokio::test]
+async fn several_connections_share_the_frames() {
+    let (service, address) = Service::start([]).await;
+    let frames = 20_000;
+    let (uploaded, reported) = upload_over(4, &client(&address), frames).await;
+    assert_eq!(uploaded.expect("an upload").retries, 0);
+    assert_eq!((service.posts().len(), service.state().posted_frames), (4, frames as usize));
+    assert_whole(&service, frames);
+    assert_each_once(reported, frames);
 }
 
 #[tokio::test]
@@ -86,7 +101,7 @@ async fn a_busy_service_is_left_alone_as_long_as_it_asks() {
 #[tokio::test]
 async fn a_refusal_is_told_even_if_the_connection_breaks_over_it() {
     // Much more than the connection's buffers hold: the server closes while the client writes.
-    let frames = 200_000;
+    let frames = 20_000;
     let faults = std::iter::repeat_n(Fault::Refuse(413, "too-large", None), 5);
     let (_, address) = Service::start(faults).await;
     let error = upload(&client(&address), frames).await.0.expect_err("too large");
@@ -312,6 +327,7 @@ proptest! {
     fn whatever_breaks_every_frame_arrives_and_is_reported_once(
         faults in faults(),
         frames in 1..80_u32,
+        connections in 1..4_usize,
         there in prop::collection::btree_set(0..80_u32, 0..20),
     ) {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
@@ -320,7 +336,7 @@ proptest! {
             for number in there.into_iter().filter(|&number| number < frames) {
                 service.state().solved.insert(number, frame_bytes(number));
             }
-            let (uploaded, reported) = upload(&client(&address), frames).await;
+            let (uploaded, reported) = upload_over(connections, &client(&address), frames).await;
             assert_eq!(uploaded.expect("an upload").frames, frames);
             assert_whole(&service, frames);
             assert_each_once(reported, frames);

@@ -125,7 +125,8 @@ async fn handle_rows_give_the_same_cages_over_http1_too() {
     let server = Server::start(&dir);
     let client = server.client().with_options(ClientOptions { http2: false, ..ClientOptions::default() });
     let (whole, handles) = (ready(&client, &dir).await, ready(&client, &dir).await);
-    upload(&client, &whole, points, &values).await;
+    let options = UploadOptions { connections: 4, ..UploadOptions::default() };
+    client.upload(&whole, MemoryFrames::new(points, values.as_slice()), options).await.expect("an upload");
     let options = UploadOptions { rows: Rows::Handles, ..UploadOptions::default() };
     let uploaded = client.upload(&handles, MemoryFrames::new(points, values), options).await.expect("an upload");
     assert_eq!(uploaded.sent_bytes, 20 * (28 + 12 * u64::from(handles.handle_count.expect("ready"))));

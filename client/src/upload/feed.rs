@@ -10,8 +10,8 @@ use std::sync::mpsc;
 use std::time::{Duration, Instant};
 use tokio::sync::{mpsc as async_mpsc, oneshot};
 
-/// Size of the chunks: few hand-overs at little memory.
-const PIECE_BYTES: usize = 512 << 10;
+/// Size of the chunks, whole frames each: few hand-overs at little memory.
+pub(crate) const PIECE_BYTES: usize = 512 << 10;
 
 /// Chunks buffered ahead of the connection.
 const WAITING_PIECES: usize = 3;
@@ -28,7 +28,7 @@ pub(crate) enum Layout {
     Records,
 }
 
-/// What to read for one request.
+/// What to read for the requests of one pass.
 struct Job {
     ranges: Vec<FrameRange>,
     layout: Layout,
@@ -41,7 +41,7 @@ struct Job {
 /// How reading ended: the number of frames of the capture, where its end was met.
 pub(crate) type Outcome = Result<Option<u32>, ClientError>;
 
-/// The chunks of one request body, and how reading ended.
+/// The chunks of request bodies, any of which may send any chunk, and how reading ended.
 pub(crate) struct BodyChunks {
     pub(crate) pieces: async_mpsc::Receiver<Bytes>,
     pub(crate) outcome: oneshot::Receiver<Outcome>,
@@ -196,10 +196,8 @@ impl BodyWriter {
     }
 
     fn flush(&mut self) -> Option<()> {
-        let mut rest = Bytes::from(std::mem::take(&mut self.piece));
-        while !rest.is_empty() {
-            // A large frame is split.
-            let piece = rest.split_to(rest.len().min(2 * PIECE_BYTES));
+        let piece = Bytes::from(std::mem::take(&mut self.piece));
+        if !piece.is_empty() {
             self.pieces.blocking_send(piece).ok()?;
         }
         self.flushed = Instant::now();

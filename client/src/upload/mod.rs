@@ -33,11 +33,14 @@ pub struct UploadOptions<'a> {
     pub on_frame: Option<&'a mut (dyn FnMut(FrameResult) + Send)>,
     /// Longest wait for a session that still prepares.
     pub ready_limit: Duration,
+    /// Requests that send frames at the same time, over as many connections where HTTP/1.1 is spoken; one where frames depend on their
+    /// predecessors. More than one is worth it where a connection is slower than the way to the service.
+    pub connections: usize,
 }
 
 impl Default for UploadOptions<'_> {
     fn default() -> Self {
-        Self { rows: Rows::All, on_frame: None, ready_limit: Duration::from_secs(600) }
+        Self { rows: Rows::All, on_frame: None, ready_limit: Duration::from_secs(600), connections: 1 }
     }
 }
 
@@ -48,7 +51,7 @@ pub struct Uploaded {
     pub frames: u32,
     /// Bytes of frames given to connections, more than once where one broke.
     pub sent_bytes: u64,
-    /// Requests after the first one.
+    /// Times that it began anew with what was missing.
     pub retries: u32,
 }
 
@@ -92,12 +95,16 @@ impl Client {
             done: FrameSet::default(),
             reported: FrameSet::default(),
             on_frame: options.on_frame,
+            connections: if session.regularizer == TEMPORAL { 1 } else { options.connections.max(1) },
             sent_bytes: 0,
         };
         upload.synchronise(&session).await?;
         upload.run(&FrameFeed::start(source, handles)?).await
     }
 }
+
+/// The regularizer whose frames are solved in order.
+const TEMPORAL: &str = "temporal";
 
 /// An upload under way.
 struct Upload<'a> {
@@ -113,6 +120,7 @@ struct Upload<'a> {
     /// Frames whose result the caller knows.
     reported: FrameSet,
     on_frame: Option<&'a mut (dyn FnMut(FrameResult) + Send)>,
+    connections: usize,
     sent_bytes: u64,
 }
 
