@@ -39,6 +39,14 @@ pub enum RemoteError {
         "the container from the service cannot be read ({0}); encode again, and look at the service's log if that gives the same"
     )]
     Container(container::Error),
+    /// It broke off, and the service keeps what it has.
+    #[error("{cause}; session {session} keeps what was sent: the same command with --session {session} goes on")]
+    Kept {
+        /// The session.
+        session: String,
+        /// Why it broke off.
+        cause: Box<Self>,
+    },
     /// The network runtime cannot be started.
     #[error("the network cannot be used ({0}); free some memory or files and try again")]
     Runtime(io::Error),
@@ -54,6 +62,8 @@ pub struct RemoteJob<'a, F> {
     pub rest: MeshFile,
     /// The cage around it.
     pub cage: RemoteCage<'a>,
+    /// A session whose upload broke, to go on with; it has rest pose, cage and options already.
+    pub session: Option<&'a str>,
     /// File with the matrix of the regularizer `matrix`.
     pub matrix: Option<&'a Path>,
     /// The capture.
@@ -62,6 +72,8 @@ pub struct RemoteJob<'a, F> {
     pub output: &'a Target,
     /// Choices for the session.
     pub options: SessionOptions,
+    /// Connections that send frames at the same time.
+    pub connections: usize,
 }
 
 /// How far an encoding by a service is.
@@ -101,7 +113,7 @@ pub struct Steps {
 /// Encodes a capture on a service, which also designs the cage if there is none.
 ///
 /// # Errors
-/// See [`RemoteError`]; the session is then deleted, where the service can still be reached.
+/// See [`RemoteError`]. The session is deleted only where it is of no use: it cannot be prepared, or the frames are refused.
 pub fn encode_remotely<F: FrameSource + 'static>(
     job: RemoteJob<'_, F>,
     progress: &mut (dyn FnMut(RemoteProgress<'_>) + Send),
@@ -130,12 +142,13 @@ async fn encode<F: FrameSource + 'static>(
         idempotency_key: None,
     };
     let mut designed = None;
-    let session = match job.cage {
-        RemoteCage::File(path) => {
+    let session = match (job.session, job.cage) {
+        (Some(session), _) => session.to_owned(),
+        (None, RemoteCage::File(path)) => {
             new.cage = Some(mesh_file(path)?);
             client.create(&new).await?.id
         }
-        RemoteCage::Designed(options) => {
+        (None, RemoteCage::Designed(options)) => {
             let design = cage::design(&client, &new.rest, &mut job.frames, options, progress).await?;
             new.options.cage = Some(CageSource { id: Some(design.id.clone()), ..CageSource::default() });
             let created = client.create(&new).await;
@@ -145,7 +158,7 @@ async fn encode<F: FrameSource + 'static>(
             created?.id
         }
     };
-    match run(&client, &session, job.frames, file, clock, progress).await {
+    match run(&client, &session, job.frames, job.connections, file, clock, progress).await {
         Ok((mut encoded, steps)) => {
             if let Some((report, warnings)) = designed {
                 encoded.report.design = Some(report);
@@ -153,11 +166,19 @@ async fn encode<F: FrameSource + 'static>(
             }
             Ok(EncodedRemotely { encoded, session, steps })
         }
-        Err(error) => {
+        Err(error) if is_final(&error) => {
             clean_up(&client, async |client| client.delete(&session).await).await;
             Err(error)
         }
+        Err(cause) => Err(RemoteError::Kept { session, cause: Box::new(cause) }),
     }
+}
+
+/// Whether the session is of no use any more: trying again would end the same way.
+fn is_final(error: &RemoteError) -> bool {
+    use ClientError::{Failed, Mismatch, NotReady, Refused, Source};
+    let RemoteError::Client(error) = error else { return false };
+    matches!(error, Failed(_) | Mismatch(_) | NotReady { .. } | Refused(_) | Source { .. })
 }
 
 /// Removes an object from the service, within a short time and without retries.
@@ -170,6 +191,7 @@ async fn run(
     client: &Client,
     session: &str,
     frames: impl FrameSource + 'static,
+    connections: usize,
     mut file: AtomicFile,
     clock: Instant,
     progress: &mut (dyn FnMut(RemoteProgress<'_>) + Send),
@@ -182,7 +204,7 @@ async fn run(
         done += 1;
         progress(RemoteProgress::Frames(done));
     };
-    let options = UploadOptions { on_frame: Some(&mut on_frame), ..UploadOptions::default() };
+    let options = UploadOptions { on_frame: Some(&mut on_frame), connections, ..UploadOptions::default() };
     let uploaded = client.upload(&ready, frames, options).await?;
     steps.upload = clock_upload.elapsed();
 
@@ -240,4 +262,22 @@ pub fn mesh_file(path: &Path) -> Result<MeshFile, cager_formats::Error> {
         cause,
     })?;
     Ok(MeshFile::new(path.file_name().unwrap_or_default().to_string_lossy(), bytes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_session_goes_only_where_trying_again_would_end_the_same_way() {
+        let broken = || ClientError::Broken { address: String::new(), cause: String::new() };
+        let kept = [broken(), ClientError::GaveUp { attempts: 9, last: Box::new(broken()) }];
+        let refused = [
+            ClientError::Mismatch("another mesh".to_owned()),
+            ClientError::Source { frame: 7, cause: io::Error::other("NaN") },
+        ];
+        assert!(kept.into_iter().all(|error| !is_final(&error.into())));
+        assert!(refused.into_iter().all(|error| is_final(&error.into())));
+        assert!(!is_final(&RemoteError::Client(ClientError::Output(io::Error::other("full")))), "it is all there");
+    }
 }

@@ -127,6 +127,14 @@ pub(crate) struct EncodeArgs {
     /// Token to show to the service [default: the environment's CAGER_TOKEN, which other users of this machine do not see].
     #[arg(long, value_name = "T", requires = "server", hide_default_value = true)]
     pub(crate) token: Option<String>,
+
+    /// Go on with a session whose upload broke: what it has is not sent again. Rest pose, cage and options are its own.
+    #[arg(long, value_name = "ID", requires = "server")]
+    pub(crate) session: Option<String>,
+
+    /// Connections to the service that send frames at the same time, where one is slower than the way there.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=16))]
+    pub(crate) connections: u8,
 }
 
 /// How the cage is designed where none is given.

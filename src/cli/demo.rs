@@ -45,10 +45,12 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
         token: None,
         rest: mesh_file(&rest_file)?,
         cage: RemoteCage::File(&cage_file),
+        session: None,
         matrix: None,
         frames: generated(&capture),
         output: &Target::from(&output),
         options: SessionOptions { name: Some("demo".to_owned()), ..SessionOptions::default() },
+        connections: 1,
     };
     let bar = progress::frames("encoding", capture.frames());
     let result = encode_remotely(job, &mut |told| {

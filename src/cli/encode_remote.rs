@@ -87,10 +87,12 @@ pub(super) fn run(
             Some(path) => RemoteCage::File(path),
             None => RemoteCage::Designed(&design),
         },
+        session: args.session.as_deref(),
         matrix: args.solver.regularizer_matrix.as_deref(),
         frames,
         output: &targets.output,
         options,
+        connections: usize::from(args.connections),
     };
     let designing = progress::steps();
     let result = encode_remotely(job, &mut |told| match told {

@@ -114,10 +114,12 @@ fn encode_through(address: &str, folder: &Path) {
         token: None,
         rest: mesh_file(&folder.join("rest.obj")).expect("a rest pose"),
         cage: RemoteCage::File(&folder.join("cage.obj")),
+        session: None,
         matrix: None,
         frames: MemoryFrames::new(values.len() / 3 / FRAMES, values),
         output: &cager_formats::Target::from(folder.join("capture.cager")),
         options: SessionOptions::default(),
+        connections: 1,
     };
     let done = encode_remotely(job, &mut |_| ()).expect("the service encodes");
     assert_eq!(done.encoded.report.frames, FRAMES);

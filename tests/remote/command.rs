@@ -1,7 +1,8 @@
 //! `cager encode --server`.
 
-use crate::server::{Server, capture};
+use crate::server::{Server, capture, ready};
 use crate::support::{Dir, ENCODE, Small, npy_f64, read_frames, split};
+use cager_client::{MemoryFrames, UploadOptions};
 use cager_proto::container::ContainerReader;
 use serde_json::Value;
 use std::collections::HashSet;
@@ -156,6 +157,32 @@ fn a_frame_that_cannot_be_read_is_named_and_nothing_is_left_anywhere() {
     assert!(said.stderr.contains("frames.npy: frame 7: point 5 has a coordinate that is NaN"), "{}", said.stderr);
     assert!(!dir.path("out.cager").exists());
     assert_eq!(sessions(&server), 0);
+}
+
+#[test]
+fn an_upload_that_broke_is_gone_on_with() {
+    let (dir, points, values) = capture();
+    let server = Server::start(&dir);
+    let session = begun(&server, &dir, points, &values);
+    let encode = format!("{ENCODE} --server {} --connections 3", server.address());
+    dir.cager(&format!("{encode} --session {session}")).succeeds();
+    assert_eq!(sessions(&server), 1);
+    let gone_on = dir.read("out.cager");
+    std::fs::remove_file(dir.path("out.cager")).expect("a file");
+    dir.cager(ENCODE).succeeds();
+    assert!(dir.read("out.cager") == gone_on, "other bytes than on this machine");
+    let said = dir.cager(&format!("{ENCODE} --session {session}")).run();
+    assert_eq!((said.status, said.stderr.contains("--server")), (Some(2), true), "{}", said.stderr);
+}
+
+/// A session that has the first seven frames.
+#[tokio::main(flavor = "current_thread")]
+async fn begun(server: &Server, dir: &Dir, points: usize, values: &[f32]) -> String {
+    let client = server.client();
+    let session = ready(&client, dir).await;
+    let some = MemoryFrames::new(points, &values[..7 * 3 * points]);
+    client.upload(&session, some, UploadOptions::default()).await.expect("an upload");
+    session.id
 }
 
 #[test]
