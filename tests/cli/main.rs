@@ -3,6 +3,7 @@
 mod blender;
 mod cage;
 mod cages_out;
+mod cases;
 mod coding;
 mod compare;
 mod decode;

@@ -45,6 +45,17 @@ impl Dir {
         (dir, small)
     }
 
+    /// With a copy of a folder of `tests/cases`.
+    pub(crate) fn with_case(name: &str) -> Self {
+        let (dir, from) = (Self::new(), Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases").join(name));
+        let mut files = BTreeMap::new();
+        collect(&from, &mut files);
+        for (path, bytes) in files.iter().filter(|(path, _)| path.is_file()) {
+            dir.write(path.strip_prefix(&from).expect("a file of the case").to_str().expect("UTF-8"), bytes);
+        }
+        dir
+    }
+
     pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.0.path().join(name)
     }

@@ -1,0 +1,1 @@
+//! Captures whose points change their order or their unit after the first frame.

@@ -1,0 +1,1 @@
+//! Cages that are designed from few poses.

@@ -1,0 +1,1 @@
+//! Folders and patterns: which files are frames, and in which order.

@@ -1,0 +1,1 @@
+//! Models in `.glb` files as the specification lets them be written.

@@ -1,0 +1,11 @@
+//! Inputs of `tests/cases`, made after files that people had trouble with: each does what a user would expect, and so do variants of it.
+
+mod belonging;
+mod designed;
+mod frame_names;
+mod gltf;
+mod meshes;
+mod numpy;
+mod origin;
+mod pointers;
+mod words;

@@ -1,0 +1,1 @@
+//! Coordinates far away from the origin.
