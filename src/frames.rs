@@ -2,18 +2,18 @@
 
 use crate::mismatch::Up;
 use crate::timing::Timing;
-use cager_formats::{Error, FrameRange, FrameReader, missing_frames, open_frames, open_frames_range};
+use cager_formats::{Error, FrameReader, FrameSelection, missing_frames, open_selected_frames};
 use std::path::PathBuf;
 
 /// The files of a capture, and how to adapt them.
 #[derive(Clone, Debug, Default)]
 pub struct CaptureFiles {
-    /// A folder or pattern of mesh files, or a point cache: see [`open_frames`].
+    /// A folder or pattern of mesh files, or a point cache: see [`open_selected_frames`].
     pub path: PathBuf,
     /// Points of the rest pose.
     pub points: usize,
-    /// The frames that are taken; all where none is given.
-    pub range: Option<FrameRange>,
+    /// Which files and frames there are taken.
+    pub selection: FrameSelection,
     /// Whether gaps in the numbers of the files are allowed.
     pub allow_gaps: bool,
     /// The up axis of the frames, if it differs from that of the rest pose.
@@ -33,7 +33,7 @@ impl CaptureFiles {
     /// Opens the frames from the first.
     ///
     /// # Errors
-    /// Those of [`open_frames`]; numbers that are missing.
+    /// Those of [`open_selected_frames`]; numbers that are missing.
     pub fn open(&self) -> Result<Box<dyn FrameReader>, Error> {
         let (inner, first_of) = self.open_welded()?;
         let found: Vec<f64> = (0..inner.frames()).map(|frame| inner.number(frame)).collect();
@@ -61,8 +61,14 @@ impl CaptureFiles {
     fn open_welded(&self) -> Result<Welded, Error> {
         let Some(weld) = &self.weld else { return Ok((self.open_with(self.points)?, None)) };
         // The number of points in a file sequence is known only after reading a file.
-        let split = open_frames(&self.path, weld.len()).and_then(|mut reader| reader.read_next(&mut Vec::new()));
-        if let Err(Error::PointCount { .. }) = split {
+        let reads = |points| self.open_with(points).and_then(|mut reader| reader.read_next(&mut Vec::new()));
+        let merged = match reads(weld.len()) {
+            Ok(_) => false,
+            Err(Error::PointCount { .. }) => true,
+            // Of arrays, which one is read depends on the points.
+            Err(_) => reads(self.points).is_ok(),
+        };
+        if merged {
             return Ok((self.open_with(self.points)?, None));
         }
         let mut first_of = vec![u32::MAX; self.points];
@@ -73,7 +79,7 @@ impl CaptureFiles {
     }
 
     fn open_with(&self, points: usize) -> Result<Box<dyn FrameReader>, Error> {
-        open_frames_range(&self.path, points, self.range)
+        open_selected_frames(&self.path, points, &self.selection)
     }
 }
 
@@ -107,6 +113,10 @@ impl FrameReader for Adapted {
 
     fn number(&self, frame: usize) -> f64 {
         self.numbers.get(frame).copied().unwrap_or(frame as f64)
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.inner.notes()
     }
 
     fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error> {

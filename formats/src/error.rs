@@ -42,6 +42,14 @@ pub enum Error {
         /// Which line, vertex or face is wrong and why, and what to do.
         what: String,
     },
+    /// The files of a folder or pattern are not one sequence: pick one with a pattern.
+    #[error("{}: {what}", .path.display())]
+    SeveralSequences {
+        /// The folder or pattern.
+        path: PathBuf,
+        /// What was found, and patterns that pick some of it.
+        what: String,
+    },
     /// A frame, or a whole capture, does not belong to the rest pose: pair the right files.
     #[error("{}: {}has {found} points where {expected} are expected; use a capture of the same mesh as the rest pose", .path.display(), InFrame(*frame))]
     PointCount {

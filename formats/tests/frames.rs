@@ -136,7 +136,101 @@ fn an_archive_with_one_array_is_read_stored_or_compressed() {
         }
     }
     fs::write(&path, npz(&["walk", "run"], zip::CompressionMethod::Stored)).unwrap();
-    assert!(message(open_frames(&path, 2)).contains("has 2 arrays (walk, run); "));
+    let error = message(open_frames(&path, 2));
+    assert!(
+        error.contains("has 2 arrays that can be the frames (walk, run); ") && error.contains("[\"walk\"]"),
+        "{error}"
+    );
+}
+
+/// An archive of arrays of any content.
+fn archive(arrays: &[(&str, Vec<u8>)], method: zip::CompressionMethod) -> Vec<u8> {
+    let mut archive = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    for (name, bytes) in arrays {
+        archive.start_file(*name, zip::write::SimpleFileOptions::default().compression_method(method)).unwrap();
+        archive.write_all(bytes).unwrap();
+    }
+    archive.finish().unwrap().into_inner()
+}
+
+#[test]
+fn the_one_array_that_fits_is_read_with_the_frame_rate_beside_it() {
+    let folder = tempdir().unwrap();
+    let path = folder.path().join("walk.npz");
+    let rest = npy("'<f4'", "'fortran_order': False, 'shape': (2, 3), ", &little(&coordinates()[..6]));
+    let faces = npy("'<i8'", "'fortran_order': False, 'shape': (4, 3), ", &[0; 96]);
+    let other = npy("'<f4'", "'fortran_order': False, 'shape': (2, 5, 3), ", &[0; 120]);
+    for (rate, wanted) in [
+        (npy("'<i8'", "'fortran_order': False, 'shape': (), ", &60_i64.to_le_bytes()), Some(60.0)),
+        (npy("'>f4'", "'fortran_order': False, 'shape': (1,), ", &29.97_f32.to_be_bytes()), Some(f64::from(29.97_f32))),
+        (npy("'<f8'", "'fortran_order': False, 'shape': (), ", &(-1_f64).to_le_bytes()), None),
+        (npy("'<f8'", "'fortran_order': False, 'shape': (2,), ", &[0; 16]), None),
+    ] {
+        let arrays = [
+            ("faces.npy", faces.clone()),
+            ("rest.npy", rest.clone()),
+            ("other.npy", other.clone()),
+            ("readme.txt", b"by hand".to_vec()),
+            ("vertices.npy", npy_f4()),
+            ("fps.npy", rate),
+        ];
+        for method in [zip::CompressionMethod::Stored, zip::CompressionMethod::Deflated] {
+            fs::write(&path, archive(&arrays, method)).unwrap();
+            let mut reader = open_frames(&path, 2).unwrap();
+            assert_eq!(reader.frame_rate(), wanted);
+            assert_eq!(all(&mut *reader), two_frames());
+            // Passed over, and read again after an error or for another sample.
+            let mut reader = open_frames(&path, 2).unwrap();
+            let mut frame = Vec::new();
+            assert!(reader.skip().unwrap() && reader.read_next(&mut frame).unwrap());
+            assert_eq!(frame, two_frames()[1]);
+        }
+    }
+    let error = message(open_frames(&path, 7));
+    assert!(error.contains("none of them is frames of 7 points") && error.contains("faces: <i8 (4, 3)"), "{error}");
+}
+
+#[test]
+fn a_packed_array_never_gives_more_bytes_than_its_header_promises() {
+    let folder = tempdir().unwrap();
+    let path = folder.path().join("walk.npz");
+    // 400 MB of zeros behind a header that promises two frames.
+    let mut bomb = npy_f4();
+    bomb.resize(400 << 20, 0);
+    fs::write(&path, archive(&[("a.npy", bomb)], zip::CompressionMethod::Deflated)).unwrap();
+    assert!(fs::metadata(&path).unwrap().len() < 1 << 20);
+    let error = message(open_frames(&path, 2));
+    assert!(error.contains("promises 2 frames and has 2 whole frames, ") && error.contains("in excess"), "{error}");
+    // Damaged where it is packed: told when it is read, and never read past what it should be.
+    let mut file = archive(&[("a.npy", npy_f4())], zip::CompressionMethod::Stored);
+    let at = file.windows(4).position(|bytes| bytes == 11_f32.to_le_bytes()).unwrap();
+    file[at] ^= 1;
+    fs::write(&path, file).unwrap();
+    let (mut reader, mut frame) = (open_frames(&path, 2).unwrap(), Vec::new());
+    assert!(reader.read_next(&mut frame).unwrap());
+    assert!(
+        message(reader.read_next(&mut frame)).contains("walk.npz: cannot be unpacked (its checksum is another one)")
+    );
+}
+
+#[test]
+fn rows_of_flat_coordinates_are_frames_however_many_there_are() {
+    let read = |shape: &str, data: &[f32], points| {
+        let rest = format!("'fortran_order': False, 'shape': {shape}");
+        all(&mut *open("a.npy", &npy("'<f4'", &rest, &little(data)), points).unwrap())
+    };
+    let twelve = coordinates();
+    assert_eq!(read("(2, 6)", &twelve, 2), two_frames());
+    assert_eq!(read("(12,)", &twelve, 4), [two_frames().concat()]);
+    assert_eq!(read("(1, 2, 2, 3)", &twelve, 2), two_frames());
+    // Three frames of two points, and not one frame of six with its axes first.
+    let three: Vec<f32> = (0..18_u8).map(f32::from).collect();
+    let rows: Vec<Vec<f64>> = three.chunks(6).map(|row| row.iter().map(|&x| x.into()).collect()).collect();
+    assert_eq!(read("(3, 6)", &three, 2), rows);
+    assert_eq!(read("(3, 6)", &three, 6).len(), 1);
+    let fortran: Vec<f32> = (0..6).flat_map(|c| [three[c], three[6 + c], three[12 + c]]).collect();
+    let file = npy("'<f4'", "'fortran_order': True, 'shape': (3, 6)", &little(&fortran));
+    assert_eq!(all(&mut *open("a.npy", &file, 2).unwrap()), rows);
 }
 
 #[test]
@@ -146,11 +240,23 @@ fn arrays_that_are_not_read_are_described_with_the_line_that_converts_them() {
     assert_eq!(
         error,
         "a.npy: has values of type \"<i4\", not 32- or 64-bit floats; \
-         convert it with numpy.save(path, numpy.load(path).astype('<f4'))"
+         convert it in Python with numpy.save(\"converted.npy\", numpy.load(path).astype(\"<f4\"))"
     );
-    assert!(of("[('x', '<f4'), ('y', '<f4', (2,))]", "'fortran_order': False, 'shape': (2,)").contains("has records"));
-    let error = of("'<f4'", "'fortran_order': False, 'shape': (2, 6)");
-    assert!(error.contains("has the shape [2, 6], not (frames, points, 3); bring its axes into this order"), "{error}");
+    let records = of("[('x', '<f4'), ('y', '<f4', (2,))]", "'fortran_order': False, 'shape': (2,)");
+    assert!(records.contains("has records (\"x\", \"y\")") && records.contains("numpy.load(path)[\"x\"]"), "{records}");
+    let axes = of("[('x', '<f4'), ('y', '<f4'), ('z', '<f4')]", "'fortran_order': False, 'shape': (2, 2)");
+    assert!(axes.contains("[numpy.load(path)[k] for k in \"xyz\"], -1)"), "{axes}");
+    let objects = of("'|O'", "'fortran_order': False, 'shape': (2,)");
+    assert!(objects.contains("allow_pickle=True) if len(frame) == 2]"), "{objects}");
+    assert!(of("'|O'", "'fortran_order': False, 'shape': ()").contains("allow_pickle=True).item()[NAME]"));
+    let error = of("'<f4'", "'fortran_order': False, 'shape': (2, 7)");
+    assert!(error.contains("has the shape (2, 7), not (frames, points, 3)"), "{error}");
+    let error = of("'<f4'", "'fortran_order': False, 'shape': (2, 9)");
+    assert!(error.contains("has 3 points where 2 are expected"), "{error}");
+    assert!(of("'<f4'", "'fortran_order': False, 'shape': (6, 5)").contains("numpy.load(path).T)"));
+    assert!(
+        of("'<f4'", "'fortran_order': False, 'shape': (5, 4, 2, 3)").contains("numpy.load(path).reshape(-1, 2, 3)")
+    );
     // The order of its axes is told; `reshape` would scramble it.
     let error = message(open("a.npy", &npy("'<f4'", "'fortran_order': False, 'shape': (5, 2, 3)", &[0; 120]), 5));
     assert!(error.contains("has the shape (5, 2, 3), points before frames; ") && error.contains("transpose(1, 0, 2)"));
@@ -195,6 +301,35 @@ fn nan_and_infinity_are_errors_that_name_frame_and_point() {
             let error = message(reader.read_next(&mut frame));
             assert!(error.starts_with(&format!("{name}: frame 1: point 1 has a coordinate that is NaN")), "{error}");
         }
+    }
+}
+
+/// Frames at these times, of two points.
+fn mdd_at(times: &[f32]) -> Vec<u8> {
+    let mut file = [times.len() as u32, 2].map(u32::to_be_bytes).concat();
+    file.extend(big(times));
+    file.extend(big(&vec![0.5; 6 * times.len()]));
+    file
+}
+
+#[test]
+fn uneven_times_of_a_point_cache_are_kept_and_told() {
+    let numbers = |times: &[f32]| {
+        let file = mdd_at(times);
+        let reader = open("a.mdd", &file, 2).unwrap();
+        let numbers: Vec<f64> = (0..times.len()).map(|k| reader.number(k)).collect();
+        (numbers, reader.frame_rate(), reader.notes().len())
+    };
+    assert_eq!(numbers(&[0.0, 0.04, 0.08, 0.16]), (vec![0.0, 1.0, 2.0, 4.0], Some(25.0), 1));
+    assert_eq!(numbers(&[2.0, 2.5, 3.0, 3.25]), (vec![4.0, 5.0, 6.0, 6.5], Some(2.0), 1));
+    // Rounded to thousandths, but even.
+    assert_eq!(numbers(&[0.0, 0.033, 0.067, 0.1]), (vec![0.0, 1.0, 2.0, 3.0], Some(30.0), 0));
+    assert_eq!(numbers(&[0.0, 0.0, 0.0]), (vec![0.0, 1.0, 2.0], None, 0));
+    let note = open("a.mdd", &mdd_at(&[0.0, 1.0, 3.0]), 2).unwrap().notes().remove(0);
+    assert!(note.starts_with("a.mdd: its times are not evenly spaced, 1.0000 s to 2.0000 s apart"), "{note}");
+    for times in [[0.0, 0.2, 0.1], [0.0, 0.1, 0.1], [0.0, f32::NAN, 0.2], [0.0, 0.1, f32::INFINITY]] {
+        let error = message(open("a.mdd", &mdd_at(&times), 2));
+        assert!(error.contains("s after frame ") && error.contains("times that ascend"), "{error}");
     }
 }
 
@@ -285,7 +420,7 @@ fn outputs_that_make_no_sense_are_refused() {
     };
     let none = Polygons::new();
     let error = message(create("a.abc", 1, 1, &none, 24.0));
-    assert!(error.ends_with("end the name in one of .npy .pc2 .mdd, or in / for a folder of .obj files"), "{error}");
+    assert!(error.ends_with("in / for a folder of .obj files, or of one frame in .obj .ply .off .stl"), "{error}");
     assert!(matches!(create("a.npy", 0, 1, &none, 24.0), Err(Error::Invalid { .. })));
     assert!(matches!(create("a.npy", 1, 0, &none, 24.0), Err(Error::Invalid { .. })));
     assert!(matches!(create("a.mdd", 1, 1, &none, f64::NAN), Err(Error::Invalid { .. })));

@@ -63,6 +63,7 @@ short! {
     npy "npy" 240_000;
     pc2 "pc2" 240_000;
     mdd "mdd" 240_000;
+    npz "npz" 6_000;
     container "container" 30_000;
     record "record" 360_000;
     frames "frames" 240_000;

@@ -82,13 +82,13 @@ pub(crate) struct EncodeArgs {
     #[command(flatten)]
     pub(crate) design: DesignArgs,
 
-    /// Capture, points in the order of the rest pose: a folder, quoted glob or numbered name (walk.%04d.obj, walk.####.obj) of
-    /// mesh files (2.obj comes before 10.obj), .npy (frames × points × 3), .npz with one array, .pc2 or .mdd.
+    /// Capture, points in the order of the rest pose: a folder, quoted glob or numbered name (walk.%04d.obj, walk.####.obj, frame_%04d/mesh.obj) of
+    /// mesh files (2.obj comes before 10.obj) or of one .npy a frame, .npy (frames × points × 3), .npz, .pc2 or .mdd.
     #[arg(long, value_name = "FRAMES")]
     pub(crate) frames: PathBuf,
 
     /// Take only frames A to B, both included, every STEP-th; counted from 0 in the order of FRAMES.
-    #[arg(long, value_name = "A-B[xSTEP]")]
+    #[arg(long, value_name = "A-B[xSTEP]", allow_hyphen_values = true)]
     pub(crate) frames_range: Option<FrameRange>,
 
     #[command(flatten)]
@@ -238,7 +238,8 @@ pub(crate) struct DecodeArgs {
     pub(crate) input: PathBuf,
 
     /// Where to write: .npy, .pc2, .mdd, or a folder that is to hold one .obj per frame ('FOLDER/*.ply' for .ply,
-    /// FOLDER/walk.%04d.obj or FOLDER/walk.####.obj for names of your own), or - for .npy on standard output.
+    /// FOLDER/walk.%04d.obj or FOLDER/walk.####.obj for names of your own), of one frame (--frame) .obj, .ply, .off or .stl, or - for .npy on
+    /// standard output.
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
 

@@ -1,7 +1,7 @@
 //! `cager cage`: generates, designs and improves cages.
 
 use super::cage_args::{CageArgs, GeneralArg};
-use super::checks::check_capture;
+use super::checks::{check_capture, checked_files};
 use super::design::{self, default_vertices};
 use super::dry_run::{read_files, tell_dry_run};
 use super::outputs::Outputs;
@@ -184,8 +184,8 @@ impl<'a> Motion<'a> {
             keep_connectivity: start.is_some(),
             symmetry: args.symmetry.map(|axis| axis as usize),
         };
-        let mut files = CaptureFiles::new(frames, rest.points.len());
-        files.allow_gaps = args.checks.allow_gaps;
+        let no_frames = args.rest.iter().chain(&args.improve);
+        let files = checked_files(&args.checks, frames, rest.points.len(), no_frames);
         check_capture(&files, (&args.rest[0], rest), &args.checks, false)?;
         Ok(Self { start, options, files })
     }

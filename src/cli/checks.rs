@@ -10,7 +10,7 @@ use cager_cages::diagnosis::{alignment, weld};
 use cager_cages::geometry::outside;
 use cager_core::mesh::{Model, TriMesh, diagonal};
 use clap::Args;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A cage larger than its model by this factor is checked for other units.
 const ROOMY: f64 = 5.0;
@@ -40,7 +40,8 @@ pub(crate) struct CheckArgs {
     #[arg(long)]
     pub(super) allow_gaps: bool,
 
-    /// Go on where rest pose, cage and capture look as if they did not belong together: other units, axes or order of points.
+    /// Go on where rest pose, cage and capture look as if they did not belong together (other units, axes or order of points), or files as if they
+    /// were several sequences.
     #[arg(long)]
     pub(super) force: bool,
 }
@@ -81,10 +82,28 @@ impl From<&TimingArgs> for Timing {
     }
 }
 
+/// The files of a capture for a rest pose of so many points; `no_frames` are the files of the rest pose and the cage.
+pub(super) fn checked_files<'a>(
+    args: &CheckArgs,
+    path: &Path,
+    points: usize,
+    no_frames: impl IntoIterator<Item = &'a PathBuf>,
+) -> CaptureFiles {
+    let mut files = CaptureFiles::new(path, points);
+    files.allow_gaps = args.allow_gaps;
+    files.selection.no_frames = no_frames.into_iter().cloned().collect();
+    files.selection.join_sequences = args.force;
+    files
+}
+
 /// The files of a capture for a rest pose, which is welded first if it should be.
-pub(super) fn capture_files(args: &CaptureArgs, path: &Path, rest: &mut Model) -> CaptureFiles {
-    let mut files = CaptureFiles::new(path, rest.points.len());
-    files.allow_gaps = args.checks.allow_gaps;
+pub(super) fn capture_files<'a>(
+    args: &CaptureArgs,
+    path: &Path,
+    rest: &mut Model,
+    no_frames: impl IntoIterator<Item = &'a PathBuf>,
+) -> CaptureFiles {
+    let mut files = checked_files(&args.checks, path, rest.points.len(), no_frames);
     files.timing = (&args.timing).into();
     files.up = args.up;
     if let Some(welded) = args.weld.then(|| weld(rest)).flatten() {
@@ -98,7 +117,10 @@ pub(super) fn capture_files(args: &CaptureArgs, path: &Path, rest: &mut Model) -
 /// Compares some frames of a capture with its rest pose.
 pub(super) fn check_capture(files: &CaptureFiles, rest: (&Path, &Model), args: &CheckArgs, turns: bool) -> Result<()> {
     let opened = files.open().map_err(EncodeError::from);
-    let frames = opened.and_then(|mut reader| sample_frames(reader.as_mut(), mismatch::FRAMES, false));
+    let frames = opened.and_then(|mut reader| {
+        warn(&reader.notes());
+        sample_frames(reader.as_mut(), mismatch::FRAMES, false)
+    });
     let frames = frames.map_err(|error| explained(error, files, rest))?;
     let found = mismatches(rest.1, &frames);
     if found.is_empty() {
@@ -155,7 +177,7 @@ fn refuse_or_warn(what: String, advice: &str, force: bool) -> Result<()> {
 
 /// Explains a wrong number of points where welding seams would make it right.
 fn explained(error: EncodeError, files: &CaptureFiles, (path, rest): (&Path, &Model)) -> anyhow::Error {
-    use cager_formats::Error::PointCount;
+    use cager_formats::Error::{PointCount, SeveralSequences};
     match error {
         EncodeError::Formats(PointCount { path: ref capture, expected, found, .. })
             if weld(rest).is_some_and(|welded| welded.model.points.len() as u64 == found) =>
@@ -168,6 +190,9 @@ fn explained(error: EncodeError, files: &CaptureFiles, (path, rest): (&Path, &Mo
             )
         }
         error @ EncodeError::EndsEarly { .. } => anyhow::anyhow!("{}: {error}", files.path.display()),
+        EncodeError::Formats(error @ SeveralSequences { .. }) => {
+            anyhow::anyhow!("{error}; --force takes them all, in natural order")
+        }
         other => other.into(),
     }
 }

@@ -1,13 +1,12 @@
 //! `cager compare`.
 
 use super::args::CompareArgs;
-use super::checks::{check_cage, check_capture};
+use super::checks::{check_cage, check_capture, checked_files};
 use super::dry_run::{read_all, tell_dry_run};
 use super::outputs::Outputs;
 use super::solver_options::{read_cage, with_input_name};
 use super::{human_bytes, plain, progress};
 use crate::compare::{CompareError, Figures, Job, Progress, compare, seconds};
-use crate::frames::CaptureFiles;
 use crate::report_page::{Contents, Kind, NO_PAGE, ReportPage};
 use anyhow::Result;
 use cager_core::coordinates;
@@ -35,8 +34,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     };
     let rest = read_model(&args.rest)?;
     let cage = read_cage(&args.cage, args.flip_cage)?;
-    let mut files = CaptureFiles::new(&args.frames, rest.points.len());
-    files.allow_gaps = args.checks.allow_gaps;
+    let files = checked_files(&args.checks, &args.frames, rest.points.len(), [&args.rest, &args.cage]);
     check_capture(&files, (&args.rest, &rest), &args.checks, false)?;
     check_cage((&args.cage, cage.mesh()), &rest, &args.checks)?;
     let open = || files.open();

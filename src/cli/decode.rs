@@ -23,9 +23,8 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     let model = transfer.model.as_ref().map(|path| read_model(path)).transpose()?;
     let there = edited.as_ref().map_or(container.frames(), EditedCages::frames);
     drop(container);
-    let range = transfer.range();
-    // A range is checked against the file that has the frames.
-    range.map_or(Ok(()), |range| range.check(there, transfer.with_cages.as_ref().unwrap_or(&args.input)))?;
+    // Checked against the file that has the frames.
+    let range = transfer.range(there, transfer.with_cages.as_ref().unwrap_or(&args.input))?;
     let taken = range.as_ref().map_or(there, FrameRange::count);
     if transfer.cages {
         let bar = progress::frames("decoding", taken);

@@ -31,8 +31,9 @@ pub(super) fn run(args: &EncodeArgs) -> Result<()> {
     let clock = Instant::now();
     let targets = Targets::new(args)?;
     let mut rest = read_model(&args.rest)?;
-    let mut files = capture_files(&args.capture, &args.frames, &mut rest);
-    files.range = args.frames_range;
+    let no_frames = [&args.rest].into_iter().chain(&args.cage);
+    let mut files = capture_files(&args.capture, &args.frames, &mut rest, no_frames);
+    files.selection.range = args.frames_range;
     // What is wrong with it is told before anything is computed.
     goal(args, &rest, 1)?;
     let cage = args.cage.as_ref().map(|path| read_cage(path, args.flip_cage)).transpose()?;

@@ -1,9 +1,10 @@
 //! Arguments of `cager decode` other than its files, and of `cager edit`.
 
 use super::outputs::OutputArgs;
+use anyhow::{Result, bail};
 use cager_formats::FrameRange;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What is decoded, where it is not every frame of the file's own model and cages.
 #[derive(Args, Debug)]
@@ -22,17 +23,29 @@ pub(crate) struct TransferArgs {
     pub(crate) model: Option<PathBuf>,
 
     /// Only frame K, counted from 0.
-    #[arg(long, value_name = "K", conflicts_with = "range")]
-    pub(crate) frame: Option<usize>,
+    #[arg(long, value_name = "K", conflicts_with = "range", allow_negative_numbers = true)]
+    pub(crate) frame: Option<i64>,
 
     /// Only frames A to B, both included, every STEP-th; counted from 0.
-    #[arg(long, value_name = "A-B[xSTEP]")]
+    #[arg(long, value_name = "A-B[xSTEP]", allow_hyphen_values = true)]
     pub(crate) range: Option<FrameRange>,
 }
 
 impl TransferArgs {
-    pub(crate) fn range(&self) -> Option<FrameRange> {
-        self.frame.map(FrameRange::only).or(self.range)
+    /// The frames that are taken of so many in `source`; all where none is given.
+    pub(crate) fn range(&self, frames: usize, source: &Path) -> Result<Option<FrameRange>> {
+        let only = match self.frame.map(|frame| (frame, usize::try_from(frame))) {
+            Some((_, Ok(frame))) => Some(FrameRange::only(frame)),
+            Some((frame, Err(_))) => bail!(
+                "{}: --frame {frame}: frames are counted from 0, and the last one of {frames} is frame {}; give that number",
+                source.display(),
+                frames.saturating_sub(1)
+            ),
+            None => None,
+        };
+        let range = only.or(self.range);
+        range.map_or(Ok(()), |range| range.check(frames, source))?;
+        Ok(range)
     }
 }
 

@@ -1,53 +1,13 @@
 //! Point caches: a header, then the coordinates of all frames as one array.
 
-use std::io::{self, Cursor, Read, Seek, SeekFrom};
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+use super::fortran::Transposed;
+use super::layout::{LONGEST_HEADER, Layout, Order};
 use super::widen::{Scalar, widen};
 use super::{CacheFormat, FrameReader, mdd, npy, pc2};
 use crate::error::{Error, Fault};
-
-/// Layout of a cache as its header declares it.
-#[derive(Debug, PartialEq)]
-pub(super) struct Layout {
-    pub(super) points: u64,
-    pub(super) frames: u64,
-    /// Offset of the first coordinate in bytes.
-    pub(super) start: u64,
-    pub(super) scalar: Scalar,
-    pub(super) order: Order,
-    /// The shape of an array whose first index varies fastest.
-    pub(super) fortran: Option<Vec<u64>>,
-    /// Frames per second, where the header tells.
-    pub(super) frame_rate: Option<f64>,
-    /// Number of the first frame, and the distance of two.
-    pub(super) first: f64,
-    pub(super) step: f64,
-}
-
-/// How the coordinates of a frame follow each other.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Order {
-    /// x y z of each point.
-    Points,
-    /// x y z 1 of each point.
-    Homogeneous,
-    /// All x, then all y, then all z.
-    Axes,
-}
-
-impl Order {
-    /// Values stored for a point.
-    fn values(self) -> usize {
-        match self {
-            Self::Points | Self::Axes => 3,
-            Self::Homogeneous => 4,
-        }
-    }
-}
-
-/// Maximum length of a header.
-pub(super) const LONGEST_HEADER: usize = 12 + (1 << 16);
 
 /// Bytes read at once: few calls, and still within the fast caches.
 const BLOCK: usize = 1 << 17;
@@ -63,55 +23,40 @@ pub(super) fn open<'a>(
     let read = |cause| Error::read(path, cause);
     let mut head = Vec::new();
     source.by_ref().take(LONGEST_HEADER as u64).read_to_end(&mut head).map_err(read)?;
-    let expected = expected_points as u64;
+    let place = npy::Place { name: None };
     let layout = match format {
-        CacheFormat::Npy => npy::layout(&head, expected),
+        CacheFormat::Npy => npy::layout(&head, expected_points as u64, place),
         CacheFormat::Pc2 => pc2::layout(&head),
         CacheFormat::Mdd => mdd::layout(&head),
     };
     let mut layout = layout.map_err(|fault| fault.at(path))?;
-    if layout.points != expected {
-        if layout.frames == expected && format == CacheFormat::Npy {
-            let what = format!(
-                "has the shape ({expected}, {}, 3), points before frames; convert it with numpy.save(path, numpy.load(path).transpose(1, 0, 2))",
-                layout.points
-            );
-            return Err(Fault::unsupported(what).at(path));
-        }
-        let (path, found) = (path.to_owned(), layout.points);
-        return Err(Error::PointCount { path, frame: None, expected: expected_points, found });
+    if format == CacheFormat::Mdd && layout.check(length, expected_points, path).is_ok() {
+        // No more than the file holds, as its length is right.
+        let mut times = vec![0; 4 * layout.frames as usize];
+        source.seek(SeekFrom::Start(mdd::HEADER)).and_then(|_| source.read_exact(&mut times)).map_err(read)?;
+        mdd::set_times(&mut layout, &times).map_err(|fault| fault.at(path))?;
     }
-    layout.check_size(length).map_err(|fault| fault.at(path))?;
-    let Some(shape) = layout.fortran.take() else {
-        return Ok(Box::new(CacheReader::new(path, source, &layout, expected_points)));
-    };
-    // Every frame is spread over the whole array.
-    let mut bytes = Vec::new();
-    source.seek(SeekFrom::Start(layout.start)).map_err(read)?;
-    source.read_to_end(&mut bytes).map_err(read)?;
-    layout.start = 0;
-    let last_fastest = Cursor::new(reordered(&bytes, &shape, layout.scalar.size()));
-    Ok(Box::new(CacheReader::new(path, last_fastest, &layout, expected_points)))
+    open_layout(path, source, layout, length, expected_points)
 }
 
-/// An array whose first index varies fastest, in the order in which the last one does.
-fn reordered(bytes: &[u8], shape: &[u64], size: usize) -> Vec<u8> {
-    // The array has as many bytes as its shape says, so that all of this fits.
-    let [a, b, c] = match *shape {
-        [a, b] => [1, a as usize, b as usize],
-        [a, b, c] => [a as usize, b as usize, c as usize],
-        _ => return bytes.to_vec(),
+/// Opens a cache of `length` bytes whose header was read.
+pub(super) fn open_layout<'a>(
+    path: &Path,
+    source: impl Read + Seek + Send + 'a,
+    mut layout: Layout,
+    length: u64,
+    expected_points: usize,
+) -> Result<Box<dyn FrameReader + 'a>, Error> {
+    layout.check(length, expected_points, path)?;
+    let Some(rows) = layout.fortran.take() else {
+        return Ok(Box::new(CacheReader::new(path, source, layout, expected_points)));
     };
-    let mut out = Vec::with_capacity(bytes.len());
-    for i in 0..a {
-        for j in 0..b {
-            for k in 0..c {
-                let at = size * (i + a * (j + b * k));
-                out.extend_from_slice(&bytes[at..at + size]);
-            }
-        }
-    }
-    out
+    // All of these are factors of the file's length.
+    let (size, frames, rows) = (layout.scalar.size(), layout.frames as usize, rows as usize);
+    let columns = layout.order.values() * expected_points / rows;
+    let gathered = Transposed::new(source, layout.start, size, [frames, rows, columns]);
+    layout.start = 0;
+    Ok(Box::new(CacheReader::new(path, gathered, layout, expected_points)))
 }
 
 struct CacheReader<R> {
@@ -123,6 +68,8 @@ struct CacheReader<R> {
     frame_rate: Option<f64>,
     first: f64,
     step: f64,
+    numbers: Option<Vec<f64>>,
+    note: Option<String>,
     points: usize,
     frames: usize,
     next: usize,
@@ -132,7 +79,7 @@ struct CacheReader<R> {
 }
 
 impl<R: Read + Seek> CacheReader<R> {
-    fn new(path: &Path, source: R, layout: &Layout, points: usize) -> Self {
+    fn new(path: &Path, source: R, layout: Layout, points: usize) -> Self {
         Self {
             path: path.to_owned(),
             source,
@@ -142,6 +89,8 @@ impl<R: Read + Seek> CacheReader<R> {
             frame_rate: layout.frame_rate,
             first: layout.first,
             step: layout.step,
+            numbers: layout.numbers,
+            note: layout.note,
             points,
             // No more than the bytes of the file, which fit.
             frames: layout.frames as usize,
@@ -192,39 +141,6 @@ impl<R: Read + Seek> CacheReader<R> {
     }
 }
 
-impl Layout {
-    /// As most formats have it, frames numbered from 0.
-    pub(super) fn new(points: u64, frames: u64, start: u64, scalar: Scalar) -> Self {
-        let (order, fortran, frame_rate) = (Order::Points, None, None);
-        Self { points, frames, start, scalar, order, fortran, frame_rate, first: 0.0, step: 1.0 }
-    }
-
-    fn check_size(&self, length: u64) -> Result<(), Fault> {
-        let Self { points, frames, start, scalar, .. } = *self;
-        if points == 0 {
-            return Err(Fault::invalid("has no points; export the capture with its points"));
-        }
-        if frames == 0 {
-            return Err(Fault::invalid("has no frames; export the capture with its frames"));
-        }
-        let frame = u128::from(points).saturating_mul((self.order.values() * scalar.size()) as u128);
-        let promised = frame.saturating_mul(frames.into()).saturating_add(start.into());
-        let length = u128::from(length);
-        if length == promised {
-            return Ok(());
-        }
-        let whole = (length.saturating_sub(start.into()) / frame).min(frames.into());
-        let difference = if length < promised {
-            format!("{} bytes are missing", promised - length)
-        } else {
-            format!("{} bytes are in excess", length - promised)
-        };
-        Err(Fault::damaged(format!(
-            "promises {frames} frames and has {whole} whole frames, {difference}; copy or export the file again"
-        )))
-    }
-}
-
 impl<R: Read + Seek + Send> FrameReader for CacheReader<R> {
     fn points(&self) -> usize {
         self.points
@@ -239,7 +155,12 @@ impl<R: Read + Seek + Send> FrameReader for CacheReader<R> {
     }
 
     fn number(&self, frame: usize) -> f64 {
-        self.first + self.step * frame as f64
+        let told = self.numbers.as_ref().and_then(|numbers| numbers.get(frame));
+        told.copied().unwrap_or(self.first + self.step * frame as f64)
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.note.iter().map(|note| format!("{}: {note}", self.path.display())).collect()
     }
 
     fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error> {

@@ -1,26 +1,37 @@
 //! The frames of captures, one after another, so that memory does not grow with their number.
 
 mod cache;
+mod cut;
+mod files;
+mod fortran;
+mod layout;
 mod mdd;
+mod names;
 mod npy;
 mod npz;
 mod numbered;
 mod numbers;
+mod packed;
 mod pc2;
+mod pieces;
+mod python;
 mod range;
+mod selection;
 mod sequence;
+mod several;
+mod single;
 mod source;
 mod widen;
 mod write;
 
 use std::path::Path;
 
-use crate::error::{Error, Fault};
-use crate::mesh::{MeshFormat, extensions};
+use crate::error::Error;
 
 pub use numbers::missing_frames;
-pub use range::{FrameRange, open_frames_range};
-pub use source::{frame_files, open_frames, open_frames_bytes, open_frames_in};
+pub use range::FrameRange;
+pub use selection::FrameSelection;
+pub use source::{frame_files, open_frames, open_frames_bytes, open_frames_in, open_selected_frames};
 pub use write::{FrameOptions, FrameWriter, create_frames, frames_path};
 
 /// Positions of one capture, frame by frame, in order. Memory does not grow with the number of frames.
@@ -42,6 +53,11 @@ pub trait FrameReader: Send {
         frame as f64
     }
 
+    /// What the user should know of how the source is read.
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Reads the next frame into `out`, which then holds 3 × points coordinates `x y z x y z …`; false at the end, with
     /// `out` empty.
     ///
@@ -61,8 +77,8 @@ pub trait FrameReader: Send {
 /// A file format for the frames of a capture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum CacheFormat {
-    /// A NumPy array, frames × points × 3, or points × 3 for one frame; 32- or 64-bit floats. Frames × 3 × points, a fourth coordinate
-    /// that is 1 throughout, and Fortran order are read as well.
+    /// A NumPy array, frames × points × 3, or points × 3 for one frame; 32- or 64-bit floats. Frames × 3·points, frames × 3 × points, a fourth
+    /// coordinate that is 1 throughout, and Fortran order are read as well.
     Npy,
     /// Point cache 2, as 3ds Max and Blender write it.
     Pc2,
@@ -88,18 +104,4 @@ impl CacheFormat {
         let found = path.extension()?;
         Self::ALL.into_iter().find(|format| found.eq_ignore_ascii_case(format.extension()))
     }
-}
-
-/// An extension that no format of frames has.
-fn unknown_extension(path: &Path, read: bool) -> Error {
-    let caches = if read { ".npy .pc2 .mdd .npz" } else { ".npy .pc2 .mdd" };
-    Fault::unsupported(if read {
-        format!(
-            "is not a capture that is read; give {caches}, or {} files in a folder",
-            extensions(&MeshFormat::ALL)
-        )
-    } else {
-        format!("is not a format of frames that is written; end the name in one of {caches}, or in / for a folder of .obj files")
-    })
-    .at(path)
 }

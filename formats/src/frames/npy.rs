@@ -1,13 +1,63 @@
 //! NumPy arrays: a header that is a Python dictionary, then the array.
 
-use super::cache::{LONGEST_HEADER, Layout, Order};
+use super::layout::{LONGEST_HEADER, Layout, Order};
+use super::python::{self, Header, Kind};
 use super::widen::Scalar;
 use crate::error::Fault;
-use crate::text::{integer, quoted};
+use crate::text::quoted;
 
 const MAGIC: &[u8; 6] = b"\x93NUMPY";
 
-pub(super) fn layout(head: &[u8], expected_points: u64) -> Result<Layout, Fault> {
+/// An array in the Python that messages give, where `path` stands for the file.
+#[derive(Clone, Copy)]
+pub(super) struct Place<'a> {
+    /// Its name in an archive.
+    pub(super) name: Option<&'a str>,
+}
+
+impl Place<'_> {
+    /// The expression that loads the array; `options` follow the path.
+    fn load(self, options: &str) -> String {
+        let file = format!("numpy.load(path{options})");
+        self.name.map_or_else(|| file.clone(), |name| format!("{file}[{name:?}]"))
+    }
+
+    /// The statement that saves what is made of the array.
+    fn save(self, made: &str) -> String {
+        format!("convert it in Python with numpy.save(\"converted.npy\", {made})")
+    }
+}
+
+pub(super) fn layout(head: &[u8], expected_points: u64, place: Place<'_>) -> Result<Layout, Fault> {
+    let (header, start) = parse(head)?;
+    let scalar = scalar(&header, expected_points, place)?;
+    let (frames, points, order) = axes(&header.shape, expected_points, place)?;
+    let mut layout = Layout::new(points, frames, start, scalar);
+    layout.order = order;
+    let rows = match order {
+        Order::Axes => 3,
+        _ if header.shape.last() == Some(&expected_points.saturating_mul(3)) => 1,
+        Order::Points | Order::Homogeneous => points,
+    };
+    layout.fortran = header.fortran.then_some(rows);
+    Ok(layout)
+}
+
+/// The header, and where the array begins.
+fn parse(head: &[u8]) -> Result<(Header<'_>, u64), Fault> {
+    let (start, length) = header_bounds(head)?;
+    let text = head.get(start..start + length).ok_or_else(truncated)?;
+    let header = python::header(text).ok_or_else(|| {
+        Fault::damaged(format!(
+            "has the header {}, which is not understood; save the array again with numpy.save",
+            quoted(text)
+        ))
+    })?;
+    Ok((header, (start + length) as u64))
+}
+
+/// Where the text of the header begins, and its length.
+pub(super) fn header_bounds(head: &[u8]) -> Result<(usize, usize), Fault> {
     let Some(rest) = head.strip_prefix(MAGIC) else {
         return Err(Fault::damaged("does not begin as a .npy file does; save the array again with numpy.save"));
     };
@@ -26,61 +76,133 @@ pub(super) fn layout(head: &[u8], expected_points: u64) -> Result<Layout, Fault>
             "has a header of {length} bytes, longer than an array of floats has; save the array again with numpy.save"
         )));
     }
-    let text = head.get(start..start + length).ok_or_else(truncated)?;
-    let array = Parser { rest: text }.array().ok_or_else(|| {
-        Fault::damaged(format!(
-            "has the header {}, which is not understood; save the array again with numpy.save",
-            quoted(text)
-        ))
-    })?;
-    array.layout((start + length) as u64, expected_points)
+    Ok((start, length))
 }
 
 fn truncated() -> Fault {
     Fault::damaged("ends within its header; copy or save the file again")
 }
 
-/// The header as it stands.
-struct Array<'a> {
-    /// None for the list that describes a record.
-    kind: Option<&'a [u8]>,
-    fortran: bool,
-    shape: Vec<u64>,
+fn scalar(header: &Header<'_>, points: u64, place: Place<'_>) -> Result<Scalar, Fault> {
+    let advice = match &header.kind {
+        Kind::Plain(b"<f4") => return Ok(Scalar::F32Little),
+        Kind::Plain(b">f4") => return Ok(Scalar::F32Big),
+        Kind::Plain(b"<f8") => return Ok(Scalar::F64Little),
+        Kind::Plain(b">f8") => return Ok(Scalar::F64Big),
+        Kind::Plain(b"|O") if header.shape.is_empty() => {
+            let load = place.load(", allow_pickle=True");
+            return Err(Fault::unsupported(format!(
+                "holds one Python object, not an array; save the frames in it, where {load}.item() is a dictionary with numpy.save(\"converted.npy\", {load}.item()[NAME])"
+            )));
+        }
+        Kind::Plain(b"|O") => {
+            let load = place.load(", allow_pickle=True");
+            let made = format!("numpy.array([frame for frame in {load} if len(frame) == {points}], \"<f4\")");
+            format!(
+                "has Python objects, which may be frames of any number of points; keep those of {points}: {}",
+                place.save(&made)
+            )
+        }
+        Kind::Plain(kind) => {
+            let save = place.save(&format!("{}.astype(\"<f4\")", place.load("")));
+            format!("has values of type {}, not 32- or 64-bit floats; {save}", quoted(kind))
+        }
+        Kind::Records(fields) => {
+            let load = place.load("");
+            let has = |name: &&str| fields.contains(&name.as_bytes());
+            let axes = ["x", "y", "z"].iter().all(has);
+            let made = if axes {
+                format!("numpy.stack([{load}[k] for k in \"xyz\"], -1).astype(\"<f4\")")
+            } else {
+                format!("{load}[{}]", fields.first().map_or("NAME".to_owned(), |field| quoted(field)))
+            };
+            let names: Vec<String> = fields.iter().take(6).map(|field| quoted(field)).collect();
+            format!("has records ({}), not plain floats; {}", names.join(", "), place.save(&made))
+        }
+    };
+    Err(Fault::unsupported(advice))
 }
 
-impl Array<'_> {
-    fn layout(self, start: u64, expected_points: u64) -> Result<Layout, Fault> {
-        let scalar = match self.kind {
-            Some(b"<f4") => Scalar::F32Little,
-            Some(b">f4") => Scalar::F32Big,
-            Some(b"<f8") => Scalar::F64Little,
-            Some(b">f8") => Scalar::F64Big,
-            kind => {
-                let kind = kind.map_or("records".into(), |kind| format!("values of type {}", quoted(kind)));
-                return Err(Fault::unsupported(format!(
-                    "has {kind}, not 32- or 64-bit floats; convert it with numpy.save(path, numpy.load(path).astype('<f4'))"
-                )));
-            }
-        };
-        let (frames, points, order) = match *self.shape {
-            [frames, points, 3] => (frames, points, Order::Points),
-            [points, 3] => (1, points, Order::Points),
-            [frames, points, 4] if points == expected_points => (frames, points, Order::Homogeneous),
-            [frames, 3, points] => (frames, points, Order::Axes),
-            [3, points] => (1, points, Order::Axes),
-            [frames, points, 4] => (frames, points, Order::Homogeneous),
-            _ => {
-                return Err(Fault::unsupported(format!(
-                    "has the shape {:?}, not (frames, points, 3); bring its axes into this order with numpy.transpose, or with reshape where each row has the coordinates x y z x y z of one frame",
-                    self.shape
-                )));
-            }
-        };
-        let mut layout = Layout::new(points, frames, start, scalar);
-        layout.order = order;
-        layout.fortran = self.fortran.then_some(self.shape);
-        Ok(layout)
+/// Frames, points, and how the coordinates of a frame follow each other.
+fn axes(shape: &[u64], expected: u64, place: Place<'_>) -> Result<(u64, u64, Order), Fault> {
+    let flat = expected.saturating_mul(3);
+    // A batch of one capture.
+    let inner = match shape {
+        [1, inner @ ..] if shape.len() > 3 => inner,
+        _ => shape,
+    };
+    Ok(match *inner {
+        [points, 3] | [1, points, 3] if points == expected => (1, points, Order::Points),
+        [3, points] if points == expected => (1, points, Order::Axes),
+        // x y z x y z … in each row, as tools for faces save them.
+        [frames, values] if values == flat => (frames, expected, Order::Points),
+        [values] if values == flat => (1, expected, Order::Points),
+        [values, frames] if values == flat => {
+            let made = format!("{}.T", place.load(""));
+            let what = format!("has the shape ({values}, {frames}), a column for each frame; {}", place.save(&made));
+            return Err(Fault::unsupported(what));
+        }
+        [points, frames, 3] if points == expected && frames != expected => {
+            let made = format!("{}.transpose(1, 0, 2)", place.load(""));
+            let what = format!("has the shape ({points}, {frames}, 3), points before frames; {}", place.save(&made));
+            return Err(Fault::unsupported(what));
+        }
+        [frames, points, 3] => (frames, points, Order::Points),
+        [points, 3] => (1, points, Order::Points),
+        [frames, points, 4] if points == expected => (frames, points, Order::Homogeneous),
+        [frames, 3, points] => (frames, points, Order::Axes),
+        [3, points] => (1, points, Order::Axes),
+        [frames, points, 4] => (frames, points, Order::Homogeneous),
+        [.., points, 3] if points == expected => {
+            let made = format!("{}.reshape(-1, {points}, 3)", place.load(""));
+            let what = format!("has the shape {}, frames along several axes; {}", listed(shape), place.save(&made));
+            return Err(Fault::unsupported(what));
+        }
+        [frames, values] if values > 4 && values % 3 == 0 => (frames, values / 3, Order::Points),
+        _ => {
+            return Err(Fault::unsupported(format!(
+                "has the shape {}, not (frames, points, 3) or (frames, 3 × points) with {expected} points; bring its axes into this order with numpy.transpose",
+                listed(shape)
+            )));
+        }
+    })
+}
+
+/// A shape as Python shows it.
+fn listed(shape: &[u64]) -> String {
+    let axes: Vec<String> = shape.iter().take(8).map(u64::to_string).collect();
+    format!("({}{})", axes.join(", "), if shape.len() == 1 { "," } else { "" })
+}
+
+/// The type and shape of an array, in words.
+pub(super) fn described(head: &[u8]) -> String {
+    match parse(head) {
+        Ok((Header { kind: Kind::Plain(kind), shape, .. }, _)) => {
+            format!("{} {}", String::from_utf8_lossy(kind), listed(&shape))
+        }
+        Ok((Header { shape, .. }, _)) => format!("records {}", listed(&shape)),
+        Err(_) => "not an array".to_owned(),
     }
+}
+
+/// The only number of an array.
+pub(super) fn single_number(file: &[u8]) -> Option<f64> {
+    let (header, start) = parse(file).ok()?;
+    let Kind::Plain(&[order, ref kind @ ..]) = header.kind else { return None };
+    let only = header.shape.iter().all(|&length| length == 1);
+    let mut bytes = file.get(usize::try_from(start).ok()?..).filter(|_| only)?.to_vec();
+    if order == b'>' {
+        bytes.reverse();
+    }
+    Some(match (kind, bytes.as_slice()) {
+        (b"f4", &[a, b, c, d]) => f32::from_le_bytes([a, b, c, d]).into(),
+        (b"f8", &[a, b, c, d, e, f, g, h]) => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
+        ([b'i' | b'u', _], &[low, ref high @ ..]) if high.iter().all(|&byte| byte == 0) => low.into(),
+        ([b'i' | b'u', _], &[low, high, ref rest @ ..]) if rest.iter().all(|&byte| byte == 0) => {
+            u16::from_le_bytes([low, high]).into()
+        }
+        _ => return None,
+    })
 }
 
 /// A header as `numpy.save` writes it.
@@ -95,104 +217,4 @@ pub(super) fn header(points: usize, frames: usize) -> Vec<u8> {
     header.extend((length as u16).to_le_bytes());
     header.extend(text.bytes());
     header
-}
-
-/// As much of Python's syntax as headers need.
-struct Parser<'a> {
-    rest: &'a [u8],
-}
-
-impl<'a> Parser<'a> {
-    fn array(mut self) -> Option<Array<'a>> {
-        let (mut kind, mut fortran, mut shape) = (None, None, None);
-        self.symbol(b'{')?;
-        while self.symbol(b'}').is_none() {
-            let key = self.string()?;
-            self.symbol(b':')?;
-            match key {
-                b"descr" => kind = Some(self.kind()?),
-                b"fortran_order" => fortran = Some(self.boolean()?),
-                b"shape" => shape = Some(self.tuple()?),
-                _ => return None,
-            }
-            if self.symbol(b',').is_none() && self.peek() != Some(b'}') {
-                return None;
-            }
-        }
-        self.peek().is_none().then_some(Array { kind: kind?, fortran: fortran?, shape: shape? })
-    }
-
-    /// A type such as `'<f4'`; none inside for a list, which is skipped.
-    fn kind(&mut self) -> Option<Option<&'a [u8]>> {
-        if self.peek()? != b'[' {
-            return self.string().map(Some);
-        }
-        let mut depth = 0_usize;
-        loop {
-            match self.peek()? {
-                b'\'' | b'"' => drop(self.string()?),
-                symbol => {
-                    self.rest = &self.rest[1..];
-                    match symbol {
-                        b'[' => depth += 1,
-                        b']' => depth = depth.checked_sub(1)?,
-                        _ => {}
-                    }
-                    if depth == 0 {
-                        return Some(None);
-                    }
-                }
-            }
-        }
-    }
-
-    fn string(&mut self) -> Option<&'a [u8]> {
-        let quote = self.peek().filter(|quote| b"'\"".contains(quote))?;
-        let text = &self.rest[1..];
-        let end = text.iter().position(|&b| b == quote)?;
-        self.rest = &text[end + 1..];
-        Some(&text[..end])
-    }
-
-    fn boolean(&mut self) -> Option<bool> {
-        self.peek()?;
-        for (word, value) in [(b"True".as_slice(), true), (b"False", false)] {
-            if let Some(rest) = self.rest.strip_prefix(word) {
-                self.rest = rest;
-                return Some(value);
-            }
-        }
-        None
-    }
-
-    fn tuple(&mut self) -> Option<Vec<u64>> {
-        let mut numbers = Vec::new();
-        self.symbol(b'(')?;
-        while self.symbol(b')').is_none() {
-            numbers.push(self.number()?);
-            if self.symbol(b',').is_none() && self.peek() != Some(b')') {
-                return None;
-            }
-        }
-        Some(numbers)
-    }
-
-    fn number(&mut self) -> Option<u64> {
-        self.peek()?;
-        let end = self.rest.iter().position(|b| !b.is_ascii_digit())?;
-        let (digits, rest) = self.rest.split_at(end);
-        // Python 2 wrote `3L`.
-        self.rest = rest.strip_prefix(b"L").unwrap_or(rest);
-        integer(digits)
-    }
-
-    fn symbol(&mut self, wanted: u8) -> Option<()> {
-        (self.peek()? == wanted).then(|| self.rest = &self.rest[1..])
-    }
-
-    /// The next byte that is not white space.
-    fn peek(&mut self) -> Option<u8> {
-        self.rest = self.rest.trim_ascii_start();
-        self.rest.first().copied()
-    }
 }

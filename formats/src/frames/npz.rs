@@ -1,44 +1,197 @@
 //! NumPy's archives: a zip file with one `.npy` file for each array.
 
-use std::fs::File;
-use std::io::{self, BufReader, Seek};
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 
-use zip::ZipArchive;
 use zip::result::ZipError;
+use zip::{CompressionMethod, ZipArchive};
 
+use super::FrameReader;
+use super::cache;
+use super::layout::Layout;
+use super::npy::{self, Place};
+use super::packed::{Entry, Unpacked};
 use crate::error::{Error, Fault};
 
-/// Unpacks the only array of an archive into a file without a name, so that memory does not grow with it; gives its length too.
-pub(super) fn only_array(path: &Path) -> Result<(File, u64), Error> {
-    let file = File::open(path).map_err(|cause| Error::read(path, cause))?;
-    let failed = |cause| match cause {
+/// What the arrays are called that tell how many frames a second has.
+const RATES: [&str; 6] = ["fps", "framerate", "frame_rate", "frames_per_second", "mocap_framerate", "mocap_frame_rate"];
+
+/// Arrays that are looked at; no archive of frames has more beside them.
+const MOST: usize = 4096;
+
+/// Deflate packs no more bytes than these into one; what announces more is no archive.
+const MOST_DEFLATED: u64 = 1032;
+
+/// Opens the one array of an archive that can be frames of so many points, as it is packed.
+pub(super) fn open<'a>(
+    path: &Path,
+    mut source: impl Read + Seek + Send + 'a,
+    expected_points: usize,
+) -> Result<Box<dyn FrameReader + 'a>, Error> {
+    let length = source.seek(SeekFrom::End(0)).map_err(|cause| Error::read(path, cause))?;
+    let mut archive = ZipArchive::new(source).map_err(|cause| failed(path, cause))?;
+    let arrays = Arrays::list(path, &mut archive, length)?;
+    let mut source = archive.into_inner();
+    let (mut found, mut fps) = (Vec::new(), None);
+    for (name, entry) in &arrays.readable {
+        let read = |cause| Error::read(path, cause);
+        let mut unpacked = Unpacked::new(source, entry).map_err(read)?;
+        let head = beginning(&mut unpacked).map_err(read)?;
+        if RATES.iter().any(|rate| name.eq_ignore_ascii_case(rate)) {
+            fps = npy::single_number(&head).filter(|rate| rate.is_finite() && *rate > 0.0);
+        }
+        let layout = npy::layout(&head, expected_points as u64, Place { name: Some(name) });
+        found.push(Array { name, entry, described: npy::described(&head), layout });
+        let Some(back) = unpacked.into_inner() else { return Err(Fault::damaged("cannot be read").at(path)) };
+        source = back;
+    }
+    let Array { entry, layout, .. } = chosen(found, &arrays, expected_points as u64, path)?;
+    let mut layout = layout.map_err(|fault| fault.at(path))?;
+    layout.frame_rate = fps;
+    let unpacked = Unpacked::new(source, entry).map_err(|cause| Error::read(path, cause))?;
+    cache::open_layout(path, unpacked, layout, entry.length, expected_points)
+}
+
+/// An array of an archive, and whether frames can be read from it.
+struct Array<'a> {
+    name: &'a str,
+    entry: &'a Entry,
+    described: String,
+    layout: Result<Layout, Fault>,
+}
+
+/// The only array that fits, or the only one of several frames among those that do.
+fn chosen<'a>(mut found: Vec<Array<'a>>, arrays: &Arrays, points: u64, path: &Path) -> Result<Array<'a>, Error> {
+    let frames = |array: &Array<'_>| array.layout.as_ref().map_or(0, |layout| layout.frames);
+    let fits = |array: &Array<'_>| array.layout.as_ref().is_ok_and(|layout| layout.points == points);
+    let only = |wanted: &dyn Fn(&Array<'_>) -> bool| {
+        let mut places = found.iter().enumerate().filter(|(_, array)| wanted(array)).map(|(place, _)| place);
+        places.next().filter(|_| places.next().is_none())
+    };
+    let moving = |array: &Array<'_>| fits(array) && frames(array) > 1;
+    // What is wrong with the only one that could be meant is said by whoever reads it.
+    let meant = || {
+        let readable = || only(&|array| frames(array) > 0);
+        (arrays.unreadable.is_none() && !found.iter().any(fits)).then(|| only(&|_| true).or_else(readable)).flatten()
+    };
+    if let Some(place) = only(&fits).or_else(|| only(&moving)).or_else(meant) {
+        return Ok(found.swap_remove(place));
+    }
+    let file = "numpy.load(path)";
+    let names: Vec<&str> = found.iter().filter(|array| fits(array)).map(|array| array.name).collect();
+    let what = if let (Some((name, method)), true) = (&arrays.unreadable, names.is_empty()) {
+        format!(
+            "{name:?} is packed with {method}, which is not unpacked here; pack it again in Python with numpy.savez_compressed(\"converted.npz\", **{file})"
+        )
+    } else if found.is_empty() {
+        "has no arrays; save the frames with numpy.save".to_owned()
+    } else if found.iter().any(|array| moving(array)) {
+        let moving: Vec<&str> = found.iter().filter(|array| moving(array)).map(|array| array.name).collect();
+        format!(
+            "has {} arrays that can be the frames ({}); save one of them in Python, as with numpy.save(\"converted.npy\", {file}[{:?}])",
+            moving.len(),
+            listed(moving.iter().map(|name| (*name).to_owned())),
+            moving[0]
+        )
+    } else if names.len() > 1 {
+        format!(
+            "has {} arrays of one frame each ({}); join them in Python with a = {file}; numpy.save(\"converted.npy\", [a[k] for k in sorted(a.files, key=lambda k: (len(k), k)) if a[k].shape == a[{:?}].shape])",
+            names.len(),
+            listed(names.iter().map(|name| (*name).to_owned())),
+            names[0]
+        )
+    } else {
+        let all = found.iter().map(|array| format!("{}: {}", array.name, array.described));
+        format!(
+            "has {} arrays ({}), and none of them is frames of {points} points as 32- or 64-bit floats; save the frames alone with numpy.save",
+            found.len(),
+            listed(all)
+        )
+    };
+    Err(Fault::unsupported(what).at(path))
+}
+
+fn listed(names: impl ExactSizeIterator<Item = String>) -> String {
+    const LISTED: usize = 6;
+    let more = names.len() > LISTED;
+    let mut list: Vec<String> = names.take(LISTED).collect();
+    if more {
+        list.push("…".to_owned());
+    }
+    list.join(", ")
+}
+
+/// The arrays of an archive by name.
+struct Arrays {
+    readable: Vec<(String, Entry)>,
+    /// The first that is packed in a way that is not read, and which.
+    unreadable: Option<(String, &'static str)>,
+}
+
+impl Arrays {
+    /// The arrays of an archive of `length` bytes.
+    fn list<R: Read + Seek>(path: &Path, archive: &mut ZipArchive<R>, length: u64) -> Result<Self, Error> {
+        let mut arrays = Self { readable: Vec::new(), unreadable: None };
+        if archive.len() > MOST {
+            let what = format!("has {} arrays, more than {MOST}; save the frames as one array", archive.len());
+            return Err(Fault::unsupported(what).at(path));
+        }
+        for index in 0..archive.len() {
+            let file = archive.by_index_raw(index).map_err(|cause| failed(path, cause))?;
+            let name = file.name().map_err(|cause| failed(path, cause))?.into_owned();
+            let Some(name) = name.strip_suffix(".npy") else { continue };
+            let deflated = match file.compression() {
+                _ if file.encrypted() => Err("encryption"),
+                CompressionMethod::Stored => Ok(false),
+                CompressionMethod::Deflated => Ok(true),
+                CompressionMethod::LZMA => Err("LZMA"),
+                CompressionMethod::BZIP2 => Err("bzip2"),
+                CompressionMethod::ZSTD => Err("Zstandard"),
+                _ => Err("a rare method"),
+            };
+            let deflated = match deflated {
+                Ok(deflated) => deflated,
+                Err(method) => {
+                    arrays.unreadable.get_or_insert((name.to_owned(), method));
+                    continue;
+                }
+            };
+            let packed = file.compressed_size();
+            let most = if deflated { packed.saturating_mul(MOST_DEFLATED) } else { packed };
+            let start = file.data_start().filter(|start| start.checked_add(packed).is_some_and(|end| end <= length));
+            let Some(start) = start.filter(|_| file.size() <= most) else {
+                let what = format!(
+                    "announces {} bytes for {name:?}, more than the {packed} bytes in which it is packed can hold; copy the file again",
+                    file.size()
+                );
+                return Err(Fault::damaged(what).at(path));
+            };
+            let (path, length, checksum) = (path.to_owned(), file.size(), file.crc32());
+            arrays.readable.push((name.to_owned(), Entry { path, start, packed, length, checksum, deflated }));
+        }
+        Ok(arrays)
+    }
+}
+
+/// As much of an array's file as says what it is; all of it where that is a single number.
+fn beginning(file: &mut impl Read) -> io::Result<Vec<u8>> {
+    let mut head = Vec::new();
+    file.take(12).read_to_end(&mut head)?;
+    if let Ok((start, length)) = npy::header_bounds(&head) {
+        // Eight bytes are the longest number.
+        let wanted = (start + length + 8).saturating_sub(head.len());
+        file.take(wanted as u64).read_to_end(&mut head)?;
+    }
+    Ok(head)
+}
+
+fn failed(path: &Path, cause: ZipError) -> Error {
+    match cause {
         ZipError::Io(cause) if cause.kind() != io::ErrorKind::UnexpectedEof => Error::read(path, cause),
         cause => {
-            Fault::damaged(format!("cannot be unpacked ({cause}); save the array again with numpy.savez")).at(path)
+            let what =
+                format!("cannot be unpacked ({cause}); copy the file again, or save its arrays again with numpy.savez");
+            Fault::damaged(what).at(path)
         }
-    };
-    let mut archive = ZipArchive::new(BufReader::new(file)).map_err(failed)?;
-    if archive.len() != 1 {
-        let names: Vec<String> = archive
-            .file_names()
-            .take(6)
-            .filter_map(|name| Some(name.ok()?.trim_end_matches(".npy").to_owned()))
-            .collect();
-        let what = format!(
-            "has {} arrays ({}); save the frames alone with numpy.save(path, numpy.load(archive)[name])",
-            archive.len(),
-            names.join(", ")
-        );
-        return Err(Fault::unsupported(what).at(path));
     }
-    let mut packed = archive.by_index(0).map_err(failed)?;
-    let mut unpacked = tempfile::tempfile().map_err(|cause| Error::write(&std::env::temp_dir(), cause))?;
-    // What is wrong with the packed bytes shows as an error of reading; a full disk as one of writing, which names another place.
-    let length = io::copy(&mut packed, &mut unpacked).map_err(|cause| match cause.kind() {
-        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Error::write(&std::env::temp_dir(), cause),
-        _ => failed(ZipError::Io(cause)),
-    })?;
-    unpacked.rewind().map_err(|cause| Error::read(path, cause))?;
-    Ok((unpacked, length))
 }

@@ -15,7 +15,7 @@ pub(super) struct NumberedNames {
 }
 
 impl NumberedNames {
-    /// The name in a path of mesh files that has such a place; a point cache holds all frames in one file.
+    /// The name in a path of mesh files to write that has such a place; a point cache holds all frames in one file.
     pub(super) fn of(path: &Path) -> Option<Self> {
         MeshFormat::guess(path)?;
         Self::parse(path.file_name()?.to_str()?)
@@ -26,7 +26,7 @@ impl NumberedNames {
         Self { before: before.to_owned(), digits, after: after.to_owned() }
     }
 
-    fn parse(name: &str) -> Option<Self> {
+    pub(super) fn parse(name: &str) -> Option<Self> {
         let start = name.find(['%', '#'])?;
         let (before, rest) = name.split_at(start);
         let (digits, after) = match rest.strip_prefix('%') {
@@ -52,6 +52,11 @@ impl NumberedNames {
 
     pub(super) fn name(&self, number: f64) -> String {
         format!("{}{}{}", self.before, padded(number, self.digits), self.after)
+    }
+
+    /// The glob pattern of such names, and of others with something else in place of the number.
+    pub(super) fn glob(&self) -> String {
+        format!("{}*{}", glob::Pattern::escape(&self.before), glob::Pattern::escape(&self.after))
     }
 
     /// The number in a name of this form.

@@ -1,26 +1,70 @@
 //! The numbers of frames, as the names of their files tell them.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 
 /// Runs of missing frames that a message lists.
 const LISTED: usize = 6;
 
-/// The numbers in names that differ by nothing else: `f-2 f0 f1.5` or `walk.0010_left walk.0011_left`. In the order of the files; `None` where a name
+/// The numbers in names that differ by nothing else: `f-2 f0 f1.5` or `walk.0010_left walk.0011_left`. In the order of the names; `None` where a name
 /// has no number, two are equal, or the names differ elsewhere.
-pub(super) fn of_files(files: &[PathBuf]) -> Option<Vec<f64>> {
-    let folder = files.first()?.parent();
-    let stems: Option<Vec<&str>> =
-        files.iter().filter(|file| file.parent() == folder).map(|file| Path::new(file).file_stem()?.to_str()).collect();
-    let stems = stems.filter(|stems| stems.len() == files.len() && stems.len() > 1)?;
-    let prefix = prefix(&stems);
-    let ends: Vec<&str> = stems.iter().map(|stem| &stem[prefix..]).collect();
+pub(super) fn of_names(names: &[&str]) -> Option<Vec<f64>> {
+    if names.len() < 2 {
+        return None;
+    }
+    let prefix = prefix(names);
+    let ends: Vec<&str> = names.iter().map(|name| &name[prefix..]).collect();
     let suffix = suffix(&ends);
-    let numbers: Vec<f64> =
-        ends.iter().map(|end| number(&end[..end.len().checked_sub(suffix)?])).collect::<Option<_>>()?;
-    let mut sorted = numbers.clone();
+    let parts: Vec<&str> =
+        ends.iter().map(|end| Some(&end[..end.len().checked_sub(suffix)?])).collect::<Option<_>>()?;
+    let numbers = fractions(&names[0][..prefix], &parts)
+        .or_else(|| parts.iter().map(|part| number(part)).collect::<Option<Vec<f64>>>())?;
+    distinct(&numbers).then_some(numbers)
+}
+
+/// Whether no two numbers are equal.
+pub(super) fn distinct(numbers: &[f64]) -> bool {
+    let mut sorted = numbers.to_vec();
     sorted.sort_by(f64::total_cmp);
-    sorted.windows(2).all(|pair| pair[0] < pair[1]).then_some(numbers)
+    sorted.windows(2).all(|pair| pair[0] < pair[1])
+}
+
+/// Whether all steps between neighbours are the same.
+pub(super) fn evenly_spaced(numbers: &[f64]) -> bool {
+    let mut sorted = numbers.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let steps: Vec<f64> = sorted.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    steps.iter().all(|step| (step - steps[0]).abs() <= 1e-6 * steps[0])
+}
+
+/// Numbers whose whole part is in the prefix, as of `0.04 0.08` or `f1.25 f1.5`; none where the point before the digits only separates them from
+/// a name that ends in a digit, as in `shot2.0010 shot2.0011`.
+fn fractions(prefix: &str, parts: &[&str]) -> Option<Vec<f64>> {
+    let before = prefix.strip_suffix('.')?;
+    let name = before.trim_end_matches(|c: char| c.is_ascii_digit());
+    let whole = &before[name.len()..];
+    let digits = parts.iter().all(|part| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit()));
+    if whole.is_empty() || !digits {
+        return None;
+    }
+    // As in `_-0.5`, but not in `walk-0.5`.
+    let stem = name.strip_suffix('-').filter(|stem| !stem.ends_with(|c: char| c.is_alphanumeric()));
+    let sign = if stem.is_some() { "-" } else { "" };
+    let decimals: Vec<f64> =
+        parts.iter().map(|part| number(&format!("{sign}{whole}.{part}"))).collect::<Option<_>>()?;
+    let counted: Vec<f64> = parts.iter().map(|part| number(part)).collect::<Option<_>>()?;
+    let width = parts[0].len();
+    let same_width = parts.iter().all(|part| part.len() == width);
+    let separates = if same_width {
+        let is_zero = whole.bytes().all(|b| b == b'0');
+        let padded = width >= 4 && name.ends_with(|c: char| c.is_alphabetic());
+        let consecutive = evenly_spaced(&counted) && (counted[0] - counted[1]).abs() == 1.0;
+        padded || !is_zero && (width >= 4 || consecutive)
+    } else {
+        // Numbers that are not filled up, as in `shot2.9 shot2.10`.
+        let filled = parts.iter().any(|part| part.len() > 1 && part.starts_with('0'));
+        !filled && parts.len() > 2 && evenly_spaced(&counted)
+    };
+    (!separates).then_some(decimals)
 }
 
 /// Bytes before the number: what all names begin with, less the digits and the sign that belong to the number.
@@ -107,10 +151,6 @@ pub(super) fn padded(number: f64, digits: usize) -> String {
 mod tests {
     use super::*;
 
-    fn of(names: &[&str]) -> Option<Vec<f64>> {
-        of_files(&names.iter().map(|name| PathBuf::from(format!("a/{name}.obj"))).collect::<Vec<_>>())
-    }
-
     #[test]
     fn names_that_differ_by_a_number_tell_it() {
         for (names, numbers) in [
@@ -123,13 +163,24 @@ mod tests {
             (vec!["v2_0999_left", "v2_1000_left"], vec![999.0, 1000.0]),
             (vec!["f1.0", "f1.5", "f2.0", "f2.5"], vec![1.0, 1.5, 2.0, 2.5]),
             (vec!["é1", "é2"], vec![1.0, 2.0]),
+            (vec!["0.04", "0.08", "0.12"], vec![0.04, 0.08, 0.12]),
+            (vec!["0.5", "0.04", "0.45"], vec![0.5, 0.04, 0.45]),
+            (vec!["t_-0.5", "t_-0.25"], vec![-0.5, -0.25]),
+            (vec!["f1.25", "f1.5", "f1.75"], vec![1.25, 1.5, 1.75]),
+            (vec!["f1.250", "f1.500", "f1.750"], vec![1.25, 1.5, 1.75]),
+            (vec!["shot2.8", "shot2.9", "shot2.10"], vec![8.0, 9.0, 10.0]),
+            (vec!["shot2.010", "shot2.011"], vec![10.0, 11.0]),
+            (vec!["shot0.0010", "shot0.0012"], vec![10.0, 12.0]),
+            (vec!["frame_-5", "frame_-4"], vec![-5.0, -4.0]),
+            (vec!["2024-01-05_v2.1_0007", "2024-01-05_v2.1_0008"], vec![7.0, 8.0]),
+            (vec!["2024-01-05-7", "2024-01-05-8"], vec![7.0, 8.0]),
         ] {
-            assert_eq!(of(&names), Some(numbers), "{names:?}");
+            assert_eq!(of_names(&names), Some(numbers), "{names:?}");
         }
         for names in
             [vec!["a1", "b2"], vec!["run", "walk"], vec!["1", "01"], vec!["f1"], vec!["f", "f1"], vec!["è1", "é1"]]
         {
-            assert_eq!(of(&names), None, "{names:?}");
+            assert_eq!(of_names(&names), None, "{names:?}");
         }
     }
 

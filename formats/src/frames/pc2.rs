@@ -1,7 +1,7 @@
 //! Point cache 2: `POINTCACHE2\0`, then version, points, first frame, frames per sample and samples, then `f32`; all
 //! little-endian.
 
-use super::cache::Layout;
+use super::layout::Layout;
 use super::widen::Scalar;
 use crate::error::Fault;
 

@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
 
-use super::{FrameReader, open_frames};
+use super::FrameReader;
 use crate::error::{Error, Fault};
 
 /// Frames `first` to `last`, both included, every `step`-th of them, counted from 0 in the order of their source. Written
@@ -83,24 +83,8 @@ impl FromStr for FrameRange {
     }
 }
 
-/// [`open_frames`], and of the frames there only those of a range.
-///
-/// # Errors
-/// Those of [`open_frames`]; a range that goes beyond the frames there.
-pub fn open_frames_range(
-    source: impl AsRef<Path>,
-    expected_points: usize,
-    range: Option<FrameRange>,
-) -> Result<Box<dyn FrameReader>, Error> {
-    let source = source.as_ref();
-    let reader = open_frames(source, expected_points)?;
-    let Some(range) = range else { return Ok(reader) };
-    range.check(reader.frames(), source)?;
-    Ok(Box::new(RangeReader { reader, range, taken: 0, at: 0 }))
-}
-
 /// The frames of a range.
-struct RangeReader {
+pub(super) struct RangeReader {
     reader: Box<dyn FrameReader>,
     range: FrameRange,
     /// How many of the range were read or skipped.
@@ -110,6 +94,17 @@ struct RangeReader {
 }
 
 impl RangeReader {
+    /// The frames of a range, where one is given, of those of a source.
+    pub(super) fn open(
+        reader: Box<dyn FrameReader>,
+        range: Option<FrameRange>,
+        source: &Path,
+    ) -> Result<Box<dyn FrameReader>, Error> {
+        let Some(range) = range else { return Ok(reader) };
+        range.check(reader.frames(), source)?;
+        Ok(Box::new(Self { reader, range, taken: 0, at: 0 }))
+    }
+
     /// Moves the reader to the next frame of the range; false at the end.
     fn advance(&mut self) -> Result<bool, Error> {
         if self.taken == self.range.count() {
@@ -147,6 +142,10 @@ impl FrameReader for RangeReader {
     /// The numbers of the source, so that the timing of the remaining frames is unchanged.
     fn number(&self, frame: usize) -> f64 {
         self.reader.number(self.range.frame(frame))
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.reader.notes()
     }
 
     fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error> {

@@ -1,30 +1,71 @@
-//! A capture with each frame in a mesh file of its own.
+//! A capture with each frame in a file of its own: meshes, or arrays of one frame.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use super::{FrameReader, numbers};
-use crate::error::Error;
-use crate::mesh::{Contents, read_file};
+use super::names::Sequence;
+use super::{FrameReader, cut, single};
+use crate::error::{Error, Fault};
+use crate::mesh::{Contents, MeshFormat, read_file};
 
 /// Reads only the positions: the faces may differ from those of the rest pose.
 pub(super) struct SequenceReader {
-    files: Vec<PathBuf>,
-    numbers: Option<Vec<f64>>,
+    sequence: Sequence,
     points: usize,
+    notes: Vec<String>,
     next: usize,
+    /// Whether the last line of the text read last has an end, with its frame and file.
+    before: Option<(bool, usize, PathBuf)>,
 }
 
 impl SequenceReader {
-    /// In the order of the numbers in the files' names, where those differ by nothing else.
-    pub(super) fn new(mut files: Vec<PathBuf>, points: usize) -> Self {
-        let numbers = numbers::of_files(&files).map(|found| {
-            let mut numbered: Vec<(f64, PathBuf)> = found.into_iter().zip(std::mem::take(&mut files)).collect();
-            numbered.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let numbers = numbered.iter().map(|(number, _)| *number).collect();
-            files = numbered.into_iter().map(|(_, file)| file).collect();
-            numbers
-        });
-        Self { files, numbers, points, next: 0 }
+    /// `notes` are what the user should know of the choice of these files.
+    pub(super) fn new(sequence: Sequence, points: usize, notes: Vec<String>) -> Self {
+        Self { sequence, points, notes, next: 0, before: None }
+    }
+
+    fn read_array(&self, path: &Path, out: &mut Vec<f64>) -> Result<(), Error> {
+        let frame = self.next;
+        let named = |error: Error| match error {
+            Error::PointCount { path, expected, found, .. } => {
+                Error::PointCount { path, frame: Some(frame), expected, found }
+            }
+            Error::NonFinite { path, point, .. } => Error::NonFinite { path, frame, point },
+            other => other.in_frame(frame),
+        };
+        let mut reader = single::open_cache(path, self.points).map_err(named)?;
+        if reader.frames() != 1 {
+            let what = format!(
+                "frame {frame}: has {} frames, where a folder of arrays has one in each; name this file alone, or join the arrays in Python with numpy.concatenate",
+                reader.frames()
+            );
+            return Err(Fault::unsupported(what).at(path));
+        }
+        reader.read_next(out).map(drop).map_err(named)
+    }
+
+    fn read_mesh(&mut self, path: &Path, out: &mut Vec<f64>) -> Result<(), Error> {
+        let frame = self.next;
+        let model = read_file(path, Contents::Points).map_err(|error| error.in_frame(frame))?;
+        let whole = cut::last_line_ends(path).map_err(|cause| Error::read(path, cause))?;
+        let found = model.points.len();
+        if found != self.points {
+            if found < self.points && whole == Some(false) {
+                let why = format!("after {found} of {} points, so it was cut, or is of another mesh", self.points);
+                return Err(cut::in_last_line(path, frame, &why));
+            }
+            let (path, frame) = (path.to_owned(), Some(frame));
+            return Err(Error::PointCount { path, frame, expected: self.points, found: found as u64 });
+        }
+        if let Some(whole) = whole {
+            let why = "where other frames end with a line break, so it was cut";
+            match &self.before {
+                Some((true, ..)) if !whole => return Err(cut::in_last_line(path, frame, why)),
+                Some((false, frame, cut)) if whole => return Err(cut::in_last_line(cut, *frame, why)),
+                _ => self.before = Some((whole, frame, path.to_owned())),
+            }
+        }
+        out.extend_from_slice(model.points.as_flattened());
+        Ok(())
     }
 }
 
@@ -34,31 +75,34 @@ impl FrameReader for SequenceReader {
     }
 
     fn frames(&self) -> usize {
-        self.files.len()
+        self.sequence.files.len()
     }
 
     fn number(&self, frame: usize) -> f64 {
-        self.numbers.as_ref().and_then(|numbers| numbers.get(frame)).copied().unwrap_or(frame as f64)
+        let told = self.sequence.numbers.as_ref().and_then(|numbers| numbers.get(frame));
+        told.copied().unwrap_or(frame as f64)
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
     }
 
     fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error> {
         out.clear();
-        let Some(path) = self.files.get(self.next) else {
+        let Some(path) = self.sequence.files.get(self.next).cloned() else {
             return Ok(false);
         };
-        let model = read_file(path, Contents::Points).map_err(|error| error.in_frame(self.next))?;
-        let found = model.points.len();
-        if found != self.points {
-            let (path, frame) = (path.clone(), Some(self.next));
-            return Err(Error::PointCount { path, frame, expected: self.points, found: found as u64 });
+        if MeshFormat::guess(&path).is_some() {
+            self.read_mesh(&path, out)?;
+        } else {
+            self.read_array(&path, out)?;
         }
-        out.extend_from_slice(model.points.as_flattened());
         self.next += 1;
         Ok(true)
     }
 
     fn skip(&mut self) -> Result<bool, Error> {
-        let more = self.next < self.files.len();
+        let more = self.next < self.frames();
         self.next += usize::from(more);
         Ok(more)
     }

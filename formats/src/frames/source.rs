@@ -1,57 +1,63 @@
 //! Opening the frames of a capture from a path, folder or pattern.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
-use std::io::{self, Cursor, Read, Seek};
+use std::fs;
+use std::io::{Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 
-use super::cache;
-use super::numbered::NumberedNames;
+use super::names::{Sequence, is_one_of};
+use super::range::RangeReader;
 use super::sequence::SequenceReader;
-use super::{CacheFormat, FrameReader, npz, unknown_extension};
+use super::{CacheFormat, FrameReader, FrameSelection, cache, files, single};
 use crate::error::{Error, Fault};
 use crate::mesh::{MeshFormat, extensions};
-use crate::natural;
 
 /// Opens the frames of a capture whose rest pose has `expected_points` points.
 ///
-/// `source` is a `.npy`, `.pc2` or `.mdd` file, a `.npz` file with one array, one mesh file, a folder of mesh files or a pattern for such
-/// files. Folder and glob pattern give the files of one mesh format in natural order, `2.obj` before `10.obj`; other files, and in
-/// a folder hidden ones, are passed over. A name with `%04d` or `####` gives the files with a number in its place, in the
-/// order of the numbers.
+/// `source` is a `.npy`, `.pc2` or `.mdd` file, a `.npz` file in which one array fits, one mesh file, a folder of mesh files or of `.npy` files of
+/// one frame each, or a pattern for such files. Files of one mesh format are taken in the order of the numbers in their names, `2.obj` before
+/// `10.obj` and `1.5.obj` before `2.obj`; other files, and in a folder hidden ones, are passed over. In a pattern every part of the path may be a glob
+/// or have `%04d` or `####` in place of a number; what is there by that name is no pattern.
 ///
 /// # Errors
 /// [`Error::PointCount`] where a cache has another number of points, [`Error::Damaged`] where its size is not what its
 /// header promises, [`Error::Unsupported`] for formats that are not read, and mesh formats mixed in one folder,
-/// [`Error::Invalid`] where there is no frame, [`Error::Io`].
+/// [`Error::Invalid`] where there is no frame, [`Error::SeveralSequences`], [`Error::Io`].
 pub fn open_frames(source: impl AsRef<Path>, expected_points: usize) -> Result<Box<dyn FrameReader>, Error> {
+    open_selected_frames(source, expected_points, &FrameSelection::default())
+}
+
+/// [`open_frames`], and of what is there only what is selected.
+///
+/// # Errors
+/// Those of [`open_frames`]; a range that goes beyond the frames there.
+pub fn open_selected_frames(
+    source: impl AsRef<Path>,
+    expected_points: usize,
+    selection: &FrameSelection,
+) -> Result<Box<dyn FrameReader>, Error> {
     let path = source.as_ref();
-    match fs::metadata(path) {
-        Ok(found) if found.is_dir() => {
-            let (files, _) = sort(list(path)?);
-            open_sequence(path, files, expected_points)
-        }
+    let reader = match fs::metadata(path) {
+        Ok(found) if found.is_dir() => open_files(path, files::in_folder(path)?, expected_points, selection),
         Ok(found) if !found.is_file() => Err(Fault::unsupported("is not a regular file; copy it to one").at(path)),
-        Ok(found) => open_file(path, found.len(), expected_points),
-        Err(cause) => match path.to_str() {
-            _ if NumberedNames::of(path).is_some() => open_numbered(path, expected_points),
-            Some(pattern) if pattern.contains(['*', '?', '[']) => open_pattern(path, pattern, expected_points),
-            _ => Err(Error::read(path, cause)),
-        },
-    }
+        Ok(_) => open_file(path, expected_points),
+        Err(_) if files::is_pattern(path) => open_files(path, files::matching(path)?, expected_points, selection),
+        Err(cause) => Err(Error::read(path, cause)),
+    }?;
+    RangeReader::open(reader, selection.range, path)
 }
 
 /// The files that [`open_frames`] reads for `source`; none where it finds none.
 pub fn frame_files(source: impl AsRef<Path>) -> Vec<PathBuf> {
     let path = source.as_ref();
-    match path.to_str() {
-        _ if path.is_dir() => sort(list(path).unwrap_or_default()).0,
-        _ if path.exists() => vec![path.to_owned()],
-        Some(pattern) if NumberedNames::of(path).is_none() => {
-            glob::glob(pattern).into_iter().flatten().flatten().collect()
-        }
-        _ => numbered_files(path).unwrap_or_default(),
-    }
+    let found = match fs::metadata(path) {
+        Ok(found) if found.is_dir() => files::in_folder(path),
+        Ok(_) => return vec![path.to_owned()],
+        Err(_) => files::matching(path),
+    };
+    let (meshes, others): (Vec<_>, Vec<_>) =
+        found.unwrap_or_default().into_iter().partition(|path| MeshFormat::guess(path).is_some());
+    if meshes.is_empty() { others.into_iter().filter(|path| single::is_cache(path)).collect() } else { meshes }
 }
 
 /// Opens the frames in the bytes of a cache file; `name` is the path in error messages.
@@ -81,104 +87,108 @@ pub fn open_frames_in<'a>(
     cache::open(format, name, source, length, expected_points)
 }
 
-fn open_file(path: &Path, length: u64, expected_points: usize) -> Result<Box<dyn FrameReader>, Error> {
-    if let Some(format) = CacheFormat::from_path(path) {
-        let file = File::open(path).map_err(|cause| Error::read(path, cause))?;
-        return cache::open(format, path, file, length, expected_points);
-    }
-    if path.extension().is_some_and(|found| found.eq_ignore_ascii_case("npz")) {
-        let (file, length) = npz::only_array(path)?;
-        return cache::open(CacheFormat::Npy, path, file, length, expected_points);
-    }
+fn open_file(path: &Path, expected_points: usize) -> Result<Box<dyn FrameReader>, Error> {
     if MeshFormat::guess(path).is_some() {
-        return Ok(Box::new(SequenceReader::new(vec![path.to_owned()], expected_points)));
+        let sequence = Sequence::of_all(vec![path.to_owned()]);
+        return Ok(Box::new(SequenceReader::new(sequence, expected_points, Vec::new())));
     }
-    Err(unknown_extension(path, true))
+    single::open_cache(path, expected_points)
 }
 
-fn open_pattern(path: &Path, pattern: &str, expected_points: usize) -> Result<Box<dyn FrameReader>, Error> {
-    let options = glob::MatchOptions { require_literal_leading_dot: true, ..Default::default() };
-    let matches = glob::glob_with(pattern, options)
-        .map_err(|cause| Fault::invalid(format!("is not a pattern ({}); correct it", cause.msg)).at(path))?;
-    let mut found = Vec::new();
-    for path in matches {
-        let path = path.map_err(|cause| {
-            let path = cause.path().to_owned();
-            Error::read(&path, cause.into())
-        })?;
-        if path.is_file() {
-            found.push(path);
-        }
+/// Opens what a folder holds or a pattern matches: meshes where there are any, else caches.
+fn open_files(
+    source: &Path,
+    found: Vec<PathBuf>,
+    expected_points: usize,
+    selection: &FrameSelection,
+) -> Result<Box<dyn FrameReader>, Error> {
+    let (meshes, others): (Vec<_>, Vec<_>) = found.into_iter().partition(|path| MeshFormat::guess(path).is_some());
+    let (frames, notes) = without(meshes, &selection.no_frames);
+    if !frames.is_empty() {
+        one_format(&frames).map_err(|fault| fault.at(source))?;
+        return open_sequence(source, frames, notes, expected_points, selection);
     }
-    let (files, caches) = sort(found);
+    let caches: Vec<PathBuf> = others.iter().filter(|path| single::is_cache(path)).cloned().collect();
     match caches.as_slice() {
-        [cache] if files.is_empty() => open_frames(cache, expected_points),
-        [_, _, ..] if files.is_empty() => {
-            Err(Fault::invalid(format!("matches {} captures; name one of them", caches.len())).at(path))
+        [] => Err(no_frames(source, &others)),
+        [cache] => single::open_cache(cache, expected_points),
+        several if several.iter().all(|path| single::is_array(path)) => {
+            open_sequence(source, caches, Vec::new(), expected_points, selection)
         }
-        _ => open_sequence(path, files, expected_points),
+        several => Err(Fault::invalid(format!("has {} captures; name one of them", several.len())).at(source)),
     }
 }
 
-fn open_numbered(path: &Path, expected_points: usize) -> Result<Box<dyn FrameReader>, Error> {
-    let files = numbered_files(path)?;
-    if files.is_empty() {
-        let what = "matches no file; the place of the number stands for as many digits or more, filled up with zeros";
-        return Err(Fault::invalid(what).at(path));
-    }
-    open_sequence(path, files, expected_points)
-}
-
-/// The files with a number in the place for it, in the order of the numbers.
-fn numbered_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let number = |file: &PathBuf| NumberedNames::of(path)?.number(file.file_name()?.to_str()?);
-    let mut files: Vec<_> = list(folder)?.into_iter().filter_map(|file| Some((number(&file)?, file))).collect();
-    files.sort();
-    Ok(files.into_iter().map(|(_, file)| file).collect())
-}
-
-fn list(folder: &Path) -> Result<Vec<PathBuf>, Error> {
-    let read = || -> io::Result<Vec<PathBuf>> {
-        let mut files = Vec::new();
-        for entry in fs::read_dir(folder)? {
-            let path = entry?.path();
-            let hidden = path.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b"."));
-            if !hidden && path.is_file() {
-                files.push(path);
-            }
-        }
-        Ok(files)
+fn open_sequence(
+    source: &Path,
+    files: Vec<PathBuf>,
+    notes: Vec<String>,
+    expected_points: usize,
+    selection: &FrameSelection,
+) -> Result<Box<dyn FrameReader>, Error> {
+    let sequence = if selection.join_sequences {
+        Sequence::of(files.clone()).unwrap_or_else(|_| Sequence::of_all(files))
+    } else {
+        Sequence::of(files).map_err(|what| Error::SeveralSequences { path: source.to_owned(), what })?
     };
-    read().map_err(|cause| Error::read(folder, cause))
+    Ok(Box::new(SequenceReader::new(sequence, expected_points, notes)))
 }
 
-/// Mesh files and cache files in natural order.
-fn sort(mut files: Vec<PathBuf>) -> (Vec<PathBuf>, Vec<PathBuf>) {
-    files.sort_by(|a, b| natural::compare(a.as_os_str().as_encoded_bytes(), b.as_os_str().as_encoded_bytes()));
-    files.retain(|path| MeshFormat::guess(path).is_some() || CacheFormat::from_path(path).is_some());
-    files.into_iter().partition(|path| MeshFormat::guess(path).is_some())
+/// Files without the rest pose and the cage, however they are spelled, and what to say of it. One that is called as the others are stays, as the first
+/// frame often is the rest pose; so does one that is alone.
+fn without(files: Vec<PathBuf>, no_frames: &[PathBuf]) -> (Vec<PathBuf>, Vec<String>) {
+    let excluded: Vec<PathBuf> = no_frames.iter().filter_map(|path| path.canonicalize().ok()).collect();
+    let is_excluded = |path: &PathBuf| path.canonicalize().is_ok_and(|found| excluded.contains(&found));
+    if excluded.is_empty() {
+        return (files, Vec::new());
+    }
+    let (found, mut frames): (Vec<_>, Vec<_>) = files.into_iter().partition(is_excluded);
+    let mut notes = Vec::new();
+    let there = frames.clone();
+    for file in found {
+        if there.is_empty() || is_one_of(&file, &there) {
+            frames.push(file);
+        } else {
+            notes.push(format!(
+                "{}: is given as the rest pose or the cage, and is not called as the frames are, so it is no frame",
+                file.display()
+            ));
+        }
+    }
+    (frames, notes)
 }
 
-fn open_sequence(source: &Path, files: Vec<PathBuf>, expected_points: usize) -> Result<Box<dyn FrameReader>, Error> {
+fn one_format(files: &[PathBuf]) -> Result<(), Fault> {
     let mut counts = BTreeMap::new();
     for format in files.iter().filter_map(|path| MeshFormat::guess(path)) {
         *counts.entry(format.extension()).or_insert(0_usize) += 1;
     }
-    match counts.len() {
-        0 => Err(Fault::invalid(format!(
-            "holds no mesh files; give a folder or pattern of {} files",
-            extensions(&MeshFormat::ALL)
-        ))
-        .at(source)),
-        1 => Ok(Box::new(SequenceReader::new(files, expected_points))),
-        _ => {
-            let list: Vec<_> = counts.iter().map(|(extension, count)| format!("{count} .{extension}")).collect();
-            Err(Fault::unsupported(format!(
-                "mixes mesh formats ({}); keep one, or pick it with a pattern such as \"*.obj\"",
-                list.join(", ")
-            ))
-            .at(source))
-        }
+    if counts.len() == 1 {
+        return Ok(());
     }
+    let list: Vec<_> = counts.iter().map(|(extension, count)| format!("{count} .{extension}")).collect();
+    Err(Fault::unsupported(format!(
+        "mixes mesh formats ({}); keep one, or pick it with a pattern such as \"*.obj\"",
+        list.join(", ")
+    )))
+}
+
+/// The error of a source without frames, with what may have been meant.
+fn no_frames(source: &Path, others: &[PathBuf]) -> Error {
+    if let Some((file, way_out)) = others.iter().find_map(|file| Some((file, single::way_out(file)?))) {
+        return Fault::unsupported(way_out).at(file);
+    }
+    let folders = fs::read_dir(source).into_iter().flatten().flatten().map(|entry| entry.path());
+    let inner = folders.filter(|path| path.is_dir()).take(32).find_map(|folder| {
+        let files = files::in_folder(&folder).ok()?;
+        files.into_iter().find(|file| MeshFormat::guess(file).is_some())
+    });
+    let cure = match inner.as_ref().and_then(|file| file.extension()) {
+        Some(extension) => format!(
+            "for one file in each of its folders give the pattern '{}'",
+            source.join("*").join(format!("*.{}", extension.display())).display()
+        ),
+        None => format!("give a folder or pattern of {} files", extensions(&MeshFormat::ALL)),
+    };
+    Fault::invalid(format!("holds no mesh files; {cure}")).at(source)
 }

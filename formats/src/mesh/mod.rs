@@ -14,9 +14,10 @@ use std::path::Path;
 use cager_core::mesh::Model;
 
 use crate::error::{Error, Fault};
+use crate::text::{Lines, quoted};
 
 pub use write::{model_bytes, obj_bytes, write_model};
-pub(crate) use write::{write_obj_faces, write_ply};
+pub(crate) use write::{write_obj_faces, write_off, write_ply, write_stl};
 
 /// A mesh file format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -131,6 +132,7 @@ fn read_bytes(format: MeshFormat, name: &Path, bytes: &[u8], contents: Contents)
         }
     };
     model
+        .map_err(|fault| cut_in_last_line(fault, bytes))
         .and_then(|model| match model.points.len() {
             0 => Err(Fault::invalid("has no points; export the mesh with its vertices")),
             n if n > u32::MAX as usize => {
@@ -155,6 +157,28 @@ fn foreign_text(bytes: &[u8]) -> Option<&'static str> {
     let start = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
     let begins = |word: &str| start.get(..word.len()).is_some_and(|found| found.eq_ignore_ascii_case(word.as_bytes()));
     (begins("<!doctype") || begins("<html")).then_some("is a web page, not a mesh; download the file itself")
+}
+
+/// What is wrong with the last line of a text is that the file was cut, where that line has no end.
+fn cut_in_last_line(fault: Fault, bytes: &[u8]) -> Fault {
+    let what = match &fault {
+        Fault::Damaged(what) => what,
+        Fault::Invalid(what) if what.contains("corners") => what,
+        _ => return fault,
+    };
+    if !what.starts_with("line ") || bytes.ends_with(b"\n") || bytes.ends_with(b"\r") {
+        return fault;
+    }
+    let mut lines = Lines::new(bytes);
+    let last = lines.by_ref().last().unwrap_or_default();
+    let place = format!("line {}", lines.number());
+    if !what.starts_with(&format!("{place}:")) {
+        return fault;
+    }
+    Fault::damaged(format!(
+        "{place}: the file ends within this line, {}, so it was cut; copy or export it again",
+        quoted(last)
+    ))
 }
 
 /// Checks the corners of one face, which `place` names in messages, against the number of points.

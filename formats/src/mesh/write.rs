@@ -94,7 +94,7 @@ pub(crate) fn write_obj_faces<'a>(out: &mut impl Write, faces: impl Iterator<Ite
     Ok(())
 }
 
-fn write_off(out: &mut impl Write, model: &Model) -> io::Result<()> {
+pub(crate) fn write_off(out: &mut impl Write, model: &Model) -> io::Result<()> {
     writeln!(out, "OFF\n{} {} 0", model.points.len(), model.faces.len())?;
     for [x, y, z] in &model.points {
         writeln!(out, "{x:?} {y:?} {z:?}")?;
@@ -105,6 +105,23 @@ fn write_off(out: &mut impl Write, model: &Model) -> io::Result<()> {
             write!(out, " {index}")?;
         }
         out.write_all(b"\n")?;
+    }
+    Ok(())
+}
+
+/// A binary STL file: the triangles of all faces in single precision. Normals are left at 0, which tells readers to take those of the triangles.
+pub(crate) fn write_stl(out: &mut impl Write, model: &Model) -> io::Result<()> {
+    let triangles = model.faces.triangulated();
+    let count = u32::try_from(triangles.len()).map_err(|_| io::ErrorKind::FileTooLarge)?;
+    // Beginning with a blank: with `solid` it would look like text.
+    out.write_all(&[b' '; 80])?;
+    out.write_all(&count.to_le_bytes())?;
+    for triangle in &triangles {
+        out.write_all(&[0; 12])?;
+        for &x in triangle.map(|index| model.points[index as usize]).as_flattened() {
+            out.write_all(&(x as f32).to_le_bytes())?;
+        }
+        out.write_all(&[0; 2])?;
     }
     Ok(())
 }

@@ -2,8 +2,11 @@
 
 use super::byte;
 use crate::Target;
-use cager_formats::{CacheFormat, open_frames_bytes};
+use cager_formats::{CacheFormat, FrameReader, open_frames, open_frames_bytes};
+use std::io::{Cursor, Write};
 use std::path::Path;
+use zip::CompressionMethod;
+use zip::write::SimpleFileOptions;
 
 const fn target(
     name: &'static str,
@@ -33,6 +36,9 @@ pub(super) const NPY: Target = target(
             file(1, "'<f4'", "'fortran_order': False, 'shape': (2, 2, 3), ", &little()),
             file(2, "'<f8'", "'fortran_order': False, 'shape': (1, 2, 3), ", &[0; 48]),
             file(1, "'>f4'", "\"shape\": (2L, 3), 'fortran_order': False", &[0; 24]),
+            file(1, "'<f4'", "'fortran_order': True, 'shape': (2, 2, 3), ", &little()),
+            file(1, "'<f4'", "'fortran_order': True, 'shape': (2, 6), ", &little()),
+            file(1, "'<f4'", "'fortran_order': False, 'shape': (1, 2, 2, 3), ", &little()),
         ]
     },
     &[
@@ -80,9 +86,44 @@ pub(super) const MDD: Target = target(
     || {
         let mut file = b"\x02\0\0\0\x02\0\0\0\x02\0\0\0\0\x3d\x2a\xaa\xab".to_vec();
         file.extend((0..12_u8).flat_map(|k| f32::from(k).to_be_bytes()));
-        vec![file]
+        let mut uneven = b"\x01\0\0\0\x03\0\0\0\x01".to_vec();
+        uneven.extend([0.0_f32, 1.0, 3.0].iter().chain(&[0.5; 9]).flat_map(|x| x.to_be_bytes()));
+        vec![file, uneven]
     },
     &["\0\0\0\u{2}"],
+);
+
+/// Archives lie on the disk.
+pub(super) const NPZ: Target = target(
+    "npz",
+    |mut bytes| {
+        let points = usize::from(byte(&mut bytes));
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.npz");
+        std::fs::write(&path, bytes).expect("a file");
+        match open_frames(&path, points) {
+            Ok(mut reader) => read_all(&mut *reader, points),
+            Err(error) => assert!(error.to_string().starts_with(&format!("{}: ", path.display())), "{error}"),
+        }
+    },
+    || {
+        let npy = &(NPY.seeds)()[0][1..];
+        let archive = |names: &[&str], method| {
+            let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
+            for name in names {
+                let options = SimpleFileOptions::default().compression_method(method);
+                archive.start_file(*name, options).expect("in memory");
+                archive.write_all(npy).expect("in memory");
+            }
+            [vec![2], archive.finish().expect("in memory").into_inner()].concat()
+        };
+        vec![
+            archive(&["a.npy"], CompressionMethod::Stored),
+            archive(&["a.npy"], CompressionMethod::Deflated),
+            archive(&["a.npy", "fps.npy"], CompressionMethod::Stored),
+        ]
+    },
+    &["PK\u{1}\u{2}", "PK\u{3}\u{4}", "PK\u{5}\u{6}", "PK\u{6}\u{6}", "fps.npy", "'<f4'", "(2, 2, 3)"],
 );
 
 fn little() -> Vec<u8> {
@@ -117,7 +158,12 @@ fn read(format: CacheFormat, mut bytes: &[u8]) {
         reader.frames(),
         bytes.len()
     );
+    read_all(&mut *reader, points);
+}
+
+fn read_all(reader: &mut dyn FrameReader, points: usize) {
     assert!(reader.frame_rate().is_none_or(|rate| rate.is_finite() && rate > 0.0));
+    assert!((0..reader.frames()).all(|frame| reader.number(frame).is_finite()), "a number of a frame is none");
     let mut frame = Vec::new();
     for _ in 0..reader.frames() {
         match reader.read_next(&mut frame) {

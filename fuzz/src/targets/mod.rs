@@ -20,6 +20,7 @@ pub const TARGETS: &[Target] = &[
     frames::NPY,
     frames::PC2,
     frames::MDD,
+    frames::NPZ,
     container::CONTAINER,
     bodies::RECORD,
     bodies::FRAMES,

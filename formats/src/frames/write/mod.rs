@@ -1,18 +1,23 @@
 //! Frames to files.
 
 mod cache;
+mod mesh;
 mod sequence;
+mod single;
 
 use std::path::{MAIN_SEPARATOR, Path, PathBuf};
 
 use cager_core::mesh::Polygons;
 
+use super::CacheFormat;
 use super::numbered::NumberedNames;
-use super::{CacheFormat, unknown_extension};
 use crate::atomic::Target;
 use crate::error::{Error, Fault};
+use crate::mesh::MeshFormat;
 use cache::CacheWriter;
+use mesh::FrameMesh;
 use sequence::SequenceWriter;
+use single::SingleWriter;
 
 /// The frames of an output, one after another; dropped before [`FrameWriter::finish`] they leave nothing.
 pub trait FrameWriter: Send {
@@ -74,7 +79,8 @@ fn mesh_pattern(path: &Path) -> Option<&str> {
 /// The extension of `path` says what: `.npy` (frames × points × 3, `<f4`), `.pc2` or `.mdd`. Without an extension, with
 /// a `/` at the end, or as an existing folder it becomes a folder of files `frame_0000.obj`, …, each with `faces` and its number;
 /// `FOLDER/*.ply` makes them `.ply` files, and `FOLDER/NAME.%04d.obj` or `FOLDER/NAME.####.ply` gives their names.
-/// A folder with nothing but such files is replaced as a whole where the target may be. Standard output gets `.npy`.
+/// A folder with nothing but such files is replaced as a whole where the target may be. Of one frame, `.obj`, `.ply`, `.off` or `.stl` becomes
+/// a mesh file. Standard output gets `.npy`.
 ///
 /// # Errors
 /// [`Error::Unsupported`] for other extensions and for more points or frames than a format can count,
@@ -106,9 +112,15 @@ pub fn create_frames(
         let names = NumberedNames::new("frame_", digits, extension);
         return Ok(Box::new(SequenceWriter::create(announced, &target, faces, names, options)?));
     }
+    if let Some(format) = MeshFormat::guess(path).filter(|format| FrameMesh::FORMATS.contains(format)) {
+        return Ok(Box::new(SingleWriter::create(announced, &target, format, faces)?));
+    }
     match CacheFormat::from_path(path) {
         Some(format) => Ok(Box::new(CacheWriter::create(announced, &target, format, options)?)),
-        None => Err(unknown_extension(path, false)),
+        None => Err(Fault::unsupported(
+            "is not a format of frames that is written; end the name in one of .npy .pc2 .mdd, in / for a folder of .obj files, or of one frame in .obj .ply .off .stl",
+        )
+        .at(path)),
     }
 }
 

@@ -1,29 +1,22 @@
 //! Each frame in a mesh file of its own.
 
-use std::io::{self, BufWriter, Write};
+use std::io::{BufWriter, Write};
 
-use cager_core::mesh::{Model, Polygons};
+use cager_core::mesh::Polygons;
 
 use super::super::numbered::NumberedNames;
+use super::mesh::FrameMesh;
 use super::{Announced, FrameOptions, FrameWriter};
 use crate::atomic::{AtomicDir, Target};
-use crate::error::{Error, Fault};
-use crate::mesh::{write_obj_faces, write_ply};
+use crate::error::Error;
+use crate::mesh::MeshFormat;
 
 pub(super) struct SequenceWriter {
     announced: Announced,
     folder: AtomicDir,
-    format: Format,
+    mesh: FrameMesh,
     names: NumberedNames,
     options: FrameOptions,
-}
-
-/// What the files are, with what is the same in all of them.
-enum Format {
-    /// The `f` lines.
-    Obj(Vec<u8>),
-    /// The model; its points change.
-    Ply(Model),
 }
 
 impl SequenceWriter {
@@ -34,41 +27,10 @@ impl SequenceWriter {
         names: NumberedNames,
         options: &FrameOptions,
     ) -> Result<Self, Error> {
-        if let Some(&index) = faces.indices().iter().find(|&&index| index as usize >= announced.points) {
-            return Err(Fault::invalid(format!(
-                "the faces to write name vertex {index}, but there are {} points; give the faces of this mesh",
-                announced.points
-            ))
-            .at(&announced.path));
-        }
+        let format = if names.extension_is("ply") { MeshFormat::Ply } else { MeshFormat::Obj };
+        let mesh = FrameMesh::new(format, &announced, faces)?;
         let folder = AtomicDir::create(&announced.path, |name| target.replaces() && names.number(name).is_some())?;
-        let format = if names.extension_is("ply") {
-            Format::Ply(Model { points: Vec::new(), faces: faces.clone(), ..Model::default() })
-        } else {
-            let mut text = Vec::new();
-            write_obj_faces(&mut text, faces.iter()).map_err(|cause| Error::write(&announced.path, cause))?;
-            Format::Obj(text)
-        };
-        Ok(Self { announced, folder, format, names, options: options.clone() })
-    }
-
-    fn write_file(&mut self, name: &str, positions: &[f32]) -> io::Result<()> {
-        let mut file = BufWriter::with_capacity(1 << 16, self.folder.create_file(name)?);
-        let points = positions.as_chunks().0;
-        match &mut self.format {
-            Format::Obj(faces) => {
-                for [x, y, z] in points {
-                    writeln!(file, "v {x:?} {y:?} {z:?}")?;
-                }
-                file.write_all(faces)?;
-            }
-            Format::Ply(model) => {
-                model.points.clear();
-                model.points.extend(points.iter().map(|p| p.map(f64::from)));
-                write_ply(&mut file, model)?;
-            }
-        }
-        file.flush()
+        Ok(Self { announced, folder, mesh, names, options: options.clone() })
     }
 }
 
@@ -76,7 +38,11 @@ impl FrameWriter for SequenceWriter {
     fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error> {
         self.announced.admit(positions)?;
         let name = self.names.name(self.options.number(self.announced.written));
-        self.write_file(&name, positions).map_err(|cause| Error::write(&self.announced.path.join(&name), cause))?;
+        let path = self.announced.path.join(&name);
+        let failed = |cause| Error::write(&path, cause);
+        let mut file = BufWriter::with_capacity(1 << 16, self.folder.create_file(&name).map_err(failed)?);
+        self.mesh.write(&mut file, positions, &path)?;
+        file.flush().map_err(failed)?;
         self.announced.written += 1;
         Ok(())
     }

@@ -1,0 +1,16 @@
+//! Which of the files and frames of a source are taken.
+
+use std::path::PathBuf;
+
+use super::FrameRange;
+
+/// What is taken of a source, where its path does not tell: everything by default.
+#[derive(Clone, Debug, Default)]
+pub struct FrameSelection {
+    /// Only these frames.
+    pub range: Option<FrameRange>,
+    /// The rest pose, the cage: files that are left out where they lie among the frames, unless they are called as frames are.
+    pub no_frames: Vec<PathBuf>,
+    /// Whether files of several sequences are taken one after another, in natural order, instead of refused.
+    pub join_sequences: bool,
+}

@@ -1,0 +1,70 @@
+//! A capture with all frames in one file.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use super::{CacheFormat, FrameReader, cache, npz};
+use crate::error::{Error, Fault};
+use crate::mesh::{MeshFormat, extensions};
+
+/// Whether the name is that of a point cache or an archive of arrays.
+pub(super) fn is_cache(path: &Path) -> bool {
+    CacheFormat::from_path(path).is_some() || is_archive(path)
+}
+
+/// Whether the name is that of NumPy's arrays, of which each may be a frame.
+pub(super) fn is_array(path: &Path) -> bool {
+    CacheFormat::from_path(path) == Some(CacheFormat::Npy) || is_archive(path)
+}
+
+fn is_archive(path: &Path) -> bool {
+    path.extension().is_some_and(|found| found.eq_ignore_ascii_case("npz"))
+}
+
+/// Opens a point cache, or the frames in an archive of arrays.
+pub(super) fn open_cache(path: &Path, expected_points: usize) -> Result<Box<dyn FrameReader>, Error> {
+    let read = |cause| Error::read(path, cause);
+    let open = || File::open(path).map_err(read);
+    if is_archive(path) {
+        return npz::open(path, BufReader::new(open()?), expected_points);
+    }
+    let Some(format) = CacheFormat::from_path(path) else { return Err(unknown(path)) };
+    let file = open()?;
+    let length = file.metadata().map_err(read)?.len();
+    cache::open(format, path, file, length, expected_points)
+}
+
+/// A file that is not read, and how its contents can come here.
+pub(super) fn unknown(path: &Path) -> Error {
+    let what = match way_out(path) {
+        Some(way_out) => way_out,
+        None => format!(
+            "is not a capture that is read; give .npy .pc2 .mdd .npz, or {} files in a folder",
+            extensions(&MeshFormat::ALL)
+        ),
+    };
+    Fault::unsupported(what).at(path)
+}
+
+/// How to get at the frames of a scene of another program.
+pub(super) fn way_out(path: &Path) -> Option<String> {
+    let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+    let kind = match extension.as_str() {
+        "abc" => "Alembic",
+        "usd" | "usda" | "usdc" | "usdz" => "Universal Scene Description",
+        "fbx" => "an FBX scene",
+        "dae" => "a Collada scene",
+        "gltf" => "glTF in separate files",
+        "blend" => "a Blender scene",
+        "ma" | "mb" => "a Maya scene",
+        "max" => "a 3ds Max scene",
+        "c4d" => "a Cinema 4D scene",
+        "bgeo" | "geo" | "hip" | "hipnc" | "hiplc" => "Houdini's own format",
+        "bvh" => "the motion of a skeleton",
+        _ => return None,
+    };
+    Some(format!(
+        "is {kind}, which is not read; export the animated mesh as a point cache, .pc2 or .mdd, or open it in Blender and run blender/export.py, which writes rest.obj and frames.npy"
+    ))
+}

@@ -1,0 +1,56 @@
+//! One frame as one mesh file.
+
+use std::io::{BufWriter, Write};
+
+use cager_core::mesh::Polygons;
+
+use super::mesh::FrameMesh;
+use super::{Announced, FrameWriter};
+use crate::atomic::{AtomicFile, Target};
+use crate::error::{Error, Fault};
+use crate::mesh::MeshFormat;
+
+pub(super) struct SingleWriter {
+    announced: Announced,
+    file: AtomicFile,
+    mesh: FrameMesh,
+}
+
+impl SingleWriter {
+    pub(super) fn create(
+        announced: Announced,
+        target: &Target,
+        format: MeshFormat,
+        faces: &Polygons,
+    ) -> Result<Self, Error> {
+        if announced.frames > 1 {
+            let name = announced.path.with_extension("");
+            return Err(Fault::invalid(format!(
+                "holds one mesh, and there are {} frames; take one of them (--frame K), or name a folder for all, such as {} or '{}'",
+                announced.frames,
+                name.join("").display(),
+                name.join(format!("*.{}", if format == MeshFormat::Ply { "ply" } else { "obj" })).display()
+            ))
+            .at(&announced.path));
+        }
+        let mesh = FrameMesh::new(format, &announced, faces)?;
+        Ok(Self { announced, file: AtomicFile::create(target)?, mesh })
+    }
+}
+
+impl FrameWriter for SingleWriter {
+    fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error> {
+        self.announced.admit(positions)?;
+        let mut out = BufWriter::with_capacity(1 << 16, &mut self.file);
+        self.mesh.write(&mut out, positions, &self.announced.path)?;
+        out.flush().map_err(|cause| Error::write(&self.announced.path, cause))?;
+        drop(out);
+        self.announced.written += 1;
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> Result<(), Error> {
+        self.announced.check_complete()?;
+        self.file.commit()
+    }
+}
