@@ -5,6 +5,7 @@ PYTHON ?= python3
 PEERS := benches/.venv/bin/python
 CODECS := target/codecs/bin/python
 SCHEMATHESIS := target/schemathesis/bin/python
+DENY := target/deny/bin/cargo-deny
 
 BLENDER := target/blender/bin/python
 
@@ -165,8 +166,15 @@ $(SCHEMATHESIS): tests/schemathesis/requirements.txt
 fuzz: ## run each fuzz target for FUZZ_SECONDS (600), FUZZ_JOBS at a time; needs a C++ compiler
 	fuzz/run.sh $(FUZZ_TARGETS)
 
-audit: ## licences and advisories of all dependencies; needs cargo-deny and the network
-	$(CARGO) deny check
+audit: $(DENY) ## licences, sources and known advisories of all dependencies; builds cargo-deny once
+	$(DENY) check bans licenses sources
+	@if $(DENY) fetch db; then \
+		$(DENY) check --disable-fetch advisories; \
+	else echo "The advisories could not be fetched from here: they were NOT checked"; fi
+
+$(DENY): Makefile
+	$(CARGO) install --locked --quiet --root target/deny cargo-deny@0.20.2
+	@touch $@
 
 clean: ## remove everything that was built
 	$(CARGO) clean
