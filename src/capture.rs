@@ -70,6 +70,8 @@ pub struct CaptureWriter<W: Write> {
     diagonal: f64,
     /// Frame whose cage lies farthest from the origin, and how far.
     farthest: (usize, f64),
+    /// Whether cages stay near their frames.
+    stays_near: bool,
 }
 
 impl<W: Write> CaptureWriter<W> {
@@ -98,7 +100,8 @@ impl<W: Write> CaptureWriter<W> {
         }
         let report = begin_report(writer.header(), encoding);
         let diagonal = encoding.solver.diagonal();
-        Ok(Self { writer, report, squared: 0.0, spread: 0.0, diagonal, farthest: (0, 0.0) })
+        let stays_near = encoding.solver.nearness().is_some();
+        Ok(Self { writer, report, squared: 0.0, spread: 0.0, diagonal, farthest: (0, 0.0), stays_near })
     }
 
     /// Sets the frame numbers, one for each frame to be written.
@@ -167,7 +170,7 @@ impl<W: Write> CaptureWriter<W> {
     /// # Errors
     /// An output that refuses.
     pub fn finish(mut self) -> Result<(W, Report), container::Error> {
-        self.report.warnings.extend(far_away(self.farthest.0, self.farthest.1 / self.diagonal));
+        self.report.warnings.extend(far_away(self.farthest.0, self.farthest.1 / self.diagonal, self.stays_near));
         let frames = &self.report.error.per_frame;
         let mean = |f: fn(&FrameError) -> f64| frames.iter().map(f).sum::<f64>() / frames.len().max(1) as f64;
         let max =
@@ -205,11 +208,16 @@ fn begin_report(header: &Header, encoding: &Encoding<'_>) -> Report {
 }
 
 /// Cages are stored in single precision, which loses resolution far from the origin.
-fn far_away(frame: usize, diagonals: f64) -> Option<String> {
+fn far_away(frame: usize, diagonals: f64, stays_near: bool) -> Option<String> {
     const LOST: f64 = 100.0;
     (diagonals > LOST).then(|| {
+        let cure = if stays_near {
+            "move the capture closer to the origin"
+        } else {
+            "unless the capture itself is there, the cage ran away, since with these options nothing keeps it near its frames: leave out --regularizer, --spectrum and --lambda, whose usual values do"
+        };
         format!(
-            "the cage of frame {frame} lies {diagonals:.0} diagonals from the origin, where single precision resolves {:.1e} of the diagonal; move the capture closer to the origin",
+            "the cage of frame {frame} lies {diagonals:.0} diagonals from the origin, where single precision resolves {:.1e} of the diagonal; {cure}",
             diagonals * f64::from(f32::EPSILON) / 2.0
         )
     })

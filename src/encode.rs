@@ -6,6 +6,7 @@ mod sink;
 use crate::capture::{CaptureWriter, Encoding};
 use crate::coding::{Carried, CodingError, Goal, GroupCoder, GroupDecoder, GroupSpace, HELD, RestMeshes, group_frames};
 use crate::memory::Memory;
+use crate::preparation_warnings::held_frames;
 use batches::{Batch, BatchPlan, SolvedBatch, read_batches, solve};
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
@@ -214,7 +215,16 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
         ..Seconds::default()
     };
     let diagonal = solver.diagonal();
-    let mut sink = FrameSink { writer, coder, seconds, convergence: Vec::new(), worst: None, frames: 0, diagonal };
+    let mut sink = FrameSink {
+        writer,
+        coder,
+        seconds,
+        convergence: Vec::new(),
+        held: Vec::new(),
+        worst: None,
+        frames: 0,
+        diagonal,
+    };
     send_frames(
         &solver,
         job.memory,
@@ -226,7 +236,7 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
         },
         progress,
     )?;
-    let FrameSink { mut writer, coder, mut seconds, convergence, worst, .. } = sink;
+    let FrameSink { mut writer, coder, mut seconds, convergence, held, worst, .. } = sink;
     let coded = job.goal.zip(coder.as_ref());
     let coding = |(goal, coder): (Goal, &GroupCoder)| {
         goal.coding(&coder.carried(), job.rest.points.len(), solver.diagonal(), group_frames)
@@ -239,6 +249,7 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
     report.spectrum_choice = choice;
     report.consistency = Consistency::new(&convergence);
     report.error.worst = worst;
+    report.warnings.extend(held_frames(&held, report.frames));
     let mut container = buffered.into_inner().map_err(|e| fail(container::Error::from(e.into_error())))?;
     report.set_output(container.complete()?);
     if let Some(Goal::Size(asked)) = job.goal

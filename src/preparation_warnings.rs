@@ -63,6 +63,15 @@ pub(crate) fn preparation_warnings(options: SolverOptions, solver: &Solver) -> V
     warnings
 }
 
+/// What to tell where the cages of some frames would have left them.
+pub(crate) fn held_frames(held: &[usize], frames: usize) -> Option<String> {
+    let first = held.first()?;
+    Some(format!(
+        "in {} of {frames} frames, the first is {first}, the cage would have run away from the model, since it cannot follow these frames and its points determine it too weakly; it was held to the shape of the rest cage there, which costs accuracy: take a cage of fewer vertices, or check that these frames are of this rest pose",
+        held.len()
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

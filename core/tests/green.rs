@@ -164,6 +164,7 @@ fn a_solver_put_together_again_gives_the_same_bits() {
             phi: solver.decoder().coordinates().unwrap().to_owned(),
             positions: solver.decoder().positions(),
             tied: Some(TiedParts { normals: normals.clone(), gram: gram.to_owned(), weight }),
+            nearness: solver.nearness().cloned(),
             diagonal: solver.diagonal(),
             preparation: solver.preparation().clone(),
         };

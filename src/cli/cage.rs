@@ -5,7 +5,7 @@ use super::checks::{check_capture, checked_files};
 use super::design::{self, default_vertices};
 use super::dry_run::{read_files, tell_dry_run};
 use super::outputs::Outputs;
-use super::{grouped, tell, warn};
+use super::{grouped, progress, tell, warn};
 use crate::design::{read_frames, report as design_report};
 use crate::frames::CaptureFiles;
 use crate::report_page::{Contents, Kind, NO_PAGE, ReportPage, ShownCage, ShownMesh};
@@ -86,7 +86,10 @@ pub(super) fn run(args: &CageArgs) -> Result<()> {
         }
         (None, None) => {
             let options = EncloseOptions { vertices, clearance: args.clearance, per_part: args.per_part };
-            (of_triangles(enclose(rest, &options).map_err(|e| name_file(&e, args))?), None)
+            let bar = progress::ticking("enclosing the rest pose");
+            let cage = enclose(rest, &options);
+            bar.finish_and_clear();
+            (of_triangles(cage.map_err(|e| name_file(&e, args))?), None)
         }
     };
     finish(args, (output, &targets), &models, &cage, report, warnings, clock)

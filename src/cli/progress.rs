@@ -32,6 +32,15 @@ pub(crate) fn steps() -> ProgressBar {
     }
 }
 
+/// What is being done for so long as it takes, with a clock that ticks; hidden as the others are.
+pub(crate) fn ticking(what: &'static str) -> ProgressBar {
+    let clock = steps();
+    if !clock.is_hidden() {
+        clock.enable_steady_tick(Duration::from_millis(250));
+    }
+    clock_of(clock, None).with_message(what)
+}
+
 /// What is being prepared, with a clock that ticks; then a bar over frames.
 pub(crate) struct PreparationBar {
     what: &'static str,
@@ -42,13 +51,7 @@ pub(crate) struct PreparationBar {
 
 impl PreparationBar {
     pub(crate) fn new(what: &'static str, total: usize) -> Self {
-        let clock = steps();
-        if !clock.is_hidden() {
-            clock.enable_steady_tick(Duration::from_millis(250));
-        }
-        let clock = clock_of(clock, None);
-        clock.set_message("coordinates");
-        Self { what, total, clock, frames: OnceCell::new() }
+        Self { what, total, clock: ticking("coordinates"), frames: OnceCell::new() }
     }
 
     /// Shows how many seconds preparing will take, about; they are asked for only where somebody sees them.

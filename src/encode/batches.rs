@@ -62,6 +62,8 @@ pub(super) struct SolvedBatch {
     pub(super) errors: Vec<FrameError>,
     /// Empty where nothing was iterated.
     pub(super) convergence: Vec<Convergence>,
+    /// Of each frame, whether its cage would have left it.
+    pub(super) held: Vec<bool>,
     pub(super) invert_seconds: f64,
     pub(super) measure_seconds: f64,
 }
@@ -73,11 +75,12 @@ pub(super) fn solve(solver: &Solver, batch: &Batch, previous: Option<&[f32]>, me
     let inverted = solver.invert_with_convergence(previous, &frames);
     let invert_seconds = clock.elapsed().as_secs_f64();
     let convergence = inverted.iter().filter_map(|inverted| inverted.convergence).collect();
+    let held = inverted.iter().map(|inverted| inverted.held).collect();
     let cages: Vec<Vec<f32>> = inverted.into_iter().map(|inverted| inverted.cage).collect();
     let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
     let errors = if measures { solver.decoder().measure(&views, &frames) } else { Vec::new() };
     let measure_seconds = clock.elapsed().as_secs_f64() - invert_seconds;
-    SolvedBatch { cages, errors, convergence, invert_seconds, measure_seconds }
+    SolvedBatch { cages, errors, convergence, held, invert_seconds, measure_seconds }
 }
 
 #[cfg(test)]

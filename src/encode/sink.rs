@@ -17,6 +17,8 @@ pub(super) struct FrameSink<W: Write> {
     pub(super) coder: Option<GroupCoder>,
     pub(super) seconds: Seconds,
     pub(super) convergence: Vec<Convergence>,
+    /// Frames whose cages would have left them.
+    pub(super) held: Vec<usize>,
     pub(super) worst: Option<WorstError>,
     /// Frames that came.
     pub(super) frames: usize,
@@ -39,6 +41,7 @@ impl<W: Write> FrameSink<W> {
         self.seconds.invert += solved.invert_seconds;
         self.seconds.measure += solved.measure_seconds;
         self.convergence.extend(solved.convergence);
+        self.held.extend((self.frames..).zip(solved.held).filter_map(|(frame, held)| held.then_some(frame)));
         let count = batch.len();
         let unused = if self.coder.is_some() {
             for (frame, cage) in batch.into_iter().zip(solved.cages) {

@@ -5,7 +5,7 @@
 use super::ContentKey;
 use super::disk::DiskFile;
 use cager_core::coordinates::TiedNormals;
-use cager_core::inversion::{Preparation, RegularizationTarget, Solver, SolverParts, TiedParts};
+use cager_core::inversion::{NearnessParts, Preparation, RegularizationTarget, Solver, SolverParts, TiedParts};
 use cager_proto::wire;
 use faer::traits::ComplexField;
 use faer::{ColRef, Mat, MatRef};
@@ -16,7 +16,7 @@ use std::collections::HashMap;
 use std::io;
 
 /// Version of the format, raised whenever [`Facts`] or what it holds changes; versions up to 4 were not safetensors files and begin with [`OLD_FORMAT`].
-const VERSION: &str = "6";
+const VERSION: &str = "7";
 const OLD_FORMAT: &[u8] = b"CGRSOLV";
 const HEADER_BYTES: u64 = 1 << 16;
 const CHECKSUM: &str = "crc32c";
@@ -34,6 +34,7 @@ struct Facts {
     /// The first frame's predecessor, where frames depend on it.
     first: Option<Vec<f32>>,
     tied: Option<Tied>,
+    nearness: Option<Near>,
     preparation: Preparation,
 }
 
@@ -43,6 +44,13 @@ struct Tied {
     faces: Vec<[u32; 3]>,
     weights: Vec<[f64; 3]>,
     start_weight: f64,
+}
+
+/// Of what brings cages back to their frames.
+#[derive(Deserialize, Serialize)]
+struct Near {
+    faces: Vec<[u32; 3]>,
+    margin: f64,
 }
 
 pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> io::Result<()> {
@@ -62,6 +70,10 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
         matrices.push(Array::new("gram", gram));
         Tied { faces: normals.faces().to_vec(), weights: normals.weights().to_vec(), start_weight }
     });
+    let nearness = solver.nearness().map(|near| {
+        matrices.extend([Array::new("factor", near.factor.as_ref()), Array::new("rest", near.rest.as_ref())]);
+        Near { faces: near.faces.clone(), margin: near.margin }
+    });
     matrices.push(Array::new("phi", phi));
     let facts = Facts {
         positions: decoder.positions() as u64,
@@ -70,6 +82,7 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
         handles: solver.handles().to_vec(),
         first,
         tied,
+        nearness,
         preparation: solver.preparation().clone(),
     };
     let facts = wire::encode::<_, MOST_FACTS>(&facts).map_err(io::Error::other)?;
@@ -143,6 +156,8 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Option<S
     let constant = source.has("constant").then(|| source.matrix("constant")).transpose()?;
     let previous = source.has("previous").then(|| source.matrix("previous")).transpose()?;
     let gram = source.has("gram").then(|| source.matrix("gram")).transpose()?;
+    let factor = source.has("factor").then(|| source.matrix("factor")).transpose()?;
+    let rest = source.has("rest").then(|| source.matrix("rest")).transpose()?;
     let phi = source.matrix("phi")?;
     let crc = source.crc;
     if source.vector::<u32>(CHECKSUM)? != [crc] {
@@ -150,7 +165,7 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Option<S
     }
     let no_fit = || damage("its parts do not fit together");
     let facts = wire::decode::<_, MOST_FACTS>(&facts).map_err(|_| no_fit())?;
-    let Facts { positions, reads_all, diagonal, handles, first, tied, preparation } = facts;
+    let Facts { positions, reads_all, diagonal, handles, first, tied, nearness, preparation } = facts;
     let positions = positions as usize;
     let target = match (constant, previous, first) {
         (Some(offset), None, None) => RegularizationTarget::Constant(offset),
@@ -166,7 +181,13 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Option<S
         (None, None) => None,
         _ => return Err(no_fit()),
     };
-    let parts = SolverParts { handles, reads_all, operator, target, phi, positions, tied, diagonal, preparation };
+    let nearness = match (nearness, factor, rest) {
+        (Some(Near { faces, margin }), Some(factor), Some(rest)) => Some(NearnessParts { factor, rest, faces, margin }),
+        (None, None, None) => None,
+        _ => return Err(no_fit()),
+    };
+    let parts =
+        SolverParts { handles, reads_all, operator, target, phi, positions, tied, nearness, diagonal, preparation };
     Solver::from_parts(parts).ok_or_else(no_fit).map(Some)
 }
 

@@ -30,13 +30,13 @@ pub struct Analysis {
     pub(super) phi: Mat<f64>,
     pub(super) cage: Cage,
     /// The points analysed.
-    points: Vec<Point>,
+    pub(super) points: Vec<Point>,
     /// Their indices in the model; `None` where all points are analysed.
     sample: Option<Vec<u32>>,
     /// Unknowns of the rest pose, m × 3.
     pub(super) rest: Vec<Point>,
-    basis: RowBasis,
-    spectra: Spectra,
+    pub(super) basis: RowBasis,
+    pub(super) spectra: Spectra,
     pub(super) decoder: Decoder,
     pub(super) diagonal: f64,
     pub(super) preparation: Preparation,

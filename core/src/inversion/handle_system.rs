@@ -2,6 +2,7 @@
 
 use super::consistent::Consistent;
 use super::factored::FactoredInversion;
+use super::nearness::Nearness;
 use super::operator::{Decomposition, Directions, failed, padded_to_tiles};
 use super::prepare::check_options;
 use super::target::RegularizationTarget;
@@ -66,6 +67,9 @@ impl<'a> HandleSystem<'a> {
         let operator = self.decomposition.operator(analysis.phi.as_ref(), &map.data);
         let operator = padded_to_tiles(with_unit_row_sums(operator, analysis.decoder.positions()));
         let (handles, reads_all) = self.points_read();
+        // The baselines and inversions without a term go where the data take them.
+        let held = options.regularizer.is_sub_spectral() && !is_unregularized(without_idle_term(options));
+        let nearness = if held { Nearness::new(self).map(Arc::new) } else { None };
         let mut preparation = analysis.preparation.clone();
         preparation.condition_handles = self.decomposition.condition;
         preparation.singular_values = self.singular_values();
@@ -76,6 +80,7 @@ impl<'a> HandleSystem<'a> {
             operator,
             target,
             consistent,
+            nearness,
             decoder: analysis.decoder.clone(),
             diagonal: analysis.diagonal,
             preparation,
@@ -92,6 +97,19 @@ impl<'a> HandleSystem<'a> {
         }
         let (map, target, _) = self.parts(options, options.regularizer.term().ok_or(TermError::Missing)?)?;
         Ok(FactoredInversion::new(self, &map, target))
+    }
+
+    /// F with `FᵀF = AᵀA · m/K` for the K rows of what is inverted, so that weights beside it are relative to the mean square error.
+    pub(super) fn scaled_factor(&self) -> Mat<f64> {
+        let Decomposition { directions, rank, rows, .. } = &self.decomposition;
+        let scale = (self.analysis.phi.ncols() as f64 / *rows as f64).sqrt();
+        match directions {
+            Directions::All { sigma, v } => Mat::from_fn(*rank, v.nrows(), |k, j| scale * sigma[k] * v[(j, k)]),
+            Directions::Last(_) => {
+                let factor = self.analysis.spectra.normal_factor.as_ref().unwrap_or(&self.analysis.basis.square);
+                Mat::from_fn(factor.nrows(), factor.ncols(), |i, j| scale * factor[(i, j)])
+            }
+        }
     }
 
     /// Indices of the points read, and whether all points are read instead.

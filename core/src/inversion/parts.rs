@@ -1,6 +1,7 @@
 //! Conversion of a solver to and from plain arrays, for storage.
 
 use super::consistent::Consistent;
+use super::nearness::{Nearness, NearnessParts};
 use super::{Preparation, RegularizationTarget, Solver};
 use crate::coordinates::TiedNormals;
 use crate::decode::Decoder;
@@ -24,6 +25,8 @@ pub struct SolverParts {
     pub positions: usize,
     /// Additional data of the consistent inversion, where normals are functions of the vertices.
     pub tied: Option<TiedParts>,
+    /// What brings cages back to their frames, where a term holds them.
+    pub nearness: Option<NearnessParts>,
     /// Diagonal of the rest pose's bounding box.
     pub diagonal: f64,
     /// Results of the preparation.
@@ -64,9 +67,15 @@ impl Solver {
         Some((self.decoder.tied_normals()?, consistent.gram(), consistent.weight()))
     }
 
+    /// What brings cages back to their frames, if anything does.
+    pub fn nearness(&self) -> Option<&NearnessParts> {
+        self.nearness.as_ref().map(|nearness| nearness.parts())
+    }
+
     /// Reassembles a solver whose results are bit-identical to those of the original. `None` where the parts are inconsistent.
     pub fn from_parts(parts: SolverParts) -> Option<Self> {
-        let SolverParts { handles, reads_all, operator, target, phi, positions, tied, diagonal, preparation } = parts;
+        let SolverParts { handles, reads_all, operator, target, phi, positions, tied, nearness, diagonal, preparation } =
+            parts;
         let (n, columns) = phi.shape();
         let m = if tied.is_some() { positions } else { columns };
         let fits = (1..=n).contains(&m)
@@ -88,8 +97,12 @@ impl Solver {
             let rows = (!reads_all).then_some(handles.as_slice());
             consistent = Some(Arc::new(Consistent::from_gram(&decoder, rows, weight, gram)?));
         }
+        let nearness = match nearness {
+            Some(parts) => Some(Arc::new(Nearness::from_parts(parts).filter(|nearness| nearness.unknowns() == m)?)),
+            None => None,
+        };
         let operator = super::operator::padded_to_tiles(operator);
-        Some(Self { handles, reads_all, operator, target, consistent, decoder, diagonal, preparation })
+        Some(Self { handles, reads_all, operator, target, consistent, nearness, decoder, diagonal, preparation })
     }
 }
 

@@ -1,6 +1,7 @@
 //! Inversion of frames: one matrix product per batch, followed by the consistent inversion where normals are functions of the vertices.
 
 use super::consistent::Consistent;
+use super::nearness::{FrameBox, Nearness};
 use super::{BLOCK_ROWS, Convergence, Preparation, RegularizationTarget};
 use crate::decode::Decoder;
 use crate::mesh::Point;
@@ -20,6 +21,8 @@ pub struct Solver {
     pub(super) target: RegularizationTarget,
     /// The consistent inversion, where normals are functions of the vertices.
     pub(super) consistent: Option<Arc<Consistent>>,
+    /// Brings cages back to their frames; `None` without a term that holds them.
+    pub(super) nearness: Option<Arc<Nearness>>,
     pub(super) decoder: Decoder,
     pub(super) diagonal: f64,
     pub(super) preparation: Preparation,
@@ -32,6 +35,8 @@ pub struct InvertedFrame {
     pub cage: Vec<f32>,
     /// Convergence of the consistent inversion, where there is one.
     pub convergence: Option<Convergence>,
+    /// Whether it would have left its frame, and was held to the shape of the rest cage.
+    pub held: bool,
 }
 
 impl Solver {
@@ -60,7 +65,8 @@ impl Solver {
     pub fn size_bytes(&self) -> usize {
         let operator = 8 * self.operator.nrows() * self.operator.ncols() + self.target.size_bytes();
         let consistent = self.consistent.as_ref().map_or(0, |consistent| consistent.size_bytes());
-        self.decoder.size_bytes() + operator + consistent + 4 * self.handles.len()
+        let nearness = self.nearness.as_ref().map_or(0, |nearness| nearness.size_bytes());
+        self.decoder.size_bytes() + operator + consistent + nearness + 4 * self.handles.len()
     }
 
     /// Whether every cage depends on the previous frame's, so that frames have to be inverted in order, by
@@ -138,26 +144,38 @@ impl Solver {
             [0, 1, 2].map(|k| frames[frame][3 * point + k].into())
         };
         if let (Some(consistent), false) = (&self.consistent, self.follows_previous()) {
-            for cage in &mut cages {
+            let mut held = Vec::with_capacity(frames.len());
+            for (f, cage) in cages.iter_mut().enumerate() {
                 self.target.add(cage, None, self.decoder.positions());
+                held.push(self.keep_near(cage, |row| position(f, row)));
             }
             let found = consistent.refine(&self.decoder, &mut cages, position, self.diagonal);
-            let inverted =
-                |(cage, found): (&Vec<Point>, _)| InvertedFrame { cage: single(cage), convergence: Some(found) };
-            return cages.iter().zip(found).map(inverted).collect();
+            let inverted = |((cage, found), held): ((&Vec<Point>, _), bool)| InvertedFrame {
+                cage: single(cage),
+                convergence: Some(found),
+                held,
+            };
+            return cages.iter().zip(found).zip(held).map(inverted).collect();
         }
         let mut solved: Vec<InvertedFrame> = Vec::with_capacity(frames.len());
         for (f, mut cage) in cages.into_iter().enumerate() {
             let before = solved.last().map(|inverted| inverted.cage.as_slice()).or(previous);
             self.target.add(&mut cage, before, self.decoder.positions());
+            let held = self.keep_near(&mut cage, |row| position(f, row));
             let mut cage = [cage];
             let refine = |consistent: &Arc<Consistent>| {
                 consistent.refine(&self.decoder, &mut cage, |_, row| position(f, row), self.diagonal).pop()
             };
             let convergence = self.consistent.as_ref().and_then(refine);
-            solved.push(InvertedFrame { cage: single(&cage[0]), convergence });
+            solved.push(InvertedFrame { cage: single(&cage[0]), convergence, held });
         }
         solved
+    }
+
+    fn keep_near(&self, cage: &mut [Point], position: impl Fn(usize) -> Point) -> bool {
+        let rows = 0..self.operator.nrows();
+        let keep = |nearness: &Arc<Nearness>| nearness.keep(cage, FrameBox::around(rows.map(position)), self.diagonal);
+        self.nearness.as_ref().is_some_and(keep)
     }
 
     /// `R · H`.

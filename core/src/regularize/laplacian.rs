@@ -21,7 +21,7 @@ impl Term for CageLaplacian {
 
 /// `Δ = I − D⁻¹A`: of the graph of vertices, v × v; where there are unknown normals, a second block of the graph of faces.
 /// The blocks need no scaling: unknown normals are vectors in the unit of the vertices.
-pub(super) fn cage_laplacian(cage: &Cage, unknowns: usize) -> Mat<f64> {
+pub(crate) fn cage_laplacian(cage: &Cage, unknowns: usize) -> Mat<f64> {
     let v = cage.vertices().len();
     let mut degree = vec![0.0; v];
     for edge in cage.edges() {

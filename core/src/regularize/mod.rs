@@ -16,6 +16,7 @@ pub use matrix::SparseMatrix;
 pub use temporal::Temporal;
 pub use term::{Reference, Term, TermError};
 
+pub(crate) use laplacian::cage_laplacian;
 pub(crate) use spectral::{DataMap, RegularizationOperator, SpectralMap, Spectrum, last_map, spectral_map};
 
 /// How the unstable end of the spectrum is treated.

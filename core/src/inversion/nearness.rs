@@ -1,0 +1,182 @@
+//! Cages that stay near their frames. What a cage cannot follow of a frame is left over in every singular direction, and moves the cage by that over the
+//! singular value: beyond the s directions that the term holds, weak ones may take vertices hundreds of diagonals away. Such a frame is solved once more,
+//! held to the shape of the rest cage over the whole spectrum, `min ‖A (C' − C)‖² + λ ‖Δ (C' − C_R)‖²`, with the smallest λ that keeps the cage near.
+
+use super::HandleSystem;
+use crate::cage::Cage;
+use crate::dense;
+use crate::mesh::{Point, TriMesh};
+use crate::regularize::cage_laplacian;
+use crate::vector::distance;
+use faer::linalg::matmul::triangular::{self, BlockStructure};
+use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
+use faer::{Accum, Mat, MatRef, Par};
+use std::sync::OnceLock;
+
+/// A cage is near its frame where no vertex is farther from the box around the points read than the rest cage's farthest and so many diagonals.
+const NEAR: f64 = 1.0;
+/// From so many diagonals on, a frame has the held cage alone. In between it has a mixture, so that cages do not jump from frame to frame; that is at most
+/// 1.25 diagonals away.
+const FAR: f64 = 2.0;
+/// Weights λ that are tried in turn, beside the mean square error. The first is that of coded cages; under the last the rest cage moves along as it is.
+const WEIGHTS: [f64; 8] = [1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e4, 1e6];
+/// Weight of displacements themselves beside that of their differences, for parts of a cage that no point determines.
+const DISPLACEMENT: f64 = 1e-3;
+
+/// What brings cages back to their frames.
+#[derive(Debug)]
+pub(crate) struct Nearness {
+    data: NearnessParts,
+    cage: Cage,
+    /// `AᵀA`; computed, as the factors are, for the first frame that needs it.
+    gram: OnceLock<Mat<f64>>,
+    /// Lower Cholesky factors of `AᵀA + λ (ΔᵀΔ + ε)`.
+    factors: [OnceLock<Option<Mat<f64>>>; WEIGHTS.len()],
+}
+
+/// The data of what brings cages back to their frames.
+#[derive(Clone, Debug)]
+pub struct NearnessParts {
+    /// F with `FᵀF = AᵀA`, scaled so that weights are beside the mean square error; r × m.
+    pub factor: Mat<f64>,
+    /// Unknowns of the rest pose, m × 3.
+    pub rest: Mat<f64>,
+    /// Faces of the cage.
+    pub faces: Vec<[u32; 3]>,
+    /// Distance of the rest cage's farthest vertex from the box around the rest pose's points.
+    pub margin: f64,
+}
+
+impl Nearness {
+    pub(super) fn new(system: &HandleSystem<'_>) -> Option<Self> {
+        let analysis = system.analysis;
+        let rest = FrameBox::around(analysis.points.iter().copied());
+        Self::from_parts(NearnessParts {
+            factor: system.scaled_factor(),
+            rest: Mat::from_fn(analysis.rest.len(), 3, |i, k| analysis.rest[i][k]),
+            faces: analysis.cage.mesh().triangles.clone(),
+            margin: rest.farthest(analysis.cage.vertices()),
+        })
+    }
+
+    /// `None` where the parts are no cage.
+    pub(super) fn from_parts(data: NearnessParts) -> Option<Self> {
+        let last = data.faces.iter().flatten().max()?;
+        let vertices = *last as usize + 1;
+        let fits = data.rest.ncols() == 3 && vertices <= data.rest.nrows() && data.factor.ncols() == data.rest.nrows();
+        if !fits {
+            return None;
+        }
+        let vertices = (0..vertices).map(|i| [0, 1, 2].map(|k| data.rest[(i, k)])).collect();
+        let cage = Cage::new(TriMesh { vertices, triangles: data.faces.clone() }).ok()?;
+        Some(Self { data, cage, gram: OnceLock::new(), factors: Default::default() })
+    }
+
+    pub(super) fn parts(&self) -> &NearnessParts {
+        &self.data
+    }
+
+    pub(super) fn unknowns(&self) -> usize {
+        self.data.rest.nrows()
+    }
+
+    pub(super) fn size_bytes(&self) -> usize {
+        8 * self.data.factor.nrows() * self.data.factor.ncols()
+    }
+
+    /// Brings the cage of a frame back where it is far from it, and says whether it was; `diagonal` is that of the rest pose.
+    pub(super) fn keep(&self, cage: &mut [Point], frame: FrameBox, diagonal: f64) -> bool {
+        let unit = diagonal.max(distance(frame.low, frame.high));
+        let vertices = self.cage.vertices().len();
+        let beyond = |cage: &[Point]| (frame.farthest(&cage[..vertices]) - self.data.margin) / unit;
+        let share = ((beyond(cage) - NEAR) / (FAR - NEAR)).min(1.0);
+        let is_far = share > 0.0;
+        if is_far {
+            let held = self.held(cage, |cage| beyond(cage) <= NEAR);
+            for (row, held) in cage.iter_mut().zip(held) {
+                *row = [0, 1, 2].map(|k| (1.0 - share) * row[k] + share * held[k]);
+            }
+        }
+        is_far
+    }
+
+    /// The cage nearest to fitting what this one fits that is near.
+    fn held(&self, cage: &[Point], is_near: impl Fn(&[Point]) -> bool) -> Vec<Point> {
+        let (m, vertices) = (cage.len(), self.cage.vertices().len());
+        let gram = self.gram.get_or_init(|| gram(self.data.factor.as_ref()));
+        // Displacements, and a translation by one.
+        let one = |i: usize| if i < vertices { 1.0 } else { 0.0 };
+        let moved = Mat::from_fn(m, 4, |i, k| if k < 3 { cage[i][k] - self.data.rest[(i, k)] } else { one(i) });
+        let moved = dense::product(gram.as_ref(), moved.as_ref());
+        let sum = |k: usize| (0..vertices).map(|i| moved[(i, k)]).sum::<f64>();
+        // What the points move by on the average, which nothing holds.
+        let mean = [0, 1, 2].map(|k| sum(k) / sum(3));
+        let right = Mat::from_fn(m, 3, |i, k| moved[(i, k)] - mean[k] * moved[(i, 3)]);
+        let with = |displacement: &Mat<f64>| -> Vec<Point> {
+            let row = |i| [0, 1, 2].map(|k| self.data.rest[(i, k)] + one(i) * mean[k] + displacement[(i, k)]);
+            (0..m).map(row).collect()
+        };
+        for (factor, weight) in self.factors.iter().zip(WEIGHTS) {
+            let Some(factor) = factor.get_or_init(|| self.factor(gram, weight)) else { continue };
+            let mut displacement = right.clone();
+            solve_lower_triangular_in_place(factor.as_ref(), displacement.as_mut(), Par::Seq);
+            solve_upper_triangular_in_place(factor.transpose(), displacement.as_mut(), Par::Seq);
+            let held = with(&displacement);
+            if is_near(&held) {
+                return held;
+            }
+        }
+        with(&Mat::zeros(m, 3))
+    }
+
+    fn factor(&self, gram: &Mat<f64>, weight: f64) -> Option<Mat<f64>> {
+        let m = self.unknowns();
+        let delta = cage_laplacian(&self.cage, m);
+        let mut system = gram.clone();
+        for i in 0..m {
+            system[(i, i)] += weight * DISPLACEMENT;
+            let entries: Vec<(usize, f64)> = (0..m).map(|j| (j, delta[(i, j)])).filter(|&(_, x)| x != 0.0).collect();
+            for &(a, x) in &entries {
+                entries.iter().for_each(|&(b, y)| system[(a, b)] += weight * x * y);
+            }
+        }
+        dense::cholesky(system)
+    }
+}
+
+/// `FᵀF`. Sequential: whoever waits for it must not be given other work, which may wait for it too.
+fn gram(factor: MatRef<'_, f64>) -> Mat<f64> {
+    let m = factor.ncols();
+    let mut gram = Mat::zeros(m, m);
+    let (lower, full) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+    triangular::matmul(gram.as_mut(), lower, Accum::Replace, factor.transpose(), full, factor, full, 1.0, Par::Seq);
+    for j in 0..m {
+        for i in 0..j {
+            gram[(i, j)] = gram[(j, i)];
+        }
+    }
+    gram
+}
+
+/// The box around the points read of a frame.
+#[derive(Clone, Copy)]
+pub(super) struct FrameBox {
+    low: Point,
+    high: Point,
+}
+
+impl FrameBox {
+    pub(super) fn around(points: impl Iterator<Item = Point>) -> Self {
+        let none = Self { low: [f64::INFINITY; 3], high: [f64::NEG_INFINITY; 3] };
+        points.fold(none, |Self { low, high }, p| Self {
+            low: [0, 1, 2].map(|k| low[k].min(p[k])),
+            high: [0, 1, 2].map(|k| high[k].max(p[k])),
+        })
+    }
+
+    /// Distance of the farthest of some places.
+    fn farthest(&self, places: &[Point]) -> f64 {
+        let beyond = |p: &Point| [0, 1, 2].map(|k| (self.low[k] - p[k]).max(p[k] - self.high[k]).max(0.0));
+        places.iter().map(|p| beyond(p).iter().map(|x| x * x).sum::<f64>()).fold(0.0, f64::max).sqrt()
+    }
+}
