@@ -2,9 +2,9 @@
 
 use std::ffi::OsString;
 use std::fmt::Debug;
-use std::fs::{self, File, FileTimes, OpenOptions, TryLockError};
+use std::fs::{self, DirBuilder, File, FileTimes, OpenOptions, TryLockError};
 use std::io;
-use std::os::unix::fs::FileExt;
+use std::os::unix::fs::{DirBuilderExt, FileExt, MetadataExt, OpenOptionsExt};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::SystemTime;
@@ -106,13 +106,25 @@ fn whole(length: usize, end: io::ErrorKind, mut step: impl FnMut(usize) -> io::R
     Ok(())
 }
 
-/// The system's own files.
+/// The system's own files. What is made here is for the service's user alone, whatever the umask: uploads of all tenants lie here.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LocalDisk;
 
+/// Modes of folders and files.
+const FOLDER_MODE: u32 = 0o700;
+const FILE_MODE: u32 = 0o600;
+
+/// Whether users of the machine who share no group with a folder may look into it.
+///
+/// # Errors
+/// The system's.
+pub(super) fn is_open_to_all(folder: &Path) -> io::Result<bool> {
+    Ok(fs::metadata(folder)?.mode() & 0o007 != 0)
+}
+
 impl Disk for LocalDisk {
     fn create_new(&self, path: &Path) -> io::Result<Arc<dyn DiskFile>> {
-        Ok(Arc::new(OpenOptions::new().read(true).write(true).create_new(true).open(path)?))
+        Ok(Arc::new(OpenOptions::new().read(true).write(true).create_new(true).mode(FILE_MODE).open(path)?))
     }
 
     fn open(&self, path: &Path) -> io::Result<Arc<dyn DiskFile>> {
@@ -124,7 +136,7 @@ impl Disk for LocalDisk {
     }
 
     fn create_dir(&self, path: &Path) -> io::Result<()> {
-        fs::create_dir(path)
+        DirBuilder::new().mode(FOLDER_MODE).create(path)
     }
 
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
@@ -167,7 +179,7 @@ impl Disk for LocalDisk {
     }
 
     fn lock(&self, path: &Path) -> io::Result<Option<File>> {
-        let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)?;
+        let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).mode(FILE_MODE).open(path)?;
         match file.try_lock() {
             Ok(()) => Ok(Some(file)),
             Err(TryLockError::WouldBlock) => Ok(None),

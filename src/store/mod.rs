@@ -112,6 +112,13 @@ impl Store {
     /// [`StoreError::Locked`] if another process uses it, or I/O errors of the folder itself. Damaged sessions are not an error.
     pub fn open(root: &Path, disk: Arc<dyn Disk>) -> Result<Opened, StoreError> {
         make_folder(&*disk, root)?;
+        // It may be so on purpose, or belong to another user: whoever made it decides.
+        if disk::is_open_to_all(root).unwrap_or(false) {
+            let folder = root.display();
+            tracing::warn!(
+                "every user of this machine may look into the data folder {folder}; close it: chmod -R go= {folder}"
+            );
+        }
         let lock_path = root.join("lock");
         let lock = disk.lock(&lock_path).map_err(|e| StoreError::of(&lock_path, "lock", e))?;
         let lock = lock.ok_or_else(|| StoreError::Locked { path: root.to_owned() })?;

@@ -1,4 +1,5 @@
 mod access;
+mod folder;
 mod limits;
 mod overload;
 mod page;

@@ -84,10 +84,16 @@ impl TestApp {
 
     /// Starts a service with a tokens file. Each entry is a tenant, its token and further keys of the file.
     pub(crate) fn guarded(tokens: &[(&str, &str, &str)]) -> Self {
+        Self::guarded_with(tokens, &[])
+    }
+
+    /// As [`Self::guarded`], with these settings.
+    pub(crate) fn guarded_with(tokens: &[(&str, &str, &str)], settings: &[&str]) -> Self {
         let place = folder();
         let file = place.path().join("tokens.toml");
         write_tokens(&file, tokens);
-        let flags = vec!["--tokens".to_owned(), file.display().to_string()];
+        let settings = settings.iter().flat_map(|setting| ["--set".to_owned(), (*setting).to_owned()]);
+        let flags = ["--tokens".to_owned(), file.display().to_string()].into_iter().chain(settings).collect();
         Self::launch(Arc::new(place), flags, Vec::new(), tokens.first().map(|(_, token, _)| (*token).to_owned()))
     }
 
@@ -148,9 +154,14 @@ impl TestApp {
         std::fs::read_to_string(self.place.path().join("log")).expect("a log")
     }
 
+    /// The data folder.
+    pub(crate) fn data(&self) -> PathBuf {
+        self.place.path().join("data")
+    }
+
     /// A value of `/metrics`; 0 where it is not there yet.
     pub(crate) async fn metric(&self, name: &str) -> f64 {
-        let text = self.get("/metrics").await.text();
+        let text = self.get("/metrics").await.expect(200).text();
         let line = text.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
         line.map_or(0.0, |value| value.trim().parse().expect("a number"))
     }
