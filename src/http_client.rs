@@ -1,7 +1,9 @@
 //! HTTP client for outgoing requests to addresses that the operator configured: TLS is required except on loopback addresses.
 
 use reqwest::{RequestBuilder, Url, redirect};
+use std::error::Error;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 /// Longest time for one request, its answer included.
@@ -12,37 +14,73 @@ const TIMEOUT: Duration = Duration::from_secs(10);
 #[derive(Clone, Debug)]
 pub(crate) struct Client {
     direct: reqwest::Client,
-    proxied: reqwest::Client,
+    /// Built at the first address with TLS: a machine that asks none needs no certificates of authorities.
+    proxied: Arc<OnceLock<Result<reqwest::Client, NoClient>>>,
+}
+
+/// Why nothing can be asked.
+#[derive(Clone, Debug, thiserror::Error)]
+pub(crate) enum NoClient {
+    /// The library refuses.
+    #[error("requests cannot be sent: {0}")]
+    Setup(String),
+    /// No certificates of authorities.
+    #[error(
+        "an address with https:// needs the certificates of the authorities that this machine trusts, and they cannot be loaded ({0}); install them (the package ca-certificates of most systems), or name a file of them in the variable SSL_CERT_FILE"
+    )]
+    Authorities(String),
 }
 
 impl Client {
     /// # Errors
-    /// The system's certificates cannot be read.
-    pub(crate) fn new() -> reqwest::Result<Self> {
-        // Fails if the process has installed another provider, which serves as well.
-        let _ = rustls::crypto::ring::default_provider().install_default();
-        let agent = concat!("cager/", env!("CARGO_PKG_VERSION"));
-        let builder =
-            || reqwest::Client::builder().timeout(TIMEOUT).redirect(redirect::Policy::none()).user_agent(agent);
+    /// [`NoClient::Setup`].
+    pub(crate) fn new() -> Result<Self, NoClient> {
         let loopback = [SocketAddr::from((Ipv4Addr::LOCALHOST, 0)), SocketAddr::from((Ipv6Addr::LOCALHOST, 0))];
-        let direct = builder().no_proxy().resolve_to_addrs("localhost", &loopback).build()?;
-        Ok(Self { direct, proxied: builder().build()? })
+        let direct = builder().no_proxy().resolve_to_addrs("localhost", &loopback);
+        // Nothing is encrypted here, so that no authority has to be trusted.
+        let direct = direct.tls_certs_only([]).build().map_err(|error| NoClient::Setup(innermost(&error)))?;
+        Ok(Self { direct, proxied: Arc::default() })
     }
 
     /// Starts a GET request to an address validated by [`address`].
-    pub(crate) fn get(&self, url: &Url) -> RequestBuilder {
-        self.of(url).get(url.clone())
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub(crate) fn get(&self, url: &Url) -> Result<RequestBuilder, NoClient> {
+        Ok(self.of(url)?.get(url.clone()))
     }
 
     /// As [`Self::get`].
-    pub(crate) fn post(&self, url: &Url) -> RequestBuilder {
-        self.of(url).post(url.clone())
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub(crate) fn post(&self, url: &Url) -> Result<RequestBuilder, NoClient> {
+        Ok(self.of(url)?.post(url.clone()))
     }
 
     /// The client for an address.
-    pub(crate) fn of(&self, url: &Url) -> &reqwest::Client {
-        if url.scheme() == "http" { &self.direct } else { &self.proxied }
+    ///
+    /// # Errors
+    /// [`NoClient::Authorities`] for an address with TLS.
+    pub(crate) fn of(&self, url: &Url) -> Result<&reqwest::Client, NoClient> {
+        if url.scheme() == "http" {
+            return Ok(&self.direct);
+        }
+        let build = || builder().build().map_err(|error| NoClient::Authorities(innermost(&error)));
+        self.proxied.get_or_init(build).as_ref().map_err(Clone::clone)
     }
+}
+
+fn builder() -> reqwest::ClientBuilder {
+    // Fails if the process has installed another provider, which serves as well.
+    let _ = rustls::crypto::ring::default_provider().install_default();
+    let agent = concat!("cager/", env!("CARGO_PKG_VERSION"));
+    reqwest::Client::builder().timeout(TIMEOUT).redirect(redirect::Policy::none()).user_agent(agent)
+}
+
+/// The root cause of an error; the outer ones say less.
+fn innermost(error: &dyn Error) -> String {
+    std::iter::successors(Some(error), |&error| error.source()).last().map(ToString::to_string).unwrap_or_default()
 }
 
 /// Parses and validates an address: `https`, or `http` on a loopback address.

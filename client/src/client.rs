@@ -264,6 +264,11 @@ impl Client {
             // A proxy's loopback address is not this machine.
             builder = builder.no_proxy();
         }
+        #[cfg(feature = "tls")]
+        if !self.shared.address.is_https() {
+            // Nothing is encrypted, so that no authority has to be trusted, and none need be installed.
+            builder = builder.tls_certs_only([]);
+        }
         if only_http1 {
             builder = builder.http1_only();
         }

@@ -98,7 +98,8 @@ impl Provider {
         let client = Client::new().map_err(|error| error.to_string())?;
         for (setting, address) in [("oidc_issuer", Some(&trust.issuer)), ("oidc_keys", trust.keys.as_ref())] {
             if let Some(address) = address {
-                crate::http_client::address(address).map_err(|why| format!("{setting}: {why}"))?;
+                let url = crate::http_client::address(address).map_err(|why| format!("{setting}: {why}"))?;
+                client.of(&url).map_err(|why| format!("{setting}: {why}"))?;
             }
         }
         Ok(Self { trust, client, keys: RwLock::default(), fetching: Mutex::default() })
@@ -257,7 +258,8 @@ impl Provider {
     async fn get<T: DeserializeOwned>(&self, address: &str) -> Result<T, String> {
         let url = crate::http_client::address(address)?;
         let failed = |error: reqwest::Error| format!("{address}: {error}");
-        let answer = self.client.get(&url).send().await.and_then(reqwest::Response::error_for_status);
+        let request = self.client.get(&url).map_err(|why| format!("{address}: {why}"))?;
+        let answer = request.send().await.and_then(reqwest::Response::error_for_status);
         let mut answer = answer.map_err(failed)?;
         let mut bytes = Vec::new();
         while let Some(chunk) = answer.chunk().await.map_err(failed)? {

@@ -40,7 +40,11 @@ pub fn begin() -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
     if let Some(protocol) = protocol.filter(|protocol| protocol != PROTOCOL) {
         tracing::warn!(%protocol, "traces are sent as {PROTOCOL}, the only protocol that this program has");
     }
-    let sender = Sender { client: Client::new()?, runtime: Handle::current(), failing: Arc::default() };
+    let client = Client::new()?;
+    if let Some(Ok(collector)) = variable(name).map(|address| address.parse()) {
+        client.of(&collector).map_err(|error| format!("{name}: {error}"))?;
+    }
+    let sender = Sender { client, runtime: Handle::current(), failing: Arc::default() };
     let exporter = SpanExporter::builder().with_http().with_http_client(sender).build();
     let exporter = exporter.map_err(|error| format!("{name}: {error}"))?;
     let mut resource = Resource::builder().with_attribute(KeyValue::new("service.version", env!("CARGO_PKG_VERSION")));
@@ -83,11 +87,11 @@ impl HttpClient for Sender {
         let client = self.client.clone();
         let sent = self.runtime.spawn(async move {
             let request: reqwest::Request = request.try_into()?;
-            let answer = client.of(request.url()).execute(request).await?;
+            let answer = client.of(request.url())?.execute(request).await?;
             let mut response = http::Response::new(Bytes::new());
             *response.status_mut() = answer.status();
             *response.headers_mut() = answer.headers().clone();
-            Ok::<_, reqwest::Error>(response)
+            Ok::<_, HttpError>(response)
         });
         let sent = sent.await?;
         let why = match &sent {

@@ -46,7 +46,7 @@ impl Message {
                     break "gone";
                 }
                 Ok(status) => format!("it answered {status}"),
-                Err(error) => error.without_url().to_string(),
+                Err(why) => why,
             };
             metrics::counter!("cager_webhooks_total", "result" => "failed_attempt").increment(1);
             let line = hook.line;
@@ -83,17 +83,19 @@ impl Message {
         format!("{}.{what}", self.session)
     }
 
-    async fn send(&self, id: &str, hook: &Hook, client: &Client) -> reqwest::Result<StatusCode> {
+    async fn send(&self, id: &str, hook: &Hook, client: &Client) -> Result<StatusCode, String> {
         let _one_of_few = hook.places.acquire().await;
         let seconds = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_secs();
         let request = client
             .post(&hook.url)
+            .map_err(|why| why.to_string())?
             .header(header::CONTENT_TYPE, "application/json")
             .header("webhook-id", id)
             .header("webhook-timestamp", seconds)
             .header("webhook-signature", signature(&hook.key, id, seconds, &self.body))
             .body(self.body.clone());
-        request.send().await.map(|answer| answer.status())
+        let answer = request.send().await;
+        answer.map(|answer| answer.status()).map_err(|error| error.without_url().to_string())
     }
 }
 

@@ -35,7 +35,7 @@ pub enum WebhooksError {
     Entries(#[from] EntriesError),
     /// Nothing can be sent.
     #[error("webhooks cannot be sent: {0}")]
-    Client(reqwest::Error),
+    Client(String),
 }
 
 #[derive(Deserialize)]

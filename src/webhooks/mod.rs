@@ -58,10 +58,15 @@ impl Webhooks {
     /// Reads the file; without one there are no receivers. Call within a tokio runtime, which sends the messages until `stop`.
     ///
     /// # Errors
-    /// A file that cannot be read, or an entry that is wrong, with its line.
+    /// A file that cannot be read, or an entry that is wrong, with its line; no authorities to check a receiver's certificate by.
     pub(crate) fn open(path: Option<&Path>, store: Store, stop: CancellationToken) -> Result<Arc<Self>, WebhooksError> {
         let hooks = path.map(file::read).transpose()?.unwrap_or_default();
-        let client = Client::new().map_err(WebhooksError::Client)?;
+        let client = Client::new().map_err(|why| WebhooksError::Client(why.to_string()))?;
+        // What is missing is said at the start, not with the first message.
+        for hook in &hooks {
+            let usable = client.of(&hook.url);
+            usable.map_err(|why| WebhooksError::Client(format!("the entry in line {}: {why}", hook.line)))?;
+        }
         let hooks = hooks.into_iter().map(Arc::new).collect();
         Ok(Arc::new(Self { hooks, client, store, runtime: Handle::current(), stop }))
     }
