@@ -4,10 +4,10 @@
 //! metrics.
 
 use super::extract::{Query, granted};
-use super::origin;
 use super::respond::JsonResult;
-use super::router::{finished, open};
+use super::router::{finished, probes};
 use super::sessions::{PAGE, PageQuery};
+use super::{health, origin};
 use crate::auth::Scope;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
@@ -35,7 +35,8 @@ pub fn admin(service: Arc<Service>, open_to_all: bool) -> Router {
         true => operated.route_layer(from_fn(refuse_web_pages)),
         false => operated.route_layer(from_fn_with_state(Arc::clone(&service), require_admin)),
     };
-    let routes = Router::from(open()).merge(operated);
+    let seen = Router::from(probes()).route("/metrics", get(health::operators_metrics));
+    let routes = seen.merge(operated);
     let routes = routes.fallback(|| async { ApiError::new(problem::NOT_FOUND, "see the documentation for operators") });
     finished(routes.with_state(service))
 }

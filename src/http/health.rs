@@ -1,12 +1,14 @@
 //! `/healthz`, `/readyz` and `/metrics`: answered outside all limits.
 
-use crate::problem::ApiError;
+use super::extract::granted;
+use crate::auth::Scope;
+use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::telemetry;
 use axum::Json;
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};
-use http::header;
+use http::{HeaderMap, header};
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -42,12 +44,23 @@ pub(crate) async fn ready(State(service): State<Arc<Service>>) -> Result<Json<He
     Ok(health(&service, service.unread.summary()))
 }
 
-/// Metrics in Prometheus' text format.
+/// Metrics in Prometheus' text format. They name tenants: where the service has tokens, one of the scope `admin` is needed. The operators'
+/// listener wants none.
 #[utoipa::path(
-    get, path = "/metrics", operation_id = "get_metrics", tag = "operation", security(()),
+    get, path = "/metrics", operation_id = "get_metrics", tag = "operation",
     responses((status = 200, description = "Metrics", content_type = "text/plain", body = String)),
 )]
-pub(crate) async fn metrics(State(service): State<Arc<Service>>) -> Response {
+pub(crate) async fn metrics(State(service): State<Arc<Service>>, headers: HeaderMap) -> Result<Response, ApiError> {
+    if service.access.is_guarded() && granted(&service, &headers).await?.scope < Scope::Admin {
+        service.rejected("scope");
+        let detail = "metrics name tenants: use a token whose scope is admin, or the operators' listener";
+        return Err(ApiError::new(problem::FORBIDDEN, detail));
+    }
+    Ok(operators_metrics(State(service)).await)
+}
+
+/// Metrics for the operators' listener.
+pub(super) async fn operators_metrics(State(service): State<Arc<Service>>) -> Response {
     telemetry::metrics::observe(&service);
     let text = telemetry::metrics::recorder().render();
     ([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], text).into_response()

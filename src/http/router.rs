@@ -62,8 +62,13 @@ fn streaming() -> OpenApiRouter<Arc<Service>> {
 }
 
 /// Routes without authentication and limits, for probes.
-pub(super) fn open() -> OpenApiRouter<Arc<Service>> {
-    OpenApiRouter::new().routes(routes!(health::live)).routes(routes!(health::ready)).routes(routes!(health::metrics))
+pub(super) fn probes() -> OpenApiRouter<Arc<Service>> {
+    OpenApiRouter::new().routes(routes!(health::live)).routes(routes!(health::ready))
+}
+
+/// Routes outside all limits.
+fn open() -> OpenApiRouter<Arc<Service>> {
+    probes().routes(routes!(health::metrics))
 }
 
 /// The page and the OpenAPI document.

@@ -91,6 +91,28 @@ fn the_settings_of_the_manifests_are_settings() {
 }
 
 #[test]
+fn the_network_policy_lets_through_what_the_settings_may_name_and_keeps_metrics_apart() {
+    let policy = text("deploy/kubernetes/networkpolicy.yaml");
+    let (ingress, egress) = policy.split_once("\n  egress:\n").expect("rules for what goes out");
+    for (what, port) in [("names", "53"), ("webhooks and the identity provider", "443"), ("traces", "4318")] {
+        assert!(egress.contains(&format!("- port: {port}\n")), "{what}");
+    }
+    let rules: Vec<&str> = ingress.split("- from:").skip(1).collect();
+    let [api, operators] = rules[..] else { panic!("{} rules", rules.len()) };
+    assert!(api.contains("- port: http\n") && !api.contains("operators") && !api.contains("monitoring"), "{api}");
+    assert!(operators.contains("- port: operators\n") && operators.contains("monitoring"), "{operators}");
+    let scraped = text("deploy/kubernetes/servicemonitor.yaml");
+    assert!(scraped.contains("- port: operators\n") && scraped.contains("path: /metrics"), "{scraped}");
+    for (file, wanted) in
+        [("service.yaml", "- name: operators\n      port: 8081"), ("statefulset.yaml", "containerPort: 8081")]
+    {
+        assert!(text(&format!("deploy/kubernetes/{file}")).contains(wanted), "{file}");
+    }
+    assert!(text(STATEFUL_SET).contains("CAGER_ADMIN_LISTEN\n              value: 0.0.0.0:8081"));
+    assert!(text(STATEFUL_SET).contains("prometheus.io/port: \"8081\""));
+}
+
+#[test]
 fn what_the_manifests_name_is_there_and_nothing_runs_as_root() {
     let folder = repository().join("deploy/kubernetes");
     let list = text("deploy/kubernetes/kustomization.yaml");

@@ -212,9 +212,15 @@ async fn secrets_are_not_in_the_log() {
 
 /// Runs a service that must not start; gives what it says.
 fn refused(args: &[&str]) -> String {
+    refused_with(args, &[])
+}
+
+/// As [`refused`], with these variables.
+fn refused_with(args: &[&str], environment: &[(&str, &str)]) -> String {
     let place = folder();
     let mut process = service()
         .args(args)
+        .envs(environment.iter().copied())
         .arg("--data")
         .arg(place.path())
         .stdout(Stdio::piped())
@@ -246,12 +252,57 @@ fn an_open_service_listens_on_this_machine_only() {
     }
 }
 
+/// Variables by which no certificates of authorities are found.
+const NO_AUTHORITIES: [(&str, &str); 2] = [("SSL_CERT_FILE", "/nowhere/cert.pem"), ("SSL_CERT_DIR", "/nowhere")];
+
+#[tokio::test]
+async fn a_service_that_asks_nobody_needs_no_certificates_of_authorities() {
+    let app = TestApp::with_environment(&NO_AUTHORITIES);
+    app.completed(Capture::tiny(), 3).await;
+}
+
+#[test]
+fn one_that_asks_over_tls_says_at_the_start_that_they_are_missing() {
+    let place = folder();
+    let hooks = place.path().join("webhooks.toml");
+    let secret = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw";
+    let entry = format!("[[webhook]]\nurl = \"https://pipeline.example/hook\"\nsecret = \"{secret}\"\n");
+    std::fs::write(&hooks, &entry).expect("a file");
+    let hooks = format!("webhooks={}", hooks.display());
+    let provider = ["--set", "oidc_issuer=https://login.example", "--set", "oidc_audience=cager"];
+    let collector = [("OTEL_EXPORTER_OTLP_ENDPOINT", "https://traces.example")];
+    for (args, more, named) in [
+        (&["--set", hooks.as_str()][..], &[][..], "the entry in line 2"),
+        (&provider, &[], "oidc_issuer"),
+        (&[], &collector, "OTEL_EXPORTER_OTLP_ENDPOINT"),
+    ] {
+        let said = refused_with(args, &[&NO_AUTHORITIES[..], more].concat());
+        assert!(said.contains(named) && said.contains("ca-certificates") && said.contains("SSL_CERT_FILE"), "{said}");
+        assert!(!said.contains("pipeline.example"), "an address may be a secret: {said}");
+    }
+}
+
 #[test]
 fn a_port_in_use_is_named() {
     let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = taken.local_addr().expect("an address").to_string();
     let said = refused(&["--listen", &address]);
     assert!(said.contains(&address), "{said}");
+}
+
+#[tokio::test]
+async fn metrics_name_tenants_and_are_the_operators_where_there_are_tokens() {
+    const ROOT: &str = "root-has-a-long-secret";
+    let app = TestApp::guarded(&[("anna", ANNA, ""), ("ops", ROOT, "scope = \"admin\"\n")]);
+    app.caller(Some(ANNA)).create(Capture::tiny()).await;
+    app.caller(None).get("/metrics").await.problem(401, "unauthorized");
+    app.caller(Some("mistyped-but-nearly-right")).get("/metrics").await.problem(401, "unauthorized");
+    let detail = app.caller(Some(ANNA)).get("/metrics").await.problem(403, "forbidden").detail;
+    assert!(detail.contains("scope is admin"), "{detail}");
+    let metrics = app.caller(Some(ROOT)).get("/metrics").await.expect(200).text();
+    assert!(metrics.contains("tenant=\"anna\""), "{metrics}");
+    // Without tokens there is one tenant, and whoever is on this machine.
+    TestApp::start().get("/metrics").await.expect(200);
 }
 
 #[tokio::test]
@@ -265,7 +316,9 @@ async fn from_another_machine_the_operator_has_a_token_that_says_so() {
     let session = app.caller(Some(ANNA)).ready(Capture::tiny()).await;
     let address = std::net::SocketAddr::from(([127, 0, 0, 1], port));
     let operator = |token: Option<&str>| crate::support::Api::new(address, token.map(str::to_owned), false);
-    operator(None).get("/healthz").await.expect(200);
+    for path in ["/healthz", "/readyz", "/metrics"] {
+        operator(None).get(path).await.expect(200);
+    }
     let path = format!("/admin/sessions/{}", session.id);
     operator(None).delete(&path).await.problem(401, "unauthorized");
     operator(Some(ANNA)).delete(&path).await.problem(403, "forbidden");

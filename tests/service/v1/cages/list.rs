@@ -26,7 +26,7 @@ async fn designs_are_listed_newest_first() {
 
 #[tokio::test]
 async fn a_tenants_design_is_nobody_elses() {
-    let app = TestApp::guarded(&[("anna", ANNA, ""), ("bert", BERT, "")]);
+    let app = TestApp::guarded(&[("anna", ANNA, "scope = \"admin\"\n"), ("bert", BERT, "")]);
     let (anna, bert) = (app.caller(Some(ANNA)), app.caller(Some(BERT)));
     let capture = Capture::tiny();
     let job = anna.design(capture, &json!({"vertices": 32, "time_limit_s": 1.0})).await;
