@@ -109,6 +109,8 @@ settings! {
     max_rest_bytes: u64 = 512 * MIB, Kind::Bytes { least: KIB, most: 16 * GIB };
     /// Connections that are served; a few more get health and otherwise 503.
     max_connections: usize = 1024, Kind::Number { least: 1, most: 1_000_000 };
+    /// Connections of one address that have shown no token; 0 for a quarter of `max_connections`. Without tokens they are not counted.
+    max_connections_per_address: usize = 0, Kind::Number { least: 0, most: 1_000_000 };
     /// Requests at work.
     max_requests: usize = 512, Kind::Number { least: 1, most: 1_000_000 };
     /// Frame, cage, event and decode streams at work.
@@ -238,6 +240,11 @@ impl ServeConfig {
             write_timeout: Duration::from_secs(self.write_timeout_s),
             drain_timeout: Duration::from_secs(self.drain_timeout_s),
             max_connections: self.max_connections,
+            max_per_address: match self.max_connections_per_address {
+                _ if !self.is_guarded() => usize::MAX,
+                0 => (self.max_connections / 4).max(1),
+                most => most,
+            },
             max_header_bytes: self.max_header_bytes,
             ..Limits::default()
         }

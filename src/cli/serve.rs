@@ -71,7 +71,7 @@ pub(crate) async fn run_until(
     if let Some(operators) = operators {
         let address = operators.local_addr()?;
         tracing::info!(%address, "listening for operators");
-        let limits = Limits { max_connections: OPERATORS, ..limits.clone() };
+        let limits = Limits { max_connections: OPERATORS, max_per_address: OPERATORS, ..limits.clone() };
         let (routes, spare) = (admin(Arc::clone(&service), address.ip().is_loopback()), spare(Arc::clone(&service)));
         tokio::spawn(serve(operators, routes, spare, limits, None, drained.clone()));
     }

@@ -1,6 +1,7 @@
 //! Extractors: the tenant, the tenant's session or cage job, validated queries and bodies.
 
 use super::guarded::revocable;
+use super::listen::ConnectionHandle;
 use crate::auth::{Denied, Grant, Scope, Tenant};
 use crate::cage_job::CageJob;
 use crate::problem::{self, ApiError};
@@ -36,6 +37,9 @@ pub(crate) async fn authenticate(
         service.rejected("scope");
         let detail = "this token may look and decode, but change nothing; use one whose scope is write";
         return ApiError::new(problem::FORBIDDEN, detail).into_response();
+    }
+    if let Some(connection) = request.extensions().get::<ConnectionHandle>() {
+        connection.caller_is_known();
     }
     request.extensions_mut().insert(Caller(Arc::clone(&grant.tenant)));
     if !service.access.is_guarded() {

@@ -15,6 +15,8 @@ mod overload;
 mod power;
 mod process;
 mod races;
+mod shares;
 mod soak;
 mod stalled;
+mod strangers;
 mod wire;

@@ -14,15 +14,15 @@ use std::time::{Duration, Instant};
 use tokio::task::JoinSet;
 use tokio::time::{sleep, timeout};
 
-const OCTETS: &str = "application/octet-stream";
+pub(crate) const OCTETS: &str = "application/octet-stream";
 
 /// A service of two tenants, each with a session that is ready.
-struct House {
-    server: Server,
-    reference: Reference,
-    loud: Session,
-    quiet: Session,
-    http: reqwest::Client,
+pub(crate) struct House {
+    pub(crate) server: Server,
+    pub(crate) reference: Reference,
+    pub(crate) loud: Session,
+    pub(crate) quiet: Session,
+    pub(crate) http: reqwest::Client,
     /// Memory before anything happens, in MiB.
     before: f64,
     /// The quiet tenant's times before anything happens.
@@ -36,7 +36,7 @@ fn attack_time() -> Duration {
 }
 
 impl House {
-    async fn new(settings: &[&str]) -> Self {
+    pub(crate) async fn new(settings: &[&str]) -> Self {
         let reference = Reference::new(2000, 60, 12);
         let folder = tempfile::tempdir().expect("a folder");
         let mut setup = Setup::new(&folder.path().join("data"), settings);
@@ -58,14 +58,14 @@ impl House {
     }
 
     /// As [`Self::new`], where the quiet tenant's times are known.
-    async fn measured(settings: &[&str]) -> Self {
+    pub(crate) async fn measured(settings: &[&str]) -> Self {
         let mut house = Self::new(settings).await;
         let time = (attack_time() / 3).max(Duration::from_millis(700));
         house.undisturbed = house.rounds(time).await.show();
         house
     }
 
-    fn path(&self, session: &Session, rest: &str) -> String {
+    pub(crate) fn path(&self, session: &Session, rest: &str) -> String {
         format!("/v1/sessions/{}{rest}", session.id)
     }
 
@@ -101,7 +101,7 @@ impl House {
     }
 
     /// What the quiet tenant and the operator see while an attack runs.
-    async fn goes_on(&self, attack: &str, most_mib: f64) {
+    pub(crate) async fn goes_on(&self, attack: &str, most_mib: f64) {
         let before = self.before;
         let stop = Arc::new(AtomicBool::new(false));
         let (watching, address) = (Arc::clone(&stop), self.server.address);
@@ -126,7 +126,7 @@ impl House {
 }
 
 /// A client of HTTP/2 that gives each response a window of so many bytes.
-fn h2(window: u32) -> reqwest::Client {
+pub(crate) fn h2(window: u32) -> reqwest::Client {
     let client = crate::inside::http().http2_prior_knowledge().http2_initial_stream_window_size(window);
     client.build().expect("a client")
 }

@@ -3,6 +3,7 @@
 use super::Limits;
 use super::connection::Shared;
 use super::idle::IdleConnections;
+use super::peers::Peers;
 use super::socket::ConnectionResources;
 use axum::Router;
 use futures_util::FutureExt as _;
@@ -30,7 +31,7 @@ const PAUSES: (Duration, Duration) = (Duration::from_millis(10), Duration::from_
 ///
 /// If all slots are taken, a connection without a request is closed in favour of a new one, preferring those that never sent a request. If
 /// all are serving requests, connections beyond the limit get one response of `spare`, which should answer health checks and otherwise 503;
-/// beyond the spare slots they are closed. On `stop` all connections are shut down gracefully; streaming handlers must watch the same
+/// beyond the spare slots they are closed. So are those of an address beyond its share, unless an idle one of it can make way. On `stop` all connections are shut down gracefully; streaming handlers must watch the same
 /// token. Requests carry the peer address as [`axum::extract::ConnectInfo`].
 ///
 /// # Errors
@@ -46,6 +47,8 @@ pub async fn serve(
     let mut acceptor = Acceptor {
         places: Arc::new(Semaphore::new(limits.max_connections)),
         spare_places: Arc::new(Semaphore::new(limits.spare_connections)),
+        lingering: Arc::new(Semaphore::new(limits.max_lingering)),
+        peers: Arc::default(),
         tracker: TaskTracker::new(),
         shared: Arc::new(Shared {
             app,
@@ -75,6 +78,8 @@ pub async fn serve(
 struct Acceptor {
     places: Arc<Semaphore>,
     spare_places: Arc<Semaphore>,
+    lingering: Arc<Semaphore>,
+    peers: Arc<Peers>,
     tracker: TaskTracker,
     shared: Arc<Shared>,
     /// Next pause after an error.
@@ -85,6 +90,11 @@ impl Acceptor {
     fn admit(&mut self, stream: TcpStream, peer: SocketAddr) {
         self.pause = PAUSES.0;
         let [waiting, spare_waiting] = &self.shared.waiting;
+        let make_room = |address| waiting.displace(Some(address)) || spare_waiting.displace(Some(address));
+        let Some(peer_place) = self.peers.enter(peer.ip(), self.shared.limits.max_per_address, make_room) else {
+            metrics::counter!("cager_connections_rejected_total", "reason" => "address").increment(1);
+            return;
+        };
         // First come, first served: a slot that becomes free goes to the connection that was waiting first.
         let admitted = admit(&self.places, waiting).map(|turn| (turn, false, waiting));
         let admitted = admitted.or_else(|| Some((admit(&self.spare_places, spare_waiting)?, true, spare_waiting)));
@@ -95,7 +105,8 @@ impl Acceptor {
         // Frames are small and latency matters. Errors mean that the socket is closed.
         let _ = stream.set_nodelay(true);
         let _ = socket2::SockRef::from(&stream).set_tcp_keepalive(&keep_alive(self.shared.limits.write_timeout));
-        let entry = Arc::new(waiting.enter());
+        let entry = Arc::new(waiting.enter(Some(peer_place)));
+        let lingering = Arc::clone(&self.lingering);
         let (tracker, shared) = (self.tracker.clone(), Arc::clone(&self.shared));
         self.tracker.spawn(async move {
             let permit = entry.displaced.run_until_cancelled(timeout(DISPLACE_TIMEOUT, turn)).await;
@@ -109,6 +120,7 @@ impl Acceptor {
             let keep = ConnectionResources {
                 tracker,
                 abort: shared.abort.clone(),
+                lingering,
                 place: Box::new(ConnectionSlot::new(permit)),
             };
             let reason = shared.connection(stream, peer, spare, keep, entry).await;
@@ -149,7 +161,9 @@ fn admit(places: &Arc<Semaphore>, waiting: &IdleConnections) -> Option<PermitFut
     // Polling once enters the semaphore's queue.
     match turn.as_mut().now_or_never() {
         Some(permit) => permit.ok().map(|permit| Box::pin(std::future::ready(permit)) as PermitFuture),
-        None if waiting.displace() => Some(Box::pin(async move { turn.await.expect("the semaphore is never closed") })),
+        None if waiting.displace(None) => {
+            Some(Box::pin(async move { turn.await.expect("the semaphore is never closed") }))
+        }
         None => None,
     }
 }

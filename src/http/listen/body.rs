@@ -135,7 +135,7 @@ impl Body for ResponseBody {
 
     fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
         let this = &mut *self;
-        this.in_flight.unread(false);
+        this.in_flight.taken();
         let mut data = std::mem::take(&mut this.rest);
         if data.is_empty() {
             match ready!(Pin::new(&mut this.inner).poll_frame(cx)) {
@@ -149,7 +149,7 @@ impl Body for ResponseBody {
         if this.split && data.len() > PIECE_BYTES {
             this.rest = data.split_off(PIECE_BYTES);
         }
-        this.in_flight.unread(true);
+        this.in_flight.offered(data.len());
         Poll::Ready(Some(Ok(Frame::data(data))))
     }
 
@@ -170,6 +170,6 @@ impl Body for ResponseBody {
 
 impl Drop for ResponseBody {
     fn drop(&mut self) {
-        self.in_flight.unread(false);
+        self.in_flight.taken();
     }
 }

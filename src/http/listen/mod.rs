@@ -9,6 +9,7 @@ mod connection;
 mod head;
 mod idle;
 mod linger;
+mod peers;
 mod service;
 mod socket;
 mod state;
@@ -16,6 +17,7 @@ mod tls;
 
 pub use accept::serve;
 pub use body::{BodyTimeout, is_body_timeout};
+pub(crate) use state::ConnectionHandle;
 pub use tls::{Tls, TlsError, tls_config};
 
 use std::time::Duration;
@@ -32,12 +34,18 @@ pub struct Limits {
     /// Longest time without progress of a response. Long by default, since a paused viewer is legitimate; an upload on the same connection
     /// counts as progress.
     pub write_timeout: Duration,
+    /// The same for responses to those who have not shown who they are, where it is shorter.
+    pub stranger_write_timeout: Duration,
     /// How long open requests may go on after the stop signal.
     pub drain_timeout: Duration,
     /// Connections that are served.
     pub max_connections: usize,
     /// Further connections that get one answer of the spare router. Beyond, connections are closed at once.
     pub spare_connections: usize,
+    /// Connections of one address on which nobody has shown who they are; beyond, idle ones of it are closed, or the new one is.
+    pub max_per_address: usize,
+    /// Closed connections whose clients may still read the last response, beside those that are served.
+    pub max_lingering: usize,
     /// Size of a request's header, request line included, in bytes.
     pub max_header_bytes: usize,
     /// Number of a request's header lines.
@@ -53,9 +61,12 @@ impl Default for Limits {
             body_timeout: Duration::from_secs(30),
             idle_timeout: Duration::from_secs(75),
             write_timeout: Duration::from_secs(300),
+            stranger_write_timeout: Duration::from_secs(30),
             drain_timeout: Duration::from_secs(20),
             max_connections: 1024,
             spare_connections: 64,
+            max_per_address: usize::MAX,
+            max_lingering: 256,
             max_header_bytes: 32 << 10,
             max_headers: 100,
             max_h2_streams: 128,
@@ -66,7 +77,8 @@ impl Default for Limits {
 impl Limits {
     /// How often connections look at the clock: often enough for the shortest limit, seldom enough to cost nothing.
     fn tick(&self) -> Duration {
-        let shortest = self.header_timeout.min(self.idle_timeout).min(self.write_timeout);
+        let shortest =
+            self.header_timeout.min(self.idle_timeout).min(self.write_timeout).min(self.stranger_write_timeout);
         (shortest / 8).clamp(Duration::from_millis(10), Duration::from_secs(1))
     }
 }

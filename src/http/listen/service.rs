@@ -3,7 +3,7 @@
 use super::Limits;
 use super::body::{RequestBody, ResponseBody};
 use super::head::Head;
-use super::state::State;
+use super::state::{ConnectionHandle, State};
 use axum::Router;
 use axum::body::Body;
 use axum::extract::ConnectInfo;
@@ -49,6 +49,7 @@ impl hyper::service::Service<Request<Incoming>> for Requests {
                     let mut request = request.map(|body| RequestBody::new(body, &in_flight, this.limits.body_timeout));
                     let unfinished = request.body().unfinished();
                     request.extensions_mut().insert(ConnectInfo(this.peer));
+                    request.extensions_mut().insert(ConnectionHandle::of(&in_flight));
                     let Ok(response) = this.app.clone().call(request.map(Body::new)).await;
                     // The rest of the body would be parsed as the next request.
                     (response, unfinished.load(Ordering::Acquire))

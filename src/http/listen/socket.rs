@@ -7,6 +7,7 @@ use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
@@ -16,6 +17,8 @@ pub(super) struct ConnectionResources {
     pub(super) tracker: TaskTracker,
     /// Ends lingering.
     pub(super) abort: CancellationToken,
+    /// Limits how many linger.
+    pub(super) lingering: Arc<Semaphore>,
     /// The connection's place; given back on drop.
     pub(super) place: Box<dyn Send>,
 }
@@ -97,14 +100,19 @@ impl<S: AsyncRead + AsyncWrite + Unpin + Send + 'static> AsyncWrite for Socket<S
 impl<S: AsyncRead + AsyncWrite + Unpin + Send + 'static> Drop for Socket<S> {
     fn drop(&mut self) {
         let (Some(io), Some(keep)) = (self.io.take(), self.keep.take()) else { return };
+        self.state.close();
         // Without a runtime (it is going down), the socket just closes.
         if !self.state.may_linger() || tokio::runtime::Handle::try_current().is_err() {
             return;
         }
-        let ConnectionResources { tracker, abort, place } = keep;
+        let ConnectionResources { tracker, abort, lingering, place } = keep;
+        drop(place);
+        let Ok(permit) = lingering.try_acquire_owned() else { return };
+        // It still counts for its address.
+        let state = Arc::clone(&self.state);
         tracker.spawn(async move {
             abort.run_until_cancelled(linger(io)).await;
-            drop(place);
+            drop((permit, state));
         });
     }
 }

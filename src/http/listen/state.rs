@@ -4,9 +4,13 @@ use super::Limits;
 use super::head::{Head, HeadScanner, Scan};
 use super::idle::IdleEntry;
 use crate::sync::lock;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, Weak};
 use std::time::Duration;
 use tokio::time::Instant;
+
+/// Slowest reading of a response beside pauses, as fast as bodies have to come: what waits for a reader takes memory that others want.
+const SLOWEST_READER_BYTES_PER_SECOND: f64 = 16_384.0;
 
 /// Why a connection ended; the label of `cager_connections_closed_total`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,6 +81,8 @@ struct Facts {
     blocked_since: Option<Instant>,
     /// Last progress of a response or a request body.
     progress: Instant,
+    /// Whether who sent the last request has shown who they are.
+    known: bool,
     /// Unread request bytes may follow, so that closing at once would discard the response.
     may_linger: bool,
 }
@@ -95,6 +101,7 @@ impl State {
             head: None,
             blocked_since: None,
             progress: now,
+            known: false,
             may_linger: false,
         });
         Arc::new(Self { facts, entry })
@@ -173,7 +180,9 @@ impl State {
         facts.head_since = None;
         facts.scanner = None;
         facts.progress = Instant::now();
-        let in_flight = Arc::new(InFlight { state: Arc::clone(self), unread_since: Mutex::default() });
+        facts.known = false;
+        let in_flight =
+            Arc::new(InFlight { state: Arc::clone(self), reading: Mutex::default(), known: AtomicBool::new(false) });
         facts.open.retain(|open| open.strong_count() > 0);
         facts.open.push(Arc::downgrade(&in_flight));
         (facts.head.take(), in_flight)
@@ -189,6 +198,11 @@ impl State {
         lock(&self.facts).may_linger = false;
     }
 
+    /// The socket is closed.
+    pub(super) fn close(&self) {
+        self.entry.close();
+    }
+
     /// Whether no request is on its way.
     pub(super) fn is_idle(&self) -> bool {
         lock(&self.facts).in_flight == 0
@@ -201,13 +215,17 @@ impl State {
         // Dropped after the lock is released, since the last one takes it.
         let open: Vec<_> = lock(&self.facts).open.iter().filter_map(Weak::upgrade).collect();
         let facts = lock(&self.facts);
+        let patience = |known| {
+            if known { limits.write_timeout } else { limits.stranger_write_timeout.min(limits.write_timeout) }
+        };
         // In HTTP/2 a stalled response does not block the socket, and its memory is released only by closing the connection, whatever
         // progress other streams make. In HTTP/1.1 every byte written belongs to the one response.
-        let unread = open.iter().filter_map(|open| *lock(&open.unread_since));
-        let unread = unread.min().map(|since| if facts.http2 { since } else { since.max(facts.progress) });
-        let blocked = facts.blocked_since.map(|since| since.max(facts.progress));
-        if let Some(since) = blocked.into_iter().chain(unread).min() {
-            return past(since, limits.write_timeout).then_some(Reason::WriteTimeout);
+        let progress = (!facts.http2).then_some(facts.progress);
+        let unread = open.iter().filter_map(|open| open.deadline(patience(open.known.load(Relaxed)), progress));
+        let any_known = facts.known || open.iter().any(|open| open.known.load(Relaxed));
+        let blocked = facts.blocked_since.map(|since| since.max(facts.progress) + patience(any_known));
+        if let Some(deadline) = blocked.into_iter().chain(unread).min() {
+            return (now >= deadline).then_some(Reason::WriteTimeout);
         }
         if facts.in_flight > 0 {
             return None;
@@ -225,8 +243,23 @@ impl State {
 /// Shared by the two halves of a request: its body and its response.
 pub(super) struct InFlight {
     state: Arc<State>,
-    /// Since when the protocol has not asked for the response's next chunk: the client has to read first.
-    unread_since: Mutex<Option<Instant>>,
+    reading: Mutex<Reading>,
+    /// Whether who sent it has shown who they are.
+    known: AtomicBool,
+}
+
+/// How the client reads a response.
+#[derive(Default)]
+struct Reading {
+    /// Since when the protocol has not asked for the next chunk after one of so many bytes: the client has to read first.
+    unread: Option<(Instant, usize)>,
+    /// Time that the chunks before took beyond what their size allows.
+    behind: Duration,
+}
+
+/// How long a client may take to read a chunk.
+fn allowance(bytes: usize) -> Duration {
+    Duration::from_secs_f64(bytes as f64 / SLOWEST_READER_BYTES_PER_SECOND)
 }
 
 impl InFlight {
@@ -234,17 +267,56 @@ impl InFlight {
         &self.state
     }
 
-    /// Records that a chunk was handed to the protocol (`true`) or the next one was requested (`false`).
-    pub(super) fn unread(&self, unread: bool) {
-        *lock(&self.unread_since) = unread.then(Instant::now);
+    /// A chunk of so many bytes was handed to the protocol.
+    pub(super) fn offered(&self, bytes: usize) {
+        lock(&self.reading).unread = Some((Instant::now(), bytes));
+        lock(&self.state.facts).progress = Instant::now();
+    }
+
+    /// The protocol wants the next chunk.
+    pub(super) fn taken(&self) {
+        let mut reading = lock(&self.reading);
+        if let Some((since, bytes)) = reading.unread.take() {
+            reading.behind = (reading.behind + since.elapsed()).saturating_sub(allowance(bytes));
+        }
+        drop(reading);
         lock(&self.state.facts).progress = Instant::now();
     }
 
     /// A client that still sends need not read.
     pub(super) fn body_progressed(&self) {
-        if let Some(since) = &mut *lock(&self.unread_since) {
+        let mut reading = lock(&self.reading);
+        reading.behind = Duration::ZERO;
+        if let Some((since, _)) = &mut reading.unread {
             *since = Instant::now();
         }
+    }
+
+    /// When the client will have read too slowly: nothing for as long as `patience`, or so little that its pauses add up to that.
+    fn deadline(&self, patience: Duration, progress: Option<Instant>) -> Option<Instant> {
+        let reading = lock(&self.reading);
+        let (since, bytes) = reading.unread?;
+        let stalled = progress.map_or(since, |progress| since.max(progress)) + patience;
+        let slow = since + (patience + allowance(bytes)).saturating_sub(reading.behind);
+        Some(stalled.min(slow))
+    }
+}
+
+/// What a handler can tell the listener about the connection that its request came by.
+#[derive(Clone)]
+pub(crate) struct ConnectionHandle(Weak<InFlight>);
+
+impl ConnectionHandle {
+    pub(super) fn of(request: &Arc<InFlight>) -> Self {
+        Self(Arc::downgrade(request))
+    }
+
+    /// Who sent the request has shown who they are: it no longer counts for its address, and its reader may pause.
+    pub(crate) fn caller_is_known(&self) {
+        let Some(request) = self.0.upgrade() else { return };
+        request.known.store(true, Relaxed);
+        lock(&request.state.facts).known = true;
+        request.state.entry.known();
     }
 }
 
@@ -265,8 +337,31 @@ mod tests {
     use std::sync::Barrier;
 
     #[test]
+    fn a_reader_may_pause_but_not_take_a_little_now_and_then_for_ever() {
+        let state = State::new(Arc::new(Arc::<super::super::idle::IdleConnections>::default().enter(None)));
+        let (_, request) = state.begin();
+        let patience = Duration::from_secs(10);
+        let left = |progress: Option<Instant>| {
+            let deadline = request.deadline(patience, progress)?;
+            Some(deadline.saturating_duration_since(Instant::now()).as_secs_f64().round())
+        };
+        assert_eq!(left(None), None);
+        request.offered(20 * 16_384);
+        let later = Some(Instant::now() + Duration::from_secs(3600));
+        assert_eq!(left(None), Some(10.0), "over HTTP/2 the whole chunk has to be taken");
+        assert_eq!(left(later), Some(30.0), "over HTTP/1.1 it is read piece by piece, but not arbitrarily slowly");
+        lock(&request.reading).behind = Duration::from_secs(9);
+        assert_eq!((left(None), left(later)), (Some(10.0), Some(21.0)), "pauses add up");
+        request.body_progressed();
+        assert_eq!(left(later), Some(30.0), "who sends need not read");
+        lock(&request.reading).behind = Duration::from_secs(9);
+        request.taken();
+        assert_eq!(lock(&request.reading).behind, Duration::ZERO, "reading makes up for pauses");
+    }
+
+    #[test]
     fn a_request_may_end_while_its_connection_is_looked_at() {
-        let state = State::new(Arc::new(Arc::<super::super::idle::IdleConnections>::default().enter()));
+        let state = State::new(Arc::new(Arc::<super::super::idle::IdleConnections>::default().enter(None)));
         let (together, limits) = (Barrier::new(2), Limits::default());
         std::thread::scope(|scope| {
             scope.spawn(|| {

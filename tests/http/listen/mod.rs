@@ -3,6 +3,7 @@
 mod closing;
 mod early;
 mod heads;
+mod shares;
 mod slow;
 mod tls;
 #[cfg(target_os = "linux")]
