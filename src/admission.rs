@@ -70,9 +70,14 @@ impl Budget {
         Arc::new(Self { total: total.max(1), shared, ledger: Mutex::default() })
     }
 
-    /// Takes `amount` without waiting. An amount above the total is reduced to the total.
+    /// The most that one tenant can hold: nobody gets everything of what is shared.
+    pub(crate) fn most(&self) -> u64 {
+        if self.shared { (self.total - self.total.div_ceil(3)).max(1) } else { self.total }
+    }
+
+    /// Takes `amount` without waiting. An amount above [`Self::most`] is reduced to it.
     pub(crate) fn try_take(self: &Arc<Self>, tenant: &str, amount: u64) -> Result<Held, Exhausted> {
-        let amount = amount.min(self.total);
+        let amount = amount.min(self.most());
         let mut ledger = lock(&self.ledger);
         let holds = ledger.tenants.get(tenant).map_or(0, |account| account.holds);
         if self.admits(ledger.used, holds, amount) {
@@ -88,12 +93,12 @@ impl Budget {
         lock(&self.ledger).hold(self, tenant, 0)
     }
 
-    /// Waits for `amount`. Among waiting tenants the one with the smallest amount is served first, then the one served longest ago;
+    /// Waits for `amount`, reduced as by [`Self::try_take`]. Among waiting tenants the one with the smallest amount is served first, then the one served longest ago;
     /// requests of one tenant are served in order. Dropping the future leaves the queue.
     pub(crate) async fn take(self: &Arc<Self>, tenant: &str, amount: u64) -> Held {
         loop {
             let (give, turn) = oneshot::channel();
-            let request = (amount.min(self.total), give);
+            let request = (amount.min(self.most()), give);
             lock(&self.ledger).tenants.entry(tenant.to_owned()).or_default().waiting.push_back(request);
             self.serve_waiters();
             // The sender is dropped only together with its receiver.
@@ -106,6 +111,12 @@ impl Budget {
     /// Tenants that hold or wait for some of it.
     pub(crate) fn tenants(&self) -> Vec<String> {
         lock(&self.ledger).tenants.keys().cloned().collect()
+    }
+
+    /// The tenant that holds most.
+    pub(crate) fn largest_holder(&self) -> Option<String> {
+        let ledger = lock(&self.ledger);
+        ledger.tenants.iter().max_by_key(|(_, account)| account.holds).map(|(tenant, _)| tenant.clone())
     }
 
     /// The amount that a tenant holds.
@@ -137,6 +148,11 @@ impl Budget {
 }
 
 impl Held {
+    /// Whose it is.
+    pub(crate) fn tenant(&self) -> &str {
+        &self.tenant
+    }
+
     /// Takes `by` more without waiting.
     pub(crate) fn grow(&mut self, by: u64) -> Result<(), Exhausted> {
         let mut more = self.budget.try_take(&self.tenant, by)?;
@@ -240,7 +256,19 @@ mod tests {
         let all = budget.take("a", 1000).await;
         assert_eq!(budget.used(), 10);
         drop(all);
-        assert_eq!(Budget::new(10, true).try_take("a", 1000).map(|held| held.amount).ok(), Some(10));
+    }
+
+    #[tokio::test]
+    async fn a_tenant_that_holds_nothing_gets_no_more_than_one_that_does() {
+        let budget = Budget::new(900, true);
+        let large = budget.try_take("large", 1000).expect("room");
+        assert_eq!((large.amount, budget.most()), (600, 600));
+        let small = budget.try_take("small", 200).expect("what is left is for others");
+        let next = tokio::time::timeout(Duration::from_millis(5), budget.take("next", 1000)).await;
+        assert!(next.is_err(), "it waits for the others");
+        drop((large, small));
+        assert_eq!(budget.take("next", 1000).await.amount, 600);
+        assert_eq!([1, 2, 3, 4].map(|total| Budget::new(total, true).most()), [1, 1, 2, 2]);
     }
 
     #[tokio::test]

@@ -18,13 +18,12 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
-use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 
 /// Threads that write frame logs; they mostly wait for the disk.
 const COMMIT_THREADS: usize = 4;
 /// New sessions and cage jobs whose files are parsed at a time.
-const MAX_CONCURRENT_PARSING: usize = 2;
+const MAX_CONCURRENT_PARSING: u64 = 2;
 /// Sessions completed at a time: each reads all its frames and keeps a processor busy.
 const MAX_CONCURRENT_COMPLETIONS: u64 = 2;
 
@@ -51,8 +50,8 @@ pub struct Service {
     pub(crate) unread: UnreadableFiles,
     pub(crate) designs: DesignPool,
     pub(crate) cage_maker: CageMaker,
-    /// Limits concurrent parsing of uploaded files, which keeps a processor busy.
-    pub(crate) reading: Semaphore,
+    /// Uploaded files being parsed, which keeps a processor busy.
+    pub(crate) reading: Arc<Budget>,
     /// Requests in progress, without streams.
     pub(crate) requests: Arc<Budget>,
     streams: Arc<Budget>,
@@ -64,6 +63,8 @@ pub struct Service {
     pub(crate) coding: Arc<Budget>,
     /// Threads that code and decode them.
     pub(crate) coders: Arc<rayon::ThreadPool>,
+    /// Frames and cages between arrival and solving.
+    pub(crate) queued_frames: Arc<Budget>,
     /// Memory for frames between arrival and solving, in bytes.
     pub(crate) frame_memory: Arc<Budget>,
     /// Memory for uploaded rest poses and cages, in bytes.
@@ -87,6 +88,7 @@ pub(crate) struct ResourceUse {
     completing: u64,
     coding: u64,
     preparing: usize,
+    queued_frames: u64,
     frame_bytes: u64,
     upload_bytes: u64,
     download_bytes: u64,
@@ -144,11 +146,12 @@ impl Service {
         for left in &opened.unread {
             unread.add(left.kind, &left.name, None, &format!("{}: {}", left.path.display(), left.why));
         }
+        let owners = opened.sessions.iter().map(|meta| (meta.key, meta.tenant.clone())).collect();
         let engine = Engine::new(config.workers).map_err(StartError::Threads)?;
-        let solvers = Arc::new(Solvers::new(opened.store.clone(), &config).map_err(StartError::Threads)?);
+        let solvers = Arc::new(Solvers::new(opened.store.clone(), &config, &owners).map_err(StartError::Threads)?);
         let container_writers =
             threads::pool("complete", MAX_CONCURRENT_COMPLETIONS as usize, threads::NICE_BACKGROUND);
-        let coders = threads::pool("code", config.workers, threads::NICE_BACKGROUND);
+        let coders = threads::pool("code", config.workers, threads::NICE_BACKGROUND).map_err(StartError::Threads)?;
         let service = Arc::new(Self {
             access,
             webhooks,
@@ -161,13 +164,14 @@ impl Service {
             designs: DesignPool::new(&config, designer).map_err(StartError::Threads)?,
             cage_maker: CageMaker::new(config.budget(config.max_preparing as u64), solvers.pool()),
             solvers,
-            reading: Semaphore::new(MAX_CONCURRENT_PARSING),
+            reading: config.budget(MAX_CONCURRENT_PARSING),
             requests: config.budget(config.max_requests as u64),
             streams: config.budget(config.max_streams as u64),
             completing: config.budget(MAX_CONCURRENT_COMPLETIONS),
             container_writers: Arc::new(container_writers.map_err(StartError::Threads)?),
-            coding: config.budget((config.workers / 2).clamp(1, MAX_CONCURRENT_CODINGS) as u64),
-            coders: Arc::new(coders.map_err(StartError::Threads)?),
+            coding: config.budget(codings(&coders)),
+            coders: Arc::new(coders),
+            queued_frames: config.budget(config.max_queue_frames as u64),
             frame_memory: config.budget(config.frame_bytes),
             upload_memory: config.budget(config.upload_bytes),
             download_memory: config.budget(config.download_bytes),
@@ -304,11 +308,11 @@ impl Service {
         if self.streams.held_by(&tenant.name) >= most {
             return Err(too_many());
         }
-        if self.engine.waiting() >= self.config.max_queue_frames {
+        // Nothing is taken yet: the stream's frames take their places as they come.
+        drop(self.queued_frames.try_take(&tenant.name, 1).map_err(|full| {
             self.rejected("queue");
-            let detail = "too many frames wait; try again in a moment";
-            return Err(ApiError::new(problem::BUSY, detail).retry_after(2));
-        }
+            full.refusal("room for frames that wait")
+        })?);
         let place = self.streams.try_take(&tenant.name, 1).map_err(|full| {
             self.rejected("streams");
             full.refusal("streams")
@@ -331,7 +335,7 @@ impl Service {
     /// Tenants that use shared resources.
     pub(crate) fn tenants_in_use(&self) -> BTreeSet<String> {
         let budgets = [&self.requests, &self.streams, &self.completing, &self.frame_memory, &self.upload_memory];
-        let more = [&self.coding, &self.download_memory, &self.spool_space];
+        let more = [&self.reading, &self.queued_frames, &self.coding, &self.download_memory, &self.spool_space];
         budgets.into_iter().chain(more).flat_map(|budget| budget.tenants()).collect()
     }
 
@@ -343,6 +347,7 @@ impl Service {
             completing: self.completing.held_by(tenant),
             coding: self.coding.held_by(tenant),
             preparing: self.solvers.in_flight_of(tenant),
+            queued_frames: self.queued_frames.held_by(tenant),
             frame_bytes: self.frame_memory.held_by(tenant),
             upload_bytes: self.upload_memory.held_by(tenant),
             download_bytes: self.download_memory.held_by(tenant),
@@ -353,5 +358,24 @@ impl Service {
     /// Number of open streams.
     pub(crate) fn open_streams(&self) -> u64 {
         self.streams.used()
+    }
+}
+
+/// Groups of frames coded or decoded at a time: one for every two threads.
+fn codings(threads: &rayon::ThreadPool) -> u64 {
+    (threads.current_num_threads() / 2).clamp(1, MAX_CONCURRENT_CODINGS) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn groups_are_coded_beside_each_other_however_the_threads_are_counted() {
+        let of = |threads| codings(&threads::pool("code", threads, 0).expect("threads"));
+        assert_eq!([1, 2, 4, 6, 64].map(of), [1, 1, 2, 3, 4]);
+        // 0: one per processor.
+        let processors = std::thread::available_parallelism().map_or(1, usize::from);
+        assert_eq!(of(0), of(processors));
     }
 }

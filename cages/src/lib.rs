@@ -7,5 +7,5 @@ mod general;
 pub mod geometry;
 
 pub use design::{Design, DesignError, DesignOptions, Goal, MOST_VERTICES, Progress, Stage, Style, design};
-pub use enclose::{EncloseError, EncloseOptions, enclose};
+pub use enclose::{EncloseError, EncloseOptions, enclose, enclose_unless};
 pub use general::{General, general};

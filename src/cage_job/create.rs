@@ -39,7 +39,8 @@ struct Checked {
 }
 
 impl Service {
-    /// Creates a job, durably, and queues it. Runs to the end even if the client disconnects.
+    /// Creates a job, durably, and queues it. Its input is looked at only as long as the client waits; from then on it runs to the end even if
+    /// the client disconnects.
     ///
     /// # Errors
     /// Input that cannot be used, a quota or a queue that is full, and storage errors.
@@ -48,15 +49,11 @@ impl Service {
         tenant: &Arc<Tenant>,
         new: NewCageJob,
     ) -> Result<Arc<CageJob>, ApiError> {
-        let (service, tenant) = (Arc::clone(self), Arc::clone(tenant));
-        to_the_end(async move { service.create_cage_job_for(&tenant, new).await }).await
-    }
-
-    async fn create_cage_job_for(self: &Arc<Self>, tenant: &Tenant, new: NewCageJob) -> Result<Arc<CageJob>, ApiError> {
         let (new, checked) = {
-            let _one_of_few = self.reading.acquire().await;
+            let place = self.reading.take(&tenant.name, 1).await;
             let (config, name) = (self.config.clone(), tenant.name.clone());
             let (new, checked) = blocking(move || {
+                let _place = place;
                 let checked = check(&new, &name, config.max_design_seconds, config.max_design_bytes);
                 (new, checked)
             })
@@ -64,8 +61,12 @@ impl Service {
             (new, checked?)
         };
         let request = request(new.idempotency_key.clone(), &checked.key, &new.options);
-        let make = |request| self.create_new_cage_job(tenant, new, checked, request);
-        once(&self.cage_jobs, &tenant.name, request, make).await
+        let (service, tenant) = (Arc::clone(self), Arc::clone(tenant));
+        to_the_end(async move {
+            let make = |request| service.create_new_cage_job(&tenant, new, checked, request);
+            once(&service.cage_jobs, &tenant.name, request, make).await
+        })
+        .await
     }
 
     async fn create_new_cage_job(

@@ -30,8 +30,12 @@ pub(crate) async fn get(
     prepared(&service, &session).await?;
     let reading = Arc::clone(&session);
     let cage = {
-        let _one_of_few = service.reading.acquire().await;
-        blocking(move || reading.rest_cage()).await??
+        let place = service.reading.take(&session.meta.tenant, 1).await;
+        blocking(move || {
+            let _place = place;
+            reading.rest_cage()
+        })
+        .await??
     };
     let (vertices, faces) = (cage.vertices().to_vec(), cage.mesh().triangles.clone());
     let counts = [vertices.len(), faces.len()];

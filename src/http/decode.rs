@@ -4,7 +4,7 @@ use super::decode_layer::{self, LayerQuery};
 use super::extract::{Query, RequestedSession, content_type};
 use super::frames::{body_error, prepared, stopping};
 use super::{openapi, other_model};
-use crate::admission::Held;
+use crate::admission::{Budget, Held};
 use crate::engine::Lane;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
@@ -94,8 +94,9 @@ pub(crate) async fn post(
             let _ = reply.send(bytes.into());
         }
     });
-    let mut decoding =
-        Decoding { spool, arrived, lane, session, frame_bytes: 12 * u64::from(facts.unknowns), next: 0, _place: place };
+    let frame_bytes = 12 * u64::from(facts.unknowns);
+    let queued = Arc::clone(&service.queued_frames);
+    let mut decoding = Decoding { spool, arrived, lane, session, queued, frame_bytes, next: 0, _place: place };
     // Wait for the first result, so that its error can have an HTTP status.
     let first = decoding.next().await?;
     let rest = futures_util::stream::unfold(decoding, |mut decoding| async {
@@ -210,6 +211,8 @@ struct Decoding {
     arrived: watch::Receiver<Arrived>,
     lane: Lane<Job>,
     session: Arc<Session>,
+    /// Cages that wait to be decoded, beside the frames that wait.
+    queued: Arc<Budget>,
     frame_bytes: u64,
     next: u64,
     _place: Held,
@@ -248,6 +251,7 @@ impl Decoding {
         let bytes = crate::tasks::blocking(move || spool.read(at, length))
             .await?
             .map_err(|error| ApiError::internal(&error))?;
+        let _queued = self.queued.take(&self.session.meta.tenant, count).await;
         let mut replies = Vec::new();
         for cage in bytes.chunks_exact(self.frame_bytes as usize) {
             let cage: Vec<f32> = cage.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();

@@ -1,6 +1,6 @@
 //! `POST /v1/sessions/{id}/decode?layer=…`: positions of a session's own frames.
 
-use super::frames::prepared;
+use super::frames::{prepared, stopping};
 use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::coding::GroupDecoder;
@@ -18,6 +18,9 @@ use serde::Deserialize;
 use std::collections::VecDeque;
 use std::io;
 use std::sync::Arc;
+
+/// Part of a tenant's share of the memory for downloads that is decoded at a time, at most, unless a single frame is larger.
+const PARTS: u64 = 4;
 
 /// Which of the session's frames to decode, and how much of them.
 #[derive(Clone, Copy, Debug, Deserialize, utoipa::IntoParams)]
@@ -73,20 +76,25 @@ pub(super) async fn respond(
         return Err(ApiError::new(problem::FRAMES_MISSING, detail));
     }
     let solver = service.solver(&session).await?;
-    let at_a_time = match session.goal() {
-        Some(_) => session.coded_group(first).map_or(1, |group| group.frames as usize),
-        None => BATCH,
-    };
-    let held = 12 * u64::from(facts.points) * at_a_time as u64;
-    let memory = service.download_memory.take(&tenant.name, held).await;
     let of = Arc::clone(&session);
     let source = match session.goal() {
         Some(goal) => Source::Groups(blocking(move || of.decoder_of_groups(&solver, goal)).await??),
         None => Source::Cages(solver),
     };
     let (ready, source) = (VecDeque::new(), Arc::new(source));
-    let decoding =
-        Decoding { service, session, source, layer, next: u64::from(first), end, ready, _held: (place, memory) };
+    let frame_bytes = 12 * u64::from(facts.points);
+    let decoding = Decoding {
+        batch: (service.download_memory.most() / PARTS / frame_bytes.max(1)).clamp(1, BATCH as u64),
+        service,
+        session,
+        source,
+        layer,
+        next: u64::from(first),
+        end,
+        frame_bytes,
+        ready,
+        _place: place,
+    };
     let stream = futures_util::stream::unfold(Some(decoding), |decoding| async {
         let mut decoding = decoding?;
         match decoding.next().await {
@@ -113,21 +121,54 @@ struct Decoding {
     /// The frame that is decoded next.
     next: u64,
     end: u64,
+    frame_bytes: u64,
+    /// Frames decoded at a time, where they are not coded in groups.
+    batch: u64,
     /// Decoded and not sent.
-    ready: VecDeque<Vec<f32>>,
-    _held: (Held, Held),
+    ready: VecDeque<Bytes>,
+    _place: Held,
+}
+
+/// Positions of a frame on their way to the client, with the memory permit of those that were decoded with them.
+struct OwnedFrame {
+    bytes: Vec<u8>,
+    _memory: Arc<Held>,
+}
+
+impl AsRef<[u8]> for OwnedFrame {
+    fn as_ref(&self) -> &[u8] {
+        &self.bytes
+    }
 }
 
 impl Decoding {
     async fn next(&mut self) -> Result<Option<Bytes>, ApiError> {
         if self.ready.is_empty() && self.next < self.end {
+            let wanted = match self.session.goal() {
+                Some(_) => self.session.coded_group(self.next as u32).map_or(1, |group| u64::from(group.frames)),
+                None => self.batch.min(self.end - self.next),
+            };
+            // Held until the client has taken the frames, for which it has a limited time, see `listen`; and taken anew for the next ones, so that
+            // others have their turn between.
+            let memory = self.service.download_memory.take(&self.session.meta.tenant, wanted * self.frame_bytes);
+            let memory = tokio::select! {
+                memory = memory => Arc::new(memory),
+                () = self.session.deleted().cancelled() => return Err(gone()),
+                () = self.service.stopping().cancelled() => return Err(stopping()),
+            };
             let place = self.service.coding.take(&self.session.meta.tenant, 1).await;
             let (session, source) = (Arc::clone(&self.session), Arc::clone(&self.source));
-            let (layer, next, end) = (self.layer, self.next, self.end);
+            let (layer, next) = (self.layer, self.next);
+            let wanted = wanted.min(self.end - next) as usize;
             let threads = Arc::clone(&self.service.coders);
             let work = move || {
                 let _place = place;
-                threads.install(|| decode(&session, &source, layer, next as u32, (end - next) as usize))
+                let frames = threads.install(|| decode(&session, &source, layer, next as u32, wanted))?;
+                let owned = |positions: Vec<f32>| OwnedFrame {
+                    bytes: positions.iter().flat_map(|x| x.to_le_bytes()).collect(),
+                    _memory: Arc::clone(&memory),
+                };
+                Ok::<_, ApiError>(frames.into_iter().map(|positions| Bytes::from_owner(owned(positions))).collect())
             };
             self.ready = tokio::select! {
                 decoded = blocking(work) => decoded??,
@@ -139,8 +180,7 @@ impl Decoding {
             }
             self.next += self.ready.len() as u64;
         }
-        let frame = self.ready.pop_front();
-        Ok(frame.map(|positions| positions.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>().into()))
+        Ok(self.ready.pop_front())
     }
 }
 
@@ -154,7 +194,7 @@ fn decode(
 ) -> Result<VecDeque<Vec<f32>>, ApiError> {
     let decoder = match source {
         Source::Cages(prepared) => {
-            let entries = session.frames().run(next, wanted.min(BATCH));
+            let entries = session.frames().run(next, wanted);
             let mut bytes = Vec::new();
             session.read_cages(&entries, &mut bytes)?;
             let numbers: Vec<f32> = bytes.as_chunks().0.iter().map(|&b| f32::from_le_bytes(b)).collect();

@@ -273,9 +273,10 @@ impl UploadReader {
                         let open = "it is never closed";
                         let unwritten = Arc::clone(&unwritten).acquire_owned().await.expect(open);
                         let place = Arc::clone(&places).acquire_owned().await.expect(open);
-                        let memory = &self.service.frame_memory;
-                        let memory = memory.take(&self.tenant.name, frames.frame_bytes() as u64).await;
-                        Permits { solving: Some((place, memory)), _writing: unwritten }
+                        let (tenant, bytes) = (&self.tenant.name, frames.frame_bytes() as u64);
+                        let queued = self.service.queued_frames.take(tenant, 1).await;
+                        let memory = self.service.frame_memory.take(tenant, bytes).await;
+                        Permits { solving: Some((place, [queued, memory])), _writing: unwritten }
                     };
                     permits = Some(tokio::select! {
                         error = &mut stopped => return Err(error),

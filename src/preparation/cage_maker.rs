@@ -1,16 +1,17 @@
 //! Cages made around rest poses, where none was sent.
 
 use super::read_part;
-use crate::admission::Budget;
+use crate::admission::{Budget, Held};
 use crate::problem::{self, ApiError};
 use crate::store::{ContentKey, NamedFile};
 use crate::sync::lock;
 use crate::tasks::blocking;
-use cager_cages::{EncloseError, EncloseOptions, enclose};
+use cager_cages::{EncloseError, EncloseOptions, enclose_unless};
 use cager_core::mesh::{Model, Polygons, TriMesh, bounds};
-use std::collections::VecDeque;
+use std::collections::{HashMap, VecDeque};
 use std::ops::RangeInclusive;
-use std::sync::{Arc, Mutex};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, Weak};
 
 /// Default number of cage vertices.
 const DEFAULT_VERTICES: usize = 350;
@@ -25,8 +26,9 @@ pub(crate) const CAGE_NAME: &str = "cage.obj";
 pub(crate) struct CageMaker {
     places: Arc<Budget>,
     pool: Arc<rayon::ThreadPool>,
-    /// One lock per shard of digests (first byte modulo 16), taken while a cage is made.
-    locks: [tokio::sync::Mutex<()>; 16],
+    /// Cages that requests wait for. Each has a lock of its own, held while room is waited for and the cage is made, so that others wait
+    /// for the same cage alone.
+    wanted: Mutex<HashMap<ContentKey, Weak<tokio::sync::Mutex<()>>>>,
     recent: Mutex<VecDeque<(ContentKey, NamedFile)>>,
 }
 
@@ -41,10 +43,11 @@ pub(crate) struct Enclosed {
 impl CageMaker {
     /// Makes at most as many cages at a time as `places` has permits.
     pub(crate) fn new(places: Arc<Budget>, pool: Arc<rayon::ThreadPool>) -> Self {
-        Self { places, pool, locks: Default::default(), recent: Mutex::default() }
+        Self { places, pool, wanted: Mutex::default(), recent: Mutex::default() }
     }
 
-    /// A cage enclosing the rest pose: one of the recent ones, one that `stored` finds by the digest of the inputs, or made now.
+    /// A cage enclosing the rest pose: one of the recent ones, one that `stored` finds by the digest of the inputs, or made now. A request
+    /// that is dropped leaves the queue, and stops the making of its cage.
     ///
     /// # Errors
     /// A number of vertices outside [`VERTICES`]; a rest pose that cannot be enclosed.
@@ -64,7 +67,8 @@ impl CageMaker {
             (rest, made)
         })
         .await?;
-        let _one_of_its_kind = self.locks[usize::from(made.0[0]) % 16].lock().await;
+        let turn = self.lock_of(made);
+        let _one_of_its_kind = turn.lock().await;
         let recent = lock(&self.recent).iter().find(|(key, _)| *key == made).map(|(_, cage)| cage.clone());
         if let Some(cage) = recent {
             return Ok(Enclosed { rest, cage, made });
@@ -72,27 +76,60 @@ impl CageMaker {
         if let Some(cage) = stored(made).await {
             return Ok(Enclosed { rest, cage, made });
         }
-        let (_place, pool) = (self.places.take(tenant, 1).await, Arc::clone(&self.pool));
-        let (rest, cage) = blocking(move || {
-            let cage =
-                read_part("rest", &rest.name, &rest.bytes).and_then(|model| pool.install(|| make(&model, vertices)));
-            (rest, cage)
-        })
-        .await?;
+        let place = self.places.take(tenant, 1).await;
+        let (rest, cage) = self.make(place, rest, vertices).await?;
         let cage = NamedFile { name: CAGE_NAME.to_owned(), bytes: obj_of(&cage?) };
         let mut recent = lock(&self.recent);
         recent.push_front((made, cage.clone()));
         recent.truncate(RECENT_CAGES);
         Ok(Enclosed { rest, cage, made })
     }
+
+    fn lock_of(&self, made: ContentKey) -> Arc<tokio::sync::Mutex<()>> {
+        let mut wanted = lock(&self.wanted);
+        wanted.retain(|_, turn| turn.strong_count() > 0);
+        let turn = wanted.get(&made).and_then(Weak::upgrade).unwrap_or_default();
+        wanted.insert(made, Arc::downgrade(&turn));
+        turn
+    }
+
+    /// Makes a cage; dropping the future stops it. The place is free when the work has ended, not when nobody waits for it any more.
+    async fn make(
+        &self,
+        place: Held,
+        rest: NamedFile,
+        vertices: Option<u32>,
+    ) -> Result<(NamedFile, Result<TriMesh, ApiError>), ApiError> {
+        let (pool, given_up) = (Arc::clone(&self.pool), StopOnDrop::default());
+        let stopped = Arc::clone(&given_up.0);
+        blocking(move || {
+            let _place = place;
+            let is_stopped = || stopped.load(Relaxed);
+            let model = read_part("rest", &rest.name, &rest.bytes);
+            let cage = model.and_then(|model| pool.install(|| make(&model, vertices, &is_stopped)));
+            (rest, cage)
+        })
+        .await
+    }
 }
 
-fn make(rest: &Model, vertices: Option<u32>) -> Result<TriMesh, ApiError> {
+/// Set when it is dropped.
+#[derive(Default)]
+struct StopOnDrop(Arc<AtomicBool>);
+
+impl Drop for StopOnDrop {
+    fn drop(&mut self) {
+        self.0.store(true, Relaxed);
+    }
+}
+
+fn make(rest: &Model, vertices: Option<u32>, stopped: &dyn Fn() -> bool) -> Result<TriMesh, ApiError> {
     check_extent(rest)?;
     // With more vertices than half the points, the data could not determine the cage.
     let usual = DEFAULT_VERTICES.min(rest.points.len() / 2).max(*VERTICES.start() as usize);
     let vertices = vertices.map_or(usual, |vertices| vertices as usize);
-    enclose(rest, &EncloseOptions { vertices, ..EncloseOptions::default() }).map_err(|error| match error {
+    let options = EncloseOptions { vertices, ..EncloseOptions::default() };
+    enclose_unless(rest, &options, &mut || stopped()).map_err(|error| match error {
         EncloseError::TooFewVertices { .. } => refuse_cage(&format!("vertices: {error}")),
         error => ApiError::new(problem::INVALID_GEOMETRY, format!("rest: {error}")),
     })

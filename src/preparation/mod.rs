@@ -4,6 +4,7 @@ mod cage_maker;
 mod checks;
 mod choices;
 mod geometry;
+mod shared_cache;
 mod solvers;
 
 pub(crate) use cage_maker::{

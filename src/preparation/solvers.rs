@@ -1,6 +1,7 @@
-//! Cache of prepared solvers by content key: in memory up to a budget, then on disk. Concurrent requests for the same key share one
-//! preparation.
+//! Cache of prepared solvers by content key: in memory up to a budget, then on disk, both shared by tenants. Concurrent requests for the
+//! same key share one preparation.
 
+use super::shared_cache::SharedCache;
 use super::{Choices, Geometry, Prepared};
 use crate::admission::{Budget, Held};
 use crate::config::ServeConfig;
@@ -14,7 +15,7 @@ use opentelemetry::Context;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
-use tokio::sync::{Semaphore, watch};
+use tokio::sync::watch;
 
 /// A prepared solver, whether it came from a cache, and what obtaining it took.
 #[derive(Clone)]
@@ -39,28 +40,25 @@ pub(crate) struct SolverRequest {
 }
 
 /// Solver files read at a time: more would compete for the same disk.
-const MAX_CONCURRENT_LOADS: usize = 4;
+const MAX_CONCURRENT_LOADS: u64 = 4;
 
 /// The cache of solvers.
 pub(crate) struct Solvers {
     inner: Mutex<Inner>,
     store: Store,
-    budget_bytes: u64,
-    disk_budget_bytes: u64,
+    /// Solver files.
+    files: Mutex<SharedCache<()>>,
     /// Largest memory of one preparation, in bytes.
     max_bytes: u64,
     /// Limits concurrent preparations.
     places: Arc<Budget>,
     /// Limits concurrent reads of solver files.
-    loads: Semaphore,
+    loads: Arc<Budget>,
     pool: Arc<rayon::ThreadPool>,
 }
 
-#[derive(Default)]
 struct Inner {
-    kept: HashMap<ContentKey, CacheEntry>,
-    bytes: u64,
-    clock: u64,
+    kept: SharedCache<Arc<Prepared>>,
     flights: HashMap<ContentKey, InFlight>,
 }
 
@@ -69,29 +67,37 @@ struct InFlight {
     tenant: String,
 }
 
-struct CacheEntry {
-    prepared: Arc<Prepared>,
-    bytes: u64,
-    used: u64,
-}
-
 impl Solvers {
-    /// Starts the threads that prepare.
+    /// Starts the threads that prepare. `owners` has the tenants of contents; solver files of others, whose sessions are deleted, are kept
+    /// as if they were of one tenant more. Blocks.
     ///
     /// # Errors
     /// Threads cannot be started.
-    pub(crate) fn new(store: Store, config: &ServeConfig) -> std::io::Result<Self> {
+    pub(crate) fn new(
+        store: Store,
+        config: &ServeConfig,
+        owners: &HashMap<ContentKey, String>,
+    ) -> std::io::Result<Self> {
         let pool = threads::pool("prepare", config.workers, threads::NICE_PREPARE)?;
-        Ok(Self {
-            inner: Mutex::default(),
-            store,
-            budget_bytes: config.cache_bytes,
-            disk_budget_bytes: config.prepared_disk_bytes,
+        let solvers = Self {
+            inner: Mutex::new(Inner {
+                kept: SharedCache::new(config.budget(config.cache_bytes)),
+                flights: HashMap::new(),
+            }),
+            files: Mutex::new(SharedCache::new(config.budget(config.prepared_disk_bytes))),
             max_bytes: config.max_prepare_bytes,
             places: config.budget(config.max_preparing as u64),
-            loads: Semaphore::new(MAX_CONCURRENT_LOADS),
+            loads: config.budget(MAX_CONCURRENT_LOADS),
             pool: Arc::new(pool),
-        })
+            store,
+        };
+        match solvers.store.prepared_files() {
+            Ok(files) => files.into_iter().for_each(|(key, bytes)| {
+                solvers.keep_file(owners.get(&key).map_or("", String::as_str), key, bytes);
+            }),
+            Err(error) => tracing::warn!(%error, "stored solvers are not counted"),
+        }
+        Ok(solvers)
     }
 
     /// A permit to prepare.
@@ -106,13 +112,9 @@ impl Solvers {
 
     /// The solver of a content if it is in memory.
     pub(crate) fn in_memory(&self, key: &ContentKey) -> Option<Arc<Prepared>> {
-        let mut inner = lock(&self.inner);
-        inner.clock += 1;
-        let clock = inner.clock;
-        let kept = inner.kept.get_mut(key)?;
-        kept.used = clock;
+        let prepared = lock(&self.inner).kept.get(key).cloned()?;
         metrics::counter!("cager_cache_total", "result" => "memory").increment(1);
-        Some(Arc::clone(&kept.prepared))
+        Some(prepared)
     }
 
     /// Whether a solver file exists for the content, which means that rest pose and cage were validated before.
@@ -123,9 +125,10 @@ impl Solvers {
     /// Drops all solvers from the cache; returns their size in bytes.
     pub(crate) fn evict(&self) -> u64 {
         let mut inner = lock(&self.inner);
+        let bytes = inner.kept.bytes();
         inner.kept.clear();
         metrics::gauge!("cager_cache_bytes", "cache" => "solvers").set(0.0);
-        std::mem::take(&mut inner.bytes)
+        bytes
     }
 
     /// Number of preparations that run or wait.
@@ -178,7 +181,7 @@ impl Solvers {
             }
         };
         if let Ok(got) = &result {
-            self.keep(key, &got.prepared);
+            self.keep(&wanted.tenant, key, &got.prepared);
         }
         lock(&self.inner).flights.remove(&key);
         let fresh = result.as_ref().ok().filter(|got| got.cache == CacheUse::Miss).map(|got| Arc::clone(&got.prepared));
@@ -186,7 +189,7 @@ impl Solvers {
         let _ = sender.send(Some(result));
         // Stored in the background: without the file the solver is prepared again after a restart.
         if let Some(prepared) = fresh {
-            drop(tokio::task::spawn_blocking(move || self.store(&key, &prepared)));
+            drop(tokio::task::spawn_blocking(move || self.store(&wanted.tenant, key, &prepared)));
         }
     }
 
@@ -209,9 +212,12 @@ impl Solvers {
         let clock = Instant::now();
         let (key, choices) = (wanted.key, wanted.choices);
         {
-            let _one_of_few = self.loads.acquire().await;
+            let place = self.loads.take(&wanted.tenant, 1).await;
             let solvers = Arc::clone(&self);
-            let load = move || solvers.load(&key, &choices, clock);
+            let load = move || {
+                let _place = place;
+                solvers.load(&key, &choices, clock)
+            };
             let loaded = tokio::task::spawn_blocking(load).await.unwrap_or_else(|e| Err(ApiError::internal(&e)));
             if let Some(done) = loaded.transpose() {
                 return Some(done);
@@ -234,13 +240,17 @@ impl Solvers {
         let queued = clock.elapsed().as_secs_f64();
         let solver = match self.store.prepared(key) {
             Ok(Some(solver)) => solver,
-            Ok(None) => return Ok(None),
+            Ok(None) => {
+                lock(&self.files).remove(key);
+                return Ok(None);
+            }
             // The solver is prepared again; the file is kept, since it may be readable later.
             Err(error) => {
                 tracing::warn!(%error, "a stored solver cannot be read");
                 return Ok(None);
             }
         };
+        lock(&self.files).get(key);
         let file = self.store.content_cage(key)?;
         let cage = super::read_cage(&file.ok_or_else(deleted)?, choices)?;
         let options = choices.inversion.options(choices.system.unknowns(&cage));
@@ -289,30 +299,29 @@ impl Solvers {
     }
 
     /// Writes a solver file for use after a restart. A failure is only logged, since the solver can be prepared again. Blocks.
-    fn store(&self, key: &ContentKey, prepared: &Prepared) {
-        let kept = self.store.put_prepared(key, &prepared.solver);
-        if let Err(error) = kept.and_then(|()| self.store.trim_prepared(self.disk_budget_bytes).map(|_| ())) {
-            tracing::warn!(%error, "a solver could not be stored");
+    fn store(&self, tenant: &str, key: ContentKey, prepared: &Prepared) {
+        match self.store.put_prepared(&key, &prepared.solver) {
+            Ok(bytes) => self.keep_file(tenant, key, bytes),
+            Err(error) => tracing::warn!(%error, "a solver could not be stored"),
         }
     }
 
-    fn keep(&self, key: ContentKey, prepared: &Arc<Prepared>) {
-        let bytes = prepared.solver.size_bytes() as u64;
+    /// Counts a solver file, and removes those that make room for it. Blocks.
+    fn keep_file(&self, tenant: &str, key: ContentKey, bytes: u64) {
+        let gone = lock(&self.files).insert(tenant, key, bytes, ());
+        for key in gone {
+            if let Err(error) = self.store.remove_prepared(&key) {
+                tracing::warn!(%error, "a stored solver still takes space");
+            }
+        }
+    }
+
+    fn keep(&self, tenant: &str, key: ContentKey, prepared: &Arc<Prepared>) {
         let mut inner = lock(&self.inner);
-        inner.clock += 1;
-        let used = inner.clock;
-        if bytes <= self.budget_bytes {
-            let old = inner.kept.insert(key, CacheEntry { prepared: Arc::clone(prepared), bytes, used });
-            inner.bytes += bytes;
-            inner.bytes -= old.map_or(0, |old| old.bytes);
-        }
-        while inner.bytes > self.budget_bytes {
-            let Some((&oldest, _)) = inner.kept.iter().min_by_key(|(_, kept)| kept.used) else { break };
-            let gone = inner.kept.remove(&oldest);
-            inner.bytes -= gone.map_or(0, |gone| gone.bytes);
-            metrics::counter!("cager_cache_evictions_total").increment(1);
-        }
-        metrics::gauge!("cager_cache_bytes", "cache" => "solvers").set(inner.bytes as f64);
+        let gone = inner.kept.insert(tenant, key, prepared.solver.size_bytes() as u64, Arc::clone(prepared));
+        metrics::counter!("cager_cache_evictions_total")
+            .increment(gone.iter().filter(|gone| **gone != key).count() as u64);
+        metrics::gauge!("cager_cache_bytes", "cache" => "solvers").set(inner.kept.bytes() as f64);
     }
 }
 

@@ -42,19 +42,15 @@ struct Checked {
 }
 
 impl Service {
-    /// Creates a session, durably, and starts preparing it. Runs to the end even if the client disconnects: otherwise a session that is on
-    /// disk but not registered would appear only after a restart, beside the one that the client created instead.
+    /// Creates a session, durably, and starts preparing it. A cage is made only as long as the client waits; from then on it runs to the end
+    /// even if the client disconnects: otherwise a session that is on disk but not registered would appear only after a restart, beside the
+    /// one that the client created instead.
     pub(crate) async fn create(
         self: &Arc<Self>,
         tenant: &Arc<Tenant>,
         new: NewSession,
     ) -> Result<Arc<Session>, ApiError> {
-        let (service, tenant) = (Arc::clone(self), Arc::clone(tenant));
-        to_the_end(async move { service.create_for(&tenant, new).await }).await
-    }
-
-    async fn create_for(self: &Arc<Self>, tenant: &Tenant, new: NewSession) -> Result<Arc<Session>, ApiError> {
-        let NewSession { uploaded, options, idempotency_key, room: _room } = new;
+        let NewSession { uploaded, options, idempotency_key, room } = new;
         let choices = Choices::of(&options)?;
         let (content, made_cage) = self.resolve_cage(&tenant.name, uploaded, &options).await?;
         let (key, content) = {
@@ -63,7 +59,13 @@ impl Service {
         };
         let request = request(idempotency_key, &key, &options);
         let checked = Checked { key, content, made_cage, options, choices };
-        once(&self.registry, &tenant.name, request, |request| self.create_new(tenant, checked, request)).await
+        let (service, tenant) = (Arc::clone(self), Arc::clone(tenant));
+        to_the_end(async move {
+            let _room = room;
+            let make = |request| service.create_new(&tenant, checked, request);
+            once(&service.registry, &tenant.name, request, make).await
+        })
+        .await
     }
 
     async fn create_new(
@@ -83,7 +85,7 @@ impl Service {
         }
         let (content, geometry) = match in_memory {
             Some(_) => (content, None),
-            None => self.read_geometry(&key, content, choices).await?,
+            None => self.read_geometry(&tenant.name, &key, content, choices).await?,
         };
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let meta = SessionMeta {
@@ -130,6 +132,7 @@ impl Service {
     /// would occupy memory while queued.
     async fn read_geometry(
         &self,
+        tenant: &str,
         key: &ContentKey,
         content: Content,
         choices: Choices,
@@ -137,8 +140,9 @@ impl Service {
         if self.solvers.is_stored(key) {
             return Ok((content, None));
         }
-        let _one_of_few = self.reading.acquire().await;
+        let place = self.reading.take(tenant, 1).await;
         let (content, geometry) = blocking(move || {
+            let _place = place;
             let geometry = preparation::read(&content, &choices);
             (content, geometry)
         })

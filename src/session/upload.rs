@@ -146,8 +146,8 @@ pub(crate) struct FrameJob {
 
 /// Limits that a frame counts against.
 pub(crate) struct Permits {
-    /// A slot in the upload's window and memory, until it is solved, or on disk where it has to be coded.
-    pub(crate) solving: Option<(OwnedSemaphorePermit, Held)>,
+    /// A slot in the upload's window, a place among the frames that wait and memory, until it is solved, or on disk where it has to be coded.
+    pub(crate) solving: Option<(OwnedSemaphorePermit, [Held; 2])>,
     /// A slot in the upload's window of unwritten frames, until it is on disk.
     pub(crate) _writing: OwnedSemaphorePermit,
 }

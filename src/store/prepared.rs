@@ -1,8 +1,10 @@
 //! Prepared solvers on disk, by content key: a cache that survives restarts.
 
+use super::disk::DiskFile;
 use super::solver_file;
 use super::{ContentKey, Store, StoreError};
 use cager_core::inversion::Solver;
+use std::ffi::OsStr;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -11,12 +13,14 @@ impl Store {
         self.files().prepared.join(format!("{key}.solver"))
     }
 
-    /// Stores a prepared solver; durable on `Ok`. An existing file is kept.
-    pub fn put_prepared(&self, key: &ContentKey, solver: &Solver) -> Result<(), StoreError> {
+    /// Stores a prepared solver; durable on `Ok`, which has the file's bytes. An existing file is kept.
+    pub fn put_prepared(&self, key: &ContentKey, solver: &Solver) -> Result<u64, StoreError> {
         let files = self.files();
         let place = self.prepared_path(key);
-        if files.exists(&place)? {
-            return files.sync_dir(&files.prepared);
+        let length = |file: &dyn DiskFile| file.length().map_err(|e| StoreError::of(&place, "read", e));
+        if let Some(file) = files.open(&place)? {
+            files.sync_dir(&files.prepared)?;
+            return length(&*file);
         }
         let staging = files.temporary("solver");
         let make = || {
@@ -26,7 +30,7 @@ impl Store {
             // One that another thread has put there meanwhile is as good.
             files.publish(&staging, &place)?;
             self.used(&place);
-            Ok(())
+            length(&*file)
         };
         make().inspect_err(|_| files.discard(&staging))
     }
@@ -65,22 +69,17 @@ impl Store {
         }
     }
 
-    /// Removes prepared solvers, least recently used first, until they take at most `budget_bytes`; returns the number of bytes freed.
-    pub fn trim_prepared(&self, budget_bytes: u64) -> Result<u64, StoreError> {
-        let files = self.files();
-        let mut entries = files.list(&files.prepared)?;
+    /// Keys and bytes of the files, least recently used first.
+    pub fn prepared_files(&self) -> Result<Vec<(ContentKey, u64)>, StoreError> {
+        let mut entries = self.files().list(&self.files().prepared)?;
         entries.sort_by(|a, b| (a.modified, &a.name).cmp(&(b.modified, &b.name)));
-        let total: u64 = entries.iter().map(|entry| entry.bytes).sum();
-        let mut freed = 0;
-        for entry in entries {
-            if total - freed <= budget_bytes {
-                break;
-            }
-            files.remove_file(&files.prepared.join(&entry.name))?;
-            freed += entry.bytes;
-        }
-        // Not synced: a file that reappears after a power cut is removed by the next trim.
-        Ok(freed)
+        let key = |name: &OsStr| name.to_str()?.strip_suffix(".solver")?.parse().ok();
+        Ok(entries.iter().filter_map(|entry| Some((key(&entry.name)?, entry.bytes))).collect())
+    }
+
+    /// Removes a file, unless it does not exist. Not synced: one that reappears after a power cut is found at the next start.
+    pub fn remove_prepared(&self, key: &ContentKey) -> Result<(), StoreError> {
+        self.files().remove_file(&self.prepared_path(key))
     }
 
     /// Updates the time of last use, for the eviction order after a restart.

@@ -30,7 +30,7 @@ pub(crate) struct House {
     _folder: tempfile::TempDir,
 }
 
-fn attack_time() -> Duration {
+pub(crate) fn attack_time() -> Duration {
     let seconds = std::env::var("CAGER_ATTACK_SECONDS").ok().and_then(|text| text.parse().ok());
     Duration::from_secs_f64(seconds.unwrap_or(2.5))
 }
@@ -70,7 +70,7 @@ impl House {
     }
 
     /// The quiet tenant looks at its session and posts frames; gives how long each round took.
-    async fn rounds(&self, time: Duration) -> Times {
+    pub(crate) async fn rounds(&self, time: Duration) -> Times {
         let (mut times, clock) = (Times(Vec::new()), Instant::now());
         while clock.elapsed() < time {
             let round = Instant::now();

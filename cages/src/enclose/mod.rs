@@ -81,7 +81,10 @@ pub fn enclose(model: &Model, options: &EncloseOptions) -> Result<TriMesh, Enclo
 }
 
 /// [`enclose`], given up once `stopped` says so; it is asked every few hundredths of a second.
-pub(crate) fn enclose_unless(
+///
+/// # Errors
+/// See [`EncloseError`].
+pub fn enclose_unless(
     model: &Model,
     options: &EncloseOptions,
     stopped: &mut dyn FnMut() -> bool,

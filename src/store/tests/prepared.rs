@@ -150,13 +150,13 @@ fn the_least_recently_used_go_first() {
         store.put_prepared(key, &SOLVER).unwrap();
     }
     let one = std::fs::metadata(given.root().join(format!("prepared/{}.solver", keys[0]))).unwrap().len();
-    assert_eq!(store.trim_prepared(3 * one).unwrap(), 0);
+    assert_eq!(store.prepared_files().unwrap(), keys.map(|key| (key, one)));
     store.prepared(&keys[0]).unwrap().unwrap();
-    assert_eq!(store.trim_prepared(3 * one - 1).unwrap(), one);
+    assert_eq!(store.prepared_files().unwrap(), [1, 2, 0].map(|k| (keys[k], one)));
+    store.remove_prepared(&keys[1]).unwrap();
+    store.remove_prepared(&keys[1]).unwrap();
     let left = keys.map(|key| store.prepared(&key).unwrap().is_some());
     assert_eq!(left, [true, false, true]);
-    assert_eq!(store.trim_prepared(0).unwrap(), 2 * one);
-    assert_eq!(store.trim_prepared(0).unwrap(), 0);
 }
 
 #[test]

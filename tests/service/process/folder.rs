@@ -30,7 +30,7 @@ async fn what_is_stored_is_for_the_services_user_alone() {
     app.prepared(&coded.id).await;
     app.upload(&coded.id, 0, capture.raw(0..2)).await;
     app.post(&format!("/v1/sessions/{}/decode", coded.id), OCTETS, vec![0; 12]).await;
-    let job = app.design(capture, &json!({"vertices": 20, "seconds": 1})).await;
+    let job = app.design(capture, &json!({"vertices": 20, "time_limit_s": 1})).await;
     app.solver_stored().await;
     let mut wrong = Vec::new();
     let files = open_to_others(&app.data(), &mut wrong);

@@ -137,6 +137,70 @@ async fn connections_beyond_the_limit_are_told_so_and_health_still_answers() {
 }
 
 #[tokio::test]
+async fn connections_with_a_token_do_not_count_for_their_address() {
+    const ANNA: &str = "anna-has-a-long-secret";
+    let app = TestApp::guarded_with(&[("anna", ANNA, "")], &["max_connections=16", "max_connections_per_address=2"]);
+    let session = app.ready(Capture::tiny()).await;
+    let (path, token) = (format!("/v1/sessions/{}/cages?follow=true", session.id), format!("Bearer {ANNA}"));
+    let mut followers = Vec::new();
+    for _ in 0..6 {
+        let mut raw = Raw::connect(&app).await;
+        raw.head("GET", &path, &[("authorization", &token)]).await;
+        raw.answer().await.expect(200);
+        followers.push(raw);
+    }
+    // Those without one have two places among them: a third makes the first go.
+    let mut strangers = Vec::new();
+    for _ in 0..3 {
+        let mut raw = Raw::connect(&app).await;
+        raw.head("GET", "/healthz", &[]).await;
+        raw.reply().await.expect(200);
+        strangers.push(raw);
+        tokio::time::sleep(Duration::from_millis(1100)).await;
+    }
+    let mut open = Vec::new();
+    for raw in &mut strangers {
+        open.push(raw.is_open().await);
+    }
+    assert_eq!(open, [false, true, true], "the first made way");
+    app.get("/v1/sessions").await.expect(200);
+}
+
+#[tokio::test]
+async fn solvers_that_one_tenant_keeps_displace_its_own() {
+    const TOKENS: [&str; 2] = ["anna-has-a-long-secret", "bert-has-a-long-secret"];
+    let start = |settings: &[&str]| {
+        TestApp::guarded_with(&[("anna", TOKENS[0], "scope = \"admin\"\n"), ("bert", TOKENS[1], "")], settings)
+    };
+    let capture = Capture::small();
+    let app = start(&[]);
+    app.ready(capture).await;
+    let one = app.metric("cager_cache_bytes{cache=\"solvers\"}").await;
+    let room = (4.5 * one) as u64;
+    let app = start(&[&format!("cache_bytes={room}"), &format!("prepared_disk_bytes={}", 2 * room)]);
+    let (anna, bert) = (app.caller(Some(TOKENS[0])), app.caller(Some(TOKENS[1])));
+    let session = anna.ready(capture).await;
+    for k in 1..=12 {
+        let other = bert.create_with(form(capture, &json!({"lambda": 0.001 * f64::from(k)})), None).await;
+        let other: cager_proto::messages::Session = other.is(201);
+        bert.prepared(&other.id).await;
+    }
+    let handles = format!("/v1/sessions/{}/handles", session.id);
+    let read = async || app.metric("cager_cache_total{result=\"disk\"}").await;
+    let before = read().await;
+    anna.get(&handles).await.expect(200);
+    assert_eq!(read().await, before, "it is still in memory");
+    // And on disk, also after a restart.
+    let files = || std::fs::read_dir(app.data().join("prepared")).expect("a folder").count();
+    eventually("old files of the other tenant go", async || (files() < 10).then_some(())).await;
+    let mut app = app;
+    app.kill();
+    let app = app.again();
+    app.caller(Some(TOKENS[0])).get(&handles).await.expect(200);
+    assert_eq!(app.metric("cager_cache_total{result=\"miss\"}").await, 0.0, "its file is still there");
+}
+
+#[tokio::test]
 async fn a_request_names_its_host_once() {
     let app = TestApp::start();
     for hosts in ["", "host: a\r\nhost: b\r\n"] {

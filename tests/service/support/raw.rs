@@ -122,6 +122,11 @@ impl Raw {
         reply
     }
 
+    /// Whether the service keeps it, where nothing is to come.
+    pub(crate) async fn is_open(&mut self) -> bool {
+        tokio::time::timeout(Duration::from_millis(100), self.stream.read_buf(&mut self.buffer)).await.is_err()
+    }
+
     async fn more(&mut self) -> bool {
         let read = self.stream.read_buf(&mut self.buffer);
         // A reset is an end, too.
