@@ -90,6 +90,15 @@ fn a_cage_that_is_slightly_small_is_enlarged_and_a_much_smaller_one_is_not() {
 }
 
 #[test]
+fn thousands_of_parts_in_one_place_are_counted_as_far_as_that_is_of_use() {
+    let mut piled = Model::default();
+    (0..10_000).for_each(|_| append(&mut piled, &TriMesh::from(&quad_cube(1.0))));
+    let findings = check(&TriMesh::from(&piled), &Model::default());
+    assert_eq!((findings.components, findings.self_intersections.len()), (10_000, 1_000_000));
+    assert!(findings.messages().iter().any(|s| s.starts_with("at least 1000000 pairs of faces")), "{findings}");
+}
+
+#[test]
 fn units_and_axes_are_guessed() {
     let mut tall = ball();
     tall.points.iter_mut().for_each(|p| *p = [0.5 * p[0], 2.0 * p[1] + 2.0, 0.3 * p[2]]);
@@ -109,6 +118,30 @@ fn units_and_axes_are_guessed() {
 }
 
 #[test]
+fn units_are_guessed_of_flat_models_across_any_axis() {
+    for axis in 0..3 {
+        let mut flat = ball();
+        flat.points.iter_mut().for_each(|p| p[axis] = 0.0);
+        let mut metres = enclose(&flat, &EncloseOptions { vertices: 80, ..EncloseOptions::default() }).unwrap();
+        metres.vertices.iter_mut().flatten().for_each(|x| *x *= 0.01);
+        let alignment = check(&metres, &flat).alignment.expect("an alignment");
+        assert_eq!((alignment.scale, alignment.axes), (100.0, None), "across axis {axis}");
+    }
+}
+
+#[test]
+fn a_cage_is_not_fit_to_be_edited_before_it_is_known_to_enclose_its_model() {
+    let mut broken = ball();
+    broken.points[3][1] = f64::NAN;
+    for model in [Model::default(), broken] {
+        let findings = check(&cage(), &model);
+        assert!(findings.usable() && !findings.enclosure_examined && !findings.editable(), "{findings}");
+        assert!(findings.messages().iter().any(|s| s.contains("is unknown")), "{findings}");
+    }
+    assert!(check(&cage(), &ball()).enclosure_examined);
+}
+
+#[test]
 fn no_input_is_too_broken() {
     let nan = TriMesh { vertices: vec![[f64::NAN; 3]; 3], triangles: vec![[0, 1, 2], [0, 1, 9]] };
     for mesh in [TriMesh::default(), nan] {
@@ -123,6 +156,30 @@ fn no_input_is_too_broken() {
     let mut two = ball();
     append(&mut two, &sphere([0.5, 0.0, 0.0], 1.0, 12));
     assert!(!check(&TriMesh::from(&two), &ball()).self_intersections.is_empty());
+}
+
+#[test]
+fn thousands_of_parts_are_diagnosed_and_turned_around() {
+    let mut parts = Model::default();
+    let mut hollow = TriMesh::from(&quad_cube(1.0));
+    for k in 0..10_000 {
+        let shift = 3.0 * f64::from(k);
+        let mut part = TriMesh::from(&quad_cube(1.0));
+        part.vertices.iter_mut().for_each(|p| p[0] += shift);
+        // Every tenth is turned inwards.
+        append(&mut parts, &if k % 10 == 0 { part.clone().flipped() } else { part.clone() });
+        part.vertices.iter_mut().flatten().for_each(|x| *x *= 1e-5);
+        let first = hollow.vertices.len() as u32;
+        hollow.vertices.extend(&part.vertices);
+        hollow.triangles.extend(part.flipped().triangles.iter().map(|t| t.map(|v| v + first)));
+    }
+    let findings = check(&TriMesh::from(&parts), &Model::default());
+    assert_eq!((findings.components, findings.cavities, findings.inward_parts), (10_000, 0, 1_000));
+    let repaired = repair(&parts, &Model::default());
+    assert_eq!(repaired.changes, ["turned 1000 parts to point outwards"]);
+    assert!(repaired.remaining.usable() && repaired.remaining.inward_parts == 0);
+    let findings = check(&hollow, &Model::default());
+    assert_eq!((findings.components, findings.cavities, findings.inward_parts), (10_001, 10_000, 0));
 }
 
 #[test]

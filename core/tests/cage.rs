@@ -2,9 +2,10 @@
 
 mod common;
 
-use cager_core::cage::{Cage, CageError};
-use cager_core::mesh::TriMesh;
+use cager_core::cage::{Cage, CageError, Nesting};
+use cager_core::mesh::{Point, TriMesh};
 use common::octahedron;
+use std::cell::Cell;
 
 fn refused(mesh: TriMesh) -> CageError {
     Cage::new(mesh).expect_err("no cage")
@@ -82,18 +83,86 @@ fn a_few_triangles_are_no_cage() {
     assert_eq!(refused(mesh), CageError::TooSmall { vertices: 6, faces: 1 });
 }
 
+/// Octahedra of this radius.
+fn octahedra(centres: impl IntoIterator<Item = Point>, scale: f64) -> TriMesh {
+    let mut all = TriMesh::default();
+    centres.into_iter().for_each(|centre| add(&mut all, &octahedron(), scale, centre));
+    all
+}
+
+fn add(all: &mut TriMesh, part: &TriMesh, scale: f64, centre: Point) {
+    let offset = all.vertices.len() as u32;
+    all.vertices.extend(part.vertices.iter().map(|p| [0, 1, 2].map(|k| scale * p[k] + centre[k])));
+    all.triangles.extend(part.triangles.iter().map(|t| t.map(|v| v + offset)));
+}
+
+/// Places of 8,000 parts: rows along each axis, a sheet, a block.
+fn arrangements() -> Vec<Vec<Point>> {
+    let sides = [[8_000, 1, 1], [1, 8_000, 1], [1, 1, 8_000], [1, 80, 100], [100, 1, 80], [20, 20, 20]];
+    let places = |[x, y, z]: [u32; 3]| {
+        (0..x * y * z).map(move |k| [k / (y * z), k / z % y, k % z].map(|i| 3.0 * f64::from(i))).collect()
+    };
+    sides.into_iter().map(places).collect()
+}
+
 #[test]
 fn a_cavity_is_welcome_but_a_part_turned_inwards_is_not() {
-    let part = |scale: f64, shift: f64| {
-        let mesh = octahedron();
-        let vertices = mesh.vertices.iter().map(|p| [scale * p[0] + shift, scale * p[1], scale * p[2]]).collect();
-        TriMesh { vertices, triangles: mesh.triangles }
-    };
-    let both = |a: TriMesh, b: TriMesh| {
-        let offset = a.vertices.len() as u32;
-        let triangles = a.triangles.iter().copied().chain(b.triangles.iter().map(|t| t.map(|v| v + offset))).collect();
-        TriMesh { vertices: a.vertices.into_iter().chain(b.vertices).collect(), triangles }
-    };
-    assert!(Cage::new(both(part(1.0, 0.0), part(0.3, 0.0).flipped())).is_ok());
-    assert!(matches!(refused(both(part(1.0, 0.0), part(1.0, 5.0).flipped())), CageError::InwardPart { vertex: 6 }));
+    let mut hollow = octahedron();
+    add(&mut hollow, &octahedron().flipped(), 0.3, [0.0; 3]);
+    assert!(Cage::new(hollow).is_ok());
+    let mut apart = octahedron();
+    add(&mut apart, &octahedron().flipped(), 1.0, [5.0, 0.0, 0.0]);
+    assert_eq!(refused(apart), CageError::InwardPart { vertex: 6 });
+    // Within a cavity there is nothing to be hollow.
+    let mut twice = octahedron();
+    add(&mut twice, &octahedron().flipped(), 0.6, [0.0; 3]);
+    add(&mut twice, &octahedron().flipped(), 0.3, [0.0; 3]);
+    assert_eq!(refused(twice.clone()), CageError::InwardPart { vertex: 12 });
+    twice.triangles[16..].iter_mut().for_each(|t| t.swap(1, 2));
+    assert!(Cage::new(twice).is_ok());
+}
+
+#[test]
+fn a_cavity_may_touch_the_part_around_it() {
+    let mut thin = octahedron().flipped();
+    thin.vertices.iter_mut().for_each(|p| *p = [p[0], 0.5 * p[1], 0.5 * p[2]]);
+    let mut touching = octahedron();
+    add(&mut touching, &thin, 0.5, [0.5, 0.0, 0.0]);
+    // One of them by a vertex that both have.
+    let mut joined = touching.clone();
+    joined.triangles.iter_mut().flatten().filter(|v| **v == 6).for_each(|v| *v = 0);
+    joined.triangles.iter_mut().flatten().filter(|v| **v > 6).for_each(|v| *v -= 1);
+    joined.vertices.remove(6);
+    assert_eq!(touching.vertices[0], touching.vertices[6]);
+    assert!(Cage::new(touching).is_ok() && Cage::new(joined).is_ok());
+}
+
+#[test]
+fn thousands_of_parts_are_told_apart() {
+    for centres in arrangements() {
+        let far = centres.iter().flatten().fold(0.0_f64, |a, &b| a.max(b));
+        let mut mesh = octahedra([[0.0; 3]], 4.0 * far);
+        centres.iter().for_each(|&centre| add(&mut mesh, &octahedron().flipped(), 1.0, centre));
+        assert!(Cage::new(mesh.clone()).is_ok());
+        add(&mut mesh, &octahedron().flipped(), 1.0, [5.0 * far, 0.0, 0.0]);
+        let vertex = mesh.vertices.len() as u32 - 6;
+        assert_eq!(refused(mesh), CageError::InwardPart { vertex });
+    }
+}
+
+#[test]
+fn what_encloses_a_part_is_found_among_a_few_faces_of_thousands_of_parts() {
+    for centres in arrangements() {
+        let mesh = octahedra(centres, 1.0);
+        let part_of: Vec<u32> = (0..mesh.triangles.len() as u32).map(|face| face / 8).collect();
+        let nesting = Nesting::new(&mesh.vertices, &mesh.triangles, &part_of);
+        let looked_at = Cell::new(0);
+        let count = |_| {
+            looked_at.set(looked_at.get() + 1);
+            1
+        };
+        assert!(!(0..8_000).any(|part| nesting.is_enclosed(part, count)));
+        // All others' faces would be 63,992 for each.
+        assert!(looked_at.get() < 8_000 * 1_000, "{}", looked_at.get());
+    }
 }

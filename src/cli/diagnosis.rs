@@ -17,7 +17,7 @@ use std::path::Path;
 pub(super) struct CheckReport {
     /// Whether it may be encoded with.
     usable: bool,
-    /// Whether it is also free of self-intersection and encloses every point.
+    /// Whether it is also free of self-intersection and known to enclose every point.
     editable: bool,
     vertices: usize,
     faces: usize,
@@ -31,10 +31,16 @@ pub(super) struct CheckReport {
     degenerate_faces: usize,
     loose_vertices: usize,
     idle_vertices: usize,
+    /// Whether it was examined if the cage encloses the model.
+    enclosure_examined: bool,
+    /// Null where it was not.
     points_outside: Option<usize>,
     /// How far the farthest of them is from the cage, as a fraction of the rest pose's diagonal.
     outside_distance: Option<f64>,
+    /// Of the mean value coordinates; null where it was not computed, and where they are singular.
     condition_number: Option<f64>,
+    /// Whether it was computed, and the coordinates are singular.
+    singular: bool,
     /// What was changed, where the cage was repaired.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     changes: Vec<String>,
@@ -59,9 +65,11 @@ impl CheckReport {
             degenerate_faces: found.degenerate_faces.len(),
             loose_vertices: found.loose_vertices.len(),
             idle_vertices: found.idle_vertices.len(),
-            points_outside: found.outside.map(|outside| outside.count),
+            enclosure_examined: found.enclosure_examined,
+            points_outside: found.enclosure_examined.then(|| found.outside.map_or(0, |outside| outside.count)),
             outside_distance: found.outside.map(|outside| outside.distance),
-            condition_number: found.condition_number,
+            condition_number: found.condition_number.filter(|condition| condition.is_finite()),
+            singular: found.condition_number == Some(f64::INFINITY),
             changes,
             findings: found.messages(),
         }
@@ -132,7 +140,7 @@ fn verdict(path: &Path, found: &Findings) -> String {
         found.components,
         if found.components == 1 { "" } else { "s" }
     );
-    if let Some(condition) = found.condition_number {
+    if let Some(condition) = found.condition_number.filter(|condition| condition.is_finite()) {
         let _ = write!(text, ", condition number {condition:.1}");
     }
     text.push('\n');

@@ -3,8 +3,8 @@
 use super::connectivity::{edges, fans, shells};
 use super::fit::alignment;
 use super::influence::influence;
-use crate::geometry::{Surface, outside, self_intersections};
-use cager_core::cage::{Cage, CageError};
+use crate::geometry::{outside, self_intersections};
+use cager_core::cage::{Cage, CageError, Nesting};
 use cager_core::mesh::{Model, TriMesh, diagonal};
 use glam::DVec3;
 use std::collections::HashMap;
@@ -46,13 +46,17 @@ pub struct Findings {
     pub inward_parts: usize,
     /// Pairs of faces that cut, touch or overlap one another.
     pub self_intersections: Vec<[u32; 2]>,
-    /// Points of the model outside the cage; unknown of a cage that cannot be encoded with.
+    /// Whether it was examined if the cage encloses the model: not of a cage that cannot be encoded with, nor around a model without points or with some
+    /// that are not finite.
+    pub enclosure_examined: bool,
+    /// Points of the model outside the cage, where there are any and they were looked for.
     pub outside: Option<Outside>,
     /// A change of units, axes or position after which the cage would enclose most points that are outside.
     pub alignment: Option<Alignment>,
     /// Vertices that move no point of the model.
     pub idle_vertices: Vec<u32>,
-    /// Ratio of the greatest to the least singular value of the mean value coordinates.
+    /// Ratio of the greatest to the least singular value of the mean value coordinates, infinite where they are singular; `None` where it was not
+    /// computed.
     pub condition_number: Option<f64>,
 }
 
@@ -91,6 +95,7 @@ impl Findings {
         self.usable()
             && self.self_intersections.is_empty()
             && self.non_manifold_vertices.is_empty()
+            && self.enclosure_examined
             && self.outside.is_none()
     }
 }
@@ -177,35 +182,30 @@ fn examine_edges(findings: &mut Findings, mesh: &TriMesh, faces: &[[u32; 3]]) {
         && findings.non_manifold_edges.is_empty()
         && findings.not_finite.is_empty();
     if sound {
-        for shell in 0..count {
-            let inside_out = shell_volume(mesh, faces, &labels, shell) < 0.0;
-            if inside_out && is_cavity(mesh, faces, &labels, shell) {
+        let nesting = Nesting::new(&mesh.vertices, faces, &labels);
+        let inside_out = (0..count).zip(shell_volumes(mesh, faces, &labels, count)).filter(|(_, volume)| *volume < 0.0);
+        for (shell, _) in inside_out {
+            if nesting.is_enclosed(shell, |_| 1) {
                 findings.cavities += 1;
-            } else if inside_out {
+            } else {
                 findings.inward_parts += 1;
             }
         }
     }
 }
 
-/// Signed volume of one part.
-pub(super) fn shell_volume(mesh: &TriMesh, faces: &[[u32; 3]], labels: &[u32], shell: u32) -> f64 {
-    let volume = |t: &[u32; 3]| {
-        let [a, b, c] = t.map(|v| DVec3::from(mesh.vertices[v as usize]) - DVec3::from(mesh.vertices[0]));
-        a.dot(b.cross(c)) / 6.0
-    };
-    faces.iter().zip(labels).filter(|(_, l)| **l == shell).map(|(t, _)| volume(t)).sum()
-}
-
-/// Whether a part lies inside the others.
-pub(super) fn is_cavity(mesh: &TriMesh, faces: &[[u32; 3]], labels: &[u32], shell: u32) -> bool {
-    let Some(own) = labels.iter().position(|&l| l == shell) else { return false };
-    let others = faces.iter().zip(labels).filter(|(_, l)| **l != shell).map(|(t, _)| *t).collect();
-    let vertices = mesh.vertices.iter().map(|&p| p.into()).collect();
-    Surface::new(vertices, others).contains(mesh.vertices[faces[own][0] as usize].into())
+/// Signed volume of each part.
+pub(super) fn shell_volumes(mesh: &TriMesh, faces: &[[u32; 3]], labels: &[u32], count: u32) -> Vec<f64> {
+    let mut volumes = vec![0.0; count as usize];
+    for (face, &label) in faces.iter().zip(labels) {
+        let [a, b, c] = face.map(|v| DVec3::from(mesh.vertices[v as usize]) - DVec3::from(mesh.vertices[0]));
+        volumes[label as usize] += a.dot(b.cross(c)) / 6.0;
+    }
+    volumes
 }
 
 fn examine_fit(findings: &mut Findings, mesh: &TriMesh, model: &Model) {
+    findings.enclosure_examined = true;
     let found = outside(mesh, &model.points);
     let farthest = found.iter().fold(None, |best: Option<(u32, f64)>, &f| match best {
         Some(b) if b.1 >= f.1 => Some(b),

@@ -8,6 +8,9 @@ use std::fmt;
 /// Points that candidates are judged by.
 const SAMPLE: usize = 400;
 
+/// A flat model's cage may be as thick as twice this part of its longest side.
+const THICKNESS: f64 = 0.1;
+
 /// Ratios of common units of length: powers of ten, inches, feet.
 const UNITS: [f64; 13] =
     [1.0, 10.0, 0.1, 100.0, 0.01, 1000.0, 0.001, 2.54, 1.0 / 2.54, 25.4, 0.0254, 0.3048, 1.0 / 0.3048];
@@ -33,9 +36,10 @@ pub fn alignment(mesh: &TriMesh, model: &Model) -> Option<Alignment> {
                     if moved { 0.5 * (low[k] + high[k] - cage_low[k] - cage_high[k]) } else { 0.0 }
                 });
                 changed.vertices.iter_mut().for_each(|p| *p = std::array::from_fn(|k| p[k] + shift[k]));
-                // A cage much larger than the model would enclose it by chance.
-                let fits = (0..3)
-                    .all(|k| cage_high[k] - cage_low[k] < 2.0 * (high[k] - low[k]).max(1e-3 * (high[0] - low[0])));
+                // A cage much larger than the model would enclose it by chance; one around a flat model is thicker than that.
+                let size = |k: usize| high[k] - low[k];
+                let least = THICKNESS * (0..3).map(size).fold(0.0, f64::max);
+                let fits = (0..3).all(|k| cage_high[k] - cage_low[k] < 2.0 * size(k).max(least));
                 if fits && 10 * outside(&changed, &sample).len() <= sample.len() {
                     return Some(Alignment { scale, axes, shift });
                 }

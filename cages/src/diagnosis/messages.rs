@@ -1,6 +1,7 @@
 //! Findings as messages that say what to do.
 
 use super::Findings;
+use crate::geometry::intersect::MOST_PAIRS;
 use std::fmt;
 
 impl Findings {
@@ -113,7 +114,8 @@ impl Findings {
         say(
             f.self_intersections.len(),
             format!(
-                "{} of faces that cut or touch one another ({}); move their vertices apart",
+                "{}{} of faces that cut or touch one another ({}); move their vertices apart",
+                if f.self_intersections.len() < MOST_PAIRS { "" } else { "at least " },
                 n(f.self_intersections.len(), "pair"),
                 two(&f.self_intersections)
             ),
@@ -130,6 +132,11 @@ impl Findings {
                 ),
             );
         }
+        say(
+            usize::from(f.usable() && !f.enclosure_examined),
+            "whether the cage encloses the model is unknown, as the model has no points or some that are not finite; export it again"
+                .to_owned(),
+        );
         if let Some(alignment) = f.alignment {
             say(1, alignment.to_string());
         }
@@ -142,10 +149,15 @@ impl Findings {
             ),
         );
         if let Some(condition) = f.condition_number.filter(|c| *c > ILL_CONDITIONED) {
+            let how = if condition.is_finite() {
+                format!("ill-conditioned (condition number {condition:.1e})")
+            } else {
+                "singular".to_owned()
+            };
             say(
                 1,
                 format!(
-                    "the coordinates are ill-conditioned (condition number {condition:.1e}), so that handles are hard to solve for; use fewer vertices where the model is small, or bring the cage closer"
+                    "the coordinates are {how}, so that handles are hard to solve for; use fewer vertices where the model is small, or bring the cage closer"
                 ),
             );
         }

@@ -2,9 +2,10 @@
 
 use super::connectivity::{border_loops, edges, fans, shells, sides};
 use super::enlarge::enlarged;
-use super::findings::{Findings, check, is_cavity, shell_volume};
+use super::findings::{Findings, check, shell_volumes};
 use super::holes::{LONGEST, fill};
 use super::weld::same_place;
+use cager_core::cage::Nesting;
 use cager_core::mesh::{Model, Polygons, TriMesh, diagonal};
 use glam::DVec3;
 use std::collections::{HashSet, VecDeque};
@@ -165,16 +166,19 @@ impl Repairing {
         for users in edges.values().filter(|u| u.len() != 2) {
             users.iter().for_each(|u| closed[labels[u.0 as usize] as usize] = false);
         }
-        let mut turned = 0;
-        for part in (0..count).filter(|&p| closed[p as usize]) {
-            let (mesh, triangle_labels) = self.labelled(&labels);
-            let inward = shell_volume(&mesh, &mesh.triangles, &triangle_labels, part) < 0.0;
-            if inward && !is_cavity(&mesh, &mesh.triangles, &triangle_labels, part) {
-                let faces = self.faces.iter_mut().zip(&labels).filter(|(_, l)| **l == part);
-                faces.for_each(|(face, _)| face.reverse());
-                turned += 1;
+        let (mesh, triangle_labels) = self.labelled(&labels);
+        let volumes = shell_volumes(&mesh, &mesh.triangles, &triangle_labels, count);
+        let nesting = Nesting::new(&mesh.vertices, &mesh.triangles, &triangle_labels);
+        // What a part encloses depends on which parts before it were turned around.
+        let mut signs = vec![1; count as usize];
+        for part in (0..count).filter(|&p| closed[p as usize] && volumes[p as usize] < 0.0) {
+            if !nesting.is_enclosed(part, |other| signs[other as usize]) {
+                signs[part as usize] = -1;
             }
         }
+        let to_turn = self.faces.iter_mut().zip(&labels).filter(|(_, label)| signs[**label as usize] < 0);
+        to_turn.for_each(|(face, _)| face.reverse());
+        let turned = signs.iter().filter(|sign| **sign < 0).count();
         self.changed(turned, |n| format!("turned {} to point outwards", counted(n, "part", "parts")));
     }
 

@@ -6,8 +6,15 @@ use cager_core::mesh::TriMesh;
 use glam::DVec3;
 use rayon::prelude::*;
 
+/// Pairs of faces after which no more are looked for, of one face and of all: thousands of parts in one place have as many as the square of their number.
+const MOST_OF_FACE: usize = 1_000;
+pub(crate) const MOST_PAIRS: usize = 1_000_000;
+/// Faces that are looked at before their pairs are counted.
+const FACES_AT_A_TIME: usize = 1 << 10;
+
 /// Pairs of faces that cut, touch or overlap one another beyond the vertices and edges that they share, in ascending order. Faces
-/// that are folded flat onto a neighbour, and doubled faces, are among them. Faces that name vertices that do not exist are left out.
+/// that are folded flat onto a neighbour, and doubled faces, are among them. Faces that name vertices that do not exist are left out, and so are pairs
+/// beyond a thousand of the same first face and a million in all.
 pub fn self_intersections(mesh: &TriMesh) -> Vec<[u32; 2]> {
     let vertices: Vec<DVec3> = mesh.vertices.iter().map(|&p| p.into()).collect();
     let valid = |t: &[u32; 3]| t.iter().all(|&v| vertices.get(v as usize).is_some_and(|p| p.is_finite()));
@@ -25,12 +32,21 @@ pub fn self_intersections(mesh: &TriMesh) -> Vec<[u32; 2]> {
                     pairs.push([first as u32, second]);
                 }
             }
-            true
+            pairs.len() < MOST_OF_FACE
         });
         pairs.sort_unstable();
         pairs
     };
-    (0..boxes.len()).into_par_iter().with_min_len(64).flat_map_iter(pairs_of).collect()
+    let mut found: Vec<[u32; 2]> = Vec::new();
+    for first in (0..boxes.len()).step_by(FACES_AT_A_TIME) {
+        let faces = first..boxes.len().min(first + FACES_AT_A_TIME);
+        found.par_extend(faces.into_par_iter().with_min_len(64).flat_map_iter(pairs_of));
+        if found.len() >= MOST_PAIRS {
+            found.truncate(MOST_PAIRS);
+            break;
+        }
+    }
+    found
 }
 
 /// Whether two triangles have a point in common beyond the vertices and the edge that they share by index.

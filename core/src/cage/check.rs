@@ -1,7 +1,7 @@
 //! Validation of a mesh as a cage: closed, edge-manifold, consistently and outwardly oriented, without degenerate faces.
 
-use super::{Edge, Face};
-use crate::mesh::{Point, TriMesh, winding_number};
+use super::{Edge, Face, Nesting};
+use crate::mesh::{Point, TriMesh};
 use crate::vector::{cross, dot, norm, sub};
 use std::collections::HashMap;
 use std::fmt::Write;
@@ -224,69 +224,60 @@ fn check_edges(edges: &[Edge], users: &[Vec<(usize, bool)>]) -> Result<(), CageE
 
 /// Every shell must enclose a positive volume, except cavities inside another shell.
 pub(super) fn check_orientation(mesh: &TriMesh, faces: &[Face], edges: usize) -> Result<(), CageError> {
-    let shells = shells(faces, edges);
-    let volumes: Vec<f64> = shells.iter().map(|shell| volume(mesh, shell)).collect();
+    let (shell_of, starts) = shells(faces, edges);
+    let volumes = volumes(mesh, &shell_of, &starts);
     if volumes.iter().all(|&v| v <= 0.0) {
         return Err(CageError::Inward { faces: faces.len(), volume: volumes.iter().sum() });
     }
-    for (k, shell) in shells.iter().enumerate() {
-        if volumes[k] > 0.0 {
-            continue;
-        }
-        let vertex = mesh.triangles[shell[0]][0];
-        let others: Vec<[u32; 3]> = shells
-            .iter()
-            .enumerate()
-            .filter(|(j, _)| *j != k)
-            .flat_map(|(_, s)| s.iter().map(|&f| mesh.triangles[f]))
-            .collect();
-        if winding_number(&mesh.vertices, &others, mesh.vertices[vertex as usize]) < 0.5 {
-            return Err(CageError::InwardPart { vertex });
-        }
+    if volumes.iter().all(|&v| v > 0.0) {
+        return Ok(());
     }
-    Ok(())
+    let nesting = Nesting::new(&mesh.vertices, &mesh.triangles, &shell_of);
+    let is_sound = |shell: usize| volumes[shell] > 0.0 || nesting.is_enclosed(shell as u32, |_| 1);
+    match (0..starts.len()).find(|&shell| !is_sound(shell)) {
+        Some(shell) => Err(CageError::InwardPart { vertex: mesh.triangles[starts[shell]][0] }),
+        None => Ok(()),
+    }
 }
 
-/// Connected components over edges, as face indices.
-fn shells(faces: &[Face], edges: usize) -> Vec<Vec<usize>> {
+/// The connected component over edges that each face belongs to, and the first face of each.
+fn shells(faces: &[Face], edges: usize) -> (Vec<u32>, Vec<usize>) {
     let mut at_edge = vec![Vec::new(); edges];
     for (f, face) in faces.iter().enumerate() {
         for e in face.edges {
             at_edge[e as usize].push(f);
         }
     }
-    let mut seen = vec![false; faces.len()];
-    let mut shells = Vec::new();
+    let mut shell_of = vec![u32::MAX; faces.len()];
+    let mut starts = Vec::new();
     for start in 0..faces.len() {
-        if std::mem::replace(&mut seen[start], true) {
+        if shell_of[start] != u32::MAX {
             continue;
         }
-        let mut shell = vec![start];
-        let mut next = 0;
-        while next < shell.len() {
-            for e in faces[shell[next]].edges {
-                for &f in &at_edge[e as usize] {
-                    if !std::mem::replace(&mut seen[f], true) {
-                        shell.push(f);
-                    }
+        let shell = starts.len() as u32;
+        shell_of[start] = shell;
+        starts.push(start);
+        let mut waiting = vec![start];
+        while let Some(face) = waiting.pop() {
+            for &f in faces[face].edges.iter().flat_map(|&e| &at_edge[e as usize]) {
+                if shell_of[f] == u32::MAX {
+                    shell_of[f] = shell;
+                    waiting.push(f);
                 }
             }
-            next += 1;
         }
-        shells.push(shell);
     }
-    shells
+    (shell_of, starts)
 }
 
-fn volume(mesh: &TriMesh, shell: &[usize]) -> f64 {
-    // Relative to a vertex of the shell, so that a cage far from the origin keeps its digits.
-    let o = mesh.vertices[mesh.triangles[shell[0]][0] as usize];
-    let at = |v: u32| sub(mesh.vertices[v as usize], o);
-    shell
-        .iter()
-        .map(|&f| {
-            let [a, b, c] = mesh.triangles[f].map(at);
-            dot(a, cross(b, c)) / 6.0
-        })
-        .sum()
+/// Signed volumes of the shells.
+fn volumes(mesh: &TriMesh, shell_of: &[u32], starts: &[usize]) -> Vec<f64> {
+    let mut volumes = vec![0.0; starts.len()];
+    for (triangle, &shell) in mesh.triangles.iter().zip(shell_of) {
+        // Relative to a vertex of the shell, so that a cage far from the origin keeps its digits.
+        let o = mesh.vertices[mesh.triangles[starts[shell as usize]][0] as usize];
+        let [a, b, c] = triangle.map(|v| sub(mesh.vertices[v as usize], o));
+        volumes[shell as usize] += dot(a, cross(b, c)) / 6.0;
+    }
+    volumes
 }

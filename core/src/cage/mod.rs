@@ -1,8 +1,10 @@
 //! A validated cage: a closed, outward-oriented triangle mesh with its edges.
 
 mod check;
+mod nesting;
 
 pub use check::CageError;
+pub use nesting::Nesting;
 
 use crate::mesh::{Point, TriMesh, diagonal};
 
