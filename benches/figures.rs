@@ -92,6 +92,7 @@ fn figures(folder: &Path) -> anyhow::Result<Value> {
         "harmonic": quality(&Harmonic, &cage, points, &harmonic_found?),
     });
     let phi = mean_value.phi;
+    let gradient = timed(|| MeanValue.gradient(&cage, points, phi.as_ref(), phi.as_ref()));
     let handles = maxvol(phi.as_ref(), maxvol::TOLERANCE)?;
     let maxvol_figure = timed(|| maxvol(phi.as_ref(), maxvol::TOLERANCE));
     let m = phi.ncols();
@@ -144,6 +145,7 @@ fn figures(folder: &Path) -> anyhow::Result<Value> {
         "coordinates": coordinates,
         "seconds": {
             "mvc": mvc,
+            "mvc_gradient": gradient,
             "green": green,
             "harmonic": harmonic,
             "maxvol": maxvol_figure,

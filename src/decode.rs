@@ -1,13 +1,13 @@
 //! Decodes containers to positions.
 
 use crate::edited::EditedCages;
-use crate::memory::Memory;
+use crate::memory::{Memory, free_bytes};
 use crate::timing::Timing;
 use cager_core::cage::{Cage, CageError};
 use cager_core::coordinates;
 use cager_core::coordinates::{Coordinates, CoordinatesError, ElementPlan, supports_definition};
 use cager_core::decode::Decoder;
-use cager_core::inversion::{BATCH, PrepareError, coordinates_fit, reject_far_points};
+use cager_core::inversion::{BATCH, PrepareError, coordinates_bytes, reject_far_points};
 use cager_core::mesh::{Model, Point};
 use cager_formats::{Action, FrameOptions, FrameRange, Target, create_frames};
 use cager_proto::container::{self, ContainerReader};
@@ -246,9 +246,10 @@ fn bind(
         let outside = other.map_or(0, |_| rest.points.chunks(some).map(outside).sum());
         return Ok(BoundModel { rest, decoder, outside });
     }
-    if !coordinates_fit(rest.points.len(), columns, 2) {
-        let gigabytes = 12e-9 * rest.points.len() as f64 * columns as f64;
-        return Err(DecodeError::Memory { path: model_path.to_owned(), gigabytes });
+    let elements = if known.is_some() { 0 } else { system.working_bytes(&cage, plan.as_ref()) };
+    let needed = coordinates_bytes(rest.points.len(), columns, 2).saturating_add(elements);
+    if needed > free_bytes() {
+        return Err(DecodeError::Memory { path: model_path.to_owned(), gigabytes: 1e-9 * needed as f64 });
     }
     let coordinates = match (known, &plan) {
         (Some(known), _) => Ok(known),
@@ -298,6 +299,7 @@ pub fn decode(
     let fail = |cause| DecodeError::container(input, cause);
     let Decoding { model, cages: mut edited, range, timing, dry_run, memory, layer, salvage } = what;
     let mut container = if salvage { open_cut(input) } else { open(input) }?;
+    container.limit_coordinates(free_bytes());
     // The residual is of the file's own model and cages.
     let own = model.is_none() && edited.is_none();
     let memory = memory.unwrap_or_else(Memory::half_of_free);

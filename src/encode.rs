@@ -5,7 +5,7 @@ mod sink;
 
 use crate::capture::{CaptureWriter, Encoding};
 use crate::coding::{Carried, CodingError, Goal, GroupCoder, GroupDecoder, GroupSpace, HELD, RestMeshes, group_frames};
-use crate::memory::Memory;
+use crate::memory::{Memory, free_bytes};
 use crate::preparation_warnings::held_frames;
 use batches::{Batch, BatchPlan, SolvedBatch, read_batches, solve};
 use cager_core::cage::Cage;
@@ -320,7 +320,8 @@ fn prepare(
         tell(step);
         ControlFlow::Continue(())
     };
-    let preparing = Preparing { term: job.term, stores_coordinates, next: &next, ..Preparing::default() };
+    let memory = free_bytes();
+    let preparing = Preparing { term: job.term, stores_coordinates, memory, next: &next, ..Preparing::default() };
     let term = preparing.term(options)?;
     let chosen_by = job.choose.as_ref().filter(|choose| !choose.samples.is_empty());
     let Some(ChooseSpectrum { samples, bound }) = chosen_by else {

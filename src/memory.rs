@@ -19,13 +19,7 @@ impl Memory {
 
     /// Half of the free memory, also within the limits of a cgroup.
     pub fn half_of_free() -> Self {
-        let read = |path: &str| std::fs::read_to_string(path).ok();
-        let number = |path: &str| read(path)?.trim().parse::<u64>().ok();
-        let machine = read("/proc/meminfo").as_deref().and_then(available);
-        let container = number("/sys/fs/cgroup/memory.max")
-            .zip(number("/sys/fs/cgroup/memory.current"))
-            .map(|(most, used)| most.saturating_sub(used));
-        Self { bytes: machine.into_iter().chain(container).min().unwrap_or(2 * UNKNOWN) / 2 }
+        Self { bytes: free_bytes() / 2 }
     }
 
     /// Number of frames of `bytes` bytes to buffer, at most `most`.
@@ -38,6 +32,18 @@ impl Memory {
     pub(crate) fn keeps(self, points: usize, columns: usize, batches: usize) -> bool {
         batches > 1 && 4 * (points as u64).saturating_mul(columns as u64) <= self.bytes / 2
     }
+}
+
+/// The free memory, also within the limits of a cgroup: what coordinates may take that cannot be computed in parts. Asking for it tells nothing, as
+/// systems promise more than they have.
+pub(crate) fn free_bytes() -> u64 {
+    let read = |path: &str| std::fs::read_to_string(path).ok();
+    let number = |path: &str| read(path)?.trim().parse::<u64>().ok();
+    let machine = read("/proc/meminfo").as_deref().and_then(available);
+    let container = number("/sys/fs/cgroup/memory.max")
+        .zip(number("/sys/fs/cgroup/memory.current"))
+        .map(|(most, used)| most.saturating_sub(used));
+    machine.into_iter().chain(container).min().unwrap_or(2 * UNKNOWN)
 }
 
 /// `MemAvailable` of `/proc/meminfo`, in bytes.

@@ -4,7 +4,8 @@ mod common;
 
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
-use cager_core::inversion::{Analysis, Handles, PrepareError, Solver, SolverOptions};
+use cager_core::decode::FrameError;
+use cager_core::inversion::{Analysis, Handles, PrepareError, Preparing, Solver, SolverOptions};
 use cager_core::maxvol::{TOLERANCE, maxvol, maxvol_from};
 use cager_core::mesh::Point;
 use cager_core::regularize::Regularizer;
@@ -75,6 +76,45 @@ fn methods_in_factors_give_the_cages_of_their_solvers() {
             }
         }
     }
+}
+
+#[test]
+fn whole_frames_are_projected_where_a_sample_was_analysed() {
+    let (capture, cage) = capture();
+    let mut frame = Vec::new();
+    capture.frame(4, &mut frame);
+    let frames = [frame.as_slice()];
+    let preparing = Preparing { analysed_entries: 1, ..Preparing::default() };
+    for handles in [Handles::MaxVol, Handles::All] {
+        let options = SolverOptions { handles, regularizer: Regularizer::Laplacian, spectrum: 7, lambda: 0.5 };
+        let analysis = Analysis::for_options(&MeanValue, &cage, &capture.rest.points, options, &preparing).unwrap();
+        assert!(analysis.coordinates().nrows() < capture.rest.points.len(), "a sample");
+        let handle_system = analysis.handle_system(handles).unwrap();
+        let method = handle_system.factored(options).unwrap();
+        let found = handle_system.cages(&method, None, &handle_system.project(&frames), &frames);
+        let wanted = handle_system.solver(options).unwrap().invert(&frames);
+        for (a, b) in found.iter().flatten().zip(wanted.iter().flatten()) {
+            assert!((a - b).abs() <= 2e-6 * (1.0 + b.abs()), "{handles:?}: {a} {b}");
+        }
+    }
+}
+
+#[test]
+fn what_would_take_more_memory_than_it_may_is_refused_before_it_is_taken() {
+    let (capture, cage) = capture();
+    let prepare = |handles, memory| {
+        let preparing = Preparing { memory, ..Preparing::default() };
+        let options = SolverOptions { handles, ..SolverOptions::PAPER };
+        Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, options, &preparing).map(|_| ())
+    };
+    // The points times the vertices, twice; the covariance of 300 handles, its factor, and what is solved with it.
+    let (points, vertices) = (capture.rest.points.len() as u64, cage.vertices().len() as u64);
+    let (coordinates, covariance) = (8 * 2 * points * vertices, 8 * 300 * (600 + 2 * vertices));
+    assert!(matches!(prepare(Handles::MaxVol, coordinates - 1), Err(PrepareError::OutOfMemory { .. })));
+    assert_eq!(prepare(Handles::MaxVol, coordinates), Ok(()));
+    let spread = Handles::Spread { count: Some(300) };
+    assert!(matches!(prepare(spread, covariance - 1), Err(PrepareError::HandlesOutOfMemory { count: 300, .. })));
+    assert_eq!(prepare(spread, covariance), Ok(()));
 }
 
 #[test]
@@ -225,6 +265,26 @@ fn the_last_directions_alone_give_the_cages_of_the_whole_decomposition() {
         assert_eq!((a.singular_values.len(), known.clone().count()), (unknowns, 1 + last));
         for (found, wanted) in known {
             assert!((found / wanted - 1.0).abs() < 1e-9, "{options:?}: {found} {wanted}");
+        }
+    }
+}
+
+#[test]
+fn an_error_that_is_nan_is_kept_whichever_way_errors_are_measured() {
+    let (capture, cage) = capture();
+    let solver = Solver::prepare(&MeanValue, &cage, &capture.rest.points, SolverOptions::PAPER).unwrap();
+    let mut frame = Vec::new();
+    capture.frame(4, &mut frame);
+    let cages = solver.invert(&[&frame]);
+    let mut decoded = [Vec::new()];
+    solver.decoder().decode(&[&cages[0]], &mut decoded);
+    for points in [&[5][..], &[100, 600], &[699]] {
+        let mut frame = frame.clone();
+        points.iter().for_each(|&point: &usize| frame[3 * point + 1] = f64::NAN);
+        let measured = solver.decoder().measure(&[&cages[0]], &[&frame]);
+        for error in [measured[0], FrameError::of_positions(&decoded[0], &frame)] {
+            assert!(error.linf.is_nan() && error.l2.is_nan(), "{error:?}");
+            assert_eq!(error.worst as usize, points[0], "the first of them");
         }
     }
 }

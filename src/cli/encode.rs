@@ -14,7 +14,7 @@ use crate::coding::{CAGE_SIZE_FRAMES, CageSizes, Goal, InversionChoices};
 use crate::design::{read_frames, report as design_report};
 use crate::encode::{self, ChooseSpectrum, EncodeProgress, Encoded, Job, sample_frames};
 use crate::frames::CaptureFiles;
-use crate::memory::Memory;
+use crate::memory::{Memory, free_bytes};
 use crate::speed::seconds_to_prepare;
 use anyhow::{Context, Result, bail};
 use cager_cages::{DesignOptions, Style};
@@ -192,7 +192,8 @@ fn encode_locally(
     let choose = match (args.solver.spectrum, spectrum_bound(&args.solver)?) {
         (Some(SpectrumArg::Auto), bound) => {
             // What is wrong with the options is told before anything is read.
-            check_options(rest.points.len(), system.unknowns(cage), options).map_err(|e| name_file(&e, args))?;
+            check_options(rest.points.len(), system.unknowns(cage), options, free_bytes())
+                .map_err(|e| name_file(&e, args))?;
             let mut again = files.open()?;
             let samples = choosing_frames(again.as_mut(), options.regularizer == Regularizer::Temporal)
                 .map_err(|error| name_files(error, args))?;
@@ -251,11 +252,12 @@ pub(super) fn checked_options(
 ) -> Result<SolverOptions> {
     let (system, options) = (args.solver.coordinates, solver_options(args, rest, cage)?);
     let delta = matrix.map_or(Ok(()), |matrix| matrix.delta(cage, system.unknowns(cage)).map(|_| ()));
-    match delta.map_err(PrepareError::from).and_then(|()| Solver::check(system, cage, &rest.points, options)) {
-        // A service knows its own memory.
-        Err(PrepareError::HandlesOutOfMemory { .. }) if args.server.is_some() => {}
-        checked => checked.map_err(|error| name_file(&error, args))?,
-    }
+    // A service knows its own memory.
+    let memory = if args.server.is_some() { u64::MAX } else { free_bytes() };
+    delta
+        .map_err(PrepareError::from)
+        .and_then(|()| Solver::check(system, cage, &rest.points, options, memory))
+        .map_err(|error| name_file(&error, args))?;
     Ok(options)
 }
 

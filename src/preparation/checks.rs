@@ -20,13 +20,11 @@ pub(crate) fn check(geometry: &Geometry, choices: &Choices, max_bytes: u64) -> R
     let options = choices.inversion.options(unknowns);
     // Report a handle count beyond the points before one beyond the memory. With too few points the options are not at fault.
     if geometry.rest.points.len() >= unknowns {
-        match check_options(geometry.rest.points.len(), unknowns, options) {
-            Ok(()) | Err(PrepareError::HandlesOutOfMemory { .. }) => {}
-            Err(error) => return Err(refused(&error)),
-        }
+        check_options(geometry.rest.points.len(), unknowns, options, u64::MAX).map_err(|error| refused(&error))?;
     }
     check_memory(geometry, choices, options, max_bytes)?;
-    Solver::check(choices.system, &geometry.cage, &geometry.rest.points, options).map_err(|error| refused(&error))?;
+    Solver::check(choices.system, &geometry.cage, &geometry.rest.points, options, u64::MAX)
+        .map_err(|error| refused(&error))?;
     choices.goal.map_or(Ok(()), |goal| check_goal(goal, geometry, unknowns, choices.frames))?;
     let Some(matrix) = &geometry.matrix else { return Ok(()) };
     matrix.delta(&geometry.cage, unknowns).map_err(|error| refused(&error.into()))?;
@@ -96,7 +94,7 @@ pub(super) fn check_memory(
     let columns = choices.system.columns(&geometry.cage) as u64;
     // The Gram matrix of the iteration, in double and in single precision.
     let iterated = if columns > unknowns as u64 { 12 * columns * columns } else { 0 };
-    let elements = choices.system.working_bytes(&geometry.cage);
+    let elements = choices.system.working_bytes(&geometry.cage, None);
     // Peak memory: two matrices of points × columns in double precision and one in single.
     let needed =
         (20 * points as u64 * columns).saturating_add(handles).saturating_add(iterated).saturating_add(elements);
@@ -126,7 +124,7 @@ pub(crate) fn check_model(
     cage: &Cage,
     max_bytes: u64,
 ) -> Result<(), ApiError> {
-    let (columns, elements) = (system.columns(cage), system.working_bytes(cage));
+    let (columns, elements) = (system.columns(cage), system.working_bytes(cage, None));
     // Peak memory: one matrix in double precision, the work space of the solve, and one matrix in single precision.
     let needed = (20 * points as u64 * columns as u64).saturating_add(elements);
     if needed <= max_bytes {

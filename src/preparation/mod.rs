@@ -48,7 +48,7 @@ pub(crate) fn prepare(
     check_memory(geometry, choices, options, max_bytes)?;
     let term = geometry.matrix.as_ref().map(|matrix| matrix as &dyn Term);
     let next = |_| if wanted() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
-    let preparing = Preparing { term, next: &next, ..Preparing::default() };
+    let preparing = Preparing { term, memory: max_bytes, next: &next, ..Preparing::default() };
     match Solver::prepare_with(choices.system, &geometry.cage, &geometry.rest.points, options, &preparing) {
         Ok(solver) => Ok(Some(with_solver(solver, &geometry.cage, options))),
         Err(PrepareError::Stopped) => Ok(None),

@@ -180,9 +180,10 @@ pub(super) fn write_group(mut rows: MatMut<'_, f64>, start: usize, values: &[Lan
     let count = LANES.min(rows.nrows() - start);
     for (j, &value) in values.iter().enumerate() {
         let scaled = value * factor;
-        let column = rows.as_mut().col_mut(j);
-        if let Some(entries) = column.try_as_col_major_mut() {
-            entries.as_slice_mut()[start..start + count].copy_from_slice(&scaled.0[..count]);
+        let mut entries = rows.as_mut().col_mut(j).subrows_mut(start, count);
+        match entries.as_mut().try_as_col_major_mut() {
+            Some(entries) => entries.as_slice_mut().copy_from_slice(&scaled.0[..count]),
+            None => entries.iter_mut().zip(scaled.0).for_each(|(entry, value)| *entry = value),
         }
     }
 }
@@ -338,5 +339,14 @@ mod tests {
                 assert!((phi[(i, v)] - expected).abs() < 1e-5, "vertex {v} from {x:?}: {} not {expected}", phi[(i, v)]);
             }
         }
+    }
+
+    #[test]
+    fn groups_are_written_into_rows_of_any_layout() {
+        let values = [Lanes([1.0; LANES]), Lanes([2.0; LANES])];
+        let mut rows = Mat::zeros(2, LANES + 1);
+        write_group(rows.transpose_mut(), 1, &values, 3.0);
+        assert!((0..LANES).all(|l| (rows[(0, l + 1)], rows[(1, l + 1)]) == (3.0, 6.0)), "{rows:?}");
+        assert_eq!((rows[(0, 0)], rows[(1, 0)]), (0.0, 0.0));
     }
 }

@@ -96,8 +96,8 @@ pub trait CoordinateSystem: Sync {
         None
     }
 
-    /// Bytes that computing takes beside `Φ`, at the most, for any points in this cage.
-    fn working_bytes(&self, _cage: &Cage) -> u64 {
+    /// Bytes that computing takes beside `Φ`, at the most, for any points in this cage; with a plan, on its elements, nothing where it is refused.
+    fn working_bytes(&self, _cage: &Cage, _plan: Option<&ElementPlan>) -> u64 {
         0
     }
 

@@ -31,7 +31,7 @@ impl FrameError {
         for (at, (a, b)) in decoded.chunks_exact(3).zip(captured.chunks_exact(3)).enumerate() {
             let squared = (0..3).map(|k| (f64::from(a[k]) - b[k]).powi(2)).sum::<f64>();
             sums.squared += squared;
-            if squared > sums.largest || squared.is_nan() {
+            if exceeds(squared, sums.largest) {
                 (sums.largest, sums.at) = (squared, at);
             }
             for k in 0..3 {
@@ -60,8 +60,8 @@ impl Sums {
     pub(super) fn total<'a>(parts: impl Iterator<Item = &'a Self>) -> Self {
         parts.fold(Self::default(), |a, b| Self {
             squared: a.squared + b.squared,
-            largest: if b.largest > a.largest { b.largest } else { a.largest },
-            at: if b.largest > a.largest { b.at } else { a.at },
+            largest: if exceeds(b.largest, a.largest) { b.largest } else { a.largest },
+            at: if exceeds(b.largest, a.largest) { b.at } else { a.at },
             first: add(a.first, b.first),
             second: a.second + b.second,
         })
@@ -80,6 +80,11 @@ impl Sums {
     }
 }
 
+/// Whether an error is larger than the largest before it. One that is NaN is larger than all others, so that it is not lost among them.
+fn exceeds(error: f64, largest: f64) -> bool {
+    error > largest || error.is_nan() && !largest.is_nan()
+}
+
 /// Error sums of the points from `first` on; decoded positions are relative to the cage's centre.
 pub(super) fn block_sums<T: Copy + Into<f64>>(columns: [&[f32]; 3], part: &[T], centre: Point, first: usize) -> Sums {
     const STRIP: usize = 64;
@@ -96,7 +101,7 @@ pub(super) fn block_sums<T: Copy + Into<f64>>(columns: [&[f32]; 3], part: &[T], 
         let there = [&strip[0][..count], &strip[1][..count], &strip[2][..count]];
         let before = sums.largest;
         strip_sums(here, there, &centre, &mut sums);
-        if sums.largest > before {
+        if exceeds(sums.largest, before) {
             sums.at = first + s * STRIP + largest(here, there, &centre);
         }
     }
@@ -109,7 +114,7 @@ fn largest(decoded: [&[f32]; 3], truth: [&[f64]; 3], centre: &Point) -> usize {
         let error = |k: usize| f64::from((f64::from(decoded[k][i]) + centre[k]) as f32) - truth[k][i];
         (0..3).map(|k| error(k).powi(2)).sum::<f64>()
     };
-    (1..decoded[0].len()).fold(0, |best, i| if squared(i) > squared(best) { i } else { best })
+    (1..decoded[0].len()).fold(0, |best, i| if exceeds(squared(i), squared(best)) { i } else { best })
 }
 
 multiversion! {
@@ -152,7 +157,9 @@ fn strip_sums_generic(decoded: [&[f32]; 3], truth: [&[f64]; 3], centre: &Point, 
     }
     for l in 0..WIDE {
         sums.squared += squared[l];
-        sums.largest = if largest[l] > sums.largest { largest[l] } else { sums.largest };
+        // The sum is NaN where one of its terms is.
+        let largest = if squared[l].is_nan() { f64::NAN } else { largest[l] };
+        sums.largest = if exceeds(largest, sums.largest) { largest } else { sums.largest };
         sums.second += second[l];
         for k in 0..3 {
             sums.first[k] += first[k][l];

@@ -295,6 +295,18 @@ fn block_product<'a>(
     product.as_ref().subrows(0, rows)
 }
 
+/// The columns of a frame in a product, which [`block_product`] makes column by column.
 fn frame_columns(product: MatRef<'_, f32>, frame: usize) -> [&[f32]; 3] {
-    [0, 1, 2].map(|k| product.col(3 * frame + k).try_as_col_major().map_or(&[][..], |c| c.as_slice()))
+    [0, 1, 2].map(|k| product.col(3 * frame + k).try_as_col_major().expect("contiguous columns").as_slice())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[should_panic(expected = "contiguous columns")]
+    fn columns_that_are_not_contiguous_are_not_taken_for_empty_ones() {
+        frame_columns(Mat::zeros(3, 8).transpose(), 0);
+    }
 }

@@ -39,6 +39,8 @@ pub struct Analysis {
     pub(super) spectra: Spectra,
     pub(super) decoder: Decoder,
     pub(super) diagonal: f64,
+    /// See [`Preparing::memory`].
+    pub(super) memory: u64,
     pub(super) preparation: Preparation,
 }
 
@@ -48,8 +50,9 @@ impl Analysis {
     /// # Errors
     /// As [`Solver::prepare`].
     pub fn new(system: &dyn CoordinateSystem, cage: &Cage, points: &[Point]) -> Result<Self, PrepareError> {
-        check(points, system.unknowns(cage), SolverOptions { spectrum: 0, ..SolverOptions::PAPER })?;
-        Self::of(system, cage, points, RequiredDecompositions::Everything, &Preparing::default())
+        let preparing = Preparing::default();
+        check(points, system.unknowns(cage), SolverOptions { spectrum: 0, ..SolverOptions::PAPER }, preparing.memory)?;
+        Self::of(system, cage, points, RequiredDecompositions::Everything, &preparing)
     }
 
     /// As [`Self::new`], computing only what solvers with these handles need. A model of very many points is analysed on a sample.
@@ -63,7 +66,7 @@ impl Analysis {
         options: SolverOptions,
         preparing: &Preparing<'_>,
     ) -> Result<Self, PrepareError> {
-        check(points, system.unknowns(cage), options)?;
+        check(points, system.unknowns(cage), options, preparing.memory)?;
         Self::of(system, cage, points, RequiredDecompositions::For(options.handles), preparing)
     }
 
@@ -75,7 +78,7 @@ impl Analysis {
         options: SolverOptions,
         preparing: &Preparing<'_>,
     ) -> Result<Self, PrepareError> {
-        check(points, system.unknowns(cage), options)?;
+        check(points, system.unknowns(cage), options, preparing.memory)?;
         let tied = system.tied_normals(cage).is_some();
         // An unregularised start is regularised nevertheless, in as many directions as are ill-conditioned.
         let required = if tied {
@@ -147,7 +150,8 @@ impl Analysis {
             None => points.to_vec(),
         };
         let cage = cage.clone();
-        Ok(Self { phi, cage, points, sample, rest, basis, spectra, decoder, diagonal, preparation })
+        let memory = preparing.memory;
+        Ok(Self { phi, cage, points, sample, rest, basis, spectra, decoder, diagonal, memory, preparation })
     }
 
     /// The linear system of a choice of handles with its decomposition, from which solvers with any regularisation follow.
@@ -157,7 +161,7 @@ impl Analysis {
     pub fn handle_system(&self, handles: Handles) -> Result<HandleSystem<'_>, PrepareError> {
         let clock = Instant::now();
         let options = SolverOptions { handles, spectrum: 0, ..SolverOptions::PAPER };
-        check_options(self.phi.nrows(), self.phi.ncols(), options)?;
+        check_options(self.phi.nrows(), self.phi.ncols(), options, self.memory)?;
         let decomposition = Decomposition::new(self.phi.as_ref(), &self.points, &self.basis, &self.spectra, handles)?;
         Ok(HandleSystem::new(self, decomposition, clock.elapsed().as_secs_f64()))
     }

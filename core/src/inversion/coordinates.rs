@@ -1,7 +1,7 @@
 //! Coordinates for an analysis: of all points of a model, or of a sample of a very large one.
 
 use super::PrepareError;
-use super::prepare::{Preparing, coordinates_fit, outside, reject_unreproduced_point, reproduction_error};
+use super::prepare::{Preparing, coordinates_bytes, outside, reject_unreproduced_point, reproduction_error};
 use super::spectra::RequiredDecompositions;
 use crate::cage::Cage;
 use crate::coordinates::{CoordinateSystem, ElementPlan, MeanValue, PointwiseCoordinates, Refinement};
@@ -65,22 +65,20 @@ pub(super) fn coordinates(
     let everything = required == RequiredDecompositions::Everything;
     let copies = if everything { 3 } else { 2 };
     let (m, columns) = (system.unknowns(cage), system.columns(cage));
-    let too_large = |rows: usize| {
-        let gigabytes = (4 + 8 * copies) as f64 * 1e-9 * rows as f64 * columns as f64;
-        PrepareError::OutOfMemory { points: points.len(), unknowns: m, gigabytes }
+    let check_memory = |rows: usize| {
+        let needed = coordinates_bytes(rows, columns, copies);
+        let gigabytes = 1e-9 * needed as f64;
+        let too_large = PrepareError::OutOfMemory { points: points.len(), unknowns: m, gigabytes };
+        if needed > preparing.memory { Err(too_large) } else { Ok(()) }
     };
     let sampled = system
         .pointwise()
         .and_then(|pointwise| Some((pointwise, sample(points, m, required, preparing.analysed_entries)?)));
     if let Some((pointwise, sample)) = sampled {
-        if !coordinates_fit(sample.len(), columns, copies) {
-            return Err(too_large(sample.len()));
-        }
+        check_memory(sample.len())?;
         return of_sample(system, pointwise, cage, points, sample, preparing.stores_coordinates);
     }
-    if !coordinates_fit(points.len(), columns, copies) {
-        return Err(too_large(points.len()));
-    }
+    check_memory(points.len())?;
     let found = system.coordinates(cage, points)?;
     let (mut phi, mut rest) = (found.phi, system.rest_values(cage));
     let worst = reproduction_error(phi.as_ref(), &rest, cage, points);

@@ -111,15 +111,19 @@ impl HandleSystem<'_> {
         if self.decomposition.reads_all { self.analysis.phi.nrows() } else { self.decomposition.handles.len() }
     }
 
-    /// Projects frames, each n × 3 interleaved.
+    /// Projects frames, each n × 3 interleaved: all points of the model, also where a sample of them was analysed.
     ///
     /// # Panics
     /// Where a frame's length does not fit.
     pub fn project(&self, frames: &[&[f64]]) -> ProjectedFrames {
         let phi = self.analysis.phi.as_ref();
-        assert!(frames.iter().all(|f| f.len() == 3 * phi.nrows()), "every frame has every point");
+        assert!(frames.iter().all(|f| f.len() == 3 * self.decoder().points()), "every frame has every point");
         let count = self.rows_read();
-        let point = |i: usize| if self.decomposition.reads_all { i } else { self.decomposition.handles[i] as usize };
+        let sample = self.analysis.sample();
+        let point = |i: usize| {
+            let row = if self.decomposition.reads_all { i } else { self.decomposition.handles[i] as usize };
+            sample.map_or(row, |sample| sample[row] as usize)
+        };
         let read = Mat::from_fn(count, 3 * frames.len(), |i, j| frames[j / 3][3 * point(i) + j % 3]);
         let mean = |j: usize| read.col_as_slice(j).iter().sum::<f64>() / count as f64;
         let means = (0..frames.len()).map(|f| [0, 1, 2].map(|k| mean(3 * f + k))).collect();

@@ -131,7 +131,7 @@ impl<'a> HandleSystem<'a> {
     ) -> Result<(SpectralMap, RegularizationTarget, Option<Arc<Consistent>>), PrepareError> {
         let analysis = self.analysis;
         let m = analysis.phi.ncols();
-        check_options(analysis.phi.nrows(), m, options)?;
+        check_options(analysis.phi.nrows(), m, options, analysis.memory)?;
         let options = without_idle_term(options);
         let tied = analysis.decoder.tied_normals().is_some();
         // Without regularisation the Gauss–Newton steps are held to their start by the small weight of `start_weight` only; the start itself is

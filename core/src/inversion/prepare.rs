@@ -57,7 +57,7 @@ pub struct Preparation {
 }
 
 impl Solver {
-    /// The checks of [`Self::prepare`] that need no computation.
+    /// The checks of [`Self::prepare`] that need no computation; the covariance of handles may take `memory` bytes.
     ///
     /// # Errors
     /// See [`PrepareError`].
@@ -66,8 +66,9 @@ impl Solver {
         cage: &Cage,
         points: &[Point],
         options: SolverOptions,
+        memory: u64,
     ) -> Result<(), PrepareError> {
-        check(points, system.unknowns(cage), options)?;
+        check(points, system.unknowns(cage), options, memory)?;
         reject_far_points(cage, points)?;
         Ok(system.check(cage, points)?)
     }
@@ -115,13 +116,21 @@ pub struct Preparing<'a> {
     /// Largest number of entries of `Φ`, points × unknowns, up to which all points are analysed; of a model with more, a sample is. With eight points per
     /// unknown or fewer all of them always are.
     pub analysed_entries: usize,
+    /// Most bytes that the coordinates, or the covariance of handles, may take; what needs more is refused before any of it is taken.
+    pub memory: u64,
     /// Called with the name of each step before it begins; `Break` ends the preparation with [`PrepareError::Stopped`].
     pub next: &'a dyn Fn(&'static str) -> ControlFlow<()>,
 }
 
 impl Default for Preparing<'_> {
     fn default() -> Self {
-        Self { term: None, stores_coordinates: true, analysed_entries: 1 << 25, next: &|_| ControlFlow::Continue(()) }
+        Self {
+            term: None,
+            stores_coordinates: true,
+            analysed_entries: 1 << 25,
+            memory: 16 << 30,
+            next: &|_| ControlFlow::Continue(()),
+        }
     }
 }
 
@@ -171,7 +180,12 @@ pub(super) fn reject_unreproduced_point(
     Ok(())
 }
 
-pub(super) fn check(points: &[Point], unknowns: usize, options: SolverOptions) -> Result<(), PrepareError> {
+pub(super) fn check(
+    points: &[Point],
+    unknowns: usize,
+    options: SolverOptions,
+    memory: u64,
+) -> Result<(), PrepareError> {
     if let Some(point) = points.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
         return Err(PrepareError::NotFinite { point });
     }
@@ -185,14 +199,14 @@ pub(super) fn check(points: &[Point], unknowns: usize, options: SolverOptions) -
     if !diagonal.is_finite() {
         return Err(PrepareError::TooLarge);
     }
-    check_options(points.len(), unknowns, options)
+    check_options(points.len(), unknowns, options, memory)
 }
 
-/// Checks options for so many points and unknowns.
+/// Checks options for so many points and unknowns, where the covariance of handles may take so many bytes of memory.
 ///
 /// # Errors
 /// Those variants of [`PrepareError`] that concern options.
-pub fn check_options(points: usize, unknowns: usize, options: SolverOptions) -> Result<(), PrepareError> {
+pub fn check_options(points: usize, unknowns: usize, options: SolverOptions, memory: u64) -> Result<(), PrepareError> {
     if options.regularizer.has_threshold() && options.spectrum > unknowns {
         return Err(PrepareError::SpectrumTooLarge { spectrum: options.spectrum, unknowns });
     }
@@ -204,17 +218,17 @@ pub fn check_options(points: usize, unknowns: usize, options: SolverOptions) -> 
         return Err(PrepareError::HandleCount { count, unknowns, points });
     }
     // Their covariance, its factor, and what is solved with it.
-    if matches!(options.handles, Handles::Spread { .. }) && !coordinates_fit(count, 2 * count + 2 * unknowns, 1) {
-        let gigabytes = 8e-9 * count as f64 * (2 * count + 2 * unknowns) as f64;
-        return Err(PrepareError::HandlesOutOfMemory { count, gigabytes });
+    let needed = coordinates_bytes(count, 2 * count + 2 * unknowns, 1);
+    if matches!(options.handles, Handles::Spread { .. }) && needed > memory {
+        return Err(PrepareError::HandlesOutOfMemory { count, gigabytes: 1e-9 * needed as f64 });
     }
     Ok(())
 }
 
-/// Whether the system grants memory for `copies` double-precision matrices n × m.
-pub fn coordinates_fit(points: usize, unknowns: usize, copies: usize) -> bool {
-    let Some(entries) = points.checked_mul(unknowns).and_then(|n| n.checked_mul(copies)) else { return false };
-    Vec::<f64>::new().try_reserve_exact(entries).is_ok()
+/// Bytes of `copies` double-precision matrices n × m. Whoever knows what is free compares them to it: a system that promises more memory than it has
+/// would grant any amount, and end the program where it is used.
+pub fn coordinates_bytes(points: usize, unknowns: usize, copies: usize) -> u64 {
+    [points, unknowns, copies].into_iter().fold(8, |bytes, factor| bytes.saturating_mul(factor as u64))
 }
 
 /// Of the points reported as outside, those that neither lie on the cage nor inside a self-overlapping part of it; and their largest distance to the

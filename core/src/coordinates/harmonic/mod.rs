@@ -68,10 +68,15 @@ impl CoordinateSystem for Harmonic {
         cage.vertices().to_vec()
     }
 
-    fn working_bytes(&self, cage: &Cage) -> u64 {
+    fn working_bytes(&self, cage: &Cage, plan: Option<&ElementPlan>) -> u64 {
         let corners = |t: &[u32; 3]| t.map(|v| cage.vertices()[v as usize]);
         let faces: Vec<[Point; 3]> = cage.mesh().triangles.iter().map(corners).collect();
-        memory::at_most(&faces, cage.vertices().len())
+        let vertices = cage.vertices().len();
+        match plan.map(|plan| plan.read(&faces, vertices)) {
+            None => memory::at_most(&faces, vertices),
+            Some(Ok((unknowns, _))) => memory::needed(&unknowns, vertices),
+            Some(Err(_)) => 0,
+        }
     }
 
     fn check(&self, cage: &Cage, points: &[Point]) -> Result<(), CoordinatesError> {

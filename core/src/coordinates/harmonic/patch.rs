@@ -19,10 +19,12 @@ pub(super) fn damp(mut a: MatMut<'_, f64>, part: f64) {
     }
 }
 
-/// The first of [`DAMPING`] with which a factorisation succeeds, or the given one if it does.
+/// The first of [`DAMPING`], from the given one on, with which a factorisation succeeds.
+///
+/// A plan gives the one that succeeded where it was made. Where a matrix is hardly definite, the rounding of other instructions can make it fail there:
+/// coordinates that are off by about what the larger diagonal changes are better than none.
 pub(super) fn least_damping(given: Option<u8>, mut succeeds: impl FnMut(f64) -> bool) -> Option<u8> {
-    let mut steps = given.map_or(0..=DAMPING.len() as u8 - 1, |given| given..=given);
-    steps.find(|&step| succeeds(DAMPING[usize::from(step)]))
+    (given.unwrap_or(0)..DAMPING.len() as u8).find(|&step| succeeds(DAMPING[usize::from(step)]))
 }
 
 /// Lower Cholesky factor in place.

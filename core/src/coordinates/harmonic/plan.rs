@@ -76,14 +76,18 @@ impl ElementPlan {
         if (count * vertices..8 * bits.len()).any(is_set) {
             return Err("it has bits beyond its end");
         }
-        let of = |v: usize| (0..count).filter(|e| is_set(v * count + e)).map(|e| e as u32).collect();
-        let patches: Vec<Vec<u32>> = (0..vertices).map(of).collect();
-        let size = |patch: &Vec<u32>| -> usize {
-            patch.iter().map(|&e| functions(unknowns.elements[e as usize].degree)).sum()
+        let patch_of = |v: usize| {
+            let (mut patch, mut size) = (Vec::new(), 0);
+            for e in (0..count).filter(|e| is_set(v * count + e)) {
+                size += functions(unknowns.elements[e].degree);
+                if size > PATCH {
+                    return Err("it solves for too many unknowns around a vertex");
+                }
+                patch.push(e as u32);
+            }
+            Ok(patch)
         };
-        if patches.iter().any(|patch| size(patch) > PATCH) {
-            return Err("it solves for too many unknowns around a vertex");
-        }
+        let patches: Vec<Vec<u32>> = (0..vertices).map(patch_of).collect::<Result<_, _>>()?;
         let steps = Steps { damping, turns, patches, patch_damping: patch_damping.to_vec() };
         Ok((unknowns, steps))
     }

@@ -340,3 +340,19 @@ impl Equations<'_> {
         sides
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_matrix_that_the_recorded_damping_leaves_indefinite_takes_more() {
+        // As one that is hardly definite may be where its entries round otherwise.
+        let matrix = Mat::from_fn(2, 2, |i, j| if i == j { 1.0 } else { 1.0 + 1e-5 });
+        let factored = |given| LowSystem::new(matrix.clone(), &single(matrix.as_ref()), given).map(|low| low.damping);
+        assert_eq!(factored(None), Some(1));
+        assert_eq!([0, 1, 3].map(|given| factored(Some(given))), [Some(1), Some(1), Some(3)]);
+        let hopeless = Mat::from_fn(2, 2, |i, j| if i == j { 1.0 } else { 2.0 });
+        assert!(LowSystem::new(hopeless.clone(), &single(hopeless.as_ref()), Some(2)).is_none());
+    }
+}
