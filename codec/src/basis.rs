@@ -17,9 +17,6 @@ const SPLIT: f64 = 1e-3;
 /// Largest change of a coefficient, relative to the largest, by rounding on another machine.
 const STABLE: f64 = 1e-7;
 
-/// Most points whose coordinates are read.
-const SAMPLE: usize = 1 << 14;
-
 /// The coordinates of a cage's rows that bytes hold.
 #[derive(Clone, Debug)]
 pub struct CageBasis {
@@ -32,6 +29,9 @@ pub struct CageBasis {
 }
 
 impl CageBasis {
+    /// Most points whose coordinates are read.
+    pub const SAMPLE: usize = 1 << 14;
+
     /// For a model in its cage: from every k-th point, with the smallest k that leaves 16,384 of them; and the coordinates of these. `rotated` is what the
     /// encoder found; an encoder leaves it out. `None` where numbers are not finite.
     ///
@@ -44,7 +44,7 @@ impl CageBasis {
         plan: Option<&ElementPlan>,
         rotated: Option<bool>,
     ) -> Result<Option<(Self, Coordinates)>, CoordinatesError> {
-        let every = points.len().div_ceil(SAMPLE).max(1);
+        let every = points.len().div_ceil(Self::SAMPLE).max(1);
         let sample: Vec<Point> = points.iter().step_by(every).copied().collect();
         let found = match plan {
             Some(plan) => system.coordinates_by_plan(cage, &sample, plan)?,

@@ -94,7 +94,11 @@ pub fn decode_cages(basis: &CageBasis, frames: usize, bytes: &[u8]) -> Result<Ve
     let values = Mat::from_fn(count, 3 * rows, |k, value| f64::from(whole[k * 3 * rows + value]) * step);
     let motion = linear::product(trajectories.values().as_ref(), values.as_ref());
     let y = Mat::from_fn(rows, 3 * frames, |j, column| motion[(column / 3, 3 * j + column % 3)]);
-    Ok(basis.inverse(y.as_ref()))
+    let cages = basis.inverse(y.as_ref());
+    if cages.iter().flatten().any(|x| !x.is_finite()) {
+        return Err(Error::Damaged("a group of cages is not finite"));
+    }
+    Ok(cages)
 }
 
 /// Whether bytes of [`encode_cages`] are in a rotated basis.
@@ -222,14 +226,25 @@ mod tests {
         let (basis, cages) = (basis(20), cages(20, 30));
         let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
         let bytes = encode_cages(&basis, &views, 1e-4, Neighbours::default()).unwrap();
+        let mut refused = 0;
+        let mut check = |bytes: &[u8]| match decode_cages(&basis, 30, bytes) {
+            Err(_) => refused += 1,
+            Ok(cages) => {
+                assert!(cages.len() == 30 && cages.iter().all(|cage| cage.len() == 60));
+                assert!(cages.iter().flatten().all(|x| x.is_finite()), "a cage is not finite");
+            }
+        };
         for cut in 0..bytes.len() {
-            let _ = decode_cages(&basis, 30, &bytes[..cut]);
+            check(&bytes[..cut]);
         }
         for at in 0..bytes.len() {
-            let mut damaged = bytes.clone();
-            damaged[at] ^= 0x5a;
-            let _ = decode_cages(&basis, 30, &damaged);
+            for flip in [0x5a, 0x80, 0x7f] {
+                let mut damaged = bytes.clone();
+                damaged[at] ^= flip;
+                check(&damaged);
+            }
         }
+        assert!(refused > 20, "{refused}");
         assert!(decode_cages(&basis, 30, &bytes[..5]).is_err());
         assert!(decode_cages(&basis, MOST_FRAMES + 1, &bytes).is_err());
         let nan = vec![f32::NAN; 60];

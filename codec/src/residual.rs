@@ -22,6 +22,10 @@ const HEAD: usize = 22;
 const PARTED: u16 = 1 << 15;
 /// Fewest numbers in two parts: of fewer, models of their own take more than is gained by coding both at once.
 const PARTED_NUMBERS: usize = 1 << 18;
+/// Sums and corrections beyond this have no positions in single precision.
+const LARGEST: f64 = 1e38;
+/// Largest step of corrections, which are up to 2³¹ of them.
+const LARGEST_CORRECTION: f64 = LARGEST / (1u64 << 31) as f64;
 /// Points that one task adds up.
 const BLOCK: usize = 2048;
 
@@ -180,7 +184,7 @@ impl Residual {
             (0, rest)
         };
         let too_many = count > frames.min(3 * points) || (3 * points).saturating_mul(count) > most;
-        let impossible = too_many || [step, correction].iter().any(|x| !x.is_finite());
+        let impossible = too_many || !step.is_finite() || !(correction.abs() <= LARGEST_CORRECTION);
         let parts =
             rest.split_at_checked(coarse).and_then(|(coarse, rest)| Some((coarse, rest.split_at_checked(fine)?)));
         let Some((coarse, (fine, corrected))) = parts.filter(|_| !impossible) else {
@@ -197,6 +201,10 @@ impl Residual {
             done.next().into_iter().for_each(|k| residual.set(k, hierarchy, &component.found, step));
         });
         coders.iter().try_for_each(Decoder::check)?;
+        // Written so that NaN is an error.
+        if !(residual.largest_sum() <= LARGEST) {
+            return Err(Error::Damaged("a residual is too large for numbers of single precision"));
+        }
         residual.corrections = Corrections::decode(corrected, frames, points, correction)?;
         Ok(residual)
     }
@@ -235,12 +243,16 @@ impl Residual {
 
     /// How far two machines that add in single precision can be apart, about: two units in the last place of the largest sum of sizes.
     fn rounding(&self) -> f64 {
+        2.0 * f64::from(f32::EPSILON) * self.largest_sum()
+    }
+
+    /// The largest sum of sizes, or more.
+    fn largest_sum(&self) -> f64 {
         let sizes = Mat::from_fn(self.trajectories.ncols(), 2, |k, which| {
             let largest = |column: faer::ColRef<'_, f32>| column.iter().fold(0.0f32, |most, x| most.max(x.abs()));
             if which == 0 { largest(self.trajectories.col(k)) } else { largest(self.values.col(k)) }
         });
-        let sum: f64 = (0..sizes.nrows()).map(|k| f64::from(sizes[(k, 0)]) * f64::from(sizes[(k, 1)])).sum();
-        2.0 * f64::from(f32::EPSILON) * sum
+        (0..sizes.nrows()).map(|k| f64::from(sizes[(k, 0)]) * f64::from(sizes[(k, 1)])).sum()
     }
 
     /// Number of positions that are corrected one by one.
@@ -380,14 +392,27 @@ mod tests {
             most_numbers: usize::MAX,
         };
         let bytes = encode_residual(&hierarchy, &group).unwrap();
+        let mut refused = 0;
+        let mut check = |bytes: &[u8]| match Residual::decode(&hierarchy, 6, bytes, usize::MAX) {
+            Err(_) => refused += 1,
+            Ok(residual) => {
+                let mut positions = of_cages.clone();
+                residual.add(0, &mut positions);
+                assert!(residual.corrected() <= 6 * 64);
+                assert!(positions.iter().flatten().all(|x| x.is_finite()), "a position is not finite");
+            }
+        };
         for cut in 0..bytes.len() {
-            let _ = Residual::decode(&hierarchy, 6, &bytes[..cut], usize::MAX);
+            check(&bytes[..cut]);
         }
         for at in 0..bytes.len() {
-            let mut damaged = bytes.clone();
-            damaged[at] ^= 0xa5;
-            let _ = Residual::decode(&hierarchy, 6, &damaged, usize::MAX);
+            for flip in [0xa5, 0x80, 0x7f] {
+                let mut damaged = bytes.clone();
+                damaged[at] ^= flip;
+                check(&damaged);
+            }
         }
+        assert!(refused > 20, "{refused}");
         assert!(Residual::decode(&hierarchy, MOST_FRAMES + 1, &bytes, usize::MAX).is_err());
     }
 }

@@ -3,30 +3,28 @@
 #![allow(unsafe_code)] // An allocator that counts.
 
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
+use std::sync::atomic::{AtomicIsize, Ordering::Relaxed};
 
-thread_local! {
-    // Of each thread alone, as tests may run side by side.
-    static LIVE: Cell<isize> = const { Cell::new(0) };
-    static PEAK: Cell<isize> = const { Cell::new(0) };
-}
+// Of all threads together: a reader that works on several holds what all of them hold.
+static LIVE: AtomicIsize = AtomicIsize::new(0);
+static PEAK: AtomicIsize = AtomicIsize::new(0);
 
-/// What `f` gives, and the most bytes of the heap that it held at one time.
+/// What `f` gives, and the most bytes of the heap that were held at one time beside what was held before, on any thread. Whatever else goes on in the
+/// process counts too.
 pub fn peak_of<T>(f: impl FnOnce() -> T) -> (T, usize) {
-    let before = LIVE.get();
-    PEAK.set(before);
+    let before = LIVE.load(Relaxed);
+    PEAK.store(before, Relaxed);
     let value = f();
-    (value, usize::try_from(PEAK.get() - before).unwrap_or(0))
+    (value, usize::try_from(PEAK.load(Relaxed) - before).unwrap_or(0))
 }
 
 struct Counting;
 
 fn count(bytes: isize) {
-    // A thread that is ending has no counters any more.
-    let _ = LIVE.try_with(|live| {
-        live.set(live.get() + bytes);
-        let _ = PEAK.try_with(|peak| peak.set(peak.get().max(live.get())));
-    });
+    let live = LIVE.fetch_add(bytes, Relaxed) + bytes;
+    if bytes > 0 {
+        PEAK.fetch_max(live, Relaxed);
+    }
 }
 
 // SAFETY: everything is passed on to the system's allocator unchanged.

@@ -2,6 +2,7 @@
 
 use cager_fuzz::{TARGETS, Target, mutate};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Long for a reader of 64 KiB, even on a busy machine.
@@ -22,7 +23,11 @@ fn check(target: &Target, bytes: &[u8], what: &str) {
     );
 }
 
+/// One target at a time: the memory of all threads is counted together.
+static ALONE: Mutex<()> = Mutex::new(());
+
 fn short(name: &str, rounds: u64) {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let target = Target::find(name).expect("a target of this name");
     let seeds = (target.seeds)();
     for (k, seed) in seeds.iter().enumerate() {

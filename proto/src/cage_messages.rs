@@ -96,8 +96,11 @@ pub struct CageStage {
     pub vertices: u32,
     /// Errors after it.
     pub error: CageError,
-    /// Condition number of the coordinates after it; null where it is infinite.
+    /// Condition number of the coordinates after it; null where they are singular, and where it was not computed.
     pub condition_number: Option<f64>,
+    /// Whether the coordinates were singular after it.
+    #[serde(default)]
+    pub singular: bool,
     /// Seconds since the design began.
     pub seconds: f64,
 }

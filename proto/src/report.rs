@@ -265,9 +265,12 @@ pub struct StageReport {
     pub designed_error: f64,
     /// Error after it on frames that it does not see.
     pub held_back_error: f64,
-    /// Condition number of the coordinates after it; absent where it is beyond all bounds.
+    /// Condition number of the coordinates after it; absent where they are singular, and where it was not computed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub condition_number: Option<f64>,
+    /// Whether the coordinates were singular after it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub singular: bool,
     /// Seconds since the design began.
     pub seconds: f64,
 }

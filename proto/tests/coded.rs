@@ -8,7 +8,7 @@ use cager_codec::{
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_core::mesh::{Model, Polygons, TriMesh};
-use cager_proto::container::{ContainerReader, ContainerWriter, group_frames};
+use cager_proto::container::{ContainerReader, ContainerWriter, Error, group_frames};
 use std::io::Cursor;
 use support::{frame, header, put_together, read_all, small_model, take_apart, tetrahedron};
 
@@ -64,6 +64,19 @@ fn groups_come_back_in_any_order() {
     let rest = reader.rest().unwrap();
     assert_eq!(rest.points.len(), small_model().points.len());
     assert_eq!(group_frames(100_000_000, 4), 1);
+}
+
+#[test]
+fn coordinates_that_take_more_than_they_may_are_refused_before_they_take_it() {
+    let (bytes, cages) = coded();
+    let mut reader = ContainerReader::open(Cursor::new(&bytes)).unwrap();
+    reader.limit_coordinates(1000);
+    let mut found = Vec::new();
+    let error = reader.read_frame(0, &mut found).unwrap_err();
+    assert!(matches!(error, Error::Memory { needed, most: 1000 } if needed > 1000), "{error}");
+    reader.limit_coordinates(1 << 20);
+    reader.read_frame(0, &mut found).unwrap();
+    assert_eq!(found, cages[0]);
 }
 
 #[test]

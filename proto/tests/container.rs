@@ -282,8 +282,10 @@ fn frame_of_another_length_or_with_nan_is_refused_by_number_and_leaves_the_rest_
 
 #[test]
 fn meshes_that_no_reader_would_take_are_not_written() {
-    let refused = |rows, rest: &Model, cage: &TriMesh| {
-        ContainerWriter::new(Vec::new(), &header(rows), rest, cage).err().map(|e| e.to_string()).unwrap_or_default()
+    let refused = |rows, rest: &Model, cage: &TriMesh| match ContainerWriter::new(Vec::new(), &header(rows), rest, cage)
+    {
+        Err(error @ Error::Invalid(_)) => error.to_string(),
+        other => panic!("{:?}", other.err()),
     };
     let (rest, cage) = (small_model(), tetrahedron());
     assert_eq!(refused(0, &rest, &cage), "cannot be stored: a frame without rows");
@@ -296,6 +298,16 @@ fn meshes_that_no_reader_would_take_are_not_written() {
     let mut long = header(4);
     long.regularizer = "x".repeat(70_000);
     assert!(matches!(ContainerWriter::new(Vec::new(), &long, &rest, &cage), Err(Error::TooLarge(_))));
+}
+
+#[test]
+fn what_readers_would_refuse_is_not_called_too_large() {
+    let mut writer = ContainerWriter::new(Vec::new(), &header(4), &small_model(), &tetrahedron()).unwrap();
+    writer.write_frame(&support::frame(0, 4), 0.0, 0.0).unwrap();
+    let error = writer.write_group(&[0], None, &[(0.0, 0.0)]).unwrap_err();
+    assert!(matches!(&error, Error::Invalid(what) if what.contains("after single ones")), "{error}");
+    let error = writer.add_frame_numbers(&[2.0, 1.0]).unwrap_err();
+    assert!(matches!(&error, Error::Invalid(what) if what.contains("ascending")), "{error}");
 }
 
 #[test]

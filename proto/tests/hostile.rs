@@ -127,6 +127,22 @@ fn small_payload_that_declares_a_huge_section_takes_no_memory() {
 }
 
 #[test]
+fn small_file_that_counts_many_frames_takes_no_memory() {
+    let frames = 1 << 27;
+    let mut parts = support::take_apart(&small_container());
+    for part in &mut parts {
+        match &part.tag {
+            b"FRAM" => (part.frames, part.raw_bytes) = ((0, frames), 12 * 4 * u64::from(frames)),
+            b"ERRS" => part.raw_bytes = 8 * u64::from(frames),
+            _ => {}
+        }
+    }
+    let (result, peak) = peak_of(|| read_all(&put_together(&parts)));
+    assert!(result.unwrap_err().to_string().contains("more frames than it can hold"));
+    assert!(peak < 1 << 20, "{peak} bytes");
+}
+
+#[test]
 fn payload_that_expands_beyond_its_declaration_is_refused_early() {
     let payload = zstd::bulk::compress(&vec![0; 32 << 20], 3).unwrap();
     let bytes = with_points(1, planes(*b"RPTS", &payload, 12));

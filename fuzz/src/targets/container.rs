@@ -33,10 +33,13 @@ pub(super) const CONTAINER: Target = Target {
         "laplacian",
         "null",
     ],
-    // What `docs/FORMAT.md` allows a reader, and 1 MiB for all that is not the file's.
-    fixed: (64 << 20) + (1 << 20),
-    per_byte: 256,
+    // What `docs/FORMAT.md` allows a reader, its coordinates, and 1 MiB for all that is not the file's.
+    fixed: (512 << 20) + COORDINATES as usize + (1 << 20),
+    per_byte: 512,
 };
+
+/// Bytes that the coordinates may take.
+const COORDINATES: u64 = 16 << 20;
 
 const PRELUDE: usize = 16;
 const SECTION: usize = 40;
@@ -121,6 +124,7 @@ fn run(mut bytes: &[u8]) {
         fix(&mut file, mode & 2 != 0);
     }
     let Ok(mut reader) = ContainerReader::open(Cursor::new(&file)) else { return };
+    reader.limit_coordinates(COORDINATES);
     reader.sections();
     let frames = reader.frames();
     let rows = reader.header().rows_per_frame as usize;

@@ -130,6 +130,12 @@ impl<R: Read + Seek> ContainerReader<R> {
             return Err(corrupt(format!("a frame has {} rows", header.rows_per_frame)));
         }
         let plan = self.elements()?.map(ElementPlan::from_bytes);
+        // Computed before any of it is taken.
+        let needed =
+            system.working_bytes(&cage, plan.as_ref()).saturating_add(basis_bytes(system, &cage, points.len()));
+        if needed > self.coordinates_bytes {
+            return Err(Error::Memory { needed, most: self.coordinates_bytes });
+        }
         Ok(Binding { system, cage, points, plan, offset })
     }
 
@@ -152,6 +158,8 @@ impl<R: Read + Seek> ContainerReader<R> {
             None => None,
         };
         let most = most_residual_numbers(self.file_bytes);
+        // Two of them would be more than a reader may take.
+        self.groups.residuals.clear();
         let (basis, residual) = rayon::join(
             || binding.basis(rotated),
             || {
@@ -259,6 +267,13 @@ impl<R: Read + Seek> ContainerReader<R> {
         }
         Ok(())
     }
+}
+
+/// Bytes that computing a basis takes: the coordinates of its points twice, as they are and as a part of them, and ten matrices of the rows.
+fn basis_bytes(system: &dyn CoordinateSystem, cage: &Cage, points: usize) -> u64 {
+    let (columns, rows) = (system.columns(cage) as u64, system.unknowns(cage) as u64);
+    let sampled = points.min(CageBasis::SAMPLE) as u64;
+    80 * rows * rows + 16 * sampled * columns
 }
 
 /// Most numbers of a residual that is decoded before it is asked for: all of any group that this program writes.

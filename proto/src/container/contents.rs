@@ -103,6 +103,10 @@ impl<R: Read + Seek> ContainerReader<R> {
                 return Err(Error::corrupt(last.offset, "a residual is not followed by its frames"));
             }
         }
+        // Whoever lists frames takes memory for each before any is read.
+        if 8 * self.frames as u64 > SectionHeader::most_raw_bytes(tag::ERRORS, codec::RAW, self.file_bytes) {
+            return Err(Error::corrupt(0, "the file counts more frames than it can hold"));
+        }
         let most_faces = usize::from(self.header.rest_faces > 0);
         if most_faces == 0 && self.header.rest_corners > 0 {
             return Err(Error::corrupt(0, "the header counts corners of a model without faces".to_owned()));

@@ -42,6 +42,17 @@ pub enum Error {
     /// Too large for the format.
     #[error("cannot be stored: {0}")]
     TooLarge(String),
+    /// What readers would refuse of any size: a mesh, frame numbers, groups beside single frames, a report.
+    #[error("cannot be stored: {0}")]
+    Invalid(String),
+    /// Coordinates that cages are coded by, and that would take more memory than they may.
+    #[error("needs {:.1} GB of memory for its coordinates, where {:.1} GB may be taken; read it where there is more", 1e-9 * *.needed as f64, 1e-9 * *.most as f64)]
+    Memory {
+        /// Bytes that they would take.
+        needed: u64,
+        /// Bytes that they may take, see [`limit_coordinates`](super::ContainerReader::limit_coordinates).
+        most: u64,
+    },
     /// The operating system refused.
     #[error("{0}")]
     Io(#[from] io::Error),

@@ -24,6 +24,9 @@ pub struct SectionInfo {
     pub raw_bytes: u64,
 }
 
+/// Bytes that coordinates may take where nobody says otherwise: as many as those that were solved for when a file was written.
+const COORDINATES_BYTES: u64 = 16 << 30;
+
 /// Reads a container from any seekable input.
 pub struct ContainerReader<R: Read + Seek> {
     input: R,
@@ -38,6 +41,8 @@ pub struct ContainerReader<R: Read + Seek> {
     /// The chunk decoded last, by its offset.
     cached: Option<(u64, Vec<u8>)>,
     pub(super) groups: Groups,
+    /// Most bytes that the coordinates which coded cages need may take.
+    pub(super) coordinates_bytes: u64,
     /// The last chunk that [`Self::is_intact`] could not read.
     damaged_chunk: Option<usize>,
 }
@@ -110,8 +115,15 @@ impl<R: Read + Seek> ContainerReader<R> {
             rest: None,
             cached: None,
             groups: Groups::default(),
+            coordinates_bytes: COORDINATES_BYTES,
             damaged_chunk: None,
         })
+    }
+
+    /// Sets how many bytes the coordinates that coded cages need may take, 16 GiB unless it is called. Everything else that reading takes follows from the
+    /// length of the file, see `docs/FORMAT.md`.
+    pub fn limit_coordinates(&mut self, bytes: u64) {
+        self.coordinates_bytes = bytes;
     }
 
     /// What a decoder must know.

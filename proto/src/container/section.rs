@@ -64,8 +64,8 @@ impl SectionHeader {
         }
     }
 
-    /// Most bytes that a section may decode to in a file of this length; what else a reader builds from them keeps its
-    /// memory below 64 MiB and 256 times the file.
+    /// Most bytes that a section may decode to in a file of this length, so that what a reader builds from all of them keeps to the bound of
+    /// `docs/FORMAT.md`.
     pub(crate) fn most_raw_bytes(tag: [u8; 4], codec: u8, file_bytes: u64) -> u64 {
         let (times, more) = match tag {
             tag::HEADER => return HEADER_LIMIT as u64,

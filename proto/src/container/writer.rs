@@ -137,7 +137,7 @@ impl<W: Write> ContainerWriter<W> {
             return Err(Error::BadFrame { frame, what: format!("cage vertex {} is not finite", k / 3) });
         }
         if frame >= u32::MAX as usize {
-            return Err(Error::TooLarge("a file holds at most 4,294,967,295 frames".to_owned()));
+            return Err(too_many_frames());
         }
         self.pending.extend(cage.iter().flat_map(|x| x.to_le_bytes()));
         self.pending_frames += 1;
@@ -154,8 +154,11 @@ impl<W: Write> ContainerWriter<W> {
     pub fn write_group(&mut self, cages: &[u8], residual: Option<&[u8]>, errors: &[(f32, f32)]) -> Result<(), Error> {
         let first = (self.errors.len() / 8) as u32;
         let frames = (first, errors.len() as u32);
-        if first.checked_add(frames.1).is_none() || self.pending_frames > 0 {
-            return Err(Error::TooLarge("a file holds at most 4,294,967,295 frames".to_owned()));
+        if first.checked_add(frames.1).is_none() {
+            return Err(too_many_frames());
+        }
+        if first > 0 && !self.is_coded {
+            return Err(Error::Invalid("a group of frames after single ones; write all frames in groups".to_owned()));
         }
         self.is_coded = true;
         // Before the cages, so that cages that are there have all that belongs to them.
@@ -176,7 +179,7 @@ impl<W: Write> ContainerWriter<W> {
     /// Numbers that readers would refuse; an output that refuses.
     pub fn add_frame_numbers(&mut self, numbers: &[f64]) -> Result<(), Error> {
         if numbers.len() != self.errors.len() / 8 || !super::are_frame_numbers(numbers) {
-            return Err(Error::TooLarge("frame numbers that are not one for each frame, ascending".to_owned()));
+            return Err(Error::Invalid("frame numbers that are not one for each frame, ascending".to_owned()));
         }
         if counted_from_zero(numbers) {
             return Ok(());
@@ -194,7 +197,7 @@ impl<W: Write> ContainerWriter<W> {
         self.flush_chunk()?;
         self.write_errors()?;
         if let Some(report) = report {
-            let text = report.stored().map_err(|e| Error::TooLarge(e.to_string()))?;
+            let text = report.stored().map_err(|e| Error::Invalid(e.to_string()))?;
             self.section(tag::REPORT, PLANES, 1, 0, &text)?;
         }
         let contents_offset = self.offset;
@@ -307,10 +310,14 @@ impl<W: Write> ContainerWriter<W> {
     }
 }
 
+fn too_many_frames() -> Error {
+    Error::TooLarge("a file holds at most 4,294,967,295 frames".to_owned())
+}
+
 /// Refuses what a reader would refuse, so that a file that was written can be read.
 fn check(header: &Header, rest: &Model, cage: &TriMesh) -> Result<(), Error> {
     if header.rows_per_frame == 0 {
-        return Err(Error::TooLarge("a frame without rows".to_owned()));
+        return Err(Error::Invalid("a frame without rows".to_owned()));
     }
     let meshes: [(&str, &[Point], &[u32]); 2] =
         [("model", &rest.points, rest.faces.indices()), ("cage", &cage.vertices, cage.triangles.as_flattened())];
@@ -319,10 +326,10 @@ fn check(header: &Header, rest: &Model, cage: &TriMesh) -> Result<(), Error> {
             return Err(Error::TooLarge(format!("the {name} has more than 4,294,967,295 points")));
         }
         if let Some(k) = points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
-            return Err(Error::TooLarge(format!("point {k} of the {name} is not finite")));
+            return Err(Error::Invalid(format!("point {k} of the {name} is not finite")));
         }
         if let Some(k) = indices.iter().find(|&&k| k as usize >= points.len()) {
-            return Err(Error::TooLarge(format!("a face of the {name} names point {k} of {}", points.len())));
+            return Err(Error::Invalid(format!("a face of the {name} names point {k} of {}", points.len())));
         }
     }
     Ok(())
