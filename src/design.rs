@@ -24,7 +24,8 @@ pub(crate) fn report(design: &Design, options: &DesignOptions, frames: usize) ->
         vertices: stage.vertices,
         designed_error: stage.designed,
         held_back_error: stage.held_back,
-        condition_number: Some(stage.condition_number).filter(|c| c.is_finite()),
+        condition_number: stage.condition_number.filter(|condition| condition.is_finite()),
+        singular: stage.condition_number == Some(f64::INFINITY),
         seconds: stage.seconds,
     });
     of_stages(stages.collect(), options, frames, design.timed_out)
@@ -38,6 +39,7 @@ pub(crate) fn report_of_job(job: &CageJob, options: &DesignOptions) -> DesignRep
         designed_error: stage.error.designed.unwrap_or(0.0),
         held_back_error: stage.error.held_back.unwrap_or(0.0),
         condition_number: stage.condition_number,
+        singular: stage.singular,
         seconds: stage.seconds,
     });
     of_stages(stages.collect(), options, job.sampled_frames as usize, job.timed_out)

@@ -1,7 +1,7 @@
 //! Queries against direct sums over all faces.
 
 use cager_cages::geometry::distance::{closest_on_segments, closest_on_triangle, segment_segment2};
-use cager_cages::geometry::{GeneralizedWinding, Surface, outside, self_intersections};
+use cager_cages::geometry::{GeneralizedWinding, Surface, outside, self_intersections, triangles_intersect};
 use cager_core::mesh::{Point, TriMesh, distance_to_surface, winding_number};
 use glam::DVec3;
 
@@ -89,12 +89,18 @@ fn meshes_that_cut_touch_or_fold_are_found() {
     let mut two = sphere([0.0; 3], 1.0, 10);
     assert!(self_intersections(&two).is_empty());
     let other = sphere([1.5, 0.1, 0.05], 1.0, 10);
-    let shift = two.vertices.len() as u32;
+    let (shift, first) = (two.vertices.len() as u32, two.triangles.len() as u32);
     two.vertices.extend(&other.vertices);
     two.triangles.extend(other.triangles.iter().map(|t| t.map(|v| v + shift)));
     let pairs = self_intersections(&two);
     assert!(!pairs.is_empty() && pairs.is_sorted());
-    assert!(pairs.iter().all(|p| (p[0] < 400) != (p[1] < 400) || p[0] / 400 != p[1] / 400 || p[0] < p[1]));
+    assert!(pairs.iter().all(|p| p[0] < first && p[1] >= first), "a sphere does not cut itself");
+    let corners = |f: u32| two.triangles[f as usize].map(|v| DVec3::from(two.vertices[v as usize]));
+    let faces = two.triangles.len() as u32;
+    let every = (0..faces).flat_map(|f| (f + 1..faces).map(move |g| [f, g]));
+    let wanted: Vec<[u32; 2]> =
+        every.filter(|pair| triangles_intersect(pair.map(|f| two.triangles[f as usize]), pair.map(corners))).collect();
+    assert_eq!(pairs, wanted);
 
     let flat = |corners: &[Point], triangles: &[[u32; 3]]| {
         self_intersections(&TriMesh { vertices: corners.to_vec(), triangles: triangles.to_vec() }).len()

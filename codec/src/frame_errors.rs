@@ -68,10 +68,18 @@ mod tests {
             assert!(a.is_nan() && b.is_nan() || a <= b && b - a <= b / 2048.0, "{a} {b}");
         }
         assert!(decode_errors(&bytes, 100_000).is_err());
+        let mut refused = 0;
         for at in 0..bytes.len() {
             let mut damaged = bytes.clone();
             damaged[at] ^= 0x5a;
-            let _ = decode_errors(&damaged, errors.len());
+            match decode_errors(&damaged, errors.len()) {
+                Ok(found) => {
+                    assert_eq!(found.len(), errors.len());
+                    assert!(found.iter().flatten().all(|x| x.is_nan() || *x >= 0.0), "an error below 0");
+                }
+                Err(_) => refused += 1,
+            }
         }
+        assert!(refused > 0);
     }
 }

@@ -268,8 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn hubs_and_vertices_alone_take_no_longer_than_others() {
-        let begin = std::time::Instant::now();
+    fn hubs_and_vertices_alone_have_their_places() {
         let (leaves, clique) = (500_000u32, 300);
         let mut faces = Polygons::new();
         (0..leaves).for_each(|k| faces.push(&[0, 2 * k + 1, 2 * k + 2]));
@@ -278,6 +277,7 @@ mod tests {
         let points = (first + clique + 500_000) as usize;
         let hierarchy = Hierarchy::new(&faces, points);
         assert_eq!(hierarchy.points(), points);
-        assert!(begin.elapsed().as_secs() < 10, "{:?}", begin.elapsed());
+        let before = |place: usize| hierarchy.parents(place).iter().all(|&parent| (parent as usize) < place);
+        assert!((0..points).all(before), "a vertex is predicted from one that follows it");
     }
 }

@@ -194,7 +194,8 @@ fn finished(designed: &Design, best: &Best, sampled: usize, told: Option<f64>, c
             name: stage.name.clone(),
             vertices: stage.vertices as u32,
             error: CageError { designed: finite(stage.designed), held_back: finite(stage.held_back) },
-            condition_number: finite(stage.condition_number),
+            condition_number: stage.condition_number.and_then(finite),
+            singular: stage.condition_number == Some(f64::INFINITY),
             seconds: stage.seconds,
         })
         .collect();

@@ -103,8 +103,8 @@ pub struct Stage {
     pub designed: f64,
     /// The same on the frames that it does not see.
     pub held_back: f64,
-    /// Condition number of the coordinates after it.
-    pub condition_number: f64,
+    /// Condition number of the coordinates after it, infinite where they are singular; `None` where it was not computed.
+    pub condition_number: Option<f64>,
     /// Seconds since the design began.
     pub seconds: f64,
 }

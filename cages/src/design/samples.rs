@@ -94,17 +94,15 @@ impl Samples {
         }
     }
 
-    /// Condition number of the coordinates of the validation points; infinite where it is not defined, and for large cages, where it would take too
-    /// long.
-    pub(super) fn condition_number(&self, cage: &Cage) -> f64 {
+    /// Condition number of the coordinates of the validation points, infinite where they are singular; `None` for large cages, where it would take too
+    /// long, and where it does not converge.
+    pub(super) fn condition_number(&self, cage: &Cage) -> Option<f64> {
         if cage.vertices().len() > LARGE {
-            return f64::INFINITY;
+            return None;
         }
         let phi = MeanValue.smooth_coordinates(cage, &self.validation_points);
-        match gram(phi.as_ref()).self_adjoint_eigenvalues(faer::Side::Lower) {
-            Ok(values) if values[0] > 0.0 => (values[values.len() - 1] / values[0]).sqrt(),
-            _ => f64::INFINITY,
-        }
+        let squares = gram(phi.as_ref()).self_adjoint_eigenvalues(faer::Side::Lower).ok()?;
+        Some(if squares[0] > 0.0 { (squares[squares.len() - 1] / squares[0]).sqrt() } else { f64::INFINITY })
     }
 }
 
