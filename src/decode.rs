@@ -9,7 +9,7 @@ use cager_core::coordinates::{Coordinates, CoordinatesError, ElementPlan, suppor
 use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, PrepareError, coordinates_bytes, reject_far_points};
 use cager_core::mesh::{Model, Point};
-use cager_formats::{Action, FrameOptions, FrameRange, Target, create_frames};
+use cager_formats::{Action, FrameOptions, FrameRange, Signature, Target, create_frames};
 use cager_proto::container::{self, ContainerReader};
 use std::fs::File;
 use std::io::BufReader;
@@ -132,7 +132,10 @@ fn open_with(
     if file.metadata().is_ok_and(|m| m.is_dir()) {
         return Err(fail(container::Error::NotAContainer));
     }
-    read(BufReader::new(file)).map_err(fail)
+    read(BufReader::new(file)).map_err(|cause| match Signature::error_of_other("cager", path) {
+        Some(other) if matches!(cause, container::Error::NotAContainer) => other.into(),
+        _ => fail(cause),
+    })
 }
 
 /// What to decode, if not all frames of the container with its own model and cages.

@@ -9,6 +9,7 @@ pub mod frames;
 mod matrix;
 pub mod mesh;
 mod natural;
+mod signature;
 mod text;
 
 pub use atomic::{AtomicDir, AtomicFile, ScratchDir, Target, commit_together, remove_temporaries};
@@ -18,4 +19,5 @@ pub use frames::{
     frames_path, missing_frames, open_frames, open_frames_bytes, open_frames_in, open_selected_frames,
 };
 pub use matrix::{read_matrix, read_matrix_bytes};
-pub use mesh::{MeshFormat, model_bytes, obj_bytes, read_model, read_model_bytes, write_model};
+pub use mesh::{MeshFormat, model_bytes, obj_bytes, read_model, read_model_bytes, read_model_with_note, write_model};
+pub use signature::Signature;

@@ -1,6 +1,7 @@
 //! Matrix Market exchange format, coordinate (Boisvert, Pozo and Remington 1996): sparse matrices as text.
 
 use crate::error::{Error, Fault};
+use crate::signature::Signature;
 use crate::text::{Lines, integer, number, quoted, words};
 use cager_core::regularize::SparseMatrix;
 use std::path::Path;
@@ -23,7 +24,7 @@ pub fn read_matrix(path: impl AsRef<Path>) -> Result<SparseMatrix, Error> {
 /// # Errors
 /// As [`read_matrix`].
 pub fn read_matrix_bytes(name: &Path, bytes: &[u8]) -> Result<SparseMatrix, Error> {
-    read(bytes).map_err(|fault| fault.at(name))
+    read(bytes).map_err(|fault| Signature::other_than("mtx", bytes).map_or(fault, Fault::damaged).at(name))
 }
 
 /// What the first line says.

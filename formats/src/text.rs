@@ -8,6 +8,8 @@ pub(crate) struct Lines<'a> {
     rest: &'a [u8],
     separator: u8,
     number: usize,
+    /// Whether the last line that was returned has an end.
+    ended: bool,
 }
 
 impl<'a> Lines<'a> {
@@ -19,12 +21,17 @@ impl<'a> Lines<'a> {
             Some((b'\r', next)) if next != Some(&b'\n') => b'\r',
             _ => b'\n',
         };
-        Self { rest: bytes, separator, number: 0 }
+        Self { rest: bytes, separator, number: 0, ended: true }
     }
 
     /// What follows the last line that was returned.
     pub(crate) fn rest(&self) -> &'a [u8] {
         self.rest
+    }
+
+    /// Whether the last line that was returned is the file's last, without an end: such a file may have been cut.
+    pub(crate) fn is_cut(&self) -> bool {
+        self.rest.is_empty() && !self.ended
     }
 
     /// Number of the last line that was returned.
@@ -44,6 +51,7 @@ impl<'a> Iterator for Lines<'a> {
         let line = &self.rest[..end.unwrap_or(self.rest.len())];
         self.rest = end.map_or(&[], |end| &self.rest[end + 1..]);
         self.number += 1;
+        self.ended = end.is_some();
         Some(line.trim_ascii())
     }
 }
@@ -77,11 +85,7 @@ pub(crate) fn point<'a>(
             )));
         };
         let Some(value) = number(word) else {
-            return Err(Fault::damaged(format!(
-                "{}: {} is not a number; export the mesh again",
-                place(),
-                quoted(word)
-            )));
+            return Err(Fault::damaged(format!("{}: {}", place(), no_number(word))));
         };
         if !value.is_finite() {
             return Err(Fault::invalid(format!(
@@ -92,6 +96,16 @@ pub(crate) fn point<'a>(
         *coordinate = value;
     }
     Ok(point)
+}
+
+/// Why a word is no number, and what to do.
+pub(crate) fn no_number(word: &[u8]) -> String {
+    let with_point: Vec<u8> = word.iter().map(|&b| if b == b',' { b'.' } else { b }).collect();
+    let shown = quoted(word);
+    if word.contains(&b',') && number(&with_point).is_some() {
+        return format!("{shown} has a decimal comma; export it with decimal points (the English number format)");
+    }
+    format!("{shown} is not a number; export the mesh again")
 }
 
 /// A word from a file, fit to be shown in a message.

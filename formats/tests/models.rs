@@ -2,7 +2,7 @@
 
 mod support;
 
-use cager_formats::{Error, MeshFormat, read_model};
+use cager_formats::{Error, MeshFormat, read_model, read_model_with_note};
 use support::*;
 
 #[test]
@@ -131,10 +131,88 @@ fn off_variants_are_read() {
         "COFF\n3 1 0\n0 0 0 1 1 1 1\n1 0 0 1 1 1 1\n0 1 0 1 1 1 1\n3 0 1 2\n",
         "STCNOFF\n3 1 0\n0 0 0 0 0 1 1 1 1 1 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
         "3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+        "OFF3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+        "OFF # of some program\n# 3 points\n3 # points\n1\n0 0 0\n1 0 0\n0 1 0\n3\n0 1 # on\n2 255 0 0\n",
     ];
     for text in files {
         let model = read("a.off", text).unwrap();
         assert_eq!((model.points.as_slice(), model.faces), (points.as_slice(), polygons(&[&[0, 1, 2]])), "{text}");
+    }
+}
+
+#[test]
+fn edges_and_points_among_faces_are_left_out_and_counted() {
+    let ply = String::from_utf8(ply_ascii()).unwrap().replace("face 4", "face 6") + "2 1 2 0.5\n1 3 0.5\n";
+    let off = String::from_utf8(off()).unwrap().replace("4 4 6", "4 6 6") + "2 0 1\n1 3\n";
+    let edges = String::from_utf8(obj()).unwrap() + "f 1/1 2/2\nf 3\nl 1 2\np 1\n";
+    let dir = std::env::temp_dir().join(format!("cager-left-out-{}", std::process::id()));
+    std::fs::create_dir_all(&dir).unwrap();
+    for (name, text) in [("a.ply", ply), ("a.off", off), ("a.obj", edges)] {
+        let path = dir.join(name);
+        std::fs::write(&path, text).unwrap();
+        let (model, note) = read_model_with_note(&path).unwrap();
+        assert_eq!(model, tetrahedron(), "{name}");
+        assert!(
+            note.unwrap().ends_with(": left out 2 faces of fewer than three corners, which have no area"),
+            "{name}"
+        );
+    }
+    std::fs::write(dir.join("b.obj"), obj()).unwrap();
+    assert_eq!(read_model_with_note(&dir.join("b.obj")).unwrap().1, None);
+    std::fs::remove_dir_all(dir).unwrap();
+}
+
+#[test]
+fn obj_faces_of_the_first_kind_are_read() {
+    let text = String::from_utf8(obj()).unwrap().replace("\nf ", "\nfo ");
+    assert_eq!(read("a.obj", text).unwrap(), tetrahedron());
+}
+
+#[test]
+fn ply_strips_are_unfolded() {
+    let strips = |element: &str, strip: &str| {
+        let head = "ply\nformat ascii 1.0\nelement vertex 5\nproperty int x\nproperty int y\nproperty int z\n";
+        let points = "0 0 0\n1 0 0\n0 1 0\n1 1 0\n0 2 0\n";
+        let list = "property list int int vertex_indices";
+        read("a.ply", format!("{head}element tristrips {element}\n{list}\nend_header\n{points}{strip}\n"))
+            .map(|m| m.faces)
+    };
+    let two = polygons(&[&[0, 1, 2], &[2, 1, 3]]);
+    assert_eq!(strips("1", "4 0 1 2 3").unwrap(), two);
+    let again = polygons(&[&[0, 1, 2], &[2, 1, 3], &[4, 3, 2], &[0, 1, 2]]);
+    assert_eq!(strips("2", "9 0 1 2 3 -1 4 3 2 -1\n3 0 1 2").unwrap(), again);
+    // A vertex that is repeated turns the strip without a face.
+    assert_eq!(strips("1", "6 0 1 2 2 3 4").unwrap(), polygons(&[&[0, 1, 2], &[3, 2, 4]]));
+    assert_eq!(strips("1", "2 0 1").unwrap(), polygons(&[]));
+    assert!(message(strips("1", "3 0 1 5")).contains("strip 0: the face names vertex 5"));
+    assert!(message(strips("1", "3 0 1 -2")).contains("strip 0: the face names vertex -2"));
+}
+
+#[test]
+fn ply_lines_that_other_programs_note_are_passed_over() {
+    let text = String::from_utf8(ply_ascii()).unwrap();
+    let noted = text
+        .replace("comment by hand\n", "comment\nTextureFile wood.png\n\n  obj_info made by hand\n")
+        .replace("element face 4", "element face 4 of them")
+        .replace("property float x", "  property  float\tx ")
+        .replace("vertex_index", "corners");
+    assert_eq!(read("a.ply", noted).unwrap(), tetrahedron());
+}
+
+#[test]
+fn stl_files_with_more_or_less_behind_their_triangles_are_read() {
+    let whole = stl_binary();
+    let mut longer = whole.clone();
+    longer[..5].copy_from_slice(b"COLOR");
+    longer.extend(b"notes of some program");
+    assert_eq!(read("a.stl", longer).unwrap(), read("a.stl", whole).unwrap());
+    let text = String::from_utf8(stl_ascii()).unwrap();
+    let open = text.replace("endsolid t\n", "");
+    assert_eq!(read("a.stl", &open).unwrap(), read("a.stl", &text).unwrap());
+    assert_eq!(read("a.stl", open.trim_end()).unwrap(), read("a.stl", &text).unwrap());
+    for cut in [1, 4, 8, 12, 14, 25, 40, 90] {
+        let error = message(read("a.stl", &open.trim_end()[..open.trim_end().len() - cut]));
+        assert!(error.contains("copy or export"), "{cut}: {error}");
     }
 }
 
@@ -192,29 +270,6 @@ fn glb_primitives_that_share_their_points_do_not_repeat_them() {
 }
 
 #[test]
-fn a_skinned_glb_is_read_in_its_bind_pose() {
-    let nodes = r#","nodes":[{"mesh":0,"skin":0,"translation":[9,9,9]}],"skins":[{"joints":[0]}]"#;
-    assert_eq!(read("a.glb", glb_file(&glb_json(nodes), &glb_data())).unwrap(), tetrahedron());
-}
-
-#[test]
-fn glb_features_that_are_not_read_are_named() {
-    let with = |from: &str, to: &str| {
-        let json = glb_json("");
-        assert!(json.contains(from));
-        message(read("a.glb", glb_file(&json.replace(from, to), &glb_data())))
-    };
-    let draco = r#""extensionsRequired":["KHR_draco_mesh_compression"],"asset""#;
-    assert!(with(r#""asset""#, draco).contains("\"KHR_draco_mesh_compression\"; export the mesh without compression"));
-    let sparse =
-        r#""count":4,"sparse":{"count":1,"indices":{"bufferView":1,"componentType":5123},"values":{"bufferView":0}}"#;
-    assert!(with(r#""count":4"#, sparse).contains("accessor 0 is sparse"));
-    assert!(with("5126", "5122").contains("without quantization"));
-    assert!(with(r#"{"byteLength":72}"#, r#"{"byteLength":72,"uri":"x.bin"}"#).contains("another file"));
-    assert!(with(r#""bufferView":0,"#, "").contains("accessor 0 has no data of its own"));
-}
-
-#[test]
 fn a_long_text_in_a_glb_is_not_repeated_in_full() {
     let text =
         message(read("a.glb", glb_file(&glb_json(&format!(",\"nodes\":[\"{}\"]", "b".repeat(5000))), &glb_data())));
@@ -263,7 +318,11 @@ fn errors_name_the_file_the_place_and_what_to_do() {
             "a.obj: line 2: the face names vertex -2, but there are 1 vertices; ",
         ),
         ("a.obj", "v 0 0 0\nf 1 99999999999 1\n".into(), "a.obj: line 2: the face names vertex 99999999999"),
-        ("a.obj", "v 0 0 0\nf 1 1\n".into(), "a.obj: line 2: the face has 2 corners where at least 3"),
+        ("a.obj", "v 0 0 0\nf 1 1".into(), "a.obj: line 2: the file ends within this line, \"f 1 1\", so it was cut; "),
+        ("a.obj", "v 0 -0,5 1\n".into(), "a.obj: line 1: \"-0,5\" has a decimal comma; export it with decimal points"),
+        ("a.off", "OFF 1 0 0\n1,5 0 0\n".into(), "a.off: line 2: \"1,5\" has a decimal comma; "),
+        ("a.ply", ply.replace("0 1.5 0 255", "0 1,5 0 255"), "a.ply: line 18: \"1,5\" has a decimal comma; "),
+        ("a.stl", "solid\nfacet\nouter loop\nvertex 0 1,5 0\n".into(), "a.stl: line 4: \"1,5\" has a decimal comma; "),
         ("a.obj", "v 0 0 0\nf a b c\n".into(), "a.obj: line 2: \"a\" is not a vertex number; "),
         ("a.obj", "v 0 0\n".into(), "a.obj: line 1: the vertex has 2 coordinates instead of 3; "),
         ("a.obj", "v 0 nan 0\n".into(), "a.obj: line 1: the vertex has a coordinate that is NaN or infinite; "),
@@ -279,7 +338,6 @@ fn errors_name_the_file_the_place_and_what_to_do() {
         ("a.off", "OFF\n1 2 0\n0 0 0\n".into(), "a.off: ends after 0 of 2 faces; "),
         ("a.off", "4OFF\n1 0 0\n".into(), "a.off: line 1: \"4OFF\" has points that are not in three dimensions; "),
         ("a.off", "OFF BINARY\n".into(), "a.off: is a binary OFF file; "),
-        ("a.off", "OFF\n1 1 0\n0 0 0\n2 0 0\n".into(), "a.off: line 4: the face has 2 corners"),
         (
             "a.off",
             "OFF\n1 1 0\n0 0 0\n9999999999 0 0\n".into(),
@@ -287,13 +345,17 @@ fn errors_name_the_file_the_place_and_what_to_do() {
         ),
         ("a.ply", ply.replace("3 1 2 3 0.5", "3 1 2 4 0.5"), "a.ply: face 3: the face names vertex 4, but there are 4"),
         ("a.ply", ply.replace("3 1 2 3 0.5", "3 1 2 -1 0.5"), "a.ply: face 3: the face names vertex -1"),
-        ("a.ply", ply.replace("3 1 2 3 0.5", "2 1 2 0.5"), "a.ply: face 3: the face has 2 corners"),
         ("a.ply", ply.replace("3 1 2 3 0.5", ""), "a.ply: ends after 3 of 4 items of \"face\"; "),
         ("a.ply", ply.replace("0 1.5 0 255", "0 nan 0 255"), "a.ply: vertex 2 has a coordinate that is NaN"),
         ("a.ply", ply.replace("double z", "double w"), "a.ply: has vertices without z; "),
-        ("a.ply", ply.replace("vertex_index", "corners"), "a.ply: has faces without vertex_indices; "),
+        (
+            "a.ply",
+            ply.replace("list uchar uint vertex_index", "uchar corners"),
+            "a.ply: has faces without vertex_indices; ",
+        ),
         ("a.ply", "ply\nelement vertex x\n".into(), "a.ply: line 2: \"element vertex x\" is not understood"),
-        ("a.stl", "solid\nvertex 0 0 0\n".into(), "a.stl: ends without `endsolid`; "),
+        ("a.stl", "solid\nvertex 0 0 0\n".into(), "a.stl: ends within a facet; "),
+        ("a.stl", "solid\nfacet\nouter loop\nvertex 0 0 0\nendloop\n".into(), "a.stl: line 5: the face has 1 corners"),
         ("a.stl", "solid\nhello\n".into(), "a.stl: line 2: \"hello\" is not a word of an STL file; "),
         ("a.stl", "short".into(), "a.stl: has 5 bytes, too few"),
     ];
@@ -346,7 +408,7 @@ fn a_web_page_or_utf_16_given_as_a_mesh_is_called_that() {
     for name in ["a.obj", "a.ply", "a.off", "a.stl", "a.glb"] {
         for page in ["<!DOCTYPE html>\n<html></html>", "\n  <HTML lang=en>"] {
             assert!(
-                message(read(name, page)).contains("is a web page, not a mesh; download the file itself"),
+                message(read(name, page)).contains("is a web page, not the file itself; download the file itself"),
                 "{name}"
             );
         }

@@ -1,7 +1,7 @@
 //! Sampling evenly spaced frames of an uploaded capture, one read at a time.
 
 use crate::problem::{self, ApiError};
-use cager_formats::{CacheFormat, Error, FrameReader, open_frames_in};
+use cager_formats::{CacheFormat, Error, FrameReader, Signature, open_frames_in};
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
@@ -21,7 +21,7 @@ pub(super) fn sampled(frames: usize, points: usize, max_bytes: u64) -> usize {
 /// A length or a number of points that does not match.
 pub(super) fn open<'a>(
     name: &str,
-    source: impl Read + Seek + Send + 'a,
+    mut source: impl Read + Seek + Send + 'a,
     bytes: u64,
     points: usize,
     announced: Option<u32>,
@@ -36,6 +36,13 @@ pub(super) fn open<'a>(
                 reader.frames()
             ))),
         };
+    }
+    let mut start = Vec::new();
+    source.by_ref().take(1024).read_to_end(&mut start).map_err(|cause| ApiError::internal(&cause))?;
+    if let Some(what) = Signature::of(&start) {
+        let noun = what.noun();
+        let what = what.stand_in().unwrap_or_else(|| format!("is {noun}, not raw numbers; send it under its name"));
+        return Err(mismatch(format!("frames: {what}")));
     }
     let Some(frames) = announced else {
         let detail = "frames: the part has no name ending in .npy, so it is raw numbers; say how many frames it has as options.frames";

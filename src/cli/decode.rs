@@ -3,12 +3,12 @@
 use super::args::DecodeArgs;
 use super::dry_run::{size, tell_dry_run};
 use super::outputs::Outputs;
-use super::{grouped, progress, tell, warn};
+use super::{grouped, progress, read_model, tell, warn};
 use crate::cage_export::write_cages;
 use crate::decode::{self, Decoding};
 use crate::edited::EditedCages;
 use anyhow::Result;
-use cager_formats::{FrameRange, Target, read_model};
+use cager_formats::{FrameRange, Target};
 use std::path::Path;
 use std::time::Instant;
 

@@ -3,11 +3,11 @@
 use super::cage::{Targets, cage_bytes, complete_file};
 use super::cage_args::CageArgs;
 use super::dry_run::tell_dry_run;
-use super::print;
+use super::{print, read_model};
 use anyhow::{Result, bail};
 use cager_cages::diagnosis::{Findings, check, repair};
 use cager_core::mesh::{Model, TriMesh};
-use cager_formats::{Target, commit_together, read_model};
+use cager_formats::{Target, commit_together};
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::Path;

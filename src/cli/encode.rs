@@ -9,7 +9,7 @@ use super::outputs::Outputs;
 use super::solver_options::{
     check_inversion, designed_spectrum, inversion_choices, matrix, read_cage, spectrum_bound, with_input_name,
 };
-use super::{design, encode_remote, grouped, human_bytes, progress, tell, warn};
+use super::{design, encode_remote, grouped, human_bytes, progress, read_model, tell, warn};
 use crate::coding::{CAGE_SIZE_FRAMES, CageSizes, Goal, InversionChoices};
 use crate::design::{read_frames, report as design_report};
 use crate::encode::{self, ChooseSpectrum, EncodeProgress, Encoded, Job, sample_frames};
@@ -23,7 +23,7 @@ use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::{PrepareError, Solver, SolverOptions, check_options};
 use cager_core::mesh::Model;
 use cager_core::regularize::{Regularizer, SparseMatrix, Term};
-use cager_formats::{AtomicFile, FrameReader, Target, commit_together, read_model};
+use cager_formats::{AtomicFile, FrameReader, Target, commit_together};
 use cager_proto::report::DesignReport;
 use std::time::{Duration, Instant};
 

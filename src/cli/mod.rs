@@ -30,9 +30,11 @@ mod solver_options;
 mod transfer_args;
 
 use args::{Cli, Command};
+use cager_core::mesh::Model;
 use clap::{CommandFactory, Parser};
 pub(crate) use global_args::{is_quiet, is_verbose, tell};
 use std::io::Write;
+use std::path::Path;
 use std::process::ExitCode;
 
 /// Runs the command given to this process. Exit status 0 done, 1 failed, 2 wrong usage.
@@ -105,6 +107,13 @@ fn print(text: &str) -> anyhow::Result<()> {
         }
         _ => Ok(()),
     }
+}
+
+/// Reads a model, and tells what is left out of it.
+fn read_model(path: &Path) -> Result<Model, cager_formats::Error> {
+    let (model, note) = cager_formats::read_model_with_note(path)?;
+    warn(note.as_slice());
+    Ok(model)
 }
 
 fn warn(warnings: &[String]) {

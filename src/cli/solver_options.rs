@@ -1,7 +1,7 @@
 //! From arguments and files to a cage and the options of its solver.
 
 use super::args::{SolverArgs, SpectrumArg};
-use super::{grouped, warn};
+use super::{grouped, read_model, warn};
 use crate::coding::InversionChoices;
 use anyhow::{Context, Result, bail};
 use cager_cages::diagnosis::weld;
@@ -9,7 +9,7 @@ use cager_core::cage::{Cage, CageError};
 use cager_core::inversion::{Handles, PrepareError};
 use cager_core::mesh::TriMesh;
 use cager_core::regularize::{Regularizer, SparseMatrix};
-use cager_formats::{read_matrix, read_model};
+use cager_formats::read_matrix;
 use std::path::Path;
 
 pub(super) fn read_cage(path: &Path, flip: bool) -> Result<Cage> {

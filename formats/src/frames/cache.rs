@@ -8,6 +8,7 @@ use super::layout::{LONGEST_HEADER, Layout, Order};
 use super::widen::{Scalar, widen};
 use super::{CacheFormat, FrameReader, mdd, npy, pc2};
 use crate::error::{Error, Fault};
+use crate::signature::Signature;
 
 /// Bytes read at once: few calls, and still within the fast caches.
 const BLOCK: usize = 1 << 17;
@@ -23,6 +24,9 @@ pub(super) fn open<'a>(
     let read = |cause| Error::read(path, cause);
     let mut head = Vec::new();
     source.by_ref().take(LONGEST_HEADER as u64).read_to_end(&mut head).map_err(read)?;
+    if let Some(what) = Signature::other_than(format.extension(), &head) {
+        return Err(Fault::damaged(what).at(path));
+    }
     let place = npy::Place { name: None };
     let layout = match format {
         CacheFormat::Npy => npy::layout(&head, expected_points as u64, place),

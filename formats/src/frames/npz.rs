@@ -12,6 +12,7 @@ use super::layout::Layout;
 use super::npy::{self, Place};
 use super::packed::{Entry, Unpacked};
 use crate::error::{Error, Fault};
+use crate::signature::Signature;
 
 /// What the arrays are called that tell how many frames a second has.
 const RATES: [&str; 6] = ["fps", "framerate", "frame_rate", "frames_per_second", "mocap_framerate", "mocap_frame_rate"];
@@ -29,6 +30,14 @@ pub(super) fn open<'a>(
     expected_points: usize,
 ) -> Result<Box<dyn FrameReader + 'a>, Error> {
     let length = source.seek(SeekFrom::End(0)).map_err(|cause| Error::read(path, cause))?;
+    let mut start = Vec::new();
+    source
+        .rewind()
+        .and_then(|()| source.by_ref().take(1024).read_to_end(&mut start))
+        .map_err(|cause| Error::read(path, cause))?;
+    if let Some(what) = Signature::other_than("npz", &start) {
+        return Err(Fault::damaged(what).at(path));
+    }
     let mut archive = ZipArchive::new(source).map_err(|cause| failed(path, cause))?;
     let arrays = Arrays::list(path, &mut archive, length)?;
     let mut source = archive.into_inner();

@@ -14,6 +14,7 @@ use std::path::Path;
 use cager_core::mesh::Model;
 
 use crate::error::{Error, Fault};
+use crate::signature::Signature;
 use crate::text::{Lines, quoted};
 
 pub use write::{model_bytes, obj_bytes, write_model};
@@ -91,17 +92,29 @@ pub fn read_model(path: &Path) -> Result<Model, Error> {
     read_file(path, Contents::PointsAndFaces)
 }
 
+/// As [`read_model`], with what was left out of the file, in words.
+///
+/// # Errors
+/// As [`read_model`].
+pub fn read_model_with_note(path: &Path) -> Result<(Model, Option<String>), Error> {
+    let Parsed { model, left_out } = parse_file(path, Contents::PointsAndFaces)?;
+    let faces = if left_out == 1 { "face" } else { "faces" };
+    let note =
+        format!("{}: left out {left_out} {faces} of fewer than three corners, which have no area", path.display());
+    Ok((model, (left_out > 0).then_some(note)))
+}
+
 /// Reads a model from the bytes of a file; `name` is the path in error messages.
 ///
 /// Coordinates are as exact as `f64` can hold them. A `.glb` gives the triangles and points of its default scene, each
-/// node's mesh at its place; a mesh with a skin is taken in its bind pose.
+/// node's mesh at its place; a mesh with a skin is where its joints put it at rest.
 ///
 /// # Errors
 /// [`Error::Damaged`] where the bytes do not follow the format or end too early, [`Error::Unsupported`] for variants
-/// that are not read, [`Error::Invalid`] for a coordinate that is not finite, a face with fewer than three corners or
-/// with a vertex that does not exist, and a file without points.
+/// that are not read, [`Error::Invalid`] for a coordinate that is not finite, a face with a vertex
+/// that does not exist, and a file without points. Faces of fewer than three corners are left out.
 pub fn read_model_bytes(format: MeshFormat, name: &Path, bytes: &[u8]) -> Result<Model, Error> {
-    read_bytes(format, name, bytes, Contents::PointsAndFaces)
+    read_bytes(format, name, bytes, Contents::PointsAndFaces).map(|parsed| parsed.model)
 }
 
 /// How much of a file is wanted: the frames of a capture need no faces.
@@ -112,51 +125,50 @@ pub(crate) enum Contents {
 }
 
 pub(crate) fn read_file(path: &Path, contents: Contents) -> Result<Model, Error> {
+    parse_file(path, contents).map(|parsed| parsed.model)
+}
+
+fn parse_file(path: &Path, contents: Contents) -> Result<Parsed, Error> {
     let format = MeshFormat::from_path(path)?;
     let bytes = fs::read(path).map_err(|cause| Error::read(path, cause))?;
     read_bytes(format, path, &bytes, contents)
 }
 
-fn read_bytes(format: MeshFormat, name: &Path, bytes: &[u8], contents: Contents) -> Result<Model, Error> {
-    let model = if bytes.is_empty() {
+/// What a file gave.
+struct Parsed {
+    model: Model,
+    /// Faces of fewer than three corners, which are edges and points.
+    left_out: usize,
+}
+
+impl From<Model> for Parsed {
+    fn from(model: Model) -> Self {
+        Self { model, left_out: 0 }
+    }
+}
+
+fn read_bytes(format: MeshFormat, name: &Path, bytes: &[u8], contents: Contents) -> Result<Parsed, Error> {
+    let parsed = if bytes.is_empty() {
         Err(Fault::damaged("is empty; export the mesh or copy the file again"))
-    } else if let Some(what) = foreign_text(bytes) {
-        Err(Fault::damaged(what))
     } else {
         match format {
             MeshFormat::Obj => obj::read(bytes, contents),
             MeshFormat::Ply => ply::read(bytes, contents),
             MeshFormat::Off => off::read(bytes, contents),
-            MeshFormat::Stl => stl::read(bytes),
-            MeshFormat::Glb => glb::read(bytes),
+            MeshFormat::Stl => stl::read(bytes).map(Parsed::from),
+            MeshFormat::Glb => glb::read(bytes).map(Parsed::from),
         }
     };
-    model
+    parsed
         .map_err(|fault| cut_in_last_line(fault, bytes))
-        .and_then(|model| match model.points.len() {
+        .and_then(|parsed| match parsed.model.points.len() {
             0 => Err(Fault::invalid("has no points; export the mesh with its vertices")),
             n if n > u32::MAX as usize => {
                 Err(Fault::unsupported(format!("has {n} points, more than 4294967295; reduce the mesh")))
             }
-            _ => Ok(model),
+            _ => Ok(parsed),
         })
-        .map_err(|fault| fault.at(name))
-}
-
-/// Recognises text that no mesh format begins with: a failed download, or an editor's encoding.
-fn foreign_text(bytes: &[u8]) -> Option<&'static str> {
-    if matches!(
-        bytes,
-        [0xff, 0xfe, ..]
-            | [0xfe, 0xff, ..]
-            | [b' '..=b'~', 0, b' '..=b'~', 0, ..]
-            | [0, b' '..=b'~', 0, b' '..=b'~', ..]
-    ) {
-        return Some("is text in UTF-16; save it as UTF-8, or export the mesh again");
-    }
-    let start = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
-    let begins = |word: &str| start.get(..word.len()).is_some_and(|found| found.eq_ignore_ascii_case(word.as_bytes()));
-    (begins("<!doctype") || begins("<html")).then_some("is a web page, not a mesh; download the file itself")
+        .map_err(|fault| Signature::other_than(format.extension(), bytes).map_or(fault, Fault::damaged).at(name))
 }
 
 /// What is wrong with the last line of a text is that the file was cut, where that line has no end.
@@ -183,19 +195,10 @@ fn cut_in_last_line(fault: Fault, bytes: &[u8]) -> Fault {
 
 /// Checks the corners of one face, which `place` names in messages, against the number of points.
 fn check_face(corners: &[u32], points: usize, place: impl Fn() -> String) -> Result<(), Fault> {
-    if corners.len() < 3 {
-        return Err(too_few_corners(&place(), corners.len()));
-    }
     match corners.iter().find(|&&index| index as usize >= points) {
         Some(&index) => Err(no_such_vertex(&place(), index.into(), points)),
         None => Ok(()),
     }
-}
-
-fn too_few_corners(place: &str, corners: usize) -> Fault {
-    Fault::invalid(format!(
-        "{place}: the face has {corners} corners where at least 3 are needed; remove it or export the mesh again"
-    ))
 }
 
 fn no_such_vertex(place: &str, index: i64, points: usize) -> Fault {

@@ -1,33 +1,35 @@
-//! Wavefront OBJ: `v` and `f` lines; everything else is skipped.
+//! Wavefront OBJ: `v` and `f` lines; everything else is skipped, and so are faces that are edges or points.
 
 use cager_core::mesh::Model;
 
 use super::colors::{Colors, Scale};
-use super::{Contents, no_such_vertex, too_few_corners};
+use super::{Contents, Parsed, no_such_vertex};
 use crate::error::Fault;
 use crate::text::{self, Lines, integer, point, quoted, words};
 
-pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Model, Fault> {
-    let model = scan(bytes, contents, None)?;
-    let points = model.points.len();
-    let named = model.faces.indices().iter().max();
+pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Parsed, Fault> {
+    let parsed = scan(bytes, contents, None)?;
+    let points = parsed.model.points.len();
+    let named = parsed.model.faces.indices().iter().max();
     if named.is_some_and(|&index| index as usize >= points) {
         // Faces may come before their vertices, so that only now it is known how many there are to check against.
         return scan(bytes, contents, Some(points));
     }
-    Ok(model)
+    Ok(parsed)
 }
 
 /// One pass over the file; with `points`, stops at the first face that names a later vertex.
-fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Model, Fault> {
-    let (mut model, mut colors) = (Model::default(), Colors::default());
+fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Parsed, Fault> {
+    let (mut model, mut colors, mut left_out) = (Model::default(), Colors::default(), 0);
     let mut face = Vec::new();
     let mut lines = Lines::new(bytes);
     while let Some(line) = lines.next() {
         let number = lines.number();
-        let is_vertex = match line {
-            [b'v'] | [b'v', b' ' | b'\t', ..] => true,
-            [b'f'] | [b'f', b' ' | b'\t', ..] if contents == Contents::PointsAndFaces => false,
+        let keyword = words(line).next().unwrap_or_default();
+        let is_vertex = match keyword {
+            b"v" => true,
+            // `fo` is what faces were called at first.
+            b"f" | b"fo" if contents == Contents::PointsAndFaces => false,
             _ => continue,
         };
         let joined;
@@ -37,7 +39,7 @@ fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Model
         } else {
             line
         };
-        let mut words = words(&line[1..]).take_while(|word| word[0] != b'#');
+        let mut words = words(&line[keyword.len()..]).take_while(|word| word[0] != b'#');
         if is_vertex {
             let point = point(&mut words, || format!("line {number}"))?;
             model.points.push(point);
@@ -53,14 +55,17 @@ fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Model
             for word in words {
                 face.push(corner(word, model.points.len(), points, number)?);
             }
-            if face.len() < 3 {
-                return Err(too_few_corners(&format!("line {number}"), face.len()));
+            if face.len() >= 3 {
+                model.faces.push(&face);
+            } else if lines.is_cut() {
+                return Err(Fault::damaged(format!("line {number}: the face has {} corners", face.len())));
+            } else {
+                left_out += 1;
             }
-            model.faces.push(&face);
         }
     }
     model.colors = colors.finish(model.points.len(), Scale::Unsaid);
-    Ok(model)
+    Ok(Parsed { model, left_out })
 }
 
 /// A line and those that continue it after a backslash.

@@ -1,15 +1,15 @@
-//! Object File Format in ASCII, one vertex or face a line; colours, normals and texture coordinates are skipped.
+//! Object File Format in ASCII, one vertex a line; colours, normals and texture coordinates are skipped.
 
 use cager_core::mesh::Model;
 
-use super::{Contents, check_face};
+use super::{Contents, Parsed, check_face};
 use crate::error::Fault;
 use crate::text::{Lines, integer, point, quoted, words};
 
-pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Model, Fault> {
+pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Parsed, Fault> {
     let mut lines = ContentLines(Lines::new(bytes));
     let (points, faces) = counts(&mut lines)?;
-    let mut model = Model::default();
+    let (mut model, mut left_out) = (Model::default(), 0);
     // A vertex takes at least six bytes: three digits and three separators.
     model.points.reserve_exact(points.min(lines.0.rest().len() / 6 + 1));
     for k in 0..points {
@@ -21,7 +21,7 @@ pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Model, Fault> {
         model.points.push(point);
     }
     if contents == Contents::Points {
-        return Ok(model);
+        return Ok(Parsed { model, left_out });
     }
     let mut face = Vec::new();
     for k in 0..faces {
@@ -29,11 +29,15 @@ pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Model, Fault> {
             return Err(truncated("faces", k, faces));
         };
         let number = lines.0.number();
-        read_face(line, number, &mut face)?;
+        read_face(line, &mut lines, &mut face)?;
         check_face(&face, points, || format!("line {number}"))?;
-        model.faces.push(&face);
+        if face.len() >= 3 {
+            model.faces.push(&face);
+        } else {
+            left_out += 1;
+        }
     }
-    Ok(model)
+    Ok(Parsed { model, left_out })
 }
 
 /// The lines that say something, without comments.
@@ -50,19 +54,22 @@ impl<'a> Iterator for ContentLines<'a> {
     }
 }
 
-/// Numbers of vertices and faces, from the line of the keyword or the one after it.
+/// Numbers of vertices and faces, from the line of the keyword or those after it.
 fn counts(lines: &mut ContentLines<'_>) -> Result<(usize, usize), Fault> {
     let mut line = lines.next().unwrap_or_default();
     let keyword = words(line).next().unwrap_or_default();
-    if let Some(prefix) = keyword.strip_suffix(b"OFF") {
-        if prefix.iter().any(|b| !b"STCN".contains(b)) {
+    // Some files have no space between the keyword and the numbers.
+    let end = keyword.windows(3).position(|w| w == b"OFF").map(|at| at + 3);
+    if let Some(end) = end.filter(|&end| keyword[end..].iter().all(u8::is_ascii_digit)) {
+        let keyword = &keyword[..end];
+        if keyword[..end - 3].iter().any(|b| !b"STCN".contains(b)) {
             return Err(Fault::unsupported(format!(
                 "line {}: {} has points that are not in three dimensions; convert it to OFF or OBJ",
                 lines.0.number(),
                 quoted(keyword)
             )));
         }
-        line = line[keyword.len()..].trim_ascii();
+        line = line[end..].trim_ascii();
         if line.eq_ignore_ascii_case(b"BINARY") {
             return Err(Fault::unsupported("is a binary OFF file; convert it to ASCII OFF or to PLY"));
         }
@@ -70,37 +77,44 @@ fn counts(lines: &mut ContentLines<'_>) -> Result<(usize, usize), Fault> {
             line = lines.next().unwrap_or_default();
         }
     }
-    let mut numbers = words(line).map(integer);
-    match (numbers.next().flatten(), numbers.next().flatten()) {
-        (Some(points), Some(faces)) => Ok((points, faces)),
-        _ => Err(Fault::damaged(format!(
-            "line {}: the numbers of vertices and faces are missing, so this is not an OFF file; export the mesh again",
-            lines.0.number().max(1)
-        ))),
-    }
+    let number = lines.0.number().max(1);
+    let mut found = words(line).map(integer);
+    let points = found.next().flatten();
+    let faces = found.next().or_else(|| words(lines.next()?).map(integer).next()).flatten();
+    points.zip(faces).ok_or_else(|| {
+        Fault::damaged(format!(
+            "line {number}: the numbers of vertices and faces are missing, so this is not an OFF file; export the mesh again"
+        ))
+    })
 }
 
-fn read_face(line: &[u8], number: usize, face: &mut Vec<u32>) -> Result<(), Fault> {
-    let mut words = words(line);
-    let unreadable = |word: &[u8]| {
+/// A number of corners and as many vertices, which may go on over several lines; what follows on the last one is a colour.
+fn read_face(line: &[u8], lines: &mut ContentLines<'_>, face: &mut Vec<u32>) -> Result<(), Fault> {
+    let start = lines.0.number();
+    let unreadable = |word: &[u8], number: usize| {
         Fault::damaged(format!(
             "line {number}: {} is not a whole number that a face can have; export the mesh again",
             quoted(word)
         ))
     };
-    let first = words.next().unwrap_or_default();
-    let corners: usize = integer(first).ok_or_else(|| unreadable(first))?;
+    let first = words(line).next().unwrap_or_default();
+    let corners: usize = integer(first).ok_or_else(|| unreadable(first, start))?;
     face.clear();
-    for word in words.by_ref().take(corners) {
-        face.push(integer(word).ok_or_else(|| unreadable(word))?);
+    let mut line = &line[first.len()..];
+    loop {
+        for word in words(line).take(corners - face.len()) {
+            face.push(integer(word).ok_or_else(|| unreadable(word, lines.0.number()))?);
+        }
+        if face.len() == corners {
+            return Ok(());
+        }
+        line = lines.next().ok_or_else(|| {
+            Fault::damaged(format!(
+                "line {start}: the face has {} of the {corners} corners that it promises; export the mesh again",
+                face.len()
+            ))
+        })?;
     }
-    if face.len() < corners {
-        return Err(Fault::damaged(format!(
-            "line {number}: the face has {} of the {corners} corners that it promises; export the mesh again",
-            face.len()
-        )));
-    }
-    Ok(())
 }
 
 fn truncated(what: &str, found: usize, promised: usize) -> Fault {

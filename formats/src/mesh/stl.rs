@@ -11,25 +11,42 @@ const HEADER: usize = 84;
 const TRIANGLE: usize = 50;
 
 pub(super) fn read(bytes: &[u8]) -> Result<Model, Fault> {
+    let mut shared = Shared::default();
+    let mut face = Vec::new();
+    scan(bytes, |corners| {
+        face.clear();
+        face.extend(corners.iter().map(|&point| shared.index(point)));
+        shared.model.faces.push(&face);
+    })?;
+    Ok(shared.model)
+}
+
+/// Calls `each` with the corners of every face.
+fn scan(bytes: &[u8], each: impl FnMut(&[Point])) -> Result<(), Fault> {
     // Binary files may begin with "solid" too, but no text has the very size that its bytes 80 to 83 would promise.
     let promised = promised_size(bytes);
     if promised == Some(bytes.len() as u64) {
-        return read_binary(bytes);
+        return scan_binary(bytes, each);
     }
     let head = &bytes[..bytes.len().min(1024)];
     let is_text =
         bytes.trim_ascii_start().get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid")) && !head.contains(&0);
     if is_text {
-        return read_ascii(bytes);
+        return scan_ascii(bytes, each);
     }
-    Err(Fault::damaged(match promised {
-        None => format!("has {} bytes, too few for an STL file; copy or export the file again", bytes.len()),
-        Some(promised) => format!(
+    match promised {
+        None => Err(Fault::damaged(format!(
+            "has {} bytes, too few for an STL file; copy or export the file again",
+            bytes.len()
+        ))),
+        // Some programs write colours or notes behind the triangles.
+        Some(promised) if promised < bytes.len() as u64 => scan_binary(&bytes[..promised as usize], each),
+        Some(promised) => Err(Fault::damaged(format!(
             "promises {} triangles in {promised} bytes but has {}; copy or export the file again",
             (promised - HEADER as u64) / TRIANGLE as u64,
             bytes.len()
-        ),
-    }))
+        ))),
+    }
 }
 
 fn promised_size(bytes: &[u8]) -> Option<u64> {
@@ -37,32 +54,27 @@ fn promised_size(bytes: &[u8]) -> Option<u64> {
     Some(HEADER as u64 + TRIANGLE as u64 * u64::from(count))
 }
 
-fn read_binary(bytes: &[u8]) -> Result<Model, Fault> {
-    let mut shared = Shared::default();
+fn scan_binary(bytes: &[u8], mut each: impl FnMut(&[Point])) -> Result<(), Fault> {
     for (k, triangle) in bytes[HEADER..].chunks_exact(TRIANGLE).enumerate() {
-        let mut face = [0; 3];
+        let mut corners = [[0.0; 3]; 3];
         // After 12 bytes of normal, three corners of 12 bytes each.
-        for (corner, bytes) in face.iter_mut().zip(triangle[12..48].chunks_exact(12)) {
-            let mut point = [0.0; 3];
-            for (x, bytes) in point.iter_mut().zip(bytes.as_chunks::<4>().0) {
-                *x = f64::from(f32::from_le_bytes(*bytes));
-            }
-            if !point.iter().all(|x| x.is_finite()) {
-                return Err(Fault::invalid(format!(
-                    "triangle {k}: a corner has a coordinate that is NaN or infinite; repair or remove it"
-                )));
-            }
-            *corner = shared.index(point);
+        for (x, bytes) in corners.as_flattened_mut().iter_mut().zip(triangle[12..48].as_chunks::<4>().0) {
+            *x = f64::from(f32::from_le_bytes(*bytes));
         }
-        shared.model.faces.push(&face);
+        if !corners.as_flattened().iter().all(|x| x.is_finite()) {
+            return Err(Fault::invalid(format!(
+                "triangle {k}: a corner has a coordinate that is NaN or infinite; repair or remove it"
+            )));
+        }
+        each(&corners);
     }
-    Ok(shared.model)
+    Ok(())
 }
 
-fn read_ascii(bytes: &[u8]) -> Result<Model, Fault> {
-    let mut shared = Shared::default();
-    let mut face = Vec::new();
-    let mut inside = true;
+fn scan_ascii(bytes: &[u8], mut each: impl FnMut(&[Point])) -> Result<(), Fault> {
+    let mut face: Vec<Point> = Vec::new();
+    // Some programs leave `endsolid` out, but none ends within a facet.
+    let mut within_facet = false;
     let mut lines = Lines::new(bytes);
     while let Some(line) = lines.next() {
         let number = lines.number();
@@ -71,17 +83,19 @@ fn read_ascii(bytes: &[u8]) -> Result<Model, Fault> {
             continue;
         };
         match keyword.to_ascii_lowercase().as_slice() {
-            b"solid" => inside = true,
-            b"endsolid" => inside = false,
-            b"facet" | b"outer" => face.clear(),
-            b"endfacet" => {}
-            b"vertex" => {
-                let point = point(&mut words, || format!("line {number}"))?;
-                face.push(shared.index(point));
-            }
+            b"solid" | b"endsolid" => {}
+            b"facet" => within_facet = true,
+            b"outer" => face.clear(),
+            b"endfacet" => within_facet = false,
+            b"vertex" => face.push(point(&mut words, || format!("line {number}"))?),
             b"endloop" => {
-                super::check_face(&face, usize::MAX, || format!("line {number}"))?;
-                shared.model.faces.push(&face);
+                if face.len() < 3 {
+                    return Err(Fault::damaged(format!(
+                        "line {number}: the face has {} corners where at least 3 are needed; export the mesh again",
+                        face.len()
+                    )));
+                }
+                each(&face);
                 face.clear();
             }
             _ => {
@@ -92,10 +106,10 @@ fn read_ascii(bytes: &[u8]) -> Result<Model, Fault> {
             }
         }
     }
-    if inside || !face.is_empty() {
-        return Err(Fault::damaged("ends without `endsolid`; copy or export the file again"));
+    if within_facet || !face.is_empty() {
+        return Err(Fault::damaged("ends within a facet; copy or export the file again"));
     }
-    Ok(shared.model)
+    Ok(())
 }
 
 /// A model whose points are numbered in the order in which they are first met.

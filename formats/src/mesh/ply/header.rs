@@ -120,15 +120,14 @@ impl Element {
         }
     }
 
-    /// Column of the list of vertices of each face.
+    /// Column of the list of vertices of each face or strip: the one of that name, or the only list there is.
     pub(super) fn corners(&self) -> Result<usize, Fault> {
-        let is_corners = |property: &Property| {
-            matches!(property.name.as_str(), "vertex_indices" | "vertex_index")
-                && matches!(property.kind, Kind::List { .. })
-        };
-        self.properties
-            .iter()
-            .position(is_corners)
+        let is_named = |k: &usize| matches!(self.properties[*k].name.as_str(), "vertex_indices" | "vertex_index");
+        let lists = || (0..self.properties.len()).filter(|&k| matches!(self.properties[k].kind, Kind::List { .. }));
+        let only = || lists().next().filter(|_| lists().count() == 1);
+        lists()
+            .find(is_named)
+            .or_else(only)
             .ok_or_else(|| Fault::unsupported("has faces without vertex_indices; export the mesh with plain polygons"))
     }
 }
@@ -151,7 +150,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header<'_>, Fault> {
                     _ => return Err(unreadable(&lines, line)),
                 });
             }
-            [b"element", name, count] => elements.push(Element {
+            [b"element", name, count, ..] => elements.push(Element {
                 name: String::from_utf8_lossy(name).into_owned(),
                 count: integer(count).ok_or_else(|| unreadable(&lines, line))?,
                 properties: Vec::new(),
@@ -161,16 +160,13 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header<'_>, Fault> {
                 let element = elements.last_mut().ok_or_else(|| unreadable(&lines, line))?;
                 element.properties.push(Property { name: String::from_utf8_lossy(name).into_owned(), kind });
             }
-            [] | [b"comment" | b"obj_info", ..] => {}
-            [b"end_header"] => {
+            [b"end_header", ..] => {
                 let encoding = encoding.ok_or_else(|| Fault::damaged("has no `format` line; export the mesh again"))?;
-                let has = |name| elements.iter().any(|element| element.name == name && element.count > 0);
-                if has("tristrips") && !has("face") {
-                    return Err(Fault::unsupported("has triangle strips; export the mesh with plain polygons"));
-                }
                 return Ok(Header { encoding, elements, body: lines });
             }
-            _ => return Err(unreadable(&lines, line)),
+            [b"element" | b"property" | b"format", ..] => return Err(unreadable(&lines, line)),
+            // Comments, and what other programs note.
+            _ => {}
         }
     }
     Err(Fault::damaged("ends within its header; copy or export the file again"))

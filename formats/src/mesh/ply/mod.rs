@@ -6,12 +6,12 @@ mod values;
 use cager_core::mesh::Model;
 
 use super::colors::Colors;
-use super::{Contents, check_face, no_such_vertex};
+use super::{Contents, Parsed, no_such_vertex};
 use crate::error::Fault;
 use header::{Element, Encoding, Header, Kind};
 use values::{Ascii, Binary, Values};
 
-pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Model, Fault> {
+pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Parsed, Fault> {
     let header = header::parse(bytes)?;
     match header.encoding {
         Encoding::Ascii => read_elements(&header, contents, Ascii::new(header.body.clone())),
@@ -20,17 +20,33 @@ pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Model, Fault> {
     }
 }
 
-fn read_elements<V: Values>(header: &Header<'_>, contents: Contents, mut values: V) -> Result<Model, Fault> {
-    let mut model = Model::default();
+fn read_elements<V: Values>(header: &Header<'_>, contents: Contents, mut values: V) -> Result<Parsed, Fault> {
+    let mut parsed = Parsed::from(Model::default());
     let points = header.vertices()?;
+    let faces = contents == Contents::PointsAndFaces;
+    let mut face = Vec::new();
     for element in &header.elements {
         match element.name.as_str() {
-            "vertex" => read_points(element, contents, &mut values, &mut model)?,
-            "face" if contents == Contents::PointsAndFaces => read_faces(element, points, &mut values, &mut model)?,
+            "vertex" => read_points(element, contents, &mut values, &mut parsed.model)?,
+            "face" if faces => each_list(element, &mut values, |k, list| {
+                face.clear();
+                for &corner in list {
+                    face.push(vertex(corner, points, || format!("face {k}"))?);
+                }
+                if face.len() >= 3 {
+                    parsed.model.faces.push(&face);
+                } else {
+                    parsed.left_out += 1;
+                }
+                Ok(())
+            })?,
+            "tristrips" if faces => {
+                each_list(element, &mut values, |k, strip| add_strip(strip, points, k, &mut parsed.model))?;
+            }
             _ => skip(element, &mut values)?,
         }
     }
-    Ok(model)
+    Ok(parsed)
 }
 
 fn read_points<V: Values>(
@@ -83,33 +99,56 @@ fn channel_of(columns: [(usize, f64); 3], column: usize) -> Option<(usize, f64)>
     Some((channel, columns[channel].1))
 }
 
-fn read_faces<V: Values>(element: &Element, points: u64, values: &mut V, model: &mut Model) -> Result<(), Fault> {
+/// Calls `each` with the number of every item of an element and its list of vertices.
+fn each_list<V: Values>(
+    element: &Element,
+    values: &mut V,
+    mut each: impl FnMut(u64, &[f64]) -> Result<(), Fault>,
+) -> Result<(), Fault> {
     if element.count == 0 {
         return Ok(());
     }
     let corners = element.corners()?;
-    let mut face = Vec::new();
+    let mut list = Vec::new();
     for k in 0..element.count {
         for (column, property) in element.properties.iter().enumerate() {
             match property.kind {
                 Kind::List { count, item } if column == corners => {
-                    face.clear();
+                    list.clear();
                     let length = values.length(count).map_err(|fault| fault.inside(element, k))?;
                     for _ in 0..length {
-                        let index = values.next(item).map_err(|fault| fault.inside(element, k))?;
-                        if !(index >= 0.0 && index < points as f64 && index.fract() == 0.0) {
-                            return Err(no_such_vertex(&format!("face {k}"), index as i64, points as usize));
-                        }
-                        face.push(index as u32);
+                        list.push(values.next(item).map_err(|fault| fault.inside(element, k))?);
                     }
                 }
                 kind => skip_value(values, kind).map_err(|fault| fault.inside(element, k))?,
             }
         }
-        check_face(&face, points as usize, || format!("face {k}"))?;
-        model.faces.push(&face);
+        each(k, &list)?;
     }
     Ok(())
+}
+
+/// Unfolds a strip of triangles, in which −1 begins anew.
+fn add_strip(strip: &[f64], points: u64, k: u64, model: &mut Model) -> Result<(), Fault> {
+    for part in strip.split(|&index| index == -1.0) {
+        let mut last = [0; 2];
+        for (i, &corner) in part.iter().enumerate() {
+            let corner = vertex(corner, points, || format!("strip {k}"))?;
+            let [a, b] = last;
+            last = [b, corner];
+            // Triangles that repeat a vertex only lead the strip elsewhere.
+            if i >= 2 && a != b && b != corner && corner != a {
+                // Every other triangle of a strip is turned around.
+                model.faces.push(&if i % 2 == 0 { [a, b, corner] } else { [b, a, corner] });
+            }
+        }
+    }
+    Ok(())
+}
+
+fn vertex(index: f64, points: u64, place: impl Fn() -> String) -> Result<u32, Fault> {
+    let exists = index >= 0.0 && index < points as f64 && index.fract() == 0.0;
+    if exists { Ok(index as u32) } else { Err(no_such_vertex(&place(), index as i64, points as usize)) }
 }
 
 fn skip<V: Values>(element: &Element, values: &mut V) -> Result<(), Fault> {

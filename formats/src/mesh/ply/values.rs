@@ -2,7 +2,7 @@
 
 use super::header::{Element, Scalar};
 use crate::error::Fault;
-use crate::text::{Lines, number, quoted};
+use crate::text::{Lines, no_number, number, quoted};
 
 /// A stream of values; all scalar types of the format fit into `f64` exactly.
 pub(super) trait Values {
@@ -22,7 +22,7 @@ pub(super) trait Values {
 pub(super) enum Failure {
     End,
     Length(f64),
-    Word { line: usize, shown: String },
+    Word { line: usize, what: String },
 }
 
 impl Failure {
@@ -32,7 +32,7 @@ impl Failure {
         Fault::damaged(match self {
             Self::End => format!("ends after {k} of {count} items of {name}; copy or export the file again"),
             Self::Length(length) => format!("{name} {k}: a list cannot have {length} items; export the mesh again"),
-            Self::Word { line, shown } => format!("line {line}: {shown} is not a number; export the mesh again"),
+            Self::Word { line, what } => format!("line {line}: {what}"),
         })
     }
 }
@@ -56,7 +56,7 @@ impl Values for Ascii<'_> {
         let end = self.line.iter().position(u8::is_ascii_whitespace).unwrap_or(self.line.len());
         let (word, rest) = self.line.split_at(end);
         self.line = rest.trim_ascii_start();
-        number(word).ok_or_else(|| Failure::Word { line: self.lines.number(), shown: quoted(word) })
+        number(word).ok_or_else(|| Failure::Word { line: self.lines.number(), what: no_number(word) })
     }
 
     fn remaining(&self) -> usize {

@@ -78,6 +78,26 @@ async fn frames_that_do_not_match_are_named() {
 }
 
 #[tokio::test]
+async fn files_that_are_another_kind_than_they_are_sent_as_are_named() {
+    let app = TestApp::start();
+    let capture = Capture::tiny();
+    let pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 1\n";
+    let lfs = "Git LFS pointer, not the file itself; run git lfs pull";
+    for name in ["f.npy", "f.pc2", "f.mdd", "f.f32"] {
+        let form = cage_form_of(&capture.rest.obj, name, pointer, &json!({}));
+        refused(&app, form, "invalid-frame", &[lfs]).await;
+    }
+    let form = cage_form_of(pointer, "f.npy", &capture.raw(0..20), &json!({}));
+    refused(&app, form, "invalid-geometry", &["rest.obj", lfs]).await;
+    // Of the length of whole frames, and for all that no numbers.
+    let mut archive = b"PK\x03\x04".to_vec();
+    archive.resize(12 * capture.points(), 0);
+    let form = cage_form_of(&capture.rest.obj, "f.f32", &archive, &json!({"frames": 1}));
+    refused(&app, form, "invalid-frame", &["not raw numbers"]).await;
+    nothing_is_left(&app).await;
+}
+
+#[tokio::test]
 async fn parts_that_are_missing_twice_or_unknown_are_named() {
     let app = TestApp::start();
     let rest = || file("rest.obj", &Capture::tiny().rest.obj);

@@ -33,7 +33,11 @@ async fn parts_that_are_missing_unknown_or_twice_are_named() {
     let rest = || file("rest.obj", &capture.rest.obj);
     let cage = || file("cage.obj", &capture.cage.obj);
     let both = || Form::new().part("rest", rest()).part("cage", cage());
+    let pointer = || file("lfs.ply", b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 1\n");
+    let is_pointer = "lfs.ply: is a Git LFS pointer, not the file itself; run git lfs pull";
     let cases = [
+        (Form::new().part("rest", pointer()).part("cage", cage()), 422, "invalid-geometry", is_pointer),
+        (Form::new().part("rest", rest()).part("cage", pointer()), 422, "invalid-geometry", is_pointer),
         (Form::new().part("cage", cage()), 400, "bad-request", "rest"),
         (both().part("cage", cage()), 400, "bad-request", "twice"),
         (both().part("extra", Part::text("x")), 400, "bad-request", "extra"),
