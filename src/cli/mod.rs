@@ -79,7 +79,7 @@ fn refused(error: &clap::Error) -> ExitCode {
     let _ = error.print();
     let stray = match error.get(clap::error::ContextKind::InvalidArg) {
         Some(clap::error::ContextValue::String(word)) if error.kind() == clap::error::ErrorKind::UnknownArgument => {
-            Some(word).filter(|word| !word.starts_with('-') && std::path::Path::new(word).exists())
+            Some(word).filter(|word| !word.starts_with('-') && Path::new(word).exists())
         }
         _ => None,
     };

@@ -25,6 +25,7 @@ pub(super) const OBJ: Target = target(
     &[
         "v ",
         "f ",
+        "fo ",
         "\nf -1 -2 -3",
         "vn ",
         "vt ",
@@ -50,9 +51,10 @@ pub(super) const OFF: Target = target(
     || {
         let plain = b"OFF\n4 4 6\n0 0 0\n1 0 0\n0 1.5 0\n0 0 -2.25\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
         let colored = b"COFF # c\n3 1 0\n0 0 0 255 0 0 255\n1 0 0 1 1 1 1\n0 1 0 0 0 0 0\n3 0 1 2 0.5 0.5 0.5\n";
-        vec![plain.to_vec(), colored.to_vec()]
+        let lines = b"OFF3 1\n0 0 0\n1 0 0\n0 1 0\n3 0\n1 # c\n2\n";
+        vec![plain.to_vec(), colored.to_vec(), lines.to_vec()]
     },
-    &["OFF", "COFF", "NOFF", "STOFF", "4OFF", "nOFF", "BINARY", "#", "\n", "3 0 1 2"],
+    &["OFF", "OFF3 1 0\n", "COFF", "NOFF", "STOFF", "4OFF", "nOFF", "BINARY", "#", "\n", "3 0 1 2"],
 );
 
 pub(super) const PLY: Target = target(
@@ -89,7 +91,9 @@ pub(super) const PLY: Target = target(
             put(&0.5_f32.to_le_bytes());
             file
         };
-        vec![ascii.into_bytes(), binary(false), binary(true)]
+        let strips = b"ply\nformat ascii 1.0\nelement vertex 3\nproperty char x\nproperty char y\nproperty char z\nelement tristrips 2\n\
+                       property list uchar char vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n8 0 1 2 1 0 -1 2 1\n3 0 1 2\n";
+        vec![ascii.into_bytes(), binary(false), binary(true), strips.to_vec()]
     },
     &[
         "element vertex ",
@@ -116,7 +120,8 @@ pub(super) const PLY: Target = target(
         "comment ",
         "\r\n",
         "x\n",
-        "tristrips",
+        "element tristrips ",
+        "-1",
     ],
 );
 
@@ -175,6 +180,16 @@ const GLB_WORDS: &[&str] = &[
     "\"VEC3\"",
     "\"SCALAR\"",
     "\"extensionsRequired\":[\"KHR_draco_mesh_compression\"]",
+    "\"extensions\":{\"KHR_meshopt_compression\":{\"buffer\":0,\"byteLength\":40,\"byteStride\":4,\"count\":4,\"mode\":\"ATTRIBUTES\",\"filter\":\"EXPONENTIAL\"}}",
+    "\"mode\":\"TRIANGLES\"",
+    "\"mode\":\"INDICES\"",
+    "\"filter\":\"COLOR\"",
+    "\"uri\":\"data:;base64,AAAA\"",
+    "\"JOINTS_0\":1,\"WEIGHTS_0\":0",
+    "\"inverseBindMatrices\":0",
+    "\"componentType\":5122",
+    "\"MAT4\"",
+    "\"weights\":[0.5]",
     "\"targets\":[{\"POSITION\":0}]",
     "BIN\0",
     "JSON",
@@ -184,20 +199,10 @@ fn glb_seeds() -> Vec<Vec<u8>> {
     let file = |rest: &str| {
         let mut data: Vec<u8> = (0..12_u8).flat_map(|k| f32::from(k % 5).to_le_bytes()).collect();
         data.extend([0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3_u16].iter().flat_map(|index| index.to_le_bytes()));
-        let mut json = format!(
+        let json = format!(
             r#"{{"asset":{{"version":"2.0"}},"buffers":[{{"byteLength":72}}],"bufferViews":[{{"buffer":0,"byteLength":48}},{{"buffer":0,"byteOffset":48,"byteLength":24}}],"accessors":[{{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"}},{{"bufferView":1,"componentType":5123,"count":12,"type":"SCALAR"}}],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1}}]}}]{rest}}}"#
-        )
-        .into_bytes();
-        json.resize(json.len().next_multiple_of(4), b' ');
-        let mut file = b"\x01glTF\x02\0\0\0".to_vec();
-        file.extend((28 + json.len() as u32 + data.len() as u32).to_le_bytes());
-        file.extend((json.len() as u32).to_le_bytes());
-        file.extend(b"JSON");
-        file.extend(json);
-        file.extend((data.len() as u32).to_le_bytes());
-        file.extend(b"BIN\0");
-        file.extend(data);
-        file
+        );
+        glb_file(json, &data)
     };
     vec![
         file(""),
@@ -207,7 +212,48 @@ fn glb_seeds() -> Vec<Vec<u8>> {
         file(
             r#","nodes":[{"mesh":0,"skin":0},{"translation":[1,2,3]}],"skins":[{"joints":[1]}],"materials":[{}],"animations":[]"#,
         ),
+        packed_glb(),
     ]
+}
+
+/// The chunks of JSON and of binary data in their container, after a byte that has the lengths made right again.
+fn glb_file(json: String, data: &[u8]) -> Vec<u8> {
+    let mut json = json.into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let mut file = b"\x01glTF\x02\0\0\0".to_vec();
+    file.extend((28 + json.len() as u32 + data.len() as u32).to_le_bytes());
+    file.extend((json.len() as u32).to_le_bytes());
+    file.extend(b"JSON");
+    file.extend(json);
+    file.extend((data.len() as u32).to_le_bytes());
+    file.extend(b"BIN\0");
+    file.extend(data);
+    file
+}
+
+/// With its positions and indices packed.
+fn packed_glb() -> Vec<u8> {
+    let mut data = vec![0xa1];
+    for _ in 0..3 {
+        // Of four bytes: none, of few bits, of more, and as they are.
+        data.extend([0b11_01_00_10, 0x01, 0x0f, 0xf0, 0, 0x55, 0xaa, 1, 2, 3, 4]);
+    }
+    data.resize(64, 0);
+    data.extend([0xe1, 0xf0, 0x00, 0x1f, 0xff, 0x02, 0xf1, 0x01, 0x05]);
+    data.resize(64 + 9 + 16, 0);
+    data.extend([0xd1, 0, 2, 4, 6, 0, 0, 0, 0]);
+    let view = |offset: usize, length: usize, stride: usize, count: usize, mode: &str| {
+        let size = stride * count;
+        format!(
+            r#"{{"buffer":1,"byteLength":{size},"extensions":{{"EXT_meshopt_compression":{{"buffer":0,"byteOffset":{offset},"byteLength":{length},"byteStride":{stride},"count":{count},"mode":"{mode}"}}}}}}"#
+        )
+    };
+    let views =
+        [view(0, 64, 12, 4, "ATTRIBUTES"), view(64, 25, 4, 12, "TRIANGLES"), view(89, 9, 4, 4, "INDICES")].join(",");
+    let json = format!(
+        r#"{{"asset":{{"version":"2.0"}},"buffers":[{{"byteLength":98}},{{"byteLength":999}}],"bufferViews":[{views}],"accessors":[{{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"}},{{"bufferView":1,"componentType":5125,"count":12,"type":"SCALAR"}},{{"bufferView":2,"componentType":5125,"count":4,"type":"SCALAR"}}],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1}},{{"attributes":{{"POSITION":0}},"indices":2,"mode":5}}]}}]}}"#
+    );
+    glb_file(json, &data)
 }
 
 /// Where the first byte says so, the lengths are made right again, so that changes of the JSON get further.

@@ -1,160 +1,219 @@
-//! Positions and indices from the binary chunk.
+//! Positions, indices and other numbers from views.
 
 use cager_core::mesh::Point;
-use gltf::json::Root;
-use gltf::json::accessor::{ComponentType, GenericComponentType, Type};
+use gltf::json::Accessor;
+use gltf::json::accessor::sparse::Sparse;
+use gltf::json::accessor::{ComponentType, GenericComponentType, IndexComponentType, Type};
 use gltf::json::validation::Checked;
 
+use super::buffers::{Buffers, outside};
 use super::{dangling, too_large};
 use crate::error::Fault;
-
-pub(super) struct Buffers<'a> {
-    pub(super) root: &'a Root,
-    pub(super) binary: &'a [u8],
-}
 
 impl Buffers<'_> {
     /// The positions of an accessor, which must have no more than `most`.
     pub(super) fn positions(&self, index: usize, most: usize, place: &str) -> Result<Vec<Point>, Fault> {
-        let (component, shape) = self.kind(index, place)?;
-        if (component, shape) != (ComponentType::F32, Type::Vec3) {
-            return Err(Fault::unsupported(format!(
-                "{place}: positions are {shape:?} of {component:?}, not Vec3 of F32; export the mesh without quantization"
-            )));
+        let kind = self.kind(index, place)?;
+        if kind.shape != Type::Vec3 || kind.component == ComponentType::U32 {
+            return Err(kind.unexpected("positions", place));
         }
-        let mut points = Vec::new();
-        self.for_each(index, most, place, |bytes: &[u8; 12]| {
-            let coordinates = bytes.as_chunks::<4>().0;
-            points.push([0, 1, 2].map(|k| f64::from(f32::from_le_bytes(coordinates[k]))));
-        })?;
-        Ok(points)
+        self.read(index, kind, most, place, |point| point)
     }
 
     /// The colours of an accessor in linear light, which must have no more than `most`; an opacity is passed over.
     pub(super) fn colors(&self, index: usize, most: usize, place: &str) -> Result<Vec<[f32; 3]>, Fault> {
-        let (component, shape) = self.kind(index, place)?;
-        let (size, value): (usize, fn(&[u8]) -> f32) = match component {
-            ComponentType::U8 => (1, |b| f32::from(b[0]) / 255.0),
-            ComponentType::U16 => (2, |b| f32::from(u16::from_le_bytes([b[0], b[1]])) / 65535.0),
-            ComponentType::F32 => (4, |b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])),
-            _ => return Ok(Vec::new()),
-        };
-        let channels = match shape {
-            Type::Vec3 => 3,
-            Type::Vec4 => 4,
-            _ => return Ok(Vec::new()),
-        };
-        let Elements { bytes, stride, count } = self.elements(index, size * channels, most, place)?;
-        // The last element may be shorter than the stride, but has all its channels.
-        let color = |element: &[u8]| [0, 1, 2].map(|k| value(&element[k * size..]));
-        Ok(bytes.chunks(stride).take(count).map(color).collect())
+        let mut kind = self.kind(index, place)?;
+        if !matches!(kind.component, ComponentType::U8 | ComponentType::U16 | ComponentType::F32)
+            || !matches!(kind.shape, Type::Vec3 | Type::Vec4)
+        {
+            return Ok(Vec::new());
+        }
+        // Not all files say so of colours, for which nothing else has a meaning.
+        kind.normalized = true;
+        self.read(index, kind, most, place, |color: [f64; 3]| color.map(|x| x as f32))
     }
 
     /// The vertex indices of an accessor, which must have no more than `most`.
     pub(super) fn indices(&self, index: usize, most: usize, place: &str) -> Result<Vec<u32>, Fault> {
-        let mut indices = Vec::new();
-        match self.kind(index, place)? {
-            (ComponentType::U8, Type::Scalar) => {
-                self.for_each(index, most, place, |&[byte]: &[u8; 1]| indices.push(byte.into()))?;
-            }
-            (ComponentType::U16, Type::Scalar) => {
-                self.for_each(index, most, place, |&bytes| indices.push(u16::from_le_bytes(bytes).into()))?;
-            }
-            (ComponentType::U32, Type::Scalar) => {
-                self.for_each(index, most, place, |&bytes| indices.push(u32::from_le_bytes(bytes)))?;
-            }
-            (component, shape) => {
-                return Err(Fault::damaged(format!(
-                    "{place}: indices are {shape:?} of {component:?}, not unsigned integers; export the mesh again"
-                )));
-            }
+        let kind = self.kind(index, place)?;
+        if kind.shape != Type::Scalar || !kind.is_unsigned() {
+            return Err(kind.unexpected("indices", place));
         }
-        Ok(indices)
+        self.read(index, Kind { normalized: false, ..kind }, most, place, |[index]: [f64; 1]| index as u32)
     }
 
-    fn kind(&self, index: usize, place: &str) -> Result<(ComponentType, Type), Fault> {
-        let accessors = &self.root.accessors;
-        let accessor = accessors.get(index).ok_or_else(|| dangling(&format!("accessor {index}"), accessors.len()))?;
-        if accessor.sparse.is_some() {
-            return Err(Fault::unsupported(format!(
-                "{place}: accessor {index} is sparse; export the mesh without that"
-            )));
+    /// Which joints move each vertex, four at a time.
+    pub(super) fn joints(&self, index: usize, most: usize, place: &str) -> Result<Vec<[usize; 4]>, Fault> {
+        let kind = self.kind(index, place)?;
+        if kind.shape != Type::Vec4 || !kind.is_unsigned() {
+            return Err(kind.unexpected("joints", place));
         }
+        let kind = Kind { normalized: false, ..kind };
+        self.read(index, kind, most, place, |joints: [f64; 4]| joints.map(|joint| joint as usize))
+    }
+
+    /// How much each of those joints does.
+    pub(super) fn weights(&self, index: usize, most: usize, place: &str) -> Result<Vec<[f64; 4]>, Fault> {
+        let kind = self.kind(index, place)?;
+        if kind.shape != Type::Vec4 {
+            return Err(kind.unexpected("weights", place));
+        }
+        self.read(index, Kind { normalized: true, ..kind }, most, place, |weights| weights)
+    }
+
+    /// Matrices of 4 × 4 numbers, column after column.
+    pub(super) fn matrices(&self, index: usize, most: usize, place: &str) -> Result<Vec<[f64; 16]>, Fault> {
+        let kind = self.kind(index, place)?;
+        if (kind.shape, kind.component) != (Type::Mat4, ComponentType::F32) {
+            return Err(kind.unexpected("matrices", place));
+        }
+        self.read(index, kind, most, place, |matrix| matrix)
+    }
+
+    fn accessor(&self, index: usize) -> Result<&Accessor, Fault> {
+        let accessors = &self.root.accessors;
+        accessors.get(index).ok_or_else(|| dangling(&format!("accessor {index}"), accessors.len()))
+    }
+
+    fn kind(&self, index: usize, place: &str) -> Result<Kind, Fault> {
+        let accessor = self.accessor(index)?;
         match (accessor.component_type, accessor.type_) {
-            (Checked::Valid(GenericComponentType(component)), Checked::Valid(shape)) => Ok((component, shape)),
+            (Checked::Valid(GenericComponentType(component)), Checked::Valid(shape)) => {
+                Ok(Kind { component, shape, normalized: accessor.normalized })
+            }
             _ => Err(Fault::damaged(format!("{place}: accessor {index} has an unknown type; export the mesh again"))),
         }
     }
 
-    /// Calls `each` with every element.
-    fn for_each<const N: usize>(
+    /// The first `N` numbers of every element, converted.
+    fn read<const N: usize, T>(
         &self,
         index: usize,
+        kind: Kind,
         most: usize,
         place: &str,
-        mut each: impl FnMut(&[u8; N]),
-    ) -> Result<(), Fault> {
-        let Elements { bytes, stride, count } = self.elements(index, N, most, place)?;
-        for element in bytes.chunks(stride).take(count) {
-            // The last element may be shorter than the stride, but not than `N`.
-            if let Some(element) = element.first_chunk() {
-                each(element);
+        convert: impl Fn([f64; N]) -> T,
+    ) -> Result<Vec<T>, Fault> {
+        let accessor = self.accessor(index)?;
+        let (size, convert) = (kind.size(), |element: &[u8]| convert(kind.numbers(element)));
+        let count = usize::try_from(accessor.count.0).ok().filter(|&count| count <= most);
+        let mut values: Vec<T> = match (accessor.buffer_view, &accessor.sparse) {
+            (Some(view), _) => {
+                let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
+                let found = self.elements(view.value(), offset, size, accessor.count.0, place)?;
+                let count = count.ok_or_else(too_large)?;
+                found.bytes.chunks(found.stride).take(count).map(&convert).collect()
+            }
+            // Zeros, but for those that follow.
+            (None, Some(_)) => (0..count.ok_or_else(too_large)?).map(|_| convert(&[0; MOST_BYTES][..size])).collect(),
+            (None, None) => {
+                return Err(Fault::unsupported(format!(
+                    "{place}: accessor {index} has no data of its own; export the mesh without compression"
+                )));
+            }
+        };
+        if let Some(sparse) = &accessor.sparse {
+            let replaced = self.sparse_indices(sparse, most, place)?;
+            let (view, offset) = (sparse.values.buffer_view.value(), sparse.values.byte_offset.0);
+            let found = self.elements(view, offset, size, sparse.count.0, place)?;
+            for (at, element) in replaced.into_iter().zip(found.bytes.chunks(found.stride)) {
+                *values.get_mut(at).ok_or_else(|| outside(place))? = convert(element);
             }
         }
-        Ok(())
+        Ok(values)
     }
 
-    /// The elements, of `size` bytes, of an accessor whose type is known.
-    fn elements(&self, index: usize, size: usize, most: usize, place: &str) -> Result<Elements<'_>, Fault> {
-        let accessor = &self.root.accessors[index];
-        let views = &self.root.buffer_views;
-        let Some(view) = accessor.buffer_view else {
-            return Err(Fault::unsupported(format!(
-                "{place}: accessor {index} has no data of its own; export the mesh without compression"
+    /// Which elements a sparse accessor replaces.
+    fn sparse_indices(&self, sparse: &Sparse, most: usize, place: &str) -> Result<Vec<usize>, Fault> {
+        let Checked::Valid(IndexComponentType(component)) = sparse.indices.component_type else {
+            return Err(Fault::damaged(format!(
+                "{place}: a sparse accessor has an unknown type; export the mesh again"
             )));
         };
-        let view = views.get(view.value()).ok_or_else(|| dangling(&format!("bufferView {view}"), views.len()))?;
-        let stored = self.root.buffers.get(view.buffer.value());
-        if view.buffer.value() != 0 || stored.is_none_or(|buffer| buffer.uri.is_some()) {
-            return Err(Fault::unsupported(format!(
-                "{place}: accessor {index} has its data in another file; export one self-contained .glb"
-            )));
-        }
-        let stride = view.byte_stride.map_or(size, |stride| stride.0);
+        let kind = Kind { component, shape: Type::Scalar, normalized: false };
+        let (view, offset) = (sparse.indices.buffer_view.value(), sparse.indices.byte_offset.0);
+        let found = self.elements(view, offset, kind.size(), sparse.count.0, place)?;
+        let count = usize::try_from(sparse.count.0).ok().filter(|&count| count <= most).ok_or_else(too_large)?;
+        let index = |element| {
+            let [index] = kind.numbers(element);
+            index as usize
+        };
+        Ok(found.bytes.chunks(found.stride).take(count).map(index).collect())
+    }
+
+    /// `count` elements of `size` bytes in a view, all of them there.
+    fn elements(&self, view: usize, offset: u64, size: usize, count: u64, place: &str) -> Result<Elements<'_>, Fault> {
+        let (bytes, stride) = self.view(view, place)?;
+        let stride = stride.unwrap_or(size);
         if stride < size {
             return Err(Fault::damaged(format!(
-                "{place}: accessor {index} has elements of {size} bytes at a stride of {stride}; export the mesh again"
+                "{place}: has elements of {size} bytes at a stride of {stride}; export the mesh again"
             )));
         }
-        let outside = || {
-            Fault::damaged(format!(
-                "{place}: accessor {index} reaches beyond the binary data; copy or export the file again"
-            ))
-        };
-        let part = |bytes: &'_ [u8], offset: u64| usize::try_from(offset).ok().filter(|&offset| offset <= bytes.len());
-        let start = part(self.binary, view.byte_offset.map_or(0, |offset| offset.0)).ok_or_else(outside)?;
-        let length = part(&self.binary[start..], view.byte_length.0).ok_or_else(outside)?;
-        let bytes = &self.binary[start..start + length];
-        let offset = part(bytes, accessor.byte_offset.map_or(0, |offset| offset.0)).ok_or_else(outside)?;
-        let bytes = &bytes[offset..];
-        let Some(last) = accessor.count.0.checked_sub(1) else {
-            return Ok(Elements { bytes: &[], stride, count: 0 });
+        let bytes =
+            usize::try_from(offset).ok().and_then(|offset| bytes.get(offset..)).ok_or_else(|| outside(place))?;
+        let Some(last) = count.checked_sub(1) else {
+            return Ok(Elements { bytes: &[], stride });
         };
         let end = last.checked_mul(stride as u64).and_then(|start| start.checked_add(size as u64));
-        if end.is_none_or(|end| end > bytes.len() as u64) {
-            return Err(outside());
-        }
-        if last >= most as u64 {
-            return Err(too_large());
-        }
-        Ok(Elements { bytes, stride, count: last as usize + 1 })
+        let end = end.and_then(|end| usize::try_from(end).ok());
+        let bytes = end.and_then(|end| bytes.get(..end)).ok_or_else(|| outside(place))?;
+        Ok(Elements { bytes, stride })
     }
 }
 
-/// Where the elements of an accessor are; all of them are there.
+/// The largest element: sixteen numbers of four bytes.
+const MOST_BYTES: usize = 64;
+
+/// Where the elements of an accessor are; the last one ends the bytes.
 struct Elements<'a> {
     bytes: &'a [u8],
     /// Bytes from the start of one to the start of the next, at least the size of one.
     stride: usize,
-    count: usize,
+}
+
+/// What the elements of an accessor are.
+#[derive(Clone, Copy)]
+struct Kind {
+    component: ComponentType,
+    shape: Type,
+    /// Whether whole numbers stand for fractions of the greatest of their type.
+    normalized: bool,
+}
+
+impl Kind {
+    /// Bytes of an element.
+    fn size(self) -> usize {
+        self.component.size() * self.shape.multiplicity()
+    }
+
+    fn is_unsigned(self) -> bool {
+        matches!(self.component, ComponentType::U8 | ComponentType::U16 | ComponentType::U32)
+    }
+
+    /// The first numbers of an element that has as many or more.
+    fn numbers<const N: usize>(self, element: &[u8]) -> [f64; N] {
+        let size = self.component.size();
+        std::array::from_fn(|k| self.number(element.get(k * size..).unwrap_or_default()))
+    }
+
+    fn number(self, bytes: &[u8]) -> f64 {
+        fn first<const N: usize>(bytes: &[u8]) -> [u8; N] {
+            bytes.first_chunk().copied().unwrap_or([0; N])
+        }
+        let (value, most) = match self.component {
+            ComponentType::I8 => (i8::from_le_bytes(first(bytes)).into(), 127.0),
+            ComponentType::U8 => (u8::from_le_bytes(first(bytes)).into(), 255.0),
+            ComponentType::I16 => (i16::from_le_bytes(first(bytes)).into(), 32767.0),
+            ComponentType::U16 => (u16::from_le_bytes(first(bytes)).into(), 65535.0),
+            ComponentType::U32 => return u32::from_le_bytes(first(bytes)).into(),
+            ComponentType::F32 => return f32::from_le_bytes(first(bytes)).into(),
+        };
+        if self.normalized { f64::max(value / most, -1.0) } else { value }
+    }
+
+    fn unexpected(self, what: &str, place: &str) -> Fault {
+        let Self { component, shape, .. } = self;
+        Fault::damaged(format!("{place}: {what} are {shape:?} of {component:?}; export the mesh again"))
+    }
 }

@@ -54,12 +54,32 @@ pub(super) fn document(json: &[u8]) -> Result<Root, Fault> {
         let more = if shown.len() < cause.len() { "…" } else { "" };
         Fault::damaged(format!("has JSON that is not glTF 2.0 ({shown}{more}); export the mesh again"))
     })?;
-    let compressed = |name: &&String| name.contains("compression") || name.contains("quantization");
-    if let Some(name) = root.extensions_required.iter().find(compressed) {
-        let name = quoted(name.as_bytes());
-        return Err(Fault::unsupported(format!("needs the extension {name}; export the mesh without compression")));
+    match root.extensions_required.iter().find(|name| !is_read(name)) {
+        Some(name) if name == DRACO => Err(draco()),
+        Some(name) => {
+            let name = quoted(name.as_bytes());
+            Err(Fault::unsupported(format!(
+                "needs the extension {name}, which is not read; export the mesh without it"
+            )))
+        }
+        None => Ok(root),
     }
-    Ok(root)
+}
+
+pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
+
+/// Whether files that require an extension are read: it is understood, or changes no shape.
+fn is_read(extension: &str) -> bool {
+    /// Parts of the names of extensions for appearance, sound and notes.
+    const OTHER: [&str; 6] = ["_materials_", "_texture_", "_light", "_xmp", "_audio", "_animation_pointer"];
+    matches!(extension, "KHR_mesh_quantization" | "EXT_meshopt_compression" | "KHR_meshopt_compression")
+        || OTHER.iter().any(|part| extension.contains(part))
+}
+
+pub(super) fn draco() -> Fault {
+    Fault::unsupported(format!(
+        "is compressed by Draco ({DRACO}), which is not read; export it without compression, or open it in Blender and do so there"
+    ))
 }
 
 fn word(bytes: &[u8], offset: usize) -> Option<u32> {

@@ -4,12 +4,17 @@
 //! checks, because the crate's own accessors and validation panic on indices out of range.
 
 mod accessor;
+mod buffers;
 mod container;
+mod meshopt;
 mod scene;
+mod skin;
 
 use std::collections::HashMap;
+use std::collections::btree_map::Entry;
 
 use cager_core::mesh::{Model, Point};
+use cager_core::vector::along;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Mesh, Root};
@@ -17,21 +22,25 @@ use gltf::json::{Mesh, Root};
 use super::check_face;
 use super::colors::{Colors, Scale, srgb};
 use crate::error::Fault;
-use accessor::Buffers;
-use scene::Placement;
+use buffers::Buffers;
+use scene::{Placement, Scene};
+use skin::{Joints, Skins};
 
 pub(super) fn read(bytes: &[u8]) -> Result<Model, Fault> {
     let chunks = container::split(bytes)?;
     let root = container::document(chunks.json)?;
+    let scene = Scene::of(&root)?;
     let mut builder = Builder {
         root: &root,
-        buffers: Buffers { root: &root, binary: chunks.binary },
+        scene: &scene,
+        buffers: Buffers::new(&root, chunks.binary, bytes.len()),
+        skins: Skins::new(),
         model: Model::default(),
         colors: Colors::default(),
         most: MOST_FREE + MOST_PER_BYTE * bytes.len(),
     };
-    for placement in scene::placements(&root)? {
-        builder.place(&placement)?;
+    for placement in &scene.placements {
+        builder.place(placement)?;
     }
     let Builder { mut model, colors, .. } = builder;
     model.colors = colors.finish(model.points.len(), Scale::Fractions);
@@ -45,7 +54,9 @@ const MOST_PER_BYTE: usize = 2;
 
 struct Builder<'a> {
     root: &'a Root,
+    scene: &'a Scene,
     buffers: Buffers<'a>,
+    skins: Skins,
     model: Model,
     colors: Colors,
     /// Nodes may repeat a mesh, and primitives an accessor, any number of times in a few bytes each.
@@ -59,21 +70,35 @@ impl Builder<'_> {
             .meshes
             .get(placement.mesh)
             .ok_or_else(|| dangling(&format!("mesh {}", placement.mesh), self.root.meshes.len()))?;
+        let mirrored = match placement.skin {
+            Some(skin) => self.joints(skin)?.mirror(),
+            None => placement.mirrored(),
+        };
         // Primitives that differ by their material alone often share their points.
         let mut placed = HashMap::new();
         for (k, primitive) in mesh.primitives.iter().enumerate() {
             // Counted even if empty: the work, not the memory alone, is bounded.
             self.most = self.most.checked_sub(1).ok_or_else(too_large)?;
             let place = format!("mesh {}, primitive {k}", placement.mesh);
-            self.primitive(primitive, placement, &place, &mut placed)?;
+            self.primitive(primitive, placement, mirrored, &place, &mut placed)?;
         }
         Ok(())
+    }
+
+    fn joints(&mut self, skin: usize) -> Result<&Joints, Fault> {
+        if let Entry::Vacant(entry) = self.skins.entry(skin) {
+            let (joints, read) = Joints::of(skin, self.scene, &self.buffers, self.most)?;
+            self.most -= read;
+            entry.insert(joints);
+        }
+        Ok(&self.skins[&skin])
     }
 
     fn primitive(
         &mut self,
         primitive: &Primitive,
         placement: &Placement,
+        mirrored: bool,
         place: &str,
         placed: &mut HashMap<usize, (usize, usize)>,
     ) -> Result<(), Fault> {
@@ -83,13 +108,19 @@ impl Builder<'_> {
         if matches!(mode, Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
             return Ok(());
         }
+        let extensions = primitive.extensions.as_ref().map(|extensions| &extensions.others);
+        let is_draco = extensions.is_some_and(|extensions| extensions.contains_key(container::DRACO));
         let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions)).ok_or_else(|| {
             Fault::unsupported(format!("{place} has no POSITION; export the mesh without compression"))
         })?;
+        // Some files have the plain data as well.
+        if is_draco && self.root.accessors.get(positions.value()).is_some_and(|a| a.buffer_view.is_none()) {
+            return Err(container::draco());
+        }
         let (base, count) = match placed.get(&positions.value()) {
             Some(&known) => known,
             None => {
-                let added = self.add_points(positions.value(), placement, place)?;
+                let added = self.add_points(positions.value(), primitive, placement, place)?;
                 // Of primitives that share their points, the first one's.
                 if let Some(colors) = primitive.attributes.get(&Checked::Valid(Semantic::Colors(0))) {
                     self.add_colors(colors.value(), added.1, place);
@@ -108,11 +139,22 @@ impl Builder<'_> {
                 (0..count as u32).collect()
             }
         };
-        self.add_triangles(&corners, mode, base, count, placement.mirrored(), place)
+        self.add_triangles(&corners, mode, base, count, mirrored, place)
     }
 
-    fn add_points(&mut self, index: usize, placement: &Placement, place: &str) -> Result<(usize, usize), Fault> {
-        let points = self.buffers.positions(index, self.room(), place)?;
+    fn add_points(
+        &mut self,
+        index: usize,
+        primitive: &Primitive,
+        placement: &Placement,
+        place: &str,
+    ) -> Result<(usize, usize), Fault> {
+        let mut points = self.buffers.positions(index, self.room(), place)?;
+        self.morph(&mut points, primitive, placement, place)?;
+        if let Some(skin) = placement.skin {
+            self.joints(skin)?;
+            self.skins[&skin].pose(&mut points, primitive, &self.buffers, place)?;
+        }
         let base = self.model.points.len();
         for (k, &point) in points.iter().enumerate() {
             let point: Point = placement.apply(point);
@@ -124,6 +166,28 @@ impl Builder<'_> {
             self.model.points.push(point);
         }
         Ok((base, points.len()))
+    }
+
+    /// Adds the differences of morph targets, as far as the node or else the mesh has them at rest.
+    fn morph(
+        &mut self,
+        points: &mut [Point],
+        primitive: &Primitive,
+        placement: &Placement,
+        place: &str,
+    ) -> Result<(), Fault> {
+        let node = placement.node.and_then(|node| self.root.nodes[node].weights.as_ref());
+        let weights = node.or(self.root.meshes[placement.mesh].weights.as_ref());
+        let targets = primitive.targets.iter().flatten().zip(weights.into_iter().flatten());
+        for (target, &weight) in targets.filter(|&(_, &weight)| weight != 0.0) {
+            let Some(positions) = &target.positions else { continue };
+            self.most = self.most.checked_sub(points.len() + 1).ok_or_else(too_large)?;
+            let moved = self.buffers.positions(positions.value(), points.len(), place)?;
+            for (point, moved) in points.iter_mut().zip(moved) {
+                *point = along(*point, weight.into(), moved);
+            }
+        }
+        Ok(())
     }
 
     /// Colours that cannot be read leave the model without any.

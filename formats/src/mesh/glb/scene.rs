@@ -8,46 +8,80 @@ use super::dangling;
 use crate::error::Fault;
 
 /// Columns of a 4 × 4 matrix without its last row, which is 0 0 0 1.
-type Affine = [[f64; 3]; 4];
+pub(super) type Affine = [[f64; 3]; 4];
 
-const IDENTITY: Affine = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]];
+pub(super) const IDENTITY: Affine = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]];
+
+/// The meshes of the default scene.
+pub(super) struct Scene {
+    pub(super) placements: Vec<Placement>,
+    /// From each node's space to the world's; none for nodes outside the scene.
+    worlds: Vec<Option<Affine>>,
+}
 
 /// A mesh at its place in the scene.
 pub(super) struct Placement {
     pub(super) mesh: usize,
+    /// The node that the mesh hangs on, if any does.
+    pub(super) node: Option<usize>,
+    /// The skin whose joints say where the mesh is.
+    pub(super) skin: Option<usize>,
     transform: Affine,
 }
 
 impl Placement {
     pub(super) fn apply(&self, p: Point) -> Point {
-        if self.transform == IDENTITY {
-            return p;
-        }
-        let [a, b, c, d] = self.transform;
-        add(combination(p, [a, b, c]), d)
+        if self.transform == IDENTITY { p } else { apply(&self.transform, p) }
     }
 
     /// Whether triangles turn around, so that they must be turned back.
     pub(super) fn mirrored(&self) -> bool {
-        let [a, b, c, _] = self.transform;
-        dot(a, cross(b, c)) < 0.0
+        mirrors(&self.transform)
     }
 }
 
-/// The meshes of the default scene in the order of their nodes, or all meshes as they are where no node has one.
-pub(super) fn placements(root: &Root) -> Result<Vec<Placement>, Fault> {
-    let mut placements = Vec::new();
-    for (node, transform) in root.nodes.iter().zip(transforms(root)?) {
-        if let (Some(mesh), Some(transform)) = (node.mesh, transform) {
-            // The joints of a skin, not its node, say where it is; at rest they leave it where it was modelled.
-            let transform = if node.skin.is_some() { IDENTITY } else { transform };
-            placements.push(Placement { mesh: mesh.value(), transform });
+impl Scene {
+    /// The meshes of the default scene in the order of their nodes, or all meshes as they are where no node has one.
+    pub(super) fn of(root: &Root) -> Result<Self, Fault> {
+        let worlds = transforms(root)?;
+        let mut placements = Vec::new();
+        for (k, (node, world)) in root.nodes.iter().zip(&worlds).enumerate() {
+            let (Some(mesh), Some(world)) = (node.mesh, world) else { continue };
+            let others = node.extensions.as_ref().map(|extensions| &extensions.others);
+            if others.is_some_and(|others| others.contains_key("EXT_mesh_gpu_instancing")) {
+                return Err(Fault::unsupported(format!(
+                    "node {k} repeats its mesh by EXT_mesh_gpu_instancing; export the copies as meshes of their own"
+                )));
+            }
+            // The joints of a skin, not its node, say where it is.
+            let skin = node.skin.map(|skin| skin.value());
+            let transform = if skin.is_some() { IDENTITY } else { *world };
+            placements.push(Placement { mesh: mesh.value(), node: Some(k), skin, transform });
         }
+        if root.nodes.iter().all(|node| node.mesh.is_none()) {
+            let alone = |mesh| Placement { mesh, node: None, skin: None, transform: IDENTITY };
+            placements.extend((0..root.meshes.len()).map(alone));
+        }
+        Ok(Self { placements, worlds })
     }
-    if root.nodes.iter().all(|node| node.mesh.is_none()) {
-        placements.extend((0..root.meshes.len()).map(|mesh| Placement { mesh, transform: IDENTITY }));
+
+    /// From a node's space to the world's.
+    pub(super) fn world(&self, node: usize) -> Result<&Affine, Fault> {
+        let world = self.worlds.get(node).ok_or_else(|| dangling(&format!("node {node}"), self.worlds.len()))?;
+        world.as_ref().ok_or_else(|| {
+            Fault::unsupported(format!("node {node} moves a skin but is not in the scene; export the mesh again"))
+        })
     }
-    Ok(placements)
+}
+
+pub(super) fn apply(transform: &Affine, p: Point) -> Point {
+    let [a, b, c, d] = *transform;
+    add(combination(p, [a, b, c]), d)
+}
+
+pub(super) fn mirrors(transform: &Affine) -> bool {
+    let [a, b, c, _] = *transform;
+    dot(a, cross(b, c)) < 0.0
 }
 
 /// From each node's space to the world's; none for nodes outside the default scene.
@@ -104,7 +138,7 @@ fn local(node: &Node) -> Affine {
     [a, b, c, node.translation.unwrap_or_default().map(f64::from)]
 }
 
-fn compose(outer: &Affine, inner: &Affine) -> Affine {
+pub(super) fn compose(outer: &Affine, inner: &Affine) -> Affine {
     let [a, b, c, d] = *outer;
     let [i, j, k, moved] = inner.map(|p| combination(p, [a, b, c]));
     [i, j, k, add(moved, d)]

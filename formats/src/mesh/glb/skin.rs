@@ -1,0 +1,97 @@
+//! Skins: meshes whose vertices follow several joints, at rest.
+
+use std::collections::BTreeMap;
+
+use cager_core::mesh::Point;
+use cager_core::vector::along;
+use gltf::json::mesh::{Primitive, Semantic};
+use gltf::json::validation::Checked;
+
+use super::buffers::Buffers;
+use super::scene::{Affine, IDENTITY, Scene, apply, compose, mirrors};
+use super::{dangling, too_large};
+use crate::error::Fault;
+
+/// From the space that the mesh was bound in to the world's, for each joint of a skin.
+pub(super) struct Joints(Vec<Affine>);
+
+/// The joints of each skin, once it was asked for.
+pub(super) type Skins = BTreeMap<usize, Joints>;
+
+impl Joints {
+    /// Those of a skin; at most `most` matrices are read, and their number is given back too.
+    pub(super) fn of(index: usize, scene: &Scene, buffers: &Buffers<'_>, most: usize) -> Result<(Self, usize), Fault> {
+        let skins = &buffers.root.skins;
+        let skin = skins.get(index).ok_or_else(|| dangling(&format!("skin {index}"), skins.len()))?;
+        let place = format!("skin {index}");
+        let bound = match skin.inverse_bind_matrices {
+            Some(accessor) => buffers.matrices(accessor.value(), most, &place)?,
+            None => Vec::new(),
+        };
+        let read = bound.len().max(skin.joints.len());
+        if read > most {
+            return Err(too_large());
+        }
+        let joint = |(k, node): (usize, &gltf::json::Index<_>)| {
+            let inverse = match bound.get(k) {
+                Some(m) => [0, 4, 8, 12].map(|column| [0, 1, 2].map(|row| m[column + row])),
+                None if bound.is_empty() => IDENTITY,
+                None => {
+                    return Err(Fault::damaged(format!(
+                        "{place}: has {} inverse bind matrices for {} joints; export the mesh again",
+                        bound.len(),
+                        skin.joints.len()
+                    )));
+                }
+            };
+            Ok(compose(scene.world(node.value())?, &inverse))
+        };
+        Ok((Self(skin.joints.iter().enumerate().map(joint).collect::<Result<_, _>>()?), read))
+    }
+
+    /// Whether triangles turn around, so that they must be turned back.
+    pub(super) fn mirror(&self) -> bool {
+        2 * self.0.iter().filter(|joint| mirrors(joint)).count() > self.0.len()
+    }
+
+    /// Moves the points of a primitive to where the joints put them; without weights they stay.
+    pub(super) fn pose(
+        &self,
+        points: &mut [Point],
+        primitive: &Primitive,
+        buffers: &Buffers<'_>,
+        place: &str,
+    ) -> Result<(), Fault> {
+        let mut moved = vec![([0.0; 3], 0.0); points.len()];
+        let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).map(|index| index.value());
+        // Four joints a vertex in each set.
+        for set in 0.. {
+            let (Some(joints), Some(weights)) = (attribute(Semantic::Joints(set)), attribute(Semantic::Weights(set)))
+            else {
+                break;
+            };
+            let joints = buffers.joints(joints, points.len(), place)?;
+            let weights = buffers.weights(weights, points.len(), place)?;
+            if joints.len().min(weights.len()) < points.len() {
+                return Err(Fault::damaged(format!("{place}: not every vertex has joints; export the mesh again")));
+            }
+            for (k, (moved, (joints, weights))) in moved.iter_mut().zip(joints.iter().zip(&weights)).enumerate() {
+                for (&joint, &weight) in joints.iter().zip(weights).filter(|&(_, &weight)| weight != 0.0) {
+                    let transform = self.0.get(joint).ok_or_else(|| {
+                        Fault::damaged(format!(
+                            "{place}: vertex {k} names joint {joint}, but the skin has {}; export the mesh again",
+                            self.0.len()
+                        ))
+                    })?;
+                    moved.0 = along(moved.0, weight, apply(transform, points[k]));
+                    moved.1 += weight;
+                }
+            }
+        }
+        for (point, (sum, weight)) in points.iter_mut().zip(moved).filter(|(_, (_, weight))| *weight != 0.0) {
+            // Weights of few bits do not always add up to 1.
+            *point = sum.map(|x| x / weight);
+        }
+        Ok(())
+    }
+}
