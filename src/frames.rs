@@ -1,9 +1,12 @@
-//! Opening a capture's files: checks for gaps, and adapts axes, welded points, frame rate and frame numbers.
+//! Opening a capture's files: checks for gaps and for frames that depart from those before, and adapts axes, welded points, frame rate and
+//! frame numbers.
 
+use crate::belonging::{Belonging, Pass};
 use crate::mismatch::Up;
 use crate::timing::Timing;
 use cager_formats::{Error, FrameReader, FrameSelection, missing_frames, open_selected_frames};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// The files of a capture, and how to adapt them.
 #[derive(Clone, Debug, Default)]
@@ -22,6 +25,8 @@ pub struct CaptureFiles {
     pub weld: Option<Vec<u32>>,
     /// Frame rate and number of the first frame, where they are given.
     pub timing: Timing,
+    /// What every frame is compared with as it is read, if anything.
+    pub belonging: Option<Arc<Belonging>>,
 }
 
 impl CaptureFiles {
@@ -54,6 +59,7 @@ impl CaptureFiles {
             frame_rate,
             frame: 0,
             values: Vec::new(),
+            pass: self.belonging.clone().map(Pass::new),
         }))
     }
 
@@ -96,6 +102,8 @@ struct Adapted {
     frame: usize,
     /// A frame before it is welded.
     values: Vec<f64>,
+    /// How the comparison of the frames goes on.
+    pass: Option<Pass>,
 }
 
 impl FrameReader for Adapted {
@@ -147,12 +155,38 @@ impl FrameReader for Adapted {
             }
         }
         self.frame += 1;
+        self.compare(out)?;
         Ok(true)
     }
 
     fn skip(&mut self) -> Result<bool, Error> {
         let more = self.inner.skip()?;
         self.frame += usize::from(more);
+        if let Some(pass) = &mut self.pass {
+            pass.skipped();
+        }
         Ok(more)
+    }
+}
+
+impl Adapted {
+    /// Compares the frame that was just read with those before.
+    fn compare(&mut self, frame: &[f64]) -> Result<(), Error> {
+        let Some(pass) = &mut self.pass else { return Ok(()) };
+        let mesh = self.inner.mesh();
+        let welded = mesh.zip(self.first_of.as_ref().and(self.files.weld.as_deref()));
+        let welded = welded.map(|((_, faces), weld)| faces.renamed(weld));
+        let faces = welded.as_ref().or(mesh.map(|(_, faces)| faces));
+        let path = mesh.map_or(self.files.path.as_path(), |(path, _)| path);
+        let number = self.inner.number(self.frame - 1);
+        let Some(found) = pass.compare(frame.as_chunks().0, faces, path, number) else { return Ok(()) };
+        if !pass.has_skipped() {
+            return found.refuse_or_note();
+        }
+        // What was skipped is read now, so that the first frame is named that departs; or growth turns out to be one.
+        self.pass = None;
+        let mut all = self.files.open()?;
+        while all.read_next(&mut self.values)? {}
+        Ok(())
     }
 }

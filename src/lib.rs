@@ -2,6 +2,7 @@
 
 mod admission;
 pub mod auth;
+pub mod belonging;
 pub mod cage_export;
 #[doc(hidden)]
 pub mod cage_job;

@@ -1,9 +1,17 @@
 //! Detects whether the frames of a capture belong to a rest pose: units, axes and order of points, by edge lengths, extents and the
 //! correlation of positions. Deformation changes these far less than a mix-up does.
 
+mod faces;
+mod watch;
+
+pub use watch::{Departure, Progress, Watch};
+
 use cager_core::mesh::{Model, Point, bounds};
 use cager_core::vector::distance;
 use std::fmt;
+
+/// Ratios of two units of length: inch and centimetre, foot and metre, powers of ten and so on.
+const UNITS: [f64; 12] = [2.54, 3.28, 10.0, 12.0, 25.4, 30.48, 36.0, 39.37, 100.0, 304.8, 1000.0, 1e6];
 
 /// Number of evenly spaced frames to compare.
 pub const FRAMES: usize = 5;
@@ -271,7 +279,6 @@ impl fmt::Display for Mismatch {
 
 /// Formats a ratio, rounded to that of two common units if it is within 5 % of one.
 fn factor(ratio: f64) -> String {
-    const UNITS: [f64; 9] = [2.54, 3.28, 10.0, 12.0, 25.4, 30.48, 39.37, 100.0, 1000.0];
     match UNITS.into_iter().find(|unit| (ratio / unit - 1.0).abs() < 0.05) {
         Some(unit) => format!("about {unit}"),
         None => format!("{ratio:.1}"),
@@ -283,7 +290,7 @@ mod tests {
     use super::*;
 
     /// A bent and uneven tube standing along y, as a mesh of quads.
-    fn tube() -> Model {
+    pub(super) fn tube() -> Model {
         let (rings, sides) = (40, 12);
         let mut model = Model::default();
         for ring in 0..rings {

@@ -1,7 +1,7 @@
 //! `cager cage`: generates, designs and improves cages.
 
 use super::cage_args::{CageArgs, GeneralArg};
-use super::checks::{check_capture, checked_files};
+use super::checks::{check_capture, checked_files, warn_of_departures};
 use super::design::{self, default_vertices};
 use super::dry_run::{read_files, tell_dry_run};
 use super::outputs::Outputs;
@@ -188,8 +188,8 @@ impl<'a> Motion<'a> {
             symmetry: args.symmetry.map(|axis| axis as usize),
         };
         let no_frames = args.rest.iter().chain(&args.improve);
-        let files = checked_files(&args.checks, frames, rest.points.len(), no_frames);
-        check_capture(&files, (&args.rest[0], rest), &args.checks, false)?;
+        let mut files = checked_files(&args.checks, frames, rest.points.len(), no_frames);
+        check_capture(&mut files, (&args.rest[0], rest), &args.checks, false)?;
         Ok(Self { start, options, files })
     }
 }
@@ -203,6 +203,7 @@ fn designed(
 ) -> Result<(Model, Option<DesignReport>)> {
     let Motion { start, options, files } = Motion::new(args, rest, frames_path)?;
     let frames = read_frames(&files)?;
+    warn_of_departures(&files);
     let mesh = start.as_ref().map(|(_, model)| TriMesh::from(model));
     let start_mesh = start.as_ref().zip(mesh.as_ref()).map(|((path, _), mesh)| (path.as_path(), mesh));
     let found = design::design((&args.rest[0], rest), (frames_path, &frames), start_mesh, &options)?;

@@ -1,6 +1,8 @@
 //! Checks before an encoding or a design that rest pose, cage and capture match. A mismatch is an error, or a warning with --force.
 
+use super::dry_run::read_files;
 use super::warn;
+use crate::belonging::Belonging;
 use crate::encode::{EncodeError, sample_frames};
 use crate::frames::CaptureFiles;
 use crate::mismatch::{self, Mismatch, Up, mismatches};
@@ -114,8 +116,13 @@ pub(super) fn capture_files<'a>(
     files
 }
 
-/// Compares some frames of a capture with its rest pose.
-pub(super) fn check_capture(files: &CaptureFiles, rest: (&Path, &Model), args: &CheckArgs, turns: bool) -> Result<()> {
+/// Compares some frames of a capture with its rest pose, and has the others compared as they are read.
+pub(super) fn check_capture(
+    files: &mut CaptureFiles,
+    rest: (&Path, &Model),
+    args: &CheckArgs,
+    turns: bool,
+) -> Result<()> {
     let opened = files.open().map_err(EncodeError::from);
     let frames = opened.and_then(|mut reader| {
         warn(&reader.notes());
@@ -124,6 +131,11 @@ pub(super) fn check_capture(files: &CaptureFiles, rest: (&Path, &Model), args: &
     let frames = frames.map_err(|error| explained(error, files, rest))?;
     let found = mismatches(rest.1, &frames);
     if found.is_empty() {
+        files.belonging = Belonging::new(rest, args.force);
+        if files.belonging.as_ref().is_some_and(|belonging| belonging.suspects(&frames)) {
+            // Told before the work, and of the first one.
+            read_files(files)?;
+        }
         return Ok(());
     }
     let advice = match found[0] {
@@ -165,6 +177,12 @@ pub(super) fn check_cage(cage: (&Path, &TriMesh), rest: &Model, args: &CheckArgs
         None => return Ok(()),
     };
     refuse_or_warn(what, "", args.force)
+}
+
+/// Warns of frames that were read although they do not look like those before.
+pub(super) fn warn_of_departures(files: &CaptureFiles) {
+    let noted = files.belonging.as_ref().and_then(|belonging| belonging.noted());
+    warn(noted.map(str::to_owned).as_slice());
 }
 
 fn refuse_or_warn(what: String, advice: &str, force: bool) -> Result<()> {

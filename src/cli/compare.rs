@@ -1,7 +1,7 @@
 //! `cager compare`.
 
 use super::args::CompareArgs;
-use super::checks::{check_cage, check_capture, checked_files};
+use super::checks::{check_cage, check_capture, checked_files, warn_of_departures};
 use super::dry_run::{read_all, tell_dry_run};
 use super::outputs::Outputs;
 use super::solver_options::{read_cage, with_input_name};
@@ -34,8 +34,8 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     };
     let rest = read_model(&args.rest)?;
     let cage = read_cage(&args.cage, args.flip_cage)?;
-    let files = checked_files(&args.checks, &args.frames, rest.points.len(), [&args.rest, &args.cage]);
-    check_capture(&files, (&args.rest, &rest), &args.checks, false)?;
+    let mut files = checked_files(&args.checks, &args.frames, rest.points.len(), [&args.rest, &args.cage]);
+    check_capture(&mut files, (&args.rest, &rest), &args.checks, false)?;
     check_cage((&args.cage, cage.mesh()), &rest, &args.checks)?;
     let open = || files.open();
     let frames = open()?.frames();
@@ -83,12 +83,13 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
         }
     }
     let bytes = report.complete()?;
-    let mut files = vec![report];
+    let mut written = vec![report];
     if let Some(mut file) = json {
         file.write_all(&figures_text)?;
-        files.insert(0, file);
+        written.insert(0, file);
     }
-    commit_together(files)?;
+    commit_together(written)?;
+    warn_of_departures(&files);
     super::tell(&summary(&figures, output.path(), bytes, clock.elapsed().as_secs_f64())?)
 }
 

@@ -1,7 +1,7 @@
 //! `cager encode`: here, and what is the same where a service encodes.
 
 use super::args::{EncodeArgs, SpectrumArg};
-use super::checks::{capture_files, check_cage, check_capture};
+use super::checks::{capture_files, check_cage, check_capture, warn_of_departures};
 use super::coding_args::goal;
 use super::dry_run::{read_files, size, tell_dry_run};
 use super::encode_summary::{summary, write_report};
@@ -37,14 +37,16 @@ pub(super) fn run(args: &EncodeArgs) -> Result<()> {
     // What is wrong with it is told before anything is computed.
     goal(args, &rest, 1)?;
     let cage = args.cage.as_ref().map(|path| read_cage(path, args.flip_cage)).transpose()?;
-    check_capture(&files, (&args.rest, &rest), &args.capture.checks, true)?;
+    check_capture(&mut files, (&args.rest, &rest), &args.capture.checks, true)?;
     if let (Some(path), Some(cage)) = (&args.cage, &cage) {
         check_cage((path, cage.mesh()), &rest, &args.capture.checks)?;
     }
     if args.outputs.dry_run {
-        return dry_run(args, &targets, &files, &rest, cage.as_ref());
+        dry_run(args, &targets, &files, &rest, cage.as_ref())?;
+        warn_of_departures(&files);
+        return Ok(());
     }
-    match (&args.server, &cage) {
+    let done = match (&args.server, &cage) {
         (None, Some(cage)) => encode_locally(args, &targets, &files, &rest, cage, None, clock),
         (None, None) => {
             // What is wrong with it is told before minutes of design.
@@ -54,7 +56,9 @@ pub(super) fn run(args: &EncodeArgs) -> Result<()> {
             encode_locally(args, &targets, &files, &rest, &cage, Some(report), clock)
         }
         (Some(address), cage) => encode_remote::run(args, &targets, address, &files, &rest, cage.as_ref(), clock),
-    }
+    };
+    warn_of_departures(&files);
+    done
 }
 
 /// Where the container goes, and the report.

@@ -26,6 +26,8 @@ mod write;
 
 use std::path::Path;
 
+use cager_core::mesh::Polygons;
+
 use crate::error::Error;
 
 pub use numbers::missing_frames;
@@ -56,6 +58,11 @@ pub trait FrameReader: Send {
     /// What the user should know of how the source is read.
     fn notes(&self) -> Vec<String> {
         Vec::new()
+    }
+
+    /// The file that the last frame was read from and the faces in it, where each frame is a mesh in a file of its own.
+    fn mesh(&self) -> Option<(&Path, &Polygons)> {
+        None
     }
 
     /// Reads the next frame into `out`, which then holds 3 × points coordinates `x y z x y z …`; false at the end, with

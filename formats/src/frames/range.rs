@@ -4,6 +4,8 @@ use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
 
+use cager_core::mesh::Polygons;
+
 use super::FrameReader;
 use crate::error::{Error, Fault};
 
@@ -146,6 +148,10 @@ impl FrameReader for RangeReader {
 
     fn notes(&self) -> Vec<String> {
         self.reader.notes()
+    }
+
+    fn mesh(&self) -> Option<(&Path, &Polygons)> {
+        self.reader.mesh()
     }
 
     fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error> {

@@ -2,12 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
+use cager_core::mesh::Polygons;
+
 use super::names::Sequence;
 use super::{FrameReader, cut, single};
 use crate::error::{Error, Fault};
-use crate::mesh::{Contents, MeshFormat, read_file};
+use crate::mesh::{MeshFormat, read_frame_file};
 
-/// Reads only the positions: the faces may differ from those of the rest pose.
+
+/// Reads the positions; the faces may differ from those of the rest pose, and are kept to be compared.
 pub(super) struct SequenceReader {
     sequence: Sequence,
     points: usize,
@@ -15,12 +18,14 @@ pub(super) struct SequenceReader {
     next: usize,
     /// Whether the last line of the text read last has an end, with its frame and file.
     before: Option<(bool, usize, PathBuf)>,
+    /// Of the frame that was read last; none where its file has none that can be read.
+    faces: Polygons,
 }
 
 impl SequenceReader {
     /// `notes` are what the user should know of the choice of these files.
     pub(super) fn new(sequence: Sequence, points: usize, notes: Vec<String>) -> Self {
-        Self { sequence, points, notes, next: 0, before: None }
+        Self { sequence, points, notes, next: 0, before: None, faces: Polygons::new() }
     }
 
     fn read_array(&self, path: &Path, out: &mut Vec<f64>) -> Result<(), Error> {
@@ -45,7 +50,7 @@ impl SequenceReader {
 
     fn read_mesh(&mut self, path: &Path, out: &mut Vec<f64>) -> Result<(), Error> {
         let frame = self.next;
-        let model = read_file(path, Contents::Points).map_err(|error| error.in_frame(frame))?;
+        let model = read_frame_file(path).map_err(|error| error.in_frame(frame))?;
         let whole = cut::last_line_ends(path).map_err(|cause| Error::read(path, cause))?;
         let found = model.points.len();
         if found != self.points {
@@ -65,6 +70,7 @@ impl SequenceReader {
             }
         }
         out.extend_from_slice(model.points.as_flattened());
+        self.faces = model.faces;
         Ok(())
     }
 }
@@ -87,6 +93,10 @@ impl FrameReader for SequenceReader {
         self.notes.clone()
     }
 
+    fn mesh(&self) -> Option<(&Path, &Polygons)> {
+        Some((self.sequence.files.get(self.next.checked_sub(1)?)?, &self.faces))
+    }
+
     fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error> {
         out.clear();
         let Some(path) = self.sequence.files.get(self.next).cloned() else {
@@ -96,6 +106,7 @@ impl FrameReader for SequenceReader {
             self.read_mesh(&path, out)?;
         } else {
             self.read_array(&path, out)?;
+            self.faces = Polygons::new();
         }
         self.next += 1;
         Ok(true)

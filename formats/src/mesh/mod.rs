@@ -89,7 +89,7 @@ pub(crate) fn extensions(formats: &[MeshFormat]) -> String {
 /// # Errors
 /// As [`read_model_bytes`], and [`Error::Io`] where the file cannot be read.
 pub fn read_model(path: &Path) -> Result<Model, Error> {
-    read_file(path, Contents::PointsAndFaces)
+    parse_file(path, Contents::PointsAndFaces).map(|parsed| parsed.model)
 }
 
 /// As [`read_model`], with what was left out of the file, in words.
@@ -117,15 +117,17 @@ pub fn read_model_bytes(format: MeshFormat, name: &Path, bytes: &[u8]) -> Result
     read_bytes(format, name, bytes, Contents::PointsAndFaces).map(|parsed| parsed.model)
 }
 
-/// How much of a file is wanted: the frames of a capture need no faces.
+/// How much of a file is wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Contents {
     PointsAndFaces,
     Points,
 }
 
-pub(crate) fn read_file(path: &Path, contents: Contents) -> Result<Model, Error> {
-    parse_file(path, contents).map(|parsed| parsed.model)
+/// A frame of a capture: its points, and its faces where nothing is wrong with them, since a frame needs none.
+pub(crate) fn read_frame_file(path: &Path) -> Result<Model, Error> {
+    let parsed = parse_file(path, Contents::PointsAndFaces).or_else(|_| parse_file(path, Contents::Points));
+    parsed.map(|parsed| parsed.model)
 }
 
 fn parse_file(path: &Path, contents: Contents) -> Result<Parsed, Error> {
