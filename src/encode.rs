@@ -167,8 +167,10 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
     let fail = |cause| EncodeError::container(path, cause);
     // First, so that an unwritable output fails before the work.
     let file = AtomicFile::create(job.output)?;
+    let clock_code = Instant::now();
     let meshes =
         job.goal.filter(|_| !job.exact_rest).and_then(|goal| RestMeshes::new(goal, job.rest, job.cage, job.system));
+    let mut code_seconds = clock_code.elapsed().as_secs_f64();
     let (given, stored) =
         (diagonal(&job.rest.points), meshes.as_ref().map(|meshes| diagonal(&meshes.rest.mesh.points)));
     // A bound holds in the unit of the rest pose that was given, and in that of the one that is stored.
@@ -183,12 +185,14 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
         let prepared = prepare(&job, &|step| progress(EncodeProgress::Preparing(step)));
         (prepared, space.map(|space| space.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))))
     });
-    let (solver, options, choice) = prepared?;
+    let (solver, options, choice, choice_seconds) = prepared?;
+    let clock_code = Instant::now();
     let model = match (goal, space) {
         (None, _) => None,
         (Some(_), Some(space)) => Some(GroupDecoder::in_space(space?, &solver)),
         (Some(_), None) => Some(GroupDecoder::new(system, cage, rest, &solver)?),
     };
+    code_seconds += clock_code.elapsed().as_secs_f64();
     let encoding = Encoding {
         rest: job.rest,
         cage: job.cage,
@@ -211,7 +215,8 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
     let seconds = Seconds {
         coordinates: found.coordinates_seconds,
         maxvol: found.maxvol_seconds,
-        svd: found.svd_seconds,
+        svd: found.svd_seconds + choice_seconds,
+        code: code_seconds,
         ..Seconds::default()
     };
     let diagonal = solver.diagonal();
@@ -306,11 +311,11 @@ fn send_frames<W: Write>(
     })
 }
 
-/// The solver, its options, and how the spectrum threshold was selected.
+/// The solver, its options, how the spectrum threshold was selected, and the seconds that this took.
 fn prepare(
     job: &Job<'_>,
     tell: &dyn Fn(&'static str),
-) -> Result<(Solver, SolverOptions, Option<SpectrumChoice>), PrepareError> {
+) -> Result<(Solver, SolverOptions, Option<SpectrumChoice>, f64), PrepareError> {
     let mut options = job.options;
     let points = &job.rest.points;
     let batches = job.frames.frames().div_ceil(BatchPlan::new(job.memory, points.len(), false).size);
@@ -325,15 +330,17 @@ fn prepare(
     let term = preparing.term(options)?;
     let chosen_by = job.choose.as_ref().filter(|choose| !choose.samples.is_empty());
     let Some(ChooseSpectrum { samples, bound }) = chosen_by else {
-        return Ok((Solver::prepare_with(job.system, job.cage, points, options, &preparing)?, options, None));
+        return Ok((Solver::prepare_with(job.system, job.cage, points, options, &preparing)?, options, None, 0.0));
     };
     term.delta(job.cage, job.system.unknowns(job.cage))?;
     let analysis = Analysis::for_options(job.system, job.cage, points, options, &preparing)?;
     tell("threshold");
     let handle_system = analysis.handle_system(options.handles)?;
+    let clock = Instant::now();
     let found = handle_system.choose_threshold(options, term, samples, *bound)?;
+    let seconds = clock.elapsed().as_secs_f64();
     options.spectrum = found.spectrum;
-    Ok((handle_system.solver_with(options, term)?, options, Some(SpectrumChoice::new(&found, *bound))))
+    Ok((handle_system.solver_with(options, term)?, options, Some(SpectrumChoice::new(&found, *bound)), seconds))
 }
 
 #[cfg(test)]

@@ -142,6 +142,7 @@ async fn encode<F: FrameSource + 'static>(
         idempotency_key: None,
     };
     let mut designed = None;
+    let mut design_time = Duration::ZERO;
     let session = match (job.session, job.cage) {
         (Some(session), _) => session.to_owned(),
         (None, RemoteCage::File(path)) => {
@@ -149,7 +150,9 @@ async fn encode<F: FrameSource + 'static>(
             client.create(&new).await?.id
         }
         (None, RemoteCage::Designed(options)) => {
+            let clock_design = Instant::now();
             let design = cage::design(&client, &new.rest, &mut job.frames, options, progress).await?;
+            design_time = clock_design.elapsed();
             new.options.cage = Some(CageSource { id: Some(design.id.clone()), ..CageSource::default() });
             let created = client.create(&new).await;
             // The session has its own copy of the cage.
@@ -159,7 +162,9 @@ async fn encode<F: FrameSource + 'static>(
         }
     };
     match run(&client, &session, job.frames, job.connections, file, clock, progress).await {
-        Ok((mut encoded, steps)) => {
+        Ok((mut encoded, mut steps)) => {
+            steps.prepare = steps.prepare.saturating_sub(design_time);
+            encoded.report.seconds.design = design_time.as_secs_f64();
             if let Some((report, warnings)) = designed {
                 encoded.report.design = Some(report);
                 encoded.report.warnings.extend(warnings);
@@ -230,11 +235,13 @@ async fn run(
 fn seconds(preparation: &PreparationSeconds, steps: &Steps, total: Duration) -> Seconds {
     Seconds {
         read: preparation.read,
+        design: 0.0,
         coordinates: preparation.coordinates,
         maxvol: preparation.maxvol,
         svd: preparation.svd,
         invert: steps.upload.as_secs_f64(),
         measure: 0.0,
+        code: 0.0,
         write: (steps.complete + steps.download).as_secs_f64(),
         total: total.as_secs_f64(),
     }

@@ -408,6 +408,9 @@ pub struct Bytes {
 pub struct Seconds {
     /// Reading rest pose, cage and frames.
     pub read: f64,
+    /// Designing the cage, with the choice of its size and the frames read for that; absent where a cage was given.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub design: f64,
     /// Computing `Φ`.
     pub coordinates: f64,
     /// Choosing the handles.
@@ -418,6 +421,9 @@ pub struct Seconds {
     pub invert: f64,
     /// Decoding all frames again and measuring them.
     pub measure: f64,
+    /// Coding meshes and groups of frames, with decoding and measuring them; absent where no error, size or quality was asked for.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub code: f64,
     /// Compressing and writing.
     pub write: f64,
     /// Wall-clock time of it all.
@@ -428,6 +434,12 @@ impl Seconds {
     fn are_zero(&self) -> bool {
         *self == Self::default()
     }
+}
+
+// By reference, as serde calls it.
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_zero(seconds: &f64) -> bool {
+    *seconds == 0.0
 }
 
 /// JSON has no infinity and no NaN, and serde_json writes null for them: a capture that stands still has such figures, and

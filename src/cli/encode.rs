@@ -52,8 +52,10 @@ pub(super) fn run(args: &EncodeArgs) -> Result<()> {
             // What is wrong with it is told before minutes of design.
             matrix(&args.solver)?;
             spectrum_bound(&args.solver)?;
+            let clock_design = Instant::now();
             let (cage, report) = designed(args, &files, &rest)?;
-            encode_locally(args, &targets, &files, &rest, &cage, Some(report), clock)
+            let design = Some((report, clock_design.elapsed().as_secs_f64()));
+            encode_locally(args, &targets, &files, &rest, &cage, design, clock)
         }
         (Some(address), cage) => encode_remote::run(args, &targets, address, &files, &rest, cage.as_ref(), clock),
     };
@@ -185,12 +187,11 @@ fn encode_locally(
     files: &CaptureFiles,
     rest: &Model,
     cage: &Cage,
-    design: Option<DesignReport>,
+    design: Option<(DesignReport, f64)>,
     clock: Instant,
 ) -> Result<()> {
     let memory = args.memory.unwrap_or_else(Memory::half_of_free);
     let mut frames = files.open()?;
-    let read_seconds = clock.elapsed().as_secs_f64();
     let (system, options) = (args.solver.coordinates, solver_options(args, rest, cage)?);
     let matrix = matrix(&args.solver)?;
     let choose = match (args.solver.spectrum, spectrum_bound(&args.solver)?) {
@@ -206,6 +207,9 @@ fn encode_locally(
         _ => None,
     };
     let report_file = targets.begin_report()?;
+    // All that was done so far.
+    let design_seconds = design.as_ref().map_or(0.0, |(_, seconds)| *seconds);
+    let read_seconds = clock.elapsed().as_secs_f64() - design_seconds;
 
     let bar = progress::PreparationBar::new("encoding", frames.frames())
         .expecting(|| seconds_to_prepare(system, cage, rest.points.len()));
@@ -230,7 +234,8 @@ fn encode_locally(
     bar.finish();
     let mut encoded = result.map_err(|error| name_files(error, args))?;
     encoded.report.seconds.read += read_seconds;
-    encoded.report.design = design;
+    encoded.report.seconds.design = design_seconds;
+    encoded.report.design = design.map(|(report, _)| report);
     finish(targets, encoded, report_file, clock)
 }
 

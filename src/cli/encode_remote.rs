@@ -73,10 +73,12 @@ pub(super) fn run(
         ..coding_options(goal(args, rest, frames.frames().unwrap_or(1) as usize)?, args.coding.exact_rest)
     };
     // Here, since a service designs before it sees what the frames cost.
+    let clock_size = Instant::now();
     let design = match cage {
         Some(_) => DesignOptions::default(),
         None => sized_design(args, files, rest)?,
     };
+    let size_seconds = clock_size.elapsed().as_secs_f64();
     let bar = progress::frames("encoding", frames.frames().unwrap_or(0) as usize);
     let job = RemoteJob {
         address,
@@ -106,6 +108,7 @@ pub(super) fn run(
     bar.finish_and_clear();
     let EncodedRemotely { mut encoded, session, .. } = result?;
     encoded.report.seconds.read += read_seconds;
+    encoded.report.seconds.design += size_seconds;
     finish(targets, encoded, report_file, clock)?;
     tell(&format!("  service {}, session {}\n", plain(address), plain(&session)))
 }

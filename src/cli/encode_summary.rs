@@ -40,10 +40,11 @@ pub(super) fn summary(report: &Report, output: &Path) -> String {
         )
     });
     let s = &report.seconds;
+    let designed = if s.design > 0.0 { format!(", {:.3} s of it for the cage", s.design) } else { String::new() };
     let steps = if is_verbose() {
         format!(
-            "  steps   read {:.3} s, coordinates {:.3} s, handles {:.3} s, SVD {:.3} s, inversion {:.3} s, errors {:.3} s, writing {:.3} s\n",
-            s.read, s.coordinates, s.maxvol, s.svd, s.invert, s.measure, s.write
+            "  steps   read {:.3} s, cage {:.3} s, coordinates {:.3} s, handles {:.3} s, SVD {:.3} s, inversion {:.3} s, errors {:.3} s, coding {:.3} s, writing {:.3} s\n",
+            s.read, s.design, s.coordinates, s.maxvol, s.svd, s.invert, s.measure, s.code, s.write
         )
     } else {
         String::new()
@@ -53,7 +54,7 @@ pub(super) fn summary(report: &Report, output: &Path) -> String {
          \x20 size    {} from {}: {:.1} times smaller, {:.2} bits per point and frame\n\
          \x20 error   {}\n{worst}\
          \x20 system  condition {:.1} (all points {:.1}), rank {} of {}, affine reproduction {:.1e}\n\
-         {refined}{chosen}\x20 time    {:.3} s\n{steps}",
+         {refined}{chosen}\x20 time    {:.3} s{designed}\n{steps}",
         output.display(),
         grouped(report.frames),
         grouped(report.points),

@@ -79,7 +79,7 @@ pub(super) fn solve(solver: &Solver, batch: &Batch, previous: Option<&[f32]>, me
     let cages: Vec<Vec<f32>> = inverted.into_iter().map(|inverted| inverted.cage).collect();
     let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
     let errors = if measures { solver.decoder().measure(&views, &frames) } else { Vec::new() };
-    let measure_seconds = clock.elapsed().as_secs_f64() - invert_seconds;
+    let measure_seconds = if measures { clock.elapsed().as_secs_f64() - invert_seconds } else { 0.0 };
     SolvedBatch { cages, errors, convergence, held, invert_seconds, measure_seconds }
 }
 

@@ -74,8 +74,11 @@ impl<W: Write> FrameSink<W> {
         for (k, (error, stored)) in errors.iter().zip(&stored).enumerate() {
             self.look_at(before + k, &FrameError { linf: f64::from(stored.linf) * self.diagonal, ..*error });
         }
-        self.seconds.measure += clock.elapsed().as_secs_f64();
-        Ok(self.writer.write_group(&cages, residual.as_deref(), &stored, farthest)?)
+        self.seconds.code += clock.elapsed().as_secs_f64();
+        let clock = Instant::now();
+        self.writer.write_group(&cages, residual.as_deref(), &stored, farthest)?;
+        self.seconds.write += clock.elapsed().as_secs_f64();
+        Ok(())
     }
 
     fn look_at(&mut self, frame: usize, error: &FrameError) {

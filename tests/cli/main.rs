@@ -32,5 +32,6 @@ mod real_methods;
 mod real_transfer;
 mod refused;
 mod support;
+mod times;
 mod transfer;
 mod usage;
