@@ -1,6 +1,7 @@
 //! Exports the cages of a container in formats that other programs read.
 
 use crate::decode::{DecodeError, frame_options, open};
+use crate::origin::move_from;
 use crate::timing::Timing;
 use cager_core::mesh::{Model, Polygons};
 use cager_formats::{AtomicFile, FrameRange, Target, commit_together, create_frames, obj_bytes};
@@ -40,7 +41,8 @@ pub fn write_cages(
     let mesh = container.cage().map_err(fail)?;
     let mut faces = Polygons::new();
     mesh.triangles.iter().for_each(|triangle| faces.push(triangle));
-    let cage = Model { points: mesh.vertices, faces, ..Model::default() };
+    let mut cage = Model { points: mesh.vertices, faces, ..Model::default() };
+    move_from(container.header().origin, &mut cage.points);
     let rest = (*output != Target::StandardOutput).then(|| rest_cage_path(output.path()));
     let mut rest_file = match &rest {
         Some(path) => rest_file(path, output.replaces(), &obj_bytes(&cage))?,

@@ -5,7 +5,7 @@ use cager_codec::{CodedMesh, rounded_error};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, DEFINITION};
 use cager_core::inversion::{Solver, SolverOptions};
-use cager_core::mesh::Model;
+use cager_core::mesh::{Model, Point};
 use cager_proto::container::{self, ContainerWriter, Header, counted_from_zero};
 use cager_proto::report::{Coding, ConditionNumber, FrameError, MaxVol, Report};
 use serde::{Deserialize, Serialize};
@@ -29,6 +29,8 @@ pub struct Encoding<'a> {
     pub solver: &'a Solver,
     /// Frames per second, where known.
     pub frame_rate: Option<f64>,
+    /// What is added to all positions when they are decoded.
+    pub origin: Option<Point>,
 }
 
 /// Errors of a frame as they are stored, with the sums that the error of the whole capture needs.
@@ -234,6 +236,7 @@ fn header(encoding: &Encoding<'_>) -> Header {
         lambda: encoding.options.lambda,
         rows_per_frame: encoding.solver.decoder().unknowns() as u32,
         frame_rate: encoding.frame_rate,
+        origin: encoding.origin,
         ..Header::default()
     }
 }

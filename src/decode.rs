@@ -2,6 +2,7 @@
 
 use crate::edited::EditedCages;
 use crate::memory::{Memory, free_bytes};
+use crate::origin::move_to;
 use crate::timing::Timing;
 use cager_core::cage::{Cage, CageError};
 use cager_core::coordinates;
@@ -216,7 +217,14 @@ fn bind(
         return Err(unsupported(format!("its coordinates are of definition {}", header.coordinates_definition)));
     }
     let own = container.rest().map_err(fail)?;
-    let (model_path, rest) = other.map_or_else(|| (path, own), |(path, model)| (path, model.clone()));
+    let (model_path, rest) = other.map_or_else(
+        || (path, own),
+        |(path, model)| {
+            let mut model = model.clone();
+            move_to(header.origin, &mut model.points);
+            (path, model)
+        },
+    );
     if let Some(face) = rest.faces.arities().iter().position(|&corners| corners < 3) {
         return Err(fail(container::Error::Corrupt {
             offset: 0,
@@ -286,7 +294,7 @@ pub(crate) fn frame_options(
     }
     let numbers = timing.numbers(found);
     let numbers = (0..range.count()).filter_map(|place| numbers.get(range.frame(place)).copied()).collect();
-    Ok(FrameOptions { fps, numbers })
+    Ok(FrameOptions { fps, numbers, origin: container.header().origin })
 }
 
 /// Decodes frames into `output`, which appears whole or not at all. `progress` is told the number of frames done.

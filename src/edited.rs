@@ -1,6 +1,8 @@
 //! Reading cages that were edited in another program.
 
 use crate::decode::{Container, DecodeError};
+use crate::origin::move_to;
+use cager_core::mesh::Point;
 use cager_formats::{Error, FrameReader, open_frames};
 use std::path::{Path, PathBuf};
 
@@ -8,6 +10,7 @@ use std::path::{Path, PathBuf};
 pub struct EditedCages {
     path: PathBuf,
     vertices: usize,
+    origin: Option<Point>,
     reader: Box<dyn FrameReader>,
     /// The frame that the reader gives next.
     next: usize,
@@ -32,7 +35,8 @@ impl EditedCages {
         }
         let vertices = header.rows_per_frame as usize;
         let reader = open_frames(path, vertices).map_err(|error| named(error, vertices, header.points))?;
-        Ok(Self { path: path.to_owned(), vertices, reader, next: 0, wide: Vec::new() })
+        let origin = header.origin;
+        Ok(Self { path: path.to_owned(), vertices, origin, reader, next: 0, wide: Vec::new() })
     }
 
     /// Number of frames.
@@ -59,6 +63,7 @@ impl EditedCages {
         }
         self.next += 1;
         out.clear();
+        move_to(self.origin, self.wide.as_chunks_mut().0);
         out.extend(self.wide.iter().map(|&x| x as f32));
         match out.iter().position(|x| !x.is_finite()) {
             Some(k) => Err(self.fail(format!(

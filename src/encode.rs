@@ -11,7 +11,7 @@ use batches::{Batch, BatchPlan, SolvedBatch, read_batches, solve};
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{Analysis, PrepareError, Preparing, Solver, SolverOptions};
-use cager_core::mesh::{Model, diagonal};
+use cager_core::mesh::{Model, Point, diagonal};
 use cager_core::regularize::Term;
 use cager_formats::{Action, AtomicFile, FrameReader, Target};
 use cager_proto::container;
@@ -94,6 +94,8 @@ pub struct Job<'a> {
     pub memory: Memory,
     /// What the file is to meet; without it frames are stored as they are solved for.
     pub goal: Option<Goal>,
+    /// What was subtracted from rest pose, cage and frames, and is added to them again when the file is decoded.
+    pub origin: Option<Point>,
     /// Whether the rest pose and the cage are stored as they are also where a goal would allow less.
     pub exact_rest: bool,
 }
@@ -176,16 +178,30 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
     // A bound holds in the unit of the rest pose that was given, and in that of the one that is stored.
     let unit = stored.map_or(given, |stored| stored.min(given));
     let (rest, cage) = meshes.as_ref().map_or((job.rest, job.cage), |meshes| (&meshes.rest.mesh, &meshes.checked));
-    let Job { frames, output, system, options, term, choose, memory, goal, exact_rest, .. } = job;
-    let job = Job { rest, cage, frames: &mut *frames, output, system, options, term, choose, memory, goal, exact_rest };
+    let Job { frames, output, system, options, term, choose, memory, goal, origin, exact_rest, .. } = job;
+    let frames = &mut *frames;
+    let job = Job { rest, cage, frames, output, system, options, term, choose, memory, goal, origin, exact_rest };
     // What groups are coded in needs nothing of the solver, unless the coordinates are a numerical solution.
     let begins_early = goal.is_some() && system.pointwise().is_some();
+    let clock_prepare = Instant::now();
     let (prepared, space) = std::thread::scope(|scope| {
         let space = begins_early.then(|| scope.spawn(|| GroupSpace::new(system, cage, rest, None)));
         let prepared = prepare(&job, &|step| progress(EncodeProgress::Preparing(step)));
         (prepared, space.map(|space| space.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))))
     });
     let (solver, options, choice, choice_seconds) = prepared?;
+    let found = solver.preparation();
+    let mut seconds = Seconds {
+        coordinates: found.coordinates_seconds,
+        maxvol: found.maxvol_seconds,
+        svd: found.svd_seconds + choice_seconds,
+        ..Seconds::default()
+    };
+    if begins_early {
+        // What was waited for after the solver was there.
+        let prepared = seconds.coordinates + seconds.maxvol + seconds.svd;
+        code_seconds += (clock_prepare.elapsed().as_secs_f64() - prepared).max(0.0);
+    }
     let clock_code = Instant::now();
     let model = match (goal, space) {
         (None, _) => None,
@@ -200,6 +216,7 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
         options,
         solver: &solver,
         frame_rate: job.frames.frame_rate(),
+        origin: job.origin,
     };
     let coded = meshes.as_ref().map(|meshes| (&meshes.rest, &meshes.cage));
     let out = BufWriter::with_capacity(1 << 20, file);
@@ -211,14 +228,7 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
         GroupCoder::new(goal, Arc::new(model), unit, group_frames, Carried { room, ..Carried::default() })
     });
     writer.number_frames((0..job.frames.frames()).map(|frame| job.frames.number(frame)).collect());
-    let found = solver.preparation();
-    let seconds = Seconds {
-        coordinates: found.coordinates_seconds,
-        maxvol: found.maxvol_seconds,
-        svd: found.svd_seconds + choice_seconds,
-        code: code_seconds,
-        ..Seconds::default()
-    };
+    seconds.code = if job.goal.is_some() { code_seconds } else { 0.0 };
     let diagonal = solver.diagonal();
     let mut sink = FrameSink {
         writer,

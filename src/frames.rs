@@ -3,7 +3,9 @@
 
 use crate::belonging::{Belonging, Pass};
 use crate::mismatch::Up;
+use crate::origin::{move_to, own_origin};
 use crate::timing::Timing;
+use cager_core::mesh::Model;
 use cager_formats::{Error, FrameReader, FrameSelection, missing_frames, open_selected_frames};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -25,6 +27,8 @@ pub struct CaptureFiles {
     pub weld: Option<Vec<u32>>,
     /// Frame rate and number of the first frame, where they are given.
     pub timing: Timing,
+    /// What is subtracted from all positions, where the rest pose lies far away.
+    pub origin: Option<[f64; 3]>,
     /// What every frame is compared with as it is read, if anything.
     pub belonging: Option<Arc<Belonging>>,
 }
@@ -33,6 +37,12 @@ impl CaptureFiles {
     /// The files as they are.
     pub fn new(path: impl Into<PathBuf>, points: usize) -> Self {
         Self { path: path.into(), points, ..Self::default() }
+    }
+
+    /// Takes the rest pose and the frames to an origin of their own where the rest pose lies far away.
+    pub fn take_origin(&mut self, rest: &mut Model) {
+        self.origin = own_origin(&rest.points);
+        move_to(self.origin, &mut rest.points);
     }
 
     /// Opens the frames from the first.
@@ -154,6 +164,7 @@ impl FrameReader for Adapted {
                 Some(Up::Other) | None => break,
             }
         }
+        move_to(self.files.origin, out.as_chunks_mut().0);
         self.frame += 1;
         self.compare(out)?;
         Ok(true)

@@ -23,6 +23,7 @@ mod http_client;
 mod idempotency;
 pub mod memory;
 pub mod mismatch;
+mod origin;
 mod preparation;
 mod preparation_warnings;
 pub mod problem;

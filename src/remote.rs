@@ -149,6 +149,10 @@ async fn encode<F: FrameSource + 'static>(
             new.cage = Some(mesh_file(path)?);
             client.create(&new).await?.id
         }
+        (None, RemoteCage::Mesh(file)) => {
+            new.cage = Some(file.clone());
+            client.create(&new).await?.id
+        }
         (None, RemoteCage::Designed(options)) => {
             let clock_design = Instant::now();
             let design = cage::design(&client, &new.rest, &mut job.frames, options, progress).await?;

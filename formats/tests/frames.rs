@@ -496,7 +496,7 @@ fn start_and_step_of_a_point_cache_are_its_frame_numbers_and_are_kept() {
         ("frames", vec![-1.0, 0.5], None),
     ] {
         let path = folder.path().join(name);
-        let options = FrameOptions { fps: fps.unwrap_or(24.0), numbers: numbers.clone() };
+        let options = FrameOptions { fps: fps.unwrap_or(24.0), numbers: numbers.clone(), ..FrameOptions::default() };
         let mut writer = create_frames(&path, 2, 2, &Polygons::new(), &options).unwrap();
         coordinates().chunks(6).for_each(|frame| writer.write_frame(frame).unwrap());
         writer.finish().unwrap();

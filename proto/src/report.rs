@@ -24,6 +24,9 @@ pub struct Report {
     pub frame_rate: Option<f64>,
     /// Diagonal of the rest pose's bounding box, in the unit of its file: what errors are fractions of.
     pub diagonal: f64,
+    /// What is added to all positions, of a capture that lies far from the origin of its coordinates.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub origin: Option<[f64; 3]>,
     /// The number of each frame where it comes from, as in the names of its files; absent where they are 0, 1, 2, …
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub frame_numbers: Vec<f64>,
@@ -96,6 +99,7 @@ impl Report {
     pub(crate) fn set_header(&mut self, header: &Header) {
         self.points = header.points as usize;
         self.frame_rate = header.frame_rate;
+        self.origin = header.origin;
         self.unknowns = header.rows_per_frame as usize;
         self.cage_vertices = header.cage_vertices as usize;
         self.cage_faces = header.cage_faces as usize;
@@ -116,11 +120,12 @@ impl Report {
 
     /// The JSON that a container stores: without what its other sections say and what differs from run to run.
     pub(crate) fn stored(&self) -> serde_json::Result<Vec<u8>> {
-        const ELSEWHERE: [&str; 15] = [
+        const ELSEWHERE: [&str; 16] = [
             "points",
             "frames",
             "frame_rate",
             "diagonal",
+            "origin",
             "frame_numbers",
             "unknowns",
             "cage_vertices",

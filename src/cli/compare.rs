@@ -32,9 +32,10 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
         (Some(_), json) => (outputs.text(&args.output)?, json.as_ref().map(|path| outputs.text(path)).transpose()?),
         (None, _) => (outputs.text(&figures)?, None),
     };
-    let rest = read_model(&args.rest)?;
-    let cage = read_cage(&args.cage, args.flip_cage)?;
+    let mut rest = read_model(&args.rest)?;
     let mut files = checked_files(&args.checks, &args.frames, rest.points.len(), [&args.rest, &args.cage]);
+    files.take_origin(&mut rest);
+    let cage = read_cage(&args.cage, args.flip_cage, files.origin)?;
     check_capture(&mut files, (&args.rest, &rest), &args.checks, false)?;
     check_cage((&args.cage, cage.mesh()), &rest, &args.checks)?;
     let open = || files.open();

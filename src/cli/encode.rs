@@ -34,9 +34,10 @@ pub(super) fn run(args: &EncodeArgs) -> Result<()> {
     let no_frames = [&args.rest].into_iter().chain(&args.cage);
     let mut files = capture_files(&args.capture, &args.frames, &mut rest, no_frames);
     files.selection.range = args.frames_range;
+    files.take_origin(&mut rest);
     // What is wrong with it is told before anything is computed.
     goal(args, &rest, 1)?;
-    let cage = args.cage.as_ref().map(|path| read_cage(path, args.flip_cage)).transpose()?;
+    let cage = args.cage.as_ref().map(|path| read_cage(path, args.flip_cage, files.origin)).transpose()?;
     check_capture(&mut files, (&args.rest, &rest), &args.capture.checks, true)?;
     if let (Some(path), Some(cage)) = (&args.cage, &cage) {
         check_cage((path, cage.mesh()), &rest, &args.capture.checks)?;
@@ -225,6 +226,7 @@ fn encode_locally(
         choose,
         memory,
         goal: goal(args, rest, announced)?,
+        origin: files.origin,
         exact_rest: args.coding.exact_rest,
     };
     let result = encode::encode(job, &|told| match told {

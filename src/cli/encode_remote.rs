@@ -6,6 +6,7 @@ use super::encode::{Targets, checked_options, design_options, finish, sized_desi
 use super::solver_options::{check_inversion, designed_spectrum, matrix, spectrum_bound};
 use super::{plain, progress, tell, warn};
 use crate::coding::Goal;
+use crate::encode::Encoded;
 use crate::frames::CaptureFiles;
 use crate::remote::{EncodedRemotely, FileFrames, RemoteCage, RemoteJob, RemoteProgress, encode_remotely, mesh_file};
 use anyhow::{Context, Result, bail};
@@ -13,9 +14,10 @@ use cager_cages::DesignOptions;
 use cager_client::messages::SessionOptions;
 use cager_client::{FrameSource, MeshFile};
 use cager_core::cage::Cage;
-use cager_core::mesh::Model;
-use cager_formats::obj_bytes;
-use cager_proto::container::counted_from_zero;
+use cager_core::mesh::{Model, Point, Polygons};
+use cager_formats::{AtomicFile, Target, obj_bytes};
+use cager_proto::container::{ContainerReader, ContainerWriter, counted_from_zero};
+use std::io::{BufReader, BufWriter};
 use std::time::Instant;
 
 /// The files are read and the options checked here as well, so that what is wrong with them is told before anything is sent, in
@@ -55,6 +57,8 @@ pub(super) fn run(
     let report_file = targets.begin_report()?;
 
     let token = args.token.clone().or_else(|| std::env::var("CAGER_TOKEN").ok()).filter(|token| !token.is_empty());
+    // As it was read: welded and turned around.
+    let moved_cage = cage.filter(|_| files.origin.is_some()).map(|cage| MeshFile::new("cage.obj", cage_obj(cage)));
     let options = SessionOptions {
         name: args
             .output
@@ -67,7 +71,7 @@ pub(super) fn run(
         regularizer: Some(args.solver.regularizer.name().to_owned()),
         spectrum,
         lambda: args.solver.lambda,
-        flip_cage: args.flip_cage,
+        flip_cage: args.flip_cage && moved_cage.is_none(),
         frame_rate: frames.frame_rate(),
         frames: frames.frames(),
         ..coding_options(goal(args, rest, frames.frames().unwrap_or(1) as usize)?, args.coding.exact_rest)
@@ -83,11 +87,16 @@ pub(super) fn run(
     let job = RemoteJob {
         address,
         token: token.as_deref(),
-        // A service reads a rest pose as it is, with the doubles along seams.
-        rest: if args.capture.weld { MeshFile::new("welded.obj", obj_bytes(rest)) } else { mesh_file(&args.rest)? },
-        cage: match &args.cage {
-            Some(path) => RemoteCage::File(path),
-            None => RemoteCage::Designed(&design),
+        // A service reads a rest pose as it is, with the doubles along seams, and where it is.
+        rest: if args.capture.weld || files.origin.is_some() {
+            MeshFile::new("rest.obj", obj_bytes(rest))
+        } else {
+            mesh_file(&args.rest)?
+        },
+        cage: match (&args.cage, &moved_cage) {
+            (Some(_), Some(cage)) => RemoteCage::Mesh(cage),
+            (Some(path), None) => RemoteCage::File(path),
+            (None, _) => RemoteCage::Designed(&design),
         },
         session: args.session.as_deref(),
         matrix: args.solver.regularizer_matrix.as_deref(),
@@ -107,10 +116,33 @@ pub(super) fn run(
     designing.finish_and_clear();
     bar.finish_and_clear();
     let EncodedRemotely { mut encoded, session, .. } = result?;
+    if let Some(origin) = files.origin {
+        encoded = with_origin(encoded, origin, &targets.output)?;
+    }
     encoded.report.seconds.read += read_seconds;
     encoded.report.seconds.design += size_seconds;
     finish(targets, encoded, report_file, clock)?;
     tell(&format!("  service {}, session {}\n", plain(address), plain(&session)))
+}
+
+/// A cage as a file for a service.
+fn cage_obj(cage: &Cage) -> Vec<u8> {
+    let mut faces = Polygons::new();
+    cage.mesh().triangles.iter().for_each(|triangle| faces.push(triangle));
+    obj_bytes(&Model { points: cage.vertices().to_vec(), faces, ..Model::default() })
+}
+
+/// The container of a service, which was sent positions about an origin and does not know of it.
+fn with_origin(encoded: Encoded, origin: Point, output: &Target) -> Result<Encoded> {
+    let Encoded { mut report, container: mut from } = encoded;
+    let mut reader = ContainerReader::open(BufReader::new(from.reader()?))?;
+    let out = BufWriter::new(AtomicFile::create(output)?);
+    let mut container = ContainerWriter::copy_with_origin(&mut reader, origin, out)?
+        .into_inner()
+        .map_err(std::io::IntoInnerError::into_error)?;
+    report.origin = Some(origin);
+    report.set_output(container.complete()?);
+    Ok(Encoded { report, container })
 }
 
 /// What the container is to meet, as a session is asked for it.

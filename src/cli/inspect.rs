@@ -62,6 +62,9 @@ fn as_text(name: &str, report: &Report, sections: &[Section]) -> Result<String> 
     let (frames, points) = (grouped(report.frames), grouped(report.points));
     writeln!(out, "  capture   {frames} frames of {points} points")?;
     numbers(&mut out, report)?;
+    if let Some([x, y, z]) = report.origin {
+        writeln!(out, "  origin    {x} {y} {z}, added to all positions")?;
+    }
     let (vertices, faces) = (grouped(report.cage_vertices), grouped(report.cage_faces));
     writeln!(out, "  cage      {vertices} vertices, {faces} faces")?;
     // How many are read is known where not every point is.

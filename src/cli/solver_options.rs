@@ -3,16 +3,18 @@
 use super::args::{SolverArgs, SpectrumArg};
 use super::{grouped, read_model, warn};
 use crate::coding::InversionChoices;
+use crate::origin::move_to;
 use anyhow::{Context, Result, bail};
 use cager_cages::diagnosis::weld;
 use cager_core::cage::{Cage, CageError};
 use cager_core::inversion::{Handles, PrepareError};
-use cager_core::mesh::TriMesh;
+use cager_core::mesh::{Point, TriMesh};
 use cager_core::regularize::{Regularizer, SparseMatrix};
 use cager_formats::read_matrix;
 use std::path::Path;
 
-pub(super) fn read_cage(path: &Path, flip: bool) -> Result<Cage> {
+/// The cage in a file, about the origin of its model.
+pub(super) fn read_cage(path: &Path, flip: bool, origin: Option<Point>) -> Result<Cage> {
     let mut model = read_model(path)?;
     if model.faces.is_empty() {
         bail!("{}: has no faces, and a cage is a closed mesh; export the cage with its faces", path.display());
@@ -25,6 +27,7 @@ pub(super) fn read_cage(path: &Path, flip: bool) -> Result<Cage> {
         )]);
         model = welded.model;
     }
+    move_to(origin, &mut model.points);
     let mesh = TriMesh::from(&model);
     let cage = Cage::new(if flip { mesh.flipped() } else { mesh });
     if flip && matches!(cage, Err(CageError::Inward { .. })) {

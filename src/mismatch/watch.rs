@@ -31,7 +31,9 @@ impl fmt::Display for Departure {
             Self::Order(ratio) => {
                 write!(f, "its points come in another order: edges of the rest pose are {ratio:.0} times longer in it")
             }
-            Self::Faces => f.write_str("its points come in another order: its faces have other numbers for the same points"),
+            Self::Faces => {
+                f.write_str("its points come in another order: its faces have other numbers for the same points")
+            }
             Self::Units(ratio) => {
                 let (times, how) = if ratio > 1.0 { (ratio, "larger") } else { (1.0 / ratio, "smaller") };
                 write!(f, "it is {} times {how} than what comes before it, as with other units", factor(times))
@@ -144,7 +146,10 @@ impl Sketch {
             return None;
         }
         let [_, times, _] = quartiles(torn.iter().map(|&k| ratio(k)).collect())?;
-        [previous, rest].into_iter().any(|before| self.exchanges_points(before, &torn)).then_some(Departure::Order(times))
+        [previous, rest]
+            .into_iter()
+            .any(|before| self.exchanges_points(before, &torn))
+            .then_some(Departure::Order(times))
     }
 
     fn exchanges_points(&self, before: &Self, torn: &[usize]) -> bool {

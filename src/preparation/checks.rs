@@ -3,11 +3,13 @@
 use super::geometry::geometry;
 use super::{Choices, Geometry};
 use crate::coding::{CodingError, Goal, slack};
+use crate::origin::own_origin;
 use crate::problem::{self, ApiError};
 use cager_codec::MOST_ROWS;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions, check_options};
+use cager_core::mesh::{Point, diagonal};
 use cager_core::regularize::Term;
 use cager_proto::container::colors_bytes;
 
@@ -23,12 +25,26 @@ pub(crate) fn check(geometry: &Geometry, choices: &Choices, max_bytes: u64) -> R
         check_options(geometry.rest.points.len(), unknowns, options, u64::MAX).map_err(|error| refused(&error))?;
     }
     check_memory(geometry, choices, options, max_bytes)?;
+    check_place(&geometry.rest.points)?;
     Solver::check(choices.system, &geometry.cage, &geometry.rest.points, options, u64::MAX)
         .map_err(|error| refused(&error))?;
     choices.goal.map_or(Ok(()), |goal| check_goal(goal, geometry, unknowns, choices.frames))?;
     let Some(matrix) = &geometry.matrix else { return Ok(()) };
     matrix.delta(&geometry.cage, unknowns).map_err(|error| refused(&error.into()))?;
     Ok(())
+}
+
+/// Refuses a rest pose so far away that the single precision in which frames are sent would lose what is seen.
+fn check_place(points: &[Point]) -> Result<(), ApiError> {
+    const LOST: f64 = 1e-4;
+    let farthest = points.iter().flatten().fold(0.0f64, |far, x| far.max(x.abs()));
+    let lost = farthest * f64::from(f32::EPSILON) / 2.0 / diagonal(points);
+    match own_origin(points) {
+        Some([x, y, z]) if lost > LOST => Err(geometry(format!(
+            "the rest pose lies so far from the origin that the single precision in which frames are sent loses {lost:.1e} of its diagonal; subtract {x} {y} {z} from rest pose, cage and frames, as cager encode --server does"
+        ))),
+        _ => Ok(()),
+    }
 }
 
 /// Refuses a goal that no frame could meet.

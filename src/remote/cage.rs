@@ -20,6 +20,8 @@ const DESIGN_TIMEOUT: Duration = Duration::from_secs(3600);
 pub enum RemoteCage<'a> {
     /// This file.
     File(&'a std::path::Path),
+    /// These bytes of a file.
+    Mesh(&'a MeshFile),
     /// The service designs it from the capture.
     Designed(&'a DesignOptions),
 }

@@ -35,6 +35,7 @@ impl<W: Write> ContainerFrames<W> {
             options: prepared.options,
             solver: &prepared.solver,
             frame_rate: session.meta.options.frame_rate,
+            origin: None,
         };
         let coded = geometry.coded.as_ref().map(|(rest, cage)| (rest, cage));
         let writer = CaptureWriter::with_meshes(out, &encoding, coded).map_err(plain)?;

@@ -58,6 +58,7 @@ pub(crate) fn run_with(
         choose: None,
         memory: Memory::half_of_free(),
         goal: None,
+        origin: None,
         exact_rest: false,
     };
     let encoded = encode(job, &|_| {}).expect("an encoding");

@@ -95,15 +95,16 @@ else:
     _, length = normals(rest, rest, faces)
     rows = [green(x, rest, faces) for x in points]
     rows = [row[:len(rest)] + [value / length for value in row[len(rest):]] for row in rows]
-decoded = []
+decoded, origin = [], found.get("ORIG", (0, 0, 0))
 for frame in frames:
     values = threes(frame)
     if system == "green":
         values += normals(values, rest, faces)[0]
-    decoded += [sum(c * value[k] for c, value in zip(row, values)) for row in rows for k in range(3)]
+    decoded += [sum(c * value[k] for c, value in zip(row, values)) + origin[k] for row in rows for k in range(3)]
 array = open(sys.argv[2], "rb").read()
+width, kind = (8, "d") if b"<f8" in array[:128] else (4, "f")
 array = array[10 + struct.unpack_from("<H", array, 8)[0]:]
-expected = struct.unpack(f"<{len(array) // 4}f", array)
+expected = struct.unpack(f"<{len(array) // width}{kind}", array)
 assert len(expected) == len(decoded), (len(expected), len(decoded))
 diagonal = norm([max(p[k] for p in points) - min(p[k] for p in points) for k in range(3)])
 print(max(abs(a - b) for a, b in zip(expected, decoded)) / diagonal)

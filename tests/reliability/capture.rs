@@ -71,6 +71,7 @@ impl Reference {
             choose: None,
             memory: Memory::half_of_free(),
             goal: None,
+            origin: None,
             exact_rest: false,
         };
         let encoded = encode(job, &|_| {}).expect("an encoding");
@@ -78,8 +79,15 @@ impl Reference {
         let container = std::fs::read(&output).expect("the container");
 
         let solver = Solver::prepare(&MeanValue, &cage, &rest.points, options).expect("a solver");
-        let encoding =
-            Encoding { rest: &rest, cage: &cage, system: &MeanValue, options, solver: &solver, frame_rate: None };
+        let encoding = Encoding {
+            rest: &rest,
+            cage: &cage,
+            system: &MeanValue,
+            options,
+            solver: &solver,
+            frame_rate: None,
+            origin: None,
+        };
         let mut writer = CaptureWriter::new(Vec::new(), &encoding).expect("a container");
         let (mut cages, mut errors) = (Vec::new(), Vec::new());
         for frame in &frames {

@@ -2,6 +2,7 @@
 
 mod client;
 mod command;
+mod far_away;
 mod restart;
 mod server;
 // Not all of it is of use here.

@@ -16,6 +16,11 @@ export interface TriangleMesh {
 /** Everything that does not change from frame to frame. */
 export interface StaticPart {
   readonly system: CoordinateSystem;
+  /**
+   * What is to be added to all positions of a capture that lies far away (`ORIG` in docs/FORMAT.md); the page shows it without. What it writes are containers, which
+   * keep it.
+   */
+  readonly origin?: Float64Array;
   /** Points of the model at rest, x y z each. */
   readonly rest: Float64Array;
   /** Number of corners of each polygon of the model; empty for a point cloud. */

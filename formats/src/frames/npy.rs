@@ -206,8 +206,8 @@ pub(super) fn single_number(file: &[u8]) -> Option<f64> {
 }
 
 /// A header as `numpy.save` writes it.
-pub(super) fn header(points: usize, frames: usize) -> Vec<u8> {
-    let mut text = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({frames}, {points}, 3), }}");
+pub(super) fn header(points: usize, frames: usize, bytes: usize) -> Vec<u8> {
+    let mut text = format!("{{'descr': '<f{bytes}', 'fortran_order': False, 'shape': ({frames}, {points}, 3), }}");
     // The array begins at a multiple of 64 bytes.
     let length = (MAGIC.len() + 4 + text.len() + 1).next_multiple_of(64) - MAGIC.len() - 4;
     text.extend(std::iter::repeat_n(' ', length - 1 - text.len()));

@@ -9,7 +9,6 @@ use super::{FrameReader, cut, single};
 use crate::error::{Error, Fault};
 use crate::mesh::{MeshFormat, read_frame_file};
 
-
 /// Reads the positions; the faces may differ from those of the rest pose, and are kept to be compared.
 pub(super) struct SequenceReader {
     sequence: Sequence,

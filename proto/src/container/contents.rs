@@ -113,6 +113,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         }
         for (tag, least, most) in [
             (tag::REST_FACES, most_faces, most_faces),
+            (tag::ORIGIN, 0, 1),
             (tag::REST_COLORS, 0, 1),
             (tag::ELEMENTS, 0, 1),
             (tag::NUMBERS, 0, 1),
@@ -129,6 +130,7 @@ impl<R: Read + Seek> ContainerReader<R> {
             let (h, s) = (&self.header, &entry.header);
             let expected = match s.tag {
                 tag::REST_POINTS => h.points.checked_mul(3 * u64::from(s.width)),
+                tag::ORIGIN => Some(24),
                 tag::REST_COLORS => h.points.checked_mul(3),
                 tag::REST_FACES => h.rest_faces.checked_add(h.rest_corners).and_then(|n| n.checked_mul(4)),
                 tag::CAGE_VERTICES => h.cage_vertices.checked_mul(3 * u64::from(s.width)),
@@ -142,7 +144,7 @@ impl<R: Read + Seek> ContainerReader<R> {
             let width_fits = match s.tag {
                 tag::REST_POINTS | tag::CAGE_VERTICES => s.width == 4 || s.width == 8,
                 tag::REST_FACES | tag::CAGE_FACES | tag::FRAMES | tag::ERRORS => s.width == 4,
-                tag::NUMBERS => s.width == 8,
+                tag::ORIGIN | tag::NUMBERS => s.width == 8,
                 tag::REST_COLORS | tag::ELEMENTS | tag::RESIDUAL => s.width == 1,
                 _ => s.width > 0,
             };

@@ -15,6 +15,7 @@ pub use error::Error;
 pub use reader::{ContainerReader, SectionInfo};
 pub use writer::{ContainerWriter, colors_bytes};
 
+use cager_core::mesh::Point;
 use serde::{Deserialize, Serialize};
 
 /// First bytes of every container. Like PNG's they show damage by text-mode transfers.
@@ -35,7 +36,7 @@ pub fn group_frames(points: usize, rows: usize) -> usize {
     fitting.clamp(1, GROUP_FRAMES)
 }
 
-/// What a decoder must know. Stored as bincode of fixed-width integers, see [`crate::wire`].
+/// What a decoder must know. Stored as bincode of fixed-width integers, see [`crate::wire`], but for the origin.
 #[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
 pub struct Header {
     /// Definition of the coordinate systems by which decoders compute `Φ` anew.
@@ -64,6 +65,9 @@ pub struct Header {
     pub rows_per_frame: u32,
     /// Frames per second, where known.
     pub frame_rate: Option<f64>,
+    /// What is to be added to all positions of a capture that lies far away; stored in a section of its own.
+    #[serde(skip)]
+    pub origin: Option<Point>,
 }
 
 impl Header {
@@ -87,6 +91,7 @@ pub(crate) fn are_frame_numbers(numbers: &[f64]) -> bool {
 /// The sections this program knows.
 pub(crate) mod tag {
     pub(crate) const HEADER: [u8; 4] = *b"HEAD";
+    pub(crate) const ORIGIN: [u8; 4] = *b"ORIG";
     pub(crate) const REST_POINTS: [u8; 4] = *b"RPTS";
     pub(crate) const REST_FACES: [u8; 4] = *b"RFAC";
     pub(crate) const REST_COLORS: [u8; 4] = *b"rcol";
@@ -99,8 +104,9 @@ pub(crate) mod tag {
     pub(crate) const NUMBERS: [u8; 4] = *b"fnum";
     pub(crate) const REPORT: [u8; 4] = *b"summ";
     pub(crate) const RESIDUAL: [u8; 4] = *b"resi";
-    pub(crate) const KNOWN: [[u8; 4]; 13] = [
+    pub(crate) const KNOWN: [[u8; 4]; 14] = [
         HEADER,
+        ORIGIN,
         REST_POINTS,
         REST_FACES,
         REST_COLORS,

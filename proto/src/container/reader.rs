@@ -65,6 +65,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         reader.read_contents(section::check_footer(&footer, file_bytes)?)?;
         reader.read_header()?;
         reader.check_sizes(true)?;
+        reader.read_origin()?;
         Ok(reader)
     }
 
@@ -78,6 +79,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         reader.scan()?;
         reader.read_header()?;
         reader.check_sizes(false)?;
+        reader.read_origin()?;
         Ok(reader)
     }
 
@@ -136,7 +138,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         self.frames
     }
 
-    /// The model in its rest pose, without its [`colors`](Self::colors).
+    /// The model in its rest pose, about the [origin](Header::origin), without its [`colors`](Self::colors).
     ///
     /// # Errors
     /// Damage.
@@ -193,7 +195,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         }
     }
 
-    /// The cage around the rest pose.
+    /// The cage around the rest pose, about the [origin](Header::origin).
     ///
     /// # Errors
     /// Damage.
@@ -360,6 +362,17 @@ impl<R: Read + Seek> ContainerReader<R> {
         if h.rows_per_frame == 0 || h.points > u64::from(u32::MAX) || h.cage_vertices > u64::from(u32::MAX) {
             return Err(Error::corrupt(entry.offset, "the header has impossible counts"));
         }
+        Ok(())
+    }
+
+    fn read_origin(&mut self) -> Result<(), Error> {
+        let Some(&entry) = self.entries.iter().find(|e| e.header.tag == tag::ORIGIN) else { return Ok(()) };
+        let raw = self.raw(entry)?;
+        let origin = [0, 8, 16].map(|at| f64::from_bits(u64_at(&raw, at)));
+        if origin.iter().any(|x| !x.is_finite()) {
+            return Err(Error::corrupt(entry.offset, "the origin is not finite"));
+        }
+        self.header.origin = Some(origin);
         Ok(())
     }
 

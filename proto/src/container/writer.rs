@@ -1,13 +1,14 @@
 //! Writing a container, frame by frame.
 
 use super::codec::{self, CODED, CODED_STATIC, DIFFERENCE, PLANES, RAW};
+use super::reader::ContainerReader;
 use super::section::{self, HEADER_BYTES, SectionHeader};
 use super::{CHUNK_FRAMES, Error, HEADER_LIMIT, Header, counted_from_zero, tag};
 use crate::report::Report;
 use crate::wire;
 use cager_codec::{CodedMesh, encode_errors};
 use cager_core::mesh::{Model, Point, TriMesh};
-use std::io::Write;
+use std::io::{Read, Seek, Write};
 
 /// Writes one container to anything that takes bytes. The same input gives the same bytes.
 ///
@@ -70,19 +71,11 @@ impl<W: Write> ContainerWriter<W> {
             ..header.clone()
         };
         check(&header, rest, cage)?;
-        let mut writer = Self {
-            out,
-            offset: 0,
-            header,
-            pending: Vec::new(),
-            pending_frames: 0,
-            errors: Vec::new(),
-            is_coded: false,
-            contents: Vec::new(),
-        };
+        let mut writer = Self::empty(out, header);
         writer.put(&section::prelude())?;
         let encoded = wire::encode::<_, HEADER_LIMIT>(&writer.header).map_err(|e| Error::TooLarge(e.to_string()))?;
         writer.section(tag::HEADER, RAW, 1, 0, &encoded)?;
+        writer.write_origin()?;
         writer.positions(tag::REST_POINTS, &rest.points, coded_rest)?;
         if let Some(coded) = coded_rest.filter(|_| !rest.faces.is_empty()) {
             let raw_bytes = 4 * (rest.faces.len() + rest.faces.indices().len());
@@ -103,6 +96,38 @@ impl<W: Write> ContainerWriter<W> {
             writer.section(tag::CAGE_FACES, DIFFERENCE, 4, 1, &corners)?;
         }
         Ok(writer)
+    }
+
+    fn empty(out: W, header: Header) -> Self {
+        Self {
+            out,
+            offset: 0,
+            header,
+            pending: Vec::new(),
+            pending_frames: 0,
+            errors: Vec::new(),
+            is_coded: false,
+            contents: Vec::new(),
+        }
+    }
+
+    /// Writes a container without an origin again with one; everything else keeps its bytes.
+    ///
+    /// # Errors
+    /// Damage; an output that refuses.
+    pub fn copy_with_origin<R: Read + Seek>(from: &mut ContainerReader<R>, origin: Point, out: W) -> Result<W, Error> {
+        let mut writer = Self::empty(out, Header { origin: Some(origin), ..from.header().clone() });
+        writer.put(&section::prelude())?;
+        for k in 0..from.entries.len() {
+            let entry = from.entries[k];
+            let payload = from.payload(entry)?;
+            let SectionHeader { tag, codec, width, first, count, raw_bytes, .. } = entry.header;
+            writer.payload((tag, codec, width), &payload, raw_bytes as usize, (first, count))?;
+            if tag == tag::HEADER {
+                writer.write_origin()?;
+            }
+        }
+        writer.end()
     }
 
     /// The header, with the counts of the meshes.
@@ -200,12 +225,23 @@ impl<W: Write> ContainerWriter<W> {
             let text = report.stored().map_err(|e| Error::Invalid(e.to_string()))?;
             self.section(tag::REPORT, PLANES, 1, 0, &text)?;
         }
+        self.end()
+    }
+
+    /// Writes the table of contents and the footer.
+    fn end(mut self) -> Result<W, Error> {
         let contents_offset = self.offset;
         let contents = std::mem::take(&mut self.contents);
         self.section(tag::CONTENTS, RAW, 1, 0, &contents)?;
         let file_bytes = self.offset + section::FOOTER_BYTES as u64;
         self.put(&section::footer(contents_offset, file_bytes))?;
         Ok(self.out)
+    }
+
+    fn write_origin(&mut self) -> Result<(), Error> {
+        let Some(origin) = self.header.origin else { return Ok(()) };
+        let raw: Vec<u8> = origin.iter().flat_map(|x| x.to_le_bytes()).collect();
+        self.section(tag::ORIGIN, RAW, 8, 0, &raw)
     }
 
     fn write_errors(&mut self) -> Result<(), Error> {
@@ -316,6 +352,9 @@ fn too_many_frames() -> Error {
 
 /// Refuses what a reader would refuse, so that a file that was written can be read.
 fn check(header: &Header, rest: &Model, cage: &TriMesh) -> Result<(), Error> {
+    if header.origin.is_some_and(|origin| origin.iter().any(|x| !x.is_finite())) {
+        return Err(Error::TooLarge("an origin that is not finite".to_owned()));
+    }
     if header.rows_per_frame == 0 {
         return Err(Error::Invalid("a frame without rows".to_owned()));
     }

@@ -169,6 +169,8 @@ function expectedSize(fields: SectionFields, head: Head, frames: number): [reado
       return [[4, 8], 3 * fields.width * head.cageVertices];
     case 'RFAC':
       return [[4], 4 * (head.restFaces + head.restCorners)];
+    case 'ORIG':
+      return [[8], 24];
     case 'rcol':
       return [[1], 3 * head.points];
     case 'CTRI':

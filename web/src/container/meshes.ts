@@ -11,7 +11,7 @@ import type { Head } from './head';
 import { CODEC, type Entry, isCoded } from './section';
 
 /** Sections before the frames that model and cage are made of. */
-export const STATIC_TAGS: readonly string[] = ['RPTS', 'RFAC', 'CVTX', 'CTRI', 'ELEM'];
+export const STATIC_TAGS: readonly string[] = ['ORIG', 'RPTS', 'RFAC', 'CVTX', 'CTRI', 'ELEM'];
 
 /** A section and its payload as it is in the file, whose checksum and sizes were checked. */
 export interface Section {
@@ -28,6 +28,7 @@ export async function decodeStatic(
   const polygons = await decodeModelFaces(head, sections.get('RFAC'), codec);
   const rest = await decodePoints(sections.get('RPTS')!, polygons, head.points, codec);
   const elements = sections.get('ELEM');
+  const origin = sections.get('ORIG');
   return {
     system: head.system,
     rest,
@@ -38,8 +39,17 @@ export async function decodeStatic(
     frameRate: head.frameRate,
     spectrum: head.spectrum,
     report: null,
+    ...(origin === undefined ? {} : { origin: decodeOrigin(origin) }),
     ...(elements === undefined ? {} : { elements: decodePayload(elements.entry, elements.payload) }),
   };
+}
+
+function decodeOrigin({ entry, payload }: Section): Float64Array {
+  const origin = new Float64Array(decodePayload(entry, payload).slice().buffer);
+  if (!origin.every(Number.isFinite)) {
+    throw damaged(entry.offset, 'the origin is not finite');
+  }
+  return origin;
 }
 
 async function decodeModelFaces(head: Head, section: Section | undefined, codec: Codec): Promise<Polygons> {

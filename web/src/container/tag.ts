@@ -2,7 +2,7 @@
 
 /** Tags of the sections that this reader knows. */
 export const KNOWN_TAGS: ReadonlySet<string> = new Set(
-  'HEAD RPTS RFAC rcol CVTX CTRI ELEM FRAM resi ERRS fnum summ TOC_'.split(' '),
+  'HEAD ORIG RPTS RFAC rcol CVTX CTRI ELEM FRAM resi ERRS fnum summ TOC_'.split(' '),
 );
 
 /** Whether a reader that does not know the section must refuse the file. */

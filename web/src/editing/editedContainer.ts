@@ -9,7 +9,7 @@ import { ContainerWriter } from '../container/writer';
 import { editedBlock, type CageEdit } from './cageEdit';
 
 /** Sections that hold whatever the cages are; they are taken over as they are. */
-const KEPT_BEFORE = ['HEAD', 'RPTS', 'RFAC', 'rcol', 'CVTX', 'CTRI', 'ELEM'];
+const KEPT_BEFORE = ['HEAD', 'ORIG', 'RPTS', 'RFAC', 'rcol', 'CVTX', 'CTRI', 'ELEM'];
 /** Frames of a chunk. */
 const CHUNK_FRAMES = 16;
 /** As `cager edit` writes it. */

@@ -87,6 +87,11 @@ export async function openOriginal(
       'These are no frames of a capture: drop an array (.npy), a point cache (.pc2), or a folder with one .obj per frame.',
     );
   }
+  if (capture.static.origin) {
+    throw new Error(
+      'The capture lies so far from the origin of its coordinates that the page cannot compare it with its frames; `cager decode` gives its positions in double precision.',
+    );
+  }
   const source = await framesOf(item.files);
   const points = capture.static.rest.length / 3;
   if (source.points !== points) {

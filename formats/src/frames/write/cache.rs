@@ -2,8 +2,10 @@
 
 use std::io::{self, Write};
 
+use cager_core::mesh::Point;
+
 use super::super::{mdd, npy, pc2};
-use super::{Announced, CacheFormat, FrameOptions, FrameWriter};
+use super::{Announced, CacheFormat, FrameOptions, FrameWriter, loses_precision};
 use crate::atomic::{AtomicFile, Target};
 use crate::error::{Error, Fault};
 
@@ -11,6 +13,8 @@ pub(super) struct CacheWriter {
     announced: Announced,
     file: AtomicFile,
     big_endian: bool,
+    /// What is added to all positions, in double precision.
+    origin: Option<Point>,
     bytes: Vec<u8>,
 }
 
@@ -23,7 +27,14 @@ impl CacheWriter {
     ) -> Result<Self, Error> {
         let Announced { points, frames, .. } = announced;
         if format == CacheFormat::Npy {
-            return Self::begin(announced, target, false, |file| file.write_all(&npy::header(points, frames)));
+            let bytes = if options.origin.is_some() { 8 } else { 4 };
+            let mut writer =
+                Self::begin(announced, target, false, |file| file.write_all(&npy::header(points, frames, bytes)))?;
+            writer.origin = options.origin;
+            return Ok(writer);
+        }
+        if let Some(origin) = options.origin {
+            return Err(loses_precision(origin).at(&announced.path));
         }
         let (Ok(points), Ok(frames)) = (i32::try_from(points), i32::try_from(frames)) else {
             let what = format!("cannot count more than {} frames or points; write .npy instead", i32::MAX);
@@ -49,7 +60,7 @@ impl CacheWriter {
     ) -> Result<Self, Error> {
         let mut file = AtomicFile::create(target)?;
         header(&mut file).map_err(|cause| Error::write(&announced.path, cause))?;
-        Ok(Self { announced, file, big_endian, bytes: Vec::new() })
+        Ok(Self { announced, file, big_endian, origin: None, bytes: Vec::new() })
     }
 }
 
@@ -57,7 +68,10 @@ impl FrameWriter for CacheWriter {
     fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error> {
         self.announced.admit(positions)?;
         self.bytes.clear();
-        if self.big_endian {
+        if let Some(origin) = self.origin {
+            let moved = positions.iter().zip(origin.iter().cycle()).map(|(&x, o)| f64::from(x) + o);
+            self.bytes.extend(moved.flat_map(f64::to_le_bytes));
+        } else if self.big_endian {
             self.bytes.extend(positions.iter().flat_map(|x| x.to_be_bytes()));
         } else {
             self.bytes.extend(positions.iter().flat_map(|x| x.to_le_bytes()));

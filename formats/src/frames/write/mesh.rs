@@ -1,16 +1,24 @@
 //! The meshes of frames: the same faces, and other points in each.
 
+use std::fmt::Debug;
 use std::io::{self, Write};
 use std::path::Path;
 
-use cager_core::mesh::{Model, Polygons};
+use cager_core::mesh::{Model, Point, Polygons};
+use cager_core::vector::add;
 
-use super::Announced;
+use super::{Announced, loses_precision};
 use crate::error::{Error, Fault};
 use crate::mesh::{MeshFormat, write_obj_faces, write_off, write_ply, write_stl};
 
 /// A mesh format that frames are written in, with what is the same in all of them.
-pub(super) enum FrameMesh {
+pub(super) struct FrameMesh {
+    form: Form,
+    /// What is added to all positions, in double precision.
+    origin: Option<Point>,
+}
+
+enum Form {
     /// The `f` lines.
     Obj(Vec<u8>),
     /// The model; its points change.
@@ -23,7 +31,12 @@ impl FrameMesh {
 
     /// # Errors
     /// Faces without their points; a format that is not written, or cannot hold these faces.
-    pub(super) fn new(format: MeshFormat, announced: &Announced, faces: &Polygons) -> Result<Self, Error> {
+    pub(super) fn new(
+        format: MeshFormat,
+        announced: &Announced,
+        faces: &Polygons,
+        origin: Option<Point>,
+    ) -> Result<Self, Error> {
         let path = &announced.path;
         if let Some(&index) = faces.indices().iter().find(|&&index| index as usize >= announced.points) {
             return Err(Fault::invalid(format!(
@@ -35,13 +48,17 @@ impl FrameMesh {
         if format == MeshFormat::Obj {
             let mut text = Vec::new();
             write_obj_faces(&mut text, faces.iter()).map_err(|cause| Error::write(path, cause))?;
-            return Ok(Self::Obj(text));
+            return Ok(Self { form: Form::Obj(text), origin });
         }
         if format == MeshFormat::Stl && faces.is_empty() {
             let what = "cannot be .stl, which holds triangles alone, and there are only points; write .ply instead";
             return Err(Fault::unsupported(what).at(path));
         }
-        Ok(Self::Other(format, Model { points: Vec::new(), faces: faces.clone(), ..Model::default() }))
+        if let Some(origin) = origin.filter(|_| format == MeshFormat::Stl) {
+            return Err(loses_precision(origin).at(path));
+        }
+        let model = Model { points: Vec::new(), faces: faces.clone(), ..Model::default() };
+        Ok(Self { form: Form::Other(format, model), origin })
     }
 
     /// Writes the mesh of a frame.
@@ -50,17 +67,21 @@ impl FrameMesh {
     }
 
     fn write_points(&mut self, out: &mut impl Write, positions: &[f32]) -> io::Result<()> {
-        let points = positions.as_chunks().0;
-        match self {
-            Self::Obj(faces) => {
-                for [x, y, z] in points {
-                    writeln!(out, "v {x:?} {y:?} {z:?}")?;
+        let (points, origin) = (positions.as_chunks().0, self.origin);
+        let place = |p: &[f32; 3]| origin.map_or(p.map(f64::from), |origin| add(p.map(f64::from), origin));
+        match &mut self.form {
+            Form::Obj(faces) => {
+                for point in points {
+                    match origin {
+                        Some(_) => write_vertex(out, &place(point))?,
+                        None => write_vertex(out, point)?,
+                    }
                 }
                 out.write_all(faces)
             }
-            Self::Other(format, model) => {
+            Form::Other(format, model) => {
                 model.points.clear();
-                model.points.extend(points.iter().map(|p| p.map(f64::from)));
+                model.points.extend(points.iter().map(place));
                 match format {
                     MeshFormat::Off => write_off(out, model),
                     MeshFormat::Stl => write_stl(out, model),
@@ -69,4 +90,8 @@ impl FrameMesh {
             }
         }
     }
+}
+
+fn write_vertex(out: &mut impl Write, [x, y, z]: &[impl Debug; 3]) -> io::Result<()> {
+    writeln!(out, "v {x:?} {y:?} {z:?}")
 }

@@ -7,7 +7,7 @@ mod single;
 
 use std::path::{MAIN_SEPARATOR, Path, PathBuf};
 
-use cager_core::mesh::Polygons;
+use cager_core::mesh::{Point, Polygons};
 
 use super::CacheFormat;
 use super::numbered::NumberedNames;
@@ -43,6 +43,8 @@ pub struct FrameOptions {
     pub fps: f64,
     /// The number of each frame, ascending, for the names of files and the times in `.pc2` and `.mdd`; 0, 1, 2, … where there are none.
     pub numbers: Vec<f64>,
+    /// What is added to all positions, which are then written in double precision; formats of single precision are refused.
+    pub origin: Option<Point>,
 }
 
 impl FrameOptions {
@@ -60,7 +62,7 @@ impl FrameOptions {
 
 impl Default for FrameOptions {
     fn default() -> Self {
-        Self { fps: 24.0, numbers: Vec::new() }
+        Self { fps: 24.0, numbers: Vec::new(), origin: None }
     }
 }
 
@@ -76,7 +78,7 @@ fn mesh_pattern(path: &Path) -> Option<&str> {
 
 /// Begins an output of `frames` frames of `points` points each.
 ///
-/// The extension of `path` says what: `.npy` (frames × points × 3, `<f4`), `.pc2` or `.mdd`. Without an extension, with
+/// The extension of `path` says what: `.npy` (frames × points × 3, `<f4`, or `<f8` with an origin), `.pc2` or `.mdd`. Without an extension, with
 /// a `/` at the end, or as an existing folder it becomes a folder of files `frame_0000.obj`, …, each with `faces` and its number;
 /// `FOLDER/*.ply` makes them `.ply` files, and `FOLDER/NAME.%04d.obj` or `FOLDER/NAME.####.ply` gives their names.
 /// A folder with nothing but such files is replaced as a whole where the target may be. Of one frame, `.obj`, `.ply`, `.off` or `.stl` becomes
@@ -113,7 +115,7 @@ pub fn create_frames(
         return Ok(Box::new(SequenceWriter::create(announced, &target, faces, names, options)?));
     }
     if let Some(format) = MeshFormat::guess(path).filter(|format| FrameMesh::FORMATS.contains(format)) {
-        return Ok(Box::new(SingleWriter::create(announced, &target, format, faces)?));
+        return Ok(Box::new(SingleWriter::create(announced, &target, format, faces, options.origin)?));
     }
     match CacheFormat::from_path(path) {
         Some(format) => Ok(Box::new(CacheWriter::create(announced, &target, format, options)?)),
@@ -140,6 +142,15 @@ fn is_folder(path: &Path) -> bool {
     let text = path.as_os_str().as_encoded_bytes();
     let separated = text.last().is_some_and(|&end| end == b'/' || char::from(end) == MAIN_SEPARATOR);
     separated || path.extension().is_none() || path.is_dir()
+}
+
+/// Why positions about an origin are not written to a format of single precision.
+fn loses_precision(origin: Point) -> Fault {
+    let farthest = origin.iter().fold(0.0, |far: f64, x| far.max(x.abs()));
+    Fault::unsupported(format!(
+        "holds single precision, which loses all that is smaller than {:.1e} units so far from the origin; write .npy, or .obj or .ply files",
+        farthest * f64::from(f32::EPSILON) / 2.0
+    ))
 }
 
 /// Announced size of an output, and the number of frames written.

@@ -2,7 +2,7 @@
 
 use std::io::{BufWriter, Write};
 
-use cager_core::mesh::Polygons;
+use cager_core::mesh::{Point, Polygons};
 
 use super::mesh::FrameMesh;
 use super::{Announced, FrameWriter};
@@ -22,6 +22,7 @@ impl SingleWriter {
         target: &Target,
         format: MeshFormat,
         faces: &Polygons,
+        origin: Option<Point>,
     ) -> Result<Self, Error> {
         if announced.frames > 1 {
             let name = announced.path.with_extension("");
@@ -33,7 +34,7 @@ impl SingleWriter {
             ))
             .at(&announced.path));
         }
-        let mesh = FrameMesh::new(format, &announced, faces)?;
+        let mesh = FrameMesh::new(format, &announced, faces, origin)?;
         Ok(Self { announced, file: AtomicFile::create(target)?, mesh })
     }
 }

@@ -47,6 +47,21 @@ async fn a_file_that_cannot_be_read_is_named_with_its_line() {
 }
 
 #[tokio::test]
+async fn a_rest_pose_that_single_precision_would_lose_is_refused_with_what_to_subtract() {
+    let app = TestApp::start();
+    let capture = Capture::small();
+    let moved = |mesh: &Mesh, by: [f64; 3]| {
+        let points = mesh.model.points.iter().map(|p| [0, 1, 2].map(|k| p[k] + by[k])).collect();
+        Mesh::new(Model { points, ..mesh.model.clone() })
+    };
+    let at = |by| form_of(&moved(&capture.rest, by), &moved(&capture.cage, by), &json!({}));
+    let problem = app.refusal(at([450_000.0, 5_400_000.0, 300.0])).await;
+    says(&problem, &["single precision", "subtract 450000 5400000 300 from rest pose, cage and frames"]);
+    // Where a warning was enough it still is.
+    let _: Session = app.create_with(at([450.0, 0.0, 0.0]), None).await.is(201);
+}
+
+#[tokio::test]
 async fn a_cage_that_is_open_is_refused_with_the_edge() {
     let app = TestApp::start();
     let capture = Capture::small();
