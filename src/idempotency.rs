@@ -22,8 +22,10 @@ struct Request {
 pub(crate) enum KeyLookup {
     /// The key is new.
     First,
-    /// An earlier request with the key created the object with this id.
+    /// The same request came before and created the object with this id.
     Done(String),
+    /// A request with the key created the object with this id, under a version whose fingerprints cannot be compared.
+    Earlier(String),
 }
 
 /// A registry of objects that are created by requests with idempotency keys.
@@ -34,15 +36,53 @@ pub(crate) trait Keyed<T> {
     fn made(&self, id: &str) -> Option<Arc<T>>;
 }
 
-/// A request with a key for this content and these options.
-pub(crate) fn request(key: Option<String>, content: &ContentKey, options: &impl Serialize) -> Option<Idempotency> {
-    let mut hasher = blake3::Hasher::new();
-    hasher.update(&content.0);
-    hasher.update(&serde_json::to_vec(options).unwrap_or_default());
-    Some(Idempotency { key: key?, fingerprint: hasher.finalize().to_hex().to_string() })
+/// What fingerprints begin with. Those of earlier versions have no such beginning: they held the version of the solver too, so that
+/// nothing is known of one that differs.
+const SENT: &str = "sent-";
+
+/// A request with a key for these parts and options. Its fingerprint is made of what the client sent and nothing else, so that it is the
+/// same after an upgrade.
+pub(crate) fn request<'a>(
+    key: Option<String>,
+    parts: impl IntoIterator<Item = &'a [u8]>,
+    options: &impl Serialize,
+) -> Option<Idempotency> {
+    let key = key?;
+    let options = serde_json::to_vec(options).unwrap_or_default();
+    let mut sent: Vec<&[u8]> = parts.into_iter().collect();
+    sent.push(&options);
+    let sent = ContentKey::of(sent);
+    Some(Idempotency { key, fingerprint: format!("{SENT}{sent}") })
 }
 
-/// Creates an object, at most once per key.
+/// The part of a file's name that says something about its content, in lower case.
+pub(crate) fn extension(name: &str) -> String {
+    name.rsplit_once('.').map_or("", |(_, ending)| ending).to_ascii_lowercase()
+}
+
+/// What an earlier request with the same key created, if it did. `may_be` compares the request with an object that a version with other
+/// fingerprints created for its key.
+///
+/// # Errors
+/// Those of [`Requests::look`]; `NOT_FOUND` if the object was deleted.
+pub(crate) fn made_before<T>(
+    registry: &impl Keyed<T>,
+    tenant: &str,
+    request: Option<&Idempotency>,
+    may_be: impl FnOnce(&T) -> bool,
+) -> Result<Option<Arc<T>>, ApiError> {
+    let Some(request) = request else { return Ok(None) };
+    match registry.requests(|requests| requests.look(tenant, request))? {
+        KeyLookup::First => Ok(None),
+        KeyLookup::Done(id) => made(registry, &id).map(Some),
+        KeyLookup::Earlier(id) => {
+            let object = made(registry, &id)?;
+            if may_be(&object) { Ok(Some(object)) } else { Err(reused()) }
+        }
+    }
+}
+
+/// Creates an object, at most once per key, after [`made_before`] found none.
 ///
 /// # Errors
 /// Those of `make` and of [`Requests::begin`]; `NOT_FOUND` if the object of an earlier request was deleted.
@@ -53,10 +93,8 @@ pub(crate) async fn once<T, Making: Future<Output = Result<Arc<T>, ApiError>>>(
     make: impl FnOnce(Option<Idempotency>) -> Making,
 ) -> Result<Arc<T>, ApiError> {
     let Some(request) = request else { return make(None).await };
-    match registry.requests(|requests| requests.begin(tenant, &request.key, &request.fingerprint))? {
-        KeyLookup::Done(id) => registry.made(&id).ok_or_else(|| {
-            ApiError::new(problem::NOT_FOUND, "what this request made before was deleted; use a new key")
-        }),
+    match registry.requests(|requests| requests.begin(tenant, &request))? {
+        KeyLookup::Done(id) | KeyLookup::Earlier(id) => made(registry, &id),
         KeyLookup::First => {
             // Releases the key, also after a panic, unless an object was created.
             let key = request.key.clone();
@@ -64,6 +102,16 @@ pub(crate) async fn once<T, Making: Future<Output = Result<Arc<T>, ApiError>>>(
             make(Some(request)).await
         }
     }
+}
+
+fn made<T>(registry: &impl Keyed<T>, id: &str) -> Result<Arc<T>, ApiError> {
+    let gone = || ApiError::new(problem::NOT_FOUND, "what this request made before was deleted; use a new key");
+    registry.made(id).ok_or_else(gone)
+}
+
+fn reused() -> ApiError {
+    let detail = "this Idempotency-Key came with other files or options before; use a new key for a new request";
+    ApiError::new(problem::KEY_REUSED, detail)
 }
 
 struct ReleaseOnDrop<F: FnMut()>(F);
@@ -75,21 +123,18 @@ impl<F: FnMut()> Drop for ReleaseOnDrop<F> {
 }
 
 impl Requests {
-    /// Registers a request; returns the id of the object that an earlier one created.
+    /// Looks a request up.
     ///
     /// # Errors
     /// The key belongs to another request, or to one that is still being worked on.
-    pub(crate) fn begin(&mut self, tenant: &str, key: &str, fingerprint: &str) -> Result<KeyLookup, ApiError> {
-        let place = (tenant.to_owned(), key.to_owned());
-        match self.known.get(&place) {
-            None => {
-                self.known.insert(place, Request { fingerprint: fingerprint.to_owned(), made: None });
-                Ok(KeyLookup::First)
+    fn look(&self, tenant: &str, request: &Idempotency) -> Result<KeyLookup, ApiError> {
+        let Idempotency { key, fingerprint } = request;
+        match self.known.get(&(tenant.to_owned(), key.clone())) {
+            None => Ok(KeyLookup::First),
+            Some(Request { fingerprint: before, made: Some(id) }) if !before.starts_with(SENT) => {
+                Ok(KeyLookup::Earlier(id.clone()))
             }
-            Some(request) if request.fingerprint != fingerprint => Err(ApiError::new(
-                problem::KEY_REUSED,
-                "this Idempotency-Key came with other files or options before; use a new key for a new request",
-            )),
+            Some(request) if request.fingerprint != *fingerprint => Err(reused()),
             Some(Request { made: Some(id), .. }) => Ok(KeyLookup::Done(id.clone())),
             Some(Request { made: None, .. }) => Err(ApiError::new(
                 problem::KEY_IN_USE,
@@ -97,6 +142,19 @@ impl Requests {
             )
             .retry_after(1)),
         }
+    }
+
+    /// As [`Self::look`]; registers a request that is the first.
+    ///
+    /// # Errors
+    /// As [`Self::look`].
+    fn begin(&mut self, tenant: &str, request: &Idempotency) -> Result<KeyLookup, ApiError> {
+        let found = self.look(tenant, request)?;
+        if matches!(found, KeyLookup::First) {
+            let Idempotency { key, fingerprint } = request.clone();
+            self.known.insert((tenant.to_owned(), key), Request { fingerprint, made: None });
+        }
+        Ok(found)
     }
 
     /// Records the object that a request created.
@@ -116,5 +174,18 @@ impl Requests {
         if self.known.get(&place).is_some_and(|request| request.made.is_none()) {
             self.known.remove(&place);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fingerprint_is_what_was_sent_whatever_the_version_of_the_solver() {
+        let parts: [&[u8]; 2] = [b"rest", b"cage"];
+        let request = request(Some("key".to_owned()), parts, &serde_json::json!({"lambda": 0.5})).expect("a key");
+        // Keys outlive upgrades: with another value here, a request repeated after one would be refused as another.
+        assert_eq!(request.fingerprint, "sent-d43d828b855e62a4a92c492ee98d8dcf9a30c108854433965115b45190fe5dff");
     }
 }

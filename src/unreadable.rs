@@ -17,7 +17,7 @@ pub(crate) struct UnreadableFiles {
     known: Mutex<BTreeMap<(Kind, String), UnreadableEntry>>,
     /// Taken while one is retried or deleted. Never awaited on the blocking pool, since the holder may need one of its threads.
     reading: Arc<tokio::sync::Mutex<()>>,
-    /// Whether orphaned content may have been kept because of unreadable sessions.
+    /// Whether there may be orphaned content.
     orphans_kept: AtomicBool,
 }
 
@@ -33,7 +33,7 @@ struct UnreadableEntry {
 impl UnreadableFiles {
     /// Adds one, or updates it; logged only the first time.
     pub(crate) fn add(&self, kind: Kind, id: &str, tenant: Option<&str>, why: &str) {
-        self.orphans_kept.store(true, Relaxed);
+        self.look_for_orphans();
         let key = (kind, id.to_owned());
         let mut known = lock(&self.known);
         let tried = known.get(&key).and_then(|left| left.tried);
@@ -42,6 +42,11 @@ impl UnreadableFiles {
         if before.is_none() {
             tracing::error!(kind = kind.name(), id, why, "cannot be read, and is left where it is");
         }
+    }
+
+    /// Has orphaned content looked for in the next round.
+    pub(crate) fn look_for_orphans(&self) {
+        self.orphans_kept.store(true, Relaxed);
     }
 
     pub(crate) fn forget(&self, kind: Kind, id: &str) {

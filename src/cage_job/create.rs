@@ -4,7 +4,7 @@ use super::{CageJob, Finished, Outcome, Phase, options, samples};
 use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::config::ServeConfig;
-use crate::idempotency::{once, request};
+use crate::idempotency::{extension, made_before, once, request};
 use crate::preparation::{check_extent, read_part};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
@@ -49,6 +49,20 @@ impl Service {
         tenant: &Arc<Tenant>,
         new: NewCageJob,
     ) -> Result<Arc<CageJob>, ApiError> {
+        let (new, request, rest) = blocking(move || {
+            let (request, rest) = (request_of(&new), blake3::hash(&new.rest));
+            (new, request, rest)
+        })
+        .await?;
+        let frames = new.frames.digest();
+        let may_be = |job: &CageJob| {
+            let meta = &job.meta;
+            let digests = [&meta.rest, &meta.frames].map(|part| part.blake3.as_str());
+            meta.options == new.options && digests == [rest.to_hex().as_str(), frames.to_hex().as_str()]
+        };
+        if let Some(made) = made_before(&self.cage_jobs, &tenant.name, request.as_ref(), may_be)? {
+            return Ok(made);
+        }
         let (new, checked) = {
             let place = self.reading.take(&tenant.name, 1).await;
             let (config, name) = (self.config.clone(), tenant.name.clone());
@@ -60,7 +74,6 @@ impl Service {
             .await?;
             (new, checked?)
         };
-        let request = request(new.idempotency_key.clone(), &checked.key, &new.options);
         let (service, tenant) = (Arc::clone(self), Arc::clone(tenant));
         to_the_end(async move {
             let make = |request| service.create_new_cage_job(&tenant, new, checked, request);
@@ -153,7 +166,9 @@ impl Service {
         if !unfinished && error.is_none() {
             self.store.forget_cage_job_input(&id);
         }
-        let job = Arc::new(CageJob::new(meta, phase, self.store.bytes(Kind::CageJob, &id)));
+        // Rather too much than nothing where it cannot be counted.
+        let bytes = self.store.bytes(Kind::CageJob, &id).unwrap_or(meta.rest.bytes + meta.frames.bytes);
+        let job = Arc::new(CageJob::new(meta, phase, bytes));
         self.cage_jobs.insert(Arc::clone(&job));
         if unfinished {
             tokio::spawn(Arc::clone(self).run_cage_job(job));
@@ -166,11 +181,12 @@ impl Service {
         let (store, id, kept) = (self.store.clone(), job.meta.id.clone(), outcome.clone());
         let stored = blocking(move || {
             let stored = store.finish_cage_job(&id, &kept, cage.as_deref());
-            stored.map(|()| store.bytes(Kind::CageJob, &id))
+            stored.map(|()| store.bytes(Kind::CageJob, &id).ok())
         });
         match stored.await {
             _ if job.deleted().is_cancelled() => return,
-            Ok(Ok(bytes)) => job.bytes.store(bytes, Relaxed),
+            Ok(Ok(Some(bytes))) => job.bytes.store(bytes, Relaxed),
+            Ok(Ok(None)) => {}
             Ok(Err(error)) => {
                 tracing::warn!(job = %job.meta.id, %error, "the outcome of a cage job could not be kept; a restart designs it again");
                 if matches!(outcome, Outcome::Completed(_)) {
@@ -220,6 +236,14 @@ impl Service {
     }
 }
 
+/// The request with an idempotency key that this input is. Blocks.
+fn request_of(new: &NewCageJob) -> Option<Idempotency> {
+    let (rest, frames) = (extension(&new.rest_name), extension(&new.frames_name));
+    let digest = new.frames.digest();
+    let parts: [&[u8]; 4] = [rest.as_bytes(), &new.rest, frames.as_bytes(), digest.as_bytes()];
+    request(new.idempotency_key.clone(), parts, &new.options)
+}
+
 /// Checks options alone.
 ///
 /// # Errors
@@ -247,7 +271,6 @@ fn check(new: &NewCageJob, tenant: &str, max_seconds: u64, max_bytes: u64) -> Re
         return Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(max_bytes));
     }
     samples::read(&mut *reader, count, |_| ())?;
-    let extension = |name: &str| name.rsplit_once('.').map_or("", |(_, ending)| ending).to_ascii_lowercase();
     let key = ContentKey::of([
         format!("cage design {design:?} {points} {frame_count} {count}").as_bytes(),
         tenant.as_bytes(),

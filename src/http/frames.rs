@@ -7,7 +7,9 @@ use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
+use crate::session::commit::frame_bytes as stored_bytes;
 use crate::session::facts::Facts;
+use crate::session::registry::Reserved;
 use crate::session::upload::{FrameJob, Permits, Rows, Upload, UploadEvent};
 use crate::session::{LiveLane, Phase, Session, gone};
 use crate::store::LogEntry;
@@ -30,8 +32,9 @@ use tokio::time::{Instant, sleep_until};
 
 /// Frames of one upload that are queued or being solved: enough to keep the pool busy.
 const MAX_IN_FLIGHT: usize = 64;
-/// Frames between checks of the tenant's quota, since the body's length may be unknown.
-const QUOTA_CHECK_FRAMES: u64 = 64;
+/// Frames that quota is reserved for at a time, and bytes of them; a larger frame alone.
+const RESERVED_FRAMES: u64 = 64;
+const RESERVED_BYTES: u64 = 16 << 20;
 /// Frames of one upload that are not on disk yet: enough to bridge a slow sync, and a bound if the disk hangs.
 const MAX_UNWRITTEN: usize = 512;
 /// Records sent at a time.
@@ -120,13 +123,16 @@ pub(crate) async fn post(
     }
     let arriving = http_body::Body::size_hint(&body).exact().unwrap_or(0);
     let frame_bytes = 12 * u64::from(if rows == Rows::Handles { facts.handle_count } else { facts.points }.max(1));
-    let record_bytes = 128 + 12 * u64::from(facts.unknowns);
+    let record_bytes = stored_bytes(facts.unknowns as usize, 0);
     service.check_bytes(&tenant, (arriving / frame_bytes).saturating_mul(record_bytes))?;
+    let posted = if session.goal().is_some() { frame_bytes as usize } else { 0 };
+    let stored_bytes = stored_bytes(facts.unknowns as usize, posted);
     let solver = service.solver(&session).await?;
     let live = service.lane(&session, solver, &tenant);
     let upload = Arc::new(Upload::default());
     let answering = UploadResponder { upload: Arc::clone(&upload), _live: Arc::clone(&live), _place: place };
-    let reading = UploadReader { service, tenant, session: Arc::clone(&session), live, upload: Arc::clone(&upload) };
+    let of = Arc::clone(&session);
+    let reading = UploadReader { service, tenant, session: of, live, upload: Arc::clone(&upload), stored_bytes };
     let frames = FrameReader::new(layout, &facts);
     tokio::spawn(async move {
         reading.live.upload_begins();
@@ -228,6 +234,8 @@ struct UploadReader {
     session: Arc<Session>,
     live: Arc<LiveLane>,
     upload: Arc<Upload>,
+    /// Bytes on disk of a frame.
+    stored_bytes: u64,
 }
 
 impl UploadReader {
@@ -236,7 +244,7 @@ impl UploadReader {
         let unwritten = Arc::new(Semaphore::new(MAX_UNWRITTEN));
         let mut permits = None;
         let mut received = 0u64;
-        let mut submitted = 0u64;
+        let mut reserved = None;
         let counter = metrics::counter!("cager_received_bytes_total", "tenant" => self.session.meta.tenant.clone());
         let stopped = async {
             tokio::select! {
@@ -276,7 +284,7 @@ impl UploadReader {
                         let (tenant, bytes) = (&self.tenant.name, frames.frame_bytes() as u64);
                         let queued = self.service.queued_frames.take(tenant, 1).await;
                         let memory = self.service.frame_memory.take(tenant, bytes).await;
-                        Permits { solving: Some((place, [queued, memory])), _writing: unwritten }
+                        Permits { solving: Some((place, [queued, memory])), _writing: unwritten, quota: None }
                     };
                     permits = Some(tokio::select! {
                         error = &mut stopped => return Err(error),
@@ -289,20 +297,28 @@ impl UploadReader {
                         + Duration::from_secs(frames.frame_bytes() as u64 / SLOWEST_BYTES_PER_SECOND);
                 }
                 if let Some(frame) = frames.push(&mut input)?
-                    && let Some(permits) = permits.take()
+                    && let Some(mut permits) = permits.take()
                 {
                     self.is_expected(frame.frame)?;
+                    permits.quota = Some(self.quota(&mut reserved)?);
                     let job = FrameJob::new(&self.session, &self.upload, frame.frame, frame.rows, frame.bytes, permits);
                     self.live.lane.push(job);
-                    submitted += 1;
-                    if submitted.is_multiple_of(QUOTA_CHECK_FRAMES) {
-                        self.service.check_bytes(&self.tenant, 0)?;
-                    }
                 }
             }
         }
         tracing::debug!(session = %self.session.meta.id, received, "upload read");
         frames.finish()
+    }
+
+    /// Quota for the next frame, of what is reserved for several.
+    fn quota(&self, reserved: &mut Option<Reserved>) -> Result<Reserved, ApiError> {
+        if let Some(one) = reserved.as_mut().and_then(|several| several.split(self.stored_bytes)) {
+            return Ok(one);
+        }
+        *reserved = None;
+        let most = (RESERVED_BYTES / self.stored_bytes).clamp(1, RESERVED_FRAMES);
+        let several = reserved.insert(self.service.reserve_frames(&self.tenant, self.stored_bytes, most)?);
+        several.split(self.stored_bytes).ok_or_else(|| ApiError::internal(&"less quota than for one frame"))
     }
 
     /// Refuses frame numbers beyond the declared number of frames early, not only at completion.

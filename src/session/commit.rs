@@ -13,6 +13,11 @@ use std::sync::{Arc, Mutex};
 /// Approximate size of a log record without its cage, in bytes.
 const RECORD_BYTES: usize = 96;
 
+/// Approximate bytes on disk of a frame with a cage of so many unknowns, of which so many bytes wait to be coded.
+pub(crate) fn frame_bytes(unknowns: usize, posted: usize) -> u64 {
+    (RECORD_BYTES + 12 * unknowns + posted) as u64
+}
+
 /// A solved frame that is not on disk yet.
 pub(crate) struct SolvedFrame {
     /// What the log will say of it.
@@ -52,8 +57,7 @@ impl Committer {
 
 /// Approximate size of frames in the log, in bytes.
 fn stored_bytes(solved: &[SolvedFrame]) -> u64 {
-    let posted = |s: &SolvedFrame| s.posted.as_ref().map_or(0, Vec::len);
-    solved.iter().map(|s| (RECORD_BYTES + 4 * s.cage.len() + posted(s)) as u64).sum()
+    solved.iter().map(|s| frame_bytes(s.cage.len() / 3, s.posted.as_ref().map_or(0, Vec::len))).sum()
 }
 
 fn run(queue: &Mutex<Receiver<Arc<Session>>>) {

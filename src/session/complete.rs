@@ -7,7 +7,7 @@ use crate::coding::{CodingError, Goal};
 use crate::preparation::{self, Choices, Geometry, Prepared, cannot_be_coded};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{Completion, StoreError};
+use crate::store::{Completion, StoreError, StoredPart};
 use crate::tasks::{blocking, to_the_end};
 use crate::telemetry::traces::TraceSpan;
 use crate::webhooks::{Event, PendingMessage, Webhooks};
@@ -75,18 +75,17 @@ impl Service {
         };
         let mut sealed = UnsealOnFailure { session, kept: before };
         session.check_end(frames)?;
-        self.code_rest(session, frames).await?;
-        let prepared = self.solver(session).await?;
-        let (writing, webhooks) = (Arc::clone(session), Arc::clone(&self.webhooks));
-        let writers = Arc::clone(&self.container_writers);
-        let work = move || writers.install(|| write(&writing, &prepared, frames, &webhooks));
-        let written = blocking(work).await?;
-        let Written { completion, replaced, due } = written.map_err(|error| match session.status().phase {
+        let written = self.write_completely(session, frames).await;
+        if written.is_err() {
+            let failed = Arc::clone(session);
+            blocking(move || failed.undo_completion()).await?;
+        }
+        let Written { completion, due } = written.map_err(|error| match session.status().phase {
             // The log or the content turned out to be damaged.
             Phase::Failed(problem) => ApiError::new(problem::SESSION_FAILED, problem.detail),
             _ => error,
         })?;
-        session.completed(completion, replaced);
+        session.completed(completion);
         sealed.kept = true;
         let cleaned = Arc::clone(session);
         blocking(move || cleaned.remove_uncoded(frames)).await?;
@@ -95,6 +94,17 @@ impl Service {
             self.webhooks.tell(session, due);
         }
         Ok(())
+    }
+}
+
+impl Service {
+    /// Codes what is left and writes container and completion mark.
+    async fn write_completely(self: &Arc<Self>, session: &Arc<Session>, frames: u32) -> Result<Written, ApiError> {
+        self.code_rest(session, frames).await?;
+        let prepared = self.solver(session).await?;
+        let (writing, webhooks) = (Arc::clone(session), Arc::clone(&self.webhooks));
+        let writers = Arc::clone(&self.container_writers);
+        blocking(move || writers.install(|| write(&writing, &prepared, frames, &webhooks))).await?
     }
 }
 
@@ -138,12 +148,33 @@ impl Session {
         }
     }
 
-    /// Records the completion; the container replaced one of `replaced` bytes.
-    fn completed(&self, completion: Completion, replaced: u64) {
+    /// Records the completion.
+    fn completed(&self, completion: Completion) {
         self.frames().discard_from(completion.frames);
-        self.bytes.fetch_add(completion.container_bytes, Relaxed);
-        self.bytes.fetch_sub(replaced, Relaxed);
+        self.keep_last_groups();
         self.set_phase(Phase::Completed(completion));
+    }
+
+    /// Counts the container as it is on disk now, whether or not the session is complete with it. Blocks.
+    fn count_container(&self) {
+        let before = self.container.load(Relaxed);
+        // What cannot be read is what was there before, or is counted by the next attempt.
+        let now = self.store.container_bytes(&self.meta.id).unwrap_or(before);
+        self.container.store(now, Relaxed);
+        self.bytes.fetch_add(now, Relaxed);
+        self.bytes.fetch_sub(before, Relaxed);
+    }
+
+    /// Removes what a completion has left that has failed, unless it may yet turn out to have succeeded. Blocks.
+    fn undo_completion(&self) {
+        if self.completion_unknown.load(Acquire) || self.has_failed() {
+            return;
+        }
+        self.drop_last_groups();
+        if let Err(error) = self.store.remove_container(&self.meta.id) {
+            tracing::warn!(session = %self.meta.id, %error, "the container of a failed completion takes space");
+        }
+        self.count_container();
     }
 
     /// If writing the completion mark failed, reads back whether it is on disk. The caller holds `completing`. Blocks.
@@ -157,13 +188,17 @@ impl Session {
         match self.store.completion(&self.meta.id).map_err(|error| self.fail_if_damaged(error))? {
             Some(completion) => {
                 let frames = completion.frames;
-                self.completed(completion, 0);
+                self.completed(completion);
                 self.remove_uncoded(frames);
                 self.webhooks.resend_undelivered(self);
+                self.completion_unknown.store(false, Release);
             }
-            None => self.frames().unseal(),
+            None => {
+                self.completion_unknown.store(false, Release);
+                self.undo_completion();
+                self.frames().unseal();
+            }
         }
-        self.completion_unknown.store(false, Release);
         Ok(())
     }
 
@@ -204,6 +239,15 @@ impl Session {
         preparation::read(&content, &Choices::of(&self.meta.options)?)
     }
 
+    /// What is known of its rest pose, its cage and its matrix without reading them. Blocks.
+    ///
+    /// # Errors
+    /// Storage errors; `SESSION_DELETED`.
+    pub(crate) fn files(&self) -> Result<[Option<StoredPart>; 3], ApiError> {
+        let files = self.store.content_parts(&self.meta.key).map_err(|error| self.storage_error(error))?;
+        files.ok_or_else(|| self.missing_content_error())
+    }
+
     fn missing_content_error(&self) -> ApiError {
         self.explain_missing_content(super::gone())
     }
@@ -225,8 +269,6 @@ impl Session {
 /// The result of writing a container and the completion mark.
 struct Written {
     completion: Completion,
-    /// Length of the container that it replaced, in bytes.
-    replaced: u64,
     /// The webhook message to send.
     due: Option<PendingMessage>,
 }
@@ -236,16 +278,16 @@ fn write(session: &Session, prepared: &Prepared, frames: u32, webhooks: &Webhook
     let geometry = session.geometry()?;
     let mut write = |out: &mut dyn Write| -> io::Result<()> {
         let out = BufWriter::with_capacity(1 << 20, out);
-        let mut container = ContainerFrames::begin(session, prepared, &geometry, out)?;
+        let mut container = ContainerFrames::begin(session, prepared, &geometry, out)?.completing();
         while container.write_next(session, frames)? {}
         if container.frames() < frames {
             return Err(io::Error::other(format!("frame {} is not there", container.frames())));
         }
         container.finish(session)?.flush()
     };
-    // A damaged container that is replaced is already counted.
-    let replaced = session.store.container_bytes(&session.meta.id).unwrap_or(0);
-    let written = session.store.write_container(&session.meta.id, &mut write).map_err(stored)?;
+    let written = session.store.write_container(&session.meta.id, &mut write);
+    session.count_container();
+    let written = written.map_err(stored)?;
     if let Some(Goal::Size(asked)) = session.goal()
         && written.bytes > asked
     {
@@ -254,5 +296,5 @@ fn write(session: &Session, prepared: &Prepared, frames: u32, webhooks: &Webhook
     let completion = Completion { frames, container_bytes: written.bytes, container_digest: written.digest };
     let due = webhooks.keep(session, Event::Completed).map_err(stored)?;
     session.mark(&completion).map_err(stored)?;
-    Ok(Written { completion, replaced, due })
+    Ok(Written { completion, due })
 }

@@ -19,6 +19,8 @@ pub(crate) struct ContainerFrames<W: Write> {
     points: usize,
     /// What the last group left.
     carried: Carried,
+    /// Whether it is written to complete the session, and so has the groups that are coded for that.
+    completes: bool,
 }
 
 impl<W: Write> ContainerFrames<W> {
@@ -40,7 +42,12 @@ impl<W: Write> ContainerFrames<W> {
         let coded = geometry.coded.as_ref().map(|(rest, cage)| (rest, cage));
         let writer = CaptureWriter::with_meshes(out, &encoding, coded).map_err(plain)?;
         let points = geometry.rest.points.len();
-        Ok(Self { writer, diagonal: prepared.solver.diagonal(), points, carried: Carried::default() })
+        Ok(Self { writer, diagonal: prepared.solver.diagonal(), points, carried: Carried::default(), completes: false })
+    }
+
+    /// With the groups that are coded for the completion that is going on.
+    pub(crate) fn completing(self) -> Self {
+        Self { completes: true, ..self }
     }
 
     /// Frames written so far.
@@ -64,9 +71,8 @@ impl<W: Write> ContainerFrames<W> {
             return Ok(false);
         }
         if session.goal().is_some() {
-            let Some(group) = session.coded_group(next).filter(|group| group.first + group.frames <= end) else {
-                return Ok(false);
-            };
+            let group = if self.completes { session.group_to_write(next) } else { session.coded_group(next) };
+            let Some(group) = group.filter(|group| group.first + group.frames <= end) else { return Ok(false) };
             let stored = session.read_group(group.first)?;
             let StoredGroup { cages, residual, errors, farthest, .. } = &stored;
             let written = self.writer.write_group(cages, residual.as_deref(), errors, *farthest);

@@ -8,7 +8,7 @@ use super::upload::FrameJob;
 use super::{LiveLane, Phase, Session, Status};
 use crate::admission::Held;
 use crate::auth::Tenant;
-use crate::idempotency::{once, request};
+use crate::idempotency::{extension, made_before, once, request};
 use crate::preparation::{self, Choices, Geometry, Prepared, SolverRequest, SolverResponse, content_key};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
@@ -52,12 +52,20 @@ impl Service {
     ) -> Result<Arc<Session>, ApiError> {
         let NewSession { uploaded, options, idempotency_key, room } = new;
         let choices = Choices::of(&options)?;
+        let (uploaded, options, request) = blocking(move || {
+            let request = request_of(idempotency_key, &uploaded, &options);
+            (uploaded, options, request)
+        })
+        .await?;
+        let may_be = |session: &Session| session.meta.options == options;
+        if let Some(made) = made_before(&self.registry, &tenant.name, request.as_ref(), may_be)? {
+            return Ok(made);
+        }
         let (content, made_cage) = self.resolve_cage(&tenant.name, uploaded, &options).await?;
         let (key, content) = {
             let (tenant, options) = (tenant.name.clone(), options.clone());
             blocking(move || (content_key(&tenant, &content, &options, &choices), content)).await?
         };
-        let request = request(idempotency_key, &key, &options);
         let checked = Checked { key, content, made_cage, options, choices };
         let (service, tenant) = (Arc::clone(self), Arc::clone(tenant));
         to_the_end(async move {
@@ -110,7 +118,11 @@ impl Service {
         {
             let _content = self.registry.content_lock(&key).await;
             let (store, meta) = (self.store.clone(), session.meta.clone());
-            blocking(move || store.put_content(&key, &content).and_then(|()| store.create_session(&meta))).await??;
+            let stored = move || store.put_content(&key, &content).and_then(|()| store.create_session(&meta));
+            if let Err(error) = blocking(stored).await? {
+                self.forget_uncreated(&session.meta).await;
+                return Err(error.into());
+            }
             self.registry.insert(Arc::clone(&session));
             drop(room);
         }
@@ -126,6 +138,28 @@ impl Service {
             }
         }
         Ok(session)
+    }
+
+    /// Removes what is left of a session that could not be created; what cannot be removed is looked at again later, so that nothing takes
+    /// space that is in nobody's quota. The caller holds the lock of its content.
+    async fn forget_uncreated(&self, meta: &SessionMeta) {
+        let is_used = self.registry.uses_content(&meta.key) || !self.unread.is_empty();
+        let (store, id, key) = (self.store.clone(), meta.id.clone(), meta.key);
+        let left = blocking(move || {
+            let deleted = store.delete(Kind::Session, &id);
+            // An error may be about what is gone all the same.
+            let is_there = deleted.is_err() && !matches!(store.reload_meta::<SessionMeta>(&id), Ok(None));
+            let content = if is_used || is_there { Ok(()) } else { store.remove_content(&key) };
+            (is_there, content)
+        });
+        match left.await {
+            Ok((false, Ok(()))) => {}
+            Ok((false, Err(error))) => {
+                tracing::warn!(%error, "the content of a session that was not created still takes space");
+                self.unread.look_for_orphans();
+            }
+            _ => self.unread.add(Kind::Session, &meta.id, Some(&meta.tenant), "it could not be created, nor removed"),
+        }
     }
 
     /// Parses rest pose and cage, so that errors are reported in the response. Returns them only if preparation starts soon; otherwise they
@@ -283,6 +317,17 @@ impl Service {
         }
         Ok(())
     }
+}
+
+/// The request with an idempotency key that these files and options are. Blocks.
+fn request_of(key: Option<String>, uploaded: &Uploaded, options: &SessionOptions) -> Option<Idempotency> {
+    let files = [Some(&uploaded.rest), uploaded.cage.as_ref(), uploaded.matrix.as_ref()];
+    let names = files.map(|file| file.map_or_else(String::new, |file| extension(&file.name)));
+    let parts = files
+        .iter()
+        .zip(&names)
+        .flat_map(|(file, name)| [name.as_bytes(), file.map_or(&[][..], |file| file.bytes.as_slice())]);
+    request(key, parts, options)
 }
 
 fn wanted(session: &Session, choices: Choices, geometry: Option<Arc<Geometry>>) -> SolverRequest {

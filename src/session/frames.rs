@@ -217,6 +217,11 @@ impl Frames {
         self.solved.values()
     }
 
+    /// Solved frames from `first` on, ascending.
+    pub(crate) fn entries_from(&self, first: u32) -> impl Iterator<Item = &LogEntry> {
+        self.solved.range(first..).map(|(_, entry)| entry)
+    }
+
     /// Up to `most` entries of consecutive frames from `first` on.
     pub(crate) fn run(&self, first: u32, most: usize) -> Vec<LogEntry> {
         self.solved

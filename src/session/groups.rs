@@ -9,7 +9,7 @@ use crate::coding::{Carried, Goal, GroupCoder, GroupDecoder, group_frames};
 use crate::preparation::{Choices, Geometry, Prepared, cannot_be_coded};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{Kind, LogEntry, StoreError};
+use crate::store::{LogEntry, SessionBytes, StoreError};
 use crate::sync::lock;
 use crate::tasks::blocking;
 use cager_proto::messages::CodedFrames;
@@ -27,12 +27,21 @@ const RETRY: Duration = Duration::from_secs(30);
 #[derive(Default)]
 pub(crate) struct Groups {
     /// From frame 0 on, without gaps.
-    coded: Vec<CodedGroup>,
-    carried: Carried,
+    pub(super) coded: Vec<CodedGroup>,
+    pub(super) carried: Carried,
+    /// What follows these in the completion that is going on: nothing of it stays if that fails.
+    pub(super) last: Vec<LastGroup>,
     /// Why the next group cannot be coded as asked for, and how many frames it has.
     failed: Option<(u32, ApiError)>,
     /// Files of frames whose names are durable, by their first frame.
     named: BTreeSet<u32>,
+}
+
+/// A group that is coded for a completion: with fewer frames than usual, or for another number of frames than was announced.
+pub(super) struct LastGroup {
+    pub(super) group: CodedGroup,
+    pub(super) errors: Vec<StoredError>,
+    pub(super) carried: Carried,
 }
 
 /// A coded group on disk.
@@ -40,7 +49,7 @@ pub(crate) struct Groups {
 pub(crate) struct CodedGroup {
     pub(crate) first: u32,
     pub(crate) frames: u32,
-    bytes: u64,
+    pub(super) bytes: u64,
 }
 
 /// What the file of a coded group holds.
@@ -59,6 +68,14 @@ impl Groups {
     /// Frames that are coded.
     pub(crate) fn frames(&self) -> u32 {
         self.coded.last().map_or(0, |group| group.first + group.frames)
+    }
+
+    /// Frames that are coded, those of a completion that is going on included, and what they leave to the next group.
+    fn end(&self) -> (u32, Carried) {
+        match self.last.last() {
+            Some(LastGroup { group, carried, .. }) => (group.first + group.frames, *carried),
+            None => (self.frames(), self.carried),
+        }
     }
 
     /// The group that a frame belongs to, if it is coded.
@@ -106,7 +123,7 @@ impl Session {
     /// # Errors
     /// A group that was left out at completion meanwhile; damage, after which the session has failed and is in quarantine; I/O errors.
     pub(crate) fn read_group(&self, first: u32) -> Result<StoredGroup, ApiError> {
-        let found = self.store.group(&self.meta.id, first).map_err(|error| self.fail_if_damaged(error))?;
+        let found = self.store.group(&self.meta.id, first, true).map_err(|error| self.fail_if_damaged(error))?;
         match found {
             Some((group, _)) => Ok(group),
             None if self.coded_group(first).is_none() => Err(left_out(first)),
@@ -127,10 +144,13 @@ impl Session {
         if self.goal.is_none() {
             return Ok(());
         }
+        // In doubt there is one: what belongs to a completion must not be lost.
+        let is_marked = !matches!(self.store.completion(&self.meta.id), Ok(None));
         let mut found = Groups::default();
         while self.declared().is_none_or(|declared| found.frames() < declared) {
             let first = found.frames();
-            let Some((group, bytes)) = self.store.group::<StoredGroup>(&self.meta.id, first)? else { break };
+            let group = self.store.group::<StoredGroup>(&self.meta.id, first, is_marked)?;
+            let Some((group, bytes)) = group else { break };
             if group.errors.is_empty() {
                 return Err(self.damaged("a group has no frames"));
             }
@@ -143,7 +163,12 @@ impl Session {
             self.store.remove_frames(&self.meta.id, None)?;
             self.store.remove_groups_from(&self.meta.id, declared)?;
         }
+        if !is_marked {
+            // The process may have ended while the session was being completed.
+            self.store.remove_last_groups(&self.meta.id)?;
+        }
         *lock(&self.groups) = found;
+        self.count_bytes();
         Ok(())
     }
 
@@ -186,7 +211,7 @@ impl Session {
         let (_, most) = self.frame_bytes();
         let (first, count) = {
             let groups = lock(&self.groups);
-            let first = groups.frames();
+            let (first, _) = groups.end();
             let count = end.map_or(most, |end| most.min(end.saturating_sub(first)));
             // With fewer frames it might go.
             if groups.failed.as_ref().is_some_and(|(failed, _)| count >= *failed) {
@@ -200,12 +225,21 @@ impl Session {
         is_whole.then(|| frames.run(first, count as usize))
     }
 
-    /// Codes a group and stores it. Blocks.
-    fn code(&self, goal: Goal, coder: &mut GroupCoder, diagonal: f64, entries: &[LogEntry]) -> Result<(), ApiError> {
+    /// Codes a group and stores it; for good, unless it is only coded like this because the session is completed with `end` frames. Blocks.
+    fn code(
+        &self,
+        goal: Goal,
+        coder: &mut GroupCoder,
+        diagonal: f64,
+        entries: &[LogEntry],
+        end: Option<u32>,
+    ) -> Result<(), ApiError> {
         let (first, row_bytes) = (entries[0].frame, 12 * self.facts().map_or(0, |facts| facts.unknowns as usize));
         let mut cages = Vec::new();
         self.read_cages(entries, &mut cages)?;
         let (frame_bytes, most) = self.frame_bytes();
+        let is_shared_out_anew = matches!(goal, Goal::Size(_)) && end != self.meta.options.frames;
+        let is_last = end.is_some() && (entries.len() < most as usize || is_shared_out_anew);
         let mut frame = vec![0; frame_bytes];
         for (entry, cage) in entries.iter().zip(cages.chunks_exact(row_bytes)) {
             let read = self.store.read_frame(&self.meta.id, entry.frame / most * most, entry.frame, &mut frame);
@@ -221,8 +255,11 @@ impl Session {
             let last = first + (entries.len() as u32 - 1);
             error.problem.detail = format!("frames {first} to {last}: {}", error.problem.detail);
             tracing::info!(session = %self.meta.id, detail = %error.problem.detail, "frames cannot be coded");
-            lock(&self.groups).failed = Some((entries.len() as u32, error.clone()));
-            self.touch();
+            // Another completion may succeed.
+            if !is_last {
+                lock(&self.groups).failed = Some((entries.len() as u32, error.clone()));
+                self.touch();
+            }
             error
         })?;
         let errors = coded.errors.iter().map(|error| StoredError::of_coded(error, diagonal)).collect();
@@ -233,8 +270,15 @@ impl Session {
             farthest: coded.farthest,
             carried: coder.carried(),
         };
-        let put = self.store.put_group(&self.meta.id, first, &group).map_err(|error| self.storage_error(error))?;
+        let put = self.store.put_group(&self.meta.id, first, is_last, &group);
+        let put = put.map_err(|error| self.storage_error(error))?;
         self.bytes.fetch_add(put, Relaxed);
+        if is_last {
+            let StoredGroup { errors, carried, .. } = group;
+            let group = CodedGroup { first, frames: errors.len() as u32, bytes: put };
+            lock(&self.groups).last.push(LastGroup { group, errors, carried });
+            return Ok(());
+        }
         self.frames().set_errors(first, &group.errors);
         {
             let mut groups = lock(&self.groups);
@@ -249,10 +293,13 @@ impl Session {
             // The next start does it.
             Err(error) => tracing::warn!(session = %self.meta.id, %error, "frames that are coded still take space"),
         }
-        metrics::counter!("cager_coded_frames_total", "tenant" => self.meta.tenant.clone())
-            .increment(entries.len() as u64);
+        self.count_coded(entries.len());
         self.touch();
         Ok(())
+    }
+
+    pub(super) fn count_coded(&self, frames: usize) {
+        metrics::counter!("cager_coded_frames_total", "tenant" => self.meta.tenant.clone()).increment(frames as u64);
     }
 
     /// The coder of the next group. Blocks.
@@ -260,7 +307,7 @@ impl Session {
         let geometry = self.geometry()?;
         let model = self.group_decoder(prepared, &geometry, goal)?;
         let most = group_frames(prepared.solver.decoder().points(), prepared.solver.decoder().unknowns());
-        let mut carried = lock(&self.groups).carried;
+        let (_, mut carried) = lock(&self.groups).end();
         if carried.frames == 0 {
             let meshes = ContainerFrames::begin(self, prepared, &geometry, io::sink());
             let meshes = meshes.map_err(|error| ApiError::internal(&error))?;
@@ -371,12 +418,14 @@ impl Service {
         let work = move || {
             let _place = place;
             threads.install(|| -> Result<(), ApiError> {
-                // After an error the coder is made anew, from what is on disk.
-                let mut coder = coding.take().map_or_else(|| session.coder(&prepared, goal), Ok)?;
+                // After an error, and after a completion that failed, the coder is made anew, from what is on disk.
+                let next = entries[0].frame as usize;
+                let kept = coding.take().filter(|coder| coder.carried().frames == next);
+                let mut coder = kept.map_or_else(|| session.coder(&prepared, goal), Ok)?;
                 if let Some(end) = end {
                     coder.expect((end - entries[0].frame) as usize);
                 }
-                session.code(goal, &mut coder, prepared.solver.diagonal(), &entries)?;
+                session.code(goal, &mut coder, prepared.solver.diagonal(), &entries, end)?;
                 *coding = Some(coder);
                 Ok(())
             })
@@ -421,8 +470,17 @@ impl Session {
 
     /// Counts the bytes of its files and content on disk anew. Blocks.
     pub(super) fn count_bytes(&self) {
-        let own = self.store.bytes(Kind::Session, &self.meta.id);
-        self.bytes.store(own + self.store.content_bytes(&self.meta.key), Relaxed);
+        match self.store.bytes_of_session(&self.meta) {
+            Ok(counted) => self.set_bytes(counted),
+            Err(error) => {
+                tracing::warn!(session = %self.meta.id, %error, "its files cannot be counted; the count stays as it was");
+            }
+        }
+    }
+
+    pub(super) fn set_bytes(&self, SessionBytes { all, container }: SessionBytes) {
+        self.bytes.store(all, Relaxed);
+        self.container.store(container, Relaxed);
     }
 
     /// Forgets what coding keeps in memory.

@@ -8,6 +8,7 @@ pub(crate) mod create;
 pub(crate) mod facts;
 pub(crate) mod frames;
 pub(crate) mod groups;
+mod last_groups;
 pub(crate) mod registry;
 mod resume;
 pub(crate) mod retention;
@@ -51,6 +52,8 @@ pub(crate) struct Session {
     queued: Arc<AtomicU64>,
     /// Bytes of its files and content on disk, and of frames queued for writing.
     pub(crate) bytes: AtomicU64,
+    /// Bytes of its container that these include.
+    container: AtomicU64,
     waiting: Mutex<CommitQueue>,
     /// The last solved frame and its cage, in sessions whose frames depend on their predecessors.
     last_solved: Mutex<Option<(u32, Vec<f32>)>>,
@@ -133,6 +136,7 @@ impl Session {
             loaded: AtomicBool::new(is_new),
             queued: Arc::default(),
             bytes: AtomicU64::new(0),
+            container: AtomicU64::new(0),
             waiting: Mutex::default(),
             last_solved: Mutex::default(),
             log: Mutex::default(),

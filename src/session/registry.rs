@@ -33,10 +33,11 @@ impl Inner {
     }
 }
 
-/// Quota reserved for a session or cage job that is being created; released on drop.
+/// Quota reserved for a session or cage job that is being created, or for frames on their way; released on drop.
 pub(crate) struct Reserved {
     registry: Arc<Registry>,
     tenant: String,
+    count: u64,
     bytes: u64,
 }
 
@@ -54,15 +55,21 @@ impl Reserved {
         self.bytes += bytes;
         Ok(())
     }
+
+    /// Takes so many bytes of it, to be released on their own; `None` if there are not as many left.
+    pub(crate) fn split(&mut self, bytes: u64) -> Option<Self> {
+        self.bytes = self.bytes.checked_sub(bytes)?;
+        Some(Self { registry: Arc::clone(&self.registry), tenant: self.tenant.clone(), count: 0, bytes })
+    }
 }
 
 impl Drop for Reserved {
     fn drop(&mut self) {
         let mut inner = lock(&self.registry.inner);
         if let Some((count, bytes)) = inner.reserved.get_mut(&self.tenant) {
-            *count -= 1;
+            *count -= self.count;
             *bytes -= self.bytes;
-            if *count == 0 {
+            if (*count, *bytes) == (0, 0) {
                 inner.reserved.remove(&self.tenant);
             }
         }
@@ -140,11 +147,24 @@ impl Registry {
         bytes: u64,
         allowed: impl FnOnce((u64, u64)) -> Result<(), E>,
     ) -> Result<Reserved, E> {
+        self.reserve_with(tenant, 1, |usage| allowed(usage).map(|()| bytes))
+    }
+
+    /// As [`Self::reserve`], for as many bytes as `allowed` says, of `count` sessions.
+    ///
+    /// # Errors
+    /// Those of `allowed`.
+    pub(crate) fn reserve_with<E>(
+        self: &Arc<Self>,
+        tenant: &str,
+        count: u64,
+        allowed: impl FnOnce((u64, u64)) -> Result<u64, E>,
+    ) -> Result<Reserved, E> {
         let mut inner = lock(&self.inner);
-        allowed(inner.usage_of(tenant))?;
+        let bytes = allowed(inner.usage_of(tenant))?;
         let entry = inner.reserved.entry(tenant.to_owned()).or_default();
-        *entry = (entry.0 + 1, entry.1 + bytes);
-        Ok(Reserved { registry: Arc::clone(self), tenant: tenant.to_owned(), bytes })
+        *entry = (entry.0 + count, entry.1 + bytes);
+        Ok(Reserved { registry: Arc::clone(self), tenant: tenant.to_owned(), count, bytes })
     }
 
     /// Key of one of the tenant's contents whose cage was made from inputs with this digest.

@@ -7,7 +7,7 @@ use super::{Phase, Session, Status};
 use crate::preparation::{Choices, Prepared};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{Completion, Kind, SessionMeta, Store, StoreError};
+use crate::store::{Completion, Kind, SessionBytes, SessionMeta, Store, StoreError};
 use crate::unreadable;
 use cager_core::inversion::SolverOptions;
 use std::sync::Arc;
@@ -120,20 +120,33 @@ impl Service {
             }
             outcome => outcome,
         };
-        match outcome.and_then(|outcome| Ok((outcome, CompletionState::read(&self.store, &meta.id)?))) {
-            Ok((outcome, mark)) => {
-                self.resume_with(meta, outcome, mark);
+        let found = outcome.and_then(|outcome| {
+            // What cannot be counted would be in nobody's quota.
+            let bytes = self.store.bytes_of_session(&meta)?;
+            Ok((outcome, CompletionState::read(&self.store, &meta.id)?, bytes))
+        });
+        match found {
+            Ok((outcome, mark, bytes)) => {
+                self.resume_with(meta, outcome, mark, bytes);
                 Ok(())
             }
             Err(error) => {
                 let problem = unreadable::problem(Kind::Session).problem;
-                self.registry.insert(self.found(meta, Status { phase: Phase::Failed(problem), facts: None }));
+                let status = Status { phase: Phase::Failed(problem), facts: None };
+                let bytes = self.store.bytes_of_session(&meta).unwrap_or_default();
+                self.registry.insert(self.found(meta, status, bytes));
                 Err(error)
             }
         }
     }
 
-    fn resume_with(self: &Arc<Self>, meta: SessionMeta, outcome: Option<Outcome>, mark: CompletionState) {
+    fn resume_with(
+        self: &Arc<Self>,
+        meta: SessionMeta,
+        outcome: Option<Outcome>,
+        mark: CompletionState,
+        bytes: SessionBytes,
+    ) {
         let failed = |problem| Status { phase: Phase::Failed(problem), facts: None };
         let status = match outcome {
             Some(Outcome::Ready(facts)) => Status { phase: Phase::Ready, facts: Some(*facts) },
@@ -141,7 +154,7 @@ impl Service {
             Some(Outcome::Failed(problem)) if problem.word() != problem::SESSION_DELETED.word => failed(problem),
             Some(Outcome::Failed(_)) | None => match Choices::of(&meta.options) {
                 Ok(choices) => {
-                    let session = self.found(meta, Status { phase: Phase::Preparing, facts: None });
+                    let session = self.found(meta, Status { phase: Phase::Preparing, facts: None }, bytes);
                     self.registry.insert(Arc::clone(&session));
                     self.code_in_background(&session);
                     tokio::spawn(Arc::clone(self).prepare(session, choices, None, mark));
@@ -151,7 +164,7 @@ impl Service {
             },
         };
         let ready = status.facts.is_some();
-        let session = self.found(meta, status);
+        let session = self.found(meta, status, bytes);
         if ready {
             session.has_log.store(true, Relaxed);
             let phase = mark.phase(&mut session.frames());
@@ -162,9 +175,9 @@ impl Service {
         self.webhooks.resend_undelivered(&session);
     }
 
-    fn found(&self, meta: SessionMeta, status: Status) -> Arc<Session> {
+    fn found(&self, meta: SessionMeta, status: Status, bytes: SessionBytes) -> Arc<Session> {
         let session = Session::new(meta, self, status, false);
-        session.count_bytes();
+        session.set_bytes(bytes);
         Arc::new(session)
     }
 }

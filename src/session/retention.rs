@@ -52,6 +52,19 @@ impl Service {
         room.extend(bytes, |usage| self.bytes_allowed(tenant, self.with_cage_jobs(tenant, usage).1, bytes))
     }
 
+    /// Reserves quota for the next frames of an upload, `bytes` bytes each: for `most` of them, or as many as there is room for.
+    ///
+    /// # Errors
+    /// There is no room for one.
+    pub(crate) fn reserve_frames(&self, tenant: &Tenant, bytes: u64, most: u64) -> Result<Reserved, ApiError> {
+        self.registry.reserve_with(&tenant.name, 0, |usage| {
+            let (_, used) = self.with_cage_jobs(tenant, usage);
+            self.bytes_allowed(tenant, used, bytes)?;
+            let room = (tenant.limits.max_bytes - used) / bytes.max(1);
+            Ok(bytes * room.min(most))
+        })
+    }
+
     fn with_cage_jobs(&self, tenant: &Tenant, (count, used): (u64, u64)) -> (u64, u64) {
         let (jobs, theirs) = self.cage_jobs.usage_of(&tenant.name);
         (count + jobs, used + theirs)

@@ -39,8 +39,8 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
             job.refuse(problem::INVALID_FRAME, detail);
             continue;
         }
+        let what = if job.rows == Rows::All { "point" } else { "handle" };
         if let Some(row) = first_not_finite(&job.bytes) {
-            let what = if job.rows == Rows::All { "point" } else { "handle" };
             let detail = format!("frame {}: {what} {row} is not finite; export this frame again", job.frame);
             job.refuse(problem::INVALID_FRAME, detail);
             continue;
@@ -226,6 +226,7 @@ fn finish(
 ) {
     guard.frames.clear();
     let mut solved = Vec::with_capacity(jobs.len());
+    let mut reserved = Vec::with_capacity(jobs.len());
     for (((mut job, digests), cage), error) in jobs.into_iter().zip(cages).zip(errors) {
         let frame = job.frame;
         let fits = cage.iter().all(|x| x.is_finite()) && (job.rows == Rows::Handles || error.linf.is_finite());
@@ -238,6 +239,7 @@ fn finish(
         } else {
             let posted = session.goal().map(|_| std::mem::take(&mut job.bytes));
             let mut permits = job.permits.take();
+            reserved.extend(permits.as_mut().and_then(|permits| permits.quota.take()));
             if let (None, Some(permits)) = (&posted, &mut permits) {
                 permits.solving = None;
             }
@@ -246,6 +248,8 @@ fn finish(
         job.disarm();
     }
     session.commit(solved);
+    // Only now that the session has counted them.
+    drop(reserved);
 }
 
 /// Releases the claims of frames that are not finished when it is dropped.

@@ -1,6 +1,7 @@
 //! State of one frame upload: what it has submitted and which answers are pending.
 
 use super::Session;
+use super::registry::Reserved;
 use crate::admission::Held;
 use crate::problem::{self, ApiError};
 use crate::sync::lock;
@@ -150,6 +151,8 @@ pub(crate) struct Permits {
     pub(crate) solving: Option<(OwnedSemaphorePermit, [Held; 2])>,
     /// A slot in the upload's window of unwritten frames, until it is on disk.
     pub(crate) _writing: OwnedSemaphorePermit,
+    /// Quota, until its session has counted it.
+    pub(crate) quota: Option<Reserved>,
 }
 
 impl FrameJob {

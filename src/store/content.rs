@@ -123,6 +123,14 @@ impl Store {
         self.quarantine_if_damaged(&place, found)
     }
 
+    /// What the rest pose, the cage and the matrix of a content are, without reading them; `None` if there is no such content.
+    pub fn content_parts(&self, key: &ContentKey) -> Result<Option<[Option<StoredPart>; 3]>, StoreError> {
+        let place = self.content_path(key);
+        let found = self.describe(&place);
+        let described = self.quarantine_if_damaged(&place, found)?;
+        Ok(described.map(|Description { rest, cage, matrix }| [Some(rest), Some(cage), matrix]))
+    }
+
     /// Removes content, if it exists. A prepared solver of the key is kept.
     pub fn remove_content(&self, key: &ContentKey) -> Result<(), StoreError> {
         self.files().delete_durably(&self.content_path(key))
@@ -140,7 +148,7 @@ impl Store {
     }
 
     /// Bytes of a content's files; 0 where there is none.
-    pub fn content_bytes(&self, key: &ContentKey) -> u64 {
+    pub fn content_bytes(&self, key: &ContentKey) -> Result<u64, StoreError> {
         self.files().folder_bytes(&self.content_path(key))
     }
 

@@ -210,8 +210,9 @@ impl Files {
     }
 
     /// Bytes of the files in a folder; 0 where there is none.
-    pub(crate) fn folder_bytes(&self, folder: &Path) -> u64 {
-        self.disk.list(folder).map_or(0, |all| all.iter().map(|entry| entry.bytes).sum())
+    pub(crate) fn folder_bytes(&self, folder: &Path) -> Result<u64, StoreError> {
+        let listed = unless_missing(self.disk.list(folder)).map_err(|e| StoreError::of(folder, "list", e))?;
+        Ok(listed.map_or(0, |all| all.iter().map(|entry| entry.bytes).sum()))
     }
 }
 

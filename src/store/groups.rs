@@ -14,6 +14,8 @@ const DIGEST: usize = 32;
 
 const FRAMES: &str = "frames-";
 const GROUP: &str = "group-";
+/// Groups that belong to a completion: without its mark they are none.
+const LAST: &str = "last-";
 
 impl Store {
     fn part(&self, id: &str, kind: &str, first: u32) -> Result<PathBuf, StoreError> {
@@ -67,9 +69,10 @@ impl Store {
         }
     }
 
-    /// Stores a coded group, atomically; durable on `Ok`. Returns the bytes of its file.
-    pub fn put_group<T: Serialize>(&self, id: &str, first: u32, group: &T) -> Result<u64, StoreError> {
-        let path = self.part(id, GROUP, first)?;
+    /// Stores a coded group, atomically; durable on `Ok`. Returns the bytes of its file. A group that is `last` counts only with the mark of
+    /// the completion that it was coded for.
+    pub fn put_group<T: Serialize>(&self, id: &str, first: u32, last: bool, group: &T) -> Result<u64, StoreError> {
+        let path = self.part(id, if last { LAST } else { GROUP }, first)?;
         let encoded = wire::encode::<_, MOST_GROUP_BYTES>(group);
         let mut bytes = encoded.map_err(|e| StoreError::of(&path, "write", io::Error::other(e)))?;
         let digest = blake3::hash(&bytes);
@@ -78,12 +81,19 @@ impl Store {
         Ok(bytes.len() as u64)
     }
 
-    /// The coded group that begins with `first`, and the bytes of its file; `None` if it has not been stored.
+    /// The coded group that begins with `first`, and the bytes of its file; with `last` also one of a completion. `None` if it has not been
+    /// stored.
     ///
     /// # Errors
     /// [`StoreError::Damaged`].
-    pub fn group<T: DeserializeOwned>(&self, id: &str, first: u32) -> Result<Option<(T, u64)>, StoreError> {
-        let path = self.part(id, GROUP, first)?;
+    pub fn group<T: DeserializeOwned>(&self, id: &str, first: u32, last: bool) -> Result<Option<(T, u64)>, StoreError> {
+        match self.read_group(self.part(id, GROUP, first)?)? {
+            None if last => self.read_group(self.part(id, LAST, first)?),
+            found => Ok(found),
+        }
+    }
+
+    fn read_group<T: DeserializeOwned>(&self, path: PathBuf) -> Result<Option<(T, u64)>, StoreError> {
         let Some(file) = self.files().read(&path, (MOST_GROUP_BYTES + DIGEST) as u64)? else { return Ok(None) };
         let damaged = |what: String| StoreError::damaged(&path, what);
         let (bytes, _) = file
@@ -94,9 +104,17 @@ impl Store {
         Ok(Some((group, file.len() as u64)))
     }
 
+    /// Removes the groups of a completion that did not come about.
+    pub fn remove_last_groups(&self, id: &str) -> Result<(), StoreError> {
+        self.remove_parts(id, |name| name.starts_with(LAST))
+    }
+
     /// Removes coded groups that begin with `from` or later.
     pub fn remove_groups_from(&self, id: &str, from: u32) -> Result<(), StoreError> {
-        let later = |name: &str| name.strip_prefix(GROUP).and_then(|n| n.parse().ok()).is_some_and(|n: u32| n >= from);
+        let later = |name: &str| {
+            let first = name.strip_prefix(GROUP).or_else(|| name.strip_prefix(LAST));
+            first.and_then(|n| n.parse().ok()).is_some_and(|n: u32| n >= from)
+        };
         self.remove_parts(id, later)
     }
 

@@ -5,7 +5,7 @@
 //! ```text
 //! lock             locked while a process uses the folder
 //! sessions/<id>/   session.json  frames.log  capture.cager  complete.json  outcome.json  announce.json
-//!                  frames-<first>  group-<first>
+//!                  frames-<first>  group-<first>  last-<first>
 //! cages/<id>/      job.json  rest  frames  attempts.json  cage.obj  outcome.json
 //! contents/<key>/  content.json  rest  cage  matrix
 //! prepared/<key>.solver
@@ -52,7 +52,7 @@ pub use error::StoreError;
 pub use log::{FrameLog, LogEntry, LogReader, LogRecord};
 pub use names::{ContentKey, is_session_id};
 pub use scan::{Kind, Unreadable};
-pub use sessions::{Completion, Container, Idempotency, SessionMeta};
+pub use sessions::{Completion, Container, Idempotency, SessionBytes, SessionMeta};
 pub use spool::{Spool, StoredFile};
 
 /// The data folder. Clones share it.

@@ -129,7 +129,7 @@ impl Store {
     }
 
     /// Bytes of an object's files; 0 where there is none.
-    pub fn bytes(&self, kind: Kind, id: &str) -> u64 {
-        self.folder(kind, id).map_or(0, |folder| self.files().folder_bytes(&folder))
+    pub fn bytes(&self, kind: Kind, id: &str) -> Result<u64, StoreError> {
+        self.files().folder_bytes(&self.folder(kind, id)?)
     }
 }

@@ -61,6 +61,15 @@ pub struct Container {
     pub digest: String,
 }
 
+/// What a session takes on disk.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SessionBytes {
+    /// Its files and its content.
+    pub all: u64,
+    /// Its container, which is one of them.
+    pub container: u64,
+}
+
 impl FolderMeta for SessionMeta {
     const KIND: Kind = Kind::Session;
     const FILE: &str = META;
@@ -141,6 +150,19 @@ impl Store {
         let path = self.folder(Kind::Session, id)?.join(CONTAINER);
         let file = self.files().open(&path)?;
         file.map_or(Ok(0), |file| file.length().map_err(|e| StoreError::of(&path, "read", e)))
+    }
+
+    /// Bytes of the session's files and of its content.
+    pub fn bytes_of_session(&self, meta: &SessionMeta) -> Result<SessionBytes, StoreError> {
+        let entries = self.files().list(&self.folder(Kind::Session, &meta.id)?)?;
+        let container = entries.iter().find(|entry| entry.name == CONTAINER).map_or(0, |entry| entry.bytes);
+        let own: u64 = entries.iter().map(|entry| entry.bytes).sum();
+        Ok(SessionBytes { all: own + self.content_bytes(&meta.key)?, container })
+    }
+
+    /// Removes the session's container, if there is one. It may come back with a power cut.
+    pub fn remove_container(&self, id: &str) -> Result<(), StoreError> {
+        self.files().remove_file(&self.folder(Kind::Session, id)?.join(CONTAINER))
     }
 
     /// Verifies length and digest of the session's container, reading all of it.

@@ -21,6 +21,7 @@ use tokio::net::TcpListener;
 use tokio::task::JoinHandle;
 use tokio::time::{sleep, timeout};
 use tokio_util::sync::CancellationToken;
+use tower::ServiceExt as _;
 
 /// A running service.
 pub(crate) struct Inside {
@@ -127,6 +128,16 @@ impl Inside {
 
     pub(crate) async fn post(&self, id: &str, first: u32, body: Vec<u8>) -> Posted {
         post(self.url(&format!("/v1/sessions/{id}/frames?first={first}")), body).await
+    }
+
+    /// Bytes that the service counts against the quota of its only tenant.
+    pub(crate) async fn counted_bytes(&self) -> u64 {
+        let service = self.running().service.upgrade().expect("it runs");
+        let request = http::Request::get("/admin/tenants").header("host", "localhost").body(axum::body::Body::empty());
+        let answer = cager::http::admin(service, true).oneshot(request.expect("a request")).await.expect("an answer");
+        let body = axum::body::to_bytes(answer.into_body(), 1 << 20).await.expect("a body");
+        let tenants: Vec<serde_json::Value> = serde_json::from_slice(&body).expect("tenants");
+        tenants.iter().filter_map(|tenant| tenant["stored_bytes"].as_u64()).sum()
     }
 
     pub(crate) fn folder(&self, name: &str) -> PathBuf {

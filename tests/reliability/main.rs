@@ -5,6 +5,7 @@
 
 mod capture;
 mod client_gone;
+mod completion;
 mod disk;
 mod faults;
 mod gate;

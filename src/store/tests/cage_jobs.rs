@@ -106,10 +106,10 @@ fn a_job_keeps_its_input_until_it_is_over_and_its_cage_from_then_on() {
     let given = Given::new();
     let store = given.open().store;
     create(&store, "a").unwrap();
-    assert!(store.bytes(Kind::CageJob, "a") > 8000);
+    assert!(store.bytes(Kind::CageJob, "a").expect("a job") > 8000);
     assert_eq!([store.count_cage_job_attempt("a").unwrap(), store.count_cage_job_attempt("a").unwrap()], [1, 2]);
     store.finish_cage_job("a", &OUTCOME, Some(CAGE)).unwrap();
-    assert!(store.bytes(Kind::CageJob, "a") < 2000);
+    assert!(store.bytes(Kind::CageJob, "a").expect("a job") < 2000);
     assert!(matches!(store.cage_job_rest(&meta("a")), Err(StoreError::Damaged { .. })));
     store.create_finished_cage_job(&meta("b"), &OUTCOME, CAGE).unwrap();
     drop(store);

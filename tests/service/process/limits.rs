@@ -1,6 +1,7 @@
 //! Limits: known, answered at once, and free again when what took them is over.
 
 use crate::support::{Capture, OCTETS, RECORDS, Raw, TestApp, chunked, eventually, form};
+use cager_proto::messages::Session;
 use serde_json::json;
 use std::time::Duration;
 
@@ -111,7 +112,29 @@ async fn the_quota_counts_frames_of_an_upload_whose_length_is_not_told() {
     raw.try_write(b"0\r\n\r\n").await;
     eventually("the upload is over", async || (app.metric("cager_streams").await == 0.0).then_some(())).await;
     let stored = app.metric("cager_stored_bytes{tenant=\"local\"}").await;
-    assert!(stored < 2.0 * 1_048_576.0, "{stored} bytes are stored where a megabyte is allowed");
+    assert!(stored <= 1_048_576.0, "{stored} bytes are stored where a megabyte is allowed");
+}
+
+#[tokio::test]
+async fn frames_that_wait_to_be_coded_stay_within_the_quota() {
+    let app = TestApp::with(&["tenant_max_bytes=2097152"]);
+    let capture = Capture::new(5000, 40, 4);
+    let created: Session = app.create_with(form(&capture, &json!({"max_error": 1e-3})), None).await.is(201);
+    app.prepared(&created.id).await;
+    let body = capture.raw(0..4).repeat(15);
+    let post = |first: u32| {
+        let (app, body, path) = (&app, body.clone(), format!("/v1/sessions/{}/frames?first={first}", created.id));
+        async move { app.stranger().post(&path, OCTETS, body).await }
+    };
+    // Several uploads at once share what is left.
+    let replies = futures_util::future::join_all([0, 60, 120].map(post)).await;
+    assert!(replies.iter().any(|reply| reply.text().contains("quota-exceeded")));
+    let stored = app.metric("cager_stored_bytes{tenant=\"local\"}").await;
+    let frames = app.errors(&created.id).await.len();
+    assert!(
+        frames > 0 && stored <= 2_097_152.0,
+        "{frames} frames of 60 kB, {stored} bytes where two megabytes are allowed"
+    );
 }
 
 #[tokio::test]

@@ -1,9 +1,12 @@
 //! `Idempotency-Key`: a session is made once, however often it is asked for.
 
-use crate::support::{Capture, TestApp, form};
+use crate::support::{Capture, TestApp, cage_form, file, form, text};
+use cager::store::{Idempotency, Kind, LocalDisk, Store};
+use cager_proto::cage_messages::CageJob;
 use cager_proto::messages::{Session, SessionList};
 use futures_util::future::join_all;
 use serde_json::json;
+use std::sync::Arc;
 
 async fn count(app: &TestApp) -> usize {
     app.get("/v1/sessions").await.is::<SessionList>(200).sessions.len()
@@ -81,4 +84,41 @@ async fn a_key_that_cannot_be_one_is_refused() {
     for key in ["", long.as_str()] {
         app.create_with(form(Capture::tiny(), &json!({})), Some(key)).await.problem(400, "bad-request");
     }
+}
+
+#[tokio::test]
+async fn a_request_repeated_after_its_design_was_deleted_still_gets_its_session() {
+    let app = TestApp::start();
+    let capture = Capture::tiny();
+    let design: CageJob =
+        app.design_with(cage_form(capture, &json!({"vertices": 32, "time_limit_s": 1.0})), None).await.is(202);
+    app.designed(&design.id).await;
+    let parts = || {
+        let options = text(&json!({"cage": {"id": design.id}}));
+        reqwest::multipart::Form::new().part("rest", file("rest.obj", &capture.rest.obj)).part("options", options)
+    };
+    let first: Session = app.create_with(parts(), Some("k")).await.is(201);
+    app.delete(&format!("/v1/cages/{}", design.id)).await.expect(204);
+    // What was sent is the same, whatever the service would make of it now.
+    assert_eq!(app.create_with(parts(), Some("k")).await.is::<Session>(201).id, first.id);
+}
+
+#[tokio::test]
+async fn a_key_of_a_version_with_other_fingerprints_still_answers() {
+    let mut app = TestApp::start();
+    let capture = Capture::tiny();
+    let first: Session = app.create_with(form(capture, &json!({})), Some("k")).await.is(201);
+    app.kill();
+    {
+        let data = app.session_file(&first.id, "session.json").ancestors().nth(3).expect("a folder").to_owned();
+        let opened = Store::open(&data, Arc::new(LocalDisk)).expect("a store");
+        let mut meta = opened.sessions.first().expect("a session").clone();
+        meta.idempotency = Some(Idempotency { key: "k".to_owned(), fingerprint: "0".repeat(64) });
+        opened.store.delete(Kind::Session, &meta.id).expect("a deletion");
+        opened.store.create_session(&meta).expect("a session");
+    }
+    let app = app.again();
+    assert_eq!(app.create_with(form(capture, &json!({})), Some("k")).await.is::<Session>(201).id, first.id);
+    let other = form(capture, &json!({"lambda": 2.0}));
+    app.create_with(other, Some("k")).await.problem(422, "idempotency-key-reused");
 }
