@@ -2,9 +2,12 @@
 //! gives of such frames.
 
 mod cage;
+mod error;
 mod frames;
+mod same;
 
 pub use cage::RemoteCage;
+pub use error::{Difference, RemoteError};
 pub use frames::FileFrames;
 
 use crate::design;
@@ -13,9 +16,9 @@ use cager_client::cage_messages::CageProgress;
 use cager_client::messages::{CageSource, FrameResult, PreparationSeconds, SessionOptions};
 use cager_client::{Client, ClientError, ClientOptions, FrameSource, MeshFile, NewSession, UploadOptions};
 use cager_formats::{Action, AtomicFile, Target};
-use cager_proto::container::{self, ContainerReader};
+use cager_proto::container::ContainerReader;
 use cager_proto::report::Seconds;
-use std::io::{self, BufReader};
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -24,33 +27,6 @@ const READY_TIMEOUT: Duration = Duration::from_secs(3600);
 
 /// Longest wait for cleaning up on the service after a failure.
 const CLEAN_UP_TIMEOUT: Duration = Duration::from_secs(5);
-
-/// Why encoding by a service stopped; nothing was written.
-#[derive(Debug, thiserror::Error)]
-pub enum RemoteError {
-    /// The service refused, or cannot be reached.
-    #[error(transparent)]
-    Client(#[from] ClientError),
-    /// A file cannot be read or written.
-    #[error(transparent)]
-    Formats(#[from] cager_formats::Error),
-    /// What the service sent is not a container.
-    #[error(
-        "the container from the service cannot be read ({0}); encode again, and look at the service's log if that gives the same"
-    )]
-    Container(container::Error),
-    /// It broke off, and the service keeps what it has.
-    #[error("{cause}; session {session} keeps what was sent: the same command with --session {session} goes on")]
-    Kept {
-        /// The session.
-        session: String,
-        /// Why it broke off.
-        cause: Box<Self>,
-    },
-    /// The network runtime cannot be started.
-    #[error("the network cannot be used ({0}); free some memory or files and try again")]
-    Runtime(io::Error),
-}
 
 /// Everything an encoding by a service needs.
 pub struct RemoteJob<'a, F> {
@@ -62,7 +38,7 @@ pub struct RemoteJob<'a, F> {
     pub rest: MeshFile,
     /// The cage around it.
     pub cage: RemoteCage<'a>,
-    /// A session whose upload broke, to go on with; it has rest pose, cage and options already.
+    /// A session whose upload broke, to go on with; rest pose, cage, options and frames that it has must be these.
     pub session: Option<&'a str>,
     /// File with the matrix of the regularizer `matrix`.
     pub matrix: Option<&'a Path>,
@@ -79,6 +55,10 @@ pub struct RemoteJob<'a, F> {
 /// How far an encoding by a service is.
 #[derive(Clone, Copy, Debug)]
 pub enum RemoteProgress<'a> {
+    /// The design of this id is on the service, which goes on with it whatever happens here.
+    Design(&'a str),
+    /// The session of this id is on the service, and can be gone on with.
+    Session(&'a str),
     /// The cage is being designed.
     Designing(&'a CageProgress),
     /// So many frames are done.
@@ -113,7 +93,7 @@ pub struct Steps {
 /// Encodes a capture on a service, which also designs the cage if there is none.
 ///
 /// # Errors
-/// See [`RemoteError`]. The session is deleted only where it is of no use: it cannot be prepared, or the frames are refused.
+/// See [`RemoteError`]. What is on the service stays there, and the error says how to go on with it, or how to look at it.
 pub fn encode_remotely<F: FrameSource + 'static>(
     job: RemoteJob<'_, F>,
     progress: &mut (dyn FnMut(RemoteProgress<'_>) + Send),
@@ -144,7 +124,16 @@ async fn encode<F: FrameSource + 'static>(
     let mut designed = None;
     let mut design_time = Duration::ZERO;
     let session = match (job.session, job.cage) {
-        (Some(session), _) => session.to_owned(),
+        (Some(session), cage) => {
+            new.cage = match cage {
+                RemoteCage::File(path) => Some(mesh_file(path)?),
+                RemoteCage::Mesh(file) => Some(file.clone()),
+                RemoteCage::Designed(_) => None,
+            };
+            let compared = same::check(&client, session, &new, &mut job.frames).await;
+            compared.map_err(|error| error.with_session(session, job.address))?;
+            session.to_owned()
+        }
         (None, RemoteCage::File(path)) => {
             new.cage = Some(mesh_file(path)?);
             client.create(&new).await?.id
@@ -155,39 +144,28 @@ async fn encode<F: FrameSource + 'static>(
         }
         (None, RemoteCage::Designed(options)) => {
             let clock_design = Instant::now();
-            let design = cage::design(&client, &new.rest, &mut job.frames, options, progress).await?;
+            let design = cage::design(&client, job.address, &new.rest, &mut job.frames, options, progress).await?;
             design_time = clock_design.elapsed();
             new.options.cage = Some(CageSource { id: Some(design.id.clone()), ..CageSource::default() });
             let created = client.create(&new).await;
+            let created = created.map_err(|cause| RemoteError::of_design(cause.into(), &design.id, job.address))?;
             // The session has its own copy of the cage.
             clean_up(&client, async |client| client.delete_cage(&design.id).await).await;
             designed = Some((design::report_of_job(&design, options), design.warnings));
-            created?.id
+            created.id
         }
     };
-    match run(&client, &session, job.frames, job.connections, file, clock, progress).await {
-        Ok((mut encoded, mut steps)) => {
-            steps.prepare = steps.prepare.saturating_sub(design_time);
-            encoded.report.seconds.design = design_time.as_secs_f64();
-            if let Some((report, warnings)) = designed {
-                encoded.report.design = Some(report);
-                encoded.report.warnings.extend(warnings);
-            }
-            Ok(EncodedRemotely { encoded, session, steps })
-        }
-        Err(error) if is_final(&error) => {
-            clean_up(&client, async |client| client.delete(&session).await).await;
-            Err(error)
-        }
-        Err(cause) => Err(RemoteError::Kept { session, cause: Box::new(cause) }),
+    progress(RemoteProgress::Session(&session));
+    let (mut encoded, mut steps) = run(&client, &session, job.frames, job.connections, file, clock, progress)
+        .await
+        .map_err(|error| error.with_session(&session, job.address))?;
+    steps.prepare = steps.prepare.saturating_sub(design_time);
+    encoded.report.seconds.design = design_time.as_secs_f64();
+    if let Some((report, warnings)) = designed {
+        encoded.report.design = Some(report);
+        encoded.report.warnings.extend(warnings);
     }
-}
-
-/// Whether the session is of no use any more: trying again would end the same way.
-fn is_final(error: &RemoteError) -> bool {
-    use ClientError::{Failed, Mismatch, NotReady, Refused, Source};
-    let RemoteError::Client(error) = error else { return false };
-    matches!(error, Failed(_) | Mismatch(_) | NotReady { .. } | Refused(_) | Source { .. })
+    Ok(EncodedRemotely { encoded, session, steps })
 }
 
 /// Removes an object from the service, within a short time and without retries.
@@ -273,22 +251,4 @@ pub fn mesh_file(path: &Path) -> Result<MeshFile, cager_formats::Error> {
         cause,
     })?;
     Ok(MeshFile::new(path.file_name().unwrap_or_default().to_string_lossy(), bytes))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_session_goes_only_where_trying_again_would_end_the_same_way() {
-        let broken = || ClientError::Broken { address: String::new(), cause: String::new() };
-        let kept = [broken(), ClientError::GaveUp { attempts: 9, last: Box::new(broken()) }];
-        let refused = [
-            ClientError::Mismatch("another mesh".to_owned()),
-            ClientError::Source { frame: 7, cause: io::Error::other("NaN") },
-        ];
-        assert!(kept.into_iter().all(|error| !is_final(&error.into())));
-        assert!(refused.into_iter().all(|error| is_final(&error.into())));
-        assert!(!is_final(&RemoteError::Client(ClientError::Output(io::Error::other("full")))), "it is all there");
-    }
 }

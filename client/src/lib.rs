@@ -37,6 +37,7 @@ mod other_model;
 mod problem;
 mod records;
 mod results;
+mod sent;
 mod sessions;
 mod source;
 mod sse;

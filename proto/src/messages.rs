@@ -299,6 +299,49 @@ pub struct FrameErrors {
     pub frames: Vec<FrameResult>,
 }
 
+/// What a session was sent, so that who goes on with it can tell whether it is of the same capture.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct Sent {
+    /// The options.
+    pub options: SessionOptions,
+    /// The rest pose.
+    pub rest: SentFile,
+    /// The cage; null where none was sent.
+    pub cage: Option<SentFile>,
+    /// The matrix of the regularizer `matrix`; null where none was sent.
+    pub regularizer_matrix: Option<SentFile>,
+    /// Frames that are solved, ascending: those that were asked for.
+    pub frames: Vec<SentFrame>,
+    /// Give it as `first` to get the frames that follow; null where these are all.
+    pub next: Option<u32>,
+}
+
+/// A file that was sent.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct SentFile {
+    /// Its name.
+    pub name: String,
+    /// Its length.
+    pub bytes: u64,
+    /// Its digest, BLAKE3, hexadecimal.
+    pub blake3: String,
+}
+
+/// A frame that was sent.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct SentFrame {
+    /// Its number.
+    pub frame: u32,
+    /// Whether only its handle rows came.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub handles_only: bool,
+    /// First half of the BLAKE3 digest of its rows as little-endian f32, hexadecimal: of all points, or of the handles in their order.
+    pub blake3: String,
+}
+
 /// Says that no more frames are coming.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]

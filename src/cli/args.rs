@@ -128,7 +128,7 @@ pub(crate) struct EncodeArgs {
     #[arg(long, value_name = "T", requires = "server", hide_default_value = true)]
     pub(crate) token: Option<String>,
 
-    /// Go on with a session whose upload broke: what it has is not sent again. Rest pose, cage and options are its own.
+    /// Go on with a session whose upload broke: what it has is not sent again, but compared. Give the files and options that it was made with.
     #[arg(long, value_name = "ID", requires = "server")]
     pub(crate) session: Option<String>,
 

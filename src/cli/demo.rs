@@ -7,7 +7,9 @@ use super::local_service::LocalService;
 use super::{grouped, human_bytes, interrupt, progress, tell};
 use crate::decode::{self, Decoding};
 use crate::encode::Encoded;
-use crate::remote::{EncodedRemotely, RemoteCage, RemoteJob, RemoteProgress, Steps, encode_remotely, mesh_file};
+use crate::remote::{
+    EncodedRemotely, RemoteCage, RemoteError, RemoteJob, RemoteProgress, Steps, encode_remotely, mesh_file,
+};
 use crate::report_page::{NO_PAGE, ReportPage};
 use anyhow::{Context, Result, ensure};
 use cager_client::FnFrames;
@@ -59,7 +61,8 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
         }
     });
     bar.finish_and_clear();
-    let EncodedRemotely { encoded: Encoded { report, container }, steps, .. } = result?;
+    let result = result.map_err(RemoteError::without_session)?;
+    let EncodedRemotely { encoded: Encoded { report, container }, steps, .. } = result;
     service.stop()?;
     let report_file = write_report(AtomicFile::create(folder.join("report.json"))?, &report)?;
     commit_together(vec![report_file, container])?;

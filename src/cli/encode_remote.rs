@@ -4,12 +4,12 @@ use super::args::{EncodeArgs, SolverArgs, SpectrumArg};
 use super::coding_args::goal;
 use super::encode::{Targets, checked_options, design_options, finish, sized_design};
 use super::solver_options::{check_inversion, designed_spectrum, matrix, spectrum_bound};
-use super::{plain, progress, tell, warn};
+use super::{interrupt, plain, progress, tell, warn};
 use crate::coding::Goal;
 use crate::encode::Encoded;
 use crate::frames::CaptureFiles;
 use crate::remote::{EncodedRemotely, FileFrames, RemoteCage, RemoteJob, RemoteProgress, encode_remotely, mesh_file};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use cager_cages::DesignOptions;
 use cager_client::messages::SessionOptions;
 use cager_client::{FrameSource, MeshFile};
@@ -80,6 +80,8 @@ pub(super) fn run(
     let clock_size = Instant::now();
     let design = match cage {
         Some(_) => DesignOptions::default(),
+        // A session has its cage.
+        None if args.session.is_some() => DesignOptions::default(),
         None => sized_design(args, files, rest)?,
     };
     let size_seconds = clock_size.elapsed().as_secs_f64();
@@ -106,7 +108,16 @@ pub(super) fn run(
         connections: usize::from(args.connections),
     };
     let designing = progress::steps();
+    let goes_on = |session: &str| {
+        format!("session {session} keeps what was sent: the same command with --session {session} goes on")
+    };
     let result = encode_remotely(job, &mut |told| match told {
+        RemoteProgress::Design(id) => interrupt::set_last_words(format!(
+            "the service goes on designing the cage: fetch it from {}/v1/cages/{} and give it with --cage",
+            plain(address.trim_end_matches('/')),
+            plain(&format!("{id}/cage.obj")),
+        )),
+        RemoteProgress::Session(id) => interrupt::set_last_words(goes_on(&plain(id))),
         RemoteProgress::Designing(told) => progress::design(&designing, told),
         RemoteProgress::Frames(done) => {
             designing.finish_and_clear();
@@ -116,12 +127,13 @@ pub(super) fn run(
     designing.finish_and_clear();
     bar.finish_and_clear();
     let EncodedRemotely { mut encoded, session, .. } = result?;
-    if let Some(origin) = files.origin {
-        encoded = with_origin(encoded, origin, &targets.output)?;
-    }
     encoded.report.seconds.read += read_seconds;
     encoded.report.seconds.design += size_seconds;
-    finish(targets, encoded, report_file, clock)?;
+    let placed = files.origin.map_or(Ok(encoded), |origin| with_origin(encoded, origin, &targets.output));
+    placed
+        .and_then(|encoded| finish(targets, encoded, report_file, clock))
+        .map_err(|error| anyhow!("{error:#}; {}", goes_on(&plain(&session))))?;
+    interrupt::set_last_words(String::new());
     tell(&format!("  service {}, session {}\n", plain(address), plain(&session)))
 }
 

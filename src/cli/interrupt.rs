@@ -1,6 +1,16 @@
 //! Handling of SIGINT and similar signals while outputs are incomplete.
 
+use crate::sync::lock;
 use anyhow::Result;
+use std::sync::Mutex;
+
+/// What a signal that ends the process has it say.
+static LAST_WORDS: Mutex<String> = Mutex::new(String::new());
+
+/// Sets what is said if a signal ends the process: what is left elsewhere, and how to go on with it.
+pub(super) fn set_last_words(text: String) {
+    *lock(&LAST_WORDS) = text;
+}
 
 /// From here on a signal that asks the process to end removes its temporary files and folders first; a second one ends
 /// it at once. Either way the process dies by the signal, so that a shell's loop around it stops too.
@@ -19,12 +29,14 @@ pub(super) fn remove_temporaries_on_signal() -> Result<()> {
 
 #[cfg(unix)]
 mod unix {
+    use crate::sync::lock;
     use anyhow::{Context, Result};
     use cager_formats::remove_temporaries;
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     use signal_hook::flag;
     use signal_hook::iterator::Signals;
     use signal_hook::low_level::emulate_default_handler;
+    use std::io::Write;
     use std::sync::Arc;
     use std::sync::atomic::AtomicBool;
     use std::sync::mpsc::channel;
@@ -36,6 +48,11 @@ mod unix {
         let thread = move || {
             if let Some(signal) = receive.recv().ok().and_then(|mut signals| signals.forever().next()) {
                 remove_temporaries();
+                let said = lock(&super::LAST_WORDS);
+                if !said.is_empty() {
+                    // Nowhere is left to report a closed stderr to.
+                    let _ = writeln!(std::io::stderr(), "cager: {said}");
+                }
                 // The signals known to this cannot fail.
                 let _ = emulate_default_handler(signal);
             }

@@ -29,6 +29,7 @@ mod progress;
 mod ranged;
 mod respond;
 mod router;
+mod sent;
 mod sessions;
 
 pub use admin::admin;

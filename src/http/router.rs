@@ -6,7 +6,7 @@ use super::guarded::with_permit;
 use super::respond::PROBLEM_JSON;
 use super::{
     cage, cage_jobs, cages, container, coordinates, decode, errors, events, extract, frames, health, openapi, origin,
-    page, sessions,
+    page, sent, sessions,
 };
 use crate::problem::{self, ApiError, Kind};
 use crate::service::Service;
@@ -38,6 +38,7 @@ fn quick() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(coordinates::get))
         .routes(routes!(cage::get))
         .routes(routes!(errors::get))
+        .routes(routes!(sent::get))
         .routes(routes!(events::get))
         .routes(routes!(cages::get))
         .routes(routes!(container::get))

@@ -29,6 +29,7 @@ pub enum RemoteCage<'a> {
 /// Has the service design a cage; returns the finished design, which stays on the service. Reads `frames` from the beginning.
 pub(super) async fn design(
     client: &Client,
+    address: &str,
     rest: &MeshFile,
     frames: &mut impl FrameSource,
     options: &DesignOptions,
@@ -55,12 +56,15 @@ pub(super) async fn design(
     };
     let id = client.design_cage(&new).await?.id;
     drop(new);
+    progress(RemoteProgress::Design(&id));
     match follow(client, &id, progress).await {
         Ok(job) => Ok(job),
-        Err(error) => {
+        // There is nothing to look at, and the error says it all.
+        Err(error @ RemoteError::Client(ClientError::NoCage(_))) => {
             super::clean_up(client, async |client| client.delete_cage(&id).await).await;
             Err(error)
         }
+        Err(error) => Err(RemoteError::of_design(error, &id, address)),
     }
 }
 

@@ -3,6 +3,7 @@
 mod client;
 mod command;
 mod far_away;
+mod gone_on;
 mod restart;
 mod server;
 // Not all of it is of use here.

@@ -79,3 +79,9 @@ pub(crate) fn capture() -> (Dir, usize, Vec<f32>) {
     let values = small.frames.iter().flatten().map(|&x| x as f32).collect();
     (dir, small.rest.points.len(), values)
 }
+
+/// The sessions of a service.
+#[tokio::main(flavor = "current_thread")]
+pub(crate) async fn sessions(server: &Server) -> Vec<Session> {
+    server.client().sessions().await.expect("sessions")
+}

@@ -58,7 +58,7 @@ pub struct Uploaded {
 impl Client {
     /// Uploads the frames that a session does not have yet, and returns when all of them are solved. Results come back while
     /// frames are sent; memory does not grow with their number. After a broken connection, a restart of the service or its
-    /// request for patience, it goes on with what is missing. Where a proxy in between stops sending a request whose answer has begun, this
+    /// request for patience, it goes on with what is missing. What is there is not compared, see [`Client::sent`]. Where a proxy in between stops sending a request whose answer has begun, this
     /// and later uploads of the client have their results at the end of each request.
     ///
     /// `source` is read on a thread of its own, for which it is handed over.

@@ -8,3 +8,4 @@ mod delete;
 mod events;
 mod frames;
 mod handles;
+mod sent;
