@@ -17,6 +17,8 @@ pub mod edit;
 pub mod edited;
 pub mod encode;
 pub mod engine;
+mod far_frames;
+mod file_bodies;
 pub mod frames;
 pub mod http;
 mod http_client;

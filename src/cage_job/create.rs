@@ -4,6 +4,7 @@ use super::{CageJob, Finished, Outcome, Phase, options, samples};
 use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::config::ServeConfig;
+use crate::far_frames::{Reach, too_far};
 use crate::idempotency::{extension, made_before, once, request};
 use crate::preparation::{check_extent, read_part};
 use crate::problem::{self, ApiError};
@@ -12,6 +13,7 @@ use crate::session::registry::Reserved;
 use crate::store::{CageJobMeta, ContentKey, Idempotency, Kind, Spool, StoreError, StoredPart};
 use crate::tasks::{blocking, to_the_end};
 use crate::unreadable;
+use cager_core::mesh::diagonal;
 use cager_proto::cage_messages::CageOptions;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -258,6 +260,7 @@ fn check(new: &NewCageJob, tenant: &str, max_seconds: u64, max_bytes: u64) -> Re
     let rest = read_part("rest", &new.rest_name, &new.rest)?;
     check_extent(&rest)?;
     let points = rest.points.len();
+    let reach = Reach::around(&rest.points, diagonal(&rest.points));
     drop(rest);
     let frames = &new.frames;
     let mut reader = samples::open(&new.frames_name, frames.stored(), frames.bytes(), points, new.options.frames)?;
@@ -270,7 +273,14 @@ fn check(new: &NewCageJob, tenant: &str, max_seconds: u64, max_bytes: u64) -> Re
         );
         return Err(ApiError::new(problem::INVALID_GEOMETRY, detail).limit(max_bytes));
     }
-    samples::read(&mut *reader, count, |_| ())?;
+    let mut far = None;
+    samples::read(&mut *reader, count, |frame, points| {
+        far = far.or_else(|| Some((frame, reach.beyond(points.as_chunks::<3>().0.iter().copied())?)));
+    })?;
+    if let Some((frame, (row, diagonals))) = far {
+        let error = ApiError::new(problem::INVALID_FRAME, too_far(frame, "point", row, diagonals));
+        return Err(error.frame(u32::try_from(frame).unwrap_or(u32::MAX)));
+    }
     let key = ContentKey::of([
         format!("cage design {design:?} {points} {frame_count} {count}").as_bytes(),
         tenant.as_bytes(),

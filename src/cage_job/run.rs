@@ -166,7 +166,7 @@ impl Service {
         let count = samples::sampled(reader.frames(), rest.points.len(), self.config.max_design_bytes);
         let taken = TrackedMemory::new(&self.designs.bytes, 24 * count as u64 * u64::from(meta.points));
         let mut frames = Vec::with_capacity(count);
-        samples::read(&mut *reader, count, |frame| frames.push(frame.to_vec()))?;
+        samples::read(&mut *reader, count, |_, frame| frames.push(frame.to_vec()))?;
         drop(reader);
         job.set_sampled(count);
 

@@ -1,7 +1,8 @@
 //! Sampling evenly spaced frames of an uploaded capture, one read at a time.
 
+use crate::file_bodies::{TELLING_BYTES, instead_of_numbers};
 use crate::problem::{self, ApiError};
-use cager_formats::{CacheFormat, Error, FrameReader, Signature, open_frames_in};
+use cager_formats::{CacheFormat, Error, FrameReader, open_frames_in};
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
@@ -37,13 +38,7 @@ pub(super) fn open<'a>(
             ))),
         };
     }
-    let mut start = Vec::new();
-    source.by_ref().take(1024).read_to_end(&mut start).map_err(|cause| ApiError::internal(&cause))?;
-    if let Some(what) = Signature::of(&start) {
-        let noun = what.noun();
-        let what = what.stand_in().unwrap_or_else(|| format!("is {noun}, not raw numbers; send it under its name"));
-        return Err(mismatch(format!("frames: {what}")));
-    }
+    refuse_file(path, &mut source, points)?;
     let Some(frames) = announced else {
         let detail = "frames: the part has no name ending in .npy, so it is raw numbers; say how many frames it has as options.frames";
         return Err(ApiError::new(problem::INVALID_OPTIONS, detail));
@@ -57,11 +52,24 @@ pub(super) fn open<'a>(
     Ok(Box::new(RawFrames { path: path.to_owned(), source, points, frames: frames as usize, next: 0 }))
 }
 
-/// Reads `count` evenly spaced frames, including the first and the last, and passes each to `each`.
+/// Refuses a file in place of raw numbers.
+fn refuse_file(path: &Path, source: &mut impl Read, points: usize) -> Result<(), ApiError> {
+    let mut start = Vec::new();
+    let read = source.take(12 * points as u64).take(TELLING_BYTES as u64).read_to_end(&mut start);
+    read.map_err(|cause| unreadable(&Error::Io { path: path.to_owned(), action: cager_formats::Action::Read, cause }))?;
+    let refuse = |what| Err(mismatch(format!("frames: the part {what}; a .npy file is sent under its name")));
+    instead_of_numbers(&start).map_or(Ok(()), refuse)
+}
+
+/// Reads `count` evenly spaced frames, including the first and the last, and passes each to `each` with its number.
 ///
 /// # Errors
 /// A frame that cannot be read, or has a coordinate that is NaN or infinite.
-pub(super) fn read(reader: &mut dyn FrameReader, count: usize, mut each: impl FnMut(&[f64])) -> Result<(), ApiError> {
+pub(super) fn read(
+    reader: &mut dyn FrameReader,
+    count: usize,
+    mut each: impl FnMut(usize, &[f64]),
+) -> Result<(), ApiError> {
     let last = reader.frames() - 1;
     let mut next = 0;
     let mut frame = Vec::new();
@@ -75,7 +83,7 @@ pub(super) fn read(reader: &mut dyn FrameReader, count: usize, mut each: impl Fn
             return Err(mismatch("frames: there are fewer than announced; send them again".to_owned()));
         }
         next += 1;
-        each(&frame);
+        each(wanted, &frame);
     }
     Ok(())
 }
@@ -151,7 +159,7 @@ mod tests {
         for (count, expected) in [(1, vec![0.0]), (2, vec![0.0, 10.0]), (3, vec![0.0, 5.0, 10.0])] {
             let mut reader = open("frames", Cursor::new(&bytes), length, 2, Some(11)).expect("frames");
             let mut found = Vec::new();
-            read(&mut *reader, count, |frame| found.push(frame[0])).expect("frames");
+            read(&mut *reader, count, |_, frame| found.push(frame[0])).expect("frames");
             assert_eq!(found, expected);
         }
     }

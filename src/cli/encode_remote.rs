@@ -129,7 +129,10 @@ pub(super) fn run(
     let EncodedRemotely { mut encoded, session, .. } = result?;
     encoded.report.seconds.read += read_seconds;
     encoded.report.seconds.design += size_seconds;
-    let placed = files.origin.map_or(Ok(encoded), |origin| with_origin(encoded, origin, &targets.output));
+    let placed = match files.origin {
+        Some(origin) => with_origin(encoded, origin, &targets.output),
+        None => Ok(encoded),
+    };
     placed
         .and_then(|encoded| finish(targets, encoded, report_file, clock))
         .map_err(|error| anyhow!("{error:#}; {}", goes_on(&plain(&session))))?;

@@ -6,6 +6,7 @@ use super::frames::{body_error, prepared, stopping};
 use super::{openapi, other_model};
 use crate::admission::{Budget, Held};
 use crate::engine::Lane;
+use crate::file_bodies::{TELLING_BYTES, refuse_file};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::{Session, gone};
@@ -218,6 +219,12 @@ struct Decoding {
     _place: Held,
 }
 
+/// Bytes of the body that have arrived.
+async fn read(spool: Arc<Spool>, at: u64, length: u64) -> Result<Vec<u8>, ApiError> {
+    let read = crate::tasks::blocking(move || spool.read(at, length as usize)).await?;
+    read.map_err(|error| ApiError::internal(&error))
+}
+
 impl Decoding {
     /// Positions of the next few cages; `None` at the end of the body.
     async fn next(&mut self) -> Result<Option<Bytes>, ApiError> {
@@ -233,6 +240,10 @@ impl Decoding {
                 Some(Err(error)) => return Err(error),
                 Some(Ok(())) if arrived.bytes == at => return Ok(None),
                 Some(Ok(())) => {
+                    if at == 0 {
+                        let length = arrived.bytes.min(TELLING_BYTES as u64);
+                        refuse_file(&read(Arc::clone(&self.spool), 0, length).await?)?;
+                    }
                     let detail = format!(
                         "the body ends within cage {}, after {} of {} bytes; send whole cages",
                         self.next,
@@ -247,10 +258,10 @@ impl Decoding {
                 return Err(ApiError::internal(&"a spool ended early"));
             }
         };
-        let (spool, length) = (Arc::clone(&self.spool), (count * self.frame_bytes) as usize);
-        let bytes = crate::tasks::blocking(move || spool.read(at, length))
-            .await?
-            .map_err(|error| ApiError::internal(&error))?;
+        let bytes = read(Arc::clone(&self.spool), at, count * self.frame_bytes).await?;
+        if at == 0 {
+            refuse_file(&bytes)?;
+        }
         let _queued = self.queued.take(&self.session.meta.tenant, count).await;
         let mut replies = Vec::new();
         for cage in bytes.chunks_exact(self.frame_bytes as usize) {

@@ -1,5 +1,6 @@
 //! Reassembles frames from the chunks of a request body.
 
+use crate::file_bodies::{TELLING_BYTES, refuse_file};
 use crate::problem::{self, ApiError};
 use crate::session::facts::Facts;
 use crate::session::upload::Rows;
@@ -34,6 +35,8 @@ pub(crate) struct FrameReader {
     record: Option<FrameHeader>,
     bytes: Vec<u8>,
     begun: bool,
+    /// Whether the first bytes may still turn out to be those of a file; records have a beginning of their own.
+    may_be_file: bool,
 }
 
 impl FrameReader {
@@ -51,6 +54,7 @@ impl FrameReader {
             record: None,
             bytes: Vec::new(),
             begun: false,
+            may_be_file: matches!(layout, Layout::Raw { .. }),
         }
     }
 
@@ -72,7 +76,7 @@ impl FrameReader {
     /// Consumes bytes from the front of `input`; returns a frame once it is complete.
     ///
     /// # Errors
-    /// A record that is damaged or of another kind or size.
+    /// A record that is damaged or of another kind or size; a file in place of numbers.
     pub(crate) fn push(&mut self, input: &mut &[u8]) -> Result<Option<ReceivedFrame>, ApiError> {
         if input.is_empty() {
             return Ok(None);
@@ -97,6 +101,11 @@ impl FrameReader {
         let take = input.len().min(needed - self.bytes.len());
         self.bytes.extend_from_slice(&input[..take]);
         *input = &input[take..];
+        let telling = needed.min(TELLING_BYTES);
+        if self.may_be_file && self.bytes.len() >= telling {
+            self.refuse_file(telling)?;
+            self.may_be_file = false;
+        }
         if self.bytes.len() < needed {
             return Ok(None);
         }
@@ -115,10 +124,13 @@ impl FrameReader {
     /// Checks that the body may end here.
     ///
     /// # Errors
-    /// The body ends within a frame.
+    /// The body ends within a frame, or is a short file.
     pub(crate) fn finish(&self) -> Result<(), ApiError> {
         if !self.begun {
             return Ok(());
+        }
+        if self.may_be_file {
+            self.refuse_file(self.bytes.len())?;
         }
         let (which, have, needed) = match (self.layout, self.record) {
             (Layout::Raw { .. }, _) => (format!("frame {}", self.next), self.bytes.len(), self.frame_bytes()),
@@ -133,6 +145,14 @@ impl FrameReader {
             problem::BAD_REQUEST,
             format!("the body ends within {which}, after {have} of {needed} bytes; send whole frames"),
         ))
+    }
+
+    /// Looks at as many bytes whatever pieces they come in.
+    fn refuse_file(&self, telling: usize) -> Result<(), ApiError> {
+        refuse_file(&self.bytes[..telling]).map_err(|mut error| {
+            error.problem.detail.push_str("; a frame that only looks like that can be posted as frame records");
+            error
+        })
     }
 
     /// The header of the current record, once it is complete.

@@ -15,6 +15,7 @@ pub(crate) use choices::{Choices, content_key};
 pub(crate) use geometry::{Geometry, read, read_cage, read_part};
 pub(crate) use solvers::{SolverRequest, SolverResponse, Solvers};
 
+use crate::far_frames::Reach;
 use crate::preparation_warnings::preparation_warnings;
 use crate::problem::ApiError;
 use cager_core::cage::Cage;
@@ -30,6 +31,8 @@ pub(crate) struct Prepared {
     pub(crate) handles_digest: String,
     pub(crate) cage_vertices: u32,
     pub(crate) cage_faces: u32,
+    /// Where the points of frames may lie.
+    pub(crate) reach: Reach,
     pub(crate) warnings: Vec<String>,
 }
 
@@ -62,6 +65,7 @@ pub(crate) fn with_solver(solver: Solver, cage: &Cage, options: SolverOptions) -
     let handles: Vec<u8> = solver.handles().iter().flat_map(|handle| handle.to_le_bytes()).collect();
     Prepared {
         handles_digest: blake3::hash(&handles).to_hex().to_string(),
+        reach: Reach::around(cage.vertices(), solver.diagonal()),
         solver,
         options,
         cage_vertices: cage.vertices().len() as u32,

@@ -5,9 +5,11 @@ use super::commit::SolvedFrame;
 use super::frames::{Claim, Digests};
 use super::upload::{FrameJob, Rows};
 use crate::capture::StoredError;
+use crate::far_frames::too_far;
 use crate::preparation::Prepared;
 use crate::problem::{self, ApiError};
 use crate::sync::lock;
+use cager_core::mesh::Point;
 use std::cell::RefCell;
 use std::sync::Arc;
 use std::time::Instant;
@@ -42,6 +44,11 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
         let what = if job.rows == Rows::All { "point" } else { "handle" };
         if let Some(row) = first_not_finite(&job.bytes) {
             let detail = format!("frame {}: {what} {row} is not finite; export this frame again", job.frame);
+            job.refuse(problem::INVALID_FRAME, detail);
+            continue;
+        }
+        if let Some((row, diagonals)) = prepared.reach.beyond(points(&job.bytes)) {
+            let detail = too_far(job.frame, what, row, diagonals);
             job.refuse(problem::INVALID_FRAME, detail);
             continue;
         }
@@ -281,6 +288,12 @@ fn first_not_finite(bytes: &[u8]) -> Option<usize> {
         return None;
     }
     bytes.chunks_exact(4).position(|b| suspicious(b) == 1).map(|k| k / 3)
+}
+
+/// The points of a frame.
+fn points(bytes: &[u8]) -> impl Iterator<Item = Point> + Clone {
+    let number = |b: [u8; 4]| f64::from(f32::from_le_bytes(b));
+    bytes.as_chunks::<4>().0.as_chunks::<3>().0.iter().map(move |&[x, y, z]| [number(x), number(y), number(z)])
 }
 
 fn digests(prepared: &Prepared, job: &FrameJob) -> Digests {

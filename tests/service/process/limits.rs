@@ -205,7 +205,7 @@ async fn solvers_that_one_tenant_keeps_displace_its_own() {
     let session = anna.ready(capture).await;
     for k in 1..=12 {
         let other = bert.create_with(form(capture, &json!({"lambda": 0.001 * f64::from(k)})), None).await;
-        let other: cager_proto::messages::Session = other.is(201);
+        let other: Session = other.is(201);
         bert.prepared(&other.id).await;
     }
     let handles = format!("/v1/sessions/{}/handles", session.id);

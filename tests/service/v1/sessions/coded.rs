@@ -219,7 +219,8 @@ async fn a_group_that_cannot_be_coded_can_be_left_out() {
     let app = TestApp::start();
     let id = session(&app, &json!({ "max_error": 1e-5 })).await.id;
     app.upload(&id, 0, long().raw(0..100)).await;
-    let far: Vec<u8> = numbers(&long().frame(100)).iter().flat_map(|x| (x + 1e6).to_le_bytes()).collect();
+    let far = 50.0 * diagonal(&long().rest.model.points) as f32;
+    let far: Vec<u8> = numbers(&long().frame(100)).iter().flat_map(|x| (x + far).to_le_bytes()).collect();
     app.upload(&id, 100, far).await;
     app.upload(&id, 101, long().raw(101..GROUP)).await;
     let problem =
