@@ -555,3 +555,31 @@ fn a_bad_file_in_a_sequence_is_named_with_its_frame() {
         assert!(error.starts_with(&format!("{}: {wanted}", second.display())), "{error}");
     }
 }
+
+#[test]
+fn stl_frames_are_merged_as_the_rest_pose_is() {
+    let dir = tempdir().unwrap();
+    let stl = |points: [[f64; 3]; 4]| {
+        let corner = |index: &u32| points[*index as usize].map(|x| x as f32).map(f32::to_le_bytes).concat();
+        let facet = |face: &[u32; 3]| [vec![0; 12], face.iter().flat_map(corner).collect(), vec![0; 2]].concat();
+        [vec![0; 80], 4_u32.to_le_bytes().to_vec(), FACES.iter().flat_map(facet).collect()].concat()
+    };
+    // In the order in which the faces meet them; the last two meet in frame 0, and nothing does in the others.
+    let touching = [POINTS[0], POINTS[1], [5.0, 6.0, 7.0], [5.0, 6.0, 7.0]];
+    let order = |p: [[f64; 3]; 4]| [p[0], p[2], p[1], p[3]].concat();
+    for (k, points) in [touching, POINTS, touching].into_iter().enumerate() {
+        fs::write(dir.path().join(format!("f{k}.stl")), stl(points)).unwrap();
+    }
+    let frames = all(&mut *open_frames(dir.path(), 4).unwrap());
+    assert_eq!(frames, [touching, POINTS, touching].map(order));
+
+    // A rest pose in which two points are one cannot be had from frames in which they part.
+    for (k, points) in [touching, POINTS].into_iter().enumerate() {
+        fs::write(dir.path().join(format!("f{k}.stl")), stl(points)).unwrap();
+    }
+    fs::remove_file(dir.path().join("f2.stl")).unwrap();
+    let mut reader = open_frames(dir.path(), 3).unwrap();
+    assert!(reader.read_next(&mut Vec::new()).unwrap());
+    let error = message(reader.read_next(&mut Vec::new()));
+    assert!(error.contains("f1.stl: frame 1: point 1 lies in two places"), "{error}");
+}

@@ -6,6 +6,7 @@ mod files;
 mod fortran;
 mod layout;
 mod mdd;
+mod merged;
 mod names;
 mod npy;
 mod npz;

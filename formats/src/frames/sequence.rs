@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use cager_core::mesh::Polygons;
 
+use super::merged::Merged;
 use super::names::Sequence;
 use super::{FrameReader, cut, single};
 use crate::error::{Error, Fault};
@@ -19,12 +20,13 @@ pub(super) struct SequenceReader {
     before: Option<(bool, usize, PathBuf)>,
     /// Of the frame that was read last; none where its file has none that can be read.
     faces: Polygons,
+    merged: Merged,
 }
 
 impl SequenceReader {
     /// `notes` are what the user should know of the choice of these files.
     pub(super) fn new(sequence: Sequence, points: usize, notes: Vec<String>) -> Self {
-        Self { sequence, points, notes, next: 0, before: None, faces: Polygons::new() }
+        Self { sequence, points, notes, next: 0, before: None, faces: Polygons::new(), merged: Merged::default() }
     }
 
     fn read_array(&self, path: &Path, out: &mut Vec<f64>) -> Result<(), Error> {
@@ -49,7 +51,9 @@ impl SequenceReader {
 
     fn read_mesh(&mut self, path: &Path, out: &mut Vec<f64>) -> Result<(), Error> {
         let frame = self.next;
-        let model = read_frame_file(path).map_err(|error| error.in_frame(frame))?;
+        let model = read_frame_file(path)
+            .and_then(|model| self.merged.apply(model, path, &self.sequence.files, self.points))
+            .map_err(|error| error.in_frame(frame))?;
         let whole = cut::last_line_ends(path).map_err(|cause| Error::read(path, cause))?;
         let found = model.points.len();
         if found != self.points {
