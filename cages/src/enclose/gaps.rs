@@ -15,8 +15,8 @@ const OPPOSITE: f64 = -0.6;
 
 /// A surface of an area that would take more samples than this is crumpled, and its gaps stay closed.
 const MOST_SAMPLES: usize = 100_000;
-/// Samples that this area may have: a cube of a smooth surface has one for each of some directions.
-const MOST_SIDES: usize = 2;
+/// Samples that are looked at, at the most: a cube of a smooth surface has one for each of some directions, and ordinary models have less than half as many.
+const MOST_LOOKED_AT: usize = 90_000;
 /// Places tried beyond one a face. Slivers as long as the model have many more than samples.
 const MOST_TRIES: usize = 2_000_000;
 
@@ -117,7 +117,7 @@ fn samples(surface: &Surface, spacing: f64) -> Option<Vec<(DVec3, DVec3)>> {
         let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
         let n = ((longest / spacing).ceil() as u32).clamp(1, 100);
         tries += n as usize * (n as usize + 1) / 2 - 1;
-        if samples.len() > MOST_SIDES * MOST_SAMPLES || tries > MOST_TRIES {
+        if samples.len() > MOST_LOOKED_AT || tries > MOST_TRIES {
             return None;
         }
         for i in 0..n {

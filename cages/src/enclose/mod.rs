@@ -13,7 +13,9 @@ mod source;
 use crate::geometry::{Surface, self_intersections};
 use cager_core::mesh::{Model, TriMesh};
 use fair::fair;
+use gaps::Offset;
 use glam::DVec3;
+use lattice::Octree;
 use offset::{offset_surface, offset_with_gaps, uniform_offset};
 use patch::EnclosedPoints;
 use rayon::prelude::*;
@@ -103,12 +105,58 @@ pub fn enclose_unless(
         }
         match enclose_at(&source, offset, clearance, options, &mut crumpled, stopped) {
             Ok(cage) => return Ok(cage),
-            Err(reached) => least = least.min(reached),
+            Err(Failure::Crumpled) => offset = least_promising(&source, offset, options),
+            Err(Failure::Left(reached)) => {
+                least = least.min(reached);
+                offset *= GROWTH;
+            }
         }
-        offset *= 1.35;
     }
     let too_few = EncloseError::TooFewVertices { vertices: options.vertices, least };
     simple_shape(&source, options.vertices, clearance).ok_or(too_few)
+}
+
+/// How many times larger the next offset is that is tried.
+const GROWTH: f64 = 1.35;
+
+/// From this offset on a lattice is so coarse that a surface takes no time.
+const COARSE: f64 = 0.04;
+
+/// Why there is no cage at an offset.
+enum Failure {
+    /// Gaps proved too many to be kept open; nothing else was tried yet.
+    Crumpled,
+    /// So many vertices were left; `usize::MAX` where it did not come to that.
+    Left(usize),
+}
+
+/// The least offset from the first on whose surface few enough vertices may enclose, gaps closed. Surfaces of crumpled models have many handles at small
+/// offsets, and take the longest there, so they are looked at from a large one down.
+fn least_promising(source: &NormalizedModel, first: f64, options: &EncloseOptions) -> f64 {
+    let mut tried = vec![first];
+    while tried[tried.len() - 1] < COARSE {
+        tried.push(GROWTH * tried[tried.len() - 1]);
+    }
+    let is_promising = |&offset: &f64| {
+        let (offset, cubes) = uniform_offset(source, offset);
+        promising_surface(source, &offset, &cubes, options).is_some()
+    };
+    let promising = tried.iter().rev().take_while(|offset| is_promising(offset)).count();
+    tried[tried.len() - promising.max(1)]
+}
+
+/// The surface at an offset, if it has no more parts and handles than the cage has vertices for.
+fn promising_surface(
+    source: &NormalizedModel,
+    offset: &Offset,
+    cubes: &Octree,
+    options: &EncloseOptions,
+) -> Option<(Vec<DVec3>, Vec<[u32; 3]>)> {
+    let most_parts = options.vertices / if options.per_part { LEAST } else { VERTICES_PER_PART };
+    let (positions, faces) = offset_surface(source, offset, cubes, options.per_part, most_parts.max(1))?;
+    // A closed surface of V vertices and F faces has V − F/2 = 2 (components − handles).
+    let handles = (faces.len() / 2).saturating_sub(positions.len());
+    (handles * VERTICES_PER_PART <= options.vertices).then_some((positions, faces))
 }
 
 /// Vertices of the least closed surface.
@@ -136,8 +184,7 @@ fn most_halved(vertices: usize) -> usize {
     (1_200 + 3 * vertices).min(2_500)
 }
 
-/// A valid cage at one offset, or how many vertices were left. Where gaps prove too many to be kept open, the model is `crumpled`, and
-/// at larger offsets they are not looked for again.
+/// A valid cage at one offset. Where gaps prove too many to be kept open, the model is `crumpled`, and they are not looked for again.
 fn enclose_at(
     source: &NormalizedModel,
     offset: f64,
@@ -145,30 +192,27 @@ fn enclose_at(
     options: &EncloseOptions,
     crumpled: &mut bool,
     stopped: &mut dyn FnMut() -> bool,
-) -> Result<TriMesh, usize> {
-    let most_parts = options.vertices / if options.per_part { LEAST } else { VERTICES_PER_PART };
-    let with_gaps =
-        if *crumpled { None } else { offset_with_gaps(source, offset, 2.0 * clearance, most_halved(options.vertices)) };
-    *crumpled = with_gaps.is_none();
-    let (offset, cubes) = with_gaps.unwrap_or_else(|| uniform_offset(source, offset));
-    let surface = offset_surface(source, &offset, &cubes, options.per_part, most_parts.max(1));
-    let (positions, faces) = surface.ok_or(usize::MAX)?;
-    // A closed surface of V vertices and F faces has V − F/2 = 2 (components − handles).
-    let handles = (faces.len() / 2).saturating_sub(positions.len());
-    if handles * VERTICES_PER_PART > options.vertices {
-        return Err(usize::MAX);
-    }
+) -> Result<TriMesh, Failure> {
+    let (offset, cubes) = if *crumpled {
+        uniform_offset(source, offset)
+    } else {
+        let with_gaps = offset_with_gaps(source, offset, 2.0 * clearance, most_halved(options.vertices));
+        *crumpled = with_gaps.is_none();
+        with_gaps.ok_or(Failure::Crumpled)?
+    };
+    let surface = promising_surface(source, &offset, &cubes, options);
+    let (positions, faces) = surface.ok_or(Failure::Left(usize::MAX))?;
     let kept = |p: DVec3| clearance.max(DEFAULT_CLEARANCE * offset.at(p));
     let (samples, clearances) = source.samples(&offset, kept);
     let enclosed = EnclosedPoints::new(samples, clearances);
     let mut simplifier = Simplifier::new(positions, faces, &enclosed);
     if !simplifier.simplify(options.vertices, stopped) {
-        return Err(simplifier.len());
+        return Err(Failure::Left(simplifier.len()));
     }
     fair(&mut simplifier.mesh, &simplifier.quadrics, &enclosed);
     let (used, triangles) = simplifier.mesh.compacted();
     let positions: Vec<DVec3> = used.iter().map(|&v| simplifier.mesh.positions[v as usize]).collect();
-    verified(source, &positions, triangles, clearance).ok_or(usize::MAX)
+    verified(source, &positions, triangles, clearance).ok_or(Failure::Left(usize::MAX))
 }
 
 /// The cage in the model's frame of reference, if it is valid there.
@@ -203,4 +247,48 @@ fn simple_shape(source: &NormalizedModel, vertices: usize, clearance: f64) -> Op
     };
     let positions: Vec<DVec3> = corners.iter().map(|&c| center + half * c).collect();
     verified(source, &positions, triangles, clearance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cager_core::mesh::Polygons;
+
+    /// Square pipes along all axes, some hundred of them, which meet and leave holes between them.
+    fn pipes(along: u32) -> Model {
+        let (mut points, mut faces) = (Vec::new(), Polygons::new());
+        let half = 0.15 / f64::from(along);
+        let places = (0..along * along).map(|k| (k / along, k % along));
+        for (axis, (i, j)) in (0..3).flat_map(|axis| places.clone().map(move |place| (axis, place))) {
+            let first = points.len() as u32;
+            for end in [0.0, 1.0] {
+                for [u, v] in [[-half, -half], [half, -half], [half, half], [-half, half]] {
+                    let mut p = [end; 3];
+                    p[(axis + 1) % 3] = (f64::from(i) + 0.5) / f64::from(along) + u;
+                    p[(axis + 2) % 3] = (f64::from(j) + 0.5) / f64::from(along) + v;
+                    points.push(p);
+                }
+            }
+            (0..4).for_each(|k| faces.push(&[k, (k + 1) % 4, 4 + (k + 1) % 4, 4 + k].map(|v| first + v)));
+        }
+        Model { points, faces, ..Model::default() }
+    }
+
+    #[test]
+    fn a_tangle_is_enclosed_at_the_least_offset_that_will_do_and_smaller_ones_are_not_tried() {
+        let options = EncloseOptions::default();
+        let first = first_offset(options.vertices);
+        let source = NormalizedModel::new(&pipes(6), first).unwrap();
+        let found = least_promising(&source, first, &options);
+        let promising = |offset: f64| {
+            let (offset, cubes) = uniform_offset(&source, offset);
+            promising_surface(&source, &offset, &cubes, &options).is_some()
+        };
+        assert!(found > 1.3 * first && promising(found) && !promising(found / GROWTH), "{found}");
+        // From a model that is crumpled on, no attempt is at a smaller offset.
+        let mut crumpled = false;
+        let attempt = enclose_at(&source, first, 0.0, &options, &mut crumpled, &mut || false);
+        assert!(matches!(attempt, Err(Failure::Crumpled)) && crumpled);
+        assert!(enclose_at(&source, found, 0.0, &options, &mut crumpled, &mut || false).is_ok());
+    }
 }
