@@ -96,7 +96,7 @@ fn different_options(
     usual: &Map<String, Value>,
 ) -> Option<String> {
     let names = here.keys().chain(there.keys()).filter(|name| !LEFT_OUT.contains(&name.as_str()));
-    names.filter_map(|name| Some((name, here.get(name), there.get(name)))).find_map(|(name, here, there)| {
+    names.map(|name| (name, here.get(name), there.get(name))).find_map(|(name, here, there)| {
         // Their number need not be known at the beginning.
         if name == "frames" && there.is_none() {
             return None;

@@ -32,7 +32,7 @@ pub(crate) struct Groups {
     /// What follows these in the completion that is going on: nothing of it stays if that fails.
     pub(super) last: Vec<LastGroup>,
     /// Why the next group cannot be coded as asked for, and how many frames it has.
-    failed: Option<(u32, ApiError)>,
+    pub(super) failed: Option<(u32, ApiError)>,
     /// Files of frames whose names are durable, by their first frame.
     named: BTreeSet<u32>,
 }

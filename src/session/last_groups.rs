@@ -22,6 +22,7 @@ impl Session {
             self.frames().set_errors(group.first, &errors);
             self.count_coded(errors.len());
             let mut groups = lock(&self.groups);
+            groups.failed = None;
             groups.coded.push(group);
             groups.carried = carried;
         }

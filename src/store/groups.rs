@@ -5,7 +5,7 @@ use cager_proto::wire;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Most bytes of a group's file.
 const MOST_GROUP_BYTES: usize = 1 << 30;
@@ -87,15 +87,15 @@ impl Store {
     /// # Errors
     /// [`StoreError::Damaged`].
     pub fn group<T: DeserializeOwned>(&self, id: &str, first: u32, last: bool) -> Result<Option<(T, u64)>, StoreError> {
-        match self.read_group(self.part(id, GROUP, first)?)? {
-            None if last => self.read_group(self.part(id, LAST, first)?),
+        match self.read_group(&self.part(id, GROUP, first)?)? {
+            None if last => self.read_group(&self.part(id, LAST, first)?),
             found => Ok(found),
         }
     }
 
-    fn read_group<T: DeserializeOwned>(&self, path: PathBuf) -> Result<Option<(T, u64)>, StoreError> {
-        let Some(file) = self.files().read(&path, (MOST_GROUP_BYTES + DIGEST) as u64)? else { return Ok(None) };
-        let damaged = |what: String| StoreError::damaged(&path, what);
+    fn read_group<T: DeserializeOwned>(&self, path: &Path) -> Result<Option<(T, u64)>, StoreError> {
+        let Some(file) = self.files().read(path, (MOST_GROUP_BYTES + DIGEST) as u64)? else { return Ok(None) };
+        let damaged = |what: String| StoreError::damaged(path, what);
         let (bytes, _) = file
             .split_last_chunk::<DIGEST>()
             .filter(|(bytes, digest)| blake3::hash(bytes) == **digest)
