@@ -1,9 +1,12 @@
-//! Frames that lie farther from the rest pose than captures travel: in other units, in another order of bytes, or no positions at all.
+//! Frames that are none, by where they lie: in other units or another order of bytes than the rest pose, or shifted.
 
 use cager_core::mesh::{Point, bounds};
 
-/// How many diagonals of the rest pose a point may lie from it. Captures travel some, frames that are none hundreds at once.
-const MOST_DIAGONALS: f64 = 100.0;
+/// How many diagonals of the rest pose the middle point of a capture's first frame may lie from it: later frames travel, the first one
+/// begins where the rest pose is.
+const MOST_AT_FIRST: f64 = 100.0;
+/// The same for any point of any frame: farther ones are no positions.
+const MOST: f64 = 1e5;
 
 /// Where the points of a capture's frames may lie.
 #[derive(Clone, Copy, Debug)]
@@ -19,22 +22,37 @@ impl Reach {
         Self { centre: std::array::from_fn(|k| (low[k] + high[k]) / 2.0), diagonal }
     }
 
-    /// The point of a frame that lies farthest away, if that is too far: its index, and how many diagonals away it is.
-    pub(crate) fn beyond(&self, points: impl Iterator<Item = Point> + Clone) -> Option<(usize, f64)> {
+    /// Why a frame is none, if it is: `frame` is its number, and `what` its rows are, such as `point`.
+    pub(crate) fn refusal(
+        &self,
+        frame: impl std::fmt::Display,
+        is_first: bool,
+        what: &str,
+        points: impl Iterator<Item = Point> + Clone,
+    ) -> Option<String> {
         let squared = |p: Point| p.iter().zip(self.centre).map(|(x, c)| (x - c).powi(2)).sum::<f64>();
+        let in_diagonals = |squared: f64| squared.sqrt() / self.diagonal;
         let farthest = points.clone().map(squared).fold(0.0, f64::max);
-        let diagonals = farthest.sqrt() / self.diagonal;
-        let mut points = points;
-        (diagonals > MOST_DIAGONALS).then(|| (points.position(|p| squared(p) == farthest).unwrap_or(0), diagonals))
+        let far = if in_diagonals(farthest) > MOST {
+            let row = points.clone().position(|p| squared(p) == farthest).unwrap_or(0);
+            format!("{what} {row} lies {} diagonals of the rest pose away from it", shown(in_diagonals(farthest)))
+        } else if is_first && in_diagonals(farthest) > MOST_AT_FIRST {
+            let mut all: Vec<f64> = points.map(squared).collect();
+            let middle = all.len() / 2;
+            let (_, median, _) = all.select_nth_unstable_by(middle, f64::total_cmp);
+            let diagonals = Some(in_diagonals(*median)).filter(|&diagonals| diagonals > MOST_AT_FIRST)?;
+            format!("its first frame lies {} diagonals of the rest pose away from it", shown(diagonals))
+        } else {
+            return None;
+        };
+        Some(format!(
+            "frame {frame}: {far}; send little-endian f32 in the units of the rest pose, and a rest pose that is where the capture begins"
+        ))
     }
 }
 
-/// What is wrong with such a frame: its `what`, such as a point, `row` lies so many diagonals away.
-pub(crate) fn too_far(frame: impl std::fmt::Display, what: &str, row: usize, diagonals: f64) -> String {
-    let distance = if diagonals < 1e6 { format!("{diagonals:.0}") } else { format!("{diagonals:.1e}") };
-    format!(
-        "frame {frame}: {what} {row} lies {distance} diagonals of the rest pose away from it, and {MOST_DIAGONALS} are the most; send little-endian f32 in the units of the rest pose, and a capture that travels so far nearer to it"
-    )
+fn shown(diagonals: f64) -> String {
+    if diagonals < 1e6 { format!("{diagonals:.0}") } else { format!("{diagonals:.1e}") }
 }
 
 #[cfg(test)]
@@ -42,13 +60,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn frames_may_travel_but_not_hundreds_of_diagonals() {
-        let rest = [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]];
+    fn a_capture_begins_near_its_rest_pose_and_travels_on_from_there() {
+        let rest = [[1.0, 0.0, 0.0], [1.5, 0.0, 0.0], [2.0, 0.0, 0.0]];
         let reach = Reach::around(&rest, 1.0);
-        let moved = |by: f64| rest.map(|[x, y, z]| [x + by, y, z]);
-        assert_eq!(reach.beyond(moved(99.0).into_iter()), None);
-        let (row, diagonals) = reach.beyond(moved(300.0).into_iter()).expect("too far");
-        assert!((row, diagonals) == (1, 300.5), "{row} {diagonals}");
-        assert!(reach.beyond([[1.5, 0.0, 0.0], [0.0, f64::MAX, 0.0]].into_iter()).is_some());
+        let moved = |by: f64| rest.map(|[x, y, z]| [x + by, y, z]).into_iter();
+        assert_eq!(reach.refusal(0, true, "point", moved(99.0)), None);
+        assert_eq!(reach.refusal(9, false, "point", moved(5000.0)), None);
+        let said = reach.refusal(0, true, "point", moved(300.0)).expect("too far");
+        assert!(said.starts_with("frame 0: its first frame lies 300 diagonals"), "{said}");
+        // One stray point is no reason.
+        let stray = [rest[0], rest[1], [0.0, 300.0, 0.0]];
+        assert_eq!(reach.refusal(0, true, "point", stray.into_iter()), None);
+        let said = reach.refusal(7, false, "point", [rest[0], [0.0, 1e30, 0.0]].into_iter()).expect("too far");
+        assert!(said.starts_with("frame 7: point 1 lies 1.0e30 diagonals"), "{said}");
+        assert!(reach.refusal(7, false, "point", [rest[0], [0.0, f64::MAX, 0.0]].into_iter()).is_some());
     }
 }

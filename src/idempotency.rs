@@ -180,12 +180,22 @@ impl Requests {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use cager_proto::cage_messages::CageOptions;
+    use cager_proto::messages::SessionOptions;
 
     #[test]
     fn a_fingerprint_is_what_was_sent_whatever_the_version_of_the_solver() {
         let parts: [&[u8]; 2] = [b"rest", b"cage"];
-        let request = request(Some("key".to_owned()), parts, &serde_json::json!({"lambda": 0.5})).expect("a key");
-        // Keys outlive upgrades: with another value here, a request repeated after one would be refused as another.
-        assert_eq!(request.fingerprint, "sent-d43d828b855e62a4a92c492ee98d8dcf9a30c108854433965115b45190fe5dff");
+        let of = |options: &dyn Fn() -> Option<Idempotency>| options().expect("a key").fingerprint;
+        let key = || Some("key".to_owned());
+        let some = SessionOptions { lambda: Some(0.5), ..SessionOptions::default() };
+        // Keys outlive upgrades: with other values here, a request repeated after one would be refused as another.
+        let defaults = "sent-d4852dca7117667e1b9a86586b926fb4a3680ffad2b05cb61e46935835c475a6";
+        assert_eq!(of(&|| request(key(), parts, &SessionOptions::default())), defaults);
+        assert_eq!(of(&|| request(key(), parts, &CageOptions::default())), defaults);
+        assert_eq!(
+            of(&|| request(key(), parts, &some)),
+            "sent-d43d828b855e62a4a92c492ee98d8dcf9a30c108854433965115b45190fe5dff"
+        );
     }
 }

@@ -58,6 +58,7 @@ impl Client {
         let key = new.idempotency_key.clone().unwrap_or_else(random_key);
         let options = serde_json::to_string(&new.options)
             .map_err(|error| ClientError::Mismatch(format!("the options: {error}")))?;
+        let bytes = (new.rest.bytes.len() + new.frames.bytes.len()) as u64;
         self.retrying(|| async {
             let sent = Arc::new(AtomicU64::new(0));
             let options = Part::text(options.clone()).mime_str("application/json");
@@ -67,7 +68,7 @@ impl Client {
                 .part("frames", part(&new.frames, &sent));
             let request = self.request(Method::POST, &["v1", "cages"], &[]).await?;
             let request = request.header("Idempotency-Key", &key).multipart(form);
-            let job: CageJob = json(self, self.send_counted(request, &sent).await?).await?;
+            let job: CageJob = json(self, self.send_for_work(request, &sent, bytes).await?).await?;
             Ok::<_, Failure>(job)
         })
         .await

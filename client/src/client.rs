@@ -16,6 +16,9 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 use tokio::sync::OnceCell;
 
+/// Longest wait for the answer to a request that has been sent and is worked on.
+const WORK_TIMEOUT: Duration = Duration::from_secs(3600);
+
 /// Timeout of the request that detects HTTP/2.
 const PROBE_TIMEOUT: Duration = Duration::from_secs(5);
 
@@ -164,6 +167,31 @@ impl Client {
     /// Sends a request whose body counts its bytes in `sent`; a response other than 2xx is a failure.
     pub(crate) async fn send_counted(&self, request: RequestBuilder, sent: &AtomicU64) -> Result<Response, Failure> {
         self.accept(self.with_idle_timeout(sent, request.send()).await?).await
+    }
+
+    /// As [`Self::send_counted`], of a body of `bytes` bytes whose answer takes as long as work on it: once it is sent, an answer may take
+    /// an hour.
+    pub(crate) async fn send_for_work(
+        &self,
+        request: RequestBuilder,
+        sent: &AtomicU64,
+        bytes: u64,
+    ) -> Result<Response, Failure> {
+        let mut answer = pin!(request.send());
+        let (mut before, mut working) = (0, Duration::ZERO);
+        loop {
+            if let Ok(answer) = tokio::time::timeout(self.options().idle_timeout, &mut answer).await {
+                return self.accept(answer).await;
+            }
+            let now = sent.load(Ordering::Relaxed);
+            if now >= bytes {
+                working += self.options().idle_timeout;
+            }
+            if (now == before && now < bytes) || working >= WORK_TIMEOUT {
+                return Err(self.stalled());
+            }
+            before = now;
+        }
     }
 
     /// Converts a network error or a response other than 2xx into a failure.

@@ -70,6 +70,8 @@ impl Client {
         let key = new.idempotency_key.clone().unwrap_or_else(random_key);
         let options = serde_json::to_string(&new.options)
             .map_err(|error| ClientError::Mismatch(format!("the options: {error}")))?;
+        let files = [Some(&new.rest), new.cage.as_ref(), new.regularizer_matrix.as_ref()];
+        let bytes = files.into_iter().flatten().map(|file| file.bytes.len() as u64).sum();
         self.retrying(|| async {
             let sent = Arc::new(AtomicU64::new(0));
             let options = Part::text(options.clone()).mime_str("application/json");
@@ -84,7 +86,8 @@ impl Client {
             }
             let request = self.request(Method::POST, &["v1", "sessions"], &[]).await?;
             let request = request.header("Idempotency-Key", &key).multipart(form);
-            let session: Session = json(self, self.send_counted(request, &sent).await?).await?;
+            // The answer comes when a cage is made, where none was sent.
+            let session: Session = json(self, self.send_for_work(request, &sent, bytes).await?).await?;
             Ok::<_, Failure>(session)
         })
         .await

@@ -4,7 +4,7 @@ use super::{CageJob, Finished, Outcome, Phase, options, samples};
 use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::config::ServeConfig;
-use crate::far_frames::{Reach, too_far};
+use crate::far_frames::Reach;
 use crate::idempotency::{extension, made_before, once, request};
 use crate::preparation::{check_extent, read_part};
 use crate::problem::{self, ApiError};
@@ -275,11 +275,12 @@ fn check(new: &NewCageJob, tenant: &str, max_seconds: u64, max_bytes: u64) -> Re
     }
     let mut far = None;
     samples::read(&mut *reader, count, |frame, points| {
-        far = far.or_else(|| Some((frame, reach.beyond(points.as_chunks::<3>().0.iter().copied())?)));
+        let positions = points.as_chunks::<3>().0.iter().copied();
+        far = far.take().or_else(|| Some((frame, reach.refusal(frame, frame == 0, "point", positions)?)));
     })?;
-    if let Some((frame, (row, diagonals))) = far {
-        let error = ApiError::new(problem::INVALID_FRAME, too_far(frame, "point", row, diagonals));
-        return Err(error.frame(u32::try_from(frame).unwrap_or(u32::MAX)));
+    if let Some((frame, detail)) = far {
+        let frame = u32::try_from(frame).unwrap_or(u32::MAX);
+        return Err(ApiError::new(problem::INVALID_FRAME, detail).frame(frame));
     }
     let key = ContentKey::of([
         format!("cage design {design:?} {points} {frame_count} {count}").as_bytes(),

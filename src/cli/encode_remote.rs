@@ -20,6 +20,9 @@ use cager_proto::container::{ContainerReader, ContainerWriter, counted_from_zero
 use std::io::{BufReader, BufWriter};
 use std::time::Instant;
 
+/// Bytes of an origin in a container, rather too many.
+const ORIGIN_BYTES: u64 = 128;
+
 /// The files are read and the options checked here as well, so that what is wrong with them is told before anything is sent, in
 /// words that name them.
 pub(super) fn run(
@@ -59,7 +62,7 @@ pub(super) fn run(
     let token = args.token.clone().or_else(|| std::env::var("CAGER_TOKEN").ok()).filter(|token| !token.is_empty());
     // As it was read: welded and turned around.
     let moved_cage = cage.filter(|_| files.origin.is_some()).map(|cage| MeshFile::new("cage.obj", cage_obj(cage)));
-    let options = SessionOptions {
+    let mut options = SessionOptions {
         name: args
             .output
             .file_stem()
@@ -76,6 +79,10 @@ pub(super) fn run(
         frames: frames.frames(),
         ..coding_options(goal(args, rest, frames.frames().unwrap_or(1) as usize)?, args.coding.exact_rest)
     };
+    // A service does not know of the origin, which is added to what it sends.
+    if files.origin.is_some() {
+        options.target_size = options.target_size.map(|bytes| bytes.saturating_sub(ORIGIN_BYTES));
+    }
     // Here, since a service designs before it sees what the frames cost.
     let clock_size = Instant::now();
     let design = match cage {

@@ -40,7 +40,7 @@ pub(crate) async fn get(
 
 fn sent(session: &Session, first: u32) -> Result<Sent, ApiError> {
     let [rest, cage, matrix] = session.files()?;
-    let options = session.meta.options.clone();
+    let options = session.sent_options()?;
     let has_sent_cage = options.cage.is_none() && session.meta.made_cage.is_none();
     let (frames, next) = {
         let known = session.frames();

@@ -20,8 +20,15 @@ pub(super) async fn check(
     frames: &mut impl FrameSource,
 ) -> Result<(), RemoteError> {
     let ready = client.wait_ready(session, READY_TIMEOUT).await?;
-    let sent = client.sent(session).await?;
     let differs = |what| RemoteError::Different(Difference { session: session.to_owned(), what });
+    let sent = match client.sent(session).await {
+        // The session is there, so that it is the address that is not.
+        Err(error) if error.status() == Some(404) => {
+            let what = "the service is of an earlier version, which cannot tell what a session was sent";
+            return Err(differs(what.to_owned()));
+        }
+        sent => sent?,
+    };
     if let Some(what) = different_files(&sent, new) {
         return Err(differs(what));
     }

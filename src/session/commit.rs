@@ -115,9 +115,11 @@ impl Session {
             self.give_up(solved, &ApiError::new(problem::SESSION_FAILED, problem.detail));
             return;
         }
+        let mut found = 0;
         let outcome = self.open_log(&mut log).and_then(|log| {
             // Opening the log may have found some of these frames on disk; they are not written again.
             records.retain(|record| self.frames().adds_information(&record.entry));
+            found = (solved.len() - records.len()) as u64;
             // First what has to be coded: a frame that the log has, has been posted as its digest there says.
             let posted: Vec<(u32, &[u8])> = solved
                 .iter()
@@ -136,6 +138,8 @@ impl Session {
         drop(log);
         match outcome {
             Ok(entries) => {
+                // These were counted when they were found.
+                self.bytes.fetch_sub(found * self.stored_frame_bytes(), Relaxed);
                 let measured = entries.iter().filter(|entry| entry.full_digest.is_some()).count();
                 for (rows, count) in [("all", measured), ("handles", entries.len() - measured)] {
                     metrics::counter!("cager_frames_total", "tenant" => self.meta.tenant.clone(), "rows" => rows)
@@ -154,6 +158,14 @@ impl Session {
             }
         }
         self.touch();
+    }
+
+    /// Bytes on disk of a frame, about.
+    pub(super) fn stored_frame_bytes(&self) -> u64 {
+        self.facts().map_or(0, |facts| {
+            let posted = if self.goal().is_some() { 12 * facts.points as usize } else { 0 };
+            frame_bytes(facts.unknowns as usize, posted)
+        })
     }
 
     /// In sessions whose frames depend on their predecessors, returns the frames up to the first one whose predecessor is not written, and

@@ -7,12 +7,12 @@ use crate::coding::{CodingError, Goal};
 use crate::preparation::{self, Choices, Geometry, Prepared, cannot_be_coded};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{Completion, StoreError, StoredPart};
+use crate::store::{Completion, SessionMeta, StoreError, StoredPart};
 use crate::tasks::{blocking, to_the_end};
 use crate::telemetry::traces::TraceSpan;
 use crate::webhooks::{Event, PendingMessage, Webhooks};
 use cager_core::cage::Cage;
-use cager_proto::messages::Complete;
+use cager_proto::messages::{Complete, SessionOptions};
 use opentelemetry::Context;
 use std::io::{self, BufWriter, Write};
 use std::sync::Arc;
@@ -246,6 +246,15 @@ impl Session {
     pub(crate) fn files(&self) -> Result<[Option<StoredPart>; 3], ApiError> {
         let files = self.store.content_parts(&self.meta.key).map_err(|error| self.storage_error(error))?;
         files.ok_or_else(|| self.missing_content_error())
+    }
+
+    /// Its options as they were sent: what an earlier version meant by those that were left out is not among them. Blocks.
+    ///
+    /// # Errors
+    /// Storage errors.
+    pub(crate) fn sent_options(&self) -> Result<SessionOptions, ApiError> {
+        let stored = self.store.reload_meta::<SessionMeta>(&self.meta.id).map_err(|error| self.storage_error(error))?;
+        Ok(stored.map_or_else(|| self.meta.options.clone(), |meta| meta.options))
     }
 
     fn missing_content_error(&self) -> ApiError {

@@ -12,7 +12,7 @@ use crate::idempotency::{extension, made_before, once, request};
 use crate::preparation::{self, Choices, Geometry, Prepared, SolverRequest, SolverResponse, content_key};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{Content, ContentKey, Idempotency, Kind, SessionMeta};
+use crate::store::{Content, ContentKey, Idempotency, Kind, NamedFile, SessionMeta, StoredPart};
 use crate::tasks::{blocking, to_the_end};
 use crate::webhooks::Event;
 use cager_proto::messages::{CacheUse, PreparationSeconds, SessionOptions};
@@ -57,7 +57,8 @@ impl Service {
             (uploaded, options, request)
         })
         .await?;
-        let may_be = |session: &Session| session.meta.options == options;
+        // Few files, and only for keys of earlier versions.
+        let may_be = |session: &Session| session.is_of(&uploaded, &options);
         if let Some(made) = made_before(&self.registry, &tenant.name, request.as_ref(), may_be)? {
             return Ok(made);
         }
@@ -316,6 +317,20 @@ impl Service {
             }
         }
         Ok(())
+    }
+}
+
+impl Session {
+    /// Whether it was made of these files and options, as far as that can be told. Blocks.
+    fn is_of(&self, uploaded: &Uploaded, options: &SessionOptions) -> bool {
+        let (Ok(sent), Ok(files)) = (self.sent_options(), self.files()) else { return false };
+        let given = [Some(&uploaded.rest), uploaded.cage.as_ref(), uploaded.matrix.as_ref()];
+        let is_same = |(there, given): (&Option<StoredPart>, Option<&NamedFile>)| match (there, given) {
+            (Some(there), Some(given)) => *there == StoredPart::of(&there.name, &given.bytes),
+            // Without a cage, it was made here.
+            (_, given) => given.is_none(),
+        };
+        sent == *options && files.iter().zip(given).all(is_same)
     }
 }
 

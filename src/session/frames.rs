@@ -248,6 +248,11 @@ impl Frames {
         self.solved_count() + self.pending.keys().filter(|frame| !self.solved.contains_key(frame)).count() as u64
     }
 
+    /// Whether no frame is solved or being solved.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.solved.is_empty() && self.pending.is_empty()
+    }
+
     /// The highest solved frame.
     pub(crate) fn highest(&self) -> Option<u32> {
         self.solved.last_key_value().map(|(frame, _)| *frame)

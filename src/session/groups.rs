@@ -144,8 +144,12 @@ impl Session {
         if self.goal.is_none() {
             return Ok(());
         }
-        // In doubt there is one: what belongs to a completion must not be lost.
-        let is_marked = !matches!(self.store.completion(&self.meta.id), Ok(None));
+        let is_marked = match self.store.completion(&self.meta.id) {
+            Ok(mark) => mark.is_some(),
+            // What belongs to a completion must not be lost with its mark.
+            Err(StoreError::Damaged { .. }) => true,
+            Err(error) => return Err(error),
+        };
         let mut found = Groups::default();
         while self.declared().is_none_or(|declared| found.frames() < declared) {
             let first = found.frames();

@@ -272,6 +272,10 @@ impl Session {
         // In a log that was loaded before, new entries are frames that reached the disk although their append reported an error.
         let mut frames = self.frames();
         let new: Vec<LogEntry> = entries.into_iter().filter(|e| frames.adds_information(e)).collect();
+        if self.loaded.load(Ordering::Acquire) {
+            // The append that failed has taken them off the count.
+            self.bytes.fetch_add(new.len() as u64 * self.stored_frame_bytes(), Ordering::Relaxed);
+        }
         for entry in new {
             let same = frames.matches_pending(&entry);
             for upload in frames.solved(entry) {

@@ -52,7 +52,8 @@ impl Service {
         room.extend(bytes, |usage| self.bytes_allowed(tenant, self.with_cage_jobs(tenant, usage).1, bytes))
     }
 
-    /// Reserves quota for the next frames of an upload, `bytes` bytes each: for `most` of them, or as many as there is room for.
+    /// Reserves quota for the next frames of an upload, `bytes` bytes each: for `most` of them, or for an eighth of those that there is room
+    /// for, since others may need the rest.
     ///
     /// # Errors
     /// There is no room for one.
@@ -61,7 +62,7 @@ impl Service {
             let (_, used) = self.with_cage_jobs(tenant, usage);
             self.bytes_allowed(tenant, used, bytes)?;
             let room = (tenant.limits.max_bytes - used) / bytes.max(1);
-            Ok(bytes * room.min(most))
+            Ok(bytes * (room / 8).clamp(1, most))
         })
     }
 

@@ -5,7 +5,6 @@ use super::commit::SolvedFrame;
 use super::frames::{Claim, Digests};
 use super::upload::{FrameJob, Rows};
 use crate::capture::StoredError;
-use crate::far_frames::too_far;
 use crate::preparation::Prepared;
 use crate::problem::{self, ApiError};
 use crate::sync::lock;
@@ -47,8 +46,8 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
             job.refuse(problem::INVALID_FRAME, detail);
             continue;
         }
-        if let Some((row, diagonals)) = prepared.reach.beyond(points(&job.bytes)) {
-            let detail = too_far(job.frame, what, row, diagonals);
+        let is_first = job.frame == 0 || session.frames().is_empty();
+        if let Some(detail) = prepared.reach.refusal(job.frame, is_first, what, points(&job.bytes)) {
             job.refuse(problem::INVALID_FRAME, detail);
             continue;
         }

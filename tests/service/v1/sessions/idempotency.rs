@@ -121,4 +121,6 @@ async fn a_key_of_a_version_with_other_fingerprints_still_answers() {
     assert_eq!(app.create_with(form(capture, &json!({})), Some("k")).await.is::<Session>(201).id, first.id);
     let other = form(capture, &json!({"lambda": 2.0}));
     app.create_with(other, Some("k")).await.problem(422, "idempotency-key-reused");
+    let other = form(Capture::small(), &json!({}));
+    app.create_with(other, Some("k")).await.problem(422, "idempotency-key-reused");
 }

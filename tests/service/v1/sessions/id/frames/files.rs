@@ -86,7 +86,7 @@ async fn numbers_that_look_like_a_file_can_be_posted_as_frame_records() {
 }
 
 #[tokio::test]
-async fn a_frame_hundreds_of_diagonals_away_is_refused_with_its_number_and_distance() {
+async fn a_first_frame_hundreds_of_diagonals_away_is_refused_with_its_number_and_distance() {
     let app = TestApp::start();
     let capture = Capture::small();
     let session = app.ready(capture).await;
@@ -120,9 +120,20 @@ async fn a_frame_hundreds_of_diagonals_away_is_refused_with_its_number_and_dista
     let reply = app.post(&format!("{path}?first=0"), OCTETS, body).await;
     assert!(reply.text().lines().last().expect("a line").contains("frame 2: point"), "{}", reply.text());
     assert!(app.errors(&session.id).await.iter().all(|result| result.frame < 2));
-    // Captures travel.
-    app.upload(&session.id, 5, raw(&moved(5, 40.0 * diagonal))).await;
     assert_eq!(app.upload(&session.id, 2, capture.raw(2..3)).await.len(), 1, "the right frame can still come");
+    // Captures travel, and fragments fly away; what is no position is refused in any frame.
+    app.upload(&session.id, 5, raw(&moved(5, 150.0 * diagonal))).await;
+    let mut stray = capture.frames[6].clone();
+    stray[7] += 400.0 * diagonal;
+    app.upload(&session.id, 6, raw(&stray)).await;
+    stray[7] = 1e30;
+    let problem = app.post(&format!("{path}?first=7"), OCTETS, raw(&stray)).await.problem(422, "invalid-frame");
+    assert!(problem.detail.starts_with("frame 7: point 2 lies "), "{}", problem.detail);
+    // A first frame with one stray point.
+    let other = app.ready(capture).await;
+    let mut stray = capture.frames[0].clone();
+    stray[7] += 400.0 * diagonal;
+    app.upload(&other.id, 0, raw(&stray)).await;
 }
 
 #[tokio::test]
@@ -130,8 +141,8 @@ async fn a_design_is_refused_frames_hundreds_of_diagonals_away() {
     let app = TestApp::start();
     let capture = Capture::tiny();
     let far: Vec<u8> = capture.frames[1].iter().flat_map(|x| (x * 1000.0).to_le_bytes()).collect();
-    let frames = [capture.frame(0), far].concat();
+    let frames = [far, capture.frame(0)].concat();
     let form = cage_form_of(&capture.rest.obj, "frames.f32", &frames, &json!({"frames": 2}));
     let problem = app.design_with(form, None).await.problem(422, "invalid-frame");
-    assert!(problem.frame == Some(1) && problem.detail.contains("diagonals"), "{}", problem.detail);
+    assert!(problem.frame == Some(0) && problem.detail.contains("diagonals"), "{}", problem.detail);
 }
