@@ -4,12 +4,12 @@
 use super::faces::FaceComparison;
 use super::{UNITS, factor, neighbours, quartiles};
 use cager_core::mesh::{Model, Point, Polygons};
-use cager_core::vector::{distance, mean, sub};
+use cager_core::vector::{distance, sub};
 use std::fmt;
 
-/// Edges compared, and points looked at beside their ends.
+/// Edges compared, and points looked at beside their ends, at the most.
 const EDGES: usize = 256;
-const POINTS: usize = 2_048;
+const POINTS: usize = 1 << 16;
 
 /// An edge is torn where it is this many times longer than before, for the size of its model.
 const TORN: f64 = 2.5;
@@ -106,7 +106,7 @@ struct Sketch {
     /// Points spread over the model's numbering.
     points: Vec<Point>,
     centre: Point,
-    /// Root mean square distance of those from their centre.
+    /// Median distance of the ends from their centre.
     radius: f64,
 }
 
@@ -116,10 +116,12 @@ impl Sketch {
         let ends: Vec<[Point; 2]> = edges.iter().map(|edge| edge.map(|end| pose[end as usize])).collect();
         let lengths = ends.iter().map(|&[a, b]| distance(a, b)).collect();
         let points: Vec<Point> = pose.iter().step_by(pose.len().div_ceil(POINTS).max(1)).copied().collect();
-        let centre = mean(&points);
-        let squares = points.iter().map(|&p| distance(p, centre).powi(2));
-        let radius = (squares.sum::<f64>() / points.len() as f64).sqrt();
-        (radius.is_finite() && radius > 0.0).then_some(Self { ends, lengths, points, centre, radius })
+        // Medians, which some points far away do not move.
+        let all = ends.as_flattened();
+        let median = |value: &dyn Fn(&Point) -> f64| Some(quartiles(all.iter().map(value).collect())?[1]);
+        let centre = [median(&|p| p[0])?, median(&|p| p[1])?, median(&|p| p[2])?];
+        let radius = median(&|&p| distance(p, centre))?;
+        (radius > 0.0).then_some(Self { ends, lengths, points, centre, radius })
     }
 
     /// A jump of all edges and of the extent alike by the ratio of two units, away from the rest pose's size. Growth takes several
@@ -139,25 +141,33 @@ impl Sketch {
 
     /// Edges are torn although their ends lie where other points of the model were: where points fly apart, they lie where none was.
     fn in_another_order(&self, previous: &Self, rest: &Self) -> Option<Departure> {
-        let relative = |sketch: &Self, k: usize| sketch.lengths[k] / sketch.radius;
-        let ratio = |k: usize| relative(self, k) / relative(previous, k).max(relative(rest, k));
-        let torn: Vec<usize> = (0..self.lengths.len()).filter(|&k| ratio(k) > TORN).collect();
-        if torn.len() < 8.max(self.lengths.len() / 20) {
+        let torn = self.torn(previous, rest);
+        let least = 8.max(self.lengths.len() / 20);
+        if torn.len() < least {
             return None;
         }
-        let [_, times, _] = quartiles(torn.iter().map(|&k| ratio(k)).collect())?;
-        [previous, rest]
-            .into_iter()
-            .any(|before| self.exchanges_points(before, &torn))
-            .then_some(Departure::Order(times))
+        let [_, times, _] = quartiles(torn.iter().map(|(_, ratio)| *ratio).collect())?;
+        // From one frame to the next points go less far than from the rest pose; but one that is torn itself says nothing.
+        let is_whole = previous.torn(rest, rest).len() < least;
+        let exchanged =
+            is_whole && self.exchanges_points(previous, &torn, 0.03) || self.exchanges_points(rest, &torn, 0.2);
+        exchanged.then_some(Departure::Order(times))
     }
 
-    fn exchanges_points(&self, before: &Self, torn: &[usize]) -> bool {
+    /// The edges that are torn in comparison with two other poses, and how many times longer they are.
+    fn torn(&self, one: &Self, other: &Self) -> Vec<(usize, f64)> {
+        let relative = |sketch: &Self, k: usize| sketch.lengths[k] / sketch.radius;
+        let ratio = |k: usize| relative(self, k) / relative(one, k).max(relative(other, k));
+        (0..self.lengths.len()).map(|k| (k, ratio(k))).filter(|(_, ratio)| *ratio > TORN).collect()
+    }
+
+    /// Whether the ends of torn edges, at least so far from where they were, are where other points were.
+    fn exchanges_points(&self, before: &Self, torn: &[(usize, f64)], least: f64) -> bool {
         let place = |sketch: &Self, p: Point| sub(p, sketch.centre).map(|x| x / sketch.radius);
         let set: Vec<Point> = before.points.iter().map(|&p| place(before, p)).collect();
         let stride = torn.len().div_ceil(48).max(1);
         let (mut own, mut nearest) = (Vec::new(), Vec::new());
-        for &k in torn.iter().step_by(stride) {
+        for &(k, _) in torn.iter().step_by(stride) {
             for end in 0..2 {
                 let now = place(self, self.ends[k][end]);
                 own.push(distance(now, place(before, before.ends[k][end])));
@@ -165,7 +175,7 @@ impl Sketch {
             }
         }
         let (Some([_, own, _]), Some([_, nearest, _])) = (quartiles(own), quartiles(nearest)) else { return false };
-        own > 0.2 && nearest < 0.15 * own
+        own > least && nearest < 0.15 * own
     }
 }
 

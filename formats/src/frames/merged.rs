@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use cager_core::mesh::{Model, Polygons};
 
 use crate::error::{Error, Fault};
-use crate::mesh::{MeshFormat, read_frame_file};
+use crate::mesh::{MeshFormat, read_model};
 
 /// Files in which the merging of the rest pose is looked for.
 const LOOKED_AT: usize = 16;
@@ -31,7 +31,7 @@ impl Merged {
         }
         let as_at_rest = |model: &Model| (model.points.len() == points).then(|| model.faces.clone());
         if self.0.is_none() {
-            let others = || files.iter().take(LOOKED_AT).filter_map(|file| read_frame_file(file).ok());
+            let others = || files.iter().take(LOOKED_AT).filter_map(|file| read_model(file).ok());
             self.0 = as_at_rest(&model).or_else(|| others().find_map(|other| as_at_rest(&other)));
         }
         let Some(faces) = self.0.as_ref().filter(|faces| faces.arities() == model.faces.arities()) else {

@@ -8,7 +8,7 @@ use super::merged::Merged;
 use super::names::Sequence;
 use super::{FrameReader, cut, single};
 use crate::error::{Error, Fault};
-use crate::mesh::{MeshFormat, read_frame_file};
+use crate::mesh::{FrameFaces, MeshFormat, read_frame_file};
 
 /// Reads the positions; the faces may differ from those of the rest pose, and are kept to be compared.
 pub(super) struct SequenceReader {
@@ -19,14 +19,14 @@ pub(super) struct SequenceReader {
     /// Whether the last line of the text read last has an end, with its frame and file.
     before: Option<(bool, usize, PathBuf)>,
     /// Of the frame that was read last; none where its file has none that can be read.
-    faces: Polygons,
+    faces: FrameFaces,
     merged: Merged,
 }
 
 impl SequenceReader {
     /// `notes` are what the user should know of the choice of these files.
     pub(super) fn new(sequence: Sequence, points: usize, notes: Vec<String>) -> Self {
-        Self { sequence, points, notes, next: 0, before: None, faces: Polygons::new(), merged: Merged::default() }
+        Self { sequence, points, notes, next: 0, before: None, faces: FrameFaces::default(), merged: Merged::default() }
     }
 
     fn read_array(&self, path: &Path, out: &mut Vec<f64>) -> Result<(), Error> {
@@ -51,7 +51,7 @@ impl SequenceReader {
 
     fn read_mesh(&mut self, path: &Path, out: &mut Vec<f64>) -> Result<(), Error> {
         let frame = self.next;
-        let model = read_frame_file(path)
+        let model = read_frame_file(path, &mut self.faces)
             .and_then(|model| self.merged.apply(model, path, &self.sequence.files, self.points))
             .map_err(|error| error.in_frame(frame))?;
         let whole = cut::last_line_ends(path).map_err(|cause| Error::read(path, cause))?;
@@ -73,7 +73,7 @@ impl SequenceReader {
             }
         }
         out.extend_from_slice(model.points.as_flattened());
-        self.faces = model.faces;
+        self.faces.faces = model.faces;
         Ok(())
     }
 }
@@ -97,7 +97,7 @@ impl FrameReader for SequenceReader {
     }
 
     fn mesh(&self) -> Option<(&Path, &Polygons)> {
-        Some((self.sequence.files.get(self.next.checked_sub(1)?)?, &self.faces))
+        Some((self.sequence.files.get(self.next.checked_sub(1)?)?, &self.faces.faces))
     }
 
     fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error> {
@@ -109,7 +109,7 @@ impl FrameReader for SequenceReader {
             self.read_mesh(&path, out)?;
         } else {
             self.read_array(&path, out)?;
-            self.faces = Polygons::new();
+            self.faces = FrameFaces::default();
         }
         self.next += 1;
         Ok(true)

@@ -11,7 +11,7 @@ mod write;
 use std::fs;
 use std::path::Path;
 
-use cager_core::mesh::Model;
+use cager_core::mesh::{Model, Polygons};
 
 use crate::error::{Error, Fault};
 use crate::signature::Signature;
@@ -124,15 +124,35 @@ pub(crate) enum Contents {
     Points,
 }
 
-/// A frame of a capture: its points, and its faces where nothing is wrong with them, since a frame needs none.
-pub(crate) fn read_frame_file(path: &Path) -> Result<Model, Error> {
-    let parsed = parse_file(path, Contents::PointsAndFaces).or_else(|_| parse_file(path, Contents::Points));
-    parsed.map(|parsed| parsed.model)
+/// The faces of the file of a frame, and the text that they are in: most frames have the same ones, which are then not parsed again.
+#[derive(Default)]
+pub(crate) struct FrameFaces {
+    pub(crate) faces: Polygons,
+    /// From the first face of an `.obj` file on; empty for other formats.
+    text: Vec<u8>,
+}
+
+/// A frame of a capture: its points, and its faces where nothing is wrong with them, since a frame needs none. They are taken from `known` where they
+/// are the same; the caller puts them there again.
+pub(crate) fn read_frame_file(path: &Path, known: &mut FrameFaces) -> Result<Model, Error> {
+    let (format, bytes) = read_named(path)?;
+    let read = |contents| read_bytes(format, path, &bytes, contents).map(|parsed| parsed.model);
+    if !known.text.is_empty() && bytes.ends_with(&known.text) {
+        return Ok(Model { faces: std::mem::take(&mut known.faces), ..read(Contents::Points)? });
+    }
+    let model = read(Contents::PointsAndFaces).or_else(|_| read(Contents::Points))?;
+    let first = bytes.windows(3).position(|start| start == b"\nf ").filter(|_| format == MeshFormat::Obj);
+    known.text = first.map_or_else(Vec::new, |first| bytes[first..].to_vec());
+    Ok(model)
+}
+
+fn read_named(path: &Path) -> Result<(MeshFormat, Vec<u8>), Error> {
+    let format = MeshFormat::from_path(path)?;
+    Ok((format, fs::read(path).map_err(|cause| Error::read(path, cause))?))
 }
 
 fn parse_file(path: &Path, contents: Contents) -> Result<Parsed, Error> {
-    let format = MeshFormat::from_path(path)?;
-    let bytes = fs::read(path).map_err(|cause| Error::read(path, cause))?;
+    let (format, bytes) = read_named(path)?;
     read_bytes(format, path, &bytes, contents)
 }
 
