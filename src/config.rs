@@ -240,6 +240,8 @@ impl ServeConfig {
             write_timeout: Duration::from_secs(self.write_timeout_s),
             drain_timeout: Duration::from_secs(self.drain_timeout_s),
             max_connections: self.max_connections,
+            // What waits for a slow reader takes from nobody where there is one tenant.
+            paced_readers: self.is_guarded(),
             max_per_address: match self.max_connections_per_address {
                 _ if !self.is_guarded() => usize::MAX,
                 0 => (self.max_connections / 4).max(1),

@@ -308,17 +308,23 @@ impl Service {
         if self.streams.held_by(&tenant.name) >= most {
             return Err(too_many());
         }
-        // Nothing is taken yet: the stream's frames take their places as they come.
-        drop(self.queued_frames.try_take(&tenant.name, 1).map_err(|full| {
-            self.rejected("queue");
-            full.refusal("room for frames that wait")
-        })?);
         let place = self.streams.try_take(&tenant.name, 1).map_err(|full| {
             self.rejected("streams");
             full.refusal("streams")
         })?;
         // A concurrent request may have exceeded the limit.
         if self.streams.held_by(&tenant.name) > most { Err(too_many()) } else { Ok(place) }
+    }
+
+    /// Refuses a stream of frames or cages that would find no room to wait for its turn. Nothing is taken yet: they take their places as they come.
+    ///
+    /// # Errors
+    /// 429 if the tenant has its share, 503 if others hold the rest.
+    pub(crate) fn check_queue(&self, tenant: &Tenant) -> Result<(), ApiError> {
+        self.queued_frames.try_take(&tenant.name, 1).map(drop).map_err(|full| {
+            self.rejected("queue");
+            full.refusal("room for frames that wait")
+        })
     }
 
     /// Grows the memory permit of an upload to `bytes` bytes.

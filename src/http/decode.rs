@@ -61,6 +61,7 @@ pub(crate) async fn post(
             return Err(ApiError::new(problem::MEDIA_TYPE, detail));
         }
     };
+    service.check_queue(&tenant)?;
     let place = service.stream(&tenant)?;
     let facts = prepared(&service, &session).await?;
     let (model, cages) = if with_model {

@@ -1,13 +1,14 @@
 //! `/healthz`, `/readyz` and `/metrics`: answered outside all limits.
 
 use super::extract::granted;
+use super::listen::ConnectionHandle;
 use crate::auth::Scope;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::telemetry;
-use axum::Json;
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};
+use axum::{Extension, Json};
 use http::{HeaderMap, header};
 use serde::Serialize;
 use std::sync::Arc;
@@ -50,11 +51,21 @@ pub(crate) async fn ready(State(service): State<Arc<Service>>) -> Result<Json<He
     get, path = "/metrics", operation_id = "get_metrics", tag = "operation",
     responses((status = 200, description = "Metrics", content_type = "text/plain", body = String)),
 )]
-pub(crate) async fn metrics(State(service): State<Arc<Service>>, headers: HeaderMap) -> Result<Response, ApiError> {
-    if service.access.is_guarded() && granted(&service, &headers).await?.scope < Scope::Admin {
-        service.rejected("scope");
-        let detail = "metrics name tenants: use a token whose scope is admin, or the operators' listener";
-        return Err(ApiError::new(problem::FORBIDDEN, detail));
+pub(crate) async fn metrics(
+    State(service): State<Arc<Service>>,
+    connection: Option<Extension<ConnectionHandle>>,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    if service.access.is_guarded() {
+        let grant = granted(&service, &headers).await?;
+        if let Some(Extension(connection)) = connection {
+            connection.caller_is_known();
+        }
+        if grant.scope < Scope::Admin {
+            service.rejected("scope");
+            let detail = "metrics name tenants: use a token whose scope is admin, or the operators' listener";
+            return Err(ApiError::new(problem::FORBIDDEN, detail));
+        }
     }
     Ok(operators_metrics(State(service)).await)
 }

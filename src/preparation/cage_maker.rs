@@ -47,7 +47,7 @@ impl CageMaker {
     }
 
     /// A cage enclosing the rest pose: one of the recent ones, one that `stored` finds by the digest of the inputs, or made now. A request
-    /// that is dropped leaves the queue, and stops the making of its cage.
+    /// that is dropped leaves the queue, and stops the making of its cage. `room` is the permit for the memory of the rest pose.
     ///
     /// # Errors
     /// A number of vertices outside [`VERTICES`]; a rest pose that cannot be enclosed.
@@ -56,13 +56,15 @@ impl CageMaker {
         tenant: &str,
         rest: NamedFile,
         vertices: Option<u32>,
+        room: &Arc<Held>,
         stored: impl AsyncFnOnce(ContentKey) -> Option<NamedFile>,
     ) -> Result<Enclosed, ApiError> {
         if let Some(vertices) = vertices.filter(|vertices| !VERTICES.contains(vertices)) {
             return Err(refuse_cage(&vertices_detail(vertices)));
         }
-        let owner = tenant.to_owned();
+        let (owner, held) = (tenant.to_owned(), Arc::clone(room));
         let (rest, made) = blocking(move || {
+            let _held = held;
             let made = digest(&owner, &rest, vertices);
             (rest, made)
         })
@@ -76,8 +78,8 @@ impl CageMaker {
         if let Some(cage) = stored(made).await {
             return Ok(Enclosed { rest, cage, made });
         }
-        let place = self.places.take(tenant, 1).await;
-        let (rest, cage) = self.make(place, rest, vertices).await?;
+        let held = (self.places.take(tenant, 1).await, Arc::clone(room));
+        let (rest, cage) = self.make(held, rest, vertices).await?;
         let cage = NamedFile { name: CAGE_NAME.to_owned(), bytes: obj_of(&cage?) };
         let mut recent = lock(&self.recent);
         recent.push_front((made, cage.clone()));
@@ -93,17 +95,18 @@ impl CageMaker {
         turn
     }
 
-    /// Makes a cage; dropping the future stops it. The place is free when the work has ended, not when nobody waits for it any more.
+    /// Makes a cage; dropping the future stops it. Its place and the memory of the rest pose are free when the work has ended, not when nobody
+    /// waits for it any more.
     async fn make(
         &self,
-        place: Held,
+        held: (Held, Arc<Held>),
         rest: NamedFile,
         vertices: Option<u32>,
     ) -> Result<(NamedFile, Result<TriMesh, ApiError>), ApiError> {
         let (pool, given_up) = (Arc::clone(&self.pool), StopOnDrop::default());
         let stopped = Arc::clone(&given_up.0);
         blocking(move || {
-            let _place = place;
+            let _held = held;
             let is_stopped = || stopped.load(Relaxed);
             let model = read_part("rest", &rest.name, &rest.bytes);
             let cage = model.and_then(|model| pool.install(|| make(&model, vertices, &is_stopped)));

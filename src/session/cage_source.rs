@@ -1,11 +1,13 @@
 //! The cage of a new session: as it was sent, designed before, or made around the rest pose.
 
+use crate::admission::Held;
 use crate::preparation::{CAGE_NAME, Enclosed, refuse_cage};
 use crate::problem::ApiError;
 use crate::service::Service;
 use crate::store::{Content, ContentKey, NamedFile};
 use crate::tasks::blocking;
 use cager_proto::messages::{CageSource, SessionOptions};
+use std::sync::Arc;
 
 /// The files of a request that creates a session.
 pub(crate) struct Uploaded {
@@ -15,7 +17,7 @@ pub(crate) struct Uploaded {
 }
 
 impl Service {
-    /// The content of a new session with its cage; and, where the cage was made here, the digest of the inputs that it was made from.
+    /// The content of a new session, whose memory `room` permits, with its cage; and, where the cage was made here, the digest of the inputs that it was made from.
     ///
     /// # Errors
     /// Options that contradict each other or the cage, a design that is unknown or not completed, a rest pose that cannot be enclosed.
@@ -24,6 +26,7 @@ impl Service {
         tenant: &str,
         uploaded: Uploaded,
         options: &SessionOptions,
+        room: &Arc<Held>,
     ) -> Result<(Content, Option<ContentKey>), ApiError> {
         let Uploaded { rest, cage, matrix } = uploaded;
         let (rest, cage, made) = match (cage, options.cage.clone()) {
@@ -42,7 +45,8 @@ impl Service {
                     // One that cannot be read is made again, whatever the reason.
                     blocking(move || store.content_cage(&key)).await.ok()?.ok()?
                 };
-                let Enclosed { rest, cage, made } = self.cage_maker.enclose(tenant, rest, vertices, stored).await?;
+                let Enclosed { rest, cage, made } =
+                    self.cage_maker.enclose(tenant, rest, vertices, room, stored).await?;
                 (rest, cage, Some(made))
             }
         };

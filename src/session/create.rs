@@ -51,6 +51,7 @@ impl Service {
         new: NewSession,
     ) -> Result<Arc<Session>, ApiError> {
         let NewSession { uploaded, options, idempotency_key, room } = new;
+        let room = Arc::new(room);
         let choices = Choices::of(&options)?;
         let (uploaded, options, request) = blocking(move || {
             let request = request_of(idempotency_key, &uploaded, &options);
@@ -62,7 +63,7 @@ impl Service {
         if let Some(made) = made_before(&self.registry, &tenant.name, request.as_ref(), may_be)? {
             return Ok(made);
         }
-        let (content, made_cage) = self.resolve_cage(&tenant.name, uploaded, &options).await?;
+        let (content, made_cage) = self.resolve_cage(&tenant.name, uploaded, &options, &room).await?;
         let (key, content) = {
             let (tenant, options) = (tenant.name.clone(), options.clone());
             blocking(move || (content_key(&tenant, &content, &options, &choices), content)).await?

@@ -112,13 +112,6 @@ impl Store {
     /// [`StoreError::Locked`] if another process uses it, or I/O errors of the folder itself. Damaged sessions are not an error.
     pub fn open(root: &Path, disk: Arc<dyn Disk>) -> Result<Opened, StoreError> {
         make_folder(&*disk, root)?;
-        // It may be so on purpose, or belong to another user: whoever made it decides.
-        if disk::is_open_to_all(root).unwrap_or(false) {
-            let folder = root.display();
-            tracing::warn!(
-                "every user of this machine may look into the data folder {folder}; close it: chmod -R go= {folder}"
-            );
-        }
         let lock_path = root.join("lock");
         let lock = disk.lock(&lock_path).map_err(|e| StoreError::of(&lock_path, "lock", e))?;
         let lock = lock.ok_or_else(|| StoreError::Locked { path: root.to_owned() })?;
@@ -126,6 +119,14 @@ impl Store {
         let kept = [&files.trash, &files.sessions, &files.cages, &files.contents, &files.prepared];
         for folder in kept.into_iter().chain([&files.quarantine, &files.tmp]) {
             make_folder(&*files.disk, folder)?;
+        }
+        // They may be so on purpose: whoever made them decides.
+        let is_open = |folder: &Path| disk::is_open_to_all(folder).unwrap_or(false);
+        if is_open(root) && [&files.sessions, &files.contents, &files.cages].into_iter().any(|folder| is_open(folder)) {
+            let folder = root.display();
+            tracing::warn!(
+                "every user of this machine may look into the data folder {folder}; close it: chmod -R o= {folder}"
+            );
         }
         // Renames that an earlier process did not live to sync are made durable before they are relied on.
         for folder in kept {

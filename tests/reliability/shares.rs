@@ -97,5 +97,10 @@ async fn frames_that_wait_for_one_tenant_leave_room_to_others() {
     sleep(Duration::from_millis(500)).await;
     // Each round begins a stream; none is turned away.
     let mut rounds = house.rounds(attack_time()).await;
+    // Nor what the other wants to see of its own session.
+    for _ in 0..5 {
+        let events = house.http.get(house.server.url(&house.path(&session, "/events"))).bearer_auth(LOUD);
+        assert_eq!(events.send().await.expect("an answer").status(), 200);
+    }
     println!("frames that wait: the quiet tenant {}", rounds.show());
 }

@@ -3,6 +3,7 @@
 use super::Limits;
 use super::connection::Shared;
 use super::idle::IdleConnections;
+use super::linger::LingeringPlaces;
 use super::peers::Peers;
 use super::socket::ConnectionResources;
 use axum::Router;
@@ -47,7 +48,7 @@ pub async fn serve(
     let mut acceptor = Acceptor {
         places: Arc::new(Semaphore::new(limits.max_connections)),
         spare_places: Arc::new(Semaphore::new(limits.spare_connections)),
-        lingering: Arc::new(Semaphore::new(limits.max_lingering)),
+        lingering: LingeringPlaces::new(limits.max_lingering),
         peers: Arc::default(),
         tracker: TaskTracker::new(),
         shared: Arc::new(Shared {
@@ -78,7 +79,7 @@ pub async fn serve(
 struct Acceptor {
     places: Arc<Semaphore>,
     spare_places: Arc<Semaphore>,
-    lingering: Arc<Semaphore>,
+    lingering: LingeringPlaces,
     peers: Arc<Peers>,
     tracker: TaskTracker,
     shared: Arc<Shared>,
@@ -106,7 +107,7 @@ impl Acceptor {
         let _ = stream.set_nodelay(true);
         let _ = socket2::SockRef::from(&stream).set_tcp_keepalive(&keep_alive(self.shared.limits.write_timeout));
         let entry = Arc::new(waiting.enter(Some(peer_place)));
-        let lingering = Arc::clone(&self.lingering);
+        let lingering = self.lingering.clone();
         let (tracker, shared) = (self.tracker.clone(), Arc::clone(&self.shared));
         self.tracker.spawn(async move {
             let permit = entry.displaced.run_until_cancelled(timeout(DISPLACE_TIMEOUT, turn)).await;

@@ -87,10 +87,14 @@ impl IdleEntry {
         }
         let place = (has_asked, list.next);
         list.next += 1;
-        let address = lock(&self.peer).as_ref().map(|peer| peer.address);
-        let idle = Idle { since: Instant::now(), address, displaced: self.displaced.clone() };
+        let idle = Idle { since: Instant::now(), address: self.address(), displaced: self.displaced.clone() };
         list.connections.insert(place, idle);
         *lock(&self.place) = Some(place);
+    }
+
+    /// The address that it counts for.
+    pub(super) fn address(&self) -> Option<IpAddr> {
+        lock(&self.peer).as_ref().map(|peer| peer.address)
     }
 
     /// It is known who uses the connection: it counts for its address no longer.

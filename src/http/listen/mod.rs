@@ -44,7 +44,10 @@ pub struct Limits {
     pub spare_connections: usize,
     /// Connections of one address on which nobody has shown who they are; beyond, idle ones of it are closed, or the new one is.
     pub max_per_address: usize,
-    /// Closed connections whose clients may still read the last response, beside those that are served.
+    /// Whether responses have to be read at 16 KiB per second, beside pauses that add up to the write timeout.
+    pub paced_readers: bool,
+    /// Closed connections whose clients may still read the last response, beside those that are served; a quarter of them for an address on whose
+    /// connections nobody has shown who they are.
     pub max_lingering: usize,
     /// Size of a request's header, request line included, in bytes.
     pub max_header_bytes: usize,
@@ -66,6 +69,7 @@ impl Default for Limits {
             max_connections: 1024,
             spare_connections: 64,
             max_per_address: usize::MAX,
+            paced_readers: true,
             max_lingering: 256,
             max_header_bytes: 32 << 10,
             max_headers: 100,

@@ -1,13 +1,12 @@
 //! The byte stream of a connection, which reports reads and writes to the connection's state.
 
-use super::linger::linger;
+use super::linger::{LingeringPlaces, linger};
 use super::state::State;
 use std::io::{self, IoSlice};
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
@@ -18,7 +17,7 @@ pub(super) struct ConnectionResources {
     /// Ends lingering.
     pub(super) abort: CancellationToken,
     /// Limits how many linger.
-    pub(super) lingering: Arc<Semaphore>,
+    pub(super) lingering: LingeringPlaces,
     /// The connection's place; given back on drop.
     pub(super) place: Box<dyn Send>,
 }
@@ -107,7 +106,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + Send + 'static> Drop for Socket<S> {
         }
         let ConnectionResources { tracker, abort, lingering, place } = keep;
         drop(place);
-        let Ok(permit) = lingering.try_acquire_owned() else { return };
+        let Some(permit) = lingering.enter(self.state.stranger()) else { return };
         // It still counts for its address.
         let state = Arc::clone(&self.state);
         tracker.spawn(async move {

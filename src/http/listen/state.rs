@@ -4,6 +4,7 @@ use super::Limits;
 use super::head::{Head, HeadScanner, Scan};
 use super::idle::IdleEntry;
 use crate::sync::lock;
+use std::net::IpAddr;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, Weak};
 use std::time::Duration;
@@ -203,6 +204,11 @@ impl State {
         self.entry.close();
     }
 
+    /// The address that the connection counts for, while nobody has shown who they are.
+    pub(super) fn stranger(&self) -> Option<IpAddr> {
+        self.entry.address()
+    }
+
     /// Whether no request is on its way.
     pub(super) fn is_idle(&self) -> bool {
         lock(&self.facts).in_flight == 0
@@ -221,7 +227,9 @@ impl State {
         // In HTTP/2 a stalled response does not block the socket, and its memory is released only by closing the connection, whatever
         // progress other streams make. In HTTP/1.1 every byte written belongs to the one response.
         let progress = (!facts.http2).then_some(facts.progress);
-        let unread = open.iter().filter_map(|open| open.deadline(patience(open.known.load(Relaxed)), progress));
+        let unread = open
+            .iter()
+            .filter_map(|open| open.deadline(patience(open.known.load(Relaxed)), progress, limits.paced_readers));
         let any_known = facts.known || open.iter().any(|open| open.known.load(Relaxed));
         let blocked = facts.blocked_since.map(|since| since.max(facts.progress) + patience(any_known));
         if let Some(deadline) = blocked.into_iter().chain(unread).min() {
@@ -292,13 +300,14 @@ impl InFlight {
         }
     }
 
-    /// When the client will have read too slowly: nothing for as long as `patience`, or so little that its pauses add up to that.
-    fn deadline(&self, patience: Duration, progress: Option<Instant>) -> Option<Instant> {
+    /// When the client will have read too slowly: nothing for as long as `patience`, or, where readers are `paced`, so little that its pauses
+    /// add up to that.
+    fn deadline(&self, patience: Duration, progress: Option<Instant>, paced: bool) -> Option<Instant> {
         let reading = lock(&self.reading);
         let (since, bytes) = reading.unread?;
         let stalled = progress.map_or(since, |progress| since.max(progress)) + patience;
         let slow = since + (patience + allowance(bytes)).saturating_sub(reading.behind);
-        Some(stalled.min(slow))
+        Some(if paced { stalled.min(slow) } else { stalled })
     }
 }
 
@@ -342,7 +351,7 @@ mod tests {
         let (_, request) = state.begin();
         let patience = Duration::from_secs(10);
         let left = |progress: Option<Instant>| {
-            let deadline = request.deadline(patience, progress)?;
+            let deadline = request.deadline(patience, progress, true)?;
             Some(deadline.saturating_duration_since(Instant::now()).as_secs_f64().round())
         };
         assert_eq!(left(None), None);

@@ -162,7 +162,8 @@ async fn connections_beyond_the_limit_are_told_so_and_health_still_answers() {
 #[tokio::test]
 async fn connections_with_a_token_do_not_count_for_their_address() {
     const ANNA: &str = "anna-has-a-long-secret";
-    let app = TestApp::guarded_with(&[("anna", ANNA, "")], &["max_connections=16", "max_connections_per_address=2"]);
+    let settings = ["max_connections=16", "max_connections_per_address=2"];
+    let app = TestApp::guarded_with(&[("anna", ANNA, "scope = \"admin\"\n")], &settings);
     let session = app.ready(Capture::tiny()).await;
     let (path, token) = (format!("/v1/sessions/{}/cages?follow=true", session.id), format!("Bearer {ANNA}"));
     let mut followers = Vec::new();
@@ -172,6 +173,9 @@ async fn connections_with_a_token_do_not_count_for_their_address() {
         raw.answer().await.expect(200);
         followers.push(raw);
     }
+    let mut scraper = Raw::connect(&app).await;
+    scraper.head("GET", "/metrics", &[("authorization", &token)]).await;
+    scraper.reply().await.expect(200);
     // Those without one have two places among them: a third makes the first go.
     let mut strangers = Vec::new();
     for _ in 0..3 {
@@ -186,6 +190,7 @@ async fn connections_with_a_token_do_not_count_for_their_address() {
         open.push(raw.is_open().await);
     }
     assert_eq!(open, [false, true, true], "the first made way");
+    assert!(scraper.is_open().await, "metrics are read with a token, too");
     app.get("/v1/sessions").await.expect(200);
 }
 
