@@ -583,3 +583,102 @@ fn stl_frames_are_merged_as_the_rest_pose_is() {
     let error = message(reader.read_next(&mut Vec::new()));
     assert!(error.contains("f1.stl: frame 1: point 1 lies in two places"), "{error}");
 }
+
+/// A folder of one-point frames under these names.
+fn files(names: &[&str]) -> tempfile::TempDir {
+    let folder = tempdir().unwrap();
+    for (k, name) in names.iter().enumerate() {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, format!("v {k} 0 0\n")).unwrap();
+    }
+    folder
+}
+
+fn told(source: &Path) -> Vec<f64> {
+    told_of(source, 1)
+}
+
+fn told_of(source: &Path, points: usize) -> Vec<f64> {
+    let reader = open_frames(source, points).unwrap();
+    (0..reader.frames()).map(|k| reader.number(k)).collect()
+}
+
+#[test]
+fn files_of_several_sequences_are_refused_with_a_pattern_that_picks_one() {
+    for (names, pick, count) in [
+        (vec!["f001.obj", "f002.obj", "f003 (1).obj", "f003.obj", "f1.obj"], "f???.obj", 3),
+        (vec!["w_0_v2.obj", "w_0_v3.obj", "w_1_v2.obj", "w_1_v3.obj"], "w_*_v2.obj", 2),
+        (vec!["w.v1.01.obj", "w.v1.02.obj", "w.v2.01.obj", "w.v2.02.obj"], "w.v1.*.obj", 2),
+        (vec!["a_000.obj", "a_001.obj", "b_000.obj"], "a_*.obj", 2),
+        (vec!["run1.obj", "run2.obj", "walk3.obj", "walk4.obj"], "run*.obj", 2),
+        (vec!["f1.obj", "f2.obj", "rest.obj"], "f*.obj", 2),
+        (vec!["f1.obj", "f2.obj", "f2 - Copy.obj"], "f?.obj", 2),
+        (vec!["f[a]1.obj", "f[a]2.obj", "g1.obj"], "f[[]a[]]*.obj", 2),
+    ] {
+        let folder = files(&names);
+        let error = message(open_frames(folder.path(), 1));
+        let pattern = folder.path().join(pick);
+        assert!(error.contains("several sequences") && error.contains(&format!("'{}'", pattern.display())), "{error}");
+        assert_eq!(open_frames(&pattern, 1).unwrap().frames(), count, "{pick}");
+    }
+    for names in [["01.obj", "1.obj"], ["f1.obj", "f1 (1).obj"], ["F1.obj", "f1.obj"]] {
+        assert!(matches!(open_frames(files(&names).path(), 1), Err(Error::SeveralSequences { .. })), "{names:?}");
+    }
+}
+
+#[test]
+fn poses_with_names_of_their_own_are_frames_in_natural_order() {
+    for names in [
+        ["jump.obj", "run.obj", "walk.obj"],
+        ["01_sit.obj", "02_stand.obj", "10_run.obj"],
+        ["jump_v2.obj", "run_v2.obj", "walk_v2.obj"],
+        ["f.obj", "f1.obj", "g2.obj"],
+    ] {
+        assert_eq!(told(files(&names).path()), [0.0, 1.0, 2.0], "{names:?}");
+    }
+    let long = ["90071992547409931.obj", "90071992547409932.obj"];
+    assert_eq!(told(files(&long).path()), [0.0, 1.0]);
+}
+
+#[test]
+fn every_part_of_a_path_may_be_a_pattern_or_a_name_that_looks_like_one() {
+    let folder = files(&["t[1]/f5.obj", "t[1]/f6.obj", "t1/f7.obj", "t1/f8.obj", "b[2]_3.obj", "b[2]_4.obj"]);
+    for (pattern, wanted) in [
+        ("t[1]/f*.obj", [5.0, 6.0]),
+        ("t[1]/f%d.obj", [5.0, 6.0]),
+        ("t[1]/f[56].obj", [5.0, 6.0]),
+        ("t*1]/*.obj", [5.0, 6.0]),
+        ("t[12]/f*.obj", [7.0, 8.0]),
+        ("b[2]_*.obj", [3.0, 4.0]),
+    ] {
+        assert_eq!(told(&folder.path().join(pattern)), wanted, "{pattern}");
+    }
+    let folder = files(&["frame_0009/mesh.obj", "frame_0010/mesh.obj", "frame_10/mesh.obj", "other/mesh.obj"]);
+    for pattern in ["frame_%04d/mesh.obj", "frame_00*/mesh.obj", "frame_####/*.obj", "frame_%04d/*.obj"] {
+        assert_eq!(told(&folder.path().join(pattern)), [9.0, 10.0], "{pattern}");
+    }
+    assert!(message(open_frames(folder.path(), 1)).contains("*/*.obj'"));
+    assert!(message(open_frames(folder.path().join("frame_%06d/mesh.obj"), 1)).contains("matches no file"));
+}
+
+#[test]
+fn a_folder_of_arrays_has_one_frame_in_each() {
+    let folder = tempdir().unwrap();
+    let frame =
+        |k: usize| npy("'<f4'", "'fortran_order': False, 'shape': (2, 3), ", &little(&coordinates()[6 * k..][..6]));
+    fs::write(folder.path().join("f_010.npy"), frame(1)).unwrap();
+    fs::write(folder.path().join("f_009.npy"), frame(0)).unwrap();
+    for source in ["", "f_%03d.npy", "*.npy"] {
+        let source = folder.path().join(source);
+        assert_eq!(told_of(&source, 2), [9.0, 10.0]);
+        assert_eq!(all(&mut *open_frames(&source, 2).unwrap()), two_frames());
+    }
+    let (mut reader, mut out) = (open_frames(folder.path(), 3).unwrap(), Vec::new());
+    assert!(matches!(reader.read_next(&mut out), Err(Error::PointCount { frame: Some(0), found: 2, .. })));
+    fs::write(folder.path().join("f_010.npy"), npy_f4()).unwrap();
+    let mut reader = open_frames(folder.path(), 2).unwrap();
+    assert!(reader.read_next(&mut out).unwrap());
+    let error = message(reader.read_next(&mut out));
+    assert!(error.contains("f_010.npy: frame 1: has 2 frames, where a folder of arrays has one in each"), "{error}");
+}

@@ -1,6 +1,7 @@
 //! The order of a capture's files as a person reads their names, and whether they are one sequence at all.
 
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use super::numbers;
@@ -49,7 +50,7 @@ impl Sequence {
 /// Whether a file is called as one more frame of these would be.
 pub(super) fn is_one_of(file: &Path, others: &[PathBuf]) -> bool {
     let all: Vec<PathBuf> = others.iter().cloned().chain([file.to_owned()]).collect();
-    let extension = |path: &Path| path.extension().map(|found| found.to_ascii_lowercase());
+    let extension = |path: &Path| path.extension().map(OsStr::to_ascii_lowercase);
     let same = others.first().is_some_and(|other| extension(other) == extension(file));
     same && Sequence::of(all).is_ok_and(|sequence| sequence.numbers.is_some())
 }

@@ -94,7 +94,7 @@ fn chosen<'a>(mut found: Vec<Array<'a>>, arrays: &Arrays, points: u64, path: &Pa
         )
     } else if found.is_empty() {
         "has no arrays; save the frames with numpy.save".to_owned()
-    } else if found.iter().any(|array| moving(array)) {
+    } else if found.iter().any(moving) {
         let moving: Vec<&str> = found.iter().filter(|array| moving(array)).map(|array| array.name).collect();
         format!(
             "has {} arrays that can be the frames ({}); save one of them in Python, as with numpy.save(\"converted.npy\", {file}[{:?}])",

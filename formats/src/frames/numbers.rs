@@ -16,6 +16,9 @@ pub(super) fn of_names(names: &[&str]) -> Option<Vec<f64>> {
     let suffix = suffix(&ends);
     let parts: Vec<&str> =
         ends.iter().map(|end| Some(&end[..end.len().checked_sub(suffix)?])).collect::<Option<_>>()?;
+    if are_versions(&parts) {
+        return None;
+    }
     let numbers = fractions(&names[0][..prefix], &parts)
         .or_else(|| parts.iter().map(|part| number(part)).collect::<Option<Vec<f64>>>())?;
     distinct(&numbers).then_some(numbers)
@@ -102,6 +105,30 @@ fn suffix(ends: &[&str]) -> usize {
     }
 }
 
+/// Whether `1.01 1.02 2.01 2.02` are frames 1 and 2 of two versions or takes: few whole numbers that follow each other, again and again.
+fn are_versions(parts: &[&str]) -> bool {
+    let mut versions: BTreeMap<&str, Vec<u64>> = BTreeMap::new();
+    let width = parts[0].rsplit('.').next().map_or(0, str::len);
+    for part in parts {
+        match part.split_once('.').map(|(version, frame)| (version, frame, frame.parse())) {
+            Some((version, frame, Ok(number))) if frame.len() == width => {
+                versions.entry(version).or_default().push(number)
+            }
+            _ => return false,
+        }
+    }
+    let most = 10_u64.saturating_pow(width as u32) / 2;
+    let counted = |frames: &mut Vec<u64>| {
+        frames.sort_unstable();
+        frames.len() > 1 && frames.len() as u64 <= most && frames.windows(2).all(|pair| pair[1] == pair[0] + 1)
+    };
+    let decimals: Option<Vec<f64>> = parts.iter().map(|part| number(part)).collect();
+    width > 1
+        && versions.len() > 1
+        && versions.values_mut().all(counted)
+        && decimals.is_none_or(|decimals| !evenly_spaced(&decimals))
+}
+
 /// Decimal digits, with a sign and a fraction where there are any; none where `f64` would round.
 fn number(text: &str) -> Option<f64> {
     let digits = text.strip_prefix('-').unwrap_or(text);
@@ -167,6 +194,7 @@ mod tests {
             (vec!["0.5", "0.04", "0.45"], vec![0.5, 0.04, 0.45]),
             (vec!["t_-0.5", "t_-0.25"], vec![-0.5, -0.25]),
             (vec!["f1.25", "f1.5", "f1.75"], vec![1.25, 1.5, 1.75]),
+            (vec!["f0.98", "f0.99", "f1.00", "f1.01"], vec![0.98, 0.99, 1.0, 1.01]),
             (vec!["f1.250", "f1.500", "f1.750"], vec![1.25, 1.5, 1.75]),
             (vec!["shot2.8", "shot2.9", "shot2.10"], vec![8.0, 9.0, 10.0]),
             (vec!["shot2.010", "shot2.011"], vec![10.0, 11.0]),
@@ -177,9 +205,15 @@ mod tests {
         ] {
             assert_eq!(of_names(&names), Some(numbers), "{names:?}");
         }
-        for names in
-            [vec!["a1", "b2"], vec!["run", "walk"], vec!["1", "01"], vec!["f1"], vec!["f", "f1"], vec!["è1", "é1"]]
-        {
+        for names in [
+            vec!["a1", "b2"],
+            vec!["run", "walk"],
+            vec!["1", "01"],
+            vec!["f1"],
+            vec!["f", "f1"],
+            vec!["è1", "é1"],
+            vec!["v1.01", "v1.02", "v2.01", "v2.02"],
+        ] {
             assert_eq!(of_names(&names), None, "{names:?}");
         }
     }
