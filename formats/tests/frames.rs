@@ -660,6 +660,7 @@ fn every_part_of_a_path_may_be_a_pattern_or_a_name_that_looks_like_one() {
     }
     assert!(message(open_frames(folder.path(), 1)).contains("*/*.obj'"));
     assert!(message(open_frames(folder.path().join("frame_%06d/mesh.obj"), 1)).contains("matches no file"));
+    assert!(message(open_frames(folder.path().join("frame_*"), 1)).contains("/frame_*/*.obj'"));
 }
 
 #[test]

@@ -81,7 +81,7 @@ impl Pattern {
         let options = glob::MatchOptions { require_literal_leading_dot: true, ..Default::default() };
         let matches = glob::glob_with(self.glob.to_str().unwrap_or_default(), options)
             .map_err(|cause| Fault::invalid(format!("is not a pattern ({}); correct it", cause.msg)).at(path))?;
-        let mut found = Vec::new();
+        let (mut found, mut folders) = (Vec::new(), false);
         for path in matches {
             let path = path.map_err(|cause| {
                 let path = cause.path().to_owned();
@@ -91,9 +91,18 @@ impl Pattern {
             let numbers = |(from_end, names): &(usize, NumberedNames)| {
                 part(*from_end).is_some_and(|name| names.number(name).is_some())
             };
-            if path.is_file() && self.numbered.iter().all(numbers) {
+            if !self.numbered.iter().all(numbers) {
+                continue;
+            }
+            folders |= path.is_dir();
+            if path.is_file() {
                 found.push(path);
             }
+        }
+        if found.is_empty() && folders {
+            let inside = path.join("*.obj");
+            let what = format!("matches folders; give a pattern of the files in them, such as '{}'", inside.display());
+            return Err(Fault::invalid(what).at(path));
         }
         Ok(found)
     }
