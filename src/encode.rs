@@ -264,7 +264,7 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
     report.spectrum_choice = choice;
     report.consistency = Consistency::new(&convergence);
     report.error.worst = worst;
-    report.warnings.extend(held_frames(&held, report.frames));
+    report.warnings.extend(held_frames(&held, report.frames, options.handles, job.goal.is_some()));
     let mut container = buffered.into_inner().map_err(|e| fail(container::Error::from(e.into_error())))?;
     report.set_output(container.complete()?);
     if let Some(Goal::Size(asked)) = job.goal

@@ -63,11 +63,16 @@ pub(crate) fn preparation_warnings(options: SolverOptions, solver: &Solver) -> V
     warnings
 }
 
-/// What to tell where the cages of some frames would have left them.
-pub(crate) fn held_frames(held: &[usize], frames: usize) -> Option<String> {
+/// What to tell where the cages of some frames would have left them, and what helps.
+pub(crate) fn held_frames(held: &[usize], frames: usize, handles: Handles, is_coded: bool) -> Option<String> {
     let first = held.first()?;
+    let closer = match (is_coded, handles) {
+        (true, _) => "",
+        (false, Handles::All) => "--max-error stores what it leaves, and ",
+        (false, _) => "--handles all follows more closely, --max-error stores what the cage leaves, and ",
+    };
     Some(format!(
-        "in {} of {frames} frames, the first is {first}, the cage would have run away from the model, since it cannot follow these frames and its points determine it too weakly; it was held to the shape of the rest cage there, which costs accuracy: take a cage of fewer vertices, or check that these frames are of this rest pose",
+        "in {} of {frames} frames, the first is {first}, the cage would have run away from the model: it cannot follow these frames, and the points determine some of its vertices too weakly; it was held to the shape of the rest cage there; {closer}a cage made from the rest pose alone (cager cage --rest) usually stays near by itself",
         held.len()
     ))
 }
