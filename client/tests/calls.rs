@@ -319,3 +319,26 @@ fn calls_can_be_spawned() {
     send(|client| client.follow(ID, 0));
     send(|client| client.events(ID));
 }
+
+#[tokio::test]
+async fn a_session_may_take_its_time_once_it_is_sent() {
+    let address = serve(|mut exchange| async move {
+        exchange.whole_body().await;
+        // As long as a cage is made.
+        tokio::time::sleep(Duration::from_millis(700)).await;
+        exchange.reply(201, &[], json(&session(SessionState::Preparing))).await;
+    })
+    .await;
+    let options = ClientOptions { idle_timeout: Duration::from_millis(100), ..hasty() };
+    let client = Client::new(&address).expect("an address").with_options(options);
+    let new = NewSession::new(MeshFile::new("rest.obj", "v 0 0 0"), MeshFile::new("cage.obj", "v 0 0 0"));
+    client.create(&new).await.expect("a session");
+    // What is only asked for must answer.
+    let error = client.session(ID).await.expect_err("nothing moved");
+    assert!(matches!(error, ClientError::Broken { .. }), "{error}");
+}
+
+/// Without a second attempt.
+fn hasty() -> ClientOptions {
+    ClientOptions { retries: 0, http2: false, ..ClientOptions::default() }
+}

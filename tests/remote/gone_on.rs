@@ -80,17 +80,24 @@ fn an_output_that_cannot_be_written_in_the_end_leaves_a_session_to_go_on_with() 
 }
 
 #[test]
-fn a_session_that_can_never_be_completed_says_where_to_look_at_it() {
-    let (dir, ..) = capture();
+fn a_session_that_can_never_be_gone_on_with_says_where_to_look_at_it() {
+    let (dir, points, values) = capture();
     let server = Server::start(&dir);
+    let session = begun(&server, &dir, points, &values);
+    complete(&server, &session, 7);
     let encode = format!("{ENCODE} --server {}", server.address());
-    let said = dir.cager(&format!("{encode} --target-size 3KB")).run();
+    let said = dir.cager(&format!("{encode} --session {session}")).run();
     assert_eq!(said.status, Some(1));
-    let [session] = &sessions(&server)[..] else { panic!("one session") };
-    let place = format!("{}/v1/sessions/{} shows it", server.address(), session.id);
+    let place = format!("{}/v1/sessions/{session} shows it", server.address());
     assert!(said.stderr.contains(&place) && !said.stderr.contains("goes on"), "{}", said.stderr);
+    assert_eq!(sessions(&server)[0].state, SessionState::Completed, "it is still there");
     let said = dir.cager(&format!("{encode} --session 0123456789abcdef")).run();
     assert!(said.stderr.contains("leave out --session to begin a new one"), "{}", said.stderr);
+}
+
+#[tokio::main(flavor = "current_thread")]
+async fn complete(server: &Server, session: &str, frames: u32) {
+    server.client().complete(session, frames).await.expect("a completion");
 }
 
 #[test]
