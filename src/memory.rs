@@ -40,9 +40,11 @@ pub(crate) fn free_bytes() -> u64 {
     let read = |path: &str| std::fs::read_to_string(path).ok();
     let number = |path: &str| read(path)?.trim().parse::<u64>().ok();
     let machine = read("/proc/meminfo").as_deref().and_then(available);
-    let container = number("/sys/fs/cgroup/memory.max")
-        .zip(number("/sys/fs/cgroup/memory.current"))
-        .map(|(most, used)| most.saturating_sub(used));
+    let container =
+        number("/sys/fs/cgroup/memory.max").zip(number("/sys/fs/cgroup/memory.current")).map(|(most, used)| {
+            let files = read("/sys/fs/cgroup/memory.stat").map_or(0, |stat| kept_of_files(&stat));
+            most.saturating_sub(used.saturating_sub(files))
+        });
     machine.into_iter().chain(container).min().unwrap_or(2 * UNKNOWN)
 }
 
@@ -52,9 +54,22 @@ fn available(meminfo: &str) -> Option<u64> {
     line.trim().strip_suffix(" kB")?.parse::<u64>().ok()?.checked_mul(1024)
 }
 
+/// What a cgroup's `memory.stat` counts of files that were read or written, in bytes: the system gives it up where memory is needed.
+fn kept_of_files(stat: &str) -> u64 {
+    let names = ["active_file ", "inactive_file "];
+    let of = |name| stat.lines().find_map(|line: &str| line.strip_prefix(name)?.trim().parse::<u64>().ok());
+    names.into_iter().filter_map(of).sum()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn files_that_the_system_keeps_in_memory_count_as_free() {
+        assert_eq!(kept_of_files("anon 7\nfile 90\ninactive_anon 5\nactive_file 20\ninactive_file 30\n"), 50);
+        assert_eq!(kept_of_files(""), 0);
+    }
 
     #[test]
     fn what_is_available_is_read_from_the_system() {

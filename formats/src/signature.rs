@@ -109,7 +109,8 @@ impl Signature {
         let found = Self::of(bytes)?;
         let is_own = found.extensions().contains(&extension) || found == Self::Text;
         found.stand_in().or_else(|| {
-            (!is_own).then(|| format!("is {}, not .{extension}; rename it, or export it again", found.noun()))
+            (!is_own)
+                .then(|| format!("is not a .{extension} file but {}; rename it, or give the right one", found.noun()))
         })
     }
 

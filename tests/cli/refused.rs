@@ -180,6 +180,7 @@ fn frames_that_are_not_there_are_refused() {
     dir.model("mixed/1.obj", &small.rest);
     dir.model("mixed/2.ply", &small.rest);
     dir.write("walk.fbx", "a format that is not read");
+    dir.write("walk.mp4", "another");
     for (frames, word) in [
         ("empty", "no mesh files"),
         ("notes", "no mesh files"),
@@ -188,7 +189,8 @@ fn frames_that_are_not_there_are_refused() {
         ("nowhere", "check the path"),
         ("nowhere.npy", "check the path"),
         ("mixed", "mixes"),
-        ("walk.fbx", ".npy .pc2 .mdd"),
+        ("walk.fbx", "export the animated mesh as a point cache, .pc2 or .mdd"),
+        ("walk.mp4", ".npy .pc2 .mdd"),
         ("[.obj", "pattern"),
     ] {
         refused(
