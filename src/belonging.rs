@@ -42,11 +42,13 @@ pub(crate) struct Pass {
     belonging: Arc<Belonging>,
     progress: Progress,
     has_skipped: bool,
+    /// A frame that is much smaller than those before; the next one decides.
+    smaller: Option<Finding>,
 }
 
 impl Pass {
     pub(crate) fn new(belonging: Arc<Belonging>) -> Self {
-        Self { belonging, progress: Progress::default(), has_skipped: false }
+        Self { belonging, progress: Progress::default(), has_skipped: false, smaller: None }
     }
 
     pub(crate) fn skipped(&mut self) {
@@ -57,7 +59,7 @@ impl Pass {
         self.has_skipped
     }
 
-    /// Compares the next frame, number `number` in the file at `path`.
+    /// Compares the next frame, number `number` in the file at `path`; what is found may be of the frame before.
     pub(crate) fn compare(
         &mut self,
         frame: &[Point],
@@ -68,8 +70,20 @@ impl Pass {
         if self.belonging.noted().is_some() {
             return None;
         }
-        let departure = self.progress.look(&self.belonging.watch, frame, faces)?;
-        Some(Finding { belonging: self.belonging.clone(), departure, path: path.to_owned(), number })
+        let watch = &self.belonging.watch;
+        let departure = self.progress.look(watch, frame, faces);
+        let smaller = self.smaller.take().filter(|_| !self.progress.is_as_large_as_at_rest(watch));
+        if smaller.is_some() {
+            return smaller;
+        }
+        let departure = departure?;
+        let found = Finding { belonging: self.belonging.clone(), departure, path: path.to_owned(), number };
+        // Animators hide things for a frame by making them small.
+        if matches!(departure, Departure::Units(ratio) if ratio < 1.0) {
+            self.smaller = Some(found);
+            return None;
+        }
+        Some(found)
     }
 }
 

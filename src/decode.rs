@@ -2,14 +2,14 @@
 
 use crate::edited::EditedCages;
 use crate::memory::{Memory, free_bytes};
-use crate::origin::move_to;
+use crate::origin::{LOST, move_to};
 use crate::timing::Timing;
 use cager_core::cage::{Cage, CageError};
 use cager_core::coordinates;
 use cager_core::coordinates::{Coordinates, CoordinatesError, ElementPlan, supports_definition};
 use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, PrepareError, coordinates_bytes, reject_far_points};
-use cager_core::mesh::{Model, Point};
+use cager_core::mesh::{Model, Point, diagonal};
 use cager_formats::{Action, FrameOptions, FrameRange, Signature, Target, create_frames};
 use cager_proto::container::{self, ContainerReader};
 use std::fs::File;
@@ -294,7 +294,9 @@ pub(crate) fn frame_options(
     }
     let numbers = timing.numbers(found);
     let numbers = (0..range.count()).filter_map(|place| numbers.get(range.frame(place)).copied()).collect();
-    Ok(FrameOptions { fps, numbers, origin: container.header().origin })
+    let origin = container.header().origin;
+    let rounding = if origin.is_some() { LOST * diagonal(&container.rest()?.points) } else { 0.0 };
+    Ok(FrameOptions { fps, numbers, origin, rounding })
 }
 
 /// Decodes frames into `output`, which appears whole or not at all. `progress` is told the number of frames done.

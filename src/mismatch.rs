@@ -10,9 +10,6 @@ use cager_core::mesh::{Model, Point, bounds};
 use cager_core::vector::distance;
 use std::fmt;
 
-/// Ratios of two units of length: inch and centimetre, foot and metre, powers of ten and so on.
-const UNITS: [f64; 12] = [2.54, 3.28, 10.0, 12.0, 25.4, 30.48, 36.0, 39.37, 100.0, 304.8, 1000.0, 1e6];
-
 /// Number of evenly spaced frames to compare.
 pub const FRAMES: usize = 5;
 
@@ -279,6 +276,7 @@ impl fmt::Display for Mismatch {
 
 /// Formats a ratio, rounded to that of two common units if it is within 5 % of one.
 fn factor(ratio: f64) -> String {
+    const UNITS: [f64; 11] = [2.54, 3.28, 10.0, 12.0, 25.4, 30.48, 39.37, 100.0, 304.8, 1000.0, 1e6];
     match UNITS.into_iter().find(|unit| (ratio / unit - 1.0).abs() < 0.05) {
         Some(unit) => format!("about {unit}"),
         None => format!("{ratio:.1}"),

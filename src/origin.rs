@@ -7,6 +7,9 @@ use cager_core::vector::{add, distance, middle, sub};
 /// Diagonals of the rest pose from which on an origin is taken: there single precision resolves less than 1e-5 of the diagonal.
 pub(crate) const FAR: f64 = 100.0;
 
+/// What single precision may lose of a diagonal without being seen.
+pub(crate) const LOST: f64 = 1e-4;
+
 /// An origin near the middle of a rest pose that lies far away; `None` for all others. In whole units, or the largest power of two that is not above
 /// the diagonal where that is less than one, so that subtracting it from doubles loses nothing.
 pub(crate) fn own_origin(rest: &[Point]) -> Option<Point> {

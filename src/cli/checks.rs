@@ -129,6 +129,7 @@ pub(super) fn check_capture(
         sample_frames(reader.as_mut(), mismatch::FRAMES, false)
     });
     let frames = frames.map_err(|error| explained(error, files, rest))?;
+    warn(single_far_away(files, rest.1, &frames).as_slice());
     let found = mismatches(rest.1, &frames);
     if found.is_empty() {
         files.belonging = Belonging::new(rest, args.force);
@@ -177,6 +178,22 @@ pub(super) fn check_cage(cage: (&Path, &TriMesh), rest: &Model, args: &CheckArgs
         None => return Ok(()),
     };
     refuse_or_warn(what, "", args.force)
+}
+
+/// What is to be said of frames that lost digits before they came here: in single precision, as far away as their rest pose.
+fn single_far_away(files: &CaptureFiles, rest: &Model, frames: &[Vec<f64>]) -> Option<String> {
+    const LOST: f64 = 1e-5;
+    let origin = files.origin?;
+    let farthest = origin.iter().fold(0.0, |far: f64, x| far.max(x.abs()));
+    let lost = farthest * f64::from(f32::EPSILON) / 2.0 / diagonal(&rest.points);
+    let is_single = |(x, o): (&f64, &f64)| f64::from((x + o) as f32) == x + o;
+    let singles = frames.iter().all(|frame| frame.iter().zip(origin.iter().cycle()).all(is_single));
+    (lost > LOST && singles).then(|| {
+        format!(
+            "{}: its frames are in single precision, which so far from the origin has lost what is smaller than {lost:.1e} of the rest pose's diagonal; export them in double precision (float64)",
+            files.path.display()
+        )
+    })
 }
 
 /// Warns of frames that were read although they do not look like those before.

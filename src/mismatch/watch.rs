@@ -2,7 +2,7 @@
 //! hundred edges of each frame are compared with those of the rest pose and of the frame before.
 
 use super::faces::FaceComparison;
-use super::{UNITS, factor, neighbours, quartiles};
+use super::{factor, neighbours, quartiles};
 use cager_core::mesh::{Model, Point, Polygons};
 use cager_core::vector::{distance, sub};
 use std::fmt;
@@ -10,6 +10,9 @@ use std::fmt;
 /// Edges compared, and points looked at beside their ends, at the most.
 const EDGES: usize = 256;
 const POINTS: usize = 1 << 16;
+
+/// Ratios of units that no model grows or shrinks by from one frame to the next, which it may by smaller ones.
+const UNITS: [f64; 7] = [25.4, 30.48, 39.37, 100.0, 304.8, 1000.0, 1e6];
 
 /// An edge is torn where it is this many times longer than before, for the size of its model.
 const TORN: f64 = 2.5;
@@ -83,6 +86,11 @@ impl Progress {
         found
     }
 
+    /// Whether the frame looked at last is about as large as the rest pose.
+    pub fn is_as_large_as_at_rest(&self, watch: &Watch) -> bool {
+        self.previous.as_ref().is_none_or(|last| last.is_as_large_as(&watch.sketch))
+    }
+
     fn renumbered(&mut self, watch: &Watch, frame: &[Point], faces: &Polygons, scale: f64) -> Option<Departure> {
         let rest = &watch.rest;
         if faces.is_empty() || rest.faces.is_empty() || *faces == rest.faces {
@@ -124,14 +132,18 @@ impl Sketch {
         (radius > 0.0).then_some(Self { ends, lengths, points, centre, radius })
     }
 
+    /// About.
+    fn is_as_large_as(&self, other: &Self) -> bool {
+        (self.radius / other.radius).ln().abs() < 2_f64.ln()
+    }
+
     /// A jump of all edges and of the extent alike by the ratio of two units, away from the rest pose's size. Growth takes several
     /// frames or other ratios.
     fn in_other_units(&self, previous: &Self, rest: &Self) -> Option<Departure> {
-        let was_at_rest = (previous.radius / rest.radius).ln().abs() < 2_f64.ln();
-        let extent = self.radius / previous.radius;
-        if !was_at_rest || extent.ln().abs() < 2_f64.ln() {
+        if !previous.is_as_large_as(rest) || self.is_as_large_as(previous) {
             return None;
         }
+        let extent = self.radius / previous.radius;
         let both = self.lengths.iter().zip(&previous.lengths).filter(|(_, before)| **before > 0.0);
         let [lower, edges, upper] = quartiles(both.map(|(now, before)| now / before).collect())?;
         let even = (upper / lower).ln() < 0.3 && (edges / extent).ln().abs() < 0.2;
@@ -212,6 +224,7 @@ mod tests {
             assert_eq!(first(&rest, 9, |t, i| bent(t, at(i))), None, "bent");
             assert_eq!(first(&rest, 9, |t, i| scaled(at(i), 1.6_f64.powi(t as i32))), None, "growing");
             assert_eq!(first(&rest, 9, |t, i| scaled(at(i), 7.0_f64.powi(t as i32))), None, "growing fast");
+            assert_eq!(first(&rest, 9, |t, i| scaled(at(i), 10.0_f64.powi(t as i32))), None, "tenfold");
             assert_eq!(
                 first(&rest, 7, |t, i| scaled(at(i), 1.3 * 10.0_f64.powi(t as i32 - 6))),
                 None,
@@ -238,7 +251,7 @@ mod tests {
     #[test]
     fn the_first_frame_in_another_unit_is_found() {
         for rest in both() {
-            for unit in [1000.0, 100.0, 39.37, 2.54, 1.0 / 3.28084, 0.01] {
+            for unit in [1000.0, 100.0, 39.37, 25.4, 1.0 / 30.48, 0.01] {
                 let scaled = |t: usize, i: usize| bent(t, rest.points[i]).map(|x| if t < 3 { x } else { unit * x });
                 let found = first(&rest, 9, scaled);
                 assert!(

@@ -3,7 +3,7 @@
 use super::geometry::geometry;
 use super::{Choices, Geometry};
 use crate::coding::{CodingError, Goal, slack};
-use crate::origin::own_origin;
+use crate::origin::{LOST, own_origin};
 use crate::problem::{self, ApiError};
 use cager_codec::MOST_ROWS;
 use cager_core::cage::Cage;
@@ -36,7 +36,6 @@ pub(crate) fn check(geometry: &Geometry, choices: &Choices, max_bytes: u64) -> R
 
 /// Refuses a rest pose so far away that the single precision in which frames are sent would lose what is seen.
 fn check_place(points: &[Point]) -> Result<(), ApiError> {
-    const LOST: f64 = 1e-4;
     let farthest = points.iter().flatten().fold(0.0f64, |far, x| far.max(x.abs()));
     let lost = farthest * f64::from(f32::EPSILON) / 2.0 / diagonal(points);
     match own_origin(points) {

@@ -71,7 +71,7 @@ fn late_frames_of_an_array_in_another_order_or_unit_are_refused() {
     for (what, frames) in [
         ("another order", changed_late(&small, |t, i| at(t, order[i]))),
         ("another order", changed_late(&small, |t, i| at(t, by_x[i]))),
-        ("about 2.54 times smaller", changed_late(&small, |t, i| at(t, i).map(|x| x / 2.54))),
+        ("about 39.37 times smaller", changed_late(&small, |t, i| at(t, i).map(|x| x / 39.37))),
         ("about 100 times larger", changed_late(&small, |t, i| at(t, i).map(|x| x * 100.0))),
     ] {
         dir.write("frames.npy", npy_f64(&frames));
@@ -80,6 +80,15 @@ fn late_frames_of_an_array_in_another_order_or_unit_are_refused() {
         let line = format!("{ENCODE} --frames-range 40-49");
         assert_sentence(&line, &dir.cager(&line).run().stderr, &["frames.npy: frame 47 ", what]);
     }
+}
+
+#[test]
+fn what_is_hidden_for_a_frame_by_making_it_small_is_encoded() {
+    let (dir, small) = Dir::with_capture();
+    let mut frames = small.frames.clone();
+    frames[7].iter_mut().for_each(|x| *x *= 1e-3);
+    dir.frames("frames.npy", &frames);
+    dir.cager(ENCODE).succeeds();
 }
 
 #[test]

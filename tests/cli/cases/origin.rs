@@ -142,6 +142,37 @@ fn designing_comparing_and_other_units_work_far_away_too() {
 }
 
 #[test]
+fn frames_that_came_in_single_precision_are_told_from_double_ones() {
+    let (dir, _, frames) = case();
+    dir.frames("single.npy", &frames);
+    let line = "encode --rest rest.obj --cage cage.obj --frames single.npy -o single.cager --force";
+    let said = dir.cager(line).succeeds().stderr;
+    assert!(said.contains("warning: single.npy: its frames are in single precision"), "{said}");
+    assert!(said.contains("float64"), "{said}");
+}
+
+#[test]
+fn formats_of_single_precision_are_written_where_they_lose_nothing_that_is_seen() {
+    let (dir, rest, frames) = case();
+    // Some hundred diagonals away instead of millions.
+    let other = Dir::new();
+    let origin = [449_500.0, 5_400_000.0, 300.0];
+    let moved = |points: &[Point]| points.iter().map(|p| [0, 1, 2].map(|k| p[k] - origin[k])).collect::<Vec<_>>();
+    for file in ["rest.obj", "cage.obj"] {
+        let model = read_model(&dir.path(file)).expect(file);
+        other.model(file, &Model { points: moved(&model.points), ..model });
+    }
+    let frames: Vec<Vec<f64>> = frames.iter().map(|frame| moved(frame.as_chunks().0).concat()).collect();
+    other.write("frames.npy", npy_f64(&frames));
+    other.cager(&format!("{ENCODE} --max-error 1e-3 --report report.json")).succeeds();
+    assert!(other.json("report.json")["origin"].is_array());
+    for output in ["back.npy", "back.pc2", "back.mdd"] {
+        other.cager(&format!("decode out.cager -o {output}")).succeeds();
+        assert!(error(&other, output, &moved(&rest), &frames) < 1.1e-3, "{output}");
+    }
+}
+
+#[test]
 fn a_capture_near_the_origin_has_none() {
     let (dir, _) = Dir::with_encoded();
     assert!(dir.json("report.json").get("origin").is_none());

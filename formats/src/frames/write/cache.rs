@@ -5,17 +5,24 @@ use std::io::{self, Write};
 use cager_core::mesh::Point;
 
 use super::super::{mdd, npy, pc2};
-use super::{Announced, CacheFormat, FrameOptions, FrameWriter, loses_precision};
+use super::{Announced, CacheFormat, FrameOptions, FrameWriter, check_precision};
 use crate::atomic::{AtomicFile, Target};
 use crate::error::{Error, Fault};
 
 pub(super) struct CacheWriter {
     announced: Announced,
     file: AtomicFile,
-    big_endian: bool,
+    numbers: Numbers,
     /// What is added to all positions, in double precision.
     origin: Option<Point>,
     bytes: Vec<u8>,
+}
+
+/// How positions are stored.
+enum Numbers {
+    Single,
+    SingleBigEndian,
+    Double,
 }
 
 impl CacheWriter {
@@ -27,25 +34,21 @@ impl CacheWriter {
     ) -> Result<Self, Error> {
         let Announced { points, frames, .. } = announced;
         if format == CacheFormat::Npy {
-            let bytes = if options.origin.is_some() { 8 } else { 4 };
-            let mut writer =
-                Self::begin(announced, target, false, |file| file.write_all(&npy::header(points, frames, bytes)))?;
-            writer.origin = options.origin;
-            return Ok(writer);
+            let (numbers, bytes) = if options.origin.is_some() { (Numbers::Double, 8) } else { (Numbers::Single, 4) };
+            let header = npy::header(points, frames, bytes);
+            return Self::begin(announced, target, (numbers, options.origin), |file| file.write_all(&header));
         }
-        if let Some(origin) = options.origin {
-            return Err(loses_precision(origin).at(&announced.path));
-        }
+        check_precision(options, &announced.path)?;
         let (Ok(points), Ok(frames)) = (i32::try_from(points), i32::try_from(frames)) else {
             let what = format!("cannot count more than {} frames or points; write .npy instead", i32::MAX);
             return Err(Fault::unsupported(what).at(&announced.path));
         };
         if format == CacheFormat::Pc2 {
-            return Self::begin(announced, target, false, |file| {
+            return Self::begin(announced, target, (Numbers::Single, options.origin), |file| {
                 file.write_all(&pc2::header(points, frames, options.number(0) as f32, options.step() as f32))
             });
         }
-        Self::begin(announced, target, true, |file| {
+        Self::begin(announced, target, (Numbers::SingleBigEndian, options.origin), |file| {
             file.write_all(&mdd::header(points, frames))?;
             let time = |k: i32| (options.number(k as usize) / options.fps) as f32;
             (0..frames).try_for_each(|k| file.write_all(&time(k).to_be_bytes()))
@@ -55,12 +58,12 @@ impl CacheWriter {
     fn begin(
         announced: Announced,
         target: &Target,
-        big_endian: bool,
+        (numbers, origin): (Numbers, Option<Point>),
         header: impl FnOnce(&mut AtomicFile) -> io::Result<()>,
     ) -> Result<Self, Error> {
         let mut file = AtomicFile::create(target)?;
         header(&mut file).map_err(|cause| Error::write(&announced.path, cause))?;
-        Ok(Self { announced, file, big_endian, origin: None, bytes: Vec::new() })
+        Ok(Self { announced, file, numbers, origin, bytes: Vec::new() })
     }
 }
 
@@ -68,13 +71,15 @@ impl FrameWriter for CacheWriter {
     fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error> {
         self.announced.admit(positions)?;
         self.bytes.clear();
-        if let Some(origin) = self.origin {
-            let moved = positions.iter().zip(origin.iter().cycle()).map(|(&x, o)| f64::from(x) + o);
-            self.bytes.extend(moved.flat_map(f64::to_le_bytes));
-        } else if self.big_endian {
-            self.bytes.extend(positions.iter().flat_map(|x| x.to_be_bytes()));
-        } else {
-            self.bytes.extend(positions.iter().flat_map(|x| x.to_le_bytes()));
+        let moved: Option<Vec<f64>> = self
+            .origin
+            .map(|origin| positions.iter().zip(origin.iter().cycle()).map(|(&x, o)| f64::from(x) + o).collect());
+        let singles: Option<Vec<f32>> = moved.as_ref().map(|moved| moved.iter().map(|&x| x as f32).collect());
+        let singles = singles.as_deref().unwrap_or(positions);
+        match self.numbers {
+            Numbers::Single => self.bytes.extend(singles.iter().flat_map(|x| x.to_le_bytes())),
+            Numbers::SingleBigEndian => self.bytes.extend(singles.iter().flat_map(|x| x.to_be_bytes())),
+            Numbers::Double => self.bytes.extend(moved.iter().flatten().flat_map(|x| x.to_le_bytes())),
         }
         self.file.write_all(&self.bytes).map_err(|cause| Error::write(&self.announced.path, cause))?;
         self.announced.written += 1;

@@ -7,7 +7,7 @@ use std::path::Path;
 use cager_core::mesh::{Model, Point, Polygons};
 use cager_core::vector::add;
 
-use super::{Announced, loses_precision};
+use super::{Announced, FrameOptions, check_precision};
 use crate::error::{Error, Fault};
 use crate::mesh::{MeshFormat, write_obj_faces, write_off, write_ply, write_stl};
 
@@ -35,7 +35,7 @@ impl FrameMesh {
         format: MeshFormat,
         announced: &Announced,
         faces: &Polygons,
-        origin: Option<Point>,
+        options: &FrameOptions,
     ) -> Result<Self, Error> {
         let path = &announced.path;
         if let Some(&index) = faces.indices().iter().find(|&&index| index as usize >= announced.points) {
@@ -48,17 +48,17 @@ impl FrameMesh {
         if format == MeshFormat::Obj {
             let mut text = Vec::new();
             write_obj_faces(&mut text, faces.iter()).map_err(|cause| Error::write(path, cause))?;
-            return Ok(Self { form: Form::Obj(text), origin });
+            return Ok(Self { form: Form::Obj(text), origin: options.origin });
         }
         if format == MeshFormat::Stl && faces.is_empty() {
             let what = "cannot be .stl, which holds triangles alone, and there are only points; write .ply instead";
             return Err(Fault::unsupported(what).at(path));
         }
-        if let Some(origin) = origin.filter(|_| format == MeshFormat::Stl) {
-            return Err(loses_precision(origin).at(path));
+        if format == MeshFormat::Stl {
+            check_precision(options, path)?;
         }
         let model = Model { points: Vec::new(), faces: faces.clone(), ..Model::default() };
-        Ok(Self { form: Form::Other(format, model), origin })
+        Ok(Self { form: Form::Other(format, model), origin: options.origin })
     }
 
     /// Writes the mesh of a frame.

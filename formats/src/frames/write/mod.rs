@@ -43,8 +43,10 @@ pub struct FrameOptions {
     pub fps: f64,
     /// The number of each frame, ascending, for the names of files and the times in `.pc2` and `.mdd`; 0, 1, 2, … where there are none.
     pub numbers: Vec<f64>,
-    /// What is added to all positions, which are then written in double precision; formats of single precision are refused.
+    /// What is added to all positions, which are then written in double precision by the formats that have it.
     pub origin: Option<Point>,
+    /// What rounding may lose where an origin is added; formats of single precision that lose more are refused.
+    pub rounding: f64,
 }
 
 impl FrameOptions {
@@ -62,7 +64,7 @@ impl FrameOptions {
 
 impl Default for FrameOptions {
     fn default() -> Self {
-        Self { fps: 24.0, numbers: Vec::new(), origin: None }
+        Self { fps: 24.0, numbers: Vec::new(), origin: None, rounding: 0.0 }
     }
 }
 
@@ -115,7 +117,7 @@ pub fn create_frames(
         return Ok(Box::new(SequenceWriter::create(announced, &target, faces, names, options)?));
     }
     if let Some(format) = MeshFormat::guess(path).filter(|format| FrameMesh::FORMATS.contains(format)) {
-        return Ok(Box::new(SingleWriter::create(announced, &target, format, faces, options.origin)?));
+        return Ok(Box::new(SingleWriter::create(announced, &target, format, faces, options)?));
     }
     match CacheFormat::from_path(path) {
         Some(format) => Ok(Box::new(CacheWriter::create(announced, &target, format, options)?)),
@@ -144,13 +146,17 @@ fn is_folder(path: &Path) -> bool {
     separated || path.extension().is_none() || path.is_dir()
 }
 
-/// Why positions about an origin are not written to a format of single precision.
-fn loses_precision(origin: Point) -> Fault {
-    let farthest = origin.iter().fold(0.0, |far: f64, x| far.max(x.abs()));
-    Fault::unsupported(format!(
-        "holds single precision, which loses all that is smaller than {:.1e} units so far from the origin; write .npy, or .obj or .ply files",
-        farthest * f64::from(f32::EPSILON) / 2.0
-    ))
+/// Refuses formats of single precision where it loses too much about an origin.
+fn check_precision(options: &FrameOptions, path: &Path) -> Result<(), Error> {
+    let farthest = options.origin.iter().flatten().fold(0.0, |far: f64, x| far.max(x.abs()));
+    let lost = farthest * f64::from(f32::EPSILON) / 2.0;
+    if lost <= options.rounding {
+        return Ok(());
+    }
+    let what = format!(
+        "holds single precision, which loses all that is smaller than {lost:.1e} units so far from the origin; write .npy, or .obj or .ply files"
+    );
+    Err(Fault::unsupported(what).at(path))
 }
 
 /// Announced size of an output, and the number of frames written.

@@ -28,7 +28,7 @@ impl SequenceWriter {
         options: &FrameOptions,
     ) -> Result<Self, Error> {
         let format = if names.extension_is("ply") { MeshFormat::Ply } else { MeshFormat::Obj };
-        let mesh = FrameMesh::new(format, &announced, faces, options.origin)?;
+        let mesh = FrameMesh::new(format, &announced, faces, options)?;
         let folder = AtomicDir::create(&announced.path, |name| target.replaces() && names.number(name).is_some())?;
         Ok(Self { announced, folder, mesh, names, options: options.clone() })
     }

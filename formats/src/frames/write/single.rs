@@ -2,10 +2,10 @@
 
 use std::io::{BufWriter, Write};
 
-use cager_core::mesh::{Point, Polygons};
+use cager_core::mesh::Polygons;
 
 use super::mesh::FrameMesh;
-use super::{Announced, FrameWriter};
+use super::{Announced, FrameOptions, FrameWriter};
 use crate::atomic::{AtomicFile, Target};
 use crate::error::{Error, Fault};
 use crate::mesh::MeshFormat;
@@ -22,7 +22,7 @@ impl SingleWriter {
         target: &Target,
         format: MeshFormat,
         faces: &Polygons,
-        origin: Option<Point>,
+        options: &FrameOptions,
     ) -> Result<Self, Error> {
         if announced.frames > 1 {
             let name = announced.path.with_extension("");
@@ -34,7 +34,7 @@ impl SingleWriter {
             ))
             .at(&announced.path));
         }
-        let mesh = FrameMesh::new(format, &announced, faces, origin)?;
+        let mesh = FrameMesh::new(format, &announced, faces, options)?;
         Ok(Self { announced, file: AtomicFile::create(target)?, mesh })
     }
 }
