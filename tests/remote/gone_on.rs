@@ -41,12 +41,12 @@ fn named(said: &str) -> String {
 #[test]
 fn a_full_quota_leaves_a_session_that_is_gone_on_with_when_there_is_room() {
     let (dir, ..) = capture();
+    // The cages of so many frames take more than a megabyte.
+    dir.frames("frames.npy", &Small::new().frames.repeat(100));
     dir.cager(ENCODE).succeeds();
     let expected = dir.read("out.cager");
     std::fs::remove_file(dir.path("out.cager")).expect("a file");
-    let size = |name| std::fs::metadata(dir.path(name)).expect(name).len();
-    let quota = format!("tenant_max_bytes={}", size("rest.obj") + size("cage.obj") + 8000);
-    let mut server = Server::start_at(&dir, "127.0.0.1:0", &["--set", &quota]);
+    let mut server = Server::start_at(&dir, "127.0.0.1:0", &["--set", "tenant_max_bytes=1MiB"]);
     let said = dir.cager(&format!("{ENCODE} --server {}", server.address())).run();
     assert_eq!(said.status, Some(1));
     assert!(said.stderr.contains("delete those that are not needed any more"), "{}", said.stderr);
