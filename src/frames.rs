@@ -52,7 +52,7 @@ impl CaptureFiles {
     pub fn open(&self) -> Result<Box<dyn FrameReader>, Error> {
         let (inner, first_of) = self.open_welded()?;
         let found: Vec<f64> = (0..inner.frames()).map(|frame| inner.number(frame)).collect();
-        if let Some(missing) = missing_frames(&found).filter(|_| !self.allow_gaps) {
+        if let Some(missing) = missing_frames(&found).filter(|_| !self.allow_gaps && !inner.numbers_are_times()) {
             let many = missing.contains([',', ' ']);
             let (frames, are) = if many { ("frames", "are") } else { ("frame", "is") };
             let what =

@@ -8,8 +8,8 @@ use std::path::Path;
 
 use cager_core::mesh::Polygons;
 use cager_formats::{
-    CacheFormat, Error, FrameOptions, FrameReader, create_frames, missing_frames, open_frames, open_frames_bytes,
-    read_model,
+    CacheFormat, Error, FrameOptions, FrameReader, FrameSelection, create_frames, missing_frames, open_frames,
+    open_frames_bytes, open_selected_frames, read_model,
 };
 use support::*;
 use tempfile::tempdir;
@@ -186,6 +186,17 @@ fn the_one_array_that_fits_is_read_with_the_frame_rate_beside_it() {
             assert_eq!(frame, two_frames()[1]);
         }
     }
+    // One frame with its axis, beside a pose without.
+    let one = npy("'<f4'", "'fortran_order': False, 'shape': (1, 2, 3), ", &little(&coordinates()[6..]));
+    fs::write(
+        &path,
+        archive(
+            &[("rest.npy", rest), ("verts.npy", one), ("other.npy", other), ("faces.npy", faces)],
+            zip::CompressionMethod::Stored,
+        ),
+    )
+    .unwrap();
+    assert_eq!(all(&mut *open_frames(&path, 2).unwrap()), [two_frames()[1].clone()]);
     let error = message(open_frames(&path, 7));
     assert!(error.contains("none of them is frames of 7 points") && error.contains("faces: <i8 (4, 3)"), "{error}");
 }
@@ -322,7 +333,9 @@ fn uneven_times_of_a_point_cache_are_kept_and_told() {
     };
     assert_eq!(numbers(&[0.0, 0.04, 0.08, 0.16]), (vec![0.0, 1.0, 2.0, 4.0], Some(25.0), 1));
     assert_eq!(numbers(&[2.0, 2.5, 3.0, 3.25]), (vec![4.0, 5.0, 6.0, 6.5], Some(2.0), 1));
-    // Rounded to thousandths, but even.
+    // At 120 frames per second, rounded to thousandths, but even.
+    let rounded: Vec<f32> = (0..24_u8).map(|k| (f32::from(k) / 0.12).round() / 1000.0).collect();
+    assert_eq!(numbers(&rounded).2, 0);
     assert_eq!(numbers(&[0.0, 0.033, 0.067, 0.1]), (vec![0.0, 1.0, 2.0, 3.0], Some(30.0), 0));
     assert_eq!(numbers(&[0.0, 0.0, 0.0]), (vec![0.0, 1.0, 2.0], None, 0));
     let note = open("a.mdd", &mdd_at(&[0.0, 1.0, 3.0]), 2).unwrap().notes().remove(0);
@@ -634,11 +647,46 @@ fn poses_with_names_of_their_own_are_frames_in_natural_order() {
         ["01_sit.obj", "02_stand.obj", "10_run.obj"],
         ["jump_v2.obj", "run_v2.obj", "walk_v2.obj"],
         ["f.obj", "f1.obj", "g2.obj"],
+        ["01_smile_L.obj", "01_smile_R.obj", "02_frown.obj"],
+        ["f_000_a1b2.obj", "f_001_c3d4.obj", "f_002_a5b6.obj"],
+        ["scan_2024-01-05_10-15-58.obj", "scan_2024-01-05_10-15-59.obj", "scan_2024-01-05_10-16-00.obj"],
     ] {
         assert_eq!(told(files(&names).path()), [0.0, 1.0, 2.0], "{names:?}");
     }
     let long = ["90071992547409931.obj", "90071992547409932.obj"];
     assert_eq!(told(files(&long).path()), [0.0, 1.0]);
+}
+
+#[test]
+fn a_selection_leaves_out_the_rest_pose_and_joins_sequences() {
+    let folder = files(&["f1.obj", "f2.obj", "rest.obj"]);
+    let path = |name: &str| folder.path().join(name);
+    let mut selection = FrameSelection { no_frames: vec![path("rest.obj")], ..FrameSelection::default() };
+    let reader = open_selected_frames(folder.path(), 1, &selection).unwrap();
+    assert_eq!((reader.frames(), reader.notes().len()), (2, 1));
+    selection.no_frames = vec![path("f1.obj")];
+    selection.join_sequences = true;
+    let reader = open_selected_frames(folder.path(), 1, &selection).unwrap();
+    assert_eq!((reader.frames(), reader.notes().len()), (2, 1));
+    // What Blender's export leaves: the rest pose, and the frames in one file.
+    let folder = files(&["rest.obj"]);
+    fs::write(folder.path().join("frames.npy"), npy_f4()).unwrap();
+    selection.no_frames = vec![folder.path().join("rest.obj")];
+    assert_eq!(open_selected_frames(folder.path(), 2, &selection).unwrap().frames(), 2);
+}
+
+#[test]
+fn a_complete_file_without_a_last_line_break_is_no_cut_one() {
+    let folder = tempdir().unwrap();
+    for (k, end) in ["\n", "", "\n"].iter().enumerate() {
+        let text = format!("v {k} 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3{end}");
+        fs::write(folder.path().join(format!("{k}.obj")), text).unwrap();
+    }
+    assert_eq!(numbers(&mut *open_frames(folder.path(), 3).unwrap()), [0.0, 1.0, 2.0]);
+    fs::write(folder.path().join("1.obj"), "v 1 0 0\nv 0 1 0\nv 0 0 1").unwrap();
+    let mut reader = open_frames(folder.path(), 3).unwrap();
+    assert!(reader.read_next(&mut Vec::new()).unwrap());
+    assert!(message(reader.read_next(&mut Vec::new())).contains("1.obj: frame 1: ends within a line"));
 }
 
 #[test]

@@ -42,8 +42,11 @@ pub(crate) struct CheckArgs {
     #[arg(long)]
     pub(super) allow_gaps: bool,
 
-    /// Go on where rest pose, cage and capture look as if they did not belong together (other units, axes or order of points), or files as if they
-    /// were several sequences.
+    /// Take all files where their names look like several sequences, in natural order: poses with names of their own, say.
+    #[arg(long)]
+    pub(super) all_files: bool,
+
+    /// Go on where rest pose, cage and capture look as if they did not belong together: other units, axes or order of points.
     #[arg(long)]
     pub(super) force: bool,
 }
@@ -94,7 +97,7 @@ pub(super) fn checked_files<'a>(
     let mut files = CaptureFiles::new(path, points);
     files.allow_gaps = args.allow_gaps;
     files.selection.no_frames = no_frames.into_iter().cloned().collect();
-    files.selection.join_sequences = args.force;
+    files.selection.join_sequences = args.all_files;
     files
 }
 
@@ -226,7 +229,7 @@ fn explained(error: EncodeError, files: &CaptureFiles, (path, rest): (&Path, &Mo
         }
         error @ EncodeError::EndsEarly { .. } => anyhow::anyhow!("{}: {error}", files.path.display()),
         EncodeError::Formats(error @ SeveralSequences { .. }) => {
-            anyhow::anyhow!("{error}; --force takes them all, in natural order")
+            anyhow::anyhow!("{error}; or pass --all-files to take them all, in natural order")
         }
         other => other.into(),
     }

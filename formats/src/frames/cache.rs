@@ -163,6 +163,10 @@ impl<R: Read + Seek + Send> FrameReader for CacheReader<R> {
         told.copied().unwrap_or(self.first + self.step * frame as f64)
     }
 
+    fn numbers_are_times(&self) -> bool {
+        self.numbers.is_some()
+    }
+
     fn notes(&self) -> Vec<String> {
         self.note.iter().map(|note| format!("{}: {note}", self.path.display())).collect()
     }

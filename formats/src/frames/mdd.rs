@@ -7,8 +7,10 @@ use crate::error::Fault;
 /// Offset of the times.
 pub(super) const HEADER: u64 = 8;
 
-/// Share of a step by which evenly spaced times may be off: programs round them, some to thousandths of a second.
+/// Share of a step by which evenly spaced times may be off.
 const EVEN: f64 = 0.05;
+/// Seconds by which they may be off: some programs round times to thousandths.
+const ROUNDED: f64 = 1e-3;
 
 pub(super) fn layout(head: &[u8]) -> Result<Layout, Fault> {
     let field = |k: usize| head.as_chunks().0.get(k).map(|bytes| i32::from_be_bytes(*bytes));
@@ -42,7 +44,8 @@ pub(super) fn set_times(layout: &mut Layout, stored: &[u8]) -> Result<(), Fault>
         )));
     }
     let step = (last - first) / (times.len() - 1) as f64;
-    let off = |(k, time): (usize, &f64)| (time - first - step * k as f64).abs() > EVEN * step;
+    let slack = (EVEN * step).max(ROUNDED).min(step / 4.0);
+    let off = |(k, time): (usize, &f64)| (time - first - step * k as f64).abs() > slack;
     if !times.iter().enumerate().any(off) {
         layout.frame_rate = rate(step);
         if let Some(rate) = layout.frame_rate {

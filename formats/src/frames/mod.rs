@@ -56,6 +56,11 @@ pub trait FrameReader: Send {
         frame as f64
     }
 
+    /// Whether [`Self::number`] tells times, so that what lies between two numbers is not missing.
+    fn numbers_are_times(&self) -> bool {
+        false
+    }
+
     /// What the user should know of how the source is read.
     fn notes(&self) -> Vec<String> {
         Vec::new()

@@ -1,12 +1,12 @@
 //! The order of a capture's files as a person reads their names, and whether they are one sequence at all.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use super::numbers;
 use super::pieces::{Names, Pieces};
-use super::several::{same_number, several};
+use super::several::several;
 use crate::natural;
 
 /// The files of one sequence in their order, with the number of each where the names tell one.
@@ -79,25 +79,21 @@ fn numbers_of_one_sequence(names: &Names) -> Result<Option<Vec<f64>>, String> {
                 "{copy} looks like a copy of {from}; keep one of them, or name the frames by a pattern"
             ));
         }
-        let mut by_number: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
-        for (file, found) in pieces.iter().enumerate() {
-            if let Some(number) = found.values().first() {
-                by_number.entry(number).or_default().push(file);
-            }
-        }
-        let all_numbered = pieces.iter().all(|found| !found.numbers.is_empty());
-        let vary = all_numbered && by_number.len() > 1;
-        return match by_number.into_values().find(|files| vary && files.len() > 1) {
-            Some(files) => Err(same_number(names, &pieces, &files)),
-            None => Ok(None),
-        };
+        return Ok(None);
+    }
+    if alike.len() > 1 && leading_numbers_differ(&pieces) {
+        return Ok(None);
     }
     let mut groups = Vec::new();
     for files in alike.into_values() {
-        match unique_column(&pieces, &files) {
-            Some(column) => groups.push((files, Some(column))),
-            None if files.len() == 1 => groups.push((files, None)),
-            None => groups.extend(split(&pieces, &files).into_iter().map(|files| (files, None))),
+        match unique_columns(&pieces, &files).as_slice() {
+            [] if files.len() > 1 => groups.extend(split(&pieces, &files).into_iter().map(|files| (files, None))),
+            columns => {
+                // Numbers that the order of the names contradicts are none, such as seconds beside minutes.
+                let even = columns.iter().find(|(_, values)| ascends(values) && numbers::evenly_spaced(values));
+                let column = even.or(columns.iter().find(|(_, values)| ascends(values))).map(|(column, _)| *column);
+                groups.push((files, column));
+            }
         }
     }
     match groups.as_slice() {
@@ -106,7 +102,6 @@ fn numbers_of_one_sequence(names: &Names) -> Result<Option<Vec<f64>>, String> {
                 |found: &Pieces<'_>| found.numbers[*column].parse().ok().filter(|_| found.numbers[*column].len() <= 15);
             Ok(pieces.iter().map(value).collect())
         }
-        // Numbers too long for `f64`.
         [_] => Ok(None),
         _ => {
             groups.sort_by_key(|(files, _)| std::cmp::Reverse(files.len()));
@@ -127,18 +122,30 @@ fn original(label: &str) -> Option<&str> {
     Some(label[..copy].trim_end_matches([' ', '-', '_']))
 }
 
-/// The number in which all of these differ; the one with even steps where there are several.
-fn unique_column(pieces: &[Pieces<'_>], files: &[usize]) -> Option<usize> {
-    let columns = pieces[*files.first()?].numbers.len();
+fn ascends(values: &[f64]) -> bool {
+    values.windows(2).all(|pair| pair[0] < pair[1])
+}
+
+/// Whether all names begin alike and go on with numbers that differ, as `01_sit 02_stand` and `f_000_a1b2 f_001_c3d4` do.
+fn leading_numbers_differ(pieces: &[Pieces<'_>]) -> bool {
+    let begin = |found: &Pieces<'_>| found.texts.split('#').next().map(str::to_owned);
+    let first = pieces.first().and_then(begin);
+    let mut seen = BTreeSet::new();
+    pieces
+        .iter()
+        .all(|found| begin(found) == first && found.values().first().is_some_and(|number| seen.insert(*number)))
+}
+
+/// The numbers in which all of these differ.
+fn unique_columns(pieces: &[Pieces<'_>], files: &[usize]) -> Vec<(usize, Vec<f64>)> {
+    let columns = files.first().map_or(0, |&file| pieces[file].numbers.len());
     let values = |column: usize| -> Option<Vec<f64>> {
         files.iter().map(|&file| pieces[file].numbers[column].parse().ok()).collect()
     };
-    let unique: Vec<(usize, Vec<f64>)> = (0..columns)
+    (0..columns)
         .filter_map(|column| Some((column, values(column)?)))
         .filter(|(_, values)| numbers::distinct(values))
-        .collect();
-    let even = unique.iter().find(|(_, values)| numbers::evenly_spaced(values));
-    even.or(unique.first()).map(|(column, _)| *column)
+        .collect()
 }
 
 /// Files whose names have the same pieces in parts, in each of which one number tells the frames apart.

@@ -185,6 +185,11 @@ pub(super) fn described(head: &[u8]) -> String {
     }
 }
 
+/// How many axes an array has.
+pub(super) fn axes_count(head: &[u8]) -> usize {
+    parse(head).map_or(0, |(header, _)| header.shape.len())
+}
+
 /// The only number of an array.
 pub(super) fn single_number(file: &[u8]) -> Option<f64> {
     let (header, start) = parse(file).ok()?;

@@ -50,7 +50,13 @@ pub(super) fn open<'a>(
             fps = npy::single_number(&head).filter(|rate| rate.is_finite() && *rate > 0.0);
         }
         let layout = npy::layout(&head, expected_points as u64, Place { name: Some(name) });
-        found.push(Array { name, entry, described: npy::described(&head), layout });
+        found.push(Array {
+            name,
+            entry,
+            described: npy::described(&head),
+            has_frames: npy::axes_count(&head) > 2,
+            layout,
+        });
         let Some(back) = unpacked.into_inner() else { return Err(Fault::damaged("cannot be read").at(path)) };
         source = back;
     }
@@ -66,6 +72,8 @@ struct Array<'a> {
     name: &'a str,
     entry: &'a Entry,
     described: String,
+    /// Whether it has an axis of frames.
+    has_frames: bool,
     layout: Result<Layout, Fault>,
 }
 
@@ -78,12 +86,13 @@ fn chosen<'a>(mut found: Vec<Array<'a>>, arrays: &Arrays, points: u64, path: &Pa
         places.next().filter(|_| places.next().is_none())
     };
     let moving = |array: &Array<'_>| fits(array) && frames(array) > 1;
+    let framed = |array: &Array<'_>| fits(array) && array.has_frames;
     // What is wrong with the only one that could be meant is said by whoever reads it.
     let meant = || {
         let readable = || only(&|array| frames(array) > 0);
         (arrays.unreadable.is_none() && !found.iter().any(fits)).then(|| only(&|_| true).or_else(readable)).flatten()
     };
-    if let Some(place) = only(&fits).or_else(|| only(&moving)).or_else(meant) {
+    if let Some(place) = only(&fits).or_else(|| only(&moving)).or_else(|| only(&framed)).or_else(meant) {
         return Ok(found.swap_remove(place));
     }
     let file = "numpy.load(path)";

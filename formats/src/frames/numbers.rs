@@ -56,16 +56,16 @@ fn fractions(prefix: &str, parts: &[&str]) -> Option<Vec<f64>> {
         parts.iter().map(|part| number(&format!("{sign}{whole}.{part}"))).collect::<Option<_>>()?;
     let counted: Vec<f64> = parts.iter().map(|part| number(part)).collect::<Option<_>>()?;
     let width = parts[0].len();
-    let same_width = parts.iter().all(|part| part.len() == width);
-    let separates = if same_width {
-        let is_zero = whole.bytes().all(|b| b == b'0');
-        let padded = width >= 4 && name.ends_with(|c: char| c.is_alphabetic());
-        let consecutive = evenly_spaced(&counted) && (counted[0] - counted[1]).abs() == 1.0;
-        padded || !is_zero && (width >= 4 || consecutive)
+    let word = name.rsplit(|c: char| !c.is_alphabetic()).next().unwrap_or_default();
+    let is_zero = whole.bytes().all(|b| b == b'0') && !matches!(word, "v" | "ver" | "version" | "take");
+    let separates = if parts.iter().all(|part| part.len() == width) {
+        // The order is the same either way; frames of renderers have four digits.
+        !is_zero || width >= 4 && !word.is_empty()
     } else {
-        // Numbers that are not filled up, as in `shot2.9 shot2.10`.
+        // Digits that are not filled up count, as in `shot2.9 shot2.10`, unless only as decimals they have even steps.
         let filled = parts.iter().any(|part| part.len() > 1 && part.starts_with('0'));
-        !filled && parts.len() > 2 && evenly_spaced(&counted)
+        let even = |numbers: &[f64]| numbers.len() > 2 && evenly_spaced(numbers);
+        !filled && if is_zero { even(&counted) } else { even(&counted) || !even(&decimals) }
     };
     (!separates).then_some(decimals)
 }
@@ -195,7 +195,12 @@ mod tests {
             (vec!["t_-0.5", "t_-0.25"], vec![-0.5, -0.25]),
             (vec!["f1.25", "f1.5", "f1.75"], vec![1.25, 1.5, 1.75]),
             (vec!["f0.98", "f0.99", "f1.00", "f1.01"], vec![0.98, 0.99, 1.0, 1.01]),
-            (vec!["f1.250", "f1.500", "f1.750"], vec![1.25, 1.5, 1.75]),
+            (vec!["f1.250", "f1.500", "f1.750"], vec![250.0, 500.0, 750.0]),
+            (vec!["w_v2.8", "w_v2.9", "w_v2.11", "w_v2.12"], vec![8.0, 9.0, 11.0, 12.0]),
+            (vec!["v2.9", "v2.10"], vec![9.0, 10.0]),
+            (vec!["s2.9", "s2.10", "s2.12", "s2.13", "s2.14"], vec![9.0, 10.0, 12.0, 13.0, 14.0]),
+            (vec!["sim_v1.001", "sim_v1.002", "sim_v1.004", "sim_v1.005"], vec![1.0, 2.0, 4.0, 5.0]),
+            (vec!["sim_v0.001", "sim_v0.002", "sim_v0.004"], vec![1.0, 2.0, 4.0]),
             (vec!["shot2.8", "shot2.9", "shot2.10"], vec![8.0, 9.0, 10.0]),
             (vec!["shot2.010", "shot2.011"], vec![10.0, 11.0]),
             (vec!["shot0.0010", "shot0.0012"], vec![10.0, 12.0]),

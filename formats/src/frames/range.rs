@@ -146,6 +146,10 @@ impl FrameReader for RangeReader {
         self.reader.number(self.range.frame(frame))
     }
 
+    fn numbers_are_times(&self) -> bool {
+        self.reader.numbers_are_times()
+    }
+
     fn notes(&self) -> Vec<String> {
         self.reader.notes()
     }

@@ -64,7 +64,9 @@ impl SequenceReader {
             let (path, frame) = (path.to_owned(), Some(frame));
             return Err(Error::PointCount { path, frame, expected: self.points, found: found as u64 });
         }
-        if let Some(whole) = whole {
+        // A file with all the faces of the one before is whole, however it ends.
+        let complete = !model.faces.is_empty() && model.faces == self.faces.faces;
+        if let Some(whole) = whole.filter(|_| !complete) {
             let why = "where other frames end with a line break, so it was cut";
             match &self.before {
                 Some((true, ..)) if !whole => return Err(cut::in_last_line(path, frame, why)),

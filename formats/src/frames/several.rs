@@ -5,17 +5,6 @@ use super::pieces::{Names, Pieces};
 /// Sequences that a message lists.
 const LISTED: usize = 4;
 
-/// Two files that are the same frame by their names.
-pub(super) fn same_number(names: &Names, pieces: &[Pieces<'_>], files: &[usize]) -> String {
-    let found: Vec<String> = files.iter().take(2).map(|&file| names.name(file)).collect();
-    let number = pieces[files[0]].values()[0];
-    format!(
-        "{} have the same frame number, {}; keep one of them, or pick the files of one sequence with a pattern",
-        found.join(" and "),
-        if number.is_empty() { "0" } else { number }
-    )
-}
-
 /// What was found in place of one sequence, and how to pick one.
 pub(super) fn several(names: &Names, pieces: &[Pieces<'_>], groups: &[Vec<usize>]) -> String {
     let mut words = Vec::new();

@@ -103,12 +103,12 @@ fn open_files(
     selection: &FrameSelection,
 ) -> Result<Box<dyn FrameReader>, Error> {
     let (meshes, others): (Vec<_>, Vec<_>) = found.into_iter().partition(|path| MeshFormat::guess(path).is_some());
-    let (frames, notes) = without(meshes, &selection.no_frames);
+    let caches: Vec<PathBuf> = others.iter().filter(|path| single::is_cache(path)).cloned().collect();
+    let (frames, notes) = without(meshes, &selection.no_frames, caches.is_empty());
     if !frames.is_empty() {
         one_format(&frames).map_err(|fault| fault.at(source))?;
         return open_sequence(source, frames, notes, expected_points, selection);
     }
-    let caches: Vec<PathBuf> = others.iter().filter(|path| single::is_cache(path)).cloned().collect();
     match caches.as_slice() {
         [] => Err(no_frames(source, &others)),
         [cache] => single::open_cache(cache, expected_points),
@@ -135,8 +135,8 @@ fn open_sequence(
 }
 
 /// Files without the rest pose and the cage, however they are spelled, and what to say of it. One that is called as the others are stays, as the first
-/// frame often is the rest pose; so does one that is alone.
-fn without(files: Vec<PathBuf>, no_frames: &[PathBuf]) -> (Vec<PathBuf>, Vec<String>) {
+/// frame often is the rest pose; so does one where there is nothing else.
+fn without(files: Vec<PathBuf>, no_frames: &[PathBuf], nothing_else: bool) -> (Vec<PathBuf>, Vec<String>) {
     let excluded: Vec<PathBuf> = no_frames.iter().filter_map(|path| path.canonicalize().ok()).collect();
     let is_excluded = |path: &PathBuf| path.canonicalize().is_ok_and(|found| excluded.contains(&found));
     if excluded.is_empty() {
@@ -146,7 +146,7 @@ fn without(files: Vec<PathBuf>, no_frames: &[PathBuf]) -> (Vec<PathBuf>, Vec<Str
     let mut notes = Vec::new();
     let there = frames.clone();
     for file in found {
-        if there.is_empty() || is_one_of(&file, &there) {
+        if there.is_empty() && nothing_else || is_one_of(&file, &there) {
             frames.push(file);
         } else {
             notes.push(format!(

@@ -100,9 +100,9 @@ fn two_files_with_one_number_or_several_sequences_are_refused_with_patterns_that
     ] {
         let dir = with_out(Dir::with_case("03-two-files-for-one-frame-number"));
         let said = refused(&dir, folder, &words);
-        assert!(said.contains(&format!("'{picks}'")) && said.contains("--force"), "{said}");
+        assert!(said.contains(&format!("'{picks}'")) && said.contains("--all-files"), "{said}");
         assert_eq!(numbers(&dir, "", picks).len(), 3, "{picks}");
-        assert!(numbers(&dir, "--force", folder).len() > 4, "{folder}");
+        assert!(numbers(&dir, "--all-files", folder).len() > 4, "{folder}");
     }
 }
 
