@@ -42,7 +42,8 @@ fn named(said: &str) -> String {
 fn a_full_quota_leaves_a_session_that_is_gone_on_with_when_there_is_room() {
     let (dir, ..) = capture();
     // The cages of so many frames take more than a megabyte.
-    dir.frames("frames.npy", &Small::new().frames.repeat(100));
+    let frames: Vec<Vec<f64>> = (0..100).flat_map(|_| Small::new().frames).collect();
+    dir.frames("frames.npy", &frames);
     dir.cager(ENCODE).succeeds();
     let expected = dir.read("out.cager");
     std::fs::remove_file(dir.path("out.cager")).expect("a file");
