@@ -184,7 +184,7 @@ impl Residual {
             (0, rest)
         };
         let too_many = count > frames.min(3 * points) || (3 * points).saturating_mul(count) > most;
-        let impossible = too_many || !step.is_finite() || !(correction.abs() <= LARGEST_CORRECTION);
+        let impossible = too_many || !step.is_finite() || correction.is_nan() || correction.abs() > LARGEST_CORRECTION;
         let parts =
             rest.split_at_checked(coarse).and_then(|(coarse, rest)| Some((coarse, rest.split_at_checked(fine)?)));
         let Some((coarse, (fine, corrected))) = parts.filter(|_| !impossible) else {
@@ -202,7 +202,7 @@ impl Residual {
         });
         coders.iter().try_for_each(Decoder::check)?;
         // Written so that NaN is an error.
-        if !(residual.largest_sum() <= LARGEST) {
+        if residual.largest_sum().is_nan() || residual.largest_sum() > LARGEST {
             return Err(Error::Damaged("a residual is too large for numbers of single precision"));
         }
         residual.corrections = Corrections::decode(corrected, frames, points, correction)?;

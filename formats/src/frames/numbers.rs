@@ -112,7 +112,7 @@ fn are_versions(parts: &[&str]) -> bool {
     for part in parts {
         match part.split_once('.').map(|(version, frame)| (version, frame, frame.parse())) {
             Some((version, frame, Ok(number))) if frame.len() == width => {
-                versions.entry(version).or_default().push(number)
+                versions.entry(version).or_default().push(number);
             }
             _ => return false,
         }
