@@ -29,6 +29,8 @@ async fn one_address_has_its_share_of_the_places_and_no_more() {
     for stream in &mut busy {
         read_response(stream).await;
     }
+    // Whichever of the two was answered first, the other has been idle for longer now.
+    assert!(ask(&mut busy[1], HERE).await.ends_with("here"));
     // One that is idle makes way for a newer one of the same address, and for no other.
     tokio::time::sleep(ms(1100)).await;
     let mut next = from(one, &server).await;
