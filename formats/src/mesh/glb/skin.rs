@@ -63,7 +63,7 @@ impl Joints {
         place: &str,
     ) -> Result<(), Fault> {
         let mut moved = vec![([0.0; 3], 0.0); points.len()];
-        let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).map(|index| index.value());
+        let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).map(gltf::json::Index::value);
         // Four joints a vertex in each set.
         for set in 0.. {
             let (Some(joints), Some(weights)) = (attribute(Semantic::Joints(set)), attribute(Semantic::Weights(set)))
