@@ -133,7 +133,7 @@ fn open_with(
     if file.metadata().is_ok_and(|m| m.is_dir()) {
         return Err(fail(container::Error::NotAContainer));
     }
-    read(BufReader::new(file)).map_err(|cause| match Signature::error_of_other("cager", path) {
+    read(BufReader::new(file)).map_err(|cause| match Signature::stand_in_of(path) {
         Some(other) if matches!(cause, container::Error::NotAContainer) => other.into(),
         _ => fail(cause),
     })

@@ -114,11 +114,11 @@ impl Signature {
         })
     }
 
-    /// As [`Self::other_than`], of a file; `None` too where it cannot be read.
-    pub fn error_of_other(extension: &str, path: &Path) -> Option<Error> {
+    /// As [`Self::stand_in`], of a file; `None` too where it cannot be read.
+    pub fn stand_in_of(path: &Path) -> Option<Error> {
         let mut start = Vec::new();
         File::open(path).ok()?.take(LOOKED_AT as u64).read_to_end(&mut start).ok()?;
-        Self::other_than(extension, &start).map(|what| Error::Damaged { path: path.to_owned(), what })
+        Self::of(&start)?.stand_in().map(|what| Error::Damaged { path: path.to_owned(), what })
     }
 
     /// As a noun phrase: `a .npy file`.

@@ -97,20 +97,15 @@ impl Buffers<'_> {
         let accessor = self.accessor(index)?;
         let (size, convert) = (kind.size(), |element: &[u8]| convert(kind.numbers(element)));
         let count = usize::try_from(accessor.count.0).ok().filter(|&count| count <= most);
-        let mut values: Vec<T> = match (accessor.buffer_view, &accessor.sparse) {
-            (Some(view), _) => {
+        let mut values: Vec<T> = match accessor.buffer_view {
+            Some(view) => {
                 let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
                 let found = self.elements(view.value(), offset, size, accessor.count.0, place)?;
                 let count = count.ok_or_else(too_large)?;
                 found.bytes.chunks(found.stride).take(count).map(&convert).collect()
             }
-            // Zeros, but for those that follow.
-            (None, Some(_)) => (0..count.ok_or_else(too_large)?).map(|_| convert(&[0; MOST_BYTES][..size])).collect(),
-            (None, None) => {
-                return Err(Fault::unsupported(format!(
-                    "{place}: accessor {index} has no data of its own; export the mesh without compression"
-                )));
-            }
+            // Zeros, but for what a sparse accessor has.
+            None => (0..count.ok_or_else(too_large)?).map(|_| convert(&[0; MOST_BYTES][..size])).collect(),
         };
         if let Some(sparse) = &accessor.sparse {
             let replaced = self.sparse_indices(sparse, most, place)?;

@@ -14,7 +14,7 @@ use crate::error::Fault;
 /// Bytes that packed views of any file may have.
 const UNPACKED_FREE: usize = 1 << 20;
 /// Those beyond, for each byte of the file.
-const UNPACKED_PER_BYTE: usize = 48;
+const UNPACKED_PER_BYTE: usize = 24;
 
 /// The files' padding is not always whole.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
@@ -29,8 +29,9 @@ pub(super) struct Buffers<'a> {
     decoded: Vec<OnceCell<Vec<u8>>>,
     /// By view: what was packed.
     unpacked: Vec<OnceCell<Vec<u8>>>,
-    /// Bytes that may still be unpacked.
-    room: Cell<usize>,
+    /// Bytes that were unpacked, and that may be at the most.
+    taken: Cell<usize>,
+    most: usize,
 }
 
 impl<'a> Buffers<'a> {
@@ -40,8 +41,17 @@ impl<'a> Buffers<'a> {
             binary,
             decoded: vec![OnceCell::new(); root.buffers.len()],
             unpacked: vec![OnceCell::new(); root.buffer_views.len()],
-            room: Cell::new(UNPACKED_FREE + UNPACKED_PER_BYTE * file),
+            taken: Cell::new(0),
+            most: UNPACKED_FREE + UNPACKED_PER_BYTE * file,
         }
+    }
+
+    /// Unpacks what an accessor reads, and gives the bytes that were unpacked up to now; what is wrong with it is told when it is read.
+    pub(super) fn unpack_for(&self, accessor: usize) -> usize {
+        if let Some(view) = self.root.accessors.get(accessor).and_then(|accessor| accessor.buffer_view) {
+            let _ = self.view(view.value(), "");
+        }
+        self.taken.get()
     }
 
     /// The bytes of a view, and its stride where it has one.
@@ -62,10 +72,11 @@ impl<'a> Buffers<'a> {
             };
             let packed = packed.ok_or_else(damaged)?;
             let size = packed.size().ok_or_else(damaged)?;
-            self.room.set(self.room.get().checked_sub(size).ok_or_else(too_large)?);
+            let taken = self.taken.get().checked_add(size).filter(|&taken| taken <= self.most).ok_or_else(too_large)?;
             let stream = self.part(packed.buffer, packed.offset, packed.length, place)?;
             let unpacked = packed.unpack(stream).ok_or_else(damaged)?;
             cell.get_or_init(|| unpacked);
+            self.taken.set(taken);
         }
         Ok((cell.get().map_or(&[], Vec::as_slice), stride))
     }

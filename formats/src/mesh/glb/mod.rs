@@ -38,6 +38,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Model, Fault> {
         model: Model::default(),
         colors: Colors::default(),
         most: MOST_FREE + MOST_PER_BYTE * bytes.len(),
+        unpacked: 0,
     };
     for placement in &scene.placements {
         builder.place(placement)?;
@@ -61,6 +62,8 @@ struct Builder<'a> {
     colors: Colors,
     /// Nodes may repeat a mesh, and primitives an accessor, any number of times in a few bytes each.
     most: usize,
+    /// Bytes that were packed, which count as those of the file do.
+    unpacked: usize,
 }
 
 impl Builder<'_> {
@@ -133,7 +136,10 @@ impl Builder<'_> {
             return Ok(());
         }
         let corners = match primitive.indices {
-            Some(index) => self.buffers.indices(index.value(), self.room(), place)?,
+            Some(index) => {
+                let room = self.room_for(index.value());
+                self.buffers.indices(index.value(), room, place)?
+            }
             None => {
                 self.check_room(count)?;
                 (0..count as u32).collect()
@@ -149,7 +155,8 @@ impl Builder<'_> {
         placement: &Placement,
         place: &str,
     ) -> Result<(usize, usize), Fault> {
-        let mut points = self.buffers.positions(index, self.room(), place)?;
+        let room = self.room_for(index);
+        let mut points = self.buffers.positions(index, room, place)?;
         self.morph(&mut points, primitive, placement, place)?;
         if let Some(skin) = placement.skin {
             self.joints(skin)?;
@@ -238,7 +245,13 @@ impl Builder<'_> {
     /// How many points or corners may still be added.
     fn room(&self) -> usize {
         let used = self.model.points.len() + self.model.faces.indices().len();
-        self.most.min(u32::MAX as usize).saturating_sub(used)
+        (self.most + self.unpacked / 2).min(u32::MAX as usize).saturating_sub(used)
+    }
+
+    /// As [`Self::room`], once what an accessor reads is unpacked: two bytes of a packed view are a corner or less.
+    fn room_for(&mut self, accessor: usize) -> usize {
+        self.unpacked = self.buffers.unpack_for(accessor);
+        self.room()
     }
 
     fn check_room(&self, wanted: usize) -> Result<(), Fault> {
