@@ -407,7 +407,8 @@ impl Service {
         while self.code_next(session, Some(end)).await? {}
         // A group that was being coded may have gone beyond.
         session.check_end(end)?;
-        if session.coded_frames().is_some_and(|coded| coded < end) { session.check_coding() } else { Ok(()) }
+        let (coded, _) = lock(&session.groups).end();
+        if coded < end { session.check_coding() } else { Ok(()) }
     }
 
     /// Codes the next group. Returns false if no group is complete.

