@@ -259,8 +259,8 @@ impl Session {
             let last = first + (entries.len() as u32 - 1);
             error.problem.detail = format!("frames {first} to {last}: {}", error.problem.detail);
             tracing::info!(session = %self.meta.id, detail = %error.problem.detail, "frames cannot be coded");
-            // Another completion may succeed.
-            if !is_last {
+            // With more frames it may go, where there may be more.
+            if !is_last || end == self.meta.options.frames {
                 lock(&self.groups).failed = Some((entries.len() as u32, error.clone()));
                 self.touch();
             }

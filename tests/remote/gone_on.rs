@@ -128,7 +128,7 @@ fn a_session_of_another_capture_is_refused_with_the_first_difference() {
     refused("", "the cage differs");
     refused(" --coordinates green", "the option coordinates differs: the session has mvc, this command green");
     refused(" --lambda 0.5", "the option lambda differs: the session has 1.0, this command 0.5");
-    refused(" --spectrum 3", "the option spectrum differs");
+    refused(" --spectrum 5", "the option spectrum differs");
     refused(" --max-error 1e-3", "the option max_error differs: the session has none, this command 0.001");
     for changed in [0, 6] {
         let mut frames = small.frames.clone();
