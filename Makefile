@@ -97,7 +97,7 @@ else
 	@echo "Node is not here, so the sources of the viewer are not checked"
 endif
 
-lint-deploy: $(LINT)/bin/python ## Dockerfile, manifests, alerts and dashboard against their schemas; needs the network
+lint-deploy: $(LINT)/bin/python ## Dockerfile, manifests, alerts and dashboard against their schemas; needs the network; CI runs it
 	$(LINT)/bin/hadolint Dockerfile
 	$(LINT)/bin/yamllint --strict -d '{extends: default, rules: {line-length: {max: 140}, document-start: disable}}' deploy
 	$(LINT)/bin/check-jsonschema --builtin-schema vendor.compose-spec deploy/compose.yaml

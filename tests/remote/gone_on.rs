@@ -52,7 +52,7 @@ fn a_full_quota_leaves_a_session_that_is_gone_on_with_when_there_is_room() {
     assert_eq!(said.status, Some(1));
     assert!(said.stderr.contains("delete those that are not needed any more"), "{}", said.stderr);
     let session = named(&said.stderr);
-    assert_eq!(sessions(&server).iter().map(|s| s.id.clone()).collect::<Vec<_>>(), [session.clone()]);
+    assert_eq!(sessions(&server).iter().map(|s| s.id.as_str()).collect::<Vec<_>>(), [session.as_str()]);
     assert!(!dir.path("out.cager").exists());
 
     let place = server.place.clone();
