@@ -63,7 +63,7 @@ endif
 
 captures: ## run the tests that need the real captures in CAGER_CAPTURES (../shared/data)
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
-		$(CARGO) nextest run --workspace --locked --run-ignored only; \
+		$(CARGO) nextest run --workspace --locked --run-ignored only --no-fail-fast; \
 	else \
 		$(CARGO) test --workspace --locked --tests -- --ignored; \
 	fi

@@ -17,4 +17,4 @@ pub mod vector;
 
 /// Version of the preparation of solvers: stored solvers of another version are recomputed. Decoding a container depends on
 /// [`coordinates::DEFINITION`] alone.
-pub const SOLVER_VERSION: u32 = 6;
+pub const SOLVER_VERSION: u32 = 7;

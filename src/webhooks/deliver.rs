@@ -57,7 +57,6 @@ impl Message {
             tracing::warn!(line, id, why, again_in_s = pause, "a webhook message was not delivered");
             tokio::time::sleep(Duration::from_secs(*pause)).await;
         };
-        metrics::counter!("cager_webhooks_total", "result" => result).increment(1);
         let told = hook.id.clone();
         let noted = tokio::task::spawn_blocking(move || {
             let mut due = self.due();
@@ -68,6 +67,7 @@ impl Message {
         if let Ok(Err(error)) = noted.await {
             tracing::debug!(%error, "the delivery of a webhook message could not be stored");
         }
+        metrics::counter!("cager_webhooks_total", "result" => result).increment(1);
     }
 
     fn due(&self) -> MutexGuard<'_, PendingMessage> {

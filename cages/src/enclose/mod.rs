@@ -98,19 +98,29 @@ pub fn enclose_unless(
         return Err(EncloseError::TooFewVertices { vertices: options.vertices, least: LEAST });
     }
     let mut least = usize::MAX;
-    let mut crumpled = false;
+    // Surfaces that are known already, the next to be tried last, from when on the model has proved to be crumpled.
+    let mut known: Option<Vec<Start>> = None;
     while offset < LARGEST_OFFSET.max(4.0 * clearance) {
         if stopped() {
             return Err(EncloseError::Stopped);
         }
-        match enclose_at(&source, offset, clearance, options, &mut crumpled, stopped) {
+        let start = match &mut known {
+            Some(known) => known.pop().unwrap_or_else(|| Start::with_gaps_closed(&source, offset, options)),
+            None => match Start::with_gaps_open(&source, offset, clearance, options) {
+                Some(start) => start,
+                None => {
+                    let promising = promising_starts(&source, offset, options);
+                    offset = promising.last().map_or(offset, |start| start.offset.largest);
+                    known = Some(promising);
+                    continue;
+                }
+            },
+        };
+        match enclose_from(&source, start, clearance, options, stopped) {
             Ok(cage) => return Ok(cage),
-            Err(Failure::Crumpled) => offset = least_promising(&source, offset, options),
-            Err(Failure::Left(reached)) => {
-                least = least.min(reached);
-                offset *= GROWTH;
-            }
+            Err(reached) => least = least.min(reached),
         }
+        offset *= GROWTH;
     }
     let too_few = EncloseError::TooFewVertices { vertices: options.vertices, least };
     simple_shape(&source, options.vertices, clearance).ok_or(too_few)
@@ -122,27 +132,45 @@ const GROWTH: f64 = 1.35;
 /// From this offset on a lattice is so coarse that a surface takes no time.
 const COARSE: f64 = 0.04;
 
-/// Why there is no cage at an offset.
-enum Failure {
-    /// Gaps proved too many to be kept open; nothing else was tried yet.
-    Crumpled,
-    /// So many vertices were left; `usize::MAX` where it did not come to that.
-    Left(usize),
+/// What a cage is simplified from.
+struct Start {
+    offset: Offset,
+    /// The surface at the offset, if it has no more parts and handles than the cage has vertices for.
+    surface: Option<(Vec<DVec3>, Vec<[u32; 3]>)>,
 }
 
-/// The least offset from the first on whose surface few enough vertices may enclose, gaps closed. Surfaces of crumpled models have many handles at small
-/// offsets, and take the longest there, so they are looked at from a large one down.
-fn least_promising(source: &NormalizedModel, first: f64, options: &EncloseOptions) -> f64 {
-    let mut tried = vec![first];
-    while tried[tried.len() - 1] < COARSE {
-        tried.push(GROWTH * tried[tried.len() - 1]);
+impl Start {
+    /// `None` where gaps prove too many to be kept open.
+    fn with_gaps_open(source: &NormalizedModel, offset: f64, clearance: f64, options: &EncloseOptions) -> Option<Self> {
+        let (offset, cubes) = offset_with_gaps(source, offset, 2.0 * clearance, most_halved(options.vertices))?;
+        Some(Self { surface: promising_surface(source, &offset, &cubes, options), offset })
     }
-    let is_promising = |&offset: &f64| {
+
+    fn with_gaps_closed(source: &NormalizedModel, offset: f64, options: &EncloseOptions) -> Self {
         let (offset, cubes) = uniform_offset(source, offset);
-        promising_surface(source, &offset, &cubes, options).is_some()
-    };
-    let promising = tried.iter().rev().take_while(|offset| is_promising(offset)).count();
-    tried[tried.len() - promising.max(1)]
+        Self { surface: promising_surface(source, &offset, &cubes, options), offset }
+    }
+}
+
+/// From the first offset on those whose surfaces few enough vertices may enclose, gaps closed; the least comes last. Surfaces of crumpled models have many
+/// handles at small offsets, and take the longest there, so they are looked at from a large one down.
+fn promising_starts(source: &NormalizedModel, first: f64, options: &EncloseOptions) -> Vec<Start> {
+    let mut offsets = vec![first];
+    while offsets[offsets.len() - 1] < COARSE {
+        offsets.push(GROWTH * offsets[offsets.len() - 1]);
+    }
+    let mut found: Vec<Start> = Vec::new();
+    for offset in offsets.into_iter().rev() {
+        let start = Start::with_gaps_closed(source, offset, options);
+        let is_promising = start.surface.is_some();
+        if is_promising || found.is_empty() {
+            found.push(start);
+        }
+        if !is_promising {
+            break;
+        }
+    }
+    found
 }
 
 /// The surface at an offset, if it has no more parts and handles than the cage has vertices for.
@@ -184,35 +212,26 @@ fn most_halved(vertices: usize) -> usize {
     (1_200 + 3 * vertices).min(2_500)
 }
 
-/// A valid cage at one offset. Where gaps prove too many to be kept open, the model is `crumpled`, and they are not looked for again.
-fn enclose_at(
+/// A valid cage simplified from a surface, or the number of vertices that were left; `usize::MAX` where it did not come to that.
+fn enclose_from(
     source: &NormalizedModel,
-    offset: f64,
+    Start { offset, surface }: Start,
     clearance: f64,
     options: &EncloseOptions,
-    crumpled: &mut bool,
     stopped: &mut dyn FnMut() -> bool,
-) -> Result<TriMesh, Failure> {
-    let (offset, cubes) = if *crumpled {
-        uniform_offset(source, offset)
-    } else {
-        let with_gaps = offset_with_gaps(source, offset, 2.0 * clearance, most_halved(options.vertices));
-        *crumpled = with_gaps.is_none();
-        with_gaps.ok_or(Failure::Crumpled)?
-    };
-    let surface = promising_surface(source, &offset, &cubes, options);
-    let (positions, faces) = surface.ok_or(Failure::Left(usize::MAX))?;
+) -> Result<TriMesh, usize> {
+    let (positions, faces) = surface.ok_or(usize::MAX)?;
     let kept = |p: DVec3| clearance.max(DEFAULT_CLEARANCE * offset.at(p));
     let (samples, clearances) = source.samples(&offset, kept);
     let enclosed = EnclosedPoints::new(samples, clearances);
     let mut simplifier = Simplifier::new(positions, faces, &enclosed);
     if !simplifier.simplify(options.vertices, stopped) {
-        return Err(Failure::Left(simplifier.len()));
+        return Err(simplifier.len());
     }
     fair(&mut simplifier.mesh, &simplifier.quadrics, &enclosed);
     let (used, triangles) = simplifier.mesh.compacted();
     let positions: Vec<DVec3> = used.iter().map(|&v| simplifier.mesh.positions[v as usize]).collect();
-    verified(source, &positions, triangles, clearance).ok_or(Failure::Left(usize::MAX))
+    verified(source, &positions, triangles, clearance).ok_or(usize::MAX)
 }
 
 /// The cage in the model's frame of reference, if it is valid there.
@@ -279,16 +298,12 @@ mod tests {
         let options = EncloseOptions::default();
         let first = first_offset(options.vertices);
         let source = NormalizedModel::new(&pipes(6), first).unwrap();
-        let found = least_promising(&source, first, &options);
-        let promising = |offset: f64| {
-            let (offset, cubes) = uniform_offset(&source, offset);
-            promising_surface(&source, &offset, &cubes, &options).is_some()
-        };
-        assert!(found > 1.3 * first && promising(found) && !promising(found / GROWTH), "{found}");
-        // From a model that is crumpled on, no attempt is at a smaller offset.
-        let mut crumpled = false;
-        let attempt = enclose_at(&source, first, 0.0, &options, &mut crumpled, &mut || false);
-        assert!(matches!(attempt, Err(Failure::Crumpled)) && crumpled);
-        assert!(enclose_at(&source, found, 0.0, &options, &mut crumpled, &mut || false).is_ok());
+        assert!(Start::with_gaps_open(&source, first, 0.0, &options).is_none());
+        let mut starts = promising_starts(&source, first, &options);
+        let found = starts.last().unwrap().offset.largest;
+        assert!(found > 1.3 * first);
+        assert!(Start::with_gaps_closed(&source, found / GROWTH, &options).surface.is_none());
+        assert!(starts.windows(2).all(|two| two[0].offset.largest > two[1].offset.largest));
+        assert!(enclose_from(&source, starts.pop().unwrap(), 0.0, &options, &mut || false).is_ok());
     }
 }

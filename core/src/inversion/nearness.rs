@@ -18,8 +18,8 @@ const NEAR: f64 = 1.0;
 /// From so many diagonals on, a frame has the held cage alone. In between it has a mixture, so that cages do not jump from frame to frame; that is at most
 /// 1.25 diagonals away.
 const FAR: f64 = 2.0;
-/// Weights λ that are tried in turn, beside the mean square error. The first is that of coded cages; under the last the rest cage moves along as it is.
-const WEIGHTS: [f64; 8] = [1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e4, 1e6];
+/// Weights λ that are tried in turn, beside the mean square error. Under the last the rest cage moves along as it is.
+const WEIGHTS: [f64; 10] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e4, 1e6];
 /// Weight of displacements themselves beside that of their differences, for parts of a cage that no point determines.
 const DISPLACEMENT: f64 = 1e-3;
 
