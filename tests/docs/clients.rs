@@ -37,7 +37,7 @@ fn the_rust_example_is_that_of_the_client_and_encodes() {
     if std::env::var_os(EXAMPLE).is_some() {
         return crate::encode_example::main().expect("the example works");
     }
-    assert_eq!(blocks(DOCUMENT, "rust"), [text("client/examples/encode.rs")]);
+    assert_eq!(blocks(DOCUMENT, "rust"), [text("crates/client/examples/encode.rs")]);
     // This test again, in a folder of its own.
     let example = |_: &Path| {
         let mut command = Command::new(std::env::current_exe().expect("this program"));

@@ -9,5 +9,5 @@ mod support;
 mod walled;
 
 // Run by `clients`, in a process of its own.
-#[path = "../../client/examples/encode.rs"]
+#[path = "../../crates/client/examples/encode.rs"]
 mod encode_example;

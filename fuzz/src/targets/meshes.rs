@@ -144,7 +144,7 @@ pub(super) const STL: Target = target(
 );
 
 pub(super) const GLB: Target = Target {
-    // A document of tiny objects grows more than other formats do; `formats/tests/hostile.rs` has the bound for large ones.
+    // A document of tiny objects grows more than other formats do; `crates/formats/tests/hostile.rs` has the bound for large ones.
     per_byte: 2048,
     ..target("glb", |bytes| read(MeshFormat::Glb, &with_lengths(bytes)), glb_seeds, GLB_WORDS)
 };

@@ -1,4 +1,4 @@
-/** Cages of a group of frames; docs/FORMAT.md, "Cages". `codec/src/cage.rs` is the reference. */
+/** Cages of a group of frames; docs/FORMAT.md, "Cages". `crates/codec/src/cage.rs` is the reference. */
 
 import type { CageBasis } from './basis';
 import { multiply } from './dense';

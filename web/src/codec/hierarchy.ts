@@ -1,7 +1,7 @@
 /**
  * An order of a mesh's vertices from coarse to fine, in which each is predicted from neighbours on the mesh that come before it. Independent vertices are taken
  * away round by round, those of few neighbours first; the neighbours of one that is gone are joined to the one of them that has the fewest.
- * `codec/src/hierarchy.rs` is the reference.
+ * `crates/codec/src/hierarchy.rs` is the reference.
  */
 
 import { adjacency } from './adjacency';

@@ -1,6 +1,6 @@
 /**
  * An order of a mesh's vertices in which as many as possible are predicted by parallelograms of vertices before them, over each edge of the mesh: of two
- * triangles with a common edge the two far corners are predicted from each other. `codec/src/parallelograms.rs` is the reference.
+ * triangles with a common edge the two far corners are predicted from each other. `crates/codec/src/parallelograms.rs` is the reference.
  */
 
 import { type ByVertex, byVertex } from './byVertex';

@@ -1,4 +1,4 @@
-/** What is added to the positions of a group's cages; docs/FORMAT.md, "Residual". `codec/src/residual.rs` is the reference. */
+/** What is added to the positions of a group's cages; docs/FORMAT.md, "Residual". `crates/codec/src/residual.rs` is the reference. */
 
 import type { Residual } from '../capture';
 import { MOST_FRAMES } from './cages';

@@ -2,7 +2,7 @@ const TAN_PI_8 = Math.SQRT2 - 1;
 
 /**
  * The angle in [0, π] whose sine is `s` ≥ 0 and whose cosine is `c`, up to a common factor: `Math.atan2` to rounding, in a third of the time, which
- * is most of what coordinates take. The polynomial is the Chebyshev fit of `core/src/simd/angle.rs` for `atan(x)/x` on |x| ≤ tan(π/8).
+ * is most of what coordinates take. The polynomial is the Chebyshev fit of `crates/core/src/simd/angle.rs` for `atan(x)/x` on |x| ≤ tan(π/8).
  */
 export function angle(s: number, c: number): number {
   const size = Math.abs(c);

@@ -12,7 +12,7 @@ const FRAME = 18;
 
 /**
  * Single and double layer potentials of a closed triangle mesh in closed form (Lipman, Levin and Cohen-Or 2008), as
- * `core/src/coordinates/layer.rs` computes them: from the solid angle Ω of each face and `L = ∫ 1/|r|` along each edge.
+ * `crates/core/src/coordinates/layer.rs` computes them: from the solid angle Ω of each face and `L = ∫ 1/|r|` along each edge.
  *
  * The mesh is scaled by a power of two to a size near one. Each face has a frame in which its longest edge runs from its first corner, at the
  * origin, to its second, at (length, 0), and the third is at (foot · length, height).

@@ -12,7 +12,7 @@ const EQUALLY_NEAR = 1e-9;
 const ON_CAGE = 1e-13;
 
 /**
- * Green coordinates of a closed triangle mesh (Lipman, Levin and Cohen-Or 2008), as `core/src/coordinates/green.rs` computes them: φ of the
+ * Green coordinates of a closed triangle mesh (Lipman, Levin and Cohen-Or 2008), as `crates/core/src/coordinates/green.rs` computes them: φ of the
  * vertices, then ψ of the faces divided by ℓ, the root of the faces' mean area. What the φ lack of a sum of one, on the cage and outside it, is
  * distributed over the nearest face by the affine coordinates of the point.
  */

@@ -19,7 +19,7 @@ const LARGE = 0.1;
 const HUGE = 1e100;
 
 /**
- * Mean value coordinates of a closed triangle mesh (Ju, Schaefer and Warren 2005) in mean-vector form, as `core/src/coordinates/mean_value`
+ * Mean value coordinates of a closed triangle mesh (Ju, Schaefer and Warren 2005) in mean-vector form, as `crates/core/src/coordinates/mean_value`
  * computes them: a face with unit vectors `u_i` to its corners has the mean vector `m = ½ Σ θ_e n_e` over its edges, and its weights
  * `w_i = m·(u_j × u_k) / (det d_i)`. Points on a vertex, an edge or a face have the coordinates of that vertex, edge or face.
  */

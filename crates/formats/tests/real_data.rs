@@ -7,7 +7,7 @@ use cager_formats::{FrameOptions, create_frames, open_frames, read_model, write_
 
 fn data() -> PathBuf {
     std::env::var_os("CAGER_CAPTURES")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from)
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"), PathBuf::from)
 }
 
 fn obj_files(folder: &Path, found: &mut Vec<PathBuf>) {

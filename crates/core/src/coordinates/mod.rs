@@ -75,7 +75,7 @@ pub fn by_name(name: &str) -> Option<&'static dyn CoordinateSystem> {
 /// Computes the coordinates of points independently of each other.
 pub type PointwiseCoordinates = fn(&Cage, &[Point]) -> Coordinates;
 
-/// A system of cage coordinates. Every implementation passes the suite in `core/tests/conformance.rs`.
+/// A system of cage coordinates. Every implementation passes the suite in `crates/core/tests/conformance.rs`.
 pub trait CoordinateSystem: Sync {
     /// The name on the command line, in reports and in containers.
     fn name(&self) -> &'static str;

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// The folder with captures, `CAGER_CAPTURES` or `shared/data` beside the repository.
 pub fn data() -> PathBuf {
     std::env::var_os("CAGER_CAPTURES")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from)
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"), PathBuf::from)
 }
 
 /// Every model of the data, by name.
