@@ -10,9 +10,9 @@ use cager_core::coordinates::{CoordinateSystem, Coordinates, Green, Harmonic, Me
 use cager_core::inversion::{BATCH, Solver, SolverOptions};
 use cager_core::maxvol::{self, maxvol};
 use cager_core::mesh::{self, Model, Point, Polygons};
-use cager_core::svd::svd;
 use cager_core::synthetic::{Capture, Options};
 use cager_formats::{FrameOptions, create_frames, write_model};
+use cager_geometry::linalg::svd::svd;
 use serde_json::{Value, json};
 use std::hint::black_box;
 use std::path::Path;

@@ -11,8 +11,8 @@ use crate::frames::CaptureFiles;
 use crate::report_page::{Contents, Kind, NO_PAGE, ReportPage, ShownCage, ShownMesh};
 use anyhow::{Result, bail};
 use cager_cages::{DesignOptions, EncloseError, EncloseOptions, General, Style, enclose, general};
-use cager_core::mesh::{Model, Polygons, TriMesh};
 use cager_formats::{AtomicFile, Target, commit_together, model_bytes, obj_bytes};
+use cager_geometry::mesh::{Model, Polygons, TriMesh};
 use cager_proto::report::DesignReport;
 use serde::Serialize;
 use std::borrow::Cow;
@@ -235,12 +235,12 @@ fn finish(
     clock: Instant,
 ) -> Result<()> {
     let mesh = TriMesh::from(cage);
-    let points_outside: usize = models.iter().map(|m| cager_cages::geometry::outside(&mesh, &m.points).len()).sum();
+    let points_outside: usize = models.iter().map(|m| cager_geometry::spatial::outside(&mesh, &m.points).len()).sum();
     let report = CageReport {
         vertices: mesh.vertices.len(),
         faces: mesh.triangles.len(),
         points_outside,
-        self_intersections: cager_cages::geometry::self_intersections(&mesh).len(),
+        self_intersections: cager_geometry::spatial::self_intersections(&mesh).len(),
         design,
         seconds: clock.elapsed().as_secs_f64(),
         warnings,

@@ -9,8 +9,8 @@ use crate::mismatch::{self, Mismatch, Up, mismatches};
 use crate::timing::Timing;
 use anyhow::{Result, bail};
 use cager_cages::diagnosis::{alignment, weld};
-use cager_cages::geometry::outside;
-use cager_core::mesh::{Model, TriMesh, diagonal};
+use cager_geometry::mesh::{Model, TriMesh, diagonal};
+use cager_geometry::spatial::outside;
 use clap::Args;
 use std::path::{Path, PathBuf};
 

@@ -55,15 +55,15 @@ impl CheckReport {
             editable: found.editable(),
             vertices: found.vertices,
             faces: found.faces,
-            components: found.components,
-            open_edges: found.open_edges.len(),
-            non_manifold_edges: found.non_manifold_edges.len(),
-            inconsistent_edges: found.inconsistent_edges.len(),
-            inward_parts: found.inward_parts,
+            components: found.defects.components,
+            open_edges: found.defects.open_edges.len(),
+            non_manifold_edges: found.defects.non_manifold_edges.len(),
+            inconsistent_edges: found.defects.inconsistent_edges.len(),
+            inward_parts: found.defects.inward_parts.len(),
             self_intersections: found.self_intersections.len(),
             duplicate_vertices: found.duplicate_vertices.len(),
-            degenerate_faces: found.degenerate_faces.len(),
-            loose_vertices: found.loose_vertices.len(),
+            degenerate_faces: found.defects.degenerate_faces.len(),
+            loose_vertices: found.defects.loose_vertices.len(),
             idle_vertices: found.idle_vertices.len(),
             enclosure_examined: found.enclosure_examined,
             points_outside: found.enclosure_examined.then(|| found.outside.map_or(0, |outside| outside.count)),
@@ -137,8 +137,8 @@ fn verdict(path: &Path, found: &Findings) -> String {
         path.display(),
         found.vertices,
         found.faces,
-        found.components,
-        if found.components == 1 { "" } else { "s" }
+        found.defects.components,
+        if found.defects.components == 1 { "" } else { "s" }
     );
     if let Some(condition) = found.condition_number.filter(|condition| condition.is_finite()) {
         let _ = write!(text, ", condition number {condition:.1}");

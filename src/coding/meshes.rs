@@ -1,11 +1,11 @@
 //! Rest pose and cage on a grid.
 
 use super::Goal;
-use cager_cages::geometry::{outside, self_intersections};
 use cager_codec::CodedMesh;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::mesh::{Model, Point, TriMesh, diagonal};
+use cager_geometry::mesh::{Model, Point, TriMesh, diagonal};
+use cager_geometry::spatial::{outside, self_intersections};
 use cager_proto::container::colors_bytes;
 
 /// Points of the rest pose by which cages are checked, at most.

@@ -2,11 +2,11 @@
 
 use crate::refused::assert_sentence;
 use crate::support::{Dir, Small, as_model, has_report_page, mean, measure, quad_box, read_frames};
-use cager_cages::geometry::{outside, self_intersections};
 use cager_core::cage::Cage;
-use cager_core::mesh::{Model, TriMesh};
-use cager_core::vector::{self, along, sub};
 use cager_formats::read_model;
+use cager_geometry::mesh::{Model, TriMesh};
+use cager_geometry::spatial::{outside, self_intersections};
+use cager_geometry::vector::{self, along, sub};
 
 fn read_cage(dir: &Dir, name: &str) -> Model {
     read_model(&dir.path(name)).expect(name)

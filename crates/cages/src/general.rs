@@ -3,7 +3,7 @@
 mod hull;
 
 use crate::EncloseError;
-use cager_core::mesh::{Model, Point, TriMesh, bounds, diagonal};
+use cager_geometry::mesh::{Model, Point, TriMesh, bounds, diagonal};
 use glam::DVec3;
 use std::collections::HashMap;
 

@@ -4,7 +4,6 @@ mod design;
 pub mod diagnosis;
 mod enclose;
 mod general;
-pub mod geometry;
 
 pub use design::{Design, DesignError, DesignOptions, Goal, MOST_VERTICES, Progress, Stage, Style, design};
 pub use enclose::{EncloseError, EncloseOptions, enclose, enclose_unless};

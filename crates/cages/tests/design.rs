@@ -5,7 +5,7 @@ mod common;
 use cager_cages::{Design, DesignError, DesignOptions, Goal, Style, design, enclose};
 use cager_core::cage::Cage;
 use cager_core::inversion::{BATCH, Handles, Solver, SolverOptions};
-use cager_core::mesh::{Model, TriMesh};
+use cager_geometry::mesh::{Model, TriMesh};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
@@ -176,7 +176,7 @@ fn an_artists_cage_keeps_its_faces_and_its_symmetry() {
 
 /// The bounding box of a model, twice subdivided.
 fn symmetric_box(model: &Model) -> TriMesh {
-    let (low, high) = cager_core::mesh::bounds(&model.points);
+    let (low, high) = cager_geometry::mesh::bounds(&model.points);
     let at = |c: [usize; 3]| -> [f64; 3] {
         std::array::from_fn(|k| low[k] + (high[k] - low[k]) * (c[k] as f64 / 2.0 * 1.2 - 0.1))
     };

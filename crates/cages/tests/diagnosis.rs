@@ -4,7 +4,7 @@ mod common;
 
 use cager_cages::diagnosis::{check, repair};
 use cager_cages::{EncloseOptions, enclose};
-use cager_core::mesh::{Model, Polygons, TriMesh};
+use cager_geometry::mesh::{Model, Polygons, TriMesh};
 use common::{append, model, sphere, verdict};
 
 fn ball() -> Model {
@@ -43,10 +43,10 @@ fn everything_wrong_is_reported_at_once() {
     broken.triangles.push(broken.triangles[0]);
     let findings = check(&broken, &ball());
     assert!(!findings.usable() && !findings.editable());
-    assert_eq!(findings.open_edges.len(), 3);
-    assert!(!findings.inconsistent_edges.is_empty() && !findings.non_manifold_edges.is_empty());
-    assert_eq!(findings.loose_vertices, [60]);
-    assert_eq!(findings.duplicate_faces, [[0, findings.faces as u32 - 1]]);
+    assert_eq!(findings.defects.open_edges.len(), 3);
+    assert!(!findings.defects.inconsistent_edges.is_empty() && !findings.defects.non_manifold_edges.is_empty());
+    assert_eq!(findings.defects.loose_vertices, [60]);
+    assert_eq!(findings.defects.duplicate_faces, [[0, findings.faces as u32 - 1]]);
     assert!(findings.messages().len() >= 5, "{findings}");
 
     let repaired = repair(&model(&broken), &ball());
@@ -94,7 +94,7 @@ fn thousands_of_parts_in_one_place_are_counted_as_far_as_that_is_of_use() {
     let mut piled = Model::default();
     (0..10_000).for_each(|_| append(&mut piled, &TriMesh::from(&quad_cube(1.0))));
     let findings = check(&TriMesh::from(&piled), &Model::default());
-    assert_eq!((findings.components, findings.self_intersections.len()), (10_000, 1_000_000));
+    assert_eq!((findings.defects.components, findings.self_intersections.len()), (10_000, 1_000_000));
     assert!(findings.messages().iter().any(|s| s.starts_with("at least 1000000 pairs of faces")), "{findings}");
 }
 
@@ -174,12 +174,18 @@ fn thousands_of_parts_are_diagnosed_and_turned_around() {
         hollow.triangles.extend(part.flipped().triangles.iter().map(|t| t.map(|v| v + first)));
     }
     let findings = check(&TriMesh::from(&parts), &Model::default());
-    assert_eq!((findings.components, findings.cavities, findings.inward_parts), (10_000, 0, 1_000));
+    assert_eq!(
+        (findings.defects.components, findings.defects.cavities, findings.defects.inward_parts.len()),
+        (10_000, 0, 1_000)
+    );
     let repaired = repair(&parts, &Model::default());
     assert_eq!(repaired.changes, ["turned 1000 parts to point outwards"]);
-    assert!(repaired.remaining.usable() && repaired.remaining.inward_parts == 0);
+    assert!(repaired.remaining.usable() && repaired.remaining.defects.inward_parts.is_empty());
     let findings = check(&hollow, &Model::default());
-    assert_eq!((findings.components, findings.cavities, findings.inward_parts), (10_001, 10_000, 0));
+    assert_eq!(
+        (findings.defects.components, findings.defects.cavities, findings.defects.inward_parts.len()),
+        (10_001, 10_000, 0)
+    );
 }
 
 #[test]

@@ -3,7 +3,7 @@
 mod common;
 
 use cager_cages::{EncloseError, EncloseOptions, enclose};
-use cager_core::mesh::{Model, Point, TriMesh};
+use cager_geometry::mesh::{Model, Point, TriMesh};
 use common::{append, model, revolved, sphere, torus, verdict};
 
 fn options(vertices: usize) -> EncloseOptions {
@@ -41,7 +41,7 @@ fn an_open_hemisphere_is_closed_over_its_opening() {
     let hemisphere = model(&hemisphere);
     assert_enclosed("hemisphere", &hemisphere, &[50, 200]);
     let cage = enclose(&hemisphere, &options(200)).unwrap();
-    let inside = cager_core::mesh::winding_number(&cage.vertices, &cage.triangles, [0.0, 0.0, 0.3]);
+    let inside = cager_geometry::mesh::winding_number(&cage.vertices, &cage.triangles, [0.0, 0.0, 0.3]);
     assert!(inside > 0.5, "the hollow is outside");
 }
 
@@ -84,7 +84,7 @@ fn parallel_limbs_stay_apart() {
     let limbs = limbs(0.18, 24);
     assert_enclosed("limbs", &limbs, &[50, 350]);
     let cage = enclose(&limbs, &options(350)).unwrap();
-    let between = cager_core::mesh::winding_number(&cage.vertices, &cage.triangles, [0.21, 0.0, 0.8]);
+    let between = cager_geometry::mesh::winding_number(&cage.vertices, &cage.triangles, [0.21, 0.0, 0.8]);
     assert!(between < 0.5, "the gap between the limbs is filled");
 }
 
@@ -107,7 +107,7 @@ fn limbs_with_a_gap_below_the_offset_stay_apart() {
         assert!(verdict.is_valid(1), "{gap}, {rows}: {verdict:?}");
         for z in [0.4, 0.8, 1.2] {
             let between = [0.12 + 0.5 * gap, 0.0, z];
-            let winding = cager_core::mesh::winding_number(&cage.vertices, &cage.triangles, between);
+            let winding = cager_geometry::mesh::winding_number(&cage.vertices, &cage.triangles, between);
             assert!(winding < 0.5, "a gap of {gap} is filled at {z}");
         }
     }

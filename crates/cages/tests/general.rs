@@ -3,7 +3,7 @@
 mod common;
 
 use cager_cages::{EncloseError, General, general};
-use cager_core::mesh::Model;
+use cager_geometry::mesh::Model;
 use common::{append, model, sphere, torus, verdict};
 
 const SHAPES: [(General, usize); 3] = [(General::Box, 8), (General::Sphere, 12), (General::Hull, 4)];

@@ -4,10 +4,10 @@
 //! its points; so a uniform step in Y is optimal at a given mean square error of the positions (reverse water-filling). A rotation of Y to the
 //! eigenvectors of `LᵀL` gathers what moves much: `Y = S Vᵀ(C − C₀)`, with the singular values S and vectors V of Φ.
 
-use crate::linear;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Coordinates, CoordinatesError, ElementPlan};
 use cager_core::mesh::Point;
+use cager_geometry::linalg;
 use faer::{Mat, MatRef, Par};
 
 /// ε over the mean of the diagonal of the Gram matrix: a vertex that hardly moves the model still is coded to a hundred steps.
@@ -78,7 +78,7 @@ impl CageBasis {
             gram[(i, j)] * (1.0 + 1e-13 * (2.0 * spread(i * 31 + j) - 1.0))
         });
         let same = Self::of_gram(disturbed.as_ref(), rest, true).is_some_and(|other| {
-            let there_and_back = linear::product(other.to.as_ref(), rotated.from.as_ref());
+            let there_and_back = linalg::product(other.to.as_ref(), rotated.from.as_ref());
             (0..m).all(|j| (0..m).all(|i| (there_and_back[(i, j)] - f64::from(u8::from(i == j))).abs() <= STABLE))
         });
         if same { Some(rotated) } else { Self::of_gram(gram.as_ref(), rest, false) }
@@ -86,24 +86,24 @@ impl CageBasis {
 
     fn of_gram(gram: MatRef<'_, f64>, rest: &[Point], rotated: bool) -> Option<Self> {
         let m = gram.nrows();
-        let l = linear::cholesky(gram)?;
+        let l = linalg::cholesky(gram.to_owned())?;
         let mut to = l.transpose().to_owned();
         // L⁻ᵀ
         let mut from = Mat::identity(m, m);
         faer::linalg::triangular_solve::solve_upper_triangular_in_place(l.transpose(), from.as_mut(), Par::Seq);
         if rotated {
-            let inner = linear::product(l.transpose(), l.as_ref());
+            let inner = linalg::product(l.transpose(), l.as_ref());
             let part = |k: usize| 1.0 + SPLIT * spread(k);
             let split = Mat::from_fn(m, m, |i, j| inner[(i, j)] * part(i) * part(j));
-            let (_, mut vectors) = linear::eigen(split.as_ref())?;
+            let (_, mut vectors) = linalg::eigen(split.as_ref())?;
             for vector in vectors.col_iter_mut() {
                 let side: f64 = vector.as_ref().iter().enumerate().map(|(k, x)| x * (spread(k) - 0.5)).sum();
                 if side < 0.0 {
                     vector.iter_mut().for_each(|x| *x = -*x);
                 }
             }
-            to = linear::product(vectors.transpose(), to.as_ref());
-            from = linear::product(from.as_ref(), vectors.as_ref());
+            to = linalg::product(vectors.transpose(), to.as_ref());
+            from = linalg::product(from.as_ref(), vectors.as_ref());
         }
         Some(Self { rest: rest.to_vec(), rotated, to, from })
     }
@@ -123,12 +123,12 @@ impl CageBasis {
         let moved = Mat::from_fn(self.rows(), 3 * cages.len(), |j, column| {
             f64::from(cages[column / 3][3 * j + column % 3]) - self.rest[j][column % 3]
         });
-        linear::product(self.to.as_ref(), moved.as_ref())
+        linalg::product(self.to.as_ref(), moved.as_ref())
     }
 
     /// The cages of Y.
     pub(crate) fn inverse(&self, y: MatRef<'_, f64>) -> Vec<Vec<f32>> {
-        let moved = linear::product(self.from.as_ref(), y);
+        let moved = linalg::product(self.from.as_ref(), y);
         let cage = |frame: usize| {
             let row = |j: usize| (0..3).map(move |c| (j, c));
             let value = |(j, c): (usize, usize)| (moved[(j, 3 * frame + c)] + self.rest[j][c]) as f32;
@@ -141,7 +141,7 @@ impl CageBasis {
 /// `ΦᵀΦ/n + εI`.
 fn gram(phi: MatRef<'_, f64>) -> Mat<f64> {
     let (n, m) = phi.shape();
-    let mut gram = linear::product(phi.transpose(), phi);
+    let mut gram = linalg::product(phi.transpose(), phi);
     let scale = 1.0 / n.max(1) as f64;
     let trace: f64 = (0..m).map(|k| gram[(k, k)]).sum::<f64>() * scale;
     let floor = FLOOR * (trace / m as f64).max(f64::MIN_POSITIVE);
@@ -174,7 +174,7 @@ mod tests {
         assert!(basis.rotated());
         let y = basis.forward(&[&cage]);
         let moved = Mat::from_fn(m, 3, |j, c| f64::from(cage[3 * j + c]) - rest[j][c]);
-        let model = linear::product(phi.as_ref(), moved.as_ref());
+        let model = linalg::product(phi.as_ref(), moved.as_ref());
         let length = model.norm_l2() / (n as f64).sqrt();
         assert!((y.norm_l2() - length).abs() < 0.05 * length, "{} {length}", y.norm_l2());
         let back = basis.inverse(y.as_ref());

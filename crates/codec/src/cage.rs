@@ -4,7 +4,8 @@ use crate::basis::CageBasis;
 use crate::entropy::{Coder, Decoder, Encoder, Integers, MOST, SIZES, size_class};
 use crate::error::{Error, Result};
 use crate::trajectories::{PULSE_FRAMES, Trajectories, fit};
-use crate::{MOST_FRAMES, linear};
+use crate::{MOST_FRAMES, trajectories};
+use cager_geometry::linalg;
 use faer::Mat;
 
 /// Bytes before the coded numbers: whether the basis is rotated, then the step as f64 and the number of components as u16.
@@ -37,7 +38,7 @@ pub fn encode_cages(basis: &CageBasis, cages: &[&[f32]], step: f64, neighbours: 
     // m × 3 T, to 3 m × T.
     let y = basis.forward(cages);
     let motion = Mat::from_fn(3 * rows, frames, |value, t| y[(value / 3, 3 * t + value % 3)]);
-    let gram = linear::gram(motion.as_ref());
+    let gram = trajectories::gram(motion.as_ref());
     let most = frames.min(3 * rows);
     let mut chosen = Trajectories::choose(gram.as_ref(), 3 * rows, step, most)?;
     let exact = fit(chosen.values().as_ref(), motion.as_ref())?;
@@ -92,7 +93,7 @@ pub fn decode_cages(basis: &CageBasis, frames: usize, bytes: &[u8]) -> Result<Ve
     let whole = code_values(&mut coder, rows, count, &[]);
     coder.check()?;
     let values = Mat::from_fn(count, 3 * rows, |k, value| f64::from(whole[k * 3 * rows + value]) * step);
-    let motion = linear::product(trajectories.values().as_ref(), values.as_ref());
+    let motion = linalg::product(trajectories.values().as_ref(), values.as_ref());
     let y = Mat::from_fn(rows, 3 * frames, |j, column| motion[(column / 3, 3 * j + column % 3)]);
     let cages = basis.inverse(y.as_ref());
     if cages.iter().flatten().any(|x| !x.is_finite()) {

@@ -2,7 +2,6 @@
 //! are met for the first time. The walk counts vertices as it meets them; the numbers that the mesh gives them follow ([`crate::vertex_order`]). Any list of polygons
 //! can be coded; vertices keep their numbers, faces come in the order of the walk.
 
-use crate::adjacency::Adjacency;
 use crate::entropy::{Coder, Decoder, Encoder};
 use crate::error::{Error, Result};
 use crate::gates::Gates;
@@ -11,6 +10,7 @@ use crate::vertex_names::{Names, Numbers};
 use crate::vertex_order::{MOST_FAR_POINTS, code_order};
 use crate::walk::Walk;
 use cager_core::mesh::Polygons;
+use cager_geometry::topology::Adjacency;
 use std::cmp::Reverse;
 use std::collections::VecDeque;
 

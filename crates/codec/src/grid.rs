@@ -1,12 +1,12 @@
 //! Positions of a mesh at rest, on a grid.
 
-use crate::adjacency::Adjacency;
 use crate::entropy::{Coder, Decoder, Encoder, Integers, MOST, SIZES, size_class};
 use crate::error::{Error, Result};
 use crate::mesh::MeshVersion;
 use crate::parallelograms::Predictions;
 use crate::prediction_weights::{PredictionWeights, WEIGHTS_BYTES};
 use cager_core::mesh::{Point, Polygons, bounds};
+use cager_geometry::topology::Adjacency;
 
 /// Bytes before the coded numbers: origin and step as f64.
 const HEAD: usize = 32;

@@ -4,7 +4,6 @@
 //! Every number is decoded by an entropy decoder of whole numbers, whose predictions and models are whole numbers too. Floating point comes
 //! after it, so machines that round differently decode the same numbers and positions that differ by rounding alone.
 
-mod adjacency;
 mod basis;
 mod cage;
 mod components;
@@ -18,7 +17,6 @@ mod gates;
 mod grid;
 mod hierarchy;
 mod histograms;
-mod linear;
 mod mesh;
 mod open_edges;
 mod parallelograms;

@@ -1,9 +1,9 @@
 //! What predicts the position of a vertex at rest from those known before it: parallelograms, and the mean of its neighbours, each by a weight that the encoder
 //! fits to the mesh. Meshes of scanners need the mean, those of modellers the parallelograms.
 
-use crate::adjacency::Adjacency;
 use crate::entropy::MOST;
 use crate::parallelograms::Predictions;
+use cager_geometry::topology::Adjacency;
 
 /// Weights are counted in these parts; so are predictions before they are rounded.
 const PARTS: i64 = 32;

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::hierarchy::Hierarchy;
 use crate::histograms::Histograms;
 use crate::trajectories::{Trajectories, fit};
-use crate::{MOST_FRAMES, MOST_POSITIONS, linear};
+use crate::{MOST_FRAMES, MOST_POSITIONS, trajectories};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use rayon::prelude::*;
@@ -95,7 +95,7 @@ impl<'a, M: Models> Contents<'a, M> {
             let pairs = group.captured[t].iter().zip(&group.of_cages[t]);
             column.iter_mut().zip(pairs).for_each(|(x, (&captured, &of_cage))| *x = captured - f64::from(of_cage));
         });
-        let gram = linear::gram(motion.as_ref());
+        let gram = trajectories::gram(motion.as_ref());
         let most = frames.min(group.most_numbers / (3 * points).max(1));
         let chosen = Trajectories::choose(gram.as_ref(), 3 * points, group.step, most)?;
         let count = chosen.count();

@@ -2,7 +2,7 @@
 //! nearly orthonormal columns, the eigenvectors of `M Mᵀ` (Karhunen–Loève transform in time), and A what each value takes of them.
 
 use crate::entropy::{Coder, Integers, SIZES, size_class};
-use crate::linear;
+use cager_geometry::linalg;
 use faer::{Mat, MatRef};
 
 /// Components whose energy per value is below this fraction of that of rounding to whole steps are left out.
@@ -11,6 +11,15 @@ const WORTH: f64 = 0.3 / 12.0;
 const ROUND_UP: f64 = 0.35;
 /// Largest number of binary digits of an entry of E.
 const MOST_DIGITS: u32 = 26;
+
+/// Fewest rows of one part of a sum over all of them, and most parts.
+const BLOCK_ROWS: usize = 2048;
+const MAX_BLOCKS: usize = 16;
+
+/// `Mᵀ M` of motion with many rows.
+pub(crate) fn gram(motion: MatRef<'_, f64>) -> Mat<f64> {
+    linalg::mirrored(linalg::gram(motion, motion.nrows().div_ceil(MAX_BLOCKS).max(BLOCK_ROWS)))
+}
 
 /// Frames over which a pulse beside another group falls to 0.
 pub(crate) const PULSE_FRAMES: usize = 8;
@@ -30,10 +39,10 @@ impl Trajectories {
     /// Those worth keeping of motion with this `M Mᵀ`, `width` values a frame, coded in steps of `step`; at most `most` of them.
     pub(crate) fn choose(gram: MatRef<'_, f64>, width: usize, step: f64, most: usize) -> Option<Self> {
         let frames = gram.nrows();
-        let (energies, vectors) = linear::eigen(gram)?;
+        let (energies, vectors) = linalg::eigen(gram)?;
         let least = WORTH * width as f64 * step * step;
         let count = energies.iter().take_while(|&&energy| energy > least).count().min(most);
-        let waves = linear::product(cosines(frames).as_ref(), vectors.subcols(0, count));
+        let waves = linalg::product(cosines(frames).as_ref(), vectors.subcols(0, count));
         // An entry's error times the component's length is an error of the values: coded to the same step.
         let digits: Vec<u32> = energies[..count]
             .iter()
@@ -57,7 +66,7 @@ impl Trajectories {
         }
         let part = |t: usize| t.abs_diff(frame).min(PULSE_FRAMES) as f64 / PULSE_FRAMES as f64;
         let pulse = Mat::from_fn(self.frames, 1, |t, _| height * 0.5 * (1.0 + (std::f64::consts::PI * part(t)).cos()));
-        let waves = linear::product(cosines(self.frames).as_ref(), pulse.as_ref());
+        let waves = linalg::product(cosines(self.frames).as_ref(), pulse.as_ref());
         self.waves.extend(waves.col(0).iter().map(|x| (x * digits.exp2()).round() as i32));
         self.digits.push(digits as u32);
         let value = self.values()[(frame, self.count() - 1)];
@@ -98,20 +107,20 @@ impl Trajectories {
         let waves = Mat::from_fn(self.frames, self.count(), |t, k| {
             f64::from(self.waves[k * self.frames + t]) / (self.digits[k] as f64).exp2()
         });
-        linear::product(cosines(self.frames).transpose(), waves.as_ref())
+        linalg::product(cosines(self.frames).transpose(), waves.as_ref())
     }
 }
 
 /// Aᵀ of least squares: values × components, for Mᵀ, values × frames.
 pub(crate) fn fit(trajectories: MatRef<'_, f64>, motion: MatRef<'_, f64>) -> Option<Mat<f64>> {
     let count = trajectories.ncols();
-    let mut inner = linear::product(trajectories.transpose(), trajectories);
+    let mut inner = linalg::product(trajectories.transpose(), trajectories);
     for k in 0..count {
         inner[(k, k)] += 1e-9;
     }
     let mut shares = trajectories.transpose().to_owned();
-    linear::solve_cholesky(linear::cholesky(inner.as_ref())?.as_ref(), &mut shares);
-    Some(linear::tall_product(motion, shares.transpose()))
+    linalg::solve_cholesky(linalg::cholesky(inner)?.as_ref(), &mut shares);
+    Some(linalg::tall_product(motion, shares.transpose()))
 }
 
 /// The orthonormal cosine transform (DCT-II) of so many values.

@@ -3,9 +3,9 @@
 //! Whatever made a mesh numbered neighbours soon after each other. So all vertices stand in a list, those near the ones numbered last in front, and each vertex
 //! is told by its place in the list.
 
-use crate::adjacency::Adjacency;
 use crate::entropy::{Bit, Coder, SIZES, size_class};
 use crate::fenwick::Counted;
+use cager_geometry::topology::Adjacency;
 
 /// Vertices with more neighbours move none of them when one of these is numbered.
 const MOST_PASSED_ON: usize = 16;

@@ -3,17 +3,16 @@
 pub mod cage;
 pub mod coordinates;
 pub mod decode;
-mod dense;
 pub mod handles;
 pub mod inversion;
 pub mod maxvol;
-pub mod mesh;
 pub mod regularize;
 mod simd;
 mod spectrum;
-pub mod svd;
 pub mod synthetic;
-pub mod vector;
+
+use cager_geometry::{linalg as dense, linalg::svd};
+pub use cager_geometry::{mesh, vector};
 
 /// Version of the preparation of solvers: stored solvers of another version are recomputed. Decoding a container depends on
 /// [`coordinates::DEFINITION`] alone.

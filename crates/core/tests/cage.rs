@@ -2,8 +2,9 @@
 
 mod common;
 
-use cager_core::cage::{Cage, CageError, Nesting};
+use cager_core::cage::{Cage, CageError};
 use cager_core::mesh::{Point, TriMesh};
+use cager_geometry::spatial::Nesting;
 use common::octahedron;
 use std::cell::Cell;
 

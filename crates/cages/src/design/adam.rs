@@ -1,6 +1,6 @@
 //! Adam (Kingma and Ba 2015) with one second moment for each vertex, half of it the mean over all.
 
-use cager_core::mesh::Point;
+use cager_geometry::mesh::Point;
 use glam::DVec3;
 
 const FIRST: f64 = 0.9;

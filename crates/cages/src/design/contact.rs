@@ -6,10 +6,10 @@
 //! cage that is valid before a move is valid after it.
 
 use super::symmetry::Symmetry;
-use crate::geometry::distance::{closest_on_segment, closest_on_segments, closest_on_triangle};
-use crate::geometry::{Aabb, Bvh, Surface, triangles_intersect};
 use cager_core::cage::Cage;
-use cager_core::mesh::TriMesh;
+use cager_geometry::mesh::TriMesh;
+use cager_geometry::spatial::distance::{closest_on_segment, closest_on_segments, closest_on_triangle};
+use cager_geometry::spatial::{Aabb, Bvh, Surface, triangles_intersect};
 use glam::DVec3;
 use rayon::prelude::*;
 

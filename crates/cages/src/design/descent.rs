@@ -4,11 +4,12 @@
 use super::adam::Adam;
 use super::contact::Obstacles;
 use super::exchange::{self, Remeshing};
-use super::fit::{Fit, product};
+use super::fit::Fit;
 use super::samples::Samples;
 use super::{DesignOptions, Style};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
+use cager_geometry::linalg::accumulate_product;
 use faer::{Accum, Mat};
 use glam::DVec3;
 
@@ -47,7 +48,7 @@ impl<'a> Descent<'a> {
         let Some(fit) = Fit::new(phi.as_ref(), batch.motion.as_ref(), RIDGE) else { return };
         // ∂E/∂Φ; the derivative through the cages vanishes where they are the best ones.
         let mut upstream = Mat::zeros(batch.points.len(), phi.ncols());
-        product(&mut upstream, Accum::Replace, fit.residual.as_ref(), fit.cages.transpose(), -2.0);
+        accumulate_product(&mut upstream, Accum::Replace, fit.residual.as_ref(), fit.cages.transpose(), -2.0);
         let gradient = MeanValue.gradient(&self.cage, &batch.points, phi.as_ref(), upstream.as_ref());
         if gradient.iter().flatten().any(|g| !g.is_finite()) {
             return;

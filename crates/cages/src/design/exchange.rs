@@ -1,11 +1,12 @@
 //! Adaptive remeshing of a cage: splits the edges that lower the error most and removes the vertices whose loss raises it least.
 
 use super::contact::Obstacles;
-use super::fit::{Fit, solve, transposed_product};
-use super::topology::{self, Collapse, Neighbours};
+use super::fit::{BLOCK_ROWS, Fit};
+use super::topology::{self, Collapse, OneRings};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
-use cager_core::mesh::{Point, TriMesh};
+use cager_geometry::linalg::{solve_cholesky, solve_definite, transposed_product};
+use cager_geometry::mesh::{Point, TriMesh};
 use faer::Mat;
 use glam::DVec3;
 
@@ -31,7 +32,7 @@ pub(super) fn exchange(
     let m = mesh.vertices.len();
     let most = ((share * m as f64) as usize).max(1);
     let (grow, shrink) = (goal.saturating_sub(m), m.saturating_sub(goal));
-    let neighbours = Neighbours::new(mesh);
+    let neighbours = OneRings::new(mesh);
     let gains = gains(cage, points, phi, fit);
     let costs = costs(mesh, &neighbours, fit);
     let mut touched = vec![false; m];
@@ -95,10 +96,10 @@ fn gains(cage: &Cage, points: &[Point], phi: &Mat<f64>, fit: &Fit) -> Vec<f64> {
     let Ok(fine) = Cage::new(topology::subdivided(cage)) else { return vec![0.0; cage.edges().len()] };
     let columns = MeanValue.smooth_coordinates(&fine, points);
     let b = columns.as_ref().subcols(m, cage.edges().len());
-    let along = transposed_product(b, fit.residual.as_ref());
-    let overlap = transposed_product(phi.as_ref(), b);
+    let along = transposed_product(b, fit.residual.as_ref(), BLOCK_ROWS);
+    let overlap = transposed_product(phi.as_ref(), b, BLOCK_ROWS);
     let mut solved = overlap.clone();
-    solve(fit.factor.as_ref(), &mut solved);
+    solve_cholesky(fit.factor.as_ref(), &mut solved);
     let gains = (0..cage.edges().len()).map(|e| {
         let own: f64 = (0..b.nrows()).map(|i| b[(i, e)] * b[(i, e)]).sum();
         let explained: f64 = (0..m).map(|j| overlap[(j, e)] * solved[(j, e)]).sum();
@@ -110,10 +111,10 @@ fn gains(cage: &Cage, points: &[Point], phi: &Mat<f64>, fit: &Fit) -> Vec<f64> {
 
 /// For every vertex, by how much `‖X − Φ C‖²` would rise if it followed its neighbours: with `a` the row that says so, `a C = 0`, the
 /// least-squares fit under that constraint is worse by `‖a C‖²/(a (ΦᵀΦ)⁻¹ aᵀ)`.
-fn costs(mesh: &TriMesh, neighbours: &Neighbours, fit: &Fit) -> Vec<f64> {
+fn costs(mesh: &TriMesh, neighbours: &OneRings<'_>, fit: &Fit) -> Vec<f64> {
     let m = mesh.vertices.len();
     let mut inverse = Mat::<f64>::identity(m, m);
-    solve(fit.factor.as_ref(), &mut inverse);
+    solve_cholesky(fit.factor.as_ref(), &mut inverse);
     let costs = (0..m).map(|v| {
         let weights = following(mesh, v, &neighbours.of(v));
         let row: Vec<(usize, f64)> = std::iter::once((v, 1.0)).chain(weights.iter().map(|&(k, w)| (k, -w))).collect();
@@ -136,10 +137,8 @@ fn following(mesh: &TriMesh, v: usize, ring: &[u32]) -> Vec<(usize, f64)> {
     let a = Mat::from_fn(k, k, |i, j| {
         offsets[i].dot(offsets[j]) / scale.max(f64::MIN_POSITIVE) + if i == j { 0.05 } else { 0.0 }
     });
-    let mut x = Mat::from_fn(k, 1, |_, _| 1.0);
-    if let Ok(llt) = a.llt(faer::Side::Lower) {
-        solve(llt.L(), &mut x);
-    }
+    let ones = Mat::full(k, 1, 1.0);
+    let x = solve_definite(a, ones.clone()).unwrap_or(ones);
     let sum: f64 = (0..k).map(|i| x[(i, 0)]).sum();
     ring.iter().enumerate().map(|(i, &r)| (r as usize, x[(i, 0)] / sum)).collect()
 }

@@ -16,10 +16,10 @@ use self::run::{Best, Defects, Run};
 use self::samples::Samples;
 use self::symmetry::Symmetry;
 use crate::enclose::enclose_unless;
-use crate::geometry::outside;
 use crate::{EncloseError, EncloseOptions};
 use cager_core::cage::{Cage, CageError};
-use cager_core::mesh::{Model, TriMesh, diagonal};
+use cager_geometry::mesh::{Model, TriMesh, diagonal};
+use cager_geometry::spatial::outside;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 

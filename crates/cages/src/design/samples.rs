@@ -1,9 +1,10 @@
 //! Training and validation data of a design: sampled points with the non-affine part of their motion, and points and frames held back for evaluation.
 
-use super::fit::{Fit, gram, product};
+use super::fit::{BLOCK_ROWS, Fit};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
-use cager_core::mesh::{Model, Point, diagonal};
+use cager_geometry::linalg::{accumulate_product, gram};
+use cager_geometry::mesh::{Model, Point, diagonal};
 use faer::{Accum, Mat};
 
 /// Maximum number of points sampled from a model.
@@ -101,7 +102,7 @@ impl Samples {
             return None;
         }
         let phi = MeanValue.smooth_coordinates(cage, &self.validation_points);
-        let squares = gram(phi.as_ref()).self_adjoint_eigenvalues(faer::Side::Lower).ok()?;
+        let squares = gram(phi.as_ref(), BLOCK_ROWS).self_adjoint_eigenvalues(faer::Side::Lower).ok()?;
         Some(if squares[0] > 0.0 { (squares[squares.len() - 1] / squares[0]).sqrt() } else { f64::INFINITY })
     }
 }
@@ -118,9 +119,11 @@ fn principal(motion: &Mat<f64>) -> Mat<f64> {
     if columns <= COLUMNS {
         return motion.clone();
     }
-    let Ok(eigen) = gram(motion.as_ref()).self_adjoint_eigen(faer::Side::Lower) else { return motion.clone() };
+    let Ok(eigen) = gram(motion.as_ref(), BLOCK_ROWS).self_adjoint_eigen(faer::Side::Lower) else {
+        return motion.clone();
+    };
     let mut out = Mat::zeros(motion.nrows(), COLUMNS);
-    product(&mut out, Accum::Replace, motion.as_ref(), eigen.U().subcols(columns - COLUMNS, COLUMNS), 1.0);
+    accumulate_product(&mut out, Accum::Replace, motion.as_ref(), eigen.U().subcols(columns - COLUMNS, COLUMNS), 1.0);
     out
 }
 

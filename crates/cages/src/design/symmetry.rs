@@ -1,6 +1,6 @@
 //! A cage's mirror symmetry, kept while it moves.
 
-use cager_core::mesh::{TriMesh, diagonal};
+use cager_geometry::mesh::{TriMesh, diagonal};
 use glam::DVec3;
 
 /// How far a vertex may be from its mirror image, as a fraction of the diagonal.
@@ -17,7 +17,7 @@ impl Symmetry {
     /// The symmetry of a cage across the plane of an axis (0, 1, 2 for x, y, z) through the middle of its bounding box; the first vertex
     /// without a mirror image where it has none.
     pub(super) fn new(mesh: &TriMesh, axis: usize) -> Result<Self, usize> {
-        let (low, high) = cager_core::mesh::bounds(&mesh.vertices);
+        let (low, high) = cager_geometry::mesh::bounds(&mesh.vertices);
         let center = low[axis] + high[axis];
         let limit = TOLERANCE * diagonal(&mesh.vertices);
         let at = |v: usize| DVec3::from(mesh.vertices[v]);

@@ -1,33 +1,25 @@
 //! Splits and collapses of a closed triangle mesh's edges.
 
 use cager_core::cage::Cage;
-use cager_core::mesh::{Point, TriMesh};
+use cager_geometry::mesh::TriMesh;
+use cager_geometry::topology::{faces_around, ring};
+use cager_geometry::vector;
 use glam::DVec3;
 
-/// Faces around each vertex.
-pub(super) struct Neighbours {
+/// What is around the vertices of a closed triangle mesh.
+pub(super) struct OneRings<'a> {
+    triangles: &'a [[u32; 3]],
     faces: Vec<Vec<u32>>,
-    triangles: Vec<[u32; 3]>,
 }
 
-impl Neighbours {
-    pub(super) fn new(mesh: &TriMesh) -> Self {
-        let mut faces = vec![Vec::new(); mesh.vertices.len()];
-        for (f, triangle) in mesh.triangles.iter().enumerate() {
-            for &v in triangle {
-                faces[v as usize].push(f as u32);
-            }
-        }
-        Self { faces, triangles: mesh.triangles.clone() }
+impl<'a> OneRings<'a> {
+    pub(super) fn new(mesh: &'a TriMesh) -> Self {
+        Self { faces: faces_around(mesh.vertices.len(), &mesh.triangles), triangles: &mesh.triangles }
     }
 
     /// Vertices that share an edge with `v`, ascending.
     pub(super) fn of(&self, v: usize) -> Vec<u32> {
-        let mut ring: Vec<u32> =
-            self.faces[v].iter().flat_map(|&f| self.triangles[f as usize]).filter(|&w| w as usize != v).collect();
-        ring.sort_unstable();
-        ring.dedup();
-        ring
+        ring(v as u32, self.faces(v), self.triangles)
     }
 
     /// Faces around `v`.
@@ -36,15 +28,11 @@ impl Neighbours {
     }
 }
 
-fn middle(a: Point, b: Point) -> Point {
-    std::array::from_fn(|k| 0.5 * (a[k] + b[k]))
-}
-
 /// Every face in four, with a vertex at the middle of every edge: those come after the cage's own, in the order of its edges.
 pub(super) fn subdivided(cage: &Cage) -> TriMesh {
     let m = cage.vertices().len() as u32;
     let at = |v: u32| cage.vertices()[v as usize];
-    let middles = cage.edges().iter().map(|e| middle(at(e.vertices[0]), at(e.vertices[1])));
+    let middles = cage.edges().iter().map(|e| vector::middle(at(e.vertices[0]), at(e.vertices[1])));
     let vertices = cage.vertices().iter().copied().chain(middles).collect();
     let mut triangles = Vec::with_capacity(4 * cage.faces().len());
     for face in cage.faces() {
@@ -59,7 +47,7 @@ pub(super) fn subdivided(cage: &Cage) -> TriMesh {
 /// Puts a vertex at the middle of the edge between `a` and `b`.
 pub(super) fn split(mesh: &mut TriMesh, [a, b]: [u32; 2]) {
     let new = mesh.vertices.len() as u32;
-    mesh.vertices.push(middle(mesh.vertices[a as usize], mesh.vertices[b as usize]));
+    mesh.vertices.push(vector::middle(mesh.vertices[a as usize], mesh.vertices[b as usize]));
     for f in 0..mesh.triangles.len() {
         let triangle = mesh.triangles[f];
         if triangle.contains(&a) && triangle.contains(&b) {
@@ -70,7 +58,7 @@ pub(super) fn split(mesh: &mut TriMesh, [a, b]: [u32; 2]) {
 }
 
 /// Whether `v` may be merged into `into` without changing the surface's topology: they have exactly two neighbours in common.
-fn is_collapsible(neighbours: &Neighbours, v: usize, into: usize) -> bool {
+fn is_collapsible(neighbours: &OneRings<'_>, v: usize, into: usize) -> bool {
     let (one, other) = (neighbours.of(v), neighbours.of(into));
     let common = one.iter().filter(|w| other.binary_search(w).is_ok()).count();
     common == 2 && one.len() + other.len() > 7 && neighbours.triangles.len() > 4
@@ -89,7 +77,7 @@ pub(super) struct Collapse {
 }
 
 /// Collapses of `v` that keep the surface's topology and leave usable faces, the best first.
-pub(super) fn collapses(mesh: &TriMesh, neighbours: &Neighbours, v: usize) -> Vec<Collapse> {
+pub(super) fn collapses(mesh: &TriMesh, neighbours: &OneRings<'_>, v: usize) -> Vec<Collapse> {
     let at = |w: u32| DVec3::from_array(mesh.vertices[w as usize]);
     let normal = |t: [u32; 3]| (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0]));
     let old: Vec<[u32; 3]> = neighbours.faces(v).iter().map(|&f| mesh.triangles[f as usize]).collect();

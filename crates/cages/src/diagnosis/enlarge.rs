@@ -1,7 +1,7 @@
 //! Slight enlargement of a closed cage, only where points of the model are outside.
 
-use crate::geometry::{Surface, self_intersections};
-use cager_core::mesh::{Model, TriMesh, diagonal};
+use cager_geometry::mesh::{Model, TriMesh, diagonal};
+use cager_geometry::spatial::{Surface, self_intersections};
 use glam::DVec3;
 use rayon::prelude::*;
 

@@ -1,8 +1,8 @@
 //! Detection of cages that miss their model because of different units, axes or position.
 
 use super::Alignment;
-use crate::geometry::outside;
-use cager_core::mesh::{Model, Point, TriMesh, bounds};
+use cager_geometry::mesh::{Model, Point, TriMesh, bounds};
+use cager_geometry::spatial::outside;
 use std::fmt;
 
 /// Points that candidates are judged by.

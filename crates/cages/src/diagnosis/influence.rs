@@ -2,8 +2,8 @@
 
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
-use cager_core::mesh::{Model, Point, TriMesh};
-use cager_core::svd::svd;
+use cager_geometry::linalg::svd::svd;
+use cager_geometry::mesh::{Model, Point, TriMesh};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 

@@ -1,7 +1,7 @@
 //! Findings as messages that say what to do.
 
 use super::Findings;
-use crate::geometry::intersect::MOST_PAIRS;
+use cager_geometry::spatial::intersect::MAX_PAIRS;
 use std::fmt;
 
 impl Findings {
@@ -25,41 +25,41 @@ impl Findings {
             (_, "vertex") => format!("{items} vertices"),
             (_, _) => format!("{items} {what}s"),
         };
-        let f = self;
+        let (f, d) = (self, &self.defects);
         say(
             usize::from(f.faces == 0),
             "no faces, where a cage is a closed surface; export it as a mesh with its faces".to_owned(),
         );
         say(
-            f.not_finite.len(),
+            d.not_finite.len(),
             format!(
                 "{} with coordinates that are NaN or infinite ({}); delete them or export the cage again",
-                n(f.not_finite.len(), "vertex"),
-                one(&f.not_finite)
+                n(d.not_finite.len(), "vertex"),
+                one(&d.not_finite)
             ),
         );
         say(
-            f.dangling_faces.len(),
+            d.dangling_faces.len(),
             format!(
                 "{} naming vertices that do not exist ({}); export the cage again",
-                n(f.dangling_faces.len(), "face"),
-                one(&f.dangling_faces)
+                n(d.dangling_faces.len(), "face"),
+                one(&d.dangling_faces)
             ),
         );
         say(
-            f.degenerate_faces.len(),
+            d.degenerate_faces.len(),
             format!(
                 "{} without area ({}); delete them or merge their vertices",
-                n(f.degenerate_faces.len(), "face"),
-                one(&f.degenerate_faces)
+                n(d.degenerate_faces.len(), "face"),
+                one(&d.degenerate_faces)
             ),
         );
         say(
-            f.duplicate_faces.len(),
+            d.duplicate_faces.len(),
             format!(
                 "{} of faces over the same vertices ({}); delete one of each",
-                n(f.duplicate_faces.len(), "pair"),
-                two(&f.duplicate_faces)
+                n(d.duplicate_faces.len(), "pair"),
+                two(&d.duplicate_faces)
             ),
         );
         say(
@@ -71,27 +71,27 @@ impl Findings {
             ),
         );
         say(
-            f.loose_vertices.len(),
+            d.loose_vertices.len(),
             format!(
                 "{} that no face uses ({}); delete loose vertices",
-                n(f.loose_vertices.len(), "vertex"),
-                one(&f.loose_vertices)
+                n(d.loose_vertices.len(), "vertex"),
+                one(&d.loose_vertices)
             ),
         );
         say(
-            f.open_edges.len(),
+            d.open_edges.len(),
             format!(
                 "the cage is open: {} with a face on one side only ({}); fill the holes or merge doubled vertices",
-                n(f.open_edges.len(), "edge"),
-                two(&f.open_edges)
+                n(d.open_edges.len(), "edge"),
+                two(&d.open_edges)
             ),
         );
         say(
-            f.non_manifold_edges.len(),
+            d.non_manifold_edges.len(),
             format!(
                 "{} shared by more than two faces ({}); separate or delete the extra faces",
-                n(f.non_manifold_edges.len(), "edge"),
-                two(&f.non_manifold_edges)
+                n(d.non_manifold_edges.len(), "edge"),
+                two(&d.non_manifold_edges)
             ),
         );
         say(
@@ -103,19 +103,22 @@ impl Findings {
             ),
         );
         say(
-            f.inconsistent_edges.len(),
+            d.inconsistent_edges.len(),
             format!(
                 "{} between faces that wind in opposite directions ({}); recalculate the cage's normals",
-                n(f.inconsistent_edges.len(), "edge"),
-                two(&f.inconsistent_edges)
+                n(d.inconsistent_edges.len(), "edge"),
+                two(&d.inconsistent_edges)
             ),
         );
-        say(f.inward_parts, format!("{} of {} pointing inwards; flip them", n(f.inward_parts, "part"), f.components));
+        say(
+            d.inward_parts.len(),
+            format!("{} of {} pointing inwards; flip them", n(d.inward_parts.len(), "part"), d.components),
+        );
         say(
             f.self_intersections.len(),
             format!(
                 "{}{} of faces that cut or touch one another ({}); move their vertices apart",
-                if f.self_intersections.len() < MOST_PAIRS { "" } else { "at least " },
+                if f.self_intersections.len() < MAX_PAIRS { "" } else { "at least " },
                 n(f.self_intersections.len(), "pair"),
                 two(&f.self_intersections)
             ),
@@ -175,7 +178,11 @@ impl fmt::Display for Findings {
             (true, false) => "usable for encoding, but not fit to be edited",
             (true, true) => "usable, and fit to be edited",
         };
-        write!(f, "{} vertices, {} faces, {} components: {verdict}", self.vertices, self.faces, self.components)?;
+        write!(
+            f,
+            "{} vertices, {} faces, {} components: {verdict}",
+            self.vertices, self.faces, self.defects.components
+        )?;
         self.messages().iter().try_for_each(|s| write!(f, "\n{s}"))
     }
 }

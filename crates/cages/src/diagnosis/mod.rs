@@ -1,6 +1,5 @@
 //! Diagnosis of a cage: all its defects at once, and repair of those that can be repaired without changing its intent.
 
-mod connectivity;
 mod enlarge;
 mod findings;
 mod fit;

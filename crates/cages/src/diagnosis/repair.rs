@@ -1,12 +1,12 @@
 //! Repair of a cage: what can be repaired without changing its shape or its faces more than needed.
 
-use super::connectivity::{border_loops, edges, fans, shells, sides};
 use super::enlarge::enlarged;
-use super::findings::{Findings, check, shell_volumes};
+use super::findings::{Findings, check};
 use super::holes::{LONGEST, fill};
 use super::weld::same_place;
-use cager_core::cage::Nesting;
-use cager_core::mesh::{Model, Polygons, TriMesh, diagonal};
+use cager_geometry::mesh::{Model, Polygons, TriMesh, diagonal};
+use cager_geometry::spatial::{Nesting, part_volumes};
+use cager_geometry::topology::{border_loops, edges, fans, shells, sides};
 use glam::DVec3;
 use std::collections::{HashSet, VecDeque};
 
@@ -167,7 +167,7 @@ impl Repairing {
             users.iter().for_each(|u| closed[labels[u.0 as usize] as usize] = false);
         }
         let (mesh, triangle_labels) = self.labelled(&labels);
-        let volumes = shell_volumes(&mesh, &mesh.triangles, &triangle_labels, count);
+        let volumes = part_volumes(&mesh.vertices, &mesh.triangles, &triangle_labels);
         let nesting = Nesting::new(&mesh.vertices, &mesh.triangles, &triangle_labels);
         // What a part encloses depends on which parts before it were turned around.
         let mut signs = vec![1; count as usize];

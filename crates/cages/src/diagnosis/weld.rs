@@ -1,7 +1,7 @@
 //! Welding of coincident vertices along open borders, where flat shading and UV seams split them.
 
-use super::connectivity::edges;
-use cager_core::mesh::{Model, Polygons, diagonal};
+use cager_geometry::mesh::{Model, Polygons, diagonal};
+use cager_geometry::topology::edges;
 use glam::DVec3;
 use std::collections::HashMap;
 

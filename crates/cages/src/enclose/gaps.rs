@@ -2,7 +2,7 @@
 
 use super::lattice::LEVELS;
 use super::source::{NormalizedModel, area};
-use crate::geometry::{Aabb, Bvh, GeneralizedWinding, Surface};
+use cager_geometry::spatial::{Aabb, Bvh, GeneralizedWinding, Surface};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};

@@ -1,7 +1,7 @@
 //! A body-centred cubic lattice that is finer where asked: an octree's cubes with tetrahedra between their centres and corners (Labelle
 //! and Shewchuk 2007, without warping). Cubes that touch differ by one level at most, so that the tetrahedra fit together.
 
-use crate::geometry::Aabb;
+use cager_geometry::spatial::Aabb;
 use glam::DVec3;
 use std::collections::{HashMap, HashSet};
 

@@ -66,7 +66,7 @@ fn crossing(lattice: &Lattice, values: &[f64], key: u64) -> DVec3 {
 mod tests {
     use super::*;
     use crate::enclose::lattice::Octree;
-    use crate::geometry::Aabb;
+    use cager_geometry::spatial::Aabb;
     use std::collections::HashMap;
 
     /// Cubes of all sizes, finest around a corner of the box and around places inside it.

@@ -10,8 +10,8 @@ mod quadric;
 mod simplify;
 mod source;
 
-use crate::geometry::{Surface, self_intersections};
-use cager_core::mesh::{Model, TriMesh};
+use cager_geometry::mesh::{Model, TriMesh};
+use cager_geometry::spatial::{Surface, self_intersections};
 use fair::fair;
 use gaps::Offset;
 use glam::DVec3;
@@ -271,7 +271,7 @@ fn simple_shape(source: &NormalizedModel, vertices: usize, clearance: f64) -> Op
 #[cfg(test)]
 mod tests {
     use super::*;
-    use cager_core::mesh::Polygons;
+    use cager_geometry::mesh::Polygons;
 
     /// Square pipes along all axes, some hundred of them, which meet and leave holes between them.
     fn pipes(along: u32) -> Model {

@@ -5,8 +5,9 @@ use super::gaps::{Offset, balls_in_gaps};
 use super::lattice::{Lattice, Octree};
 use super::level_set::level_set;
 use super::source::NormalizedModel;
-use crate::geometry::distance::closest_on_segment;
-use crate::geometry::{Aabb, Bvh, GeneralizedWinding};
+use cager_geometry::spatial::distance::closest_on_segment;
+use cager_geometry::spatial::{Aabb, Bvh, GeneralizedWinding};
+use cager_geometry::topology::UnionFind;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::VecDeque;
@@ -92,15 +93,15 @@ fn distances(source: &NormalizedModel, lattice: &Lattice, offset: &Offset) -> Ve
 
 /// Groups of nodes of one sign that edges of the lattice join: for each node, the first of its group.
 fn groups(lattice: &Lattice, values: &[f64]) -> Vec<u32> {
-    let mut group: Vec<u32> = (0..values.len() as u32).collect();
+    let mut groups = UnionFind::new(values.len());
     for t in &lattice.tetrahedra {
         for (i, j) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
             if (values[t[i] as usize] < 0.0) == (values[t[j] as usize] < 0.0) {
-                join(&mut group, [t[i], t[j]]);
+                groups.join(t[i], t[j]);
             }
         }
     }
-    (0..values.len() as u32).map(|node| root(&mut group, node)).collect()
+    (0..values.len() as u32).map(|node| groups.root(node)).collect()
 }
 
 /// Marks as inside everything that cannot be reached from the border.
@@ -169,29 +170,14 @@ fn shortest_links(lattice: &Lattice, labels: &[u32], parts: u32) -> Vec<[usize; 
         }
     }
     links.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((a.3, a.4).cmp(&(b.3, b.4))));
-    let mut group: Vec<u32> = (0..parts).collect();
+    let mut joined = UnionFind::new(parts as usize);
     let mut tree = Vec::new();
     for (_, a, b, from, to) in links {
-        if join(&mut group, [a, b]) {
+        if joined.join(a, b) {
             tree.push([from as usize, to as usize]);
         }
     }
     tree
-}
-
-/// Joins the groups of two members; says whether they were apart.
-fn join(group: &mut [u32], members: [u32; 2]) -> bool {
-    let [a, b] = members.map(|member| root(group, member));
-    group[a.max(b) as usize] = a.min(b);
-    a != b
-}
-
-fn root(group: &mut [u32], mut part: u32) -> u32 {
-    while group[part as usize] != part {
-        group[part as usize] = group[group[part as usize] as usize];
-        part = group[part as usize];
-    }
-    part
 }
 
 /// Puts tubes as thick as the offset between the points of the model nearest to the nodes of each link.

@@ -1,8 +1,9 @@
 //! A closed mesh with local replacement of faces, as long as the model stays enclosed and no faces intersect.
 
-use crate::geometry::distance::point_triangle2;
-use crate::geometry::surface::crossing;
-use crate::geometry::{Aabb, Bvh, triangles_intersect};
+use cager_geometry::spatial::distance::point_triangle2;
+use cager_geometry::spatial::surface::crossing;
+use cager_geometry::spatial::{Aabb, Bvh, triangles_intersect};
+use cager_geometry::topology::{faces_around, ring};
 use glam::DVec3;
 
 /// Corners of a face that was removed.
@@ -68,10 +69,7 @@ pub(super) struct PatchMesh {
 
 impl PatchMesh {
     pub(super) fn new(positions: Vec<DVec3>, faces: Vec<[u32; 3]>) -> Self {
-        let mut around = vec![Vec::new(); positions.len()];
-        for (f, face) in faces.iter().enumerate() {
-            face.iter().for_each(|&v| around[v as usize].push(f as u32));
-        }
+        let around = faces_around(positions.len(), &faces);
         let boxes: Vec<Aabb> = faces.iter().map(|f| Aabb::around(f.map(|v| positions[v as usize]))).collect();
         Self { tree: Bvh::new(&boxes), positions, faces, around }
     }
@@ -87,11 +85,7 @@ impl PatchMesh {
 
     /// Vertices joined to one by an edge, ascending.
     pub(super) fn ring(&self, vertex: u32) -> Vec<u32> {
-        let faces = self.around[vertex as usize].iter();
-        let mut ring: Vec<u32> = faces.flat_map(|&f| self.faces[f as usize]).filter(|&v| v != vertex).collect();
-        ring.sort_unstable();
-        ring.dedup();
-        ring
+        ring(vertex, &self.around[vertex as usize], &self.faces)
     }
 
     /// Whether two vertices share a face.

@@ -2,8 +2,8 @@
 
 use super::EncloseError;
 use super::gaps::Offset;
-use crate::geometry::Surface;
-use cager_core::mesh::{Model, bounds, diagonal};
+use cager_geometry::mesh::{Model, bounds, diagonal};
+use cager_geometry::spatial::Surface;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::HashSet;

@@ -1,7 +1,7 @@
 //! Convex hulls by insertion of the farthest point (Barber et al. 1996), ended when there are enough vertices and then enlarged.
 
-use crate::geometry::predicates::orient3d;
-use cager_core::mesh::{Point, TriMesh};
+use cager_geometry::mesh::{Point, TriMesh};
+use cager_geometry::spatial::predicates::orient3d;
 use glam::DVec3;
 
 /// A face of the hull with the points that see it.

@@ -1,7 +1,7 @@
 //! Models for tests, and a check of cages by another library than the one that made them.
 #![allow(dead_code, unreachable_pub)]
 
-use cager_core::mesh::{Model, Point, TriMesh, diagonal};
+use cager_geometry::mesh::{Model, Point, TriMesh, diagonal};
 use parry3d_f64::math::Vector;
 use parry3d_f64::query::PointQuery;
 use parry3d_f64::shape::{TriMesh as ParryMesh, TriMeshFlags};

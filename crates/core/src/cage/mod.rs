@@ -1,18 +1,21 @@
 //! A validated cage: a closed, outward-oriented triangle mesh with its edges.
 
-mod check;
-mod nesting;
+mod defects;
+mod error;
 
-pub use check::CageError;
-pub use nesting::Nesting;
+pub use defects::Defects;
+pub use error::CageError;
 
 use crate::mesh::{Point, TriMesh, diagonal};
+use defects::Examination;
 
 /// An edge of a cage, shared by exactly two faces.
 #[derive(Clone, Copy, Debug)]
 pub struct Edge {
     /// Its ends, the smaller index first.
     pub vertices: [u32; 2],
+    /// The faces at it, in the mesh's order.
+    pub faces: [u32; 2],
 }
 
 /// A face of a cage with its edges.
@@ -39,12 +42,13 @@ impl Cage {
     /// Validates a mesh as a cage.
     ///
     /// # Errors
-    /// What makes the mesh unusable: see [`CageError`].
+    /// The first of the mesh's [`Defects`].
     pub fn new(mesh: TriMesh) -> Result<Self, CageError> {
-        let (edges, faces) = check::connect(&mesh)?;
-        check::check_orientation(&mesh, &faces, edges.len())?;
-        let diagonal = diagonal(&mesh.vertices);
-        Ok(Self { mesh, edges, faces, diagonal })
+        let Examination { defects, edges, faces } = Examination::of(&mesh);
+        match defects.first(&mesh) {
+            Some(error) => Err(error),
+            None => Ok(Self { diagonal: diagonal(&mesh.vertices), mesh, edges, faces }),
+        }
     }
 
     /// Vertices, v × 3.

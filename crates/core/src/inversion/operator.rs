@@ -1,7 +1,7 @@
 //! The linear inversion as one matrix R, `C = R · H`.
 
 use super::spectra::{ENDS_ALONE, Spectra};
-use super::{BLOCK_ROWS, PrepareError};
+use super::{PrepareError, tall_product};
 use crate::dense;
 use crate::handles::Handles;
 use crate::handles::farthest::farthest_points;
@@ -9,11 +9,9 @@ use crate::handles::interpolation::{Drift, Samples, interpolated};
 use crate::handles::rectangular::rectangular_rows;
 use crate::mesh::Point;
 use crate::regularize::DataMap;
-use crate::simd::zeros;
 use crate::spectrum::{RANK_TOLERANCE, RowBasis};
 use crate::svd::{self, LastDirections, Svd};
 use faer::{Mat, MatRef};
-use rayon::prelude::*;
 
 /// The singular directions of the inverted matrix A.
 pub(super) enum Directions {
@@ -284,14 +282,4 @@ pub(super) fn failed(what: &'static str) -> PrepareError {
 pub(super) fn padded_to_tiles(mut operator: Mat<f64>) -> Mat<f64> {
     operator.resize_with(operator.nrows(), operator.ncols().next_multiple_of(dense::TILE_ROWS), |_, _| 0.0);
     operator
-}
-
-/// `Φ · X` in parallel row blocks whose bits do not depend on the threads.
-pub(crate) fn tall_product(phi: MatRef<'_, f64>, x: MatRef<'_, f64>) -> Mat<f64> {
-    let mut out = zeros(phi.nrows(), x.ncols());
-    out.as_mut().par_row_chunks_mut(BLOCK_ROWS).enumerate().for_each(|(block, rows)| {
-        let count = rows.nrows();
-        dense::multiply(rows, phi.subrows(block * BLOCK_ROWS, count), x);
-    });
-    out
 }

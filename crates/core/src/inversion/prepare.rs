@@ -1,6 +1,6 @@
 //! Preparation of a solver: coordinates, handles, spectrum and operator.
 
-use super::operator::tall_product;
+use super::tall_product;
 use super::{Analysis, Handles, PrepareError, Solver, SolverOptions};
 use crate::cage::Cage;
 use crate::coordinates::{CoordinateSystem, ElementPlan, Refinement};

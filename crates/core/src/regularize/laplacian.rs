@@ -39,16 +39,11 @@ pub(crate) fn cage_laplacian(cage: &Cage, unknowns: usize) -> Mat<f64> {
         delta[(b, a)] = -1.0 / degree[b];
     }
     if unknowns == v + cage.faces().len() {
-        let mut faces_of = vec![Vec::with_capacity(2); cage.edges().len()];
-        for (f, face) in cage.faces().iter().enumerate() {
-            delta[(v + f, v + f)] = 1.0;
-            face.edges.iter().for_each(|&edge| faces_of[edge as usize].push(v + f));
-        }
-        for pair in faces_of {
-            if let [f, g] = pair[..] {
-                delta[(f, g)] -= 1.0 / 3.0;
-                delta[(g, f)] -= 1.0 / 3.0;
-            }
+        (v..unknowns).for_each(|i| delta[(i, i)] = 1.0);
+        for edge in cage.edges() {
+            let [f, g] = edge.faces.map(|face| v + face as usize);
+            delta[(f, g)] -= 1.0 / 3.0;
+            delta[(g, f)] -= 1.0 / 3.0;
         }
     }
     delta

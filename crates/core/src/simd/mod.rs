@@ -6,10 +6,9 @@ mod angle;
 mod dispatch;
 mod lanes;
 mod logarithm;
-mod zeros;
 
 pub(crate) use angle::angle;
+pub(crate) use cager_geometry::linalg::zeros;
 pub(crate) use dispatch::multiversion;
 pub(crate) use lanes::{LANES, Lanes, cross, dot};
 pub(crate) use logarithm::ln_ratio;
-pub(crate) use zeros::zeros;

@@ -62,14 +62,8 @@ impl<'a> Surface<'a> {
                 *sum = vector::along(*sum, angle, normal);
             }
         }
-        let mut at_edge = vec![[u32::MAX; 2]; cage.edges().len()];
-        for (f, face) in cage.faces().iter().enumerate() {
-            for &e in &face.edges {
-                let sides = &mut at_edge[e as usize];
-                sides[usize::from(sides[0] != u32::MAX)] = f as u32;
-            }
-        }
-        let other = |e: u32, f: usize| at_edge[e as usize].into_iter().find(|&g| g != f as u32).unwrap_or(f as u32);
+        let other =
+            |e: u32, f: usize| cage.edges()[e as usize].faces.into_iter().find(|&g| g != f as u32).unwrap_or(f as u32);
         let across = cage.faces().iter().enumerate().map(|(f, face)| face.edges.map(|e| other(e, f))).collect();
         let thickness = ON_SURFACE * mesh::diagonal(vertices);
         Self { vertices, faces, spheres, normals, vertex_normals, across, thickness }

@@ -1,17 +1,18 @@
 //! Connectivity of polygon meshes of any arity, without assumptions on their validity.
 
-use std::collections::{BTreeMap, HashMap};
+use super::{UnionFind, faces_around};
+use std::collections::BTreeMap;
 
 /// Every edge, with the smaller vertex first, and the faces at it, each with whether it runs from the smaller to the larger vertex.
-pub(super) type Edges = BTreeMap<[u32; 2], Vec<(u32, bool)>>;
+pub type Edges = BTreeMap<[u32; 2], Vec<(u32, bool)>>;
 
 /// Sides of a polygon, in its direction.
-pub(super) fn sides(face: &[u32]) -> impl Iterator<Item = [u32; 2]> + '_ {
+pub fn sides(face: &[u32]) -> impl Iterator<Item = [u32; 2]> + '_ {
     (0..face.len()).map(move |k| [face[k], face[(k + 1) % face.len()]])
 }
 
 /// The edges of some faces.
-pub(super) fn edges(faces: &[impl AsRef<[u32]>]) -> Edges {
+pub fn edges(faces: &[impl AsRef<[u32]>]) -> Edges {
     let mut edges = Edges::new();
     for (f, face) in faces.iter().enumerate() {
         for [a, b] in sides(face.as_ref()) {
@@ -22,36 +23,16 @@ pub(super) fn edges(faces: &[impl AsRef<[u32]>]) -> Edges {
 }
 
 /// The number of the connected part that each face belongs to, by edges shared by two faces, and how many parts there are.
-pub(super) fn shells(faces: usize, edges: &Edges) -> (Vec<u32>, u32) {
-    let mut group: Vec<u32> = (0..faces as u32).collect();
+pub fn shells(faces: usize, edges: &Edges) -> (Vec<u32>, u32) {
+    let mut shells = UnionFind::new(faces);
     for users in edges.values().filter(|u| u.len() == 2) {
-        let [a, b] = [users[0].0, users[1].0].map(|f| root(&mut group, f));
-        group[a.max(b) as usize] = a.min(b);
+        shells.join(users[0].0, users[1].0);
     }
-    let mut number = HashMap::new();
-    let labels: Vec<u32> = (0..faces as u32)
-        .map(|f| {
-            let next = number.len() as u32;
-            *number.entry(root(&mut group, f)).or_insert(next)
-        })
-        .collect();
-    (labels, number.len() as u32)
-}
-
-fn root(group: &mut [u32], mut f: u32) -> u32 {
-    while group[f as usize] != f {
-        group[f as usize] = group[group[f as usize] as usize];
-        f = group[f as usize];
-    }
-    f
+    shells.numbered()
 }
 
 /// The faces around each vertex, grouped by connection over edges at that vertex: one group at a manifold vertex.
-pub(super) fn fans(vertices: usize, faces: &[impl AsRef<[u32]>]) -> Vec<Vec<Vec<u32>>> {
-    let mut around: Vec<Vec<u32>> = vec![Vec::new(); vertices];
-    for (f, face) in faces.iter().enumerate() {
-        face.as_ref().iter().for_each(|&v| around[v as usize].push(f as u32));
-    }
+pub fn fans(vertices: usize, faces: &[impl AsRef<[u32]>]) -> Vec<Vec<Vec<u32>>> {
     let fans_at = |(v, faces_at): (usize, Vec<u32>)| {
         let mut fans: Vec<(Vec<u32>, Vec<u32>)> = Vec::new();
         for f in faces_at {
@@ -78,12 +59,12 @@ pub(super) fn fans(vertices: usize, faces: &[impl AsRef<[u32]>]) -> Vec<Vec<Vec<
         fans.sort_unstable();
         fans
     };
-    around.into_iter().enumerate().map(fans_at).collect()
+    faces_around(vertices, faces).into_iter().enumerate().map(fans_at).collect()
 }
 
 /// Border loops, each as its vertices in the direction in which a face would have to run that fills it. Borders that branch are left
 /// out.
-pub(super) fn border_loops(edges: &Edges) -> Vec<Vec<u32>> {
+pub fn border_loops(edges: &Edges) -> Vec<Vec<u32>> {
     let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for ([a, b], users) in edges.iter().filter(|(_, u)| u.len() == 1) {
         let [from, to] = if users[0].1 { [*b, *a] } else { [*a, *b] };

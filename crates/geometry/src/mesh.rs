@@ -162,7 +162,8 @@ pub fn distance_to_surface(vertices: &[Point], triangles: &[[u32; 3]], x: Point)
         .sqrt()
 }
 
-pub(crate) fn distance2_to_triangle([a, b, c]: [Point; 3], x: Point) -> f64 {
+/// Squared distance from `x` to a triangle.
+pub fn distance2_to_triangle([a, b, c]: [Point; 3], x: Point) -> f64 {
     let (u, v, w) = (sub(b, a), sub(c, a), sub(x, a));
     let n = cross(u, v);
     let n2 = dot(n, n);

@@ -68,9 +68,3 @@ pub fn closest_on_segments([a, b]: [DVec3; 2], [c, d]: [DVec3; 2]) -> (f64, f64)
         (s, t)
     }
 }
-
-/// Squared distance between two segments.
-pub fn segment_segment2(first: [DVec3; 2], second: [DVec3; 2]) -> f64 {
-    let (s, t) = closest_on_segments(first, second);
-    (first[0] + s * (first[1] - first[0])).distance_squared(second[0] + t * (second[1] - second[0]))
-}

@@ -1,7 +1,7 @@
 //! The largest and the smallest singular value alone, by the method of Lanczos (1950) with every vector kept orthogonal to all
 //! before: some dozens of products where a decomposition takes as many as columns.
 
-use crate::dense;
+use crate::linalg;
 use faer::{Mat, MatRef};
 
 /// Steps that the method takes at the most.
@@ -11,15 +11,15 @@ const SETTLED: f64 = 1e-11;
 const UNCHANGED: usize = 4;
 
 /// Largest and smallest singular value of `R A` from the upper triangular R, m × m, the identity where it is left out, and from A, m × m, with its inverse.
-pub(crate) fn ends(factor: Option<MatRef<'_, f64>>, a: MatRef<'_, f64>, inverse: MatRef<'_, f64>) -> [f64; 2] {
+pub fn ends(factor: Option<MatRef<'_, f64>>, a: MatRef<'_, f64>, inverse: MatRef<'_, f64>) -> [f64; 2] {
     let last = || {
         largest(a.ncols(), |x| {
-            let mut image = dense::product(inverse.transpose(), x);
+            let mut image = linalg::product(inverse.transpose(), x);
             if let Some(factor) = factor {
-                dense::solve_lower(factor.transpose(), &mut image);
-                dense::solve_upper(factor, &mut image);
+                linalg::solve_lower(factor.transpose(), &mut image);
+                linalg::solve_upper(factor, &mut image);
             }
-            dense::product(inverse, image.as_ref())
+            linalg::product(inverse, image.as_ref())
         })
     };
     let first = || match factor {
@@ -31,10 +31,10 @@ pub(crate) fn ends(factor: Option<MatRef<'_, f64>>, a: MatRef<'_, f64>, inverse:
 }
 
 /// Largest singular value of the product of these matrices, m × m, of which the first is multiplied by a vector first.
-pub(crate) fn first_value(factors: &[MatRef<'_, f64>]) -> f64 {
+pub fn first_value(factors: &[MatRef<'_, f64>]) -> f64 {
     let squared = largest(factors[0].ncols(), |x| {
-        let image = factors.iter().fold(x.to_owned(), |x, a| dense::product(*a, x.as_ref()));
-        factors.iter().rev().fold(image, |x, a| dense::product(a.transpose(), x.as_ref()))
+        let image = factors.iter().fold(x.to_owned(), |x, a| linalg::product(*a, x.as_ref()));
+        factors.iter().rev().fold(image, |x, a| linalg::product(a.transpose(), x.as_ref()))
     });
     squared.sqrt()
 }
@@ -57,11 +57,11 @@ fn largest(m: usize, apply: impl Fn(MatRef<'_, f64>) -> Mat<f64>) -> f64 {
         let known = basis.as_ref().subcols(0, k + 1);
         // Twice is enough (Kahan and Parlett).
         for pass in 0..2 {
-            let along = dense::product(known.transpose(), next.as_ref());
+            let along = linalg::product(known.transpose(), next.as_ref());
             if pass == 0 {
                 diagonal.push(along[(k, 0)]);
             }
-            next -= dense::product(known, along.as_ref());
+            next -= linalg::product(known, along.as_ref());
         }
         let now = largest_of_tridiagonal(&diagonal, &beside);
         unchanged = if (now - value).abs() <= SETTLED * now { unchanged + 1 } else { 0 };
@@ -109,7 +109,7 @@ fn largest_of_tridiagonal(diagonal: &[f64], beside: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::svd::singular_values;
+    use crate::linalg::svd::singular_values;
 
     #[test]
     fn the_ends_are_those_of_the_decomposition() {
@@ -126,8 +126,8 @@ mod tests {
                     0.0
                 }
             });
-            let inverse = dense::inverse(a.as_ref()).0;
-            let all = singular_values(dense::product(factor.as_ref(), a.as_ref()).as_ref()).unwrap();
+            let inverse = linalg::inverse(a.as_ref()).0;
+            let all = singular_values(linalg::product(factor.as_ref(), a.as_ref()).as_ref()).unwrap();
             let [first, last] = ends(Some(factor.as_ref()), a.as_ref(), inverse.as_ref());
             assert!((first / all[0] - 1.0).abs() < 1e-12, "{m}: {first} {}", all[0]);
             assert!((last / all[m - 1] - 1.0).abs() < 1e-9, "{m}: {last} {}", all[m - 1]);

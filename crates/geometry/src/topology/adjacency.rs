@@ -1,16 +1,16 @@
 //! Which vertices a mesh's edges join.
 
-use cager_core::mesh::Polygons;
+use crate::mesh::Polygons;
 
 /// The neighbours of each vertex along the edges of polygons, each once, ascending unless they were [renamed](Self::renamed).
-pub(crate) struct Adjacency {
+pub struct Adjacency {
     starts: Vec<u32>,
     items: Vec<u32>,
 }
 
 impl Adjacency {
     /// Of the vertices of these faces.
-    pub(crate) fn new(faces: &Polygons, points: usize) -> Self {
+    pub fn new(faces: &Polygons, points: usize) -> Self {
         let mut edges: Vec<[u32; 2]> = Vec::with_capacity(2 * faces.indices().len());
         for face in faces.iter() {
             for (k, &a) in face.iter().enumerate() {
@@ -29,7 +29,7 @@ impl Adjacency {
     }
 
     /// The same with other names of the vertices; the neighbours come in another order.
-    pub(crate) fn renamed(&self, names: &[u32]) -> Self {
+    pub fn renamed(&self, names: &[u32]) -> Self {
         let mut starts = vec![0; self.starts.len()];
         (0..self.points()).for_each(|v| starts[names[v] as usize + 1] = self.of(v).len() as u32);
         (0..self.points()).for_each(|k| starts[k + 1] += starts[k]);
@@ -41,11 +41,13 @@ impl Adjacency {
         Self { starts, items }
     }
 
-    pub(crate) fn points(&self) -> usize {
+    /// Number of vertices.
+    pub fn points(&self) -> usize {
         self.starts.len() - 1
     }
 
-    pub(crate) fn of(&self, vertex: usize) -> &[u32] {
+    /// The neighbours of a vertex.
+    pub fn of(&self, vertex: usize) -> &[u32] {
         &self.items[self.starts[vertex] as usize..self.starts[vertex + 1] as usize]
     }
 }

@@ -2,13 +2,14 @@
 
 use super::predicates::{orient2d, orient3d};
 use super::{Aabb, Bvh};
-use cager_core::mesh::TriMesh;
+use crate::mesh::TriMesh;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Pairs of faces after which no more are looked for, of one face and of all: thousands of parts in one place have as many as the square of their number.
-const MOST_OF_FACE: usize = 1_000;
-pub(crate) const MOST_PAIRS: usize = 1_000_000;
+/// Pairs of one face after which no more are looked for: thousands of parts in one place have as many as the square of their number.
+const MAX_PAIRS_OF_FACE: usize = 1_000;
+/// Pairs of all faces likewise.
+pub const MAX_PAIRS: usize = 1_000_000;
 /// Faces that are looked at before their pairs are counted.
 const FACES_AT_A_TIME: usize = 1 << 10;
 
@@ -32,7 +33,7 @@ pub fn self_intersections(mesh: &TriMesh) -> Vec<[u32; 2]> {
                     pairs.push([first as u32, second]);
                 }
             }
-            pairs.len() < MOST_OF_FACE
+            pairs.len() < MAX_PAIRS_OF_FACE
         });
         pairs.sort_unstable();
         pairs
@@ -41,8 +42,8 @@ pub fn self_intersections(mesh: &TriMesh) -> Vec<[u32; 2]> {
     for first in (0..boxes.len()).step_by(FACES_AT_A_TIME) {
         let faces = first..boxes.len().min(first + FACES_AT_A_TIME);
         found.par_extend(faces.into_par_iter().with_min_len(64).flat_map_iter(pairs_of));
-        if found.len() >= MOST_PAIRS {
-            found.truncate(MOST_PAIRS);
+        if found.len() >= MAX_PAIRS {
+            found.truncate(MAX_PAIRS);
             break;
         }
     }

@@ -4,8 +4,8 @@
 mod ends;
 mod last;
 
-pub(crate) use ends::{ends, first_value};
-pub(crate) use last::{LastDirections, last_directions};
+pub use ends::{ends, first_value};
+pub use last::{LastDirections, last_directions};
 
 use faer::diag::Diag;
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -37,7 +37,7 @@ pub fn svd(a: MatRef<'_, f64>) -> Option<Svd> {
 }
 
 /// Singular values alone, descending: min(K, m) of them.
-pub(crate) fn singular_values(a: MatRef<'_, f64>) -> Option<Vec<f64>> {
+pub fn singular_values(a: MatRef<'_, f64>) -> Option<Vec<f64>> {
     compute(a, ComputeSvdVectors::No, None)
 }
 

@@ -6,7 +6,7 @@ use std::mem::MaybeUninit;
 
 /// Zeros, n × m, whose memory the threads of the current rayon pool touch first, each a share: the system hands out new memory
 /// page by page, which takes one thread longer than most steps of a preparation.
-pub(crate) fn zeros<T: Copy + Default + Send>(n: usize, m: usize) -> Mat<T> {
+pub fn zeros<T: Copy + Default + Send>(n: usize, m: usize) -> Mat<T> {
     const TASK_BYTES: usize = 1 << 18;
     let mut matrix = Mat::<T>::with_capacity(n, m);
     let stride = matrix.col_stride().unsigned_abs();

@@ -3,8 +3,7 @@
 //! transpose with a vector.
 
 use super::svd;
-use crate::dense;
-use crate::inversion::tall_product;
+use crate::linalg;
 use faer::{Mat, MatRef};
 
 /// Vectors of a block beyond the wanted ones: the farther the values left out, the fewer steps.
@@ -18,28 +17,28 @@ const DEPENDENT: f64 = 1e-10;
 
 /// The last singular values of `M` with their right vectors.
 #[derive(Clone, Debug)]
-pub(crate) struct LastDirections {
+pub struct LastDirections {
     /// Singular values, descending: s.
-    pub(crate) sigma: Vec<f64>,
+    pub sigma: Vec<f64>,
     /// Right singular vectors, m × s.
-    pub(crate) v: Mat<f64>,
+    pub v: Mat<f64>,
     /// The largest singular value of all.
-    pub(crate) first: f64,
+    pub first: f64,
 }
 
 impl LastDirections {
     /// The largest and the smallest singular value.
-    pub(crate) fn ends(&self) -> [f64; 2] {
+    pub fn ends(&self) -> [f64; 2] {
         [self.first, self.sigma[self.sigma.len() - 1]]
     }
 
     /// How many of them are below this fraction of the largest.
-    pub(crate) fn below(&self, fraction: f64) -> usize {
+    pub fn below(&self, fraction: f64) -> usize {
         self.sigma.iter().filter(|&&x| x < fraction * self.first).count()
     }
 
     /// All singular values, descending, NaN between the first and the last s.
-    pub(crate) fn values(&self) -> Vec<f64> {
+    pub fn values(&self) -> Vec<f64> {
         let mut values = vec![f64::NAN; self.v.nrows() - self.sigma.len()];
         if let Some(first) = values.first_mut() {
             *first = self.first;
@@ -50,7 +49,7 @@ impl LastDirections {
 }
 
 /// The last `count` singular values of M and their vectors, from `M⁻¹` and the first of the values. `None` where they do not converge.
-pub(crate) fn last_directions(inverse: MatRef<'_, f64>, first: f64, count: usize) -> Option<LastDirections> {
+pub fn last_directions(inverse: MatRef<'_, f64>, first: f64, count: usize) -> Option<LastDirections> {
     let m = inverse.ncols();
     let width = (count + MARGIN).min(m);
     let mut state = 0x9e37_79b9_7f4a_7c15u64;
@@ -63,13 +62,13 @@ pub(crate) fn last_directions(inverse: MatRef<'_, f64>, first: f64, count: usize
     for _ in 0..BLOCKS {
         // Twice is enough (Kahan and Parlett).
         for _ in 0..2 {
-            block -= tall_product(space.as_ref(), dense::product(space.transpose(), block.as_ref()).as_ref());
+            block -= linalg::tall_product(space.as_ref(), linalg::product(space.transpose(), block.as_ref()).as_ref());
         }
         let directions = svd(block.as_ref())?;
         let long = directions.sigma.iter().filter(|&&x| x > DEPENDENT * directions.sigma[0]).count();
         let long = long.min(m - space.ncols());
         let new = directions.u.as_ref().subcols(0, long);
-        let image = tall_product(inverse.transpose(), new);
+        let image = linalg::tall_product(inverse.transpose(), new);
         append(&mut space, new);
         append(&mut images, image.as_ref());
         // Of the images `M⁻ᵀ X = U S Wᵀ` the singular vectors of M are U and `X W`, its singular values 1/S.
@@ -78,13 +77,13 @@ pub(crate) fn last_directions(inverse: MatRef<'_, f64>, first: f64, count: usize
         let settled = known.len() == count
             && known.iter().zip(values).all(|(before, now)| (before - now).abs() <= SETTLED * values[0]);
         if settled || space.ncols() == m {
-            let v = dense::product(space.as_ref(), ritz.v.as_ref().subcols(0, count));
+            let v = linalg::product(space.as_ref(), ritz.v.as_ref().subcols(0, count));
             let v = Mat::from_fn(m, count, |i, j| v[(i, count - 1 - j)]);
             let sigma = values.iter().rev().map(|x| 1.0 / x).collect();
             return Some(LastDirections { sigma, v, first });
         }
         known = values.to_vec();
-        block = tall_product(inverse, image.as_ref());
+        block = linalg::tall_product(inverse, image.as_ref());
     }
     None
 }
@@ -109,21 +108,21 @@ mod tests {
             };
             let (left, right) = (noise(7), noise(13));
             let scaled = Mat::from_fn(m, m, |i, k| left[(i, k)] * value(k));
-            let a = dense::product(scaled.as_ref(), right.transpose());
-            let found = last_directions(dense::inverse(a.as_ref()).0.as_ref(), value(0), count).unwrap();
+            let a = linalg::product(scaled.as_ref(), right.transpose());
+            let found = last_directions(linalg::inverse(a.as_ref()).0.as_ref(), value(0), count).unwrap();
             let wanted: Vec<f64> = (m - count..m).map(value).collect();
             for (x, y) in found.sigma.iter().zip(&wanted) {
                 assert!((x / y - 1.0).abs() < 1e-10, "{m} {count}: {x} {y}");
             }
-            let images = dense::product(a.as_ref(), found.v.as_ref());
-            let squares = dense::product(images.transpose(), images.as_ref());
+            let images = linalg::product(a.as_ref(), found.v.as_ref());
+            let squares = linalg::product(images.transpose(), images.as_ref());
             for (i, j) in (0..count).flat_map(|i| (0..count).map(move |j| (i, j))) {
                 let expected = if i == j { found.sigma[i] * found.sigma[i] } else { 0.0 };
                 let off = (squares[(i, j)] - expected).abs() / (found.sigma[i] * found.sigma[j]);
                 assert!(off < 1e-9, "{m} {count}: {off:e}");
             }
             let unit = |a: &Mat<f64>| {
-                let gram = dense::product(a.transpose(), a.as_ref());
+                let gram = linalg::product(a.transpose(), a.as_ref());
                 (0..count).all(|i| (0..count).all(|j| (gram[(i, j)] - f64::from(u8::from(i == j))).abs() < 1e-9))
             };
             assert!(unit(&found.v), "{m} {count}");

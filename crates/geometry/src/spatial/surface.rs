@@ -3,7 +3,7 @@
 use super::distance::{closest_on_triangle, point_triangle2};
 use super::predicates::{orient2d, orient3d};
 use super::{Aabb, Bvh};
-use cager_core::mesh::{Point, TriMesh};
+use crate::mesh::{Point, TriMesh};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -103,7 +103,7 @@ pub fn outside(cage: &TriMesh, points: &[Point]) -> Vec<(u32, f64)> {
 
 /// +1 where the ray from `p` along x leaves through a triangle, −1 where it enters, 0 where it misses.
 #[inline]
-pub(crate) fn crossing(p: DVec3, [a, b, c]: [DVec3; 3]) -> i32 {
+pub fn crossing(p: DVec3, [a, b, c]: [DVec3; 3]) -> i32 {
     if p.y < a.y.min(b.y).min(c.y) || p.y > a.y.max(b.y).max(c.y) {
         return 0;
     }

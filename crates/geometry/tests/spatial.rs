@@ -1,8 +1,8 @@
 //! Queries against direct sums over all faces.
 
-use cager_cages::geometry::distance::{closest_on_segments, closest_on_triangle, segment_segment2};
-use cager_cages::geometry::{GeneralizedWinding, Surface, outside, self_intersections, triangles_intersect};
-use cager_core::mesh::{Point, TriMesh, distance_to_surface, winding_number};
+use cager_geometry::mesh::{Point, TriMesh, distance_to_surface, winding_number};
+use cager_geometry::spatial::distance::{closest_on_segments, closest_on_triangle};
+use cager_geometry::spatial::{GeneralizedWinding, Surface, outside, self_intersections, triangles_intersect};
 use glam::DVec3;
 
 /// A sphere as a grid of latitudes and longitudes.
@@ -128,7 +128,7 @@ fn nearest_points_of_segments_and_triangles_are_nearest() {
     for s in p.chunks_exact(4) {
         let [a, b, c, d] = [0, 1, 2, 3].map(|i| DVec3::from(s[i]));
         let (u, v) = closest_on_segments([a, b], [c, d]);
-        let least = segment_segment2([a, b], [c, d]);
+        let least = a.lerp(b, u).distance_squared(c.lerp(d, v));
         let w = closest_on_triangle(d, [a, b, c]);
         let nearest = (w[0] * a + w[1] * b + w[2] * c).distance_squared(d);
         for i in 0..=20 {

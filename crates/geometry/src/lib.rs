@@ -1,0 +1,8 @@
+//! Meshes, their topology, spatial queries and dense linear algebra: plain data in, plain data out; nothing about cages. All results are independent
+//! of the number of threads.
+
+pub mod linalg;
+pub mod mesh;
+pub mod spatial;
+pub mod topology;
+pub mod vector;

@@ -1,0 +1,18 @@
+//! Dense linear algebra on faer: products, factorisations, eigenvalues and singular values whose bits do not depend on the number of threads.
+
+mod eigen;
+mod factors;
+mod products;
+pub mod svd;
+mod zeros;
+
+pub use eigen::eigen;
+pub use factors::{
+    Pivoted, cholesky, inverse, pivoted, right_singular, solve_cholesky, solve_definite, solve_definite_within,
+    solve_lower, solve_upper, upper_factor, upper_inverse,
+};
+pub use products::{
+    TILE_COLUMNS, TILE_ROWS, accumulate_product, gram, lower_product, mirrored, multiply, product, rows_of,
+    tall_product, transposed_product,
+};
+pub use zeros::zeros;
