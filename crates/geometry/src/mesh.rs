@@ -1,9 +1,7 @@
 //! Meshes as plain data.
 
+pub use crate::vector::Point;
 use crate::vector::{cross, dot, norm, sub};
-
-/// A point or vector in space.
-pub type Point = [f64; 3];
 
 /// Polygonal faces of any arity over some list of points.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -1,6 +1,7 @@
 //! Arithmetic of points and vectors in space.
 
-use crate::mesh::Point;
+/// A point or vector in space.
+pub type Point = [f64; 3];
 
 /// `a + b`.
 pub fn add(a: Point, b: Point) -> Point {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use cager_core::mesh::{Model, Polygons};
+use cager_geometry::mesh::{Model, Polygons};
 
 use crate::error::{Error, Fault};
 use crate::mesh::{MeshFormat, read_model};

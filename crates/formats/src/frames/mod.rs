@@ -27,7 +27,7 @@ mod write;
 
 use std::path::Path;
 
-use cager_core::mesh::Polygons;
+use cager_geometry::mesh::Polygons;
 
 use crate::error::Error;
 

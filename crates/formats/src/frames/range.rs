@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
 
-use cager_core::mesh::Polygons;
+use cager_geometry::mesh::Polygons;
 
 use super::FrameReader;
 use crate::error::{Error, Fault};

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use cager_core::mesh::Polygons;
+use cager_geometry::mesh::Polygons;
 
 use super::merged::Merged;
 use super::names::Sequence;

@@ -4,6 +4,7 @@ mod colors;
 mod glb;
 mod obj;
 mod off;
+mod parsed;
 mod ply;
 mod stl;
 mod write;
@@ -11,12 +12,14 @@ mod write;
 use std::fs;
 use std::path::Path;
 
-use cager_core::mesh::{Model, Polygons};
+use cager_geometry::mesh::{Model, Polygons};
 
 use crate::error::{Error, Fault};
 use crate::signature::Signature;
 use crate::text::{Lines, quoted};
 
+pub(crate) use parsed::Contents;
+use parsed::Parsed;
 pub use write::{model_bytes, obj_bytes, write_model};
 pub(crate) use write::{write_obj_faces, write_off, write_ply, write_stl};
 
@@ -117,13 +120,6 @@ pub fn read_model_bytes(format: MeshFormat, name: &Path, bytes: &[u8]) -> Result
     read_bytes(format, name, bytes, Contents::PointsAndFaces).map(|parsed| parsed.model)
 }
 
-/// How much of a file is wanted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Contents {
-    PointsAndFaces,
-    Points,
-}
-
 /// The faces of the file of a frame, and the text that they are in: most frames have the same ones, which are then not parsed again.
 #[derive(Default)]
 pub(crate) struct FrameFaces {
@@ -154,19 +150,6 @@ fn read_named(path: &Path) -> Result<(MeshFormat, Vec<u8>), Error> {
 fn parse_file(path: &Path, contents: Contents) -> Result<Parsed, Error> {
     let (format, bytes) = read_named(path)?;
     read_bytes(format, path, &bytes, contents)
-}
-
-/// What a file gave.
-struct Parsed {
-    model: Model,
-    /// Faces of fewer than three corners, which are edges and points.
-    left_out: usize,
-}
-
-impl From<Model> for Parsed {
-    fn from(model: Model) -> Self {
-        Self { model, left_out: 0 }
-    }
 }
 
 fn read_bytes(format: MeshFormat, name: &Path, bytes: &[u8], contents: Contents) -> Result<Parsed, Error> {
@@ -215,16 +198,3 @@ fn cut_in_last_line(fault: Fault, bytes: &[u8]) -> Fault {
     ))
 }
 
-/// Checks the corners of one face, which `place` names in messages, against the number of points.
-fn check_face(corners: &[u32], points: usize, place: impl Fn() -> String) -> Result<(), Fault> {
-    match corners.iter().find(|&&index| index as usize >= points) {
-        Some(&index) => Err(no_such_vertex(&place(), index.into(), points)),
-        None => Ok(()),
-    }
-}
-
-fn no_such_vertex(place: &str, index: i64, points: usize) -> Fault {
-    Fault::invalid(format!(
-        "{place}: the face names vertex {index}, but there are {points} vertices; export the mesh again"
-    ))
-}

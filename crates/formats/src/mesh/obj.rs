@@ -1,9 +1,9 @@
 //! Wavefront OBJ: `v` and `f` lines; everything else is skipped, and so are faces that are edges or points.
 
-use cager_core::mesh::Model;
+use cager_geometry::mesh::Model;
 
 use super::colors::{Colors, Scale};
-use super::{Contents, Parsed, no_such_vertex};
+use super::parsed::{Contents, Parsed, no_such_vertex};
 use crate::error::Fault;
 use crate::text::{self, Lines, integer, point, quoted, words};
 

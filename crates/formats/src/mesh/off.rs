@@ -1,8 +1,8 @@
 //! Object File Format in ASCII, one vertex a line; colours, normals and texture coordinates are skipped.
 
-use cager_core::mesh::Model;
+use cager_geometry::mesh::Model;
 
-use super::{Contents, Parsed, check_face};
+use super::parsed::{Contents, Parsed, check_face};
 use crate::error::Fault;
 use crate::text::{Lines, integer, point, quoted, words};
 

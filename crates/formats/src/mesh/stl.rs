@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use cager_core::mesh::{Model, Point};
+use cager_geometry::mesh::{Model, Point};
 
 use crate::error::Fault;
 use crate::text::{Lines, point, quoted, words};

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use cager_core::mesh::Model;
+use cager_geometry::mesh::Model;
 
 use super::{MeshFormat, check_face, extensions};
 use crate::atomic::AtomicFile;

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use cager_core::mesh::{Model, Polygons};
+use cager_geometry::mesh::{Model, Polygons};
 use cager_formats::{Error, MeshFormat, read_model_bytes};
 
 pub const POINTS: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.5, 0.0], [0.0, 0.0, -2.25]];

@@ -2,10 +2,11 @@
 
 use std::io::{self, Write};
 
-use cager_core::mesh::Point;
+use cager_geometry::mesh::Point;
 
 use super::super::{mdd, npy, pc2};
-use super::{Announced, CacheFormat, FrameOptions, FrameWriter, check_precision};
+use super::super::CacheFormat;
+use super::output::{Announced, FrameOptions, FrameWriter, check_precision};
 use crate::atomic::{AtomicFile, Target};
 use crate::error::{Error, Fault};
 

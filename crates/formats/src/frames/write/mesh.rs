@@ -4,10 +4,10 @@ use std::fmt::Debug;
 use std::io::{self, Write};
 use std::path::Path;
 
-use cager_core::mesh::{Model, Point, Polygons};
-use cager_core::vector::add;
+use cager_geometry::mesh::{Model, Point, Polygons};
+use cager_geometry::vector::add;
 
-use super::{Announced, FrameOptions, check_precision};
+use super::output::{Announced, FrameOptions, check_precision};
 use crate::error::{Error, Fault};
 use crate::mesh::{MeshFormat, write_obj_faces, write_off, write_ply, write_stl};
 

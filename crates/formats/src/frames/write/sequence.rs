@@ -2,11 +2,11 @@
 
 use std::io::{BufWriter, Write};
 
-use cager_core::mesh::Polygons;
+use cager_geometry::mesh::Polygons;
 
 use super::super::numbered::NumberedNames;
 use super::mesh::FrameMesh;
-use super::{Announced, FrameOptions, FrameWriter};
+use super::output::{Announced, FrameOptions, FrameWriter};
 use crate::atomic::{AtomicDir, Target};
 use crate::error::Error;
 use crate::mesh::MeshFormat;

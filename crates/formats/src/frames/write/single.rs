@@ -2,10 +2,10 @@
 
 use std::io::{BufWriter, Write};
 
-use cager_core::mesh::Polygons;
+use cager_geometry::mesh::Polygons;
 
 use super::mesh::FrameMesh;
-use super::{Announced, FrameOptions, FrameWriter};
+use super::output::{Announced, FrameOptions, FrameWriter};
 use crate::atomic::{AtomicFile, Target};
 use crate::error::{Error, Fault};
 use crate::mesh::MeshFormat;

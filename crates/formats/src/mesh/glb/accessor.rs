@@ -1,13 +1,13 @@
 //! Positions, indices and other numbers from views.
 
-use cager_core::mesh::Point;
+use cager_geometry::mesh::Point;
 use gltf::json::Accessor;
 use gltf::json::accessor::sparse::Sparse;
 use gltf::json::accessor::{ComponentType, GenericComponentType, IndexComponentType, Type};
 use gltf::json::validation::Checked;
 
 use super::buffers::{Buffers, outside};
-use super::{dangling, too_large};
+use super::faults::{dangling, too_large};
 use crate::error::Fault;
 
 impl Buffers<'_> {

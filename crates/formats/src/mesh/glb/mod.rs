@@ -6,6 +6,7 @@
 mod accessor;
 mod buffers;
 mod container;
+mod faults;
 mod meshopt;
 mod scene;
 mod skin;
@@ -13,16 +14,17 @@ mod skin;
 use std::collections::HashMap;
 use std::collections::btree_map::Entry;
 
-use cager_core::mesh::{Model, Point};
-use cager_core::vector::along;
+use cager_geometry::mesh::{Model, Point};
+use cager_geometry::vector::along;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Mesh, Root};
 
-use super::check_face;
+use super::parsed::check_face;
 use super::colors::{Colors, Scale, srgb};
 use crate::error::Fault;
 use buffers::Buffers;
+use faults::{dangling, too_large};
 use scene::{Placement, Scene};
 use skin::{Joints, Skins};
 
@@ -259,11 +261,3 @@ impl Builder<'_> {
     }
 }
 
-fn too_large() -> Fault {
-    Fault::unsupported("repeats its meshes too often; export one copy of each, or bake them into a single mesh")
-}
-
-/// A reference to something that is not there.
-fn dangling(what: &str, count: usize) -> Fault {
-    Fault::damaged(format!("refers to {what}, but has {count} of those; export the mesh again"))
-}

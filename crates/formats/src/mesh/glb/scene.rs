@@ -1,10 +1,10 @@
 //! Where the meshes of a scene stand.
 
-use cager_core::mesh::Point;
-use cager_core::vector::{add, combination, cross, dot};
+use cager_geometry::mesh::Point;
+use cager_geometry::vector::{add, combination, cross, dot};
 use gltf::json::{Index, Node, Root};
 
-use super::dangling;
+use super::faults::dangling;
 use crate::error::Fault;
 
 /// Columns of a 4 × 4 matrix without its last row, which is 0 0 0 1.

@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use cager_core::mesh::Point;
-use cager_core::vector::along;
+use cager_geometry::mesh::Point;
+use cager_geometry::vector::along;
 use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::validation::Checked;
 
 use super::buffers::Buffers;
 use super::scene::{Affine, IDENTITY, Scene, apply, compose, mirrors};
-use super::{dangling, too_large};
+use super::faults::{dangling, too_large};
 use crate::error::Fault;
 
 /// Sets of four joints that vertices may have: enough for any skin, and few enough that sets that repeat an accessor cost little.

@@ -3,10 +3,10 @@
 mod header;
 mod values;
 
-use cager_core::mesh::Model;
+use cager_geometry::mesh::Model;
 
 use super::colors::Colors;
-use super::{Contents, Parsed, no_such_vertex};
+use super::parsed::{Contents, Parsed, no_such_vertex};
 use crate::error::Fault;
 use header::{Element, Encoding, Header, Kind};
 use values::{Ascii, Binary, Values};

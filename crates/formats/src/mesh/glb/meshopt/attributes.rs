@@ -1,6 +1,6 @@
 //! Attributes: differences of consecutive elements, byte by byte, in blocks of up to 256 elements.
 
-use super::{Bytes, signed};
+use super::bytes::{Bytes, signed};
 
 /// Elements of a group, whose numbers have one width.
 const GROUP: usize = 16;

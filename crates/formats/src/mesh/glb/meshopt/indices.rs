@@ -1,6 +1,6 @@
 //! Indices: of triangles that share edges with recent ones, and of anything else.
 
-use super::{Bytes, signed};
+use super::bytes::{Bytes, signed};
 
 /// Indices of `count` triangles.
 pub(super) fn triangles(stream: &[u8], count: usize) -> Option<Vec<u32>> {

@@ -4,9 +4,11 @@
 //! goes on too long, or refers to what was not there before.
 
 mod attributes;
+mod bytes;
 mod filters;
 mod indices;
 
+use bytes::Bytes;
 use gltf::json::buffer::View;
 
 /// How a view is packed, and where.
@@ -83,39 +85,6 @@ impl Packed {
     fn narrowed(&self, indices: &[u32]) -> Vec<u8> {
         indices.iter().flat_map(|index| index.to_le_bytes().into_iter().take(self.stride)).collect()
     }
-}
-
-/// Takes bytes from the front of a stream.
-struct Bytes<'a>(&'a [u8]);
-
-impl<'a> Bytes<'a> {
-    fn take(&mut self, count: usize) -> Option<&'a [u8]> {
-        let (taken, rest) = self.0.split_at_checked(count)?;
-        self.0 = rest;
-        Some(taken)
-    }
-
-    fn byte(&mut self) -> Option<u8> {
-        Some(self.take(1)?[0])
-    }
-
-    /// A number in groups of seven bits, the lowest first.
-    fn number(&mut self) -> Option<u32> {
-        let mut value = 0;
-        for shift in [0, 7, 14, 21, 28] {
-            let byte = self.byte()?;
-            value |= u32::from(byte & 0x7f) << shift;
-            if byte < 0x80 {
-                return Some(value);
-            }
-        }
-        None
-    }
-}
-
-/// A signed number from one whose lowest bit is its sign, in wrapping arithmetic.
-fn signed(value: u32) -> u32 {
-    if value & 1 == 0 { value >> 1 } else { !(value >> 1) }
 }
 
 #[cfg(test)]

@@ -1,0 +1,130 @@
+//! What all outputs of frames have: their writer, their options, and what was announced of them.
+
+use std::path::{Path, PathBuf};
+
+use cager_geometry::mesh::Point;
+
+use crate::error::{Error, Fault};
+
+/// The frames of an output, one after another; dropped before [`FrameWriter::finish`] they leave nothing.
+pub trait FrameWriter: Send {
+    /// Writes the next frame, 3 × points coordinates `x y z x y z …`.
+    ///
+    /// # Errors
+    /// [`Error::PointCount`] for another number of coordinates, [`Error::NonFinite`], [`Error::FrameCount`] for more
+    /// frames than announced, [`Error::Io`].
+    fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error>;
+
+    /// Makes the frames durable and gives the output its name.
+    ///
+    /// # Errors
+    /// [`Error::FrameCount`] for fewer frames than announced, [`Error::Target`], [`Error::Io`]; the output is then not
+    /// created.
+    fn finish(self: Box<Self>) -> Result<(), Error>;
+}
+
+/// What some formats store beside the positions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameOptions {
+    /// Frames per second, for the times in `.mdd`: 24 by default.
+    pub fps: f64,
+    /// The number of each frame, ascending, for the names of files and the times in `.pc2` and `.mdd`; 0, 1, 2, … where there are none.
+    pub numbers: Vec<f64>,
+    /// What is added to all positions, which are then written in double precision by the formats that have it.
+    pub origin: Option<Point>,
+    /// What rounding may lose where an origin is added; formats of single precision that lose more are refused.
+    pub rounding: f64,
+}
+
+impl FrameOptions {
+    pub(super) fn number(&self, frame: usize) -> f64 {
+        self.numbers.get(frame).copied().unwrap_or(frame as f64)
+    }
+
+    /// The distance of two frames; 1 where it is not the same throughout.
+    pub(super) fn step(&self) -> f64 {
+        let mut steps = self.numbers.windows(2).map(|pair| pair[1] - pair[0]);
+        let first = steps.next().unwrap_or(1.0);
+        if steps.all(|step| (step - first).abs() <= 1e-6 * first) { first } else { 1.0 }
+    }
+}
+
+impl Default for FrameOptions {
+    fn default() -> Self {
+        Self { fps: 24.0, numbers: Vec::new(), origin: None, rounding: 0.0 }
+    }
+}
+
+/// Refuses formats of single precision where it loses too much about an origin.
+pub(super) fn check_precision(options: &FrameOptions, path: &Path) -> Result<(), Error> {
+    let farthest = options.origin.iter().flatten().fold(0.0, |far: f64, x| far.max(x.abs()));
+    let lost = farthest * f64::from(f32::EPSILON) / 2.0;
+    if lost <= options.rounding {
+        return Ok(());
+    }
+    let what = format!(
+        "holds single precision, which loses all that is smaller than {lost:.1e} units so far from the origin; write .npy, or .obj or .ply files"
+    );
+    Err(Fault::unsupported(what).at(path))
+}
+
+/// Announced size of an output, and the number of frames written.
+pub(super) struct Announced {
+    pub(super) path: PathBuf,
+    pub(super) points: usize,
+    pub(super) frames: usize,
+    pub(super) written: usize,
+}
+
+impl Announced {
+    pub(super) fn check(&self, options: &FrameOptions) -> Result<(), Fault> {
+        if self.points == 0 || self.frames == 0 {
+            return Err(Fault::invalid(format!(
+                "cannot hold {} frames of {} points; give it at least one of each",
+                self.frames, self.points
+            )));
+        }
+        if self.points > u32::MAX as usize {
+            return Err(Fault::unsupported(format!(
+                "cannot hold {} points, more than {}; reduce the mesh",
+                self.points,
+                u32::MAX
+            )));
+        }
+        let ascending = options.numbers.windows(2).all(|pair| pair[0] < pair[1]);
+        let counted = options.numbers.is_empty() || options.numbers.len() == self.frames;
+        if !(ascending && counted && options.numbers.iter().all(|x| x.is_finite())) {
+            return Err(Fault::invalid("cannot have these frame numbers; give one for each frame, ascending"));
+        }
+        if !(options.fps > 0.0 && options.fps.is_finite()) {
+            return Err(Fault::invalid(format!(
+                "cannot have {} frames per second; give a positive number",
+                options.fps
+            )));
+        }
+        Ok(())
+    }
+
+    /// Checks the next frame.
+    pub(super) fn admit(&self, positions: &[f32]) -> Result<(), Error> {
+        let (path, frame) = (|| self.path.clone(), self.written);
+        if self.written == self.frames {
+            return Err(Error::FrameCount { path: path(), announced: self.frames, written: self.written + 1 });
+        }
+        if positions.len() != 3 * self.points {
+            let found = (positions.len() / 3) as u64;
+            return Err(Error::PointCount { path: path(), frame: Some(frame), expected: self.points, found });
+        }
+        match positions.iter().position(|x| !x.is_finite()) {
+            Some(culprit) => Err(Error::NonFinite { path: path(), frame, point: culprit / 3 }),
+            None => Ok(()),
+        }
+    }
+
+    pub(super) fn check_complete(&self) -> Result<(), Error> {
+        if self.written == self.frames {
+            return Ok(());
+        }
+        Err(Error::FrameCount { path: self.path.clone(), announced: self.frames, written: self.written })
+    }
+}
