@@ -22,8 +22,8 @@ pub(crate) fn report(design: &Design, options: &DesignOptions, frames: usize) ->
     let stages = design.stages.iter().map(|stage| StageReport {
         name: stage.name.clone(),
         vertices: stage.vertices,
-        designed_error: stage.designed,
-        held_back_error: stage.held_back,
+        designed_error: stage.training_error,
+        held_back_error: stage.validation_error,
         condition_number: stage.condition_number.filter(|condition| condition.is_finite()),
         singular: stage.condition_number == Some(f64::INFINITY),
         seconds: stage.seconds,

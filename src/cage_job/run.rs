@@ -193,7 +193,7 @@ fn finished(designed: &Design, best: &Best, sampled: usize, told: Option<f64>, c
         .map(|stage| CageStage {
             name: stage.name.clone(),
             vertices: stage.vertices as u32,
-            error: CageError { designed: finite(stage.designed), held_back: finite(stage.held_back) },
+            error: CageError { designed: finite(stage.training_error), held_back: finite(stage.validation_error) },
             condition_number: stage.condition_number.and_then(finite),
             singular: stage.condition_number == Some(f64::INFINITY),
             seconds: stage.seconds,

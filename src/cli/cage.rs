@@ -10,7 +10,7 @@ use crate::design::{read_frames, report as design_report};
 use crate::frames::CaptureFiles;
 use crate::report_page::{Contents, Kind, NO_PAGE, ReportPage, ShownCage, ShownMesh};
 use anyhow::{Result, bail};
-use cager_cages::{DesignOptions, EncloseError, EncloseOptions, General, Style, enclose, general};
+use cager_cages::{DesignOptions, EncloseError, EncloseOptions, BoundingShape, Style, bounding_shape, enclose};
 use cager_formats::{AtomicFile, Target, commit_together, model_bytes, obj_bytes};
 use cager_geometry::mesh::{Model, Polygons, TriMesh};
 use cager_proto::report::DesignReport;
@@ -77,12 +77,12 @@ pub(super) fn run(args: &CageArgs) -> Result<()> {
         (Some(frames), None) => designed(args, rest, frames, &mut warnings)?,
         (_, Some(shape)) => {
             let shape = match shape {
-                GeneralArg::Box => General::Box,
-                GeneralArg::Sphere => General::Sphere,
-                GeneralArg::Hull => General::Hull,
+                GeneralArg::Box => BoundingShape::Box,
+                GeneralArg::Sphere => BoundingShape::Sphere,
+                GeneralArg::Hull => BoundingShape::Hull,
             };
             let all: Vec<&Model> = models.iter().collect();
-            (of_triangles(general(&all, shape, vertices).map_err(|e| name_file(&e, args))?), None)
+            (of_triangles(bounding_shape(&all, shape, vertices).map_err(|e| name_file(&e, args))?), None)
         }
         (None, None) => {
             let options = EncloseOptions { vertices, clearance: args.clearance, per_part: args.per_part };

@@ -3,8 +3,8 @@
 mod design;
 pub mod diagnosis;
 mod enclose;
-mod general;
+mod bounding_shape;
 
 pub use design::{Design, DesignError, DesignOptions, Goal, MOST_VERTICES, Progress, Stage, Style, design};
 pub use enclose::{EncloseError, EncloseOptions, enclose, enclose_unless};
-pub use general::{General, general};
+pub use bounding_shape::{BoundingShape, bounding_shape};

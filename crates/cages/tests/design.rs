@@ -89,8 +89,8 @@ fn a_designed_cage_is_several_times_more_accurate_than_one_of_the_rest_pose_also
     assert!(after < before / 2.0, "{before} {after}");
     // What is reported is what was reached, and it fell.
     let (first, last) = (&found.stages[0], found.stages.last().unwrap());
-    assert!(last.held_back < first.held_back / 2.0 && last.designed < first.designed / 2.0);
-    assert!(last.held_back < 1.5 * last.designed);
+    assert!(last.validation_error < first.validation_error / 2.0 && last.training_error < first.training_error / 2.0);
+    assert!(last.validation_error < 1.5 * last.training_error);
 }
 
 #[test]
@@ -100,7 +100,7 @@ fn a_cage_for_editing_is_valid_and_far_more_accurate_than_where_it_began() {
     let verdict = common::verdict(&found.cage, &capture.rest);
     assert!(verdict.is_valid(1), "{verdict:?}");
     let (first, last) = (&found.stages[0], found.stages.last().unwrap());
-    assert!(last.held_back < first.held_back / 1.8, "{first:?} {last:?}");
+    assert!(last.validation_error < first.validation_error / 1.8, "{first:?} {last:?}");
 }
 
 #[test]
@@ -161,7 +161,7 @@ fn an_artists_cage_keeps_its_faces_and_its_symmetry() {
     let found = designed(&capture, Some(&start), &options).unwrap();
     assert_eq!(found.cage.triangles, start.triangles);
     assert_ne!(found.cage.vertices, start.vertices);
-    assert!(found.stages.last().unwrap().held_back < found.stages[0].held_back);
+    assert!(found.stages.last().unwrap().validation_error < found.stages[0].validation_error);
     let middle = start.vertices.iter().map(|v| v[0]).sum::<f64>() / start.vertices.len() as f64;
     for v in &found.cage.vertices {
         let image = [2.0 * middle - v[0], v[1], v[2]];

@@ -6,11 +6,11 @@ use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 
-use cager_geometry::mesh::Polygons;
 use cager_formats::{
     CacheFormat, Error, FrameOptions, FrameReader, FrameSelection, create_frames, missing_frames, open_frames,
     open_frames_bytes, open_selected_frames, read_model,
 };
+use cager_geometry::mesh::Polygons;
 use support::*;
 use tempfile::tempdir;
 

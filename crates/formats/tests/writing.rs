@@ -7,8 +7,8 @@ use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use cager_geometry::mesh::Model;
 use cager_formats::{AtomicDir, AtomicFile, Error, ScratchDir, Target, commit_together, read_model, write_model};
+use cager_geometry::mesh::Model;
 use proptest::prelude::*;
 use support::*;
 use tempfile::tempdir;

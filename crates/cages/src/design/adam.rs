@@ -3,8 +3,9 @@
 use cager_geometry::mesh::Point;
 use glam::DVec3;
 
-const FIRST: f64 = 0.9;
-const SECOND: f64 = 0.95;
+/// Share of the moments that a step keeps.
+const BETA1: f64 = 0.9;
+const BETA2: f64 = 0.95;
 
 /// Moments of the gradient.
 pub(super) struct Adam {
@@ -21,11 +22,11 @@ impl Adam {
     /// The step of each vertex, about `size` long.
     pub(super) fn step(&mut self, gradient: &[Point], size: f64) -> Vec<DVec3> {
         self.steps += 1;
-        let (unbias1, unbias2) = (1.0 - FIRST.powi(self.steps), 1.0 - SECOND.powi(self.steps));
+        let (unbias1, unbias2) = (1.0 - BETA1.powi(self.steps), 1.0 - BETA2.powi(self.steps));
         for ((first, second), &g) in self.first.iter_mut().zip(&mut self.second).zip(gradient) {
             let g = DVec3::from(g);
-            *first = FIRST * *first + (1.0 - FIRST) * g;
-            *second = SECOND * *second + (1.0 - SECOND) * g.length_squared() / 3.0;
+            *first = BETA1 * *first + (1.0 - BETA1) * g;
+            *second = BETA2 * *second + (1.0 - BETA2) * g.length_squared() / 3.0;
         }
         let mean = self.mean();
         let step = |(first, second): (&DVec3, &f64)| {

@@ -2,8 +2,8 @@
 
 use super::contact::Obstacles;
 use super::descent::Descent;
+use super::options::{Design, DesignOptions, Goal, Progress, Stage, Style};
 use super::samples::{Evaluation, Samples};
-use super::{Design, DesignOptions, Goal, Progress, Stage, Style};
 use cager_core::cage::Cage;
 use cager_geometry::mesh::{Model, Point, TriMesh};
 use cager_geometry::spatial::{outside, self_intersections};
@@ -76,7 +76,7 @@ impl Run<'_> {
         let begun = Progress {
             stage: "moving the vertices",
             fraction: 0.0,
-            error: Some(evaluation.held_back),
+            error: Some(evaluation.validation_error),
             better: Some(descent.cage.mesh()),
         };
         let ended = match (self.watch)(begun) {
@@ -89,10 +89,10 @@ impl Run<'_> {
                 self.defects.outside
             ));
         }
-        if self.best.evaluation.held_back > NOT_FOLLOWED {
+        if self.best.evaluation.validation_error > NOT_FOLLOWED {
             warnings.push(format!(
                 "even the best cage found leaves an error of {:.1} % of the diagonal: the frames tear the model apart, or are not of this rest pose",
-                100.0 * self.best.evaluation.held_back
+                100.0 * self.best.evaluation.validation_error
             ));
         }
         let timed_out = ended.is_break() && self.is_late();
@@ -146,7 +146,7 @@ impl Run<'_> {
                 let evaluation = self.samples.evaluate(&descent.cage);
                 self.keep(&descent.cage, evaluation);
             }
-            let error = Some(self.best.evaluation.held_back).filter(|error| error.is_finite());
+            let error = Some(self.best.evaluation.validation_error).filter(|error| error.is_finite());
             (self.watch)(Progress { stage: phase.stage, fraction, error, better })?;
             if late {
                 return ControlFlow::Break(());
@@ -166,7 +166,7 @@ impl Run<'_> {
 
     /// Keeps a cage that is better than the best so far.
     fn keep(&mut self, cage: &Cage, evaluation: Evaluation) -> bool {
-        let better = evaluation.held_back < self.best.evaluation.held_back && self.has_no_new_defects(cage);
+        let better = evaluation.validation_error < self.best.evaluation.validation_error && self.has_no_new_defects(cage);
         if better {
             self.best = Best { mesh: cage.mesh().clone(), evaluation };
         }
@@ -190,8 +190,8 @@ fn stage(name: &str, cage: &Cage, evaluation: Evaluation, samples: &Samples, clo
     Stage {
         name: name.to_owned(),
         vertices: cage.vertices().len(),
-        designed: evaluation.designed,
-        held_back: evaluation.held_back,
+        training_error: evaluation.training_error,
+        validation_error: evaluation.validation_error,
         condition_number: samples.condition_number(cage),
         seconds: clock.elapsed().as_secs_f64(),
     }

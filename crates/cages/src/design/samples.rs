@@ -23,7 +23,7 @@ pub(super) struct Samples {
     points: Vec<Point>,
     /// Training motion, n × c: every frame minus its best affine image of the rest pose, which coordinates reproduce exactly, projected to the
     /// principal components of all frames. A fit to these has the same sum of squared residuals as one to the frames, up to the truncation.
-    designed: Mat<f64>,
+    training: Mat<f64>,
     /// Validation points and their motion: in training frames and, from column `held_back_from` on, in held-back frames.
     validation_points: Vec<Point>,
     validation_motion: Mat<f64>,
@@ -42,8 +42,8 @@ pub(super) struct Batch {
 /// Least-squares errors of a cage over points and frames, as fractions of the diagonal.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Evaluation {
-    pub(super) designed: f64,
-    pub(super) held_back: f64,
+    pub(super) training_error: f64,
+    pub(super) validation_error: f64,
 }
 
 impl Samples {
@@ -64,7 +64,7 @@ impl Samples {
         let at = |indices: &[usize]| -> Vec<Point> { indices.iter().map(|&i| rest.points[i]).collect() };
         Self {
             points: at(&used),
-            designed: principal(&without_affine(&rest.points, &used, &designed)),
+            training: principal(&without_affine(&rest.points, &used, &designed)),
             validation_points: at(&validation_points),
             validation_motion: without_affine(&rest.points, &validation_points, &[seen.as_slice(), &unseen].concat()),
             held_back_from: 3 * seen.len(),
@@ -76,7 +76,7 @@ impl Samples {
     pub(super) fn batch(&self, points: usize, random: &mut fastrand::Rng) -> Batch {
         let mut rows = random.choose_multiple(0..self.points.len(), points);
         rows.sort_unstable();
-        let motion = Mat::from_fn(rows.len(), self.designed.ncols(), |i, c| self.designed[(rows[i], c)]);
+        let motion = Mat::from_fn(rows.len(), self.training.ncols(), |i, c| self.training[(rows[i], c)]);
         Batch { points: rows.iter().map(|&i| self.points[i]).collect(), motion }
     }
 
@@ -90,8 +90,8 @@ impl Samples {
             (left.squared_norm_l2() / (left.nrows() * left.ncols()) as f64 * 3.0).sqrt() / self.diagonal
         };
         Evaluation {
-            designed: error(0, self.held_back_from),
-            held_back: error(self.held_back_from, self.validation_motion.ncols()),
+            training_error: error(0, self.held_back_from),
+            validation_error: error(self.held_back_from, self.validation_motion.ncols()),
         }
     }
 

@@ -1,7 +1,7 @@
 //! Search for the smallest cage within an error bound, by extrapolating how the error falls with the number of vertices.
 
-use super::MOST_VERTICES;
 use super::descent::Descent;
+use super::options::MOST_VERTICES;
 use super::run::{Best, Phase, Run};
 use super::samples::{Evaluation, evenly};
 use cager_core::cage::Cage;
@@ -9,13 +9,11 @@ use cager_core::coordinates::MeanValue;
 use cager_core::inversion::{BATCH, Solver, SolverOptions};
 use std::ops::ControlFlow;
 
-/// Vertices to begin with, and at most.
+/// Vertices to begin with.
 const FIRST_VERTICES: usize = 100;
 /// Steps with each number of vertices, and how many numbers are tried.
 const STEPS: usize = 80;
 const ROUNDS: usize = 8;
-/// The error falls about as this power of the number of vertices.
-const POWER: f64 = 1.0;
 /// A cage whose error is within this of the goal is small enough.
 const CLOSE: f64 = 0.93;
 /// Frames that the encoder's error is measured on.
@@ -44,10 +42,10 @@ impl Run<'_> {
         for round in 0..ROUNDS {
             let fraction = [round as f64 / ROUNDS as f64, (round + 1) as f64 / ROUNDS as f64];
             // Results with another number of vertices do not count.
-            let evaluation = Evaluation { designed: f64::INFINITY, held_back: f64::INFINITY };
+            let evaluation = Evaluation { training_error: f64::INFINITY, validation_error: f64::INFINITY };
             self.best = Best { mesh: descent.cage.mesh().clone(), evaluation };
             ended = self.phase(descent, &Phase { stage: "searching the smallest cage", steps: STEPS, goal, fraction });
-            if !self.best.evaluation.held_back.is_finite() {
+            if !self.best.evaluation.validation_error.is_finite() {
                 self.best =
                     Best { mesh: descent.cage.mesh().clone(), evaluation: self.samples.evaluate(&descent.cage) };
             }
@@ -64,7 +62,8 @@ impl Run<'_> {
             if ended.is_break() || (found <= error && found >= CLOSE * error) {
                 break;
             }
-            let aimed = (goal as f64 * (found / (0.97 * error)).powf(1.0 / POWER)).ceil() as usize;
+            // The error falls about as the number of vertices rises.
+            let aimed = (goal as f64 * (found / (0.97 * error))).ceil() as usize;
             let next = aimed.clamp(goal / 2, goal * 2).clamp(4, most);
             if next == goal {
                 break;

@@ -1,6 +1,6 @@
 //! All defects of a cage.
 
-use super::fit::alignment;
+use super::alignment::{Alignment, alignment};
 use super::influence::influence;
 use cager_core::cage::{CageError, Defects};
 use cager_geometry::mesh::{Model, TriMesh, diagonal};
@@ -50,17 +50,6 @@ pub struct Outside {
     pub farthest: u32,
     /// How far it is from the cage, as a fraction of the model's diagonal.
     pub distance: f64,
-}
-
-/// A change of the cage after which it would enclose the model.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Alignment {
-    /// Factor on all coordinates.
-    pub scale: f64,
-    /// Axes to turn: `"y and z"` where up is another axis, otherwise none.
-    pub axes: Option<&'static str>,
-    /// Move after that, in units of the model.
-    pub shift: [f64; 3],
 }
 
 impl Findings {

@@ -1,8 +1,8 @@
-//! Thin gaps between parts of a model, and an offset that leaves them open.
+//! Thin gaps between parts of a model.
 
-use super::lattice::LEVELS;
+use super::gap_offset::Ball;
 use super::source::{NormalizedModel, area};
-use cager_geometry::spatial::{Aabb, Bvh, GeneralizedWinding, Surface};
+use cager_geometry::spatial::{Aabb, GeneralizedWinding, Surface};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
@@ -13,7 +13,7 @@ const LARGEST_BALL: f64 = 1.15;
 /// A ball in a gap touches the surface on both sides: at the least, the cosine between its touching points lies below this.
 const OPPOSITE: f64 = -0.6;
 
-/// A surface of an area that would take more samples than this is crumpled, and its gaps stay closed.
+/// A surface of an area that would take more samples than this has too many narrow gaps, which stay closed.
 const MOST_SAMPLES: usize = 100_000;
 /// Samples that are looked at, at the most: a cube of a smooth surface has one for each of some directions, and ordinary models have less than half as many.
 const MOST_LOOKED_AT: usize = 90_000;
@@ -23,66 +23,7 @@ const MOST_TRIES: usize = 2_000_000;
 /// Gaps shorter than this many times the largest offset stay closed: few vertices could not follow both sides.
 const LEAST_EXTENT: f64 = 3.0;
 
-/// How fast the offset grows with the distance from a gap. Below 1, every point within the offset is joined with the model by a straight
-/// line within it.
-const GROWTH: f64 = 0.5;
-
-/// The offset of a cage from the model: the largest everywhere but near thin gaps, where it is a half to a quarter of the gap's half width.
-#[derive(Debug)]
-pub(super) struct Offset {
-    pub(super) largest: f64,
-    gaps: Vec<Gaps>,
-}
-
-/// Places in gaps that ask for the same offset.
-#[derive(Debug)]
-struct Gaps {
-    offset: f64,
-    centers: Vec<DVec3>,
-    tree: Bvh,
-}
-
-/// A ball that touches the model without containing any of it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Ball {
-    center: DVec3,
-    radius: f64,
-}
-
-impl Offset {
-    /// The same offset everywhere.
-    pub(super) fn uniform(largest: f64) -> Self {
-        Self { largest, gaps: Vec::new() }
-    }
-
-    /// The offset that leaves gaps open, but for those so thin that it would have to be below `least` or an eighth of the largest.
-    pub(super) fn around(balls: &[Ball], largest: f64, least: f64) -> Self {
-        let mut gaps = Vec::new();
-        for level in 1..=LEVELS {
-            let offset = largest / f64::from(1 << level);
-            let asked = |b: &&Ball| b.radius >= 2.0 * offset && (level == 1 || b.radius < 4.0 * offset);
-            let centers: Vec<DVec3> = balls.iter().filter(asked).map(|b| b.center).collect();
-            if !centers.is_empty() && offset >= least {
-                let boxes: Vec<Aabb> = centers.iter().map(|&c| Aabb { low: c, high: c }).collect();
-                gaps.push(Gaps { offset, tree: Bvh::new(&boxes), centers });
-            }
-        }
-        Self { largest, gaps }
-    }
-
-    /// The offset for the surface near a place.
-    pub(super) fn at(&self, p: DVec3) -> f64 {
-        self.gaps.iter().fold(self.largest, |offset, gaps| {
-            // Within two offsets of the centre, where the gap's sides are, the offset is as small as asked for.
-            let reach = 2.0 * gaps.offset + (offset - gaps.offset).max(0.0) / GROWTH;
-            let nearest = gaps.tree.nearest(p, reach * reach, |i| gaps.centers[i as usize].distance_squared(p));
-            nearest
-                .map_or(offset, |(_, d2)| offset.min(gaps.offset + GROWTH * (d2.sqrt() - 2.0 * gaps.offset).max(0.0)))
-        })
-    }
-}
-
-/// Balls outside the model that touch two opposite sides, in gaps that are not too short. `None` where the model is crumpled.
+/// Balls outside the model that touch two opposite sides, in gaps that are not too short. `None` where there are too many narrow gaps.
 pub(super) fn balls_in_gaps(source: &NormalizedModel, largest: f64) -> Option<Vec<Ball>> {
     let samples = samples(&source.surface, 0.5 * largest)?;
     let winding = GeneralizedWinding::new(&source.surface);

@@ -1,10 +1,12 @@
 //! A cage around a model, from its rest pose alone.
 
 mod fair;
+mod gap_offset;
 mod gaps;
 mod lattice;
 mod level_set;
 mod offset;
+mod options;
 mod patch;
 mod quadric;
 mod simplify;
@@ -13,68 +15,20 @@ mod source;
 use cager_geometry::mesh::{Model, TriMesh};
 use cager_geometry::spatial::{Surface, self_intersections};
 use fair::fair;
-use gaps::Offset;
+use gap_offset::Offset;
 use glam::DVec3;
 use lattice::Octree;
 use offset::{offset_surface, offset_with_gaps, uniform_offset};
+pub use options::{EncloseError, EncloseOptions};
 use patch::EnclosedPoints;
 use rayon::prelude::*;
 use simplify::Simplifier;
 use source::NormalizedModel;
 
-/// How a cage is made around a model.
-#[derive(Clone, Debug, PartialEq)]
-pub struct EncloseOptions {
-    /// Most vertices that the cage may have.
-    pub vertices: usize,
-    /// Least distance of the model's points to the cage, as a fraction of the diagonal; chosen where it is `None`, usually a fifth of
-    /// the offset.
-    pub clearance: Option<f64>,
-    /// One closed surface for each connected part of the model, instead of one around all. Parts too close together for the
-    /// offset share one.
-    pub per_part: bool,
-}
-
-impl Default for EncloseOptions {
-    fn default() -> Self {
-        Self { vertices: 350, clearance: None, per_part: false }
-    }
-}
-
-/// Why no cage can be made around a model.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum EncloseError {
-    /// No points at all.
-    #[error("the rest pose has no points; a cage needs a model to enclose")]
-    Empty,
-    /// NaN or infinity.
-    #[error("rest point {point} has a coordinate that is NaN or infinite; repair or delete it")]
-    NotFinite {
-        /// The point.
-        point: usize,
-    },
-    /// All points in one place.
-    #[error(
-        "all points of the rest pose lie in one place, so there is nothing to enclose; check the file's unit and contents"
-    )]
-    NoExtent,
-    /// The caller had it stopped.
-    #[error("the making of the cage was stopped")]
-    Stopped,
-    /// Too few vertices to enclose this model.
-    #[error("a cage of at most {vertices} vertices cannot enclose this model; ask for at least {least}")]
-    TooFewVertices {
-        /// What was asked for.
-        vertices: usize,
-        /// What will do.
-        least: usize,
-    },
-}
-
 /// A closed, outward-oriented cage around a model, free of self-intersection, with no point of the model outside: an offset surface,
 /// simplified under quadric error metrics with validity kept at every collapse. The offset is smaller beside thin gaps, so that limbs
 /// stay apart, and grows until the number of vertices is reached. Gaps stay closed in a point cloud, which has no sides, and in a model
-/// that is crumpled all over. Runs on the current rayon pool; the result does not depend on it.
+/// that has too many narrow gaps. Runs on the current rayon pool; the result does not depend on it.
 ///
 /// # Errors
 /// See [`EncloseError`].
@@ -98,7 +52,7 @@ pub fn enclose_unless(
         return Err(EncloseError::TooFewVertices { vertices: options.vertices, least: LEAST });
     }
     let mut least = usize::MAX;
-    // Surfaces that are known already, the next to be tried last, from when on the model has proved to be crumpled.
+    // Surfaces that are known already, the next to be tried last, from when on its narrow gaps have proved to be too many.
     let mut known: Option<Vec<Start>> = None;
     while offset < LARGEST_OFFSET.max(4.0 * clearance) {
         if stopped() {
@@ -152,7 +106,7 @@ impl Start {
     }
 }
 
-/// From the first offset on those whose surfaces few enough vertices may enclose, gaps closed; the least comes last. Surfaces of crumpled models have many
+/// From the first offset on those whose surfaces few enough vertices may enclose, gaps closed; the least comes last. Surfaces of models with many narrow gaps have many
 /// handles at small offsets, and take the longest there, so they are looked at from a large one down.
 fn promising_starts(source: &NormalizedModel, first: f64, options: &EncloseOptions) -> Vec<Start> {
     let mut offsets = vec![first];

@@ -1,7 +1,8 @@
 //! The offset surface of a model: the boundary of all points closer than a distance, with cavities filled, holes closed by the winding number, and
 //! components joined by tubes.
 
-use super::gaps::{Offset, balls_in_gaps};
+use super::gap_offset::Offset;
+use super::gaps::balls_in_gaps;
 use super::lattice::{Lattice, Octree};
 use super::level_set::level_set;
 use super::source::NormalizedModel;
@@ -25,7 +26,7 @@ pub(super) fn uniform_offset(source: &NormalizedModel, largest: f64) -> (Offset,
 }
 
 /// The offset that keeps gaps of the model open, at least `least` where it is below `largest`, and the lattice's cubes. `None` where more
-/// than `most` cubes would have to be halved for it, or too many places looked at, as in a model that is crumpled all over.
+/// than `most` cubes would have to be halved for it, or too many places looked at, as in a model that has too many narrow gaps.
 pub(super) fn offset_with_gaps(
     source: &NormalizedModel,
     largest: f64,

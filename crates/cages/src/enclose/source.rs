@@ -1,7 +1,7 @@
 //! A model normalised for enclosing: centred, with unit diagonal, and with loose points as degenerate triangles.
 
-use super::EncloseError;
-use super::gaps::Offset;
+use super::gap_offset::Offset;
+use super::options::EncloseError;
 use cager_geometry::mesh::{Model, bounds, diagonal};
 use cager_geometry::spatial::Surface;
 use glam::DVec3;

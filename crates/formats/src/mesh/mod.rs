@@ -197,4 +197,3 @@ fn cut_in_last_line(fault: Fault, bytes: &[u8]) -> Fault {
         quoted(last)
     ))
 }
-

@@ -4,8 +4,8 @@
 
 use std::path::Path;
 
-use cager_geometry::mesh::{Model, Polygons};
 use cager_formats::{Error, MeshFormat, read_model_bytes};
+use cager_geometry::mesh::{Model, Polygons};
 
 pub const POINTS: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.5, 0.0], [0.0, 0.0, -2.25]];
 pub const FACES: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];

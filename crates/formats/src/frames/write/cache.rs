@@ -4,8 +4,8 @@ use std::io::{self, Write};
 
 use cager_geometry::mesh::Point;
 
-use super::super::{mdd, npy, pc2};
 use super::super::CacheFormat;
+use super::super::{mdd, npy, pc2};
 use super::output::{Announced, FrameOptions, FrameWriter, check_precision};
 use crate::atomic::{AtomicFile, Target};
 use crate::error::{Error, Fault};

@@ -99,4 +99,3 @@ fn is_folder(path: &Path) -> bool {
     let separated = text.last().is_some_and(|&end| end == b'/' || char::from(end) == MAIN_SEPARATOR);
     separated || path.extension().is_none() || path.is_dir()
 }
-

@@ -7,8 +7,8 @@ use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use gltf::json::Root;
 
-use super::meshopt::Packed;
 use super::faults::{dangling, too_large};
+use super::meshopt::Packed;
 use crate::error::Fault;
 
 /// Bytes that packed views of any file may have.

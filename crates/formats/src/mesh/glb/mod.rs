@@ -20,8 +20,8 @@ use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Mesh, Root};
 
-use super::parsed::check_face;
 use super::colors::{Colors, Scale, srgb};
+use super::parsed::check_face;
 use crate::error::Fault;
 use buffers::Buffers;
 use faults::{dangling, too_large};
@@ -260,4 +260,3 @@ impl Builder<'_> {
         if wanted <= self.room() { Ok(()) } else { Err(too_large()) }
     }
 }
-

@@ -8,8 +8,8 @@ use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::validation::Checked;
 
 use super::buffers::Buffers;
-use super::scene::{Affine, IDENTITY, Scene, apply, compose, mirrors};
 use super::faults::{dangling, too_large};
+use super::scene::{Affine, IDENTITY, Scene, apply, compose, mirrors};
 use crate::error::Fault;
 
 /// Sets of four joints that vertices may have: enough for any skin, and few enough that sets that repeat an accessor cost little.

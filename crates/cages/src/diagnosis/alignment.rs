@@ -1,6 +1,5 @@
 //! Detection of cages that miss their model because of different units, axes or position.
 
-use super::Alignment;
 use cager_geometry::mesh::{Model, Point, TriMesh, bounds};
 use cager_geometry::spatial::outside;
 use std::fmt;
@@ -14,6 +13,17 @@ const THICKNESS: f64 = 0.1;
 /// Ratios of common units of length: powers of ten, inches, feet.
 const UNITS: [f64; 13] =
     [1.0, 10.0, 0.1, 100.0, 0.01, 1000.0, 0.001, 2.54, 1.0 / 2.54, 25.4, 0.0254, 0.3048, 1.0 / 0.3048];
+
+/// A change of the cage after which it would enclose the model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Alignment {
+    /// Factor on all coordinates.
+    pub scale: f64,
+    /// Axes to turn: `"y and z"` where up is another axis, otherwise none.
+    pub axes: Option<&'static str>,
+    /// Move after that, in units of the model.
+    pub shift: [f64; 3],
+}
 
 /// A change of axes.
 type Turn = fn(Point) -> Point;

@@ -1,4 +1,4 @@
-//! General cages: a box, a sphere or a convex hull around one model, or around several together as their *public cage*.
+//! BoundingShape cages: a box, a sphere or a convex hull around one model, or around several together as their *public cage*.
 
 mod hull;
 
@@ -7,9 +7,9 @@ use cager_geometry::mesh::{Model, Point, TriMesh, bounds, diagonal};
 use glam::DVec3;
 use std::collections::HashMap;
 
-/// The shape of a general cage.
+/// The shape of a cage that is not made to a model's own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum General {
+pub enum BoundingShape {
     /// The bounding box, its sides divided evenly.
     Box,
     /// A geodesic sphere.
@@ -21,12 +21,12 @@ pub enum General {
 /// Least distance of a point from the cage, as a fraction of the diagonal of all models.
 const MARGIN: f64 = 0.01;
 
-/// A general cage of at most `vertices` vertices around all points of the models: closed, outward-oriented, free of self-intersection.
+/// A cage of this shape, of at most `vertices` vertices around all points of the models: closed, outward-oriented, free of self-intersection.
 ///
 /// # Errors
 /// Models without points, with coordinates that are not finite, or all in one place, and fewer vertices than the shape needs: 8 for a
 /// box, 12 for a sphere, 4 for a hull.
-pub fn general(models: &[&Model], shape: General, vertices: usize) -> Result<TriMesh, EncloseError> {
+pub fn bounding_shape(models: &[&Model], shape: BoundingShape, vertices: usize) -> Result<TriMesh, EncloseError> {
     for model in models {
         if let Some(point) = model.points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
             return Err(EncloseError::NotFinite { point });
@@ -43,9 +43,9 @@ pub fn general(models: &[&Model], shape: General, vertices: usize) -> Result<Tri
         return Err(EncloseError::NoExtent);
     }
     let least = match shape {
-        General::Box => 8,
-        General::Sphere => 12,
-        General::Hull => 4,
+        BoundingShape::Box => 8,
+        BoundingShape::Sphere => 12,
+        BoundingShape::Hull => 4,
     };
     if vertices < least {
         return Err(EncloseError::TooFewVertices { vertices, least });
@@ -53,14 +53,14 @@ pub fn general(models: &[&Model], shape: General, vertices: usize) -> Result<Tri
     let margin = MARGIN * extent;
     let center = 0.5 * low + 0.5 * high;
     Ok(match shape {
-        General::Box => placed(divided_cube(vertices), center, 0.5 * (high - low) + margin),
-        General::Sphere => {
+        BoundingShape::Box => placed(divided_cube(vertices), center, 0.5 * (high - low) + margin),
+        BoundingShape::Sphere => {
             let sphere = geodesic_sphere(vertices);
             let reach = points.iter().map(|&p| center.distance(p.into())).fold(0.0, f64::max);
             let radius = (reach + margin) / inradius(&sphere);
             placed(sphere, center, DVec3::splat(radius))
         }
-        General::Hull => hull::enlarged_hull(&points, vertices, margin),
+        BoundingShape::Hull => hull::enlarged_hull(&points, vertices, margin),
     })
 }
 
