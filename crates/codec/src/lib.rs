@@ -25,7 +25,6 @@ mod parallelograms;
 mod prediction_weights;
 mod residual;
 mod trajectories;
-mod vertex_names;
 mod vertex_order;
 mod walk;
 
@@ -36,7 +35,7 @@ pub use error::Error;
 pub use frame_errors::{decode_errors, encode_errors, rounded_error};
 pub use grid::{Grid, decode_positions, encode_positions};
 pub use hierarchy::Hierarchy;
-pub use mesh::{CodedMesh, MeshVersion};
+pub use mesh::CodedMesh;
 pub use residual::{Residual, ResidualGroup, encode_residual, estimate_residual};
 
 /// Most positions of one group of frames, points times frames: what decoding one holds in memory follows from it.

@@ -56,7 +56,7 @@ fn seeds() -> Vec<Vec<u8>> {
     let points = cage.vertices.iter().map(|p| p.map(|x| 0.1 + x / 3.0)).collect();
     let rest = Model { points, faces, colors: vec![[200, 0, 7]; 4] };
     let header = Header {
-        coordinates_definition: 1,
+        coordinates_definition: 3,
         coordinates: "mvc".to_owned(),
         handles: "maxvol".to_owned(),
         regularizer: "laplacian".to_owned(),
