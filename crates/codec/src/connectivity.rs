@@ -5,7 +5,7 @@
 use crate::adjacency::Adjacency;
 use crate::entropy::{Coder, Decoder, Encoder};
 use crate::error::{Error, Result};
-use crate::vertex_order::{MOST_FAR_POINTS, code_order};
+use crate::vertex_order::{MAX_FAR_POINTS, code_order};
 use crate::walk::{VertexLabels, Walk};
 use cager_core::mesh::Polygons;
 use std::cmp::Reverse;
@@ -82,11 +82,11 @@ impl WalkedFaces {
         let Self { coder, turns, adjacency, .. } = self;
         let with_order = |is_far: bool| {
             let mut coder = coder.clone();
-            coder.even(is_far);
+            coder.bypass(is_far);
             code_order(&mut coder, &adjacency, is_far, Some(&turns));
             coder.into_bytes()
         };
-        let is_small = adjacency.points() <= MOST_FAR_POINTS;
+        let is_small = adjacency.points() <= MAX_FAR_POINTS;
         let (near, far) = rayon::join(|| with_order(false), || is_small.then(|| with_order(true)));
         far.filter(|far| far.len() < near.len()).unwrap_or(near)
     }
@@ -123,8 +123,8 @@ pub fn decode_faces(bytes: &[u8], points: usize, count: usize, corners: usize) -
         add(walk.face(&mut coder, None, &[]))?;
     }
     drop(walk);
-    let is_far = coder.even(false);
-    if is_far && points > MOST_FAR_POINTS {
+    let is_far = coder.bypass(false);
+    if is_far && points > MAX_FAR_POINTS {
         return Err(Error::Damaged("the order of so many vertices cannot have been written"));
     }
     let order = code_order(&mut coder, &Adjacency::new(&faces, points), is_far, None);

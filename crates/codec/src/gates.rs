@@ -3,16 +3,16 @@
 use std::collections::VecDeque;
 
 /// Open edges are told apart by the faces to come at their ends up to this number.
-pub(crate) const MOST_TO_COME: u32 = 15;
+pub(crate) const MAX_TO_COME: u32 = 15;
 
 /// Edges at which the walk may go on; some wait no longer. By how few faces are to come at one of their ends, which is then complete soon; those that were opened or
 /// came nearer first before others.
 #[derive(Default)]
-pub(crate) struct Gates([VecDeque<(u32, u32)>; MOST_TO_COME as usize + 1]);
+pub(crate) struct Gates([VecDeque<(u32, u32)>; MAX_TO_COME as usize + 1]);
 
 impl Gates {
     pub(crate) fn push(&mut self, gate: (u32, u32), to_come: u32) {
-        self.0[to_come.min(MOST_TO_COME) as usize].push_back(gate);
+        self.0[to_come.min(MAX_TO_COME) as usize].push_back(gate);
     }
 
     pub(crate) fn pop(&mut self) -> Option<(u32, u32)> {

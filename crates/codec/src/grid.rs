@@ -1,7 +1,7 @@
 //! Positions of a mesh at rest, on a grid.
 
 use crate::adjacency::Adjacency;
-use crate::entropy::{Coder, Decoder, Encoder, Integers, MOST, SIZES, size_class};
+use crate::entropy::{Coder, Decoder, Encoder, Integers, MAX_SIZE, SIZES, size_class};
 use crate::error::{Error, Result};
 use crate::parallelograms::Predictions;
 use crate::prediction_weights::{PredictionWeights, WEIGHTS_BYTES};
@@ -24,7 +24,7 @@ impl Grid {
         let steps = (0..3).map(|k| (high[k] - low[k]) / step).fold(0.0, f64::max);
         let far = low.iter().chain(&high).any(|x| x.abs() > f64::from(f32::MAX));
         let finite = points.iter().flatten().all(|x| x.is_finite());
-        (!points.is_empty() && finite && step > 0.0 && steps.is_finite() && steps < f64::from(MOST >> 4) && !far)
+        (!points.is_empty() && finite && step > 0.0 && steps.is_finite() && steps < f64::from(MAX_SIZE >> 4) && !far)
             .then_some(Self { origin: low, step })
     }
 

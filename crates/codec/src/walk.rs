@@ -1,17 +1,17 @@
 //! The walk over a mesh, from a face across an edge to the next, as encoder and decoder take it.
 
-use crate::entropy::{Bit, Coder, Integers};
-use crate::gates::{Gates, MOST_TO_COME};
+use crate::entropy::{BinaryModel, Coder, Integers};
+use crate::gates::{Gates, MAX_TO_COME};
 use crate::open_edges::{NEWEST, OpenEdges};
 
 /// Faces at a vertex are told apart up to this number.
-const MOST_FACES: u32 = 8;
+const MAX_FACES: u32 = 8;
 /// Pairs of such numbers.
-const PAIRS: usize = (MOST_FACES as usize + 1).pow(2);
+const PAIRS: usize = (MAX_FACES as usize + 1).pow(2);
 /// Open edges of a vertex that are sorted anew with it, in either direction: ordinary meshes have no more.
-const MOST_NEARER: usize = 4;
+const MAX_NEARER: usize = 4;
 /// Vertices that a corner is looked for among, those that open edges lead to.
-const MOST_NEAR: usize = 8;
+const MAX_NEAR: usize = 8;
 
 /// The turn of vertices that were not met yet.
 const UNVISITED: u32 = u32::MAX;
@@ -41,12 +41,12 @@ pub(crate) struct Walk {
     arity: u32,
     /// Corners that are not coded yet: a damaged face has no more.
     corners_left: usize,
-    across: Vec<Bit>,
+    across: Vec<BinaryModel>,
     /// Whether faces follow that begin anywhere.
-    pub(crate) more: Bit,
-    same_arity: Bit,
-    first_time: Vec<Bit>,
-    place: Vec<Bit>,
+    pub(crate) more: BinaryModel,
+    same_arity: BinaryModel,
+    first_time: Vec<BinaryModel>,
+    place: Vec<BinaryModel>,
     arities: Integers,
     face_counts: Integers,
     labels: VertexLabels,
@@ -65,11 +65,11 @@ impl Walk {
             gates: Gates::default(),
             arity: 3,
             corners_left: corners,
-            across: vec![Bit::default(); 9],
-            more: Bit::default(),
-            same_arity: Bit::default(),
-            first_time: vec![Bit::default(); 2 * PAIRS],
-            place: vec![Bit::default(); 8 * MOST_NEAR],
+            across: vec![BinaryModel::default(); 9],
+            more: BinaryModel::default(),
+            same_arity: BinaryModel::default(),
+            first_time: vec![BinaryModel::default(); 2 * PAIRS],
+            place: vec![BinaryModel::default(); 8 * MAX_NEAR],
             arities: Integers::new(1),
             face_counts: Integers::new(1),
             labels,
@@ -94,7 +94,7 @@ impl Walk {
     /// Sorts the open edges of a vertex anew where none of their ends has fewer faces to come.
     fn requeue_open_edges(&mut self, v: u32) {
         let faces = self.faces[v as usize];
-        if faces >= MOST_TO_COME {
+        if faces >= MAX_TO_COME {
             return;
         }
         let mut scratch = [0; NEWEST];
@@ -197,15 +197,15 @@ impl Walk {
                 k += 1;
             }
         }
-        near.truncate(MOST_NEAR);
-        let faces = |v: u32| self.faces[v as usize].min(MOST_FACES);
-        let pair = ((MOST_FACES + 1) * faces(previous) + faces(first)) as usize;
+        near.truncate(MAX_NEAR);
+        let faces = |v: u32| self.faces[v as usize].min(MAX_FACES);
+        let pair = ((MAX_FACES + 1) * faces(previous) + faces(first)) as usize;
         let ends = usize::from(faces(previous) == 1) + 2 * usize::from(faces(first) == 1);
         let new = self.is_unvisited(given);
         if coder.bit(&mut self.first_time[PAIRS * usize::from(both) + pair], new) {
             return self.new_vertex(coder, given);
         }
-        let context = MOST_NEAR * (2 * ends + usize::from(both));
+        let context = MAX_NEAR * (2 * ends + usize::from(both));
         for (k, &x) in near.iter().enumerate() {
             if !coder.bit(&mut self.place[context + k], x != given) {
                 return x;
@@ -259,5 +259,5 @@ impl Walk {
 }
 
 fn last_few(ends: &[u32]) -> &[u32] {
-    &ends[ends.len().saturating_sub(MOST_NEARER)..]
+    &ends[ends.len().saturating_sub(MAX_NEARER)..]
 }

@@ -6,7 +6,7 @@ use super::reader::ContainerReader;
 use super::section::SectionHeader;
 use super::{Error, tag};
 use cager_codec::{
-    CageBasis, Hierarchy, MOST_ROWS, Residual, decode_cages, decode_errors, decode_faces, decode_positions, is_rotated,
+    CageBasis, Hierarchy, MAX_ROWS, Residual, decode_cages, decode_errors, decode_faces, decode_positions, is_rotated,
 };
 use cager_core::cage::Cage;
 use cager_core::coordinates::{self, CoordinateSystem, Coordinates, DEFINITION, ElementPlan};
@@ -121,7 +121,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         let corrupt = |what: String| Error::corrupt(offset, what);
         let points = self.rest()?.points;
         let cage = Cage::new(self.cage()?).map_err(|e| corrupt(e.to_string()))?;
-        if system.unknowns(&cage) != header.rows_per_frame as usize || system.unknowns(&cage) > MOST_ROWS {
+        if system.unknowns(&cage) != header.rows_per_frame as usize || system.unknowns(&cage) > MAX_ROWS {
             return Err(corrupt(format!("a frame has {} rows", header.rows_per_frame)));
         }
         let plan = self.elements()?.map(ElementPlan::from_bytes);
