@@ -4,7 +4,7 @@
 //! `figures --growth POINTS CAGE_VERTICES` prepares once and prints times and sizes.
 
 use anyhow::Context;
-use cager_codec::{CageBasis, Neighbours, decode_cages, encode_cages};
+use cager_codec::{AdjacentGroups, CageBasis, decode_cages, encode_cages};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Coordinates, Green, Harmonic, MeanValue, Refinement};
 use cager_core::inversion::{BATCH, Solver, SolverOptions};
@@ -124,7 +124,7 @@ fn figures(folder: &Path) -> anyhow::Result<Value> {
     let (basis, _) = CageBasis::of(&MeanValue, &cage, points, None, None)?.context("a basis")?;
     let views: Vec<&[f32]> = cages.iter().flatten().map(Vec::as_slice).collect();
     let step = CAGE_STEP * mesh::diagonal(points) / (basis.rows() as f64).sqrt();
-    let groups = || views.chunks(GROUP).map(|group| encode_cages(&basis, group, step, Neighbours::default()));
+    let groups = || views.chunks(GROUP).map(|group| encode_cages(&basis, group, step, AdjacentGroups::default()));
     let code_cages = timed(|| groups().collect::<Vec<_>>());
     let coded: Vec<Vec<u8>> = groups().collect::<Option<_>>().context("cages that can be coded")?;
     let read_cages = timed(|| {

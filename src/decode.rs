@@ -6,7 +6,7 @@ use crate::origin::{LOST, move_to};
 use crate::timing::Timing;
 use cager_core::cage::{Cage, CageError};
 use cager_core::coordinates;
-use cager_core::coordinates::{Coordinates, CoordinatesError, ElementPlan, supports_definition};
+use cager_core::coordinates::{Coordinates, CoordinatesError, DEFINITION, ElementPlan};
 use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, PrepareError, coordinates_bytes, reject_far_points};
 use cager_core::mesh::{Model, Point, diagonal};
@@ -213,7 +213,7 @@ fn bind(
     let Some(system) = coordinates::by_name(&header.coordinates) else {
         return Err(unsupported(format!("its coordinates are {:?}", header.coordinates)));
     };
-    if !supports_definition(header.coordinates_definition) {
+    if header.coordinates_definition != DEFINITION {
         return Err(unsupported(format!("its coordinates are of definition {}", header.coordinates_definition)));
     }
     let own = container.rest().map_err(fail)?;

@@ -3,7 +3,7 @@
 mod support;
 
 use cager_codec::{
-    CageBasis, CodedMesh, Hierarchy, Neighbours, ResidualGroup, decode_cages, encode_cages, encode_residual,
+    AdjacentGroups, CageBasis, CodedMesh, Hierarchy, ResidualGroup, decode_cages, encode_cages, encode_residual,
 };
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
@@ -31,7 +31,7 @@ fn coded() -> (Vec<u8>, Vec<Vec<f32>>) {
     let mut decoded = Vec::new();
     for group in cages.chunks(4) {
         let views: Vec<&[f32]> = group.iter().map(Vec::as_slice).collect();
-        let bytes = encode_cages(&basis, &views, 1e-3, Neighbours::default()).unwrap();
+        let bytes = encode_cages(&basis, &views, 1e-3, AdjacentGroups::default()).unwrap();
         decoded.extend(decode_cages(&basis, group.len(), &bytes).unwrap());
         let captured: Vec<Vec<f64>> = group.iter().map(|f| f.iter().map(|&x| f64::from(x) + 0.25).collect()).collect();
         let captured: Vec<&[f64]> = captured.iter().map(Vec::as_slice).collect();
@@ -77,6 +77,21 @@ fn coordinates_that_take_more_than_they_may_are_refused_before_they_take_it() {
     reader.limit_coordinates(1 << 20);
     reader.read_frame(0, &mut found).unwrap();
     assert_eq!(found, cages[0]);
+}
+
+#[test]
+fn forms_that_were_never_released_are_refused_by_name() {
+    let parts = take_apart(&coded().0);
+    for tag in [b"RPTS", b"RFAC", b"CVTX", b"ERRS"] {
+        let mut earlier = parts.clone();
+        earlier.iter_mut().filter(|part| part.tag == *tag).for_each(|part| part.codec = 3);
+        let error = read_all(&put_together(&earlier)).unwrap_err();
+        assert!(matches!(&error, Error::UnknownSection(what) if what == "codec 3"), "{error}");
+    }
+    let mut earlier = parts;
+    earlier[0].payload[0] = 2;
+    let error = read_all(&put_together(&earlier)).unwrap_err();
+    assert!(matches!(&error, Error::UnknownSection(what) if what == "coordinates of definition 2"), "{error}");
 }
 
 #[test]

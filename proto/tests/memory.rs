@@ -4,7 +4,7 @@
 
 mod support;
 
-use cager_codec::{CageBasis, CodedMesh, Neighbours, encode_cages};
+use cager_codec::{AdjacentGroups, CageBasis, CodedMesh, encode_cages};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_core::mesh::{Model, Polygons};
@@ -37,7 +37,7 @@ fn small_file_of_large_sections() -> Vec<u8> {
     let (basis, _) = CageBasis::of(&MeanValue, &checked, &rest.mesh.points, None, None).unwrap().unwrap();
     let frames: Vec<Vec<f32>> = (0..FRAMES).map(|k| frame(k, 4)).collect();
     let views: Vec<&[f32]> = frames.iter().map(Vec::as_slice).collect();
-    let cages = encode_cages(&basis, &views, 1e-3, Neighbours::default()).unwrap();
+    let cages = encode_cages(&basis, &views, 1e-3, AdjacentGroups::default()).unwrap();
     // Step, number of components, step of corrections, bytes of the components; zeros stand for as many numbers as there are.
     let mut residual = 0.01_f64.to_le_bytes().to_vec();
     residual.extend(COMPONENTS.to_le_bytes());

@@ -1,7 +1,9 @@
 //! Groups of frames: collected, coded, and read back to measure what they decode to.
 
 use super::{CodingError, Goal, GroupDecoder, slack};
-use cager_codec::{Hierarchy, Neighbours, Residual, ResidualGroup, encode_cages, encode_residual, estimate_residual};
+use cager_codec::{
+    AdjacentGroups, Hierarchy, Residual, ResidualGroup, encode_cages, encode_residual, estimate_residual,
+};
 use cager_core::decode::FrameError;
 use cager_proto::container::most_residual_numbers;
 use rayon::prelude::*;
@@ -194,8 +196,8 @@ impl GroupCoder {
         let cages: Vec<&[f32]> = self.cages[..count].iter().map(Vec::as_slice).collect();
         // Cages that travel very far are counted in larger steps; the residual says the rest.
         let is_full = self.frames.len() >= self.most;
-        let neighbours = Neighbours { before: self.carried.frames > 0, after: count == self.frames.len() && is_full };
-        let coded = (0..16).find_map(|k| encode_cages(&self.model.basis, &cages, step * f64::from(1 << k), neighbours));
+        let adjacent = AdjacentGroups { before: self.carried.frames > 0, after: count == self.frames.len() && is_full };
+        let coded = (0..16).find_map(|k| encode_cages(&self.model.basis, &cages, step * f64::from(1 << k), adjacent));
         let coded = coded.ok_or_else(|| self.uncountable())?;
         // From here on what a decoder has.
         let decoded = self.model.cages(count, &coded).map_err(|_| self.uncountable())?;

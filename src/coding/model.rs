@@ -1,7 +1,7 @@
 //! What groups of one model are coded and decoded with.
 
 use super::CodingError;
-use cager_codec::{CageBasis, Error, Hierarchy, MOST_POSITIONS, MOST_ROWS, Residual, decode_cages};
+use cager_codec::{CageBasis, Error, Hierarchy, MAX_POSITIONS, MAX_ROWS, Residual, decode_cages};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, ElementPlan};
 use cager_core::decode::Decoder;
@@ -26,11 +26,11 @@ impl GroupSpace {
         plan: Option<&ElementPlan>,
     ) -> Result<Self, CodingError> {
         let rows = system.unknowns(cage);
-        if rows > MOST_ROWS {
-            return Err(CodingError::TooManyRows { rows, most: MOST_ROWS });
+        if rows > MAX_ROWS {
+            return Err(CodingError::TooManyRows { rows, most: MAX_ROWS });
         }
-        if rest.points.len() > MOST_POSITIONS {
-            return Err(CodingError::TooManyPoints { points: rest.points.len(), most: MOST_POSITIONS });
+        if rest.points.len() > MAX_POSITIONS {
+            return Err(CodingError::TooManyPoints { points: rest.points.len(), most: MAX_POSITIONS });
         }
         let basis = CageBasis::of(system, cage, &rest.points, plan, None)?;
         let (basis, _) = basis.ok_or(CodingError::Uncountable { first: 0, last: 0 })?;

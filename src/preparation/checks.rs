@@ -5,7 +5,7 @@ use super::{Choices, Geometry};
 use crate::coding::{CodingError, Goal, slack};
 use crate::origin::{LOST, own_origin};
 use crate::problem::{self, ApiError};
-use cager_codec::MOST_ROWS;
+use cager_codec::MAX_ROWS;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions, check_options};
@@ -54,7 +54,7 @@ fn check_goal(goal: Goal, geometry: &Geometry, rows: usize, frames: u32) -> Resu
         .as_ref()
         .map_or(0, |(rest, cage)| (rest.bytes() + cage.bytes() + colors_bytes(&rest.mesh.colors)) as u64);
     let checked = match goal {
-        _ if rows > MOST_ROWS => Err(CodingError::TooManyRows { rows, most: MOST_ROWS }),
+        _ if rows > MAX_ROWS => Err(CodingError::TooManyRows { rows, most: MAX_ROWS }),
         goal => goal
             .check_size(meshes, frames as usize)
             .and_then(|()| goal.check_precision(geometry.unit, slack(geometry.unit, 0.0, farthest))),

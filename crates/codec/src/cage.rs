@@ -1,10 +1,10 @@
 //! Cages of a group of frames: `Y = E A` in the coordinates of [`CageBasis`], A in whole steps.
 
 use crate::basis::CageBasis;
-use crate::entropy::{Coder, Decoder, Encoder, Integers, MOST, SIZES, size_class};
+use crate::entropy::{Coder, Decoder, Encoder, Integers, MAX_SIZE, SIZES, size_class};
 use crate::error::{Error, Result};
 use crate::trajectories::{PULSE_FRAMES, Trajectories, fit};
-use crate::{MOST_FRAMES, trajectories};
+use crate::{MAX_FRAMES, trajectories};
 use cager_geometry::linalg;
 use faer::Mat;
 
@@ -17,7 +17,7 @@ const ROUND_UP: f64 = 0.44;
 
 /// Whether groups come before and after a group. The frame next to one is coded more exactly, so that the model does not jump from group to group.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Neighbours {
+pub struct AdjacentGroups {
     /// A group ends right before this one.
     pub before: bool,
     /// A group begins right after this one.
@@ -31,10 +31,10 @@ const JOINT_ERROR: f64 = 0.1;
 /// numbers are not finite, or too far apart to be counted in these steps.
 ///
 /// # Panics
-/// Where a cage has another number of rows, or there are more than [`MOST_FRAMES`].
-pub fn encode_cages(basis: &CageBasis, cages: &[&[f32]], step: f64, neighbours: Neighbours) -> Option<Vec<u8>> {
+/// Where a cage has another number of rows, or there are more than [`MAX_FRAMES`].
+pub fn encode_cages(basis: &CageBasis, cages: &[&[f32]], step: f64, adjacent: AdjacentGroups) -> Option<Vec<u8>> {
     let (rows, frames) = (basis.rows(), cages.len());
-    assert!(frames <= MOST_FRAMES && cages.iter().all(|cage| cage.len() == 3 * rows));
+    assert!(frames <= MAX_FRAMES && cages.iter().all(|cage| cage.len() == 3 * rows));
     // m × 3 T, to 3 m × T.
     let y = basis.forward(cages);
     let motion = Mat::from_fn(3 * rows, frames, |value, t| y[(value / 3, 3 * t + value % 3)]);
@@ -44,12 +44,12 @@ pub fn encode_cages(basis: &CageBasis, cages: &[&[f32]], step: f64, neighbours: 
     let exact = fit(chosen.values().as_ref(), motion.as_ref())?;
     let in_steps = |exact: f64, round_up: f64| {
         let steps = (exact.abs() / step + round_up).floor();
-        (steps <= f64::from(MOST)).then_some(steps.copysign(exact) as i32)
+        (steps <= f64::from(MAX_SIZE)).then_some(steps.copysign(exact) as i32)
     };
     let width = 3 * rows;
     let numbers = (0..chosen.count() * width).map(|at| in_steps(exact[(at % width, at / width)], ROUND_UP));
     let mut whole: Vec<i32> = numbers.collect::<Option<_>>()?;
-    for (frame, is_joined) in [(0, neighbours.before), (frames.saturating_sub(1), neighbours.after)] {
+    for (frame, is_joined) in [(0, adjacent.before), (frames.saturating_sub(1), adjacent.after)] {
         // With as many trajectories as there can be every frame is as exact as a step.
         if !is_joined || frames < 4 * PULSE_FRAMES || chosen.count() == most {
             continue;
@@ -82,7 +82,7 @@ pub fn decode_cages(basis: &CageBasis, frames: usize, bytes: &[u8]) -> Result<Ve
     let rows = basis.rows();
     let (head, coded) = bytes.split_first_chunk::<HEAD>().ok_or(Error::Damaged("a group of cages is cut"))?;
     let (step, count) = step_and_count(&std::array::from_fn(|k| head[1 + k]));
-    if frames > MOST_FRAMES || count > frames.min(3 * rows) || !(step.is_finite() && step > 0.0) {
+    if frames > MAX_FRAMES || count > frames.min(3 * rows) || !(step.is_finite() && step > 0.0) {
         return Err(Error::Damaged("a group of cages has impossible counts"));
     }
     if is_rotated(bytes)? != basis.rotated() {
@@ -164,7 +164,7 @@ mod tests {
             let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
             let mut sizes = Vec::new();
             for step in [1e-2, 1e-4, 1e-6] {
-                let bytes = encode_cages(&basis, &views, step, Neighbours::default()).unwrap();
+                let bytes = encode_cages(&basis, &views, step, AdjacentGroups::default()).unwrap();
                 let back = decode_cages(&basis, frames, &bytes).unwrap();
                 let views: Vec<&[f32]> = back.iter().map(Vec::as_slice).collect();
                 let (a, b) =
@@ -192,8 +192,8 @@ mod tests {
         let changes = |joins: bool| {
             let coded = cages.chunks(frames).enumerate().flat_map(|(k, group)| {
                 let views: Vec<&[f32]> = group.iter().map(Vec::as_slice).collect();
-                let neighbours = Neighbours { before: joins && k > 0, after: joins && k < 2 };
-                decode_cages(&basis, frames, &encode_cages(&basis, &views, step, neighbours).unwrap()).unwrap()
+                let adjacent = AdjacentGroups { before: joins && k > 0, after: joins && k < 2 };
+                decode_cages(&basis, frames, &encode_cages(&basis, &views, step, adjacent).unwrap()).unwrap()
             });
             let errors: Vec<Mat<f64>> =
                 coded.zip(&cages).map(|(a, b)| basis.forward(&[&a]) - basis.forward(&[b])).collect();
@@ -214,7 +214,7 @@ mod tests {
             let basis = basis(rows);
             let cages: Vec<Vec<f32>> = (0..frames).map(|_| (0..3 * rows).map(|_| random.f32()).collect()).collect();
             let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
-            let both = Neighbours { before: true, after: true };
+            let both = AdjacentGroups { before: true, after: true };
             let bytes = encode_cages(&basis, &views, 1e-5, both).unwrap();
             for (a, b) in decode_cages(&basis, frames, &bytes).unwrap().iter().zip(&cages) {
                 assert!((basis.forward(&[a]) - basis.forward(&[b])).norm_max() < 1e-3);
@@ -226,7 +226,7 @@ mod tests {
     fn damage_is_an_error_or_finite_cages() {
         let (basis, cages) = (basis(20), cages(20, 30));
         let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
-        let bytes = encode_cages(&basis, &views, 1e-4, Neighbours::default()).unwrap();
+        let bytes = encode_cages(&basis, &views, 1e-4, AdjacentGroups::default()).unwrap();
         let mut refused = 0;
         let mut check = |bytes: &[u8]| match decode_cages(&basis, 30, bytes) {
             Err(_) => refused += 1,
@@ -247,8 +247,8 @@ mod tests {
         }
         assert!(refused > 20, "{refused}");
         assert!(decode_cages(&basis, 30, &bytes[..5]).is_err());
-        assert!(decode_cages(&basis, MOST_FRAMES + 1, &bytes).is_err());
+        assert!(decode_cages(&basis, MAX_FRAMES + 1, &bytes).is_err());
         let nan = vec![f32::NAN; 60];
-        assert!(encode_cages(&basis, &[&nan], 1e-3, Neighbours::default()).is_none());
+        assert!(encode_cages(&basis, &[&nan], 1e-3, AdjacentGroups::default()).is_none());
     }
 }

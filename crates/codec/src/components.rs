@@ -2,7 +2,7 @@
 //! around it are. Vertices may be coded in two parts, coarse and fine, each by a range coder of its own, so that two threads code them: the fine part of a component
 //! while the coarse part of a later one is under way.
 
-use crate::entropy::{Bit, Coder, Integers, MOST, SIZES, size_class};
+use crate::entropy::{BinaryModel, Coder, Integers, MAX_SIZE, SIZES, size_class};
 use crate::hierarchy::Hierarchy;
 use std::ops::Range;
 use std::sync::LazyLock;
@@ -20,7 +20,7 @@ const POINTS_AT_A_TIME: usize = 1 << 17;
 pub(crate) trait Models: Send {
     fn new(contexts: usize) -> Self;
 
-    /// Codes a number between −[`MOST`] and [`MOST`], and gives it back.
+    /// Codes a number between −[`MAX_SIZE`] and [`MAX_SIZE`], and gives it back.
     fn code(&mut self, coder: &mut impl Coder, context: usize, value: i32) -> i32;
 }
 
@@ -102,7 +102,7 @@ impl<M: Models> Part<M> {
 /// Codes component after component.
 pub(crate) struct Components<'a, M> {
     hierarchy: &'a Hierarchy,
-    flag: Bit,
+    flag: BinaryModel,
     parts: [Part<M>; 2],
 }
 
@@ -111,7 +111,7 @@ impl<'a, M: Models> Components<'a, M> {
     pub(crate) fn new(hierarchy: &'a Hierarchy, is_parted: bool) -> Self {
         let points = hierarchy.points();
         let middle = if is_parted { points / 2 } else { points };
-        Self { hierarchy, flag: Bit::default(), parts: [Part::new(0..middle), Part::new(middle..points)] }
+        Self { hierarchy, flag: BinaryModel::default(), parts: [Part::new(0..middle), Part::new(middle..points)] }
     }
 
     /// Codes what `next` gives, called until it gives nothing, with one coder for each part; `done` takes each component when it is coded. `None` where `next` says so
@@ -186,7 +186,7 @@ fn is_predictable(hierarchy: &Hierarchy, target: &[[i64; 3]]) -> bool {
 /// Rounded to whole steps; less than 11/16 of a step is dropped.
 fn rounded(parts: i64) -> i32 {
     let steps = (parts.abs() + ROUND_UP) / PARTS * parts.signum();
-    steps.clamp(-i64::from(MOST), i64::from(MOST)) as i32
+    steps.clamp(-i64::from(MAX_SIZE), i64::from(MAX_SIZE)) as i32
 }
 
 /// What a vertex is predicted from its parents: their means, rounded down; without parents 0.

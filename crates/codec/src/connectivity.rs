@@ -4,15 +4,11 @@
 
 use crate::entropy::{Coder, Decoder, Encoder};
 use crate::error::{Error, Result};
-use crate::gates::Gates;
-use crate::mesh::MeshVersion;
-use crate::vertex_names::{Names, Numbers};
-use crate::vertex_order::{MOST_FAR_POINTS, code_order};
-use crate::walk::Walk;
+use crate::vertex_order::{MAX_FAR_POINTS, code_order};
+use crate::walk::{VertexLabels, Walk};
 use cager_core::mesh::Polygons;
 use cager_geometry::topology::Adjacency;
 use std::cmp::Reverse;
-use std::collections::VecDeque;
 
 /// Faces as they were coded, without the numbers of their vertices yet.
 pub(crate) struct WalkedFaces {
@@ -47,7 +43,7 @@ impl WalkedFaces {
         // Of equal edges, by where the first of them is, how many have a face that is done.
         let mut past = vec![0; edges.len()];
         let mut coder = Encoder::default();
-        let mut walk = Walk::new(points, edges.len(), Gates::fewest(), Names::Given(counts));
+        let mut walk = Walk::new(points, edges.len(), VertexLabels::Given(counts));
         let mut found = Polygons::new();
         let mut next = 0;
         loop {
@@ -86,36 +82,23 @@ impl WalkedFaces {
         let Self { coder, turns, adjacency, .. } = self;
         let with_order = |is_far: bool| {
             let mut coder = coder.clone();
-            coder.even(is_far);
+            coder.bypass(is_far);
             code_order(&mut coder, &adjacency, is_far, Some(&turns));
             coder.into_bytes()
         };
-        let is_small = adjacency.points() <= MOST_FAR_POINTS;
+        let is_small = adjacency.points() <= MAX_FAR_POINTS;
         let (near, far) = rayon::join(|| with_order(false), || is_small.then(|| with_order(true)));
         far.filter(|far| far.len() < near.len()).unwrap_or(near)
     }
 }
 
-/// The polygons of coded bytes, this program's or earlier ones': `count` faces with `corners` corners in all.
+/// The polygons of coded bytes: `count` faces with `corners` corners in all.
 ///
 /// # Errors
 /// Bytes that the encoder did not write.
-pub fn decode_faces(
-    bytes: &[u8],
-    version: MeshVersion,
-    points: usize,
-    count: usize,
-    corners: usize,
-) -> Result<Polygons> {
+pub fn decode_faces(bytes: &[u8], points: usize, count: usize, corners: usize) -> Result<Polygons> {
     let mut coder = Decoder::new(bytes)?;
-    let (gates, names) = match version {
-        MeshVersion::First => {
-            let gates = if coder.even(false) { Gates::Oldest(VecDeque::new()) } else { Gates::Newest(Vec::new()) };
-            (gates, Names::Numbers(Box::new(Numbers::new(points))))
-        }
-        MeshVersion::Second => (Gates::fewest(), Names::Turns),
-    };
-    let mut walk = Walk::new(points, corners, gates, names);
+    let mut walk = Walk::new(points, corners, VertexLabels::TraversalOrder);
     let mut faces = Polygons::new();
     let (mut found, mut read) = (0, 0);
     let mut add = |face: Vec<u32>| {
@@ -140,20 +123,17 @@ pub fn decode_faces(
         add(walk.face(&mut coder, None, &[]))?;
     }
     drop(walk);
-    if version == MeshVersion::Second {
-        let is_far = coder.even(false);
-        if is_far && points > MOST_FAR_POINTS {
-            return Err(Error::Damaged("the order of so many vertices cannot have been written"));
-        }
-        let order = code_order(&mut coder, &Adjacency::new(&faces, points), is_far, None);
-        let order = order.ok_or(Error::Damaged("vertices are not those that the faces name"))?;
-        let mut numbers = vec![0; points];
-        order.iter().enumerate().for_each(|(number, &vertex)| numbers[vertex as usize] = number as u32);
-        faces = faces.renamed(&numbers);
+    let is_far = coder.bypass(false);
+    if is_far && points > MAX_FAR_POINTS {
+        return Err(Error::Damaged("the order of so many vertices cannot have been written"));
     }
+    let order = code_order(&mut coder, &Adjacency::new(&faces, points), is_far, None);
+    let order = order.ok_or(Error::Damaged("vertices are not those that the faces name"))?;
+    let mut numbers = vec![0; points];
+    order.iter().enumerate().for_each(|(number, &vertex)| numbers[vertex as usize] = number as u32);
     coder.check()?;
     if (found, read) == (count, corners) {
-        Ok(faces)
+        Ok(faces.renamed(&numbers))
     } else {
         Err(Error::Damaged("faces are not those that the header counts"))
     }
@@ -177,7 +157,7 @@ mod tests {
         faces.iter().for_each(|face| polygons.push(face));
         let bytes = encode_faces(&polygons, points);
         let corners = polygons.indices().len();
-        let back = decode_faces(&bytes, MeshVersion::Second, points, faces.len(), corners).unwrap();
+        let back = decode_faces(&bytes, points, faces.len(), corners).unwrap();
         assert_eq!(normal(&back), normal(&polygons));
         bytes.len()
     }
@@ -221,7 +201,7 @@ mod tests {
         round.push(&(0..count).collect::<Vec<_>>());
         round.push(&(0..count).rev().collect::<Vec<_>>());
         let bytes = encode_faces(&round, count as usize);
-        assert_eq!(decode_faces(&bytes, MeshVersion::Second, count as usize, 2, 2 * count as usize).unwrap().len(), 2);
+        assert_eq!(decode_faces(&bytes, count as usize, 2, 2 * count as usize).unwrap().len(), 2);
         check(&vec![&[0, 1, 2][..]; count as usize], 3);
     }
 
@@ -230,10 +210,8 @@ mod tests {
         let mut random = fastrand::Rng::with_seed(8);
         for _ in 0..300 {
             let bytes: Vec<u8> = (0..4 * random.usize(..60)).map(|_| random.u8(..)).collect();
-            for version in [MeshVersion::First, MeshVersion::Second] {
-                if let Ok(faces) = decode_faces(&bytes, version, 20, random.usize(..30), random.usize(..90)) {
-                    assert!(faces.indices().iter().all(|&v| v < 20));
-                }
+            if let Ok(faces) = decode_faces(&bytes, 20, random.usize(..30), random.usize(..90)) {
+                assert!(faces.indices().iter().all(|&v| v < 20));
             }
         }
     }

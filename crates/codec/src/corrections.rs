@@ -1,6 +1,6 @@
 //! Single vertices in single frames that are moved to where they were captured, to within a bound.
 
-use crate::entropy::{Coder, Decoder, Encoder, Integers, MOST};
+use crate::entropy::{Coder, Decoder, Encoder, Integers, MAX_SIZE};
 use crate::error::{Error, Result};
 use rayon::prelude::*;
 
@@ -30,7 +30,7 @@ impl Corrections {
                 };
                 if far(b) {
                     let steps: [f64; 3] = std::array::from_fn(|k| ((a[k] - f64::from(b[k])) / step).round());
-                    if steps.iter().any(|x| x.is_nan() || x.abs() > f64::from(MOST)) {
+                    if steps.iter().any(|x| x.is_nan() || x.abs() > f64::from(MAX_SIZE)) {
                         return None;
                     }
                     let steps = steps.map(|x| x as i32);

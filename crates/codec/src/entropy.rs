@@ -1,7 +1,7 @@
 //! Whole numbers to bytes: adaptive binary models of their digits, and a range coder (Martin 1979) of the `constriction` crate.
 //!
 //! One piece of code describes a stream for both directions: it hands each number to a [`Coder`], which writes it, or returns the one that was read
-//! and ignores the argument, or only adds up what it would cost.
+//! and ignores the argument.
 
 use crate::error::{Error, Result};
 use constriction::stream::Encode;
@@ -28,19 +28,19 @@ const RECIPROCALS: [u64; (1 << SLOW) + 1] = {
 
 /// The probability that a binary digit is 0: the mean of two estimates that follow what they meet fast and slowly.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Bit {
+pub(crate) struct BinaryModel {
     fast: u16,
     slow: u16,
     met: u8,
 }
 
-impl Default for Bit {
+impl Default for BinaryModel {
     fn default() -> Self {
         Self { fast: 1 << 15, slow: 1 << 15, met: 0 }
     }
 }
 
-impl Bit {
+impl BinaryModel {
     /// Probability of 0 in units of 2⁻¹⁶, never 0 or 1.
     #[inline(always)]
     fn zero(self) -> u16 {
@@ -48,7 +48,7 @@ impl Bit {
     }
 
     #[inline(always)]
-    fn meet(&mut self, one: bool) {
+    fn update(&mut self, one: bool) {
         let left = |p: u16| if one { p } else { u16::MAX - p };
         let (fast, slow) = if self.met >= (1 << SLOW) - 2 {
             (left(self.fast) >> FAST, left(self.slow) >> SLOW)
@@ -67,11 +67,11 @@ impl Bit {
 /// A direction of coding.
 pub(crate) trait Coder {
     /// Codes a binary digit and returns it.
-    fn bit(&mut self, model: &mut Bit, value: bool) -> bool;
+    fn bit(&mut self, model: &mut BinaryModel, value: bool) -> bool;
 
     /// Codes the low binary digits of a number, all equally likely.
     fn bits(&mut self, count: u32, value: u32) -> u32 {
-        (0..count).rev().fold(0, |number, k| number << 1 | u32::from(self.even(value >> k & 1 == 1)))
+        (0..count).rev().fold(0, |number, k| number << 1 | u32::from(self.bypass(value >> k & 1 == 1)))
     }
 
     /// Whether what was read cannot be what an encoder wrote.
@@ -80,8 +80,8 @@ pub(crate) trait Coder {
     }
 
     /// Codes a binary digit of probability 1/2.
-    fn even(&mut self, value: bool) -> bool {
-        self.bit(&mut Bit::default(), value)
+    fn bypass(&mut self, value: bool) -> bool {
+        self.bit(&mut BinaryModel::default(), value)
     }
 }
 
@@ -115,11 +115,11 @@ impl Encoder {
 }
 
 impl Coder for Encoder {
-    fn bit(&mut self, model: &mut Bit, value: bool) -> bool {
+    fn bit(&mut self, model: &mut BinaryModel, value: bool) -> bool {
         // Both symbols have a probability above 0, and a vector takes every word.
         let coded = self.0.encode_symbol(value, Probability(model.zero()));
         debug_assert!(coded.is_ok());
-        model.meet(value);
+        model.update(value);
         value
     }
 }
@@ -169,7 +169,7 @@ impl<'a> Decoder<'a> {
 
 impl Coder for Decoder<'_> {
     #[inline(always)]
-    fn bit(&mut self, model: &mut Bit, _: bool) -> bool {
+    fn bit(&mut self, model: &mut BinaryModel, _: bool) -> bool {
         let unit = self.range >> PRECISION;
         let zeros = unit * u64::from(model.zero());
         let one = self.offset >= zeros;
@@ -185,7 +185,7 @@ impl Coder for Decoder<'_> {
             self.range <<= 32;
             self.offset = self.offset << 32 | self.word();
         }
-        model.meet(one);
+        model.update(one);
         one
     }
 
@@ -198,28 +198,28 @@ impl Coder for Decoder<'_> {
 /// number of binary digits.
 pub(crate) struct Integers {
     contexts: Vec<Context>,
-    exponent: [Bit; 32],
-    leading: [Bit; 32],
+    exponent: [BinaryModel; 32],
+    leading: [BinaryModel; 32],
 }
 
 #[derive(Clone, Default)]
 struct Context {
-    zero: Bit,
-    sign: Bit,
-    unary: [Bit; UNARY as usize],
+    zero: BinaryModel,
+    sign: BinaryModel,
+    unary: [BinaryModel; UNARY as usize],
 }
 
 /// Sizes from 1 to this are coded in unary.
 pub(crate) const UNARY: u32 = 14;
 /// Largest size of a number.
-pub(crate) const MOST: u32 = 1 << 28;
+pub(crate) const MAX_SIZE: u32 = 1 << 28;
 
 impl Integers {
     pub(crate) fn new(contexts: usize) -> Self {
         Self { contexts: vec![Context::default(); contexts], exponent: Default::default(), leading: Default::default() }
     }
 
-    /// Codes a number between −[`MOST`] and [`MOST`].
+    /// Codes a number between −[`MAX_SIZE`] and [`MAX_SIZE`].
     pub(crate) fn code(&mut self, coder: &mut impl Coder, context: usize, value: i32) -> i32 {
         let models = &mut self.contexts[context];
         if !coder.bit(&mut models.zero, value != 0) {
@@ -246,7 +246,7 @@ impl Integers {
             number = 2 | u32::from(coder.bit(&mut self.leading[count as usize], rest >> (count - 1) & 1 == 1));
             number = number << (count - 1) | coder.bits(count - 1, rest & ((1 << (count - 1)) - 1));
         }
-        let size = (number + UNARY).min(MOST) as i32;
+        let size = (number + UNARY).min(MAX_SIZE) as i32;
         if negative { -size } else { size }
     }
 
@@ -274,10 +274,10 @@ impl Integers {
 
 /// The context of a number from the sizes around it, in sixteenths: 0 to [`SIZES`] − 1.
 pub(crate) fn size_class(sixteenths: u32) -> usize {
-    const EDGES: [u32; SIZES - 1] = [1, 3, 5, 8, 12, 17, 24, 34, 48, 70, 100, 150, 230, 400, MOST];
-    const MOST: u32 = 900;
-    const CLASSES: [u8; MOST as usize + 1] = {
-        let mut classes = [0; MOST as usize + 1];
+    const EDGES: [u32; SIZES - 1] = [1, 3, 5, 8, 12, 17, 24, 34, 48, 70, 100, 150, 230, 400, LAST];
+    const LAST: u32 = 900;
+    const CLASSES: [u8; LAST as usize + 1] = {
+        let mut classes = [0; LAST as usize + 1];
         let mut size = 1;
         while size < classes.len() {
             let class = classes[size - 1];
@@ -286,7 +286,7 @@ pub(crate) fn size_class(sixteenths: u32) -> usize {
         }
         classes
     };
-    usize::from(CLASSES[sixteenths.min(MOST) as usize])
+    usize::from(CLASSES[sixteenths.min(LAST) as usize])
 }
 
 /// Classes of [`size_class`].
@@ -301,7 +301,7 @@ mod tests {
         let mut random = fastrand::Rng::with_seed(1);
         let numbers: Vec<i32> = (0..20_000)
             .map(|k| match k % 50 {
-                0 => random.i32(-(MOST as i32)..=MOST as i32),
+                0 => random.i32(-(MAX_SIZE as i32)..=MAX_SIZE as i32),
                 1..5 => random.i32(-40..40),
                 _ => i32::from(random.u8(..) < 20),
             })
@@ -342,7 +342,7 @@ mod tests {
             let mut decoder = Decoder::new(&bytes).unwrap();
             let mut models = Integers::new(1);
             for _ in 0..1_000 {
-                assert!(models.code(&mut decoder, 0, 0).unsigned_abs() <= MOST);
+                assert!(models.code(&mut decoder, 0, 0).unsigned_abs() <= MAX_SIZE);
                 models.natural(&mut decoder, 0, 0);
             }
         }

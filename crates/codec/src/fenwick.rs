@@ -13,12 +13,6 @@ impl Counted {
         Self { sums: vec![0; limit + 1], count: 0 }
     }
 
-    /// All of them.
-    pub(crate) fn all(limit: usize) -> Self {
-        let sums = (0..=limit as u32).map(|k| k & k.wrapping_neg()).collect();
-        Self { sums, count: limit as u32 }
-    }
-
     /// How many are in the set.
     pub(crate) fn count(&self) -> u32 {
         self.count

@@ -1,8 +1,7 @@
 //! Positions of a mesh at rest, on a grid.
 
-use crate::entropy::{Coder, Decoder, Encoder, Integers, MOST, SIZES, size_class};
+use crate::entropy::{Coder, Decoder, Encoder, Integers, MAX_SIZE, SIZES, size_class};
 use crate::error::{Error, Result};
-use crate::mesh::MeshVersion;
 use crate::parallelograms::Predictions;
 use crate::prediction_weights::{PredictionWeights, WEIGHTS_BYTES};
 use cager_core::mesh::{Point, Polygons, bounds};
@@ -25,7 +24,7 @@ impl Grid {
         let steps = (0..3).map(|k| (high[k] - low[k]) / step).fold(0.0, f64::max);
         let far = low.iter().chain(&high).any(|x| x.abs() > f64::from(f32::MAX));
         let finite = points.iter().flatten().all(|x| x.is_finite());
-        (!points.is_empty() && finite && step > 0.0 && steps.is_finite() && steps < f64::from(MOST >> 4) && !far)
+        (!points.is_empty() && finite && step > 0.0 && steps.is_finite() && steps < f64::from(MAX_SIZE >> 4) && !far)
             .then_some(Self { origin: low, step })
     }
 
@@ -56,31 +55,22 @@ pub fn encode_positions(grid: Grid, faces: &Polygons, points: &[Point]) -> Vec<u
     bytes
 }
 
-/// The positions that [`encode_positions`] wrote, or that earlier programs did, for the same faces in the same order.
+/// The positions that [`encode_positions`] wrote, for the same faces in the same order.
 ///
 /// # Errors
 /// Bytes that the encoder did not write.
-pub fn decode_positions(bytes: &[u8], version: MeshVersion, faces: &Polygons, points: usize) -> Result<Vec<Point>> {
+pub fn decode_positions(bytes: &[u8], faces: &Polygons, points: usize) -> Result<Vec<Point>> {
     const CUT: Error = Error::Damaged("positions are cut");
     let (head, coded) = bytes.split_first_chunk::<HEAD>().ok_or(CUT)?;
     let number = |k: usize| f64::from_le_bytes(std::array::from_fn(|byte| head[8 * k + byte]));
     let grid = Grid { origin: [number(0), number(1), number(2)], step: number(3) };
     let predictions = Predictions::new(faces, points);
-    let steps = match version {
-        MeshVersion::First => {
-            let mut coder = Decoder::new(coded)?;
-            let steps = read_first(&mut coder, &predictions, points);
-            coder.check().map(|()| steps)
-        }
-        MeshVersion::Second => {
-            let (weights, coded) = coded.split_first_chunk::<WEIGHTS_BYTES>().ok_or(CUT)?;
-            let mut coder = Decoder::new(coded)?;
-            let weights = PredictionWeights::from_bytes(*weights);
-            let steps = code(&mut coder, &predictions, &Adjacency::new(faces, points), weights, &[]);
-            coder.check().map(|()| steps)
-        }
-    };
-    Ok(steps?.into_iter().map(|steps| grid.position(steps)).collect())
+    let (weights, coded) = coded.split_first_chunk::<WEIGHTS_BYTES>().ok_or(CUT)?;
+    let mut coder = Decoder::new(coded)?;
+    let weights = PredictionWeights::from_bytes(*weights);
+    let steps = code(&mut coder, &predictions, &Adjacency::new(faces, points), weights, &[]);
+    coder.check()?;
+    Ok(steps.into_iter().map(|steps| grid.position(steps)).collect())
 }
 
 /// Codes steps by weighted predictions. How far those of neighbours were off says how large a number will be.
@@ -93,58 +83,30 @@ fn code(
 ) -> Vec<[i32; 3]> {
     let points = adjacency.points();
     let mut found = vec![[0i32; 3]; points];
-    // How far each was off; of those that are not known yet nothing.
-    let mut off: Vec<Option<[u32; 3]>> = vec![None; points];
+    // How far each was from where it was expected; of those that are not known yet nothing.
+    let mut residuals: Vec<Option<[u32; 3]>> = vec![None; points];
     let mut models = Integers::new(3 * SIZES);
     let mut before = 0;
     let mut known = Vec::new();
     for (vertex, triples, near) in predictions.iter() {
         known.clear();
-        known.extend(adjacency.of(vertex).iter().copied().filter(|&w| off[w as usize].is_some()));
+        known.extend(adjacency.of(vertex).iter().copied().filter(|&w| residuals[w as usize].is_some()));
         let mut sizes = [0; 3];
-        let mut so_far = 0;
+        let mut coded_so_far = 0;
         let expected = weights.expected(&found, triples, &known, (near != vertex).then_some(near));
         for k in 0..3 {
-            let of = |w: &u32| off[*w as usize].map_or(0, |off| u64::from(off[k]));
+            let of = |w: &u32| residuals[*w as usize].map_or(0, |sizes| u64::from(sizes[k]));
             let around = 6 * known.iter().map(of).sum::<u64>() / known.len().max(1) as u64;
-            let around = around.min(1 << 20) as u32 + 5 * (before / 8) + 5 * so_far;
+            let around = around.min(1 << 20) as u32 + 5 * (before / 8) + 5 * coded_so_far;
             let context = SIZES * triples.len().min(2) + size_class(around.min(1 << 20));
             let value = given.get(vertex).map_or(0, |steps| steps[k] - expected[k]);
             let value = models.code(coder, context, value);
             found[vertex][k] = value.saturating_add(expected[k]);
             sizes[k] = value.unsigned_abs().min(1 << 16);
-            so_far += sizes[k];
+            coded_so_far += sizes[k];
         }
-        before = (before + 8 * so_far / 3) / 2;
-        off[vertex] = Some(sizes);
-    }
-    found
-}
-
-/// Reads steps that were predicted by the mean of parallelograms: [`MeshVersion::First`].
-fn read_first(coder: &mut impl Coder, predictions: &Predictions, points: usize) -> Vec<[i32; 3]> {
-    let mut found = vec![[0i32; 3]; points];
-    let mut models = Integers::new(3 * SIZES);
-    let mut around = 0;
-    for (vertex, triples, near) in predictions.iter() {
-        let at = |v: u32, k: usize| i64::from(found[v as usize][k]);
-        let mut met = [0; 3];
-        let mut size = 0;
-        for k in 0..3 {
-            let expected = match triples.len() as i64 {
-                0 if near == vertex => 0,
-                0 => at(near as u32, k),
-                count => triples.iter().map(|&[a, b, c]| at(a, k) + at(b, k) - at(c, k)).sum::<i64>().div_euclid(count),
-            };
-            let most = i64::from(MOST);
-            let expected = expected.clamp(-most, most) as i32;
-            let context = SIZES * triples.len().min(2) + size_class((around + 6 * size).min(1 << 20));
-            let value = models.code(coder, context, 0);
-            met[k] = value.saturating_add(expected);
-            size += value.unsigned_abs().min(1 << 16);
-        }
-        around = (around + 8 * size / 3) / 2;
-        found[vertex] = met;
+        before = (before + 8 * coded_so_far / 3) / 2;
+        residuals[vertex] = Some(sizes);
     }
     found
 }
@@ -162,7 +124,7 @@ mod tests {
         for step in [10.0, 1e-2, 1e-4] {
             let grid = Grid::new(&points, step).unwrap();
             let bytes = encode_positions(grid, &faces, &points);
-            let back = decode_positions(&bytes, MeshVersion::Second, &faces, points.len()).unwrap();
+            let back = decode_positions(&bytes, &faces, points.len()).unwrap();
             for (&a, b) in points.iter().zip(&back) {
                 assert_eq!(grid.nearest(a), *b);
                 assert!((0..3).all(|k| (a[k] - b[k]).abs() <= 0.5 * step + 1e-5));
@@ -178,10 +140,8 @@ mod tests {
         let mut random = fastrand::Rng::with_seed(6);
         for _ in 0..200 {
             let bytes: Vec<u8> = (0..4 * random.usize(..40)).map(|_| random.u8(..)).collect();
-            for version in [MeshVersion::First, MeshVersion::Second] {
-                if let Ok(points) = decode_positions(&bytes, version, &Polygons::new(), 50) {
-                    assert_eq!(points.len(), 50);
-                }
+            if let Ok(points) = decode_positions(&bytes, &Polygons::new(), 50) {
+                assert_eq!(points.len(), 50);
             }
         }
     }

@@ -42,8 +42,8 @@ impl Models for Histograms {
     }
 
     fn code(&mut self, _: &mut impl Coder, context: usize, value: i32) -> i32 {
-        const MOST: i32 = UNARY as i32 + 1;
-        self.contexts[context][(MOST + value.clamp(-MOST, MOST)) as usize] += 1;
+        const MAX: i32 = UNARY as i32 + 1;
+        self.contexts[context][(MAX + value.clamp(-MAX, MAX)) as usize] += 1;
         let size = value.unsigned_abs();
         self.modelled += f64::from(1 + (size + 1).min(UNARY));
         if size > UNARY {

@@ -23,23 +23,22 @@ mod parallelograms;
 mod prediction_weights;
 mod residual;
 mod trajectories;
-mod vertex_names;
 mod vertex_order;
 mod walk;
 
 pub use basis::CageBasis;
-pub use cage::{Neighbours, decode_cages, encode_cages, is_rotated};
+pub use cage::{AdjacentGroups, decode_cages, encode_cages, is_rotated};
 pub use connectivity::decode_faces;
 pub use error::Error;
 pub use frame_errors::{decode_errors, encode_errors, rounded_error};
 pub use grid::{Grid, decode_positions, encode_positions};
 pub use hierarchy::Hierarchy;
-pub use mesh::{CodedMesh, MeshVersion};
+pub use mesh::CodedMesh;
 pub use residual::{Residual, ResidualGroup, encode_residual, estimate_residual};
 
 /// Most positions of one group of frames, points times frames: what decoding one holds in memory follows from it.
-pub const MOST_POSITIONS: usize = 1 << 26;
+pub const MAX_POSITIONS: usize = 1 << 26;
 /// Most frames of a group.
-pub const MOST_FRAMES: usize = 1024;
+pub const MAX_FRAMES: usize = 1024;
 /// Most rows of a cage.
-pub const MOST_ROWS: usize = 4096;
+pub const MAX_ROWS: usize = 4096;

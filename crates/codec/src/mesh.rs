@@ -5,15 +5,6 @@ use crate::error::{Error, Result};
 use crate::grid::{Grid, decode_positions, encode_positions};
 use cager_core::mesh::{Model, Point, Polygons};
 
-/// How a mesh was coded.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum MeshVersion {
-    /// Codec 3 of a container: the numbers of vertices come within the faces, and positions are predicted by parallelograms alone.
-    First,
-    /// Codec 4: numbers come after the faces, and what predicts positions is weighted.
-    Second,
-}
-
 /// A mesh as bytes, and what they decode to: the same vertices and polygons, the polygons in another order.
 #[derive(Clone, Debug)]
 pub struct CodedMesh {
@@ -54,12 +45,9 @@ impl CodedMesh {
 
     fn of(mesh: &Model, grid: Grid, ordered: Polygons, faces: Vec<u8>, positions: Vec<u8>) -> Self {
         let points: Vec<Point> = mesh.points.iter().map(|&point| grid.nearest(point)).collect();
-        let (version, count) = (MeshVersion::Second, points.len());
-        debug_assert_eq!(
-            decode_faces(&faces, version, count, ordered.len(), ordered.indices().len()),
-            Ok(ordered.clone())
-        );
-        debug_assert_eq!(decode_positions(&positions, version, &ordered, count), Ok(points.clone()));
+        let count = points.len();
+        debug_assert_eq!(decode_faces(&faces, count, ordered.len(), ordered.indices().len()), Ok(ordered.clone()));
+        debug_assert_eq!(decode_positions(&positions, &ordered, count), Ok(points.clone()));
         Self { mesh: Model { points, faces: ordered, colors: mesh.colors.clone() }, faces, positions }
     }
 

@@ -1,7 +1,7 @@
 //! What predicts the position of a vertex at rest from those known before it: parallelograms, and the mean of its neighbours, each by a weight that the encoder
 //! fits to the mesh. Meshes of scanners need the mean, those of modellers the parallelograms.
 
-use crate::entropy::MOST;
+use crate::entropy::MAX_SIZE;
 use crate::parallelograms::Predictions;
 use cager_geometry::topology::Adjacency;
 
@@ -66,7 +66,7 @@ impl PredictionWeights {
         near: Option<usize>,
     ) -> [i32; 3] {
         if triples.is_empty() {
-            let most = MOST as i32;
+            let most = MAX_SIZE as i32;
             return near.map_or([0; 3], |near| found[near].map(|steps| steps.clamp(-most, most)));
         }
         let weights = self.0[class(triples)].map(i64::from);
@@ -74,7 +74,7 @@ impl PredictionWeights {
             let Terms { middle, differences } = terms(found, triples, known, k);
             let sum = PARTS * middle + weights[0] * differences[0] + weights[1] * differences[1];
             let nearest = (sum + PARTS * PARTS / 2).div_euclid(PARTS * PARTS);
-            nearest.clamp(-i64::from(MOST), i64::from(MOST)) as i32
+            nearest.clamp(-i64::from(MAX_SIZE), i64::from(MAX_SIZE)) as i32
         })
     }
 }

@@ -6,12 +6,12 @@
 use crate::cage::step_and_count;
 use crate::components::{Component, Components, Models, PARTS, pieces};
 use crate::corrections::Corrections;
-use crate::entropy::{Decoder, Encoder, Integers, MOST};
+use crate::entropy::{Decoder, Encoder, Integers, MAX_SIZE};
 use crate::error::{Error, Result};
 use crate::hierarchy::Hierarchy;
 use crate::histograms::Histograms;
 use crate::trajectories::{Trajectories, fit};
-use crate::{MOST_FRAMES, MOST_POSITIONS, trajectories};
+use crate::{MAX_FRAMES, MAX_POSITIONS, trajectories};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use rayon::prelude::*;
@@ -88,7 +88,7 @@ struct Contents<'a, M> {
 impl<'a, M: Models> Contents<'a, M> {
     fn new(hierarchy: &'a Hierarchy, group: &ResidualGroup<'_>) -> Option<Self> {
         let (points, frames) = (hierarchy.points(), group.captured.len());
-        assert!(frames == group.of_cages.len() && frames <= MOST_FRAMES && points * frames <= MOST_POSITIONS);
+        assert!(frames == group.of_cages.len() && frames <= MAX_FRAMES && points * frames <= MAX_POSITIONS);
         assert!(group.captured.iter().all(|frame| frame.len() == 3 * points));
         let mut motion = Mat::<f64>::zeros(3 * points, frames);
         motion.par_col_iter_mut().enumerate().for_each(|(t, column)| {
@@ -102,7 +102,7 @@ impl<'a, M: Models> Contents<'a, M> {
         let values = fit(chosen.values().as_ref(), motion.as_ref())?;
         drop(motion);
         let per_unit = PARTS as f64 / group.step;
-        let most = f64::from(MOST) / per_unit;
+        let most = f64::from(MAX_SIZE) / per_unit;
         let mut coders: [Encoder; 2] = Default::default();
         chosen.code(&mut coders[0], frames, count);
         let mut decoded = Residual::new(&chosen, points);
@@ -169,7 +169,7 @@ impl Residual {
     /// Bytes that the encoder did not write.
     pub fn decode(hierarchy: &Hierarchy, frames: usize, bytes: &[u8], most: usize) -> Result<Self> {
         let points = hierarchy.points();
-        if frames > MOST_FRAMES || points.saturating_mul(frames) > MOST_POSITIONS {
+        if frames > MAX_FRAMES || points.saturating_mul(frames) > MAX_POSITIONS {
             return Err(Error::Damaged("a group has too many positions"));
         }
         let (head, rest) = bytes.split_first_chunk::<HEAD>().ok_or(Error::Damaged("a residual is cut"))?;
@@ -413,6 +413,6 @@ mod tests {
             }
         }
         assert!(refused > 20, "{refused}");
-        assert!(Residual::decode(&hierarchy, MOST_FRAMES + 1, &bytes, usize::MAX).is_err());
+        assert!(Residual::decode(&hierarchy, MAX_FRAMES + 1, &bytes, usize::MAX).is_err());
     }
 }

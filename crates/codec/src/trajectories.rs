@@ -10,7 +10,7 @@ const WORTH: f64 = 0.3 / 12.0;
 /// Added to the size of an entry of E before it is rounded down: small ones cost more than they are worth.
 const ROUND_UP: f64 = 0.35;
 /// Largest number of binary digits of an entry of E.
-const MOST_DIGITS: u32 = 26;
+const MAX_DIGITS: u32 = 26;
 
 /// Fewest rows of one part of a sum over all of them, and most parts.
 const BLOCK_ROWS: usize = 2048;
@@ -46,7 +46,7 @@ impl Trajectories {
         // An entry's error times the component's length is an error of the values: coded to the same step.
         let digits: Vec<u32> = energies[..count]
             .iter()
-            .map(|energy| ((energy.sqrt() / step).log2().ceil().max(2.0) as u32).min(MOST_DIGITS))
+            .map(|energy| ((energy.sqrt() / step).log2().ceil().max(2.0) as u32).min(MAX_DIGITS))
             .collect();
         let whole = |k: usize| {
             let unit = (digits[k] as f64).exp2();
@@ -61,7 +61,7 @@ impl Trajectories {
     /// too high to be counted.
     pub(crate) fn push_pulse(&mut self, frame: usize, height: f64) -> Option<f64> {
         let digits = PULSE_DIGITS - height.log2().floor();
-        if !(2.0..=f64::from(MOST_DIGITS)).contains(&digits) {
+        if !(2.0..=f64::from(MAX_DIGITS)).contains(&digits) {
             return None;
         }
         let part = |t: usize| t.abs_diff(frame).min(PULSE_FRAMES) as f64 / PULSE_FRAMES as f64;
@@ -87,7 +87,7 @@ impl Trajectories {
         for k in 0..count {
             let digits = self.digits.get(k).copied().unwrap_or(0);
             before += lengths.code(coder, 0, digits as i32 - before);
-            before = before.clamp(0, MOST_DIGITS as i32);
+            before = before.clamp(0, MAX_DIGITS as i32);
             found.digits.push(before as u32);
             let (mut last, mut last_but_one) = (0, 0);
             for t in 0..frames {

@@ -3,14 +3,14 @@
 //! Whatever made a mesh numbered neighbours soon after each other. So all vertices stand in a list, those near the ones numbered last in front, and each vertex
 //! is told by its place in the list.
 
-use crate::entropy::{Bit, Coder, SIZES, size_class};
+use crate::entropy::{BinaryModel, Coder, SIZES, size_class};
 use crate::fenwick::Counted;
 use cager_geometry::topology::Adjacency;
 
 /// Vertices with more neighbours move none of them when one of these is numbered.
-const MOST_PASSED_ON: usize = 16;
+const MAX_PASSED_ON: usize = 16;
 /// Most points for which neighbours of neighbours are moved too: that takes several times as long.
-pub(crate) const MOST_FAR_POINTS: usize = 1 << 17;
+pub(crate) const MAX_FAR_POINTS: usize = 1 << 17;
 
 /// Codes the numbers of vertices: `given` and the result are the vertex of each number, as the faces name it. `is_far` says that neighbours of neighbours
 /// are moved to the front too. `None` where what is read is no vertex.
@@ -32,7 +32,7 @@ pub(crate) fn code_order(
         let neighbours = adjacency.of(vertex as usize);
         if is_far {
             let passing = neighbours.iter().map(|&w| adjacency.of(w as usize));
-            near.extend(passing.filter(|list| list.len() <= MOST_PASSED_ON).flatten());
+            near.extend(passing.filter(|list| list.len() <= MAX_PASSED_ON).flatten());
             list.move_to_front(&mut near);
         }
         near.extend(neighbours);
@@ -111,14 +111,14 @@ impl RecencyList {
 
 /// Models of places: the number of binary digits of the place plus one, in the context of the place before; then the digits.
 struct Places {
-    digits: Vec<[Bit; 32]>,
-    leading: [[Bit; 4]; 32],
+    digits: Vec<[BinaryModel; 32]>,
+    leading: [[BinaryModel; 4]; 32],
     before: u32,
 }
 
 impl Default for Places {
     fn default() -> Self {
-        Self { digits: vec![[Bit::default(); 32]; SIZES], leading: Default::default(), before: 0 }
+        Self { digits: vec![[BinaryModel::default(); 32]; SIZES], leading: Default::default(), before: 0 }
     }
 }
 

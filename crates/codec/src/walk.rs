@@ -1,18 +1,28 @@
 //! The walk over a mesh, from a face across an edge to the next, as encoder and decoder take it.
 
-use crate::entropy::{Bit, Coder, Integers};
-use crate::gates::{Gates, MOST_TO_COME};
+use crate::entropy::{BinaryModel, Coder, Integers};
+use crate::gates::{Gates, MAX_TO_COME};
 use crate::open_edges::{NEWEST, OpenEdges};
-use crate::vertex_names::{Names, UNMET};
 
 /// Faces at a vertex are told apart up to this number.
-const MOST_FACES: u32 = 8;
+const MAX_FACES: u32 = 8;
 /// Pairs of such numbers.
-const PAIRS: usize = (MOST_FACES as usize + 1).pow(2);
+const PAIRS: usize = (MAX_FACES as usize + 1).pow(2);
 /// Open edges of a vertex that are sorted anew with it, in either direction: ordinary meshes have no more.
-const MOST_NEARER: usize = 4;
+const MAX_NEARER: usize = 4;
 /// Vertices that a corner is looked for among, those that open edges lead to.
-const MOST_NEAR: usize = 8;
+const MAX_NEAR: usize = 8;
+
+/// The turn of vertices that were not met yet.
+const UNVISITED: u32 = u32::MAX;
+
+/// What vertices are called.
+pub(crate) enum VertexLabels {
+    /// What the faces call them that are encoded; the faces at each.
+    Given(Vec<u32>),
+    /// By their turn.
+    TraversalOrder,
+}
 
 /// What the walk knows of the mesh.
 pub(crate) struct Walk {
@@ -22,7 +32,7 @@ pub(crate) struct Walk {
     /// The vertices that were met, in order, and the place of each in it.
     met: Vec<u32>,
     pub(crate) turns: Vec<u32>,
-    /// Faces that each vertex still is a corner of; of [`crate::mesh::MeshVersion::First`] those that it was of.
+    /// Faces that each vertex still is a corner of.
     faces: Vec<u32>,
     /// The last face, counted from 1, that each vertex is a corner of, and the face that is coded.
     of_face: Vec<u32>,
@@ -31,38 +41,38 @@ pub(crate) struct Walk {
     arity: u32,
     /// Corners that are not coded yet: a damaged face has no more.
     corners_left: usize,
-    across: Vec<Bit>,
+    across: Vec<BinaryModel>,
     /// Whether faces follow that begin anywhere.
-    pub(crate) more: Bit,
-    same_arity: Bit,
-    first_time: Vec<Bit>,
-    place: Vec<Bit>,
+    pub(crate) more: BinaryModel,
+    same_arity: BinaryModel,
+    first_time: Vec<BinaryModel>,
+    place: Vec<BinaryModel>,
     arities: Integers,
     face_counts: Integers,
-    names: Names,
+    labels: VertexLabels,
 }
 
 impl Walk {
-    pub(crate) fn new(points: usize, corners: usize, gates: Gates, names: Names) -> Self {
+    pub(crate) fn new(points: usize, corners: usize, labels: VertexLabels) -> Self {
         Self {
             leaving: std::iter::repeat_with(OpenEdges::default).take(points).collect(),
             arriving: std::iter::repeat_with(OpenEdges::default).take(points).collect(),
             met: Vec::new(),
-            turns: vec![UNMET; points],
+            turns: vec![UNVISITED; points],
             faces: vec![0; points],
             of_face: vec![0; points],
             face: 0,
-            gates,
+            gates: Gates::default(),
             arity: 3,
             corners_left: corners,
-            across: vec![Bit::default(); 9],
-            more: Bit::default(),
-            same_arity: Bit::default(),
-            first_time: vec![Bit::default(); 2 * PAIRS],
-            place: vec![Bit::default(); 8 * MOST_NEAR],
+            across: vec![BinaryModel::default(); 9],
+            more: BinaryModel::default(),
+            same_arity: BinaryModel::default(),
+            first_time: vec![BinaryModel::default(); 2 * PAIRS],
+            place: vec![BinaryModel::default(); 8 * MAX_NEAR],
             arities: Integers::new(1),
             face_counts: Integers::new(1),
-            names,
+            labels,
         }
     }
 
@@ -76,10 +86,6 @@ impl Walk {
         None
     }
 
-    fn is_first_version(&self) -> bool {
-        matches!(self.names, Names::Numbers(_))
-    }
-
     /// Fewest faces that are to come at an end of an edge.
     fn to_come(&self, (a, b): (u32, u32)) -> u32 {
         self.faces[a as usize].min(self.faces[b as usize])
@@ -88,7 +94,7 @@ impl Walk {
     /// Sorts the open edges of a vertex anew where none of their ends has fewer faces to come.
     fn requeue_open_edges(&mut self, v: u32) {
         let faces = self.faces[v as usize];
-        if faces >= MOST_TO_COME {
+        if faces >= MAX_TO_COME {
             return;
         }
         let mut scratch = [0; NEWEST];
@@ -107,8 +113,7 @@ impl Walk {
     /// Codes whether a face follows across a gate.
     pub(crate) fn code_across(&mut self, coder: &mut impl Coder, (a, b): (u32, u32), follows: bool) -> bool {
         let to_come = |v: u32| self.faces[v as usize].min(2) as usize;
-        let context = if self.is_first_version() { 0 } else { 3 * to_come(a) + to_come(b) };
-        coder.bit(&mut self.across[context], follows)
+        coder.bit(&mut self.across[3 * to_come(a) + to_come(b)], follows)
     }
 
     /// The edge from a to b waits no longer.
@@ -151,9 +156,7 @@ impl Walk {
                 opened.push((from, to));
             }
             let faces = self.faces[from as usize];
-            if self.is_first_version() {
-                self.faces[from as usize] = faces + 1;
-            } else if faces > 0 {
+            if faces > 0 {
                 self.faces[from as usize] = faces - 1;
                 nearer.push(from);
             }
@@ -194,20 +197,15 @@ impl Walk {
                 k += 1;
             }
         }
-        near.truncate(MOST_NEAR);
-        let faces = |v: u32| self.faces[v as usize].min(MOST_FACES);
-        let pair = ((MOST_FACES + 1) * faces(previous) + faces(first)) as usize;
+        near.truncate(MAX_NEAR);
+        let faces = |v: u32| self.faces[v as usize].min(MAX_FACES);
+        let pair = ((MAX_FACES + 1) * faces(previous) + faces(first)) as usize;
         let ends = usize::from(faces(previous) == 1) + 2 * usize::from(faces(first) == 1);
-        let (context, ends) = match (both, self.is_first_version()) {
-            (true, true) => (PAIRS, 0),
-            (false, true) => (pair, 0),
-            (both, false) => (PAIRS * usize::from(both) + pair, ends),
-        };
-        let new = self.is_unmet(given);
-        if coder.bit(&mut self.first_time[context], new) {
-            return self.new_vertex(coder, previous.max(first), given);
+        let new = self.is_unvisited(given);
+        if coder.bit(&mut self.first_time[PAIRS * usize::from(both) + pair], new) {
+            return self.new_vertex(coder, given);
         }
-        let context = MOST_NEAR * (2 * ends + usize::from(both));
+        let context = MAX_NEAR * (2 * ends + usize::from(both));
         for (k, &x) in near.iter().enumerate() {
             if !coder.bit(&mut self.place[context + k], x != given) {
                 return x;
@@ -218,33 +216,29 @@ impl Walk {
 
     /// A corner of the first face of a part.
     fn any(&mut self, coder: &mut impl Coder, given: u32) -> u32 {
-        let new = self.is_unmet(given);
+        let new = self.is_unvisited(given);
         if coder.bit(&mut self.first_time[0], new) {
-            let last = self.met.last().copied().unwrap_or(0);
-            self.new_vertex(coder, last, given)
+            self.new_vertex(coder, given)
         } else {
             self.met_vertex(coder, given)
         }
     }
 
-    fn is_unmet(&self, vertex: u32) -> bool {
-        self.turns.get(vertex as usize).is_none_or(|&turn| turn == UNMET)
+    fn is_unvisited(&self, vertex: u32) -> bool {
+        self.turns.get(vertex as usize).is_none_or(|&turn| turn == UNVISITED)
     }
 
-    /// A vertex met for the first time, `near` another.
-    fn new_vertex(&mut self, coder: &mut impl Coder, near: u32, given: u32) -> u32 {
+    /// A vertex met for the first time.
+    fn new_vertex(&mut self, coder: &mut impl Coder, given: u32) -> u32 {
         let turn = self.met.len() as u32;
-        let (vertex, faces) = match &mut self.names {
-            Names::Given(faces) => (given, faces[given as usize]),
-            Names::Turns => (turn, 1),
-            Names::Numbers(numbers) => (numbers.read(coder, near), 0),
+        let (vertex, faces) = match &self.labels {
+            VertexLabels::Given(faces) => (given, faces[given as usize]),
+            VertexLabels::TraversalOrder => (turn, 1),
         };
-        if !self.is_first_version() && (vertex as usize) < self.faces.len() {
-            // Of the first face of all it is a corner now.
-            self.faces[vertex as usize] = self.face_counts.natural(coder, 0, faces - 1).saturating_add(1);
-        }
         if let Some(place) = self.turns.get_mut(vertex as usize) {
             *place = turn;
+            // Of the first face of all it is a corner now.
+            self.faces[vertex as usize] = self.face_counts.natural(coder, 0, faces - 1).saturating_add(1);
             self.met.push(vertex);
         }
         vertex
@@ -252,21 +246,18 @@ impl Walk {
 
     /// A vertex that was met, but that nothing leads to.
     fn met_vertex(&mut self, coder: &mut impl Coder, given: u32) -> u32 {
-        if let Names::Numbers(_) = self.names {
-            return coder.bits(32, 0);
-        }
         let turn = self.turns.get(given as usize).copied().unwrap_or(0);
         let turn = coder.bits(u32::BITS - (self.met.len() as u32).leading_zeros(), turn);
-        self.met.get(turn as usize).copied().unwrap_or(UNMET)
+        self.met.get(turn as usize).copied().unwrap_or(UNVISITED)
     }
 
     /// Gives the vertices of no face the last turns.
     pub(crate) fn number_isolated_vertices(&mut self) {
-        let unmet = self.turns.iter_mut().filter(|turn| **turn == UNMET);
-        unmet.zip(self.met.len() as u32..).for_each(|(turn, next)| *turn = next);
+        let unvisited = self.turns.iter_mut().filter(|turn| **turn == UNVISITED);
+        unvisited.zip(self.met.len() as u32..).for_each(|(turn, next)| *turn = next);
     }
 }
 
 fn last_few(ends: &[u32]) -> &[u32] {
-    &ends[ends.len().saturating_sub(MOST_NEARER)..]
+    &ends[ends.len().saturating_sub(MAX_NEARER)..]
 }

@@ -3,7 +3,7 @@
 
 use super::{byte, mend, u64_at};
 use crate::Target;
-use cager_codec::{CageBasis, CodedMesh, Hierarchy, Neighbours, ResidualGroup, encode_cages, encode_residual};
+use cager_codec::{AdjacentGroups, CageBasis, CodedMesh, Hierarchy, ResidualGroup, encode_cages, encode_residual};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_core::mesh::{Model, Polygons, TriMesh};
@@ -56,7 +56,7 @@ fn seeds() -> Vec<Vec<u8>> {
     let points = cage.vertices.iter().map(|p| p.map(|x| 0.1 + x / 3.0)).collect();
     let rest = Model { points, faces, colors: vec![[200, 0, 7]; 4] };
     let header = Header {
-        coordinates_definition: 1,
+        coordinates_definition: 3,
         coordinates: "mvc".to_owned(),
         handles: "maxvol".to_owned(),
         regularizer: "laplacian".to_owned(),
@@ -98,7 +98,7 @@ fn coded(header: &Header, rest: &Model, cage: &TriMesh) -> Vec<u8> {
     let frames: Vec<Vec<f32>> =
         (0..5u8).map(|k| (0..12u8).map(|i| f32::from(i) * 0.1 + f32::from(k) * 0.05).collect()).collect();
     let views: Vec<&[f32]> = frames.iter().map(Vec::as_slice).collect();
-    let cages = encode_cages(&basis, &views, 0.01, Neighbours::default()).expect("cages");
+    let cages = encode_cages(&basis, &views, 0.01, AdjacentGroups::default()).expect("cages");
     let captured: Vec<Vec<f64>> =
         frames.iter().map(|frame| frame.iter().map(|&x| f64::from(x) + 0.1).collect()).collect();
     let captured: Vec<&[f64]> = captured.iter().map(Vec::as_slice).collect();

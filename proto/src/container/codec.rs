@@ -10,9 +10,9 @@ pub(crate) const RAW: u8 = 0;
 pub(crate) const PLANES: u8 = 1;
 /// Elements are 32-bit words; each less the word one stride before it, zigzag, byte planes, zstd.
 pub(crate) const DIFFERENCE: u8 = 2;
-/// Whole numbers of the `cager-codec` crate; what they are depends on the section.
+/// Whole numbers of the `cager-codec` crate: cages of a group of frames, or what they leave of the positions.
 pub(crate) const CODED: u8 = 3;
-/// Whole numbers of a mesh at rest, where files of earlier programs have [`CODED`], and of the errors of frames.
+/// Whole numbers of a mesh at rest or of the errors of frames.
 pub(crate) const CODED_STATIC: u8 = 4;
 
 /// Whether a section is whole numbers.

@@ -1,16 +1,15 @@
 //! Sections of whole numbers: meshes, groups of cages and what is added to their positions, by the `cager-codec` crate.
 
-use super::codec::{CODED, is_coded};
+use super::codec::{CODED, CODED_STATIC};
 use super::contents::Entry;
 use super::reader::ContainerReader;
 use super::section::SectionHeader;
 use super::{Error, tag};
 use cager_codec::{
-    CageBasis, Hierarchy, MOST_ROWS, MeshVersion, Residual, decode_cages, decode_errors, decode_faces,
-    decode_positions, is_rotated,
+    CageBasis, Hierarchy, MAX_ROWS, Residual, decode_cages, decode_errors, decode_faces, decode_positions, is_rotated,
 };
 use cager_core::cage::Cage;
-use cager_core::coordinates::{self, CoordinateSystem, Coordinates, ElementPlan, supports_definition};
+use cager_core::coordinates::{self, CoordinateSystem, Coordinates, DEFINITION, ElementPlan};
 use cager_core::mesh::{Point, Polygons};
 use std::io::{Read, Seek};
 
@@ -45,17 +44,16 @@ impl Binding {
 /// The bytes of a section.
 pub(super) struct CodedSection {
     pub(super) offset: u64,
-    version: MeshVersion,
     payload: Vec<u8>,
 }
 
 impl CodedSection {
     pub(super) fn faces(&self, points: usize, count: usize, corners: usize) -> Result<Polygons, Error> {
-        decode_faces(&self.payload, self.version, points, count, corners).map_err(|e| self.damaged(&e))
+        decode_faces(&self.payload, points, count, corners).map_err(|e| self.damaged(&e))
     }
 
     pub(super) fn positions(&self, faces: &Polygons, count: usize) -> Result<Vec<Point>, Error> {
-        let points = decode_positions(&self.payload, self.version, faces, count).map_err(|e| self.damaged(&e))?;
+        let points = decode_positions(&self.payload, faces, count).map_err(|e| self.damaged(&e))?;
         match points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
             Some(k) => Err(Error::corrupt(self.offset, format!("position {k} is not finite"))),
             None => Ok(points),
@@ -63,9 +61,6 @@ impl CodedSection {
     }
 
     pub(super) fn errors(&self, frames: usize) -> Result<Vec<[f32; 2]>, Error> {
-        if self.version == MeshVersion::First {
-            return Err(Error::UnknownSection("codec 3 of errors".to_owned()));
-        }
         decode_errors(&self.payload, frames).map_err(|e| self.damaged(&e))
     }
 
@@ -83,10 +78,10 @@ impl CodedSection {
 }
 
 impl<R: Read + Seek> ContainerReader<R> {
-    /// A section's bytes where it is coded.
+    /// The bytes of a mesh or of errors where they are coded.
     pub(super) fn coded(&mut self, tag: [u8; 4]) -> Result<Option<CodedSection>, Error> {
         let entry = self.entry(tag)?;
-        if is_coded(entry.header.codec) { self.coded_entry(entry).map(Some) } else { Ok(None) }
+        if entry.header.codec == CODED_STATIC { self.coded_entry(entry).map(Some) } else { Ok(None) }
     }
 
     fn coded_entry(&mut self, entry: Entry) -> Result<CodedSection, Error> {
@@ -120,13 +115,13 @@ impl<R: Read + Seek> ContainerReader<R> {
         let Some(system) = coordinates::by_name(&header.coordinates) else {
             return Err(unsupported(format!("coordinates {}", header.coordinates)));
         };
-        if !supports_definition(header.coordinates_definition) {
+        if header.coordinates_definition != DEFINITION {
             return Err(unsupported(format!("coordinates of definition {}", header.coordinates_definition)));
         }
         let corrupt = |what: String| Error::corrupt(offset, what);
         let points = self.rest()?.points;
         let cage = Cage::new(self.cage()?).map_err(|e| corrupt(e.to_string()))?;
-        if system.unknowns(&cage) != header.rows_per_frame as usize || system.unknowns(&cage) > MOST_ROWS {
+        if system.unknowns(&cage) != header.rows_per_frame as usize || system.unknowns(&cage) > MAX_ROWS {
             return Err(corrupt(format!("a frame has {} rows", header.rows_per_frame)));
         }
         let plan = self.elements()?.map(ElementPlan::from_bytes);
@@ -253,8 +248,7 @@ impl<R: Read + Seek> ContainerReader<R> {
     }
 
     fn coded_payload(&mut self, entry: Entry) -> Result<CodedSection, Error> {
-        let version = if entry.header.codec == CODED { MeshVersion::First } else { MeshVersion::Second };
-        Ok(CodedSection { offset: entry.offset, version, payload: self.payload(entry)? })
+        Ok(CodedSection { offset: entry.offset, payload: self.payload(entry)? })
     }
 
     /// Reads every residual.

@@ -32,7 +32,7 @@ const GROUP_FRAMES: usize = 256;
 
 /// Frames of a coded group of so many points and rows a frame, so that readers can decode it in little memory.
 pub fn group_frames(points: usize, rows: usize) -> usize {
-    let fitting = (cager_codec::MOST_POSITIONS / points.max(1)).min((2 << 20) / (12 * rows.max(1)));
+    let fitting = (cager_codec::MAX_POSITIONS / points.max(1)).min((2 << 20) / (12 * rows.max(1)));
     fitting.clamp(1, GROUP_FRAMES)
 }
 

@@ -31,7 +31,7 @@ pub fn small_model() -> Model {
 
 pub fn header(rows: u32) -> Header {
     Header {
-        coordinates_definition: 1,
+        coordinates_definition: 3,
         coordinates: "mvc".to_owned(),
         handles: "maxvol".to_owned(),
         regularizer: "laplacian".to_owned(),

@@ -47,7 +47,7 @@ function named(face: number[]): string {
 }
 
 describe('the errors of frames', () => {
-  const payload = payloadsOf('connected-static.cager').get('ERRS')!;
+  const payload = payloadsOf('connected.cager').get('ERRS')!;
 
   it('are those that the program reads', () => {
     const { l2, linf } = decodeFrameErrors(payload, 6);
@@ -68,13 +68,13 @@ describe('the errors of frames', () => {
   });
 });
 
-it.each(['connected-static.cager', 'chessboard.cager'])(
+it.each(['connected.cager', 'chessboard.cager'])(
   'damage of the static sections of %s is an error or numbers of the mesh',
   (name) => {
     const payloads = payloadsOf(name);
     const { points, restFaces, restCorners } = parseHead(payloads.get('HEAD')!, 0);
     const [faces, positions, errors] = ['RFAC', 'RPTS', 'ERRS'].map((tag) => payloads.get(tag)!);
-    const polygons = decodeFaces(faces, 'second', points, restFaces, restCorners);
+    const polygons = decodeFaces(faces, points, restFaces, restCorners);
     const attempt = <T>(decode: () => T, check: (found: T) => void) => {
       try {
         check(decode());
@@ -84,14 +84,14 @@ it.each(['connected-static.cager', 'chessboard.cager'])(
     };
     const attemptAll = (change: (bytes: Uint8Array) => Uint8Array) => {
       attempt(
-        () => decodeFaces(change(faces), 'second', points, restFaces, restCorners),
+        () => decodeFaces(change(faces), points, restFaces, restCorners),
         ({ counts, corners }) => {
           expect(counts.reduce((sum, count) => sum + count, 0)).toBe(corners.length);
           expect(corners.every((vertex) => vertex < points)).toBe(true);
         },
       );
       attempt(
-        () => decodePositions(change(positions), 'second', polygons, points),
+        () => decodePositions(change(positions), polygons, points),
         (found) => expect(found.length).toBe(3 * points),
       );
       attempt(
@@ -109,7 +109,7 @@ it.each(['connected-static.cager', 'chessboard.cager'])(
         return changed;
       });
     }
-    expect(() => decodeFaces(faces, 'second', points, restFaces + 1, restCorners)).toThrow(CodedDataError);
-    expect(() => decodeFaces(faces, 'second', points, restFaces, restCorners - 1)).toThrow(CodedDataError);
+    expect(() => decodeFaces(faces, points, restFaces + 1, restCorners)).toThrow(CodedDataError);
+    expect(() => decodeFaces(faces, points, restFaces, restCorners - 1)).toThrow(CodedDataError);
   },
 );

@@ -5,13 +5,11 @@
 
 import { adjacency } from './adjacency';
 import { CodedDataError } from './error';
-import { FewestToComeFirst, type Gate, type Gates, MOST_TO_COME, NewestFirst, OldestFirst } from './gates';
+import { type Gate, Gates, MOST_TO_COME } from './gates';
 import { IntegerModels } from './integers';
-import type { MeshVersion } from './meshVersion';
 import { OpenEdges } from './openEdges';
 import type { Polygons } from './polygons';
 import { BinaryModels, RangeDecoder } from './rangeDecoder';
-import { Numbers, Turns, type VertexNames } from './vertexNames';
 import { MOST_FAR_POINTS, decodeOrder } from './vertexOrder';
 
 /** Faces at a vertex are told apart up to this number less one. */
@@ -31,20 +29,9 @@ const WRONG_COUNTS = 'faces are not those that the header counts';
  *
  * @throws {CodedDataError} for bytes that the encoder did not write.
  */
-export function decodeFaces(
-  bytes: Uint8Array,
-  version: MeshVersion,
-  points: number,
-  faces: number,
-  corners: number,
-): Polygons {
+export function decodeFaces(bytes: Uint8Array, points: number, faces: number, corners: number): Polygons {
   const decoder = new RangeDecoder(bytes);
-  if (version === 'first') {
-    const gates = decoder.bits(1) === 1 ? new OldestFirst() : new NewestFirst();
-    return new Walk(decoder, version, gates, new Numbers(points), points, faces, corners).run();
-  }
-  const names = new Turns(points);
-  const polygons = new Walk(decoder, version, new FewestToComeFirst(), names, points, faces, corners).run();
+  const polygons = new Walk(decoder, points, faces, corners).run();
   const isFar = decoder.bits(1) === 1;
   if (isFar && points > MOST_FAR_POINTS) {
     throw new CodedDataError('the order of so many vertices cannot have been written');
@@ -54,17 +41,18 @@ export function decodeFaces(
   return { counts: polygons.counts, corners: polygons.corners.map((vertex) => numbers[vertex]) };
 }
 
+/** Vertices are called by their turn: the numbers of the mesh follow after the faces. */
 class Walk {
-  private readonly isFirst: boolean;
   /** Ends of the directed edges that wait for their opposite, by where these begin, and the other way round. */
   private readonly leaving: OpenEdges[];
   private readonly arriving: OpenEdges[];
-  /** Faces that each vertex still is a corner of; of the first version those that it was of. */
+  /** Faces that each vertex still is a corner of. */
   private readonly facesAt: Uint32Array;
   /** The last face, counted from 1, that each vertex is a corner of. */
   private readonly faceOf: Uint32Array;
-  /** The vertex that was met last. */
-  private last = 0;
+  /** How many vertices were met. */
+  private met = 0;
+  private readonly gates = new Gates();
   private arity = 3;
   private readonly counts: Uint32Array;
   private readonly corners: Uint32Array;
@@ -80,14 +68,10 @@ class Walk {
 
   constructor(
     private readonly decoder: RangeDecoder,
-    version: MeshVersion,
-    private readonly gates: Gates,
-    private readonly names: VertexNames,
     private readonly points: number,
     faces: number,
     corners: number,
   ) {
-    this.isFirst = version === 'first';
     this.leaving = Array.from({ length: points }, () => new OpenEdges());
     this.arriving = Array.from({ length: points }, () => new OpenEdges());
     this.facesAt = new Uint32Array(points);
@@ -132,7 +116,7 @@ class Walk {
   }
 
   private acrossContext([from, to]: Gate): number {
-    return this.isFirst ? 0 : 3 * Math.min(this.facesAt[from], 2) + Math.min(this.facesAt[to], 2);
+    return 3 * Math.min(this.facesAt[from], 2) + Math.min(this.facesAt[to], 2);
   }
 
   /** The edge waits no longer; false if it did not. */
@@ -159,9 +143,6 @@ class Walk {
     while (face.length < this.arity) {
       const closes = gate !== null && face.length + 1 === this.arity;
       const vertex = this.corner(face, closes);
-      if (vertex >= this.points) {
-        throw new CodedDataError(WRONG_COUNTS);
-      }
       face.push(vertex);
       this.faceOf[vertex] = this.facesRead;
     }
@@ -182,9 +163,7 @@ class Walk {
         this.arriving[to].add(from);
         opened.push([from, to]);
       }
-      if (this.isFirst) {
-        this.facesAt[from]++;
-      } else if (this.facesAt[from] > 0) {
+      if (this.facesAt[from] > 0) {
         this.facesAt[from]--;
         nearer.push(from);
       }
@@ -217,13 +196,13 @@ class Walk {
   private corner(face: readonly number[], closes: boolean): number {
     if (face.length === 0) {
       const isNew = this.decoder.bit(this.firstTime, 0) === 1;
-      return isNew ? this.newVertex(this.last) : this.names.again(this.decoder);
+      return isNew ? this.newVertex() : this.metVertex();
     }
     const first = face[0];
     const previous = face[face.length - 1];
     const { near, both } = this.near(previous, first, closes);
     if (this.decoder.bit(this.firstTime, this.firstTimeContext(previous, first, both)) === 1) {
-      return this.newVertex(Math.max(previous, first));
+      return this.newVertex();
     }
     const base = MOST_NEAR * (2 * this.lastOnes(previous, first) + (both ? 1 : 0));
     for (let k = 0; k < near.length; k++) {
@@ -231,7 +210,7 @@ class Walk {
         return near[k];
       }
     }
-    return this.names.again(this.decoder);
+    return this.metVertex();
   }
 
   /** Vertices that an open edge leads from to the last corner, or to from the first one, the likeliest first; whether one is both. */
@@ -258,11 +237,7 @@ class Walk {
   }
 
   private firstTimeContext(previous: number, first: number, both: boolean): number {
-    const pair = VALENCES * this.valence(previous) + this.valence(first);
-    if (this.isFirst) {
-      return both ? PAIRS : pair;
-    }
-    return (both ? PAIRS : 0) + pair;
+    return (both ? PAIRS : 0) + VALENCES * this.valence(previous) + this.valence(first);
   }
 
   private valence(vertex: number): number {
@@ -271,23 +246,25 @@ class Walk {
 
   /** Which of two vertices have this face alone to come: 1 and 2, added up. */
   private lastOnes(previous: number, first: number): number {
-    if (this.isFirst) {
-      return 0;
-    }
     return (this.facesAt[previous] === 1 ? 1 : 0) + (this.facesAt[first] === 1 ? 2 : 0);
   }
 
-  /** Reads a vertex met for the first time, near another. */
-  private newVertex(near: number): number {
-    const vertex = this.names.first(this.decoder, near);
-    if (vertex === null) {
+  /** Takes a vertex met for the first time. */
+  private newVertex(): number {
+    if (this.met === this.points) {
       throw new CodedDataError(WRONG_COUNTS);
     }
-    if (!this.isFirst) {
-      // Of the face that is read it is a corner now.
-      this.facesAt[vertex] = Math.min(this.faceCounts.natural(this.decoder, 0) + 1, MOST_COUNT);
+    // Of the face that is read it is a corner now.
+    this.facesAt[this.met] = Math.min(this.faceCounts.natural(this.decoder, 0) + 1, MOST_COUNT);
+    return this.met++;
+  }
+
+  /** Reads a vertex that was met, but that nothing leads to. */
+  private metVertex(): number {
+    const turn = this.decoder.bits(32 - Math.clz32(this.met));
+    if (turn >= this.met) {
+      throw new CodedDataError('a face names a vertex that was not met');
     }
-    this.last = vertex;
-    return vertex;
+    return turn;
   }
 }

@@ -15,16 +15,6 @@ export class CountedSet {
     this.reach = reach;
   }
 
-  /** Of all of them. */
-  static all(limit: number): CountedSet {
-    const set = new CountedSet(limit);
-    for (let k = 1; k <= limit; k++) {
-      set.sums[k] = k & -k;
-    }
-    set.size = limit;
-    return set;
-  }
-
   /** How many are in the set. */
   get count(): number {
     return this.size;

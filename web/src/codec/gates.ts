@@ -8,28 +8,8 @@ const LEAST_DROPPED = 1 << 10;
 
 export type Gate = readonly [from: number, to: number];
 
-export interface Gates {
-  /** @param toCome fewest faces that are to come at an end of the edge. */
-  add(from: number, to: number, toCome: number): void;
-  /** The next one, which is then none any more; null where there is none. */
-  take(): Gate | null;
-}
-
-/** The newest first. */
-export class NewestFirst implements Gates {
-  private readonly gates: Gate[] = [];
-
-  add(from: number, to: number): void {
-    this.gates.push([from, to]);
-  }
-
-  take(): Gate | null {
-    return this.gates.pop() ?? null;
-  }
-}
-
 /** The oldest first. */
-export class OldestFirst implements Gates {
+class GateQueue {
   /** Both ends of each; those before `next` are taken. */
   private readonly ends: number[] = [];
   private next = 0;
@@ -53,13 +33,15 @@ export class OldestFirst implements Gates {
 }
 
 /** By how few faces are to come at one of their ends, which is then complete soon; those that were opened or came nearer first before others. */
-export class FewestToComeFirst implements Gates {
-  private readonly queues = Array.from({ length: MOST_TO_COME + 1 }, () => new OldestFirst());
+export class Gates {
+  private readonly queues = Array.from({ length: MOST_TO_COME + 1 }, () => new GateQueue());
 
+  /** @param toCome fewest faces that are to come at an end of the edge. */
   add(from: number, to: number, toCome: number): void {
     this.queues[Math.min(toCome, MOST_TO_COME)].add(from, to);
   }
 
+  /** The next one, which is then none any more; null where there is none. */
   take(): Gate | null {
     for (const queue of this.queues) {
       const gate = queue.take();

@@ -8,7 +8,6 @@ import { decodeFaces } from './connectivity';
 import { CodedDataError } from './error';
 import { decodeFrameErrors } from './frameErrors';
 import { type Hierarchy, vertexHierarchy } from './hierarchy';
-import type { MeshVersion } from './meshVersion';
 import { type Polygons } from './polygons';
 import { decodePositions } from './positions';
 import { decodeResidual } from './residual';
@@ -20,13 +19,13 @@ export class GroupDecoder {
   private basis: CageBasis | null = null;
 
   /** {@link decodeFaces} */
-  faces(bytes: Uint8Array, version: MeshVersion, points: number, faces: number, corners: number): Polygons {
-    return decodeFaces(bytes, version, points, faces, corners);
+  faces(bytes: Uint8Array, points: number, faces: number, corners: number): Polygons {
+    return decodeFaces(bytes, points, faces, corners);
   }
 
   /** {@link decodePositions} */
-  positions(bytes: Uint8Array, version: MeshVersion, faces: Polygons, points: number): Float64Array {
-    return decodePositions(bytes, version, faces, points);
+  positions(bytes: Uint8Array, faces: Polygons, points: number): Float64Array {
+    return decodePositions(bytes, faces, points);
   }
 
   /** {@link decodeFrameErrors} */

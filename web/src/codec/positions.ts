@@ -2,15 +2,15 @@
 
 import { CodedDataError } from './error';
 import { IntegerModels, MOST, SIZE_CLASSES, sizeClass } from './integers';
-import type { MeshVersion } from './meshVersion';
 import { parallelogramPredictions, type Predictions } from './parallelograms';
 import type { Polygons } from './polygons';
 import { PredictionWeights, WEIGHTS_BYTES } from './predictionWeights';
 import { RangeDecoder } from './rangeDecoder';
-import { MeanPredictor, type StepPredictor, WeightedPredictor } from './stepPredictors';
+import { StepPredictor } from './stepPredictor';
 
 /** Origin (three f64) and step (f64) of the grid. */
 const GRID_BYTES = 32;
+const HEAD_BYTES = GRID_BYTES + WEIGHTS_BYTES;
 /** Sizes of numbers count up to this. */
 const MOST_SIZE = 1 << 16;
 
@@ -20,29 +20,15 @@ const MOST_SIZE = 1 << 16;
  *
  * @throws {CodedDataError} for bytes that the encoder did not write.
  */
-export function decodePositions(
-  bytes: Uint8Array,
-  version: MeshVersion,
-  faces: Polygons,
-  points: number,
-): Float64Array {
-  const headBytes = GRID_BYTES + (version === 'first' ? 0 : WEIGHTS_BYTES);
-  if (bytes.length < headBytes) {
+export function decodePositions(bytes: Uint8Array, faces: Polygons, points: number): Float64Array {
+  if (bytes.length < HEAD_BYTES) {
     throw new CodedDataError('positions are cut');
   }
-  const decoder = new RangeDecoder(bytes.subarray(headBytes));
+  const decoder = new RangeDecoder(bytes.subarray(HEAD_BYTES));
   const predictions = parallelogramPredictions(faces, points);
   const found = new Int32Array(3 * points);
-  const predictor =
-    version === 'first'
-      ? new MeanPredictor(predictions, found)
-      : new WeightedPredictor(
-          new PredictionWeights(bytes.subarray(GRID_BYTES, headBytes)),
-          predictions,
-          faces,
-          points,
-          found,
-        );
+  const weights = new PredictionWeights(bytes.subarray(GRID_BYTES, HEAD_BYTES));
+  const predictor = new StepPredictor(weights, predictions, faces, points, found);
   readSteps(decoder, predictions, predictor, found);
   return onGrid(new DataView(bytes.buffer, bytes.byteOffset, GRID_BYTES), found);
 }

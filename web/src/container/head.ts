@@ -4,7 +4,7 @@ import type { CoordinateSystem } from '../capture';
 import { damaged, unknownFeature } from './error';
 import { CODEC, type Entry, safeInteger, viewOf } from './section';
 
-/** Highest definition of the coordinate systems that this reader knows. */
+/** The definition of the coordinate systems that this reader knows. */
 const DEFINITION = 3;
 const SYSTEMS: readonly string[] = ['mvc', 'harmonic', 'green', 'green-free'] satisfies CoordinateSystem[];
 const MOST_BYTES = 64 * 2 ** 10;
@@ -68,7 +68,7 @@ export function parseHead(bytes: Uint8Array, offset: number): Head {
   if (!isKnownSystem(system)) {
     throw unknownFeature(`coordinates ${system}`);
   }
-  if (definition < 1 || definition > DEFINITION) {
+  if (definition !== DEFINITION) {
     throw unknownFeature(`coordinates of definition ${definition}`);
   }
   const rows = head.cageVertices + (system === 'green-free' ? head.cageFaces : 0);

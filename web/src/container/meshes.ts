@@ -3,12 +3,11 @@
 import type { StaticPart, TriangleMesh } from '../capture';
 import type { Codec } from '../codec/client';
 import { CodedDataError } from '../codec/error';
-import type { MeshVersion } from '../codec/meshVersion';
 import { NO_POLYGONS, type Polygons } from '../codec/polygons';
 import { decodePayload } from './codecs';
 import { damaged } from './error';
 import type { Head } from './head';
-import { CODEC, type Entry, isCoded } from './section';
+import { CODEC, type Entry } from './section';
 
 /** Sections before the frames that model and cage are made of. */
 export const STATIC_TAGS: readonly string[] = ['ORIG', 'RPTS', 'RFAC', 'CVTX', 'CTRI', 'ELEM'];
@@ -57,9 +56,8 @@ async function decodeModelFaces(head: Head, section: Section | undefined, codec:
     return NO_POLYGONS;
   }
   const { entry, payload } = section;
-  const version = meshVersion(entry);
-  if (version !== null) {
-    return located(entry, codec.call('faces', [payload, version, head.points, head.restFaces, head.restCorners]));
+  if (isCoded(entry)) {
+    return located(entry, codec.call('faces', [payload, head.points, head.restFaces, head.restCorners]));
   }
   const words = new Uint32Array(decodePayload(entry, payload).buffer);
   const counts = words.slice(0, head.restFaces);
@@ -74,13 +72,12 @@ async function decodeModelFaces(head: Head, section: Section | undefined, codec:
 async function decodeCage(head: Head, faces: Section, vertices: Section, codec: Codec): Promise<TriangleMesh> {
   const { entry, payload } = faces;
   const { cageVertices, cageFaces } = head;
-  const version = meshVersion(entry);
-  if (version === null) {
+  if (!isCoded(entry)) {
     const triangles = new Uint32Array(decodePayload(entry, payload).buffer);
     checkIndices(triangles, cageVertices, entry);
     return { positions: await decodePoints(vertices, NO_POLYGONS, cageVertices, codec), triangles };
   }
-  const call = codec.call('faces', [payload, version, cageVertices, cageFaces, 3 * cageFaces]);
+  const call = codec.call('faces', [payload, cageVertices, cageFaces, 3 * cageFaces]);
   const polygons = await located(entry, call);
   if (polygons.counts.some((count) => count !== 3)) {
     throw damaged(entry.offset, 'the cage has faces that are no triangles');
@@ -96,9 +93,8 @@ async function decodePoints(
   codec: Codec,
 ): Promise<Float64Array> {
   let positions: Float64Array;
-  const version = meshVersion(entry);
-  if (version !== null) {
-    positions = await located(entry, codec.call('positions', [payload, version, faces, count]));
+  if (isCoded(entry)) {
+    positions = await located(entry, codec.call('positions', [payload, faces, count]));
   } else {
     const { buffer } = decodePayload(entry, payload);
     positions = entry.fields.width === 4 ? Float64Array.from(new Float32Array(buffer)) : new Float64Array(buffer);
@@ -110,12 +106,9 @@ async function decodePoints(
   return positions;
 }
 
-/** How a section of a mesh was coded; null where it was not. */
-function meshVersion({ fields }: Entry): MeshVersion | null {
-  if (!isCoded(fields.codec)) {
-    return null;
-  }
-  return fields.codec === CODEC.coded ? 'first' : 'second';
+/** Whether a section of a mesh is coded. */
+function isCoded({ fields }: Entry): boolean {
+  return fields.codec === CODEC.codedStatic;
 }
 
 /** Says where in the file damage of coded numbers is. */

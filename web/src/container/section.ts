@@ -12,7 +12,7 @@ export const ENTRY_BYTES = 40;
 const MAGIC = [0x89, 0x43, 0x47, 0x52, 0x0d, 0x0a, 0x1a, 0x0a];
 const FOOTER_MAGIC = [0x43, 0x47, 0x52, 0x45];
 
-/** Numbers of the codecs. `codedStatic` are meshes at rest, which are `coded` in files of earlier programs, and errors of frames. */
+/** Numbers of the codecs. `coded` are groups of frames, `codedStatic` meshes at rest and errors of frames. */
 export const CODEC = { raw: 0, planes: 1, difference: 2, coded: 3, codedStatic: 4 } as const;
 
 /** Whether a section is whole numbers. */

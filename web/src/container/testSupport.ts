@@ -22,10 +22,11 @@ export function goldenBytes(name: string): Uint8Array<ArrayBuffer> {
   return new Uint8Array(readFileSync(new URL(`${name}.cager`, FOLDER)));
 }
 
-/** Positions that a golden file decodes to, frames × points × 3. */
-export function goldenPositions(name: string): Float32Array {
+/** Positions that a golden file decodes to, frames × points × 3; in double precision where it has an origin. */
+export function goldenPositions(name: string): Float32Array | Float64Array {
   const bytes = new Uint8Array(readFileSync(new URL(`${name}.npy`, FOLDER)));
-  return new Float32Array(bytes.slice(10 + viewOf(bytes).getUint16(8, true)).buffer);
+  const { buffer } = bytes.slice(10 + viewOf(bytes).getUint16(8, true));
+  return name.endsWith('-origin') ? new Float64Array(buffer) : new Float32Array(buffer);
 }
 
 /** Opens bytes and decodes in this thread. */

@@ -32,14 +32,8 @@ pub struct Coordinates {
 }
 
 /// Version of the definition of the coordinate systems, stored in containers because decoders recompute the coordinates. It increases when a change
-/// moves a decoded point by more than 1e-7 of the diagonal; earlier definitions remain supported.
+/// moves a decoded point by more than 1e-7 of the diagonal; those before it then remain supported. 1 and 2 were never released.
 pub const DEFINITION: u32 = 3;
-
-/// Whether coordinates of this definition can be computed, as is the case for every one released so far. Definitions 1 to 3 are identical: programs
-/// that wrote 1 and 2 also counted changes of the solver.
-pub fn supports_definition(definition: u32) -> bool {
-    (1..=DEFINITION).contains(&definition)
-}
 
 /// How a numerical solution was refined.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]

@@ -1,4 +1,4 @@
-/** What positions on a grid are expected to be, and how far off that was around them: of both versions of meshes. */
+/** What positions on a grid are expected to be, and how far off that was around them. */
 
 import { adjacency } from './adjacency';
 import type { ByVertex } from './byVertex';
@@ -6,54 +6,10 @@ import type { Predictions } from './parallelograms';
 import type { Polygons } from './polygons';
 import type { PredictionWeights } from './predictionWeights';
 
-/** Predicts vertices, one after another. */
-export interface StepPredictor {
-  /** Turns to the next vertex. */
-  begin(place: number): void;
-  /** What parallelograms make of a coordinate of that vertex, x, y, z being 0, 1, 2; there is one at least. */
-  expected(axis: number): number;
-  /** How far off vertices around it were, in sixteenths. */
-  around(axis: number, soFar: number): number;
-  /** Takes how far off it was, in each coordinate and in all. */
-  end(sizes: Uint32Array, sum: number): void;
-}
-
-/** By the mean of parallelograms: of the first version. */
-export class MeanPredictor implements StepPredictor {
-  private place = 0;
-  private before = 0;
-
-  constructor(
-    private readonly predictions: Predictions,
-    private readonly found: Int32Array,
-  ) {}
-
-  begin(place: number): void {
-    this.place = place;
-  }
-
-  expected(axis: number): number {
-    const { starts, triples } = this.predictions;
-    const { found } = this;
-    const [start, end] = [starts[this.place], starts[this.place + 1]];
-    let sum = 0;
-    for (let t = 3 * start; t < 3 * end; t += 3) {
-      sum += found[3 * triples[t] + axis] + found[3 * triples[t + 1] + axis] - found[3 * triples[t + 2] + axis];
-    }
-    return Math.floor(sum / (end - start));
-  }
-
-  around(_axis: number, soFar: number): number {
-    return this.before + 6 * soFar;
-  }
-
-  end(_sizes: Uint32Array, sum: number): void {
-    this.before = halfOf(this.before, sum);
-  }
-}
-
-/** By parallelograms and neighbours, weighted. How far those of neighbours were off says how large a number will be. */
-export class WeightedPredictor implements StepPredictor {
+/**
+ * Predicts vertices, one after another, by parallelograms and neighbours, weighted. How far those of neighbours were off says how large a number will be.
+ */
+export class StepPredictor {
   private readonly neighbours: ByVertex;
   private readonly isKnown: Uint8Array;
   private readonly off: Uint32Array;
@@ -74,6 +30,7 @@ export class WeightedPredictor implements StepPredictor {
     this.off = new Uint32Array(3 * points);
   }
 
+  /** Turns to the next vertex. */
   begin(place: number): void {
     this.place = place;
     this.known = [];
@@ -86,6 +43,7 @@ export class WeightedPredictor implements StepPredictor {
     }
   }
 
+  /** What is expected of a coordinate of that vertex, x, y, z being 0, 1, 2; one parallelogram predicts it at least. */
   expected(axis: number): number {
     const { starts, triples } = this.predictions;
     const { found, known } = this;
@@ -99,16 +57,18 @@ export class WeightedPredictor implements StepPredictor {
     return this.weights.expected(end - start, edges, far, known.length, this.sumOfKnown(found, axis));
   }
 
+  /** How far off vertices around it were, in sixteenths. */
   around(axis: number, soFar: number): number {
     const mean = Math.floor((6 * this.sumOfKnown(this.off, axis)) / Math.max(this.known.length, 1));
     return mean + 5 * (this.before >> 3) + 5 * soFar;
   }
 
+  /** Takes how far off it was, in each coordinate and in all. */
   end(sizes: Uint32Array, sum: number): void {
     const vertex = this.predictions.order[this.place];
     this.isKnown[vertex] = 1;
     this.off.set(sizes, 3 * vertex);
-    this.before = halfOf(this.before, sum);
+    this.before = (this.before + Math.floor((8 * sum) / 3)) >> 1;
   }
 
   private sumOfKnown(numbers: Int32Array | Uint32Array, axis: number): number {
@@ -118,9 +78,4 @@ export class WeightedPredictor implements StepPredictor {
     }
     return sum;
   }
-}
-
-/** What is kept of how far vertices were off. */
-function halfOf(before: number, sum: number): number {
-  return (before + Math.floor((8 * sum) / 3)) >> 1;
 }
