@@ -5,7 +5,8 @@ use std::path::Path;
 
 use cager_geometry::mesh::Model;
 
-use super::{MeshFormat, check_face, extensions};
+use super::parsed::check_face;
+use super::{MeshFormat, extensions};
 use crate::atomic::AtomicFile;
 use crate::error::{Error, Fault};
 

@@ -8,7 +8,6 @@ mod bytes;
 mod filters;
 mod indices;
 
-use bytes::Bytes;
 use gltf::json::buffer::View;
 
 /// How a view is packed, and where.
@@ -89,7 +88,7 @@ impl Packed {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::bytes::{Bytes, signed};
 
     #[test]
     fn numbers_take_up_to_five_bytes() {
