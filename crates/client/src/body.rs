@@ -1,9 +1,9 @@
 //! Reading response bodies with limits on length and idle time.
 
 use crate::client::Client;
-use crate::error::Failure;
+use crate::error::{ClientError, Failure};
 use bytes::Bytes;
-use reqwest::Response;
+use reqwest::{Method, Response};
 use serde::de::DeserializeOwned;
 
 /// Longest JSON body: the errors of half a million frames are shorter.
@@ -56,6 +56,22 @@ pub(crate) async fn whole(client: &Client, mut response: Response, limit: u64) -
         body.extend_from_slice(&chunk);
     }
     Ok(body)
+}
+
+impl Client {
+    /// Sends an idempotent request and parses its JSON response.
+    pub(crate) async fn fetch<T: DeserializeOwned>(
+        &self,
+        method: Method,
+        segments: &[&str],
+        query: &[(&str, String)],
+    ) -> Result<T, ClientError> {
+        self.retrying(|| async {
+            let request = self.request(method.clone(), segments, query).await?;
+            json(self, self.send(request).await?).await
+        })
+        .await
+    }
 }
 
 /// A JSON body.

@@ -2,13 +2,11 @@
 
 use crate::address::Address;
 use crate::backoff::Backoff;
-use crate::body::json;
 use crate::error::{ClientError, Failure};
 use crate::options::ClientOptions;
 use crate::problem::check;
 use reqwest::header::{AUTHORIZATION, HeaderValue};
 use reqwest::{Method, RequestBuilder, Response};
-use serde::de::DeserializeOwned;
 use std::error::Error as _;
 use std::pin::pin;
 use std::sync::Arc;
@@ -124,20 +122,6 @@ impl Client {
                 Err(failure) => backoff.wait_after(failure).await?,
             }
         }
-    }
-
-    /// Sends an idempotent request and parses its JSON response.
-    pub(crate) async fn fetch<T: DeserializeOwned>(
-        &self,
-        method: Method,
-        segments: &[&str],
-        query: &[(&str, String)],
-    ) -> Result<T, ClientError> {
-        self.retrying(|| async {
-            let request = self.request(method.clone(), segments, query).await?;
-            json(self, self.send(request).await?).await
-        })
-        .await
     }
 
     /// A request to a resource, with the token.

@@ -46,7 +46,7 @@ impl Client {
     }
 
     /// The coordinates that turn cages into positions: `P = Φ·C`, or where there are more columns than unknowns, with the face
-    /// normals that follow from them in addition: see [`LocalDecoder`](crate::LocalDecoder).
+    /// normals that follow from them in addition: see `LocalDecoder`.
     ///
     /// # Errors
     /// [`ClientError::Refused`] where the session has none yet, and those of the connection.
@@ -109,7 +109,7 @@ impl Client {
 
     /// Positions of the model from cages, edited or not, by the service: `cages` holds whole frames of m × 3 values one after
     /// another, the result as many of n × 3. For many frames, call it for some at a time, or see
-    /// [`LocalDecoder`](crate::LocalDecoder).
+    /// `LocalDecoder`.
     ///
     /// # Errors
     /// [`ClientError::Mismatch`] where `cages` does not hold whole frames, and those of the connection.

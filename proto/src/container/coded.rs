@@ -1,9 +1,8 @@
 //! Sections of whole numbers: meshes, groups of cages and what is added to their positions, by the `cager-codec` crate.
 
 use super::codec::{CODED, CODED_STATIC};
-use super::contents::Entry;
 use super::reader::ContainerReader;
-use super::section::SectionHeader;
+use super::section::{Entry, SectionHeader};
 use super::{Error, tag};
 use cager_codec::{
     CageBasis, Hierarchy, MAX_ROWS, Residual, decode_cages, decode_errors, decode_faces, decode_positions, is_rotated,
@@ -12,16 +11,6 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::{self, CoordinateSystem, Coordinates, DEFINITION, ElementPlan};
 use cager_core::mesh::{Point, Polygons};
 use std::io::{Read, Seek};
-
-/// What decoding groups needs, computed where the first is read.
-#[derive(Default)]
-pub(super) struct Groups {
-    /// Unrotated and rotated, as each group says which it has.
-    bases: [Option<CageBasis>; 2],
-    hierarchy: Option<Hierarchy>,
-    /// The residuals decoded last, each with the entry that it was read from.
-    residuals: Vec<(Entry, Residual)>,
-}
 
 /// What the basis of coded cages is computed from.
 struct Binding {

@@ -2,19 +2,13 @@
 
 use super::codec::{self, CODED};
 use super::reader::ContainerReader;
-use super::section::{FOOTER_BYTES, HEADER_BYTES, PRELUDE_BYTES, SectionHeader};
+use super::section::{Entry, FOOTER_BYTES, HEADER_BYTES, PRELUDE_BYTES, SectionHeader};
 use super::{Error, tag};
 use crate::le::u64_at;
 use std::io::{Read, Seek};
 
 /// Bytes of one entry of the table of contents: an offset and the section's header but for its checksums.
 const ENTRY_BYTES: usize = 40;
-
-#[derive(Clone, Copy)]
-pub(super) struct Entry {
-    pub(super) offset: u64,
-    pub(super) header: SectionHeader,
-}
 
 impl<R: Read + Seek> ContainerReader<R> {
     pub(super) fn read_contents(&mut self, offset: u64) -> Result<(), Error> {

@@ -50,7 +50,7 @@ pub enum Error {
     Memory {
         /// Bytes that they would take.
         needed: u64,
-        /// Bytes that they may take, see [`limit_coordinates`](super::ContainerReader::limit_coordinates).
+        /// Bytes that they may take, see `limit_coordinates` of the reader.
         most: u64,
     },
     /// The operating system refused.

@@ -6,6 +6,7 @@ mod codec;
 mod coded;
 mod contents;
 mod error;
+mod groups;
 mod reader;
 mod section;
 mod writer;

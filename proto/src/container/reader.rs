@@ -1,9 +1,8 @@
 //! Reading a container: validated before use, with random access to frames.
 
 use super::codec::{self, CODED};
-use super::coded::Groups;
-use super::contents::Entry;
-use super::section::{self, FOOTER_BYTES, HEADER_BYTES, PRELUDE_BYTES, SectionHeader};
+use super::groups::Groups;
+use super::section::{self, Entry, FOOTER_BYTES, HEADER_BYTES, PRELUDE_BYTES, SectionHeader};
 use super::{Error, HEADER_LIMIT, Header, counted_from_zero, tag};
 use crate::le::{self, f32_at, u64_at};
 use crate::report::{FrameError, Report, WorstError};

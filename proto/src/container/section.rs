@@ -129,3 +129,10 @@ pub(crate) fn check_footer(b: &[u8; FOOTER_BYTES], file_bytes: u64) -> Result<u6
     }
     Ok(u64_at(b, 0))
 }
+
+/// A section, and where it begins.
+#[derive(Clone, Copy)]
+pub(super) struct Entry {
+    pub(super) offset: u64,
+    pub(super) header: SectionHeader,
+}
