@@ -22,7 +22,7 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::{PrepareError, Solver, SolverOptions, check_options};
 use cager_core::mesh::Model;
-use cager_core::regularize::{Regularizer, SparseMatrix, Term};
+use cager_core::regularize::{Regularizer, SparseMatrix};
 use cager_formats::{AtomicFile, FrameReader, Target, commit_together};
 use cager_proto::report::DesignReport;
 use std::time::{Duration, Instant};
@@ -222,7 +222,7 @@ fn encode_locally(
         output: &targets.output,
         system,
         options,
-        term: matrix.as_ref().map(|matrix| matrix as &dyn Term),
+        matrix: matrix.as_ref(),
         choose,
         memory,
         goal: goal(args, rest, announced)?,

@@ -4,7 +4,7 @@ use super::evaluation::{Batch, MethodEvaluation, Shape};
 use super::figures::{DRAW_FRAMES, draws};
 use super::methods::{Method, methods};
 use super::sample::{Frame, Sample};
-use cager_core::inversion::{Analysis, FactoredInversion, HandleSystem, Handles, PrepareError, SolverOptions};
+use cager_core::inversion::{Analysis, FactoredInversion, HandleSystem, Handles, PrepareError, Rows, SolverOptions};
 use cager_core::regularize::Regularizer;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -155,10 +155,10 @@ impl<'a> MethodGroup<'a> {
             evaluation.frame_seconds = match known.filter(|_| !ordered) {
                 Some(seconds) => seconds,
                 None => {
-                    let solver = self.handle_system.solver(series.options())?;
+                    let solver = self.handle_system.solver(series.options(), None)?;
                     let seconds = (0..REPEATS).map(|_| {
                         let clock = Instant::now();
-                        std::hint::black_box(solver.invert_after(None, &frames));
+                        std::hint::black_box(solver.invert(Rows::All, None, &frames));
                         clock.elapsed().as_secs_f64()
                     });
                     seconds.fold(f64::INFINITY, f64::min) / frames.len() as f64

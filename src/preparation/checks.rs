@@ -10,7 +10,6 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions, check_options};
 use cager_core::mesh::{Point, diagonal};
-use cager_core::regularize::Term;
 use cager_proto::container::colors_bytes;
 
 /// Validates rest pose, cage and options together, without expensive computation.

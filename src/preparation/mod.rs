@@ -20,7 +20,6 @@ use crate::preparation_warnings::preparation_warnings;
 use crate::problem::ApiError;
 use cager_core::cage::Cage;
 use cager_core::inversion::{PrepareError, Preparing, Solver, SolverOptions};
-use cager_core::regularize::Term;
 use checks::{check_memory, refused};
 use std::ops::ControlFlow;
 
@@ -49,9 +48,9 @@ pub(crate) fn prepare(
     let unknowns = choices.system.unknowns(&geometry.cage);
     let options = choices.inversion.options(unknowns);
     check_memory(geometry, choices, options, max_bytes)?;
-    let term = geometry.matrix.as_ref().map(|matrix| matrix as &dyn Term);
     let next = |_| if wanted() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
-    let preparing = Preparing { term, memory: max_bytes, next: &next, ..Preparing::default() };
+    let preparing =
+        Preparing { matrix: geometry.matrix.as_ref(), memory: max_bytes, next: &next, ..Preparing::default() };
     match Solver::prepare_with(choices.system, &geometry.cage, &geometry.rest.points, options, &preparing) {
         Ok(solver) => Ok(Some(with_solver(solver, &geometry.cage, options))),
         Err(PrepareError::Stopped) => Ok(None),

@@ -54,7 +54,7 @@ pub(crate) fn run_with(
         output: &Target::from(&output),
         system,
         options,
-        term: None,
+        matrix: None,
         choose: None,
         memory: Memory::half_of_free(),
         goal: None,

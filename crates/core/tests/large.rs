@@ -1,10 +1,13 @@
 //! Models of more points than are analysed, and coordinates that are computed in parts.
 
+mod common;
+
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::decode::{Decoder, FrameError};
 use cager_core::inversion::{Analysis, Handles, Preparing, Solver, SolverOptions};
 use cager_core::synthetic::{Capture, Options};
+use common::Cages;
 
 fn capture(points: u32, cage_vertices: u32) -> (Capture, Cage) {
     let capture = Capture::new(&Options { points: points as usize, frames: 12, cage_vertices: cage_vertices as usize });
@@ -23,7 +26,7 @@ fn frames(capture: &Capture) -> Vec<Vec<f64>> {
 
 fn errors(solver: &Solver, frames: &[Vec<f64>]) -> (Vec<Vec<f32>>, Vec<FrameError>) {
     let frames: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
-    let cages = solver.invert(&frames);
+    let cages = solver.cages(&frames);
     let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
     let errors = solver.decoder().measure(&views, &frames);
     (cages, errors)

@@ -186,15 +186,7 @@ impl Analysis {
     /// # Errors
     /// As [`Solver::prepare`].
     pub fn solver(&self, options: SolverOptions) -> Result<Solver, PrepareError> {
-        self.handle_system(options.handles)?.solver(options)
-    }
-
-    /// A solver that reads the given rows, at least as many as unknowns; the handles in the options are checked, but not used.
-    ///
-    /// # Errors
-    /// As [`Solver::prepare`]; [`PrepareError::NoSolution`] where the rows determine nothing.
-    pub fn solver_of_rows(&self, rows: &[u32], options: SolverOptions) -> Result<Solver, PrepareError> {
-        self.handle_system_of(rows)?.solver(options)
+        self.handle_system(options.handles)?.solver(options, None)
     }
 
     /// Results of the preparation; the singular values are empty, see [`Self::handle_spectrum`] and [`Self::full_spectrum`].

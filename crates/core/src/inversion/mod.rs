@@ -28,7 +28,7 @@ pub use nearness::NearnessParts;
 pub use options::{SolverOptions, default_spectrum};
 pub use parts::{SolverParts, TiedParts};
 pub use prepare::{Preparation, Preparing, check_options, coordinates_bytes, reject_far_points};
-pub use solve::{BATCH, InvertedFrame, Solver};
+pub use solve::{BATCH, InvertedFrame, Rows, Solver};
 pub use target::RegularizationTarget;
 pub use threshold::Threshold;
 

@@ -5,7 +5,7 @@ use super::{Analysis, Handles, PrepareError, Solver, SolverOptions};
 use crate::cage::Cage;
 use crate::coordinates::{CoordinateSystem, ElementPlan, Refinement};
 use crate::mesh::{Point, diagonal, distance_to_surface, winding_number};
-use crate::regularize::{Term, TermError};
+use crate::regularize::SparseMatrix;
 use crate::vector::norm;
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
@@ -86,7 +86,7 @@ impl Solver {
         Self::prepare_with(system, cage, points, options, &Preparing::default())
     }
 
-    /// As [`Self::prepare`], with a custom term, progress and cancellation.
+    /// As [`Self::prepare`], with a custom matrix, progress and cancellation.
     ///
     /// # Errors
     /// See [`PrepareError`].
@@ -97,20 +97,19 @@ impl Solver {
         options: SolverOptions,
         preparing: &Preparing<'_>,
     ) -> Result<Self, PrepareError> {
-        let term = preparing.term(options)?;
-        // A term that does not fit the cage is refused before anything is computed.
-        term.delta(cage, system.unknowns(cage))?;
+        // A matrix that does not fit the cage is refused before anything is computed.
+        options.regularizer.delta(preparing.matrix, cage, system.unknowns(cage))?;
         let analysis = Analysis::for_solver(system, cage, points, options, preparing)?;
         preparing.next("operator")?;
-        analysis.handle_system(options.handles)?.solver_with(options, term)
+        analysis.handle_system(options.handles)?.solver(options, preparing.matrix)
     }
 }
 
 /// How to prepare a solver, apart from its options.
 #[derive(Clone, Copy)]
 pub struct Preparing<'a> {
-    /// A custom term, for [`Regularizer::Matrix`](crate::regularize::Regularizer::Matrix).
-    pub term: Option<&'a dyn Term>,
+    /// Δ of [`Regularizer::Matrix`](crate::regularize::Regularizer::Matrix).
+    pub matrix: Option<&'a SparseMatrix>,
     /// Whether the decoder of a model of very many points stores their coordinates, four bytes per point and column, or recomputes them at every use.
     pub stores_coordinates: bool,
     /// Largest number of entries of `Φ`, points × unknowns, up to which all points are analysed; of a model with more, a sample is. With eight points per
@@ -125,7 +124,7 @@ pub struct Preparing<'a> {
 impl Default for Preparing<'_> {
     fn default() -> Self {
         Self {
-            term: None,
+            matrix: None,
             stores_coordinates: true,
             analysed_entries: 1 << 25,
             memory: 16 << 30,
@@ -134,15 +133,7 @@ impl Default for Preparing<'_> {
     }
 }
 
-impl<'a> Preparing<'a> {
-    /// The term of these options.
-    ///
-    /// # Errors
-    /// [`TermError::Missing`] where the options need a custom term and there is none.
-    pub fn term(&self, options: SolverOptions) -> Result<&'a dyn Term, TermError> {
-        self.term.or_else(|| options.regularizer.term()).ok_or(TermError::Missing)
-    }
-
+impl Preparing<'_> {
     pub(super) fn next(&self, step: &'static str) -> Result<(), PrepareError> {
         match (self.next)(step) {
             ControlFlow::Continue(()) => Ok(()),
