@@ -82,9 +82,9 @@ fn figures(folder: &Path) -> anyhow::Result<Value> {
     let points = &capture.rest.points;
     let frames = write(&capture, &cage, folder)?;
 
-    let (mvc, mean_value) = timed_runs(RUNS, || MeanValue.coordinates(&cage, points));
-    let (green, green_found) = timed_runs(RUNS, || Green::Free.coordinates(&cage, points));
-    let (harmonic, harmonic_found) = timed_runs(FEW_RUNS, || Harmonic.coordinates(&cage, points));
+    let (mvc, mean_value) = timed_runs(RUNS, || MeanValue.coordinates(&cage, points, None));
+    let (green, green_found) = timed_runs(RUNS, || Green::Free.coordinates(&cage, points, None));
+    let (harmonic, harmonic_found) = timed_runs(FEW_RUNS, || Harmonic.coordinates(&cage, points, None));
     let mean_value = mean_value?;
     let coordinates = json!({
         "mvc": quality(&MeanValue, &cage, points, &mean_value),
@@ -165,7 +165,7 @@ fn figures(folder: &Path) -> anyhow::Result<Value> {
 
 /// How well coordinates reproduce the rest pose, at worst and over its diagonal, and how they were refined.
 fn quality(system: &dyn CoordinateSystem, cage: &Cage, points: &[Point], found: &Coordinates) -> Value {
-    let values = system.rest_values(cage);
+    let values = system.values(cage).rest;
     let values = faer::Mat::from_fn(values.len(), 3, |j, k| values[j][k]);
     let reproduced = &found.phi * &values;
     let miss = |(i, p): (usize, &Point)| (0..3).map(|k| (reproduced[(i, k)] - p[k]).powi(2)).sum::<f64>().sqrt();

@@ -330,7 +330,7 @@ fn prepare(
     let points = &job.rest.points;
     let batches = job.frames.frames().div_ceil(BatchPlan::new(job.memory, points.len(), false).size);
     let passes = if job.choose.is_some() { usize::MAX } else { batches };
-    let stores_coordinates = job.memory.keeps(points.len(), job.system.columns(job.cage), passes);
+    let stores_coordinates = job.memory.keeps(points.len(), job.system.values(job.cage).columns(), passes);
     let next = |step| {
         tell(step);
         ControlFlow::Continue(())
@@ -341,7 +341,7 @@ fn prepare(
     let Some(ChooseSpectrum { samples, bound }) = chosen_by else {
         return Ok((Solver::prepare_with(job.system, job.cage, points, options, &preparing)?, options, None, 0.0));
     };
-    options.regularizer.delta(job.matrix, job.cage, job.system.unknowns(job.cage))?;
+    options.regularizer.delta(job.matrix, job.cage, job.system.values(job.cage).unknowns())?;
     let analysis = Analysis::for_options(job.system, job.cage, points, options, &preparing)?;
     tell("threshold");
     let handle_system = analysis.handle_system(options.handles)?;

@@ -45,7 +45,7 @@ pub(crate) fn prepare(
     max_bytes: u64,
     wanted: &dyn Fn() -> bool,
 ) -> Result<Option<Prepared>, ApiError> {
-    let unknowns = choices.system.unknowns(&geometry.cage);
+    let unknowns = choices.system.values(&geometry.cage).unknowns();
     let options = choices.inversion.options(unknowns);
     check_memory(geometry, choices, options, max_bytes)?;
     let next = |_| if wanted() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };

@@ -48,7 +48,7 @@ fn a_rest_pose_of_the_pairs_gives_its_cage() {
         let (rest, cage) = (read_model(&folder.join("mesh.obj")).expect("a model"), cage_of(&folder.join("cage.obj")));
         let systems: [&dyn CoordinateSystem; 4] = [&MeanValue, &Harmonic, &Green::Consistent, &Green::Free];
         for system in systems {
-            let options = SolverOptions::for_unknowns(system.unknowns(&cage));
+            let options = SolverOptions::for_unknowns(system.values(&cage).unknowns());
             let frame: Vec<f64> = rest.points.iter().flatten().copied().collect();
             let solver = match Solver::prepare(system, &cage, &rest.points, options) {
                 Ok(solver) => solver,

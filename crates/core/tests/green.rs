@@ -182,9 +182,9 @@ fn a_solver_put_together_again_gives_the_same_bits() {
 #[test]
 fn collapsed_cages_have_finite_positions() {
     let (capture, cage) = capture();
-    let phi = Green::Consistent.coordinates(&cage, &capture.rest.points).unwrap().phi;
+    let phi = Green::Consistent.coordinates(&cage, &capture.rest.points, None).unwrap().phi;
     let v = cage.vertices().len();
-    let decoder = Decoder::new(phi.as_ref(), v).with_tied_normals(Green::Consistent.tied_normals(&cage));
+    let decoder = Decoder::new(phi.as_ref(), v).with_tied_normals(Green::Consistent.values(&cage).tied_normals);
     let point = vec![2.5f32; 3 * v];
     let flat: Vec<f32> = cage.vertices().iter().flat_map(|p| [p[0] as f32, p[1] as f32, 0.0]).collect();
     let line: Vec<f32> = cage.vertices().iter().flat_map(|p| [p[0] as f32, 0.0, 0.0]).collect();

@@ -3,7 +3,7 @@
 mod common;
 
 use cager_core::cage::Cage;
-use cager_core::coordinates::{CoordinateSystem, Coordinates, CoordinatesError, MeanValue};
+use cager_core::coordinates::{CageValues, CoordinateSystem, Coordinates, CoordinatesError, ElementPlan, MeanValue};
 use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, Handles, PrepareError, Preparing, Solver, SolverOptions};
 use cager_core::mesh::Point;
@@ -33,7 +33,7 @@ fn frame(capture: &Capture, t: usize) -> Vec<f64> {
 
 /// Positions of a cage's model, in double precision.
 fn posed(cage: &Cage, points: &[Point], pose: &[Point]) -> Vec<f64> {
-    let phi = MeanValue.coordinates(cage, points).unwrap().phi;
+    let phi = MeanValue.coordinates(cage, points, None).unwrap().phi;
     (0..points.len())
         .flat_map(|i| [0, 1, 2].map(|k| (0..pose.len()).map(|j| phi[(i, j)] * pose[j][k]).sum::<f64>()))
         .collect()
@@ -234,14 +234,16 @@ impl CoordinateSystem for Deaf {
     fn name(&self) -> &'static str {
         "deaf"
     }
-    fn columns(&self, cage: &Cage) -> usize {
-        cage.vertices().len()
+    fn values(&self, cage: &Cage) -> CageValues {
+        CageValues::of_vertices(cage)
     }
-    fn rest_values(&self, cage: &Cage) -> Vec<Point> {
-        cage.vertices().to_vec()
-    }
-    fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError> {
-        let mut coordinates = MeanValue.coordinates(cage, points)?;
+    fn coordinates(
+        &self,
+        cage: &Cage,
+        points: &[Point],
+        _: Option<&ElementPlan>,
+    ) -> Result<Coordinates, CoordinatesError> {
+        let mut coordinates = MeanValue.coordinates(cage, points, None)?;
         let v = cage.vertices();
         let m = v.len();
         let heirs = [0, m / 4, m / 2, 3 * m / 4];

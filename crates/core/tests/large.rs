@@ -44,15 +44,15 @@ fn decoders_that_compute_their_coordinates_have_the_bits_of_those_that_keep_them
     let (capture, cage) = capture(70_001, 200);
     let points = &capture.rest.points;
     for system in [&MeanValue as &dyn CoordinateSystem, &Green::Consistent] {
-        let (pointwise, columns) = (system.pointwise().unwrap(), system.columns(&cage));
-        let phi = system.coordinates(&cage, points).unwrap().phi;
+        let (pointwise, columns) = (system.pointwise().unwrap(), system.values(&cage).columns());
+        let phi = system.coordinates(&cage, points, None).unwrap().phi;
         let decoders = [
             Decoder::new(phi.as_ref(), cage.vertices().len()),
             Decoder::with_stored_coordinates(pointwise, &cage, points, columns),
             Decoder::with_recomputed_coordinates(pointwise, &cage, points, columns),
         ];
         assert!(decoders[1].size_bytes() > 0 && decoders[2].size_bytes() == 0);
-        let decoders = decoders.map(|decoder| decoder.with_tied_normals(system.tied_normals(&cage)));
+        let decoders = decoders.map(|decoder| decoder.with_tied_normals(system.values(&cage).tied_normals));
         let bent: Vec<f32> =
             cage.vertices().iter().flat_map(|p| [p[0] + 0.1 * p[1] * p[1], p[1], p[2]]).map(|x| x as f32).collect();
         let found = decoders.map(|decoder| {

@@ -102,7 +102,7 @@ fn no_cage_runs_away_from_its_frame() {
     for system in systems {
         for handles in [Handles::default(), Handles::MaxVol, Handles::All] {
             for regularizer in [Regularizer::Differential, Regularizer::Laplacian, Regularizer::Temporal] {
-                let usual = SolverOptions::for_unknowns(system.unknowns(&cage));
+                let usual = SolverOptions::for_unknowns(system.values(&cage).unknowns());
                 let options = SolverOptions { handles, regularizer, ..usual };
                 let solver = Solver::prepare(system, &cage, &capture.rest.points, options).unwrap();
                 let far = away(&let_go(&solver), &capture, &cage, &frames);

@@ -3,7 +3,9 @@
 mod common;
 
 use cager_core::cage::Cage;
-use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
+use cager_core::coordinates::{
+    CageValues, CoordinateSystem, Coordinates, CoordinatesError, ElementPlan, Green, MeanValue,
+};
 use cager_core::inversion::{Analysis, BATCH, Handles, PrepareError, Preparing, Solver, SolverOptions};
 use cager_core::mesh::Point;
 use cager_core::regularize::{Reference, Regularizer, SparseMatrix, TermError};
@@ -41,7 +43,7 @@ fn own_term(m: usize) -> SparseMatrix {
 fn every_term_minimises_its_energy() {
     let (capture, cage) = capture();
     let m = cage.vertices().len();
-    let phi = MeanValue.coordinates(&cage, &capture.rest.points).unwrap().phi;
+    let phi = MeanValue.coordinates(&cage, &capture.rest.points, None).unwrap().phi;
     let own = own_term(m);
     let (before, now) = (frame(&capture, 11), frame(&capture, 14));
     let lambda = 0.3;
@@ -292,19 +294,17 @@ impl CoordinateSystem for WithNormals {
     fn name(&self) -> &'static str {
         "with-normals"
     }
-    fn columns(&self, cage: &Cage) -> usize {
-        cage.vertices().len() + cage.faces().len()
-    }
-    fn rest_values(&self, cage: &Cage) -> Vec<Point> {
+    fn values(&self, cage: &Cage) -> CageValues {
         let normals = cage.faces().iter().map(|_| [0.0, 0.0, 1.0]);
-        cage.vertices().iter().copied().chain(normals).collect()
+        CageValues { rest: cage.vertices().iter().copied().chain(normals).collect(), tied_normals: None }
     }
     fn coordinates(
         &self,
         cage: &Cage,
         points: &[Point],
-    ) -> Result<cager_core::coordinates::Coordinates, cager_core::coordinates::CoordinatesError> {
-        let mut coordinates = MeanValue.coordinates(cage, points)?;
+        _: Option<&ElementPlan>,
+    ) -> Result<Coordinates, CoordinatesError> {
+        let mut coordinates = MeanValue.coordinates(cage, points, None)?;
         let (v, f) = (cage.vertices().len(), cage.faces().len());
         let phi = &coordinates.phi;
         // Of the sum over all faces nothing is left, so that the rest pose is reproduced.

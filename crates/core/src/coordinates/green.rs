@@ -9,7 +9,10 @@
 //! Normals have the length ℓ, the square root of the mean area of the faces, so that `Φ` is dimensionless and all rows of a cage are lengths.
 
 use super::layer::{self, Frame, Layers, Scratch};
-use super::{CoordinateSystem, Coordinates, CoordinatesError, PointwiseCoordinates, TiedNormals};
+use super::{
+    CageValues, CoordinateSystem, Coordinates, CoordinatesError, ElementPlan, PointwiseCoordinates, TiedNormals,
+    refuse_plan,
+};
 use crate::cage::Cage;
 use crate::mesh::{self, Point};
 use crate::simd::{LANES, Lanes, zeros};
@@ -42,36 +45,27 @@ impl CoordinateSystem for Green {
         }
     }
 
-    fn columns(&self, cage: &Cage) -> usize {
-        cage.vertices().len() + cage.faces().len()
-    }
-
-    fn rest_values(&self, cage: &Cage) -> Vec<Point> {
+    fn values(&self, cage: &Cage) -> CageValues {
         let layers = Layers::new(cage);
         let length = normal_length(&layers) / layers.scale();
         let normals = layers.faces().iter().map(|f| f.normal().map(|c| c * length));
-        cage.vertices().iter().copied().chain(normals).collect()
-    }
-
-    fn unknowns(&self, cage: &Cage) -> usize {
-        match self {
-            Self::Consistent => cage.vertices().len(),
-            Self::Free => self.columns(cage),
+        CageValues {
+            rest: cage.vertices().iter().copied().chain(normals).collect(),
+            tied_normals: (*self == Self::Consistent).then(|| TiedNormals::new(cage, length)),
         }
-    }
-
-    fn tied_normals(&self, cage: &Cage) -> Option<TiedNormals> {
-        (*self == Self::Consistent).then(|| {
-            let layers = Layers::new(cage);
-            TiedNormals::new(cage, normal_length(&layers) / layers.scale())
-        })
     }
 
     fn pointwise(&self) -> Option<PointwiseCoordinates> {
         Some(coordinates)
     }
 
-    fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError> {
+    fn coordinates(
+        &self,
+        cage: &Cage,
+        points: &[Point],
+        plan: Option<&ElementPlan>,
+    ) -> Result<Coordinates, CoordinatesError> {
+        refuse_plan(self.name(), plan)?;
         Ok(coordinates(cage, points))
     }
 }

@@ -51,7 +51,12 @@ impl Analysis {
     /// As [`Solver::prepare`].
     pub fn new(system: &dyn CoordinateSystem, cage: &Cage, points: &[Point]) -> Result<Self, PrepareError> {
         let preparing = Preparing::default();
-        check(points, system.unknowns(cage), SolverOptions { spectrum: 0, ..SolverOptions::PAPER }, preparing.memory)?;
+        check(
+            points,
+            system.values(cage).unknowns(),
+            SolverOptions { spectrum: 0, ..SolverOptions::PAPER },
+            preparing.memory,
+        )?;
         Self::of(system, cage, points, RequiredDecompositions::Everything, &preparing)
     }
 
@@ -66,7 +71,7 @@ impl Analysis {
         options: SolverOptions,
         preparing: &Preparing<'_>,
     ) -> Result<Self, PrepareError> {
-        check(points, system.unknowns(cage), options, preparing.memory)?;
+        check(points, system.values(cage).unknowns(), options, preparing.memory)?;
         Self::of(system, cage, points, RequiredDecompositions::For(options.handles), preparing)
     }
 
@@ -78,8 +83,9 @@ impl Analysis {
         options: SolverOptions,
         preparing: &Preparing<'_>,
     ) -> Result<Self, PrepareError> {
-        check(points, system.unknowns(cage), options, preparing.memory)?;
-        let tied = system.tied_normals(cage).is_some();
+        let values = system.values(cage);
+        check(points, values.unknowns(), options, preparing.memory)?;
+        let tied = values.tied_normals.is_some();
         // An unregularised start is regularised nevertheless, in as many directions as are ill-conditioned.
         let required = if tied {
             RequiredDecompositions::For(options.handles)
@@ -96,7 +102,7 @@ impl Analysis {
         required: RequiredDecompositions,
         preparing: &Preparing<'_>,
     ) -> Result<Self, PrepareError> {
-        let (m, diagonal) = (system.unknowns(cage), diagonal(points));
+        let (m, diagonal) = (system.values(cage).unknowns(), diagonal(points));
         let clock = Instant::now();
         reject_far_points(cage, points)?;
         preparing.next("coordinates")?;

@@ -68,7 +68,7 @@ impl Solver {
         options: SolverOptions,
         memory: u64,
     ) -> Result<(), PrepareError> {
-        check(points, system.unknowns(cage), options, memory)?;
+        check(points, system.values(cage).unknowns(), options, memory)?;
         reject_far_points(cage, points)?;
         Ok(system.check(cage, points)?)
     }
@@ -98,7 +98,7 @@ impl Solver {
         preparing: &Preparing<'_>,
     ) -> Result<Self, PrepareError> {
         // A matrix that does not fit the cage is refused before anything is computed.
-        options.regularizer.delta(preparing.matrix, cage, system.unknowns(cage))?;
+        options.regularizer.delta(preparing.matrix, cage, system.values(cage).unknowns())?;
         let analysis = Analysis::for_solver(system, cage, points, options, preparing)?;
         preparing.next("operator")?;
         analysis.handle_system(options.handles)?.solver(options, preparing.matrix)

@@ -29,7 +29,7 @@ mod surface;
 mod triangle;
 
 use super::layer::Layers;
-use super::{CoordinateSystem, Coordinates, CoordinatesError, Refinement};
+use super::{CageValues, CoordinateSystem, Coordinates, CoordinatesError, Refinement};
 use crate::cage::Cage;
 use crate::mesh::Point;
 use elements::Unknowns;
@@ -60,12 +60,8 @@ impl CoordinateSystem for Harmonic {
         NAME
     }
 
-    fn columns(&self, cage: &Cage) -> usize {
-        cage.vertices().len()
-    }
-
-    fn rest_values(&self, cage: &Cage) -> Vec<Point> {
-        cage.vertices().to_vec()
+    fn values(&self, cage: &Cage) -> CageValues {
+        CageValues::of_vertices(cage)
     }
 
     fn working_bytes(&self, cage: &Cage, plan: Option<&ElementPlan>) -> u64 {
@@ -83,17 +79,16 @@ impl CoordinateSystem for Harmonic {
         check_inside(&Surface::new(cage.vertices(), cage).closest_points(points), cage.diagonal())
     }
 
-    fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError> {
-        solve_for(cage, points, refine)
-    }
-
-    fn coordinates_by_plan(
+    fn coordinates(
         &self,
         cage: &Cage,
         points: &[Point],
-        plan: &ElementPlan,
+        plan: Option<&ElementPlan>,
     ) -> Result<Coordinates, CoordinatesError> {
-        solve_for(cage, points, |problem| follow(problem, plan))
+        solve_for(cage, points, |problem| match plan {
+            Some(plan) => follow(problem, plan),
+            None => refine(problem),
+        })
     }
 }
 
@@ -293,7 +288,7 @@ mod tests {
     fn what_is_left_is_part_of_the_change_that_is_reported() {
         let Capture { cage, rest, .. } = Capture::new(&Options { points: 300, frames: 1, cage_vertices: 30 });
         let cage = Cage::new(cage).expect("a cage");
-        let found = Harmonic.coordinates(&cage, &rest.points).expect("coordinates");
+        let found = Harmonic.coordinates(&cage, &rest.points, None).expect("coordinates");
         let (plan, change) = (found.plan.expect("a plan"), found.refinement.expect("a numerical solution").change);
         let left = solve_for(&cage, &rest.points, |problem| {
             let (unknowns, steps) = plan.read(&problem.corners, cage.vertices().len()).expect("its own plan");

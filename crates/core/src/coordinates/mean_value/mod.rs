@@ -10,7 +10,9 @@
 mod gradient;
 mod integral;
 
-use super::{CoordinateSystem, Coordinates, CoordinatesError, PointwiseCoordinates};
+use super::{
+    CageValues, CoordinateSystem, Coordinates, CoordinatesError, ElementPlan, PointwiseCoordinates, refuse_plan,
+};
 use crate::cage::{Cage, Edge, Face};
 use crate::mesh::Point;
 use crate::simd::{LANES, Lanes, angle, cross, dot, multiversion, zeros};
@@ -40,19 +42,21 @@ impl CoordinateSystem for MeanValue {
         "mvc"
     }
 
-    fn columns(&self, cage: &Cage) -> usize {
-        cage.vertices().len()
-    }
-
-    fn rest_values(&self, cage: &Cage) -> Vec<Point> {
-        cage.vertices().to_vec()
+    fn values(&self, cage: &Cage) -> CageValues {
+        CageValues::of_vertices(cage)
     }
 
     fn pointwise(&self) -> Option<PointwiseCoordinates> {
         Some(coordinates)
     }
 
-    fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError> {
+    fn coordinates(
+        &self,
+        cage: &Cage,
+        points: &[Point],
+        plan: Option<&ElementPlan>,
+    ) -> Result<Coordinates, CoordinatesError> {
+        refuse_plan(self.name(), plan)?;
         Ok(coordinates(cage, points))
     }
 }
