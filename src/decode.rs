@@ -252,7 +252,7 @@ fn bind(
             &rest.points,
             columns,
         );
-        let decoder = decoder.with_tied_normals(values.tied_normals);
+        let decoder = decoder.with_dependent_normals(values.dependent_normals);
         let some = (OUTSIDE_ENTRIES / columns).max(1);
         let outside = |points: &[Point]| pointwise(&cage, points).outside.len();
         let outside = other.map_or(0, |_| rest.points.chunks(some).map(outside).sum());
@@ -265,7 +265,8 @@ fn bind(
     }
     let coordinates = known.map_or_else(|| system.coordinates(&cage, &rest.points, plan.as_ref()), Ok);
     let found = coordinates.map_err(|cause| DecodeError::Coordinates { path: model_path.to_owned(), cause })?;
-    let decoder = Decoder::new(found.phi.as_ref(), cage.vertices().len()).with_tied_normals(values.tied_normals);
+    let decoder =
+        Decoder::new(found.phi.as_ref(), cage.vertices().len()).with_dependent_normals(values.dependent_normals);
     Ok(BoundModel { rest, decoder, outside: found.outside.len() })
 }
 

@@ -10,7 +10,7 @@ use crate::preparation_warnings::held_frames;
 use batches::{Batch, BatchPlan, SolvedBatch, read_batches, solve};
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{Analysis, PrepareError, Preparing, Solver, SolverOptions};
+use cager_core::inversion::{Analysis, PrepareContext, PrepareError, Solver, SolverOptions};
 use cager_core::mesh::{Model, Point, diagonal};
 use cager_core::regularize::SparseMatrix;
 use cager_formats::{Action, AtomicFile, FrameReader, Target};
@@ -336,13 +336,14 @@ fn prepare(
         ControlFlow::Continue(())
     };
     let memory = free_bytes();
-    let preparing = Preparing { matrix: job.matrix, stores_coordinates, memory, next: &next, ..Preparing::default() };
+    let context =
+        PrepareContext { matrix: job.matrix, stores_coordinates, memory, next: &next, ..PrepareContext::default() };
     let chosen_by = job.choose.as_ref().filter(|choose| !choose.samples.is_empty());
     let Some(ChooseSpectrum { samples, bound }) = chosen_by else {
-        return Ok((Solver::prepare_with(job.system, job.cage, points, options, &preparing)?, options, None, 0.0));
+        return Ok((Solver::prepare_with(job.system, job.cage, points, options, &context)?, options, None, 0.0));
     };
     options.regularizer.delta(job.matrix, job.cage, job.system.values(job.cage).unknowns())?;
-    let analysis = Analysis::for_options(job.system, job.cage, points, options, &preparing)?;
+    let analysis = Analysis::for_options(job.system, job.cage, points, options, &context)?;
     tell("threshold");
     let handle_system = analysis.handle_system(options.handles)?;
     let clock = Instant::now();

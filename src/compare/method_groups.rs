@@ -84,7 +84,7 @@ impl GroupPlan {
     /// Upper estimate of the memory that the group takes, in bytes.
     pub(super) fn bytes(&self, analysis: &Analysis) -> usize {
         let m = analysis.coordinates().ncols();
-        let columns = if analysis.decoder().tied_normals().is_some() { analysis.decoder().columns() } else { 0 };
+        let columns = if analysis.decoder().dependent_normals().is_some() { analysis.decoder().columns() } else { 0 };
         let operator = if columns > 0 { m * analysis.coordinates().nrows() } else { 0 };
         8 * m * m * 4 + (8 * (m * m + operator) + 16 * columns * columns) * self.series.len()
     }
@@ -123,7 +123,7 @@ impl<'a> MethodGroup<'a> {
         let mut methods: Vec<(SolverOptions, Arc<FactoredInversion>)> =
             first.iter().map(factored).collect::<Result<_, PrepareError>>()?;
         methods.extend(others.par_iter().map(factored).collect::<Result<Vec<_>, PrepareError>>()?);
-        let is_tied = analysis.decoder().tied_normals().is_some();
+        let is_tied = analysis.decoder().dependent_normals().is_some();
         let sample = if is_tied && plan.is_draw() { sample.some(DRAW_FRAMES) } else { sample.clone() };
         let evaluation = |series: &SeriesKind| {
             let (_, method) = methods.iter().find(|(of, _)| *of == series.options())?;

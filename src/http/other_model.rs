@@ -109,7 +109,7 @@ pub(super) async fn bind(
         let found = coordinates.map_err(|error| ApiError::new(problem::INVALID_GEOMETRY, format!("model: {error}")))?;
         let decoder = Decoder::new(found.phi.as_ref(), cage.vertices().len());
         Ok(Bound {
-            decoder: decoder.with_tied_normals(system.values(&cage).tied_normals),
+            decoder: decoder.with_dependent_normals(system.values(&cage).dependent_normals),
             outside: found.outside.len(),
         })
     })

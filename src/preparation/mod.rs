@@ -19,7 +19,7 @@ use crate::far_frames::Reach;
 use crate::preparation_warnings::preparation_warnings;
 use crate::problem::ApiError;
 use cager_core::cage::Cage;
-use cager_core::inversion::{PrepareError, Preparing, Solver, SolverOptions};
+use cager_core::inversion::{PrepareContext, PrepareError, Solver, SolverOptions};
 use checks::{check_memory, refused};
 use std::ops::ControlFlow;
 
@@ -49,9 +49,13 @@ pub(crate) fn prepare(
     let options = choices.inversion.options(unknowns);
     check_memory(geometry, choices, options, max_bytes)?;
     let next = |_| if wanted() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
-    let preparing =
-        Preparing { matrix: geometry.matrix.as_ref(), memory: max_bytes, next: &next, ..Preparing::default() };
-    match Solver::prepare_with(choices.system, &geometry.cage, &geometry.rest.points, options, &preparing) {
+    let context = PrepareContext {
+        matrix: geometry.matrix.as_ref(),
+        memory: max_bytes,
+        next: &next,
+        ..PrepareContext::default()
+    };
+    match Solver::prepare_with(choices.system, &geometry.cage, &geometry.rest.points, options, &context) {
         Ok(solver) => Ok(Some(with_solver(solver, &geometry.cage, options))),
         Err(PrepareError::Stopped) => Ok(None),
         Err(error) => Err(refused(&error)),

@@ -49,7 +49,7 @@ impl LocalDecoder {
             let what = format!("coordinates of a cage of {vertices} vertices have {columns} columns");
             return Err(ClientError::Protocol(what));
         }
-        Ok(Self { decoder: self.decoder.with_tied_normals(values.tied_normals) })
+        Ok(Self { decoder: self.decoder.with_dependent_normals(values.dependent_normals) })
     }
 
     /// A decoder from coordinates whose first `positions` columns belong to vertices and whose other columns belong to further unknowns;

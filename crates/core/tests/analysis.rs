@@ -5,7 +5,7 @@ mod common;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::decode::FrameError;
-use cager_core::inversion::{Analysis, Handles, PrepareError, Preparing, Solver, SolverOptions};
+use cager_core::inversion::{Analysis, Handles, PrepareContext, PrepareError, Solver, SolverOptions};
 use cager_core::maxvol::{TOLERANCE, maxvol, maxvol_from};
 use cager_core::mesh::Point;
 use cager_core::regularize::Regularizer;
@@ -84,10 +84,10 @@ fn whole_frames_are_projected_where_a_sample_was_analysed() {
     let mut frame = Vec::new();
     capture.frame(4, &mut frame);
     let frames = [frame.as_slice()];
-    let preparing = Preparing { analysed_entries: 1, ..Preparing::default() };
+    let context = PrepareContext { analysed_entries: 1, ..PrepareContext::default() };
     for handles in [Handles::MaxVol, Handles::All] {
         let options = SolverOptions { handles, regularizer: Regularizer::Laplacian, spectrum: 7, lambda: 0.5 };
-        let analysis = Analysis::for_options(&MeanValue, &cage, &capture.rest.points, options, &preparing).unwrap();
+        let analysis = Analysis::for_options(&MeanValue, &cage, &capture.rest.points, options, &context).unwrap();
         assert!(analysis.coordinates().nrows() < capture.rest.points.len(), "a sample");
         let handle_system = analysis.handle_system(handles).unwrap();
         let method = handle_system.factored(options).unwrap();
@@ -103,9 +103,9 @@ fn whole_frames_are_projected_where_a_sample_was_analysed() {
 fn what_would_take_more_memory_than_it_may_is_refused_before_it_is_taken() {
     let (capture, cage) = capture();
     let prepare = |handles, memory| {
-        let preparing = Preparing { memory, ..Preparing::default() };
+        let context = PrepareContext { memory, ..PrepareContext::default() };
         let options = SolverOptions { handles, ..SolverOptions::PAPER };
-        Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, options, &preparing).map(|_| ())
+        Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, options, &context).map(|_| ())
     };
     // The points times the vertices, twice; the covariance of 300 handles, its factor, and what is solved with it.
     let (points, vertices) = (capture.rest.points.len() as u64, cage.vertices().len() as u64);

@@ -5,7 +5,7 @@ mod common;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::decode::Decoder;
-use cager_core::inversion::{BATCH, Handles, Outcome, Rows, Solver, SolverOptions, SolverParts, TiedParts};
+use cager_core::inversion::{BATCH, DependentParts, Handles, Outcome, Rows, Solver, SolverOptions, SolverParts};
 use cager_core::mesh::Point;
 use cager_core::regularize::Regularizer;
 use cager_core::synthetic::{Capture, Options};
@@ -156,7 +156,7 @@ fn a_solver_put_together_again_gives_the_same_bits() {
     let (capture, cage) = capture();
     for handles in [Handles::MaxVol, Handles::All] {
         let solver = prepare(&capture, &cage, SolverOptions { handles, ..SolverOptions::PAPER });
-        let (normals, gram, weight) = solver.tied().unwrap();
+        let (normals, gram, weight) = solver.dependent().unwrap();
         let parts = SolverParts {
             handles: solver.handles().to_vec(),
             reads_all: solver.reads_all(),
@@ -164,13 +164,13 @@ fn a_solver_put_together_again_gives_the_same_bits() {
             target: solver.regularization_target().clone(),
             phi: solver.decoder().coordinates().unwrap().to_owned(),
             positions: solver.decoder().positions(),
-            tied: Some(TiedParts { normals: normals.clone(), gram: gram.to_owned(), weight }),
+            dependent: Some(DependentParts { normals: normals.clone(), gram: gram.to_owned(), weight }),
             nearness: solver.nearness().cloned(),
             diagonal: solver.diagonal(),
             preparation: solver.preparation().clone(),
         };
         let mut without = parts.clone();
-        without.tied = None;
+        without.dependent = None;
         assert!(Solver::from_parts(without).is_none(), "rows of vertices alone are not those of free normals");
         let again = Solver::from_parts(parts).unwrap();
         let positions = frame(&capture, 11);
@@ -184,7 +184,8 @@ fn collapsed_cages_have_finite_positions() {
     let (capture, cage) = capture();
     let phi = Green::Consistent.coordinates(&cage, &capture.rest.points, None).unwrap().phi;
     let v = cage.vertices().len();
-    let decoder = Decoder::new(phi.as_ref(), v).with_tied_normals(Green::Consistent.values(&cage).tied_normals);
+    let decoder =
+        Decoder::new(phi.as_ref(), v).with_dependent_normals(Green::Consistent.values(&cage).dependent_normals);
     let point = vec![2.5f32; 3 * v];
     let flat: Vec<f32> = cage.vertices().iter().flat_map(|p| [p[0] as f32, p[1] as f32, 0.0]).collect();
     let line: Vec<f32> = cage.vertices().iter().flat_map(|p| [p[0] as f32, 0.0, 0.0]).collect();

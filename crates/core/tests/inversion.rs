@@ -5,7 +5,7 @@ mod common;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CageValues, CoordinateSystem, Coordinates, CoordinatesError, ElementPlan, MeanValue};
 use cager_core::decode::Decoder;
-use cager_core::inversion::{BATCH, Handles, PrepareError, Preparing, Solver, SolverOptions};
+use cager_core::inversion::{BATCH, Handles, PrepareContext, PrepareError, Solver, SolverOptions};
 use cager_core::mesh::Point;
 use cager_core::regularize::{Regularizer, SparseMatrix};
 use cager_core::synthetic::{Capture, Options};
@@ -173,7 +173,7 @@ fn every_method_follows_a_translation_exactly() {
                 &cage,
                 &capture.rest.points,
                 options,
-                &Preparing { matrix: Some(&own), ..Preparing::default() },
+                &PrepareContext { matrix: Some(&own), ..PrepareContext::default() },
             )
             .unwrap();
             let here = frame(&capture, 9);

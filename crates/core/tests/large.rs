@@ -5,7 +5,7 @@ mod common;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::decode::{Decoder, FrameError};
-use cager_core::inversion::{Analysis, Handles, Preparing, Solver, SolverOptions};
+use cager_core::inversion::{Analysis, Handles, PrepareContext, Solver, SolverOptions};
 use cager_core::synthetic::{Capture, Options};
 use common::Cages;
 
@@ -34,8 +34,9 @@ fn errors(solver: &Solver, frames: &[Vec<f64>]) -> (Vec<Vec<f32>>, Vec<FrameErro
 
 fn prepare(system: &dyn CoordinateSystem, (capture, cage): &(Capture, Cage), handles: Handles, keeps: bool) -> Solver {
     let options = SolverOptions { handles, ..SolverOptions::default() };
-    let preparing = Preparing { stores_coordinates: keeps, analysed_entries: 8_000_000, ..Preparing::default() };
-    Solver::prepare_with(system, cage, &capture.rest.points, options, &preparing).unwrap()
+    let context =
+        PrepareContext { stores_coordinates: keeps, analysed_entries: 8_000_000, ..PrepareContext::default() };
+    Solver::prepare_with(system, cage, &capture.rest.points, options, &context).unwrap()
 }
 
 #[test]
@@ -52,7 +53,7 @@ fn decoders_that_compute_their_coordinates_have_the_bits_of_those_that_keep_them
             Decoder::with_recomputed_coordinates(pointwise, &cage, points, columns),
         ];
         assert!(decoders[1].size_bytes() > 0 && decoders[2].size_bytes() == 0);
-        let decoders = decoders.map(|decoder| decoder.with_tied_normals(system.values(&cage).tied_normals));
+        let decoders = decoders.map(|decoder| decoder.with_dependent_normals(system.values(&cage).dependent_normals));
         let bent: Vec<f32> =
             cage.vertices().iter().flat_map(|p| [p[0] + 0.1 * p[1] * p[1], p[1], p[2]]).map(|x| x as f32).collect();
         let found = decoders.map(|decoder| {

@@ -49,7 +49,7 @@ fn trembling(capture: &Capture) -> Vec<Vec<f64>> {
 
 /// Without what keeps its cages near.
 fn let_go(solver: &Solver) -> Solver {
-    let tied = solver.tied().map(|(normals, gram, weight)| cager_core::inversion::TiedParts {
+    let dependent = solver.dependent().map(|(normals, gram, weight)| cager_core::inversion::DependentParts {
         normals: normals.clone(),
         gram: gram.to_owned(),
         weight,
@@ -61,7 +61,7 @@ fn let_go(solver: &Solver) -> Solver {
         target: solver.regularization_target().clone(),
         phi: solver.decoder().coordinates().unwrap().to_owned(),
         positions: solver.decoder().positions(),
-        tied,
+        dependent,
         nearness: None,
         diagonal: solver.diagonal(),
         preparation: solver.preparation().clone(),

@@ -6,15 +6,15 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::{
     CageValues, CoordinateSystem, Coordinates, CoordinatesError, ElementPlan, Green, MeanValue,
 };
-use cager_core::inversion::{Analysis, BATCH, Handles, PrepareError, Preparing, Solver, SolverOptions};
+use cager_core::inversion::{Analysis, BATCH, Handles, PrepareContext, PrepareError, Solver, SolverOptions};
 use cager_core::mesh::Point;
 use cager_core::regularize::{Reference, Regularizer, SparseMatrix, TermError};
 use cager_core::synthetic::{Capture, Options};
 use common::Cages;
 use faer::Mat;
 
-fn with(matrix: &SparseMatrix) -> Preparing<'_> {
-    Preparing { matrix: Some(matrix), ..Preparing::default() }
+fn with(matrix: &SparseMatrix) -> PrepareContext<'_> {
+    PrepareContext { matrix: Some(matrix), ..PrepareContext::default() }
 }
 
 fn capture() -> (Capture, Cage) {
@@ -296,7 +296,7 @@ impl CoordinateSystem for WithNormals {
     }
     fn values(&self, cage: &Cage) -> CageValues {
         let normals = cage.faces().iter().map(|_| [0.0, 0.0, 1.0]);
-        CageValues { rest: cage.vertices().iter().copied().chain(normals).collect(), tied_normals: None }
+        CageValues { rest: cage.vertices().iter().copied().chain(normals).collect(), dependent_normals: None }
     }
     fn coordinates(
         &self,

@@ -34,7 +34,7 @@ fn a_solver_comes_back_the_same_to_the_bit() {
     for (i, (system, handles, regularizer)) in kinds.into_iter().enumerate() {
         let key = ContentKey([i as u8; 32]);
         let solver = prepare_with(system, SolverOptions { handles, regularizer, ..SolverOptions::PAPER });
-        assert_eq!(solver.tied().is_some(), system == "green");
+        assert_eq!(solver.dependent().is_some(), system == "green");
         assert_eq!(solver.preparation().plan.is_some(), system == "harmonic");
         assert!(store.prepared(&key).unwrap().is_none());
         store.put_prepared(&key, &solver).unwrap();

@@ -11,7 +11,7 @@ pub use error::CoordinatesError;
 pub use green::Green;
 pub use harmonic::{ElementPlan, Harmonic};
 pub use mean_value::MeanValue;
-pub use normals::TiedNormals;
+pub use normals::DependentNormals;
 
 use crate::cage::Cage;
 use crate::mesh::Point;
@@ -81,13 +81,13 @@ pub struct CageValues {
     /// Those of the rest pose, columns × 3. The vertices come first.
     pub rest: Vec<Point>,
     /// How normals are computed from the vertices, for systems in which the vertices alone are unknown.
-    pub tied_normals: Option<TiedNormals>,
+    pub dependent_normals: Option<DependentNormals>,
 }
 
 impl CageValues {
     /// Those of a system with one column per vertex.
     pub fn of_vertices(cage: &Cage) -> Self {
-        Self { rest: cage.vertices().to_vec(), tied_normals: None }
+        Self { rest: cage.vertices().to_vec(), dependent_normals: None }
     }
 
     /// Columns of `Φ`.
@@ -97,7 +97,7 @@ impl CageValues {
 
     /// Unknowns m of a cage: rows stored per frame. Equal to the number of columns unless some values are functions of others.
     pub fn unknowns(&self) -> usize {
-        self.columns() - self.tied_normals.as_ref().map_or(0, |normals| normals.faces().len())
+        self.columns() - self.dependent_normals.as_ref().map_or(0, |normals| normals.faces().len())
     }
 }
 

@@ -14,7 +14,7 @@ pub struct FactoredInversion(Form);
 #[derive(Clone, Debug)]
 enum Form {
     Factors(Factors),
-    /// For tied normals: the iteration amplifies rounding errors of its start, so that it uses the same solver as encoding.
+    /// For dependent normals: the iteration amplifies rounding errors of its start, so that it uses the same solver as encoding.
     Solver(Box<Solver>),
 }
 

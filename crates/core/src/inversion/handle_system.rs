@@ -26,7 +26,7 @@ pub struct HandleSystem<'a> {
     pub(super) decomposition: Decomposition,
     /// Time the decomposition took.
     pub(super) seconds: f64,
-    /// Scaled Gram matrix of the rows read, for tied normals (functions of the vertices); expensive, and therefore computed on first use.
+    /// Scaled Gram matrix of the rows read, for dependent normals; expensive, and therefore computed on first use.
     gram: OnceLock<Mat<f64>>,
 }
 
@@ -59,7 +59,7 @@ impl<'a> HandleSystem<'a> {
         let operator = padded_to_tiles(with_unit_row_sums(operator, analysis.decoder.positions()));
         let (handles, reads_all) = self.points_read();
         // The baselines and inversions without a term go where the data take them.
-        let held = options.regularizer.is_sub_spectral() && !is_unregularized(without_idle_term(options));
+        let held = options.regularizer.is_sub_spectral() && !is_unregularized(drop_zero_weight_regularizer(options));
         let nearness = if held { Nearness::new(self).map(Arc::new) } else { None };
         let mut preparation = analysis.preparation.clone();
         preparation.condition_handles = self.decomposition.condition;
@@ -83,7 +83,7 @@ impl<'a> HandleSystem<'a> {
     /// # Errors
     /// As [`Solver::prepare`].
     pub fn factored(&self, options: SolverOptions) -> Result<FactoredInversion, PrepareError> {
-        if self.analysis.decoder.tied_normals().is_some() {
+        if self.analysis.decoder.dependent_normals().is_some() {
             return Ok(self.solver(options, None)?.into());
         }
         let (map, target, _) = self.parts(options, None)?;
@@ -123,11 +123,11 @@ impl<'a> HandleSystem<'a> {
         let analysis = self.analysis;
         let m = analysis.phi.ncols();
         check_options(analysis.phi.nrows(), m, options, analysis.memory)?;
-        let options = without_idle_term(options);
-        let tied = analysis.decoder.tied_normals().is_some();
+        let options = drop_zero_weight_regularizer(options);
+        let dependent = analysis.decoder.dependent_normals().is_some();
         // Without regularisation the Gauss–Newton steps are held to their start by the small weight of `start_weight` only; the start itself is
         // regularised nevertheless, since from an ill-conditioned one they end in a worse minimum.
-        let unregularized = tied && is_unregularized(options);
+        let unregularized = dependent && is_unregularized(options);
         let regularizer = if unregularized { Regularizer::Laplacian } else { options.regularizer };
         let regularization_operator = RegularizationOperator {
             delta: regularizer.delta(matrix, &analysis.cage, m)?,
@@ -142,7 +142,7 @@ impl<'a> HandleSystem<'a> {
         };
         let target = self.target(&map, regularization_operator.reference);
         let decoder = &analysis.decoder;
-        let consistent = match decoder.tied_normals() {
+        let consistent = match decoder.dependent_normals() {
             None => None,
             Some(_) => {
                 let (handles, reads_all) = self.points_read();
@@ -201,7 +201,7 @@ impl<'a> HandleSystem<'a> {
 const ILL_CONDITIONED: f64 = 1e-2;
 
 /// Drops the regularisation term where λ is zero, which makes it the same as a threshold of zero.
-pub(super) fn without_idle_term(options: SolverOptions) -> SolverOptions {
+pub(super) fn drop_zero_weight_regularizer(options: SolverOptions) -> SolverOptions {
     if options.lambda > 0.0 {
         return options;
     }

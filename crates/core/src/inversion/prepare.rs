@@ -22,7 +22,7 @@ const ON_THE_CAGE: f64 = 1e-9;
 
 /// Results of the preparation.
 #[derive(Clone, Debug, Default, Deserialize, Serialize)]
-pub struct Preparation {
+pub struct PreparationReport {
     /// Numerical rank of `Φ`, at most m.
     pub rank: usize,
     /// `max_i |Φ C_R − P_R|_i` over the rest diagonal.
@@ -83,7 +83,7 @@ impl Solver {
         points: &[Point],
         options: SolverOptions,
     ) -> Result<Self, PrepareError> {
-        Self::prepare_with(system, cage, points, options, &Preparing::default())
+        Self::prepare_with(system, cage, points, options, &PrepareContext::default())
     }
 
     /// As [`Self::prepare`], with a custom matrix, progress and cancellation.
@@ -95,19 +95,19 @@ impl Solver {
         cage: &Cage,
         points: &[Point],
         options: SolverOptions,
-        preparing: &Preparing<'_>,
+        context: &PrepareContext<'_>,
     ) -> Result<Self, PrepareError> {
         // A matrix that does not fit the cage is refused before anything is computed.
-        options.regularizer.delta(preparing.matrix, cage, system.values(cage).unknowns())?;
-        let analysis = Analysis::for_solver(system, cage, points, options, preparing)?;
-        preparing.next("operator")?;
-        analysis.handle_system(options.handles)?.solver(options, preparing.matrix)
+        options.regularizer.delta(context.matrix, cage, system.values(cage).unknowns())?;
+        let analysis = Analysis::for_solver(system, cage, points, options, context)?;
+        context.next("operator")?;
+        analysis.handle_system(options.handles)?.solver(options, context.matrix)
     }
 }
 
 /// How to prepare a solver, apart from its options.
 #[derive(Clone, Copy)]
-pub struct Preparing<'a> {
+pub struct PrepareContext<'a> {
     /// Δ of [`Regularizer::Matrix`](crate::regularize::Regularizer::Matrix).
     pub matrix: Option<&'a SparseMatrix>,
     /// Whether the decoder of a model of very many points stores their coordinates, four bytes per point and column, or recomputes them at every use.
@@ -121,7 +121,7 @@ pub struct Preparing<'a> {
     pub next: &'a dyn Fn(&'static str) -> ControlFlow<()>,
 }
 
-impl Default for Preparing<'_> {
+impl Default for PrepareContext<'_> {
     fn default() -> Self {
         Self {
             matrix: None,
@@ -133,7 +133,7 @@ impl Default for Preparing<'_> {
     }
 }
 
-impl Preparing<'_> {
+impl PrepareContext<'_> {
     pub(super) fn next(&self, step: &'static str) -> Result<(), PrepareError> {
         match (self.next)(step) {
             ControlFlow::Continue(()) => Ok(()),

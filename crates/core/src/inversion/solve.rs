@@ -2,7 +2,7 @@
 
 use super::consistent::Consistent;
 use super::nearness::{FrameBox, Nearness};
-use super::{BLOCK_ROWS, Convergence, Preparation, RegularizationTarget};
+use super::{BLOCK_ROWS, Convergence, PreparationReport, RegularizationTarget};
 use crate::decode::Decoder;
 use crate::mesh::Point;
 use faer::{Accum, Mat, Par};
@@ -25,7 +25,7 @@ pub struct Solver {
     pub(super) nearness: Option<Arc<Nearness>>,
     pub(super) decoder: Decoder,
     pub(super) diagonal: f64,
-    pub(super) preparation: Preparation,
+    pub(super) preparation: PreparationReport,
 }
 
 /// What is given of a frame.
@@ -50,7 +50,7 @@ pub struct InvertedFrame {
 
 impl Solver {
     /// Results of the preparation.
-    pub fn preparation(&self) -> &Preparation {
+    pub fn preparation(&self) -> &PreparationReport {
         &self.preparation
     }
 

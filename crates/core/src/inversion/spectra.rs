@@ -5,7 +5,7 @@ use super::{PrepareError, SolverOptions};
 use crate::dense;
 use crate::handles::Handles;
 use crate::regularize::{Regularizer, WEAK_SINGULAR_VALUE};
-use crate::spectrum::RowBasis;
+use crate::row_basis::RowBasis;
 use crate::svd::{self, LastDirections, Svd};
 use faer::{Mat, MatRef};
 
@@ -39,18 +39,20 @@ impl RequiredDecompositions {
     fn last(self, unknowns: usize) -> Option<usize> {
         match self {
             Self::Last(Handles::Rectangular { .. }, _) => None,
-            Self::Last(_, count) if unknowns >= LAST_ALONE && count <= unknowns / MOST_LAST => Some(count.max(1)),
+            Self::Last(_, count) if unknowns >= PARTIAL_SVD_FROM && count <= unknowns / MIN_UNKNOWNS_PER_DIRECTION => {
+                Some(count.max(1))
+            }
             _ => None,
         }
     }
 }
 
 /// From this many unknowns on, only the largest and smallest singular values are computed where no more of a decomposition is needed.
-pub(super) const ENDS_ALONE: usize = 512;
+pub(super) const EXTREMES_ONLY_FROM: usize = 512;
 /// From this many unknowns on, only the directions that a term acts on are computed.
-const LAST_ALONE: usize = 1024;
-/// They are found on their own only where they are at most this part of all.
-const MOST_LAST: usize = 32;
+const PARTIAL_SVD_FROM: usize = 1024;
+/// They are found on their own only where there are at least this many unknowns for each.
+const MIN_UNKNOWNS_PER_DIRECTION: usize = 32;
 
 /// Condition number of `Φ` up to which its normal equations keep ten of sixteen digits, or, of the direction that the points determine least, six.
 const NORMAL_IS_SAFE: f64 = 1e5;
@@ -83,7 +85,7 @@ impl Spectra {
         required: RequiredDecompositions,
     ) -> Result<Self, PrepareError> {
         let m = basis.square.ncols();
-        let (rank, large) = (basis.rank, m >= ENDS_ALONE && basis.rank == m);
+        let (rank, large) = (basis.rank, m >= EXTREMES_ONLY_FROM && basis.rank == m);
         let no_spectrum = failed("singular value decomposition of the coordinates");
         let whole_frames = matches!(required.handles(), None | Some(Handles::All | Handles::Spread { .. }));
         let inverse = basis.handles.inverse.as_ref();

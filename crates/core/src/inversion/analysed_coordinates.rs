@@ -1,7 +1,7 @@
 //! Coordinates for an analysis: of all points of a model, or of a sample of a very large one.
 
 use super::PrepareError;
-use super::prepare::{Preparing, coordinates_bytes, outside, reject_unreproduced_point, reproduction_error};
+use super::prepare::{PrepareContext, coordinates_bytes, outside, reject_unreproduced_point, reproduction_error};
 use super::spectra::RequiredDecompositions;
 use crate::cage::Cage;
 use crate::coordinates::{CageValues, CoordinateSystem, ElementPlan, MeanValue, PointwiseCoordinates, Refinement};
@@ -60,7 +60,7 @@ pub(super) fn coordinates(
     cage: &Cage,
     points: &[Point],
     required: RequiredDecompositions,
-    preparing: &Preparing<'_>,
+    context: &PrepareContext<'_>,
 ) -> Result<AnalysisCoordinates, PrepareError> {
     let everything = required == RequiredDecompositions::Everything;
     let copies = if everything { 3 } else { 2 };
@@ -70,14 +70,14 @@ pub(super) fn coordinates(
         let needed = coordinates_bytes(rows, columns, copies);
         let gigabytes = 1e-9 * needed as f64;
         let too_large = PrepareError::OutOfMemory { points: points.len(), unknowns: m, gigabytes };
-        if needed > preparing.memory { Err(too_large) } else { Ok(()) }
+        if needed > context.memory { Err(too_large) } else { Ok(()) }
     };
     let sampled = system
         .pointwise()
-        .and_then(|pointwise| Some((pointwise, sample(points, m, required, preparing.analysed_entries)?)));
+        .and_then(|pointwise| Some((pointwise, sample(points, m, required, context.analysed_entries)?)));
     if let Some((pointwise, sample)) = sampled {
         check_memory(sample.len())?;
-        return of_sample(values, pointwise, cage, points, sample, preparing.stores_coordinates);
+        return of_sample(values, pointwise, cage, points, sample, context.stores_coordinates);
     }
     check_memory(points.len())?;
     let found = system.coordinates(cage, points, None)?;
@@ -85,8 +85,9 @@ pub(super) fn coordinates(
     let worst = reproduction_error(phi.as_ref(), &rest, cage, points);
     reject_unreproduced_point(worst.0, worst.1, cage, diagonal(points))?;
     let mut decoder = None;
-    if values.tied_normals.is_some() {
-        decoder = Some(Decoder::new(phi.as_ref(), cage.vertices().len()).with_tied_normals(values.tied_normals));
+    if values.dependent_normals.is_some() {
+        decoder =
+            Some(Decoder::new(phi.as_ref(), cage.vertices().len()).with_dependent_normals(values.dependent_normals));
         drop(phi);
         phi = MeanValue.coordinates(cage, points, None)?.phi;
         rest.truncate(m);
@@ -135,10 +136,10 @@ fn of_sample(
     let decoder = if keeps { Decoder::with_stored_coordinates } else { Decoder::with_recomputed_coordinates }(
         pointwise, cage, points, columns,
     );
-    let decoder = decoder.with_tied_normals(values.tied_normals);
+    let decoder = decoder.with_dependent_normals(values.dependent_normals);
     rest.truncate(unknowns);
     let sampled: Vec<Point> = sample.iter().map(|&i| points[i as usize]).collect();
-    let start = if decoder.tied_normals().is_some() {
+    let start = if decoder.dependent_normals().is_some() {
         MeanValue.coordinates(cage, &sampled, None)?
     } else {
         pointwise(cage, &sampled)
