@@ -138,7 +138,7 @@ impl Analysis {
             rank,
             affine_reproduction_error: error / diagonal,
             condition_full: spectra.full_ends[0] / spectra.full_ends[1],
-            condition_handles: spectra.handles_ends[0] / spectra.handles_ends[1],
+            condition_handles: spectra.handles_ends.map_or(f64::NAN, |[first, last]| first / last),
             singular_values: Vec::new(),
             swaps: basis.handles.swaps,
             log_volume: basis.handles.log_volume,

@@ -128,19 +128,16 @@ impl<'a> HandleSystem<'a> {
         // Without regularisation the Gauss–Newton steps are held to their start by the small weight of `start_weight` only; the start itself is
         // regularised nevertheless, since from an ill-conditioned one they end in a worse minimum.
         let unregularized = dependent && is_unregularized(options);
-        let regularizer = if unregularized { Regularizer::Laplacian } else { options.regularizer };
-        let regularization_operator = RegularizationOperator {
-            delta: regularizer.delta(matrix, &analysis.cage, m)?,
-            reference: regularizer.reference(),
-        };
-        let map = if unregularized {
+        let (regularizer, s, lambda) = if unregularized {
             let sigma = self.singular_values();
             let ill_conditioned = sigma.iter().filter(|&&x| x < ILL_CONDITIONED * sigma[0]).count();
-            self.map(&regularization_operator, regularizer, ill_conditioned.min(m / 4), 1.0)?
+            (Regularizer::Laplacian, ill_conditioned.min(m / 4), 1.0)
         } else {
-            self.map(&regularization_operator, regularizer, options.spectrum, options.lambda)?
+            (options.regularizer, options.spectrum, options.lambda)
         };
-        let target = self.target(&map, regularization_operator.reference);
+        let (delta, reference) = (regularizer.delta(matrix, &analysis.cage, m)?, regularizer.reference());
+        let map = self.map(&RegularizationOperator { delta, reference }, regularizer, s, lambda)?;
+        let target = self.target(&map, reference);
         let decoder = &analysis.decoder;
         let consistent = match decoder.dependent_normals() {
             None => None,

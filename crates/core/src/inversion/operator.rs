@@ -136,11 +136,8 @@ impl Decomposition {
             }
             FullSvd::Last(last, factor) => (LeftFactor::Normal(factor.to_owned()), Directions::Last(last.clone())),
         };
-        let [first, last] = match spectra.handles_ends {
-            // Not computed with the other decompositions.
-            [first, _] if first.is_nan() => svd::ends(None, basis.square.as_ref(), basis.handles.inverse.as_ref()),
-            known => known,
-        };
+        let ends = || svd::ends(None, basis.square.as_ref(), basis.handles.inverse.as_ref());
+        let [first, last] = spectra.handles_ends.unwrap_or_else(ends);
         let condition = first / last;
         let (handles, rows) = (basis.handles.rows.clone(), phi.nrows());
         Ok(Self { handles, reads_all: true, rows, left, rank, directions, condition })

@@ -62,8 +62,8 @@ const NORMAL_IS_SAFE: f64 = 1e5;
 pub(super) struct Spectra {
     /// Of `Φ□`; none where at most its extreme singular values are needed.
     pub(super) handles: Option<Svd>,
-    /// Largest and smallest singular value of `Φ□` over the rank; NaN where they are not needed.
-    pub(super) handles_ends: [f64; 2],
+    /// Largest and smallest singular value of `Φ□` over the rank, where they are needed.
+    pub(super) handles_ends: Option<[f64; 2]>,
     /// Singular values of `Φ`; none where only the ends are known.
     pub(super) full_sigma: Vec<f64>,
     /// The largest of them, the smallest over the rank, and the last of all.
@@ -134,10 +134,10 @@ impl Spectra {
             }
         };
         let handles_ends = match (&handles, required.handles()) {
-            (Some(svd), _) => [svd.sigma[0], svd.sigma[rank - 1]],
-            (None, Some(Handles::MaxVol)) => last.as_ref().map_or([f64::NAN; 2], LastDirections::ends),
-            (None, Some(Handles::All)) => svd::ends(None, basis.square.as_ref(), inverse),
-            (None, _) => [f64::NAN; 2],
+            (Some(svd), _) => Some([svd.sigma[0], svd.sigma[rank - 1]]),
+            (None, Some(Handles::MaxVol)) => last.as_ref().map(LastDirections::ends),
+            (None, Some(Handles::All)) => Some(svd::ends(None, basis.square.as_ref(), inverse)),
+            (None, _) => None,
         };
         let normal_factor = normal.filter(|_| whole_frames && last.is_some()).map(|normal| normal.factor);
         Ok(Self { handles, handles_ends, full_sigma, full_ends, gram_factor, full, last, normal_factor })
