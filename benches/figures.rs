@@ -7,7 +7,7 @@ use anyhow::Context;
 use cager_codec::{AdjacentGroups, CageBasis, decode_cages, encode_cages};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Coordinates, Green, Harmonic, MeanValue, Refinement};
-use cager_core::inversion::{BATCH, Solver, SolverOptions};
+use cager_core::inversion::{BATCH, Rows, Solver, SolverOptions};
 use cager_core::maxvol::{self, maxvol};
 use cager_core::mesh::{self, Model, Point, Polygons};
 use cager_core::synthetic::{Capture, Options};
@@ -82,9 +82,9 @@ fn figures(folder: &Path) -> anyhow::Result<Value> {
     let points = &capture.rest.points;
     let frames = write(&capture, &cage, folder)?;
 
-    let (mvc, mean_value) = timed_runs(RUNS, || MeanValue.coordinates(&cage, points));
-    let (green, green_found) = timed_runs(RUNS, || Green::Free.coordinates(&cage, points));
-    let (harmonic, harmonic_found) = timed_runs(FEW_RUNS, || Harmonic.coordinates(&cage, points));
+    let (mvc, mean_value) = timed_runs(RUNS, || MeanValue.coordinates(&cage, points, None));
+    let (green, green_found) = timed_runs(RUNS, || Green::Free.coordinates(&cage, points, None));
+    let (harmonic, harmonic_found) = timed_runs(FEW_RUNS, || Harmonic.coordinates(&cage, points, None));
     let mean_value = mean_value?;
     let coordinates = json!({
         "mvc": quality(&MeanValue, &cage, points, &mean_value),
@@ -102,27 +102,29 @@ fn figures(folder: &Path) -> anyhow::Result<Value> {
 
     let solver = Solver::prepare(&MeanValue, &cage, points, SolverOptions::PAPER)?;
     let batches: Vec<Vec<&[f32]>> = frames.chunks(BATCH).map(|b| b.iter().map(Vec::as_slice).collect()).collect();
-    let invert = timed(|| batches.iter().map(|b| solver.invert(b)).collect::<Vec<_>>());
+    let invert = timed(|| batches.iter().map(|b| solver.invert(Rows::All, None, b)).collect::<Vec<_>>());
     // Normals that follow from the vertices: an iteration for every frame.
     let consistent = Solver::prepare(&Green::Consistent, &cage, points, SolverOptions::PAPER)?;
-    let green_invert = timed_runs(FEW_RUNS, || batches.iter().map(|b| consistent.invert(b)).collect::<Vec<_>>()).0;
-    let cages: Vec<Vec<Vec<f32>>> = batches.iter().map(|b| solver.invert(b)).collect();
+    let green_invert =
+        timed_runs(FEW_RUNS, || batches.iter().map(|b| consistent.invert(Rows::All, None, b)).collect::<Vec<_>>()).0;
+    let inverted: Vec<_> = batches.iter().map(|b| solver.invert(Rows::All, None, b)).collect();
+    let cages: Vec<Vec<&[f32]>> =
+        inverted.iter().map(|batch| batch.iter().map(|inverted| inverted.cage.as_slice()).collect()).collect();
     let invert_measure = timed(|| {
         for batch in &batches {
-            let cages = solver.invert(batch);
-            let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
+            let inverted = solver.invert(Rows::All, None, batch);
+            let views: Vec<&[f32]> = inverted.iter().map(|inverted| inverted.cage.as_slice()).collect();
             black_box(solver.decoder().measure(&views, batch));
         }
     });
     let mut out = vec![Vec::new(); BATCH];
     let decode = timed(|| {
-        for batch in &cages {
-            let views: Vec<&[f32]> = batch.iter().map(Vec::as_slice).collect();
-            solver.decoder().decode(&views, &mut out[..views.len()]);
+        for views in &cages {
+            solver.decoder().decode(views, &mut out[..views.len()]);
         }
     });
     let (basis, _) = CageBasis::of(&MeanValue, &cage, points, None, None)?.context("a basis")?;
-    let views: Vec<&[f32]> = cages.iter().flatten().map(Vec::as_slice).collect();
+    let views = cages.concat();
     let step = CAGE_STEP * mesh::diagonal(points) / (basis.rows() as f64).sqrt();
     let groups = || views.chunks(GROUP).map(|group| encode_cages(&basis, group, step, AdjacentGroups::default()));
     let code_cages = timed(|| groups().collect::<Vec<_>>());
@@ -163,7 +165,7 @@ fn figures(folder: &Path) -> anyhow::Result<Value> {
 
 /// How well coordinates reproduce the rest pose, at worst and over its diagonal, and how they were refined.
 fn quality(system: &dyn CoordinateSystem, cage: &Cage, points: &[Point], found: &Coordinates) -> Value {
-    let values = system.rest_values(cage);
+    let values = system.values(cage).rest;
     let values = faer::Mat::from_fn(values.len(), 3, |j, k| values[j][k]);
     let reproduced = &found.phi * &values;
     let miss = |(i, p): (usize, &Point)| (0..3).map(|k| (reproduced[(i, k)] - p[k]).powi(2)).sum::<f64>().sqrt();

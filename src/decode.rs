@@ -233,10 +233,11 @@ fn bind(
     }
     let mesh = container.cage().map_err(fail)?;
     let cage = Cage::new(mesh).map_err(|cause| DecodeError::Cage { path: path.to_owned(), cause })?;
-    if system.unknowns(&cage) != header.rows_per_frame as usize {
+    let values = system.values(&cage);
+    if values.unknowns() != header.rows_per_frame as usize {
         return Err(unsupported(format!("it stores {} rows per frame", header.rows_per_frame)));
     }
-    let columns = system.columns(&cage);
+    let columns = values.columns();
     if other.is_some() {
         reject_far_points(&cage, &rest.points)
             .map_err(|cause| DecodeError::Model { path: model_path.to_owned(), cause })?;
@@ -251,7 +252,7 @@ fn bind(
             &rest.points,
             columns,
         );
-        let decoder = decoder.with_tied_normals(system.tied_normals(&cage));
+        let decoder = decoder.with_dependent_normals(values.dependent_normals);
         let some = (OUTSIDE_ENTRIES / columns).max(1);
         let outside = |points: &[Point]| pointwise(&cage, points).outside.len();
         let outside = other.map_or(0, |_| rest.points.chunks(some).map(outside).sum());
@@ -262,13 +263,10 @@ fn bind(
     if needed > free_bytes() {
         return Err(DecodeError::Memory { path: model_path.to_owned(), gigabytes: 1e-9 * needed as f64 });
     }
-    let coordinates = match (known, &plan) {
-        (Some(known), _) => Ok(known),
-        (None, Some(plan)) => system.coordinates_by_plan(&cage, &rest.points, plan),
-        (None, None) => system.coordinates(&cage, &rest.points),
-    };
+    let coordinates = known.map_or_else(|| system.coordinates(&cage, &rest.points, plan.as_ref()), Ok);
     let found = coordinates.map_err(|cause| DecodeError::Coordinates { path: model_path.to_owned(), cause })?;
-    let decoder = Decoder::new(found.phi.as_ref(), cage.vertices().len()).with_tied_normals(system.tied_normals(&cage));
+    let decoder =
+        Decoder::new(found.phi.as_ref(), cage.vertices().len()).with_dependent_normals(values.dependent_normals);
     Ok(BoundModel { rest, decoder, outside: found.outside.len() })
 }
 

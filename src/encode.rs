@@ -10,9 +10,9 @@ use crate::preparation_warnings::held_frames;
 use batches::{Batch, BatchPlan, SolvedBatch, read_batches, solve};
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{Analysis, PrepareError, Preparing, Solver, SolverOptions};
+use cager_core::inversion::{Analysis, PrepareContext, PrepareError, Solver, SolverOptions};
 use cager_core::mesh::{Model, Point, diagonal};
-use cager_core::regularize::Term;
+use cager_core::regularize::SparseMatrix;
 use cager_formats::{Action, AtomicFile, FrameReader, Target};
 use cager_proto::container;
 use cager_proto::report::{Consistency, Report, Seconds, SpectrumChoice};
@@ -86,8 +86,8 @@ pub struct Job<'a> {
     pub system: &'a dyn CoordinateSystem,
     /// Solver options.
     pub options: SolverOptions,
-    /// The user's own term, for [`Regularizer::Matrix`](cager_core::regularize::Regularizer::Matrix).
-    pub term: Option<&'a dyn Term>,
+    /// The user's own matrix, for [`Regularizer::Matrix`](cager_core::regularize::Regularizer::Matrix).
+    pub matrix: Option<&'a SparseMatrix>,
     /// Selects the spectrum threshold; without it that of the options is used.
     pub choose: Option<ChooseSpectrum>,
     /// What the encoding may hold in memory.
@@ -178,9 +178,9 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
     // A bound holds in the unit of the rest pose that was given, and in that of the one that is stored.
     let unit = stored.map_or(given, |stored| stored.min(given));
     let (rest, cage) = meshes.as_ref().map_or((job.rest, job.cage), |meshes| (&meshes.rest.mesh, &meshes.checked));
-    let Job { frames, output, system, options, term, choose, memory, goal, origin, exact_rest, .. } = job;
+    let Job { frames, output, system, options, matrix, choose, memory, goal, origin, exact_rest, .. } = job;
     let frames = &mut *frames;
-    let job = Job { rest, cage, frames, output, system, options, term, choose, memory, goal, origin, exact_rest };
+    let job = Job { rest, cage, frames, output, system, options, matrix, choose, memory, goal, origin, exact_rest };
     // What groups are coded in needs nothing of the solver, unless the coordinates are a numerical solution.
     let begins_early = goal.is_some() && system.pointwise().is_some();
     let clock_prepare = Instant::now();
@@ -330,27 +330,27 @@ fn prepare(
     let points = &job.rest.points;
     let batches = job.frames.frames().div_ceil(BatchPlan::new(job.memory, points.len(), false).size);
     let passes = if job.choose.is_some() { usize::MAX } else { batches };
-    let stores_coordinates = job.memory.keeps(points.len(), job.system.columns(job.cage), passes);
+    let stores_coordinates = job.memory.keeps(points.len(), job.system.values(job.cage).columns(), passes);
     let next = |step| {
         tell(step);
         ControlFlow::Continue(())
     };
     let memory = free_bytes();
-    let preparing = Preparing { term: job.term, stores_coordinates, memory, next: &next, ..Preparing::default() };
-    let term = preparing.term(options)?;
+    let context =
+        PrepareContext { matrix: job.matrix, stores_coordinates, memory, next: &next, ..PrepareContext::default() };
     let chosen_by = job.choose.as_ref().filter(|choose| !choose.samples.is_empty());
     let Some(ChooseSpectrum { samples, bound }) = chosen_by else {
-        return Ok((Solver::prepare_with(job.system, job.cage, points, options, &preparing)?, options, None, 0.0));
+        return Ok((Solver::prepare_with(job.system, job.cage, points, options, &context)?, options, None, 0.0));
     };
-    term.delta(job.cage, job.system.unknowns(job.cage))?;
-    let analysis = Analysis::for_options(job.system, job.cage, points, options, &preparing)?;
+    options.regularizer.delta(job.matrix, job.cage, job.system.values(job.cage).unknowns())?;
+    let analysis = Analysis::for_options(job.system, job.cage, points, options, &context)?;
     tell("threshold");
     let handle_system = analysis.handle_system(options.handles)?;
     let clock = Instant::now();
-    let found = handle_system.choose_threshold(options, term, samples, *bound)?;
+    let found = handle_system.choose_threshold(options, job.matrix, samples, *bound)?;
     let seconds = clock.elapsed().as_secs_f64();
     options.spectrum = found.spectrum;
-    Ok((handle_system.solver_with(options, term)?, options, Some(SpectrumChoice::new(&found, *bound)), seconds))
+    Ok((handle_system.solver(options, job.matrix)?, options, Some(SpectrumChoice::new(&found, *bound)), seconds))
 }
 
 #[cfg(test)]

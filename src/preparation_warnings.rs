@@ -82,7 +82,7 @@ mod tests {
     use super::*;
     use cager_core::cage::Cage;
     use cager_core::coordinates::MeanValue;
-    use cager_core::inversion::Preparing;
+    use cager_core::inversion::PrepareContext;
     use cager_core::synthetic::{Capture, Options};
 
     #[test]
@@ -91,8 +91,8 @@ mod tests {
         let cage = Cage::new(capture.cage.clone()).unwrap();
         let warnings = |handles, analysed_entries| {
             let options = SolverOptions { handles, ..SolverOptions::default() };
-            let preparing = Preparing { analysed_entries, ..Preparing::default() };
-            let solver = Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, options, &preparing).unwrap();
+            let context = PrepareContext { analysed_entries, ..PrepareContext::default() };
+            let solver = Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, options, &context).unwrap();
             preparation_warnings(options, &solver).concat()
         };
         let sampled = warnings(Handles::All, 40_000);

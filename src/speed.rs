@@ -26,7 +26,7 @@ pub(crate) fn seconds_per_multiplication() -> f64 {
 pub(crate) fn seconds_to_prepare(system: &dyn CoordinateSystem, cage: &Cage, points: usize) -> f64 {
     /// Points that are analysed at the most, times unknowns, as the core has it.
     const ANALYSED: f64 = (1u64 << 25) as f64;
-    let (n, m, faces) = (points as f64, system.unknowns(cage) as f64, cage.faces().len() as f64);
+    let (n, m, faces) = (points as f64, system.values(cage).unknowns() as f64, cage.faces().len() as f64);
     let of_points = n * faces * 400.0 + n.min((ANALYSED / m).max(8.0 * m)) * m * m * 3.0;
     let of_cage = 17.0 * m.powi(3) + if system.pointwise().is_none() { 2.2e5 * faces.powi(2) } else { 0.0 };
     (of_points + of_cage) * seconds_per_multiplication() / rayon::current_num_threads() as f64

@@ -22,7 +22,7 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::{PrepareError, Solver, SolverOptions, check_options};
 use cager_core::mesh::Model;
-use cager_core::regularize::{Regularizer, SparseMatrix, Term};
+use cager_core::regularize::{Regularizer, SparseMatrix};
 use cager_formats::{AtomicFile, FrameReader, Target, commit_together};
 use cager_proto::report::DesignReport;
 use std::time::{Duration, Instant};
@@ -102,7 +102,9 @@ fn dry_run(
             let system = args.solver.coordinates;
             let frames = read_files(files)?;
             match goal(args, rest, frames)? {
-                None => format!("cages of {}, and the rest pose", size(frames, system.unknowns(cage), "unknowns")),
+                None => {
+                    format!("cages of {}, and the rest pose", size(frames, system.values(cage).unknowns(), "unknowns"))
+                }
                 Some(Goal::Size(most)) => {
                     format!("{} frames, coded, {} at the most", grouped(frames), human_bytes(most))
                 }
@@ -175,7 +177,7 @@ fn best_cage_size(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Resu
     let bar = progress::steps();
     bar.set_message("trying cages of several sizes");
     let best = sizes.best(|cage, rest| {
-        let options = InversionChoices::coded(system).options(system.unknowns(cage));
+        let options = InversionChoices::coded(system).options(system.values(cage).unknowns());
         Solver::prepare(system, cage, &rest.points, options)
     });
     bar.finish_and_clear();
@@ -198,7 +200,7 @@ fn encode_locally(
     let choose = match (args.solver.spectrum, spectrum_bound(&args.solver)?) {
         (Some(SpectrumArg::Auto), bound) => {
             // What is wrong with the options is told before anything is read.
-            check_options(rest.points.len(), system.unknowns(cage), options, free_bytes())
+            check_options(rest.points.len(), system.values(cage).unknowns(), options, free_bytes())
                 .map_err(|e| name_file(&e, args))?;
             let mut again = files.open()?;
             let samples = choosing_frames(again.as_mut(), options.regularizer == Regularizer::Temporal)
@@ -222,7 +224,7 @@ fn encode_locally(
         output: &targets.output,
         system,
         options,
-        term: matrix.as_ref().map(|matrix| matrix as &dyn Term),
+        matrix: matrix.as_ref(),
         choose,
         memory,
         goal: goal(args, rest, announced)?,
@@ -248,7 +250,7 @@ fn choosing_frames(frames: &mut dyn FrameReader, first_ones: bool) -> Result<Vec
 
 /// What the arguments say of the inversion, and what is usual for this rest pose and cage.
 fn solver_options(args: &EncodeArgs, rest: &Model, cage: &Cage) -> Result<SolverOptions> {
-    let unknowns = args.solver.coordinates.unknowns(cage);
+    let unknowns = args.solver.coordinates.values(cage).unknowns();
     // The number of frames says how large a file may be, not whether it is coded.
     let is_coded = goal(args, rest, 1)?.is_some();
     Ok(inversion_choices(&args.solver, is_coded, unknowns)?.options(unknowns))
@@ -262,7 +264,7 @@ pub(super) fn checked_options(
     matrix: Option<&SparseMatrix>,
 ) -> Result<SolverOptions> {
     let (system, options) = (args.solver.coordinates, solver_options(args, rest, cage)?);
-    let delta = matrix.map_or(Ok(()), |matrix| matrix.delta(cage, system.unknowns(cage)).map(|_| ()));
+    let delta = matrix.map_or(Ok(()), |matrix| matrix.delta(cage, system.values(cage).unknowns()).map(|_| ()));
     // A service knows its own memory.
     let memory = if args.server.is_some() { u64::MAX } else { free_bytes() };
     delta

@@ -30,8 +30,12 @@ pub(super) fn read_cage(path: &Path, flip: bool, origin: Option<Point>) -> Resul
     move_to(origin, &mut model.points);
     let mesh = TriMesh::from(&model);
     let cage = Cage::new(if flip { mesh.flipped() } else { mesh });
-    if flip && matches!(cage, Err(CageError::Inward { .. })) {
-        bail!("{}: turned around, the faces of the cage point inwards; leave out --flip-cage", path.display());
+    match cage {
+        Err(CageError::Inward { .. }) if flip => {
+            bail!("{}: turned around, the faces of the cage point inwards; leave out --flip-cage", path.display())
+        }
+        Err(error @ CageError::Inward { .. }) => bail!("{}: {error}, or pass --flip-cage", path.display()),
+        _ => {}
     }
     let polygon_of = model.faces.polygon_of_triangle();
     cage.map_err(|error| error.renumbered(|triangle| polygon_of[triangle] as usize))

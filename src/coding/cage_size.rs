@@ -5,7 +5,7 @@ use crate::memory::Memory;
 use cager_cages::{EncloseOptions, enclose};
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{BATCH, PrepareError, Solver};
+use cager_core::inversion::{BATCH, PrepareError, Rows, Solver};
 use cager_core::mesh::{Model, diagonal};
 use cager_proto::container::colors_bytes;
 use std::sync::Arc;
@@ -66,8 +66,8 @@ impl CageSizes<'_> {
         let mut coder = GroupCoder::new(self.goal, Arc::new(model), diagonal(&rest.points), most, carried);
         let frames: Vec<&[f64]> = self.frames[..most].iter().map(Vec::as_slice).collect();
         for batch in frames.chunks(BATCH) {
-            for (frame, cage) in batch.iter().zip(solver.invert(batch)) {
-                coder.push(frame.to_vec(), cage);
+            for (frame, inverted) in batch.iter().zip(solver.invert(Rows::All, None, batch)) {
+                coder.push(frame.to_vec(), inverted.cage);
             }
         }
         let cost: Result<f64, CodingError> = match self.goal {

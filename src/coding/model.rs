@@ -25,7 +25,7 @@ impl GroupSpace {
         rest: &Model,
         plan: Option<&ElementPlan>,
     ) -> Result<Self, CodingError> {
-        let rows = system.unknowns(cage);
+        let rows = system.values(cage).unknowns();
         if rows > MAX_ROWS {
             return Err(CodingError::TooManyRows { rows, most: MAX_ROWS });
         }

@@ -14,7 +14,8 @@ const DRAWN: f64 = 2.0 * (DRAWS + 1) as f64;
 pub(super) fn work(job: &Job<'_>, system: &dyn CoordinateSystem) -> f64 {
     let frames = Sample::new(job.frames, job.frames_at_most).measured().len() as f64;
     let (points, faces) = (job.rest.points.len() as f64, job.cage.faces().len() as f64);
-    let (unknowns, columns) = (system.unknowns(job.cage) as f64, system.columns(job.cage) as f64);
+    let values = system.values(job.cage);
+    let (unknowns, columns) = (values.unknowns() as f64, values.columns() as f64);
     let analysis = 8.0 * points * unknowns.powi(2) + 750.0 * unknowns.powi(3);
     let measuring = METHODS * frames * points * columns;
     let iterated = (METHODS - DRAWN) * frames + DRAWN * frames.min(3.0 * DRAW_FRAMES as f64);

@@ -4,7 +4,7 @@ use super::evaluation::{Batch, MethodEvaluation, Shape};
 use super::figures::{DRAW_FRAMES, draws};
 use super::methods::{Method, methods};
 use super::sample::{Frame, Sample};
-use cager_core::inversion::{Analysis, FactoredInversion, HandleSystem, Handles, PrepareError, SolverOptions};
+use cager_core::inversion::{Analysis, FactoredInversion, HandleSystem, Handles, PrepareError, Rows, SolverOptions};
 use cager_core::regularize::Regularizer;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -84,7 +84,7 @@ impl GroupPlan {
     /// Upper estimate of the memory that the group takes, in bytes.
     pub(super) fn bytes(&self, analysis: &Analysis) -> usize {
         let m = analysis.coordinates().ncols();
-        let columns = if analysis.decoder().tied_normals().is_some() { analysis.decoder().columns() } else { 0 };
+        let columns = if analysis.decoder().dependent_normals().is_some() { analysis.decoder().columns() } else { 0 };
         let operator = if columns > 0 { m * analysis.coordinates().nrows() } else { 0 };
         8 * m * m * 4 + (8 * (m * m + operator) + 16 * columns * columns) * self.series.len()
     }
@@ -123,7 +123,7 @@ impl<'a> MethodGroup<'a> {
         let mut methods: Vec<(SolverOptions, Arc<FactoredInversion>)> =
             first.iter().map(factored).collect::<Result<_, PrepareError>>()?;
         methods.extend(others.par_iter().map(factored).collect::<Result<Vec<_>, PrepareError>>()?);
-        let is_tied = analysis.decoder().tied_normals().is_some();
+        let is_tied = analysis.decoder().dependent_normals().is_some();
         let sample = if is_tied && plan.is_draw() { sample.some(DRAW_FRAMES) } else { sample.clone() };
         let evaluation = |series: &SeriesKind| {
             let (_, method) = methods.iter().find(|(of, _)| *of == series.options())?;
@@ -155,10 +155,10 @@ impl<'a> MethodGroup<'a> {
             evaluation.frame_seconds = match known.filter(|_| !ordered) {
                 Some(seconds) => seconds,
                 None => {
-                    let solver = self.handle_system.solver(series.options())?;
+                    let solver = self.handle_system.solver(series.options(), None)?;
                     let seconds = (0..REPEATS).map(|_| {
                         let clock = Instant::now();
-                        std::hint::black_box(solver.invert_after(None, &frames));
+                        std::hint::black_box(solver.invert(Rows::All, None, &frames));
                         clock.elapsed().as_secs_f64()
                     });
                     seconds.fold(f64::INFINITY, f64::min) / frames.len() as f64

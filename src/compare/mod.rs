@@ -161,7 +161,7 @@ fn frames_of(reader: &mut dyn FrameReader, wanted: &[usize]) -> Result<Vec<Frame
 #[cfg(test)]
 mod tests {
     use super::*;
-    use cager_core::coordinates::{Coordinates, CoordinatesError, MeanValue};
+    use cager_core::coordinates::{CageValues, Coordinates, CoordinatesError, ElementPlan, MeanValue};
     use cager_core::mesh::Point;
     use cager_core::synthetic::{Capture, Options};
 
@@ -173,15 +173,11 @@ mod tests {
             "never"
         }
 
-        fn columns(&self, cage: &Cage) -> usize {
-            cage.vertices().len()
+        fn values(&self, cage: &Cage) -> CageValues {
+            CageValues::of_vertices(cage)
         }
 
-        fn rest_values(&self, cage: &Cage) -> Vec<Point> {
-            cage.vertices().to_vec()
-        }
-
-        fn coordinates(&self, _: &Cage, _: &[Point]) -> Result<Coordinates, CoordinatesError> {
+        fn coordinates(&self, _: &Cage, _: &[Point], _: Option<&ElementPlan>) -> Result<Coordinates, CoordinatesError> {
             Err(CoordinatesError::Outside { system: "never", points: vec![3, 17], distance: 0.02 })
         }
     }

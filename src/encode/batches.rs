@@ -2,7 +2,7 @@
 
 use crate::memory::Memory;
 use cager_core::decode::FrameError;
-use cager_core::inversion::{BATCH, Convergence, Solver};
+use cager_core::inversion::{BATCH, Convergence, Rows, Solver};
 use cager_formats::FrameReader;
 use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::Instant;
@@ -72,7 +72,7 @@ pub(super) struct SolvedBatch {
 pub(super) fn solve(solver: &Solver, batch: &Batch, previous: Option<&[f32]>, measures: bool) -> SolvedBatch {
     let frames: Vec<&[f64]> = batch.iter().map(Vec::as_slice).collect();
     let clock = Instant::now();
-    let inverted = solver.invert_with_convergence(previous, &frames);
+    let inverted = solver.invert(Rows::All, previous, &frames);
     let invert_seconds = clock.elapsed().as_secs_f64();
     let convergence = inverted.iter().filter_map(|inverted| inverted.convergence).collect();
     let held = inverted.iter().map(|inverted| inverted.held).collect();

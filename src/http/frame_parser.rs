@@ -3,7 +3,7 @@
 use crate::file_bodies::{TELLING_BYTES, refuse_file};
 use crate::problem::{self, ApiError};
 use crate::session::facts::Facts;
-use crate::session::upload::Rows;
+use cager_core::inversion::Rows;
 use cager_proto::record::{self, FrameHeader, Kind, RecordError};
 
 /// A complete frame.

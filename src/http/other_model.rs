@@ -104,13 +104,14 @@ pub(super) async fn bind(
             .map_err(|error| ApiError::new(problem::INVALID_GEOMETRY, format!("model: {error}")))?;
         check_model(model.points.len(), system, &cage, service.config.max_prepare_bytes)?;
         // On the elements of the session's own coordinates, where it has any, as in its container.
-        let coordinates = service.solvers.pool().install(|| match &prepared.solver.preparation().plan {
-            Some(plan) => system.coordinates_by_plan(&cage, &model.points, plan),
-            None => system.coordinates(&cage, &model.points),
-        });
+        let plan = prepared.solver.preparation().plan.as_ref();
+        let coordinates = service.solvers.pool().install(|| system.coordinates(&cage, &model.points, plan));
         let found = coordinates.map_err(|error| ApiError::new(problem::INVALID_GEOMETRY, format!("model: {error}")))?;
         let decoder = Decoder::new(found.phi.as_ref(), cage.vertices().len());
-        Ok(Bound { decoder: decoder.with_tied_normals(system.tied_normals(&cage)), outside: found.outside.len() })
+        Ok(Bound {
+            decoder: decoder.with_dependent_normals(system.values(&cage).dependent_normals),
+            outside: found.outside.len(),
+        })
     })
     .await?
 }

@@ -10,7 +10,6 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions, check_options};
 use cager_core::mesh::{Point, diagonal};
-use cager_core::regularize::Term;
 use cager_proto::container::colors_bytes;
 
 /// Validates rest pose, cage and options together, without expensive computation.
@@ -18,7 +17,7 @@ use cager_proto::container::colors_bytes;
 /// # Errors
 /// `INVALID_GEOMETRY`, `INVALID_OPTIONS`.
 pub(crate) fn check(geometry: &Geometry, choices: &Choices, max_bytes: u64) -> Result<(), ApiError> {
-    let unknowns = choices.system.unknowns(&geometry.cage);
+    let unknowns = choices.system.values(&geometry.cage).unknowns();
     let options = choices.inversion.options(unknowns);
     // Report a handle count beyond the points before one beyond the memory. With too few points the options are not at fault.
     if geometry.rest.points.len() >= unknowns {
@@ -97,7 +96,8 @@ pub(super) fn check_memory(
     max_bytes: u64,
 ) -> Result<(), ApiError> {
     let points = geometry.rest.points.len();
-    let unknowns = choices.system.unknowns(&geometry.cage);
+    let values = choices.system.values(&geometry.cage);
+    let unknowns = values.unknowns();
     let handles = match options.handles {
         // Covariance of the handles, its Cholesky factor, and the solution.
         Handles::Spread { .. } => {
@@ -106,7 +106,7 @@ pub(super) fn check_memory(
         }
         _ => 0,
     };
-    let columns = choices.system.columns(&geometry.cage) as u64;
+    let columns = values.columns() as u64;
     // The Gram matrix of the iteration, in double and in single precision.
     let iterated = if columns > unknowns as u64 { 12 * columns * columns } else { 0 };
     let elements = choices.system.working_bytes(&geometry.cage, None);
@@ -139,7 +139,7 @@ pub(crate) fn check_model(
     cage: &Cage,
     max_bytes: u64,
 ) -> Result<(), ApiError> {
-    let (columns, elements) = (system.columns(cage), system.working_bytes(cage, None));
+    let (columns, elements) = (system.values(cage).columns(), system.working_bytes(cage, None));
     // Peak memory: one matrix in double precision, the work space of the solve, and one matrix in single precision.
     let needed = (20 * points as u64 * columns as u64).saturating_add(elements);
     if needed <= max_bytes {
@@ -166,7 +166,7 @@ mod tests {
         let checked = |system: &str, max_bytes: u64| {
             let options = SessionOptions { coordinates: Some(system.to_owned()), ..SessionOptions::default() };
             let choices = Choices::of(&options).expect("options");
-            let columns = choices.inversion.options(choices.system.unknowns(&geometry.cage));
+            let columns = choices.inversion.options(choices.system.values(&geometry.cage).unknowns());
             let other = check_model(2000, choices.system, &geometry.cage, max_bytes);
             (check_memory(&geometry, &choices, columns, max_bytes), other)
         };

@@ -6,7 +6,7 @@ use crate::problem::{self, ApiError};
 use crate::store::{Content, NamedFile};
 use cager_cages::diagnosis::weld;
 use cager_codec::CodedMesh;
-use cager_core::cage::Cage;
+use cager_core::cage::{Cage, CageError};
 use cager_core::mesh::{Model, TriMesh, diagonal};
 use cager_core::regularize::{Regularizer, SparseMatrix};
 use cager_formats::{MeshFormat, read_matrix_bytes, read_model_bytes};
@@ -74,8 +74,10 @@ pub(crate) fn read_cage(file: &NamedFile, choices: &Choices) -> Result<Cage, Api
     let mesh = TriMesh::from(&model);
     let polygon_of = model.faces.polygon_of_triangle();
     Cage::new(if choices.flip_cage { mesh.flipped() } else { mesh }).map_err(|error| {
+        let or =
+            if matches!(error, CageError::Inward { .. }) && !choices.flip_cage { ", or send flip_cage" } else { "" };
         let error = error.renumbered(|triangle| polygon_of[triangle] as usize);
-        geometry(format!("{name}: {error}"))
+        geometry(format!("{name}: {error}{or}"))
     })
 }
 

@@ -19,8 +19,7 @@ use crate::far_frames::Reach;
 use crate::preparation_warnings::preparation_warnings;
 use crate::problem::ApiError;
 use cager_core::cage::Cage;
-use cager_core::inversion::{PrepareError, Preparing, Solver, SolverOptions};
-use cager_core::regularize::Term;
+use cager_core::inversion::{PrepareContext, PrepareError, Solver, SolverOptions};
 use checks::{check_memory, refused};
 use std::ops::ControlFlow;
 
@@ -46,13 +45,17 @@ pub(crate) fn prepare(
     max_bytes: u64,
     wanted: &dyn Fn() -> bool,
 ) -> Result<Option<Prepared>, ApiError> {
-    let unknowns = choices.system.unknowns(&geometry.cage);
+    let unknowns = choices.system.values(&geometry.cage).unknowns();
     let options = choices.inversion.options(unknowns);
     check_memory(geometry, choices, options, max_bytes)?;
-    let term = geometry.matrix.as_ref().map(|matrix| matrix as &dyn Term);
     let next = |_| if wanted() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
-    let preparing = Preparing { term, memory: max_bytes, next: &next, ..Preparing::default() };
-    match Solver::prepare_with(choices.system, &geometry.cage, &geometry.rest.points, options, &preparing) {
+    let context = PrepareContext {
+        matrix: geometry.matrix.as_ref(),
+        memory: max_bytes,
+        next: &next,
+        ..PrepareContext::default()
+    };
+    match Solver::prepare_with(choices.system, &geometry.cage, &geometry.rest.points, options, &context) {
         Ok(solver) => Ok(Some(with_solver(solver, &geometry.cage, options))),
         Err(PrepareError::Stopped) => Ok(None),
         Err(error) => Err(refused(&error)),

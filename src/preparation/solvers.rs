@@ -253,7 +253,7 @@ impl Solvers {
         lock(&self.files).get(key);
         let file = self.store.content_cage(key)?;
         let cage = super::read_cage(&file.ok_or_else(deleted)?, choices)?;
-        let options = choices.inversion.options(choices.system.unknowns(&cage));
+        let options = choices.inversion.options(choices.system.values(&cage).unknowns());
         metrics::counter!("cager_cache_total", "result" => "disk").increment(1);
         let total = clock.elapsed().as_secs_f64();
         let seconds = PreparationSeconds { queued, read: total - queued, total, ..PreparationSeconds::default() };

@@ -272,7 +272,7 @@ impl Service {
                 let decoder = prepared.solver.decoder();
                 let (points, columns) = (decoder.points() as f64, decoder.columns() as f64);
                 // Where normals are functions of the vertices, the iteration multiplies by a square matrix about this many times.
-                let products = if decoder.tied_normals().is_some() { 40.0 } else { 0.0 };
+                let products = if decoder.dependent_normals().is_some() { 40.0 } else { 0.0 };
                 points * columns + products * columns * columns
             };
             let in_order = prepared.solver.follows_previous();

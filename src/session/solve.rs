@@ -3,11 +3,12 @@
 use super::Session;
 use super::commit::SolvedFrame;
 use super::frames::{Claim, Digests};
-use super::upload::{FrameJob, Rows};
+use super::upload::FrameJob;
 use crate::capture::StoredError;
 use crate::preparation::Prepared;
 use crate::problem::{self, ApiError};
 use crate::sync::lock;
+use cager_core::inversion::Rows;
 use cager_core::mesh::Point;
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -203,14 +204,15 @@ fn solve_batch(
     }
     let views: Vec<&[f32]> = buffers[..jobs.len()].iter().map(Vec::as_slice).collect();
     let solver = &prepared.solver;
-    let (cages, errors) = match rows {
+    let cages: Vec<Vec<f32>> =
+        solver.invert(rows, previous, &views).into_iter().map(|inverted| inverted.cage).collect();
+    let errors = match rows {
         Rows::All => {
-            let cages = solver.invert_after(previous, &views);
             let cage_views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
             let errors = solver.decoder().measure(&cage_views, &views);
-            (cages, errors.iter().map(|e| StoredError::new(e, solver.diagonal())).collect())
+            errors.iter().map(|e| StoredError::new(e, solver.diagonal())).collect()
         }
-        Rows::Handles => (solver.invert_handles_after(previous, &views), vec![StoredError::NOT_MEASURED; jobs.len()]),
+        Rows::Handles => vec![StoredError::NOT_MEASURED; jobs.len()],
     };
     if buffers.iter().map(Vec::capacity).sum::<usize>() <= MAX_RETAINED_VALUES {
         FRAME_BUFFERS.set(buffers);

@@ -5,6 +5,7 @@ use super::registry::Reserved;
 use crate::admission::Held;
 use crate::problem::{self, ApiError};
 use crate::sync::lock;
+use cager_core::inversion::Rows;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
@@ -120,15 +121,6 @@ impl Upload {
             self.changed.notified().await;
         }
     }
-}
-
-/// What a posted frame consists of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Rows {
-    /// Every point of the model.
-    All,
-    /// The handles.
-    Handles,
 }
 
 /// A frame queued for solving.

@@ -4,8 +4,10 @@
 
 use super::ContentKey;
 use super::disk::DiskFile;
-use cager_core::coordinates::TiedNormals;
-use cager_core::inversion::{NearnessParts, Preparation, RegularizationTarget, Solver, SolverParts, TiedParts};
+use cager_core::coordinates::DependentNormals;
+use cager_core::inversion::{
+    DependentParts, NearnessParts, PreparationReport, RegularizationTarget, Solver, SolverParts,
+};
 use cager_proto::wire;
 use faer::traits::ComplexField;
 use faer::{ColRef, Mat, MatRef};
@@ -35,7 +37,7 @@ struct Facts {
     first: Option<Vec<f32>>,
     tied: Option<Tied>,
     nearness: Option<Near>,
-    preparation: Preparation,
+    preparation: PreparationReport,
 }
 
 /// Of normals that follow from the vertices.
@@ -66,7 +68,7 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
             first = Some(cage.clone());
         }
     }
-    let tied = solver.tied().map(|(normals, gram, start_weight)| {
+    let tied = solver.dependent().map(|(normals, gram, start_weight)| {
         matrices.push(Array::new("gram", gram));
         Tied { faces: normals.faces().to_vec(), weights: normals.weights().to_vec(), start_weight }
     });
@@ -175,8 +177,8 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Option<S
     };
     let tied = match (tied, gram) {
         (Some(Tied { faces, weights, start_weight }), Some(gram)) => {
-            let normals = TiedNormals::from_parts(faces, weights, positions).ok_or_else(no_fit)?;
-            Some(TiedParts { normals, gram, weight: start_weight })
+            let normals = DependentNormals::from_parts(faces, weights, positions).ok_or_else(no_fit)?;
+            Some(DependentParts { normals, gram, weight: start_weight })
         }
         (None, None) => None,
         _ => return Err(no_fit()),
@@ -186,8 +188,18 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Option<S
         (None, None, None) => None,
         _ => return Err(no_fit()),
     };
-    let parts =
-        SolverParts { handles, reads_all, operator, target, phi, positions, tied, nearness, diagonal, preparation };
+    let parts = SolverParts {
+        handles,
+        reads_all,
+        operator,
+        target,
+        phi,
+        positions,
+        dependent: tied,
+        nearness,
+        diagonal,
+        preparation,
+    };
     Solver::from_parts(parts).ok_or_else(no_fit).map(Some)
 }
 
@@ -328,7 +340,7 @@ mod tests {
 
     #[test]
     fn what_is_no_matrix_keeps_its_layout() {
-        let preparation = Preparation {
+        let preparation = PreparationReport {
             rank: 1,
             affine_reproduction_error: 2.0,
             condition_full: 3.0,

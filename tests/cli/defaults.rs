@@ -3,7 +3,7 @@
 use crate::real_data::{cage_of, data};
 use crate::support::Dir;
 use cager_core::coordinates::{CoordinateSystem, Green, Harmonic, MeanValue};
-use cager_core::inversion::{Solver, SolverOptions};
+use cager_core::inversion::{Rows, Solver, SolverOptions};
 use cager_formats::read_model;
 use std::fs;
 
@@ -48,7 +48,7 @@ fn a_rest_pose_of_the_pairs_gives_its_cage() {
         let (rest, cage) = (read_model(&folder.join("mesh.obj")).expect("a model"), cage_of(&folder.join("cage.obj")));
         let systems: [&dyn CoordinateSystem; 4] = [&MeanValue, &Harmonic, &Green::Consistent, &Green::Free];
         for system in systems {
-            let options = SolverOptions::for_unknowns(system.unknowns(&cage));
+            let options = SolverOptions::for_unknowns(system.values(&cage).unknowns());
             let frame: Vec<f64> = rest.points.iter().flatten().copied().collect();
             let solver = match Solver::prepare(system, &cage, &rest.points, options) {
                 Ok(solver) => solver,
@@ -58,8 +58,8 @@ fn a_rest_pose_of_the_pairs_gives_its_cage() {
                     continue;
                 }
             };
-            let cages = solver.invert(&[&frame]);
-            let error = solver.decoder().measure(&[&cages[0]], &[&frame])[0].linf / solver.diagonal();
+            let cage = solver.invert(Rows::All, None, &[&frame]).remove(0).cage;
+            let error = solver.decoder().measure(&[&cage], &[&frame])[0].linf / solver.diagonal();
             assert!(error <= 1e-6, "{pair}, {}: {error:e}", system.name());
             compared += 1;
         }

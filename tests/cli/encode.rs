@@ -367,10 +367,10 @@ fn handles_are_counted_as_asked_and_begin_with_those_of_maximum_volume() {
 
 /// The Laplacian of a cage as a file.
 fn laplacian_file(cage: &cager_core::mesh::TriMesh) -> String {
-    use cager_core::regularize::{CageLaplacian, Term as _};
+    use cager_core::regularize::Regularizer;
     let cage = cager_core::cage::Cage::new(cage.clone()).expect("a cage");
     let m = cage.vertices().len();
-    let delta = CageLaplacian.delta(&cage, m).expect("a term");
+    let delta = Regularizer::Laplacian.delta(None, &cage, m).expect("a term");
     let mut lines = Vec::new();
     for (i, j) in (0..m).flat_map(|i| (0..m).map(move |j| (i, j))).filter(|&(i, j)| delta[(i, j)] != 0.0) {
         lines.push(format!("{} {} {:?}", i + 1, j + 1, delta[(i, j)]));

@@ -54,7 +54,7 @@ pub(crate) fn run_with(
         output: &Target::from(&output),
         system,
         options,
-        term: None,
+        matrix: None,
         choose: None,
         memory: Memory::half_of_free(),
         goal: None,
@@ -202,7 +202,7 @@ fn encode_rest_pose(dir: &Dir, folder: &Path) -> Output {
 
 /// `Φ · C` in double precision.
 fn posed(cage: &Cage, rest: &[Point], moved: &[Point]) -> Vec<f64> {
-    let phi = MeanValue.coordinates(cage, rest).unwrap().phi;
+    let phi = MeanValue.coordinates(cage, rest, None).unwrap().phi;
     (0..rest.len())
         .flat_map(|i| [0, 1, 2].map(|k| (0..moved.len()).map(|j| phi[(i, j)] * moved[j][k]).sum::<f64>()))
         .collect()

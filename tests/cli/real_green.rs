@@ -119,8 +119,8 @@ fn every_pair_is_reproduced_and_points_outside_are_found() {
         let folder = entry.expect("a pair").path();
         let rest = read_model(&folder.join("mesh.obj")).expect("a model");
         let cage = cage_of(&folder.join("cage.obj"));
-        let found = Green::Free.coordinates(&cage, &rest.points).expect("coordinates");
-        let (values, size) = (Green::Free.rest_values(&cage), diagonal(&rest.points));
+        let found = Green::Free.coordinates(&cage, &rest.points, None).expect("coordinates");
+        let (values, size) = (Green::Free.values(&cage).rest, diagonal(&rest.points));
         let mut worst: f64 = 0.0;
         for (i, p) in rest.points.iter().enumerate() {
             for k in 0..3 {

@@ -3,7 +3,7 @@
 use crate::real_data::{cage_of, data, run};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
-use cager_core::inversion::{Analysis, BATCH, Handles, Solver, SolverOptions};
+use cager_core::inversion::{Analysis, BATCH, Handles, Rows, Solver, SolverOptions};
 use cager_core::mesh::Model;
 use cager_core::regularize::Regularizer;
 use cager_formats::{open_frames, read_model};
@@ -105,7 +105,8 @@ fn make(solver: &Solver, frames: &[Vec<f64>]) -> Made {
     let (mut l2, mut linf, mut cages) = (0.0, 0.0f64, Vec::new());
     for batch in frames.chunks(BATCH) {
         let views: Vec<&[f64]> = batch.iter().map(Vec::as_slice).collect();
-        let solved = solver.invert_after(cages.last().map(Vec::as_slice), &views);
+        let inverted = solver.invert(Rows::All, cages.last().map(Vec::as_slice), &views);
+        let solved: Vec<Vec<f32>> = inverted.into_iter().map(|inverted| inverted.cage).collect();
         let solved_views: Vec<&[f32]> = solved.iter().map(Vec::as_slice).collect();
         for error in solver.decoder().measure(&solved_views, &views) {
             l2 += error.l2;

@@ -6,7 +6,7 @@ use cager::memory::Memory;
 use cager_client::{MeshFile, NewSession, messages::SessionOptions};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
-use cager_core::inversion::{Solver, SolverOptions};
+use cager_core::inversion::{Rows, Solver, SolverOptions};
 use cager_core::mesh::{Model, Polygons, TriMesh};
 use cager_core::synthetic::{Capture, Options};
 use cager_formats::{FrameReader, MeshFormat, Target, commit_together, read_model_bytes, write_model};
@@ -67,7 +67,7 @@ impl Reference {
             output: &Target::from(&output),
             system: &MeanValue,
             options,
-            term: None,
+            matrix: None,
             choose: None,
             memory: Memory::half_of_free(),
             goal: None,
@@ -92,7 +92,7 @@ impl Reference {
         let (mut cages, mut errors) = (Vec::new(), Vec::new());
         for frame in &frames {
             // One by one: what is solved together must not matter.
-            let cage = solver.invert(&[frame]).remove(0);
+            let cage = solver.invert(Rows::All, None, &[frame]).remove(0).cage;
             let error = StoredError::new(&solver.decoder().measure(&[&cage], &[frame])[0], solver.diagonal());
             errors.push(Errors { l2: error.l2.to_bits(), linf: error.linf.to_bits() });
             writer.write_frame(&cage, &StoredError::NOT_MEASURED).expect("a frame");

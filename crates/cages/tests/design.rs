@@ -4,7 +4,7 @@ mod common;
 
 use cager_cages::{Design, DesignError, DesignOptions, Goal, Style, design, enclose};
 use cager_core::cage::Cage;
-use cager_core::inversion::{BATCH, Handles, Solver, SolverOptions};
+use cager_core::inversion::{BATCH, Handles, Rows, Solver, SolverOptions};
 use cager_geometry::mesh::{Model, TriMesh};
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -68,9 +68,8 @@ fn encoded(cage: &TriMesh, rest: &Model, frames: &[Vec<f64>]) -> f64 {
     let frames: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
     let mut errors = Vec::new();
     for frames in frames.chunks(BATCH) {
-        let cages: Vec<Vec<f32>> =
-            solver.invert_with_convergence(None, frames).into_iter().map(|found| found.cage).collect();
-        let cages: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
+        let inverted = solver.invert(Rows::All, None, frames);
+        let cages: Vec<&[f32]> = inverted.iter().map(|inverted| inverted.cage.as_slice()).collect();
         errors.extend(solver.decoder().measure(&cages, frames));
     }
     errors.iter().map(|e| e.l2).sum::<f64>() / errors.len() as f64 / solver.diagonal()

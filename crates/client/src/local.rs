@@ -43,12 +43,13 @@ impl LocalDecoder {
     pub fn with_tied_normals(self, cage: &RestCage) -> Result<Self, ClientError> {
         let mesh = TriMesh { vertices: cage.vertices.clone(), triangles: cage.faces.clone() };
         let cage = Cage::new(mesh).map_err(|error| ClientError::Protocol(error.to_string()))?;
-        let (vertices, columns) = (cage.vertices().len(), Green::Consistent.columns(&cage));
+        let values = Green::Consistent.values(&cage);
+        let (vertices, columns) = (cage.vertices().len(), values.columns());
         if (self.decoder.positions(), self.decoder.columns()) != (vertices, columns) {
             let what = format!("coordinates of a cage of {vertices} vertices have {columns} columns");
             return Err(ClientError::Protocol(what));
         }
-        Ok(Self { decoder: self.decoder.with_tied_normals(Green::Consistent.tied_normals(&cage)) })
+        Ok(Self { decoder: self.decoder.with_dependent_normals(values.dependent_normals) })
     }
 
     /// A decoder from coordinates whose first `positions` columns belong to vertices and whose other columns belong to further unknowns;

@@ -46,13 +46,11 @@ impl CageBasis {
     ) -> Result<Option<(Self, Coordinates)>, CoordinatesError> {
         let every = points.len().div_ceil(Self::SAMPLE).max(1);
         let sample: Vec<Point> = points.iter().step_by(every).copied().collect();
-        let found = match plan {
-            Some(plan) => system.coordinates_by_plan(cage, &sample, plan)?,
-            None => system.coordinates(cage, &sample)?,
-        };
+        let found = system.coordinates(cage, &sample, plan)?;
         // Of normals that follow from the vertices no rows are stored.
-        let rows = system.unknowns(cage);
-        let (phi, rest) = (found.phi.subcols(0, rows), &system.rest_values(cage)[..rows]);
+        let values = system.values(cage);
+        let rows = values.unknowns();
+        let (phi, rest) = (found.phi.subcols(0, rows), &values.rest[..rows]);
         let basis = match rotated {
             Some(rotated) => Self::new(phi, rest, rotated),
             None => Self::for_encoding(phi, rest),

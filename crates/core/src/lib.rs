@@ -7,8 +7,8 @@ pub mod handles;
 pub mod inversion;
 pub mod maxvol;
 pub mod regularize;
+mod row_basis;
 mod simd;
-mod spectrum;
 pub mod synthetic;
 
 use cager_geometry::{linalg as dense, linalg::svd};

@@ -5,12 +5,12 @@ mod common;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::decode::FrameError;
-use cager_core::inversion::{Analysis, Handles, PrepareError, Preparing, Solver, SolverOptions};
+use cager_core::inversion::{Analysis, Handles, PrepareContext, PrepareError, Solver, SolverOptions};
 use cager_core::maxvol::{TOLERANCE, maxvol, maxvol_from};
 use cager_core::mesh::Point;
 use cager_core::regularize::Regularizer;
 use cager_core::synthetic::{Capture, Options};
-use common::Random;
+use common::{Cages, Random};
 use faer::Mat;
 
 fn capture() -> (Capture, Cage) {
@@ -28,12 +28,12 @@ fn solvers_of_an_analysis_have_the_bits_of_those_prepared_alone() {
     capture.frame(4, &mut frame);
     let some = [Handles::Rectangular { count: None }, Handles::Spread { count: Some(100) }];
     for handles in [Handles::MaxVol, Handles::All].into_iter().chain(some) {
-        for regularizer in Regularizer::ALL.into_iter().filter(|r| r.term().is_some()) {
+        for regularizer in Regularizer::ALL.into_iter().filter(|&r| r != Regularizer::Matrix) {
             for spectrum in [0, 7] {
                 let options = SolverOptions { handles, regularizer, spectrum, lambda: 0.5 };
                 let alone = Solver::prepare(&MeanValue, &cage, points, options).unwrap();
                 let shared = analysis.solver(options).unwrap();
-                let invert = |solver: &Solver| solver.invert_after(None, &[frame.as_slice()]);
+                let invert = |solver: &Solver| solver.cages(&[frame.as_slice()]);
                 assert_eq!(invert(&shared), invert(&alone), "{options:?}");
                 assert_eq!(shared.handles(), alone.handles());
                 let (a, b) = (shared.preparation(), alone.preparation());
@@ -62,13 +62,13 @@ fn methods_in_factors_give_the_cages_of_their_solvers() {
         for handles in [Handles::MaxVol, Handles::All].into_iter().chain(some) {
             let handle_system = analysis.handle_system(handles).unwrap();
             let projected = handle_system.project(&frames);
-            for regularizer in Regularizer::ALL.into_iter().filter(|r| r.term().is_some()) {
+            for regularizer in Regularizer::ALL.into_iter().filter(|&r| r != Regularizer::Matrix) {
                 let options = SolverOptions { handles, regularizer, spectrum: 7, lambda: 0.5 };
                 let method = handle_system.factored(options).unwrap();
                 let solver = analysis.solver(options).unwrap();
                 assert_eq!(method.follows_previous(), solver.follows_previous());
                 let found = handle_system.cages(&method, None, &projected, &frames);
-                let wanted = solver.invert_after(None, &frames);
+                let wanted = solver.cages(&frames);
                 let tolerance = if system.name() == "green" { 0.0 } else { 2e-6 };
                 for (a, b) in found.iter().flatten().zip(wanted.iter().flatten()) {
                     assert!((a - b).abs() <= tolerance * (1.0 + b.abs()), "{} {options:?}: {a} {b}", system.name());
@@ -84,15 +84,15 @@ fn whole_frames_are_projected_where_a_sample_was_analysed() {
     let mut frame = Vec::new();
     capture.frame(4, &mut frame);
     let frames = [frame.as_slice()];
-    let preparing = Preparing { analysed_entries: 1, ..Preparing::default() };
+    let context = PrepareContext { analysed_entries: 1, ..PrepareContext::default() };
     for handles in [Handles::MaxVol, Handles::All] {
         let options = SolverOptions { handles, regularizer: Regularizer::Laplacian, spectrum: 7, lambda: 0.5 };
-        let analysis = Analysis::for_options(&MeanValue, &cage, &capture.rest.points, options, &preparing).unwrap();
+        let analysis = Analysis::for_options(&MeanValue, &cage, &capture.rest.points, options, &context).unwrap();
         assert!(analysis.coordinates().nrows() < capture.rest.points.len(), "a sample");
         let handle_system = analysis.handle_system(handles).unwrap();
         let method = handle_system.factored(options).unwrap();
         let found = handle_system.cages(&method, None, &handle_system.project(&frames), &frames);
-        let wanted = handle_system.solver(options).unwrap().invert(&frames);
+        let wanted = handle_system.solver(options, None).unwrap().cages(&frames);
         for (a, b) in found.iter().flatten().zip(wanted.iter().flatten()) {
             assert!((a - b).abs() <= 2e-6 * (1.0 + b.abs()), "{handles:?}: {a} {b}");
         }
@@ -103,9 +103,9 @@ fn whole_frames_are_projected_where_a_sample_was_analysed() {
 fn what_would_take_more_memory_than_it_may_is_refused_before_it_is_taken() {
     let (capture, cage) = capture();
     let prepare = |handles, memory| {
-        let preparing = Preparing { memory, ..Preparing::default() };
+        let context = PrepareContext { memory, ..PrepareContext::default() };
         let options = SolverOptions { handles, ..SolverOptions::PAPER };
-        Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, options, &preparing).map(|_| ())
+        Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, options, &context).map(|_| ())
     };
     // The points times the vertices, twice; the covariance of 300 handles, its factor, and what is solved with it.
     let (points, vertices) = (capture.rest.points.len() as u64, cage.vertices().len() as u64);
@@ -144,23 +144,23 @@ fn rows_given_to_an_analysis_are_followed_exactly_where_they_determine_the_cage(
     let (capture, cage) = capture();
     let analysis = Analysis::new(&MeanValue, &cage, &capture.rest.points).unwrap();
     let options = SolverOptions { regularizer: Regularizer::None, spectrum: 0, ..SolverOptions::PAPER };
+    let of_rows = |rows: &[u32]| analysis.handle_system_of(rows)?.solver(options, None);
     let rows = analysis.handles().rows.clone();
-    let (given, own) = (analysis.solver_of_rows(&rows, options).unwrap(), analysis.solver(options).unwrap());
+    let (given, own) = (of_rows(&rows).unwrap(), analysis.solver(options).unwrap());
     let mut frame = Vec::new();
     capture.frame(3, &mut frame);
-    let (a, b) = (given.invert(&[frame.as_slice()]), own.invert(&[frame.as_slice()]));
+    let (a, b) = (given.cages(&[frame.as_slice()]), own.cages(&[frame.as_slice()]));
     assert!(a[0].iter().zip(&b[0]).all(|(x, y)| (x - y).abs() < 1e-5));
     // More rows than unknowns: least squares over them.
     let more: Vec<u32> = (0..capture.rest.points.len() as u32).collect();
     let all = analysis.solver(SolverOptions { handles: Handles::All, ..options }).unwrap();
-    let (a, b) =
-        (analysis.solver_of_rows(&more, options).unwrap().invert(&[frame.as_slice()]), all.invert(&[frame.as_slice()]));
+    let (a, b) = (of_rows(&more).unwrap().cages(&[frame.as_slice()]), all.cages(&[frame.as_slice()]));
     assert!(a[0].iter().zip(&b[0]).all(|(x, y)| (x - y).abs() < 1e-4));
     // The same row many times determines nothing but one direction, and the Laplacian places the rest.
-    let poor = analysis.solver_of_rows(&vec![5; rows.len()], options).unwrap();
+    let poor = of_rows(&vec![5; rows.len()]).unwrap();
     let sigma = &poor.preparation().singular_values;
     assert_eq!(sigma.iter().filter(|&&x| x > 1e-11 * sigma[0]).count(), 1);
-    assert!(poor.invert(&[frame.as_slice()])[0].iter().all(|x| x.is_finite()));
+    assert!(poor.cages(&[frame.as_slice()])[0].iter().all(|x| x.is_finite()));
 }
 
 #[test]
@@ -171,7 +171,8 @@ fn thresholds_beyond_the_unknowns_are_refused_by_an_analysis_too() {
     let options = SolverOptions { spectrum: unknowns + 1, ..SolverOptions::PAPER };
     let refused = PrepareError::SpectrumTooLarge { spectrum: unknowns + 1, unknowns };
     assert_eq!(analysis.solver(options).unwrap_err(), refused);
-    assert_eq!(analysis.solver_of_rows(&analysis.handles().rows, options).unwrap_err(), refused);
+    let of_rows = analysis.handle_system_of(&analysis.handles().rows).unwrap();
+    assert_eq!(of_rows.solver(options, None).unwrap_err(), refused);
 }
 
 #[test]
@@ -252,7 +253,7 @@ fn the_last_directions_alone_give_the_cages_of_the_whole_decomposition() {
         if handles == Handles::default() {
             assert_eq!(alone.operator(), with(1).operator());
         }
-        let [found, wanted] = [&alone, &whole].map(|solver| solver.invert_after(None, &[frame.as_slice()]).concat());
+        let [found, wanted] = [&alone, &whole].map(|solver| solver.cages(&[frame.as_slice()]).concat());
         for (found, wanted) in found.iter().zip(&wanted) {
             assert!((found - wanted).abs() < 1e-6 * alone.diagonal() as f32, "{options:?}: {found} {wanted}");
         }
@@ -275,7 +276,7 @@ fn an_error_that_is_nan_is_kept_whichever_way_errors_are_measured() {
     let solver = Solver::prepare(&MeanValue, &cage, &capture.rest.points, SolverOptions::PAPER).unwrap();
     let mut frame = Vec::new();
     capture.frame(4, &mut frame);
-    let cages = solver.invert(&[&frame]);
+    let cages = solver.cages(&[&frame]);
     let mut decoded = [Vec::new()];
     solver.decoder().decode(&[&cages[0]], &mut decoded);
     for points in [&[5][..], &[100, 600], &[699]] {

@@ -84,8 +84,8 @@ fn reproduces_points_far_outside(system: &dyn CoordinateSystem, name: &str, cage
     let mut random = Random::new(17);
     for &distance in distances {
         let points: Vec<Point> = (0..10).map(|_| random.direction().map(|c| c * distance)).collect();
-        let found = system.coordinates(cage, &points).unwrap();
-        let unknowns = system.rest_values(cage);
+        let found = system.coordinates(cage, &points, None).unwrap();
+        let unknowns = system.values(cage).rest;
         assert_eq!(found.outside.len(), points.len(), "{name}: not all points at {distance:e} are outside");
         for (i, p) in points.iter().enumerate() {
             let name = format!("{name} from {distance:e}");
@@ -174,7 +174,7 @@ struct Solved {
 
 /// Coordinates of several sets of points, computed together.
 fn solved<const N: usize>(system: &dyn CoordinateSystem, cage: &Cage, sets: [Vec<Point>; N]) -> [Solved; N] {
-    let Coordinates { phi, outside, .. } = system.coordinates(cage, &sets.concat()).unwrap();
+    let Coordinates { phi, outside, .. } = system.coordinates(cage, &sets.concat(), None).unwrap();
     let mut first = 0;
     sets.map(|points| {
         let here = first..first + points.len();
@@ -205,7 +205,7 @@ fn conforms_or_refuses(system: &dyn CoordinateSystem, promises: Promises, name: 
         let cage = common::mapped(cage, |p| p.map(|c| c * scale));
         let scaled: Vec<Point> = points.iter().map(|p| p.map(|c| c * scale)).collect();
         let all = [&scaled[..], &points_on_faces(&cage)].concat();
-        match system.coordinates(&cage, &all) {
+        match system.coordinates(&cage, &all, None) {
             Ok(found) => {
                 let rows = |from: usize, points: &[Point]| Solved {
                     points: points.to_vec(),
@@ -264,7 +264,7 @@ fn probes(promises: Promises, cage: &Cage) -> Vec<Point> {
 }
 
 fn reproduces_affine_functions(system: &dyn CoordinateSystem, name: &str, cage: &Cage, found: &Solved) {
-    let (unknowns, size) = (system.rest_values(cage), diagonal(&found.points));
+    let (unknowns, size) = (system.values(cage).rest, diagonal(&found.points));
     for (i, p) in found.points.iter().enumerate() {
         assert_reproduced(name, &row(&found.phi, i), cage.vertices().len(), &unknowns, *p, size);
     }
@@ -293,9 +293,9 @@ fn does_not_depend_on_the_order_of_vertices_and_faces(
     cage: &Cage,
 ) {
     let points = some(promises, probes(promises, cage));
-    let found = system.coordinates(cage, &points).unwrap();
+    let found = system.coordinates(cage, &points, None).unwrap();
     let (shuffled, order) = common::shuffled(cage, &mut Random::new(11));
-    let other = system.coordinates(&shuffled, &points).unwrap();
+    let other = system.coordinates(&shuffled, &points, None).unwrap();
     // Points within rounding of an edge may be taken for points on it in one order and not in the other.
     let vertices = cage.vertices();
     for i in 0..points.len() {
@@ -315,7 +315,7 @@ fn follows_rigid_motions(system: &dyn CoordinateSystem, promises: Promises, name
     let mut random = Random::new(13);
     let points = (0..200).map(|_| [0, 1, 2].map(|_| cage.diagonal() * (random.uniform() - 0.5))).collect();
     let points = some(promises, defined(promises, cage, points));
-    let found = system.coordinates(cage, &points).unwrap();
+    let found = system.coordinates(cage, &points, None).unwrap();
     let motion = |p: Point| {
         let (s, c) = 0.7f64.sin_cos();
         let q = [c * p[0] - s * p[1], s * p[0] + c * p[1], p[2]];
@@ -323,7 +323,7 @@ fn follows_rigid_motions(system: &dyn CoordinateSystem, promises: Promises, name
         [q[0] + 3.0, c * q[1] - s * q[2] - 2.0, s * q[1] + c * q[2] + 1.0]
     };
     let moved: Vec<Point> = points.iter().map(|&p| motion(p)).collect();
-    let other = system.coordinates(&common::mapped(cage, motion), &moved).unwrap();
+    let other = system.coordinates(&common::mapped(cage, motion), &moved, None).unwrap();
     for i in 0..points.len() {
         for j in 0..found.phi.ncols() {
             let difference = (found.phi[(i, j)] - other.phi[(i, j)]).abs();
@@ -441,7 +441,7 @@ fn harmonic_coordinates_do_not_exist_outside() {
             .filter(|(_, p)| winding_number(vertices, triangles, **p) < 0.5)
             .map(|(i, _)| i as u32)
             .collect();
-        let error = Harmonic.coordinates(&cage, &[inside, out, inside, far]).unwrap_err();
+        let error = Harmonic.coordinates(&cage, &[inside, out, inside, far], None).unwrap_err();
         let CoordinatesError::Outside { system, points, distance } = error else { panic!("{name}: {error}") };
         assert_eq!((system, points), ("harmonic", expected), "{name}");
         let farthest = distance_to_surface(vertices, triangles, far) / cage.diagonal();

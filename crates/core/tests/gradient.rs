@@ -26,7 +26,7 @@ fn weighted_sum(cage: &Cage, points: &[Point], weights: &Mat<f64>) -> f64 {
 fn values_are_those_of_the_full_computation() {
     let capture = capture();
     let (cage, points) = (Cage::new(capture.cage.clone()).unwrap(), &capture.rest.points[..101]);
-    let exact = MeanValue.coordinates(&cage, points).unwrap().phi;
+    let exact = MeanValue.coordinates(&cage, points, None).unwrap().phi;
     let smooth = MeanValue.smooth_coordinates(&cage, points);
     for j in 0..exact.ncols() {
         for i in 0..exact.nrows() {

@@ -5,10 +5,11 @@ mod common;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::decode::Decoder;
-use cager_core::inversion::{BATCH, Handles, Outcome, Solver, SolverOptions, SolverParts, TiedParts};
+use cager_core::inversion::{BATCH, DependentParts, Handles, Outcome, Rows, Solver, SolverOptions, SolverParts};
 use cager_core::mesh::Point;
 use cager_core::regularize::Regularizer;
 use cager_core::synthetic::{Capture, Options};
+use common::Cages;
 
 const HANDLES: [Handles; 4] =
     [Handles::MaxVol, Handles::Rectangular { count: None }, Handles::Spread { count: None }, Handles::All];
@@ -62,7 +63,7 @@ fn similar_poses_of_the_rest_cage_pose_the_model_alike_and_come_back() {
         let solver = prepare(&capture, &cage, SolverOptions { handles, spectrum: 0, ..SolverOptions::PAPER });
         let posed = solver.decoder().measure(&[&single(&truth)], &[&positions])[0];
         assert!(posed.linf < 1e-5 * solver.diagonal(), "{handles:?}: {}", posed.linf);
-        let found = solver.invert_with_convergence(None, &[&positions]).remove(0);
+        let found = solver.invert(Rows::All, None, &[&positions]).remove(0);
         assert!(farthest(&found.cage, &truth) < 1e-4 * solver.diagonal(), "{handles:?}");
         assert_eq!(found.convergence.unwrap().outcome, Outcome::Converged);
     }
@@ -77,7 +78,7 @@ fn models_posed_by_a_cage_are_explained_by_one() {
         for t in [0, 13, 39] {
             let mut posed = vec![Vec::new()];
             solver.decoder().decode(&[&single(&capture.deformed_cage(t))], &mut posed);
-            let found = solver.invert_with_convergence(None, &[&posed[0]]).remove(0);
+            let found = solver.invert(Rows::All, None, &[&posed[0]]).remove(0);
             let convergence = found.convergence.unwrap();
             let error = solver.decoder().measure(&[&found.cage], &[&posed[0]])[0].l2 / solver.diagonal();
             assert!(error < 1e-3, "{handles:?}, frame {t}: {error:e} {convergence:?}");
@@ -95,7 +96,7 @@ fn the_points_read_are_never_worse_than_where_the_iteration_starts() {
             let solver = prepare(&capture, &cage, options);
             let frames: Vec<Vec<f64>> = [5, 20, 35].map(|t| frame(&capture, t)).to_vec();
             let views: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
-            for found in solver.invert_with_convergence(None, &views) {
+            for found in solver.invert(Rows::All, None, &views) {
                 let convergence = found.convergence.unwrap();
                 assert!(convergence.residual <= convergence.start, "{handles:?} {regularizer:?}: {convergence:?}");
                 assert!(convergence.steps > 0 || convergence.outcome != Outcome::StepLimit);
@@ -112,7 +113,7 @@ fn the_iteration_lowers_the_error_of_the_linear_start() {
     for t in [7, 21, 33] {
         let positions = frame(&capture, t);
         let error = |cage: &[f32]| solver.decoder().measure(&[cage], &[&positions])[0].l2;
-        let (before, after) = (error(&start.invert(&[&positions])[0]), error(&solver.invert(&[&positions])[0]));
+        let (before, after) = (error(&start.cages(&[&positions])[0]), error(&solver.cages(&[&positions])[0]));
         assert!(after < 0.9 * before, "frame {t}: {after} {before}");
     }
 }
@@ -124,13 +125,13 @@ fn bits_depend_on_the_frame_alone() {
         let solver = prepare(&capture, &cage, SolverOptions { handles, ..SolverOptions::PAPER });
         let frames: Vec<Vec<f64>> = (0..BATCH).map(|t| frame(&capture, 2 * t)).collect();
         let views: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
-        let together = solver.invert(&views);
+        let together = solver.cages(&views);
         for count in [1, 3, 5, 9] {
-            assert_eq!(solver.invert(&views[..count]), together[..count], "{handles:?}: {count} frames");
+            assert_eq!(solver.cages(&views[..count]), together[..count], "{handles:?}: {count} frames");
         }
         let mut turned = views.clone();
         turned.reverse();
-        let mut back = solver.invert(&turned);
+        let mut back = solver.cages(&turned);
         back.reverse();
         assert_eq!(back, together, "{handles:?}: in another order");
         if handles == Handles::MaxVol {
@@ -139,11 +140,11 @@ fn bits_depend_on_the_frame_alone() {
             };
             let read: Vec<Vec<f64>> = views.iter().map(rows).collect();
             let read: Vec<&[f64]> = read.iter().map(Vec::as_slice).collect();
-            assert_eq!(solver.invert_handles(&read), together);
+            assert_eq!(solver.cages_of_handles(None, &read), together);
         }
         let threads = |count| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap();
-            pool.install(|| prepare(&capture, &cage, SolverOptions { handles, ..SolverOptions::PAPER }).invert(&views))
+            pool.install(|| prepare(&capture, &cage, SolverOptions { handles, ..SolverOptions::PAPER }).cages(&views))
         };
         assert_eq!(threads(1), together);
         assert_eq!(threads(3), together);
@@ -155,7 +156,7 @@ fn a_solver_put_together_again_gives_the_same_bits() {
     let (capture, cage) = capture();
     for handles in [Handles::MaxVol, Handles::All] {
         let solver = prepare(&capture, &cage, SolverOptions { handles, ..SolverOptions::PAPER });
-        let (normals, gram, weight) = solver.tied().unwrap();
+        let (normals, gram, weight) = solver.dependent().unwrap();
         let parts = SolverParts {
             handles: solver.handles().to_vec(),
             reads_all: solver.reads_all(),
@@ -163,17 +164,17 @@ fn a_solver_put_together_again_gives_the_same_bits() {
             target: solver.regularization_target().clone(),
             phi: solver.decoder().coordinates().unwrap().to_owned(),
             positions: solver.decoder().positions(),
-            tied: Some(TiedParts { normals: normals.clone(), gram: gram.to_owned(), weight }),
+            dependent: Some(DependentParts { normals: normals.clone(), gram: gram.to_owned(), weight }),
             nearness: solver.nearness().cloned(),
             diagonal: solver.diagonal(),
             preparation: solver.preparation().clone(),
         };
         let mut without = parts.clone();
-        without.tied = None;
+        without.dependent = None;
         assert!(Solver::from_parts(without).is_none(), "rows of vertices alone are not those of free normals");
         let again = Solver::from_parts(parts).unwrap();
         let positions = frame(&capture, 11);
-        assert_eq!(again.invert(&[&positions]), solver.invert(&[&positions]));
+        assert_eq!(again.cages(&[&positions]), solver.cages(&[&positions]));
         assert_eq!(again.size_bytes(), solver.size_bytes());
     }
 }
@@ -181,9 +182,10 @@ fn a_solver_put_together_again_gives_the_same_bits() {
 #[test]
 fn collapsed_cages_have_finite_positions() {
     let (capture, cage) = capture();
-    let phi = Green::Consistent.coordinates(&cage, &capture.rest.points).unwrap().phi;
+    let phi = Green::Consistent.coordinates(&cage, &capture.rest.points, None).unwrap().phi;
     let v = cage.vertices().len();
-    let decoder = Decoder::new(phi.as_ref(), v).with_tied_normals(Green::Consistent.tied_normals(&cage));
+    let decoder =
+        Decoder::new(phi.as_ref(), v).with_dependent_normals(Green::Consistent.values(&cage).dependent_normals);
     let point = vec![2.5f32; 3 * v];
     let flat: Vec<f32> = cage.vertices().iter().flat_map(|p| [p[0] as f32, p[1] as f32, 0.0]).collect();
     let line: Vec<f32> = cage.vertices().iter().flat_map(|p| [p[0] as f32, 0.0, 0.0]).collect();
@@ -203,12 +205,12 @@ fn free_normals_follow_translations_and_explain_what_a_consistent_cage_poses() {
         let solver = Solver::prepare(&Green::Free, &cage, &capture.rest.points, options).unwrap();
         let mut posed = vec![Vec::new()];
         consistent.decoder().decode(&[&single(&capture.deformed_cage(17))], &mut posed);
-        let found = solver.invert_with_convergence(None, &[&posed[0]]).remove(0);
+        let found = solver.invert(Rows::All, None, &[&posed[0]]).remove(0);
         assert_eq!(found.convergence, None, "it is linear");
         let error = solver.decoder().measure(&[&found.cage], &[&posed[0]])[0].linf / solver.diagonal();
         assert!(error < 1e-3, "{handles:?}: {error}");
         let moved: Vec<f32> = posed[0].iter().map(|x| x + 64.0).collect();
-        let there = solver.invert(&[&moved]).remove(0);
+        let there = solver.cages(&[&moved]).remove(0);
         for (j, (a, b)) in found.cage.iter().zip(&there).enumerate() {
             let shift = if j < 3 * v { 64.0 } else { 0.0 };
             assert!((a + shift - b).abs() < 0.05, "{handles:?}: row {} is off by {}", j / 3, a + shift - b);

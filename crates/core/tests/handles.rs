@@ -1,11 +1,14 @@
 //! Choices of handles on the built-in capture.
 
+mod common;
+
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions};
 use cager_core::mesh::Point;
 use cager_core::regularize::Regularizer;
 use cager_core::synthetic::{Capture, Options};
+use common::Cages;
 
 const CHOICES: [Handles; 6] = [
     Handles::MaxVol,
@@ -35,7 +38,7 @@ fn mean_l2(capture: &Capture, solver: &Solver) -> f64 {
     let error = |t: usize| {
         let mut frame = Vec::new();
         capture.frame(t, &mut frame);
-        let cage = solver.invert(&[&frame]).remove(0);
+        let cage = solver.cages(&[&frame]).remove(0);
         solver.decoder().measure(&[&cage], &[&frame])[0].l2 / solver.diagonal()
     };
     (0..10).map(|k| error(4 * k)).sum::<f64>() / 10.0
@@ -60,7 +63,7 @@ fn affine_maps_of_the_model_are_affine_maps_of_the_cage() {
         for (k, map) in maps.into_iter().enumerate() {
             let moved: Vec<f64> = capture.rest.points.iter().flat_map(|&p| map(p)).collect();
             let wanted: Vec<Point> = cage.vertices().iter().map(|&p| map(p)).collect();
-            let found = solver.invert(&[&moved]);
+            let found = solver.cages(&[&moved]);
             let apart = farthest(&found[0], &wanted) / solver.diagonal();
             assert!(apart < 4e-6, "{handles:?}, map {k}: {apart:e}");
         }
@@ -84,7 +87,7 @@ fn as_few_handles_as_unknowns_are_those_of_maximum_volume_and_as_many_as_points_
     let (m, n) = (cage.vertices().len(), capture.rest.points.len());
     let mut frame = Vec::new();
     capture.frame(9, &mut frame);
-    let invert = |handles| prepare(&capture, &cage, handles).invert(&[&frame]).remove(0);
+    let invert = |handles| prepare(&capture, &cage, handles).cages(&[&frame]).remove(0);
     let (maxvol, all) = (invert(Handles::MaxVol), invert(Handles::All));
     let near = |a: &[f32], b: &[f32]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5);
     assert!(near(&invert(Handles::Spread { count: Some(m) }), &maxvol));
@@ -134,7 +137,7 @@ fn coincident_points_do_not_disturb_what_is_interpolated() {
     let handles = Handles::Spread { count: Some(n + 100) };
     let solver = prepare(&capture, &cage, handles);
     let moved: Vec<f64> = capture.rest.points.iter().flat_map(|p| [p[0] * 1.5, p[1], p[2] - p[0]]).collect();
-    let found = solver.invert(&[&moved]);
+    let found = solver.cages(&[&moved]);
     let error = solver.decoder().measure(&[&found[0]], &[&moved])[0];
     assert!(error.linf < 1e-5 * solver.diagonal(), "{}", error.linf);
 }

@@ -26,7 +26,7 @@ fn points_inside(cage: &Cage, count: usize, seed: u64) -> Vec<Point> {
 }
 
 fn of(cage: &Cage, points: &[Point]) -> Coordinates {
-    Harmonic.coordinates(cage, points).expect("coordinates")
+    Harmonic.coordinates(cage, points, None).expect("coordinates")
 }
 
 fn refined(found: &Coordinates) -> Refinement {
@@ -293,10 +293,10 @@ fn a_plan_gives_the_same_bits_again_and_coordinates_of_other_points() {
         let points = points_inside(&cage, 150, 59);
         let found = of(&cage, &points);
         let plan = found.plan.expect("a plan");
-        let again = Harmonic.coordinates_by_plan(&cage, &points, &plan).expect("coordinates");
+        let again = Harmonic.coordinates(&cage, &points, Some(&plan)).expect("coordinates");
         let same = |v: usize| (0..points.len()).all(|i| found.phi[(i, v)].to_bits() == again.phi[(i, v)].to_bits());
         assert!((0..found.phi.ncols()).all(same), "{name}: other bits");
-        let few = Harmonic.coordinates_by_plan(&cage, &points[7..9], &plan).expect("coordinates");
+        let few = Harmonic.coordinates(&cage, &points[7..9], Some(&plan)).expect("coordinates");
         for v in 0..found.phi.ncols() {
             for i in 0..2 {
                 // Products of other sizes round otherwise, in single precision.
@@ -314,7 +314,7 @@ fn plans_of_other_cages_and_of_any_bytes_are_refused_in_one_sentence() {
     let plan = of(&cage, &points).plan.expect("a plan");
     let refused = |cage: &Cage, points: &[Point], bytes: &[u8]| {
         let plan = ElementPlan::from_bytes(bytes.to_vec());
-        let error = Harmonic.coordinates_by_plan(cage, points, &plan).expect_err("a wrong plan");
+        let error = Harmonic.coordinates(cage, points, Some(&plan)).expect_err("a wrong plan");
         let text = error.to_string();
         assert!(text.starts_with("the boundary elements of harmonic coordinates do not fit the cage: "), "{text}");
     };
@@ -330,9 +330,9 @@ fn plans_of_other_cages_and_of_any_bytes_are_refused_in_one_sentence() {
     deep.extend(vec![3; 1100 + cage.faces().len()]);
     let elements = 1100 + cage.faces().len();
     deep.extend(vec![0; cage.vertices().len() + (elements * cage.vertices().len()).div_ceil(8)]);
-    let found = Harmonic.coordinates_by_plan(&cage, &points, &ElementPlan::from_bytes(deep));
+    let found = Harmonic.coordinates(&cage, &points, Some(&ElementPlan::from_bytes(deep)));
     assert!(found.is_err(), "elements without area");
-    let wrong = Green::Free.coordinates_by_plan(&cage, &points, &plan).expect_err("no such system");
+    let wrong = Green::Free.coordinates(&cage, &points, Some(&plan)).expect_err("no such system");
     assert!(wrong.to_string().contains("green-free"), "{wrong}");
 }
 
@@ -360,13 +360,13 @@ fn points_outside_are_counted_and_listed_before_anything_is_computed() {
     let mut points = vec![[0.0; 3], [0.1, 0.2, 0.3]];
     points.extend((0..12).map(far));
     let error = Harmonic.check(&cage, &points).expect_err("points outside");
-    assert_eq!(Harmonic.coordinates(&cage, &points).expect_err("points outside"), error);
+    assert_eq!(Harmonic.coordinates(&cage, &points, None).expect_err("points outside"), error);
     let text = error.to_string();
     assert!(text.starts_with("12 points lie outside the cage (2, 3, 4, 5, 6, 7, 8, 9, …), by up to"), "{text}");
     assert!(text.ends_with("enlarge the cage or use mean value coordinates (mvc)"), "{text}");
     let one = Harmonic.check(&cage, &points[1..3]).expect_err("a point outside");
     assert!(one.to_string().starts_with("1 point lies outside the cage (1), by up to 28.87 %"), "{one}");
     assert!(Harmonic.check(&cage, &points[..2]).is_ok());
-    let bad = Harmonic.coordinates(&cage, &[[f64::NAN; 3]]);
+    let bad = Harmonic.coordinates(&cage, &[[f64::NAN; 3]], None);
     assert!(matches!(bad, Err(CoordinatesError::NotComputed { .. } | CoordinatesError::Outside { .. })), "{bad:?}");
 }

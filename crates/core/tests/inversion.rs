@@ -3,13 +3,14 @@
 mod common;
 
 use cager_core::cage::Cage;
-use cager_core::coordinates::{CoordinateSystem, Coordinates, CoordinatesError, MeanValue};
+use cager_core::coordinates::{CageValues, CoordinateSystem, Coordinates, CoordinatesError, ElementPlan, MeanValue};
 use cager_core::decode::Decoder;
-use cager_core::inversion::{BATCH, Handles, PrepareError, Preparing, Solver, SolverOptions};
+use cager_core::inversion::{BATCH, Handles, PrepareContext, PrepareError, Solver, SolverOptions};
 use cager_core::mesh::Point;
-use cager_core::regularize::{Regularizer, SparseMatrix, Term};
+use cager_core::regularize::{Regularizer, SparseMatrix};
 use cager_core::synthetic::{Capture, Options};
 use cager_core::vector::{along, sub};
+use common::Cages;
 
 const HANDLES: [Handles; 4] =
     [Handles::MaxVol, Handles::Rectangular { count: None }, Handles::Spread { count: None }, Handles::All];
@@ -32,7 +33,7 @@ fn frame(capture: &Capture, t: usize) -> Vec<f64> {
 
 /// Positions of a cage's model, in double precision.
 fn posed(cage: &Cage, points: &[Point], pose: &[Point]) -> Vec<f64> {
-    let phi = MeanValue.coordinates(cage, points).unwrap().phi;
+    let phi = MeanValue.coordinates(cage, points, None).unwrap().phi;
     (0..points.len())
         .flat_map(|i| [0, 1, 2].map(|k| (0..pose.len()).map(|j| phi[(i, j)] * pose[j][k]).sum::<f64>()))
         .collect()
@@ -53,7 +54,7 @@ fn cages_that_posed_the_model_come_back() {
         for t in [0, 13, 39] {
             let truth = capture.deformed_cage(t);
             let positions = posed(&cage, &capture.rest.points, &truth);
-            let found = solver.invert(&[&positions]);
+            let found = solver.cages(&[&positions]);
             assert!(farthest(&found[0], &truth) <= 1e-6 * solver.diagonal(), "{handles:?}, frame {t}");
             let error = solver.decoder().measure(&[&found[0]], &[&positions])[0];
             assert!(error.linf <= 2e-6 * solver.diagonal(), "{handles:?}, frame {t}: {}", error.linf);
@@ -67,7 +68,7 @@ fn the_measured_error_is_that_of_the_decoded_positions() {
     let solver = prepare(&capture, &cage, SolverOptions::PAPER);
     let frames: Vec<Vec<f64>> = (0..5).map(|t| frame(&capture, t)).collect();
     let views: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
-    let cages = solver.invert(&views);
+    let cages = solver.cages(&views);
     let cages: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
     let errors = solver.decoder().measure(&cages, &views);
     let mut decoded = vec![Vec::new(); 5];
@@ -89,7 +90,7 @@ fn coordinates_that_have_travelled_decode_to_the_same_bits() {
     let (capture, cage) = capture();
     let solver = prepare(&capture, &cage, SolverOptions::PAPER);
     let frame = frame(&capture, 3);
-    let cages = solver.invert(&[&frame]);
+    let cages = solver.cages(&[&frame]);
     let phi = solver.decoder().coordinates().unwrap();
     let rows: Vec<f32> = (0..phi.nrows()).flat_map(|i| (0..phi.ncols()).map(move |j| phi[(i, j)])).collect();
     let elsewhere = Decoder::from_rows(&rows, phi.ncols(), cage.vertices().len());
@@ -126,11 +127,11 @@ fn a_frame_has_the_same_bits_alone_in_any_place_of_a_batch_and_with_any_threads(
         assert_eq!(one.handles(), many.handles());
         let frames: Vec<Vec<f64>> = (0..BATCH).map(|t| frame(&capture, t)).collect();
         let views: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
-        let together = one.invert(&views);
-        let elsewhere = pool(3).install(|| many.invert(&views));
+        let together = one.cages(&views);
+        let elsewhere = pool(3).install(|| many.cages(&views));
         assert_eq!(together, elsewhere);
         for t in 0..BATCH {
-            assert_eq!(one.invert(&[views[t]])[0], together[t], "{handles:?}, frame {t}");
+            assert_eq!(one.cages(&[views[t]])[0], together[t], "{handles:?}, frame {t}");
         }
         let cages: Vec<&[f32]> = together.iter().map(Vec::as_slice).collect();
         let (mut all, mut single) = (vec![Vec::new(); BATCH], vec![Vec::new()]);
@@ -153,8 +154,8 @@ fn the_handle_rows_of_a_frame_give_the_same_cage_as_the_whole_frame() {
             solver.handles().iter().flat_map(|&i| f[3 * i as usize..][..3].to_vec()).collect()
         };
         let parts: Vec<Vec<f64>> = whole.iter().map(rows).collect();
-        let from_whole = solver.invert(&whole.iter().map(Vec::as_slice).collect::<Vec<_>>());
-        let from_rows = solver.invert_handles(&parts.iter().map(Vec::as_slice).collect::<Vec<_>>());
+        let from_whole = solver.cages(&whole.iter().map(Vec::as_slice).collect::<Vec<_>>());
+        let from_rows = solver.cages_of_handles(None, &parts.iter().map(Vec::as_slice).collect::<Vec<_>>());
         assert_eq!(from_whole, from_rows);
     }
 }
@@ -167,18 +168,17 @@ fn every_method_follows_a_translation_exactly() {
     for handles in HANDLES {
         for regularizer in Regularizer::ALL {
             let options = SolverOptions { handles, regularizer, lambda: 0.1, ..SolverOptions::PAPER };
-            let term: &dyn Term = regularizer.term().unwrap_or(&own);
             let solver = Solver::prepare_with(
                 &MeanValue,
                 &cage,
                 &capture.rest.points,
                 options,
-                &Preparing { term: Some(term), ..Preparing::default() },
+                &PrepareContext { matrix: Some(&own), ..PrepareContext::default() },
             )
             .unwrap();
             let here = frame(&capture, 9);
             let there: Vec<f64> = here.chunks_exact(3).flat_map(|p| [p[0] + 50.0, p[1] - 20.0, p[2] + 3.0]).collect();
-            let cages = [&here, &there].map(|frame| solver.invert_after(None, &[frame]).remove(0));
+            let cages = [&here, &there].map(|frame| solver.cages(&[frame]).remove(0));
             for (a, b) in cages[0].chunks_exact(3).zip(cages[1].chunks_exact(3)) {
                 for (k, shift) in [50.0f32, -20.0, 3.0].into_iter().enumerate() {
                     assert!((b[k] - a[k] - shift).abs() < 2e-5, "{handles:?} {regularizer:?}: {} {}", a[k], b[k]);
@@ -193,7 +193,7 @@ fn l2(capture: &Capture, cage: &Cage, options: SolverOptions) -> f64 {
     let solver = prepare(capture, cage, options);
     let frames: Vec<Vec<f64>> = (0..BATCH).map(|t| frame(capture, 2 * t)).collect();
     let views: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
-    let cages = solver.invert(&views);
+    let cages = solver.cages(&views);
     let cages: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
     solver.decoder().measure(&cages, &views).iter().map(|e| e.l2).sum::<f64>() / BATCH as f64 / solver.diagonal()
 }
@@ -218,7 +218,7 @@ fn no_threshold_no_weight_and_no_regularizer_are_the_same() {
     let positions = frame(&capture, 3);
     let with = |regularizer, spectrum, lambda| {
         prepare(&capture, &cage, SolverOptions { handles: Handles::MaxVol, regularizer, spectrum, lambda })
-            .invert(&[&positions])
+            .cages(&[&positions])
     };
     let plain = with(Regularizer::None, 20, 1.0);
     assert_eq!(with(Regularizer::Laplacian, 0, 1.0), plain);
@@ -234,14 +234,16 @@ impl CoordinateSystem for Deaf {
     fn name(&self) -> &'static str {
         "deaf"
     }
-    fn columns(&self, cage: &Cage) -> usize {
-        cage.vertices().len()
+    fn values(&self, cage: &Cage) -> CageValues {
+        CageValues::of_vertices(cage)
     }
-    fn rest_values(&self, cage: &Cage) -> Vec<Point> {
-        cage.vertices().to_vec()
-    }
-    fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError> {
-        let mut coordinates = MeanValue.coordinates(cage, points)?;
+    fn coordinates(
+        &self,
+        cage: &Cage,
+        points: &[Point],
+        _: Option<&ElementPlan>,
+    ) -> Result<Coordinates, CoordinatesError> {
+        let mut coordinates = MeanValue.coordinates(cage, points, None)?;
         let v = cage.vertices();
         let m = v.len();
         let heirs = [0, m / 4, m / 2, 3 * m / 4];
@@ -272,7 +274,7 @@ fn vertices_that_no_point_feels_are_counted_and_placed_by_their_neighbours() {
             let read = if matches!(handles, Handles::MaxVol | Handles::All) { m - 3 } else { 2 * m };
             assert_eq!(solver.handles().len(), read);
             let positions = frame(&capture, 5);
-            let found = solver.invert(&[&positions]);
+            let found = solver.cages(&[&positions]);
             assert!(found[0].iter().all(|x| x.is_finite()));
             let error = solver.decoder().measure(&[&found[0]], &[&positions])[0];
             assert!(error.l2 < 0.1 * solver.diagonal(), "{handles:?} {regularizer:?} {}", error.l2);
@@ -314,7 +316,7 @@ fn a_model_of_few_places_repeated_many_times_is_solved_as_far_as_it_goes() {
     let solver = Solver::prepare(&MeanValue, &cage, &points, SolverOptions::PAPER).unwrap();
     assert_eq!(solver.preparation().rank, 30);
     let positions: Vec<f64> = points.iter().flatten().copied().collect();
-    let found = solver.invert(&[&positions]);
+    let found = solver.cages(&[&positions]);
     let error = solver.decoder().measure(&[&found[0]], &[&positions])[0];
     assert!(error.linf < 1e-5 * solver.diagonal(), "{}", error.linf / solver.diagonal());
 }
@@ -332,7 +334,7 @@ fn a_model_far_too_small_for_its_cage_is_still_followed_by_every_method() {
             for spectrum in [0, 20] {
                 let options = SolverOptions { handles, spectrum, ..SolverOptions::PAPER };
                 let solver = Solver::prepare(&MeanValue, &cage, &points, options).unwrap();
-                let found = solver.invert(&[&moved]);
+                let found = solver.cages(&[&moved]);
                 let error = solver.decoder().measure(&[&found[0]], &[&moved])[0];
                 let l2 = error.l2 / solver.diagonal();
                 eprintln!(

@@ -1,10 +1,13 @@
 //! Models of more points than are analysed, and coordinates that are computed in parts.
 
+mod common;
+
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::decode::{Decoder, FrameError};
-use cager_core::inversion::{Analysis, Handles, Preparing, Solver, SolverOptions};
+use cager_core::inversion::{Analysis, Handles, PrepareContext, Solver, SolverOptions};
 use cager_core::synthetic::{Capture, Options};
+use common::Cages;
 
 fn capture(points: u32, cage_vertices: u32) -> (Capture, Cage) {
     let capture = Capture::new(&Options { points: points as usize, frames: 12, cage_vertices: cage_vertices as usize });
@@ -23,7 +26,7 @@ fn frames(capture: &Capture) -> Vec<Vec<f64>> {
 
 fn errors(solver: &Solver, frames: &[Vec<f64>]) -> (Vec<Vec<f32>>, Vec<FrameError>) {
     let frames: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
-    let cages = solver.invert(&frames);
+    let cages = solver.cages(&frames);
     let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
     let errors = solver.decoder().measure(&views, &frames);
     (cages, errors)
@@ -31,8 +34,9 @@ fn errors(solver: &Solver, frames: &[Vec<f64>]) -> (Vec<Vec<f32>>, Vec<FrameErro
 
 fn prepare(system: &dyn CoordinateSystem, (capture, cage): &(Capture, Cage), handles: Handles, keeps: bool) -> Solver {
     let options = SolverOptions { handles, ..SolverOptions::default() };
-    let preparing = Preparing { stores_coordinates: keeps, analysed_entries: 8_000_000, ..Preparing::default() };
-    Solver::prepare_with(system, cage, &capture.rest.points, options, &preparing).unwrap()
+    let context =
+        PrepareContext { stores_coordinates: keeps, analysed_entries: 8_000_000, ..PrepareContext::default() };
+    Solver::prepare_with(system, cage, &capture.rest.points, options, &context).unwrap()
 }
 
 #[test]
@@ -41,15 +45,15 @@ fn decoders_that_compute_their_coordinates_have_the_bits_of_those_that_keep_them
     let (capture, cage) = capture(70_001, 200);
     let points = &capture.rest.points;
     for system in [&MeanValue as &dyn CoordinateSystem, &Green::Consistent] {
-        let (pointwise, columns) = (system.pointwise().unwrap(), system.columns(&cage));
-        let phi = system.coordinates(&cage, points).unwrap().phi;
+        let (pointwise, columns) = (system.pointwise().unwrap(), system.values(&cage).columns());
+        let phi = system.coordinates(&cage, points, None).unwrap().phi;
         let decoders = [
             Decoder::new(phi.as_ref(), cage.vertices().len()),
             Decoder::with_stored_coordinates(pointwise, &cage, points, columns),
             Decoder::with_recomputed_coordinates(pointwise, &cage, points, columns),
         ];
         assert!(decoders[1].size_bytes() > 0 && decoders[2].size_bytes() == 0);
-        let decoders = decoders.map(|decoder| decoder.with_tied_normals(system.tied_normals(&cage)));
+        let decoders = decoders.map(|decoder| decoder.with_dependent_normals(system.values(&cage).dependent_normals));
         let bent: Vec<f32> =
             cage.vertices().iter().flat_map(|p| [p[0] + 0.1 * p[1] * p[1], p[1], p[2]]).map(|x| x as f32).collect();
         let found = decoders.map(|decoder| {

@@ -1,12 +1,15 @@
 //! Cages stay near their frames, also where the points hardly determine them.
 
+mod common;
+
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
-use cager_core::inversion::{BATCH, Handles, Solver, SolverOptions, SolverParts};
+use cager_core::inversion::{BATCH, Handles, Rows, Solver, SolverOptions, SolverParts};
 use cager_core::mesh::{Point, TriMesh, bounds, diagonal};
 use cager_core::regularize::Regularizer;
 use cager_core::synthetic::{Capture, Options};
 use cager_core::vector::{centroid, distance};
+use common::Cages;
 
 const FRAMES: usize = 8;
 
@@ -46,7 +49,7 @@ fn trembling(capture: &Capture) -> Vec<Vec<f64>> {
 
 /// Without what keeps its cages near.
 fn let_go(solver: &Solver) -> Solver {
-    let tied = solver.tied().map(|(normals, gram, weight)| cager_core::inversion::TiedParts {
+    let dependent = solver.dependent().map(|(normals, gram, weight)| cager_core::inversion::DependentParts {
         normals: normals.clone(),
         gram: gram.to_owned(),
         weight,
@@ -58,7 +61,7 @@ fn let_go(solver: &Solver) -> Solver {
         target: solver.regularization_target().clone(),
         phi: solver.decoder().coordinates().unwrap().to_owned(),
         positions: solver.decoder().positions(),
-        tied,
+        dependent,
         nearness: None,
         diagonal: solver.diagonal(),
         preparation: solver.preparation().clone(),
@@ -79,7 +82,7 @@ fn away(solver: &Solver, capture: &Capture, cage: &Cage, frames: &[Vec<f64>]) ->
     let mut previous: Option<Vec<f32>> = None;
     for batch in frames.chunks(BATCH) {
         let views: Vec<&[f64]> = batch.iter().map(Vec::as_slice).collect();
-        let cages = solver.invert_after(previous.as_deref(), &views);
+        let cages = solver.cages_after(previous.as_deref(), &views);
         for (found, frame) in cages.iter().zip(batch) {
             let vertices: Vec<Point> =
                 found.as_chunks::<3>().0[..cage.vertices().len()].iter().map(|v| v.map(f64::from)).collect();
@@ -99,7 +102,7 @@ fn no_cage_runs_away_from_its_frame() {
     for system in systems {
         for handles in [Handles::default(), Handles::MaxVol, Handles::All] {
             for regularizer in [Regularizer::Differential, Regularizer::Laplacian, Regularizer::Temporal] {
-                let usual = SolverOptions::for_unknowns(system.unknowns(&cage));
+                let usual = SolverOptions::for_unknowns(system.values(&cage).unknowns());
                 let options = SolverOptions { handles, regularizer, ..usual };
                 let solver = Solver::prepare(system, &cage, &capture.rest.points, options).unwrap();
                 let far = away(&let_go(&solver), &capture, &cage, &frames);
@@ -120,7 +123,7 @@ fn cages_that_stay_near_anyway_keep_their_bits() {
     let mut frame = Vec::new();
     for t in 0..FRAMES {
         capture.frame(t, &mut frame);
-        assert_eq!(solver.invert(&[&frame]), let_go(&solver).invert(&[&frame]));
+        assert_eq!(solver.cages(&[&frame]), let_go(&solver).cages(&[&frame]));
     }
 }
 
@@ -131,7 +134,7 @@ fn a_held_cage_follows_its_frame_and_is_the_same_however_it_is_solved_for() {
     let options = SolverOptions::for_unknowns(cage.vertices().len());
     let solver = Solver::prepare(&MeanValue, &cage, &capture.rest.points, options).unwrap();
     let views: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
-    let solved = solver.invert_with_convergence(None, &views);
+    let solved = solver.invert(Rows::All, None, &views);
     assert!(solved.iter().any(|frame| frame.held));
     let together: Vec<Vec<f32>> = solved.into_iter().map(|frame| frame.cage).collect();
     let read = |frame: &[f64]| -> Vec<f64> {
@@ -143,18 +146,18 @@ fn a_held_cage_follows_its_frame_and_is_the_same_however_it_is_solved_for() {
         let again = Solver::prepare(&MeanValue, &cage, &capture.rest.points, options).unwrap();
         for (frame, cage) in frames.iter().zip(&together) {
             pool.install(|| {
-                assert_eq!(again.invert(&[frame]), [cage.as_slice()]);
-                assert_eq!(again.invert_handles(&[&read(frame)]), [cage.as_slice()]);
+                assert_eq!(again.cages(&[frame]), [cage.as_slice()]);
+                assert_eq!(again.cages_of_handles(None, &[&read(frame)]), [cage.as_slice()]);
             });
         }
     }
     let moved: Vec<f64> = frames[3].iter().map(|x| x + 64.0).collect();
-    let there = solver.invert(&[&moved]).concat();
+    let there = solver.cages(&[&moved]).concat();
     let shifted = together[3].iter().zip(there).map(|(a, b)| (a + 64.0 - b).abs()).fold(0.0, f32::max);
     assert!(shifted < 1e-3 * solver.diagonal() as f32, "{shifted}");
     // About as accurate as the cage that ran away.
     let error = |solver: &Solver| {
-        let cages = solver.invert(&views);
+        let cages = solver.cages(&views);
         let cages: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
         solver.decoder().measure(&cages, &views).iter().map(|error| error.l2).sum::<f64>()
     };

@@ -1,15 +1,20 @@
 //! Regularisation terms: what they minimise, what they depend on, and thresholds chosen by measuring.
 
+mod common;
+
 use cager_core::cage::Cage;
-use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
-use cager_core::inversion::{Analysis, BATCH, Handles, PrepareError, Preparing, Solver, SolverOptions};
+use cager_core::coordinates::{
+    CageValues, CoordinateSystem, Coordinates, CoordinatesError, ElementPlan, Green, MeanValue,
+};
+use cager_core::inversion::{Analysis, BATCH, Handles, PrepareContext, PrepareError, Solver, SolverOptions};
 use cager_core::mesh::Point;
-use cager_core::regularize::{CageLaplacian, Reference, Regularizer, SparseMatrix, Term, TermError};
+use cager_core::regularize::{Reference, Regularizer, SparseMatrix, TermError};
 use cager_core::synthetic::{Capture, Options};
+use common::Cages;
 use faer::Mat;
 
-fn with(term: &dyn Term) -> Preparing<'_> {
-    Preparing { term: Some(term), ..Preparing::default() }
+fn with(matrix: &SparseMatrix) -> PrepareContext<'_> {
+    PrepareContext { matrix: Some(matrix), ..PrepareContext::default() }
 }
 
 fn capture() -> (Capture, Cage) {
@@ -38,25 +43,24 @@ fn own_term(m: usize) -> SparseMatrix {
 fn every_term_minimises_its_energy() {
     let (capture, cage) = capture();
     let m = cage.vertices().len();
-    let phi = MeanValue.coordinates(&cage, &capture.rest.points).unwrap().phi;
+    let phi = MeanValue.coordinates(&cage, &capture.rest.points, None).unwrap().phi;
     let own = own_term(m);
     let (before, now) = (frame(&capture, 11), frame(&capture, 14));
     let lambda = 0.3;
     let terms = [Regularizer::Laplacian, Regularizer::Differential, Regularizer::Temporal, Regularizer::Matrix];
     for (regularizer, handles) in terms.into_iter().flat_map(|t| [(t, Handles::MaxVol), (t, Handles::All)]) {
-        let term: &dyn Term = regularizer.term().unwrap_or(&own);
         let options = SolverOptions { regularizer, handles, spectrum: m, lambda };
-        let solver = Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, options, &with(term)).unwrap();
-        let previous = solver.invert_after(None, &[&before]).remove(0);
-        let found = as_matrix(&solver.invert_after(Some(&previous), &[&now])[0]);
+        let solver = Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, options, &with(&own)).unwrap();
+        let previous = solver.cages(&[&before]).remove(0);
+        let found = as_matrix(&solver.cages_after(Some(&previous), &[&now])[0]);
         let read: Vec<usize> = match handles {
             Handles::All => (0..phi.nrows()).collect(),
             _ => solver.handles().iter().map(|&row| row as usize).collect(),
         };
         let rows = Mat::from_fn(read.len(), m, |i, j| phi[(read[i], j)]);
         let target = Mat::from_fn(read.len(), 3, |i, k| now[3 * read[i] + k]);
-        let delta = term.delta(&cage, m).unwrap();
-        let reference = match term.reference() {
+        let delta = regularizer.delta(Some(&own), &cage, m).unwrap();
+        let reference = match regularizer.reference() {
             Reference::Origin => Mat::zeros(m, 3),
             Reference::RestCage => Mat::from_fn(m, 3, |i, k| cage.vertices()[i][k]),
             Reference::PreviousCage => as_matrix(&previous),
@@ -82,7 +86,7 @@ fn a_weight_means_the_same_however_densely_the_model_is_sampled() {
     for regularizer in [Regularizer::Differential, Regularizer::Global, Regularizer::Tikhonov] {
         let options = SolverOptions { regularizer, handles: Handles::All, spectrum: 20, lambda: 0.3 };
         let cages = |rest: &[Point], frame: &[f64]| {
-            as_matrix(&Solver::prepare(&MeanValue, &cage, rest, options).unwrap().invert(&[frame])[0])
+            as_matrix(&Solver::prepare(&MeanValue, &cage, rest, options).unwrap().cages(&[frame])[0])
         };
         let apart = cages(&rest, &twice(&now)) - cages(&capture.rest.points, &now);
         assert!(apart.norm_max() < 2e-6, "{regularizer:?}: {:e}", apart.norm_max());
@@ -97,7 +101,7 @@ fn no_weight_is_no_threshold() {
         for regularizer in [Regularizer::Laplacian, Regularizer::Differential, Regularizer::Temporal] {
             let cage = |spectrum, lambda| {
                 let options = SolverOptions { handles, regularizer, spectrum, lambda };
-                Solver::prepare(&MeanValue, &cage, &capture.rest.points, options).unwrap().invert(&[&now])
+                Solver::prepare(&MeanValue, &cage, &capture.rest.points, options).unwrap().cages(&[&now])
             };
             assert_eq!(cage(20, 0.0), cage(0, 1.0), "{handles:?} {regularizer:?}");
         }
@@ -111,7 +115,7 @@ fn the_rest_cage_comes_back_where_its_differential_coordinates_are_kept() {
     let far = |regularizer| {
         let options = SolverOptions { regularizer, spectrum: 60, lambda: 100.0, ..SolverOptions::PAPER };
         let solver = Solver::prepare(&MeanValue, &cage, &capture.rest.points, options).unwrap();
-        let found = solver.invert_after(None, &[&rest]).remove(0);
+        let found = solver.cages(&[&rest]).remove(0);
         let apart = found.iter().zip(cage.vertices().as_flattened()).map(|(a, b)| (f64::from(*a) - b).abs());
         apart.fold(0.0, f64::max) / solver.diagonal()
     };
@@ -129,18 +133,18 @@ fn frames_that_follow_each_other_have_the_same_bits_in_any_batches() {
         assert!(solver.follows_previous());
         let frames: Vec<Vec<f64>> = (0..2 * BATCH).map(|t| frame(&capture, t)).collect();
         let views: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
-        let mut whole = solver.invert_after(None, &views[..BATCH]);
-        whole.extend(solver.invert_after(whole.last().cloned().as_deref(), &views[BATCH..]));
+        let mut whole = solver.cages(&views[..BATCH]);
+        whole.extend(solver.cages_after(whole.last().cloned().as_deref(), &views[BATCH..]));
         let mut single: Vec<Vec<f32>> = Vec::new();
         for view in &views {
-            single.push(solver.invert_after(single.last().cloned().as_deref(), &[view]).remove(0));
+            single.push(solver.cages_after(single.last().cloned().as_deref(), &[view]).remove(0));
         }
         assert_eq!(whole, single);
-        assert_ne!(whole[5], solver.invert_after(None, &[views[5]])[0], "the predecessor matters");
+        assert_ne!(whole[5], solver.cages(&[views[5]])[0], "the predecessor matters");
         if handles != Handles::All {
             let rows: Vec<f64> =
                 solver.handles().iter().flat_map(|&i| frames[5][3 * i as usize..][..3].to_vec()).collect();
-            assert_eq!(solver.invert_handles_after(Some(&whole[4]), &[&rows])[0], whole[5]);
+            assert_eq!(solver.cages_of_handles(Some(&whole[4]), &[&rows])[0], whole[5]);
         }
     }
 }
@@ -148,7 +152,7 @@ fn frames_that_follow_each_other_have_the_same_bits_in_any_batches() {
 /// The Laplacian as a matrix of the user's own, each row written `copies` times at less weight.
 fn laplacian_as_matrix(cage: &Cage, copies: usize) -> SparseMatrix {
     let m = cage.vertices().len();
-    let delta = CageLaplacian.delta(cage, m).unwrap();
+    let delta = Regularizer::Laplacian.delta(None, cage, m).unwrap();
     let scale = (copies as f64).sqrt();
     let entries = (0..m * copies).flat_map(|row| {
         let delta = &delta;
@@ -161,12 +165,12 @@ fn laplacian_as_matrix(cage: &Cage, copies: usize) -> SparseMatrix {
 fn a_matrix_that_is_the_laplacian_does_what_the_laplacian_does() {
     let (capture, cage) = capture();
     let positions = frame(&capture, 8);
-    let solve = |regularizer, term: &dyn Term| {
+    let solve = |regularizer, matrix: &SparseMatrix| {
         let options = SolverOptions { regularizer, ..SolverOptions::PAPER };
-        let solver = Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, options, &with(term)).unwrap();
-        as_matrix(&solver.invert(&[&positions])[0])
+        let solver = Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, options, &with(matrix)).unwrap();
+        as_matrix(&solver.cages(&[&positions])[0])
     };
-    let wanted = solve(Regularizer::Laplacian, &CageLaplacian);
+    let wanted = solve(Regularizer::Laplacian, &laplacian_as_matrix(&cage, 1));
     for copies in [1, 7] {
         let found = solve(Regularizer::Matrix, &laplacian_as_matrix(&cage, copies));
         assert!((&found - &wanted).norm_max() < 1e-6, "{copies}: {:e}", (&found - &wanted).norm_max());
@@ -194,7 +198,7 @@ fn a_matrix_that_does_not_fit_is_refused() {
     let plain = SolverOptions { regularizer: Regularizer::None, ..options };
     let plain = Solver::prepare(&MeanValue, &cage, points, plain).unwrap();
     let positions = frame(&capture, 2);
-    let apart = as_matrix(&solver.invert(&[&positions])[0]) - as_matrix(&plain.invert(&[&positions])[0]);
+    let apart = as_matrix(&solver.cages(&[&positions])[0]) - as_matrix(&plain.cages(&[&positions])[0]);
     assert!(apart.norm_max() < 1e-6, "an empty matrix wants nothing: {:e}", apart.norm_max());
 }
 
@@ -209,17 +213,16 @@ fn the_chosen_threshold_is_the_largest_within_the_bound() {
     {
         for regularizer in [Regularizer::Laplacian, Regularizer::Differential, Regularizer::TruncatedSvd] {
             let options = SolverOptions { handles, regularizer, lambda: 0.001, ..SolverOptions::PAPER };
-            let term = regularizer.term().unwrap();
             let handle_system = analysis.handle_system(handles).unwrap();
             let measured = |spectrum| {
                 let solver = analysis.solver(SolverOptions { spectrum, ..options }).unwrap();
                 let l2 = |frame: &Vec<f64>| {
-                    let cage = solver.invert(&[frame]).remove(0);
+                    let cage = solver.cages(&[frame]).remove(0);
                     solver.decoder().measure(&[&cage], &[frame])[0].l2 / solver.diagonal()
                 };
                 samples.iter().map(l2).sum::<f64>() / samples.len() as f64
             };
-            let found = handle_system.choose_threshold(options, term, &samples, 0.05).unwrap();
+            let found = handle_system.choose_threshold(options, None, &samples, 0.05).unwrap();
             for &(s, l2) in &found.tried {
                 assert!((l2 / measured(s) - 1.0).abs() < 1e-4, "{handles:?} {regularizer:?} {s}: {l2} {}", measured(s));
             }
@@ -237,7 +240,7 @@ fn the_chosen_threshold_is_the_largest_within_the_bound() {
     }
     let options = SolverOptions::PAPER;
     let handle_system = analysis.handle_system(options.handles).unwrap();
-    let at = |bound| handle_system.choose_threshold(options, &CageLaplacian, &samples, bound).unwrap().spectrum;
+    let at = |bound| handle_system.choose_threshold(options, None, &samples, bound).unwrap().spectrum;
     assert!(at(0.0) <= at(0.2) && at(0.2) < at(2.0), "{} {} {}", at(0.0), at(0.2), at(2.0));
     assert_eq!(at(1e9), m);
 }
@@ -249,14 +252,13 @@ fn a_threshold_for_frames_that_follow_each_other_is_measured_in_their_order() {
     let options = SolverOptions { regularizer: Regularizer::Temporal, ..SolverOptions::PAPER };
     let samples: Vec<Vec<f64>> = (0..20).map(|t| frame(&capture, t)).collect();
     let handle_system = analysis.handle_system(options.handles).unwrap();
-    let term = options.regularizer.term().unwrap();
-    let found = handle_system.choose_threshold(options, term, &samples, 0.05).unwrap();
+    let found = handle_system.choose_threshold(options, None, &samples, 0.05).unwrap();
     for &(spectrum, l2) in &found.tried {
         let solver = analysis.solver(SolverOptions { spectrum, ..options }).unwrap();
         let mut previous: Option<Vec<f32>> = None;
         let mut sum = 0.0;
         for frame in &samples {
-            let cage = solver.invert_after(previous.as_deref(), &[frame]).remove(0);
+            let cage = solver.cages_after(previous.as_deref(), &[frame]).remove(0);
             sum += solver.decoder().measure(&[&cage], &[frame])[0].l2 / solver.diagonal();
             previous = Some(cage);
         }
@@ -273,11 +275,11 @@ fn a_threshold_for_normals_that_follow_is_measured_on_the_cages_that_are_found()
     let samples: Vec<Vec<f64>> = (0..4).map(|k| frame(&capture, 9 * k)).collect();
     let options = SolverOptions::PAPER;
     let handle_system = analysis.handle_system(options.handles).unwrap();
-    let found = handle_system.choose_threshold(options, &CageLaplacian, &samples, 0.2).unwrap();
+    let found = handle_system.choose_threshold(options, None, &samples, 0.2).unwrap();
     for &(spectrum, l2) in found.tried.iter().step_by(4) {
         let solver = analysis.solver(SolverOptions { spectrum, ..options }).unwrap();
         let error = |frame: &Vec<f64>| {
-            let cage = solver.invert(&[frame]).remove(0);
+            let cage = solver.cages(&[frame]).remove(0);
             solver.decoder().measure(&[&cage], &[frame])[0].l2 / solver.diagonal()
         };
         let measured = samples.iter().map(error).sum::<f64>() / samples.len() as f64;
@@ -292,19 +294,17 @@ impl CoordinateSystem for WithNormals {
     fn name(&self) -> &'static str {
         "with-normals"
     }
-    fn columns(&self, cage: &Cage) -> usize {
-        cage.vertices().len() + cage.faces().len()
-    }
-    fn rest_values(&self, cage: &Cage) -> Vec<Point> {
+    fn values(&self, cage: &Cage) -> CageValues {
         let normals = cage.faces().iter().map(|_| [0.0, 0.0, 1.0]);
-        cage.vertices().iter().copied().chain(normals).collect()
+        CageValues { rest: cage.vertices().iter().copied().chain(normals).collect(), dependent_normals: None }
     }
     fn coordinates(
         &self,
         cage: &Cage,
         points: &[Point],
-    ) -> Result<cager_core::coordinates::Coordinates, cager_core::coordinates::CoordinatesError> {
-        let mut coordinates = MeanValue.coordinates(cage, points)?;
+        _: Option<&ElementPlan>,
+    ) -> Result<Coordinates, CoordinatesError> {
+        let mut coordinates = MeanValue.coordinates(cage, points, None)?;
         let (v, f) = (cage.vertices().len(), cage.faces().len());
         let phi = &coordinates.phi;
         // Of the sum over all faces nothing is left, so that the rest pose is reproduced.
@@ -324,7 +324,7 @@ impl CoordinateSystem for WithNormals {
 fn terms_know_cages_with_normals() {
     let (capture, cage) = capture();
     let (v, f) = (cage.vertices().len(), cage.faces().len());
-    let delta = CageLaplacian.delta(&cage, v + f).unwrap();
+    let delta = Regularizer::Laplacian.delta(None, &cage, v + f).unwrap();
     for i in 0..v + f {
         let sum: f64 = (0..v + f).map(|j| delta[(i, j)]).sum();
         assert!(sum.abs() < 1e-12, "row {i}: a constant is smooth");
@@ -332,10 +332,9 @@ fn terms_know_cages_with_normals() {
     let positions = frame(&capture, 6);
     for regularizer in [Regularizer::Laplacian, Regularizer::Differential, Regularizer::Matrix] {
         let own = own_term(v);
-        let term: &dyn Term = regularizer.term().unwrap_or(&own);
         let options = SolverOptions { regularizer, ..SolverOptions::PAPER };
-        let solver = Solver::prepare_with(&WithNormals, &cage, &capture.rest.points, options, &with(term)).unwrap();
-        let found = solver.invert(&[&positions]);
+        let solver = Solver::prepare_with(&WithNormals, &cage, &capture.rest.points, options, &with(&own)).unwrap();
+        let found = solver.cages(&[&positions]);
         let error = solver.decoder().measure(&[&found[0]], &[&positions])[0];
         assert_eq!(solver.preparation().rank, v + f - 1, "the mean of all directions moves nothing");
         assert!(error.l2 < 0.05 * solver.diagonal(), "{regularizer:?}: {}", error.l2);

@@ -6,7 +6,7 @@ use crate::disk::MemoryDisk;
 use cager::store::{Content, ContentKey, LogEntry, LogRecord, NamedFile, SessionMeta, Store};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
-use cager_core::inversion::{Solver, SolverOptions};
+use cager_core::inversion::{Rows, Solver, SolverOptions};
 use cager_core::mesh::TriMesh;
 use cager_proto::messages::SessionOptions;
 use std::collections::HashSet;
@@ -161,7 +161,7 @@ fn solver(mut bytes: &[u8]) {
     decoder.decode(&[&cage[..]], &mut out);
     assert_eq!(out[0].len(), 3 * decoder.points());
     let frame = vec![0.5_f32; 3 * decoder.points()];
-    solver.invert(&[&frame[..]]);
+    solver.invert(Rows::All, None, &[&frame[..]]);
 }
 
 /// The first byte says which file it is, and whether its wrapper is made right.

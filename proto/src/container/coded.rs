@@ -110,7 +110,8 @@ impl<R: Read + Seek> ContainerReader<R> {
         let corrupt = |what: String| Error::corrupt(offset, what);
         let points = self.rest()?.points;
         let cage = Cage::new(self.cage()?).map_err(|e| corrupt(e.to_string()))?;
-        if system.unknowns(&cage) != header.rows_per_frame as usize || system.unknowns(&cage) > MAX_ROWS {
+        let rows = system.values(&cage).unknowns();
+        if rows != header.rows_per_frame as usize || rows > MAX_ROWS {
             return Err(corrupt(format!("a frame has {} rows", header.rows_per_frame)));
         }
         let plan = self.elements()?.map(ElementPlan::from_bytes);
@@ -254,7 +255,8 @@ impl<R: Read + Seek> ContainerReader<R> {
 
 /// Bytes that computing a basis takes: the coordinates of its points twice, as they are and as a part of them, and ten matrices of the rows.
 fn basis_bytes(system: &dyn CoordinateSystem, cage: &Cage, points: usize) -> u64 {
-    let (columns, rows) = (system.columns(cage) as u64, system.unknowns(cage) as u64);
+    let values = system.values(cage);
+    let (columns, rows) = (values.columns() as u64, values.unknowns() as u64);
     let sampled = points.min(CageBasis::SAMPLE) as u64;
     80 * rows * rows + 16 * sampled * columns
 }

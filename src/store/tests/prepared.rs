@@ -2,7 +2,7 @@
 
 use super::{Given, KEY, SOLVER, content, prepare_with};
 use crate::store::ContentKey;
-use cager_core::inversion::{BATCH, Handles, Solver, SolverOptions};
+use cager_core::inversion::{BATCH, Handles, Rows, Solver, SolverOptions};
 use cager_core::regularize::Regularizer;
 
 /// Bits of everything a solver is used for.
@@ -11,8 +11,8 @@ fn bits(solver: &Solver) -> Vec<u64> {
     let frames: Vec<Vec<f64>> =
         (0..BATCH).map(|f| (0..3 * n).map(|i| ((i * 7 + f * 13) % 101) as f64 * 0.01).collect()).collect();
     let frames: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
-    let cages = solver.invert_after(None, &frames);
-    let cages: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
+    let inverted = solver.invert(Rows::All, None, &frames);
+    let cages: Vec<&[f32]> = inverted.iter().map(|inverted| inverted.cage.as_slice()).collect();
     let errors = solver.decoder().measure(&cages, &frames);
     let errors = errors.iter().flat_map(|e| [e.l2, e.linf, e.squared, e.spread]).map(f64::to_bits);
     cages.iter().flat_map(|cage| cage.iter()).map(|x| u64::from(x.to_bits())).chain(errors).collect()
@@ -34,7 +34,7 @@ fn a_solver_comes_back_the_same_to_the_bit() {
     for (i, (system, handles, regularizer)) in kinds.into_iter().enumerate() {
         let key = ContentKey([i as u8; 32]);
         let solver = prepare_with(system, SolverOptions { handles, regularizer, ..SolverOptions::PAPER });
-        assert_eq!(solver.tied().is_some(), system == "green");
+        assert_eq!(solver.dependent().is_some(), system == "green");
         assert_eq!(solver.preparation().plan.is_some(), system == "harmonic");
         assert!(store.prepared(&key).unwrap().is_none());
         store.put_prepared(&key, &solver).unwrap();

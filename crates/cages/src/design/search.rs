@@ -6,7 +6,7 @@ use super::run::{Best, Phase, Run};
 use super::samples::{Evaluation, evenly};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
-use cager_core::inversion::{BATCH, Solver, SolverOptions};
+use cager_core::inversion::{BATCH, Rows, Solver, SolverOptions};
 use std::ops::ControlFlow;
 
 /// Vertices to begin with.
@@ -95,9 +95,8 @@ impl Run<'_> {
             frames.iter().skip(usize::from(frames.len() > 1)).step_by(2).map(Vec::as_slice).collect();
         let mut errors = Vec::new();
         for frames in evenly(&held_back, FRAMES).chunks(BATCH) {
-            let cages: Vec<Vec<f32>> =
-                solver.invert_with_convergence(None, frames).into_iter().map(|found| found.cage).collect();
-            let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
+            let inverted = solver.invert(Rows::All, None, frames);
+            let views: Vec<&[f32]> = inverted.iter().map(|inverted| inverted.cage.as_slice()).collect();
             errors.extend(solver.decoder().measure(&views, frames));
         }
         errors.iter().map(|e| e.l2).sum::<f64>() / errors.len() as f64 / solver.diagonal()

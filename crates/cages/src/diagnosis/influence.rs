@@ -24,7 +24,7 @@ pub(super) fn influence(mesh: &TriMesh, model: &Model) -> (Vec<u32>, Option<f64>
     }
     let stride = (model.points.len() * mesh.vertices.len()).div_ceil(ENTRIES).max(1);
     let points: Vec<Point> = model.points.iter().step_by(stride).copied().collect();
-    let Ok(coordinates) = MeanValue.coordinates(&cage, &points) else { return (Vec::new(), None) };
+    let Ok(coordinates) = MeanValue.coordinates(&cage, &points, None) else { return (Vec::new(), None) };
     let phi = &coordinates.phi;
     let most = |v: usize| (0..phi.nrows()).map(|i| phi[(i, v)].abs()).fold(0.0, f64::max);
     let idle = (0..phi.ncols()).filter(|&v| most(v) < IDLE).map(|v| v as u32).collect();

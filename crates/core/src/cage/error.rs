@@ -76,7 +76,7 @@ pub enum CageError {
         edge: [u32; 2],
     },
     /// All faces point inwards.
-    #[error("all {faces} faces of the cage point inwards (signed volume {volume:.3e}); flip them, or pass --flip-cage")]
+    #[error("all {faces} faces of the cage point inwards (signed volume {volume:.3e}); flip them")]
     Inward {
         /// Number of faces.
         faces: usize,

@@ -8,8 +8,11 @@
 //!
 //! Normals have the length ℓ, the square root of the mean area of the faces, so that `Φ` is dimensionless and all rows of a cage are lengths.
 
-use super::layer::{self, Frame, Layers, Scratch};
-use super::{CoordinateSystem, Coordinates, CoordinatesError, PointwiseCoordinates, TiedNormals};
+use super::layer::{self, FaceBasis, Layers, Scratch};
+use super::{
+    CageValues, CoordinateSystem, Coordinates, CoordinatesError, DependentNormals, ElementPlan, PointwiseCoordinates,
+    refuse_plan,
+};
 use crate::cage::Cage;
 use crate::mesh::{self, Point};
 use crate::simd::{LANES, Lanes, zeros};
@@ -20,14 +23,14 @@ use rayon::prelude::*;
 /// Green coordinates: cage vertices and face normals, defined inside and outside the cage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Green {
-    /// Normals are functions of the vertices, see [`TiedNormals`]: the vertices are the unknowns, and the inversion is nonlinear.
+    /// Normals are functions of the vertices, see [`DependentNormals`]: the vertices are the unknowns, and the inversion is nonlinear.
     #[default]
     Consistent,
     /// Normals are independent unknowns, as in Thiery et al. 2012, who report it as their least stable case.
     Free,
 }
 
-/// Rows that sum to one within this need no affine_coordinates.
+/// Rows that sum to one within this are not completed by affine coordinates.
 const COMPLETE: f64 = 1e-13;
 /// Faces whose distances differ by less than this fraction, as they do at a common edge, are equally near.
 const EQUALLY_NEAR: f64 = 1e-9;
@@ -42,36 +45,27 @@ impl CoordinateSystem for Green {
         }
     }
 
-    fn columns(&self, cage: &Cage) -> usize {
-        cage.vertices().len() + cage.faces().len()
-    }
-
-    fn rest_values(&self, cage: &Cage) -> Vec<Point> {
+    fn values(&self, cage: &Cage) -> CageValues {
         let layers = Layers::new(cage);
         let length = normal_length(&layers) / layers.scale();
         let normals = layers.faces().iter().map(|f| f.normal().map(|c| c * length));
-        cage.vertices().iter().copied().chain(normals).collect()
-    }
-
-    fn unknowns(&self, cage: &Cage) -> usize {
-        match self {
-            Self::Consistent => cage.vertices().len(),
-            Self::Free => self.columns(cage),
+        CageValues {
+            rest: cage.vertices().iter().copied().chain(normals).collect(),
+            dependent_normals: (*self == Self::Consistent).then(|| DependentNormals::new(cage, length)),
         }
-    }
-
-    fn tied_normals(&self, cage: &Cage) -> Option<TiedNormals> {
-        (*self == Self::Consistent).then(|| {
-            let layers = Layers::new(cage);
-            TiedNormals::new(cage, normal_length(&layers) / layers.scale())
-        })
     }
 
     fn pointwise(&self) -> Option<PointwiseCoordinates> {
         Some(coordinates)
     }
 
-    fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError> {
+    fn coordinates(
+        &self,
+        cage: &Cage,
+        points: &[Point],
+        plan: Option<&ElementPlan>,
+    ) -> Result<Coordinates, CoordinatesError> {
+        refuse_plan(self.name(), plan)?;
         Ok(coordinates(cage, points))
     }
 }
@@ -140,7 +134,7 @@ fn rows_of(
 }
 
 /// The point relative to a face's first corner.
-fn from_corner(layers: &Layers, face: &Frame, x: Point) -> Point {
+fn from_corner(layers: &Layers, face: &FaceBasis, x: Point) -> Point {
     let corner = layers.vertices()[face.vertices[0] as usize];
     vector::sub(x, corner)
 }
@@ -148,12 +142,13 @@ fn from_corner(layers: &Layers, face: &Frame, x: Point) -> Point {
 /// The nearest faces, several where a shared edge or vertex is nearest, and the weight of each. Weights fall with the angle between a face's normal
 /// and the direction to the point, so that they vary continuously across edges.
 fn nearest_faces(layers: &Layers, x: Point, missing: f64) -> Vec<(usize, f64)> {
-    let distance2 = |face: &Frame| mesh::distance2_to_triangle(face.vertices.map(|v| layers.vertices()[v as usize]), x);
+    let distance2 =
+        |face: &FaceBasis| mesh::distance2_to_triangle(face.vertices.map(|v| layers.vertices()[v as usize]), x);
     let distances: Vec<f64> = layers.faces().iter().map(distance2).collect();
     let least = distances.iter().copied().fold(f64::INFINITY, f64::min);
     let bound = least * (1.0 + EQUALLY_NEAR) + ON_CAGE * ON_CAGE;
     let distance = least.sqrt();
-    let share = |face: &Frame| {
+    let share = |face: &FaceBasis| {
         if distance <= ON_CAGE {
             return 1.0;
         }

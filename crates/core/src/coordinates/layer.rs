@@ -32,14 +32,14 @@ pub(crate) struct Layers {
     scale: f64,
     /// Ends and length.
     edges: Vec<([u32; 2], f64)>,
-    faces: Vec<Frame>,
+    faces: Vec<FaceBasis>,
     triangles: Vec<[u32; 3]>,
 }
 
 /// A face in its own coordinates: its longest edge runs from the first corner, at the origin, to the second, at `(length, 0)`;
 /// the third is at `(foot · length, height)`.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Frame {
+pub(super) struct FaceBasis {
     /// Corners, counter-clockwise.
     pub(super) vertices: [u32; 3],
     /// `edges[i]` is the edge opposite corner i.
@@ -55,7 +55,7 @@ pub(super) struct Frame {
     normals: [[f64; 2]; 2],
 }
 
-impl Frame {
+impl FaceBasis {
     fn new(vertices: &[Point], face: &Face) -> Self {
         let between = |a: u32, b: u32| vector::sub(vertices[b as usize], vertices[a as usize]);
         let side = |i: usize| between(face.vertices[(i + 1) % 3], face.vertices[(i + 2) % 3]);
@@ -119,7 +119,7 @@ impl Layers {
     pub(crate) fn new(cage: &Cage) -> Self {
         let scale = 2f64.powi(-(cage.diagonal().log2() as i32).clamp(-1000, 1000));
         let vertices: Vec<Point> = cage.vertices().iter().map(|v| v.map(|c| c * scale)).collect();
-        let faces = cage.faces().iter().map(|face| Frame::new(&vertices, face)).collect();
+        let faces = cage.faces().iter().map(|face| FaceBasis::new(&vertices, face)).collect();
         let length = |[a, b]: [u32; 2]| vector::norm(vector::sub(vertices[b as usize], vertices[a as usize]));
         let edges = cage.edges().iter().map(|e| (e.vertices, length(e.vertices))).collect();
         Self { vertices, scale, edges, faces, triangles: cage.mesh().triangles.clone() }
@@ -136,7 +136,7 @@ impl Layers {
     }
 
     /// Faces, in the order of the cage.
-    pub(super) fn faces(&self) -> &[Frame] {
+    pub(super) fn faces(&self) -> &[FaceBasis] {
         &self.faces
     }
 

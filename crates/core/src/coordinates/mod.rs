@@ -11,7 +11,7 @@ pub use error::CoordinatesError;
 pub use green::Green;
 pub use harmonic::{ElementPlan, Harmonic};
 pub use mean_value::MeanValue;
-pub use normals::TiedNormals;
+pub use normals::DependentNormals;
 
 use crate::cage::Cage;
 use crate::mesh::Point;
@@ -69,24 +69,55 @@ pub fn by_name(name: &str) -> Option<&'static dyn CoordinateSystem> {
 /// Computes the coordinates of points independently of each other.
 pub type PointwiseCoordinates = fn(&Cage, &[Point]) -> Coordinates;
 
+/// The values of a cage in a coordinate system: what `Φ` multiplies.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CageValues {
+    /// Those of the rest pose, columns × 3. The vertices come first.
+    pub rest: Vec<Point>,
+    /// How normals are computed from the vertices, for systems in which the vertices alone are unknown.
+    pub dependent_normals: Option<DependentNormals>,
+}
+
+impl CageValues {
+    /// Those of a system with one column per vertex.
+    pub fn of_vertices(cage: &Cage) -> Self {
+        Self { rest: cage.vertices().to_vec(), dependent_normals: None }
+    }
+
+    /// Columns of `Φ`.
+    pub fn columns(&self) -> usize {
+        self.rest.len()
+    }
+
+    /// Unknowns m of a cage: rows stored per frame. Equal to the number of columns unless some values are functions of others.
+    pub fn unknowns(&self) -> usize {
+        self.columns() - self.dependent_normals.as_ref().map_or(0, |normals| normals.faces().len())
+    }
+}
+
 /// A system of cage coordinates. Every implementation passes the suite in `crates/core/tests/conformance.rs`.
 pub trait CoordinateSystem: Sync {
     /// The name on the command line, in reports and in containers.
     fn name(&self) -> &'static str;
 
-    /// Columns of `Φ`: the values of a cage that it multiplies.
-    fn columns(&self, cage: &Cage) -> usize;
+    /// The values of a cage.
+    fn values(&self, cage: &Cage) -> CageValues;
 
-    /// The values of the rest pose, columns × 3: what `Φ` multiplies to give the rest points. The vertices come first.
-    fn rest_values(&self, cage: &Cage) -> Vec<Point>;
+    /// `Φ` for these points. Rows sum to one; runs on the current rayon pool; the result does not depend on it. By a plan, a numerical solution is
+    /// found on the elements of an earlier one instead of elements chosen for these points; with the earlier points the bits are the same.
+    ///
+    /// # Errors
+    /// A cage or points for which the system is not defined; a plan that is not of this cage or of no such system.
+    fn coordinates(
+        &self,
+        cage: &Cage,
+        points: &[Point],
+        plan: Option<&ElementPlan>,
+    ) -> Result<Coordinates, CoordinatesError>;
 
-    /// Unknowns m of a cage: rows stored per frame. Equal to the number of columns unless some values are functions of others.
-    fn unknowns(&self, cage: &Cage) -> usize {
-        self.columns(cage)
-    }
-
-    /// How normals are computed from the vertices, for systems in which the vertices alone are unknown.
-    fn tied_normals(&self, _cage: &Cage) -> Option<TiedNormals> {
+    /// [`Self::coordinates`] for systems in which a row of `Φ` depends on its own point alone and always exists, so that `Φ` can be computed in
+    /// chunks.
+    fn pointwise(&self) -> Option<PointwiseCoordinates> {
         None
     }
 
@@ -102,30 +133,9 @@ pub trait CoordinateSystem: Sync {
     fn check(&self, _cage: &Cage, _points: &[Point]) -> Result<(), CoordinatesError> {
         Ok(())
     }
+}
 
-    /// [`Self::coordinates`] for systems in which a row of `Φ` depends on its own point alone and always exists, so that `Φ` can be computed in
-    /// chunks.
-    fn pointwise(&self) -> Option<PointwiseCoordinates> {
-        None
-    }
-
-    /// `Φ` for these points. Rows sum to one; runs on the current rayon pool; the result does not depend on it.
-    ///
-    /// # Errors
-    /// A cage or points for which the system is not defined.
-    fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError>;
-
-    /// The same, where they are a numerical solution on the elements of an earlier one instead of elements chosen for these points. With
-    /// the earlier points the bits are the same.
-    ///
-    /// # Errors
-    /// As [`Self::coordinates`]; a plan that is not of this cage or of no such system.
-    fn coordinates_by_plan(
-        &self,
-        _cage: &Cage,
-        _points: &[Point],
-        _plan: &ElementPlan,
-    ) -> Result<Coordinates, CoordinatesError> {
-        Err(CoordinatesError::BadPlan { system: self.name(), reason: "they have none" })
-    }
+/// Refuses a plan for a system that is no numerical solution.
+fn refuse_plan(system: &'static str, plan: Option<&ElementPlan>) -> Result<(), CoordinatesError> {
+    plan.map_or(Ok(()), |_| Err(CoordinatesError::BadPlan { system, reason: "they have none" }))
 }

@@ -11,7 +11,7 @@ use crate::vector::{cross, dot, norm, sub};
 
 /// Computes a cage's face normals from its vertices.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TiedNormals {
+pub struct DependentNormals {
     faces: Vec<[u32; 3]>,
     /// Of each face, what `|u'|²`, `u'·v'` and `|v'|²` are multiplied with to give the square of the normal's length.
     weights: Vec<[f64; 3]>,
@@ -20,7 +20,7 @@ pub struct TiedNormals {
 /// Derivatives of a face's normal with respect to `u'` and `v'`, each row by row.
 pub(crate) type Derivative = [[Point; 3]; 2];
 
-impl TiedNormals {
+impl DependentNormals {
     /// Normals of this length at rest.
     pub fn new(cage: &Cage, length: f64) -> Self {
         let faces: Vec<[u32; 3]> = cage.faces().iter().map(|face| face.vertices).collect();
@@ -113,18 +113,18 @@ mod tests {
         Cage::new(TriMesh { vertices, triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]] }).unwrap()
     }
 
-    fn of(tied: &TiedNormals, vertices: &[Point]) -> Vec<Point> {
-        tied.normals(|v| vertices[v as usize]).collect()
+    fn of(dependent: &DependentNormals, vertices: &[Point]) -> Vec<Point> {
+        dependent.normals(|v| vertices[v as usize]).collect()
     }
 
     #[test]
     fn normals_turn_with_a_cage_and_grow_with_its_stretch() {
         let (cage, length) = (cage(), 0.7);
-        let tied = TiedNormals::new(&cage, length);
-        let rest = of(&tied, cage.vertices());
+        let dependent = DependentNormals::new(&cage, length);
+        let rest = of(&dependent, cage.vertices());
         assert!(rest.iter().all(|n| (norm(*n) - length).abs() < 1e-14));
         let turned: Vec<Point> = cage.vertices().iter().map(|p| [-3.0 * p[1], 3.0 * p[0], 3.0 * p[2] + 5.0]).collect();
-        for (a, b) in rest.iter().zip(of(&tied, &turned)) {
+        for (a, b) in rest.iter().zip(of(&dependent, &turned)) {
             let expected = [-3.0 * a[1], 3.0 * a[0], 3.0 * a[2]];
             assert!((0..3).all(|k| (expected[k] - b[k]).abs() < 1e-13), "{expected:?} {b:?}");
         }
@@ -133,32 +133,32 @@ mod tests {
     #[test]
     fn collapsed_faces_have_no_normal() {
         let cage = cage();
-        let tied = TiedNormals::new(&cage, 1.0);
+        let dependent = DependentNormals::new(&cage, 1.0);
         let mut line = cage.vertices().to_vec();
         line[1] = line[0];
         for vertices in [vec![[0.5; 3]; 4], line, vec![[0.0; 3]; 4]] {
-            let normals = of(&tied, &vertices);
+            let normals = of(&dependent, &vertices);
             assert!(normals.iter().flatten().all(|c| c.is_finite()));
             assert_eq!(normals[1], [0.0; 3]);
-            assert!(tied.derivatives(&vertices).iter().flatten().flatten().flatten().all(|c| c.is_finite()));
+            assert!(dependent.derivatives(&vertices).iter().flatten().flatten().flatten().all(|c| c.is_finite()));
         }
     }
 
     #[test]
     fn derivatives_are_those_of_the_normals() {
         let cage = cage();
-        let tied = TiedNormals::new(&cage, 0.4);
+        let dependent = DependentNormals::new(&cage, 0.4);
         let deformed: Vec<Point> =
             cage.vertices().iter().map(|p| [p[0] + 0.2 * p[1] * p[2], 0.7 * p[1] - 0.1 * p[0] * p[0], p[2]]).collect();
-        let derivatives = tied.derivatives(&deformed);
+        let derivatives = dependent.derivatives(&deformed);
         const STEP: f64 = 1e-6;
-        for (f, face) in tied.faces().iter().enumerate() {
+        for (f, face) in dependent.faces().iter().enumerate() {
             for (side, &corner) in face[1..].iter().enumerate() {
                 for k in 0..3 {
                     let moved = |by: f64| {
                         let mut vertices = deformed.clone();
                         vertices[corner as usize][k] += by;
-                        of(&tied, &vertices)[f]
+                        of(&dependent, &vertices)[f]
                     };
                     let (up, down) = (moved(STEP), moved(-STEP));
                     for i in 0..3 {

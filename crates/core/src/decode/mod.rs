@@ -8,7 +8,7 @@ pub use error::FrameError;
 pub(crate) use phi::for_each_chunk;
 
 use crate::cage::Cage;
-use crate::coordinates::{PointwiseCoordinates, TiedNormals};
+use crate::coordinates::{DependentNormals, PointwiseCoordinates};
 use crate::dense;
 use crate::inversion::{BATCH, product_columns};
 use crate::mesh::Point;
@@ -30,7 +30,7 @@ pub struct Decoder {
     /// Number of leading columns of `Φ` that multiply vertices, which follow a translation; the others multiply normals.
     positions: usize,
     /// Computes the normals from the vertices; `None` where normals are rows of the cage.
-    normals: Option<Arc<TiedNormals>>,
+    normals: Option<Arc<DependentNormals>>,
 }
 
 impl Decoder {
@@ -93,7 +93,7 @@ impl Decoder {
     /// # Panics
     /// Where there is not one column per vertex and face.
     #[must_use]
-    pub fn with_tied_normals(mut self, normals: Option<TiedNormals>) -> Self {
+    pub fn with_dependent_normals(mut self, normals: Option<DependentNormals>) -> Self {
         if let Some(normals) = &normals {
             assert_eq!(self.columns(), self.positions + normals.faces().len(), "one column per vertex and face");
         }
@@ -102,7 +102,7 @@ impl Decoder {
     }
 
     /// How normals are computed from the vertices; `None` where they are unknowns or absent.
-    pub fn tied_normals(&self) -> Option<&TiedNormals> {
+    pub fn dependent_normals(&self) -> Option<&DependentNormals> {
         self.normals.as_deref()
     }
 
@@ -268,9 +268,9 @@ impl Decoder {
                     columns[(j, 3 * f + k)] = (f64::from(row[k]) - shift) as f32;
                 }
             }
-            if let Some(tied) = &self.normals {
+            if let Some(dependent) = &self.normals {
                 let vertex = |v: u32| [0, 1, 2].map(|k| f64::from(cage[3 * v as usize + k]));
-                for (j, normal) in tied.normals(vertex).enumerate() {
+                for (j, normal) in dependent.normals(vertex).enumerate() {
                     for k in 0..3 {
                         columns[(self.positions + j, 3 * f + k)] = normal[k] as f32;
                     }

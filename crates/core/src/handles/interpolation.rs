@@ -25,7 +25,7 @@ const BLOCK_ROWS: usize = 128;
 /// Blocks whose covariances are held at the same time.
 const BLOCKS_TOGETHER: usize = 64;
 /// Columns of one task of a product with the covariances, at the most.
-const MOST_COLUMNS: usize = 192;
+const MAX_COLUMNS: usize = 192;
 /// Samples of one task when covariances are computed.
 const TASK_SAMPLES: usize = 64;
 
@@ -108,7 +108,7 @@ fn difference(a: MatRef<'_, f64>, mut b: Mat<f64>) -> Mat<f64> {
 /// space-filling curve, each with the samples within its support, and summed in that order, so that the result does not depend on the threads.
 fn with_all_points(covariance: Covariance, points: &[Point], samples: &[Point], wide: MatRef<'_, f64>) -> Mat<f64> {
     let m = wide.ncols();
-    let columns = (m / 16).next_multiple_of(LANES).clamp(LANES, MOST_COLUMNS);
+    let columns = (m / 16).next_multiple_of(LANES).clamp(LANES, MAX_COLUMNS);
     let mut sum = zeros(m, samples.len());
     let order = morton_order(points);
     let blocks: Vec<&[u32]> = order.chunks(BLOCK_ROWS).collect();

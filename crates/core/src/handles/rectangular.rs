@@ -5,7 +5,7 @@
 //! anew for each row.
 
 use crate::dense;
-use crate::spectrum::RowBasis;
+use crate::row_basis::RowBasis;
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 use std::cmp::Ordering;

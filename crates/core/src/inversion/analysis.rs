@@ -1,12 +1,12 @@
 //! Analysis of a rest pose and its cage: coordinates, maximum-volume handles and singular value decompositions, shared by solvers with different
 //! options.
 
-use super::coordinates::{AnalysisCoordinates, coordinates};
-use super::handle_system::{HandleSystem, without_idle_term};
+use super::analysed_coordinates::{AnalysisCoordinates, coordinates};
+use super::handle_system::{HandleSystem, drop_zero_weight_regularizer};
 use super::operator::Decomposition;
 use super::prepare::{check, check_options, reject_far_points};
 use super::spectra::{RequiredDecompositions, Spectra};
-use super::{Preparation, PrepareError, Preparing, Solver, SolverOptions};
+use super::{PreparationReport, PrepareContext, PrepareError, Solver, SolverOptions};
 use crate::cage::Cage;
 use crate::coordinates::CoordinateSystem;
 use crate::decode::Decoder;
@@ -14,7 +14,7 @@ use crate::dense;
 use crate::handles::Handles;
 use crate::maxvol::MaxVol;
 use crate::mesh::{Point, diagonal};
-use crate::spectrum::{RANK_TOLERANCE, RowBasis, deficient_basis, row_basis};
+use crate::row_basis::{RANK_TOLERANCE, RowBasis, deficient_basis, row_basis};
 use crate::svd;
 use faer::{Mat, MatRef};
 use std::time::Instant;
@@ -39,9 +39,9 @@ pub struct Analysis {
     pub(super) spectra: Spectra,
     pub(super) decoder: Decoder,
     pub(super) diagonal: f64,
-    /// See [`Preparing::memory`].
+    /// See [`PrepareContext::memory`].
     pub(super) memory: u64,
-    pub(super) preparation: Preparation,
+    pub(super) preparation: PreparationReport,
 }
 
 impl Analysis {
@@ -50,9 +50,14 @@ impl Analysis {
     /// # Errors
     /// As [`Solver::prepare`].
     pub fn new(system: &dyn CoordinateSystem, cage: &Cage, points: &[Point]) -> Result<Self, PrepareError> {
-        let preparing = Preparing::default();
-        check(points, system.unknowns(cage), SolverOptions { spectrum: 0, ..SolverOptions::PAPER }, preparing.memory)?;
-        Self::of(system, cage, points, RequiredDecompositions::Everything, &preparing)
+        let context = PrepareContext::default();
+        check(
+            points,
+            system.values(cage).unknowns(),
+            SolverOptions { spectrum: 0, ..SolverOptions::PAPER },
+            context.memory,
+        )?;
+        Self::of(system, cage, points, RequiredDecompositions::Everything, &context)
     }
 
     /// As [`Self::new`], computing only what solvers with these handles need. A model of very many points is analysed on a sample.
@@ -64,10 +69,10 @@ impl Analysis {
         cage: &Cage,
         points: &[Point],
         options: SolverOptions,
-        preparing: &Preparing<'_>,
+        context: &PrepareContext<'_>,
     ) -> Result<Self, PrepareError> {
-        check(points, system.unknowns(cage), options, preparing.memory)?;
-        Self::of(system, cage, points, RequiredDecompositions::For(options.handles), preparing)
+        check(points, system.values(cage).unknowns(), options, context.memory)?;
+        Self::of(system, cage, points, RequiredDecompositions::For(options.handles), context)
     }
 
     /// As [`Self::for_options`], for the solver with these options alone.
@@ -76,17 +81,18 @@ impl Analysis {
         cage: &Cage,
         points: &[Point],
         options: SolverOptions,
-        preparing: &Preparing<'_>,
+        context: &PrepareContext<'_>,
     ) -> Result<Self, PrepareError> {
-        check(points, system.unknowns(cage), options, preparing.memory)?;
-        let tied = system.tied_normals(cage).is_some();
+        let values = system.values(cage);
+        check(points, values.unknowns(), options, context.memory)?;
+        let dependent = values.dependent_normals.is_some();
         // An unregularised start is regularised nevertheless, in as many directions as are ill-conditioned.
-        let required = if tied {
+        let required = if dependent {
             RequiredDecompositions::For(options.handles)
         } else {
-            RequiredDecompositions::of_solver(without_idle_term(options))
+            RequiredDecompositions::of_solver(drop_zero_weight_regularizer(options))
         };
-        Self::of(system, cage, points, required, preparing)
+        Self::of(system, cage, points, required, context)
     }
 
     fn of(
@@ -94,12 +100,12 @@ impl Analysis {
         cage: &Cage,
         points: &[Point],
         required: RequiredDecompositions,
-        preparing: &Preparing<'_>,
+        context: &PrepareContext<'_>,
     ) -> Result<Self, PrepareError> {
-        let (m, diagonal) = (system.unknowns(cage), diagonal(points));
+        let (m, diagonal) = (system.values(cage).unknowns(), diagonal(points));
         let clock = Instant::now();
         reject_far_points(cage, points)?;
-        preparing.next("coordinates")?;
+        context.next("coordinates")?;
         let AnalysisCoordinates {
             phi,
             sample,
@@ -109,11 +115,11 @@ impl Analysis {
             outside: (outside, outside_distance),
             refinement,
             plan,
-        } = coordinates(system, cage, points, required, preparing)?;
+        } = coordinates(system, cage, points, required, context)?;
         let coordinates_seconds = clock.elapsed().as_secs_f64();
 
         let clock = Instant::now();
-        preparing.next("handles")?;
+        context.next("handles")?;
         let no_handles = PrepareError::NoSolution { what: "choice of handles" };
         let mut basis = row_basis(phi.as_ref()).ok_or(no_handles.clone())?;
         let maxvol_seconds = clock.elapsed().as_secs_f64();
@@ -121,18 +127,18 @@ impl Analysis {
         let decoder = decoder.unwrap_or_else(|| Decoder::new(phi.as_ref(), cage.vertices().len()));
 
         let clock = Instant::now();
-        preparing.next("singular values")?;
+        context.next("singular values")?;
         let mut spectra = Spectra::of(phi.as_ref(), &basis, required)?;
         if basis.rank == m && spectra.full_ends[2] <= RANK_TOLERANCE * spectra.full_ends[0] {
             basis = deficient_basis(phi.as_ref()).ok_or(no_handles)?;
             spectra = Spectra::of(phi.as_ref(), &basis, required)?;
         }
         let rank = basis.rank;
-        let preparation = Preparation {
+        let preparation = PreparationReport {
             rank,
             affine_reproduction_error: error / diagonal,
             condition_full: spectra.full_ends[0] / spectra.full_ends[1],
-            condition_handles: spectra.handles_ends[0] / spectra.handles_ends[1],
+            condition_handles: spectra.handles_ends.map_or(f64::NAN, |[first, last]| first / last),
             singular_values: Vec::new(),
             swaps: basis.handles.swaps,
             log_volume: basis.handles.log_volume,
@@ -150,7 +156,7 @@ impl Analysis {
             None => points.to_vec(),
         };
         let cage = cage.clone();
-        let memory = preparing.memory;
+        let memory = context.memory;
         Ok(Self { phi, cage, points, sample, rest, basis, spectra, decoder, diagonal, memory, preparation })
     }
 
@@ -186,19 +192,11 @@ impl Analysis {
     /// # Errors
     /// As [`Solver::prepare`].
     pub fn solver(&self, options: SolverOptions) -> Result<Solver, PrepareError> {
-        self.handle_system(options.handles)?.solver(options)
-    }
-
-    /// A solver that reads the given rows, at least as many as unknowns; the handles in the options are checked, but not used.
-    ///
-    /// # Errors
-    /// As [`Solver::prepare`]; [`PrepareError::NoSolution`] where the rows determine nothing.
-    pub fn solver_of_rows(&self, rows: &[u32], options: SolverOptions) -> Result<Solver, PrepareError> {
-        self.handle_system_of(rows)?.solver(options)
+        self.handle_system(options.handles)?.solver(options, None)
     }
 
     /// Results of the preparation; the singular values are empty, see [`Self::handle_spectrum`] and [`Self::full_spectrum`].
-    pub fn preparation(&self) -> &Preparation {
+    pub fn preparation(&self) -> &PreparationReport {
         &self.preparation
     }
 

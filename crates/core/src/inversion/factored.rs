@@ -1,7 +1,7 @@
 //! The linear inversion in factors, `C = V T (Uᵀ H)`, for applying many methods to the same frames: `Uᵀ H` is computed once per choice of handles,
 //! and a method is the map T of singular directions.
 
-use super::{HandleSystem, RegularizationTarget, Solver};
+use super::{HandleSystem, RegularizationTarget, Rows, Solver};
 use crate::dense;
 use crate::mesh::Point;
 use crate::regularize::SpectralMap;
@@ -14,7 +14,7 @@ pub struct FactoredInversion(Form);
 #[derive(Clone, Debug)]
 enum Form {
     Factors(Factors),
-    /// For tied normals: the iteration amplifies rounding errors of its start, so that it uses the same solver as encoding.
+    /// For dependent normals: the iteration amplifies rounding errors of its start, so that it uses the same solver as encoding.
     Solver(Box<Solver>),
 }
 
@@ -131,7 +131,7 @@ impl HandleSystem<'_> {
     }
 
     /// Cages, each m × 3 interleaved, of up to [`BATCH`](super::BATCH) frames that this system has projected, by one of its methods;
-    /// `previous` as for [`Solver::invert_after`].
+    /// `previous` as for [`Solver::invert`].
     ///
     /// # Panics
     /// Where frames and their projections differ in number, or more come than a batch holds.
@@ -145,7 +145,9 @@ impl HandleSystem<'_> {
         assert_eq!(projected.means.len(), frames.len(), "one projection per frame");
         match &method.0 {
             Form::Factors(factors) => factors.invert(self, previous, projected),
-            Form::Solver(solver) => solver.invert_after(previous, frames),
+            Form::Solver(solver) => {
+                solver.invert(Rows::All, previous, frames).into_iter().map(|inverted| inverted.cage).collect()
+            }
         }
     }
 }

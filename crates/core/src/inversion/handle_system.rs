@@ -12,8 +12,8 @@ use crate::decode::Decoder;
 use crate::dense;
 use crate::mesh::Point;
 use crate::regularize::{
-    CageLaplacian, Reference, RegularizationOperator, Regularizer, SpectralMap, Spectrum, Term, TermError,
-    WEAK_SINGULAR_VALUE, last_map, spectral_map,
+    Reference, RegularizationOperator, Regularizer, SparseMatrix, SpectralMap, Spectrum, WEAK_SINGULAR_VALUE, last_map,
+    spectral_map,
 };
 use faer::Mat;
 use std::sync::{Arc, OnceLock};
@@ -26,7 +26,7 @@ pub struct HandleSystem<'a> {
     pub(super) decomposition: Decomposition,
     /// Time the decomposition took.
     pub(super) seconds: f64,
-    /// Scaled Gram matrix of the rows read, for tied normals (functions of the vertices); expensive, and therefore computed on first use.
+    /// Scaled Gram matrix of the rows read, for dependent normals; expensive, and therefore computed on first use.
     gram: OnceLock<Mat<f64>>,
 }
 
@@ -47,28 +47,19 @@ impl<'a> HandleSystem<'a> {
 
     /// The solver with these options; their handles are checked, but this system's are used. The weight λ is relative to the mean square error of the
     /// points in the data term, so that it means the same whichever points are read: λ · K/m multiplies the regularisation of a
-    /// sum over K points, for m unknowns. For maximum-volume handles K = m, the paper's own setting.
+    /// sum over K points, for m unknowns. For maximum-volume handles K = m, the paper's own setting. `matrix` is Δ of [`Regularizer::Matrix`].
     ///
     /// # Errors
     /// As [`Solver::prepare`].
-    pub fn solver(&self, options: SolverOptions) -> Result<Solver, PrepareError> {
-        self.solver_with(options, options.regularizer.term().ok_or(TermError::Missing)?)
-    }
-
-    /// As [`Self::solver`], with a custom term, which takes the place of the regularizer's own; [`Regularizer::TruncatedSvd`] and
-    /// [`Regularizer::Tikhonov`] use none.
-    ///
-    /// # Errors
-    /// As [`Solver::prepare`].
-    pub fn solver_with(&self, options: SolverOptions, term: &dyn Term) -> Result<Solver, PrepareError> {
+    pub fn solver(&self, options: SolverOptions, matrix: Option<&SparseMatrix>) -> Result<Solver, PrepareError> {
         let clock = Instant::now();
         let analysis = self.analysis;
-        let (map, target, consistent) = self.parts(options, term)?;
+        let (map, target, consistent) = self.parts(options, matrix)?;
         let operator = self.decomposition.operator(analysis.phi.as_ref(), &map.data);
         let operator = padded_to_tiles(with_unit_row_sums(operator, analysis.decoder.positions()));
         let (handles, reads_all) = self.points_read();
         // The baselines and inversions without a term go where the data take them.
-        let held = options.regularizer.is_sub_spectral() && !is_unregularized(without_idle_term(options));
+        let held = options.regularizer.is_sub_spectral() && !is_unregularized(drop_zero_weight_regularizer(options));
         let nearness = if held { Nearness::new(self).map(Arc::new) } else { None };
         let mut preparation = analysis.preparation.clone();
         preparation.condition_handles = self.decomposition.condition;
@@ -92,10 +83,10 @@ impl<'a> HandleSystem<'a> {
     /// # Errors
     /// As [`Solver::prepare`].
     pub fn factored(&self, options: SolverOptions) -> Result<FactoredInversion, PrepareError> {
-        if self.analysis.decoder.tied_normals().is_some() {
-            return Ok(self.solver(options)?.into());
+        if self.analysis.decoder.dependent_normals().is_some() {
+            return Ok(self.solver(options, None)?.into());
         }
-        let (map, target, _) = self.parts(options, options.regularizer.term().ok_or(TermError::Missing)?)?;
+        let (map, target, _) = self.parts(options, None)?;
         Ok(FactoredInversion::new(self, &map, target))
     }
 
@@ -127,28 +118,28 @@ impl<'a> HandleSystem<'a> {
     fn parts(
         &self,
         options: SolverOptions,
-        term: &dyn Term,
+        matrix: Option<&SparseMatrix>,
     ) -> Result<(SpectralMap, RegularizationTarget, Option<Arc<Consistent>>), PrepareError> {
         let analysis = self.analysis;
         let m = analysis.phi.ncols();
         check_options(analysis.phi.nrows(), m, options, analysis.memory)?;
-        let options = without_idle_term(options);
-        let tied = analysis.decoder.tied_normals().is_some();
+        let options = drop_zero_weight_regularizer(options);
+        let dependent = analysis.decoder.dependent_normals().is_some();
         // Without regularisation the Gauss–Newton steps are held to their start by the small weight of `start_weight` only; the start itself is
         // regularised nevertheless, since from an ill-conditioned one they end in a worse minimum.
-        let unregularized = tied && is_unregularized(options);
-        let regularization_operator =
-            self.regularization_operator(if unregularized { &CageLaplacian } else { term })?;
-        let map = if unregularized {
+        let unregularized = dependent && is_unregularized(options);
+        let (regularizer, s, lambda) = if unregularized {
             let sigma = self.singular_values();
             let ill_conditioned = sigma.iter().filter(|&&x| x < ILL_CONDITIONED * sigma[0]).count();
-            self.map(&regularization_operator, Regularizer::Laplacian, ill_conditioned.min(m / 4), 1.0)?
+            (Regularizer::Laplacian, ill_conditioned.min(m / 4), 1.0)
         } else {
-            self.map(&regularization_operator, options.regularizer, options.spectrum, options.lambda)?
+            (options.regularizer, options.spectrum, options.lambda)
         };
-        let target = self.target(&map, regularization_operator.reference);
+        let (delta, reference) = (regularizer.delta(matrix, &analysis.cage, m)?, regularizer.reference());
+        let map = self.map(&RegularizationOperator { delta, reference }, regularizer, s, lambda)?;
+        let target = self.target(&map, reference);
         let decoder = &analysis.decoder;
-        let consistent = match decoder.tied_normals() {
+        let consistent = match decoder.dependent_normals() {
             None => None,
             Some(_) => {
                 let (handles, reads_all) = self.points_read();
@@ -161,12 +152,7 @@ impl<'a> HandleSystem<'a> {
         Ok((map, target, consistent))
     }
 
-    pub(super) fn regularization_operator(&self, term: &dyn Term) -> Result<RegularizationOperator, PrepareError> {
-        let unknowns = self.analysis.phi.ncols();
-        Ok(RegularizationOperator { delta: term.delta(&self.analysis.cage, unknowns)?, reference: term.reference() })
-    }
-
-    pub(super) fn map(
+    fn map(
         &self,
         regularization_operator: &RegularizationOperator,
         regularizer: Regularizer,
@@ -191,7 +177,7 @@ impl<'a> HandleSystem<'a> {
     }
 
     /// The regularisation target: a constant for the rest cage, a matrix for the previous frame's cage.
-    pub(super) fn target(&self, map: &SpectralMap, reference: Reference) -> RegularizationTarget {
+    fn target(&self, map: &SpectralMap, reference: Reference) -> RegularizationTarget {
         let Some(target) = &map.target else { return RegularizationTarget::None };
         let to_cage = self.decomposition.directions.to_cage(target.as_ref());
         let positions = self.analysis.decoder.positions();
@@ -212,7 +198,7 @@ impl<'a> HandleSystem<'a> {
 const ILL_CONDITIONED: f64 = 1e-2;
 
 /// Drops the regularisation term where λ is zero, which makes it the same as a threshold of zero.
-pub(super) fn without_idle_term(options: SolverOptions) -> SolverOptions {
+pub(super) fn drop_zero_weight_regularizer(options: SolverOptions) -> SolverOptions {
     if options.lambda > 0.0 {
         return options;
     }

@@ -1,9 +1,9 @@
 //! Inversion of frames: a [`Solver`] is prepared once for a rest pose and its cage and then takes one matrix product per batch of frames, followed by
 //! Gauss–Newton steps where normals are functions of the vertices.
 
+mod analysed_coordinates;
 mod analysis;
 mod consistent;
-mod coordinates;
 mod error;
 mod factored;
 mod handle_system;
@@ -26,9 +26,9 @@ pub use factored::{FactoredInversion, ProjectedFrames};
 pub use handle_system::HandleSystem;
 pub use nearness::NearnessParts;
 pub use options::{SolverOptions, default_spectrum};
-pub use parts::{SolverParts, TiedParts};
-pub use prepare::{Preparation, Preparing, check_options, coordinates_bytes, reject_far_points};
-pub use solve::{BATCH, InvertedFrame, Solver};
+pub use parts::{DependentParts, SolverParts};
+pub use prepare::{PreparationReport, PrepareContext, check_options, coordinates_bytes, reject_far_points};
+pub use solve::{BATCH, InvertedFrame, Rows, Solver};
 pub use target::RegularizationTarget;
 pub use threshold::Threshold;
 

@@ -1,6 +1,6 @@
 //! The linear inversion as one matrix R, `C = R · H`.
 
-use super::spectra::{ENDS_ALONE, Spectra};
+use super::spectra::{EXTREMES_ONLY_FROM, Spectra};
 use super::{PrepareError, tall_product};
 use crate::dense;
 use crate::handles::Handles;
@@ -9,7 +9,7 @@ use crate::handles::interpolation::{Drift, Samples, interpolated};
 use crate::handles::rectangular::rectangular_rows;
 use crate::mesh::Point;
 use crate::regularize::DataMap;
-use crate::spectrum::{RANK_TOLERANCE, RowBasis};
+use crate::row_basis::{RANK_TOLERANCE, RowBasis};
 use crate::svd::{self, LastDirections, Svd};
 use faer::{Mat, MatRef};
 
@@ -134,11 +134,8 @@ impl Decomposition {
             }
             FullSvd::Last(last, factor) => (LeftFactor::Normal(factor.to_owned()), Directions::Last(last.clone())),
         };
-        let [first, last] = match spectra.handles_ends {
-            // Not computed with the other decompositions.
-            [first, _] if first.is_nan() => svd::ends(None, basis.square.as_ref(), basis.handles.inverse.as_ref()),
-            known => known,
-        };
+        let ends = || svd::ends(None, basis.square.as_ref(), basis.handles.inverse.as_ref());
+        let [first, last] = spectra.handles_ends.unwrap_or_else(ends);
         let condition = first / last;
         let (handles, rows) = (basis.handles.rows.clone(), phi.nrows());
         Ok(Self { handles, reads_all: true, rows, left, rank, directions, condition })
@@ -265,7 +262,7 @@ fn whole<'a>(phi: MatRef<'_, f64>, rank: usize, spectra: &'a Spectra) -> Result<
 /// Condition number over the rank of the handles' rows of `Φ`; where there are many unknowns, from `B_S = [I; others]`.
 fn condition_of(phi: MatRef<'_, f64>, handles: &[u32], others: MatRef<'_, f64>, basis: &RowBasis) -> Option<f64> {
     let (m, rank) = (phi.ncols(), basis.rank);
-    if m >= ENDS_ALONE && rank == m {
+    if m >= EXTREMES_ONLY_FROM && rank == m {
         let factor = dense::cholesky(Mat::<f64>::identity(m, m) + dense::lower_product(others.transpose(), others))?;
         let [first, last] = svd::ends(Some(factor.transpose()), basis.square.as_ref(), basis.handles.inverse.as_ref());
         return Some(first / last);

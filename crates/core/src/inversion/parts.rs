@@ -2,8 +2,8 @@
 
 use super::consistent::Consistent;
 use super::nearness::{Nearness, NearnessParts};
-use super::{Preparation, RegularizationTarget, Solver};
-use crate::coordinates::TiedNormals;
+use super::{PreparationReport, RegularizationTarget, Solver};
+use crate::coordinates::DependentNormals;
 use crate::decode::Decoder;
 use faer::{Mat, MatRef};
 use std::sync::Arc;
@@ -24,20 +24,20 @@ pub struct SolverParts {
     /// Number of columns that multiply vertices; they come first.
     pub positions: usize,
     /// Additional data of the consistent inversion, where normals are functions of the vertices.
-    pub tied: Option<TiedParts>,
+    pub dependent: Option<DependentParts>,
     /// What brings cages back to their frames, where a term holds them.
     pub nearness: Option<NearnessParts>,
     /// Diagonal of the rest pose's bounding box.
     pub diagonal: f64,
     /// Results of the preparation.
-    pub preparation: Preparation,
+    pub preparation: PreparationReport,
 }
 
 /// Data of the consistent inversion.
 #[derive(Clone, Debug)]
-pub struct TiedParts {
+pub struct DependentParts {
     /// How normals are computed from the vertices.
-    pub normals: TiedNormals,
+    pub normals: DependentNormals,
     /// `(v/K) ΦᵀΦ` of the K points read, for v vertices; columns × columns.
     pub gram: Mat<f64>,
     /// Weight λ of the regularisation towards the linear start.
@@ -62,9 +62,9 @@ impl Solver {
 
     /// Data of the consistent inversion, if any: the definition of the normals, the Gram matrix of the rows read, columns × columns, and the weight λ
     /// of the linear start.
-    pub fn tied(&self) -> Option<(&TiedNormals, MatRef<'_, f64>, f64)> {
+    pub fn dependent(&self) -> Option<(&DependentNormals, MatRef<'_, f64>, f64)> {
         let consistent = self.consistent.as_ref()?;
-        Some((self.decoder.tied_normals()?, consistent.gram(), consistent.weight()))
+        Some((self.decoder.dependent_normals()?, consistent.gram(), consistent.weight()))
     }
 
     /// What brings cages back to their frames, if anything does.
@@ -74,10 +74,20 @@ impl Solver {
 
     /// Reassembles a solver whose results are bit-identical to those of the original. `None` where the parts are inconsistent.
     pub fn from_parts(parts: SolverParts) -> Option<Self> {
-        let SolverParts { handles, reads_all, operator, target, phi, positions, tied, nearness, diagonal, preparation } =
-            parts;
+        let SolverParts {
+            handles,
+            reads_all,
+            operator,
+            target,
+            phi,
+            positions,
+            dependent,
+            nearness,
+            diagonal,
+            preparation,
+        } = parts;
         let (n, columns) = phi.shape();
-        let m = if tied.is_some() { positions } else { columns };
+        let m = if dependent.is_some() { positions } else { columns };
         let fits = (1..=n).contains(&m)
             && (1..=columns).contains(&positions)
             && operator.ncols() == m
@@ -85,15 +95,15 @@ impl Solver {
             && (1..=n).contains(&handles.len())
             && handles.iter().all(|&h| (h as usize) < n)
             && target.fits(m)
-            && tied.as_ref().is_none_or(|tied| tied.fits(columns, positions))
+            && dependent.as_ref().is_none_or(|dependent| dependent.fits(columns, positions))
             && diagonal.is_finite();
         if !fits {
             return None;
         }
         let mut decoder = Decoder::from_single(phi, positions);
         let mut consistent = None;
-        if let Some(TiedParts { normals, gram, weight }) = tied {
-            decoder = decoder.with_tied_normals(Some(normals));
+        if let Some(DependentParts { normals, gram, weight }) = dependent {
+            decoder = decoder.with_dependent_normals(Some(normals));
             let rows = (!reads_all).then_some(handles.as_slice());
             consistent = Some(Arc::new(Consistent::from_gram(&decoder, rows, weight, gram)?));
         }
@@ -106,7 +116,7 @@ impl Solver {
     }
 }
 
-impl TiedParts {
+impl DependentParts {
     fn fits(&self, columns: usize, positions: usize) -> bool {
         positions + self.normals.faces().len() == columns
             && self.normals.faces().iter().flatten().all(|&v| (v as usize) < positions)

@@ -5,7 +5,7 @@ use super::{Analysis, Handles, PrepareError, Solver, SolverOptions};
 use crate::cage::Cage;
 use crate::coordinates::{CoordinateSystem, ElementPlan, Refinement};
 use crate::mesh::{Point, diagonal, distance_to_surface, winding_number};
-use crate::regularize::{Term, TermError};
+use crate::regularize::SparseMatrix;
 use crate::vector::norm;
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
@@ -22,7 +22,7 @@ const ON_THE_CAGE: f64 = 1e-9;
 
 /// Results of the preparation.
 #[derive(Clone, Debug, Default, Deserialize, Serialize)]
-pub struct Preparation {
+pub struct PreparationReport {
     /// Numerical rank of `Φ`, at most m.
     pub rank: usize,
     /// `max_i |Φ C_R − P_R|_i` over the rest diagonal.
@@ -68,7 +68,7 @@ impl Solver {
         options: SolverOptions,
         memory: u64,
     ) -> Result<(), PrepareError> {
-        check(points, system.unknowns(cage), options, memory)?;
+        check(points, system.values(cage).unknowns(), options, memory)?;
         reject_far_points(cage, points)?;
         Ok(system.check(cage, points)?)
     }
@@ -83,10 +83,10 @@ impl Solver {
         points: &[Point],
         options: SolverOptions,
     ) -> Result<Self, PrepareError> {
-        Self::prepare_with(system, cage, points, options, &Preparing::default())
+        Self::prepare_with(system, cage, points, options, &PrepareContext::default())
     }
 
-    /// As [`Self::prepare`], with a custom term, progress and cancellation.
+    /// As [`Self::prepare`], with a custom matrix, progress and cancellation.
     ///
     /// # Errors
     /// See [`PrepareError`].
@@ -95,22 +95,21 @@ impl Solver {
         cage: &Cage,
         points: &[Point],
         options: SolverOptions,
-        preparing: &Preparing<'_>,
+        context: &PrepareContext<'_>,
     ) -> Result<Self, PrepareError> {
-        let term = preparing.term(options)?;
-        // A term that does not fit the cage is refused before anything is computed.
-        term.delta(cage, system.unknowns(cage))?;
-        let analysis = Analysis::for_solver(system, cage, points, options, preparing)?;
-        preparing.next("operator")?;
-        analysis.handle_system(options.handles)?.solver_with(options, term)
+        // A matrix that does not fit the cage is refused before anything is computed.
+        options.regularizer.delta(context.matrix, cage, system.values(cage).unknowns())?;
+        let analysis = Analysis::for_solver(system, cage, points, options, context)?;
+        context.next("operator")?;
+        analysis.handle_system(options.handles)?.solver(options, context.matrix)
     }
 }
 
 /// How to prepare a solver, apart from its options.
 #[derive(Clone, Copy)]
-pub struct Preparing<'a> {
-    /// A custom term, for [`Regularizer::Matrix`](crate::regularize::Regularizer::Matrix).
-    pub term: Option<&'a dyn Term>,
+pub struct PrepareContext<'a> {
+    /// Δ of [`Regularizer::Matrix`](crate::regularize::Regularizer::Matrix).
+    pub matrix: Option<&'a SparseMatrix>,
     /// Whether the decoder of a model of very many points stores their coordinates, four bytes per point and column, or recomputes them at every use.
     pub stores_coordinates: bool,
     /// Largest number of entries of `Φ`, points × unknowns, up to which all points are analysed; of a model with more, a sample is. With eight points per
@@ -122,10 +121,10 @@ pub struct Preparing<'a> {
     pub next: &'a dyn Fn(&'static str) -> ControlFlow<()>,
 }
 
-impl Default for Preparing<'_> {
+impl Default for PrepareContext<'_> {
     fn default() -> Self {
         Self {
-            term: None,
+            matrix: None,
             stores_coordinates: true,
             analysed_entries: 1 << 25,
             memory: 16 << 30,
@@ -134,15 +133,7 @@ impl Default for Preparing<'_> {
     }
 }
 
-impl<'a> Preparing<'a> {
-    /// The term of these options.
-    ///
-    /// # Errors
-    /// [`TermError::Missing`] where the options need a custom term and there is none.
-    pub fn term(&self, options: SolverOptions) -> Result<&'a dyn Term, TermError> {
-        self.term.or_else(|| options.regularizer.term()).ok_or(TermError::Missing)
-    }
-
+impl PrepareContext<'_> {
     pub(super) fn next(&self, step: &'static str) -> Result<(), PrepareError> {
         match (self.next)(step) {
             ControlFlow::Continue(()) => Ok(()),

@@ -2,7 +2,7 @@
 
 use super::consistent::Consistent;
 use super::nearness::{FrameBox, Nearness};
-use super::{BLOCK_ROWS, Convergence, Preparation, RegularizationTarget};
+use super::{BLOCK_ROWS, Convergence, PreparationReport, RegularizationTarget};
 use crate::decode::Decoder;
 use crate::mesh::Point;
 use faer::{Accum, Mat, Par};
@@ -25,7 +25,16 @@ pub struct Solver {
     pub(super) nearness: Option<Arc<Nearness>>,
     pub(super) decoder: Decoder,
     pub(super) diagonal: f64,
-    pub(super) preparation: Preparation,
+    pub(super) preparation: PreparationReport,
+}
+
+/// What is given of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rows {
+    /// Every point, n × 3 interleaved.
+    All,
+    /// Only the points of [`Solver::handles`], K × 3 interleaved.
+    Handles,
 }
 
 /// The cage of a frame.
@@ -41,7 +50,7 @@ pub struct InvertedFrame {
 
 impl Solver {
     /// Results of the preparation.
-    pub fn preparation(&self) -> &Preparation {
+    pub fn preparation(&self) -> &PreparationReport {
         &self.preparation
     }
 
@@ -69,76 +78,34 @@ impl Solver {
         self.decoder.size_bytes() + operator + consistent + nearness + 4 * self.handles.len()
     }
 
-    /// Whether every cage depends on the previous frame's, so that frames have to be inverted in order, by
-    /// [`Self::invert_after`].
+    /// Whether every cage depends on the previous frame's, so that frames have to be inverted in order.
     pub fn follows_previous(&self) -> bool {
         self.target.is_previous()
     }
 
-    /// Cages, each m × 3 interleaved, of up to [`BATCH`] frames, each n × 3 interleaved.
-    ///
-    /// The cage of a frame is bit-identical whatever the other frames of the batch.
-    ///
-    /// # Panics
-    /// Where a frame's length does not fit, more frames come than a batch holds, or the solver follows the previous frame.
-    pub fn invert<T: Copy + Into<f64>>(&self, frames: &[&[T]]) -> Vec<Vec<f32>> {
-        assert!(!self.follows_previous(), "every cage depends on the one before");
-        self.invert_after(None, frames)
-    }
-
-    /// As [`Self::invert`], for any solver: where cages depend on the previous frame, these are consecutive frames, and `previous` is the cage of the
+    /// The cages of up to [`BATCH`] frames. Where cages depend on the previous frame, these are consecutive frames, and `previous` is the cage of the
     /// frame before them, `None` at the beginning. Other solvers ignore it.
     ///
-    /// # Panics
-    /// Where lengths do not fit, or more frames come than a batch holds.
-    pub fn invert_after<T: Copy + Into<f64>>(&self, previous: Option<&[f32]>, frames: &[&[T]]) -> Vec<Vec<f32>> {
-        self.invert_with_convergence(previous, frames).into_iter().map(|inverted| inverted.cage).collect()
-    }
-
-    /// As [`Self::invert_after`], with how the inversion of each frame went.
+    /// The cage of a frame is bit-identical whatever the other frames of the batch, and whichever rows are given.
     ///
     /// # Panics
-    /// As [`Self::invert_after`].
-    pub fn invert_with_convergence<T: Copy + Into<f64>>(
+    /// Where lengths do not fit, more frames come than a batch holds, or the solver reads every point and only handles are given.
+    pub fn invert<T: Copy + Into<f64>>(
         &self,
+        rows: Rows,
         previous: Option<&[f32]>,
         frames: &[&[T]],
     ) -> Vec<InvertedFrame> {
-        assert!(frames.iter().all(|f| f.len() == 3 * self.decoder.points()), "every frame has every point");
-        self.solve(previous, frames, |row| if self.reads_all { row } else { self.handles[row] as usize })
-    }
-
-    /// As [`Self::invert`], given only the rows of [`Self::handles`], K × 3 interleaved; the result is bit-identical.
-    ///
-    /// # Panics
-    /// As [`Self::invert`], and where the solver reads every point.
-    pub fn invert_handles<T: Copy + Into<f64>>(&self, frames: &[&[T]]) -> Vec<Vec<f32>> {
-        assert!(!self.follows_previous(), "every cage depends on the one before");
-        self.invert_handles_after(None, frames)
-    }
-
-    /// As [`Self::invert_after`] and [`Self::invert_handles`].
-    ///
-    /// # Panics
-    /// As both.
-    pub fn invert_handles_after<T: Copy + Into<f64>>(
-        &self,
-        previous: Option<&[f32]>,
-        frames: &[&[T]],
-    ) -> Vec<Vec<f32>> {
-        assert!(!self.reads_all, "handles are not enough for least squares over all points");
-        assert!(frames.iter().all(|f| f.len() == 3 * self.handles.len()), "every frame has every handle");
-        self.solve(previous, frames, |row| row).into_iter().map(|inverted| inverted.cage).collect()
-    }
-
-    fn solve<T: Copy + Into<f64>>(
-        &self,
-        previous: Option<&[f32]>,
-        frames: &[&[T]],
-        point_of_row: impl Fn(usize) -> usize,
-    ) -> Vec<InvertedFrame> {
+        assert!(rows == Rows::All || !self.reads_all, "handles are not enough for least squares over all points");
+        let (given, every) = match rows {
+            Rows::All => (self.decoder.points(), "every frame has every point"),
+            Rows::Handles => (self.handles.len(), "every frame has every handle"),
+        };
+        assert!(frames.iter().all(|f| f.len() == 3 * given), "{every}");
+        let is_given = rows == Rows::Handles || self.reads_all;
+        let point_of_row = |row: usize| if is_given { row } else { self.handles[row] as usize };
         assert!(previous.is_none_or(|cage| cage.len() == 3 * self.decoder.unknowns()), "a cage has every unknown");
-        let mut cages = self.linear(frames, &point_of_row);
+        let mut cages = self.linear(frames, point_of_row);
         let position = |frame: usize, row: usize| {
             let point = point_of_row(row);
             [0, 1, 2].map(|k| frames[frame][3 * point + k].into())

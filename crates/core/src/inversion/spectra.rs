@@ -5,7 +5,7 @@ use super::{PrepareError, SolverOptions};
 use crate::dense;
 use crate::handles::Handles;
 use crate::regularize::{Regularizer, WEAK_SINGULAR_VALUE};
-use crate::spectrum::RowBasis;
+use crate::row_basis::RowBasis;
 use crate::svd::{self, LastDirections, Svd};
 use faer::{Mat, MatRef};
 
@@ -39,18 +39,20 @@ impl RequiredDecompositions {
     fn last(self, unknowns: usize) -> Option<usize> {
         match self {
             Self::Last(Handles::Rectangular { .. }, _) => None,
-            Self::Last(_, count) if unknowns >= LAST_ALONE && count <= unknowns / MOST_LAST => Some(count.max(1)),
+            Self::Last(_, count) if unknowns >= PARTIAL_SVD_FROM && count <= unknowns / MIN_UNKNOWNS_PER_DIRECTION => {
+                Some(count.max(1))
+            }
             _ => None,
         }
     }
 }
 
 /// From this many unknowns on, only the largest and smallest singular values are computed where no more of a decomposition is needed.
-pub(super) const ENDS_ALONE: usize = 512;
+pub(super) const EXTREMES_ONLY_FROM: usize = 512;
 /// From this many unknowns on, only the directions that a term acts on are computed.
-const LAST_ALONE: usize = 1024;
-/// They are found on their own only where they are at most this part of all.
-const MOST_LAST: usize = 32;
+const PARTIAL_SVD_FROM: usize = 1024;
+/// They are found on their own only where there are at least this many unknowns for each.
+const MIN_UNKNOWNS_PER_DIRECTION: usize = 32;
 
 /// Condition number of `Φ` up to which its normal equations keep ten of sixteen digits, or, of the direction that the points determine least, six.
 const NORMAL_IS_SAFE: f64 = 1e5;
@@ -60,8 +62,8 @@ const NORMAL_IS_SAFE: f64 = 1e5;
 pub(super) struct Spectra {
     /// Of `Φ□`; none where at most its extreme singular values are needed.
     pub(super) handles: Option<Svd>,
-    /// Largest and smallest singular value of `Φ□` over the rank; NaN where they are not needed.
-    pub(super) handles_ends: [f64; 2],
+    /// Largest and smallest singular value of `Φ□` over the rank, where they are needed.
+    pub(super) handles_ends: Option<[f64; 2]>,
     /// Singular values of `Φ`; none where only the ends are known.
     pub(super) full_sigma: Vec<f64>,
     /// The largest of them, the smallest over the rank, and the last of all.
@@ -83,7 +85,7 @@ impl Spectra {
         required: RequiredDecompositions,
     ) -> Result<Self, PrepareError> {
         let m = basis.square.ncols();
-        let (rank, large) = (basis.rank, m >= ENDS_ALONE && basis.rank == m);
+        let (rank, large) = (basis.rank, m >= EXTREMES_ONLY_FROM && basis.rank == m);
         let no_spectrum = failed("singular value decomposition of the coordinates");
         let whole_frames = matches!(required.handles(), None | Some(Handles::All | Handles::Spread { .. }));
         let inverse = basis.handles.inverse.as_ref();
@@ -132,10 +134,10 @@ impl Spectra {
             }
         };
         let handles_ends = match (&handles, required.handles()) {
-            (Some(svd), _) => [svd.sigma[0], svd.sigma[rank - 1]],
-            (None, Some(Handles::MaxVol)) => last.as_ref().map_or([f64::NAN; 2], LastDirections::ends),
-            (None, Some(Handles::All)) => svd::ends(None, basis.square.as_ref(), inverse),
-            (None, _) => [f64::NAN; 2],
+            (Some(svd), _) => Some([svd.sigma[0], svd.sigma[rank - 1]]),
+            (None, Some(Handles::MaxVol)) => last.as_ref().map(LastDirections::ends),
+            (None, Some(Handles::All)) => Some(svd::ends(None, basis.square.as_ref(), inverse)),
+            (None, _) => None,
         };
         let normal_factor = normal.filter(|_| whole_frames && last.is_some()).map(|normal| normal.factor);
         Ok(Self { handles, handles_ends, full_sigma, full_ends, gram_factor, full, last, normal_factor })

@@ -1,7 +1,7 @@
 //! Automatic choice of the spectrum threshold: the largest one whose additional error on sample frames stays within a bound.
 
-use super::{BATCH, HandleSystem, PrepareError, Solver, SolverOptions};
-use crate::regularize::Term;
+use super::{BATCH, HandleSystem, PrepareError, Rows, Solver, SolverOptions};
+use crate::regularize::SparseMatrix;
 use rayon::prelude::*;
 
 /// Errors below this fraction of the diagonal count as rounding.
@@ -39,14 +39,14 @@ impl HandleSystem<'_> {
     pub fn choose_threshold(
         &self,
         options: SolverOptions,
-        term: &dyn Term,
+        matrix: Option<&SparseMatrix>,
         frames: &[Vec<f64>],
         bound: f64,
     ) -> Result<Threshold, PrepareError> {
         assert!(!frames.is_empty(), "a frame to measure");
         let m = self.analysis.phi.ncols();
         let error = |spectrum: usize| -> Result<f64, PrepareError> {
-            Ok(mean_error(&self.solver_with(SolverOptions { spectrum, ..options }, term)?, frames))
+            Ok(mean_error(&self.solver(SolverOptions { spectrum, ..options }, matrix)?, frames))
         };
         let mut tried = vec![(0, error(0)?)];
         let most = (1.0 + bound) * tried[0].1.max(ROUNDING);
@@ -73,7 +73,8 @@ impl HandleSystem<'_> {
 fn mean_error(solver: &Solver, frames: &[Vec<f64>]) -> f64 {
     let measured = |previous: Option<&[f32]>, batch: &[Vec<f64>]| {
         let frames: Vec<&[f64]> = batch.iter().map(Vec::as_slice).collect();
-        let cages = solver.invert_after(previous, &frames);
+        let inverted = solver.invert(Rows::All, previous, &frames);
+        let cages: Vec<Vec<f32>> = inverted.into_iter().map(|inverted| inverted.cage).collect();
         let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
         let l2: Vec<f64> = solver.decoder().measure(&views, &frames).iter().map(|error| error.l2).collect();
         (l2, cages)

@@ -11,8 +11,8 @@ mod swaps;
 pub(crate) use passes::maxima_and_gram;
 
 use crate::dense;
+use crate::row_basis::RANK_TOLERANCE;
 use crate::simd;
-use crate::spectrum::RANK_TOLERANCE;
 use faer::{Mat, MatRef};
 use passes::row_maxima;
 use rayon::prelude::*;

@@ -1,23 +1,7 @@
-//! The uniform cage Laplacian: the paper's default term.
+//! The uniform cage Laplacian: Δ of every term but a custom one.
 
-use super::{Reference, Term, TermError};
 use crate::cage::Cage;
 use faer::Mat;
-
-/// Smoothness: penalises the difference of each vertex from the mean of its neighbours, and of each unknown normal from the mean of those of adjacent
-/// faces. It does not preserve the rest cage's shape ("destructive", §5.1), hence the small s.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct CageLaplacian;
-
-impl Term for CageLaplacian {
-    fn delta(&self, cage: &Cage, unknowns: usize) -> Result<Mat<f64>, TermError> {
-        Ok(cage_laplacian(cage, unknowns))
-    }
-
-    fn reference(&self) -> Reference {
-        Reference::Origin
-    }
-}
 
 /// `Δ = I − D⁻¹A`: of the graph of vertices, v × v; where there are unknown normals, a second block of the graph of faces.
 /// The blocks need no scaling: unknown normals are vectors in the unit of the vertices.

@@ -1,6 +1,6 @@
 //! A custom term, given as a sparse matrix.
 
-use super::{Reference, Term, TermError};
+use super::TermError;
 use crate::cage::Cage;
 use crate::svd::{Svd, svd};
 use faer::Mat;
@@ -53,6 +53,18 @@ impl SparseMatrix {
         &self.entries
     }
 
+    /// Δ for a cage of which this many rows are unknown, rows × unknowns.
+    ///
+    /// # Errors
+    /// A matrix that does not fit the cage.
+    pub fn delta(&self, cage: &Cage, unknowns: usize) -> Result<Mat<f64>, TermError> {
+        let vertices = cage.vertices().len();
+        if self.columns != unknowns && self.columns != vertices {
+            return Err(TermError::Columns { columns: self.columns, vertices, unknowns });
+        }
+        Ok(self.compressed(unknowns))
+    }
+
     /// A matrix with as many columns and the same `‖Δ C‖` for every C, of at most four times as many rows as columns.
     fn compressed(&self, unknowns: usize) -> Mat<f64> {
         let rows: Vec<&[(u32, u32, f64)]> = self.entries.chunk_by(|a, b| a.0 == b.0).collect();
@@ -75,19 +87,5 @@ impl SparseMatrix {
             // Squares overflow; the solve then reports the failure.
             None => Mat::full(1, unknowns, f64::NAN),
         }
-    }
-}
-
-impl Term for SparseMatrix {
-    fn delta(&self, cage: &Cage, unknowns: usize) -> Result<Mat<f64>, TermError> {
-        let vertices = cage.vertices().len();
-        if self.columns != unknowns && self.columns != vertices {
-            return Err(TermError::Columns { columns: self.columns, vertices, unknowns });
-        }
-        Ok(self.compressed(unknowns))
-    }
-
-    fn reference(&self) -> Reference {
-        Reference::Origin
     }
 }

@@ -1,36 +1,36 @@
 //! Sub-spectral regularisation (Thiery, Tierny and Boubekeur 2012, §5) and the baselines it is compared with.
 //!
-//! A [`Term`] is a quadratic penalty on the cage, applied only to the singular directions with the smallest singular values. With `A = U Σ Vᵀ`
-//! and `C = V q` every method here is a matrix `T` in `q = T (Uᵀ H)`, to which a term with a reference cage adds a linear function of that cage.
+//! A term `λ‖Δ (C − C₀)‖²` is a quadratic penalty on the cage C, applied only to the singular directions with the smallest singular values. With
+//! `A = U Σ Vᵀ` and `C = V q` every method here is a matrix `T` in `q = T (Uᵀ H)`, to which a term with a reference cage adds a linear function of
+//! that cage.
 
-mod differential;
 mod laplacian;
 mod matrix;
 mod spectral;
-mod temporal;
-mod term;
 
-pub use differential::Differential;
-pub use laplacian::CageLaplacian;
 pub use matrix::SparseMatrix;
-pub use temporal::Temporal;
-pub use term::{Reference, Term, TermError};
 
 pub(crate) use laplacian::cage_laplacian;
 pub(crate) use spectral::{DataMap, RegularizationOperator, SpectralMap, Spectrum, last_map, spectral_map};
+
+use crate::cage::Cage;
+use faer::Mat;
 
 /// How the unstable end of the spectrum is treated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Regularizer {
     /// Smooth the last s singular directions by the cage Laplacian: minimise `λ‖Δ C‖² + ‖Φ□ C − H‖²` over them, the others
-    /// fixed by the data (Eq. 5–7). See [`CageLaplacian`].
+    /// fixed by the data (Eq. 5–7). It penalises the difference of each vertex from the mean of its neighbours, and of each unknown normal from
+    /// the mean of those of adjacent faces. It does not preserve the rest cage's shape ("destructive", §5.1), hence the small s.
     Laplacian,
     /// As the Laplacian, but keep the rest cage's shape: `λ‖Δ C − Δ C_R‖²`, so that a frame that equals the rest pose gives the rest
-    /// cage. See [`Differential`].
+    /// cage and sharp features survive (Savoye and Franco 2010). Not invariant to rotation: parts rotated far from the rest pose shrink in the
+    /// regularised directions.
     #[default]
     Differential,
-    /// As the Laplacian, but keep the shape of the previous frame's cage: `λ‖Δ C_t − Δ C_{t−1}‖²`. Makes every frame depend on
-    /// the ones before it. See [`Temporal`].
+    /// As the Laplacian, but keep the shape of the previous frame's cage: `λ‖Δ C_t − Δ C_{t−1}‖²`, and that of the rest
+    /// cage for the first frame. Global translations are not penalised. Every frame depends on all before it: frames have to be inverted in
+    /// order, and one cannot be inverted without its predecessor's cage.
     Temporal,
     /// As the Laplacian, with a custom Δ: see [`SparseMatrix`].
     Matrix,
@@ -87,16 +87,63 @@ impl Regularizer {
         matches!(self, Self::Laplacian | Self::Differential | Self::Temporal | Self::Matrix)
     }
 
-    /// Its term; `None` where it is custom. [`Self::None`] applies the Laplacian only to directions that no point determines;
-    /// [`Self::TruncatedSvd`] and [`Self::Tikhonov`] do not use it.
-    pub fn term(self) -> Option<&'static dyn Term> {
+    /// Δ of its term for a cage of which this many rows are unknown, rows × unknowns: the given matrix for [`Self::Matrix`], otherwise the cage
+    /// Laplacian. Where there are more unknowns than vertices, those after the vertices are one direction per face. [`Self::None`] applies it only
+    /// to directions that no point determines; [`Self::TruncatedSvd`] and [`Self::Tikhonov`] do not use it.
+    ///
+    /// # Errors
+    /// A matrix that is missing or does not fit the cage.
+    pub fn delta(self, matrix: Option<&SparseMatrix>, cage: &Cage, unknowns: usize) -> Result<Mat<f64>, TermError> {
         match self {
-            Self::Matrix => None,
-            Self::Differential => Some(&Differential),
-            Self::Temporal => Some(&Temporal),
-            Self::Laplacian | Self::None | Self::TruncatedSvd | Self::Tikhonov | Self::Global => Some(&CageLaplacian),
+            Self::Matrix => matrix.ok_or(TermError::Missing)?.delta(cage, unknowns),
+            _ => Ok(cage_laplacian(cage, unknowns)),
         }
     }
+
+    /// The cage `C₀` of its term.
+    pub fn reference(self) -> Reference {
+        match self {
+            Self::Differential => Reference::RestCage,
+            Self::Temporal => Reference::PreviousCage,
+            _ => Reference::Origin,
+        }
+    }
+}
+
+/// The cage `C₀` in `λ‖Δ C − Δ C₀‖²`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reference {
+    /// Zero: `Δ C` itself is penalised.
+    Origin,
+    /// The rest pose's; adds a constant to every cage.
+    RestCage,
+    /// The previous frame's, and the rest pose's for the first frame.
+    PreviousCage,
+}
+
+/// Why a term cannot be used with a cage.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum TermError {
+    /// The columns of a matrix are not the cage's unknowns.
+    #[error("the regularisation matrix has {columns} columns, but the cage has {}; give one column per unknown, in its order", expected(*.vertices, *.unknowns))]
+    Columns {
+        /// Columns of the matrix.
+        columns: usize,
+        /// Vertices of the cage v.
+        vertices: usize,
+        /// Unknowns m.
+        unknowns: usize,
+    },
+    /// None was given.
+    #[error("the regularizer matrix needs a matrix; give one")]
+    Missing,
+}
+
+fn expected(vertices: usize, unknowns: usize) -> String {
+    if vertices == unknowns {
+        return format!("{vertices} vertices");
+    }
+    format!("{vertices} vertices, or {unknowns} unknowns with the normals of its faces")
 }
 
 /// Directions with a singular value below this fraction of the largest amplify single-precision cages beyond use.

@@ -2,8 +2,30 @@
 #![allow(dead_code)]
 
 use cager_core::cage::Cage;
+use cager_core::inversion::{Rows, Solver};
 use cager_core::mesh::{Point, TriMesh};
 use cager_core::synthetic::{Capture, Options};
+
+/// For tests that want cages alone, of whole frames or of the rows of handles.
+pub(crate) trait Cages {
+    fn cages<T: Copy + Into<f64>>(&self, frames: &[&[T]]) -> Vec<Vec<f32>>;
+    fn cages_after<T: Copy + Into<f64>>(&self, previous: Option<&[f32]>, frames: &[&[T]]) -> Vec<Vec<f32>>;
+    fn cages_of_handles<T: Copy + Into<f64>>(&self, previous: Option<&[f32]>, rows: &[&[T]]) -> Vec<Vec<f32>>;
+}
+
+impl Cages for Solver {
+    fn cages<T: Copy + Into<f64>>(&self, frames: &[&[T]]) -> Vec<Vec<f32>> {
+        self.cages_after(None, frames)
+    }
+
+    fn cages_after<T: Copy + Into<f64>>(&self, previous: Option<&[f32]>, frames: &[&[T]]) -> Vec<Vec<f32>> {
+        self.invert(Rows::All, previous, frames).into_iter().map(|inverted| inverted.cage).collect()
+    }
+
+    fn cages_of_handles<T: Copy + Into<f64>>(&self, previous: Option<&[f32]>, rows: &[&[T]]) -> Vec<Vec<f32>> {
+        self.invert(Rows::Handles, previous, rows).into_iter().map(|inverted| inverted.cage).collect()
+    }
+}
 
 /// A small generator with a fixed seed, so that failures repeat.
 pub(crate) struct Random(u64);

@@ -71,7 +71,7 @@ impl AffineFit {
         if finite { largest } else { f64::NAN }
     }
 
-    /// As a dense matrix 4 × v, for tests and bounds.
+    /// `M V̂`, 4 × 4.
     #[cfg(test)]
     pub(super) fn product(&self) -> Mat<f64> {
         Mat::from_fn(4, 4, |i, k| self.columns.iter().zip(&self.rows).map(|(c, r)| c[i] * r[k]).sum())

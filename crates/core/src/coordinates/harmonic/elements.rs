@@ -65,7 +65,7 @@ impl Element {
     /// Highest degree that a triangle of this shape is given: polynomials of high degree nearly depend on each other in thin ones.
     fn most(&self) -> usize {
         let aspect = self.triangle.diameter() / self.triangle.height();
-        MOST.iter().find(|(limit, _)| aspect < *limit).map_or(LEAST, |m| m.1)
+        MAX_ASPECT.iter().find(|(limit, _)| aspect < *limit).map_or(super::MIN_DEGREE, |m| m.1)
     }
 
     /// Distance over the diameter to the nearest of these points, but for those as good as on it.
@@ -115,10 +115,8 @@ fn grouped(points: &[Point]) -> Vec<[Lanes; 3]> {
 const ENOUGH: [(f64, usize); 4] = [(0.4, 3), (0.18, 4), (0.1, 5), (0.06, 6)];
 /// Points nearer than this are left to what is known on the surface.
 const ON: f64 = 0.01;
-/// Ratio of length to height below which a triangle may have each degree,
-const MOST: [(f64, usize); 3] = [(4.0, 6), (8.0, 5), (14.0, 4)];
-/// and what any may have.
-const LEAST: usize = super::LEAST_DEGREE;
+/// Ratio of length to height below which a triangle may have each degree; any may have the smallest.
+const MAX_ASPECT: [(f64, usize); 3] = [(4.0, 6), (8.0, 5), (14.0, 4)];
 /// Sides are of different length when their squares differ by more than this factor: cages with symmetries are divided alike,
 /// however their vertices are ordered.
 const TIE: f64 = 1.0 + 1e-9;
@@ -161,7 +159,7 @@ pub(super) fn elements(faces: &[[Point; 3]], points: &[Point]) -> Vec<Element> {
 /// Marks the thinnest elements too, where they are what makes the equations inexact.
 pub(super) fn mark_thin(elements: &[Element], marked: &mut [bool]) {
     let aspect = |element: &Element| element.triangle.diameter() / element.triangle.height();
-    let limit = (0.4 * elements.iter().map(aspect).fold(0.0, f64::max)).max(MOST[0].0);
+    let limit = (0.4 * elements.iter().map(aspect).fold(0.0, f64::max)).max(MAX_ASPECT[0].0);
     for (element, marked) in elements.iter().zip(marked) {
         *marked |= aspect(element) >= limit;
     }

@@ -9,7 +9,7 @@ use crate::mesh::Point;
 use rayon::prelude::*;
 
 /// More than this is refused: a file must not make its reader take any amount.
-pub(super) const MOST_BYTES: u64 = 16 << 30;
+pub(super) const MAX_BYTES: u64 = 16 << 30;
 
 /// Bytes that solving on these elements takes at its peak, for a cage of so many vertices.
 pub(super) fn needed(unknowns: &Unknowns, vertices: usize) -> u64 {

@@ -29,14 +29,14 @@ mod surface;
 mod triangle;
 
 use super::layer::Layers;
-use super::{CoordinateSystem, Coordinates, CoordinatesError, Refinement};
+use super::{CageValues, CoordinateSystem, Coordinates, CoordinatesError, Refinement};
 use crate::cage::Cage;
 use crate::mesh::Point;
 use elements::Unknowns;
 use evaluate::{Evaluated, Solution};
 use faer::Mat;
 pub use plan::ElementPlan;
-use solve::Steps;
+use solve::SolveRecord;
 use surface::{ClosestPoint, Side, Surface};
 
 /// Harmonic coordinates: one unknown per cage vertex, defined inside the cage and on it.
@@ -51,7 +51,7 @@ const ELEMENTS: usize = 2500;
 /// Elements up to which all have so many low degrees: the equations of low unknowns are dense.
 const LOW_DEGREES: [(usize, usize); 3] = [(1300, 2), (3000, 1), (10_000, 0)];
 /// Least degree that refining gives an element.
-const LEAST_DEGREE: usize = 3;
+const MIN_DEGREE: usize = 3;
 /// Linear functions that are missed by more than this say that nothing was solved.
 const MISSED: f64 = 0.1;
 
@@ -60,12 +60,8 @@ impl CoordinateSystem for Harmonic {
         NAME
     }
 
-    fn columns(&self, cage: &Cage) -> usize {
-        cage.vertices().len()
-    }
-
-    fn rest_values(&self, cage: &Cage) -> Vec<Point> {
-        cage.vertices().to_vec()
+    fn values(&self, cage: &Cage) -> CageValues {
+        CageValues::of_vertices(cage)
     }
 
     fn working_bytes(&self, cage: &Cage, plan: Option<&ElementPlan>) -> u64 {
@@ -83,17 +79,16 @@ impl CoordinateSystem for Harmonic {
         check_inside(&Surface::new(cage.vertices(), cage).closest_points(points), cage.diagonal())
     }
 
-    fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError> {
-        solve_for(cage, points, refine)
-    }
-
-    fn coordinates_by_plan(
+    fn coordinates(
         &self,
         cage: &Cage,
         points: &[Point],
-        plan: &ElementPlan,
+        plan: Option<&ElementPlan>,
     ) -> Result<Coordinates, CoordinatesError> {
-        solve_for(cage, points, |problem| follow(problem, plan))
+        solve_for(cage, points, |problem| match plan {
+            Some(plan) => follow(problem, plan),
+            None => refine(problem),
+        })
     }
 }
 
@@ -162,12 +157,12 @@ fn refine(problem: &Problem<'_>) -> Result<Coordinates, CoordinatesError> {
     let mut refinements = 0;
     loop {
         let unknowns = Unknowns::new(&elements, degree);
-        let (mut found, steps, remainder) = solve_on(problem, &unknowns, None, true)?;
+        let (mut found, record, residual) = solve_on(problem, &unknowns, None, true)?;
         let change = found.change.max(found.correction);
         let solution = |phi: Mat<f64>| {
             let refinement =
-                Refinement { elements: unknowns.elements.len(), refinements, change: change.max(remainder) };
-            let plan = Some(ElementPlan::new(&unknowns, &steps));
+                Refinement { elements: unknowns.elements.len(), refinements, change: change.max(residual) };
+            let plan = Some(ElementPlan::new(&unknowns, &record));
             Coordinates { phi, outside: Vec::new(), refinement: Some(refinement), plan }
         };
         if change <= Refinement::TOLERANCE || refinements == REFINEMENTS {
@@ -186,13 +181,13 @@ fn refine(problem: &Problem<'_>) -> Result<Coordinates, CoordinatesError> {
     }
 }
 
-/// Solves on the elements of a plan, by its steps.
+/// Solves on the elements of a plan, by its record.
 fn follow(problem: &Problem<'_>, plan: &ElementPlan) -> Result<Coordinates, CoordinatesError> {
-    let (unknowns, steps) = plan
+    let (unknowns, record) = plan
         .read(&problem.corners, problem.layers.vertices().len())
         .map_err(|reason| CoordinatesError::BadPlan { system: NAME, reason })?;
     // Whoever decodes cannot choose other coordinates: it is the plan that does not suit the cage.
-    let (found, ..) = solve_on(problem, &unknowns, Some(&steps), false)
+    let (found, ..) = solve_on(problem, &unknowns, Some(&record), false)
         .map_err(|_| CoordinatesError::BadPlan { system: NAME, reason: "its equations cannot be solved" })?;
     Ok(Coordinates { phi: found.phi, outside: Vec::new(), refinement: None, plan: Some(plan.clone()) })
 }
@@ -202,23 +197,23 @@ fn low_degree(elements: usize) -> Option<usize> {
     LOW_DEGREES.iter().find(|(most, _)| elements <= *most).map(|(_, degree)| *degree)
 }
 
-/// Coordinates with these elements, the steps of the solution, and what it left of the equations.
+/// Coordinates with these elements, the record of the solution, and what it left of the equations.
 fn solve_on(
     problem: &Problem<'_>,
     unknowns: &Unknowns,
-    given: Option<&Steps>,
+    given: Option<&SolveRecord>,
     measures: bool,
-) -> Result<(Evaluated, Steps, f64), CoordinatesError> {
+) -> Result<(Evaluated, SolveRecord, f64), CoordinatesError> {
     let Problem { tables, affine, layers, surface, points, closest_points, .. } = problem;
     let bytes = memory::needed(unknowns, layers.vertices().len());
-    if bytes > memory::MOST_BYTES {
+    if bytes > memory::MAX_BYTES {
         let gigabytes = 1e-9 * bytes as f64;
         return Err(not_computed(format!("its boundary elements would take {gigabytes:.0} GB of memory")));
     }
     let outer = galerkin::Outer::new(tables);
     let operator = galerkin::operator(tables, &outer, unknowns);
     let sides = galerkin::right_hand_sides(&outer, layers, unknowns);
-    let solve::Solved { densities, steps, remainder } =
+    let solve::Solved { densities, record, residual } =
         solve::solve(operator, &sides, unknowns, layers.triangles(), given, measures)
             .ok_or_else(|| not_computed("the equations on its faces are singular in double precision".to_owned()))?;
     let solution = Solution { tables, layers, surface, affine, unknowns, densities: &densities };
@@ -230,7 +225,7 @@ fn solve_on(
             found.correction
         )));
     }
-    Ok((found, steps, remainder))
+    Ok((found, record, residual))
 }
 
 #[cfg(test)]
@@ -239,7 +234,7 @@ mod tests {
     use crate::synthetic::{Capture, Options};
 
     /// The problem of a small cage, with points of the model in it, solved on its faces.
-    fn solved<T>(work: impl FnOnce(&Problem<'_>, &Unknowns, (Evaluated, Steps, f64)) -> T) -> T {
+    fn solved<T>(work: impl FnOnce(&Problem<'_>, &Unknowns, (Evaluated, SolveRecord, f64)) -> T) -> T {
         let Capture { cage, rest, .. } = Capture::new(&Options { points: 300, frames: 1, cage_vertices: 30 });
         let cage = Cage::new(cage).expect("a cage");
         let mut value = None;
@@ -254,38 +249,38 @@ mod tests {
         value.expect("a value")
     }
 
-    /// That steps which leave more of the equations say so, by no less than coordinates are off for it.
-    fn shows_in_the_remainder(change: impl FnOnce(&mut Steps)) {
-        solved(|problem, unknowns, (found, mut steps, remainder)| {
-            assert!(remainder > 0.0 && remainder < 1e-3, "{remainder:e}");
-            change(&mut steps);
-            let (other, _, left) = solve_on(problem, unknowns, Some(&steps), true).expect("a solution");
+    /// That records which leave more of the equations say so, by no less than coordinates are off for it.
+    fn shows_in_the_residual(change: impl FnOnce(&mut SolveRecord)) {
+        solved(|problem, unknowns, (found, mut record, residual)| {
+            assert!(residual > 0.0 && residual < 1e-3, "{residual:e}");
+            change(&mut record);
+            let (other, _, left) = solve_on(problem, unknowns, Some(&record), true).expect("a solution");
             let mut worst = 0.0f64;
             for v in 0..found.phi.ncols() {
                 for i in 0..found.phi.nrows() {
                     worst = worst.max((other.phi[(i, v)] - found.phi[(i, v)]).abs());
                 }
             }
-            assert!(left > remainder && worst <= left + remainder, "{left:e} after {remainder:e}, off by {worst:e}");
+            assert!(left > residual && worst <= left + residual, "{left:e} after {residual:e}, off by {worst:e}");
         });
     }
 
     #[test]
     fn an_iteration_that_ends_early_shows_in_what_is_left() {
-        shows_in_the_remainder(|steps| steps.turns = 0);
+        shows_in_the_residual(|record| record.iterations = 0);
     }
 
     #[test]
     fn unknowns_that_are_left_out_show_in_what_is_left() {
-        shows_in_the_remainder(|steps| steps.patches.iter_mut().for_each(|patch| patch.truncate(patch.len() / 2)));
+        shows_in_the_residual(|record| record.patches.iter_mut().for_each(|patch| patch.truncate(patch.len() / 2)));
     }
 
     #[test]
     fn larger_diagonals_show_in_what_is_left() {
-        shows_in_the_remainder(|steps| steps.damping = 3);
-        shows_in_the_remainder(|steps| {
-            steps.patch_damping.fill(4);
-            steps.turns = 1;
+        shows_in_the_residual(|record| record.damping = 3);
+        shows_in_the_residual(|record| {
+            record.patch_damping.fill(4);
+            record.iterations = 1;
         });
     }
 
@@ -293,11 +288,11 @@ mod tests {
     fn what_is_left_is_part_of_the_change_that_is_reported() {
         let Capture { cage, rest, .. } = Capture::new(&Options { points: 300, frames: 1, cage_vertices: 30 });
         let cage = Cage::new(cage).expect("a cage");
-        let found = Harmonic.coordinates(&cage, &rest.points).expect("coordinates");
+        let found = Harmonic.coordinates(&cage, &rest.points, None).expect("coordinates");
         let (plan, change) = (found.plan.expect("a plan"), found.refinement.expect("a numerical solution").change);
         let left = solve_for(&cage, &rest.points, |problem| {
-            let (unknowns, steps) = plan.read(&problem.corners, cage.vertices().len()).expect("its own plan");
-            let (_, _, left) = solve_on(problem, &unknowns, Some(&steps), true)?;
+            let (unknowns, record) = plan.read(&problem.corners, cage.vertices().len()).expect("its own plan");
+            let (_, _, left) = solve_on(problem, &unknowns, Some(&record), true)?;
             assert!(change >= left && left > 0.0, "{change:e} with {left:e} left");
             Ok(Coordinates { phi: Mat::zeros(0, 0), outside: Vec::new(), refinement: None, plan: None })
         });

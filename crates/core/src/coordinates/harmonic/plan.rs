@@ -4,8 +4,8 @@
 use super::basis::{MAX_DEGREE, functions};
 use super::elements::{Element, LATER, QUARTERS, Unknowns};
 use super::patch::{DAMPING, PATCH};
-use super::solve::{Steps, TURNS};
-use super::{LEAST_DEGREE, LOW_DEGREES};
+use super::solve::{MAX_ITERATIONS, SolveRecord};
+use super::{LOW_DEGREES, MIN_DEGREE};
 use crate::mesh::Point;
 use serde::{Deserialize, Serialize};
 
@@ -26,17 +26,17 @@ impl ElementPlan {
         &self.bytes
     }
 
-    /// The elements, each face's division in preorder, and the steps of the solution.
-    pub(super) fn new(unknowns: &Unknowns, steps: &Steps) -> Self {
-        let mut bytes = vec![unknowns.low_degree as u8, steps.damping, steps.turns];
+    /// The elements, each face's division in preorder, and the record of the solution.
+    pub(super) fn new(unknowns: &Unknowns, record: &SolveRecord) -> Self {
+        let mut bytes = vec![unknowns.low_degree as u8, record.damping, record.iterations];
         for element in unknowns.preorder.iter().map(|&k| &unknowns.elements[k]) {
             bytes.extend_from_slice(&element.cuts);
             bytes.push(element.degree as u8);
         }
-        bytes.extend_from_slice(&steps.patch_damping);
+        bytes.extend_from_slice(&record.patch_damping);
         let count = unknowns.elements.len();
-        let mut bits = vec![0; (count * steps.patches.len()).div_ceil(8)];
-        for (v, patch) in steps.patches.iter().enumerate() {
+        let mut bits = vec![0; (count * record.patches.len()).div_ceil(8)];
+        for (v, patch) in record.patches.iter().enumerate() {
             for &e in patch {
                 let bit = v * count + e as usize;
                 bits[bit / 8] |= 1 << (bit % 8);
@@ -46,16 +46,19 @@ impl ElementPlan {
         Self { bytes }
     }
 
-    /// Elements and steps for a cage with these faces and so many vertices. Takes no more memory than elements that refining may make.
+    /// Elements and the record for a cage with these faces and so many vertices. Takes no more memory than elements that refining may make.
     ///
     /// # Errors
     /// What is wrong with the bytes.
-    pub(super) fn read(&self, faces: &[[Point; 3]], vertices: usize) -> Result<(Unknowns, Steps), &'static str> {
-        let Some((&[low_degree, damping, turns], mut rest)) = self.bytes.split_first_chunk() else {
+    pub(super) fn read(&self, faces: &[[Point; 3]], vertices: usize) -> Result<(Unknowns, SolveRecord), &'static str> {
+        let Some((&[low_degree, damping, iterations], mut rest)) = self.bytes.split_first_chunk() else {
             return Err("it is cut");
         };
         let least = usize::from(low_degree);
-        if least > LOW_DEGREES[0].1 || usize::from(damping) >= DAMPING.len() || !(1..=TURNS).contains(&turns) {
+        if least > LOW_DEGREES[0].1
+            || usize::from(damping) >= DAMPING.len()
+            || !(1..=MAX_ITERATIONS).contains(&iterations)
+        {
             return Err("it begins with numbers that cannot be");
         }
         let most = LOW_DEGREES[2].0 / functions(least);
@@ -88,8 +91,8 @@ impl ElementPlan {
             Ok(patch)
         };
         let patches: Vec<Vec<u32>> = (0..vertices).map(patch_of).collect::<Result<_, _>>()?;
-        let steps = Steps { damping, turns, patches, patch_damping: patch_damping.to_vec() };
-        Ok((unknowns, steps))
+        let record = SolveRecord { damping, iterations, patches, patch_damping: patch_damping.to_vec() };
+        Ok((unknowns, record))
     }
 }
 
@@ -106,7 +109,7 @@ fn divide<'a>(
         bytes = rest;
         if byte < 3 || byte == QUARTERS || (LATER..LATER + 3).contains(&byte) {
             waiting.extend(element.parts(byte).into_iter().rev());
-        } else if (LEAST_DEGREE..=MAX_DEGREE).contains(&usize::from(byte)) {
+        } else if (MIN_DEGREE..=MAX_DEGREE).contains(&usize::from(byte)) {
             element.degree = usize::from(byte);
             // Cut until nothing is left.
             let has_area = element.triangle.height() > 0.0;
@@ -142,7 +145,7 @@ mod tests {
 
     #[test]
     fn what_was_written_is_read() {
-        let (unknowns, steps) = plan().read(&faces(), 4).expect("a plan");
+        let (unknowns, record) = plan().read(&faces(), 4).expect("a plan");
         let degrees: Vec<usize> = unknowns.elements.iter().map(|element| element.degree).collect();
         assert_eq!(degrees, [5, 3, 3, 4, 6, 3]);
         let area = |face: u32| -> f64 {
@@ -152,18 +155,18 @@ mod tests {
             let whole = Element::face(face, corners).triangle.area;
             assert!((area(face as u32) - whole).abs() < 1e-15, "face {face}");
         }
-        assert_eq!(steps.patches, [vec![0], vec![0], vec![], vec![5]]);
-        assert_eq!((steps.turns, steps.patch_damping.as_slice()), (2, &[0, 0, 1, 0][..]));
-        assert_eq!(ElementPlan::new(&unknowns, &steps), plan());
+        assert_eq!(record.patches, [vec![0], vec![0], vec![], vec![5]]);
+        assert_eq!((record.iterations, record.patch_damping.as_slice()), (2, &[0, 0, 1, 0][..]));
+        assert_eq!(ElementPlan::new(&unknowns, &record), plan());
     }
 
     #[test]
     fn elements_that_were_cut_before_the_first_solution_come_last() {
         let bytes = [&[1, 0, 1, 1, 3, 4, LATER + 1, 5, 6][..], &[0; 4], &[0; 2]].concat();
-        let (unknowns, steps) = ElementPlan::from_bytes(bytes.clone()).read(&faces(), 4).expect("a plan");
+        let (unknowns, record) = ElementPlan::from_bytes(bytes.clone()).read(&faces(), 4).expect("a plan");
         let degrees: Vec<usize> = unknowns.elements.iter().map(|element| element.degree).collect();
         assert_eq!(degrees, [5, 6, 3, 4]);
-        assert_eq!(ElementPlan::new(&unknowns, &steps).as_bytes(), bytes);
+        assert_eq!(ElementPlan::new(&unknowns, &record).as_bytes(), bytes);
     }
 
     #[test]

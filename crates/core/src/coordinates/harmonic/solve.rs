@@ -2,7 +2,7 @@
 //!
 //! The density of a hat function is smooth away from its star, so that its high unknowns count on a few elements only. Solving for all
 //! low unknowns, then for all unknowns of the patch with the residual that is left, then for the low ones again is a
-//! multiplicative Schwarz iteration, which gains more than a digit a turn.
+//! multiplicative Schwarz iteration, which gains more than a digit an iteration.
 
 use super::basis::functions;
 use super::elements::Unknowns;
@@ -16,8 +16,8 @@ use rayon::prelude::*;
 /// An element belongs to a vertex's patch where the residual of the low unknowns is above this, as a value on the boundary; the iteration
 /// ends where all residuals are below.
 pub(super) const RESIDUAL: f64 = 3e-4;
-/// Turns at most.
-pub(super) const TURNS: u8 = 6;
+/// Iterations at most.
+pub(super) const MAX_ITERATIONS: u8 = 6;
 
 /// Densities on one element.
 pub(super) struct Part {
@@ -67,14 +67,14 @@ impl High {
     }
 }
 
-/// What solving decided: solving again by the same steps gives the same bits.
+/// What solving decided: solving again by the same record gives the same bits.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Steps {
+pub(super) struct SolveRecord {
     /// Which of [`DAMPING`] the matrix of the low unknowns took, and that of each vertex's patch.
     pub(super) damping: u8,
     pub(super) patch_damping: Vec<u8>,
-    /// Turns of the iteration.
-    pub(super) turns: u8,
+    /// Iterations that it took.
+    pub(super) iterations: u8,
     /// Elements of each vertex's patch, ascending.
     pub(super) patches: Vec<Vec<u32>>,
 }
@@ -82,41 +82,41 @@ pub(super) struct Steps {
 /// Densities, and how they were found.
 pub(super) struct Solved {
     pub(super) densities: Densities,
-    pub(super) steps: Steps,
+    pub(super) record: SolveRecord,
     /// The largest residual of all equations, damped ones and those of unknowns that were left out among them, as a value on the
     /// boundary: harmonic functions being largest there, about as much as a coordinate can be off for it. Zero where it is not measured.
-    pub(super) remainder: f64,
+    pub(super) residual: f64,
 }
 
-/// Solves for all densities, by these steps where they are given, and `measures` what that leaves; `None` where the equations are not definite.
+/// Solves for all densities, by this record where it is given, and `measures` what that leaves; `None` where the equations are not definite.
 pub(super) fn solve(
     operator: Operator,
     b: &RightHandSides,
     unknowns: &Unknowns,
     faces: &[[u32; 3]],
-    given: Option<&Steps>,
+    given: Option<&SolveRecord>,
     measures: bool,
 ) -> Option<Solved> {
     // The factor takes the place of the matrix, of which the patches need entries between elements that are not near, those on and
     // below the diagonal.
     let far = single_from(operator.low.as_ref(), |j| j - j % unknowns.low);
-    let low_system = LowSystem::new(operator.low, &far, given.map(|steps| steps.damping))?;
+    let low_system = LowSystem::new(operator.low, &far, given.map(|record| record.damping))?;
     let equations = Equations { near: &operator.near, far: &far, b, unknowns };
     let mut low = low_system.solve(b.low.clone());
     let candidates = if given.is_none() || measures { candidates(&operator.near, unknowns, faces) } else { Vec::new() };
     let (mut patches, mut high) = match given {
-        Some(steps) => patches(unknowns, &steps.patches),
+        Some(record) => patches(unknowns, &record.patches),
         None => patches(unknowns, &equations.choose_patches(low.as_ref(), &candidates)),
     };
     let vertices: Vec<Vec<u32>> = high.iter().map(|high| high.vertices.clone()).collect();
     for (k, patch) in patches.iter_mut().enumerate() {
-        patch.damping = given.map(|steps| steps.patch_damping[k]);
+        patch.damping = given.map(|record| record.patch_damping[k]);
     }
     let mut changes = Vec::new();
-    let mut turns = 0;
-    while turns < given.map_or(TURNS, |steps| steps.turns) {
+    let mut iterations = 0;
+    while iterations < given.map_or(MAX_ITERATIONS, |record| record.iterations) {
         let residuals = equations.residuals(low.as_ref(), &high, &vertices);
-        if given.is_none() && turns > 0 && largest(unknowns, &residuals) < RESIDUAL {
+        if given.is_none() && iterations > 0 && largest(unknowns, &residuals) < RESIDUAL {
             break;
         }
         let found: Option<Vec<patch::Step>> = patches
@@ -128,21 +128,21 @@ pub(super) fn solve(
         for (patch, step) in patches.iter_mut().zip(&found) {
             patch.damping = Some(step.damping);
         }
-        if turns == 0 && given.is_none() {
+        if iterations == 0 && given.is_none() {
             changes = found.into_iter().map(|step| step.change).collect();
         }
         low = low_system.solve(equations.low_sides(&high));
-        turns += 1;
+        iterations += 1;
     }
     let damping = DAMPING[usize::from(low_system.damping)];
-    let remainder = if measures { equations.remainder(low.as_ref(), &high, &candidates, damping) } else { 0.0 };
-    let steps = Steps {
+    let residual = if measures { equations.largest_residual(low.as_ref(), &high, &candidates, damping) } else { 0.0 };
+    let record = SolveRecord {
         damping: low_system.damping,
         patch_damping: patches.iter().map(|patch| patch.damping.unwrap_or_default()).collect(),
-        turns,
+        iterations,
         patches: patches.iter().map(|patch| patch.places.iter().map(|place| place.0).collect()).collect(),
     };
-    Some(Solved { densities: Densities { low, parts: parts(unknowns, high, &patches, &changes) }, steps, remainder })
+    Some(Solved { densities: Densities { low, parts: parts(unknowns, high, &patches, &changes) }, record, residual })
 }
 
 /// The equations of the low unknowns, factored.
@@ -265,8 +265,8 @@ impl Equations<'_> {
         patch::choose(self.unknowns, candidates, &self.residuals(low, &high, candidates), low.ncols())
     }
 
-    /// The largest residual, see [`Solved::remainder`]; the low unknowns were solved for with diagonals larger by the part `damping`.
-    fn remainder(&self, low: MatRef<'_, f64>, high: &[High], candidates: &[Vec<u32>], damping: f64) -> f64 {
+    /// The largest residual, see [`Solved::residual`]; the low unknowns were solved for with diagonals larger by the part `damping`.
+    fn largest_residual(&self, low: MatRef<'_, f64>, high: &[High], candidates: &[Vec<u32>], damping: f64) -> f64 {
         let l = self.unknowns.low;
         let residuals = self.residuals(low, high, candidates);
         let of = |(e, residual): (usize, &Mat<f64>)| {

@@ -10,7 +10,9 @@
 mod gradient;
 mod integral;
 
-use super::{CoordinateSystem, Coordinates, CoordinatesError, PointwiseCoordinates};
+use super::{
+    CageValues, CoordinateSystem, Coordinates, CoordinatesError, ElementPlan, PointwiseCoordinates, refuse_plan,
+};
 use crate::cage::{Cage, Edge, Face};
 use crate::mesh::Point;
 use crate::simd::{LANES, Lanes, angle, cross, dot, multiversion, zeros};
@@ -29,9 +31,9 @@ const EDGE_TOLERANCE: f64 = 1e-11;
 /// Estimated error of an entry from which the weights of a face are integrated.
 const ENTRY_TOLERANCE: f64 = 1e-11;
 /// Length of a face's mean vector from which a point is so near to the face that the plain formula does not cancel.
-const LARGE: f64 = 0.1;
+const SAFE_MEAN_LENGTH: f64 = 0.1;
 /// What takes the place of 1/0 where a point lies on a face.
-const HUGE: f64 = 1e100;
+const INV_ZERO: f64 = 1e100;
 /// Points one parallel task computes: a few lane groups.
 const TASK_POINTS: usize = 8 * LANES;
 
@@ -40,19 +42,21 @@ impl CoordinateSystem for MeanValue {
         "mvc"
     }
 
-    fn columns(&self, cage: &Cage) -> usize {
-        cage.vertices().len()
-    }
-
-    fn rest_values(&self, cage: &Cage) -> Vec<Point> {
-        cage.vertices().to_vec()
+    fn values(&self, cage: &Cage) -> CageValues {
+        CageValues::of_vertices(cage)
     }
 
     fn pointwise(&self) -> Option<PointwiseCoordinates> {
         Some(coordinates)
     }
 
-    fn coordinates(&self, cage: &Cage, points: &[Point]) -> Result<Coordinates, CoordinatesError> {
+    fn coordinates(
+        &self,
+        cage: &Cage,
+        points: &[Point],
+        plan: Option<&ElementPlan>,
+    ) -> Result<Coordinates, CoordinatesError> {
+        refuse_plan(self.name(), plan)?;
         Ok(coordinates(cage, points))
     }
 }
@@ -199,14 +203,14 @@ fn face_weights(cage: &Cage, scratch: &Scratch, face: &Face, x: Point, l: usize,
     let nearness = vertices.map(|v| scratch.nearness[v].0[l]);
     let loss2 = (vector::dot(g[0], g[0]) + vector::dot(g[1], g[1])) / (det * det);
     let nearest = nearness.iter().copied().fold(0.0, f64::max);
-    if vector::norm(mean) < LARGE && is_inaccurate(loss2, nearest, total) {
+    if vector::norm(mean) < SAFE_MEAN_LENGTH && is_inaccurate(loss2, nearest, total) {
         let weights = integral::face_weights(vertices.map(|v| cage.vertices()[v]), x);
         return [0, 1, 2].map(|i| weights[i] / nearness[i]);
     }
     let numerators = [0, 1, 2].map(|i| vector::dot(mean, g[i]) * edges[i][3]);
     let weights = numerators.map(|n| n / det);
     // On the face itself, only the ratios of the weights count.
-    if weights.iter().all(|w| w.is_finite()) { weights } else { numerators.map(|n| n * HUGE) }
+    if weights.iter().all(|w| w.is_finite()) { weights } else { numerators.map(|n| n * INV_ZERO) }
 }
 
 /// Whether rounding may change entries by more than [`ENTRY_TOLERANCE`], from the square of what a face's determinant amplifies it by, the

@@ -11,7 +11,7 @@
 mod gram_matrix;
 mod state;
 
-use crate::coordinates::TiedNormals;
+use crate::coordinates::DependentNormals;
 use crate::decode::Decoder;
 use crate::dense;
 use crate::mesh::Point;
@@ -89,7 +89,7 @@ impl Consistent {
     /// Prepares the inversion from the [`Self::gram_of`] of the same points. `None` where the factorisation fails, or where normals are not functions
     /// of the vertices.
     pub(crate) fn from_gram(decoder: &Decoder, rows: Option<&[u32]>, weight: f64, gram: Mat<f64>) -> Option<Self> {
-        let neighbours = neighbours(decoder.tied_normals()?, decoder.positions());
+        let neighbours = neighbours(decoder.dependent_normals()?, decoder.positions());
         let (v, total) = (decoder.positions(), decoder.columns());
         if gram.shape() != (total, total) {
             return None;
@@ -153,10 +153,10 @@ impl Consistent {
         point: impl Fn(usize, usize) -> Point,
         diagonal: f64,
     ) -> Vec<Convergence> {
-        let Some(tied) = decoder.tied_normals() else { return Vec::new() };
+        let Some(dependent) = decoder.dependent_normals() else { return Vec::new() };
         let mut frames: Vec<FrameState> = cages.iter().map(|cage| FrameState::new(cage)).collect();
         self.read(decoder, &mut frames, point);
-        let values: Vec<Vec<Point>> = frames.iter().map(|frame| frame.values(tied, &frame.cage)).collect();
+        let values: Vec<Vec<Point>> = frames.iter().map(|frame| frame.values(dependent, &frame.cage)).collect();
         for (frame, (values, products)) in frames.iter_mut().zip(values.iter().zip(self.gram_product(&values))) {
             frame.energy = frame.data_energy(values, &products);
             frame.start_energy = frame.energy;
@@ -171,8 +171,8 @@ impl Consistent {
             if frames.iter().all(|frame| frame.outcome.is_some()) {
                 break;
             }
-            let steps = self.steps(tied, &frames);
-            self.line_search(tied, &mut frames, &steps);
+            let steps = self.steps(dependent, &frames);
+            self.line_search(dependent, &mut frames, &steps);
         }
         let vertices = decoder.positions() as f64;
         let length = |energy: f64| (energy.max(0.0) / vertices).sqrt() / diagonal;
@@ -227,14 +227,14 @@ impl Consistent {
     }
 
     /// The Gauss–Newton step of each frame that has not converged.
-    fn steps(&self, tied: &TiedNormals, frames: &[FrameState]) -> Vec<Vec<Point>> {
+    fn steps(&self, dependent: &DependentNormals, frames: &[FrameState]) -> Vec<Vec<Point>> {
         let mut searches: Vec<_> = frames
             .iter()
             .map(|frame| {
                 frame
                     .outcome
                     .is_none()
-                    .then(|| state::ConjugateGradients::new(tied, frame, &self.regularization_gradient(frame)))
+                    .then(|| state::ConjugateGradients::new(dependent, frame, &self.regularization_gradient(frame)))
             })
             .collect();
         for iteration in 0..MAX_CG_ITERATIONS {
@@ -250,11 +250,11 @@ impl Consistent {
                 break;
             }
             let moved: Vec<Vec<Point>> =
-                searches.iter().map(|s| active(s).map_or(Vec::new(), |s| s.jacobian_product(tied))).collect();
+                searches.iter().map(|s| active(s).map_or(Vec::new(), |s| s.jacobian_product(dependent))).collect();
             let products = state::products(self.curvature.as_ref(), &moved, |x| x as f32, f64::from);
             for (search, products) in searches.iter_mut().zip(products) {
                 if let Some(search) = search {
-                    search.advance(tied, &products);
+                    search.advance(dependent, &products);
                 }
             }
         }
@@ -262,7 +262,7 @@ impl Consistent {
     }
 
     /// Backtracking line search: takes each step, halved until it lowers E.
-    fn line_search(&self, tied: &TiedNormals, frames: &mut [FrameState], steps: &[Vec<Point>]) {
+    fn line_search(&self, dependent: &DependentNormals, frames: &mut [FrameState], steps: &[Vec<Point>]) {
         let mut length = 1.0;
         let mut waiting: Vec<bool> = frames.iter().map(|frame| frame.outcome.is_none()).collect();
         for _ in 0..MAX_STEP_TRIALS {
@@ -276,7 +276,7 @@ impl Consistent {
                     }
                     let moved = |(c, s): (&Point, &Point)| along(*c, length, *s);
                     let cage: Vec<Point> = frame.cage.iter().zip(step).map(moved).collect();
-                    let values = frame.values(tied, &cage);
+                    let values = frame.values(dependent, &cage);
                     (cage, values)
                 })
                 .collect();
@@ -356,9 +356,9 @@ fn single(n: usize, entry: &dyn Fn(usize, usize) -> f64) -> Mat<f32> {
 }
 
 /// Neighbours of each vertex of a closed mesh, each once: the two faces of an edge run along it in opposite directions.
-fn neighbours(tied: &TiedNormals, vertices: usize) -> Vec<Vec<u32>> {
+fn neighbours(dependent: &DependentNormals, vertices: usize) -> Vec<Vec<u32>> {
     let mut neighbours = vec![Vec::new(); vertices];
-    for &[a, b, c] in tied.faces() {
+    for &[a, b, c] in dependent.faces() {
         for (from, to) in [(a, b), (b, c), (c, a)] {
             neighbours[from as usize].push(to);
         }

@@ -2,7 +2,7 @@
 
 use super::Outcome;
 use super::product_columns;
-use crate::coordinates::TiedNormals;
+use crate::coordinates::DependentNormals;
 use crate::mesh::Point;
 use crate::vector::{add, along, combination, dot, sub};
 use faer::{Mat, MatRef};
@@ -49,8 +49,8 @@ impl FrameState {
     }
 
     /// Vertices and their normals, T × 3.
-    pub(super) fn values(&self, tied: &TiedNormals, cage: &[Point]) -> Vec<Point> {
-        cage.iter().copied().chain(tied.normals(|v| cage[v as usize])).collect()
+    pub(super) fn values(&self, dependent: &DependentNormals, cage: &[Point]) -> Vec<Point> {
+        cage.iter().copied().chain(dependent.normals(|v| cage[v as usize])).collect()
     }
 
     /// Data term of E.
@@ -87,11 +87,11 @@ pub(super) struct ConjugateGradients {
 
 impl ConjugateGradients {
     /// From a frame and half the gradient of the regularisation term of E.
-    pub(super) fn new(tied: &TiedNormals, frame: &FrameState, regularization_gradient: &[Point]) -> Self {
-        let derivatives = tied.derivatives(&frame.cage);
+    pub(super) fn new(dependent: &DependentNormals, frame: &FrameState, regularization_gradient: &[Point]) -> Self {
+        let derivatives = dependent.derivatives(&frame.cage);
         let difference = |(s, g): (&Point, &Point)| sub(*s, *g);
         let open: Vec<Point> = frame.right_hand_side.iter().zip(&frame.products).map(difference).collect();
-        let mut residual = transposed_jacobian_product(tied, &derivatives, &open);
+        let mut residual = transposed_jacobian_product(dependent, &derivatives, &open);
         for (r, p) in residual.iter_mut().zip(regularization_gradient) {
             *r = sub(*r, *p);
         }
@@ -133,22 +133,22 @@ impl ConjugateGradients {
     }
 
     /// `J d` of the direction, T × 3.
-    pub(super) fn jacobian_product(&self, tied: &TiedNormals) -> Vec<Point> {
+    pub(super) fn jacobian_product(&self, dependent: &DependentNormals) -> Vec<Point> {
         let d = &self.direction;
         let of_face = |(&[a, b, c], derivative): (&[u32; 3], &[[Point; 3]; 2])| {
             let [a, b, c] = [a, b, c].map(|v| d[v as usize]);
             let (u, v) = (sub(b, a), sub(c, a));
             [0, 1, 2].map(|i| dot(derivative[0][i], u) + dot(derivative[1][i], v))
         };
-        d.iter().copied().chain(tied.faces().iter().zip(&self.derivatives).map(of_face)).collect()
+        d.iter().copied().chain(dependent.faces().iter().zip(&self.derivatives).map(of_face)).collect()
     }
 
     /// Steps along the direction d; takes the product of the curvature matrix with `J d`.
-    pub(super) fn advance(&mut self, tied: &TiedNormals, products: &[Point]) {
+    pub(super) fn advance(&mut self, dependent: &DependentNormals, products: &[Point]) {
         if self.done {
             return;
         }
-        let image = transposed_jacobian_product(tied, &self.derivatives, products);
+        let image = transposed_jacobian_product(dependent, &self.derivatives, products);
         let curvature: f64 = self.direction.iter().zip(&image).map(|(&d, &i)| dot(d, i)).sum();
         let length = self.size / curvature;
         if !(length.is_finite() && length > 0.0) {
@@ -165,10 +165,14 @@ impl ConjugateGradients {
 }
 
 /// `Jᵀ w` of values w, T × 3.
-fn transposed_jacobian_product(tied: &TiedNormals, derivatives: &[[[Point; 3]; 2]], w: &[Point]) -> Vec<Point> {
+fn transposed_jacobian_product(
+    dependent: &DependentNormals,
+    derivatives: &[[[Point; 3]; 2]],
+    w: &[Point],
+) -> Vec<Point> {
     let vertices = w.len() - derivatives.len();
     let mut out = w[..vertices].to_vec();
-    for ((&[a, b, c], derivative), w) in tied.faces().iter().zip(derivatives).zip(&w[vertices..]) {
+    for ((&[a, b, c], derivative), w) in dependent.faces().iter().zip(derivatives).zip(&w[vertices..]) {
         let [u, v] = derivative.map(|rows| combination(*w, rows));
         for k in 0..3 {
             out[a as usize][k] -= u[k] + v[k];

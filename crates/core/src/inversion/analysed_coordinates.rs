@@ -1,10 +1,10 @@
 //! Coordinates for an analysis: of all points of a model, or of a sample of a very large one.
 
 use super::PrepareError;
-use super::prepare::{Preparing, coordinates_bytes, outside, reject_unreproduced_point, reproduction_error};
+use super::prepare::{PrepareContext, coordinates_bytes, outside, reject_unreproduced_point, reproduction_error};
 use super::spectra::RequiredDecompositions;
 use crate::cage::Cage;
-use crate::coordinates::{CoordinateSystem, ElementPlan, MeanValue, PointwiseCoordinates, Refinement};
+use crate::coordinates::{CageValues, CoordinateSystem, ElementPlan, MeanValue, PointwiseCoordinates, Refinement};
 use crate::decode::{Decoder, for_each_chunk};
 use crate::handles::Handles;
 use crate::handles::farthest::morton_order;
@@ -60,35 +60,36 @@ pub(super) fn coordinates(
     cage: &Cage,
     points: &[Point],
     required: RequiredDecompositions,
-    preparing: &Preparing<'_>,
+    context: &PrepareContext<'_>,
 ) -> Result<AnalysisCoordinates, PrepareError> {
     let everything = required == RequiredDecompositions::Everything;
     let copies = if everything { 3 } else { 2 };
-    let (m, columns) = (system.unknowns(cage), system.columns(cage));
+    let values = system.values(cage);
+    let (m, columns) = (values.unknowns(), values.columns());
     let check_memory = |rows: usize| {
         let needed = coordinates_bytes(rows, columns, copies);
         let gigabytes = 1e-9 * needed as f64;
         let too_large = PrepareError::OutOfMemory { points: points.len(), unknowns: m, gigabytes };
-        if needed > preparing.memory { Err(too_large) } else { Ok(()) }
+        if needed > context.memory { Err(too_large) } else { Ok(()) }
     };
     let sampled = system
         .pointwise()
-        .and_then(|pointwise| Some((pointwise, sample(points, m, required, preparing.analysed_entries)?)));
+        .and_then(|pointwise| Some((pointwise, sample(points, m, required, context.analysed_entries)?)));
     if let Some((pointwise, sample)) = sampled {
         check_memory(sample.len())?;
-        return of_sample(system, pointwise, cage, points, sample, preparing.stores_coordinates);
+        return of_sample(values, pointwise, cage, points, sample, context.stores_coordinates);
     }
     check_memory(points.len())?;
-    let found = system.coordinates(cage, points)?;
-    let (mut phi, mut rest) = (found.phi, system.rest_values(cage));
+    let found = system.coordinates(cage, points, None)?;
+    let (mut phi, mut rest) = (found.phi, values.rest);
     let worst = reproduction_error(phi.as_ref(), &rest, cage, points);
     reject_unreproduced_point(worst.0, worst.1, cage, diagonal(points))?;
-    let tied = system.tied_normals(cage);
     let mut decoder = None;
-    if tied.is_some() {
-        decoder = Some(Decoder::new(phi.as_ref(), cage.vertices().len()).with_tied_normals(tied));
+    if values.dependent_normals.is_some() {
+        decoder =
+            Some(Decoder::new(phi.as_ref(), cage.vertices().len()).with_dependent_normals(values.dependent_normals));
         drop(phi);
-        phi = MeanValue.coordinates(cage, points)?.phi;
+        phi = MeanValue.coordinates(cage, points, None)?.phi;
         rest.truncate(m);
     }
     let outside = outside(cage, points, &found.outside, diagonal(points));
@@ -97,14 +98,15 @@ pub(super) fn coordinates(
 }
 
 fn of_sample(
-    system: &dyn CoordinateSystem,
+    values: CageValues,
     pointwise: PointwiseCoordinates,
     cage: &Cage,
     points: &[Point],
     mut sample: Vec<u32>,
     keeps: bool,
 ) -> Result<AnalysisCoordinates, PrepareError> {
-    let (columns, mut rest) = (system.columns(cage), system.rest_values(cage));
+    let (unknowns, columns) = (values.unknowns(), values.columns());
+    let mut rest = values.rest;
     let mut nearest: Vec<Vec<(f64, u32)>> = vec![Vec::new(); columns];
     let (mut worst, mut found_outside) = ((0, 0.0), Vec::new());
     for_each_chunk(pointwise, cage, points, columns, |first, part| {
@@ -134,11 +136,11 @@ fn of_sample(
     let decoder = if keeps { Decoder::with_stored_coordinates } else { Decoder::with_recomputed_coordinates }(
         pointwise, cage, points, columns,
     );
-    let decoder = decoder.with_tied_normals(system.tied_normals(cage));
-    rest.truncate(system.unknowns(cage));
+    let decoder = decoder.with_dependent_normals(values.dependent_normals);
+    rest.truncate(unknowns);
     let sampled: Vec<Point> = sample.iter().map(|&i| points[i as usize]).collect();
-    let start = if decoder.tied_normals().is_some() {
-        MeanValue.coordinates(cage, &sampled)?
+    let start = if decoder.dependent_normals().is_some() {
+        MeanValue.coordinates(cage, &sampled, None)?
     } else {
         pointwise(cage, &sampled)
     };
