@@ -2,8 +2,8 @@
 //! noted where the user goes on all the same.
 
 use crate::mismatch::{Departure, Progress, Watch};
-use cager_core::mesh::{Model, Point, Polygons};
 use cager_formats::Error;
+use cager_geometry::mesh::{Model, Point, Polygons};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 

@@ -3,8 +3,8 @@
 use crate::decode::{DecodeError, frame_options, open};
 use crate::origin::move_from;
 use crate::timing::Timing;
-use cager_core::mesh::{Model, Polygons};
 use cager_formats::{AtomicFile, FrameRange, Target, commit_together, create_frames, obj_bytes};
+use cager_geometry::mesh::{Model, Polygons};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 

@@ -5,7 +5,7 @@ use cager_codec::{CodedMesh, rounded_error};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, DEFINITION};
 use cager_core::inversion::{Solver, SolverOptions};
-use cager_core::mesh::{Model, Point};
+use cager_geometry::mesh::{Model, Point};
 use cager_proto::container::{self, ContainerWriter, Header, counted_from_zero};
 use cager_proto::report::{Coding, ConditionNumber, FrameError, MaxVol, Report};
 use serde::{Deserialize, Serialize};

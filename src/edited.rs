@@ -2,8 +2,8 @@
 
 use crate::decode::{Container, DecodeError};
 use crate::origin::move_to;
-use cager_core::mesh::Point;
 use cager_formats::{Error, FrameReader, open_frames};
+use cager_geometry::mesh::Point;
 use std::path::{Path, PathBuf};
 
 /// Edited cages of a container, frame by frame in any order.

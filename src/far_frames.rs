@@ -1,6 +1,6 @@
 //! Frames that are none, by where they lie: in other units or another order of bytes than the rest pose, or shifted.
 
-use cager_core::mesh::{Point, bounds};
+use cager_geometry::mesh::{Point, bounds};
 
 /// How many diagonals of the rest pose the middle point of a capture's first frame may lie from it: later frames travel, the first one
 /// begins where the rest pose is.

@@ -5,8 +5,8 @@ use crate::belonging::{Belonging, Pass};
 use crate::mismatch::Up;
 use crate::origin::{move_to, own_origin};
 use crate::timing::Timing;
-use cager_core::mesh::Model;
 use cager_formats::{Error, FrameReader, FrameSelection, missing_frames, open_selected_frames};
+use cager_geometry::mesh::Model;
 use std::path::PathBuf;
 use std::sync::Arc;
 

@@ -6,8 +6,8 @@ mod watch;
 
 pub use watch::{Departure, Progress, Watch};
 
-use cager_core::mesh::{Model, Point, bounds};
-use cager_core::vector::distance;
+use cager_geometry::mesh::{Model, Point, bounds};
+use cager_geometry::vector::distance;
 use std::fmt;
 
 /// Number of evenly spaced frames to compare.

@@ -1,8 +1,8 @@
 //! Captures far from the origin of their coordinates, as in UTM metres: cages in single precision would lose them, so they are encoded about an origin of
 //! their own, which the container keeps.
 
-use cager_core::mesh::{Point, bounds};
-use cager_core::vector::{add, distance, middle, sub};
+use cager_geometry::mesh::{Point, bounds};
+use cager_geometry::vector::{add, distance, middle, sub};
 
 /// Diagonals of the rest pose from which on an origin is taken: there single precision resolves less than 1e-5 of the diagonal.
 pub(crate) const FAR: f64 = 100.0;

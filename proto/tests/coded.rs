@@ -7,7 +7,7 @@ use cager_codec::{
 };
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
-use cager_core::mesh::{Model, Polygons, TriMesh};
+use cager_geometry::mesh::{Model, Polygons, TriMesh};
 use cager_proto::container::{ContainerReader, ContainerWriter, Error, group_frames};
 use std::io::Cursor;
 use support::{frame, header, put_together, read_all, small_model, take_apart, tetrahedron};

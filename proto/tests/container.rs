@@ -2,7 +2,7 @@
 
 mod support;
 
-use cager_core::mesh::{Model, Polygons, TriMesh};
+use cager_geometry::mesh::{Model, Polygons, TriMesh};
 use cager_proto::container::{CHUNK_FRAMES, ContainerReader, ContainerWriter, Error};
 use cager_proto::report::{FrameError, Refinement, Report};
 use proptest::prelude::*;

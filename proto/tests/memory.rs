@@ -7,7 +7,7 @@ mod support;
 use cager_codec::{AdjacentGroups, CageBasis, CodedMesh, encode_cages};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
-use cager_core::mesh::{Model, Polygons};
+use cager_geometry::mesh::{Model, Polygons};
 use cager_proto::container::{ContainerReader, ContainerWriter};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::io::Cursor;

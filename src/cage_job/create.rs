@@ -13,7 +13,7 @@ use crate::session::registry::Reserved;
 use crate::store::{CageJobMeta, ContentKey, Idempotency, Kind, Spool, StoreError, StoredPart};
 use crate::tasks::{blocking, to_the_end};
 use crate::unreadable;
-use cager_core::mesh::diagonal;
+use cager_geometry::mesh::diagonal;
 use cager_proto::cage_messages::CageOptions;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;

@@ -15,7 +15,7 @@ use crate::store::{CageJobMeta, Kind, Store, StoreError};
 use crate::sync::lock;
 use bytes::Bytes;
 use cager_cages::Progress as DesignProgress;
-use cager_core::mesh::TriMesh;
+use cager_geometry::mesh::TriMesh;
 use cager_proto::cage_messages::{CageError, CageJob as View, CageProgress, CageStage, CageState};
 use cager_proto::messages::Problem;
 use serde::{Deserialize, Serialize};

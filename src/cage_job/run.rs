@@ -10,7 +10,7 @@ use crate::service::Service;
 use crate::store::StoreError;
 use crate::tasks::blocking;
 use cager_cages::{Design, DesignError, DesignOptions, Progress, design};
-use cager_core::mesh::Model;
+use cager_geometry::mesh::Model;
 use cager_proto::cage_messages::{CageError, CageStage};
 use std::ops::ControlFlow;
 use std::sync::Arc;

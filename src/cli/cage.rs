@@ -10,7 +10,7 @@ use crate::design::{read_frames, report as design_report};
 use crate::frames::CaptureFiles;
 use crate::report_page::{Contents, Kind, NO_PAGE, ReportPage, ShownCage, ShownMesh};
 use anyhow::{Result, bail};
-use cager_cages::{DesignOptions, EncloseError, EncloseOptions, BoundingShape, Style, bounding_shape, enclose};
+use cager_cages::{BoundingShape, DesignOptions, EncloseError, EncloseOptions, Style, bounding_shape, enclose};
 use cager_formats::{AtomicFile, Target, commit_together, model_bytes, obj_bytes};
 use cager_geometry::mesh::{Model, Polygons, TriMesh};
 use cager_proto::report::DesignReport;

@@ -4,7 +4,7 @@ use super::args::EncodeArgs;
 use crate::coding::Goal;
 use crate::config::bytes;
 use anyhow::{Result, bail};
-use cager_core::mesh::{Model, diagonal};
+use cager_geometry::mesh::{Model, diagonal};
 use clap::ValueEnum;
 use std::str::FromStr;
 

@@ -3,9 +3,9 @@
 use crate::decode;
 use crate::report_page::{Box3, Contents, Kind, Quantised, ReportPage, ShownCage, ShownMesh};
 use anyhow::Result;
-use cager_core::mesh::{Point, TriMesh, diagonal};
 use cager_core::synthetic::Capture;
 use cager_formats::open_frames;
+use cager_geometry::mesh::{Point, TriMesh, diagonal};
 use cager_proto::report::Report;
 use serde::Serialize;
 use std::path::Path;

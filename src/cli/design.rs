@@ -4,7 +4,7 @@ use super::progress;
 use anyhow::{Result, bail};
 use cager_cages::{Design, DesignError, DesignOptions, Goal, Progress};
 use cager_core::cage::CageError;
-use cager_core::mesh::{Model, TriMesh};
+use cager_geometry::mesh::{Model, TriMesh};
 use std::ops::ControlFlow;
 use std::path::Path;
 

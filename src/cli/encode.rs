@@ -21,9 +21,9 @@ use cager_cages::{DesignOptions, Style};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::{PrepareError, Solver, SolverOptions, check_options};
-use cager_core::mesh::Model;
 use cager_core::regularize::{Regularizer, SparseMatrix};
 use cager_formats::{AtomicFile, FrameReader, Target, commit_together};
+use cager_geometry::mesh::Model;
 use cager_proto::report::DesignReport;
 use std::time::{Duration, Instant};
 

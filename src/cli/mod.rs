@@ -30,7 +30,7 @@ mod solver_options;
 mod transfer_args;
 
 use args::{Cli, Command};
-use cager_core::mesh::Model;
+use cager_geometry::mesh::Model;
 use clap::{CommandFactory, Parser};
 pub(crate) use global_args::{is_quiet, is_verbose, tell};
 use std::io::Write;

@@ -6,7 +6,7 @@ use cager_cages::{EncloseOptions, enclose};
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{BATCH, PrepareError, Rows, Solver};
-use cager_core::mesh::{Model, diagonal};
+use cager_geometry::mesh::{Model, diagonal};
 use cager_proto::container::colors_bytes;
 use std::sync::Arc;
 

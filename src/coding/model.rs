@@ -6,7 +6,7 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, ElementPlan};
 use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, Solver};
-use cager_core::mesh::Model;
+use cager_geometry::mesh::Model;
 
 /// What the numbers of groups mean: the basis of the model's cages, and the order of its points.
 pub(crate) struct GroupSpace {

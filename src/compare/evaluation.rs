@@ -3,8 +3,8 @@
 use super::sample::{Frame, Sample};
 use cager_core::cage::Cage;
 use cager_core::inversion::{FactoredInversion, HandleSystem, ProjectedFrames};
-use cager_core::mesh::{Point, diagonal};
-use cager_core::vector::distance;
+use cager_geometry::mesh::{Point, diagonal};
+use cager_geometry::vector::distance;
 use serde::Serialize;
 use std::collections::VecDeque;
 use std::sync::Arc;

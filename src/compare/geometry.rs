@@ -9,7 +9,7 @@ use super::{CompareError, Job, frames_of};
 use crate::report_page::{Box3, Quantised, ShownCage, ShownMesh, floats};
 use cager_core::cage::Cage;
 use cager_core::inversion::{BATCH, SolverOptions};
-use cager_core::mesh::{Point, TriMesh};
+use cager_geometry::mesh::{Point, TriMesh};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -126,7 +126,7 @@ impl<'a> GeometryBuilder<'a> {
             Some(CaptureFrame { frame: number, points: Quantised::new(&points, 16, Box3::around(&points, 0.0)) })
         });
         let captured = captured.collect();
-        let diagonal = cager_core::mesh::diagonal(&mesh.vertices);
+        let diagonal = cager_geometry::mesh::diagonal(&mesh.vertices);
         let cage = ShownCage::new(job.cage.mesh());
         let reach = Box3::around(&mesh.vertices, CAGE_REACH * diagonal);
         let geometry = Geometry { mesh: shown_mesh, cage, frames: captured, clip, systems: Vec::new() };

@@ -21,8 +21,8 @@ use crate::report_page::Up;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{Analysis, PrepareError};
-use cager_core::mesh::{Model, TriMesh};
 use cager_formats::FrameReader;
+use cager_geometry::mesh::{Model, TriMesh};
 use evaluation::Shape;
 use figures::{System, claims, recommend};
 use geometry::GeometryBuilder;
@@ -162,8 +162,8 @@ fn frames_of(reader: &mut dyn FrameReader, wanted: &[usize]) -> Result<Vec<Frame
 mod tests {
     use super::*;
     use cager_core::coordinates::{CageValues, Coordinates, CoordinatesError, ElementPlan, MeanValue};
-    use cager_core::mesh::Point;
     use cager_core::synthetic::{Capture, Options};
+    use cager_geometry::mesh::Point;
 
     /// A system that no cage is good enough for.
     struct Never;

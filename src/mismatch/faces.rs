@@ -1,8 +1,8 @@
 //! Whether the faces of a frame's own file name the points of the rest pose: exporters that renumber points renumber the faces with them.
 
 use super::quartiles;
-use cager_core::mesh::{Point, Polygons};
-use cager_core::vector::distance;
+use cager_geometry::mesh::{Point, Polygons};
+use cager_geometry::vector::distance;
 
 /// Most edges whose lengths are compared.
 const MAX_EDGES: usize = 2_000;

@@ -3,8 +3,8 @@
 
 use super::faces::FaceComparison;
 use super::{factor, neighbours, quartiles};
-use cager_core::mesh::{Model, Point, Polygons};
-use cager_core::vector::{distance, sub};
+use cager_geometry::mesh::{Model, Point, Polygons};
+use cager_geometry::vector::{distance, sub};
 use std::fmt;
 
 /// Edges compared, and points looked at beside their ends, at the most.

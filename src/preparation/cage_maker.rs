@@ -7,7 +7,7 @@ use crate::store::{ContentKey, NamedFile};
 use crate::sync::lock;
 use crate::tasks::blocking;
 use cager_cages::{EncloseError, EncloseOptions, enclose_unless};
-use cager_core::mesh::{Model, Polygons, TriMesh, bounds};
+use cager_geometry::mesh::{Model, Polygons, TriMesh, bounds};
 use std::collections::{HashMap, VecDeque};
 use std::ops::RangeInclusive;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};

@@ -9,7 +9,7 @@ use cager_codec::MAX_ROWS;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions, check_options};
-use cager_core::mesh::{Point, diagonal};
+use cager_geometry::mesh::{Point, diagonal};
 use cager_proto::container::colors_bytes;
 
 /// Validates rest pose, cage and options together, without expensive computation.

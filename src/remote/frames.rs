@@ -90,8 +90,8 @@ impl FrameSource for FileFrames {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use cager_core::mesh::Polygons;
     use cager_formats::{FrameOptions, create_frames};
+    use cager_geometry::mesh::Polygons;
 
     #[test]
     fn frames_are_read_from_anywhere_in_any_order() {

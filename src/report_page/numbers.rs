@@ -2,7 +2,7 @@
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use cager_core::mesh::{Point, bounds};
+use cager_geometry::mesh::{Point, bounds};
 use serde::Serialize;
 
 /// Numbers as `f32`.

@@ -2,7 +2,7 @@
 
 use super::Up;
 use super::numbers::{Box3, Quantised, floats, indices};
-use cager_core::mesh::{Point, TriMesh, bounds, diagonal};
+use cager_geometry::mesh::{Point, TriMesh, bounds, diagonal};
 use serde::Serialize;
 use std::collections::{HashMap, HashSet};
 

@@ -1,7 +1,7 @@
 //! The vertical axis.
 
-use cager_core::mesh::{Point, bounds};
-use cager_core::vector::sub;
+use cager_geometry::mesh::{Point, bounds};
+use cager_geometry::vector::sub;
 use serde::Serialize;
 
 /// An axis so much longer than the two others is the vertical one, whatever the file says.

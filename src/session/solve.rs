@@ -9,7 +9,7 @@ use crate::preparation::Prepared;
 use crate::problem::{self, ApiError};
 use crate::sync::lock;
 use cager_core::inversion::Rows;
-use cager_core::mesh::Point;
+use cager_geometry::mesh::Point;
 use std::cell::RefCell;
 use std::sync::Arc;
 use std::time::Instant;

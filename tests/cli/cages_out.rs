@@ -2,8 +2,8 @@
 
 use crate::refused::refused;
 use crate::support::{Dir, ENCODE, Small, as_model, read_cages, read_frames};
-use cager_core::mesh::TriMesh;
 use cager_formats::{FrameOptions, create_frames, read_model};
+use cager_geometry::mesh::TriMesh;
 use cager_proto::container::ContainerReader;
 use std::io::Cursor;
 

@@ -2,7 +2,7 @@
 
 use crate::support::{Dir, ENCODE, Small, largest, mean, measure, polygons, read_frames};
 use cager::decode;
-use cager_core::mesh::{Model, Polygons};
+use cager_geometry::mesh::{Model, Polygons};
 
 /// Encodes with more arguments, decodes, and gives the errors and the size.
 fn coded(dir: &Dir, small: &Small, args: &str) -> (crate::support::Measured, u64) {
@@ -17,7 +17,7 @@ fn coded(dir: &Dir, small: &Small, args: &str) -> (crate::support::Measured, u64
 fn no_point_is_beyond_the_bound_whatever_moves() {
     let mut random = fastrand::Rng::with_seed(1);
     let (dir, plain) = Dir::with_capture();
-    let size = cager_core::mesh::diagonal(&plain.rest.points);
+    let size = cager_geometry::mesh::diagonal(&plain.rest.points);
     let mut kinds = vec![("plain", plain.frames.clone())];
     kinds.push(("one frame", plain.frames[7..8].to_vec()));
     kinds.push(("constant", vec![plain.frames[3].clone(); 12]));
@@ -64,7 +64,7 @@ fn the_bound_holds_in_every_coordinate_system() {
 #[test]
 fn a_length_is_a_bound_in_the_unit_of_the_capture() {
     let (dir, small) = Dir::with_capture();
-    let size = cager_core::mesh::diagonal(&small.rest.points);
+    let size = cager_geometry::mesh::diagonal(&small.rest.points);
     let (errors, _) = coded(&dir, &small, "--max-error 4mm --unit m");
     assert!(largest(&errors.linf) <= 0.004 / size);
     let coarse = coded(&dir, &small, "--max-error 4mm --unit cm").1;
@@ -164,7 +164,7 @@ fn the_rest_pose_comes_back_with_its_polygons_and_the_order_of_its_points() {
     coded(&dir, &small, "--max-error 1e-3");
     let found = rest();
     assert_eq!(turned(&found.faces), turned(&small.rest.faces));
-    let size = cager_core::mesh::diagonal(&small.rest.points);
+    let size = cager_geometry::mesh::diagonal(&small.rest.points);
     for (a, b) in found.points.iter().zip(&small.rest.points) {
         assert!((0..3).all(|k| (a[k] - b[k]).abs() <= 2.6e-4 * size), "{a:?} {b:?}");
     }

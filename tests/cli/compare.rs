@@ -4,7 +4,7 @@ use crate::refused::assert_sentence;
 use crate::support::{Dir, Small, close, has_report_page, npy_f64};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use cager_core::mesh::Model;
+use cager_geometry::mesh::Model;
 use serde_json::Value;
 
 const COMPARE: &str =

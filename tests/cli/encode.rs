@@ -3,7 +3,7 @@
 use crate::support::{
     Dir, ENCODE, as_model, close, largest, mean, measure, npy_f64, polygons, quad_box, read_cages, read_frames,
 };
-use cager_core::mesh::{Model, winding_number};
+use cager_geometry::mesh::{Model, winding_number};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -366,7 +366,7 @@ fn handles_are_counted_as_asked_and_begin_with_those_of_maximum_volume() {
 }
 
 /// The Laplacian of a cage as a file.
-fn laplacian_file(cage: &cager_core::mesh::TriMesh) -> String {
+fn laplacian_file(cage: &cager_geometry::mesh::TriMesh) -> String {
     use cager_core::regularize::Regularizer;
     let cage = cager_core::cage::Cage::new(cage.clone()).expect("a cage");
     let m = cage.vertices().len();
@@ -472,7 +472,7 @@ fn names_with_spaces_and_accents_work() {
 #[test]
 fn half_a_model_in_the_cage_of_the_whole_is_encoded_well_with_the_default_options() {
     let (dir, small) = Dir::with_capture();
-    let (low, high) = cager_core::mesh::bounds(&small.rest.points);
+    let (low, high) = cager_geometry::mesh::bounds(&small.rest.points);
     let upper: Vec<usize> =
         (0..small.rest.points.len()).filter(|&i| small.rest.points[i][2] > 0.5 * (low[2] + high[2])).collect();
     let rest = Model {

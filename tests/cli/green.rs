@@ -89,7 +89,7 @@ fn too_few_points_for_free_normals_are_refused_in_one_sentence() {
     let (dir, mut small) = Dir::with_capture();
     let keep = small.cage.vertices.len() + 10;
     small.rest.points.truncate(keep);
-    small.rest.faces = cager_core::mesh::Polygons::new();
+    small.rest.faces = cager_geometry::mesh::Polygons::new();
     dir.model("rest.ply", &small.rest);
     let frames: Vec<Vec<f64>> = small.frames.iter().map(|frame| frame[..3 * keep].to_vec()).collect();
     dir.frames("few.npy", &frames);

@@ -2,7 +2,7 @@
 
 use crate::refused::assert_sentence;
 use crate::support::{Dir, ENCODE, Small, as_model, npy, npy_f64, quad_box, read_frames, split};
-use cager_core::mesh::{Model, Point};
+use cager_geometry::mesh::{Model, Point};
 
 /// Every point of every frame changed.
 fn changed(small: &Small, change: impl Fn(Point) -> Point) -> Vec<Vec<f64>> {

@@ -4,9 +4,9 @@ use crate::real_data::{cage_of, data, run_with};
 use crate::support::{Dir, read_cages, read_frames};
 use cager_core::coordinates::{CoordinateSystem, Green};
 use cager_core::inversion::{Handles, SolverOptions};
-use cager_core::mesh::{Point, bounds, diagonal, winding_number};
-use cager_core::vector::norm;
 use cager_formats::read_model;
+use cager_geometry::mesh::{Point, bounds, diagonal, winding_number};
+use cager_geometry::vector::norm;
 use std::fs;
 
 /// Mean and largest second temporal difference of the vertices of a capture's cages, over the rest diagonal.

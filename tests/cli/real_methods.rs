@@ -4,9 +4,9 @@ use crate::real_data::{cage_of, data, run};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_core::inversion::{Analysis, BATCH, Handles, Rows, Solver, SolverOptions};
-use cager_core::mesh::Model;
 use cager_core::regularize::Regularizer;
 use cager_formats::{open_frames, read_model};
+use cager_geometry::mesh::Model;
 
 /// Mean L2 of every handle selection on one capture with its `cage350`, all frames, as a fraction over that of all points.
 fn spread_comes_near_all(capture: &str) {

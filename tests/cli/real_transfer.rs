@@ -2,9 +2,9 @@
 
 use crate::real_data::data;
 use crate::support::{Dir, mean, measure, polygons, read_frames};
-use cager_core::mesh::{Model, Point, diagonal};
-use cager_core::vector::{add, along, cross, norm, sub};
 use cager_formats::{open_frames, read_model, write_model};
+use cager_geometry::mesh::{Model, Point, diagonal};
+use cager_geometry::vector::{add, along, cross, norm, sub};
 use std::path::Path;
 
 /// Frames that are looked at.
@@ -93,7 +93,7 @@ fn garments_over_makehuman_follow_its_cages_within_a_tenth_of_the_error_of_the_b
         error(&dir, &rest, &Model { points, faces: polygons([]), ..Model::default() }, &truth)
     };
     // A suit all over, and a garment from the knees to the shoulders.
-    let (low, high) = cager_core::mesh::bounds(&rest.points);
+    let (low, high) = cager_geometry::mesh::bounds(&rest.points);
     let up = (0..3).max_by(|&a, &b| (high[a] - low[a]).total_cmp(&(high[b] - low[b]))).unwrap_or(1);
     let height = |i: &u32| (rest.points[*i as usize][up] - low[up]) / (high[up] - low[up]);
     let all: Vec<u32> = (0..rest.points.len() as u32).collect();

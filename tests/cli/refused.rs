@@ -4,7 +4,7 @@ mod cages;
 mod containers;
 
 use crate::support::{Dir, ENCODE, Small, as_model, npy, npy_f64, polygons, quad_box};
-use cager_core::mesh::{Model, Polygons};
+use cager_geometry::mesh::{Model, Polygons};
 
 /// Runs a command that must be refused with one line that has all these words, and must leave the folder as it was.
 #[track_caller]

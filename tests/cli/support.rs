@@ -1,10 +1,10 @@
 //! A folder to work in, the program to run there, and small captures to run it on.
 
 use cager::decode;
-use cager_core::mesh::{Model, Point, Polygons, TriMesh, diagonal};
 use cager_core::synthetic::{Capture, Options};
-use cager_core::vector;
 use cager_formats::{FrameOptions, create_frames, open_frames, write_model};
+use cager_geometry::mesh::{Model, Point, Polygons, TriMesh, diagonal};
+use cager_geometry::vector;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
@@ -263,7 +263,7 @@ pub(crate) fn polygons(all: impl IntoIterator<Item = Vec<u32>>) -> Polygons {
 
 /// A box around points, of six quads.
 pub(crate) fn quad_box(points: &[Point]) -> Model {
-    let (low, high) = cager_core::mesh::bounds(points);
+    let (low, high) = cager_geometry::mesh::bounds(points);
     let margin = 0.05 * diagonal(points);
     let corner = |i: usize| [0, 1, 2].map(|k| if i >> k & 1 == 0 { low[k] - margin } else { high[k] + margin });
     let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];

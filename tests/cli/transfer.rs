@@ -2,7 +2,7 @@
 
 use crate::refused::refused;
 use crate::support::{Dir, close, mean, measure, polygons, read_frames};
-use cager_core::mesh::{Model, Point, diagonal};
+use cager_geometry::mesh::{Model, Point, diagonal};
 
 /// Every quad of the model split at its centre: the original's points, then one for each face. Its motion follows the faces.
 fn remeshed(rest: &Model) -> Model {

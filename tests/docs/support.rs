@@ -1,8 +1,8 @@
 //! A running service, blocks of documents, names in the sources.
 
-use cager_core::mesh::{Model, Polygons};
 use cager_core::synthetic::{Capture, Options};
 use cager_formats::write_model;
+use cager_geometry::mesh::{Model, Polygons};
 use std::collections::BTreeSet;
 use std::fs;
 use std::io::{BufRead, BufReader};

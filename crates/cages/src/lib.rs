@@ -1,10 +1,10 @@
 //! Cages: generated around a model, checked, repaired, and designed from its motion. Plain data in, plain data out; no files, no async.
 
+mod bounding_shape;
 mod design;
 pub mod diagnosis;
 mod enclose;
-mod bounding_shape;
 
+pub use bounding_shape::{BoundingShape, bounding_shape};
 pub use design::{Design, DesignError, DesignOptions, Goal, MOST_VERTICES, Progress, Stage, Style, design};
 pub use enclose::{EncloseError, EncloseOptions, enclose, enclose_unless};
-pub use bounding_shape::{BoundingShape, bounding_shape};

@@ -2,11 +2,12 @@
 
 mod common;
 
-use cager_cages::{EncloseError, BoundingShape, bounding_shape};
+use cager_cages::{BoundingShape, EncloseError, bounding_shape};
 use cager_geometry::mesh::Model;
 use common::{append, model, sphere, torus, verdict};
 
-const SHAPES: [(BoundingShape, usize); 3] = [(BoundingShape::Box, 8), (BoundingShape::Sphere, 12), (BoundingShape::Hull, 4)];
+const SHAPES: [(BoundingShape, usize); 3] =
+    [(BoundingShape::Box, 8), (BoundingShape::Sphere, 12), (BoundingShape::Hull, 4)];
 
 #[test]
 fn every_shape_encloses_every_model() {

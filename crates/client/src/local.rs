@@ -7,7 +7,7 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green};
 use cager_core::decode::Decoder;
 use cager_core::inversion::BATCH;
-use cager_core::mesh::TriMesh;
+use cager_geometry::mesh::TriMesh;
 use cager_proto::messages::RestCage;
 
 /// Decodes cages to positions locally, with the coordinates `Φ` fetched once.

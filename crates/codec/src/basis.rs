@@ -6,8 +6,8 @@
 
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Coordinates, CoordinatesError, ElementPlan};
-use cager_core::mesh::Point;
 use cager_geometry::linalg;
+use cager_geometry::mesh::Point;
 use faer::{Mat, MatRef, Par};
 
 /// ε over the mean of the diagonal of the Gram matrix: a vertex that hardly moves the model still is coded to a hundred steps.

@@ -143,7 +143,7 @@ fn code_values(coder: &mut impl Coder, rows: usize, count: usize, given: &[i32])
 #[cfg(test)]
 mod tests {
     use super::*;
-    use cager_core::mesh::Point;
+    use cager_geometry::mesh::Point;
 
     fn basis(rows: usize) -> CageBasis {
         let mut random = fastrand::Rng::with_seed(3);

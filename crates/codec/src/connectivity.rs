@@ -6,7 +6,7 @@ use crate::entropy::{Coder, Decoder, Encoder};
 use crate::error::{Error, Result};
 use crate::vertex_order::{MAX_FAR_POINTS, code_order};
 use crate::walk::{VertexLabels, Walk};
-use cager_core::mesh::Polygons;
+use cager_geometry::mesh::Polygons;
 use cager_geometry::topology::Adjacency;
 use std::cmp::Reverse;
 

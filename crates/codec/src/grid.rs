@@ -4,7 +4,7 @@ use crate::entropy::{Coder, Decoder, Encoder, Integers, MAX_SIZE, SIZES, size_cl
 use crate::error::{Error, Result};
 use crate::parallelograms::Predictions;
 use crate::prediction_weights::{PredictionWeights, WEIGHTS_BYTES};
-use cager_core::mesh::{Point, Polygons, bounds};
+use cager_geometry::mesh::{Point, Polygons, bounds};
 use cager_geometry::topology::Adjacency;
 
 /// Bytes before the coded numbers: origin and step as f64.

@@ -3,7 +3,7 @@
 //! Independent vertices are taken away round by round, those of few neighbours first; the neighbours of one that is gone are joined to the one of
 //! them that has the fewest. It depends on the faces alone, in whole numbers.
 
-use cager_core::mesh::Polygons;
+use cager_geometry::mesh::Polygons;
 use cager_geometry::topology::Adjacency;
 use std::collections::BTreeSet;
 

@@ -3,7 +3,7 @@
 use crate::connectivity::{WalkedFaces, decode_faces};
 use crate::error::{Error, Result};
 use crate::grid::{Grid, decode_positions, encode_positions};
-use cager_core::mesh::{Model, Point, Polygons};
+use cager_geometry::mesh::{Model, Point, Polygons};
 
 /// A mesh as bytes, and what they decode to: the same vertices and polygons, the polygons in another order.
 #[derive(Clone, Debug)]

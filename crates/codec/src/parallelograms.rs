@@ -1,7 +1,7 @@
 //! An order of a mesh's vertices in which as many as possible are predicted by parallelograms of vertices before them, over each edge of the mesh: of two
 //! triangles with a common edge the two far corners are predicted from each other.
 
-use cager_core::mesh::Polygons;
+use cager_geometry::mesh::Polygons;
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 

@@ -269,7 +269,7 @@ impl Residual {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use cager_core::mesh::Polygons;
+    use cager_geometry::mesh::Polygons;
 
     fn mesh(side: u32) -> Polygons {
         let mut faces = Polygons::new();

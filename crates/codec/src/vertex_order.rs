@@ -148,7 +148,7 @@ impl Places {
 mod tests {
     use super::*;
     use crate::entropy::{Decoder, Encoder};
-    use cager_core::mesh::Polygons;
+    use cager_geometry::mesh::Polygons;
 
     fn grid(side: u32) -> Adjacency {
         let mut faces = Polygons::new();

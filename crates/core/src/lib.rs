@@ -11,9 +11,6 @@ mod row_basis;
 mod simd;
 pub mod synthetic;
 
-use cager_geometry::{linalg as dense, linalg::svd};
-pub use cager_geometry::{mesh, vector};
-
 /// Version of the preparation of solvers: stored solvers of another version are recomputed. Decoding a container depends on
 /// [`coordinates::DEFINITION`] alone.
 pub const SOLVER_VERSION: u32 = 7;

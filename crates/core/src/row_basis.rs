@@ -1,8 +1,8 @@
 //! Rank and spectrum of the coordinate matrix, and a well-conditioned basis of its rows.
 
-use crate::dense;
 use crate::maxvol::{self, MaxVol};
-use crate::svd::Svd;
+use cager_geometry::linalg;
+use cager_geometry::linalg::svd::Svd;
 use faer::{Mat, MatRef};
 
 /// Singular values below this fraction of the largest are taken for zero: coordinates are not accurate to more.
@@ -26,7 +26,7 @@ pub(crate) struct RowBasis {
 pub(crate) fn row_basis(phi: MatRef<'_, f64>) -> Option<RowBasis> {
     let m = phi.ncols();
     if let Ok(handles) = maxvol::maxvol(phi, maxvol::tolerance(m)) {
-        let square = dense::rows_of(phi, &handles.rows);
+        let square = linalg::rows_of(phi, &handles.rows);
         let to_basis = handles.inverse.clone();
         return Some(RowBasis { handles, square, rank: m, to_basis });
     }
@@ -37,16 +37,16 @@ pub(crate) fn row_basis(phi: MatRef<'_, f64>) -> Option<RowBasis> {
 ///
 /// `None` where a decomposition does not converge.
 pub(crate) fn deficient_basis(phi: MatRef<'_, f64>) -> Option<RowBasis> {
-    let Svd { sigma, v, .. } = dense::right_singular(phi.to_owned())?;
+    let Svd { sigma, v, .. } = linalg::right_singular(phi.to_owned())?;
     let mut rank = sigma.iter().filter(|&&s| s > RANK_TOLERANCE * sigma[0]).count();
     loop {
         // Coordinates in the right singular vectors of the rank, one fewer each time a borderline singular value is still too small.
         let range = v.as_ref().subcols(0, rank);
-        let projected = crate::inversion::tall_product(phi, range);
+        let projected = linalg::tall_product(phi, range);
         match maxvol::maxvol(projected.as_ref(), maxvol::tolerance(rank)) {
             Ok(handles) => {
-                let square = dense::rows_of(phi, &handles.rows);
-                let to_basis = dense::product(range, handles.inverse.as_ref());
+                let square = linalg::rows_of(phi, &handles.rows);
+                let to_basis = linalg::product(range, handles.inverse.as_ref());
                 return Some(RowBasis { handles, square, rank, to_basis });
             }
             Err(_) if rank > 1 => rank -= 1,
@@ -62,6 +62,6 @@ impl RowBasis {
             Some(gram) => gram.clone(),
             None => maxvol::maxima_and_gram(phi, self.to_basis.as_ref(), f64::INFINITY).1,
         };
-        Some(dense::cholesky(gram)?.transpose().to_owned())
+        Some(linalg::cholesky(gram)?.transpose().to_owned())
     }
 }

@@ -5,7 +5,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::mesh::{Model, Point, Polygons, TriMesh};
+use cager_geometry::mesh::{Model, Point, Polygons, TriMesh};
 
 mod shell;
 
@@ -267,8 +267,8 @@ mod tests {
     use std::collections::HashMap;
 
     use super::*;
-    use crate::mesh::winding_number;
-    use crate::vector::{cross, dot, sub};
+    use cager_geometry::mesh::winding_number;
+    use cager_geometry::vector::{cross, dot, sub};
 
     fn capture(points: usize, cage_vertices: usize) -> Capture {
         Capture::new(&Options { points, frames: 12, cage_vertices })

@@ -3,7 +3,7 @@
 mod common;
 
 use cager_core::cage::{Cage, CageError};
-use cager_core::mesh::{Point, TriMesh};
+use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::spatial::Nesting;
 use common::octahedron;
 use std::cell::Cell;

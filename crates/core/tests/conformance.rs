@@ -8,8 +8,8 @@ mod common;
 
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Coordinates, CoordinatesError, Green, Harmonic, MeanValue};
-use cager_core::mesh::{Point, diagonal, distance_to_surface, winding_number};
-use cager_core::vector::{along, combination, cross, mean, norm, sub};
+use cager_geometry::mesh::{Point, diagonal, distance_to_surface, winding_number};
+use cager_geometry::vector::{along, combination, cross, mean, norm, sub};
 use common::{Random, cages, cages_of, thin_cages};
 use faer::Mat;
 

@@ -2,8 +2,8 @@
 
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
-use cager_core::mesh::{Point, TriMesh};
 use cager_core::synthetic;
+use cager_geometry::mesh::{Point, TriMesh};
 use faer::Mat;
 
 mod common;

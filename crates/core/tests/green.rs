@@ -6,9 +6,9 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, DependentParts, Handles, Outcome, Rows, Solver, SolverOptions, SolverParts};
-use cager_core::mesh::Point;
 use cager_core::regularize::Regularizer;
 use cager_core::synthetic::{Capture, Options};
+use cager_geometry::mesh::Point;
 use common::Cages;
 
 const HANDLES: [Handles; 4] =

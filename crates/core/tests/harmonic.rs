@@ -6,8 +6,8 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::{
     CoordinateSystem, Coordinates, CoordinatesError, ElementPlan, Green, Harmonic, Refinement,
 };
-use cager_core::mesh::{Point, TriMesh, bounds, distance_to_surface, winding_number};
-use cager_core::vector::{add, along, combination, dot, middle, norm, sub};
+use cager_geometry::mesh::{Point, TriMesh, bounds, distance_to_surface, winding_number};
+use cager_geometry::vector::{add, along, combination, dot, middle, norm, sub};
 use common::{Random, cages, octahedron};
 
 fn named(wanted: &str) -> Cage {

@@ -6,10 +6,10 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::{CageValues, CoordinateSystem, Coordinates, CoordinatesError, ElementPlan, MeanValue};
 use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, Handles, PrepareContext, PrepareError, Solver, SolverOptions};
-use cager_core::mesh::Point;
 use cager_core::regularize::{Regularizer, SparseMatrix};
 use cager_core::synthetic::{Capture, Options};
-use cager_core::vector::{along, sub};
+use cager_geometry::mesh::Point;
+use cager_geometry::vector::{along, sub};
 use common::Cages;
 
 const HANDLES: [Handles; 4] =
@@ -279,7 +279,7 @@ fn vertices_that_no_point_feels_are_counted_and_placed_by_their_neighbours() {
             let error = solver.decoder().measure(&[&found[0]], &[&positions])[0];
             assert!(error.l2 < 0.1 * solver.diagonal(), "{handles:?} {regularizer:?} {}", error.l2);
             // An unfelt vertex lies within the cage's own extent, not at the origin or at infinity.
-            let (low, high) = cager_core::mesh::bounds(&capture.deformed_cage(5));
+            let (low, high) = cager_geometry::mesh::bounds(&capture.deformed_cage(5));
             for vertex in found[0].chunks_exact(3).skip(m - 3) {
                 for k in 0..3 {
                     let (x, size) = (f64::from(vertex[k]), high[k] - low[k]);

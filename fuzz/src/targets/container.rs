@@ -6,7 +6,7 @@ use crate::Target;
 use cager_codec::{AdjacentGroups, CageBasis, CodedMesh, Hierarchy, ResidualGroup, encode_cages, encode_residual};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
-use cager_core::mesh::{Model, Polygons, TriMesh};
+use cager_geometry::mesh::{Model, Polygons, TriMesh};
 use cager_proto::container::{ContainerReader, ContainerWriter, Header};
 use cager_proto::report::Report;
 use std::io::Cursor;

@@ -7,7 +7,7 @@ use cager::store::{Content, ContentKey, LogEntry, LogRecord, NamedFile, SessionM
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::inversion::{Rows, Solver, SolverOptions};
-use cager_core::mesh::TriMesh;
+use cager_geometry::mesh::TriMesh;
 use cager_proto::messages::SessionOptions;
 use std::collections::HashSet;
 use std::path::Path;

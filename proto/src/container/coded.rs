@@ -9,7 +9,7 @@ use cager_codec::{
 };
 use cager_core::cage::Cage;
 use cager_core::coordinates::{self, CoordinateSystem, Coordinates, DEFINITION, ElementPlan};
-use cager_core::mesh::{Point, Polygons};
+use cager_geometry::mesh::{Point, Polygons};
 use std::io::{Read, Seek};
 
 /// What the basis of coded cages is computed from.

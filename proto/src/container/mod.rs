@@ -16,7 +16,7 @@ pub use error::Error;
 pub use reader::{ContainerReader, SectionInfo};
 pub use writer::{ContainerWriter, colors_bytes};
 
-use cager_core::mesh::Point;
+use cager_geometry::mesh::Point;
 use serde::{Deserialize, Serialize};
 
 /// First bytes of every container. Like PNG's they show damage by text-mode transfers.

@@ -7,7 +7,7 @@ use super::{Error, HEADER_LIMIT, Header, counted_from_zero, tag};
 use crate::le::{self, f32_at, u64_at};
 use crate::report::{FrameError, Report, WorstError};
 use crate::wire;
-use cager_core::mesh::{Model, Point, Polygons, TriMesh, diagonal};
+use cager_geometry::mesh::{Model, Point, Polygons, TriMesh, diagonal};
 use std::io::{Read, Seek, SeekFrom};
 
 /// One section, for listings.

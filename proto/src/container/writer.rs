@@ -7,7 +7,7 @@ use super::{CHUNK_FRAMES, Error, HEADER_LIMIT, Header, counted_from_zero, tag};
 use crate::report::Report;
 use crate::wire;
 use cager_codec::{CodedMesh, encode_errors};
-use cager_core::mesh::{Model, Point, TriMesh};
+use cager_geometry::mesh::{Model, Point, TriMesh};
 use std::io::{Read, Seek, Write};
 
 /// Writes one container to anything that takes bytes. The same input gives the same bytes.

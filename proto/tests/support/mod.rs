@@ -2,7 +2,7 @@
 
 #![allow(dead_code, unreachable_pub)] // Each test file uses a part of it.
 
-use cager_core::mesh::{Model, Polygons, TriMesh};
+use cager_geometry::mesh::{Model, Polygons, TriMesh};
 use cager_proto::container::{ContainerReader, ContainerWriter, Error, Header};
 use cager_proto::report::Report;
 use std::io::Cursor;

@@ -2,7 +2,7 @@
 
 use crate::refused::assert_sentence;
 use crate::support::{Dir, ENCODE, Small, npy_f64};
-use cager_core::mesh::{Model, Point};
+use cager_geometry::mesh::{Model, Point};
 
 const CASE: &str = "01-order-or-unit-changes-after-frame-0";
 

@@ -1,8 +1,8 @@
 //! Case 09: cages of few poses, which determine some of a cage's vertices hardly at all. They stay near the model, and what is said blames the cage.
 
 use crate::support::{Dir, Small, as_model, read_cages};
-use cager_core::mesh::{Point, TriMesh, bounds, diagonal};
-use cager_core::vector::{centroid, distance};
+use cager_geometry::mesh::{Point, TriMesh, bounds, diagonal};
+use cager_geometry::vector::{centroid, distance};
 
 /// Farthest that a vertex may be from the box around a frame's points, in diagonals, beyond what it is in the rest pose.
 const NEAR: f64 = 1.25;

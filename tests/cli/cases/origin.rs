@@ -2,8 +2,8 @@
 
 use crate::refused::assert_sentence;
 use crate::support::{Dir, ENCODE, largest, measure, npy_f64, read_frames};
-use cager_core::mesh::{Model, Point};
 use cager_formats::read_model;
+use cager_geometry::mesh::{Model, Point};
 
 const CASE: &str = "07-utm-coordinates";
 

@@ -2,7 +2,7 @@
 
 use super::refused;
 use crate::support::{Dir, ENCODE, as_model};
-use cager_core::mesh::{Model, TriMesh};
+use cager_geometry::mesh::{Model, TriMesh};
 
 /// Writes a changed cage and expects its refusal.
 #[track_caller]

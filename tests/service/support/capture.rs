@@ -1,8 +1,8 @@
 //! Small captures, as bytes.
 
-use cager_core::mesh::{Model, Polygons, TriMesh};
 use cager_core::synthetic::{self, Options};
 use cager_formats::{FrameOptions, create_frames, write_model};
+use cager_geometry::mesh::{Model, Polygons, TriMesh};
 use cager_proto::record::{self, Kind};
 use std::ops::Range;
 use std::process::{Command, Stdio};

@@ -8,7 +8,7 @@ use cager::http::{router, spare};
 use cager::service::Service;
 use cager::store::LocalDisk;
 use cager_cages::{Design, DesignError, Progress};
-use cager_core::mesh::{TriMesh, bounds};
+use cager_geometry::mesh::{TriMesh, bounds};
 use std::ops::{ControlFlow, Deref};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
 use std::sync::{Arc, Mutex};

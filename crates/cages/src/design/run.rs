@@ -166,7 +166,8 @@ impl Run<'_> {
 
     /// Keeps a cage that is better than the best so far.
     fn keep(&mut self, cage: &Cage, evaluation: Evaluation) -> bool {
-        let better = evaluation.validation_error < self.best.evaluation.validation_error && self.has_no_new_defects(cage);
+        let better =
+            evaluation.validation_error < self.best.evaluation.validation_error && self.has_no_new_defects(cage);
         if better {
             self.best = Best { mesh: cage.mesh().clone(), evaluation };
         }

@@ -6,7 +6,7 @@ mod error;
 pub use defects::Defects;
 pub use error::CageError;
 
-use crate::mesh::{Point, TriMesh, diagonal};
+use cager_geometry::mesh::{Point, TriMesh, diagonal};
 use defects::Examination;
 
 /// An edge of a cage, shared by exactly two faces.

@@ -14,9 +14,10 @@ use super::{
     refuse_plan,
 };
 use crate::cage::Cage;
-use crate::mesh::{self, Point};
-use crate::simd::{LANES, Lanes, zeros};
-use crate::vector;
+use crate::simd::{LANES, Lanes};
+use cager_geometry::linalg::zeros;
+use cager_geometry::mesh::{self, Point};
+use cager_geometry::vector;
 use faer::MatMut;
 use rayon::prelude::*;
 

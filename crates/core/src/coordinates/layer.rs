@@ -12,9 +12,9 @@
 //! whose rounding cancels even in faces a million times longer than wide.
 
 use crate::cage::{Cage, Face};
-use crate::mesh::Point;
 use crate::simd::{LANES, Lanes, angle, dot, ln_ratio, multiversion};
-use crate::vector;
+use cager_geometry::mesh::Point;
+use cager_geometry::vector;
 use faer::MatMut;
 
 /// Closer to the plane of a face than this fraction of its longest edge, a point lies in it.
@@ -277,7 +277,7 @@ fn group_potentials_generic(layers: &Layers, x: &[Lanes; 3], scratch: &mut Scrat
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::TriMesh;
+    use cager_geometry::mesh::TriMesh;
     use faer::Mat;
 
     /// `φ`, n × v, and `ψ`, n × f.

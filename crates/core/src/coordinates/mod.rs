@@ -14,7 +14,7 @@ pub use mean_value::MeanValue;
 pub use normals::DependentNormals;
 
 use crate::cage::Cage;
-use crate::mesh::Point;
+use cager_geometry::mesh::Point;
 use faer::Mat;
 use serde::{Deserialize, Serialize};
 

@@ -6,8 +6,8 @@
 //! face is stretched. The normal of a face collapsed to a line or a point is zero.
 
 use crate::cage::Cage;
-use crate::mesh::Point;
-use crate::vector::{cross, dot, norm, sub};
+use cager_geometry::mesh::Point;
+use cager_geometry::vector::{cross, dot, norm, sub};
 
 /// Computes a cage's face normals from its vertices.
 #[derive(Clone, Debug, PartialEq)]
@@ -106,7 +106,7 @@ fn length2([a, b, c]: &[f64; 3], u: Point, v: Point) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::TriMesh;
+    use cager_geometry::mesh::TriMesh;
 
     fn cage() -> Cage {
         let vertices = vec![[0.1, 0.2, 0.0], [3.1, 0.0, 0.3], [0.4, 1.9, -0.2], [0.7, 0.5, 2.2]];

@@ -1,8 +1,8 @@
 //! Errors of decoded frames, summed over blocks of points.
 
-use crate::mesh::Point;
 use crate::simd::multiversion;
-use crate::vector::add;
+use cager_geometry::mesh::Point;
+use cager_geometry::vector::add;
 
 /// Errors of one frame against the capture.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -9,9 +9,9 @@ pub(crate) use phi::for_each_chunk;
 
 use crate::cage::Cage;
 use crate::coordinates::{DependentNormals, PointwiseCoordinates};
-use crate::dense;
 use crate::inversion::{BATCH, product_columns};
-use crate::mesh::Point;
+use cager_geometry::linalg;
+use cager_geometry::mesh::Point;
 use error::{Sums, block_sums};
 use faer::{Mat, MatRef};
 use phi::{Phi, padded, single};
@@ -84,7 +84,7 @@ impl Decoder {
     /// Takes coordinates n × m that are in single precision already.
     pub(crate) fn from_single(mut phi: Mat<f32>, positions: usize) -> Self {
         let points = phi.nrows();
-        phi.resize_with(points.next_multiple_of(dense::TILE_ROWS), phi.ncols(), |_, _| 0.0);
+        phi.resize_with(points.next_multiple_of(linalg::TILE_ROWS), phi.ncols(), |_, _| 0.0);
         Self { phi: Phi::Stored(Arc::new(phi)), points, positions, normals: None }
     }
 
@@ -290,8 +290,8 @@ fn block_product<'a>(
     columns: MatRef<'_, f32>,
     product: &'a mut Mat<f32>,
 ) -> MatRef<'a, f32> {
-    let whole = rows.next_multiple_of(dense::TILE_ROWS);
-    dense::multiply(product.as_mut().subrows_mut(0, whole), phi.subrows(block * BLOCK_ROWS, whole), columns);
+    let whole = rows.next_multiple_of(linalg::TILE_ROWS);
+    linalg::multiply(product.as_mut().subrows_mut(0, whole), phi.subrows(block * BLOCK_ROWS, whole), columns);
     product.as_ref().subrows(0, rows)
 }
 

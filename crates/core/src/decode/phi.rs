@@ -3,9 +3,8 @@
 use super::BLOCK_ROWS;
 use crate::cage::Cage;
 use crate::coordinates::{Coordinates, PointwiseCoordinates};
-use crate::dense;
-use crate::mesh::Point;
-use crate::simd;
+use cager_geometry::linalg;
+use cager_geometry::mesh::Point;
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -63,7 +62,7 @@ impl Phi {
 
     pub(super) fn rows(&self, rows: &[u32]) -> Mat<f32> {
         match self {
-            Self::Stored(phi) => dense::rows_of((**phi).as_ref(), rows),
+            Self::Stored(phi) => linalg::rows_of((**phi).as_ref(), rows),
             Self::Recomputed(computed) => {
                 let points: Vec<Point> = rows.iter().map(|&i| computed.points[i as usize]).collect();
                 single((computed.pointwise)(&computed.cage, &points).phi.as_ref()).subrows(0, rows.len()).to_owned()
@@ -87,7 +86,7 @@ pub(crate) fn for_each_chunk(
 }
 
 pub(super) fn padded(points: usize, columns: usize) -> Mat<f32> {
-    simd::zeros(points.next_multiple_of(dense::TILE_ROWS), columns)
+    linalg::zeros(points.next_multiple_of(linalg::TILE_ROWS), columns)
 }
 
 /// Converts to single precision, padded with zero rows to a whole tile.

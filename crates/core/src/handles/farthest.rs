@@ -4,8 +4,8 @@
 //! block only if it is closer to the box than the block's largest distance to a sample so far; others are skipped, so that all samples together
 //! cost little more than a few passes.
 
-use crate::mesh::{Point, bounds};
 use crate::simd::{LANES, Lanes, multiversion};
+use cager_geometry::mesh::{Point, bounds};
 use rayon::prelude::*;
 
 /// Points of one block.

@@ -9,9 +9,10 @@
 //! k that of all points with them. N itself, n × K, is never computed.
 
 use super::farthest::morton_order;
-use crate::dense;
-use crate::mesh::{Point, bounds, diagonal};
-use crate::simd::{LANES, Lanes, multiversion, zeros};
+use crate::simd::{LANES, Lanes, multiversion};
+use cager_geometry::linalg;
+use cager_geometry::linalg::zeros;
+use cager_geometry::mesh::{Point, bounds, diagonal};
 use faer::reborrow::{Reborrow, ReborrowMut};
 use faer::{Mat, MatMut, MatRef};
 use rayon::prelude::*;
@@ -88,13 +89,13 @@ pub(crate) fn interpolated(samples: &Samples<'_>, drift: &Drift<'_>) -> Option<M
     let cross = with_all_points(covariance, samples.points, &places, drift.wide);
     let (cross_first, cross_others) = cross.as_ref().split_at_col(r);
     // Lᵀ k Wᵀ, and the coefficients of B Ω₁ Wᵀ.
-    let seen = (drift.least_squares)(difference(cross_others, dense::product(cross_first, drift.others.transpose())));
-    let right = difference(seen.transpose(), dense::product(first, drift.of_basis.transpose()));
-    let covariance_of_contrasts = difference(others, dense::lower_product(first, drift.others.transpose()));
-    let weights = dense::solve_definite(covariance_of_contrasts, right)?;
+    let seen = (drift.least_squares)(difference(cross_others, linalg::product(cross_first, drift.others.transpose())));
+    let right = difference(seen.transpose(), linalg::product(first, drift.of_basis.transpose()));
+    let covariance_of_contrasts = difference(others, linalg::lower_product(first, drift.others.transpose()));
+    let weights = linalg::solve_definite(covariance_of_contrasts, right)?;
     map.as_mut().subrows_mut(r, p).copy_from(&weights);
     let (mut of_first, weights) = map.as_mut().split_at_row_mut(r);
-    of_first -= dense::product(drift.others.transpose(), weights.as_ref());
+    of_first -= linalg::product(drift.others.transpose(), weights.as_ref());
     Some(map)
 }
 
@@ -126,10 +127,10 @@ fn with_all_points(covariance: Covariance, points: &[Point], samples: &[Point], 
         sum.as_mut().par_row_chunks_mut(columns).enumerate().for_each_init(Vec::new, |part, (chunk, mut sum)| {
             let wide = wide.subcols(chunk * columns, sum.nrows());
             for (block, (near, weights)) in blocks.iter().zip(&weights) {
-                let rows = dense::rows_of(wide, block);
+                let rows = linalg::rows_of(wide, block);
                 part.resize(sum.nrows() * near.len(), 0.0);
                 let mut part = MatMut::from_column_major_slice_mut(part, sum.nrows(), near.len());
-                dense::multiply(part.rb_mut(), rows.transpose(), weights.as_ref());
+                linalg::multiply(part.rb_mut(), rows.transpose(), weights.as_ref());
                 for (part, &j) in part.rb().col_iter().zip(near) {
                     sum.rb_mut().col_mut(j).iter_mut().zip(part.iter()).for_each(|(sum, x)| *sum += x);
                 }

@@ -4,8 +4,8 @@
 //! the greedy choice is the largest. Leverages only fall as rows are added: old ones are bounds, and few have to be computed
 //! anew for each row.
 
-use crate::dense;
 use crate::row_basis::RowBasis;
+use cager_geometry::linalg;
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 use std::cmp::Ordering;
@@ -56,8 +56,8 @@ pub(crate) fn rectangular_rows(phi: MatRef<'_, f64>, basis: &RowBasis, count: us
     let mut added = 0;
     while rows.len() < count {
         let Some(top) = bounds.pop() else { break };
-        let b = dense::product(dense::rows_of(phi, &[top.row]).as_ref(), basis.to_basis.as_ref());
-        let direction = dense::product(inverse.as_ref(), b.transpose());
+        let b = linalg::product(linalg::rows_of(phi, &[top.row]).as_ref(), basis.to_basis.as_ref());
+        let direction = linalg::product(inverse.as_ref(), b.transpose());
         let leverage = (0..r).map(|j| b[(0, j)] * direction[(j, 0)]).sum();
         if top.added < added {
             bounds.push(Bound { leverage, added, ..top });
@@ -82,7 +82,7 @@ fn row_norms(phi: MatRef<'_, f64>, to_basis: MatRef<'_, f64>) -> Vec<f64> {
         || Mat::<f64>::zeros(BLOCK_ROWS, to_basis.ncols()),
         |b, (block, norms)| {
             let mut b = b.as_mut().subrows_mut(0, norms.len());
-            dense::multiply(b.as_mut(), phi.subrows(block * BLOCK_ROWS, norms.len()), to_basis);
+            linalg::multiply(b.as_mut(), phi.subrows(block * BLOCK_ROWS, norms.len()), to_basis);
             for j in 0..to_basis.ncols() {
                 for (norm, &x) in norms.iter_mut().zip(b.as_ref().col(j).iter()) {
                     *norm += x * x;

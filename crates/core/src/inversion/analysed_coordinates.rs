@@ -8,7 +8,7 @@ use crate::coordinates::{CageValues, CoordinateSystem, ElementPlan, MeanValue, P
 use crate::decode::{Decoder, for_each_chunk};
 use crate::handles::Handles;
 use crate::handles::farthest::morton_order;
-use crate::mesh::{Point, diagonal};
+use cager_geometry::mesh::{Point, diagonal};
 use faer::Mat;
 use rayon::prelude::*;
 

@@ -10,12 +10,12 @@ use super::{PreparationReport, PrepareContext, PrepareError, Solver, SolverOptio
 use crate::cage::Cage;
 use crate::coordinates::CoordinateSystem;
 use crate::decode::Decoder;
-use crate::dense;
 use crate::handles::Handles;
 use crate::maxvol::MaxVol;
-use crate::mesh::{Point, diagonal};
 use crate::row_basis::{RANK_TOLERANCE, RowBasis, deficient_basis, row_basis};
-use crate::svd;
+use cager_geometry::linalg;
+use cager_geometry::linalg::svd;
+use cager_geometry::mesh::{Point, diagonal};
 use faer::{Mat, MatRef};
 use std::time::Instant;
 
@@ -233,6 +233,6 @@ impl Analysis {
 
     /// Singular values of the given rows of `Φ`, descending; `None` where they do not converge.
     pub fn spectrum_of(&self, rows: &[u32]) -> Option<Vec<f64>> {
-        svd::singular_values(dense::rows_of(self.phi.as_ref(), rows).as_ref())
+        svd::singular_values(linalg::rows_of(self.phi.as_ref(), rows).as_ref())
     }
 }

@@ -2,9 +2,9 @@
 //! and a method is the map T of singular directions.
 
 use super::{HandleSystem, RegularizationTarget, Rows, Solver};
-use crate::dense;
-use crate::mesh::Point;
 use crate::regularize::SpectralMap;
+use cager_geometry::linalg;
+use cager_geometry::mesh::Point;
 use faer::Mat;
 
 /// A method of inversion for frames projected by a [`HandleSystem`]. Its cages are those of the solver with the same options, up to rounding.
@@ -82,7 +82,7 @@ impl Factors {
             }
         }
         if self.mixed.nrows() > 0 {
-            dense::multiply(q.as_mut().subrows_mut(low, self.mixed.nrows()), self.mixed.as_ref(), x.as_ref());
+            linalg::multiply(q.as_mut().subrows_mut(low, self.mixed.nrows()), self.mixed.as_ref(), x.as_ref());
         }
         handle_system.decomposition.directions.to_cage(q.as_ref())
     }

@@ -9,12 +9,12 @@ use super::target::RegularizationTarget;
 use super::translations::{with_unit_row_sums, with_zero_row_sums};
 use super::{Analysis, PrepareError, Solver, SolverOptions};
 use crate::decode::Decoder;
-use crate::dense;
-use crate::mesh::Point;
 use crate::regularize::{
     Reference, RegularizationOperator, Regularizer, SparseMatrix, SpectralMap, Spectrum, WEAK_SINGULAR_VALUE, last_map,
     spectral_map,
 };
+use cager_geometry::linalg;
+use cager_geometry::mesh::Point;
 use faer::Mat;
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
@@ -184,7 +184,7 @@ impl<'a> HandleSystem<'a> {
         let operator = with_zero_row_sums(to_cage, positions);
         let rest = &self.analysis.rest;
         if reference == Reference::RestCage {
-            return RegularizationTarget::Constant(dense::product(
+            return RegularizationTarget::Constant(linalg::product(
                 operator.as_ref(),
                 about_first(rest, positions).as_ref(),
             ));

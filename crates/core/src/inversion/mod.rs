@@ -32,7 +32,6 @@ pub use solve::{BATCH, InvertedFrame, Rows, Solver};
 pub use target::RegularizationTarget;
 pub use threshold::Threshold;
 
-pub(crate) use cager_geometry::linalg::tall_product;
 pub(crate) use solve::product_columns;
 
 /// Rows of one block where a tall matrix is multiplied in blocks.

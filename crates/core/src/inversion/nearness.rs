@@ -4,10 +4,10 @@
 
 use super::HandleSystem;
 use crate::cage::Cage;
-use crate::dense;
-use crate::mesh::{Point, TriMesh};
 use crate::regularize::cage_laplacian;
-use crate::vector::distance;
+use cager_geometry::linalg;
+use cager_geometry::mesh::{Point, TriMesh};
+use cager_geometry::vector::distance;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Accum, Mat, MatRef, Par};
@@ -107,7 +107,7 @@ impl Nearness {
         // Displacements, and a translation by one.
         let one = |i: usize| if i < vertices { 1.0 } else { 0.0 };
         let moved = Mat::from_fn(m, 4, |i, k| if k < 3 { cage[i][k] - self.data.rest[(i, k)] } else { one(i) });
-        let moved = dense::product(gram.as_ref(), moved.as_ref());
+        let moved = linalg::product(gram.as_ref(), moved.as_ref());
         let sum = |k: usize| (0..vertices).map(|i| moved[(i, k)]).sum::<f64>();
         // What the points move by on the average, which nothing holds.
         let mean = [0, 1, 2].map(|k| sum(k) / sum(3));
@@ -140,7 +140,7 @@ impl Nearness {
                 entries.iter().for_each(|&(b, y)| system[(a, b)] += weight * x * y);
             }
         }
-        dense::cholesky(system)
+        linalg::cholesky(system)
     }
 }
 

@@ -1,16 +1,17 @@
 //! The linear inversion as one matrix R, `C = R · H`.
 
+use super::PrepareError;
 use super::spectra::{EXTREMES_ONLY_FROM, Spectra};
-use super::{PrepareError, tall_product};
-use crate::dense;
 use crate::handles::Handles;
 use crate::handles::farthest::farthest_points;
 use crate::handles::interpolation::{Drift, Samples, interpolated};
 use crate::handles::rectangular::rectangular_rows;
-use crate::mesh::Point;
 use crate::regularize::DataMap;
 use crate::row_basis::{RANK_TOLERANCE, RowBasis};
-use crate::svd::{self, LastDirections, Svd};
+use cager_geometry::linalg;
+use cager_geometry::linalg::svd::{self, LastDirections, Svd};
+use cager_geometry::linalg::tall_product;
+use cager_geometry::mesh::Point;
 use faer::{Mat, MatRef};
 
 /// The singular directions of the inverted matrix A.
@@ -33,7 +34,7 @@ impl Directions {
     /// Cages from combinations of directions.
     pub(super) fn to_cage(&self, directions: MatRef<'_, f64>) -> Mat<f64> {
         match self {
-            Self::All { v, .. } => dense::product(v.as_ref(), directions),
+            Self::All { v, .. } => linalg::product(v.as_ref(), directions),
             Self::Last(_) => directions.to_owned(),
         }
     }
@@ -104,7 +105,7 @@ impl Decomposition {
     /// Decomposes the given rows, with equal weights.
     pub(super) fn of_given_rows(phi: MatRef<'_, f64>, rows: Vec<u32>, rank: usize) -> Result<Self, PrepareError> {
         let what = "singular value decomposition of the rows";
-        let svd = svd::svd(dense::rows_of(phi, &rows).as_ref()).ok_or(failed(what))?;
+        let svd = svd::svd(linalg::rows_of(phi, &rows).as_ref()).ok_or(failed(what))?;
         let numerical_rank = svd.sigma.iter().filter(|&&x| x > RANK_TOLERANCE * svd.sigma[0]).count();
         if numerical_rank == 0 {
             return Err(failed("choice of rows"));
@@ -160,12 +161,12 @@ impl Decomposition {
             let left = LeftFactor::Rows(left.ok_or(failed("interpolation between the handles"))?);
             Ok::<_, PrepareError>((left, condition.ok_or(failed("singular value decomposition of the rows"))?))
         };
-        let of_others = || dense::product(dense::rows_of(phi, others).as_ref(), basis.to_basis.as_ref());
+        let of_others = || linalg::product(linalg::rows_of(phi, others).as_ref(), basis.to_basis.as_ref());
         let ((left, condition), directions) = match full {
             FullSvd::Direct(Svd { u, sigma, v }) => {
                 let u = u.as_ref().subcols(0, rank);
-                let (inverse, _) = dense::inverse(dense::rows_of(u, first).as_ref());
-                let others = dense::product(dense::rows_of(u, others).as_ref(), inverse.as_ref());
+                let (inverse, _) = linalg::inverse(linalg::rows_of(u, first).as_ref());
+                let others = linalg::product(linalg::rows_of(u, others).as_ref(), inverse.as_ref());
                 let (others, of_basis) = (others.as_ref(), inverse.as_ref());
                 let drift = Drift { wide: u, others, of_basis, least_squares: &|seen| seen };
                 (interpolate(drift)?, Directions::All { sigma, v })
@@ -175,11 +176,11 @@ impl Decomposition {
                 let others = of_others();
                 let factor = spectra.gram_factor.as_ref().ok_or(failed("factorisation of the handles"))?;
                 let u = u.as_ref().subcols(0, rank);
-                let of_basis = dense::product(u.transpose(), factor.as_ref());
+                let of_basis = linalg::product(u.transpose(), factor.as_ref());
                 let least_squares = |seen: Mat<f64>| {
-                    let mut of_basis = dense::product(basis.to_basis.transpose(), seen.as_ref());
-                    dense::solve_lower(factor.transpose(), &mut of_basis);
-                    dense::product(u.transpose(), of_basis.as_ref())
+                    let mut of_basis = linalg::product(basis.to_basis.transpose(), seen.as_ref());
+                    linalg::solve_lower(factor.transpose(), &mut of_basis);
+                    linalg::product(u.transpose(), of_basis.as_ref())
                 };
                 let (others, of_basis) = (others.as_ref(), of_basis.as_ref());
                 let drift = Drift { wide: phi, others, of_basis, least_squares: &least_squares };
@@ -199,17 +200,17 @@ impl Decomposition {
     /// `Rᵀ`, one row per row read × m, for `q = data · Uᵀ H`.
     pub(super) fn operator(&self, phi: MatRef<'_, f64>, data: &DataMap) -> Mat<f64> {
         if let (LeftFactor::Rows(left), DataMap::Update(out, of)) = (&self.left, data) {
-            let of_left = dense::product(left.as_ref(), of.transpose());
-            return dense::product(of_left.as_ref(), out.transpose()) + left;
+            let of_left = linalg::product(left.as_ref(), of.transpose());
+            return linalg::product(of_left.as_ref(), out.transpose()) + left;
         }
         let to_cage = self.directions.to_cage(data.matrix().as_ref());
         match &self.left {
             LeftFactor::Rows(left) if self.reads_all => tall_product(left.as_ref(), to_cage.transpose()),
-            LeftFactor::Rows(left) => dense::product(left.as_ref(), to_cage.transpose()),
+            LeftFactor::Rows(left) => linalg::product(left.as_ref(), to_cage.transpose()),
             LeftFactor::Implicit { u, factor, to_basis } => {
-                let mut inverse = dense::product(u.as_ref(), to_cage.transpose());
-                dense::solve_upper(factor.as_ref(), &mut inverse);
-                tall_product(phi, dense::product(to_basis.as_ref(), inverse.as_ref()).as_ref())
+                let mut inverse = linalg::product(u.as_ref(), to_cage.transpose());
+                linalg::solve_upper(factor.as_ref(), &mut inverse);
+                tall_product(phi, linalg::product(to_basis.as_ref(), inverse.as_ref()).as_ref())
             }
             LeftFactor::Normal(factor) => {
                 tall_product(phi, normal_solution(factor.as_ref(), to_cage.transpose().to_owned()).as_ref())
@@ -220,21 +221,22 @@ impl Decomposition {
     /// `Uᵀ H` of the rows read H, K × columns.
     pub(super) fn project(&self, phi: MatRef<'_, f64>, read: MatRef<'_, f64>) -> Mat<f64> {
         match &self.left {
-            LeftFactor::Rows(left) => dense::product(left.transpose(), read),
+            LeftFactor::Rows(left) => linalg::product(left.transpose(), read),
             LeftFactor::Implicit { u, factor, to_basis } => {
-                let mut of_basis = dense::product(to_basis.transpose(), dense::product(phi.transpose(), read).as_ref());
-                dense::solve_lower(factor.transpose(), &mut of_basis);
-                dense::product(u.transpose(), of_basis.as_ref())
+                let mut of_basis =
+                    linalg::product(to_basis.transpose(), linalg::product(phi.transpose(), read).as_ref());
+                linalg::solve_lower(factor.transpose(), &mut of_basis);
+                linalg::product(u.transpose(), of_basis.as_ref())
             }
-            LeftFactor::Normal(factor) => normal_solution(factor.as_ref(), dense::product(phi.transpose(), read)),
+            LeftFactor::Normal(factor) => normal_solution(factor.as_ref(), linalg::product(phi.transpose(), read)),
         }
     }
 }
 
 /// `(RᵀR)⁻¹ X`.
 fn normal_solution(factor: MatRef<'_, f64>, mut x: Mat<f64>) -> Mat<f64> {
-    dense::solve_lower(factor.transpose(), &mut x);
-    dense::solve_upper(factor, &mut x);
+    linalg::solve_lower(factor.transpose(), &mut x);
+    linalg::solve_upper(factor, &mut x);
     x
 }
 
@@ -263,11 +265,11 @@ fn whole<'a>(phi: MatRef<'_, f64>, rank: usize, spectra: &'a Spectra) -> Result<
 fn condition_of(phi: MatRef<'_, f64>, handles: &[u32], others: MatRef<'_, f64>, basis: &RowBasis) -> Option<f64> {
     let (m, rank) = (phi.ncols(), basis.rank);
     if m >= EXTREMES_ONLY_FROM && rank == m {
-        let factor = dense::cholesky(Mat::<f64>::identity(m, m) + dense::lower_product(others.transpose(), others))?;
+        let factor = linalg::cholesky(Mat::<f64>::identity(m, m) + linalg::lower_product(others.transpose(), others))?;
         let [first, last] = svd::ends(Some(factor.transpose()), basis.square.as_ref(), basis.handles.inverse.as_ref());
         return Some(first / last);
     }
-    let values = svd::singular_values(dense::upper_factor(dense::rows_of(phi, handles)).as_ref())?;
+    let values = svd::singular_values(linalg::upper_factor(linalg::rows_of(phi, handles)).as_ref())?;
     Some(values[0] / values[rank - 1])
 }
 
@@ -277,6 +279,6 @@ pub(super) fn failed(what: &'static str) -> PrepareError {
 
 /// Zero columns up to a whole tile, see [`product_columns`](super::product_columns).
 pub(super) fn padded_to_tiles(mut operator: Mat<f64>) -> Mat<f64> {
-    operator.resize_with(operator.nrows(), operator.ncols().next_multiple_of(dense::TILE_ROWS), |_, _| 0.0);
+    operator.resize_with(operator.nrows(), operator.ncols().next_multiple_of(linalg::TILE_ROWS), |_, _| 0.0);
     operator
 }

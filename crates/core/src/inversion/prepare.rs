@@ -1,12 +1,12 @@
 //! Preparation of a solver: coordinates, handles, spectrum and operator.
 
-use super::tall_product;
 use super::{Analysis, Handles, PrepareError, Solver, SolverOptions};
 use crate::cage::Cage;
 use crate::coordinates::{CoordinateSystem, ElementPlan, Refinement};
-use crate::mesh::{Point, diagonal, distance_to_surface, winding_number};
 use crate::regularize::SparseMatrix;
-use crate::vector::norm;
+use cager_geometry::linalg::tall_product;
+use cager_geometry::mesh::{Point, diagonal, distance_to_surface, winding_number};
+use cager_geometry::vector::norm;
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

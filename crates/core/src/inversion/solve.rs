@@ -4,7 +4,7 @@ use super::consistent::Consistent;
 use super::nearness::{FrameBox, Nearness};
 use super::{BLOCK_ROWS, Convergence, PreparationReport, RegularizationTarget};
 use crate::decode::Decoder;
-use crate::mesh::Point;
+use cager_geometry::mesh::Point;
 use faer::{Accum, Mat, Par};
 use std::sync::Arc;
 

@@ -2,11 +2,11 @@
 
 use super::operator::failed;
 use super::{PrepareError, SolverOptions};
-use crate::dense;
 use crate::handles::Handles;
 use crate::regularize::{Regularizer, WEAK_SINGULAR_VALUE};
 use crate::row_basis::RowBasis;
-use crate::svd::{self, LastDirections, Svd};
+use cager_geometry::linalg;
+use cager_geometry::linalg::svd::{self, LastDirections, Svd};
 use faer::{Mat, MatRef};
 
 /// Which decompositions to compute.
@@ -110,7 +110,7 @@ impl Spectra {
                 return Some((Vec::new(), None));
             }
             let factor = gram_factor.as_ref()?;
-            let compressed = dense::product(factor.as_ref(), basis.square.as_ref());
+            let compressed = linalg::product(factor.as_ref(), basis.square.as_ref());
             if vectors_of_all {
                 svd::svd(compressed.as_ref()).map(|svd| (svd.sigma.clone(), Some(svd)))
             } else {
@@ -153,8 +153,8 @@ struct Normal {
 
 impl Normal {
     fn of(phi: MatRef<'_, f64>) -> Option<Self> {
-        let factor = dense::cholesky(dense::lower_product(phi.transpose(), phi))?.transpose().to_owned();
-        let inverse = dense::upper_inverse(factor.as_ref());
+        let factor = linalg::cholesky(linalg::lower_product(phi.transpose(), phi))?.transpose().to_owned();
+        let inverse = linalg::upper_inverse(factor.as_ref());
         Some(Self { factor, inverse })
     }
 

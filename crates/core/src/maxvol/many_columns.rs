@@ -3,8 +3,8 @@
 
 use super::swaps::CandidateRows;
 use super::{MAX_PASSES, MaxVol, SINGLE_IS_SAFE, to_single};
-use crate::dense;
-use crate::simd::zeros;
+use cager_geometry::linalg;
+use cager_geometry::linalg::zeros;
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::solve_unit_upper_triangular_in_place;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
@@ -15,7 +15,7 @@ const TASK_ROWS: usize = 256;
 
 /// As [`maxvol`](super::maxvol); `None` where the columns are too close to dependent for single precision, or where swaps do not end.
 pub(super) fn search(phi: MatRef<'_, f64>, tolerance: f64) -> Option<MaxVol> {
-    let lu = dense::pivoted(to_single(phi));
+    let lu = linalg::pivoted(to_single(phi));
     let safe = lu.smallest > SINGLE_IS_SAFE;
     // NaN where a column vanished.
     if !safe {
@@ -41,7 +41,7 @@ pub(super) fn search(phi: MatRef<'_, f64>, tolerance: f64) -> Option<MaxVol> {
         let max_entry = row_max.iter().copied().fold(0.0, f32::max);
         if f64::from(max_entry) <= 1.0 + tolerance {
             let rows: Vec<u32> = picked.iter().map(|&at| order[at as usize]).collect();
-            let (inverse, log_volume) = dense::inverse(dense::rows_of(phi, &rows).as_ref());
+            let (inverse, log_volume) = linalg::inverse(linalg::rows_of(phi, &rows).as_ref());
             let start_log_volume = log_volume - trace.iter().map(|swap| swap.growth.ln()).sum::<f64>();
             let swaps = trace.len();
             let max_entry = f64::from(max_entry);
@@ -91,9 +91,9 @@ fn exchange(b: &mut Mat<f32>, before: &[u32], after: &[u32]) {
         return;
     }
     let row = |i: usize, j: usize| f64::from(b[(j, after[changed[i]] as usize)]);
-    let (inverse, _) = dense::inverse(Mat::from_fn(k, k, |i, j| row(i, changed[j])).as_ref());
+    let (inverse, _) = linalg::inverse(Mat::from_fn(k, k, |i, j| row(i, changed[j])).as_ref());
     let moved = Mat::from_fn(k, m, |i, j| row(i, j) - if changed[i] == j { 1.0 } else { 0.0 });
-    let update = dense::product(inverse.as_ref(), moved.as_ref());
+    let update = linalg::product(inverse.as_ref(), moved.as_ref());
     let update = Mat::<f32>::from_fn(m, k, |j, i| update[(i, j)] as f32);
     b.as_mut().par_col_chunks_mut(TASK_ROWS).for_each(|mut columns: MatMut<'_, f32>| {
         let of_changed = Mat::from_fn(k, columns.ncols(), |i, row| columns[(changed[i], row)]);
@@ -131,7 +131,7 @@ mod tests {
             "{}",
             found.log_volume
         );
-        let b = dense::product(phi.as_ref(), found.inverse.as_ref());
+        let b = linalg::product(phi.as_ref(), found.inverse.as_ref());
         let largest = b.norm_max();
         assert!((found.max_entry - largest).abs() < 1e-3 * largest && largest <= 1.0 + LOOSE_TOLERANCE, "{largest}");
         assert!(found.swaps > 0 && (found.start_log_volume - expected.start_log_volume).abs() < 1e-3);

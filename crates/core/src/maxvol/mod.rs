@@ -10,9 +10,8 @@ mod swaps;
 
 pub(crate) use passes::maxima_and_gram;
 
-use crate::dense;
 use crate::row_basis::RANK_TOLERANCE;
-use crate::simd;
+use cager_geometry::linalg;
 use faer::{Mat, MatRef};
 use passes::row_maxima;
 use rayon::prelude::*;
@@ -103,14 +102,14 @@ pub fn maxvol(phi: MatRef<'_, f64>, tolerance: f64) -> Result<MaxVol, DependentC
 /// Where there are not as many rows as columns.
 pub fn maxvol_from(phi: MatRef<'_, f64>, start: Vec<u32>, tolerance: f64) -> Result<MaxVol, DependentColumns> {
     assert_eq!(start.len(), phi.ncols(), "as many rows as columns");
-    let smallest = dense::pivoted(dense::rows_of(phi, &start)).smallest;
+    let smallest = linalg::pivoted(linalg::rows_of(phi, &start)).smallest;
     if smallest > SINGLE_IS_SAFE { Ok(search(phi, start, tolerance)) } else { Err(DependentColumns { smallest }) }
 }
 
 fn search(phi: MatRef<'_, f64>, start: Vec<u32>, tolerance: f64) -> MaxVol {
     let mut rows = start.clone();
     let mut trace = Vec::new();
-    let (mut inverse, mut log_volume) = dense::inverse(dense::rows_of(phi, &rows).as_ref());
+    let (mut inverse, mut log_volume) = linalg::inverse(linalg::rows_of(phi, &rows).as_ref());
     let start_log_volume = log_volume;
     let found = |rows, trace: Vec<Swap>, log_volume, max_entry, gram, inverse| {
         let swaps = trace.len();
@@ -122,7 +121,7 @@ fn search(phi: MatRef<'_, f64>, start: Vec<u32>, tolerance: f64) -> MaxVol {
         let done = candidates.swap(&mut rows, tolerance);
         let swapped = !done.is_empty();
         trace.extend(done);
-        (inverse, log_volume) = dense::inverse(dense::rows_of(phi, &rows).as_ref());
+        (inverse, log_volume) = linalg::inverse(linalg::rows_of(phi, &rows).as_ref());
         // A pass that is about to find more rows to swap need not be exact.
         let several = (SEVERAL_ROUNDS..MANY_COLUMNS).contains(&phi.ncols());
         if swapped && (pass > 0 || several) {
@@ -150,11 +149,11 @@ fn search(phi: MatRef<'_, f64>, start: Vec<u32>, tolerance: f64) -> MaxVol {
 /// # Errors
 /// [`DependentColumns`] where the columns are numerically dependent.
 pub fn start_rows(phi: MatRef<'_, f64>) -> Result<Vec<u32>, DependentColumns> {
-    let single = dense::pivoted(to_single(phi));
+    let single = linalg::pivoted(to_single(phi));
     if single.smallest > SINGLE_IS_SAFE {
         return Ok(single.rows().to_vec());
     }
-    let double = dense::pivoted(phi.to_owned());
+    let double = linalg::pivoted(phi.to_owned());
     if double.smallest > RANK_TOLERANCE {
         return Ok(double.rows().to_vec());
     }
@@ -162,7 +161,7 @@ pub fn start_rows(phi: MatRef<'_, f64>) -> Result<Vec<u32>, DependentColumns> {
 }
 
 fn to_single(phi: MatRef<'_, f64>) -> Mat<f32> {
-    let mut single = simd::zeros(phi.nrows(), phi.ncols());
+    let mut single = linalg::zeros(phi.nrows(), phi.ncols());
     single.as_mut().par_col_chunks_mut(1).enumerate().for_each(|(j, mut column)| {
         for (s, &x) in column.as_mut().col_mut(0).iter_mut().zip(phi.col(j).iter()) {
             *s = x as f32;

@@ -1,7 +1,7 @@
 //! Passes over all rows of `B = Φ Φ□⁻¹`, without ever holding B.
 
 use super::MANY_COLUMNS;
-use crate::dense;
+use cager_geometry::linalg;
 use faer::reborrow::{Reborrow, ReborrowMut};
 use faer::{Accum, Mat, MatRef, Par};
 use rayon::prelude::*;
@@ -36,7 +36,7 @@ pub(super) fn row_maxima(phi: MatRef<'_, f64>, inverse: MatRef<'_, f64>) -> Vec<
                 }
             }
             let mut b = b.as_mut().subrows_mut(0, maxima.len());
-            dense::multiply(b.rb_mut(), single.rb(), inverse.as_ref());
+            linalg::multiply(b.rb_mut(), single.rb(), inverse.as_ref());
             for j in 0..m {
                 for (max, &x) in maxima.iter_mut().zip(b.rb().col(j).iter()) {
                     *max = if x.abs() > *max { x.abs() } else { *max };
@@ -65,7 +65,7 @@ pub(crate) fn maxima_and_gram(phi: MatRef<'_, f64>, inverse: MatRef<'_, f64>, li
             for (k, maxima) in maxima.chunks_mut(block_rows).enumerate() {
                 let first = (group * blocks_per_group + k) * block_rows;
                 let mut b = b.as_mut().subrows_mut(0, maxima.len());
-                dense::multiply(b.rb_mut(), phi.subrows(first, maxima.len()), inverse);
+                linalg::multiply(b.rb_mut(), phi.subrows(first, maxima.len()), inverse);
                 for j in 0..m {
                     for (max, &x) in maxima.iter_mut().zip(b.rb().col(j).iter()) {
                         *max = if x.abs() > *max { x.abs() } else { *max };
@@ -119,8 +119,8 @@ mod tests {
         for rank in [9, 5] {
             let to_basis = Mat::from_fn(9, rank, |i, j| ((3 * i + 7 * j) % 5) as f64 - 2.0);
             let (maxima, gram) = maxima_and_gram(phi.as_ref(), to_basis.as_ref(), f64::INFINITY);
-            let b = dense::product(phi.as_ref(), to_basis.as_ref());
-            assert_eq!(gram, dense::product(b.transpose(), b.as_ref()), "integers are exact");
+            let b = linalg::product(phi.as_ref(), to_basis.as_ref());
+            assert_eq!(gram, linalg::product(b.transpose(), b.as_ref()), "integers are exact");
             assert_eq!(maxima[3], b.as_ref().row(3).norm_max());
         }
     }

@@ -1,8 +1,8 @@
 //! Swaps of rows, in single precision, among the rows that may take part in them.
 
 use super::Swap;
-use crate::dense;
 use crate::simd::multiversion;
+use cager_geometry::linalg;
 use faer::MatRef;
 use rayon::prelude::*;
 
@@ -43,8 +43,8 @@ impl CandidateRows {
         blocks.zip(candidates.par_chunks(TASK_ROWS)).for_each(|((entries, row_max), candidates)| {
             // Transposed, so that a row of B is contiguous.
             let others: Vec<u32> = candidates.iter().copied().filter(|&i| position[i as usize].is_none()).collect();
-            let rows = dense::rows_of(phi, &others);
-            let b = dense::product(inverse.transpose(), rows.transpose());
+            let rows = linalg::rows_of(phi, &others);
+            let b = linalg::product(inverse.transpose(), rows.transpose());
             let mut columns = b.col_iter();
             for ((row, max), &i) in entries.chunks_exact_mut(width).zip(row_max).zip(candidates) {
                 if let Some(j) = position[i as usize] {

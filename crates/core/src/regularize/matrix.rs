@@ -2,7 +2,7 @@
 
 use super::TermError;
 use crate::cage::Cage;
-use crate::svd::{Svd, svd};
+use cager_geometry::linalg::svd::{Svd, svd};
 use faer::Mat;
 
 /// Larger entries overflow where they are squared.

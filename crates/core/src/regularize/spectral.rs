@@ -1,8 +1,8 @@
 //! A term on the unstable end of the spectrum, and the baselines (paper §5.2).
 
 use super::{Reference, Regularizer, WEAK_SINGULAR_VALUE};
-use crate::dense;
-use crate::svd::LastDirections;
+use cager_geometry::linalg;
+use cager_geometry::linalg::svd::LastDirections;
 use faer::{Mat, MatRef};
 
 /// Input of [`spectral_map`]: a decomposition and a regularisation term.
@@ -44,7 +44,7 @@ impl DataMap {
         match self {
             Self::Matrix(map) => map.clone(),
             Self::Update(left, right) => {
-                Mat::<f64>::identity(left.nrows(), left.nrows()) + dense::product(left.as_ref(), right.as_ref())
+                Mat::<f64>::identity(left.nrows(), left.nrows()) + linalg::product(left.as_ref(), right.as_ref())
             }
         }
     }
@@ -92,9 +92,9 @@ fn sub_spectral(spectrum: &Spectrum<'_>, s: usize, weight: f64) -> Option<Spectr
     if s == 0 {
         return Some(SpectralMap { data: DataMap::Matrix(data), target: None });
     }
-    let delta_v = dense::product(spectrum.term.delta.as_ref(), spectrum.v);
+    let delta_v = linalg::product(spectrum.term.delta.as_ref(), spectrum.v);
     let (delta_low, delta_high) = (delta_v.as_ref().subcols(0, low), delta_v.as_ref().subcols(low, s));
-    let coupling = dense::product(delta_high.transpose(), delta_low);
+    let coupling = linalg::product(delta_high.transpose(), delta_low);
     let mut right = Mat::zeros(s, r);
     for i in 0..s {
         for k in 0..low {
@@ -129,15 +129,15 @@ pub(crate) fn last_map(
     let mut update = Mat::zeros(s, v.nrows());
     let mut target = None;
     if s > 0 {
-        let delta_high = dense::product(term.delta.as_ref(), v);
-        let seen = dense::product(delta_high.transpose(), term.delta.as_ref());
-        let mut right = dense::product(dense::product(seen.as_ref(), v).as_ref(), v.transpose());
+        let delta_high = linalg::product(term.delta.as_ref(), v);
+        let seen = linalg::product(delta_high.transpose(), term.delta.as_ref());
+        let mut right = linalg::product(linalg::product(seen.as_ref(), v).as_ref(), v.transpose());
         for (i, j) in (0..v.nrows()).flat_map(|j| (0..s).map(move |i| (i, j))) {
             right[(i, j)] = sigma[i] * sigma[i] * v[(j, i)] - weight * (seen[(i, j)] - right[(i, j)]);
         }
         let (high, of_reference) = place(delta_high.as_ref(), sigma, right, term, weight)?;
         update = high - v.transpose();
-        target = of_reference.map(|high| dense::product(v, high.as_ref()));
+        target = of_reference.map(|high| linalg::product(v, high.as_ref()));
     }
     Some(SpectralMap { data: DataMap::Update(v.to_owned(), update), target })
 }
@@ -152,7 +152,7 @@ fn place(
     weight: f64,
 ) -> Option<(Mat<f64>, Option<Mat<f64>>)> {
     let (s, m, r) = (delta_high.ncols(), term.delta.ncols(), data.ncols());
-    let mut system = dense::product(delta_high.transpose(), delta_high);
+    let mut system = linalg::product(delta_high.transpose(), delta_high);
     for (i, j) in (0..s).flat_map(|j| (0..s).map(move |i| (i, j))) {
         system[(i, j)] *= weight;
     }
@@ -164,10 +164,10 @@ fn place(
     // The right-hand sides of the data, and after them those of the reference.
     let mut right = data;
     if term.reference != Reference::Origin {
-        let target = dense::product(delta_high.transpose(), term.delta.as_ref());
+        let target = linalg::product(delta_high.transpose(), term.delta.as_ref());
         right.resize_with(s, r + m, |i, j| weight * target[(i, j - r)]);
     }
-    let solved = match dense::solve_definite_within(system.clone(), right.clone(), 1e-13, rounding_level) {
+    let solved = match linalg::solve_definite_within(system.clone(), right.clone(), 1e-13, rounding_level) {
         Some(solved) => solved,
         // Neither Δ nor any point determines the position of some connected component: add a small multiple of the identity, which keeps it near the
         // origin.
@@ -176,7 +176,7 @@ fn place(
             for i in 0..s {
                 system[(i, i)] += if size > 0.0 { 1e-9 * size } else { 1.0 };
             }
-            dense::solve_definite(system, right)?
+            linalg::solve_definite(system, right)?
         }
     };
     let target = (solved.ncols() > r).then(|| solved.subcols(r, m).to_owned());

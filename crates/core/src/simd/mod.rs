@@ -8,7 +8,6 @@ mod lanes;
 mod logarithm;
 
 pub(crate) use angle::angle;
-pub(crate) use cager_geometry::linalg::zeros;
 pub(crate) use dispatch::multiversion;
 pub(crate) use lanes::{LANES, Lanes, cross, dot};
 pub(crate) use logarithm::ln_ratio;

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::{HEIGHT, heights, place, pushed_out, radius, silhouette_normal, spine};
-use crate::mesh::{Point, TriMesh};
+use cager_geometry::mesh::{Point, TriMesh};
 
 /// Distance the cage aims to keep from the figure.
 const MARGIN: f64 = 0.02;

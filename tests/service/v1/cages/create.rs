@@ -1,8 +1,8 @@
 //! `POST /v1/cages`: a cage is designed from a motion, and sessions use it.
 
 use crate::support::{Capture, TestApp, cage_form, cage_form_of, file, text};
-use cager_core::mesh::Polygons;
 use cager_formats::{FrameOptions, MeshFormat, create_frames, read_model_bytes};
+use cager_geometry::mesh::Polygons;
 use cager_proto::cage_messages::{CageJob, CageState};
 use cager_proto::messages::Session;
 use reqwest::multipart::Form;

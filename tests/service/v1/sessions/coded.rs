@@ -1,7 +1,7 @@
 //! Sessions with a goal for error, size or quality: frames are coded in groups while they come.
 
 use crate::support::{Api, Capture, HANG, OCTETS, TestApp, eventually, form, piece, within};
-use cager_core::mesh::diagonal;
+use cager_geometry::mesh::diagonal;
 use cager_proto::container::ContainerReader;
 use cager_proto::messages::{CacheUse, Session};
 use http::Method;

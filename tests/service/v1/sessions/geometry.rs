@@ -1,7 +1,7 @@
 //! Rest poses and cages that cannot be used: what is said about them.
 
 use crate::support::{Capture, Mesh, TestApp, file, form, form_of, text};
-use cager_core::mesh::{Model, Polygons};
+use cager_geometry::mesh::{Model, Polygons};
 use cager_proto::messages::{Problem, Session};
 use reqwest::multipart::Form;
 use serde_json::json;

@@ -1,7 +1,7 @@
 //! Sessions whose cage is not sent.
 
 use crate::support::{Capture, Mesh, TestApp, file, form, text};
-use cager_core::mesh::Model;
+use cager_geometry::mesh::Model;
 use cager_proto::messages::{CacheUse, Session};
 use futures_util::future::join_all;
 use reqwest::multipart::Form;

@@ -1,7 +1,7 @@
 //! What makes linear functions exact: every column of data is split into its best linear function and a rest.
 
-use crate::mesh::Point;
-use crate::vector::mean;
+use cager_geometry::mesh::Point;
+use cager_geometry::vector::mean;
 #[cfg(test)]
 use faer::Mat;
 use faer::MatMut;

@@ -9,9 +9,9 @@ use super::potential::Tables;
 use super::quadrature::GAUSS_6;
 use super::triangle::Triangle;
 use crate::coordinates::layer::{INVERSE_4PI, edge_logarithm};
-use crate::mesh::Point;
 use crate::simd::{LANES, Lanes, angle, dot};
-use crate::vector;
+use cager_geometry::mesh::Point;
+use cager_geometry::vector;
 
 /// Farther from an edge than so many of its lengths, integrals along it are taken by quadrature.
 const FAR_FROM_EDGE: f64 = 1.5;

@@ -2,9 +2,9 @@
 
 use super::basis::functions;
 use super::triangle::Triangle;
-use crate::mesh::{Point, distance2_to_triangle};
 use crate::simd::{LANES, Lanes, dot, multiversion};
-use crate::vector::{self, middle, sub};
+use cager_geometry::mesh::{Point, distance2_to_triangle};
+use cager_geometry::vector::{self, middle, sub};
 use rayon::prelude::*;
 
 /// One element.

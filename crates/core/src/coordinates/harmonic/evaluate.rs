@@ -12,8 +12,8 @@ use super::potential::{Tables, potentials};
 use super::solve::{Densities, Part, single};
 use super::surface::{ClosestPoint, Surface};
 use crate::coordinates::layer::{self, INVERSE_4PI, Layers, group_potentials, write_group};
-use crate::mesh::Point;
 use crate::simd::{LANES, Lanes, multiversion};
+use cager_geometry::mesh::Point;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
@@ -74,7 +74,7 @@ pub(super) fn evaluate(
     let m = solution.layers.vertices().len();
     let near = Near::new(solution, points, closest_points);
     let low = single(solution.densities.low.as_ref());
-    let mut phi = crate::simd::zeros::<f64>(points.len(), m);
+    let mut phi = cager_geometry::linalg::zeros::<f64>(points.len(), m);
     let found: Vec<TaskResult> = phi
         .as_mut()
         .par_row_chunks_mut(TASK_POINTS)

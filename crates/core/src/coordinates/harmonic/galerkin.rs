@@ -8,7 +8,7 @@ use super::quadrature::Rule;
 use super::triangle::Triangle;
 use crate::coordinates::layer::{INVERSE_4PI, Layers, group_potentials};
 use crate::simd::{LANES, Lanes, multiversion};
-use crate::vector;
+use cager_geometry::vector;
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
@@ -170,7 +170,7 @@ pub(super) fn is_near(a: &Element, b: &Element) -> bool {
 pub(super) fn operator(tables: &Tables, outer: &Outer, unknowns: &Unknowns) -> Operator {
     let elements = &unknowns.elements;
     let low = unknowns.low;
-    let mut a = crate::simd::zeros::<f64>(unknowns.low_count(), unknowns.low_count());
+    let mut a = cager_geometry::linalg::zeros::<f64>(unknowns.low_count(), unknowns.low_count());
     let found: Vec<Vec<(u32, u32, Mat<f64>)>> = a
         .as_mut()
         .par_col_chunks_mut(low)
@@ -256,12 +256,12 @@ pub(super) fn right_hand_sides(outer: &Outer, layers: &Layers, unknowns: &Unknow
                 }
                 let count = functions(element.degree);
                 let weights = Mat::from_fn(count, nodes, |k, q| element.triangle.area * rule.weighted[q][k]);
-                crate::dense::product(weights.as_ref(), data.as_ref())
+                cager_geometry::linalg::product(weights.as_ref(), data.as_ref())
             },
         )
         .collect();
-    let mut low = crate::simd::zeros::<f64>(unknowns.low_count(), m);
-    let mut high = crate::simd::zeros::<f64>(unknowns.high_count(), m);
+    let mut low = cager_geometry::linalg::zeros::<f64>(unknowns.low_count(), m);
+    let mut high = cager_geometry::linalg::zeros::<f64>(unknowns.high_count(), m);
     for (e, rows) in rows.iter().enumerate() {
         for v in 0..m {
             for k in 0..unknowns.low {

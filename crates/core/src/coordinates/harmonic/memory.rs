@@ -5,7 +5,7 @@ use super::elements::{Element, MANY, Unknowns};
 use super::galerkin::is_near;
 use super::patch::PATCH;
 use super::{ELEMENTS, LOW_DEGREES};
-use crate::mesh::Point;
+use cager_geometry::mesh::Point;
 use rayon::prelude::*;
 
 /// More than this is refused: a file must not make its reader take any amount.

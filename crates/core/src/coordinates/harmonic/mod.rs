@@ -31,7 +31,7 @@ mod triangle;
 use super::layer::Layers;
 use super::{CageValues, CoordinateSystem, Coordinates, CoordinatesError, Refinement};
 use crate::cage::Cage;
-use crate::mesh::Point;
+use cager_geometry::mesh::Point;
 use elements::Unknowns;
 use evaluate::{Evaluated, Solution};
 use faer::Mat;

@@ -3,9 +3,9 @@
 
 use super::evaluate::Solution;
 use super::surface::{ClosestPoint, Side};
-use crate::mesh::{Point, distance2_to_triangle};
 use crate::simd::{LANES, Lanes};
-use crate::vector;
+use cager_geometry::mesh::{Point, distance2_to_triangle};
+use cager_geometry::vector;
 use rayon::prelude::*;
 
 /// Points with their closest points of the surface and shares.

@@ -6,7 +6,7 @@ use super::elements::{Element, LATER, QUARTERS, Unknowns};
 use super::patch::{DAMPING, PATCH};
 use super::solve::{MAX_ITERATIONS, SolveRecord};
 use super::{LOW_DEGREES, MIN_DEGREE};
-use crate::mesh::Point;
+use cager_geometry::mesh::Point;
 use serde::{Deserialize, Serialize};
 
 /// The boundary elements that harmonic coordinates were solved on, and how.

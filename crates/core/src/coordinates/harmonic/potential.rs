@@ -124,8 +124,8 @@ fn quadrature(
 mod tests {
     use super::super::basis::MAX_DEGREE;
     use super::*;
-    use crate::mesh::Point;
-    use crate::vector;
+    use cager_geometry::mesh::Point;
+    use cager_geometry::vector;
 
     /// The same by brute force: the triangle divided until its parts are small against their distance.
     fn divided(

@@ -43,7 +43,7 @@ pub(super) fn single(a: MatRef<'_, f64>) -> Mat<f32> {
 
 /// The same from the row on that belongs to each column; zeros above.
 fn single_from(a: MatRef<'_, f64>, first: impl Fn(usize) -> usize + Sync) -> Mat<f32> {
-    let mut out = crate::simd::zeros::<f32>(a.nrows(), a.ncols());
+    let mut out = cager_geometry::linalg::zeros::<f32>(a.nrows(), a.ncols());
     out.as_mut().par_col_iter_mut().zip(a.par_col_iter()).enumerate().for_each(|(j, (out, a))| {
         let first = first(j);
         faer::zip!(out.subrows_mut(first, a.nrows() - first), a.subrows(first, a.nrows() - first))

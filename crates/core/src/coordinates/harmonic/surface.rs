@@ -1,7 +1,7 @@
 //! The closest point of the cage's surface, and whether a point is inside, outside or on it.
 
-use crate::mesh::{self, Point};
-use crate::vector;
+use cager_geometry::mesh::{self, Point};
+use cager_geometry::vector;
 use rayon::prelude::*;
 
 /// Nearer to the surface than this, over the cage's diagonal, a point counts as on it.

@@ -1,7 +1,7 @@
 //! Triangles with what integrals over them need.
 
-use crate::mesh::Point;
-use crate::vector;
+use cager_geometry::mesh::Point;
+use cager_geometry::vector;
 
 /// A triangle with a polynomial density.
 #[derive(Clone, Debug)]

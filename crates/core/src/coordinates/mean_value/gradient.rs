@@ -7,8 +7,9 @@
 
 use super::MeanValue;
 use crate::cage::{Cage, Edge, Face};
-use crate::mesh::Point;
-use crate::simd::{LANES, Lanes, angle, cross, dot, multiversion, zeros};
+use crate::simd::{LANES, Lanes, angle, cross, dot, multiversion};
+use cager_geometry::linalg::zeros;
+use cager_geometry::mesh::Point;
 use faer::{Mat, MatMut, MatRef};
 use rayon::prelude::*;
 

@@ -2,8 +2,8 @@
 //! `w_i = h ∫ λ_i / |r|⁴ dA`, with `r` from the point to the face, `h` the height of the face's plane over the point and `λ_i` the
 //! barycentric coordinates. The integrands have one sign, so nothing cancels, however flat or far away the face appears.
 
-use crate::mesh::{Point, distance2_to_triangle};
-use crate::vector::{along, cross, dot, middle, sub};
+use cager_geometry::mesh::{Point, distance2_to_triangle};
+use cager_geometry::vector::{along, cross, dot, middle, sub};
 
 /// Nodes and weights of Gauss's rule with eight points on [0, 1], exact to degree 15.
 const GAUSS: [[f64; 2]; 8] = [

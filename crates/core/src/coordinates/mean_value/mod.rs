@@ -14,9 +14,10 @@ use super::{
     CageValues, CoordinateSystem, Coordinates, CoordinatesError, ElementPlan, PointwiseCoordinates, refuse_plan,
 };
 use crate::cage::{Cage, Edge, Face};
-use crate::mesh::Point;
-use crate::simd::{LANES, Lanes, angle, cross, dot, multiversion, zeros};
-use crate::vector;
+use crate::simd::{LANES, Lanes, angle, cross, dot, multiversion};
+use cager_geometry::linalg::zeros;
+use cager_geometry::mesh::Point;
+use cager_geometry::vector;
 use faer::MatMut;
 use rayon::prelude::*;
 

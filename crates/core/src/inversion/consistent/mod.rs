@@ -13,9 +13,9 @@ mod state;
 
 use crate::coordinates::DependentNormals;
 use crate::decode::Decoder;
-use crate::dense;
-use crate::mesh::Point;
-use crate::vector::{along, dot, sub};
+use cager_geometry::linalg;
+use cager_geometry::mesh::Point;
+use cager_geometry::vector::{along, dot, sub};
 use faer::{Accum, Mat, MatRef, Par};
 use state::FrameState;
 
@@ -108,12 +108,12 @@ impl Consistent {
                 }
             }
         }
-        let preconditioner = dense::solve_definite(system.clone(), Mat::identity(v, v))?;
+        let preconditioner = linalg::solve_definite(system.clone(), Mat::identity(v, v))?;
         let curvature = |i, j| if i < v && j < v { system[(i, j)] } else { gram[(i, j)] };
         let curvature = single(total, &curvature);
         let preconditioner = single(v, &|i, j| preconditioner[(i, j)]);
         let whole = |mut a: Mat<f64>| {
-            let columns = a.ncols().next_multiple_of(dense::TILE_ROWS);
+            let columns = a.ncols().next_multiple_of(linalg::TILE_ROWS);
             a.resize_with(a.nrows(), columns, |_, _| 0.0);
             a
         };
@@ -352,7 +352,7 @@ fn active(search: &Option<state::ConjugateGradients>) -> Option<&state::Conjugat
 
 /// An n × n matrix in single precision, padded with zero rows to a whole tile.
 fn single(n: usize, entry: &dyn Fn(usize, usize) -> f64) -> Mat<f32> {
-    Mat::from_fn(n.next_multiple_of(dense::TILE_ROWS), n, |i, j| if i < n { entry(i, j) as f32 } else { 0.0 })
+    Mat::from_fn(n.next_multiple_of(linalg::TILE_ROWS), n, |i, j| if i < n { entry(i, j) as f32 } else { 0.0 })
 }
 
 /// Neighbours of each vertex of a closed mesh, each once: the two faces of an edge run along it in opposite directions.

@@ -3,8 +3,8 @@
 use super::Outcome;
 use super::product_columns;
 use crate::coordinates::DependentNormals;
-use crate::mesh::Point;
-use crate::vector::{add, along, combination, dot, sub};
+use cager_geometry::mesh::Point;
+use cager_geometry::vector::{add, along, combination, dot, sub};
 use faer::{Mat, MatRef};
 
 /// State of one frame. Positions are relative to the centre of the initial cage, to keep precision far from the origin.
@@ -204,7 +204,7 @@ pub(super) fn products<T: faer::traits::RealField + Copy>(
         }
     }
     let mut out = Mat::<T>::zeros(a.nrows(), width);
-    crate::dense::multiply(out.as_mut(), a, columns.as_ref());
+    cager_geometry::linalg::multiply(out.as_mut(), a, columns.as_ref());
     let mut place = 0..;
     let rows = |f: usize| (0..a.ncols()).map(|j| [0, 1, 2].map(|k| from(out[(j, 3 * f + k)]))).collect();
     let of_frame =

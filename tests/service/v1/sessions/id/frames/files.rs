@@ -90,7 +90,7 @@ async fn a_first_frame_hundreds_of_diagonals_away_is_refused_with_its_number_and
     let app = TestApp::start();
     let capture = Capture::small();
     let session = app.ready(capture).await;
-    let diagonal = cager_core::mesh::diagonal(&capture.rest.model.points) as f32;
+    let diagonal = cager_geometry::mesh::diagonal(&capture.rest.model.points) as f32;
     let path = format!("/v1/sessions/{}/frames", session.id);
     let moved = |frame: u32, by: f32| -> Vec<f32> { capture.frames[frame as usize].iter().map(|x| x + by).collect() };
     let raw = |values: &[f32]| -> Vec<u8> { values.iter().flat_map(|x| x.to_le_bytes()).collect() };
