@@ -1,5 +1,6 @@
 //! The mathematics of CageR: plain data in, plain data out; no I/O, no async, no threads of its own making.
 
+mod batch;
 pub mod cage;
 pub mod coordinates;
 pub mod decode;

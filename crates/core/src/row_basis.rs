@@ -1,12 +1,9 @@
 //! Rank and spectrum of the coordinate matrix, and a well-conditioned basis of its rows.
 
-use crate::maxvol::{self, MaxVol};
+use crate::maxvol::{self, MaxVol, RANK_TOLERANCE};
 use cager_geometry::linalg;
 use cager_geometry::linalg::svd::Svd;
 use faer::{Mat, MatRef};
-
-/// Singular values below this fraction of the largest are taken for zero: coordinates are not accurate to more.
-pub(crate) const RANK_TOLERANCE: f64 = 1e-11;
 
 /// `Φ = B Φ□`: handles of maximum volume, with what the inversion needs of B.
 pub(crate) struct RowBasis {

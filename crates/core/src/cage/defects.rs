@@ -1,6 +1,7 @@
 //! All that keeps a triangle mesh from being a cage, and its edges.
 
-use super::{CageError, Edge, Face};
+use super::edges::{Edge, Face};
+use super::error::CageError;
 use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::spatial::{Nesting, part_volumes};
 use cager_geometry::topology::UnionFind;

@@ -7,19 +7,16 @@ mod phi;
 pub use error::FrameError;
 pub(crate) use phi::for_each_chunk;
 
+use crate::batch::{BATCH, product_columns};
 use crate::cage::Cage;
 use crate::coordinates::{DependentNormals, PointwiseCoordinates};
-use crate::inversion::{BATCH, product_columns};
 use cager_geometry::linalg;
 use cager_geometry::mesh::Point;
 use error::{Sums, block_sums};
 use faer::{Mat, MatRef};
-use phi::{Phi, padded, single};
+use phi::{BLOCK_ROWS, Phi, padded, single};
 use rayon::prelude::*;
 use std::sync::Arc;
-
-/// Rows of Φ that one task multiplies: their product with a batch of cages stays in the second-level cache.
-const BLOCK_ROWS: usize = 1024;
 
 /// Turns cages into positions of the model's points.
 #[derive(Clone, Debug)]

@@ -1,6 +1,5 @@
 //! A decoder's `Φ`: stored, or recomputed chunk by chunk at every use.
 
-use super::BLOCK_ROWS;
 use crate::cage::Cage;
 use crate::coordinates::{Coordinates, PointwiseCoordinates};
 use cager_geometry::linalg;
@@ -8,6 +7,9 @@ use cager_geometry::mesh::Point;
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 use std::sync::Arc;
+
+/// Rows of Φ that one task multiplies: their product with a batch of cages stays in the second-level cache.
+pub(super) const BLOCK_ROWS: usize = 1024;
 
 /// Approximate memory of one chunk of coordinates, in both precisions together.
 const CHUNK_BYTES: usize = 96 << 20;

@@ -1,7 +1,8 @@
 //! Coordinates for an analysis: of all points of a model, or of a sample of a very large one.
 
 use super::PrepareError;
-use super::prepare::{PrepareContext, coordinates_bytes, outside, reject_unreproduced_point, reproduction_error};
+use super::checks::{coordinates_bytes, outside, reject_unreproduced_point, reproduction_error};
+use super::context::PrepareContext;
 use super::spectra::RequiredDecompositions;
 use crate::cage::Cage;
 use crate::coordinates::{CageValues, CoordinateSystem, ElementPlan, MeanValue, PointwiseCoordinates, Refinement};

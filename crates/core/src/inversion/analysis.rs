@@ -2,17 +2,16 @@
 //! options.
 
 use super::analysed_coordinates::{AnalysisCoordinates, coordinates};
-use super::handle_system::{HandleSystem, drop_zero_weight_regularizer};
-use super::operator::Decomposition;
-use super::prepare::{check, check_options, reject_far_points};
+use super::checks::{check, reject_far_points};
+use super::options::drop_zero_weight_regularizer;
 use super::spectra::{RequiredDecompositions, Spectra};
-use super::{PreparationReport, PrepareContext, PrepareError, Solver, SolverOptions};
+use super::{PreparationReport, PrepareContext, PrepareError, SolverOptions};
 use crate::cage::Cage;
 use crate::coordinates::CoordinateSystem;
 use crate::decode::Decoder;
-use crate::handles::Handles;
 use crate::maxvol::MaxVol;
-use crate::row_basis::{RANK_TOLERANCE, RowBasis, deficient_basis, row_basis};
+use crate::maxvol::RANK_TOLERANCE;
+use crate::row_basis::{RowBasis, deficient_basis, row_basis};
 use cager_geometry::linalg;
 use cager_geometry::linalg::svd;
 use cager_geometry::mesh::{Point, diagonal};
@@ -160,39 +159,9 @@ impl Analysis {
         Ok(Self { phi, cage, points, sample, rest, basis, spectra, decoder, diagonal, memory, preparation })
     }
 
-    /// The linear system of a choice of handles with its decomposition, from which solvers with any regularisation follow.
-    ///
-    /// # Errors
-    /// As [`Solver::prepare`].
-    pub fn handle_system(&self, handles: Handles) -> Result<HandleSystem<'_>, PrepareError> {
-        let clock = Instant::now();
-        let options = SolverOptions { handles, spectrum: 0, ..SolverOptions::PAPER };
-        check_options(self.phi.nrows(), self.phi.ncols(), options, self.memory)?;
-        let decomposition = Decomposition::new(self.phi.as_ref(), &self.points, &self.basis, &self.spectra, handles)?;
-        Ok(HandleSystem::new(self, decomposition, clock.elapsed().as_secs_f64()))
-    }
-
-    /// As [`Self::handle_system`], of the given rows, at least as many as unknowns.
-    ///
-    /// # Errors
-    /// [`PrepareError::NoSolution`] where the rows determine nothing.
-    pub fn handle_system_of(&self, rows: &[u32]) -> Result<HandleSystem<'_>, PrepareError> {
-        let clock = Instant::now();
-        let decomposition = Decomposition::of_given_rows(self.phi.as_ref(), rows.to_vec(), self.phi.ncols())?;
-        Ok(HandleSystem::new(self, decomposition, clock.elapsed().as_secs_f64()))
-    }
-
     /// Indices of the points analysed; `None` where all are.
     pub(super) fn sample(&self) -> Option<&[u32]> {
         self.sample.as_deref()
-    }
-
-    /// The solver with these options.
-    ///
-    /// # Errors
-    /// As [`Solver::prepare`].
-    pub fn solver(&self, options: SolverOptions) -> Result<Solver, PrepareError> {
-        self.handle_system(options.handles)?.solver(options, None)
     }
 
     /// Results of the preparation; the singular values are empty, see [`Self::handle_spectrum`] and [`Self::full_spectrum`].

@@ -110,3 +110,8 @@ pub enum PrepareError {
         what: &'static str,
     },
 }
+
+/// That a computation did not succeed.
+pub(super) fn failed(what: &'static str) -> PrepareError {
+    PrepareError::NoSolution { what }
+}

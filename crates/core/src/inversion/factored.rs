@@ -1,7 +1,7 @@
 //! The linear inversion in factors, `C = V T (Uᵀ H)`, for applying many methods to the same frames: `Uᵀ H` is computed once per choice of handles,
 //! and a method is the map T of singular directions.
 
-use super::{HandleSystem, RegularizationTarget, Rows, Solver};
+use super::{HandleSystem, PrepareError, RegularizationTarget, Rows, Solver, SolverOptions};
 use crate::regularize::SpectralMap;
 use cager_geometry::linalg;
 use cager_geometry::mesh::Point;
@@ -107,6 +107,18 @@ impl Factors {
 }
 
 impl HandleSystem<'_> {
+    /// As [`Self::solver`], in factors: much cheaper to prepare, and cheaper to apply where many are applied to the same frames.
+    ///
+    /// # Errors
+    /// As [`Solver::prepare`].
+    pub fn factored(&self, options: SolverOptions) -> Result<FactoredInversion, PrepareError> {
+        if self.analysis.decoder.dependent_normals().is_some() {
+            return Ok(self.solver(options, None)?.into());
+        }
+        let (map, target, _) = self.parts(options, None)?;
+        Ok(FactoredInversion::new(self, &map, target))
+    }
+
     fn rows_read(&self) -> usize {
         if self.decomposition.reads_all { self.analysis.phi.nrows() } else { self.decomposition.handles.len() }
     }

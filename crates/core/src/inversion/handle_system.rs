@@ -1,14 +1,16 @@
 //! From a choice of handles to solvers: the regularised map of singular directions, and the regularisation target.
 
+use super::checks::check_options;
 use super::consistent::Consistent;
-use super::factored::FactoredInversion;
-use super::nearness::Nearness;
-use super::operator::{Decomposition, Directions, failed, padded_to_tiles};
-use super::prepare::check_options;
+use super::error::failed;
+use super::nearness::{FrameBox, Nearness, NearnessParts};
+use super::operator::{Decomposition, Directions, padded_to_tiles};
+use super::options::drop_zero_weight_regularizer;
 use super::target::RegularizationTarget;
 use super::translations::{with_unit_row_sums, with_zero_row_sums};
 use super::{Analysis, PrepareError, Solver, SolverOptions};
 use crate::decode::Decoder;
+use crate::handles::Handles;
 use crate::regularize::{
     Reference, RegularizationOperator, Regularizer, SparseMatrix, SpectralMap, Spectrum, WEAK_SINGULAR_VALUE, last_map,
     spectral_map,
@@ -28,6 +30,38 @@ pub struct HandleSystem<'a> {
     pub(super) seconds: f64,
     /// Scaled Gram matrix of the rows read, for dependent normals; expensive, and therefore computed on first use.
     gram: OnceLock<Mat<f64>>,
+}
+
+impl Analysis {
+    /// The linear system of a choice of handles with its decomposition, from which solvers with any regularisation follow.
+    ///
+    /// # Errors
+    /// As [`Solver::prepare`].
+    pub fn handle_system(&self, handles: Handles) -> Result<HandleSystem<'_>, PrepareError> {
+        let clock = Instant::now();
+        let options = SolverOptions { handles, spectrum: 0, ..SolverOptions::PAPER };
+        check_options(self.phi.nrows(), self.phi.ncols(), options, self.memory)?;
+        let decomposition = Decomposition::new(self.phi.as_ref(), &self.points, &self.basis, &self.spectra, handles)?;
+        Ok(HandleSystem::new(self, decomposition, clock.elapsed().as_secs_f64()))
+    }
+
+    /// As [`Self::handle_system`], of the given rows, at least as many as unknowns.
+    ///
+    /// # Errors
+    /// [`PrepareError::NoSolution`] where the rows determine nothing.
+    pub fn handle_system_of(&self, rows: &[u32]) -> Result<HandleSystem<'_>, PrepareError> {
+        let clock = Instant::now();
+        let decomposition = Decomposition::of_given_rows(self.phi.as_ref(), rows.to_vec(), self.phi.ncols())?;
+        Ok(HandleSystem::new(self, decomposition, clock.elapsed().as_secs_f64()))
+    }
+
+    /// The solver with these options.
+    ///
+    /// # Errors
+    /// As [`Solver::prepare`].
+    pub fn solver(&self, options: SolverOptions) -> Result<Solver, PrepareError> {
+        self.handle_system(options.handles)?.solver(options, None)
+    }
 }
 
 impl<'a> HandleSystem<'a> {
@@ -60,7 +94,7 @@ impl<'a> HandleSystem<'a> {
         let (handles, reads_all) = self.points_read();
         // The baselines and inversions without a term go where the data take them.
         let held = options.regularizer.is_sub_spectral() && !is_unregularized(drop_zero_weight_regularizer(options));
-        let nearness = if held { Nearness::new(self).map(Arc::new) } else { None };
+        let nearness = if held { self.nearness().map(Arc::new) } else { None };
         let mut preparation = analysis.preparation.clone();
         preparation.condition_handles = self.decomposition.condition;
         preparation.singular_values = self.singular_values();
@@ -78,16 +112,16 @@ impl<'a> HandleSystem<'a> {
         })
     }
 
-    /// As [`Self::solver`], in factors: much cheaper to prepare, and cheaper to apply where many are applied to the same frames.
-    ///
-    /// # Errors
-    /// As [`Solver::prepare`].
-    pub fn factored(&self, options: SolverOptions) -> Result<FactoredInversion, PrepareError> {
-        if self.analysis.decoder.dependent_normals().is_some() {
-            return Ok(self.solver(options, None)?.into());
-        }
-        let (map, target, _) = self.parts(options, None)?;
-        Ok(FactoredInversion::new(self, &map, target))
+    /// What brings cages back to their frames.
+    fn nearness(&self) -> Option<Nearness> {
+        let analysis = self.analysis;
+        let rest = FrameBox::around(analysis.points.iter().copied());
+        Nearness::from_parts(NearnessParts {
+            factor: self.scaled_factor(),
+            rest: Mat::from_fn(analysis.rest.len(), 3, |i, k| analysis.rest[i][k]),
+            faces: analysis.cage.mesh().triangles.clone(),
+            margin: rest.farthest(analysis.cage.vertices()),
+        })
     }
 
     /// F with `FᵀF = AᵀA · m/K` for the K rows of what is inverted, so that weights beside it are relative to the mean square error.
@@ -115,7 +149,7 @@ impl<'a> HandleSystem<'a> {
     }
 
     /// The map of singular directions, the regularisation target, and the consistent inversion that follows, if any.
-    fn parts(
+    pub(super) fn parts(
         &self,
         options: SolverOptions,
         matrix: Option<&SparseMatrix>,
@@ -196,19 +230,6 @@ impl<'a> HandleSystem<'a> {
 
 /// Singular values below this fraction of the largest are of directions that the points hardly determine.
 const ILL_CONDITIONED: f64 = 1e-2;
-
-/// Drops the regularisation term where λ is zero, which makes it the same as a threshold of zero.
-pub(super) fn drop_zero_weight_regularizer(options: SolverOptions) -> SolverOptions {
-    if options.lambda > 0.0 {
-        return options;
-    }
-    let usual = SolverOptions { spectrum: 0, lambda: SolverOptions::default().lambda, ..options };
-    match options.regularizer {
-        Regularizer::Global => SolverOptions { regularizer: Regularizer::None, ..usual },
-        regularizer if regularizer.is_sub_spectral() => usual,
-        _ => options,
-    }
-}
 
 /// Whether the options apply no regularisation at all.
 fn is_unregularized(options: SolverOptions) -> bool {

@@ -3,7 +3,9 @@
 
 mod analysed_coordinates;
 mod analysis;
+mod checks;
 mod consistent;
+mod context;
 mod error;
 mod factored;
 mod handle_system;
@@ -18,21 +20,18 @@ mod target;
 mod threshold;
 mod translations;
 
+pub use crate::batch::BATCH;
 pub use crate::handles::Handles;
 pub use analysis::Analysis;
+pub use checks::{check_options, coordinates_bytes, reject_far_points};
 pub use consistent::{Convergence, Outcome};
+pub use context::{PreparationReport, PrepareContext};
 pub use error::PrepareError;
 pub use factored::{FactoredInversion, ProjectedFrames};
 pub use handle_system::HandleSystem;
 pub use nearness::NearnessParts;
 pub use options::{SolverOptions, default_spectrum};
 pub use parts::{DependentParts, SolverParts};
-pub use prepare::{PreparationReport, PrepareContext, check_options, coordinates_bytes, reject_far_points};
-pub use solve::{BATCH, InvertedFrame, Rows, Solver};
+pub use solve::{InvertedFrame, Rows, Solver};
 pub use target::RegularizationTarget;
 pub use threshold::Threshold;
-
-pub(crate) use solve::product_columns;
-
-/// Rows of one block where a tall matrix is multiplied in blocks.
-const BLOCK_ROWS: usize = 1024;

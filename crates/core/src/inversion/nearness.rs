@@ -2,15 +2,12 @@
 //! singular value: beyond the s directions that the term holds, weak ones may take vertices hundreds of diagonals away. Such a frame is solved once more,
 //! held to the shape of the rest cage over the whole spectrum, `min ‖A (C' − C)‖² + λ ‖Δ (C' − C_R)‖²`, with the smallest λ that keeps the cage near.
 
-use super::HandleSystem;
 use crate::cage::Cage;
 use crate::regularize::cage_laplacian;
 use cager_geometry::linalg;
 use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::vector::distance;
-use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
-use faer::{Accum, Mat, MatRef, Par};
+use faer::Mat;
 use std::sync::OnceLock;
 
 /// A cage is near its frame where no vertex is farther from the box around the points read than the rest cage's farthest and so many diagonals.
@@ -48,17 +45,6 @@ pub struct NearnessParts {
 }
 
 impl Nearness {
-    pub(super) fn new(system: &HandleSystem<'_>) -> Option<Self> {
-        let analysis = system.analysis;
-        let rest = FrameBox::around(analysis.points.iter().copied());
-        Self::from_parts(NearnessParts {
-            factor: system.scaled_factor(),
-            rest: Mat::from_fn(analysis.rest.len(), 3, |i, k| analysis.rest[i][k]),
-            faces: analysis.cage.mesh().triangles.clone(),
-            margin: rest.farthest(analysis.cage.vertices()),
-        })
-    }
-
     /// `None` where the parts are no cage.
     pub(super) fn from_parts(data: NearnessParts) -> Option<Self> {
         let last = data.faces.iter().flatten().max()?;
@@ -103,7 +89,9 @@ impl Nearness {
     /// The cage nearest to fitting what this one fits that is near.
     fn held(&self, cage: &[Point], is_near: impl Fn(&[Point]) -> bool) -> Vec<Point> {
         let (m, vertices) = (cage.len(), self.cage.vertices().len());
-        let gram = self.gram.get_or_init(|| gram(self.data.factor.as_ref()));
+        // By the calling thread: whoever waits for it must not be given other work, which may wait for it too.
+        let of_factor = || linalg::mirrored(linalg::gram(self.data.factor.as_ref(), usize::MAX));
+        let gram = self.gram.get_or_init(of_factor);
         // Displacements, and a translation by one.
         let one = |i: usize| if i < vertices { 1.0 } else { 0.0 };
         let moved = Mat::from_fn(m, 4, |i, k| if k < 3 { cage[i][k] - self.data.rest[(i, k)] } else { one(i) });
@@ -119,8 +107,7 @@ impl Nearness {
         for (factor, weight) in self.factors.iter().zip(WEIGHTS) {
             let Some(factor) = factor.get_or_init(|| self.factor(gram, weight)) else { continue };
             let mut displacement = right.clone();
-            solve_lower_triangular_in_place(factor.as_ref(), displacement.as_mut(), Par::Seq);
-            solve_upper_triangular_in_place(factor.transpose(), displacement.as_mut(), Par::Seq);
+            linalg::solve_cholesky(factor.as_ref(), &mut displacement);
             let held = with(&displacement);
             if is_near(&held) {
                 return held;
@@ -144,20 +131,6 @@ impl Nearness {
     }
 }
 
-/// `FᵀF`. Sequential: whoever waits for it must not be given other work, which may wait for it too.
-fn gram(factor: MatRef<'_, f64>) -> Mat<f64> {
-    let m = factor.ncols();
-    let mut gram = Mat::zeros(m, m);
-    let (lower, full) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
-    triangular::matmul(gram.as_mut(), lower, Accum::Replace, factor.transpose(), full, factor, full, 1.0, Par::Seq);
-    for j in 0..m {
-        for i in 0..j {
-            gram[(i, j)] = gram[(j, i)];
-        }
-    }
-    gram
-}
-
 /// The box around the points read of a frame.
 #[derive(Clone, Copy)]
 pub(super) struct FrameBox {
@@ -175,7 +148,7 @@ impl FrameBox {
     }
 
     /// Distance of the farthest of some places.
-    fn farthest(&self, places: &[Point]) -> f64 {
+    pub(super) fn farthest(&self, places: &[Point]) -> f64 {
         let beyond = |p: &Point| [0, 1, 2].map(|k| (self.low[k] - p[k]).max(p[k] - self.high[k]).max(0.0));
         places.iter().map(|p| beyond(p).iter().map(|x| x * x).sum::<f64>()).fold(0.0, f64::max).sqrt()
     }

@@ -1,13 +1,15 @@
 //! The linear inversion as one matrix R, `C = R · H`.
 
 use super::PrepareError;
+use super::error::failed;
 use super::spectra::{EXTREMES_ONLY_FROM, Spectra};
 use crate::handles::Handles;
 use crate::handles::farthest::farthest_points;
 use crate::handles::interpolation::{Drift, Samples, interpolated};
 use crate::handles::rectangular::rectangular_rows;
+use crate::maxvol::RANK_TOLERANCE;
 use crate::regularize::DataMap;
-use crate::row_basis::{RANK_TOLERANCE, RowBasis};
+use crate::row_basis::RowBasis;
 use cager_geometry::linalg;
 use cager_geometry::linalg::svd::{self, LastDirections, Svd};
 use cager_geometry::linalg::tall_product;
@@ -271,10 +273,6 @@ fn condition_of(phi: MatRef<'_, f64>, handles: &[u32], others: MatRef<'_, f64>, 
     }
     let values = svd::singular_values(linalg::upper_factor(linalg::rows_of(phi, handles)).as_ref())?;
     Some(values[0] / values[rank - 1])
-}
-
-pub(super) fn failed(what: &'static str) -> PrepareError {
-    PrepareError::NoSolution { what }
 }
 
 /// Zero columns up to a whole tile, see [`product_columns`](super::product_columns).

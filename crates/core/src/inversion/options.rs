@@ -46,3 +46,16 @@ impl Default for SolverOptions {
         }
     }
 }
+
+/// Drops the regularisation term where λ is zero, which makes it the same as a threshold of zero.
+pub(super) fn drop_zero_weight_regularizer(options: SolverOptions) -> SolverOptions {
+    if options.lambda > 0.0 {
+        return options;
+    }
+    let usual = SolverOptions { spectrum: 0, lambda: SolverOptions::default().lambda, ..options };
+    match options.regularizer {
+        Regularizer::Global => SolverOptions { regularizer: Regularizer::None, ..usual },
+        regularizer if regularizer.is_sub_spectral() => usual,
+        _ => options,
+    }
+}

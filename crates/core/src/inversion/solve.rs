@@ -1,15 +1,15 @@
 //! Inversion of frames: one matrix product per batch, followed by the consistent inversion where normals are functions of the vertices.
 
 use super::consistent::Consistent;
+use super::context::PreparationReport;
 use super::nearness::{FrameBox, Nearness};
-use super::{BLOCK_ROWS, Convergence, PreparationReport, RegularizationTarget};
+use super::{Convergence, RegularizationTarget};
+use crate::batch::product_columns;
 use crate::decode::Decoder;
+use cager_geometry::linalg::BLOCK_ROWS;
 use cager_geometry::mesh::Point;
 use faer::{Accum, Mat, Par};
 use std::sync::Arc;
-
-/// Maximum number of frames per matrix product.
-pub const BATCH: usize = 16;
 
 /// A prepared inversion: `C_t = R · H_t`, plus a constant or a linear function of the previous cage for some terms.
 #[derive(Clone, Debug)]
@@ -179,19 +179,4 @@ impl Solver {
 
 fn single(cage: &[Point]) -> Vec<f32> {
     cage.as_flattened().iter().map(|&x| x as f32).collect()
-}
-
-/// Columns of a tile of the kernels that multiply matrices.
-const TILE_COLUMNS: usize = 4;
-
-/// Columns of the product of a batch of frames.
-///
-/// Fewer frames take a narrower product. Widths are whole tiles of the kernels, which then sum over the unknowns in the same order (there is a test
-/// for it).
-///
-/// # Panics
-/// Where more frames come than a batch holds.
-pub(crate) fn product_columns(frames: usize) -> usize {
-    assert!(frames <= BATCH, "at most {BATCH} frames in a batch");
-    (3 * frames.max(1)).next_multiple_of(TILE_COLUMNS)
 }

@@ -1,6 +1,6 @@
 //! The decompositions that an analysis computes, and which of them its solvers need.
 
-use super::operator::failed;
+use super::error::failed;
 use super::{PrepareError, SolverOptions};
 use crate::handles::Handles;
 use crate::regularize::{Regularizer, WEAK_SINGULAR_VALUE};

@@ -1,8 +1,8 @@
 //! Maximum volume with many columns, to a loose tolerance. The LU factorisation that picks the first rows gives all of `B = Φ Φ□⁻¹` for half a product, and
 //! a round of k swaps changes it by a product of rank k; both in single precision, which is enough for a tolerance of one.
 
+use super::handles::{MAX_PASSES, MaxVol, SINGLE_IS_SAFE, Swap, to_single};
 use super::swaps::CandidateRows;
-use super::{MAX_PASSES, MaxVol, SINGLE_IS_SAFE, to_single};
 use cager_geometry::linalg;
 use cager_geometry::linalg::zeros;
 use faer::linalg::matmul::matmul;
@@ -13,7 +13,7 @@ use rayon::prelude::*;
 /// Rows of B of one task.
 const TASK_ROWS: usize = 256;
 
-/// As [`maxvol`](super::maxvol); `None` where the columns are too close to dependent for single precision, or where swaps do not end.
+/// As `maxvol`; `None` where the columns are too close to dependent for single precision, or where swaps do not end.
 pub(super) fn search(phi: MatRef<'_, f64>, tolerance: f64) -> Option<MaxVol> {
     let lu = linalg::pivoted(to_single(phi));
     let safe = lu.smallest > SINGLE_IS_SAFE;
@@ -35,7 +35,7 @@ pub(super) fn search(phi: MatRef<'_, f64>, tolerance: f64) -> Option<MaxVol> {
     for _ in 0..MAX_PASSES {
         let before = picked.clone();
         let done = CandidateRows::copied(b.as_ref(), &row_max).swap(&mut picked, tolerance);
-        trace.extend(done.into_iter().map(|swap| super::Swap { row: order[swap.row as usize], ..swap }));
+        trace.extend(done.into_iter().map(|swap| Swap { row: order[swap.row as usize], ..swap }));
         exchange(&mut b, &before, &picked);
         row_max = maxima(b.as_ref());
         let max_entry = row_max.iter().copied().fold(0.0, f32::max);
@@ -109,7 +109,8 @@ fn exchange(b: &mut Mat<f32>, before: &[u32], after: &[u32]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::maxvol::{LOOSE_TOLERANCE, search as general, start_rows};
+    use crate::maxvol::handles::LOOSE_TOLERANCE;
+    use crate::maxvol::{search as general, start_rows};
 
     #[test]
     fn rows_are_those_of_the_general_search() {

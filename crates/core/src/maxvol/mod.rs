@@ -4,65 +4,26 @@
 //! The swaps run in single precision on the candidate rows, which have an entry near one or above; a pass over all of `Φ` in double precision with a
 //! fresh factorisation then confirms the result or finds further candidates.
 
+mod handles;
 mod many_columns;
 mod passes;
 mod swaps;
 
+pub use handles::{MaxVol, Swap};
 pub(crate) use passes::maxima_and_gram;
 
-use crate::row_basis::RANK_TOLERANCE;
 use cager_geometry::linalg;
-use faer::{Mat, MatRef};
+use faer::MatRef;
+use handles::{LOOSE_TOLERANCE, MANY_COLUMNS, MAX_PASSES, SINGLE_IS_SAFE, to_single};
 use passes::row_maxima;
-use rayon::prelude::*;
 use swaps::{CandidateRows, candidates};
 
+/// Singular values below this fraction of the largest are taken for zero: coordinates are not accurate to more.
+pub(crate) const RANK_TOLERANCE: f64 = 1e-11;
 /// Default tolerance τ: swaps end when no entry of B exceeds 1.01.
 pub const TOLERANCE: f64 = 0.01;
-/// From this many columns on swaps end at [`LOOSE_TOLERANCE`].
-const MANY_COLUMNS: usize = 1536;
-/// Tolerance for many columns: each swap costs more there, and a basis this well conditioned is enough to interpolate and decompose by.
-const LOOSE_TOLERANCE: f64 = 1.0;
 /// From this many columns on, and up to [`MANY_COLUMNS`], the first round of swaps is hardly ever the last.
 const SEVERAL_ROUNDS: usize = 512;
-/// Pivots of LU above this fraction of the largest: far enough from dependent for single precision.
-const SINGLE_IS_SAFE: f64 = 1e-4;
-/// Bound on confirming passes; the growth of the volume keeps their number far below it.
-const MAX_PASSES: usize = 64;
-
-/// One exchange: the row of the matrix that became a handle, and which handle it replaced.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Swap {
-    /// The new row.
-    pub row: u32,
-    /// Position of the replaced one among the picked rows.
-    pub position: u32,
-    /// `|B_ij|`, by which the volume grew.
-    pub growth: f64,
-}
-
-/// The handles picked from a tall matrix.
-#[derive(Clone, Debug)]
-pub struct MaxVol {
-    /// Picked rows, one per column of the matrix.
-    pub rows: Vec<u32>,
-    /// Rows the search started from: those of pivoted LU, or what was given.
-    pub start: Vec<u32>,
-    /// Number of swaps after the start.
-    pub swaps: usize,
-    /// These swaps, in order.
-    pub trace: Vec<Swap>,
-    /// `ln |det Φ□|` of the picked rows.
-    pub log_volume: f64,
-    /// The same for the rows the search started from.
-    pub start_log_volume: f64,
-    /// Largest `|B_ij|` over all rows after the last swap: from a fresh factorisation, or, where a tolerance of one allows it, in single precision.
-    pub max_entry: f64,
-    /// `Bᵀ B`, m × m, symmetric; `None` where the swaps were confirmed in single precision.
-    pub(crate) gram: Option<Mat<f64>>,
-    /// `Φ□⁻¹`, m × m.
-    pub(crate) inverse: Mat<f64>,
-}
 
 /// The matrix has no m linearly independent rows to the working precision.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -158,14 +119,4 @@ pub fn start_rows(phi: MatRef<'_, f64>) -> Result<Vec<u32>, DependentColumns> {
         return Ok(double.rows().to_vec());
     }
     Err(DependentColumns { smallest: double.smallest })
-}
-
-fn to_single(phi: MatRef<'_, f64>) -> Mat<f32> {
-    let mut single = linalg::zeros(phi.nrows(), phi.ncols());
-    single.as_mut().par_col_chunks_mut(1).enumerate().for_each(|(j, mut column)| {
-        for (s, &x) in column.as_mut().col_mut(0).iter_mut().zip(phi.col(j).iter()) {
-            *s = x as f32;
-        }
-    });
-    single
 }

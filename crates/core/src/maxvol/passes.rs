@@ -1,6 +1,6 @@
 //! Passes over all rows of `B = Φ Φ□⁻¹`, without ever holding B.
 
-use super::MANY_COLUMNS;
+use super::handles::MANY_COLUMNS;
 use cager_geometry::linalg;
 use faer::reborrow::{Reborrow, ReborrowMut};
 use faer::{Accum, Mat, MatRef, Par};

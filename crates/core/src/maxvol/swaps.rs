@@ -1,6 +1,6 @@
 //! Swaps of rows, in single precision, among the rows that may take part in them.
 
-use super::Swap;
+use super::handles::Swap;
 use crate::simd::multiversion;
 use cager_geometry::linalg;
 use faer::MatRef;

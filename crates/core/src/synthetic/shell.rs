@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use super::{HEIGHT, heights, place, pushed_out, radius, silhouette_normal, spine};
-use cager_geometry::mesh::{Point, TriMesh};
+use super::figure::{HEIGHT, heights, place, pushed_out, radius, silhouette_normal, spine};
+use cager_geometry::mesh::{Model, Point, Polygons, TriMesh};
 
 /// Distance the cage aims to keep from the figure.
 const MARGIN: f64 = 0.02;
@@ -166,4 +166,27 @@ impl Shell {
         }
         mesh
     }
+}
+
+pub(super) fn figure(points: usize) -> Model {
+    let grid = Grid::near(points, 1.15);
+    let heights = heights(grid.rings);
+    let mut positions = Vec::with_capacity(grid.len());
+    positions.push(place(spine(0.0), 0.0, 0.0, 0.0));
+    for &z in &heights {
+        positions.extend((0..grid.columns).map(|j| place(spine(z), radius(z, grid.angle(j)), grid.angle(j), z)));
+    }
+    positions.push(place(spine(HEIGHT), 0.0, 0.0, HEIGHT));
+    let mut faces = Polygons::new();
+    for k in 0..=grid.rings {
+        for j in 0..grid.columns {
+            let [a, b, c, d] = grid.cell(k, j);
+            match k {
+                0 => faces.push(&[a, c, d]),
+                _ if k == grid.rings => faces.push(&[a, b, c]),
+                _ => faces.push(&[a, b, c, d]),
+            }
+        }
+    }
+    Model { points: positions, faces, ..Model::default() }
 }

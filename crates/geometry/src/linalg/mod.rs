@@ -12,7 +12,7 @@ pub use factors::{
     solve_lower, solve_upper, upper_factor, upper_inverse,
 };
 pub use products::{
-    TILE_COLUMNS, TILE_ROWS, accumulate_product, gram, lower_product, mirrored, multiply, product, rows_of,
+    BLOCK_ROWS, TILE_COLUMNS, TILE_ROWS, accumulate_product, gram, lower_product, mirrored, multiply, product, rows_of,
     tall_product, transposed_product,
 };
 pub use zeros::zeros;

@@ -11,7 +11,7 @@ pub(super) const BLOCK_COLUMNS: usize = 192;
 /// Products and solves with fewer multiplications run as a single task.
 pub(super) const PARALLEL_THRESHOLD: usize = 1 << 26;
 /// Rows that one task computes of the product of a matrix with many rows.
-const BLOCK_ROWS: usize = 1024;
+pub const BLOCK_ROWS: usize = 1024;
 /// Parts of a sum that are computed at the same time, at the least and at the most, and the entries of those beyond the least.
 const PARTS_AT_ONCE: [usize; 2] = [4, 16];
 const MAX_PART_ENTRIES: usize = 1 << 24;

@@ -5,8 +5,8 @@
 //! coordinates α, β follow from those of lower degree and from integrals of R along the edges.
 
 use super::basis::{MAX_DEGREE, MAX_FUNCTIONS, functions, place};
-use super::potential::Tables;
 use super::quadrature::GAUSS_6;
+use super::tables::Tables;
 use super::triangle::Triangle;
 use crate::coordinates::layer::{INVERSE_4PI, edge_logarithm};
 use crate::simd::{LANES, Lanes, angle, dot};

@@ -1,6 +1,7 @@
 //! Boundary elements: triangles on the cage's faces, each with a polynomial density of its own degree.
 
 use super::basis::functions;
+use super::limits::MIN_DEGREE;
 use super::triangle::Triangle;
 use crate::simd::{LANES, Lanes, dot, multiversion};
 use cager_geometry::mesh::{Point, distance2_to_triangle};
@@ -15,7 +16,7 @@ pub(super) struct Element {
     pub(super) face: u32,
     /// Degree of its density; one less in the coarse space.
     pub(super) degree: usize,
-    /// Cuts of the face that come before this element where its division is written in preorder, as in a [plan](super::plan).
+    /// Cuts of the face that come before this element where its division is written in preorder, as in a plan.
     pub(super) cuts: Vec<u8>,
     /// Cuts above it from before the first solution: unknowns are in the order of this number, and otherwise of faces and preorder.
     depth: u32,
@@ -65,7 +66,7 @@ impl Element {
     /// Highest degree that a triangle of this shape is given: polynomials of high degree nearly depend on each other in thin ones.
     fn most(&self) -> usize {
         let aspect = self.triangle.diameter() / self.triangle.height();
-        MAX_ASPECT.iter().find(|(limit, _)| aspect < *limit).map_or(super::MIN_DEGREE, |m| m.1)
+        MAX_ASPECT.iter().find(|(limit, _)| aspect < *limit).map_or(MIN_DEGREE, |m| m.1)
     }
 
     /// Distance over the diameter to the nearest of these points, but for those as good as on it.

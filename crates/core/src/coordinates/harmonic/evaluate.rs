@@ -8,9 +8,10 @@ use super::affine::AffineFit;
 use super::basis::{MAX_FUNCTIONS, functions};
 use super::elements::Unknowns;
 use super::near::{Group, Near};
-use super::potential::{Tables, potentials};
+use super::potential::potentials;
 use super::solve::{Densities, Part, single};
 use super::surface::{ClosestPoint, Surface};
+use super::tables::Tables;
 use crate::coordinates::layer::{self, INVERSE_4PI, Layers, group_potentials, write_group};
 use crate::simd::{LANES, Lanes, multiversion};
 use cager_geometry::mesh::Point;
@@ -72,7 +73,7 @@ pub(super) fn evaluate(
     tolerance: f64,
 ) -> Evaluated {
     let m = solution.layers.vertices().len();
-    let near = Near::new(solution, points, closest_points);
+    let near = Near::new(solution.surface, solution.unknowns, points, closest_points);
     let low = single(solution.densities.low.as_ref());
     let mut phi = cager_geometry::linalg::zeros::<f64>(points.len(), m);
     let found: Vec<TaskResult> = phi

@@ -3,8 +3,9 @@
 
 use super::basis::{MAX_FUNCTIONS, functions};
 use super::elements::{Element, Unknowns};
-use super::potential::{Tables, potentials};
+use super::potential::potentials;
 use super::quadrature::Rule;
+use super::tables::Tables;
 use super::triangle::Triangle;
 use crate::coordinates::layer::{INVERSE_4PI, Layers, group_potentials};
 use crate::simd::{LANES, Lanes, multiversion};

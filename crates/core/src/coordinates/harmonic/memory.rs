@@ -3,8 +3,8 @@
 use super::basis::{MAX_FUNCTIONS, functions};
 use super::elements::{Element, MANY, Unknowns};
 use super::galerkin::is_near;
+use super::limits::{ELEMENTS, LOW_DEGREES};
 use super::patch::PATCH;
-use super::{ELEMENTS, LOW_DEGREES};
 use cager_geometry::mesh::Point;
 use rayon::prelude::*;
 

@@ -16,8 +16,10 @@ mod affine;
 mod basis;
 mod closed_form;
 mod elements;
+mod equations;
 mod evaluate;
 mod galerkin;
+mod limits;
 mod memory;
 mod near;
 mod patch;
@@ -26,6 +28,7 @@ mod potential;
 mod quadrature;
 mod solve;
 mod surface;
+mod tables;
 mod triangle;
 
 use super::layer::Layers;
@@ -35,6 +38,7 @@ use cager_geometry::mesh::Point;
 use elements::Unknowns;
 use evaluate::{Evaluated, Solution};
 use faer::Mat;
+use limits::{ELEMENTS, LOW_DEGREES};
 pub use plan::ElementPlan;
 use solve::SolveRecord;
 use surface::{ClosestPoint, Side, Surface};
@@ -46,12 +50,6 @@ pub struct Harmonic;
 const NAME: &str = "harmonic";
 /// Refinements at most.
 const REFINEMENTS: usize = 8;
-/// Elements that refining may make, unless there are half as many at first: the time grows with their cube.
-const ELEMENTS: usize = 2500;
-/// Elements up to which all have so many low degrees: the equations of low unknowns are dense.
-const LOW_DEGREES: [(usize, usize); 3] = [(1300, 2), (3000, 1), (10_000, 0)];
-/// Least degree that refining gives an element.
-const MIN_DEGREE: usize = 3;
 /// Linear functions that are missed by more than this say that nothing was solved.
 const MISSED: f64 = 0.1;
 
@@ -107,7 +105,7 @@ fn solve_for(
     let closest_points = surface.closest_points(&points);
     check_inside(&closest_points, cage.diagonal() * layers.scale())?;
     let problem = Problem {
-        tables: potential::Tables::new(),
+        tables: tables::Tables::new(),
         affine: affine::AffineFit::new(layers.vertices()),
         corners: layers.triangles().iter().map(|t| t.map(|v| layers.vertices()[v as usize])).collect(),
         layers: &layers,
@@ -134,7 +132,7 @@ fn check_inside(closest_points: &[ClosestPoint], diagonal: f64) -> Result<(), Co
 
 /// What is to be solved, in the unit of the layers.
 struct Problem<'a> {
-    tables: potential::Tables,
+    tables: tables::Tables,
     affine: affine::AffineFit,
     /// Corners of the faces.
     corners: Vec<[Point; 3]>,

@@ -1,8 +1,8 @@
 //! Correction near the surface: the densities leave an error in the boundary values, which decays inside over the length of an
 //! element. The error at the closest point of the surface, times a share from 0 to 1, is subtracted at each point.
 
-use super::evaluate::Solution;
-use super::surface::{ClosestPoint, Side};
+use super::elements::Unknowns;
+use super::surface::{ClosestPoint, Side, Surface};
 use crate::simd::{LANES, Lanes};
 use cager_geometry::mesh::{Point, distance2_to_triangle};
 use cager_geometry::vector;
@@ -19,16 +19,20 @@ pub(super) struct Near<'a> {
 }
 
 impl<'a> Near<'a> {
-    pub(super) fn new(solution: &Solution<'_>, points: &'a [Point], closest_points: &'a [ClosestPoint]) -> Self {
+    pub(super) fn new(
+        surface: &Surface<'_>,
+        unknowns: &Unknowns,
+        points: &'a [Point],
+        closest_points: &'a [ClosestPoint],
+    ) -> Self {
         // The error of a density of degree p changes its sign about p times along an element.
-        let reaches: Vec<f64> = solution
-            .unknowns
+        let reaches: Vec<f64> = unknowns
             .elements
             .iter()
             .map(|element| 0.5 * element.triangle.diameter() / (element.degree + 1) as f64)
             .collect();
         let farthest = reaches.iter().copied().fold(0.0, f64::max);
-        let touching = solution.surface.thickness();
+        let touching = surface.thickness();
         let share = |closest: &ClosestPoint| {
             if closest.side == Side::On {
                 return 1.0;
@@ -36,7 +40,7 @@ impl<'a> Near<'a> {
                 return 0.0;
             }
             // All elements that meet at the closest, so that the order of faces does not count.
-            let meet = solution.unknowns.elements.iter().zip(&reaches).filter(|(element, _)| {
+            let meet = unknowns.elements.iter().zip(&reaches).filter(|(element, _)| {
                 let triangle = &element.triangle;
                 let apart = vector::norm(vector::sub(triangle.centre, closest.place));
                 apart <= triangle.radius + touching
@@ -46,7 +50,7 @@ impl<'a> Near<'a> {
             (1.0 - closest.distance / reach).max(0.0).powi(3)
         };
         let shares = closest_points.par_iter().map(share).collect();
-        Self { points, closest_points, shares, inwards: solution.surface.thickness() }
+        Self { points, closest_points, shares, inwards: surface.thickness() }
     }
 
     /// Eight points, their closest points moved just inside, and the shares; the last point is repeated where there are no more. Points on

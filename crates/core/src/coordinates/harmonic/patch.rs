@@ -2,7 +2,7 @@
 
 use super::basis::functions;
 use super::elements::Unknowns;
-use super::solve::{Equations, RESIDUAL};
+use super::equations::{Equations, RESIDUAL};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::{cholesky::llt, triangular_solve};
 use faer::{Mat, MatMut, MatRef, Par};

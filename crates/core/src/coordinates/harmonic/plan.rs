@@ -3,9 +3,9 @@
 
 use super::basis::{MAX_DEGREE, functions};
 use super::elements::{Element, LATER, QUARTERS, Unknowns};
+use super::limits::{LOW_DEGREES, MIN_DEGREE};
 use super::patch::{DAMPING, PATCH};
 use super::solve::{MAX_ITERATIONS, SolveRecord};
-use super::{LOW_DEGREES, MIN_DEGREE};
 use cager_geometry::mesh::Point;
 use serde::{Deserialize, Serialize};
 

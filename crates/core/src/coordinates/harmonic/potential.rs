@@ -2,9 +2,10 @@
 //!
 //! Near the triangle in closed form, farther away by quadrature, very far with a few points for the lowest degrees.
 
-use super::basis::{Basis, MAX_FUNCTIONS, functions};
+use super::basis::{MAX_FUNCTIONS, functions};
 use super::closed_form::closed_form;
 use super::quadrature::Rule;
+use super::tables::Tables;
 use super::triangle::Triangle;
 use crate::coordinates::layer::INVERSE_4PI;
 use crate::simd::{LANES, Lanes, dot, multiversion};
@@ -15,25 +16,6 @@ const FAR: f64 = 6.0;
 const FARTHER: f64 = 20.0;
 /// Degree of the densities that count there.
 const FARTHER_DEGREE: usize = 2;
-
-/// What the potentials of all triangles need.
-pub(super) struct Tables {
-    pub(super) basis: Basis,
-    /// Rules with the polynomials at their nodes, times the weights.
-    pub(super) fine: (Rule, Vec<[f64; MAX_FUNCTIONS]>),
-    pub(super) coarse: (Rule, Vec<[f64; MAX_FUNCTIONS]>),
-}
-
-impl Tables {
-    pub(super) fn new() -> Self {
-        let basis = Basis::new();
-        let with = |rule: Rule| {
-            let values = basis.weighted(&rule);
-            (rule, values)
-        };
-        Self { fine: with(Rule::degree_8()), coarse: with(Rule::degree_5()), basis }
-    }
-}
 
 multiversion! {
     /// Potentials at one lane group of the polynomials up to a degree on a triangle; as many entries of `out` are written.

@@ -6,6 +6,7 @@
 
 use super::basis::functions;
 use super::elements::Unknowns;
+use super::equations::{Equations, RESIDUAL};
 use super::galerkin::{NearPairs, Operator, RightHandSides};
 use super::patch::{self, DAMPING, Patch, damp, factor, zeroed};
 use faer::linalg::{matmul::matmul, triangular_solve};
@@ -13,9 +14,6 @@ use faer::prelude::IntoConst;
 use faer::{Accum, ColRef, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
-/// An element belongs to a vertex's patch where the residual of the low unknowns is above this, as a value on the boundary; the iteration
-/// ends where all residuals are below.
-pub(super) const RESIDUAL: f64 = 3e-4;
 /// Iterations at most.
 pub(super) const MAX_ITERATIONS: u8 = 6;
 
@@ -246,15 +244,6 @@ fn largest(unknowns: &Unknowns, residuals: &[Mat<f64>]) -> f64 {
         r.col_iter().map(|c| c.norm_l2()).fold(0.0, f64::max) / unknowns.elements[e].triangle.area
     };
     residuals.iter().enumerate().map(of).fold(0.0, f64::max)
-}
-
-/// The equations of all unknowns.
-pub(super) struct Equations<'a> {
-    pub(super) near: &'a NearPairs,
-    /// The low unknowns with each other, the lower triangle.
-    pub(super) far: &'a Mat<f32>,
-    b: &'a RightHandSides,
-    pub(super) unknowns: &'a Unknowns,
 }
 
 impl Equations<'_> {

@@ -1,7 +1,7 @@
 //! Gram matrix of the points read, from the decoder's single-precision coordinates, so that the minimised error is that of decoding.
 
-use super::BLOCK_ROWS;
 use crate::decode::Decoder;
+use cager_geometry::linalg::BLOCK_ROWS;
 use faer::{Accum, Mat, Par};
 use rayon::prelude::*;
 

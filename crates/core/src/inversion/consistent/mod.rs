@@ -9,7 +9,10 @@
 //! products with `G = (v/K) ΦᵀΦ`; the result of a frame does not depend on the other frames.
 
 mod gram_matrix;
+mod outcome;
 mod state;
+
+pub use outcome::Outcome;
 
 use crate::coordinates::DependentNormals;
 use crate::decode::Decoder;
@@ -19,7 +22,8 @@ use cager_geometry::vector::{along, dot, sub};
 use faer::{Accum, Mat, MatRef, Par};
 use state::FrameState;
 
-use super::{BLOCK_ROWS, product_columns};
+use crate::batch::product_columns;
+use cager_geometry::linalg::BLOCK_ROWS;
 
 /// Maximum number of Gauss–Newton steps per frame.
 const MAX_STEPS: usize = 24;
@@ -47,17 +51,6 @@ pub struct Convergence {
     pub residual: f64,
     /// How it ended.
     pub outcome: Outcome,
-}
-
-/// How the inversion of one frame ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
-    /// The last step lowered E by less than the tolerance, or no further step lowered it.
-    Converged,
-    /// The maximum number of steps was taken, each of which lowered E.
-    StepLimit,
-    /// No step lowered E: the cage is that of the linear start.
-    KeptStart,
 }
 
 /// Consistent inversion, prepared for the points that a solver reads.

@@ -1,7 +1,7 @@
 //! State of one frame during the consistent inversion, and the conjugate gradients of its Gauss–Newton step.
 
-use super::Outcome;
-use super::product_columns;
+use super::outcome::Outcome;
+use crate::batch::product_columns;
 use crate::coordinates::DependentNormals;
 use cager_geometry::mesh::Point;
 use cager_geometry::vector::{add, along, combination, dot, sub};

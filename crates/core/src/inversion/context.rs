@@ -1,0 +1,80 @@
+//! What preparing may take and reports.
+
+use super::PrepareError;
+use crate::coordinates::{ElementPlan, Refinement};
+use crate::regularize::SparseMatrix;
+use serde::{Deserialize, Serialize};
+use std::ops::ControlFlow;
+
+/// Results of the preparation.
+#[derive(Clone, Debug, Default, Deserialize, Serialize)]
+pub struct PreparationReport {
+    /// Numerical rank of `Φ`, at most m.
+    pub rank: usize,
+    /// `max_i |Φ C_R − P_R|_i` over the rest diagonal.
+    pub affine_reproduction_error: f64,
+    /// Condition number of `Φ`, over its rank.
+    pub condition_full: f64,
+    /// Condition number of the rows read, over their rank; of `Φ□` where every point is read.
+    pub condition_handles: f64,
+    /// Singular values of the inverted matrix, descending: of `Φ` for spread handles and where every point is read, otherwise of the rows read. Of
+    /// 1,024 unknowns or more, of which few are regularised, only the first one and the last are computed; the others are NaN.
+    pub singular_values: Vec<f64>,
+    /// Swaps of maxvol after its start.
+    pub swaps: usize,
+    /// `ln |det Φ□|`.
+    pub log_volume: f64,
+    /// Largest `|B_ij|` of `Φ = B Φ□` after the last swap.
+    pub max_entry: f64,
+    /// Points outside the cage, ascending.
+    pub outside: Vec<u32>,
+    /// Largest distance of those to the cage, over the rest diagonal.
+    pub outside_distance: f64,
+    /// How the coordinates were refined, where they are a numerical solution.
+    pub refinement: Option<Refinement>,
+    /// The boundary elements on which they were solved, in that case.
+    pub plan: Option<ElementPlan>,
+    /// Seconds for the coordinates.
+    pub coordinates_seconds: f64,
+    /// Seconds for maxvol.
+    pub maxvol_seconds: f64,
+    /// Seconds for singular values, regularisation and the operator.
+    pub svd_seconds: f64,
+}
+
+/// How to prepare a solver, apart from its options.
+#[derive(Clone, Copy)]
+pub struct PrepareContext<'a> {
+    /// Δ of [`Regularizer::Matrix`](crate::regularize::Regularizer::Matrix).
+    pub matrix: Option<&'a SparseMatrix>,
+    /// Whether the decoder of a model of very many points stores their coordinates, four bytes per point and column, or recomputes them at every use.
+    pub stores_coordinates: bool,
+    /// Largest number of entries of `Φ`, points × unknowns, up to which all points are analysed; of a model with more, a sample is. With eight points per
+    /// unknown or fewer all of them always are.
+    pub analysed_entries: usize,
+    /// Most bytes that the coordinates, or the covariance of handles, may take; what needs more is refused before any of it is taken.
+    pub memory: u64,
+    /// Called with the name of each step before it begins; `Break` ends the preparation with [`PrepareError::Stopped`].
+    pub next: &'a dyn Fn(&'static str) -> ControlFlow<()>,
+}
+
+impl Default for PrepareContext<'_> {
+    fn default() -> Self {
+        Self {
+            matrix: None,
+            stores_coordinates: true,
+            analysed_entries: 1 << 25,
+            memory: 16 << 30,
+            next: &|_| ControlFlow::Continue(()),
+        }
+    }
+}
+
+impl PrepareContext<'_> {
+    pub(super) fn next(&self, step: &'static str) -> Result<(), PrepareError> {
+        match (self.next)(step) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(PrepareError::Stopped),
+        }
+    }
+}

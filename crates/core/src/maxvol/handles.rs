@@ -1,0 +1,61 @@
+//! What a search for rows of maximum volume gives, and what its parts share.
+
+use cager_geometry::linalg;
+use faer::{Mat, MatRef};
+use rayon::prelude::*;
+
+/// From this many columns on swaps end at [`LOOSE_TOLERANCE`].
+pub(super) const MANY_COLUMNS: usize = 1536;
+
+/// Tolerance for many columns: each swap costs more there, and a basis this well conditioned is enough to interpolate and decompose by.
+pub(super) const LOOSE_TOLERANCE: f64 = 1.0;
+
+/// Pivots of LU above this fraction of the largest: far enough from dependent for single precision.
+pub(super) const SINGLE_IS_SAFE: f64 = 1e-4;
+
+/// Bound on confirming passes; the growth of the volume keeps their number far below it.
+pub(super) const MAX_PASSES: usize = 64;
+
+/// One exchange: the row of the matrix that became a handle, and which handle it replaced.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Swap {
+    /// The new row.
+    pub row: u32,
+    /// Position of the replaced one among the picked rows.
+    pub position: u32,
+    /// `|B_ij|`, by which the volume grew.
+    pub growth: f64,
+}
+
+/// The handles picked from a tall matrix.
+#[derive(Clone, Debug)]
+pub struct MaxVol {
+    /// Picked rows, one per column of the matrix.
+    pub rows: Vec<u32>,
+    /// Rows the search started from: those of pivoted LU, or what was given.
+    pub start: Vec<u32>,
+    /// Number of swaps after the start.
+    pub swaps: usize,
+    /// These swaps, in order.
+    pub trace: Vec<Swap>,
+    /// `ln |det Φ□|` of the picked rows.
+    pub log_volume: f64,
+    /// The same for the rows the search started from.
+    pub start_log_volume: f64,
+    /// Largest `|B_ij|` over all rows after the last swap: from a fresh factorisation, or, where a tolerance of one allows it, in single precision.
+    pub max_entry: f64,
+    /// `Bᵀ B`, m × m, symmetric; `None` where the swaps were confirmed in single precision.
+    pub(crate) gram: Option<Mat<f64>>,
+    /// `Φ□⁻¹`, m × m.
+    pub(crate) inverse: Mat<f64>,
+}
+
+pub(super) fn to_single(phi: MatRef<'_, f64>) -> Mat<f32> {
+    let mut single = linalg::zeros(phi.nrows(), phi.ncols());
+    single.as_mut().par_col_chunks_mut(1).enumerate().for_each(|(j, mut column)| {
+        for (s, &x) in column.as_mut().col_mut(0).iter_mut().zip(phi.col(j).iter()) {
+            *s = x as f32;
+        }
+    });
+    single
+}
