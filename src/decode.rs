@@ -42,7 +42,7 @@ pub enum DecodeError {
         cause: CageError,
     },
     /// The container needs a feature that this version lacks.
-    #[error("{}: {what}; use a newer cager", .path.display())]
+    #[error("{}: {what}; use a newer cager, or encode the capture again where one before 0.2.0 wrote it", .path.display())]
     Unsupported {
         /// The container.
         path: PathBuf,

@@ -13,7 +13,9 @@ pub enum Error {
     #[error("has version {0} of the format, and this program reads version 1; use a newer cager")]
     NewerVersion(u16),
     /// A required section of a later program.
-    #[error("needs the feature {0:?}, which this program does not have; use a newer cager")]
+    #[error(
+        "needs the feature {0:?}, which this program does not have; use a newer cager, or encode the capture again where one before 0.2.0 wrote it"
+    )]
     UnknownSection(String),
     /// Bytes were changed or are missing.
     #[error("is damaged at byte {offset}: {what}; get the file again")]
