@@ -21,8 +21,9 @@ use cager_cages::{DesignOptions, Style};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::{PrepareError, Solver, SolverOptions, check_options};
-use cager_core::regularize::{Regularizer, SparseMatrix};
+use cager_core::regularize::Regularizer;
 use cager_formats::{AtomicFile, FrameReader, Target, commit_together};
+use cager_geometry::linalg::SparseMatrix;
 use cager_geometry::mesh::Model;
 use cager_proto::report::DesignReport;
 use std::time::{Duration, Instant};
@@ -264,7 +265,8 @@ pub(super) fn checked_options(
     matrix: Option<&SparseMatrix>,
 ) -> Result<SolverOptions> {
     let (system, options) = (args.solver.coordinates, solver_options(args, rest, cage)?);
-    let delta = matrix.map_or(Ok(()), |matrix| matrix.delta(cage, system.values(cage).unknowns()).map(|_| ()));
+    let unknowns = system.values(cage).unknowns();
+    let delta = matrix.map_or(Ok(()), |_| Regularizer::Matrix.delta(matrix, cage, unknowns).map(|_| ()));
     // A service knows its own memory.
     let memory = if args.server.is_some() { u64::MAX } else { free_bytes() };
     delta

@@ -8,8 +8,9 @@ use anyhow::{Context, Result, bail};
 use cager_cages::diagnosis::weld;
 use cager_core::cage::{Cage, CageError};
 use cager_core::inversion::{Handles, PrepareError};
-use cager_core::regularize::{Regularizer, SparseMatrix};
+use cager_core::regularize::Regularizer;
 use cager_formats::read_matrix;
+use cager_geometry::linalg::SparseMatrix;
 use cager_geometry::mesh::{Point, TriMesh};
 use std::path::Path;
 

@@ -65,6 +65,7 @@ impl CageSizes<'_> {
         let carried = Carried { room: self.goal.room(other, self.total), ..Carried::default() };
         let mut coder = GroupCoder::new(self.goal, Arc::new(model), diagonal(&rest.points), most, carried);
         let frames: Vec<&[f64]> = self.frames[..most].iter().map(Vec::as_slice).collect();
+        assert!(!solver.follows_previous(), "every cage depends on the one before");
         for batch in frames.chunks(BATCH) {
             for (frame, inverted) in batch.iter().zip(solver.invert(Rows::All, None, batch)) {
                 coder.push(frame.to_vec(), inverted.cage);

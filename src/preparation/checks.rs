@@ -9,6 +9,7 @@ use cager_codec::MAX_ROWS;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions, check_options};
+use cager_core::regularize::Regularizer;
 use cager_geometry::mesh::{Point, diagonal};
 use cager_proto::container::colors_bytes;
 
@@ -29,7 +30,7 @@ pub(crate) fn check(geometry: &Geometry, choices: &Choices, max_bytes: u64) -> R
         .map_err(|error| refused(&error))?;
     choices.goal.map_or(Ok(()), |goal| check_goal(goal, geometry, unknowns, choices.frames))?;
     let Some(matrix) = &geometry.matrix else { return Ok(()) };
-    matrix.delta(&geometry.cage, unknowns).map_err(|error| refused(&error.into()))?;
+    Regularizer::Matrix.delta(Some(matrix), &geometry.cage, unknowns).map_err(|error| refused(&error.into()))?;
     Ok(())
 }
 

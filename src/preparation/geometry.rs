@@ -7,8 +7,9 @@ use crate::store::{Content, NamedFile};
 use cager_cages::diagnosis::weld;
 use cager_codec::CodedMesh;
 use cager_core::cage::{Cage, CageError};
-use cager_core::regularize::{Regularizer, SparseMatrix};
+use cager_core::regularize::Regularizer;
 use cager_formats::{MeshFormat, read_matrix_bytes, read_model_bytes};
+use cager_geometry::linalg::SparseMatrix;
 use cager_geometry::mesh::{Model, TriMesh, diagonal};
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! BoundingShape cages: a box, a sphere or a convex hull around one model, or around several together as their *public cage*.
+//! Bounding shapes as cages: a box, a sphere or a convex hull around one model, or around several together as their *public cage*.
 
 mod hull;
 

@@ -1,4 +1,4 @@
-//! BoundingShape cages around one model and around several.
+//! Bounding shapes as cages around one model and around several.
 
 mod common;
 

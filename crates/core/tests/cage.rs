@@ -167,3 +167,9 @@ fn what_encloses_a_part_is_found_among_a_few_faces_of_thousands_of_parts() {
         assert!(looked_at.get() < 8_000 * 1_000, "{}", looked_at.get());
     }
 }
+
+#[test]
+fn coordinates_whose_products_overflow_are_refused() {
+    let of_size = |size: f64| Cage::new(octahedra([[0.0; 3]], size));
+    assert!(of_size(1.0).is_ok() && of_size(1e110).is_err());
+}

@@ -3,7 +3,7 @@
 use crate::error::{Error, Fault};
 use crate::signature::Signature;
 use crate::text::{Lines, integer, number, quoted, words};
-use cager_core::regularize::SparseMatrix;
+use cager_geometry::linalg::SparseMatrix;
 use std::path::Path;
 
 /// Bytes of the shortest entry: two numbers of one digit, a space and the end of the line.

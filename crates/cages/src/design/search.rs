@@ -91,6 +91,7 @@ impl Run<'_> {
         let Ok(cage) = Cage::new(best.mesh.clone()) else { return f64::INFINITY };
         let options = SolverOptions::for_unknowns(cage.vertices().len());
         let Ok(solver) = Solver::prepare(&MeanValue, &cage, &self.rest.points, options) else { return f64::INFINITY };
+        assert!(!solver.follows_previous(), "every cage depends on the one before");
         let held_back: Vec<&[f64]> =
             frames.iter().skip(usize::from(frames.len() > 1)).step_by(2).map(Vec::as_slice).collect();
         let mut errors = Vec::new();

@@ -71,14 +71,14 @@ impl Findings {
 /// All defects of a cage around a model, rather than the first one.
 pub fn check(mesh: &TriMesh, model: &Model) -> Findings {
     let vertices = mesh.vertices.len();
-    let defects = Defects::of(mesh);
+    let (defects, refusal) = Defects::of(mesh);
     let exists = |t: &&[u32; 3]| t.iter().all(|&v| (v as usize) < vertices);
     let faces: Vec<[u32; 3]> = mesh.triangles.iter().filter(exists).copied().collect();
     let fans = fans(vertices, &faces);
     let mut findings = Findings {
         vertices,
         faces: mesh.triangles.len(),
-        refusal: defects.first(mesh),
+        refusal,
         defects,
         duplicate_vertices: same_place(mesh),
         non_manifold_vertices: (0..vertices as u32).filter(|&v| fans[v as usize].len() > 1).collect(),

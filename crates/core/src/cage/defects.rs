@@ -12,7 +12,7 @@ use std::collections::HashMap;
 const FLAT: f64 = 1e-12;
 
 /// What keeps a mesh from being a cage: closed, edge-manifold, consistently and outwardly oriented, without degenerate faces. Vertices and faces are counted
-/// from 0, all lists ascend.
+/// from 0; lists ascend, pairs by their second entry.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Defects {
     /// Vertices with coordinates that are NaN or infinite.
@@ -37,26 +37,29 @@ pub struct Defects {
     pub cavities: usize,
     /// Parts that point inwards without being a cavity, each by its first face.
     pub inward_parts: Vec<u32>,
-    /// Sum of the signed volumes of all parts.
-    pub volume: f64,
+    /// Whether all parts point inwards, and the sum of their signed volumes.
+    all_inwards: bool,
+    volume: f64,
 }
 
 /// A mesh's defects, and its faces whose vertices exist, with their edges.
 pub(super) struct Examination {
     pub(super) defects: Defects,
-    /// In the order in which the faces first refer to them; of edges without two faces, some are missing.
+    /// In the order in which the faces first refer to them; complete, and what faces refer to, only where edges have no defects.
     pub(super) edges: Vec<Edge>,
     pub(super) faces: Vec<Face>,
 }
 
 impl Defects {
-    /// Those of a mesh.
-    pub fn of(mesh: &TriMesh) -> Self {
-        Examination::of(mesh).defects
+    /// Those of a mesh, and why it cannot be a cage, if that is so.
+    pub fn of(mesh: &TriMesh) -> (Self, Option<CageError>) {
+        let defects = Examination::of(mesh).defects;
+        let refusal = defects.first(mesh);
+        (defects, refusal)
     }
 
-    /// The first that is worth mending.
-    pub fn first(&self, mesh: &TriMesh) -> Option<CageError> {
+    /// The first that is worth mending; `mesh` is the one that was examined.
+    pub(super) fn first(&self, mesh: &TriMesh) -> Option<CageError> {
         let (vertices, faces) = (mesh.vertices.len(), mesh.triangles.len());
         if vertices < 4 || faces < 4 {
             return Some(CageError::TooSmall { vertices, faces });
@@ -98,10 +101,10 @@ impl Defects {
             let found = faces_at(edge);
             return Some(CageError::Inconsistent { faces: [found[0], found[1]], edge });
         }
-        let face = *self.inward_parts.first()?;
-        if self.inward_parts.len() == self.components {
+        if self.all_inwards {
             return Some(CageError::Inward { faces, volume: self.volume });
         }
+        let face = *self.inward_parts.first()?;
         Some(CageError::InwardPart { vertex: corners(face)[0] })
     }
 }
@@ -200,7 +203,8 @@ impl Defects {
         let faces: Vec<[u32; 3]> = names.iter().map(|&f| mesh.triangles[f as usize]).collect();
         let volumes = part_volumes(&mesh.vertices, &faces, labels);
         self.volume = volumes.iter().sum();
-        let inwards: Vec<u32> = (0..volumes.len() as u32).filter(|&part| volumes[part as usize] <= 0.0).collect();
+        let inwards: Vec<u32> = (0..volumes.len() as u32).filter(|&part| is_inwards(volumes[part as usize])).collect();
+        self.all_inwards = !volumes.is_empty() && volumes.iter().all(|&volume| volume <= 0.0);
         if inwards.is_empty() {
             return;
         }
@@ -213,6 +217,11 @@ impl Defects {
             }
         }
     }
+}
+
+/// NaN, from coordinates whose products overflow, is no volume either.
+fn is_inwards(volume: f64) -> bool {
+    volume.is_nan() || volume <= 0.0
 }
 
 fn is_flat([a, b, c]: [Point; 3]) -> bool {

@@ -20,7 +20,7 @@ use std::time::Instant;
 
 /// Analysis of a rest pose and its cage, from which solvers with any options follow at the cost of their operator alone.
 ///
-/// It holds `Φ` in double precision as well; for a single solver use [`Solver::prepare`].
+/// It holds `Φ` in double precision as well; for a single solver use [`Solver::prepare`](super::Solver::prepare).
 ///
 /// For a system whose normals are functions of the vertices, it analyses mean value coordinates of the same cage and points, from which the nonlinear
 /// inversion starts. Only the decoder and the reproduction errors are the system's own.
@@ -47,7 +47,7 @@ impl Analysis {
     /// Computes coordinates, handles and decompositions. Runs on the current rayon pool; its result does not depend on it.
     ///
     /// # Errors
-    /// As [`Solver::prepare`].
+    /// As [`Solver::prepare`](super::Solver::prepare).
     pub fn new(system: &dyn CoordinateSystem, cage: &Cage, points: &[Point]) -> Result<Self, PrepareError> {
         let context = PrepareContext::default();
         check(
@@ -62,7 +62,7 @@ impl Analysis {
     /// As [`Self::new`], computing only what solvers with these handles need. A model of very many points is analysed on a sample.
     ///
     /// # Errors
-    /// As [`Solver::prepare`].
+    /// As [`Solver::prepare`](super::Solver::prepare).
     pub fn for_options(
         system: &dyn CoordinateSystem,
         cage: &Cage,

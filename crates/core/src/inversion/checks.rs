@@ -5,7 +5,7 @@ use crate::cage::Cage;
 use cager_geometry::linalg::tall_product;
 use cager_geometry::mesh::{Point, diagonal};
 use cager_geometry::spatial::Surface;
-use cager_geometry::vector::norm;
+use cager_geometry::vector::{norm, sub};
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
@@ -102,9 +102,14 @@ pub fn coordinates_bytes(points: usize, unknowns: usize, copies: usize) -> u64 {
 /// Of the points reported as outside, those that neither lie on the cage nor inside a self-overlapping part of it; and their largest distance to the
 /// cage over the diagonal.
 pub(super) fn outside(cage: &Cage, points: &[Point], found: &[u32], diagonal: f64) -> (Vec<u32>, f64) {
-    let surface = Surface::from(cage.mesh());
-    let distance = |i: u32| surface.nearest(points[i as usize].into()).map_or(0.0, |found| found.distance) / diagonal;
-    let enclosed = |i: u32| surface.contains(points[i as usize].into());
+    // Relative to a vertex, so that a cage far from the origin keeps its digits.
+    let origin = cage.vertices()[0];
+    let mut mesh = cage.mesh().clone();
+    mesh.vertices.iter_mut().for_each(|p| *p = sub(*p, origin));
+    let surface = Surface::from(&mesh);
+    let at = |i: u32| sub(points[i as usize], origin).into();
+    let distance = |i: u32| surface.nearest(at(i)).map_or(0.0, |found| found.distance) / diagonal;
+    let enclosed = |i: u32| surface.contains(at(i));
     let measured: Vec<(u32, f64)> = found
         .par_iter()
         .map(|&i| (i, distance(i)))

@@ -2,7 +2,7 @@
 
 use super::PrepareError;
 use crate::coordinates::{ElementPlan, Refinement};
-use crate::regularize::SparseMatrix;
+use cager_geometry::linalg::SparseMatrix;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
@@ -45,7 +45,7 @@ pub struct PreparationReport {
 /// How to prepare a solver, apart from its options.
 #[derive(Clone, Copy)]
 pub struct PrepareContext<'a> {
-    /// Δ of [`Regularizer::Matrix`](crate::regularize::Regularizer::Matrix).
+    /// Δ of [`Regularizer::Matrix`](crate::regularize::Regularizer::Matrix); the others have one of their own.
     pub matrix: Option<&'a SparseMatrix>,
     /// Whether the decoder of a model of very many points stores their coordinates, four bytes per point and column, or recomputes them at every use.
     pub stores_coordinates: bool,

@@ -12,10 +12,9 @@ use super::{Analysis, PrepareError, Solver, SolverOptions};
 use crate::decode::Decoder;
 use crate::handles::Handles;
 use crate::regularize::{
-    Reference, RegularizationOperator, Regularizer, SparseMatrix, SpectralMap, Spectrum, WEAK_SINGULAR_VALUE, last_map,
-    spectral_map,
+    Reference, RegularizationOperator, Regularizer, SpectralMap, Spectrum, WEAK_SINGULAR_VALUE, last_map, spectral_map,
 };
-use cager_geometry::linalg;
+use cager_geometry::linalg::{self, SparseMatrix};
 use cager_geometry::mesh::Point;
 use faer::Mat;
 use std::sync::{Arc, OnceLock};

@@ -275,7 +275,7 @@ fn condition_of(phi: MatRef<'_, f64>, handles: &[u32], others: MatRef<'_, f64>, 
     Some(values[0] / values[rank - 1])
 }
 
-/// Zero columns up to a whole tile, see [`product_columns`](super::product_columns).
+/// Zero columns up to a whole tile, see `product_columns`.
 pub(super) fn padded_to_tiles(mut operator: Mat<f64>) -> Mat<f64> {
     operator.resize_with(operator.nrows(), operator.ncols().next_multiple_of(linalg::TILE_ROWS), |_, _| 0.0);
     operator

@@ -83,7 +83,7 @@ impl Solver {
         self.target.is_previous()
     }
 
-    /// The cages of up to [`BATCH`] frames. Where cages depend on the previous frame, these are consecutive frames, and `previous` is the cage of the
+    /// The cages of up to [`BATCH`](super::BATCH) frames. Where cages depend on the previous frame, these are consecutive frames, and `previous` is the cage of the
     /// frame before them, `None` at the beginning. Other solvers ignore it.
     ///
     /// The cage of a frame is bit-identical whatever the other frames of the batch, and whichever rows are given.

@@ -1,7 +1,7 @@
 //! Automatic choice of the spectrum threshold: the largest one whose additional error on sample frames stays within a bound.
 
 use super::{BATCH, HandleSystem, PrepareError, Rows, Solver, SolverOptions};
-use crate::regularize::SparseMatrix;
+use cager_geometry::linalg::SparseMatrix;
 use rayon::prelude::*;
 
 /// Errors below this fraction of the diagonal count as rounding.

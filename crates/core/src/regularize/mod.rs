@@ -5,15 +5,13 @@
 //! that cage.
 
 mod laplacian;
-mod matrix;
 mod spectral;
-
-pub use matrix::SparseMatrix;
 
 pub(crate) use laplacian::cage_laplacian;
 pub(crate) use spectral::{DataMap, RegularizationOperator, SpectralMap, Spectrum, last_map, spectral_map};
 
 use crate::cage::Cage;
+use cager_geometry::linalg::SparseMatrix;
 use faer::Mat;
 
 /// How the unstable end of the spectrum is treated.
@@ -95,7 +93,14 @@ impl Regularizer {
     /// A matrix that is missing or does not fit the cage.
     pub fn delta(self, matrix: Option<&SparseMatrix>, cage: &Cage, unknowns: usize) -> Result<Mat<f64>, TermError> {
         match self {
-            Self::Matrix => matrix.ok_or(TermError::Missing)?.delta(cage, unknowns),
+            Self::Matrix => {
+                let (matrix, vertices) = (matrix.ok_or(TermError::Missing)?, cage.vertices().len());
+                // Where face normals are unknown too, a matrix with one column per vertex does not affect them.
+                if ![unknowns, vertices].contains(&matrix.columns()) {
+                    return Err(TermError::Columns { columns: matrix.columns(), vertices, unknowns });
+                }
+                Ok(matrix.compressed(unknowns))
+            }
             _ => Ok(cage_laplacian(cage, unknowns)),
         }
     }

@@ -3,6 +3,7 @@
 mod eigen;
 mod factors;
 mod products;
+mod sparse;
 pub mod svd;
 mod zeros;
 
@@ -15,4 +16,5 @@ pub use products::{
     BLOCK_ROWS, TILE_COLUMNS, TILE_ROWS, accumulate_product, gram, lower_product, mirrored, multiply, product, rows_of,
     tall_product, transposed_product,
 };
+pub use sparse::SparseMatrix;
 pub use zeros::zeros;

@@ -1,15 +1,12 @@
-//! A custom term, given as a sparse matrix.
+//! Sparse matrices, as they are given.
 
-use super::TermError;
-use crate::cage::Cage;
-use cager_geometry::linalg::svd::{Svd, svd};
+use super::svd::{Svd, svd};
 use faer::Mat;
 
 /// Larger entries overflow where they are squared.
 const LARGEST: f64 = 1e100;
 
-/// A sparse matrix Δ, one column per unknown of the cage: `λ‖Δ C‖²`. Where face normals are unknown too, a matrix with one column per vertex does not
-/// affect them.
+/// A sparse matrix Δ, for terms `‖Δ C‖²`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SparseMatrix {
     rows: usize,
@@ -53,20 +50,9 @@ impl SparseMatrix {
         &self.entries
     }
 
-    /// Δ for a cage of which this many rows are unknown, rows × unknowns.
-    ///
-    /// # Errors
-    /// A matrix that does not fit the cage.
-    pub fn delta(&self, cage: &Cage, unknowns: usize) -> Result<Mat<f64>, TermError> {
-        let vertices = cage.vertices().len();
-        if self.columns != unknowns && self.columns != vertices {
-            return Err(TermError::Columns { columns: self.columns, vertices, unknowns });
-        }
-        Ok(self.compressed(unknowns))
-    }
-
-    /// A matrix with as many columns and the same `‖Δ C‖` for every C, of at most four times as many rows as columns.
-    fn compressed(&self, unknowns: usize) -> Mat<f64> {
+    /// A matrix with as many columns and the same `‖Δ C‖` for every C, of at most four times as many rows as there are `unknowns`, beyond whose
+    /// number no entry lies.
+    pub fn compressed(&self, unknowns: usize) -> Mat<f64> {
         let rows: Vec<&[(u32, u32, f64)]> = self.entries.chunk_by(|a, b| a.0 == b.0).collect();
         let mut delta = Mat::zeros(rows.len().min(4 * unknowns), unknowns);
         if rows.len() <= 4 * unknowns {
