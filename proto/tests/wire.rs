@@ -21,7 +21,7 @@ fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, WireError> {
 
 /// Each line a field of the header, in the order of `docs/FORMAT.md`.
 const GOLDEN: &str = "
-    01000000
+    03000000
     0300000000000000 6d7663
     0600000000000000 6d6178766f6c
     0900000000000000 6c61706c616369616e
