@@ -42,6 +42,9 @@ pub struct Defects {
     volume: f64,
 }
 
+/// The faces at an edge, each with whether it runs from the smaller to the larger vertex.
+type FacesAtEdge = Vec<(u32, bool)>;
+
 /// A mesh's defects, and its faces whose vertices exist, with their edges.
 pub(super) struct Examination {
     pub(super) defects: Defects,
@@ -113,13 +116,12 @@ impl Examination {
     pub(super) fn of(mesh: &TriMesh) -> Self {
         let vertices = mesh.vertices.len();
         let is_finite = |v: &u32| mesh.vertices[*v as usize].iter().all(|x| x.is_finite());
-        let mut defects = Defects::default();
-        defects.not_finite = (0..vertices as u32).filter(|v| !is_finite(v)).collect();
+        let not_finite = (0..vertices as u32).filter(|v| !is_finite(v)).collect();
+        let mut defects = Defects { not_finite, ..Defects::default() };
         let names = defects.examine_faces(mesh);
 
         let mut edge_of: HashMap<[u32; 2], u32> = HashMap::with_capacity(mesh.triangles.len() * 2);
-        // Edges with the faces at them, each with whether it runs from the smaller to the larger vertex.
-        let mut edges: Vec<([u32; 2], Vec<(u32, bool)>)> = Vec::new();
+        let mut edges: Vec<([u32; 2], FacesAtEdge)> = Vec::new();
         let mut faces = Vec::with_capacity(names.len());
         for (f, &name) in names.iter().enumerate() {
             let corners = mesh.triangles[name as usize];
