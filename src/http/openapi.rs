@@ -205,6 +205,7 @@ fn can_answer(status: u16, guarded: bool, path: &str, operation: &Operation) -> 
         // Whatever the route: a request that is broken or stalls, too many connections, a fault of the service.
         400 | 405 | 408 | 500 | 503 => true,
         507 => path == "/readyz" || takes_body,
+        401 | 403 if path == "/metrics" => true,
         _ if !guarded => false,
         401 | 403 | 429 => true,
         404 => in_session,

@@ -99,5 +99,5 @@ fn headers_that_clients_rely_on_are_described() {
     assert_eq!([giving("201", "Location"), giving("202", "Location")], [1, 1]);
     assert_eq!([giving("200", "ETag"), giving("206", "Content-Range"), giving("304", "ETag")], [4, 4, 4]);
     assert_eq!(giving("503", "Retry-After"), operations.len());
-    assert!(giving("401", "WWW-Authenticate") == 21 && giving("429", "Retry-After") > 0);
+    assert!(giving("401", "WWW-Authenticate") == 22 && giving("429", "Retry-After") > 0);
 }

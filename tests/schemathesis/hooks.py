@@ -56,7 +56,8 @@ def before_call(ctx, case, **kwargs):
     key = (case.headers or {}).get("Idempotency-Key")
     if isinstance(key, str) and 0 < len(key) <= 200 and key.isascii() and key.isprintable():
         case.headers["Idempotency-Key"] = key + str(next(KEYS))
-    if label.endswith("/events") or label.endswith("/cages"):
+    follows = label.endswith("/capture.cager") and "follow" in (case.query or {})
+    if label.endswith("/events") or label.endswith("/cages") or follows:
         session = str((case.path_parameters or {}).get("id"))
         if len(session) == 32 and session.isalnum():
             case.path_parameters["id"] = DONE
