@@ -41,7 +41,7 @@ export class Gates {
     this.queues[Math.min(toCome, MOST_TO_COME)].add(from, to);
   }
 
-  /** The next one, which is then none any more; null where there is none. */
+  /** Takes the next gate off the lists; null where there is none. */
   take(): Gate | null {
     for (const queue of this.queues) {
       const gate = queue.take();

@@ -28,7 +28,7 @@ pub trait FrameWriter: Send {
 pub struct FrameOptions {
     /// Frames per second, for the times in `.mdd`: 24 by default.
     pub fps: f64,
-    /// The number of each frame, ascending, for the names of files and the times in `.pc2` and `.mdd`; 0, 1, 2, … where there are none.
+    /// The number of each frame, ascending, for the names of files and the times in `.pc2` and `.mdd`; 0, 1, 2, … where the list is empty.
     pub numbers: Vec<f64>,
     /// What is added to all positions, which are then written in double precision by the formats that have it.
     pub origin: Option<Point>,
