@@ -3,12 +3,12 @@
 use cager_geometry::linalg::{cholesky, solve_cholesky, tall_product, transposed_product};
 use cager_geometry::vector::Point;
 use faer::{Mat, MatRef};
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Mat3A, Vec3A};
 use rayon::prelude::*;
 
 use crate::matching::{OrientedPoints, match_weight};
 use crate::observation::Observation;
-use crate::sparse_rows::{matrix, points, vectors};
+use crate::sparse_rows::{matrix, points, single, vectors};
 use crate::template::{Template, plain, pose};
 
 /// How a fit goes from stiff and far-seeing to loose and exact: `[first, last]` of each iteration's values, in between in proportion.
@@ -76,6 +76,7 @@ impl Target {
 struct Distances {
     hessians: Vec<DMat3>,
     pulls: Vec<DVec3>,
+    single_hessians: Vec<Mat3A>,
 }
 
 impl Template {
@@ -101,9 +102,9 @@ impl Template {
             pull += faer::Scale(hold) * (&start - &cage);
             let Some(preconditioner) = self.preconditioner(&distances, rigidity, hold) else { break };
             let change = self.solve(&distances, rigidity, hold, &preconditioner, pull, options.steps);
-            let moved = self.sparse.times(&points(change.as_ref()));
+            let moved = self.sparse.times(&single(change.as_ref()));
             cage += &change;
-            let mean = moved.iter().map(|x| x.length_squared()).sum::<f64>() / moved.len() as f64;
+            let mean = moved.iter().map(|x| f64::from(x.length_squared())).sum::<f64>() / moved.len() as f64;
             if mean.sqrt() < MIN_MOVE * self.diagonal && iteration > options.iterations / 2 {
                 break;
             }
@@ -149,7 +150,8 @@ impl Template {
             hessians[i] += hessian;
             pulls[i] += pull;
         }
-        Distances { hessians, pulls }
+        let single_hessians = hessians.iter().map(|b| Mat3A::from(b.as_mat3())).collect();
+        Distances { hessians, pulls, single_hessians }
     }
 
     /// The Cholesky factor of a Hessian in which every sample's is the mean of all in every direction.
@@ -161,13 +163,14 @@ impl Template {
         cholesky(sum)
     }
 
+    /// The Hessian times a change of the cage, of coordinates without their small entries, in single precision.
     fn hessian_times(&self, distances: &Distances, rigidity: f64, hold: f64, x: MatRef<'_, f64>) -> Mat<f64> {
-        let x = points(x);
-        let pulled: Vec<DVec3> = self.sparse.times(&x).iter().zip(&distances.hessians).map(|(&x, &b)| b * x).collect();
-        let mut sum = self.sparse.transposed_times(&pulled);
-        let rigid = self.rigidity.hessian_times(&x);
-        sum.iter_mut().zip(rigid).zip(&x).for_each(|((sum, rigid), &x)| *sum += rigidity * rigid + hold * x);
-        matrix(&sum)
+        let change = single(x);
+        let moved = self.sparse.times(&change);
+        let pulled: Vec<Vec3A> = moved.iter().zip(&distances.single_hessians).map(|(&x, &b)| b * x).collect();
+        let sum = self.sparse.transposed_times(&pulled);
+        let rigid = self.rigidity.hessian_times(&change);
+        Mat::from_fn(x.nrows(), 3, |i, k| f64::from(sum[i][k]) + rigidity * f64::from(rigid[i][k]) + hold * x[(i, k)])
     }
 
     /// Conjugate gradients from 0.

@@ -8,7 +8,7 @@ use cager_geometry::linalg::{gram, nearest_rotation, tall_product};
 use cager_geometry::mesh::Polygons;
 use cager_geometry::topology::{Adjacency, UnionFind};
 use faer::{Mat, MatRef};
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Vec3A};
 use rayon::prelude::*;
 
 use crate::nearest::NearestPoints;
@@ -115,12 +115,12 @@ impl Rigidity {
     }
 
     /// The Hessian, of coordinates without their small entries, times a change of the cage.
-    pub(crate) fn hessian_times(&self, change: &[DVec3]) -> Vec<DVec3> {
+    pub(crate) fn hessian_times(&self, change: &[Vec3A]) -> Vec<Vec3A> {
         let moved = self.sparse.times(change);
         let forces = self.of_each_node(|i| {
             self.edges(i)
                 .iter()
-                .fold(DVec3::ZERO, |sum, edge| sum + 2.0 * edge.weight * (moved[i] - moved[edge.to as usize]))
+                .fold(Vec3A::ZERO, |sum, edge| sum + (2.0 * edge.weight) as f32 * (moved[i] - moved[edge.to as usize]))
         });
         self.sparse.transposed_times(&forces)
     }

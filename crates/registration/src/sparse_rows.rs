@@ -2,10 +2,11 @@
 
 use cager_geometry::vector::Point;
 use faer::MatRef;
-use glam::DVec3;
+use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
 
-/// The larger entries of a matrix, by rows and by columns.
+/// The larger entries of coordinates in single precision, by rows and by columns. Rows are scaled to sum to one as coordinates do, so that what moves the whole
+/// cage moves every point.
 pub(crate) struct SparseRows {
     rows: Compressed,
     columns: Compressed,
@@ -14,7 +15,7 @@ pub(crate) struct SparseRows {
 /// Lists of (number, value), back to back.
 struct Compressed {
     first: Vec<u32>,
-    entries: Vec<(u32, f64)>,
+    entries: Vec<(u32, f32)>,
 }
 
 /// Products with fewer entries are computed by one thread.
@@ -23,42 +24,49 @@ const MIN_PARALLEL_ENTRIES: usize = 20_000;
 impl SparseRows {
     /// The entries of a matrix that are larger than `threshold`, absolute.
     pub(crate) fn new(matrix: MatRef<'_, f64>, threshold: f64) -> Self {
-        let rows = Compressed::new(matrix, threshold);
-        Self { rows, columns: Compressed::new(matrix.transpose(), threshold) }
+        let mut rows: Vec<Vec<(u32, f32)>> = Vec::with_capacity(matrix.nrows());
+        let mut columns: Vec<Vec<(u32, f32)>> = vec![Vec::new(); matrix.ncols()];
+        for i in 0..matrix.nrows() {
+            let row = matrix.row(i);
+            let kept: Vec<(u32, f64)> =
+                (0..matrix.ncols()).map(|j| (j as u32, row[j])).filter(|(_, x)| x.abs() > threshold).collect();
+            let sum: f64 = kept.iter().map(|(_, x)| x).sum();
+            rows.push(kept.iter().map(|&(j, x)| (j, (x / sum) as f32)).collect());
+            rows[i].iter().for_each(|&(j, x)| columns[j as usize].push((i as u32, x)));
+        }
+        Self { rows: Compressed::new(&rows), columns: Compressed::new(&columns) }
     }
 
     /// `A x`.
-    pub(crate) fn times(&self, x: &[DVec3]) -> Vec<DVec3> {
+    pub(crate) fn times(&self, x: &[Vec3A]) -> Vec<Vec3A> {
         self.rows.times(x)
     }
 
     /// `Aᵀ y`.
-    pub(crate) fn transposed_times(&self, y: &[DVec3]) -> Vec<DVec3> {
+    pub(crate) fn transposed_times(&self, y: &[Vec3A]) -> Vec<Vec3A> {
         self.columns.times(y)
     }
 }
 
 impl Compressed {
-    fn new(matrix: MatRef<'_, f64>, threshold: f64) -> Self {
-        let (mut first, mut entries) = (vec![0], Vec::new());
-        for i in 0..matrix.nrows() {
-            let row = matrix.row(i);
-            entries.extend((0..matrix.ncols()).map(|j| (j as u32, row[j])).filter(|(_, x)| x.abs() > threshold));
-            first.push(entries.len() as u32);
-        }
-        Self { first, entries }
+    fn new(lists: &[Vec<(u32, f32)>]) -> Self {
+        let ends = lists.iter().scan(0, |sum, list| {
+            *sum += list.len() as u32;
+            Some(*sum)
+        });
+        Self { first: std::iter::once(0).chain(ends).collect(), entries: lists.concat() }
     }
 
-    fn times(&self, x: &[DVec3]) -> Vec<DVec3> {
-        let row = |ends: &[u32]| -> DVec3 {
-            let entries = &self.entries[ends[0] as usize..ends[1] as usize];
-            entries.iter().fold(DVec3::ZERO, |sum, &(j, value)| sum + value * x[j as usize])
+    fn times(&self, x: &[Vec3A]) -> Vec<Vec3A> {
+        let row = |i: usize| -> Vec3A {
+            let entries = &self.entries[self.first[i] as usize..self.first[i + 1] as usize];
+            entries.iter().fold(Vec3A::ZERO, |sum, &(j, value)| sum + value * x[j as usize])
         };
-        if self.entries.len() < MIN_PARALLEL_ENTRIES {
-            return self.first.windows(2).map(row).collect();
-        }
         let lists = self.first.len() - 1;
-        (0..lists).into_par_iter().with_min_len(64).map(|i| row(&self.first[i..i + 2])).collect()
+        if self.entries.len() < MIN_PARALLEL_ENTRIES {
+            return (0..lists).map(row).collect();
+        }
+        (0..lists).into_par_iter().with_min_len(128).map(row).collect()
     }
 }
 
@@ -75,4 +83,9 @@ pub(crate) fn points(matrix: MatRef<'_, f64>) -> Vec<DVec3> {
 /// As vectors.
 pub(crate) fn vectors(points: &[Point]) -> Vec<DVec3> {
     points.iter().map(|&p| DVec3::from(p)).collect()
+}
+
+/// The rows of an n × 3 matrix in single precision.
+pub(crate) fn single(matrix: MatRef<'_, f64>) -> Vec<Vec3A> {
+    (0..matrix.nrows()).map(|i| DVec3::new(matrix[(i, 0)], matrix[(i, 1)], matrix[(i, 2)]).as_vec3a()).collect()
 }

@@ -77,7 +77,7 @@ pub(crate) struct Sample {
 }
 
 /// Coordinates below this are left out where a product need not be exact.
-const SPARSE_THRESHOLD: f64 = 1e-3;
+const SPARSE_THRESHOLD: f64 = 3e-3;
 /// Blocks of rows in which products are summed.
 const BLOCK_ROWS: usize = 512;
 /// Vertices that nodes are chosen among, at the most.
