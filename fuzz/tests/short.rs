@@ -65,6 +65,7 @@ short! {
     stl "stl" 120_000;
     glb "glb" 30_000;
     mtx "mtx" 120_000;
+    bvh "bvh" 120_000;
     npy "npy" 240_000;
     pc2 "pc2" 240_000;
     mdd "mdd" 240_000;

@@ -1,9 +1,10 @@
-//! Meshes, point caches and sparse matrices to and from files and byte slices.
+//! Meshes, point caches, skeletons in motion and sparse matrices to and from files and byte slices.
 //!
 //! Readers take bytes of any origin: they return an error for whatever they do not understand, never panic, and never
 //! allocate more than a small multiple of what the file holds. Writers make files that appear whole or not at all.
 
 pub mod atomic;
+pub mod biovision;
 mod error;
 pub mod frames;
 mod matrix;

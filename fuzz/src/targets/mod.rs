@@ -5,6 +5,7 @@ mod container;
 mod frames;
 mod meshes;
 mod settings;
+mod skeletons;
 mod store;
 
 use crate::Target;
@@ -17,6 +18,7 @@ pub const TARGETS: &[Target] = &[
     meshes::STL,
     meshes::GLB,
     meshes::MTX,
+    skeletons::BVH,
     frames::NPY,
     frames::PC2,
     frames::MDD,

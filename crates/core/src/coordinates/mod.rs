@@ -11,7 +11,7 @@ pub use error::CoordinatesError;
 pub use green::Green;
 pub use harmonic::{ElementPlan, Harmonic};
 pub use mean_value::MeanValue;
-pub use normals::DependentNormals;
+pub use normals::{DependentNormals, Derivative};
 
 use crate::cage::Cage;
 use cager_geometry::mesh::Point;

@@ -18,7 +18,7 @@ pub struct DependentNormals {
 }
 
 /// Derivatives of a face's normal with respect to `u'` and `v'`, each row by row.
-pub(crate) type Derivative = [[Point; 3]; 2];
+pub type Derivative = [[Point; 3]; 2];
 
 impl DependentNormals {
     /// Normals of this length at rest.
@@ -63,7 +63,7 @@ impl DependentNormals {
     }
 
     /// Derivatives of the normal of each face with respect to the edges from its first corner to the other two.
-    pub(crate) fn derivatives(&self, vertices: &[Point]) -> Vec<Derivative> {
+    pub fn derivatives(&self, vertices: &[Point]) -> Vec<Derivative> {
         let of_face = |(&face, weights): (&[u32; 3], &[f64; 3])| {
             let [u, v] = edges(face, |i| vertices[i as usize]);
             let normal = cross(u, v);

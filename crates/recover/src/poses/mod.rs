@@ -1,0 +1,7 @@
+//! Poses of a rig from motion-capture clips: the quads are taken along by the bones of a skeleton (Duveau et al. 2012, §6.2).
+
+mod names;
+mod skeleton;
+
+pub use names::{BONES, BoneNames, Naming};
+pub use skeleton::{PoseError, SkeletonPoses};
