@@ -48,7 +48,11 @@ impl CodedMesh {
         let count = points.len();
         debug_assert_eq!(decode_faces(&faces, count, ordered.len(), ordered.indices().len()), Ok(ordered.clone()));
         debug_assert_eq!(decode_positions(&positions, &ordered, count), Ok(points.clone()));
-        Self { mesh: Model { points, faces: ordered, colors: mesh.colors.clone() }, faces, positions }
+        Self {
+            mesh: Model { points, faces: ordered, colors: mesh.colors.clone(), ..Model::default() },
+            faces,
+            positions,
+        }
     }
 
     /// Bytes that its polygons and positions take; colours are not coded.

@@ -92,6 +92,8 @@ pub struct Model {
     pub faces: Polygons,
     /// Colours of the points, red, green and blue in sRGB; empty where there are none.
     pub colors: Vec<[u8; 3]>,
+    /// Normals of the points of a cloud, as they were read; empty for meshes, and where there are none.
+    pub normals: Vec<Point>,
 }
 
 /// A triangle mesh: the form a cage has.

@@ -6,7 +6,9 @@
 
 pub mod joints;
 pub mod manifold;
+pub mod offsets;
 pub mod people;
 pub mod poses;
 pub mod rig;
 mod rotation;
+pub mod track;

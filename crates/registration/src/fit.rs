@@ -24,12 +24,20 @@ pub struct FitOptions {
     pub matched_back: usize,
     /// Steps of conjugate gradients in each iteration, at the most.
     pub steps: usize,
+    /// Weight that holds the cage at its reference, of a mean squared distance as a share of the diagonal.
+    pub hold: f64,
 }
 
 impl FitOptions {
     /// For a start that is near: the frame before.
-    pub const NEAR: Self =
-        Self { iterations: 8, rigidity: [1e-3, 1e-5], reach: [0.03, 0.006], matched_back: 5000, steps: 12 };
+    pub const NEAR: Self = Self {
+        iterations: 8,
+        rigidity: [1e-3, 1e-5],
+        reach: [0.03, 0.006],
+        matched_back: 5000,
+        steps: 12,
+        hold: START_WEIGHT,
+    };
     /// For a start that may be far.
     pub const FAR: Self = Self { iterations: 16, rigidity: [1e-2, 1e-5], reach: [0.1, 0.006], ..Self::NEAR };
 }
@@ -44,7 +52,7 @@ pub struct Target {
 
 /// What a normal counts in matches, as a share of the diagonal.
 const NORMAL_LENGTH: f64 = 0.02;
-/// Weight that holds the cage where it started, by m d²: what nothing else determines stays.
+/// Holds what nothing else determines.
 const START_WEIGHT: f64 = 1e-4;
 /// A fit ends early once the samples move by less than this share of the diagonal.
 const MIN_MOVE: f64 = 1e-4;
@@ -70,6 +78,26 @@ impl Target {
             normal_length,
         }
     }
+
+    /// The observed points.
+    pub fn points(&self) -> &[DVec3] {
+        &self.points
+    }
+
+    /// Their unit normals.
+    pub fn normals(&self) -> &[DVec3] {
+        &self.normals
+    }
+
+    /// The observed point that a point with this unit normal matches.
+    pub fn nearest(&self, point: DVec3, normal: DVec3) -> usize {
+        self.tree.nearest(point.to_array(), normal.to_array()).0
+    }
+
+    /// What a normal counts in matches, in the unit of the points.
+    pub fn normal_length(&self) -> f64 {
+        self.normal_length
+    }
 }
 
 /// Weighted squared distances along normals, by sample: `½ xᵢᵀ Bᵢ xᵢ − bᵢᵀ xᵢ` of a sample's displacement.
@@ -88,10 +116,21 @@ impl Template {
 
     /// The cage that lays the template onto a surface, from a cage near it. Runs on the current rayon pool; the result does not depend on it.
     pub fn fit(&self, target: &Target, start: &[Point], options: &FitOptions) -> Vec<Point> {
-        let start = matrix(&vectors(start));
-        let mut cage = start.clone();
+        self.fit_beside(target, start, start, options)
+    }
+
+    /// [`Self::fit`], held at another cage than where it starts.
+    pub fn fit_beside(
+        &self,
+        target: &Target,
+        start: &[Point],
+        reference: &[Point],
+        options: &FitOptions,
+    ) -> Vec<Point> {
+        let reference = matrix(&vectors(reference));
+        let mut cage = matrix(&vectors(start));
         let m = cage.nrows();
-        let hold = START_WEIGHT / (self.diagonal * self.diagonal * m as f64);
+        let hold = options.hold / (self.diagonal * self.diagonal * m as f64);
         for iteration in 0..options.iterations {
             let t = iteration as f64 / (options.iterations - 1).max(1) as f64;
             let between = |[first, last]: [f64; 2]| first * (last / first).powf(t);
@@ -99,7 +138,7 @@ impl Template {
             let distances = self.distances(target, cage.as_ref(), reach, options.matched_back, iteration);
             let mut pull = transposed_product(self.coordinates.as_ref(), matrix(&distances.pulls).as_ref(), BLOCK_ROWS);
             pull += faer::Scale(rigidity) * self.rigidity.pull(&self.rigidity.positions(cage.as_ref()));
-            pull += faer::Scale(hold) * (&start - &cage);
+            pull += faer::Scale(hold) * (&reference - &cage);
             let Some(preconditioner) = self.preconditioner(&distances, rigidity, hold) else { break };
             let change = self.solve(&distances, rigidity, hold, &preconditioner, pull, options.steps);
             let moved = self.sparse.times(&single(change.as_ref()));
@@ -213,25 +252,37 @@ impl Template {
         x
     }
 
-    /// How well the template lies on a surface in a cage: mean distance both ways, of positions and normals together, as a share of the diagonal; far ones
-    /// count as [`MAX_SCORED`]. Good fits of the same surface differ by a few per cent.
+    /// How well the template lies on a surface in a cage: the mean, both ways, of the distance from the plane of the nearest point and of the difference of
+    /// normals together, as a share of the diagonal; far ones count as [`MAX_SCORED`].
     pub fn score(&self, target: &Target, cage: &[Point]) -> f64 {
         let (positions, normals) = self.samples_in(matrix(&vectors(cage)).as_ref());
-        let capped = |d2: f64| (d2.sqrt() / self.diagonal).min(MAX_SCORED);
+        let samples = OrientedPoints::new(&plain(&positions), &plain(&normals), target.normal_length);
+        let scored = |offset: DVec3, own: DVec3, other: DVec3, d2: f64| {
+            let far = d2.sqrt() / self.diagonal;
+            let plane = offset.dot(other) / self.diagonal;
+            let turn = NORMAL_LENGTH * (own - other).length();
+            if far > MAX_SCORED { MAX_SCORED } else { (plane * plane + turn * turn).sqrt().min(MAX_SCORED) }
+        };
         let there: Vec<f64> = positions
             .par_iter()
             .zip(&normals)
             .with_min_len(64)
-            .map(|(p, n)| capped(target.tree.nearest(p.to_array(), n.to_array()).1))
+            .map(|(&p, &n)| {
+                let (j, d2) = target.tree.nearest(p.to_array(), n.to_array());
+                scored(p - target.points[j], n, target.normals[j], d2)
+            })
             .collect();
-        let samples = OrientedPoints::new(&plain(&positions), &plain(&normals), target.normal_length);
         let back: Vec<f64> = (0..target.points.len())
             .into_par_iter()
             .step_by(SCORED_EVERY)
             .with_min_len(64)
-            .map(|k| capped(samples.nearest(target.points[k].to_array(), target.normals[k].to_array()).1))
+            .map(|k| {
+                let (point, normal) = (target.points[k], target.normals[k]);
+                let (i, d2) = samples.nearest(point.to_array(), normal.to_array());
+                scored(point - positions[i], normal, normals[i], d2)
+            })
             .collect();
-        let mean = |distances: &[f64]| distances.iter().sum::<f64>() / distances.len() as f64;
+        let mean = |distances: &[f64]| (distances.iter().map(|d| d * d).sum::<f64>() / distances.len() as f64).sqrt();
         mean(&there) + mean(&back)
     }
 }

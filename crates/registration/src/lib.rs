@@ -1,6 +1,7 @@
 //! A model, by its cage, laid onto a surface that shares nothing with it: no correspondence, other numbers of points, noise, holes. Once:
 //! nothing of time, rigs or files. Plain data in, plain data out.
 
+mod align;
 mod fit;
 mod matching;
 mod nearest;
@@ -12,6 +13,7 @@ mod sampling;
 mod sparse_rows;
 mod template;
 
+pub use align::{AlignOptions, Alignment, align};
 pub use fit::{FitOptions, Target};
 pub use matching::OrientedPoints;
 pub use nearest::NearestPoints;

@@ -48,7 +48,7 @@ pub fn weld(model: &Model) -> Option<Welded> {
         let corners: Vec<u32> = face.iter().map(|&v| target[v as usize]).collect();
         merged_faces.push(&corners);
     }
-    Some(Welded { model: Model { points: kept, faces: merged_faces, colors }, target, merged })
+    Some(Welded { model: Model { points: kept, faces: merged_faces, colors, ..Model::default() }, target, merged })
 }
 
 /// For each vertex, the first one in its place, where both lie on open borders; otherwise itself.

@@ -34,7 +34,9 @@ use crate::error::Error;
 pub use numbers::missing_frames;
 pub use range::FrameRange;
 pub use selection::FrameSelection;
-pub use source::{frame_files, open_frames, open_frames_bytes, open_frames_in, open_selected_frames};
+pub use source::{
+    MeshSequence, frame_files, mesh_sequence, open_frames, open_frames_bytes, open_frames_in, open_selected_frames,
+};
 pub use write::{FrameOptions, FrameWriter, create_frames, frames_path};
 
 /// Positions of one capture, frame by frame, in order. Memory does not grow with the number of frames.

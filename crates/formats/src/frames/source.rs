@@ -60,6 +60,41 @@ pub fn frame_files(source: impl AsRef<Path>) -> Vec<PathBuf> {
     if meshes.is_empty() { others.into_iter().filter(|path| single::is_cache(path)).collect() } else { meshes }
 }
 
+/// Mesh files that are frames of a sequence, in its order.
+#[derive(Debug)]
+pub struct MeshSequence {
+    /// The files.
+    pub files: Vec<PathBuf>,
+    /// The number of each, where the names tell one.
+    pub numbers: Option<Vec<f64>>,
+    /// What the user should know of the choice of these files.
+    pub notes: Vec<String>,
+}
+
+/// The mesh files of a folder or pattern in the order of their numbers, or one file, whatever each of them holds; `no_frames` are left out as in a
+/// [`FrameSelection`].
+///
+/// # Errors
+/// As [`open_frames`], where there is no mesh file, or several sequences or formats.
+pub fn mesh_sequence(source: impl AsRef<Path>, no_frames: &[PathBuf]) -> Result<MeshSequence, Error> {
+    let path = source.as_ref();
+    let found = match fs::metadata(path) {
+        Ok(found) if found.is_dir() => files::in_folder(path)?,
+        Ok(_) => vec![path.to_owned()],
+        Err(_) if files::is_pattern(path) => files::matching(path)?,
+        Err(cause) => return Err(Error::read(path, cause)),
+    };
+    let (meshes, others): (Vec<_>, Vec<_>) = found.into_iter().partition(|path| MeshFormat::guess(path).is_some());
+    let (files, notes) = without(meshes, no_frames, true);
+    if files.is_empty() {
+        return Err(no_frames_in(path, &others));
+    }
+    one_format(&files).map_err(|fault| fault.at(path))?;
+    let Sequence { files, numbers } =
+        Sequence::of(files).map_err(|what| Error::SeveralSequences { path: path.to_owned(), what })?;
+    Ok(MeshSequence { files, numbers, notes })
+}
+
 /// Opens the frames in the bytes of a cache file; `name` is the path in error messages.
 ///
 /// # Errors
@@ -110,7 +145,7 @@ fn open_files(
         return open_sequence(source, frames, notes, expected_points, selection);
     }
     match caches.as_slice() {
-        [] => Err(no_frames(source, &others)),
+        [] => Err(no_frames_in(source, &others)),
         [cache] => single::open_cache(cache, expected_points),
         several if several.iter().all(|path| single::is_array(path)) => {
             open_sequence(source, caches, Vec::new(), expected_points, selection)
@@ -174,7 +209,7 @@ fn one_format(files: &[PathBuf]) -> Result<(), Fault> {
 }
 
 /// The error of a source without frames, with what may have been meant.
-fn no_frames(source: &Path, others: &[PathBuf]) -> Error {
+fn no_frames_in(source: &Path, others: &[PathBuf]) -> Error {
     if let Some((file, way_out)) = others.iter().find_map(|file| Some((file, single::way_out(file)?))) {
         return Fault::unsupported(way_out).at(file);
     }

@@ -171,7 +171,7 @@ fn read_bytes(format: MeshFormat, name: &Path, bytes: &[u8], contents: Contents)
             n if n > u32::MAX as usize => {
                 Err(Fault::unsupported(format!("has {n} points, more than 4294967295; reduce the mesh")))
             }
-            _ => Ok(parsed),
+            _ => Ok(parsed.without_mesh_normals()),
         })
         .map_err(|fault| Signature::other_than(format.extension(), bytes).map_or(fault, Fault::damaged).at(name))
 }

@@ -1,4 +1,4 @@
-//! Wavefront OBJ: `v` and `f` lines; everything else is skipped, and so are faces that are edges or points.
+//! Wavefront OBJ: `v`, `vn` and `f` lines; everything else is skipped, and so are faces that are edges or points.
 
 use cager_geometry::mesh::Model;
 
@@ -30,6 +30,11 @@ fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Parse
             b"v" => true,
             // `fo` is what faces were called at first.
             b"f" | b"fo" if contents == Contents::PointsAndFaces => false,
+            b"vn" if contents == Contents::PointsAndFaces && model.faces.is_empty() => {
+                let mut words = words(&line[keyword.len()..]);
+                model.normals.extend(point(&mut words, String::new).ok());
+                continue;
+            }
             _ => continue,
         };
         let joined;
@@ -63,6 +68,9 @@ fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Parse
                 left_out += 1;
             }
         }
+    }
+    if model.normals.len() != model.points.len() {
+        model.normals.clear();
     }
     model.colors = colors.finish(model.points.len(), Scale::Unsaid);
     Ok(Parsed { model, left_out })

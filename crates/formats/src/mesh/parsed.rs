@@ -17,6 +17,16 @@ pub(super) struct Parsed {
     pub(super) left_out: usize,
 }
 
+impl Parsed {
+    /// Faces tell the normals of a mesh.
+    pub(super) fn without_mesh_normals(mut self) -> Self {
+        if !self.model.faces.is_empty() {
+            self.model.normals = Vec::new();
+        }
+        self
+    }
+}
+
 impl From<Model> for Parsed {
     fn from(model: Model) -> Self {
         Self { model, left_out: 0 }

@@ -87,14 +87,21 @@ impl Header<'_> {
 impl Element {
     /// Columns of x, y and z.
     pub(super) fn coordinates(&self) -> Result<[usize; 3], Fault> {
-        let mut columns = [0; 3];
-        for (column, axis) in columns.iter_mut().zip(["x", "y", "z"]) {
-            let is_axis = |property: &Property| property.name == axis && matches!(property.kind, Kind::Scalar(_));
-            *column = self.properties.iter().position(is_axis).ok_or_else(|| {
+        let column = |axis| {
+            self.scalar(axis).ok_or_else(|| {
                 Fault::unsupported(format!("has vertices without {axis}; export the mesh with x, y and z"))
-            })?;
-        }
-        Ok(columns)
+            })
+        };
+        Ok([column("x")?, column("y")?, column("z")?])
+    }
+
+    /// Columns of the normal; `None` where one is missing.
+    pub(super) fn normals(&self) -> Option<[usize; 3]> {
+        Some([self.scalar("nx")?, self.scalar("ny")?, self.scalar("nz")?])
+    }
+
+    fn scalar(&self, name: &str) -> Option<usize> {
+        self.properties.iter().position(|p| p.name == name && matches!(p.kind, Kind::Scalar(_)))
     }
 
     /// Columns of red, green and blue, and the value of full light in each; `None` where one is missing, or of another kind.

@@ -58,12 +58,13 @@ fn read_points<V: Values>(
     let columns = element.coordinates()?;
     let said = element.colors().filter(|_| contents == Contents::PointsAndFaces);
     let color_columns = said.map(|(columns, _)| columns);
+    let normal_columns = element.normals().filter(|_| contents == Contents::PointsAndFaces);
     let mut colors = Colors::default();
     // Three scalars take at least three bytes.
     let most = (values.remaining() / 3) as u64;
     model.points.reserve_exact(element.count.min(most) as usize);
     for k in 0..element.count {
-        let (mut point, mut color) = ([0.0; 3], [0.0; 3]);
+        let (mut point, mut color, mut normal) = ([0.0; 3], [0.0; 3], [0.0; 3]);
         for (column, property) in element.properties.iter().enumerate() {
             let value = match property.kind {
                 Kind::Scalar(scalar) => values.next(scalar),
@@ -72,6 +73,9 @@ fn read_points<V: Values>(
             let value = value.map_err(|fault| fault.inside(element, k))?;
             if let Some(axis) = columns.iter().position(|&c| c == column) {
                 point[axis] = value;
+            }
+            if let Some(axis) = normal_columns.and_then(|columns| columns.iter().position(|&c| c == column)) {
+                normal[axis] = value;
             }
             if let Some((channel, most)) = color_columns.and_then(|columns| channel_of(columns, column)) {
                 color[channel] = (value / most) as f32;
@@ -85,6 +89,9 @@ fn read_points<V: Values>(
         model.points.push(point);
         if color_columns.is_some() {
             colors.push(color);
+        }
+        if normal_columns.is_some() {
+            model.normals.push(normal);
         }
     }
     if let Some((_, scale)) = said {

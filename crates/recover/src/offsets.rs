@@ -1,0 +1,161 @@
+//! How far every vertex of a template leaves its cage to meet a surface.
+
+use cager_geometry::mesh::Polygons;
+use cager_geometry::topology::Adjacency;
+use cager_geometry::vector::Point;
+use cager_registration::{OrientedPoints, Target};
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+
+/// The faces of a template, for offsets that are smooth over them.
+pub struct OffsetSolver {
+    triangles: Vec<[u32; 3]>,
+    adjacency: Adjacency,
+    diagonal: f64,
+}
+
+/// Iterations, each with matches of its own.
+const ITERATIONS: usize = 4;
+/// Weight of smoothness, by sixths of a vertex's edges.
+const SMOOTHNESS: f64 = 3.0 / 6.0;
+/// Weight that keeps offsets small.
+const SIZE: f64 = 0.02;
+/// Distance at which a match counts a quarter in the first iteration and in the last, as a share of the diagonal.
+const REACH: [f64; 2] = [0.02, 0.008];
+/// Surfaces that face further apart than this cosine do not match.
+const MIN_COSINE: f64 = 0.3;
+/// Steps of conjugate gradients, at the most, and where they end.
+const MAX_STEPS: usize = 30;
+const TOLERANCE: f64 = 1e-5;
+
+/// What matches say of each vertex: `½ xᵀ A x − bᵀ x` of its displacement.
+struct Pulls {
+    hessians: Vec<DMat3>,
+    pulls: Vec<DVec3>,
+}
+
+impl OffsetSolver {
+    /// For a template with this diagonal.
+    pub fn new(triangles: &[[u32; 3]], points: usize, diagonal: f64) -> Self {
+        let mut faces = Polygons::new();
+        triangles.iter().for_each(|triangle| faces.push(triangle));
+        Self { triangles: triangles.to_vec(), adjacency: Adjacency::new(&faces, points), diagonal }
+    }
+
+    /// The template's vertices moved from `positions`, where their cage has them, towards a surface: point to plane, both ways, smooth. Runs on the
+    /// current rayon pool; the result does not depend on it.
+    pub fn offset(&self, positions: &[Point], surface: &Target) -> Vec<Point> {
+        let base: Vec<DVec3> = positions.iter().map(|&p| DVec3::from(p)).collect();
+        let mut offsets = vec![DVec3::ZERO; base.len()];
+        for iteration in 0..ITERATIONS {
+            let t = iteration as f64 / (ITERATIONS - 1) as f64;
+            let reach = REACH[0] * (REACH[1] / REACH[0]).powf(t) * self.diagonal;
+            let moved: Vec<DVec3> = base.iter().zip(&offsets).map(|(&p, &d)| p + d).collect();
+            let Pulls { hessians, mut pulls } = self.pulls(&moved, surface, reach);
+            let held = self.smoothness_times(&offsets);
+            pulls.iter_mut().zip(held).for_each(|(pull, held)| *pull -= held);
+            let change = self.solve(&hessians, pulls);
+            offsets.iter_mut().zip(change).for_each(|(d, change)| *d += change);
+        }
+        base.iter().zip(&offsets).map(|(&p, &d)| (p + d).to_array()).collect()
+    }
+
+    fn normals(&self, vertices: &[DVec3]) -> Vec<DVec3> {
+        let mut normals = vec![DVec3::ZERO; vertices.len()];
+        for triangle in &self.triangles {
+            let [a, b, c] = triangle.map(|v| vertices[v as usize]);
+            let normal = (b - a).cross(c - a);
+            triangle.iter().for_each(|&v| normals[v as usize] += normal);
+        }
+        normals.iter().map(|n| n.normalize_or_zero()).collect()
+    }
+
+    /// Matches of every vertex with the surface, and of every point of the surface with a vertex.
+    fn pulls(&self, vertices: &[DVec3], surface: &Target, reach: f64) -> Pulls {
+        let normals = self.normals(vertices);
+        let term = |own: DVec3, other: DVec3, offset: DVec3, share: f64| {
+            let cosine = own.dot(other);
+            let far = offset.length_squared() / (reach * reach);
+            let weight = if cosine > MIN_COSINE { share * cosine / (1.0 + far).powi(2) } else { 0.0 };
+            let weighted = weight * other;
+            let hessian = DMat3::from_cols(weighted * other.x, weighted * other.y, weighted * other.z);
+            (hessian, -offset.dot(other) * weighted)
+        };
+        let (mut hessians, mut pulls): (Vec<DMat3>, Vec<DVec3>) = vertices
+            .par_iter()
+            .zip(&normals)
+            .with_min_len(64)
+            .map(|(&p, &n)| {
+                let j = surface.nearest(p, n);
+                term(n, surface.normals()[j], p - surface.points()[j], 1.0)
+            })
+            .unzip();
+        let plain = |points: &[DVec3]| points.iter().map(|p| p.to_array()).collect::<Vec<Point>>();
+        let tree = OrientedPoints::new(&plain(vertices), &plain(&normals), surface.normal_length());
+        let share = vertices.len() as f64 / surface.points().len() as f64;
+        let back: Vec<(usize, (DMat3, DVec3))> = surface
+            .points()
+            .par_iter()
+            .zip(surface.normals())
+            .with_min_len(64)
+            .map(|(&q, &n)| {
+                let (i, _) = tree.nearest(q.to_array(), n.to_array());
+                (i, term(normals[i], n, vertices[i] - q, share))
+            })
+            .collect();
+        for (i, (hessian, pull)) in back {
+            hessians[i] += hessian;
+            pulls[i] += pull;
+        }
+        Pulls { hessians, pulls }
+    }
+
+    /// What smoothness and size have against offsets: their gradient.
+    fn smoothness_times(&self, x: &[DVec3]) -> Vec<DVec3> {
+        (0..x.len())
+            .into_par_iter()
+            .with_min_len(512)
+            .map(|i| {
+                let differences = self.adjacency.of(i).iter().map(|&j| x[i] - x[j as usize]);
+                SMOOTHNESS * differences.sum::<DVec3>() + SIZE * x[i]
+            })
+            .collect()
+    }
+
+    /// Conjugate gradients from 0, each vertex's own 3 × 3 block inverted.
+    fn solve(&self, hessians: &[DMat3], mut residual: Vec<DVec3>) -> Vec<DVec3> {
+        let inverses: Vec<DMat3> = hessians
+            .iter()
+            .enumerate()
+            .map(|(i, &a)| {
+                let own = SMOOTHNESS * self.adjacency.of(i).len() as f64 + SIZE;
+                (a + DMat3::from_diagonal(DVec3::splat(own))).inverse()
+            })
+            .collect();
+        let scaled = |r: &[DVec3]| r.iter().zip(&inverses).map(|(&r, &inverse)| inverse * r).collect::<Vec<_>>();
+        let inner = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum::<f64>();
+        let mut x = vec![DVec3::ZERO; residual.len()];
+        let mut direction = scaled(&residual);
+        let first = inner(&residual, &direction);
+        let mut size = first;
+        for _ in 0..MAX_STEPS {
+            let mut image = self.smoothness_times(&direction);
+            image.iter_mut().zip(&direction).zip(hessians).for_each(|((image, &d), &a)| *image += a * d);
+            let curvature = inner(&direction, &image);
+            if curvature.is_nan() || curvature <= 0.0 {
+                break;
+            }
+            let step = size / curvature;
+            x.iter_mut().zip(&direction).for_each(|(x, &d)| *x += step * d);
+            residual.iter_mut().zip(&image).for_each(|(r, &image)| *r -= step * image);
+            let z = scaled(&residual);
+            let next = inner(&residual, &z);
+            if next < TOLERANCE * first {
+                break;
+            }
+            direction.iter_mut().zip(&z).for_each(|(d, &z)| *d = z + next / size * *d);
+            size = next;
+        }
+        x
+    }
+}
