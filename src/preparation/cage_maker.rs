@@ -16,7 +16,7 @@ use std::sync::{Arc, Mutex, Weak};
 /// Default number of cage vertices.
 const DEFAULT_VERTICES: usize = 350;
 /// Allowed numbers of cage vertices: a closed surface has at least 4.
-pub(crate) const VERTICES: RangeInclusive<u32> = 4..=cager_cages::MOST_VERTICES as u32;
+pub(crate) const VERTICES: RangeInclusive<u32> = 4..=cager_cages::MAX_VERTICES as u32;
 /// Number of recently made cages kept in memory, so that sessions created at the same time share one.
 const RECENT_CAGES: usize = 16;
 /// File name of a cage that was not sent.

@@ -217,7 +217,7 @@ impl<R: Read + Seek> ContainerReader<R> {
                 || section.residual(hierarchy, entry.header.count, most),
                 || {
                     let (of, section) = after?;
-                    Some((of, section.residual(hierarchy, of.header.count, most.min(MOST_AHEAD)).ok()?))
+                    Some((of, section.residual(hierarchy, of.header.count, most.min(MAX_AHEAD)).ok()?))
                 },
             );
             self.groups.residuals.push((entry, residual?));
@@ -262,7 +262,7 @@ fn basis_bytes(system: &dyn CoordinateSystem, cage: &Cage, points: usize) -> u64
 }
 
 /// Most numbers of a residual that is decoded before it is asked for: all of any group that this program writes.
-const MOST_AHEAD: usize = 1 << 24;
+const MAX_AHEAD: usize = 1 << 24;
 
 /// Most numbers of a residual's components in a file of so many bytes: what reading them takes four times.
 pub fn most_residual_numbers(file_bytes: u64) -> usize {

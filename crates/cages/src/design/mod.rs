@@ -13,7 +13,7 @@ mod symmetry;
 mod topology;
 
 use self::contact::{Distances, Obstacles};
-pub use self::options::{Design, DesignError, DesignOptions, Goal, MOST_VERTICES, Progress, Stage, Style};
+pub use self::options::{Design, DesignError, DesignOptions, Goal, MAX_VERTICES, Progress, Stage, Style};
 use self::run::{Best, Defects, Run};
 use self::samples::Samples;
 use self::symmetry::Symmetry;
@@ -65,8 +65,8 @@ pub fn design(
         (None, Goal::Vertices(vertices)) => vertices,
         (None, Goal::MeanError(_)) => search::first_vertices(rest.points.len()),
     };
-    if vertices > MOST_VERTICES {
-        return Err(DesignError::TooManyVertices { vertices, most: MOST_VERTICES });
+    if vertices > MAX_VERTICES {
+        return Err(DesignError::TooManyVertices { vertices, most: MAX_VERTICES });
     }
     let mesh = match start {
         Some(mesh) => mesh.clone(),

@@ -14,12 +14,12 @@ const IDLE: f64 = 1e-4;
 const ENTRIES: usize = 20_000_000;
 
 /// Cages with more vertices are not analysed: it would take minutes.
-const MOST_VERTICES: usize = 2_000;
+const MAX_VERTICES: usize = 2_000;
 
 /// Vertices that move no point, and the condition number of the mean value coordinates; neither of a cage of thousands of vertices.
 pub(super) fn influence(mesh: &TriMesh, model: &Model) -> (Vec<u32>, Option<f64>) {
     let Ok(cage) = Cage::new(mesh.clone()) else { return (Vec::new(), None) };
-    if mesh.vertices.len() > MOST_VERTICES {
+    if mesh.vertices.len() > MAX_VERTICES {
         return (Vec::new(), None);
     }
     let stride = (model.points.len() * mesh.vertices.len()).div_ceil(ENTRIES).max(1);

@@ -48,8 +48,8 @@ pub fn enclose_unless(
     let clearance = options.clearance.filter(|c| c.is_finite()).unwrap_or(0.0).clamp(0.0, LARGEST_CLEARANCE);
     let mut offset = first_offset(options.vertices).max(2.0 * clearance);
     let source = NormalizedModel::new(model, offset)?;
-    if options.vertices < LEAST {
-        return Err(EncloseError::TooFewVertices { vertices: options.vertices, least: LEAST });
+    if options.vertices < MIN_VERTICES {
+        return Err(EncloseError::TooFewVertices { vertices: options.vertices, least: MIN_VERTICES });
     }
     let mut least = usize::MAX;
     // Surfaces that are known already, the next to be tried last, from when on its narrow gaps have proved to be too many.
@@ -134,7 +134,7 @@ fn promising_surface(
     cubes: &Octree,
     options: &EncloseOptions,
 ) -> Option<(Vec<DVec3>, Vec<[u32; 3]>)> {
-    let most_parts = options.vertices / if options.per_part { LEAST } else { VERTICES_PER_PART };
+    let most_parts = options.vertices / if options.per_part { MIN_VERTICES } else { VERTICES_PER_PART };
     let (positions, faces) = offset_surface(source, offset, cubes, options.per_part, most_parts.max(1))?;
     // A closed surface of V vertices and F faces has V − F/2 = 2 (components − handles).
     let handles = (faces.len() / 2).saturating_sub(positions.len());
@@ -142,7 +142,7 @@ fn promising_surface(
 }
 
 /// Vertices of the least closed surface.
-const LEAST: usize = 4;
+const MIN_VERTICES: usize = 4;
 
 /// Minimum number of vertices per component, or per topological handle; with fewer, a larger offset is tried at once.
 const VERTICES_PER_PART: usize = 6;
