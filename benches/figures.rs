@@ -9,7 +9,7 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Coordinates, Green, Harmonic, MeanValue, Refinement};
 use cager_core::inversion::{BATCH, Rows, Solver, SolverOptions};
 use cager_core::maxvol::{self, maxvol};
-use cager_core::synthetic::{Capture, Options};
+use cager_demo::{Capture, Options};
 use cager_formats::{FrameOptions, create_frames, write_model};
 use cager_geometry::linalg::svd::svd;
 use cager_geometry::mesh::{self, Model, Point, Polygons};

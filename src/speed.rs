@@ -36,7 +36,7 @@ pub(crate) fn seconds_to_prepare(system: &dyn CoordinateSystem, cage: &Cage, poi
 mod tests {
     use super::*;
     use cager_core::coordinates::MeanValue;
-    use cager_core::synthetic::{Capture, Options};
+    use cager_demo::{Capture, Options};
 
     #[test]
     fn larger_models_and_cages_take_longer() {

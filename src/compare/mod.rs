@@ -162,7 +162,7 @@ fn frames_of(reader: &mut dyn FrameReader, wanted: &[usize]) -> Result<Vec<Frame
 mod tests {
     use super::*;
     use cager_core::coordinates::{CageValues, Coordinates, CoordinatesError, ElementPlan, MeanValue};
-    use cager_core::synthetic::{Capture, Options};
+    use cager_demo::{Capture, Options};
     use cager_geometry::mesh::Point;
 
     /// A system that no cage is good enough for.

@@ -10,7 +10,6 @@ pub mod maxvol;
 pub mod regularize;
 mod row_basis;
 mod simd;
-pub mod synthetic;
 
 /// Version of the preparation of solvers: stored solvers of another version are recomputed. Decoding a container depends on
 /// [`coordinates::DEFINITION`] alone.

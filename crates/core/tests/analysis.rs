@@ -8,7 +8,7 @@ use cager_core::decode::FrameError;
 use cager_core::inversion::{Analysis, Handles, PrepareContext, PrepareError, Solver, SolverOptions};
 use cager_core::maxvol::{TOLERANCE, maxvol, maxvol_from};
 use cager_core::regularize::Regularizer;
-use cager_core::synthetic::{Capture, Options};
+use cager_demo::{Capture, Options};
 use cager_geometry::mesh::Point;
 use common::{Cages, Random};
 use faer::Mat;

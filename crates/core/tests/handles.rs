@@ -6,7 +6,7 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions};
 use cager_core::regularize::Regularizer;
-use cager_core::synthetic::{Capture, Options};
+use cager_demo::{Capture, Options};
 use cager_geometry::mesh::Point;
 use common::Cages;
 

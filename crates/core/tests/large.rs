@@ -6,7 +6,7 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::decode::{Decoder, FrameError};
 use cager_core::inversion::{Analysis, Handles, PrepareContext, Solver, SolverOptions};
-use cager_core::synthetic::{Capture, Options};
+use cager_demo::{Capture, Options};
 use common::Cages;
 
 fn capture(points: u32, cage_vertices: u32) -> (Capture, Cage) {

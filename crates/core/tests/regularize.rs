@@ -8,7 +8,7 @@ use cager_core::coordinates::{
 };
 use cager_core::inversion::{Analysis, BATCH, Handles, PrepareContext, PrepareError, Solver, SolverOptions};
 use cager_core::regularize::{Reference, Regularizer, TermError};
-use cager_core::synthetic::{Capture, Options};
+use cager_demo::{Capture, Options};
 use cager_geometry::linalg::SparseMatrix;
 use cager_geometry::mesh::Point;
 use common::Cages;

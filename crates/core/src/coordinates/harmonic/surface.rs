@@ -154,7 +154,7 @@ fn nearest_in_triangle(corners: [Point; 3], normal: Point, x: Point) -> ([f64; 3
 mod tests {
     use super::*;
     use crate::cage::Cage;
-    use crate::synthetic::{Capture, Options};
+    use cager_demo::{Capture, Options};
 
     #[test]
     fn sides_and_distances_are_those_of_the_winding_number_and_of_all_faces() {
