@@ -17,7 +17,7 @@ pub use self::options::{Design, DesignError, DesignOptions, Goal, MAX_VERTICES, 
 use self::run::{Best, Defects, Run};
 use self::samples::Samples;
 use self::symmetry::Symmetry;
-use crate::enclose::enclose_unless;
+use crate::enclose::enclose_watched;
 use crate::{EncloseError, EncloseOptions};
 use cager_core::cage::Cage;
 use cager_geometry::mesh::{Model, TriMesh, diagonal};
@@ -72,7 +72,7 @@ pub fn design(
         Some(mesh) => mesh.clone(),
         None => {
             let options = EncloseOptions { vertices, ..EncloseOptions::default() };
-            enclose_unless(rest, &options, &mut || watch(enclosing).is_break()).map_err(|e| match e {
+            enclose_watched(rest, &options, &mut || watch(enclosing)).map_err(|e| match e {
                 EncloseError::Stopped => DesignError::Stopped,
                 other => other.into(),
             })?
