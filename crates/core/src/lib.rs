@@ -13,4 +13,4 @@ mod simd;
 
 /// Version of the preparation of solvers: stored solvers of another version are recomputed. Decoding a container depends on
 /// [`coordinates::DEFINITION`] alone.
-pub const SOLVER_VERSION: u32 = 7;
+pub const SOLVER_VERSION: u32 = 8;

@@ -3,7 +3,7 @@
 use super::checks::check_options;
 use super::consistent::Consistent;
 use super::error::failed;
-use super::nearness::{FrameBox, Nearness, NearnessParts};
+use super::nearness::{Nearness, NearnessParts, farthest};
 use super::operator::{Decomposition, Directions, padded_to_tiles};
 use super::options::drop_zero_weight_regularizer;
 use super::target::RegularizationTarget;
@@ -16,6 +16,7 @@ use crate::regularize::{
 };
 use cager_geometry::linalg::{self, SparseMatrix};
 use cager_geometry::mesh::Point;
+use cager_geometry::spatial::Aabb;
 use faer::Mat;
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
@@ -114,12 +115,12 @@ impl<'a> HandleSystem<'a> {
     /// What brings cages back to their frames.
     fn nearness(&self) -> Option<Nearness> {
         let analysis = self.analysis;
-        let rest = FrameBox::around(analysis.points.iter().copied());
+        let rest = Aabb::around(analysis.points.iter().map(|&p| p.into()));
         Nearness::from_parts(NearnessParts {
             factor: self.scaled_factor(),
             rest: Mat::from_fn(analysis.rest.len(), 3, |i, k| analysis.rest[i][k]),
             faces: analysis.cage.mesh().triangles.clone(),
-            margin: rest.farthest(analysis.cage.vertices()),
+            margin: farthest(&rest, analysis.cage.vertices()),
         })
     }
 

@@ -1,8 +1,6 @@
 //! What a search for rows of maximum volume gives, and what its parts share.
 
-use cager_geometry::linalg;
-use faer::{Mat, MatRef};
-use rayon::prelude::*;
+use faer::Mat;
 
 /// From this many columns on swaps end at [`LOOSE_TOLERANCE`].
 pub(super) const MANY_COLUMNS: usize = 1536;
@@ -48,14 +46,4 @@ pub struct MaxVol {
     pub(crate) gram: Option<Mat<f64>>,
     /// `Φ□⁻¹`, m × m.
     pub(crate) inverse: Mat<f64>,
-}
-
-pub(super) fn to_single(phi: MatRef<'_, f64>) -> Mat<f32> {
-    let mut single = linalg::zeros(phi.nrows(), phi.ncols());
-    single.as_mut().par_col_chunks_mut(1).enumerate().for_each(|(j, mut column)| {
-        for (s, &x) in column.as_mut().col_mut(0).iter_mut().zip(phi.col(j).iter()) {
-            *s = x as f32;
-        }
-    });
-    single
 }

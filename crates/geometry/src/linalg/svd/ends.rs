@@ -43,11 +43,8 @@ pub fn first_value(factors: &[MatRef<'_, f64>]) -> f64 {
 fn largest(m: usize, apply: impl Fn(MatRef<'_, f64>) -> Mat<f64>) -> f64 {
     let steps = STEPS.min(m);
     let mut basis = Mat::<f64>::zeros(m, steps + 1);
-    let mut state = 0x9e37_79b9_7f4a_7c15u64;
-    for x in basis.col_mut(0).iter_mut() {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        *x = (state >> 33) as f64 / (1u64 << 30) as f64 - 1.0;
-    }
+    let mut random = fastrand::Rng::with_seed(0);
+    basis.col_mut(0).iter_mut().for_each(|x| *x = random.f64() - 0.5);
     let norm = basis.col(0).norm_l2();
     basis.col_mut(0).iter_mut().for_each(|x| *x /= norm);
     let (mut diagonal, mut off_diagonal) = (Vec::new(), Vec::new());
