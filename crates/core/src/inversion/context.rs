@@ -34,12 +34,6 @@ pub struct PreparationReport {
     pub refinement: Option<Refinement>,
     /// The boundary elements on which they were solved, in that case.
     pub plan: Option<ElementPlan>,
-    /// Seconds for the coordinates.
-    pub coordinates_seconds: f64,
-    /// Seconds for maxvol.
-    pub maxvol_seconds: f64,
-    /// Seconds for singular values, regularisation and the operator.
-    pub svd_seconds: f64,
 }
 
 /// How to prepare a solver, apart from its options.
