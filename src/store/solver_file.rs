@@ -337,6 +337,7 @@ impl In<'_> {
 mod tests {
     use super::*;
     use cager_core::coordinates::{ElementPlan, Refinement};
+    use cager_core::maxvol::Volume;
 
     #[test]
     fn what_is_no_matrix_keeps_its_layout() {
@@ -346,9 +347,7 @@ mod tests {
             condition_full: 3.0,
             condition_handles: 4.0,
             singular_values: vec![5.0, f64::NAN],
-            swaps: 6,
-            log_volume: 7.0,
-            max_entry: 8.0,
+            maxvol: Volume { swaps: 6, log_volume: 7.0, max_entry: 8.0 },
             outside: vec![9],
             outside_distance: 10.0,
             refinement: Some(Refinement { elements: 11, refinements: 12, change: 13.0 }),

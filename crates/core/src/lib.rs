@@ -7,6 +7,7 @@ pub mod decode;
 pub mod handles;
 pub mod inversion;
 pub mod maxvol;
+pub mod numbers;
 pub mod regularize;
 mod row_basis;
 mod simd;

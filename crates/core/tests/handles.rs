@@ -110,7 +110,7 @@ fn handles_begin_with_those_of_maximum_volume_and_none_comes_twice() {
         sorted.dedup();
         assert_eq!(sorted.len(), 333);
         let found = solver.preparation();
-        assert_eq!(found.log_volume, maxvol.preparation().log_volume);
+        assert_eq!(found.maxvol.log_volume, maxvol.preparation().maxvol.log_volume);
         assert!(found.condition_handles >= 1.0 && found.condition_handles < 2.0 * found.condition_full);
     }
 }

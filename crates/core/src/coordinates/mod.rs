@@ -48,6 +48,7 @@ pub struct Refinement {
     /// An estimate of how far a coordinate of a point is from the limit, the largest of: what the highest degrees of the elements change of
     /// one; what one was corrected by to make linear functions exact; and the residual that the iteration left of the equations on the
     /// cage, those of unknowns that it left out and of damped ones as well.
+    #[serde(deserialize_with = "crate::numbers::number_or_null")]
     pub change: f64,
 }
 

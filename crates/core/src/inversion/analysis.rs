@@ -9,7 +9,7 @@ use super::{PreparationReport, PrepareContext, PrepareError, SolverOptions};
 use crate::cage::Cage;
 use crate::coordinates::CoordinateSystem;
 use crate::decode::Decoder;
-use crate::maxvol::{MaxVol, RANK_TOLERANCE};
+use crate::maxvol::{MaxVol, RANK_TOLERANCE, Volume};
 use crate::row_basis::{RowBasis, deficient_basis, row_basis};
 use cager_geometry::linalg;
 use cager_geometry::linalg::svd;
@@ -122,15 +122,14 @@ impl Analysis {
             spectra = Spectra::of(phi.as_ref(), &basis, required)?;
         }
         let rank = basis.rank;
+        let MaxVol { swaps, log_volume, max_entry, .. } = basis.handles;
         let preparation = PreparationReport {
             rank,
             affine_reproduction_error: error / diagonal,
             condition_full: spectra.full_ends[0] / spectra.full_ends[1],
             condition_handles: spectra.handles_ends.map_or(f64::NAN, |[first, last]| first / last),
             singular_values: Vec::new(),
-            swaps: basis.handles.swaps,
-            log_volume: basis.handles.log_volume,
-            max_entry: basis.handles.max_entry,
+            maxvol: Volume { swaps, log_volume, max_entry },
             outside,
             outside_distance,
             refinement,

@@ -1,6 +1,7 @@
 //! What a search for rows of maximum volume gives, and what its parts share.
 
 use faer::Mat;
+use serde::{Deserialize, Serialize};
 
 /// From this many columns on swaps end at [`LOOSE_TOLERANCE`].
 pub(super) const MANY_COLUMNS: usize = 1536;
@@ -23,6 +24,20 @@ pub struct Swap {
     pub position: u32,
     /// `|B_ij|`, by which the volume grew.
     pub growth: f64,
+}
+
+/// How a search went.
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
+#[serde(default)]
+pub struct Volume {
+    /// Swaps after the start by pivoted LU.
+    pub swaps: usize,
+    /// `ln |det Φ□|`.
+    #[serde(deserialize_with = "crate::numbers::number_or_null")]
+    pub log_volume: f64,
+    /// Largest `|B_ij|` of `Φ = B Φ□` after the last swap.
+    #[serde(deserialize_with = "crate::numbers::number_or_null")]
+    pub max_entry: f64,
 }
 
 /// The handles picked from a tall matrix.

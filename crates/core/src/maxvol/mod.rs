@@ -9,7 +9,7 @@ mod many_columns;
 mod passes;
 mod swaps;
 
-pub use handles::{MaxVol, Swap};
+pub use handles::{MaxVol, Swap, Volume};
 pub(crate) use passes::maxima_and_gram;
 
 use cager_geometry::linalg;
