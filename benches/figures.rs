@@ -7,14 +7,16 @@ use anyhow::Context;
 use cager_codec::{AdjacentGroups, CageBasis, decode_cages, encode_cages};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Coordinates, Green, Harmonic, MeanValue, Refinement};
-use cager_core::inversion::{BATCH, Rows, Solver, SolverOptions};
+use cager_core::inversion::{BATCH, PrepareContext, Rows, Solver, SolverOptions};
 use cager_core::maxvol::{self, maxvol};
-use cager_core::synthetic::{Capture, Options};
+use cager_demo::{Capture, Options};
 use cager_formats::{FrameOptions, create_frames, write_model};
 use cager_geometry::linalg::svd::svd;
 use cager_geometry::mesh::{self, Model, Point, Polygons};
 use serde_json::{Value, json};
+use std::cell::RefCell;
 use std::hint::black_box;
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
@@ -204,16 +206,23 @@ fn write(capture: &Capture, cage: &Cage, folder: &Path) -> anyhow::Result<Vec<Ve
 fn growth(points: usize, cage_vertices: usize) -> anyhow::Result<Value> {
     let (capture, cage) = capture(points, cage_vertices)?;
     let clock = Instant::now();
-    let solver = Solver::prepare(&MeanValue, &cage, &capture.rest.points, SolverOptions::PAPER)?;
+    let begun = RefCell::new(Vec::new());
+    let next = |step| {
+        begun.borrow_mut().push((step, clock.elapsed().as_secs_f64()));
+        ControlFlow::Continue(())
+    };
+    let context = PrepareContext { next: &next, ..PrepareContext::default() };
+    let solver = Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, SolverOptions::PAPER, &context)?;
     let seconds = clock.elapsed().as_secs_f64();
-    let found = solver.preparation();
+    let begin = |step| begun.borrow().iter().find(|(name, _)| *name == step).map_or(seconds, |(_, begin)| *begin);
+    let [coordinates, handles, rest] = ["coordinates", "handles", "singular values"].map(begin);
     Ok(json!({
         "points": capture.rest.points.len(),
         "cage_vertices": cage.vertices().len(),
         "seconds": seconds,
-        "coordinates_seconds": found.coordinates_seconds,
-        "maxvol_seconds": found.maxvol_seconds,
-        "svd_seconds": found.svd_seconds,
+        "coordinates_seconds": handles - coordinates,
+        "maxvol_seconds": rest - handles,
+        "svd_seconds": seconds - rest,
         "solver_bytes": solver.size_bytes(),
     }))
 }

@@ -7,7 +7,7 @@ use cager_core::coordinates::{CoordinateSystem, DEFINITION};
 use cager_core::inversion::{Solver, SolverOptions};
 use cager_geometry::mesh::{Model, Point};
 use cager_proto::container::{self, ContainerWriter, Header, counted_from_zero};
-use cager_proto::report::{Coding, ConditionNumber, FrameError, MaxVol, Report};
+use cager_proto::report::{Coding, ConditionNumber, FrameError, Report};
 use serde::{Deserialize, Serialize};
 use std::io::Write;
 
@@ -197,12 +197,12 @@ fn begin_report(header: &Header, encoding: &Encoding<'_>) -> Report {
         generator: GENERATOR.to_owned(),
         triangles: encoding.rest.faces.arities().iter().map(|&a| (a as usize).saturating_sub(2)).sum(),
         diagonal: solver.diagonal(),
-        refinement: found.refinement.map(Into::into),
+        refinement: found.refinement,
         affine_reproduction_error: found.affine_reproduction_error,
         condition_number: ConditionNumber { full: found.condition_full, handles: found.condition_handles },
         rank: found.rank,
         singular_values: found.singular_values.clone(),
-        maxvol: MaxVol { swaps: found.swaps, log_volume: found.log_volume, max_entry: found.max_entry },
+        maxvol: found.maxvol,
         handle_indices: solver.handles().to_vec(),
         warnings: preparation_warnings(encoding.options, solver),
         ..Report::new(header)

@@ -7,6 +7,7 @@ use crate::capture::{CaptureWriter, Encoding};
 use crate::coding::{Carried, CodingError, Goal, GroupCoder, GroupDecoder, GroupSpace, HELD, RestMeshes, group_frames};
 use crate::memory::{Memory, free_bytes};
 use crate::preparation_warnings::held_frames;
+use crate::speed::StepClock;
 use batches::{Batch, BatchPlan, SolvedBatch, read_batches, solve};
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
@@ -189,14 +190,8 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
         let prepared = prepare(&job, &|step| progress(EncodeProgress::Preparing(step)));
         (prepared, space.map(|space| space.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))))
     });
-    let (solver, options, choice, choice_seconds) = prepared?;
-    let found = solver.preparation();
-    let mut seconds = Seconds {
-        coordinates: found.coordinates_seconds,
-        maxvol: found.maxvol_seconds,
-        svd: found.svd_seconds + choice_seconds,
-        ..Seconds::default()
-    };
+    let (solver, options, choice, [coordinates, maxvol, svd]) = prepared?;
+    let mut seconds = Seconds { coordinates, maxvol, svd, ..Seconds::default() };
     if begins_early {
         // What was waited for after the solver was there.
         let prepared = seconds.coordinates + seconds.maxvol + seconds.svd;
@@ -321,17 +316,19 @@ fn send_frames<W: Write>(
     })
 }
 
-/// The solver, its options, how the spectrum threshold was selected, and the seconds that this took.
+/// The solver, its options, how the spectrum threshold was selected, and the seconds of [`StepClock`].
 fn prepare(
     job: &Job<'_>,
     tell: &dyn Fn(&'static str),
-) -> Result<(Solver, SolverOptions, Option<SpectrumChoice>, f64), PrepareError> {
+) -> Result<(Solver, SolverOptions, Option<SpectrumChoice>, [f64; 3]), PrepareError> {
     let mut options = job.options;
     let points = &job.rest.points;
     let batches = job.frames.frames().div_ceil(BatchPlan::new(job.memory, points.len(), false).size);
     let passes = if job.choose.is_some() { usize::MAX } else { batches };
     let stores_coordinates = job.memory.keeps(points.len(), job.system.values(job.cage).columns(), passes);
+    let clock = StepClock::default();
     let next = |step| {
+        clock.begin(step);
         tell(step);
         ControlFlow::Continue(())
     };
@@ -340,17 +337,17 @@ fn prepare(
         PrepareContext { matrix: job.matrix, stores_coordinates, memory, next: &next, ..PrepareContext::default() };
     let chosen_by = job.choose.as_ref().filter(|choose| !choose.samples.is_empty());
     let Some(ChooseSpectrum { samples, bound }) = chosen_by else {
-        return Ok((Solver::prepare_with(job.system, job.cage, points, options, &context)?, options, None, 0.0));
+        let solver = Solver::prepare_with(job.system, job.cage, points, options, &context)?;
+        return Ok((solver, options, None, clock.seconds()));
     };
     options.regularizer.delta(job.matrix, job.cage, job.system.values(job.cage).unknowns())?;
     let analysis = Analysis::for_options(job.system, job.cage, points, options, &context)?;
     tell("threshold");
     let handle_system = analysis.handle_system(options.handles)?;
-    let clock = Instant::now();
     let found = handle_system.choose_threshold(options, job.matrix, samples, *bound)?;
-    let seconds = clock.elapsed().as_secs_f64();
     options.spectrum = found.spectrum;
-    Ok((handle_system.solver(options, job.matrix)?, options, Some(SpectrumChoice::new(&found, *bound)), seconds))
+    let solver = handle_system.solver(options, job.matrix)?;
+    Ok((solver, options, Some(SpectrumChoice::new(&found, *bound)), clock.seconds()))
 }
 
 #[cfg(test)]

@@ -83,7 +83,7 @@ mod tests {
     use cager_core::cage::Cage;
     use cager_core::coordinates::MeanValue;
     use cager_core::inversion::PrepareContext;
-    use cager_core::synthetic::{Capture, Options};
+    use cager_demo::{Capture, Options};
 
     #[test]
     fn all_points_of_a_sampled_model_are_those_of_the_sample() {

@@ -1,10 +1,29 @@
-//! Estimates of how long preparations take, from the measured speed of matrix products.
+//! How long preparations take: measured step by step, and estimated from the speed of matrix products.
 
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
+use std::cell::RefCell;
 use std::time::Instant;
+
+/// When the steps of a preparation began.
+#[derive(Default)]
+pub(crate) struct StepClock(RefCell<Vec<(&'static str, Instant)>>);
+
+impl StepClock {
+    pub(crate) fn begin(&self, step: &'static str) {
+        self.0.borrow_mut().push((step, Instant::now()));
+    }
+
+    /// Seconds for the coordinates, for the handles, and for all that came after these up to now.
+    pub(crate) fn seconds(&self) -> [f64; 3] {
+        let (now, begun) = (Instant::now(), self.0.borrow());
+        let begin = |step| begun.iter().find(|(name, _)| *name == step).map_or(now, |(_, begin)| *begin);
+        let [coordinates, handles, rest] = ["coordinates", "handles", "singular values"].map(begin);
+        [handles - coordinates, rest - handles, now - rest].map(|time| time.as_secs_f64())
+    }
+}
 
 /// Size of the timed matrix product, and number of repetitions.
 const SIZE: usize = 384;
@@ -36,7 +55,7 @@ pub(crate) fn seconds_to_prepare(system: &dyn CoordinateSystem, cage: &Cage, poi
 mod tests {
     use super::*;
     use cager_core::coordinates::MeanValue;
-    use cager_core::synthetic::{Capture, Options};
+    use cager_demo::{Capture, Options};
 
     #[test]
     fn larger_models_and_cages_take_longer() {

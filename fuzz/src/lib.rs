@@ -5,11 +5,12 @@
 //! each for as long as wanted, led by coverage.
 
 mod disk;
+#[path = "../../proto/tests/support/memory.rs"]
 mod memory;
 pub mod mutate;
 mod targets;
 
-pub use memory::peak_of;
+use memory::peak_of_all_threads;
 pub use targets::TARGETS;
 
 /// Something that reads bytes from outside.
@@ -39,7 +40,7 @@ impl Target {
     /// # Panics
     /// Where a promise is broken.
     pub fn check(&self, bytes: &[u8]) {
-        let ((), peak) = peak_of(|| (self.run)(bytes));
+        let ((), peak) = peak_of_all_threads(|| (self.run)(bytes));
         let most = self.fixed + self.per_byte * bytes.len();
         assert!(
             peak <= most,

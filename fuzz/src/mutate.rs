@@ -7,7 +7,7 @@ pub const EXTREMES: [u64; 12] =
     [0, 1, 0x7f, 0xff, 0xffff, 0x7fff_ffff, 1 << 31, 0xffff_ffff, 1 << 32, i64::MAX as u64, 1 << 63, u64::MAX];
 
 /// Longer ones are cut.
-const MOST_BYTES: usize = 1 << 16;
+const MAX_BYTES: usize = 1 << 16;
 
 /// Changes one of `seeds` in one to eight places.
 pub fn mutated(rng: &mut Rng, seeds: &[Vec<u8>], words: &[&str]) -> Vec<u8> {
@@ -15,7 +15,7 @@ pub fn mutated(rng: &mut Rng, seeds: &[Vec<u8>], words: &[&str]) -> Vec<u8> {
     for _ in 0..1 << rng.u8(0..4) {
         change(rng, &mut bytes, seeds, words);
     }
-    bytes.truncate(MOST_BYTES);
+    bytes.truncate(MAX_BYTES);
     bytes
 }
 

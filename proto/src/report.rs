@@ -3,7 +3,10 @@
 //! Errors are fractions of the rest pose's bounding-box diagonal, times are seconds.
 
 use crate::container::Header;
+use cager_core::coordinates::Refinement;
 use cager_core::inversion::{Convergence, Outcome, Threshold};
+use cager_core::maxvol::Volume;
+use cager_core::numbers::number_or_null;
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// The report of one encoding. Keys that are missing read as zero or empty.
@@ -70,7 +73,7 @@ pub struct Report {
     #[serde(deserialize_with = "numbers_or_null")]
     pub singular_values: Vec<f64>,
     /// How the handles of maximum volume were found.
-    pub maxvol: MaxVol,
+    pub maxvol: Volume,
     /// Rows read, in their order: those of maximum volume first. Where every point is read, only those.
     pub handle_indices: Vec<u32>,
     /// Errors of what a decoder of the written file gets back.
@@ -171,25 +174,6 @@ pub struct Coding {
     pub residual_step: Option<f64>,
     /// Most frames of a group.
     pub group_frames: usize,
-}
-
-/// How a numerical solution for the coordinates was refined.
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
-pub struct Refinement {
-    /// Boundary elements of the last solution.
-    pub elements: usize,
-    /// Solutions after the first.
-    pub refinements: usize,
-    /// About how far a coordinate may be off: by what refining last changed, or by what the solution leaves of its equations; at most
-    /// 1e-3 but where a warning says otherwise.
-    #[serde(deserialize_with = "number_or_null")]
-    pub change: f64,
-}
-
-impl From<cager_core::coordinates::Refinement> for Refinement {
-    fn from(found: cager_core::coordinates::Refinement) -> Self {
-        Self { elements: found.elements, refinements: found.refinements, change: found.change }
-    }
 }
 
 /// Condition numbers.
@@ -320,20 +304,6 @@ impl Consistency {
     }
 }
 
-/// How the handles were found.
-#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
-#[serde(default)]
-pub struct MaxVol {
-    /// Swaps after the start by pivoted LU.
-    pub swaps: usize,
-    /// `ln |det Φ□|`.
-    #[serde(deserialize_with = "number_or_null")]
-    pub log_volume: f64,
-    /// Largest `|B_ij|` at the end.
-    #[serde(deserialize_with = "number_or_null")]
-    pub max_entry: f64,
-}
-
 /// Errors of the decoded capture; NaN where they were not measured.
 #[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
 #[serde(default)]
@@ -447,13 +417,7 @@ fn is_zero(seconds: &f64) -> bool {
     *seconds == 0.0
 }
 
-/// JSON has no infinity and no NaN, and serde_json writes null for them: a capture that stands still has such figures, and
-/// its file must open.
-fn number_or_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
-}
-
-/// The same for numbers of which some were not computed.
+/// What [`number_or_null`] does, for numbers of which some were not computed.
 fn numbers_or_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
     let numbers: Vec<Option<f64>> = Deserialize::deserialize(deserializer)?;
     Ok(numbers.into_iter().map(|number| number.unwrap_or(f64::NAN)).collect())

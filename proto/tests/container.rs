@@ -2,9 +2,10 @@
 
 mod support;
 
+use cager_core::coordinates::Refinement;
 use cager_geometry::mesh::{Model, Polygons, TriMesh};
 use cager_proto::container::{CHUNK_FRAMES, ContainerReader, ContainerWriter, Error};
-use cager_proto::report::{FrameError, Refinement, Report};
+use cager_proto::report::{FrameError, Report};
 use proptest::prelude::*;
 use proptest::test_runner::Config;
 use std::io::Cursor;

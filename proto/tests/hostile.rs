@@ -1,16 +1,15 @@
 //! Bytes of any origin: never a panic, never a wrong answer, never more memory than the file's length allows.
 
-#![allow(unsafe_code)] // An allocator that counts.
-
+#[path = "support/memory.rs"]
+mod memory;
 mod support;
 
 use cager_proto::container::{ContainerReader, Error, Header};
 use cager_proto::record::{self, FrameHeader, HEADER_BYTES, Kind, RecordError};
 use cager_proto::wire;
+use memory::peak_of;
 use proptest::prelude::*;
 use proptest::test_runner::Config;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 use std::io::Cursor;
 use support::{FOOTER, LINE, PRELUDE, Part, SECTION, extents, fix_checksums, put_together, read_all, small_container};
 
@@ -350,50 +349,3 @@ fn with_points(points: u64, section: Part) -> Vec<u8> {
     parts[1] = section;
     put_together(&parts)
 }
-
-/// What `f` gives, and the most bytes of the heap that it held at one time.
-fn peak_of<T>(f: impl FnOnce() -> T) -> (T, usize) {
-    let before = LIVE.get();
-    PEAK.set(before);
-    let value = f();
-    (value, usize::try_from(PEAK.get() - before).unwrap())
-}
-
-thread_local! {
-    // Of each thread alone, as tests may run side by side.
-    static LIVE: Cell<isize> = const { Cell::new(0) };
-    static PEAK: Cell<isize> = const { Cell::new(0) };
-}
-
-struct Counting;
-
-fn count(bytes: isize) {
-    LIVE.set(LIVE.get() + bytes);
-    PEAK.set(PEAK.get().max(LIVE.get()));
-}
-
-// SAFETY: everything is passed on to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count(layout.size() as isize);
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        count(layout.size() as isize);
-        unsafe { System.alloc_zeroed(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        count(-(layout.size() as isize));
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count(size as isize - layout.size() as isize);
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;

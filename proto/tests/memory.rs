@@ -1,7 +1,7 @@
 //! What reading takes of memory on all threads together, of the files that take the most for their length. One test, as everything in the process counts.
 
-#![allow(unsafe_code)] // An allocator that counts.
-
+#[path = "support/memory.rs"]
+mod memory;
 mod support;
 
 use cager_codec::{AdjacentGroups, CageBasis, CodedMesh, encode_cages};
@@ -9,9 +9,8 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_geometry::mesh::{Model, Polygons};
 use cager_proto::container::{ContainerReader, ContainerWriter};
-use std::alloc::{GlobalAlloc, Layout, System};
+use memory::peak_of_all_threads;
 use std::io::Cursor;
-use std::sync::atomic::{AtomicIsize, Ordering::Relaxed};
 use support::{frame, header, tetrahedron};
 
 /// Vertices along each side of a grid: as many as so small a file may have.
@@ -57,59 +56,16 @@ fn reading_takes_no_more_than_the_format_says() {
     let bytes = small_file_of_large_sections();
     let most = (512 << 20) + 512 * bytes.len();
     let mut reader = ContainerReader::open(Cursor::new(&bytes)).unwrap();
-    let (_, peak) = peak_of(|| reader.verify());
+    let (_, peak) = peak_of_all_threads(|| reader.verify());
     eprintln!("{} bytes, {} MiB to verify", bytes.len(), peak >> 20);
     assert!(peak > 200 << 20, "the counter has not seen the threads: {peak}");
     assert!(peak < most, "{peak} bytes of memory for {} bytes", bytes.len());
     // Two residuals at once, where one group is read after the other.
     let mut reader = ContainerReader::open(Cursor::new(&bytes)).unwrap();
     let mut positions = vec![vec![0.0; 3 * (SIDE * SIDE) as usize]];
-    let (_, peak) = peak_of(|| {
+    let (_, peak) = peak_of_all_threads(|| {
         [0, FRAMES].map(|k| reader.read_ahead(k).is_ok() && reader.add_residual(&[k], &mut positions).is_ok())
     });
     eprintln!("{} MiB for one group after the other", peak >> 20);
     assert!(peak < most, "{peak} bytes of memory for {} bytes", bytes.len());
 }
-
-static LIVE: AtomicIsize = AtomicIsize::new(0);
-static PEAK: AtomicIsize = AtomicIsize::new(0);
-
-fn peak_of<T>(f: impl FnOnce() -> T) -> (T, usize) {
-    let before = LIVE.load(Relaxed);
-    PEAK.store(before, Relaxed);
-    let value = f();
-    (value, usize::try_from(PEAK.load(Relaxed) - before).unwrap_or(0))
-}
-
-struct Counting;
-
-fn count(bytes: isize) {
-    let live = LIVE.fetch_add(bytes, Relaxed) + bytes;
-    PEAK.fetch_max(live, Relaxed);
-}
-
-// SAFETY: everything is passed on to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count(layout.size() as isize);
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        count(layout.size() as isize);
-        unsafe { System.alloc_zeroed(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        count(-(layout.size() as isize));
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count(size as isize - layout.size() as isize);
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;

@@ -15,7 +15,7 @@ use anyhow::{Context, Result, ensure};
 use cager_client::FnFrames;
 use cager_client::messages::SessionOptions;
 use cager_core::cage::Cage;
-use cager_core::synthetic::{Capture, Options};
+use cager_demo::{Capture, Options};
 use cager_formats::{AtomicFile, Target, commit_together, open_frames, write_model};
 use cager_geometry::mesh::{Model, Polygons, diagonal};
 use cager_proto::report::Report;

@@ -3,7 +3,7 @@
 use crate::decode;
 use crate::report_page::{Box3, Contents, Kind, Quantised, ReportPage, ShownCage, ShownMesh};
 use anyhow::Result;
-use cager_core::synthetic::Capture;
+use cager_demo::Capture;
 use cager_formats::open_frames;
 use cager_geometry::mesh::{Point, TriMesh, diagonal};
 use cager_proto::report::Report;

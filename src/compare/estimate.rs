@@ -35,7 +35,7 @@ mod tests {
     use super::*;
     use cager_core::cage::Cage;
     use cager_core::coordinates::{Green, Harmonic, MeanValue};
-    use cager_core::synthetic::{Capture, Options};
+    use cager_demo::{Capture, Options};
 
     #[test]
     fn iterations_elements_and_frames_count() {

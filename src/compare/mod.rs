@@ -18,15 +18,17 @@ pub(crate) use figures::Figures;
 pub(crate) use geometry::Geometry;
 
 use crate::report_page::Up;
+use crate::speed::StepClock;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{Analysis, PrepareError};
+use cager_core::inversion::{Analysis, PrepareContext, PrepareError};
 use cager_formats::FrameReader;
 use cager_geometry::mesh::{Model, TriMesh};
 use evaluation::Shape;
 use figures::{System, claims, recommend};
 use geometry::GeometryBuilder;
 use sample::{Frame, Sample};
+use std::ops::ControlFlow;
 
 /// Why there is no comparison.
 #[derive(Debug, thiserror::Error)]
@@ -91,14 +93,22 @@ pub(crate) fn compare(job: &Job<'_>, progress: &mut Progress<'_>) -> Result<(Fig
             refused.get_or_insert(error);
         };
         tell(&format!("{name}: coordinates"), 0.0);
-        let analysis = match Analysis::new(system, job.cage, &job.rest.points) {
+        let clock = StepClock::default();
+        let next = |step| {
+            clock.begin(step);
+            ControlFlow::Continue(())
+        };
+        let context = PrepareContext { next: &next, ..PrepareContext::default() };
+        let analysis = match Analysis::new(system, job.cage, &job.rest.points, &context) {
             Ok(analysis) => analysis,
             Err(error) => {
                 refuse(error);
                 continue;
             }
         };
-        let study = match system::study(job, name, &analysis, &sample, &shape, &mut Progress { tell: &mut tell }) {
+        let seconds = clock.seconds();
+        let mut progress = Progress { tell: &mut tell };
+        let study = match system::study(job, name, (&analysis, seconds), &sample, &shape, &mut progress) {
             Ok(study) => study,
             Err(CompareError::Prepare(error)) => {
                 refuse(error);
@@ -162,7 +172,7 @@ fn frames_of(reader: &mut dyn FrameReader, wanted: &[usize]) -> Result<Vec<Frame
 mod tests {
     use super::*;
     use cager_core::coordinates::{CageValues, Coordinates, CoordinatesError, ElementPlan, MeanValue};
-    use cager_core::synthetic::{Capture, Options};
+    use cager_demo::{Capture, Options};
     use cager_geometry::mesh::Point;
 
     /// A system that no cage is good enough for.

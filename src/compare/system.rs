@@ -36,14 +36,14 @@ impl SystemStudy<'_> {
     }
 }
 
-/// Studies a system on the sample.
+/// Studies a system, analysed in so many seconds of [`StepClock`](crate::speed::StepClock), on the sample.
 ///
 /// # Errors
 /// [`CompareError::Prepare`] where it cannot be inverted for this cage.
 pub(super) fn study<'a>(
     job: &Job<'_>,
     name: &str,
-    analysis: &'a Analysis,
+    (analysis, [coordinates, maxvol, svd]): (&'a Analysis, [f64; 3]),
     sample: &Sample,
     shape: &Shape,
     progress: &mut Progress<'_>,
@@ -103,9 +103,9 @@ pub(super) fn study<'a>(
         swaps,
         vectors,
         seconds: Seconds {
-            coordinates: prepared.coordinates_seconds,
-            maxvol: prepared.maxvol_seconds,
-            svd: prepared.svd_seconds,
+            coordinates,
+            maxvol,
+            svd,
             per_frame: found.methods.iter().find(usual_seconds).map_or(f64::NAN, |(_, m)| m.frame_seconds),
         },
         random: found.draws,

@@ -6,17 +6,17 @@ use crate::problem::{self, ApiError};
 use crate::store::{ContentKey, NamedFile};
 use crate::sync::lock;
 use crate::tasks::blocking;
-use cager_cages::{EncloseError, EncloseOptions, enclose_unless};
+use cager_cages::{EncloseError, EncloseOptions, enclose_watched};
 use cager_geometry::mesh::{Model, Polygons, TriMesh, bounds};
 use std::collections::{HashMap, VecDeque};
-use std::ops::RangeInclusive;
+use std::ops::{ControlFlow, RangeInclusive};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, Weak};
 
 /// Default number of cage vertices.
 const DEFAULT_VERTICES: usize = 350;
 /// Allowed numbers of cage vertices: a closed surface has at least 4.
-pub(crate) const VERTICES: RangeInclusive<u32> = 4..=cager_cages::MOST_VERTICES as u32;
+pub(crate) const VERTICES: RangeInclusive<u32> = 4..=cager_cages::MAX_VERTICES as u32;
 /// Number of recently made cages kept in memory, so that sessions created at the same time share one.
 const RECENT_CAGES: usize = 16;
 /// File name of a cage that was not sent.
@@ -107,9 +107,9 @@ impl CageMaker {
         let stopped = Arc::clone(&given_up.0);
         blocking(move || {
             let _held = held;
-            let is_stopped = || stopped.load(Relaxed);
+            let mut watch = || if stopped.load(Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
             let model = read_part("rest", &rest.name, &rest.bytes);
-            let cage = model.and_then(|model| pool.install(|| make(&model, vertices, &is_stopped)));
+            let cage = model.and_then(|model| pool.install(|| make(&model, vertices, &mut watch)));
             (rest, cage)
         })
         .await
@@ -126,13 +126,17 @@ impl Drop for StopOnDrop {
     }
 }
 
-fn make(rest: &Model, vertices: Option<u32>, stopped: &dyn Fn() -> bool) -> Result<TriMesh, ApiError> {
+fn make(
+    rest: &Model,
+    vertices: Option<u32>,
+    watch: &mut (dyn FnMut() -> ControlFlow<()> + Send),
+) -> Result<TriMesh, ApiError> {
     check_extent(rest)?;
     // With more vertices than half the points, the data could not determine the cage.
     let usual = DEFAULT_VERTICES.min(rest.points.len() / 2).max(*VERTICES.start() as usize);
     let vertices = vertices.map_or(usual, |vertices| vertices as usize);
     let options = EncloseOptions { vertices, ..EncloseOptions::default() };
-    enclose_unless(rest, &options, &mut || stopped()).map_err(|error| match error {
+    enclose_watched(rest, &options, watch).map_err(|error| match error {
         EncloseError::TooFewVertices { .. } => refuse_cage(&format!("vertices: {error}")),
         error => ApiError::new(problem::INVALID_GEOMETRY, format!("rest: {error}")),
     })

@@ -156,7 +156,7 @@ pub(crate) fn check_model(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use cager_core::synthetic::{Capture, Options};
+    use cager_demo::{Capture, Options};
     use cager_proto::messages::SessionOptions;
 
     #[test]

@@ -18,6 +18,7 @@ pub(crate) use solvers::{SolverRequest, SolverResponse, Solvers};
 use crate::far_frames::Reach;
 use crate::preparation_warnings::preparation_warnings;
 use crate::problem::ApiError;
+use crate::speed::StepClock;
 use cager_core::cage::Cage;
 use cager_core::inversion::{PrepareContext, PrepareError, Solver, SolverOptions};
 use checks::{check_memory, refused};
@@ -35,7 +36,7 @@ pub(crate) struct Prepared {
     pub(crate) warnings: Vec<String>,
 }
 
-/// Prepares the solver. `wanted` is called before each step; returns `None` once it is false.
+/// Prepares the solver, and gives the seconds of [`StepClock`] too. `wanted` is called before each step; returns `None` once it is false.
 ///
 /// # Errors
 /// `INVALID_GEOMETRY`, `INVALID_OPTIONS`.
@@ -44,11 +45,15 @@ pub(crate) fn prepare(
     choices: &Choices,
     max_bytes: u64,
     wanted: &dyn Fn() -> bool,
-) -> Result<Option<Prepared>, ApiError> {
+) -> Result<Option<(Prepared, [f64; 3])>, ApiError> {
     let unknowns = choices.system.values(&geometry.cage).unknowns();
     let options = choices.inversion.options(unknowns);
     check_memory(geometry, choices, options, max_bytes)?;
-    let next = |_| if wanted() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
+    let clock = StepClock::default();
+    let next = |step| {
+        clock.begin(step);
+        if wanted() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    };
     let context = PrepareContext {
         matrix: geometry.matrix.as_ref(),
         memory: max_bytes,
@@ -56,7 +61,7 @@ pub(crate) fn prepare(
         ..PrepareContext::default()
     };
     match Solver::prepare_with(choices.system, &geometry.cage, &geometry.rest.points, options, &context) {
-        Ok(solver) => Ok(Some(with_solver(solver, &geometry.cage, options))),
+        Ok(solver) => Ok(Some((with_solver(solver, &geometry.cage, options), clock.seconds()))),
         Err(PrepareError::Stopped) => Ok(None),
         Err(error) => Err(refused(&error)),
     }

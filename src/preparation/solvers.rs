@@ -279,16 +279,9 @@ impl Solvers {
         };
         let read = clock.elapsed().as_secs_f64();
         let prepared = self.pool.install(|| super::prepare(&geometry, choices, self.max_bytes, wanted))?;
-        let Some(prepared) = prepared else { return Ok(None) };
-        let found = prepared.solver.preparation();
-        let seconds = PreparationSeconds {
-            queued,
-            read,
-            coordinates: found.coordinates_seconds,
-            maxvol: found.maxvol_seconds,
-            svd: found.svd_seconds,
-            total: queued + clock.elapsed().as_secs_f64(),
-        };
+        let Some((prepared, [coordinates, maxvol, svd])) = prepared else { return Ok(None) };
+        let total = queued + clock.elapsed().as_secs_f64();
+        let seconds = PreparationSeconds { queued, read, coordinates, maxvol, svd, total };
         metrics::histogram!("cager_prepare_seconds").record(clock.elapsed().as_secs_f64());
         Ok(Some(SolverResponse { prepared: Arc::new(prepared), cache: CacheUse::Miss, seconds }))
     }

@@ -115,7 +115,7 @@ fn clustered(mesh: &TriMesh, most: usize) -> (Vec<u32>, Vec<[u32; 3]>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use cager_core::synthetic::{Capture, Options};
+    use cager_demo::{Capture, Options};
 
     #[test]
     fn a_large_model_keeps_its_shape_with_few_points() {

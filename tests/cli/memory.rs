@@ -1,7 +1,7 @@
 //! How much memory large models take.
 
 use super::support::{Dir, as_model};
-use cager_core::synthetic::{Capture, Options};
+use cager_demo::{Capture, Options};
 use std::fs;
 use std::process::{Command, Stdio};
 use std::time::Duration;

@@ -3,7 +3,7 @@
 use crate::real_data::{cage_of, data, run};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
-use cager_core::inversion::{Analysis, BATCH, Handles, Rows, Solver, SolverOptions};
+use cager_core::inversion::{Analysis, BATCH, Handles, PrepareContext, Rows, Solver, SolverOptions};
 use cager_core::regularize::Regularizer;
 use cager_formats::{open_frames, read_model};
 use cager_geometry::mesh::Model;
@@ -154,7 +154,7 @@ fn sub_spectral_regularisation_calms_cages_at_less_error_than_global_regularisat
     for Real { name, rest, cage, frames } in
         captures(&["horse-gallop", "samba", "supercages-arm", "makehuman-cmu-walk"])
     {
-        let analysis = Analysis::new(&MeanValue, &cage, &rest.points).expect("an analysis");
+        let analysis = Analysis::new(&MeanValue, &cage, &rest.points, &PrepareContext::default()).expect("an analysis");
         let with = |regularizer, spectrum| {
             let options = SolverOptions { regularizer, spectrum, ..SolverOptions::PAPER };
             make(&analysis.solver(options).expect("a solver"), &frames)

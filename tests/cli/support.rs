@@ -1,7 +1,7 @@
 //! A folder to work in, the program to run there, and small captures to run it on.
 
 use cager::decode;
-use cager_core::synthetic::{Capture, Options};
+use cager_demo::{Capture, Options};
 use cager_formats::{FrameOptions, create_frames, open_frames, write_model};
 use cager_geometry::mesh::{Model, Point, Polygons, TriMesh, diagonal};
 use cager_geometry::vector;

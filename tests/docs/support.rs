@@ -1,6 +1,6 @@
 //! A running service, blocks of documents, names in the sources.
 
-use cager_core::synthetic::{Capture, Options};
+use cager_demo::{Capture, Options};
 use cager_formats::write_model;
 use cager_geometry::mesh::{Model, Polygons};
 use std::collections::BTreeSet;

@@ -7,7 +7,7 @@ use cager_client::{MeshFile, NewSession, messages::SessionOptions};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_core::inversion::{Rows, Solver, SolverOptions};
-use cager_core::synthetic::{Capture, Options};
+use cager_demo::{Capture, Options};
 use cager_formats::{FrameReader, MeshFormat, Target, commit_together, read_model_bytes, write_model};
 use cager_geometry::mesh::{Model, Polygons, TriMesh};
 use std::path::Path;

@@ -3,7 +3,8 @@
 mod hull;
 
 use crate::EncloseError;
-use cager_geometry::mesh::{Model, Point, TriMesh, bounds, diagonal};
+use crate::enclose::{check_finite, extent};
+use cager_geometry::mesh::{Model, Point, TriMesh};
 use glam::DVec3;
 use std::collections::HashMap;
 
@@ -28,20 +29,10 @@ const MARGIN: f64 = 0.01;
 /// box, 12 for a sphere, 4 for a hull.
 pub fn bounding_shape(models: &[&Model], shape: BoundingShape, vertices: usize) -> Result<TriMesh, EncloseError> {
     for model in models {
-        if let Some(point) = model.points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
-            return Err(EncloseError::NotFinite { point });
-        }
+        check_finite(&model.points)?;
     }
     let points: Vec<Point> = models.iter().flat_map(|m| &m.points).copied().collect();
-    if points.is_empty() {
-        return Err(EncloseError::Empty);
-    }
-    let extent = diagonal(&points);
-    let (low, high) = bounds(&points);
-    let (low, high) = (DVec3::from(low), DVec3::from(high));
-    if !extent.is_finite() || extent <= 1e-12 * low.abs().max(high.abs()).max_element() {
-        return Err(EncloseError::NoExtent);
-    }
+    let (low, high, extent) = extent(&points)?;
     let least = match shape {
         BoundingShape::Box => 8,
         BoundingShape::Sphere => 12,

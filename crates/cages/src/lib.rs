@@ -6,5 +6,5 @@ pub mod diagnosis;
 mod enclose;
 
 pub use bounding_shape::{BoundingShape, bounding_shape};
-pub use design::{Design, DesignError, DesignOptions, Goal, MOST_VERTICES, Progress, Stage, Style, design};
-pub use enclose::{EncloseError, EncloseOptions, enclose, enclose_unless};
+pub use design::{Design, DesignError, DesignOptions, Goal, MAX_VERTICES, Progress, Stage, Style, design};
+pub use enclose::{EncloseError, EncloseOptions, enclose, enclose_watched};

@@ -7,11 +7,11 @@ pub mod decode;
 pub mod handles;
 pub mod inversion;
 pub mod maxvol;
+pub mod numbers;
 pub mod regularize;
 mod row_basis;
 mod simd;
-pub mod synthetic;
 
 /// Version of the preparation of solvers: stored solvers of another version are recomputed. Decoding a container depends on
 /// [`coordinates::DEFINITION`] alone.
-pub const SOLVER_VERSION: u32 = 7;
+pub const SOLVER_VERSION: u32 = 8;

@@ -8,7 +8,7 @@ use cager_core::decode::FrameError;
 use cager_core::inversion::{Analysis, Handles, PrepareContext, PrepareError, Solver, SolverOptions};
 use cager_core::maxvol::{TOLERANCE, maxvol, maxvol_from};
 use cager_core::regularize::Regularizer;
-use cager_core::synthetic::{Capture, Options};
+use cager_demo::{Capture, Options};
 use cager_geometry::mesh::Point;
 use common::{Cages, Random};
 use faer::Mat;
@@ -23,7 +23,7 @@ fn capture() -> (Capture, Cage) {
 fn solvers_of_an_analysis_have_the_bits_of_those_prepared_alone() {
     let (capture, cage) = capture();
     let points: &[Point] = &capture.rest.points;
-    let analysis = Analysis::new(&MeanValue, &cage, points).unwrap();
+    let analysis = Analysis::new(&MeanValue, &cage, points, &PrepareContext::default()).unwrap();
     let mut frame = Vec::new();
     capture.frame(4, &mut frame);
     let some = [Handles::Rectangular { count: None }, Handles::Spread { count: Some(100) }];
@@ -37,7 +37,7 @@ fn solvers_of_an_analysis_have_the_bits_of_those_prepared_alone() {
                 assert_eq!(invert(&shared), invert(&alone), "{options:?}");
                 assert_eq!(shared.handles(), alone.handles());
                 let (a, b) = (shared.preparation(), alone.preparation());
-                assert_eq!((a.rank, a.swaps, &a.singular_values), (b.rank, b.swaps, &b.singular_values));
+                assert_eq!((a.rank, a.maxvol, &a.singular_values), (b.rank, b.maxvol, &b.singular_values));
                 assert_eq!(a.condition_handles, b.condition_handles);
             }
         }
@@ -57,7 +57,7 @@ fn methods_in_factors_give_the_cages_of_their_solvers() {
     let frames: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
     let systems: [&dyn CoordinateSystem; 3] = [&MeanValue, &Green::Free, &Green::Consistent];
     for system in systems {
-        let analysis = Analysis::new(system, &cage, &capture.rest.points).unwrap();
+        let analysis = Analysis::new(system, &cage, &capture.rest.points, &PrepareContext::default()).unwrap();
         let some = [Handles::Rectangular { count: None }, Handles::Spread { count: None }];
         for handles in [Handles::MaxVol, Handles::All].into_iter().chain(some) {
             let handle_system = analysis.handle_system(handles).unwrap();
@@ -120,7 +120,7 @@ fn what_would_take_more_memory_than_it_may_is_refused_before_it_is_taken() {
 #[test]
 fn spectra_are_those_of_the_matrices() {
     let (capture, cage) = capture();
-    let analysis = Analysis::new(&MeanValue, &cage, &capture.rest.points).unwrap();
+    let analysis = Analysis::new(&MeanValue, &cage, &capture.rest.points, &PrepareContext::default()).unwrap();
     let m = analysis.coordinates().ncols();
     let direct = analysis.coordinates().singular_values().unwrap();
     for (found, wanted) in analysis.full_spectrum().iter().zip(direct) {
@@ -142,7 +142,7 @@ fn spectra_are_those_of_the_matrices() {
 #[test]
 fn rows_given_to_an_analysis_are_followed_exactly_where_they_determine_the_cage() {
     let (capture, cage) = capture();
-    let analysis = Analysis::new(&MeanValue, &cage, &capture.rest.points).unwrap();
+    let analysis = Analysis::new(&MeanValue, &cage, &capture.rest.points, &PrepareContext::default()).unwrap();
     let options = SolverOptions { regularizer: Regularizer::None, spectrum: 0, ..SolverOptions::PAPER };
     let of_rows = |rows: &[u32]| analysis.handle_system_of(rows)?.solver(options, None);
     let rows = analysis.handles().rows.clone();
@@ -166,7 +166,7 @@ fn rows_given_to_an_analysis_are_followed_exactly_where_they_determine_the_cage(
 #[test]
 fn thresholds_beyond_the_unknowns_are_refused_by_an_analysis_too() {
     let (capture, cage) = capture();
-    let analysis = Analysis::new(&MeanValue, &cage, &capture.rest.points).unwrap();
+    let analysis = Analysis::new(&MeanValue, &cage, &capture.rest.points, &PrepareContext::default()).unwrap();
     let unknowns = analysis.coordinates().ncols();
     let options = SolverOptions { spectrum: unknowns + 1, ..SolverOptions::PAPER };
     let refused = PrepareError::SpectrumTooLarge { spectrum: unknowns + 1, unknowns };
@@ -206,7 +206,7 @@ fn many_unknowns_are_prepared_to_the_same_bits_by_any_threads_and_as_an_analysis
     let capture = Capture::new(&Options { points: 2_600, frames: 3, cage_vertices: 560 });
     let cage = Cage::new(capture.cage.clone()).unwrap();
     let points: &[Point] = &capture.rest.points;
-    let everything = Analysis::new(&MeanValue, &cage, points).unwrap();
+    let everything = Analysis::new(&MeanValue, &cage, points, &PrepareContext::default()).unwrap();
     assert!(everything.coordinates().ncols() >= 512, "the sizes where only the ends of some spectra are computed");
     for handles in [Handles::MaxVol, Handles::Spread { count: None }, Handles::All] {
         let options = SolverOptions { handles, ..SolverOptions::default() };
@@ -233,7 +233,7 @@ fn the_last_directions_alone_give_the_cages_of_the_whole_decomposition() {
     let capture = Capture::new(&Options { points: 2_100, frames: 9, cage_vertices: 1_030 });
     let cage = Cage::new(capture.cage.clone()).unwrap();
     let points: &[Point] = &capture.rest.points;
-    let everything = Analysis::new(&MeanValue, &cage, points).unwrap();
+    let everything = Analysis::new(&MeanValue, &cage, points, &PrepareContext::default()).unwrap();
     let unknowns = everything.coordinates().ncols();
     assert!(unknowns >= 1024, "the sizes where only the directions that a term acts on are computed");
     let mut frame = Vec::new();

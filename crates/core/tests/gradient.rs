@@ -2,14 +2,14 @@
 
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
-use cager_core::synthetic;
+use cager_demo::{Capture, Options};
 use cager_geometry::mesh::{Point, TriMesh};
 use faer::Mat;
 
 mod common;
 
-fn capture() -> synthetic::Capture {
-    synthetic::Capture::new(&synthetic::Options { points: 2_000, frames: 4, cage_vertices: 120 })
+fn capture() -> Capture {
+    Capture::new(&Options { points: 2_000, frames: 4, cage_vertices: 120 })
 }
 
 fn noise(rows: usize, columns: usize) -> Mat<f64> {

@@ -7,7 +7,7 @@ use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, DependentParts, Handles, Outcome, Rows, Solver, SolverOptions, SolverParts};
 use cager_core::regularize::Regularizer;
-use cager_core::synthetic::{Capture, Options};
+use cager_demo::{Capture, Options};
 use cager_geometry::mesh::Point;
 use common::Cages;
 

@@ -6,7 +6,7 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions};
 use cager_core::regularize::Regularizer;
-use cager_core::synthetic::{Capture, Options};
+use cager_demo::{Capture, Options};
 use cager_geometry::mesh::Point;
 use common::Cages;
 
@@ -110,7 +110,7 @@ fn handles_begin_with_those_of_maximum_volume_and_none_comes_twice() {
         sorted.dedup();
         assert_eq!(sorted.len(), 333);
         let found = solver.preparation();
-        assert_eq!(found.log_volume, maxvol.preparation().log_volume);
+        assert_eq!(found.maxvol.log_volume, maxvol.preparation().maxvol.log_volume);
         assert!(found.condition_handles >= 1.0 && found.condition_handles < 2.0 * found.condition_full);
     }
 }

@@ -7,7 +7,7 @@ use cager_core::coordinates::{CageValues, CoordinateSystem, Coordinates, Coordin
 use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, Handles, PrepareContext, PrepareError, Solver, SolverOptions};
 use cager_core::regularize::Regularizer;
-use cager_core::synthetic::{Capture, Options};
+use cager_demo::{Capture, Options};
 use cager_geometry::linalg::SparseMatrix;
 use cager_geometry::mesh::Point;
 use cager_geometry::vector::{along, sub};

@@ -6,7 +6,7 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::decode::{Decoder, FrameError};
 use cager_core::inversion::{Analysis, Handles, PrepareContext, Solver, SolverOptions};
-use cager_core::synthetic::{Capture, Options};
+use cager_demo::{Capture, Options};
 use common::Cages;
 
 fn capture(points: u32, cage_vertices: u32) -> (Capture, Cage) {
@@ -87,7 +87,7 @@ fn decoders_that_compute_their_coordinates_have_the_bits_of_those_that_keep_them
 fn a_sample_of_a_large_model_gives_nearly_the_errors_of_all_its_points() {
     let large = capture(75_000, 120);
     let frames = frames(&large.0);
-    let whole = Analysis::new(&MeanValue, &large.1, &large.0.rest.points).unwrap();
+    let whole = Analysis::new(&MeanValue, &large.1, &large.0.rest.points, &PrepareContext::default()).unwrap();
     for handles in [Handles::MaxVol, Handles::Spread { count: None }, Handles::All] {
         let options = SolverOptions { handles, ..SolverOptions::default() };
         let (_, wanted) = errors(&whole.solver(options).unwrap(), &frames);

@@ -6,7 +6,7 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::inversion::{BATCH, Handles, Rows, Solver, SolverOptions, SolverParts};
 use cager_core::regularize::Regularizer;
-use cager_core::synthetic::{Capture, Options};
+use cager_demo::{Capture, Options};
 use cager_geometry::mesh::{Point, TriMesh, bounds, diagonal};
 use cager_geometry::vector::{centroid, distance};
 use common::Cages;

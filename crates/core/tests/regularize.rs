@@ -8,7 +8,7 @@ use cager_core::coordinates::{
 };
 use cager_core::inversion::{Analysis, BATCH, Handles, PrepareContext, PrepareError, Solver, SolverOptions};
 use cager_core::regularize::{Reference, Regularizer, TermError};
-use cager_core::synthetic::{Capture, Options};
+use cager_demo::{Capture, Options};
 use cager_geometry::linalg::SparseMatrix;
 use cager_geometry::mesh::Point;
 use common::Cages;
@@ -207,7 +207,7 @@ fn a_matrix_that_does_not_fit_is_refused() {
 fn the_chosen_threshold_is_the_largest_within_the_bound() {
     let (capture, cage) = capture();
     let m = cage.vertices().len();
-    let analysis = Analysis::new(&MeanValue, &cage, &capture.rest.points).unwrap();
+    let analysis = Analysis::new(&MeanValue, &cage, &capture.rest.points, &PrepareContext::default()).unwrap();
     let samples: Vec<Vec<f64>> = (0..8).map(|k| frame(&capture, 5 * k)).collect();
     for handles in
         [Handles::MaxVol, Handles::Rectangular { count: None }, Handles::Spread { count: None }, Handles::All]
@@ -249,7 +249,7 @@ fn the_chosen_threshold_is_the_largest_within_the_bound() {
 #[test]
 fn a_threshold_for_frames_that_follow_each_other_is_measured_in_their_order() {
     let (capture, cage) = capture();
-    let analysis = Analysis::new(&MeanValue, &cage, &capture.rest.points).unwrap();
+    let analysis = Analysis::new(&MeanValue, &cage, &capture.rest.points, &PrepareContext::default()).unwrap();
     let options = SolverOptions { regularizer: Regularizer::Temporal, ..SolverOptions::PAPER };
     let samples: Vec<Vec<f64>> = (0..20).map(|t| frame(&capture, t)).collect();
     let handle_system = analysis.handle_system(options.handles).unwrap();
@@ -272,7 +272,7 @@ fn a_threshold_for_frames_that_follow_each_other_is_measured_in_their_order() {
 #[test]
 fn a_threshold_for_normals_that_follow_is_measured_on_the_cages_that_are_found() {
     let (capture, cage) = capture();
-    let analysis = Analysis::new(&Green::Consistent, &cage, &capture.rest.points).unwrap();
+    let analysis = Analysis::new(&Green::Consistent, &cage, &capture.rest.points, &PrepareContext::default()).unwrap();
     let samples: Vec<Vec<f64>> = (0..4).map(|k| frame(&capture, 9 * k)).collect();
     let options = SolverOptions::PAPER;
     let handle_system = analysis.handle_system(options.handles).unwrap();

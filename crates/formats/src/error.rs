@@ -51,7 +51,7 @@ pub enum Error {
         what: String,
     },
     /// A frame, or a whole capture, does not belong to the rest pose: pair the right files.
-    #[error("{}: {}has {found} points where {expected} are expected; use a capture of the same mesh as the rest pose", .path.display(), InFrame(*frame))]
+    #[error("{}: {}has {found} points where {expected} are expected; use a capture of the same mesh as the rest pose", .path.display(), in_frame(*frame))]
     PointCount {
         /// The file.
         path: PathBuf,
@@ -111,12 +111,8 @@ impl fmt::Display for Action {
 }
 
 /// The words before "has … points" where one frame is at fault.
-struct InFrame(Option<usize>);
-
-impl fmt::Display for InFrame {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.map_or(Ok(()), |frame| write!(f, "frame {frame} "))
-    }
+fn in_frame(frame: Option<usize>) -> String {
+    frame.map_or(String::new(), |frame| format!("frame {frame} "))
 }
 
 impl Error {

@@ -76,7 +76,7 @@ const BEGINNINGS: &[(&[u8], Signature)] = &[
 /// Bytes of a file that are looked at.
 const LOOKED_AT: usize = 1024;
 /// Bytes that must be letters, digits, punctuation and white space in text.
-const LEAST_TEXT: usize = 12;
+const MIN_TEXT: usize = 12;
 
 impl Signature {
     /// What a file that begins with these bytes is; a few hundred of them are enough. `None` for bytes that say nothing.
@@ -94,7 +94,7 @@ impl Signature {
         let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start).trim_ascii_start();
         let is_text = |b: &u8| matches!(b, b'\t' | b'\n' | b'\r' | b' '..=b'~') || *b >= 0x80;
         let checked = &text[..text.len().min(64)];
-        if checked.len() < LEAST_TEXT || !checked[..LEAST_TEXT].is_ascii() || !checked.iter().all(is_text) {
+        if checked.len() < MIN_TEXT || !checked[..MIN_TEXT].is_ascii() || !checked.iter().all(is_text) {
             return None;
         }
         let begins = |word: &str| text.get(..word.len()).is_some_and(|t| t.eq_ignore_ascii_case(word.as_bytes()));

@@ -1,7 +1,7 @@
 //! Sections of whole numbers: meshes, groups of cages and what is added to their positions, by the `cager-codec` crate.
 
 use super::codec::{CODED, CODED_STATIC};
-use super::reader::ContainerReader;
+use super::reader::{ContainerReader, finite};
 use super::section::{Entry, SectionHeader};
 use super::{Error, tag};
 use cager_codec::{
@@ -43,10 +43,7 @@ impl CodedSection {
 
     pub(super) fn positions(&self, faces: &Polygons, count: usize) -> Result<Vec<Point>, Error> {
         let points = decode_positions(&self.payload, faces, count).map_err(|e| self.damaged(&e))?;
-        match points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
-            Some(k) => Err(Error::corrupt(self.offset, format!("position {k} is not finite"))),
-            None => Ok(points),
-        }
+        finite(points, self.offset)
     }
 
     pub(super) fn errors(&self, frames: usize) -> Result<Vec<[f32; 2]>, Error> {
@@ -217,7 +214,7 @@ impl<R: Read + Seek> ContainerReader<R> {
                 || section.residual(hierarchy, entry.header.count, most),
                 || {
                     let (of, section) = after?;
-                    Some((of, section.residual(hierarchy, of.header.count, most.min(MOST_AHEAD)).ok()?))
+                    Some((of, section.residual(hierarchy, of.header.count, most.min(MAX_AHEAD)).ok()?))
                 },
             );
             self.groups.residuals.push((entry, residual?));
@@ -262,7 +259,7 @@ fn basis_bytes(system: &dyn CoordinateSystem, cage: &Cage, points: usize) -> u64
 }
 
 /// Most numbers of a residual that is decoded before it is asked for: all of any group that this program writes.
-const MOST_AHEAD: usize = 1 << 24;
+const MAX_AHEAD: usize = 1 << 24;
 
 /// Most numbers of a residual's components in a file of so many bytes: what reading them takes four times.
 pub fn most_residual_numbers(file_bytes: u64) -> usize {

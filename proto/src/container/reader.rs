@@ -160,7 +160,7 @@ impl<R: Read + Seek> ContainerReader<R> {
     /// # Errors
     /// Damage.
     pub fn colors(&mut self) -> Result<Vec<[u8; 3]>, Error> {
-        let entry = self.entries.iter().find(|e| e.header.tag == tag::REST_COLORS).copied();
+        let entry = self.sections_of(tag::REST_COLORS).next();
         let colors = entry.map_or(Ok(Vec::new()), |entry| self.raw(entry))?;
         Ok(colors.as_chunks().0.to_vec())
     }
@@ -220,7 +220,7 @@ impl<R: Read + Seek> ContainerReader<R> {
     /// # Errors
     /// Damage.
     pub fn elements(&mut self) -> Result<Option<Vec<u8>>, Error> {
-        let entry = self.entries.iter().find(|e| e.header.tag == tag::ELEMENTS).copied();
+        let entry = self.sections_of(tag::ELEMENTS).next();
         entry.map(|entry| self.raw(entry)).transpose()
     }
 
@@ -276,7 +276,7 @@ impl<R: Read + Seek> ContainerReader<R> {
     /// # Errors
     /// Damage.
     pub fn frame_numbers(&mut self) -> Result<Vec<f64>, Error> {
-        let Some(&entry) = self.entries.iter().find(|e| e.header.tag == tag::NUMBERS) else {
+        let Some(entry) = self.sections_of(tag::NUMBERS).next() else {
             return Ok((0..self.frames).map(|frame| frame as f64).collect());
         };
         let raw = self.raw(entry)?;
@@ -293,8 +293,9 @@ impl<R: Read + Seek> ContainerReader<R> {
     /// # Errors
     /// Damage.
     pub fn report(&mut self) -> Result<Report, Error> {
-        let mut report = match self.entries.iter().find(|e| e.header.tag == tag::REPORT) {
-            Some(&entry) => serde_json::from_slice(&self.raw(entry)?)
+        let entry = self.sections_of(tag::REPORT).next();
+        let mut report = match entry {
+            Some(entry) => serde_json::from_slice(&self.raw(entry)?)
                 .map_err(|e| Error::corrupt(entry.offset, format!("the report cannot be read ({e})")))?,
             None => Report::default(),
         };
@@ -365,7 +366,7 @@ impl<R: Read + Seek> ContainerReader<R> {
     }
 
     fn read_origin(&mut self) -> Result<(), Error> {
-        let Some(&entry) = self.entries.iter().find(|e| e.header.tag == tag::ORIGIN) else { return Ok(()) };
+        let Some(entry) = self.sections_of(tag::ORIGIN).next() else { return Ok(()) };
         let raw = self.raw(entry)?;
         let origin = [0, 8, 16].map(|at| f64::from_bits(u64_at(&raw, at)));
         if origin.iter().any(|x| !x.is_finite()) {
@@ -381,9 +382,9 @@ impl<R: Read + Seek> ContainerReader<R> {
     }
 
     pub(super) fn entry(&self, tag: [u8; 4]) -> Result<Entry, Error> {
-        let mut found = self.entries.iter().filter(|e| e.header.tag == tag);
+        let mut found = self.sections_of(tag);
         match (found.next(), found.next()) {
-            (Some(&entry), None) => Ok(entry),
+            (Some(entry), None) => Ok(entry),
             (None, _) => Err(Error::corrupt(0, format!("the section {} is missing", String::from_utf8_lossy(&tag)))),
             (Some(_), Some(second)) => Err(Error::corrupt(
                 second.offset,
@@ -455,16 +456,21 @@ impl<R: Read + Seek> ContainerReader<R> {
         } else {
             raw.chunks_exact(24).map(|b| [0, 8, 16].map(|k| f64::from_bits(u64_at(b, k)))).collect()
         };
-        match points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
-            Some(k) => Err(Error::corrupt(entry.offset, format!("position {k} is not finite"))),
-            None => Ok(points),
-        }
+        finite(points, entry.offset)
     }
 
     fn indices(&mut self, tag: [u8; 4]) -> Result<(u64, Vec<u32>), Error> {
         let entry = self.entry(tag)?;
         let raw = self.raw(entry)?;
         Ok((entry.offset, le::u32_values(&raw).collect()))
+    }
+}
+
+/// Refuses positions that are not finite, of the section there.
+pub(super) fn finite(points: Vec<Point>, offset: u64) -> Result<Vec<Point>, Error> {
+    match points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+        Some(k) => Err(Error::corrupt(offset, format!("position {k} is not finite"))),
+        None => Ok(points),
     }
 }
 

@@ -5,7 +5,7 @@ use super::{Completion, Content, ContentKey, Idempotency, NamedFile, Opened, Ses
 use cager_core::cage::Cage;
 use cager_core::coordinates;
 use cager_core::inversion::{Handles, Solver, SolverOptions};
-use cager_core::synthetic::{Capture, Options};
+use cager_demo::{Capture, Options};
 use cager_proto::messages::SessionOptions;
 use std::io;
 use std::path::Path;

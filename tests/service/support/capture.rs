@@ -1,6 +1,6 @@
 //! Small captures, as bytes.
 
-use cager_core::synthetic::{self, Options};
+use cager_demo::Options;
 use cager_formats::{FrameOptions, create_frames, write_model};
 use cager_geometry::mesh::{Model, Polygons, TriMesh};
 use cager_proto::record::{self, Kind};
@@ -51,7 +51,7 @@ impl Capture {
     }
 
     pub(crate) fn new(points: usize, cage_vertices: usize, frames: usize) -> Self {
-        let capture = synthetic::Capture::new(&Options { points, frames, cage_vertices });
+        let capture = cager_demo::Capture::new(&Options { points, frames, cage_vertices });
         let mut wide = Vec::new();
         let frame = |t| {
             capture.frame(t, &mut wide);

@@ -8,12 +8,12 @@ import { RangeDecoder } from './rangeDecoder';
 import { decodeTrajectories } from './trajectories';
 
 /** Most frames of a group. */
-export const MOST_FRAMES = 1024;
+export const MAX_FRAMES = 1024;
 /** Most rows of a cage. */
-export const MOST_ROWS = 4096;
+export const MAX_ROWS = 4096;
 /** Whether the basis is rotated (u8), the step (f64) and the number of components (u16). */
 const HEAD_BYTES = 11;
-const MOST_SIZE = 1 << 20;
+const MAX_SIZE = 1 << 20;
 
 /** What a group of cages holds: `E·A` in whole steps of a basis. */
 export interface CageNumbers {
@@ -44,7 +44,7 @@ export function decodeCageNumbers(bytes: Uint8Array, frames: number, rows: numbe
     throw new CodedDataError('a group of cages has an unknown basis');
   }
   const possible = Number.isFinite(step) && step > 0 && components <= Math.min(frames, 3 * rows);
-  if (frames > MOST_FRAMES || rows > MOST_ROWS || !possible) {
+  if (frames > MAX_FRAMES || rows > MAX_ROWS || !possible) {
     throw new CodedDataError('a group of cages has impossible counts');
   }
   const decoder = new RangeDecoder(bytes.subarray(HEAD_BYTES));
@@ -110,7 +110,7 @@ function decodeNumbers(decoder: RangeDecoder, components: number, width: number)
       }
       const number = models.signed(decoder, SIZE_CLASSES * axis + sizeClass(around));
       found[k * width + value] = number;
-      sizes[at] = Math.min(Math.abs(number), MOST_SIZE);
+      sizes[at] = Math.min(Math.abs(number), MAX_SIZE);
     }
     [sizes, before, twoBefore] = [twoBefore, sizes, before];
   }

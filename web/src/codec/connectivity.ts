@@ -5,22 +5,22 @@
 
 import { adjacency } from './adjacency';
 import { CodedDataError } from './error';
-import { type Gate, Gates, MOST_TO_COME } from './gates';
+import { type Gate, Gates, MAX_TO_COME } from './gates';
 import { IntegerModels } from './integers';
 import { OpenEdges } from './openEdges';
 import type { Polygons } from './polygons';
 import { BinaryModels, RangeDecoder } from './rangeDecoder';
-import { MOST_FAR_POINTS, decodeOrder } from './vertexOrder';
+import { MAX_FAR_POINTS, decodeOrder } from './vertexOrder';
 
 /** Faces at a vertex are told apart up to this number less one. */
 const VALENCES = 9;
 /** Pairs of such numbers. */
 const PAIRS = VALENCES * VALENCES;
 /** Open edges of a vertex that are sorted anew with it, in either direction: ordinary meshes have no more. */
-const MOST_NEARER = 4;
+const MAX_NEARER = 4;
 /** Vertices that a corner is looked for among, those that open edges lead to. */
-const MOST_NEAR = 8;
-const MOST_COUNT = 0xffffffff;
+const MAX_NEAR = 8;
+const MAX_COUNT = 0xffffffff;
 
 const WRONG_COUNTS = 'faces are not those that the header counts';
 
@@ -33,7 +33,7 @@ export function decodeFaces(bytes: Uint8Array, points: number, faces: number, co
   const decoder = new RangeDecoder(bytes);
   const polygons = new Walk(decoder, points, faces, corners).run();
   const isFar = decoder.bits(1) === 1;
-  if (isFar && points > MOST_FAR_POINTS) {
+  if (isFar && points > MAX_FAR_POINTS) {
     throw new CodedDataError('the order of so many vertices cannot have been written');
   }
   const numbers = new Uint32Array(points);
@@ -62,7 +62,7 @@ class Walk {
   private readonly more = new BinaryModels(1);
   private readonly sameArity = new BinaryModels(1);
   private readonly firstTime = new BinaryModels(2 * PAIRS);
-  private readonly place = new BinaryModels(8 * MOST_NEAR);
+  private readonly place = new BinaryModels(8 * MAX_NEAR);
   private readonly arities = new IntegerModels(1);
   private readonly faceCounts = new IntegerModels(1);
 
@@ -177,15 +177,15 @@ class Walk {
   /** Sorts the open edges of a vertex anew where none of their ends has fewer faces to come. */
   private requeueOpenEdges(vertex: number): void {
     const toCome = this.facesAt[vertex];
-    if (toCome >= MOST_TO_COME) {
+    if (toCome >= MAX_TO_COME) {
       return;
     }
-    for (const end of this.leaving[vertex].newest().slice(-MOST_NEARER)) {
+    for (const end of this.leaving[vertex].newest().slice(-MAX_NEARER)) {
       if (this.facesAt[end] >= toCome) {
         this.gates.add(vertex, end, toCome);
       }
     }
-    for (const end of this.arriving[vertex].newest().slice(-MOST_NEARER)) {
+    for (const end of this.arriving[vertex].newest().slice(-MAX_NEARER)) {
       if (this.facesAt[end] >= toCome) {
         this.gates.add(end, vertex, toCome);
       }
@@ -204,7 +204,7 @@ class Walk {
     if (this.decoder.bit(this.firstTime, this.firstTimeContext(previous, first, both)) === 1) {
       return this.newVertex();
     }
-    const base = MOST_NEAR * (2 * this.lastOnes(previous, first) + (both ? 1 : 0));
+    const base = MAX_NEAR * (2 * this.lastOnes(previous, first) + (both ? 1 : 0));
     for (let k = 0; k < near.length; k++) {
       if (this.decoder.bit(this.place, base + k) === 0) {
         return near[k];
@@ -224,7 +224,7 @@ class Walk {
     }
     const near: number[] = [];
     for (const x of [...ofBoth.reverse(), ...ofOne, ...[...back].reverse()]) {
-      if (near.length < MOST_NEAR && !this.isCorner(x) && !near.includes(x)) {
+      if (near.length < MAX_NEAR && !this.isCorner(x) && !near.includes(x)) {
         near.push(x);
       }
     }
@@ -255,7 +255,7 @@ class Walk {
       throw new CodedDataError(WRONG_COUNTS);
     }
     // Of the face that is read it is a corner now.
-    this.facesAt[this.met] = Math.min(this.faceCounts.natural(this.decoder, 0) + 1, MOST_COUNT);
+    this.facesAt[this.met] = Math.min(this.faceCounts.natural(this.decoder, 0) + 1, MAX_COUNT);
     return this.met++;
   }
 

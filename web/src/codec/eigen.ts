@@ -4,7 +4,7 @@
  */
 
 /** Steps for each eigenvalue before giving up. */
-const MOST_STEPS = 50;
+const MAX_STEPS = 50;
 /** Rotations that are collected before they are applied to the vectors: those of many steps pass over a row while it is in the cache. */
 const ROTATIONS = 1 << 14;
 /** Rows of the vectors that are rotated together. */
@@ -143,7 +143,7 @@ function diagonalise(diagonal: Float64Array, offDiagonal: Float64Array, vectors:
   const rotations = new Rotations(vectors, n);
   let end = n - 1;
   for (let steps = 0; end > 0; steps++) {
-    if (steps > MOST_STEPS * n) {
+    if (steps > MAX_STEPS * n) {
       return false;
     }
     let start = end;

@@ -7,7 +7,7 @@ const UNARY = 14;
 /** Models of one context: whether the number is 0, its sign, and the unary digits of its size. */
 const PER_CONTEXT = 2 + UNARY;
 /** Largest size of a signed number. */
-export const MOST = 2 ** 28;
+export const MAX_VALUE = 2 ** 28;
 /** Number of classes of {@link sizeClass}. */
 export const SIZE_CLASSES = 16;
 
@@ -43,7 +43,7 @@ export class IntegerModels {
       size++;
     }
     if (size > UNARY) {
-      size = Math.min(UNARY + this.largeSize(decoder), MOST);
+      size = Math.min(UNARY + this.largeSize(decoder), MAX_VALUE);
     }
     return negative ? -size : size;
   }

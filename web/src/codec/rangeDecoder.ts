@@ -3,7 +3,7 @@
 import { CodedDataError } from './error';
 
 /** Words that a decoder may read past the end of what an encoder wrote. */
-const MOST_PAST = 2;
+const MAX_PAST = 2;
 /** Rates at which the two estimates of a model change at least: 1/16 and 1/128. */
 const FAST_RATE = 16;
 const SLOW_RATE = 128;
@@ -131,7 +131,7 @@ export class RangeDecoder {
       return this.words.getUint32(this.next - 4, true);
     }
     this.past++;
-    if (this.past > MOST_PAST) {
+    if (this.past > MAX_PAST) {
       throw new CodedDataError('coded numbers are damaged');
     }
     return 0;

@@ -1,7 +1,7 @@
 /** What is added to the positions of a group's cages; docs/FORMAT.md, "Residual". `crates/codec/src/residual.rs` is the reference. */
 
 import type { Residual } from '../capture';
-import { MOST_FRAMES } from './cages';
+import { MAX_FRAMES } from './cages';
 import { decodeCorrections } from './corrections';
 import { CodedDataError } from './error';
 import type { Hierarchy } from './hierarchy';
@@ -10,7 +10,7 @@ import { BinaryModels, RangeDecoder } from './rangeDecoder';
 import { decodeTrajectories } from './trajectories';
 
 /** Most positions of a group, points times frames. */
-const MOST_POSITIONS = 2 ** 26;
+const MAX_POSITIONS = 2 ** 26;
 /** Step (f64), number of components (u16), step of corrections (f64), and bytes of the components (u32). */
 const HEAD_BYTES = 22;
 /** Added to the number of components where the vertices are in two parts; the bytes of the second one (u32) then follow the head. */
@@ -26,7 +26,7 @@ const PARTS = 16;
  */
 export function decodeResidual(bytes: Uint8Array, hierarchy: Hierarchy, frames: number, mostNumbers: number): Residual {
   const points = hierarchy.order.length;
-  if (frames > MOST_FRAMES || points * frames > MOST_POSITIONS) {
+  if (frames > MAX_FRAMES || points * frames > MAX_POSITIONS) {
     throw new CodedDataError('a group has too many positions');
   }
   const isHead = (parted: boolean) => bytes.length >= HEAD_BYTES + (parted ? 4 : 0);

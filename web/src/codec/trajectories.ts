@@ -5,8 +5,8 @@ import { multiply } from './dense';
 import type { RangeDecoder } from './rangeDecoder';
 
 /** Largest number of binary digits of an entry. */
-const MOST_DIGITS = 26;
-const MOST_SIZE = 1 << 20;
+const MAX_DIGITS = 26;
+const MAX_SIZE = 1 << 20;
 
 /** Reads E, frames × components, row by row. */
 export function decodeTrajectories(decoder: RangeDecoder, frames: number, components: number): Float64Array {
@@ -17,7 +17,7 @@ export function decodeTrajectories(decoder: RangeDecoder, frames: number, compon
   const waves = new Float64Array(frames * components);
   let digits = 0;
   for (let component = 0; component < components; component++) {
-    digits = Math.max(0, Math.min(MOST_DIGITS, digits + lengths.signed(decoder, 0)));
+    digits = Math.max(0, Math.min(MAX_DIGITS, digits + lengths.signed(decoder, 0)));
     const unit = 2 ** -digits;
     let last = 0;
     let lastButOne = 0;
@@ -25,7 +25,7 @@ export function decodeTrajectories(decoder: RangeDecoder, frames: number, compon
       const value = models.signed(decoder, sizeClass(8 * last + 4 * lastButOne + 4 * above[t]));
       waves[t * components + component] = value * unit;
       lastButOne = last;
-      last = Math.min(Math.abs(value), MOST_SIZE);
+      last = Math.min(Math.abs(value), MAX_SIZE);
       above[t] = last;
     }
   }

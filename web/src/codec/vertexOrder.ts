@@ -10,11 +10,11 @@ import { SIZE_CLASSES, sizeClass } from './integers';
 import { BinaryModels, type RangeDecoder } from './rangeDecoder';
 
 /** Vertices with more neighbours move none of them when one of these is numbered. */
-const MOST_PASSED_ON = 16;
+const MAX_PASSED_ON = 16;
 /** Most points for which neighbours of neighbours are moved too. */
-export const MOST_FAR_POINTS = 1 << 17;
+export const MAX_FAR_POINTS = 1 << 17;
 /** Most binary digits of a place below its leading 1. */
-const MOST_DIGITS = 31;
+const MAX_DIGITS = 31;
 
 /**
  * Reads the vertex of each number, as the faces name it.
@@ -36,7 +36,7 @@ export function decodeOrder(decoder: RangeDecoder, { starts, items }: ByVertex, 
     if (isFar) {
       for (let k = start; k < end; k++) {
         const w = items[k];
-        if (starts[w + 1] - starts[w] <= MOST_PASSED_ON) {
+        if (starts[w + 1] - starts[w] <= MAX_PASSED_ON) {
           list.choose(items, starts[w], starts[w + 1]);
         }
       }
@@ -140,13 +140,13 @@ export class RecencyList {
 /** Models of places: the number of binary digits of the place plus one, in the context of the place before; then the digits, the first two by models. */
 class Places {
   private readonly digits = new BinaryModels(32 * SIZE_CLASSES);
-  private readonly leading = new BinaryModels(4 * (MOST_DIGITS + 1));
+  private readonly leading = new BinaryModels(4 * (MAX_DIGITS + 1));
   private before = 0;
 
   read(decoder: RangeDecoder): number {
     const context = 32 * sizeClass(this.before);
     let count = 0;
-    while (count < MOST_DIGITS && decoder.bit(this.digits, context + count) === 1) {
+    while (count < MAX_DIGITS && decoder.bit(this.digits, context + count) === 1) {
       count++;
     }
     const modelled = Math.min(count, 2);

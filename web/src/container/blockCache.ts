@@ -3,8 +3,8 @@
 import type { FrameBlock } from '../capture';
 
 /** Bytes of blocks that are kept; the two used last stay whatever they take. */
-const MOST_BYTES = 256 * 2 ** 20;
-const LEAST_BLOCKS = 2;
+const MAX_BYTES = 256 * 2 ** 20;
+const MIN_BLOCKS = 2;
 
 interface Pending {
   readonly promise: Promise<FrameBlock>;
@@ -117,7 +117,7 @@ export class BlockCache {
       bytes += bytesOf(kept);
     }
     for (const [first, oldest] of this.done) {
-      if (bytes <= MOST_BYTES || this.done.size <= LEAST_BLOCKS) {
+      if (bytes <= MAX_BYTES || this.done.size <= MIN_BLOCKS) {
         break;
       }
       this.done.delete(first);

@@ -2,7 +2,7 @@
 
 import type { FrameBlock, Residual, StaticPart } from '../capture';
 import { sampleStride } from '../codec/basis';
-import { MOST_ROWS } from '../codec/cages';
+import { MAX_ROWS } from '../codec/cages';
 import type { Codec } from '../codec/client';
 import { columnsOf } from '../coordinates/compute';
 import { TiedNormals } from '../coordinates/tiedNormals';
@@ -76,7 +76,7 @@ export class BlockDecoder {
     if (codec !== CODEC.coded) {
       return new Float32Array(decodePayload(entry, payload, 3 * this.part.rowsPerFrame).buffer);
     }
-    if (this.part.rowsPerFrame > MOST_ROWS) {
+    if (this.part.rowsPerFrame > MAX_ROWS) {
       throw damaged(entry.offset, `a coded frame has ${this.part.rowsPerFrame} rows`);
     }
     this.basis ??= this.addCoordinates().catch((error: unknown) => {

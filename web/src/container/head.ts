@@ -7,8 +7,8 @@ import { CODEC, type Entry, safeInteger, viewOf } from './section';
 /** The definition of the coordinate systems that this reader knows. */
 const DEFINITION = 3;
 const SYSTEMS: readonly string[] = ['mvc', 'harmonic', 'green', 'green-free'] satisfies CoordinateSystem[];
-const MOST_BYTES = 64 * 2 ** 10;
-const MOST_COUNT = 2 ** 32 - 1;
+const MAX_BYTES = 64 * 2 ** 10;
+const MAX_COUNT = 2 ** 32 - 1;
 
 export interface Head {
   readonly definition: number;
@@ -33,7 +33,7 @@ export function checkHeadSection({ fields, offset }: Entry): void {
   if (fields.codec !== CODEC.raw) {
     throw damaged(offset, 'the header is compressed');
   }
-  if (fields.width !== 1 || fields.rawBytes > MOST_BYTES) {
+  if (fields.width !== 1 || fields.rawBytes > MAX_BYTES) {
     throw damaged(offset, 'the header is too large');
   }
 }
@@ -61,7 +61,7 @@ export function parseHead(bytes: Uint8Array, offset: number): Head {
   if (head.frameRate !== null && !(Number.isFinite(head.frameRate) && head.frameRate > 0)) {
     throw damaged(offset, 'the frame rate is not a positive number');
   }
-  const impossible = head.rowsPerFrame === 0 || head.points > MOST_COUNT || head.cageVertices > MOST_COUNT;
+  const impossible = head.rowsPerFrame === 0 || head.points > MAX_COUNT || head.cageVertices > MAX_COUNT;
   if (impossible || (head.restFaces === 0 && head.restCorners > 0)) {
     throw damaged(offset, 'the header has impossible counts');
   }

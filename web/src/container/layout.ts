@@ -5,7 +5,7 @@ import type { Head } from './head';
 import { CODEC, type Entry, HEADER_BYTES, isCoded, PRELUDE_BYTES, type SectionFields } from './section';
 import { KNOWN_TAGS, isRequired } from './tag';
 
-const MOST_FRAMES = 2 ** 32 - 1;
+const MAX_FRAMES = 2 ** 32 - 1;
 const MIB = 2 ** 20;
 
 /** A chunk of frames, and the residual right before it. */
@@ -74,7 +74,7 @@ export class Layout {
     }
     this.pendingResidual = tag === 'resi' ? entry : null;
     if (tag === 'FRAM') {
-      if (first !== this.frames || count === 0 || first + count > MOST_FRAMES) {
+      if (first !== this.frames || count === 0 || first + count > MAX_FRAMES) {
         throw damaged(entry.offset, 'the frames are not in order');
       }
       this.chunks.push({ frames: entry, residual });

@@ -1,5 +1,5 @@
 /** Seconds of transfer before the rate is known, and after which what came before counts half. */
-const [LEAST_SECONDS, MEMORY_SECONDS] = [0.5, 4];
+const [MIN_SECONDS, MEMORY_SECONDS] = [0.5, 4];
 
 /** Bytes per second of a connection of late; time in which nothing was to be transferred does not count. */
 export class Throughput {
@@ -8,7 +8,7 @@ export class Throughput {
 
   /** Null before it is known, as of what is there at once. */
   get bytesPerSecond(): number | null {
-    return this.seconds < LEAST_SECONDS ? null : this.bytes / this.seconds;
+    return this.seconds < MIN_SECONDS ? null : this.bytes / this.seconds;
   }
 
   /** So many bytes took so many seconds. */

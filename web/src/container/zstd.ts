@@ -1,6 +1,6 @@
 /** Decompression of one zstd frame (RFC 8878) whose size is known: it writes no more than that, whatever the frame says. */
 
-import { BlockDecoder, MOST_BLOCK } from './zstdBlock';
+import { BlockDecoder, MAX_BLOCK } from './zstdBlock';
 
 /**
  * Decompresses to exactly `size` bytes.
@@ -22,7 +22,7 @@ export function decompress(frame: Uint8Array, size: number): Uint8Array<ArrayBuf
     at += 3;
     // A repeated byte is one byte whatever its length.
     const stored = kind === 1 ? 1 : length;
-    if (kind === 3 || length > MOST_BLOCK || at + stored > frame.length) {
+    if (kind === 3 || length > MAX_BLOCK || at + stored > frame.length) {
       throw new Error('a block is impossible');
     }
     const block = frame.subarray(at, at + stored);

@@ -12,7 +12,7 @@ import {
 } from './zstdEntropy';
 
 /** Most bytes that a block may have, compressed or not. */
-export const MOST_BLOCK = 2 ** 17;
+export const MAX_BLOCK = 2 ** 17;
 
 /** Bits that follow a code, and the smallest number of the code. */
 interface Lengths {
@@ -62,7 +62,7 @@ export class BlockDecoder {
   /** Decodes a block into `out` from `start` on; returns where it ends there. */
   decode(block: Uint8Array, out: Uint8Array, start: number): number {
     const [literals, used] = this.literals(block);
-    const most = Math.min(out.length, start + MOST_BLOCK);
+    const most = Math.min(out.length, start + MAX_BLOCK);
     return this.sequences(block.subarray(used), literals, out, start, most);
   }
 
@@ -82,7 +82,7 @@ export class BlockDecoder {
     const size = header % 2 ** width;
     const stored = isCoded ? Math.floor(header / 2 ** width) : kind === 0 ? size : 1;
     const end = headerBytes + stored;
-    if (size > MOST_BLOCK || end > block.length) {
+    if (size > MAX_BLOCK || end > block.length) {
       throw new Error('its literals are too long');
     }
     const bytes = block.subarray(headerBytes, end);

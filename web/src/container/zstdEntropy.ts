@@ -18,7 +18,7 @@ export interface HuffmanTable {
 }
 
 const LONGEST_CODE = 11;
-const MOST_WEIGHTS = 255;
+const MAX_WEIGHTS = 255;
 const WEIGHT_LOG = 6;
 
 /** The table in which a symbol has as many of the 2^`log` states as `counts` says; −1 stands for one at the end. */
@@ -149,7 +149,7 @@ function codedWeights(bytes: Uint8Array): number[] {
   const bits = new BackwardBits(bytes.subarray(used));
   const states = [bits.read(table.log), bits.read(table.log)];
   const weights: number[] = [];
-  for (let turn = 0; weights.length < MOST_WEIGHTS; turn = 1 - turn) {
+  for (let turn = 0; weights.length < MAX_WEIGHTS; turn = 1 - turn) {
     const state = states[turn];
     weights.push(table.symbols[state]);
     states[turn] = table.bases[state] + bits.read(table.bits[state]);

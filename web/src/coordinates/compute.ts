@@ -8,7 +8,7 @@ export function canCompute(system: CoordinateSystem): boolean {
 }
 
 /** Most bytes that Φ may take, in memory or as texels: more makes browsers and devices fail without a word. */
-export const MOST_PHI_BYTES = 2 ** 30;
+export const MAX_PHI_BYTES = 2 ** 30;
 
 /** Columns of Φ: the cage's vertices and, for Green coordinates, its faces. */
 export function columnsOf(system: CoordinateSystem, cage: TriangleMesh): number {

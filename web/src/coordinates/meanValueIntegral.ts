@@ -14,7 +14,7 @@ const GAUSS: readonly (readonly [number, number])[] = [
 /** Pieces are halved until their longest side is at most this fraction of their distance: the rule is then exact to rounding. */
 const SIDE_OVER_DISTANCE = 0.35;
 /** Halvings at most; a longest side is halved by every second one. */
-const MOST_HALVINGS = 120;
+const MAX_HALVINGS = 120;
 
 type Triangle = readonly [Vector, Vector, Vector];
 
@@ -35,7 +35,7 @@ export function integratedWeights(corners: Triangle, x: Vector): Vector {
     [0, 1, 0],
     [0, 0, 1],
   ];
-  addPiece(seen, unit, 1, MOST_HALVINGS, sums);
+  addPiece(seen, unit, 1, MAX_HALVINGS, sums);
   const height = dot(seen[longest], normal);
   return [sums[0] * height, sums[1] * height, sums[2] * height];
 }

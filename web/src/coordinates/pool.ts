@@ -1,5 +1,5 @@
 import type { StaticPart } from '../capture';
-import { columnsOf, MOST_PHI_BYTES } from './compute';
+import { columnsOf, MAX_PHI_BYTES } from './compute';
 import type { FromWorker, ToWorker } from './messages';
 import { moduleWorker } from '../moduleWorker';
 import workerAddress from './worker.ts?worker&url';
@@ -7,7 +7,7 @@ import workerAddress from './worker.ts?worker&url';
 /** Entries of Φ that a worker computes before it reports: some tens of milliseconds of work. */
 const SLICE_ENTRIES = 1 << 17;
 /** More workers hardly help: the rows have to be copied into one array. */
-const MOST_WORKERS = 8;
+const MAX_WORKERS = 8;
 
 /** Milliseconds between reports: drawing each of them would take the processor from the computation. */
 const REPORT_EVERY = 200;
@@ -33,7 +33,7 @@ export async function computePhi(capture: StaticPart, options: ComputeOptions = 
   if (points === 0) return phi;
   const slice = Math.max(1, Math.floor(SLICE_ENTRIES / columns));
   const slices = Math.ceil(points / slice);
-  const count = Math.min(MOST_WORKERS, slices, Math.max(1, navigator.hardwareConcurrency));
+  const count = Math.min(MAX_WORKERS, slices, Math.max(1, navigator.hardwareConcurrency));
   const workers = Array.from({ length: count }, startWorker);
   try {
     await new Promise<void>((resolve, reject) => {
@@ -84,7 +84,7 @@ function send(worker: Worker, message: ToWorker) {
 function allocate(points: number, columns: number): Float32Array {
   const bytes = 4 * points * columns;
   try {
-    if (bytes > MOST_PHI_BYTES) throw new RangeError();
+    if (bytes > MAX_PHI_BYTES) throw new RangeError();
     return new Float32Array(points * columns);
   } catch {
     const gigabytes = (bytes / 2 ** 30).toFixed(1);

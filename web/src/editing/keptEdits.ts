@@ -9,9 +9,9 @@ import type { Motion } from './motion';
 const DATABASE = 'cager-edits';
 const STORE = 'captures';
 /** Captures whose edits are kept; those that were changed the longest ago go first. */
-const MOST_CAPTURES = 40;
+const MAX_CAPTURES = 40;
 /** Most bytes of one capture's edits. */
-const MOST_BYTES = 32 << 20;
+const MAX_BYTES = 32 << 20;
 /** Bytes at the beginning and at the end of a container that tell it from others. */
 const [HEAD_BYTES, TAIL_BYTES] = [1 << 16, 1 << 13];
 
@@ -68,7 +68,7 @@ export async function keepEdits(key: string, edits: readonly CageEdit[]): Promis
       await inStore('readwrite', (store) => store.delete(key));
       return 'kept';
     }
-    if (edits.reduce((sum, { grip }) => sum + bytesOf(grip), 0) > MOST_BYTES) return 'large';
+    if (edits.reduce((sum, { grip }) => sum + bytesOf(grip), 0) > MAX_BYTES) return 'large';
     await inStore('readwrite', (store) => store.put({ key, changed: Date.now(), edits } satisfies KeptEdits));
     await forgetOldest();
     return 'kept';
@@ -79,8 +79,8 @@ export async function keepEdits(key: string, edits: readonly CageEdit[]): Promis
 
 async function forgetOldest(): Promise<void> {
   const count = await inStore('readonly', (store) => store.count());
-  if (count <= MOST_CAPTURES) return;
-  const keys = await inStore('readonly', (store) => store.index('changed').getAllKeys(null, count - MOST_CAPTURES));
+  if (count <= MAX_CAPTURES) return;
+  const keys = await inStore('readonly', (store) => store.index('changed').getAllKeys(null, count - MAX_CAPTURES));
   for (const key of keys) await inStore('readwrite', (store) => store.delete(key));
 }
 

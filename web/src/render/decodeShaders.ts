@@ -4,7 +4,7 @@ const FAN_BITS = 11;
 /** Texels per row of the list of fans. */
 export const FAN_WIDTH = 1 << FAN_BITS;
 /** Triangles around one point that count for its normal: more would take a frame's time for a single point. */
-const MOST_TRIANGLES = 256;
+const MAX_TRIANGLES = 256;
 
 const header = `precision highp float;
 precision highp int;
@@ -89,7 +89,7 @@ void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
   vec3 own = texelFetch(positions, at, 0).xyz;
   uvec2 range = texelFetch(fanStarts, at, 0).xy;
-  uint end = range.x + min(range.y, ${MOST_TRIANGLES}u);
+  uint end = range.x + min(range.y, ${MAX_TRIANGLES}u);
   vec3 sum = vec3(0.0);
   for (uint k = range.x; k < end; k++) {
     uvec2 others = texelFetch(fans, ivec2(k & ${FAN_WIDTH - 1}u, k >> ${FAN_BITS}), 0).xy;

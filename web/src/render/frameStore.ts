@@ -19,7 +19,7 @@ const BLOCK_BYTES = 192 * 2 ** 20;
 /** Bytes of offsets that are kept. */
 const OFFSET_BYTES = 96 * 2 ** 20;
 /** Frames whose offsets are kept, whatever they take. */
-const LEAST_OFFSETS = 8;
+const MIN_OFFSETS = 8;
 
 /**
  * Frames of a capture that are in memory or on their way. Blocks are asked for one after another; residual layers are added up in a worker. Preliminary
@@ -58,7 +58,7 @@ export class FrameStore {
   private readonly mostOffsets: number;
 
   constructor(private readonly capture: Capture) {
-    this.mostOffsets = Math.max(LEAST_OFFSETS, Math.floor(OFFSET_BYTES / (16 * (capture.static.rest.length / 3))));
+    this.mostOffsets = Math.max(MIN_OFFSETS, Math.floor(OFFSET_BYTES / (16 * (capture.static.rest.length / 3))));
     capture.events.addEventListener('replaced', () => this.replace(), { signal: this.stop.signal });
   }
 

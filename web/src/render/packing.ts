@@ -1,5 +1,5 @@
 import type { StaticPart } from '../capture';
-import { MOST_PHI_BYTES } from '../coordinates/compute';
+import { MAX_PHI_BYTES } from '../coordinates/compute';
 import { diagonalOf } from '../coordinates/topology';
 
 /** Binary logarithm of {@link WIDTH}. */
@@ -48,7 +48,7 @@ export function layoutOf(points: number, columns: number, limits: TextureLimits)
   // Texels of full floats, which are four columns each; 16 bits may turn out not to be accurate enough.
   const bytes = 16 * WIDTH * bandsPerLayer * blocks * layers;
   const fits = mostBands >= 1 && layers <= limits.layers && bands <= limits.size && limits.size >= WIDTH;
-  if (!fits || bytes > MOST_PHI_BYTES) {
+  if (!fits || bytes > MAX_PHI_BYTES) {
     throw new Error(
       `${points} points × ${columns} columns do not fit this device's graphics memory; open the capture on another device, or encode it with a coarser cage.`,
     );

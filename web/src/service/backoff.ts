@@ -3,7 +3,7 @@
 import { ServiceProblem, problemBehind } from './problem';
 
 const FIRST_SECONDS = 0.4;
-const MOST_SECONDS = 15;
+const MAX_SECONDS = 15;
 
 /** Grows the wait between attempts, from 0.4 s to 15 s, each at random between half and all of it. */
 export class Backoff {
@@ -11,7 +11,7 @@ export class Backoff {
 
   /** Seconds to wait before the next attempt; what the service asked for, if that is longer. */
   next(asked: number | null = null): number {
-    const most = Math.min(MOST_SECONDS, FIRST_SECONDS * 2 ** this.#attempts);
+    const most = Math.min(MAX_SECONDS, FIRST_SECONDS * 2 ** this.#attempts);
     this.#attempts += 1;
     return Math.max(asked ?? 0, most * (0.5 + 0.5 * Math.random()));
   }

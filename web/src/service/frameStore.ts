@@ -4,7 +4,7 @@ import type { FrameBlock, FrameErrors } from '../capture';
 import type { CageRecord } from './frameRecords';
 
 /** Most bytes of cages that are kept; what was used least recently goes first. */
-const MOST_BYTES = 48 << 20;
+const MAX_BYTES = 48 << 20;
 const CHUNK_BYTES = 512 << 10;
 const CHUNK_FRAMES = 64;
 
@@ -24,7 +24,7 @@ export class FrameStore {
   readonly #chunks = new Map<number, Chunk>();
 
   /** @param rows rows of three numbers of a frame */
-  constructor(rows: number, mostBytes = MOST_BYTES) {
+  constructor(rows: number, mostBytes = MAX_BYTES) {
     this.#stride = 3 * rows;
     this.chunkFrames = Math.max(1, Math.min(CHUNK_FRAMES, Math.floor(CHUNK_BYTES / (12 * rows))));
     this.#most = Math.max(2, Math.floor(mostBytes / (12 * rows * this.chunkFrames)));

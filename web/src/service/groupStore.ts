@@ -5,7 +5,7 @@ import { HEADER_BYTES } from '../container/section';
 import type { Source } from '../container/source';
 
 /** Most bytes of groups that are kept; the earliest ones go first. */
-const MOST_BYTES = 96 << 20;
+const MAX_BYTES = 96 << 20;
 
 /** Keeps groups in the order of their frames. */
 export class GroupStore {
@@ -14,7 +14,7 @@ export class GroupStore {
   readonly #groups: StoredChunk[] = [];
   #keptBytes = 0;
 
-  constructor(private readonly mostBytes = MOST_BYTES) {}
+  constructor(private readonly mostBytes = MAX_BYTES) {}
 
   /** Takes the group that follows the last one. */
   put(group: StoredChunk): void {

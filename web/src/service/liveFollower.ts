@@ -13,10 +13,10 @@ const LOOK_SECONDS = 3;
 /** The first look shows the delay soon. */
 const FIRST_LOOK_SECONDS = 0.5;
 /** After so many looks at the session without an answer, the stream is taken for dead: a lost network does not end it. */
-const MOST_SILENT_LOOKS = 2;
+const MAX_SILENT_LOOKS = 2;
 /** Live pictures that are later than this go on at the newest frame, and leave out those between. */
-const MOST_BEHIND_SECONDS = 6;
-const LEAST_SKIPPED = 30;
+const MAX_BEHIND_SECONDS = 6;
+const MIN_SKIPPED = 30;
 
 /** Why the stream is left: the page goes on at the newest frame. */
 class TooFarBehind extends Error {}
@@ -158,7 +158,7 @@ export class LiveFollower {
           .catch(() => null);
         signal.throwIfAborted();
         unanswered = session === null ? unanswered + 1 : 0;
-        if (unanswered >= MOST_SILENT_LOOKS) left.abort(new ServiceProblem('unreachable', 0));
+        if (unanswered >= MAX_SILENT_LOOKS) left.abort(new ServiceProblem('unreachable', 0));
         if (session === null) continue;
         const solved = solvedFromStart(session.frames);
         if (solved > 0) this.latency.looked(from, performance.now(), solved - 1);
@@ -177,7 +177,7 @@ export class LiveFollower {
     const getsBetter = this.behind < 0.8 * this.#behindBefore;
     this.#behindBefore = this.behind;
     const rate = this.frames.perSecond();
-    return !getsBetter && this.behind > LEAST_SKIPPED && this.behind > MOST_BEHIND_SECONDS * rate;
+    return !getsBetter && this.behind > MIN_SKIPPED && this.behind > MAX_BEHIND_SECONDS * rate;
   }
 
   /** After a break, and where the connection is too slow, goes on with the newest frame. */
@@ -185,7 +185,7 @@ export class LiveFollower {
     const solved = solvedFromStart(session.frames);
     this.behind = Math.max(0, solved - this.#next);
     const rate = this.frames.perSecond();
-    if (this.behind <= LEAST_SKIPPED || this.behind <= MOST_BEHIND_SECONDS * rate) return;
+    if (this.behind <= MIN_SKIPPED || this.behind <= MAX_BEHIND_SECONDS * rate) return;
     this.skipped += this.behind;
     this.behind = 0;
     this.#behindBefore = 0;

@@ -9,7 +9,7 @@ export interface ServerEvent {
 }
 
 /** Longest line that is waited for; events of the service have some hundred characters. */
-const MOST_CHARACTERS = 1 << 20;
+const MAX_CHARACTERS = 1 << 20;
 
 /** Takes the text of an event stream in pieces and gives the events that are whole. */
 export class EventParser {
@@ -24,7 +24,7 @@ export class EventParser {
     // A carriage return at the very end may be the first half of a line end.
     const lines = this.#rest.split(/\r\n|\n|\r(?!$)/);
     this.#rest = lines.pop() ?? '';
-    if (this.#rest.length > MOST_CHARACTERS) throw new Error('The service sent an event without an end.');
+    if (this.#rest.length > MAX_CHARACTERS) throw new Error('The service sent an event without an end.');
     for (const line of lines) {
       const event = line === '' ? this.#dispatch() : this.#field(line);
       if (event) events.push(event);

@@ -28,7 +28,7 @@ export interface Figures {
 const TAIL_BYTES = 64 << 10;
 const AT_ONCE = 2;
 /** Least time between looks at the errors of a running session; longer for many frames, since all of them come each time. */
-const LEAST_MS = 5000;
+const MIN_MS = 5000;
 const MS_PER_FRAME = 2;
 const RETRY_MS = 30_000;
 
@@ -79,7 +79,7 @@ export class FigureLoader extends EventTarget {
       const { solved } = session.frames;
       const note = (wait: number, known: number, isFinal: boolean) =>
         this.#fetched.set(id, { solved: known, isFinal, next: performance.now() + wait });
-      note(Math.max(LEAST_MS, MS_PER_FRAME * solved), solved, isOver(session));
+      note(Math.max(MIN_MS, MS_PER_FRAME * solved), solved, isOver(session));
       try {
         const fetch = session.state === 'completed' ? containerFigures : frameFigures;
         this.#figures.set(id, await fetch(this.service, session));

@@ -6,7 +6,7 @@ import type { Spectrum } from './singular';
 import workerAddress from './worker.ts?worker&url';
 
 /** Rows of a cage beyond which their eigenvectors would take minutes. */
-const MOST_ROWS = 1500;
+const MAX_ROWS = 1500;
 
 /** Spectra that were computed, by the cages they belong to. */
 const computed = new WeakMap<TriangleMesh, Spectrum>();
@@ -30,8 +30,8 @@ export async function computeSpectrum(
       'Singular values need the coordinates of the points. Harmonic ones are computed by the service alone: open the capture as a session.',
     );
   }
-  if (rows > MOST_ROWS) {
-    throw new Error(`This cage has ${rows} unknowns; singular values are computed here for up to ${MOST_ROWS}.`);
+  if (rows > MAX_ROWS) {
+    throw new Error(`This cage has ${rows} unknowns; singular values are computed here for up to ${MAX_ROWS}.`);
   }
   const fetched = isComputed ? 0 : 0.5;
   const phi = isComputed ? null : await capture.coordinates!((fraction) => onProgress(fraction * fetched), signal);

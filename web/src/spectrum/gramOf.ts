@@ -3,7 +3,7 @@ import { columnsOf, computeCoordinates } from '../coordinates/compute';
 import type { SpectrumRequest } from './messages';
 
 /** Products that are summed up at most, points × rows²: some seconds of work. */
-const MOST_PRODUCTS = 4e9;
+const MAX_PRODUCTS = 4e9;
 /** Entries of Φ that are held at a time. */
 const BATCH_ENTRIES = 1 << 19;
 
@@ -19,7 +19,7 @@ export function gramOf(
   const gram = new GramMatrix(rows);
   const points = rest.length / 3;
   const columns = columnsOf(system, cage);
-  const stride = Math.max(1, Math.ceil((points * rows * rows) / MOST_PRODUCTS));
+  const stride = Math.max(1, Math.ceil((points * rows * rows) / MAX_PRODUCTS));
   const batch = Math.max(1, Math.floor(BATCH_ENTRIES / columns));
   for (let first = 0; first < points; first += batch * stride) {
     const indices: number[] = [];

@@ -3,7 +3,7 @@
 import type { Dropped } from './classify';
 
 /** Most files that are taken from folders: a capture of a frame per file has some thousand. */
-const MOST_FILES = 100_000;
+const MAX_FILES = 100_000;
 
 /** All files of a drop, those in folders included. The transfer is read before the first wait, as browsers demand. */
 export async function droppedFiles(transfer: DataTransfer): Promise<Dropped[]> {
@@ -30,8 +30,8 @@ export function pickedFiles(files: FileList): Dropped[] {
 }
 
 async function collect(entry: FileSystemEntry, found: Dropped[]): Promise<void> {
-  if (found.length >= MOST_FILES)
-    throw new Error(`There are more than ${MOST_FILES} files; drop the folder of the capture alone.`);
+  if (found.length >= MAX_FILES)
+    throw new Error(`There are more than ${MAX_FILES} files; drop the folder of the capture alone.`);
   if (entry instanceof FileSystemDirectoryEntry) {
     const reader = entry.createReader();
     for (;;) {

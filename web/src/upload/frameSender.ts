@@ -7,7 +7,7 @@ import type { FrameSource } from './frameSource';
 
 const AT_ONCE = 2;
 const FIRST_BYTES = 1 << 20;
-const MOST_BYTES = 16 << 20;
+const MAX_BYTES = 16 << 20;
 /** How long a batch should take: long enough to be worth a request, short enough for progress to be seen. */
 const BATCH_SECONDS = 1.5;
 
@@ -104,7 +104,7 @@ export class FrameSender {
   #adapt(bytes: number, seconds: number): void {
     const wanted = (bytes / Math.max(seconds, 0.01)) * BATCH_SECONDS;
     // Half of the way, so that one slow answer does not change much.
-    const next = (this.#batchBytes + Math.min(MOST_BYTES, wanted)) / 2;
+    const next = (this.#batchBytes + Math.min(MAX_BYTES, wanted)) / 2;
     this.#batchBytes = Math.max(this.#frameBytes, Math.min(2 * this.#batchBytes, next));
   }
 }

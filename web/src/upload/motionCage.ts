@@ -8,17 +8,17 @@ import type { FrameSource } from './frameSource';
 import type { KeptUpload } from './keptUpload';
 
 /** A design looks at no more frames. */
-const MOST_FRAMES = 160;
+const MAX_FRAMES = 160;
 /** Of large models fewer frames are sent: they show as much of the motion. */
-const MOST_BYTES = 192 << 20;
-const LEAST_FRAMES = 24;
+const MAX_BYTES = 192 << 20;
+const MIN_FRAMES = 24;
 /** How long a request that begins a design may still be answered after nobody wants it, in milliseconds. */
 const ANSWER_MS = 2000;
 
 /** Numbers of the frames that a design sees: evenly spaced, the first and the last among them. */
 export function sampledFrames(frames: number, points: number): number[] {
-  const room = Math.max(LEAST_FRAMES, Math.floor(MOST_BYTES / (12 * points)));
-  const sampled = Math.min(frames, MOST_FRAMES, room);
+  const room = Math.max(MIN_FRAMES, Math.floor(MAX_BYTES / (12 * points)));
+  const sampled = Math.min(frames, MAX_FRAMES, room);
   return Array.from({ length: sampled }, (_, k) => Math.round((k * (frames - 1)) / Math.max(1, sampled - 1)));
 }
 

@@ -4,11 +4,11 @@ import { ArrayFrames, type FrameSource, UnusableFile } from './frameSource';
 
 const MAGIC = [0x93, 0x4e, 0x55, 0x4d, 0x50, 0x59];
 /** Longest header that is read; NumPy pads them to some hundred bytes. */
-const MOST_HEADER_BYTES = 1 << 16;
+const MAX_HEADER_BYTES = 1 << 16;
 
 /** Frames of an array of F × n × 3 numbers in f32 or f64. */
 export async function npyFrames(file: File): Promise<FrameSource> {
-  const head = new Uint8Array(await file.slice(0, MOST_HEADER_BYTES).arrayBuffer());
+  const head = new Uint8Array(await file.slice(0, MAX_HEADER_BYTES).arrayBuffer());
   const text = new TextDecoder('latin1').decode(head);
   if (head.length < 12 || !MAGIC.every((byte, k) => head[k] === byte))
     throw new UnusableFile(file.name, 'this is no NumPy file.');

@@ -2,7 +2,7 @@ import uPlot from 'uplot';
 import { percent } from './text';
 
 /** Least space for the labels of the axis, and space between them and the chart. */
-const [LEAST_GUTTER, GAP] = [46, 4];
+const [MIN_GUTTER, GAP] = [46, 4];
 const DASHES = [5, 3];
 
 /** Colours as canvases take them, the font of the labels, and the space right of the chart. */
@@ -26,7 +26,7 @@ export function errorsChart(
   { worst, mean, text, line, font, margin }: ChartLook,
   onDraw: (gutter: number) => void,
 ): uPlot {
-  let gutter = LEAST_GUTTER;
+  let gutter = MIN_GUTTER;
   const options: uPlot.Options = {
     hooks: { draw: [() => onDraw(gutter)] },
     width: Math.max(60, place.clientWidth),
@@ -66,9 +66,9 @@ export function errorsChart(
 /** The width of the longest label, and what keeps it off the chart. */
 function gutterFor(labels: readonly string[] | null, font: string): number {
   const context = document.createElement('canvas').getContext('2d');
-  if (!context || !labels) return LEAST_GUTTER;
+  if (!context || !labels) return MIN_GUTTER;
   context.font = font;
-  return Math.max(LEAST_GUTTER, ...labels.map((label) => Math.ceil(context.measureText(label).width) + 2 * GAP));
+  return Math.max(MIN_GUTTER, ...labels.map((label) => Math.ceil(context.measureText(label).width) + 2 * GAP));
 }
 
 function withOpacity(color: string, opacity: number): string {

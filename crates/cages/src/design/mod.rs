@@ -13,11 +13,11 @@ mod symmetry;
 mod topology;
 
 use self::contact::{Distances, Obstacles};
-pub use self::options::{Design, DesignError, DesignOptions, Goal, MOST_VERTICES, Progress, Stage, Style};
+pub use self::options::{Design, DesignError, DesignOptions, Goal, MAX_VERTICES, Progress, Stage, Style};
 use self::run::{Best, Defects, Run};
 use self::samples::Samples;
 use self::symmetry::Symmetry;
-use crate::enclose::enclose_unless;
+use crate::enclose::enclose_watched;
 use crate::{EncloseError, EncloseOptions};
 use cager_core::cage::Cage;
 use cager_geometry::mesh::{Model, TriMesh, diagonal};
@@ -65,14 +65,14 @@ pub fn design(
         (None, Goal::Vertices(vertices)) => vertices,
         (None, Goal::MeanError(_)) => search::first_vertices(rest.points.len()),
     };
-    if vertices > MOST_VERTICES {
-        return Err(DesignError::TooManyVertices { vertices, most: MOST_VERTICES });
+    if vertices > MAX_VERTICES {
+        return Err(DesignError::TooManyVertices { vertices, most: MAX_VERTICES });
     }
     let mesh = match start {
         Some(mesh) => mesh.clone(),
         None => {
             let options = EncloseOptions { vertices, ..EncloseOptions::default() };
-            enclose_unless(rest, &options, &mut || watch(enclosing).is_break()).map_err(|e| match e {
+            enclose_watched(rest, &options, &mut || watch(enclosing)).map_err(|e| match e {
                 EncloseError::Stopped => DesignError::Stopped,
                 other => other.into(),
             })?

@@ -6,7 +6,7 @@ use cager_geometry::mesh::TriMesh;
 use std::time::Duration;
 
 /// Vertices of a designed cage at most.
-pub const MOST_VERTICES: usize = 1_500;
+pub const MAX_VERTICES: usize = 1_500;
 
 /// What a cage is designed to be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]

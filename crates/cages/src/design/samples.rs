@@ -8,7 +8,7 @@ use cager_geometry::mesh::{Model, Point, diagonal};
 use faer::{Accum, Mat};
 
 /// Maximum number of points sampled from a model.
-const MOST_POINTS: usize = 20_000;
+const MAX_POINTS: usize = 20_000;
 /// Number of principal components that the motion is reduced to.
 const COLUMNS: usize = 96;
 /// Numbers of points and frames on which a cage is evaluated.
@@ -59,7 +59,7 @@ impl Samples {
             indices.sort_unstable();
             indices
         };
-        let (used, validation_points) = (some(MOST_POINTS), some(VALIDATION_POINTS));
+        let (used, validation_points) = (some(MAX_POINTS), some(VALIDATION_POINTS));
         let (seen, unseen) = (evenly(&designed, VALIDATION_FRAMES), evenly(&held_back, VALIDATION_FRAMES));
         let at = |indices: &[usize]| -> Vec<Point> { indices.iter().map(|&i| rest.points[i]).collect() };
         Self {

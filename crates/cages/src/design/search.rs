@@ -1,7 +1,7 @@
 //! Search for the smallest cage within an error bound, by extrapolating how the error falls with the number of vertices.
 
 use super::descent::Descent;
-use super::options::MOST_VERTICES;
+use super::options::MAX_VERTICES;
 use super::run::{Best, Phase, Run};
 use super::samples::{Evaluation, evenly};
 use cager_core::cage::Cage;
@@ -35,7 +35,7 @@ impl Run<'_> {
         warnings: &mut Vec<String>,
     ) -> ControlFlow<()> {
         let mut goal = descent.cage.vertices().len();
-        let most = MOST_VERTICES.min(self.rest.points.len() / 2).max(goal);
+        let most = MAX_VERTICES.min(self.rest.points.len() / 2).max(goal);
         let mut smallest: Option<Best> = None;
         let mut lowest: Option<(f64, Best)> = None;
         let mut ended = ControlFlow::Continue(());

@@ -2,10 +2,9 @@
 
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
-use cager_geometry::linalg::svd::svd;
+use cager_geometry::linalg::{multiply, svd::svd};
 use cager_geometry::mesh::{Model, Point, TriMesh};
-use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, MatRef, Par};
+use faer::{Mat, MatRef};
 
 /// A vertex moves no point when none of its coordinates is larger.
 const IDLE: f64 = 1e-4;
@@ -14,12 +13,12 @@ const IDLE: f64 = 1e-4;
 const ENTRIES: usize = 20_000_000;
 
 /// Cages with more vertices are not analysed: it would take minutes.
-const MOST_VERTICES: usize = 2_000;
+const MAX_VERTICES: usize = 2_000;
 
 /// Vertices that move no point, and the condition number of the mean value coordinates; neither of a cage of thousands of vertices.
 pub(super) fn influence(mesh: &TriMesh, model: &Model) -> (Vec<u32>, Option<f64>) {
     let Ok(cage) = Cage::new(mesh.clone()) else { return (Vec::new(), None) };
-    if mesh.vertices.len() > MOST_VERTICES {
+    if mesh.vertices.len() > MAX_VERTICES {
         return (Vec::new(), None);
     }
     let stride = (model.points.len() * mesh.vertices.len()).div_ceil(ENTRIES).max(1);
@@ -35,7 +34,7 @@ pub(super) fn influence(mesh: &TriMesh, model: &Model) -> (Vec<u32>, Option<f64>
 /// From the eigenvalues of the Gram matrix: above 10⁷ only its order is known.
 fn condition_number(phi: MatRef<'_, f64>) -> Option<f64> {
     let mut gram = Mat::zeros(phi.ncols(), phi.ncols());
-    matmul(gram.as_mut(), Accum::Replace, phi.transpose(), phi, 1.0, Par::Seq);
+    multiply(gram.as_mut(), phi.transpose(), phi);
     let squares = svd(gram.as_ref())?.sigma;
     Some((squares.first()? / squares.last()?).sqrt())
 }

@@ -7,164 +7,118 @@ use std::fmt;
 impl Findings {
     /// One sentence for each thing that is wrong, with what to do about it; empty for a faultless cage.
     pub fn messages(&self) -> Vec<String> {
-        let mut said = Vec::new();
-        let mut say = |wrong: usize, sentence: String| {
-            if wrong > 0 {
-                said.push(sentence);
-            }
-        };
-        let list = |shown: Vec<String>, of: usize| {
-            let dots = if of > shown.len() { ", …" } else { "" };
-            format!("{}{dots}", shown.join(", "))
-        };
-        let one = |items: &[u32]| list(items.iter().take(6).map(u32::to_string).collect(), items.len());
-        let two =
-            |items: &[[u32; 2]]| list(items.iter().take(6).map(|[a, b]| format!("{a}–{b}")).collect(), items.len());
-        let n = |items: usize, what: &str| match (items, what) {
-            (1, _) => format!("1 {what}"),
-            (_, "vertex") => format!("{items} vertices"),
-            (_, _) => format!("{items} {what}s"),
-        };
         let (f, d) = (self, &self.defects);
-        say(
-            usize::from(f.faces == 0),
-            "no faces, where a cage is a closed surface; export it as a mesh with its faces".to_owned(),
-        );
-        say(
-            d.not_finite.len(),
-            format!(
-                "{} with coordinates that are NaN or infinite ({}); delete them or export the cage again",
-                n(d.not_finite.len(), "vertex"),
-                one(&d.not_finite)
+        let at_least = if f.self_intersections.len() < MAX_PAIRS { "" } else { "at least " };
+        let condition = f.condition_number.filter(|c| *c > ILL_CONDITIONED).map(|condition| {
+            if condition.is_finite() {
+                format!("ill-conditioned (condition number {condition:.1e})")
+            } else {
+                "singular".to_owned()
+            }
+        });
+        let said = [
+            (f.faces == 0)
+                .then(|| "no faces, where a cage is a closed surface; export it as a mesh with its faces".to_owned()),
+            listed(
+                "vertex",
+                one(&d.not_finite),
+                "with coordinates that are NaN or infinite",
+                "delete them or export the cage again",
             ),
-        );
-        say(
-            d.dangling_faces.len(),
-            format!(
-                "{} naming vertices that do not exist ({}); export the cage again",
-                n(d.dangling_faces.len(), "face"),
-                one(&d.dangling_faces)
+            listed("face", one(&d.dangling_faces), "naming vertices that do not exist", "export the cage again"),
+            listed("face", one(&d.degenerate_faces), "without area", "delete them or merge their vertices"),
+            listed("pair", two(&d.duplicate_faces), "of faces over the same vertices", "delete one of each"),
+            listed("pair", two(&f.duplicate_vertices), "of vertices in the same place", "merge them"),
+            listed("vertex", one(&d.loose_vertices), "that no face uses", "delete loose vertices"),
+            listed(
+                "edge",
+                two(&d.open_edges),
+                "with a face on one side only",
+                "fill the holes or merge doubled vertices",
+            )
+            .map(|open| format!("the cage is open: {open}")),
+            listed(
+                "edge",
+                two(&d.non_manifold_edges),
+                "shared by more than two faces",
+                "separate or delete the extra faces",
             ),
-        );
-        say(
-            d.degenerate_faces.len(),
-            format!(
-                "{} without area ({}); delete them or merge their vertices",
-                n(d.degenerate_faces.len(), "face"),
-                one(&d.degenerate_faces)
+            listed(
+                "vertex",
+                one(&f.non_manifold_vertices),
+                "at which parts of the surface only touch",
+                "split them",
             ),
-        );
-        say(
-            d.duplicate_faces.len(),
-            format!(
-                "{} of faces over the same vertices ({}); delete one of each",
-                n(d.duplicate_faces.len(), "pair"),
-                two(&d.duplicate_faces)
+            listed(
+                "edge",
+                two(&d.inconsistent_edges),
+                "between faces that wind in opposite directions",
+                "recalculate the cage's normals",
             ),
-        );
-        say(
-            f.duplicate_vertices.len(),
-            format!(
-                "{} of vertices in the same place ({}); merge them",
-                n(f.duplicate_vertices.len(), "pair"),
-                two(&f.duplicate_vertices)
-            ),
-        );
-        say(
-            d.loose_vertices.len(),
-            format!(
-                "{} that no face uses ({}); delete loose vertices",
-                n(d.loose_vertices.len(), "vertex"),
-                one(&d.loose_vertices)
-            ),
-        );
-        say(
-            d.open_edges.len(),
-            format!(
-                "the cage is open: {} with a face on one side only ({}); fill the holes or merge doubled vertices",
-                n(d.open_edges.len(), "edge"),
-                two(&d.open_edges)
-            ),
-        );
-        say(
-            d.non_manifold_edges.len(),
-            format!(
-                "{} shared by more than two faces ({}); separate or delete the extra faces",
-                n(d.non_manifold_edges.len(), "edge"),
-                two(&d.non_manifold_edges)
-            ),
-        );
-        say(
-            f.non_manifold_vertices.len(),
-            format!(
-                "{} at which parts of the surface only touch ({}); split them",
-                n(f.non_manifold_vertices.len(), "vertex"),
-                one(&f.non_manifold_vertices)
-            ),
-        );
-        say(
-            d.inconsistent_edges.len(),
-            format!(
-                "{} between faces that wind in opposite directions ({}); recalculate the cage's normals",
-                n(d.inconsistent_edges.len(), "edge"),
-                two(&d.inconsistent_edges)
-            ),
-        );
-        say(
-            d.inward_parts.len(),
-            format!("{} of {} pointing inwards; flip them", n(d.inward_parts.len(), "part"), d.components),
-        );
-        say(
-            f.self_intersections.len(),
-            format!(
-                "{}{} of faces that cut or touch one another ({}); move their vertices apart",
-                if f.self_intersections.len() < MAX_PAIRS { "" } else { "at least " },
-                n(f.self_intersections.len(), "pair"),
-                two(&f.self_intersections)
-            ),
-        );
-        if let Some(o) = f.outside {
-            say(
-                1,
+            (!d.inward_parts.is_empty()).then(|| {
+                format!("{} of {} pointing inwards; flip them", counted(d.inward_parts.len(), "part"), d.components)
+            }),
+            listed(
+                "pair",
+                two(&f.self_intersections),
+                "of faces that cut or touch one another",
+                "move their vertices apart",
+            )
+            .map(|pairs| format!("{at_least}{pairs}")),
+            f.outside.map(|o| {
                 format!(
                     "{} of {} points outside the cage, the farthest, point {}, by {:.3} % of the diagonal; enlarge the cage there",
                     o.count,
                     o.points,
                     o.farthest,
                     100.0 * o.distance
-                ),
-            );
-        }
-        say(
-            usize::from(f.usable() && !f.enclosure_examined),
-            "whether the cage encloses the model is unknown, as the model has no points or some that are not finite; export it again"
-                .to_owned(),
-        );
-        if let Some(alignment) = f.alignment {
-            say(1, alignment.to_string());
-        }
-        say(
-            f.idle_vertices.len(),
-            format!(
-                "{} that moves no point of the model ({}); delete it or bring the cage closer there",
-                n(f.idle_vertices.len(), "vertex"),
-                one(&f.idle_vertices)
+                )
+            }),
+            (f.usable() && !f.enclosure_examined).then(|| {
+                "whether the cage encloses the model is unknown, as the model has no points or some that are not finite; export it again"
+                    .to_owned()
+            }),
+            f.alignment.map(|alignment| alignment.to_string()),
+            listed(
+                "vertex",
+                one(&f.idle_vertices),
+                "that moves no point of the model",
+                "delete it or bring the cage closer there",
             ),
-        );
-        if let Some(condition) = f.condition_number.filter(|c| *c > ILL_CONDITIONED) {
-            let how = if condition.is_finite() {
-                format!("ill-conditioned (condition number {condition:.1e})")
-            } else {
-                "singular".to_owned()
-            };
-            say(
-                1,
+            condition.map(|how| {
                 format!(
                     "the coordinates are {how}, so that handles are hard to solve for; use fewer vertices where the model is small, or bring the cage closer"
-                ),
-            );
-        }
-        said
+                )
+            }),
+        ];
+        said.into_iter().flatten().collect()
+    }
+}
+
+/// How many there are of something, what is wrong with them, the first few of them and a cure; nothing where there are none.
+fn listed(noun: &str, (count, shown): (usize, String), wrong: &str, cure: &str) -> Option<String> {
+    let dots = if count > SHOWN { ", …" } else { "" };
+    (count > 0).then(|| format!("{} {wrong} ({shown}{dots}); {cure}", counted(count, noun)))
+}
+
+/// Items that a sentence lists.
+const SHOWN: usize = 6;
+
+fn one(items: &[u32]) -> (usize, String) {
+    let shown: Vec<String> = items.iter().take(SHOWN).map(u32::to_string).collect();
+    (items.len(), shown.join(", "))
+}
+
+fn two(items: &[[u32; 2]]) -> (usize, String) {
+    let shown: Vec<String> = items.iter().take(SHOWN).map(|[a, b]| format!("{a}–{b}")).collect();
+    (items.len(), shown.join(", "))
+}
+
+fn counted(items: usize, noun: &str) -> String {
+    match (items, noun) {
+        (1, _) => format!("1 {noun}"),
+        (_, "vertex") => format!("{items} vertices"),
+        (_, _) => format!("{items} {noun}s"),
     }
 }
 

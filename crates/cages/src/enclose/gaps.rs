@@ -14,14 +14,14 @@ const LARGEST_BALL: f64 = 1.15;
 const OPPOSITE: f64 = -0.6;
 
 /// A surface of an area that would take more samples than this has too many narrow gaps, which stay closed.
-const MOST_SAMPLES: usize = 100_000;
+const MAX_SAMPLES: usize = 100_000;
 /// Samples that are looked at, at the most: a cube of a smooth surface has one for each of some directions, and ordinary models have less than half as many.
-const MOST_LOOKED_AT: usize = 90_000;
+const MAX_LOOKED_AT: usize = 90_000;
 /// Places tried beyond one a face. Slivers as long as the model have many more than samples.
-const MOST_TRIES: usize = 2_000_000;
+const MAX_TRIES: usize = 2_000_000;
 
 /// Gaps shorter than this many times the largest offset stay closed: few vertices could not follow both sides.
-const LEAST_EXTENT: f64 = 3.0;
+const MIN_EXTENT: f64 = 3.0;
 
 /// Balls outside the model that touch two opposite sides, in gaps that are not too short. `None` where there are too many narrow gaps.
 pub(super) fn balls_in_gaps(source: &NormalizedModel, largest: f64) -> Option<Vec<Ball>> {
@@ -42,7 +42,7 @@ pub(super) fn balls_in_gaps(source: &NormalizedModel, largest: f64) -> Option<Ve
 /// Points on the surface with their normals, at most one for each direction in a cube of the spacing; `None` where there are too many.
 fn samples(surface: &Surface, spacing: f64) -> Option<Vec<(DVec3, DVec3)>> {
     let area = (0..surface.triangles.len() as u32).map(|f| area(surface.corners(f))).sum::<f64>();
-    if area > MOST_SAMPLES as f64 * spacing * spacing {
+    if area > MAX_SAMPLES as f64 * spacing * spacing {
         return None;
     }
     let mut seen = HashSet::new();
@@ -58,7 +58,7 @@ fn samples(surface: &Surface, spacing: f64) -> Option<Vec<(DVec3, DVec3)>> {
         let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
         let n = ((longest / spacing).ceil() as u32).clamp(1, 100);
         tries += n as usize * (n as usize + 1) / 2 - 1;
-        if samples.len() > MOST_LOOKED_AT || tries > MOST_TRIES {
+        if samples.len() > MAX_LOOKED_AT || tries > MAX_TRIES {
             return None;
         }
         for i in 0..n {
@@ -113,7 +113,7 @@ fn long_gaps(balls: &[Ball], largest: f64) -> Vec<Ball> {
             waiting.extend((0..27).map(|s| [at[0] + s % 3 - 1, at[1] + s / 3 % 3 - 1, at[2] + s / 9 - 1]));
         }
         let extent = Aabb::around(members.iter().map(|&i| balls[i].center)).size();
-        if !members.is_empty() && extent.length() >= LEAST_EXTENT * largest {
+        if !members.is_empty() && extent.length() >= MIN_EXTENT * largest {
             members.iter().for_each(|&i| kept[i] = true);
         }
     }

@@ -24,6 +24,8 @@ use patch::EnclosedPoints;
 use rayon::prelude::*;
 use simplify::Simplifier;
 use source::NormalizedModel;
+pub(crate) use source::{check_finite, extent};
+use std::ops::ControlFlow;
 
 /// A closed, outward-oriented cage around a model, free of self-intersection, with no point of the model outside: an offset surface,
 /// simplified under quadric error metrics with validity kept at every collapse. The offset is smaller beside thin gaps, so that limbs
@@ -33,29 +35,29 @@ use source::NormalizedModel;
 /// # Errors
 /// See [`EncloseError`].
 pub fn enclose(model: &Model, options: &EncloseOptions) -> Result<TriMesh, EncloseError> {
-    enclose_unless(model, options, &mut || false)
+    enclose_watched(model, options, &mut || ControlFlow::Continue(()))
 }
 
-/// [`enclose`], given up once `stopped` says so; it is asked every few hundredths of a second.
+/// [`enclose`], given up once `watch` breaks; it is called every few hundredths of a second.
 ///
 /// # Errors
 /// See [`EncloseError`].
-pub fn enclose_unless(
+pub fn enclose_watched(
     model: &Model,
     options: &EncloseOptions,
-    stopped: &mut dyn FnMut() -> bool,
+    watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Result<TriMesh, EncloseError> {
     let clearance = options.clearance.filter(|c| c.is_finite()).unwrap_or(0.0).clamp(0.0, LARGEST_CLEARANCE);
     let mut offset = first_offset(options.vertices).max(2.0 * clearance);
     let source = NormalizedModel::new(model, offset)?;
-    if options.vertices < LEAST {
-        return Err(EncloseError::TooFewVertices { vertices: options.vertices, least: LEAST });
+    if options.vertices < MIN_VERTICES {
+        return Err(EncloseError::TooFewVertices { vertices: options.vertices, least: MIN_VERTICES });
     }
     let mut least = usize::MAX;
     // Surfaces that are known already, the next to be tried last, from when on its narrow gaps have proved to be too many.
     let mut known: Option<Vec<Start>> = None;
     while offset < LARGEST_OFFSET.max(4.0 * clearance) {
-        if stopped() {
+        if watch().is_break() {
             return Err(EncloseError::Stopped);
         }
         let start = match &mut known {
@@ -70,7 +72,7 @@ pub fn enclose_unless(
                 }
             },
         };
-        match enclose_from(&source, start, clearance, options, stopped) {
+        match enclose_from(&source, start, clearance, options, watch) {
             Ok(cage) => return Ok(cage),
             Err(reached) => least = least.min(reached),
         }
@@ -134,7 +136,7 @@ fn promising_surface(
     cubes: &Octree,
     options: &EncloseOptions,
 ) -> Option<(Vec<DVec3>, Vec<[u32; 3]>)> {
-    let most_parts = options.vertices / if options.per_part { LEAST } else { VERTICES_PER_PART };
+    let most_parts = options.vertices / if options.per_part { MIN_VERTICES } else { VERTICES_PER_PART };
     let (positions, faces) = offset_surface(source, offset, cubes, options.per_part, most_parts.max(1))?;
     // A closed surface of V vertices and F faces has V − F/2 = 2 (components − handles).
     let handles = (faces.len() / 2).saturating_sub(positions.len());
@@ -142,7 +144,7 @@ fn promising_surface(
 }
 
 /// Vertices of the least closed surface.
-const LEAST: usize = 4;
+const MIN_VERTICES: usize = 4;
 
 /// Minimum number of vertices per component, or per topological handle; with fewer, a larger offset is tried at once.
 const VERTICES_PER_PART: usize = 6;
@@ -172,14 +174,14 @@ fn enclose_from(
     Start { offset, surface }: Start,
     clearance: f64,
     options: &EncloseOptions,
-    stopped: &mut dyn FnMut() -> bool,
+    watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Result<TriMesh, usize> {
     let (positions, faces) = surface.ok_or(usize::MAX)?;
     let kept = |p: DVec3| clearance.max(DEFAULT_CLEARANCE * offset.at(p));
     let (samples, clearances) = source.samples(&offset, kept);
     let enclosed = EnclosedPoints::new(samples, clearances);
     let mut simplifier = Simplifier::new(positions, faces, &enclosed);
-    if !simplifier.simplify(options.vertices, stopped) {
+    if !simplifier.simplify(options.vertices, watch) {
         return Err(simplifier.len());
     }
     fair(&mut simplifier.mesh, &simplifier.quadrics, &enclosed);
@@ -258,6 +260,6 @@ mod tests {
         assert!(found > 1.3 * first);
         assert!(Start::with_gaps_closed(&source, found / GROWTH, &options).surface.is_none());
         assert!(starts.windows(2).all(|two| two[0].offset.largest > two[1].offset.largest));
-        assert!(enclose_from(&source, starts.pop().unwrap(), 0.0, &options, &mut || false).is_ok());
+        assert!(enclose_from(&source, starts.pop().unwrap(), 0.0, &options, &mut || ControlFlow::Continue(())).is_ok());
     }
 }

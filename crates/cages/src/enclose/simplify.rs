@@ -6,6 +6,7 @@ use super::quadric::Quadric;
 use glam::DVec3;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
+use std::ops::ControlFlow;
 
 /// How far shapes may degrade.
 #[derive(Clone, Copy, Debug)]
@@ -20,8 +21,8 @@ struct Limits {
 const LIMITS: [Limits; 3] =
     [Limits { turn: 0.5, quality: 0.3 }, Limits { turn: 0.2, quality: 0.15 }, Limits { turn: -0.2, quality: 0.04 }];
 
-/// Collapses that are tried between two questions whether to stop.
-const STOP_EVERY: usize = 500;
+/// Collapses that are tried between two calls of `watch`.
+const WATCH_EVERY: usize = 500;
 
 /// How many times dearer a collapse is under the next limits.
 const PRICE: f64 = 8.0;
@@ -98,11 +99,11 @@ impl<'a> Simplifier<'a> {
     }
 
     /// Collapses edges until at most `target` vertices are left. Says whether it came that far, which it does not where it was stopped.
-    pub(super) fn simplify(&mut self, target: usize, stopped: &mut dyn FnMut() -> bool) -> bool {
+    pub(super) fn simplify(&mut self, target: usize, watch: &mut dyn FnMut() -> ControlFlow<()>) -> bool {
         while self.vertices > target {
             let before = self.vertices;
             let goal = target.max(before * 6 / 10);
-            if !self.collapse_cheapest(goal, stopped) {
+            if !self.collapse_cheapest(goal, watch) {
                 return false;
             }
             self.compact();
@@ -114,7 +115,7 @@ impl<'a> Simplifier<'a> {
     }
 
     /// Collapses edges until `goal` vertices are left or none can be collapsed; false where it was stopped.
-    fn collapse_cheapest(&mut self, goal: usize, stopped: &mut dyn FnMut() -> bool) -> bool {
+    fn collapse_cheapest(&mut self, goal: usize, watch: &mut dyn FnMut() -> ControlFlow<()>) -> bool {
         let mut heap = BinaryHeap::new();
         for v in 0..self.mesh.positions.len() as u32 {
             self.propose_around(v, |w| v < w, &mut heap);
@@ -123,7 +124,7 @@ impl<'a> Simplifier<'a> {
         while self.vertices > goal {
             let Some(candidate) = heap.pop() else { break };
             tried += 1;
-            if tried % STOP_EVERY == 0 && stopped() {
+            if tried % WATCH_EVERY == 0 && watch().is_break() {
                 return false;
             }
             let [u, v] = candidate.edge;

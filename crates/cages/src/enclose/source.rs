@@ -2,7 +2,7 @@
 
 use super::gap_offset::Offset;
 use super::options::EncloseError;
-use cager_geometry::mesh::{Model, bounds, diagonal};
+use cager_geometry::mesh::{Model, Point, bounds, diagonal};
 use cager_geometry::spatial::Surface;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -30,19 +30,8 @@ pub(super) struct NormalizedModel {
 
 impl NormalizedModel {
     pub(super) fn new(model: &Model, spacing: f64) -> Result<Self, EncloseError> {
-        if model.points.is_empty() {
-            return Err(EncloseError::Empty);
-        }
-        if let Some(point) = model.points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
-            return Err(EncloseError::NotFinite { point });
-        }
-        let (low, high) = bounds(&model.points);
-        let (low, high) = (DVec3::from(low), DVec3::from(high));
-        let scale = diagonal(&model.points);
-        let magnitude = low.abs().max(high.abs()).max_element();
-        if !scale.is_finite() || scale <= 1e-12 * magnitude {
-            return Err(EncloseError::NoExtent);
-        }
+        check_finite(&model.points)?;
+        let (low, high, scale) = extent(&model.points)?;
         let center = 0.5 * low + 0.5 * high;
         let points: Vec<DVec3> = model.points.iter().map(|&p| (DVec3::from(p) - center) / scale).collect();
         let exists = |t: &[u32; 3]| t.iter().all(|&v| (v as usize) < points.len());
@@ -80,6 +69,28 @@ impl NormalizedModel {
     pub(super) fn restored(&self, p: DVec3) -> [f64; 3] {
         (self.center + self.scale * p).to_array()
     }
+}
+
+/// Refuses points with coordinates that are not finite.
+pub(crate) fn check_finite(points: &[Point]) -> Result<(), EncloseError> {
+    match points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+        Some(point) => Err(EncloseError::NotFinite { point }),
+        None => Ok(()),
+    }
+}
+
+/// Corners and diagonal of the bounding box of points that a cage can be around.
+pub(crate) fn extent(points: &[Point]) -> Result<(DVec3, DVec3, f64), EncloseError> {
+    if points.is_empty() {
+        return Err(EncloseError::Empty);
+    }
+    let (low, high) = bounds(points);
+    let (low, high) = (DVec3::from(low), DVec3::from(high));
+    let extent = diagonal(points);
+    if !extent.is_finite() || extent <= 1e-12 * low.abs().max(high.abs()).max_element() {
+        return Err(EncloseError::NoExtent);
+    }
+    Ok((low, high, extent))
 }
 
 /// Area of a triangle.

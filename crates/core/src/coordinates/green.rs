@@ -11,15 +11,13 @@
 use super::layer::{self, FaceBasis, Layers, Scratch};
 use super::{
     CageValues, CoordinateSystem, Coordinates, CoordinatesError, DependentNormals, ElementPlan, PointwiseCoordinates,
-    refuse_plan,
+    by_tasks, refuse_plan,
 };
 use crate::cage::Cage;
 use crate::simd::{LANES, Lanes};
-use cager_geometry::linalg::zeros;
 use cager_geometry::mesh::{self, Point};
 use cager_geometry::vector;
 use faer::MatMut;
-use rayon::prelude::*;
 
 /// Green coordinates: cage vertices and face normals, defined inside and outside the cage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -74,20 +72,12 @@ impl CoordinateSystem for Green {
 fn coordinates(cage: &Cage, points: &[Point]) -> Coordinates {
     let layers = Layers::new(cage);
     let length = normal_length(&layers);
-    let mut phi = zeros(points.len(), cage.vertices().len() + cage.faces().len());
-    let outside = phi
-        .as_mut()
-        .par_row_chunks_mut(layer::TASK_POINTS)
-        .enumerate()
-        .map_init(
-            || layers.scratch(),
-            |scratch, (task, rows)| rows_of(&layers, length, points, task * layer::TASK_POINTS, rows, scratch),
-        )
-        .reduce(Vec::new, |mut a, b| {
-            a.extend(b);
-            a
-        });
-    Coordinates { phi, outside, refinement: None, plan: None }
+    by_tasks(
+        points.len(),
+        cage.vertices().len() + cage.faces().len(),
+        || layers.scratch(),
+        |first, rows, scratch| rows_of(&layers, length, points, first, rows, scratch),
+    )
 }
 
 /// Length of the normals, in the unit of the layers.

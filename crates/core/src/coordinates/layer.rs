@@ -12,7 +12,7 @@
 //! whose rounding cancels even in faces a million times longer than wide.
 
 use crate::cage::{Cage, Face};
-use crate::simd::{LANES, Lanes, angle, dot, ln_ratio, multiversion};
+use crate::simd::{LANES, Lanes, angle, dot, gather, ln_ratio, multiversion};
 use cager_geometry::mesh::Point;
 use cager_geometry::vector;
 use faer::MatMut;
@@ -21,8 +21,6 @@ use faer::MatMut;
 const IN_PLANE: f64 = 1e-13;
 /// Largest ratio whose logarithm is taken, at edges: the range of `L`.
 const LARGEST: f64 = 1.329_227_995_784_916e36;
-/// Points one parallel task computes: a few lane groups.
-pub(super) const TASK_POINTS: usize = 8 * LANES;
 
 /// A closed triangle mesh, prepared for the potentials of its layers.
 #[derive(Clone, Debug)]
@@ -161,14 +159,7 @@ impl Layers {
 
     /// The points from `first` on, in the unit of the prepared mesh; lanes beyond the last point repeat it.
     pub(super) fn group(&self, points: &[Point], first: usize) -> [Lanes; 3] {
-        let mut x = [Lanes::ZERO; 3];
-        for l in 0..LANES {
-            let point = points[(first + l).min(points.len() - 1)];
-            for k in 0..3 {
-                x[k].0[l] = point[k] * self.scale;
-            }
-        }
-        x
+        gather(|l| points[(first + l).min(points.len() - 1)].map(|c| c * self.scale))
     }
 }
 

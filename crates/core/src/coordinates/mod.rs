@@ -14,8 +14,11 @@ pub use mean_value::MeanValue;
 pub use normals::{DependentNormals, Derivative};
 
 use crate::cage::Cage;
+use crate::simd::LANES;
+use cager_geometry::linalg::zeros;
 use cager_geometry::mesh::Point;
-use faer::Mat;
+use faer::{Mat, MatMut};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Coordinates of all points of a model.
@@ -45,6 +48,7 @@ pub struct Refinement {
     /// An estimate of how far a coordinate of a point is from the limit, the largest of: what the highest degrees of the elements change of
     /// one; what one was corrected by to make linear functions exact; and the residual that the iteration left of the equations on the
     /// cage, those of unknowns that it left out and of damped ones as well.
+    #[serde(deserialize_with = "crate::numbers::number_or_null")]
     pub change: f64,
 }
 
@@ -133,6 +137,24 @@ pub trait CoordinateSystem: Sync {
     fn check(&self, _cage: &Cage, _points: &[Point]) -> Result<(), CoordinatesError> {
         Ok(())
     }
+}
+
+/// Points that one parallel task computes: a few lane groups.
+const TASK_POINTS: usize = 8 * LANES;
+
+/// Coordinates whose rows depend on their own points alone, task by task: `work` fills the rows from that of the given point on, and returns the points of
+/// them that lie outside.
+fn by_tasks<S>(
+    points: usize,
+    columns: usize,
+    scratch: impl Fn() -> S + Send + Sync,
+    work: impl Fn(usize, MatMut<'_, f64>, &mut S) -> Vec<u32> + Send + Sync,
+) -> Coordinates {
+    let mut phi = zeros(points, columns);
+    let tasks = phi.as_mut().par_row_chunks_mut(TASK_POINTS).enumerate();
+    let outside = tasks.map_init(scratch, |scratch, (task, rows)| work(task * TASK_POINTS, rows, scratch));
+    let outside = outside.flatten_iter().collect();
+    Coordinates { phi, outside, refinement: None, plan: None }
 }
 
 /// Refuses a plan for a system that is no numerical solution.

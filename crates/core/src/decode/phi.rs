@@ -5,7 +5,6 @@ use crate::coordinates::{Coordinates, PointwiseCoordinates};
 use cager_geometry::linalg;
 use cager_geometry::mesh::Point;
 use faer::{Mat, MatRef};
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Rows of Φ that one task multiplies: their product with a batch of cages stays in the second-level cache.
@@ -93,11 +92,5 @@ pub(super) fn padded(points: usize, columns: usize) -> Mat<f32> {
 
 /// Converts to single precision, padded with zero rows to a whole tile.
 pub(super) fn single(phi: MatRef<'_, f64>) -> Mat<f32> {
-    let mut single = padded(phi.nrows(), phi.ncols());
-    single.as_mut().par_col_chunks_mut(1).enumerate().for_each(|(j, mut column)| {
-        for (s, &x) in column.as_mut().col_mut(0).iter_mut().zip(phi.col(j).iter()) {
-            *s = x as f32;
-        }
-    });
-    single
+    linalg::to_single(phi, phi.nrows().next_multiple_of(linalg::TILE_ROWS))
 }

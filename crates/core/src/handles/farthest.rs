@@ -4,8 +4,9 @@
 //! block only if it is closer to the box than the block's largest distance to a sample so far; others are skipped, so that all samples together
 //! cost little more than a few passes.
 
-use crate::simd::{LANES, Lanes, multiversion};
+use crate::simd::{LANES, Lanes, grouped, multiversion};
 use cager_geometry::mesh::{Point, bounds};
+use cager_geometry::spatial::Aabb;
 use rayon::prelude::*;
 
 /// Points of one block.
@@ -42,8 +43,7 @@ fn farthest(blocks: &[Block]) -> Option<(f64, u32)> {
 
 /// A block of neighbouring points with its bounding box.
 struct Block {
-    low: Point,
-    high: Point,
+    around: Aabb,
     ids: Vec<u32>,
     places: Vec<[Lanes; 3]>,
     /// Squared distances to the nearest sample; −1 for samples themselves, and in the lanes that are not used.
@@ -56,16 +56,11 @@ struct Block {
 impl Block {
     fn new(points: &[Point], ids: &[u32]) -> Self {
         let own: Vec<Point> = ids.iter().map(|&i| points[i as usize]).collect();
-        let (low, high) = bounds(&own);
-        let groups = own.len().div_ceil(LANES);
-        let (mut places, mut squared) = (vec![[Lanes::ZERO; 3]; groups], vec![Lanes::splat(-1.0); groups]);
-        for (i, p) in own.iter().enumerate() {
-            for k in 0..3 {
-                places[i / LANES][k].0[i % LANES] = p[k];
-            }
-            squared[i / LANES].0[i % LANES] = f64::INFINITY;
-        }
-        Self { low, high, ids: ids.to_vec(), places, squared, farthest: f64::INFINITY, farthest_at: 0 }
+        let around = Aabb::around(own.iter().map(|&p| p.into()));
+        let mut squared = vec![Lanes::splat(-1.0); own.len().div_ceil(LANES)];
+        (0..own.len()).for_each(|i| squared[i / LANES].0[i % LANES] = f64::INFINITY);
+        let (ids, places) = (ids.to_vec(), grouped(&own, [0.0; 3]));
+        Self { around, ids, places, squared, farthest: f64::INFINITY, farthest_at: 0 }
     }
 
     /// Marks the point at this place as a sample.
@@ -75,9 +70,8 @@ impl Block {
     }
 
     fn add(&mut self, p: Point) {
-        let gap = [0, 1, 2].map(|k| (self.low[k] - p[k]).max(p[k] - self.high[k]).max(0.0));
         // Rounding may make a box seem as far as the points in it.
-        if (gap[0] * gap[0] + gap[1] * gap[1] + gap[2] * gap[2]) * (1.0 - 1e-12) < self.farthest {
+        if self.around.distance2(p.into()) * (1.0 - 1e-12) < self.farthest {
             self.update(p);
         }
     }
@@ -157,11 +151,8 @@ mod tests {
     use super::*;
 
     fn noise(count: usize) -> Vec<Point> {
-        let mut state = 0x9e37_79b9_7f4a_7c15u64;
-        let mut next = move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 33) as f64 / (1u64 << 30) as f64 - 1.0
-        };
+        let mut random = fastrand::Rng::with_seed(0);
+        let mut next = move || 2.0 * random.f64() - 1.0;
         (0..count).map(|_| [next(), 0.3 * next(), 2.0 * next() * next()]).collect()
     }
 

@@ -9,10 +9,11 @@
 //! k that of all points with them. N itself, n × K, is never computed.
 
 use super::farthest::morton_order;
-use crate::simd::{LANES, Lanes, multiversion};
+use crate::simd::{LANES, Lanes, grouped, multiversion};
 use cager_geometry::linalg;
 use cager_geometry::linalg::zeros;
-use cager_geometry::mesh::{Point, bounds, diagonal};
+use cager_geometry::mesh::{Point, diagonal};
+use cager_geometry::spatial::Aabb;
 use faer::reborrow::{Reborrow, ReborrowMut};
 use faer::{Mat, MatMut, MatRef};
 use rayon::prelude::*;
@@ -143,22 +144,16 @@ fn with_all_points(covariance: Covariance, points: &[Point], samples: &[Point], 
 impl Covariance {
     /// Indices of the samples that may have a nonzero covariance with one of the points.
     fn within_support(self, points: &[Point], samples: &[Point]) -> Vec<usize> {
-        let (low, high) = bounds(points);
+        let around = Aabb::around(points.iter().map(|&p| p.into()));
         // Rounding may make a box seem as far as the points in it.
         let most = (1.0 + 1e-9) / (self.inverse_support * self.inverse_support);
-        let squared = |p: &Point| (0..3).map(|k| (low[k] - p[k]).max(p[k] - high[k]).max(0.0).powi(2)).sum::<f64>();
-        samples.iter().enumerate().filter(|(_, p)| squared(p) <= most).map(|(j, _)| j).collect()
+        (0..samples.len()).filter(|&j| around.distance2(samples[j].into()) <= most).collect()
     }
 }
 
 /// Covariances of points with samples, points × samples.
 fn covariances(covariance: Covariance, points: &[Point], samples: &[Point]) -> Mat<f64> {
-    let mut places = vec![[Lanes::ZERO; 3]; points.len().div_ceil(LANES)];
-    for (i, p) in points.iter().enumerate() {
-        for k in 0..3 {
-            places[i / LANES][k].0[i % LANES] = p[k];
-        }
-    }
+    let places = grouped(points, [0.0; 3]);
     let mut out = zeros(points.len(), samples.len());
     out.as_mut().par_col_chunks_mut(TASK_SAMPLES).zip(samples.par_chunks(TASK_SAMPLES)).for_each(
         |(columns, samples)| {

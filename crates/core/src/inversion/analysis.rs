@@ -9,14 +9,12 @@ use super::{PreparationReport, PrepareContext, PrepareError, SolverOptions};
 use crate::cage::Cage;
 use crate::coordinates::CoordinateSystem;
 use crate::decode::Decoder;
-use crate::maxvol::MaxVol;
-use crate::maxvol::RANK_TOLERANCE;
+use crate::maxvol::{MaxVol, RANK_TOLERANCE, Volume};
 use crate::row_basis::{RowBasis, deficient_basis, row_basis};
 use cager_geometry::linalg;
 use cager_geometry::linalg::svd;
 use cager_geometry::mesh::{Point, diagonal};
 use faer::{Mat, MatRef};
-use std::time::Instant;
 
 /// Analysis of a rest pose and its cage, from which solvers with any options follow at the cost of their operator alone.
 ///
@@ -48,15 +46,14 @@ impl Analysis {
     ///
     /// # Errors
     /// As [`Solver::prepare`](super::Solver::prepare).
-    pub fn new(system: &dyn CoordinateSystem, cage: &Cage, points: &[Point]) -> Result<Self, PrepareError> {
-        let context = PrepareContext::default();
-        check(
-            points,
-            system.values(cage).unknowns(),
-            SolverOptions { spectrum: 0, ..SolverOptions::PAPER },
-            context.memory,
-        )?;
-        Self::of(system, cage, points, RequiredDecompositions::Everything, &context)
+    pub fn new(
+        system: &dyn CoordinateSystem,
+        cage: &Cage,
+        points: &[Point],
+        context: &PrepareContext<'_>,
+    ) -> Result<Self, PrepareError> {
+        let options = SolverOptions { spectrum: 0, ..SolverOptions::PAPER };
+        Self::of(system, cage, points, options, RequiredDecompositions::Everything, context)
     }
 
     /// As [`Self::new`], computing only what solvers with these handles need. A model of very many points is analysed on a sample.
@@ -70,8 +67,7 @@ impl Analysis {
         options: SolverOptions,
         context: &PrepareContext<'_>,
     ) -> Result<Self, PrepareError> {
-        check(points, system.values(cage).unknowns(), options, context.memory)?;
-        Self::of(system, cage, points, RequiredDecompositions::For(options.handles), context)
+        Self::of(system, cage, points, options, RequiredDecompositions::For(options.handles), context)
     }
 
     /// As [`Self::for_options`], for the solver with these options alone.
@@ -82,27 +78,25 @@ impl Analysis {
         options: SolverOptions,
         context: &PrepareContext<'_>,
     ) -> Result<Self, PrepareError> {
-        let values = system.values(cage);
-        check(points, values.unknowns(), options, context.memory)?;
-        let dependent = values.dependent_normals.is_some();
         // An unregularised start is regularised nevertheless, in as many directions as are ill-conditioned.
-        let required = if dependent {
+        let required = if system.values(cage).dependent_normals.is_some() {
             RequiredDecompositions::For(options.handles)
         } else {
             RequiredDecompositions::of_solver(drop_zero_weight_regularizer(options))
         };
-        Self::of(system, cage, points, required, context)
+        Self::of(system, cage, points, options, required, context)
     }
 
     fn of(
         system: &dyn CoordinateSystem,
         cage: &Cage,
         points: &[Point],
+        options: SolverOptions,
         required: RequiredDecompositions,
         context: &PrepareContext<'_>,
     ) -> Result<Self, PrepareError> {
         let (m, diagonal) = (system.values(cage).unknowns(), diagonal(points));
-        let clock = Instant::now();
+        check(points, m, options, context.memory)?;
         reject_far_points(cage, points)?;
         context.next("coordinates")?;
         let AnalysisCoordinates {
@@ -115,17 +109,12 @@ impl Analysis {
             refinement,
             plan,
         } = coordinates(system, cage, points, required, context)?;
-        let coordinates_seconds = clock.elapsed().as_secs_f64();
-
-        let clock = Instant::now();
         context.next("handles")?;
         let no_handles = PrepareError::NoSolution { what: "choice of handles" };
         let mut basis = row_basis(phi.as_ref()).ok_or(no_handles.clone())?;
-        let maxvol_seconds = clock.elapsed().as_secs_f64();
         // Built only now, since memory use peaks in maxvol.
         let decoder = decoder.unwrap_or_else(|| Decoder::new(phi.as_ref(), cage.vertices().len()));
 
-        let clock = Instant::now();
         context.next("singular values")?;
         let mut spectra = Spectra::of(phi.as_ref(), &basis, required)?;
         if basis.rank == m && spectra.full_ends[2] <= RANK_TOLERANCE * spectra.full_ends[0] {
@@ -133,22 +122,18 @@ impl Analysis {
             spectra = Spectra::of(phi.as_ref(), &basis, required)?;
         }
         let rank = basis.rank;
+        let MaxVol { swaps, log_volume, max_entry, .. } = basis.handles;
         let preparation = PreparationReport {
             rank,
             affine_reproduction_error: error / diagonal,
             condition_full: spectra.full_ends[0] / spectra.full_ends[1],
             condition_handles: spectra.handles_ends.map_or(f64::NAN, |[first, last]| first / last),
             singular_values: Vec::new(),
-            swaps: basis.handles.swaps,
-            log_volume: basis.handles.log_volume,
-            max_entry: basis.handles.max_entry,
+            maxvol: Volume { swaps, log_volume, max_entry },
             outside,
             outside_distance,
             refinement,
             plan,
-            coordinates_seconds,
-            maxvol_seconds,
-            svd_seconds: clock.elapsed().as_secs_f64(),
         };
         let points = match &sample {
             Some(sample) => sample.iter().map(|&i| points[i as usize]).collect(),

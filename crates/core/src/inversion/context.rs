@@ -2,6 +2,7 @@
 
 use super::PrepareError;
 use crate::coordinates::{ElementPlan, Refinement};
+use crate::maxvol::Volume;
 use cager_geometry::linalg::SparseMatrix;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
@@ -20,12 +21,8 @@ pub struct PreparationReport {
     /// Singular values of the inverted matrix, descending: of `Φ` for spread handles and where every point is read, otherwise of the rows read. Of
     /// 1,024 unknowns or more, of which few are regularised, only the first one and the last are computed; the others are NaN.
     pub singular_values: Vec<f64>,
-    /// Swaps of maxvol after its start.
-    pub swaps: usize,
-    /// `ln |det Φ□|`.
-    pub log_volume: f64,
-    /// Largest `|B_ij|` of `Φ = B Φ□` after the last swap.
-    pub max_entry: f64,
+    /// How the handles of maximum volume were found.
+    pub maxvol: Volume,
     /// Points outside the cage, ascending.
     pub outside: Vec<u32>,
     /// Largest distance of those to the cage, over the rest diagonal.
@@ -34,12 +31,6 @@ pub struct PreparationReport {
     pub refinement: Option<Refinement>,
     /// The boundary elements on which they were solved, in that case.
     pub plan: Option<ElementPlan>,
-    /// Seconds for the coordinates.
-    pub coordinates_seconds: f64,
-    /// Seconds for maxvol.
-    pub maxvol_seconds: f64,
-    /// Seconds for singular values, regularisation and the operator.
-    pub svd_seconds: f64,
 }
 
 /// How to prepare a solver, apart from its options.

@@ -3,7 +3,7 @@
 use super::checks::check_options;
 use super::consistent::Consistent;
 use super::error::failed;
-use super::nearness::{FrameBox, Nearness, NearnessParts};
+use super::nearness::{Nearness, NearnessParts, farthest};
 use super::operator::{Decomposition, Directions, padded_to_tiles};
 use super::options::drop_zero_weight_regularizer;
 use super::target::RegularizationTarget;
@@ -16,17 +16,15 @@ use crate::regularize::{
 };
 use cager_geometry::linalg::{self, SparseMatrix};
 use cager_geometry::mesh::Point;
+use cager_geometry::spatial::Aabb;
 use faer::Mat;
 use std::sync::{Arc, OnceLock};
-use std::time::Instant;
 
 /// The linear system of a choice of handles of an [`Analysis`] with its decomposition, from which solvers with any regularisation follow at little
 /// cost.
 pub struct HandleSystem<'a> {
     pub(super) analysis: &'a Analysis,
     pub(super) decomposition: Decomposition,
-    /// Time the decomposition took.
-    pub(super) seconds: f64,
     /// Scaled Gram matrix of the rows read, for dependent normals; expensive, and therefore computed on first use.
     gram: OnceLock<Mat<f64>>,
 }
@@ -37,11 +35,10 @@ impl Analysis {
     /// # Errors
     /// As [`Solver::prepare`].
     pub fn handle_system(&self, handles: Handles) -> Result<HandleSystem<'_>, PrepareError> {
-        let clock = Instant::now();
         let options = SolverOptions { handles, spectrum: 0, ..SolverOptions::PAPER };
         check_options(self.phi.nrows(), self.phi.ncols(), options, self.memory)?;
         let decomposition = Decomposition::new(self.phi.as_ref(), &self.points, &self.basis, &self.spectra, handles)?;
-        Ok(HandleSystem::new(self, decomposition, clock.elapsed().as_secs_f64()))
+        Ok(HandleSystem::new(self, decomposition))
     }
 
     /// As [`Self::handle_system`], of the given rows, at least as many as unknowns.
@@ -49,9 +46,8 @@ impl Analysis {
     /// # Errors
     /// [`PrepareError::NoSolution`] where the rows determine nothing.
     pub fn handle_system_of(&self, rows: &[u32]) -> Result<HandleSystem<'_>, PrepareError> {
-        let clock = Instant::now();
         let decomposition = Decomposition::of_given_rows(self.phi.as_ref(), rows.to_vec(), self.phi.ncols())?;
-        Ok(HandleSystem::new(self, decomposition, clock.elapsed().as_secs_f64()))
+        Ok(HandleSystem::new(self, decomposition))
     }
 
     /// The solver with these options.
@@ -64,8 +60,8 @@ impl Analysis {
 }
 
 impl<'a> HandleSystem<'a> {
-    pub(super) fn new(analysis: &'a Analysis, decomposition: Decomposition, seconds: f64) -> Self {
-        Self { analysis, decomposition, seconds, gram: OnceLock::new() }
+    pub(super) fn new(analysis: &'a Analysis, decomposition: Decomposition) -> Self {
+        Self { analysis, decomposition, gram: OnceLock::new() }
     }
 
     /// The decoder from cages to positions.
@@ -85,7 +81,6 @@ impl<'a> HandleSystem<'a> {
     /// # Errors
     /// As [`Solver::prepare`].
     pub fn solver(&self, options: SolverOptions, matrix: Option<&SparseMatrix>) -> Result<Solver, PrepareError> {
-        let clock = Instant::now();
         let analysis = self.analysis;
         let (map, target, consistent) = self.parts(options, matrix)?;
         let operator = self.decomposition.operator(analysis.phi.as_ref(), &map.data);
@@ -97,7 +92,6 @@ impl<'a> HandleSystem<'a> {
         let mut preparation = analysis.preparation.clone();
         preparation.condition_handles = self.decomposition.condition;
         preparation.singular_values = self.singular_values();
-        preparation.svd_seconds += self.seconds + clock.elapsed().as_secs_f64();
         Ok(Solver {
             handles,
             reads_all,
@@ -114,12 +108,12 @@ impl<'a> HandleSystem<'a> {
     /// What brings cages back to their frames.
     fn nearness(&self) -> Option<Nearness> {
         let analysis = self.analysis;
-        let rest = FrameBox::around(analysis.points.iter().copied());
+        let rest = Aabb::around(analysis.points.iter().map(|&p| p.into()));
         Nearness::from_parts(NearnessParts {
             factor: self.scaled_factor(),
             rest: Mat::from_fn(analysis.rest.len(), 3, |i, k| analysis.rest[i][k]),
             faces: analysis.cage.mesh().triangles.clone(),
-            margin: rest.farthest(analysis.cage.vertices()),
+            margin: farthest(&rest, analysis.cage.vertices()),
         })
     }
 

@@ -6,7 +6,7 @@ use crate::cage::Cage;
 use crate::regularize::cage_laplacian;
 use cager_geometry::linalg;
 use cager_geometry::mesh::{Point, TriMesh};
-use cager_geometry::vector::distance;
+use cager_geometry::spatial::Aabb;
 use faer::Mat;
 use std::sync::OnceLock;
 
@@ -71,10 +71,10 @@ impl Nearness {
     }
 
     /// Brings the cage of a frame back where it is far from it, and says whether it was; `diagonal` is that of the rest pose.
-    pub(super) fn keep(&self, cage: &mut [Point], frame: FrameBox, diagonal: f64) -> bool {
-        let unit = diagonal.max(distance(frame.low, frame.high));
+    pub(super) fn keep(&self, cage: &mut [Point], frame: &Aabb, diagonal: f64) -> bool {
+        let unit = diagonal.max(frame.size().length());
         let vertices = self.cage.vertices().len();
-        let beyond = |cage: &[Point]| (frame.farthest(&cage[..vertices]) - self.data.margin) / unit;
+        let beyond = |cage: &[Point]| (farthest(frame, &cage[..vertices]) - self.data.margin) / unit;
         let share = ((beyond(cage) - NEAR) / (FAR - NEAR)).min(1.0);
         let is_far = share > 0.0;
         if is_far {
@@ -131,25 +131,7 @@ impl Nearness {
     }
 }
 
-/// The box around the points read of a frame.
-#[derive(Clone, Copy)]
-pub(super) struct FrameBox {
-    low: Point,
-    high: Point,
-}
-
-impl FrameBox {
-    pub(super) fn around(points: impl Iterator<Item = Point>) -> Self {
-        let none = Self { low: [f64::INFINITY; 3], high: [f64::NEG_INFINITY; 3] };
-        points.fold(none, |Self { low, high }, p| Self {
-            low: [0, 1, 2].map(|k| low[k].min(p[k])),
-            high: [0, 1, 2].map(|k| high[k].max(p[k])),
-        })
-    }
-
-    /// Distance of the farthest of some places.
-    pub(super) fn farthest(&self, places: &[Point]) -> f64 {
-        let beyond = |p: &Point| [0, 1, 2].map(|k| (self.low[k] - p[k]).max(p[k] - self.high[k]).max(0.0));
-        places.iter().map(|p| beyond(p).iter().map(|x| x * x).sum::<f64>()).fold(0.0, f64::max).sqrt()
-    }
+/// Distance of the farthest of some places from a box.
+pub(super) fn farthest(from: &Aabb, places: &[Point]) -> f64 {
+    places.iter().map(|&p| from.distance2(p.into())).fold(0.0, f64::max).sqrt()
 }

@@ -2,12 +2,13 @@
 
 use super::consistent::Consistent;
 use super::context::PreparationReport;
-use super::nearness::{FrameBox, Nearness};
+use super::nearness::Nearness;
 use super::{Convergence, RegularizationTarget};
 use crate::batch::product_columns;
 use crate::decode::Decoder;
 use cager_geometry::linalg::BLOCK_ROWS;
 use cager_geometry::mesh::Point;
+use cager_geometry::spatial::Aabb;
 use faer::{Accum, Mat, Par};
 use std::sync::Arc;
 
@@ -141,7 +142,8 @@ impl Solver {
 
     fn keep_near(&self, cage: &mut [Point], position: impl Fn(usize) -> Point) -> bool {
         let rows = 0..self.operator.nrows();
-        let keep = |nearness: &Arc<Nearness>| nearness.keep(cage, FrameBox::around(rows.map(position)), self.diagonal);
+        let around = || Aabb::around(rows.map(|row| position(row).into()));
+        let keep = |nearness: &Arc<Nearness>| nearness.keep(cage, &around(), self.diagonal);
         self.nearness.as_ref().is_some_and(keep)
     }
 

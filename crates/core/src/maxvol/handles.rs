@@ -1,8 +1,7 @@
 //! What a search for rows of maximum volume gives, and what its parts share.
 
-use cager_geometry::linalg;
-use faer::{Mat, MatRef};
-use rayon::prelude::*;
+use faer::Mat;
+use serde::{Deserialize, Serialize};
 
 /// From this many columns on swaps end at [`LOOSE_TOLERANCE`].
 pub(super) const MANY_COLUMNS: usize = 1536;
@@ -27,6 +26,20 @@ pub struct Swap {
     pub growth: f64,
 }
 
+/// How a search went.
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
+#[serde(default)]
+pub struct Volume {
+    /// Swaps after the start by pivoted LU.
+    pub swaps: usize,
+    /// `ln |det Φ□|`.
+    #[serde(deserialize_with = "crate::numbers::number_or_null")]
+    pub log_volume: f64,
+    /// Largest `|B_ij|` of `Φ = B Φ□` after the last swap.
+    #[serde(deserialize_with = "crate::numbers::number_or_null")]
+    pub max_entry: f64,
+}
+
 /// The handles picked from a tall matrix.
 #[derive(Clone, Debug)]
 pub struct MaxVol {
@@ -48,14 +61,4 @@ pub struct MaxVol {
     pub(crate) gram: Option<Mat<f64>>,
     /// `Φ□⁻¹`, m × m.
     pub(crate) inverse: Mat<f64>,
-}
-
-pub(super) fn to_single(phi: MatRef<'_, f64>) -> Mat<f32> {
-    let mut single = linalg::zeros(phi.nrows(), phi.ncols());
-    single.as_mut().par_col_chunks_mut(1).enumerate().for_each(|(j, mut column)| {
-        for (s, &x) in column.as_mut().col_mut(0).iter_mut().zip(phi.col(j).iter()) {
-            *s = x as f32;
-        }
-    });
-    single
 }

@@ -1,7 +1,7 @@
 //! Maximum volume with many columns, to a loose tolerance. The LU factorisation that picks the first rows gives all of `B = Φ Φ□⁻¹` for half a product, and
 //! a round of k swaps changes it by a product of rank k; both in single precision, which is enough for a tolerance of one.
 
-use super::handles::{MAX_PASSES, MaxVol, SINGLE_IS_SAFE, Swap, to_single};
+use super::handles::{MAX_PASSES, MaxVol, SINGLE_IS_SAFE, Swap};
 use super::swaps::CandidateRows;
 use cager_geometry::linalg;
 use cager_geometry::linalg::zeros;
@@ -15,7 +15,7 @@ const TASK_ROWS: usize = 256;
 
 /// As `maxvol`; `None` where the columns are too close to dependent for single precision, or where swaps do not end.
 pub(super) fn search(phi: MatRef<'_, f64>, tolerance: f64) -> Option<MaxVol> {
-    let lu = linalg::pivoted(to_single(phi));
+    let lu = linalg::pivoted(linalg::to_single(phi, phi.nrows()));
     let safe = lu.smallest > SINGLE_IS_SAFE;
     // NaN where a column vanished.
     if !safe {

@@ -9,12 +9,12 @@ mod many_columns;
 mod passes;
 mod swaps;
 
-pub use handles::{MaxVol, Swap};
+pub use handles::{MaxVol, Swap, Volume};
 pub(crate) use passes::maxima_and_gram;
 
 use cager_geometry::linalg;
 use faer::MatRef;
-use handles::{LOOSE_TOLERANCE, MANY_COLUMNS, MAX_PASSES, SINGLE_IS_SAFE, to_single};
+use handles::{LOOSE_TOLERANCE, MANY_COLUMNS, MAX_PASSES, SINGLE_IS_SAFE};
 use passes::row_maxima;
 use swaps::{CandidateRows, candidates};
 
@@ -110,7 +110,7 @@ fn search(phi: MatRef<'_, f64>, start: Vec<u32>, tolerance: f64) -> MaxVol {
 /// # Errors
 /// [`DependentColumns`] where the columns are numerically dependent.
 pub fn start_rows(phi: MatRef<'_, f64>) -> Result<Vec<u32>, DependentColumns> {
-    let single = linalg::pivoted(to_single(phi));
+    let single = linalg::pivoted(linalg::to_single(phi, phi.nrows()));
     if single.smallest > SINGLE_IS_SAFE {
         return Ok(single.rows().to_vec());
     }

@@ -85,12 +85,7 @@ pub(crate) fn maxima_and_gram(phi: MatRef<'_, f64>, inverse: MatRef<'_, f64>, li
     for part in &grams {
         gram += part;
     }
-    for j in 0..m {
-        for i in 0..j {
-            gram[(i, j)] = gram[(j, i)];
-        }
-    }
-    (maxima, gram)
+    (maxima, linalg::mirrored(gram))
 }
 
 /// Adds `bᵀ b` to the lower triangle.

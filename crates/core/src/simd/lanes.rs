@@ -1,5 +1,7 @@
 //! A value for each of eight points, and their arithmetic.
 
+use cager_geometry::mesh::Point;
+
 /// Points or entries that one lane group holds.
 pub(crate) const LANES: usize = 8;
 
@@ -48,6 +50,24 @@ impl Lanes {
         }
         found
     }
+}
+
+/// The points that a lane group holds, coordinate by coordinate.
+#[inline(always)]
+pub(crate) fn gather(point: impl Fn(usize) -> Point) -> [Lanes; 3] {
+    let mut x = [Lanes::ZERO; 3];
+    for l in 0..LANES {
+        let p = point(l);
+        for k in 0..3 {
+            x[k].0[l] = p[k];
+        }
+    }
+    x
+}
+
+/// Points in lane groups, the last one filled up with `beyond`.
+pub(crate) fn grouped(points: &[Point], beyond: Point) -> Vec<[Lanes; 3]> {
+    points.chunks(LANES).map(|points| gather(|l| points.get(l).copied().unwrap_or(beyond))).collect()
 }
 
 macro_rules! lanewise {

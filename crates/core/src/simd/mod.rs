@@ -9,5 +9,5 @@ mod logarithm;
 
 pub(crate) use angle::angle;
 pub(crate) use dispatch::multiversion;
-pub(crate) use lanes::{LANES, Lanes, cross, dot};
+pub(crate) use lanes::{LANES, Lanes, cross, dot, gather, grouped};
 pub(crate) use logarithm::ln_ratio;

@@ -3,7 +3,7 @@
 
 use cager_core::cage::Cage;
 use cager_core::inversion::{Rows, Solver};
-use cager_core::synthetic::{Capture, Options};
+use cager_demo::{Capture, Options};
 use cager_geometry::mesh::{Point, TriMesh};
 
 /// For tests that want cages alone, of whole frames or of the rows of handles.

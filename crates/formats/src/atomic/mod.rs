@@ -56,9 +56,9 @@ impl Place {
 
 /// What a symbolic link to a file that is yet to be made names; a path that is no link as it is.
 fn behind_links(path: &Path) -> PathBuf {
-    const MOST: usize = 40;
+    const MAX_LINKS: usize = 40;
     let mut path = path.to_owned();
-    for _ in 0..MOST {
+    for _ in 0..MAX_LINKS {
         let Ok(next) = fs::read_link(&path) else { break };
         // An absolute one replaces the whole.
         path = path.parent().unwrap_or(Path::new("")).join(next);

@@ -3,7 +3,7 @@
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
 /// Memory for the frames that are brought together at a time.
-const MOST: usize = 256 << 20;
+const MAX_BYTES: usize = 256 << 20;
 
 /// Such an array, frame after frame: as many frames as memory has room for are gathered in one pass over the file.
 pub(super) struct Transposed<R> {
@@ -28,7 +28,7 @@ pub(super) struct Transposed<R> {
 impl<R: Read + Seek> Transposed<R> {
     pub(super) fn new(source: R, start: u64, size: usize, [frames, rows, columns]: [usize; 3]) -> Self {
         let (source, block) = (BufReader::with_capacity(1 << 17, source), Vec::new());
-        Self { source, start, size, frames, rows, columns, room: MOST, block, first: 0, held: 0, at: 0 }
+        Self { source, start, size, frames, rows, columns, room: MAX_BYTES, block, first: 0, held: 0, at: 0 }
     }
 
     /// Bytes of a frame; the array has as many bytes as its shape says, so that all products fit.

@@ -18,10 +18,10 @@ use crate::signature::Signature;
 const RATES: [&str; 6] = ["fps", "framerate", "frame_rate", "frames_per_second", "mocap_framerate", "mocap_frame_rate"];
 
 /// Arrays that are looked at; no archive of frames has more beside them.
-const MOST: usize = 4096;
+const MAX_ARRAYS: usize = 4096;
 
 /// Deflate packs no more bytes than these into one; what announces more is no archive.
-const MOST_DEFLATED: u64 = 1032;
+const MAX_DEFLATED: u64 = 1032;
 
 /// Opens the one array of an archive that can be frames of so many points, as it is packed.
 pub(super) fn open<'a>(
@@ -150,8 +150,8 @@ impl Arrays {
     /// The arrays of an archive of `length` bytes.
     fn list<R: Read + Seek>(path: &Path, archive: &mut ZipArchive<R>, length: u64) -> Result<Self, Error> {
         let mut arrays = Self { readable: Vec::new(), unreadable: None };
-        if archive.len() > MOST {
-            let what = format!("has {} arrays, more than {MOST}; save the frames as one array", archive.len());
+        if archive.len() > MAX_ARRAYS {
+            let what = format!("has {} arrays, more than {MAX_ARRAYS}; save the frames as one array", archive.len());
             return Err(Fault::unsupported(what).at(path));
         }
         for index in 0..archive.len() {
@@ -175,7 +175,7 @@ impl Arrays {
                 }
             };
             let packed = file.compressed_size();
-            let most = if deflated { packed.saturating_mul(MOST_DEFLATED) } else { packed };
+            let most = if deflated { packed.saturating_mul(MAX_DEFLATED) } else { packed };
             let start = file.data_start().filter(|start| start.checked_add(packed).is_some_and(|end| end <= length));
             let Some(start) = start.filter(|_| file.size() <= most) else {
                 let what = format!(

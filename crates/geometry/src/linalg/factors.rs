@@ -8,6 +8,7 @@ use faer::linalg::triangular_solve::{
     solve_lower_triangular_in_place, solve_unit_lower_triangular_in_place, solve_upper_triangular_in_place,
 };
 use faer::linalg::{cholesky, lu};
+use faer::perm::PermRef;
 use faer::{Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
@@ -30,20 +31,8 @@ impl<T> Pivoted<T> {
 
 /// LU with partial pivoting of an n × m matrix, n ≥ m, done in place. Runs on the rayon pool, with bit-identical results for any number of threads.
 pub fn pivoted<T: faer::traits::RealField + Copy + Into<f64>>(mut a: Mat<T>) -> Pivoted<T> {
-    let (n, m) = a.shape();
-    let mut forward = vec![0usize; n];
-    let mut backward = vec![0usize; n];
-    let par = Par::rayon(0);
-    let mut memory =
-        MemBuffer::new(lu::partial_pivoting::factor::lu_in_place_scratch::<usize, T>(n, m, par, Default::default()));
-    lu::partial_pivoting::factor::lu_in_place(
-        a.as_mut(),
-        &mut forward,
-        &mut backward,
-        par,
-        MemStack::new(&mut memory),
-        Default::default(),
-    );
+    let m = a.ncols();
+    let [forward, _] = lu_in_place(a.as_mut(), Par::rayon(0));
     let pivots: Vec<f64> = (0..m).map(|j| Into::<f64>::into(a[(j, j)]).abs()).collect();
     let smallest = pivots.iter().fold(f64::INFINITY, |low, &p| if p < low { p } else { low });
     let largest = pivots.iter().copied().fold(0.0, f64::max);
@@ -51,32 +40,29 @@ pub fn pivoted<T: faer::traits::RealField + Copy + Into<f64>>(mut a: Mat<T>) -> 
     Pivoted { factors: a, order: forward.into_iter().map(|r| r as u32).collect(), smallest }
 }
 
+/// LU with partial pivoting, in place: the rows of the matrix in the order of those of L, and the place of each in it.
+fn lu_in_place<T: faer::traits::RealField>(a: MatMut<'_, T>, par: Par) -> [Vec<usize>; 2] {
+    use lu::partial_pivoting::factor;
+    let (n, m) = a.shape();
+    let [mut forward, mut backward] = [vec![0; n], vec![0; n]];
+    let mut memory = MemBuffer::new(factor::lu_in_place_scratch::<usize, T>(n, m, par, Default::default()));
+    let stack = MemStack::new(&mut memory);
+    factor::lu_in_place(a, &mut forward, &mut backward, par, stack, Default::default());
+    [forward, backward]
+}
+
 /// Inverse of a square matrix, and the natural logarithm of its absolute determinant.
 pub fn inverse(a: MatRef<'_, f64>) -> (Mat<f64>, f64) {
     let m = a.nrows();
     let mut factors = a.to_owned();
-    let mut forward = vec![0usize; m];
-    let mut backward = vec![0usize; m];
-    let mut memory = MemBuffer::new(lu::partial_pivoting::factor::lu_in_place_scratch::<usize, f64>(
-        m,
-        m,
-        Par::Seq,
-        Default::default(),
-    ));
-    let (_, permutation) = lu::partial_pivoting::factor::lu_in_place(
-        factors.as_mut(),
-        &mut forward,
-        &mut backward,
-        Par::Seq,
-        MemStack::new(&mut memory),
-        Default::default(),
-    );
+    let [forward, backward] = lu_in_place(factors.as_mut(), Par::Seq);
     let log_volume = (0..m).map(|j| factors[(j, j)].abs().ln()).sum();
     let mut result = Mat::zeros(m, m);
     if m * m * m < PARALLEL_THRESHOLD {
         let mut memory = MemBuffer::new(lu::partial_pivoting::inverse::inverse_scratch::<usize, f64>(m, Par::Seq));
         let factors = factors.as_ref();
         let stack = MemStack::new(&mut memory);
+        let permutation = PermRef::new_checked(&forward, &backward, m);
         lu::partial_pivoting::inverse::inverse(result.as_mut(), factors, factors, permutation, Par::Seq, stack);
         return (result, log_volume);
     }
@@ -117,23 +103,21 @@ pub fn upper_factor(mut a: Mat<f64>) -> Mat<f64> {
 
 /// Lower Cholesky factor in place of a symmetric positive definite matrix, zeros above; `None` where it is not definite.
 pub fn cholesky(mut a: Mat<f64>) -> Option<Mat<f64>> {
-    let n = a.nrows();
-    let mut memory =
-        MemBuffer::new(cholesky::llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default()));
-    cholesky::llt::factor::cholesky_in_place(
-        a.as_mut(),
-        Default::default(),
-        Par::Seq,
-        MemStack::new(&mut memory),
-        Default::default(),
-    )
-    .ok()?;
-    for j in 1..n {
+    cholesky_in_place(a.as_mut(), Par::Seq)?;
+    for j in 1..a.nrows() {
         for i in 0..j {
             a[(i, j)] = 0.0;
         }
     }
     Some(a)
+}
+
+/// Lower Cholesky factor in place of the lower triangle of a symmetric positive definite matrix; `None` where it is not definite.
+pub fn cholesky_in_place(a: MatMut<'_, f64>, par: Par) -> Option<()> {
+    use cholesky::llt::factor;
+    let mut memory = MemBuffer::new(factor::cholesky_in_place_scratch::<f64>(a.nrows(), par, Default::default()));
+    factor::cholesky_in_place(a, Default::default(), par, MemStack::new(&mut memory), Default::default()).ok()?;
+    Some(())
 }
 
 /// Solves `A X = B` for symmetric positive definite A. `None` where A is not definite.

@@ -11,12 +11,12 @@ mod zeros;
 
 pub use eigen::eigen;
 pub use factors::{
-    Pivoted, cholesky, inverse, pivoted, right_singular, solve_cholesky, solve_definite, solve_definite_within,
-    solve_lower, solve_upper, upper_factor, upper_inverse,
+    Pivoted, cholesky, cholesky_in_place, inverse, pivoted, right_singular, solve_cholesky, solve_definite,
+    solve_definite_within, solve_lower, solve_upper, upper_factor, upper_inverse,
 };
 pub use products::{
     BLOCK_ROWS, TILE_COLUMNS, TILE_ROWS, accumulate_product, gram, lower_product, mirrored, multiply, product, rows_of,
-    tall_product, transposed_product,
+    tall_product, to_single, transposed_product,
 };
 pub use rotation::nearest_rotation;
 pub use small::symmetric_eigen;

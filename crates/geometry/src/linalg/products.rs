@@ -65,6 +65,15 @@ pub fn rows_of<T: Copy + Default + Send>(a: MatRef<'_, T>, rows: &[u32]) -> Mat<
     out
 }
 
+/// A matrix in single precision, followed by rows of zeros up to so many.
+pub fn to_single(a: MatRef<'_, f64>, rows: usize) -> Mat<f32> {
+    let mut out = zeros(rows, a.ncols());
+    out.as_mut().par_col_iter_mut().zip(a.par_col_iter()).for_each(|(out, a)| {
+        out.iter_mut().zip(a.iter()).for_each(|(out, &x)| *out = x as f32);
+    });
+    out
+}
+
 /// `A · B` of a matrix A with many rows, in blocks of these.
 pub fn tall_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     let mut out = zeros(a.nrows(), b.ncols());
@@ -140,11 +149,8 @@ mod tests {
     const BATCH: usize = 16;
 
     fn noise(rows: usize, columns: usize) -> Mat<f64> {
-        let mut state = 0x9e37_79b9_7f4a_7c15u64;
-        Mat::from_fn(rows, columns, |_, _| {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 33) as f64 / (1u64 << 30) as f64 - 1.0
-        })
+        let mut random = fastrand::Rng::with_seed((rows + columns) as u64);
+        Mat::from_fn(rows, columns, |_, _| random.f64() - 0.5)
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::basis::functions;
 use super::limits::MIN_DEGREE;
 use super::triangle::Triangle;
-use crate::simd::{LANES, Lanes, dot, multiversion};
+use crate::simd::{LANES, Lanes, dot, grouped, multiversion};
 use cager_geometry::mesh::{Point, distance2_to_triangle};
 use cager_geometry::vector::{self, middle, sub};
 use rayon::prelude::*;
@@ -105,13 +105,6 @@ fn nearest_generic(triangle: &Triangle, points: &[[Lanes; 3]]) -> f64 {
     nearest.sqrt()
 }
 
-/// Points in groups of eight, the last one filled up with points far away.
-fn grouped(points: &[Point]) -> Vec<[Lanes; 3]> {
-    let far = [f64::INFINITY; 3];
-    let group = |points: &[Point]| [0, 1, 2].map(|k| Lanes(std::array::from_fn(|l| points.get(l).unwrap_or(&far)[k])));
-    points.chunks(LANES).map(group).collect()
-}
-
 /// Nearest point, in diameters, from which on each degree is enough.
 const ENOUGH: [(f64, usize); 4] = [(0.4, 3), (0.18, 4), (0.1, 5), (0.06, 6)];
 /// Points nearer than this are left to what is known on the surface.
@@ -126,7 +119,7 @@ pub(super) const MANY: usize = 1200;
 
 /// The faces of a cage, in their order, divided where points are near.
 pub(super) fn elements(faces: &[[Point; 3]], points: &[Point]) -> Vec<Element> {
-    let points = grouped(points);
+    let points = grouped(points, [f64::INFINITY; 3]);
     let mut elements: Vec<Element> =
         faces.iter().enumerate().map(|(face, &corners)| Element::face(face, corners)).collect();
     loop {

@@ -9,11 +9,12 @@ use super::basis::{MAX_FUNCTIONS, functions};
 use super::elements::Unknowns;
 use super::near::{Group, Near};
 use super::potential::potentials;
-use super::solve::{Densities, Part, single};
+use super::solve::{Densities, Part};
 use super::surface::{ClosestPoint, Surface};
 use super::tables::Tables;
 use crate::coordinates::layer::{self, INVERSE_4PI, Layers, group_potentials, write_group};
 use crate::simd::{LANES, Lanes, multiversion};
+use cager_geometry::linalg;
 use cager_geometry::mesh::Point;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
@@ -74,8 +75,8 @@ pub(super) fn evaluate(
 ) -> Evaluated {
     let m = solution.layers.vertices().len();
     let near = Near::new(solution.surface, solution.unknowns, points, closest_points);
-    let low = single(solution.densities.low.as_ref());
-    let mut phi = cager_geometry::linalg::zeros::<f64>(points.len(), m);
+    let low = linalg::to_single(solution.densities.low.as_ref(), solution.densities.low.nrows());
+    let mut phi = linalg::zeros::<f64>(points.len(), m);
     let found: Vec<TaskResult> = phi
         .as_mut()
         .par_row_chunks_mut(TASK_POINTS)

@@ -8,7 +8,7 @@ use super::quadrature::Rule;
 use super::tables::Tables;
 use super::triangle::Triangle;
 use crate::coordinates::layer::{INVERSE_4PI, Layers, group_potentials};
-use crate::simd::{LANES, Lanes, multiversion};
+use crate::simd::{LANES, Lanes, gather, multiversion};
 use cager_geometry::vector;
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
@@ -50,14 +50,8 @@ impl OuterRule {
 
     /// The nodes of one group on a triangle.
     fn at(&self, group: usize, triangle: &Triangle) -> [Lanes; 3] {
-        let mut x = [Lanes::ZERO; 3];
-        for l in 0..LANES {
-            let point = triangle.point(self.nodes[group][0].0[l], self.nodes[group][1].0[l]);
-            for k in 0..3 {
-                x[k].0[l] = point[k];
-            }
-        }
-        x
+        let [alpha, beta] = &self.nodes[group];
+        gather(|l| triangle.point(alpha.0[l], beta.0[l]))
     }
 }
 

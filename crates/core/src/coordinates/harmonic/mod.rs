@@ -229,7 +229,7 @@ fn solve_on(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::synthetic::{Capture, Options};
+    use cager_demo::{Capture, Options};
 
     /// The problem of a small cage, with points of the model in it, solved on its faces.
     fn solved<T>(work: impl FnOnce(&Problem<'_>, &Unknowns, (Evaluated, SolveRecord, f64)) -> T) -> T {

@@ -3,8 +3,8 @@
 use super::basis::functions;
 use super::elements::Unknowns;
 use super::equations::{Equations, RESIDUAL};
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::{cholesky::llt, triangular_solve};
+use cager_geometry::linalg::cholesky_in_place;
+use faer::linalg::triangular_solve;
 use faer::{Mat, MatMut, MatRef, Par};
 
 /// Unknowns of a patch at most.
@@ -25,13 +25,6 @@ pub(super) fn damp(mut a: MatMut<'_, f64>, part: f64) {
 /// coordinates that are off by about what the larger diagonal changes are better than none.
 pub(super) fn least_damping(given: Option<u8>, mut succeeds: impl FnMut(f64) -> bool) -> Option<u8> {
     (given.unwrap_or(0)..DAMPING.len() as u8).find(|&step| succeeds(DAMPING[usize::from(step)]))
-}
-
-/// Lower Cholesky factor in place.
-pub(super) fn factor(a: MatMut<'_, f64>, par: Par) -> Option<()> {
-    let mut memory = MemBuffer::new(llt::factor::cholesky_in_place_scratch::<f64>(a.nrows(), par, Default::default()));
-    llt::factor::cholesky_in_place(a, Default::default(), par, MemStack::new(&mut memory), Default::default()).ok()?;
-    Some(())
 }
 
 /// A matrix of zeros in memory that is used again and again.
@@ -130,7 +123,7 @@ pub(super) fn solve(
         fill_low(matrix.as_mut(), equations, patch);
         fill_near(matrix.as_mut(), equations, patch, &layout);
         damp(matrix.as_mut(), part);
-        factor(matrix, Par::Seq).is_some()
+        cholesky_in_place(matrix, Par::Seq).is_some()
     };
     let damping = least_damping(patch.damping, definite)?;
     let factor = MatRef::from_column_major_slice(memory, layout.count, layout.count);

@@ -8,7 +8,8 @@ use super::basis::functions;
 use super::elements::Unknowns;
 use super::equations::{Equations, RESIDUAL};
 use super::galerkin::{NearPairs, Operator, RightHandSides};
-use super::patch::{self, DAMPING, Patch, damp, factor, zeroed};
+use super::patch::{self, DAMPING, Patch, damp, zeroed};
+use cager_geometry::linalg;
 use faer::linalg::{matmul::matmul, triangular_solve};
 use faer::prelude::IntoConst;
 use faer::{Accum, ColRef, Mat, MatMut, MatRef, Par};
@@ -34,14 +35,9 @@ pub(super) struct Densities {
     pub(super) parts: Vec<Part>,
 }
 
-/// A matrix in single precision.
-pub(super) fn single(a: MatRef<'_, f64>) -> Mat<f32> {
-    single_from(a, |_| 0)
-}
-
-/// The same from the row on that belongs to each column; zeros above.
+/// A matrix in single precision, from the row on that belongs to each column; zeros above.
 fn single_from(a: MatRef<'_, f64>, first: impl Fn(usize) -> usize + Sync) -> Mat<f32> {
-    let mut out = cager_geometry::linalg::zeros::<f32>(a.nrows(), a.ncols());
+    let mut out = linalg::zeros::<f32>(a.nrows(), a.ncols());
     out.as_mut().par_col_iter_mut().zip(a.par_col_iter()).enumerate().for_each(|(j, (out, a))| {
         let first = first(j);
         faer::zip!(out.subrows_mut(first, a.nrows() - first), a.subrows(first, a.nrows() - first))
@@ -159,7 +155,7 @@ impl LowSystem {
                 restore(matrix.as_mut(), far);
                 damp(matrix.as_mut(), part);
             }
-            factor(matrix.as_mut(), Par::rayon(0)).is_some()
+            linalg::cholesky_in_place(matrix.as_mut(), Par::rayon(0)).is_some()
         };
         let damping = patch::least_damping(given, definite)?;
         Some(Self { factor: matrix, damping })
@@ -338,10 +334,12 @@ mod tests {
     fn a_matrix_that_the_recorded_damping_leaves_indefinite_takes_more() {
         // As one that is hardly definite may be where its entries round otherwise.
         let matrix = Mat::from_fn(2, 2, |i, j| if i == j { 1.0 } else { 1.0 + 1e-5 });
-        let factored = |given| LowSystem::new(matrix.clone(), &single(matrix.as_ref()), given).map(|low| low.damping);
+        let factored = |given| {
+            LowSystem::new(matrix.clone(), &linalg::to_single(matrix.as_ref(), 2), given).map(|low| low.damping)
+        };
         assert_eq!(factored(None), Some(1));
         assert_eq!([0, 1, 3].map(|given| factored(Some(given))), [Some(1), Some(1), Some(3)]);
         let hopeless = Mat::from_fn(2, 2, |i, j| if i == j { 1.0 } else { 2.0 });
-        assert!(LowSystem::new(hopeless.clone(), &single(hopeless.as_ref()), Some(2)).is_none());
+        assert!(LowSystem::new(hopeless.clone(), &linalg::to_single(hopeless.as_ref(), 2), Some(2)).is_none());
     }
 }

@@ -154,18 +154,15 @@ fn nearest_in_triangle(corners: [Point; 3], normal: Point, x: Point) -> ([f64; 3
 mod tests {
     use super::*;
     use crate::cage::Cage;
-    use crate::synthetic::{Capture, Options};
+    use cager_demo::{Capture, Options};
 
     #[test]
     fn sides_and_distances_are_those_of_the_winding_number_and_of_all_faces() {
         let mesh = Capture::new(&Options { points: 500, frames: 1, cage_vertices: 60 }).cage;
         let cage = Cage::new(mesh).unwrap();
         let surface = Surface::new(cage.vertices(), &cage);
-        let mut state = 1u64;
-        let mut random = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-        };
+        let mut generator = fastrand::Rng::with_seed(1);
+        let mut random = || generator.f64() - 0.5;
         let (low, high) = mesh::bounds(cage.vertices());
         let mut counts = [0, 0];
         for _ in 0..2000 {

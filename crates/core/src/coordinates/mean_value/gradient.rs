@@ -5,12 +5,12 @@
 //! `det = u_0·g_0` and `m = ½ Σ θ_e n_e`; all of it is smooth away from the cage's faces. A face that a point sees edge-on has
 //! weights of zero, their limit beside the face.
 
-use super::MeanValue;
+use super::{MeanValue, store};
 use crate::cage::{Cage, Edge, Face};
-use crate::simd::{LANES, Lanes, angle, cross, dot, multiversion};
+use crate::simd::{LANES, Lanes, angle, cross, dot, gather, multiversion};
 use cager_geometry::linalg::zeros;
 use cager_geometry::mesh::Point;
-use faer::{Mat, MatMut, MatRef};
+use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
 /// Points of one task: partial gradients are added up task by task, so that the sum does not depend on the number of threads.
@@ -35,7 +35,7 @@ impl MeanValue {
                 let points = &points[task * TASK_POINTS..];
                 for start in (0..rows.nrows()).step_by(LANES) {
                     let filled = LANES.min(rows.nrows() - start);
-                    let scale = forward(cage, lanes_of(points, start, filled), scratch);
+                    let scale = forward(cage, gather(|l| points[start + l.min(filled - 1)]), scratch);
                     store(rows.as_mut().subrows_mut(start, filled), &scratch.weights, scale);
                 }
             },
@@ -64,7 +64,7 @@ impl MeanValue {
                     adjoint.total.fill([Lanes::ZERO; 3]);
                     for start in (first..first + count).step_by(LANES) {
                         let filled = LANES.min(first + count - start);
-                        let scale = forward(cage, lanes_of(points, start, filled), scratch);
+                        let scale = forward(cage, gather(|l| points[start + l.min(filled - 1)]), scratch);
                         let rows = (phi.subrows(start, filled), upstream.subrows(start, filled));
                         load(rows, scale, &scratch.nearness, &mut adjoint.weights);
                         backward(cage, scratch, adjoint);
@@ -85,29 +85,9 @@ impl MeanValue {
     }
 }
 
-/// Intermediate values of the forward pass of one lane group.
-struct Scratch {
-    /// Unit vectors from the points to each cage vertex, `u`.
-    directions: Vec<[Lanes; 3]>,
-    /// Reciprocal distances to each cage vertex, `1/d`.
-    nearness: Vec<Lanes>,
-    /// Per edge: `c = u_a × u_b`; `f = θ/(2 sin θ)`, so that the mean-vector term is `f c`; and `(df/ds)/s`.
-    edges: Vec<[Lanes; 5]>,
-    /// Unnormalised weights `W`.
-    weights: Vec<Lanes>,
-}
-
-impl Scratch {
-    fn new(cage: &Cage) -> Self {
-        let m = cage.vertices().len();
-        Self {
-            directions: vec![[Lanes::ZERO; 3]; m],
-            nearness: vec![Lanes::ZERO; m],
-            edges: vec![[Lanes::ZERO; 5]; cage.edges().len()],
-            weights: vec![Lanes::ZERO; m],
-        }
-    }
-}
+/// Values of the forward pass: unit vectors `u`, reciprocal distances `1/d` and unnormalised weights `W`. Per edge: `c = u_a × u_b`; `f = θ/(2 sin θ)`, so
+/// that the mean-vector term is `f c`; and `(df/ds)/s`.
+type Scratch = super::Scratch<5>;
 
 /// Accumulators of the backward pass.
 struct Adjoint {
@@ -129,27 +109,6 @@ impl Adjoint {
             directions: vec![[Lanes::ZERO; 3]; m],
             edges: vec![[Lanes::ZERO; 6]; cage.edges().len()],
             total: vec![[Lanes::ZERO; 3]; m],
-        }
-    }
-}
-
-/// `filled` points from `start` on, padded with the last one.
-fn lanes_of(points: &[Point], start: usize, filled: usize) -> [Lanes; 3] {
-    let mut x = [Lanes::ZERO; 3];
-    for l in 0..LANES {
-        let p = points[start + l.min(filled - 1)];
-        for k in 0..3 {
-            x[k].0[l] = p[k];
-        }
-    }
-    x
-}
-
-fn store(mut rows: MatMut<'_, f64>, weights: &[Lanes], scale: Lanes) {
-    for (j, &weight) in weights.iter().enumerate() {
-        let values = (weight * scale).0;
-        for l in 0..rows.nrows() {
-            rows[(l, j)] = values[l];
         }
     }
 }

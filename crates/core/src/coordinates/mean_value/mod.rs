@@ -11,15 +11,14 @@ mod gradient;
 mod integral;
 
 use super::{
-    CageValues, CoordinateSystem, Coordinates, CoordinatesError, ElementPlan, PointwiseCoordinates, refuse_plan,
+    CageValues, CoordinateSystem, Coordinates, CoordinatesError, ElementPlan, PointwiseCoordinates, by_tasks,
+    refuse_plan,
 };
 use crate::cage::{Cage, Edge, Face};
-use crate::simd::{LANES, Lanes, angle, cross, dot, multiversion};
-use cager_geometry::linalg::zeros;
+use crate::simd::{LANES, Lanes, angle, cross, dot, gather, multiversion};
 use cager_geometry::mesh::Point;
 use cager_geometry::vector;
 use faer::MatMut;
-use rayon::prelude::*;
 
 /// Mean value coordinates: one unknown per cage vertex, defined inside and outside the cage.
 #[derive(Clone, Copy, Debug, Default)]
@@ -35,8 +34,6 @@ const ENTRY_TOLERANCE: f64 = 1e-11;
 const SAFE_MEAN_LENGTH: f64 = 0.1;
 /// What takes the place of 1/0 where a point lies on a face.
 const INV_ZERO: f64 = 1e100;
-/// Points one parallel task computes: a few lane groups.
-const TASK_POINTS: usize = 8 * LANES;
 
 impl CoordinateSystem for MeanValue {
     fn name(&self) -> &'static str {
@@ -63,40 +60,33 @@ impl CoordinateSystem for MeanValue {
 }
 
 fn coordinates(cage: &Cage, points: &[Point]) -> Coordinates {
-    let mut phi = zeros(points.len(), cage.vertices().len());
-    let outside = phi
-        .as_mut()
-        .par_row_chunks_mut(TASK_POINTS)
-        .enumerate()
-        .map_init(
-            || Scratch::new(cage),
-            |scratch, (task, rows)| task_coordinates(cage, points, task * TASK_POINTS, rows, scratch),
-        )
-        .reduce(Vec::new, |mut a, b| {
-            a.extend(b);
-            a
-        });
-    Coordinates { phi, outside, refinement: None, plan: None }
+    by_tasks(
+        points.len(),
+        cage.vertices().len(),
+        || Scratch::new(cage),
+        |first, rows, scratch| task_coordinates(cage, points, first, rows, scratch),
+    )
 }
 
 /// Working memory of one task; every entry holds one lane group.
-struct Scratch {
+struct Scratch<const EDGE: usize> {
     /// Unit vectors from the points to each cage vertex.
     directions: Vec<[Lanes; 3]>,
     /// Reciprocal distances to each cage vertex.
     nearness: Vec<Lanes>,
-    /// Per edge: half mean-vector term `½ θ n`, and the factor that turns it into `u_a × u_b`.
-    edges: Vec<[Lanes; 4]>,
+    /// Terms of each edge; of the coordinates themselves, half the mean-vector term `½ θ n`, and the factor that turns it into `u_a × u_b`.
+    edges: Vec<[Lanes; EDGE]>,
+    /// Unnormalised weights.
     weights: Vec<Lanes>,
 }
 
-impl Scratch {
+impl<const EDGE: usize> Scratch<EDGE> {
     fn new(cage: &Cage) -> Self {
         let m = cage.vertices().len();
         Self {
             directions: vec![[Lanes::ZERO; 3]; m],
             nearness: vec![Lanes::ZERO; m],
-            edges: vec![[Lanes::ZERO; 4]; cage.edges().len()],
+            edges: vec![[Lanes::ZERO; EDGE]; cage.edges().len()],
             weights: vec![Lanes::ZERO; m],
         }
     }
@@ -108,34 +98,21 @@ fn task_coordinates(
     points: &[Point],
     first: usize,
     mut rows: MatMut<'_, f64>,
-    scratch: &mut Scratch,
+    scratch: &mut Scratch<4>,
 ) -> Vec<u32> {
     let mut outsiders = Vec::new();
     let count = rows.nrows();
-    let mut start = 0;
-    while start < count {
+    for start in (0..count).step_by(LANES) {
         let filled = LANES.min(count - start);
         // A last, partly filled group repeats its last point.
         let at = |l: usize| points[first + start + l.min(filled - 1)];
-        let mut x = [Lanes::ZERO; 3];
-        for l in 0..LANES {
-            for k in 0..3 {
-                x[k].0[l] = at(l)[k];
-            }
-        }
-        let Sums { mut total, on, inaccurate } = group_weights(cage, x, scratch);
+        let Sums { mut total, on, inaccurate } = group_weights(cage, gather(at), scratch);
         for l in 0..filled {
             if inaccurate[l] && matches!(on[l], On::Nothing) {
                 total.0[l] = accurate_weights(cage, scratch, at(l), l, total.0[l]);
             }
         }
-        let scale = total.map(|t| 1.0 / t);
-        for (j, &weight) in scratch.weights.iter().enumerate() {
-            let values = (weight * scale).0;
-            for l in 0..filled {
-                rows[(start + l, j)] = values[l];
-            }
-        }
+        store(rows.as_mut().subrows_mut(start, filled), &scratch.weights, total.map(|t| 1.0 / t));
         for l in 0..filled {
             match on[l] {
                 On::Nothing if total.0[l] <= 0.0 => outsiders.push((first + start + l) as u32),
@@ -147,9 +124,18 @@ fn task_coordinates(
                 }
             }
         }
-        start += filled;
     }
     outsiders
+}
+
+/// Writes the coordinates of the points of a lane group, as many as there are rows.
+fn store(mut rows: MatMut<'_, f64>, weights: &[Lanes], scale: Lanes) {
+    for (j, &weight) in weights.iter().enumerate() {
+        let values = (weight * scale).0;
+        for l in 0..rows.nrows() {
+            rows[(l, j)] = values[l];
+        }
+    }
 }
 
 /// What of the cage a point lies on, where the weights have no finite limit.
@@ -180,7 +166,7 @@ fn set_row(rows: &mut MatMut<'_, f64>, row: usize, entries: &[(usize, f64)]) {
 /// Computes the weights of one lane's point anew, integrated for faces whose rounding matters, where all weights add up to about
 /// `total`; returns their sum.
 #[cold]
-fn accurate_weights(cage: &Cage, scratch: &mut Scratch, x: Point, l: usize, total: f64) -> f64 {
+fn accurate_weights(cage: &Cage, scratch: &mut Scratch<4>, x: Point, l: usize, total: f64) -> f64 {
     for weight in &mut scratch.weights {
         weight.0[l] = 0.0;
     }
@@ -195,7 +181,7 @@ fn accurate_weights(cage: &Cage, scratch: &mut Scratch, x: Point, l: usize, tota
 }
 
 /// Weights of one face times the distances of its corners.
-fn face_weights(cage: &Cage, scratch: &Scratch, face: &Face, x: Point, l: usize, total: f64) -> [f64; 3] {
+fn face_weights(cage: &Cage, scratch: &Scratch<4>, face: &Face, x: Point, l: usize, total: f64) -> [f64; 3] {
     let vertices = face.vertices.map(|v| v as usize);
     let edges = face.edges.map(|e| scratch.edges[e as usize].map(|c| c.0[l]));
     let g = [0, 1, 2].map(|i| [0, 1, 2].map(|k| face.signs[i] * edges[i][k]));
@@ -223,11 +209,11 @@ fn is_inaccurate(loss2: f64, nearest: f64, total: f64) -> bool {
 
 multiversion! {
     /// Unnormalised weights of one lane group, left in the scratch; returns their sums.
-    fn group_weights(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> Sums = group_weights_generic;
+    fn group_weights(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch<4>) -> Sums = group_weights_generic;
 }
 
 #[inline(always)]
-fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> Sums {
+fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch<4>) -> Sums {
     let mut on = [On::Nothing; LANES];
     let near_vertex = VERTEX_TOLERANCE * cage.diagonal();
     for (j, v) in cage.vertices().iter().enumerate() {

@@ -102,9 +102,10 @@ impl Consistent {
             }
         }
         let preconditioner = linalg::solve_definite(system.clone(), Mat::identity(v, v))?;
-        let curvature = |i, j| if i < v && j < v { system[(i, j)] } else { gram[(i, j)] };
-        let curvature = single(total, &curvature);
-        let preconditioner = single(v, &|i, j| preconditioner[(i, j)]);
+        let mut curvature = gram.clone();
+        curvature.submatrix_mut(0, 0, v, v).copy_from(&system);
+        let single = |a: &Mat<f64>| linalg::to_single(a.as_ref(), a.nrows().next_multiple_of(linalg::TILE_ROWS));
+        let (curvature, preconditioner) = (single(&curvature), single(&preconditioner));
         let whole = |mut a: Mat<f64>| {
             let columns = a.ncols().next_multiple_of(linalg::TILE_ROWS);
             a.resize_with(a.nrows(), columns, |_, _| 0.0);
@@ -341,11 +342,6 @@ impl Consistent {
 /// The conjugate gradients of a frame, unless they have ended.
 fn active(search: &Option<state::ConjugateGradients>) -> Option<&state::ConjugateGradients> {
     search.as_ref().filter(|search| !search.is_done())
-}
-
-/// An n × n matrix in single precision, padded with zero rows to a whole tile.
-fn single(n: usize, entry: &dyn Fn(usize, usize) -> f64) -> Mat<f32> {
-    Mat::from_fn(n.next_multiple_of(linalg::TILE_ROWS), n, |i, j| if i < n { entry(i, j) as f32 } else { 0.0 })
 }
 
 /// Neighbours of each vertex of a closed mesh, each once: the two faces of an edge run along it in opposite directions.

@@ -4,7 +4,7 @@ use super::outcome::Outcome;
 use crate::batch::product_columns;
 use crate::coordinates::DependentNormals;
 use cager_geometry::mesh::Point;
-use cager_geometry::vector::{add, along, combination, dot, sub};
+use cager_geometry::vector::{add, along, combination, dot, mean, sub};
 use faer::{Mat, MatRef};
 
 /// State of one frame. Positions are relative to the centre of the initial cage, to keep precision far from the origin.
@@ -26,13 +26,7 @@ pub(super) struct FrameState {
 
 impl FrameState {
     pub(super) fn new(cage: &[Point]) -> Self {
-        let mut origin = [0.0; 3];
-        for row in cage {
-            for k in 0..3 {
-                origin[k] += row[k];
-            }
-        }
-        let origin = origin.map(|c| c / cage.len() as f64);
+        let origin = mean(cage);
         let start: Vec<Point> = cage.iter().map(|p| sub(*p, origin)).collect();
         Self {
             origin,

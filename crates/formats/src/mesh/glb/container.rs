@@ -41,10 +41,10 @@ pub(super) fn document(json: &[u8]) -> Result<Root, Fault> {
     /// Characters of the reason that are shown.
     const SHOWN: usize = 160;
     // Three bytes of JSON make an object of some hundred, so that their number is bounded before any is made.
-    const MOST_OBJECTS: usize = 100_000;
-    if json.iter().filter(|&&b| b == b'{').count() > MOST_OBJECTS {
+    const MAX_OBJECTS: usize = 100_000;
+    if json.iter().filter(|&&b| b == b'{').count() > MAX_OBJECTS {
         return Err(Fault::unsupported(format!(
-            "describes more than {MOST_OBJECTS} objects; export the mesh alone, without its scene"
+            "describes more than {MAX_OBJECTS} objects; export the mesh alone, without its scene"
         )));
     }
     let root: Root = gltf::json::deserialize::from_slice(json).map_err(|cause| {

@@ -13,7 +13,7 @@ use super::scene::{Affine, IDENTITY, Scene, apply, compose, mirrors};
 use crate::error::Fault;
 
 /// Sets of four joints that vertices may have: enough for any skin, and few enough that sets that repeat an accessor cost little.
-const MOST_SETS: u32 = 8;
+const MAX_SETS: u32 = 8;
 
 /// From the space that the mesh was bound in to the world's, for each joint of a skin.
 pub(super) struct Joints(Vec<Affine>);
@@ -67,14 +67,14 @@ impl Joints {
     ) -> Result<(), Fault> {
         let mut moved = vec![([0.0; 3], 0.0); points.len()];
         let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).map(gltf::json::Index::value);
-        if attribute(Semantic::Joints(MOST_SETS)).is_some() {
+        if attribute(Semantic::Joints(MAX_SETS)).is_some() {
             return Err(Fault::unsupported(format!(
                 "{place}: vertices have more than {} joints each; export the mesh with fewer",
-                4 * MOST_SETS
+                4 * MAX_SETS
             )));
         }
         // Four joints a vertex in each set.
-        for set in 0..MOST_SETS {
+        for set in 0..MAX_SETS {
             let (Some(joints), Some(weights)) = (attribute(Semantic::Joints(set)), attribute(Semantic::Weights(set)))
             else {
                 break;

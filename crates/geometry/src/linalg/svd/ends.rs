@@ -43,14 +43,11 @@ pub fn first_value(factors: &[MatRef<'_, f64>]) -> f64 {
 fn largest(m: usize, apply: impl Fn(MatRef<'_, f64>) -> Mat<f64>) -> f64 {
     let steps = STEPS.min(m);
     let mut basis = Mat::<f64>::zeros(m, steps + 1);
-    let mut state = 0x9e37_79b9_7f4a_7c15u64;
-    for x in basis.col_mut(0).iter_mut() {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        *x = (state >> 33) as f64 / (1u64 << 30) as f64 - 1.0;
-    }
+    let mut random = fastrand::Rng::with_seed(0);
+    basis.col_mut(0).iter_mut().for_each(|x| *x = random.f64() - 0.5);
     let norm = basis.col(0).norm_l2();
     basis.col_mut(0).iter_mut().for_each(|x| *x /= norm);
-    let (mut diagonal, mut beside) = (Vec::new(), Vec::new());
+    let (mut diagonal, mut off_diagonal) = (Vec::new(), Vec::new());
     let (mut value, mut unchanged) = (0.0, 0);
     for k in 0..steps {
         let mut next = apply(basis.as_ref().subcols(k, 1));
@@ -63,14 +60,14 @@ fn largest(m: usize, apply: impl Fn(MatRef<'_, f64>) -> Mat<f64>) -> f64 {
             }
             next -= linalg::product(known, along.as_ref());
         }
-        let now = largest_of_tridiagonal(&diagonal, &beside);
+        let now = largest_of_tridiagonal(&diagonal, &off_diagonal);
         unchanged = if (now - value).abs() <= SETTLED * now { unchanged + 1 } else { 0 };
         value = now;
         let length = next.norm_l2();
         if unchanged >= UNCHANGED || length.is_nan() || length <= f64::EPSILON * now {
             break;
         }
-        beside.push(length);
+        off_diagonal.push(length);
         for (to, &x) in basis.col_mut(k + 1).iter_mut().zip(next.col(0).iter()) {
             *to = x / length;
         }
@@ -79,19 +76,19 @@ fn largest(m: usize, apply: impl Fn(MatRef<'_, f64>) -> Mat<f64>) -> f64 {
 }
 
 /// Largest eigenvalue of a symmetric tridiagonal matrix, by bisection on the signs of its pivots.
-fn largest_of_tridiagonal(diagonal: &[f64], beside: &[f64]) -> f64 {
-    let around = |i: usize| {
-        let before = if i > 0 { beside[i - 1].abs() } else { 0.0 };
-        before + beside.get(i).filter(|_| i + 1 < diagonal.len()).map_or(0.0, |x| x.abs())
+fn largest_of_tridiagonal(diagonal: &[f64], off_diagonal: &[f64]) -> f64 {
+    let radius = |i: usize| {
+        let before = if i > 0 { off_diagonal[i - 1].abs() } else { 0.0 };
+        before + off_diagonal.get(i).filter(|_| i + 1 < diagonal.len()).map_or(0.0, |x| x.abs())
     };
     let (mut low, mut high) = (diagonal.iter().copied().fold(f64::NEG_INFINITY, f64::max), f64::NEG_INFINITY);
     for (i, &d) in diagonal.iter().enumerate() {
-        high = high.max(d + around(i));
+        high = high.max(d + radius(i));
     }
     let is_above_all = |x: f64| {
         let mut pivot = f64::INFINITY;
         diagonal.iter().enumerate().all(|(i, &d)| {
-            let before = if i > 0 { beside[i - 1] } else { 0.0 };
+            let before = if i > 0 { off_diagonal[i - 1] } else { 0.0 };
             pivot = x - d - before * before / pivot;
             pivot > 0.0
         })

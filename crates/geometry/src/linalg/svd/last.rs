@@ -52,11 +52,8 @@ impl LastDirections {
 pub fn last_directions(inverse: MatRef<'_, f64>, first: f64, count: usize) -> Option<LastDirections> {
     let m = inverse.ncols();
     let width = (count + MARGIN).min(m);
-    let mut state = 0x9e37_79b9_7f4a_7c15u64;
-    let mut block = Mat::from_fn(m, width, |_, _| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as f64 / (1u64 << 30) as f64 - 1.0
-    });
+    let mut random = fastrand::Rng::with_seed(0);
+    let mut block = Mat::from_fn(m, width, |_, _| random.f64() - 0.5);
     let (mut space, mut images) = (Mat::<f64>::zeros(m, 0), Mat::<f64>::zeros(m, 0));
     let mut known: Vec<f64> = Vec::new();
     for _ in 0..BLOCKS {

@@ -1,29 +1,44 @@
-//! How much memory a reader takes.
+//! An allocator that counts: how much memory something takes.
 
-#![allow(unsafe_code)] // An allocator that counts.
+#![allow(unsafe_code, dead_code)]
 
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
 use std::sync::atomic::{AtomicIsize, Ordering::Relaxed};
 
-// Of all threads together: a reader that works on several holds what all of them hold.
 static LIVE: AtomicIsize = AtomicIsize::new(0);
 static PEAK: AtomicIsize = AtomicIsize::new(0);
 
+thread_local! {
+    static LIVE_HERE: Cell<isize> = const { Cell::new(0) };
+    static PEAK_HERE: Cell<isize> = const { Cell::new(0) };
+}
+
 /// What `f` gives, and the most bytes of the heap that were held at one time beside what was held before, on any thread. Whatever else goes on in the
 /// process counts too.
-pub fn peak_of<T>(f: impl FnOnce() -> T) -> (T, usize) {
+pub(crate) fn peak_of_all_threads<T>(f: impl FnOnce() -> T) -> (T, usize) {
     let before = LIVE.load(Relaxed);
     PEAK.store(before, Relaxed);
     let value = f();
     (value, usize::try_from(PEAK.load(Relaxed) - before).unwrap_or(0))
 }
 
+/// As [`peak_of_all_threads`], on this thread alone: others may go on beside it.
+pub(crate) fn peak_of<T>(f: impl FnOnce() -> T) -> (T, usize) {
+    let before = LIVE_HERE.get();
+    PEAK_HERE.set(before);
+    let value = f();
+    (value, usize::try_from(PEAK_HERE.get() - before).unwrap_or(0))
+}
+
 struct Counting;
 
 fn count(bytes: isize) {
     let live = LIVE.fetch_add(bytes, Relaxed) + bytes;
+    LIVE_HERE.set(LIVE_HERE.get() + bytes);
     if bytes > 0 {
         PEAK.fetch_max(live, Relaxed);
+        PEAK_HERE.set(PEAK_HERE.get().max(LIVE_HERE.get()));
     }
 }
 
