@@ -29,6 +29,7 @@ mod origin;
 mod preparation;
 mod preparation_warnings;
 pub mod problem;
+pub mod recover;
 pub mod remote;
 mod report_page;
 pub mod service;

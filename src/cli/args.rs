@@ -5,6 +5,7 @@ use super::checks::{CaptureArgs, CheckArgs, TimingArgs};
 use super::coding_args::{ErrorBound, Quality, TargetSize, Unit};
 use super::names;
 use super::outputs::OutputArgs;
+use super::recover_args::RecoverArgs;
 use super::transfer_args::{EditArgs, TransferArgs};
 use crate::config::{ServeFlags, bytes};
 use crate::decode::Layer;
@@ -54,6 +55,7 @@ pub(crate) struct GlobalArgs {
 pub(crate) enum Command {
     Encode(Box<EncodeArgs>),
     Decode(DecodeArgs),
+    Recover(Box<RecoverArgs>),
     Edit(EditArgs),
     Inspect(InspectArgs),
     Cage(Box<CageArgs>),
@@ -144,11 +146,6 @@ pub(crate) struct DesignArgs {
     #[arg(long, value_name = "N", conflicts_with_all = ["cage", "mean_error"], value_parser = clap::value_parser!(u32).range(4..=1_500))]
     pub(crate) cage_vertices: Option<u32>,
 
-    /// Without --cage, design the smallest cage whose mean L2 error is at most E, a fraction of the rest pose's diagonal; with one, write the
-    /// smallest file of which that holds.
-    #[arg(long, value_name = "E", allow_negative_numbers = true)]
-    pub(crate) mean_error: Option<f64>,
-
     /// What the designed cage is for [default: free with mean value coordinates, editable with others].
     #[arg(long, value_parser = names::style(), value_name = "STYLE", conflicts_with = "cage")]
     pub(crate) style: Option<Style>,
@@ -178,6 +175,11 @@ pub(crate) struct CodingArgs {
     /// diagonal.
     #[arg(long, value_enum, value_name = "QUALITY", conflicts_with = "mean_error")]
     pub(crate) quality: Option<Quality>,
+
+    /// Write the smallest file whose mean L2 error is at most E, a fraction of the rest pose's diagonal; where a cage is designed, the smallest
+    /// cage of which that holds.
+    #[arg(long, value_name = "E", allow_negative_numbers = true)]
+    pub(crate) mean_error: Option<f64>,
 
     /// What one unit of the capture's positions is, for lengths given to --max-error.
     #[arg(long, value_enum, value_name = "UNIT", requires = "max_error")]

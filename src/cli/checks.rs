@@ -63,7 +63,7 @@ pub(crate) struct TimingArgs {
     pub(super) start: Option<f64>,
 }
 
-fn up(text: &str) -> Result<Up, String> {
+pub(super) fn up(text: &str) -> Result<Up, String> {
     match text {
         "y" => Ok(Up::Y),
         "z" => Ok(Up::Z),

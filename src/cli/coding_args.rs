@@ -1,6 +1,6 @@
 //! What `cager encode` is asked of errors and sizes.
 
-use super::args::EncodeArgs;
+use super::args::CodingArgs;
 use crate::coding::Goal;
 use crate::config::bytes;
 use anyhow::{Result, bail};
@@ -98,9 +98,8 @@ impl FromStr for TargetSize {
     }
 }
 
-/// What the file is to meet, for this rest pose and so many frames; `None` where nothing is asked.
-pub(super) fn goal(args: &EncodeArgs, rest: &Model, frames: usize) -> Result<Option<Goal>> {
-    let coding = &args.coding;
+/// What the file is to meet, for this rest pose and so many frames; `None` where nothing is asked. A mean error is what a cage meets that is designed for it.
+pub(super) fn goal(coding: &CodingArgs, has_cage: bool, rest: &Model, frames: usize) -> Result<Option<Goal>> {
     let unit = coding.unit.map(Unit::metres);
     Ok(match (coding.max_error, coding.target_size, coding.quality) {
         (Some(ErrorBound::Fraction(_)), ..) if unit.is_some() => {
@@ -131,8 +130,8 @@ pub(super) fn goal(args: &EncodeArgs, rest: &Model, frames: usize) -> Result<Opt
         (.., Some(Quality::Preview)) => Some(Goal::Preview),
         (.., Some(Quality::Standard)) => Some(Goal::Standard),
         (.., Some(Quality::Master)) => Some(Goal::MASTER),
-        _ => match args.design.mean_error {
-            Some(error) if args.cage.is_some() => {
+        _ => match coding.mean_error {
+            Some(error) if has_cage => {
                 if !(error > 0.0 && error < 1.0) {
                     bail!(
                         "--mean-error: is {error}; give a fraction of the rest pose's diagonal above 0, such as 0.001"

@@ -37,7 +37,7 @@ pub(super) fn run(args: &EncodeArgs) -> Result<()> {
     files.selection.range = args.frames_range;
     files.take_origin(&mut rest);
     // What is wrong with it is told before anything is computed.
-    goal(args, &rest, 1)?;
+    goal(&args.coding, args.cage.is_some(), &rest, 1)?;
     let cage = args.cage.as_ref().map(|path| read_cage(path, args.flip_cage, files.origin)).transpose()?;
     check_capture(&mut files, (&args.rest, &rest), &args.capture.checks, true)?;
     if let (Some(path), Some(cage)) = (&args.cage, &cage) {
@@ -102,7 +102,7 @@ fn dry_run(
             checked_options(args, rest, cage, matrix.as_ref())?;
             let system = args.solver.coordinates;
             let frames = read_files(files)?;
-            match goal(args, rest, frames)? {
+            match goal(&args.coding, args.cage.is_some(), rest, frames)? {
                 None => {
                     format!("cages of {}, and the rest pose", size(frames, system.values(cage).unknowns(), "unknowns"))
                 }
@@ -127,13 +127,13 @@ fn dry_run(
 /// How a cage is designed. Mean value coordinates do without a tidy one; the others want all points inside.
 pub(super) fn design_options(args: &EncodeArgs, points: usize) -> Result<DesignOptions> {
     let mean_value = args.solver.coordinates.name() == MeanValue.name();
-    if args.design.mean_error.is_some() && !mean_value {
+    if args.coding.mean_error.is_some() && !mean_value {
         bail!(
             "--mean-error: is measured with mean value coordinates; give --cage-vertices, or leave --coordinates out"
         );
     }
     Ok(DesignOptions {
-        goal: design::goal(args.design.cage_vertices, args.design.mean_error, points)?,
+        goal: design::goal(args.design.cage_vertices, args.coding.mean_error, points)?,
         style: args.design.style.unwrap_or(if mean_value { Style::Free } else { Style::Editable }),
         seed: args.design.seed.unwrap_or(0),
         time_limit: args.design.time_limit.map(|s| Duration::from_secs(s.into())),
@@ -168,8 +168,8 @@ pub(super) fn sized_design(args: &EncodeArgs, files: &CaptureFiles, rest: &Model
 fn best_cage_size(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<Option<usize>> {
     let mut reader = files.open()?;
     let total = reader.frames();
-    let goal = goal(args, rest, total)?;
-    let (Some(goal), None, None) = (goal, args.design.cage_vertices, args.design.mean_error) else { return Ok(None) };
+    let goal = goal(&args.coding, args.cage.is_some(), rest, total)?;
+    let (Some(goal), None, None) = (goal, args.design.cage_vertices, args.coding.mean_error) else { return Ok(None) };
     let frames = sample_frames(reader.as_mut(), CAGE_SIZE_FRAMES, true).map_err(|error| name_files(error, args))?;
     let memory = args.memory.unwrap_or_else(Memory::half_of_free);
     let system = args.solver.coordinates;
@@ -228,7 +228,7 @@ fn encode_locally(
         matrix: matrix.as_ref(),
         choose,
         memory,
-        goal: goal(args, rest, announced)?,
+        goal: goal(&args.coding, args.cage.is_some(), rest, announced)?,
         origin: files.origin,
         exact_rest: args.coding.exact_rest,
     };
@@ -253,7 +253,7 @@ fn choosing_frames(frames: &mut dyn FrameReader, first_ones: bool) -> Result<Vec
 fn solver_options(args: &EncodeArgs, rest: &Model, cage: &Cage) -> Result<SolverOptions> {
     let unknowns = args.solver.coordinates.values(cage).unknowns();
     // The number of frames says how large a file may be, not whether it is coded.
-    let is_coded = goal(args, rest, 1)?.is_some();
+    let is_coded = goal(&args.coding, args.cage.is_some(), rest, 1)?.is_some();
     Ok(inversion_choices(&args.solver, is_coded, unknowns)?.options(unknowns))
 }
 

@@ -77,7 +77,10 @@ pub(super) fn run(
         flip_cage: args.flip_cage && moved_cage.is_none(),
         frame_rate: frames.frame_rate(),
         frames: frames.frames(),
-        ..coding_options(goal(args, rest, frames.frames().unwrap_or(1) as usize)?, args.coding.exact_rest)
+        ..coding_options(
+            goal(&args.coding, args.cage.is_some(), rest, frames.frames().unwrap_or(1) as usize)?,
+            args.coding.exact_rest,
+        )
     };
     // A service does not know of the origin, which is added to what it sends.
     if files.origin.is_some() {

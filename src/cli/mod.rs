@@ -25,6 +25,8 @@ mod manual;
 mod names;
 mod outputs;
 mod progress;
+mod recover;
+mod recover_args;
 pub(crate) mod serve;
 mod solver_options;
 mod transfer_args;
@@ -50,6 +52,7 @@ pub fn run() -> ExitCode {
     let result = match command {
         Command::Encode(args) => encode::run(&args),
         Command::Decode(args) => decode::run(&args),
+        Command::Recover(args) => recover::run(&args),
         Command::Edit(args) => edit::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Cage(args) => cage::run(&args),

@@ -31,6 +31,11 @@ pub(crate) fn oriented(vertices: &[Point], triangles: &[[u32; 3]]) -> Oriented {
     Oriented { triangles, turned_faces, turned }
 }
 
+/// The triangles of a mesh turned to face outwards: those that run against their neighbours, then all where they enclose a negative volume.
+pub fn outward(vertices: &[Point], triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
+    oriented(vertices, triangles).triangles
+}
+
 /// The first vertex at each one's place.
 fn welded(vertices: &[Point]) -> Vec<u32> {
     let mut first = HashMap::with_capacity(vertices.len());

@@ -1,0 +1,196 @@
+//! `cager recover`: an animation from surfaces without correspondence, encoded as any capture.
+
+use super::coding_args::goal;
+use super::dry_run::tell_dry_run;
+use super::outputs::Outputs;
+use super::recover_args::{Align, RecoverArgs};
+use super::solver_options::read_cage;
+use super::{design, grouped, human_bytes, progress, read_model, tell, warn};
+use crate::coding::InversionChoices;
+use crate::encode::{self, EncodeProgress, Encoded, Job};
+use crate::memory::Memory;
+use crate::recover::{RecoverJob, RecoverOptions, RecoverProgress, Recovered, RecoveryReport, recover};
+use anyhow::{Context, Result, bail};
+use cager_cages::{EncloseOptions, enclose};
+use cager_core::cage::Cage;
+use cager_core::coordinates::{CoordinateSystem, MeanValue};
+use cager_core::regularize::Regularizer;
+use cager_formats::{AtomicFile, MeshSequence, ScratchDir, Target, commit_together, mesh_sequence};
+use cager_geometry::mesh::Model;
+use std::io::Write;
+use std::path::Path;
+
+pub(super) fn run(args: &RecoverArgs) -> Result<()> {
+    let inputs = [&args.template, &args.frames].into_iter().chain(&args.cage);
+    let mut outputs = Outputs::new(args.outputs, inputs)?;
+    let output = outputs.binary(&args.output, "dance.cager")?;
+    let report = args.report.as_ref().map(|path| outputs.text(path)).transpose()?;
+    let template = read_model(&args.template)?;
+    if template.faces.is_empty() {
+        bail!("{}: has no faces, and a template is a mesh; give one with faces", args.template.display());
+    }
+    goal(&args.coding, true, &template, 1)?;
+    let files = frames(args)?;
+    if args.outputs.dry_run {
+        let what = format!("{} frames of {} points", grouped(files.files.len()), grouped(template.points.len()));
+        return tell_dry_run(&output, &what, &[report]);
+    }
+    let cage = cage(args, &template)?;
+    let report = report.map(AtomicFile::create).transpose()?;
+    let scratch = ScratchDir::create(scratch_folder(&output))?;
+    let recovered = followed(args, template, cage, &files, scratch.path())?;
+    write(args, &output, recovered, report)
+}
+
+/// The files of the frames; the template and the cage are none unless they are called like these.
+fn frames(args: &RecoverArgs) -> Result<MeshSequence> {
+    let no_frames: Vec<_> = [&args.template].into_iter().chain(&args.cage).cloned().collect();
+    let mut files = mesh_sequence(&args.frames, &no_frames)?;
+    warn(&files.notes);
+    if let Some(start) = args.timing.start {
+        files.numbers = Some((0..files.files.len()).map(|frame| start + frame as f64).collect());
+    }
+    Ok(files)
+}
+
+/// The cage that is given, or one around the template.
+fn cage(args: &RecoverArgs, template: &Model) -> Result<Cage> {
+    if let Some(path) = &args.cage {
+        return read_cage(path, false, None);
+    }
+    let bar = progress::ticking("making a cage");
+    let options = EncloseOptions { vertices: design::default_vertices(template.points.len()), ..Default::default() };
+    let made = enclose(template, &options);
+    bar.finish_and_clear();
+    let named = || args.template.display().to_string();
+    Cage::new(made.with_context(named)?).with_context(named)
+}
+
+/// Beside the output, where there is room for it.
+fn scratch_folder(output: &Target) -> &Path {
+    let folder = match output {
+        Target::StandardOutput => None,
+        output => output.path().parent().filter(|folder| !folder.as_os_str().is_empty()),
+    };
+    folder.unwrap_or(Path::new("."))
+}
+
+fn followed(
+    args: &RecoverArgs,
+    template: Model,
+    cage: Cage,
+    files: &MeshSequence,
+    scratch: &Path,
+) -> Result<Recovered> {
+    let job = RecoverJob {
+        template,
+        cage,
+        files,
+        frame_rate: args.timing.fps,
+        first_number: 0.0,
+        options: RecoverOptions {
+            align: args.align == Align::Auto,
+            scale: args.scale == Align::Auto,
+            up: args.up,
+            offsets: args.offsets,
+            force: args.force,
+            points: args.points as usize,
+        },
+        scratch,
+    };
+    let (there, back) = (progress::frames("following", files.files.len()), std::cell::OnceCell::new());
+    let recovered = recover(job, &|told| match told {
+        RecoverProgress::Followed(done) => there.set_position(done as u64),
+        RecoverProgress::Refined(done) => {
+            there.finish_and_clear();
+            back.get_or_init(|| progress::frames("refining", files.files.len())).set_position(done as u64);
+        }
+    });
+    there.finish_and_clear();
+    back.into_inner().inspect(indicatif::ProgressBar::finish_and_clear);
+    Ok(recovered?)
+}
+
+/// Encodes what was recovered.
+fn write(args: &RecoverArgs, output: &Target, recovered: Recovered, report_file: Option<AtomicFile>) -> Result<()> {
+    let Recovered { rest, cage, mut frames, report, warnings } = recovered;
+    let system: &dyn CoordinateSystem = &MeanValue;
+    let count = report.frames.len();
+    let goal = goal(&args.coding, true, &rest, count)?;
+    let choices = InversionChoices {
+        system,
+        handles: None,
+        regularizer: Regularizer::default(),
+        spectrum: None,
+        lambda: None,
+        is_coded: goal.is_some(),
+    };
+    let bar = progress::PreparationBar::new("encoding", count);
+    let job = Job {
+        rest: &rest,
+        cage: &cage,
+        frames: &mut frames,
+        output,
+        system,
+        options: choices.options(system.values(&cage).unknowns()),
+        matrix: None,
+        choose: None,
+        memory: Memory::half_of_free(),
+        goal,
+        origin: None,
+        exact_rest: args.coding.exact_rest,
+    };
+    let result = encode::encode(job, &|told| match told {
+        EncodeProgress::Preparing(step) => bar.preparing(step),
+        EncodeProgress::Frames(done) => bar.done(done),
+    });
+    bar.finish();
+    let Encoded { report: encoded, container } = result?;
+    let report_file = report_file.map(|file| write_report(file, &report)).transpose()?;
+    commit_together(report_file.into_iter().chain([container]).collect())?;
+    warn(&warnings);
+    warn(&encoded.warnings);
+    tell(&summary(&report, &encoded, output.path()))
+}
+
+fn write_report(mut file: AtomicFile, report: &RecoveryReport) -> Result<AtomicFile> {
+    let mut text = serde_json::to_vec_pretty(report)?;
+    text.push(b'\n');
+    file.write_all(&text)?;
+    Ok(file)
+}
+
+fn summary(report: &RecoveryReport, encoded: &cager_proto::report::Report, output: &Path) -> String {
+    let percent = |share: Option<f64>| share.map_or("unknown".to_owned(), |share| format!("{:.3} %", 100.0 * share));
+    let count = |outcome: &str| report.frames.iter().filter(|frame| frame.outcome == outcome).count();
+    let placed = report.placement.map_or_else(String::new, |placed| {
+        format!(
+            "  placed  turned by {:.1} degrees, scaled by {:.4}; the runner-up lies {:.2} times as far\n",
+            placed.degrees, placed.scale, placed.runner_up
+        )
+    });
+    let s = report.seconds;
+    format!(
+        "{}: {} frames of {} points as cages of {} vertices\n\
+         {placed}\x20 frames  {} followed from the one before, {} found by a wider search, {} lost\n\
+         \x20 surface template to surface {}, surface to template {} of the diagonal, on average\n\
+         \x20 size    {}; errors of encoding: L2 {} on average, {} at most\n\
+         \x20 time    {:.3} s: {:.3} s to prepare, {:.3} s to follow, {:.3} s to refine\n",
+        output.display(),
+        grouped(report.frames.len()),
+        grouped(report.points),
+        grouped(report.cage_vertices),
+        grouped(count("followed")),
+        grouped(count("wider_search")),
+        grouped(report.lost.len()),
+        percent(report.to_surface),
+        percent(report.from_surface),
+        human_bytes(encoded.bytes.output),
+        percent(Some(encoded.error.l2_mean)),
+        percent(Some(encoded.error.linf_max)),
+        s.prepare + s.follow + s.refine,
+        s.prepare,
+        s.follow,
+        s.refine,
+    )
+}

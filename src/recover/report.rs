@@ -1,0 +1,140 @@
+//! What is told of a recovery.
+
+use super::placement::Placement;
+use super::surfaces::Distances;
+use cager_core::cage::Cage;
+use cager_formats::MeshSequence;
+use cager_geometry::mesh::TriMesh;
+use cager_recover::track::{Outcome, TrackedFrame};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// How a recovery went, as JSON. Lengths are shares of the template's diagonal.
+#[derive(Debug, Serialize)]
+pub struct RecoveryReport {
+    /// Points of the template.
+    pub points: usize,
+    /// Vertices of its cage.
+    pub cage_vertices: usize,
+    /// Length of the template's diagonal, in the frames' unit.
+    pub diagonal: f64,
+    /// How the template was brought to the first surface, where it was.
+    pub placement: Option<Placement>,
+    /// Frames in which part of the template may be somewhere else, by their numbers.
+    pub lost: Vec<f64>,
+    /// From the template to the surfaces, on average over the frames.
+    pub to_surface: Option<f64>,
+    /// And back.
+    pub from_surface: Option<f64>,
+    /// Every frame.
+    pub frames: Vec<FrameReport>,
+    /// How long it took.
+    pub seconds: Seconds,
+}
+
+/// A frame.
+#[derive(Debug, Serialize)]
+pub struct FrameReport {
+    /// Its number.
+    pub number: f64,
+    /// Its file.
+    pub file: PathBuf,
+    /// How its cage was found: `followed` from the frame before, by a `wider_search`, `lost`, or `no_surface`.
+    pub outcome: &'static str,
+    /// How well the template lies on the surface: root mean square distances both ways, of positions and normals together; none without a surface.
+    pub score: Option<f64>,
+    /// From the template to the surface; none where that is a cloud.
+    pub to_surface: Option<Distances>,
+    /// From the surface to the template.
+    pub from_surface: Option<Distances>,
+    /// Whether the surface faced inwards, and was turned.
+    pub turned: bool,
+    /// Whether normals were estimated from the points.
+    pub estimated_normals: bool,
+}
+
+/// Seconds of each part.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Seconds {
+    /// Placing, coordinates, what is needed for fits.
+    pub prepare: f64,
+    /// From the first frame to the last.
+    pub follow: f64,
+    /// From the last frame to the first, offsets and measuring included.
+    pub refine: f64,
+}
+
+impl FrameReport {
+    pub(super) fn new(
+        frame: &TrackedFrame,
+        to_surface: Option<Distances>,
+        from_surface: Option<Distances>,
+        turned: bool,
+        estimated_normals: bool,
+    ) -> Self {
+        let outcome = match frame.outcome {
+            Outcome::Followed => "followed",
+            Outcome::SearchedWider => "wider_search",
+            Outcome::Lost => "lost",
+            Outcome::NoSurface => "no_surface",
+        };
+        let score = Some(frame.score).filter(|score| score.is_finite());
+        Self { number: 0.0, file: PathBuf::new(), outcome, score, to_surface, from_surface, turned, estimated_normals }
+    }
+}
+
+impl RecoveryReport {
+    #[allow(clippy::too_many_arguments)]
+    pub(super) fn new(
+        rest: &TriMesh,
+        cage: &Cage,
+        diagonal: f64,
+        placement: Option<Placement>,
+        mut frames: Vec<FrameReport>,
+        numbers: &[f64],
+        files: &MeshSequence,
+        seconds: Seconds,
+    ) -> Self {
+        for ((frame, &number), file) in frames.iter_mut().zip(numbers).zip(&files.files) {
+            (frame.number, frame.file) = (number, file.clone());
+        }
+        let mean = |of: fn(&FrameReport) -> Option<Distances>| {
+            let found: Vec<f64> = frames.iter().filter_map(of).map(|distances| distances.mean).collect();
+            (!found.is_empty()).then(|| found.iter().sum::<f64>() / found.len() as f64)
+        };
+        Self {
+            points: rest.vertices.len(),
+            cage_vertices: cage.vertices().len(),
+            diagonal,
+            placement,
+            lost: frames.iter().filter(|frame| frame.outcome == "lost").map(|frame| frame.number).collect(),
+            to_surface: mean(|frame| frame.to_surface),
+            from_surface: mean(|frame| frame.from_surface),
+            frames,
+            seconds,
+        }
+    }
+
+    /// What the user should know.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let list = |numbers: &[f64]| {
+            let shown: Vec<String> = numbers.iter().take(10).map(ToString::to_string).collect();
+            let more = if numbers.len() > 10 { format!(" and {} more", numbers.len() - 10) } else { String::new() };
+            format!("{}{more}", shown.join(", "))
+        };
+        let of = |what: fn(&FrameReport) -> bool| {
+            self.frames.iter().filter(|frame| what(frame)).map(|frame| frame.number).collect::<Vec<f64>>()
+        };
+        let mut warnings = Vec::new();
+        let mut tell = |numbers: &[f64], what: &str| {
+            if !numbers.is_empty() {
+                warnings.push(format!("{what}: {}", list(numbers)));
+            }
+        };
+        tell(&self.lost, "part of the template may be somewhere else in frames");
+        tell(&of(|frame| frame.outcome == "no_surface"), "no surface, so the template stays as it was, in frames");
+        tell(&of(|frame| frame.turned), "the surface faced inwards, and was turned, in frames");
+        tell(&of(|frame| frame.estimated_normals), "there are no normals, so they were estimated, in frames");
+        warnings
+    }
+}
