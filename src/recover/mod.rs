@@ -272,7 +272,7 @@ impl Recovering<'_> {
     ) -> Result<Vec<FrameReport>, RecoverError> {
         let pass = SecondPass::new(self.template, tracked);
         let offsets =
-            options.offsets.then(|| OffsetSolver::new(&self.rest.triangles, self.rest.vertices.len(), self.diagonal));
+            options.offsets.then(|| OffsetSolver::new(self.rest, self.diagonal));
         let samples = sample_surface(&self.rest.vertices, &self.rest.triangles, MEASURED, 1);
         let mut reports: VecDeque<FrameReport> = VecDeque::with_capacity(tracked.len());
         let mut finish = |frame: usize, seen: Option<&Followed>, tracked: &[TrackedFrame]| {

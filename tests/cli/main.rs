@@ -24,6 +24,8 @@ mod memory;
 mod mistakes;
 mod outputs;
 mod ranges;
+mod recover;
+mod real_recover;
 mod real_coding;
 mod real_data;
 mod real_green;

@@ -1,14 +1,16 @@
 //! How far every vertex of a template leaves its cage to meet a surface.
 
-use cager_geometry::mesh::Polygons;
+use cager_geometry::mesh::{Polygons, TriMesh};
 use cager_geometry::topology::Adjacency;
 use cager_geometry::vector::Point;
-use cager_registration::{OrientedPoints, Target};
+use cager_registration::{OrientedPoints, Target, welded};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 /// The faces of a template, for offsets that are smooth over them.
 pub struct OffsetSolver {
+    /// The first vertex at each one's place, which stands for all there.
+    first: Vec<u32>,
     triangles: Vec<[u32; 3]>,
     adjacency: Adjacency,
     diagonal: f64,
@@ -35,11 +37,13 @@ struct Pulls {
 }
 
 impl OffsetSolver {
-    /// For a template with this diagonal.
-    pub fn new(triangles: &[[u32; 3]], points: usize, diagonal: f64) -> Self {
+    /// For a template at rest, with this diagonal.
+    pub fn new(rest: &TriMesh, diagonal: f64) -> Self {
+        let first = welded(&rest.vertices);
+        let triangles: Vec<[u32; 3]> = rest.triangles.iter().map(|t| t.map(|v| first[v as usize])).collect();
         let mut faces = Polygons::new();
         triangles.iter().for_each(|triangle| faces.push(triangle));
-        Self { triangles: triangles.to_vec(), adjacency: Adjacency::new(&faces, points), diagonal }
+        Self { adjacency: Adjacency::new(&faces, rest.vertices.len()), first, triangles, diagonal }
     }
 
     /// The template's vertices moved from `positions`, where their cage has them, towards a surface: point to plane, both ways, smooth. Runs on the
@@ -57,7 +61,7 @@ impl OffsetSolver {
             let change = self.solve(&hessians, pulls);
             offsets.iter_mut().zip(change).for_each(|(d, change)| *d += change);
         }
-        base.iter().zip(&offsets).map(|(&p, &d)| (p + d).to_array()).collect()
+        base.iter().zip(&self.first).map(|(&p, &first)| (p + offsets[first as usize]).to_array()).collect()
     }
 
     fn normals(&self, vertices: &[DVec3]) -> Vec<DVec3> {

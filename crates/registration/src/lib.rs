@@ -18,6 +18,6 @@ pub use fit::{FitOptions, Target};
 pub use matching::OrientedPoints;
 pub use nearest::NearestPoints;
 pub use observation::{Observation, ObservationError, ObservationNotes, ObservationOptions};
-pub use orientation::outward;
+pub use orientation::{outward, welded};
 pub use sampling::{SurfacePoint, farthest, sample_surface};
 pub use template::{RegistrationError, Template, TemplateOptions};

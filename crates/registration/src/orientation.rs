@@ -36,8 +36,8 @@ pub fn outward(vertices: &[Point], triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
     oriented(vertices, triangles).triangles
 }
 
-/// The first vertex at each one's place.
-fn welded(vertices: &[Point]) -> Vec<u32> {
+/// The first vertex at each one's place: scans double vertices along the seams of their textures, where no surface is cut.
+pub fn welded(vertices: &[Point]) -> Vec<u32> {
     let mut first = HashMap::with_capacity(vertices.len());
     // 0 and −0 are one place.
     let key = |p: &Point| p.map(|x| (x + 0.0).to_bits());

@@ -8,6 +8,7 @@ use faer::{Mat, MatRef};
 use glam::DVec3;
 
 use crate::matching::join;
+use crate::orientation::welded;
 use crate::rigidity::{Rigidity, node_edges};
 use crate::sampling::{SurfacePoint, area_normal, farthest, sample_surface};
 use crate::sparse_rows::{SparseRows, vectors};
@@ -86,7 +87,7 @@ const MAX_CANDIDATES: usize = 20_000;
 const NODE_NORMAL: f64 = 0.1;
 
 impl Template {
-    /// From a rest pose, a cage around it and the coordinates, n × m, one column per vertex of the cage.
+    /// From a rest pose, a cage around it and the coordinates, n × m, one column per vertex of the cage. Vertices at the same place count as one.
     ///
     /// # Errors
     /// See [`RegistrationError`].
@@ -126,7 +127,10 @@ impl Template {
         });
         let mut scaled = gram(coordinates.as_ref(), BLOCK_ROWS);
         scaled *= faer::Scale(1.0 / (samples.len() as f64 * diagonal * diagonal));
-        let rigidity = rigidity(rest, cage, phi, diagonal, options);
+        let first = welded(&rest.vertices);
+        let joined: Vec<[u32; 3]> = rest.triangles.iter().map(|t| t.map(|v| first[v as usize])).collect();
+        let joined = TriMesh { vertices: rest.vertices.clone(), triangles: joined };
+        let rigidity = rigidity(&joined, cage, phi, diagonal, options);
         Ok(Self {
             diagonal,
             samples,

@@ -1,0 +1,193 @@
+//! One animation from surfaces that share nothing: `recover`.
+
+use crate::refused::refused;
+use crate::support::{Dir, measure, mean, polygons, read_frames};
+use cager_demo::{Capture, Options};
+use cager_geometry::mesh::{Model, Point, TriMesh};
+use cager_geometry::vector::{add, centroid};
+use cager_registration::{Observation, ObservationOptions};
+use std::fmt::Write;
+
+/// The built-in figure and some frames of it.
+struct Dance {
+    rest: Model,
+    frames: Vec<Vec<f64>>,
+}
+
+impl Dance {
+    fn new() -> Self {
+        let capture = Capture::new(&Options { points: 1500, frames: 40, cage_vertices: 120 });
+        let mut frame = Vec::new();
+        let frames = (0..8).map(|t| {
+            capture.frame(t, &mut frame);
+            frame.clone()
+        });
+        let frames: Vec<Vec<f64>> = frames.collect();
+        // The template is the figure as it stands in the first frame.
+        let rest = Model { points: frames[0].as_chunks().0.to_vec(), ..capture.rest };
+        Self { rest, frames }
+    }
+
+    fn posed(&self, frame: usize) -> Model {
+        Model { points: self.frames[frame].as_chunks().0.to_vec(), ..self.rest.clone() }
+    }
+
+    /// Points drawn anew of a frame, with normals.
+    fn seen(&self, frame: usize, points: usize) -> Observation {
+        let mesh = TriMesh::from(&self.posed(frame));
+        let options = ObservationOptions { points, seed: 77 + frame as u64 };
+        Observation::of_mesh(&mesh.vertices, &mesh.triangles, &options).expect("a surface").0
+    }
+}
+
+pub(crate) fn ply(seen: &Observation, normals: bool) -> String {
+    let mut text = format!("ply\nformat ascii 1.0\nelement vertex {}\n", seen.points.len());
+    let names: &[&str] = if normals { &["x", "y", "z", "nx", "ny", "nz"] } else { &["x", "y", "z"] };
+    names.iter().for_each(|name| writeln!(text, "property float {name}").expect("text"));
+    text += "end_header\n";
+    for ([x, y, z], [a, b, c]) in seen.points.iter().zip(&seen.normals) {
+        let end = if normals { format!(" {a} {b} {c}") } else { String::new() };
+        writeln!(text, "{x} {y} {z}{end}").expect("text");
+    }
+    text
+}
+
+/// A mesh with other vertices than the model: the centre of each face, joined to its corners, each face's own, in another order, turned inwards if so asked.
+fn remeshed(model: &Model, inwards: bool) -> Model {
+    let (mut points, mut faces) = (Vec::<Point>::new(), Vec::new());
+    let triangles = model.faces.triangulated();
+    for triangle in triangles.iter().rev() {
+        let corners = triangle.map(|v| model.points[v as usize]);
+        let first = points.len() as u32;
+        points.extend(corners);
+        points.push(centroid(corners));
+        for (a, b) in [(0, 1), (1, 2), (2, 0)] {
+            let (a, b) = if inwards { (b, a) } else { (a, b) };
+            faces.push(vec![first + a, first + b, first + 3]);
+        }
+    }
+    Model { points, faces: polygons(faces), ..Model::default() }
+}
+
+/// Where the recovered points are, off the true ones, as a share of the diagonal: root mean square of each frame.
+fn error(dir: &Dir, dance: &Dance) -> f64 {
+    dir.cager("decode out.cager -o out.npy --overwrite").succeeds();
+    let found = read_frames(&dir.path("out.npy"), dance.rest.points.len());
+    assert_eq!(found.len(), dance.frames.len());
+    mean(&measure(&dance.rest.points, &dance.frames, &found).l2)
+}
+
+const RECOVER: &str = "recover --template rest.obj --frames scan_*.ply -o out.cager";
+
+#[test]
+fn a_figure_is_recovered_from_clouds_drawn_anew_in_every_frame() {
+    let (dir, dance) = (Dir::new(), Dance::new());
+    dir.model("rest.obj", &dance.rest);
+    for frame in 0..dance.frames.len() {
+        dir.write(&format!("scan_{}.ply", 5 + frame), ply(&dance.seen(frame, 4000 + 100 * frame), true));
+    }
+    let said = dir.cager(&format!("{RECOVER} --report report.json --fps 25")).succeeds();
+    assert_eq!(said.stderr, "");
+    assert!(said.stdout.contains("8 frames of") && said.stdout.contains("0 lost"), "{}", said.stdout);
+    let moved = measure(&dance.rest.points, &dance.frames, &vec![dance.frames[0].clone(); 8]);
+    let found = error(&dir, &dance);
+    assert!(found < 0.006 && found < 0.15 * mean(&moved.l2), "{found} of {}", mean(&moved.l2));
+
+    let report = dir.json("report.json");
+    let frames = report["frames"].as_array().expect("frames");
+    assert_eq!((frames.len(), frames[0]["number"].as_f64()), (8, Some(5.0)));
+    assert!(frames.iter().all(|frame| frame["from_surface"]["mean"].as_f64().expect("a distance") < 0.002));
+    assert!(report["lost"].as_array().expect("a list").is_empty());
+    // The numbers of the files and the rate are those of the capture.
+    let shown = dir.cager("inspect out.cager --json").succeeds();
+    let shown: serde_json::Value = serde_json::from_str(&shown.stdout).expect("JSON");
+    assert_eq!(shown["frame_rate"].as_f64(), Some(25.0));
+    assert_eq!(shown["frame_numbers"][7].as_f64(), Some(12.0));
+
+    // The same on any number of threads.
+    let first = dir.read("out.cager");
+    dir.cager(&format!("{RECOVER} --overwrite --threads 1 --fps 25")).succeeds();
+    assert!(dir.read("out.cager") == first, "another number of threads gives another file");
+}
+
+#[test]
+fn inward_meshes_and_clouds_without_normals_are_followed_and_told() {
+    let (dir, dance) = (Dir::new(), Dance::new());
+    dir.model("rest.obj", &dance.rest);
+    for frame in 0..dance.frames.len() {
+        let name = format!("scan_{frame}.ply");
+        if frame % 2 == 0 {
+            cager_formats::write_model(&dir.path(&name), &remeshed(&dance.posed(frame), frame == 4)).expect("a mesh");
+        } else {
+            dir.write(&name, ply(&dance.seen(frame, 6000), false));
+        }
+    }
+    let said = dir.cager(&format!("{RECOVER} --offsets --max-error 1e-3")).succeeds();
+    assert!(said.stderr.contains("faced inwards, and was turned, in frames: 4\n"), "{}", said.stderr);
+    assert!(said.stderr.contains("normals, so they were estimated, in frames: 1, 3, 5, 7\n"), "{}", said.stderr);
+    let found = error(&dir, &dance);
+    assert!(found < 0.008, "{found}");
+}
+
+#[test]
+fn templates_that_are_turned_or_of_another_size_are_refused_and_brought_to_the_first_surface_when_asked() {
+    let (dir, dance) = (Dir::new(), Dance::new());
+    for frame in 0..dance.frames.len() {
+        dir.write(&format!("scan_{frame}.ply"), ply(&dance.seen(frame, 5000), true));
+    }
+    let (sine, cosine) = 1.2_f64.sin_cos();
+    let changed = |scale: f64, turn: bool| {
+        let place = |&[x, y, z]: &Point| {
+            let [a, b] = if turn { [cosine * x - sine * y, sine * x + cosine * y] } else { [x, y] };
+            add([a, b, z].map(|x| scale * x), [0.0, 0.1, 0.0])
+        };
+        Model { points: dance.rest.points.iter().map(place).collect(), ..dance.rest.clone() }
+    };
+    dir.model("rest.obj", &changed(1.0, true));
+    refused(&dir, RECOVER, &["scan_0.ply", "turned by", "--align auto"]);
+    dir.cager(&format!("{RECOVER} --align auto")).succeeds();
+    let found = error(&dir, &dance);
+    assert!(found < 0.008, "{found}");
+
+    dir.model("rest.obj", &changed(1.15, false));
+    dir.cager("decode out.cager -o before.npy").succeeds();
+    refused(&dir, &format!("{RECOVER} --overwrite"), &["scan_0.ply", "times as large", "--scale auto"]);
+    let said = dir.cager(&format!("{RECOVER} --overwrite --scale auto")).succeeds();
+    assert!(said.stdout.contains("scaled by 0.8"), "{}", said.stdout);
+    let found = error(&dir, &dance);
+    assert!(found < 0.012, "{found}");
+}
+
+#[test]
+fn frames_without_a_surface_are_refused_by_name_and_passed_over_by_force() {
+    let (dir, dance) = (Dir::new(), Dance::new());
+    dir.model("rest.obj", &dance.rest);
+    for frame in 0..4 {
+        dir.write(&format!("scan_{frame}.ply"), ply(&dance.seen(frame, 4000), true));
+    }
+    let line = Observation { points: vec![[1.0, 2.0, 3.0]; 50], normals: vec![[0.0; 3]; 50] };
+    for (text, words) in [
+        (ply(&line, false), ["scan_2.ply", "frame 2", "one line only"]),
+        (ply(&line, true), ["scan_2.ply", "frame 2", "no normal at vertex 0"]),
+        (ply(&Observation { points: vec![[0.0; 3]; 3], normals: vec![[0.0; 3]; 3] }, false), ["scan_2.ply", "3 points", "at least"]),
+        (ply(&dance.seen(2, 100), true).replacen("\n0.", "\nnan ", 1).replacen("\n-0.", "\nnan ", 1), ["scan_2.ply", "NaN", "repair"]),
+    ] {
+        dir.write("scan_2.ply", text);
+        refused(&dir, RECOVER, &words);
+    }
+    dir.write("scan_2.ply", ply(&line, false));
+    let said = dir.cager(&format!("{RECOVER} --force")).succeeds();
+    assert!(said.stderr.contains("stays as it was, in frames: 2\n"), "{}", said.stderr);
+    let names: Vec<String> = dir.names("");
+    assert_eq!(names, ["out.cager", "rest.obj", "scan_0.ply", "scan_1.ply", "scan_2.ply", "scan_3.ply"]);
+}
+
+#[test]
+fn what_is_no_template_and_what_holds_no_frames_is_refused() {
+    let (dir, dance) = (Dir::new(), Dance::new());
+    dir.model("cloud.obj", &Model { points: dance.rest.points.clone(), ..Model::default() });
+    dir.model("rest.obj", &dance.rest);
+    dir.write("scan_0.ply", ply(&dance.seen(0, 4000), true));
+    refused(&dir, &RECOVER.replace("rest.obj", "cloud.obj"), &["cloud.obj", "no faces"]);
+    refused(&dir, &RECOVER.replace("scan_*", "other_*"), &["other_*.ply", "no mesh files"]);
+}
