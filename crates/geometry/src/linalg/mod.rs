@@ -3,6 +3,8 @@
 mod eigen;
 mod factors;
 mod products;
+mod rotation;
+mod small;
 mod sparse;
 pub mod svd;
 mod zeros;
@@ -16,5 +18,7 @@ pub use products::{
     BLOCK_ROWS, TILE_COLUMNS, TILE_ROWS, accumulate_product, gram, lower_product, mirrored, multiply, product, rows_of,
     tall_product, transposed_product,
 };
+pub use rotation::nearest_rotation;
+pub use small::symmetric_eigen;
 pub use sparse::SparseMatrix;
 pub use zeros::zeros;

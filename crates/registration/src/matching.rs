@@ -1,0 +1,41 @@
+//! Matches of points with normals, by both.
+
+use cager_geometry::vector::Point;
+use glam::DVec3;
+
+use crate::nearest::NearestPoints;
+
+/// Oriented points in a tree over six dimensions: position, and unit normal times a length. The nearest there is near in space and faces the same
+/// way, so that a finger is not matched with the back of its neighbour.
+pub struct OrientedPoints {
+    tree: NearestPoints<6>,
+    normal_length: f64,
+}
+
+impl OrientedPoints {
+    /// Points and their unit normals; a normal counts as much as a distance of `normal_length`.
+    ///
+    /// # Panics
+    /// Without any point.
+    pub fn new(points: &[Point], normals: &[Point], normal_length: f64) -> Self {
+        let joined = points.iter().zip(normals).map(|(&p, &n)| join(p, n, normal_length));
+        Self { tree: NearestPoints::new(joined), normal_length }
+    }
+
+    /// The number of the nearest point, and the squared distance in six dimensions.
+    pub fn nearest(&self, point: Point, normal: Point) -> (usize, f64) {
+        self.tree.nearest(join(point, normal, self.normal_length))
+    }
+}
+
+/// A point with its normal in six dimensions.
+pub(crate) fn join(point: Point, normal: Point, normal_length: f64) -> [f64; 6] {
+    let ([x, y, z], [a, b, c]) = (point, normal.map(|x| normal_length * x));
+    [x, y, z, a, b, c]
+}
+
+/// How much a match counts: nothing where the surfaces face more than about 78° apart, less the further apart they are.
+pub(crate) fn match_weight(cosine: f64, offset: DVec3, reach: f64) -> f64 {
+    const MIN_COSINE: f64 = 0.2;
+    if cosine > MIN_COSINE { cosine / (1.0 + offset.length_squared() / (reach * reach)).powi(2) } else { 0.0 }
+}

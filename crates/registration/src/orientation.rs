@@ -1,0 +1,146 @@
+//! Triangles turned to face outwards.
+
+use std::collections::HashMap;
+
+use cager_geometry::vector::{Point, mean};
+
+use crate::observation::volume6;
+
+/// Triangles that face outwards, as far as that can be told.
+pub(crate) struct Oriented {
+    pub(crate) triangles: Vec<[u32; 3]>,
+    /// Faces that ran against their neighbours.
+    pub(crate) turned_faces: usize,
+    /// Whether all were turned.
+    pub(crate) turned: bool,
+}
+
+/// Turns faces that run against their neighbours, part by part, then all of them where the whole encloses a negative volume. Vertices at the
+/// same place are one: scans double them along seams of their textures.
+pub(crate) fn oriented(vertices: &[Point], triangles: &[[u32; 3]]) -> Oriented {
+    let welded = welded(vertices);
+    let joined: Vec<[u32; 3]> = triangles.iter().map(|t| t.map(|v| welded[v as usize])).collect();
+    let links = links(&joined);
+    let mut triangles = triangles.to_vec();
+    let against = links.iter().any(|link| link.against);
+    let turned_faces = if against { turn_parts(vertices, &mut triangles, &links) } else { 0 };
+    let turned = volume6(vertices, &triangles, mean(vertices)) < 0.0;
+    if turned {
+        triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    }
+    Oriented { triangles, turned_faces, turned }
+}
+
+/// The first vertex at each one's place.
+fn welded(vertices: &[Point]) -> Vec<u32> {
+    let mut first = HashMap::with_capacity(vertices.len());
+    // 0 and −0 are one place.
+    let key = |p: &Point| p.map(|x| (x + 0.0).to_bits());
+    vertices.iter().enumerate().map(|(k, p)| *first.entry(key(p)).or_insert(k as u32)).collect()
+}
+
+/// Two faces that meet at an edge of no other face.
+struct Link {
+    faces: [u32; 2],
+    /// Whether they run along it in the same direction, one of them wrongly.
+    against: bool,
+}
+
+fn links(triangles: &[[u32; 3]]) -> Vec<Link> {
+    let mut sides: Vec<([u32; 2], u32, bool)> = Vec::with_capacity(3 * triangles.len());
+    for (face, &[a, b, c]) in triangles.iter().enumerate() {
+        let real = [[a, b], [b, c], [c, a]].into_iter().filter(|[u, v]| u != v);
+        sides.extend(real.map(|[u, v]| ([u.min(v), u.max(v)], face as u32, u < v)));
+    }
+    sides.sort_unstable();
+    sides
+        .chunk_by(|a, b| a.0 == b.0)
+        .filter_map(|at| match at {
+            [(_, f, forth), (_, g, back)] => Some(Link { faces: [*f, *g], against: forth == back }),
+            _ => None,
+        })
+        .collect()
+}
+
+/// Turns faces so that linked ones agree where they can, and each part so that it encloses a positive volume. How many were turned.
+fn turn_parts(vertices: &[Point], triangles: &mut [[u32; 3]], links: &[Link]) -> usize {
+    let mut of_face: Vec<Vec<(u32, bool)>> = vec![Vec::new(); triangles.len()];
+    for &Link { faces: [f, g], against } in links {
+        of_face[f as usize].push((g, against));
+        of_face[g as usize].push((f, against));
+    }
+    let mut turn: Vec<Option<bool>> = vec![None; triangles.len()];
+    let mut turned = 0;
+    for first in 0..triangles.len() {
+        if turn[first].is_some() {
+            continue;
+        }
+        turn[first] = Some(false);
+        let mut part = vec![first];
+        let mut next = 0;
+        while let Some(&face) = part.get(next) {
+            let own = turn[face] == Some(true);
+            for &(other, against) in &of_face[face] {
+                if turn[other as usize].is_none() {
+                    turn[other as usize] = Some(own != against);
+                    part.push(other as usize);
+                }
+            }
+            next += 1;
+        }
+        let turned_to = |face: usize, turn: bool| {
+            let [a, b, c] = triangles[face];
+            if turn { [a, c, b] } else { [a, b, c] }
+        };
+        let faces: Vec<[u32; 3]> = part.iter().map(|&face| turned_to(face, turn[face] == Some(true))).collect();
+        let corners: Vec<Point> = faces.iter().flatten().map(|&v| vertices[v as usize]).collect();
+        let inside_out = volume6(vertices, &faces, mean(&corners)) < 0.0;
+        for &face in &part {
+            if (turn[face] == Some(true)) != inside_out {
+                triangles[face].swap(1, 2);
+                turned += 1;
+            }
+        }
+    }
+    turned
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A cube of side 2, each face of which has vertices of its own.
+    fn cube() -> (Vec<Point>, Vec<[u32; 3]>) {
+        let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+        for axis in 0..3 {
+            for side in [-1.0, 1.0] {
+                let first = vertices.len() as u32;
+                for (u, v) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
+                    let mut p = [0.0; 3];
+                    (p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]) = (side, u, side * v);
+                    vertices.push(p);
+                }
+                triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+            }
+        }
+        (vertices, triangles)
+    }
+
+    #[test]
+    fn a_cube_with_doubled_vertices_comes_out_outward_however_its_faces_run() {
+        let (vertices, triangles) = cube();
+        let right = oriented(&vertices, &triangles);
+        assert_eq!((right.turned_faces, right.turned), (0, false));
+        let inward: Vec<[u32; 3]> = triangles.iter().map(|&[a, b, c]| [a, c, b]).collect();
+        let found = oriented(&vertices, &inward);
+        assert_eq!((found.turned_faces, found.turned, found.triangles), (0, true, triangles.clone()));
+        let mixed: Vec<[u32; 3]> = triangles
+            .iter()
+            .enumerate()
+            .map(|(k, &[a, b, c])| if k % 5 == 0 { [a, c, b] } else { [a, b, c] })
+            .collect();
+        let found = oriented(&vertices, &mixed);
+        assert_eq!((found.turned_faces, found.turned), (3, false));
+        assert!((volume6(&vertices, &found.triangles, [9.0, 0.0, 0.0]) - 48.0).abs() < 1e-12);
+    }
+}

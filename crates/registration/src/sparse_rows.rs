@@ -1,0 +1,91 @@
+//! Coordinates whose small entries are left out, for the many products of a solver that needs no more.
+
+use cager_geometry::vector::Point;
+use faer::MatRef;
+use glam::{DVec3, Vec3A};
+use rayon::prelude::*;
+
+/// The larger entries of coordinates in single precision, by rows and by columns. Rows are scaled to sum to one as coordinates do, so that what moves the whole
+/// cage moves every point.
+pub(crate) struct SparseRows {
+    rows: Compressed,
+    columns: Compressed,
+}
+
+/// Lists of (number, value), back to back.
+struct Compressed {
+    first: Vec<u32>,
+    entries: Vec<(u32, f32)>,
+}
+
+/// Products with fewer entries are computed by one thread.
+const MIN_PARALLEL_ENTRIES: usize = 20_000;
+
+impl SparseRows {
+    /// The entries of a matrix that are larger than `threshold`, absolute.
+    pub(crate) fn new(matrix: MatRef<'_, f64>, threshold: f64) -> Self {
+        let mut rows: Vec<Vec<(u32, f32)>> = Vec::with_capacity(matrix.nrows());
+        let mut columns: Vec<Vec<(u32, f32)>> = vec![Vec::new(); matrix.ncols()];
+        for i in 0..matrix.nrows() {
+            let row = matrix.row(i);
+            let kept: Vec<(u32, f64)> =
+                (0..matrix.ncols()).map(|j| (j as u32, row[j])).filter(|(_, x)| x.abs() > threshold).collect();
+            let sum: f64 = kept.iter().map(|(_, x)| x).sum();
+            rows.push(kept.iter().map(|&(j, x)| (j, (x / sum) as f32)).collect());
+            rows[i].iter().for_each(|&(j, x)| columns[j as usize].push((i as u32, x)));
+        }
+        Self { rows: Compressed::new(&rows), columns: Compressed::new(&columns) }
+    }
+
+    /// `A x`.
+    pub(crate) fn times(&self, x: &[Vec3A]) -> Vec<Vec3A> {
+        self.rows.times(x)
+    }
+
+    /// `Aᵀ y`.
+    pub(crate) fn transposed_times(&self, y: &[Vec3A]) -> Vec<Vec3A> {
+        self.columns.times(y)
+    }
+}
+
+impl Compressed {
+    fn new(lists: &[Vec<(u32, f32)>]) -> Self {
+        let ends = lists.iter().scan(0, |sum, list| {
+            *sum += list.len() as u32;
+            Some(*sum)
+        });
+        Self { first: std::iter::once(0).chain(ends).collect(), entries: lists.concat() }
+    }
+
+    fn times(&self, x: &[Vec3A]) -> Vec<Vec3A> {
+        let row = |i: usize| -> Vec3A {
+            let entries = &self.entries[self.first[i] as usize..self.first[i + 1] as usize];
+            entries.iter().fold(Vec3A::ZERO, |sum, &(j, value)| sum + value * x[j as usize])
+        };
+        let lists = self.first.len() - 1;
+        if self.entries.len() < MIN_PARALLEL_ENTRIES {
+            return (0..lists).map(row).collect();
+        }
+        (0..lists).into_par_iter().with_min_len(128).map(row).collect()
+    }
+}
+
+/// Points as a matrix, n × 3.
+pub(crate) fn matrix(points: &[DVec3]) -> faer::Mat<f64> {
+    faer::Mat::from_fn(points.len(), 3, |i, k| points[i][k])
+}
+
+/// The rows of an n × 3 matrix as points.
+pub(crate) fn points(matrix: MatRef<'_, f64>) -> Vec<DVec3> {
+    (0..matrix.nrows()).map(|i| DVec3::new(matrix[(i, 0)], matrix[(i, 1)], matrix[(i, 2)])).collect()
+}
+
+/// As vectors.
+pub(crate) fn vectors(points: &[Point]) -> Vec<DVec3> {
+    points.iter().map(|&p| DVec3::from(p)).collect()
+}
+
+/// The rows of an n × 3 matrix in single precision.
+pub(crate) fn single(matrix: MatRef<'_, f64>) -> Vec<Vec3A> {
+    (0..matrix.nrows()).map(|i| DVec3::new(matrix[(i, 0)], matrix[(i, 1)], matrix[(i, 2)]).as_vec3a()).collect()
+}
