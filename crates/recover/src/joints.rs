@@ -25,7 +25,9 @@ pub struct MarkedJoints {
 #[derive(Debug, thiserror::Error)]
 pub enum JointsError {
     /// Names, parents and positions differ in number, or there are none.
-    #[error("there are {names} names, {parents} parents and {positions} positions of joints; each joint needs all three")]
+    #[error(
+        "there are {names} names, {parents} parents and {positions} positions of joints; each joint needs all three"
+    )]
     Counts {
         /// Names there are.
         names: usize,
@@ -61,7 +63,9 @@ impl MarkedJoints {
         if names == 0 || names != parents || names != positions {
             return Err(JointsError::Counts { names, parents, positions });
         }
-        let in_order = |(k, parent): (usize, &Option<usize>)| if k == 0 { parent.is_none() } else { parent.is_some_and(|p| p < k) };
+        let in_order = |(k, parent): (usize, &Option<usize>)| {
+            if k == 0 { parent.is_none() } else { parent.is_some_and(|p| p < k) }
+        };
         self.parents.iter().enumerate().position(|at| !in_order(at)).map_or(Ok(()), |k| Err(JointsError::Order(k)))
     }
 }

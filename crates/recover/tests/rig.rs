@@ -23,9 +23,16 @@ fn a_rig_is_placed_in_people_of_any_size_and_encloses_them() {
         for scale in [1.0, 100.0] {
             let vertices = rest.vertices.iter().map(|p| p.map(|x| x * scale)).collect();
             let template = TriMesh { vertices, triangles: rest.triangles.clone() };
-            let PlacedRig { rig, enclosure } = place(&template, &PlacementOptions { up, ..Default::default() }).unwrap();
-            eprintln!("{name}: {} of {} points outside, at most {:.2} % of the height; corners moved {:.1} %; looks along {:?}",
-                enclosure.outside.len(), template.vertices.len(), 100.0 * enclosure.farthest, 100.0 * enclosure.moved, rig.forward);
+            let PlacedRig { rig, enclosure } =
+                place(&template, &PlacementOptions { up, ..Default::default() }).unwrap();
+            eprintln!(
+                "{name}: {} of {} points outside, at most {:.2} % of the height; corners moved {:.1} %; looks along {:?}",
+                enclosure.outside.len(),
+                template.vertices.len(),
+                100.0 * enclosure.farthest,
+                100.0 * enclosure.moved,
+                rig.forward
+            );
             if let Some(folder) = std::env::var_os("RIG_OUT").filter(|_| scale == 1.0) {
                 std::fs::write(std::path::Path::new(&folder).join(format!("{name}.json")), rig.to_json()).unwrap();
             }
@@ -43,9 +50,8 @@ fn a_rig_is_placed_in_people_of_any_size_and_encloses_them() {
 #[test]
 fn what_is_wrong_with_a_rig_file_is_named() {
     let quad = r#"{"name":"tail","joint":[0,0,0],"corners":[[0,0,0],[0,0,0],[0,0,0],[0,0,0]]}"#;
-    let file = |quads: &str| {
-        format!(r#"{{"up":[0,1,0],"forward":[0,0,1],"crotch":[[0,0,0],[0,0,0]],"quads":[{quads}]}}"#)
-    };
+    let file =
+        |quads: &str| format!(r#"{{"up":[0,1,0],"forward":[0,0,1],"crotch":[[0,0,0],[0,0,0]],"quads":[{quads}]}}"#);
     let read = |text: &str| Rig::from_json(text.as_bytes()).unwrap_err();
     assert_eq!(read(&file(quad)), RigError::UnknownQuad("tail".to_owned()));
     let waist = quad.replace("tail", "waist");
@@ -53,5 +59,8 @@ fn what_is_wrong_with_a_rig_file_is_named() {
     assert_eq!(read(&file(&waist)), RigError::MissingQuad("pelvis"));
     assert!(matches!(read("{}"), RigError::Syntax(_)));
     let ball = TriMesh { vertices: vec![[0.0; 3]; 4], triangles: vec![[0, 1, 2]] };
-    assert!(matches!(place(&ball, &PlacementOptions::default()).unwrap_err(), RigError::NoSurface { points: 4, faces: 1 }));
+    assert!(matches!(
+        place(&ball, &PlacementOptions::default()).unwrap_err(),
+        RigError::NoSurface { points: 4, faces: 1 }
+    ));
 }

@@ -58,7 +58,8 @@ impl Examples {
         }
         let weights = PoseWeights::of(rig);
         let n = poses.len();
-        let mean: Vec<f64> = (0..QUAD_UNKNOWNS).map(|j| poses.iter().map(|pose| pose[j]).sum::<f64>() / n as f64).collect();
+        let mean: Vec<f64> =
+            (0..QUAD_UNKNOWNS).map(|j| poses.iter().map(|pose| pose[j]).sum::<f64>() / n as f64).collect();
         let mut centered = zeros(n, QUAD_UNKNOWNS);
         for (i, pose) in poses.iter().enumerate() {
             for j in 0..QUAD_UNKNOWNS {

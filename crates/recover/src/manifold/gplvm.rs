@@ -226,7 +226,8 @@ impl Problem {
         let factor = cholesky(Mat::from_fn(n, n, |i, j| self.back[(i, j)] + if i == j { 1e-3 } else { 0.0 }))?;
         let mut a = Mat::from_fn(n, self.dims, |i, k| latent[i][k]);
         solve_cholesky(factor.as_ref(), &mut a);
-        let mut unknowns: Vec<f64> = (0..self.dims).flat_map(|k| a.col(k).iter().copied().collect::<Vec<_>>()).collect();
+        let mut unknowns: Vec<f64> =
+            (0..self.dims).flat_map(|k| a.col(k).iter().copied().collect::<Vec<_>>()).collect();
         unknowns.extend([0.0, 0.5_f64.ln(), 50.0_f64.ln()]);
         Some(unknowns)
     }
@@ -298,7 +299,11 @@ mod tests {
             };
             let difference = (cost(x + step) - cost(x - step)) / (2.0 * step);
             at[k] = x;
-            assert!((difference - gradient[k]).abs() < 1e-6 * difference.abs().max(1.0), "{k}: {difference} {}", gradient[k]);
+            assert!(
+                (difference - gradient[k]).abs() < 1e-6 * difference.abs().max(1.0),
+                "{k}: {difference} {}",
+                gradient[k]
+            );
         }
     }
 }

@@ -1,7 +1,6 @@
 //! One frame: rounds of matching and Gauss–Newton, stage after stage.
 
 use super::equations::NormalEquations;
-use super::matching::{Observation, OrientedPoints};
 use super::model::{CAGE_UNKNOWNS, PersonModel, Sampled};
 use super::options::{FitOptions, Method};
 use super::search::search;
@@ -10,6 +9,7 @@ use crate::manifold::Manifold;
 use crate::rig::{Placement, QUAD_UNKNOWNS, deform};
 use cager_geometry::linalg::zeros;
 use cager_geometry::mesh::Point;
+use cager_registration::{Observation, OrientedPoints};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -84,7 +84,13 @@ impl<'a> PersonFit<'a> {
     }
 
     /// All stages from a placement and latent numbers.
-    fn finish(&self, observed: &Observed<'_>, mut stage: LatentStage<'_>, rounds: [usize; 3], carried: Option<&[f64]>) -> FrameFit {
+    fn finish(
+        &self,
+        observed: &Observed<'_>,
+        mut stage: LatentStage<'_>,
+        rounds: [usize; 3],
+        carried: Option<&[f64]>,
+    ) -> FrameFit {
         let (options, rig, height) = (&self.options, self.model.rig(), self.model.height());
         if options.method == Method::Paper {
             for free in [Free::Placement, Free::Latent, Free::Placement, Free::Latent, Free::Placement, Free::Latent] {
@@ -98,7 +104,9 @@ impl<'a> PersonFit<'a> {
         let target = self.manifold.pose(&latent);
         let on_manifold = deform(rig, &target, &placement).vertices;
         let start = match carried {
-            Some(carried) if options.method == Method::Robust => target.iter().zip(carried).map(|(a, b)| a + b).collect(),
+            Some(carried) if options.method == Method::Robust => {
+                target.iter().zip(carried).map(|(a, b)| a + b).collect()
+            }
             _ => target.clone(),
         };
         let mut quads = QuadStage::new(rig, height, options, placement, [start, target]);
@@ -112,7 +120,14 @@ impl<'a> PersonFit<'a> {
             of_quads.clone()
         };
         let score = self.score(observed, &vertices);
-        FrameFit { placement: quads.placement, latent, pose: quads.pose, vertices, score, stages: [on_manifold, of_quads] }
+        FrameFit {
+            placement: quads.placement,
+            latent,
+            pose: quads.pose,
+            vertices,
+            score,
+            stages: [on_manifold, of_quads],
+        }
     }
 
     /// The stage of placement and latent numbers.
@@ -180,7 +195,8 @@ impl<'a> PersonFit<'a> {
         let unit = self.options.deviation * self.model.height();
         let Observation { points, normals } = observed.observation;
         let matched = |sample: usize, point: usize, count: usize| {
-            let (normal, offset) = (DVec3::from(normals[point]), DVec3::from(sampled.points[sample]) - DVec3::from(points[point]));
+            let (normal, offset) =
+                (DVec3::from(normals[point]), DVec3::from(sampled.points[sample]) - DVec3::from(points[point]));
             let cosine = normal.dot(sampled.normals[sample].into());
             let weight = match robust {
                 true if cosine < MIN_COSINE => 0.0,
@@ -192,7 +208,7 @@ impl<'a> PersonFit<'a> {
         };
         let forth: Vec<usize> = (0..sampled.points.len())
             .into_par_iter()
-            .map(|s| observed.tree.nearest(sampled.points[s], sampled.normals[s]))
+            .map(|s| observed.tree.nearest(sampled.points[s], sampled.normals[s]).0)
             .collect();
         let mut all: Vec<Match> = forth.iter().enumerate().map(|(s, &p)| matched(s, p, forth.len())).collect();
         if robust {
@@ -205,7 +221,7 @@ impl<'a> PersonFit<'a> {
     fn nearest_samples(&self, observed: &Observed<'_>, sampled: &Sampled) -> Vec<usize> {
         let tree = OrientedPoints::new(&sampled.points, &sampled.normals, NORMAL_LENGTH * self.model.diagonal());
         let Observation { points, normals } = observed.observation;
-        observed.chosen.par_iter().map(|&p| tree.nearest(points[p], normals[p])).collect()
+        observed.chosen.par_iter().map(|&p| tree.nearest(points[p], normals[p]).0).collect()
     }
 
     /// See [`FrameFit::score`].

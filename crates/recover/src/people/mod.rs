@@ -6,15 +6,14 @@
 
 mod equations;
 mod fit;
-mod matching;
 mod model;
 mod options;
 mod search;
 mod stages;
 mod track;
 
+pub use cager_registration::Observation;
 pub use fit::{FrameFit, PersonFit};
-pub use matching::Observation;
 pub use model::{ModelError, PersonModel};
 pub use options::{FitOptions, Method, SystemKind};
 pub use track::{TrackedFrame, track};

@@ -6,7 +6,8 @@ use cager_core::cage::{Cage, CageError};
 use cager_core::coordinates::{CoordinatesError, DependentNormals, Derivative};
 use cager_geometry::linalg::{tall_product, zeros};
 use cager_geometry::mesh::{Point, TriMesh, diagonal};
-use cager_geometry::vector::{cross, dot, norm, sub};
+use cager_geometry::vector::{cross, dot, norm};
+use cager_registration::{SurfacePoint, sample_surface};
 use faer::Mat;
 use glam::{DMat3, DVec3};
 
@@ -42,7 +43,9 @@ pub enum ModelError {
     #[error("the template has no coordinates in the rig's cage: {0}")]
     Coordinates(#[from] CoordinatesError),
     /// Points outside the cage.
-    #[error("{outside} of {points} points of the template lie outside the rig's cage; place the rig anew with `cager rig`")]
+    #[error(
+        "{outside} of {points} points of the template lie outside the rig's cage; place the rig anew with `cager rig`"
+    )]
     Outside {
         /// Points outside.
         outside: usize,
@@ -72,15 +75,15 @@ impl PersonModel {
         }
         let heights: Vec<f64> = template.vertices.iter().map(|&p| dot(p, rig.up)).collect();
         let (low, high) = heights.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &x| (l.min(x), h.max(x)));
-        let drawn = drawn(template, samples);
+        let drawn = sample_surface(&template.vertices, &template.triangles, samples, 0);
         if drawn.is_empty() {
             return Err(ModelError::NoSurface);
         }
         let columns = coordinates.phi.ncols();
         let (count, phi) = (drawn.len(), &coordinates.phi);
         let mut at_samples = zeros(columns, 3 * count);
-        for (s, (face, weights)) in drawn.into_iter().enumerate() {
-            let [a, b, c] = template.triangles[face].map(|v| v as usize);
+        for (s, SurfacePoint { face, weights }) in drawn.into_iter().enumerate() {
+            let [a, b, c] = template.triangles[face as usize].map(|v| v as usize);
             for j in 0..columns {
                 let (pa, pb, pc) = (phi[(a, j)], phi[(b, j)], phi[(c, j)]);
                 at_samples[(j, s)] = weights[0] * pa + weights[1] * pb + weights[2] * pc;
@@ -188,27 +191,4 @@ impl SampleDerivative<'_> {
             }
         }
     }
-}
-
-/// Points of the surface, one in each of as many parts of equal area: their faces and the weights of the corners.
-fn drawn(template: &TriMesh, count: usize) -> Vec<(usize, [f64; 3])> {
-    let mut random = fastrand::Rng::with_seed(0);
-    let mut sums = Vec::with_capacity(template.triangles.len());
-    let mut area = 0.0;
-    for triangle in &template.triangles {
-        let [a, b, c] = triangle.map(|v| template.vertices[v as usize]);
-        area += norm(cross(sub(b, a), sub(c, a)));
-        sums.push(area);
-    }
-    if area.is_nan() || area <= 0.0 || area.is_infinite() {
-        return Vec::new();
-    }
-    let draw = |k: usize| {
-        let at = (k as f64 + random.f64()) / count as f64 * area;
-        let face = sums.partition_point(|&sum| sum <= at).min(sums.len() - 1);
-        let (u, v) = (random.f64(), random.f64());
-        let (low, high) = if u < v { (u, v) } else { (v, u) };
-        (face, [low, high - low, 1.0 - high])
-    };
-    (0..count).map(draw).collect()
 }

@@ -1,10 +1,10 @@
 //! Where to begin without a frame before: every example of the manifold under eight headings about the up axis.
 
 use super::fit::{Observed, PersonFit};
-use super::matching::{Observation, OrientedPoints};
 use crate::rig::{Placement, deform};
 use cager_geometry::mesh::Point;
 use cager_geometry::vector::mean;
+use cager_registration::{Observation, OrientedPoints};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -31,7 +31,8 @@ pub(super) fn search(fit: &PersonFit<'_>, observed: &Observed<'_>) -> (Placement
     let mut starts: Vec<(f64, Placement, usize)> = examples
         .par_iter()
         .flat_map_iter(|&example| {
-            let vertices = deform(fit.model.rig(), &manifold.pose(manifold.latent(example)), &Placement::default()).vertices;
+            let vertices =
+                deform(fit.model.rig(), &manifold.pose(manifold.latent(example)), &Placement::default()).vertices;
             let sampled = fit.model.sampled(&vertices);
             let own = DVec3::from(mean(&sampled.points));
             let thin = |all: &[Point]| -> Vec<DVec3> { all.iter().step_by(THIN).map(|&p| p.into()).collect() };
@@ -47,13 +48,13 @@ pub(super) fn search(fit: &PersonFit<'_>, observed: &Observed<'_>) -> (Placement
                     let placement = Placement { rotation, translation: center - rotation * own };
                     let forth = at.iter().zip(&facing).map(|(&p, &n)| {
                         let p = placement.at(p);
-                        let found = observed.tree.nearest(p.to_array(), (rotation * n).to_array());
+                        let found = observed.tree.nearest(p.to_array(), (rotation * n).to_array()).0;
                         p.distance(points[found].into()).min(cap)
                     });
                     let back = seen.iter().map(|&s| {
                         let turned = rotation.transpose() * (DVec3::from(points[s]) - placement.translation);
                         let normal = rotation.transpose() * DVec3::from(normals[s]);
-                        let found = tree.nearest(turned.to_array(), normal.to_array());
+                        let found = tree.nearest(turned.to_array(), normal.to_array()).0;
                         turned.distance(at[found]).min(cap)
                     });
                     let cost = forth.sum::<f64>() / at.len() as f64 + back.sum::<f64>() / seen.len() as f64;

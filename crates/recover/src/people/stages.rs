@@ -141,7 +141,13 @@ pub(super) struct QuadStage<'a> {
 }
 
 impl<'a> QuadStage<'a> {
-    pub(super) fn new(rig: &'a Rig, height: f64, options: &FitOptions, placement: Placement, start: [Vec<f64>; 2]) -> Self {
+    pub(super) fn new(
+        rig: &'a Rig,
+        height: f64,
+        options: &FitOptions,
+        placement: Placement,
+        start: [Vec<f64>; 2],
+    ) -> Self {
         let [pose, target] = start;
         // The paper's own local adjustment holds quads by nothing.
         let held = f64::from(u8::from(options.method == super::Method::Robust));
@@ -175,10 +181,8 @@ impl Stage for QuadStage<'_> {
             let length = bone.length().max(f64::MIN_POSITIVE);
             let along = bone / length * self.bones;
             let residual = self.bones * (length - rest(i).distance(rest(j)));
-            let row: Vec<_> = (0..3)
-                .map(|k| (6 + 6 * i + k, -along[k]))
-                .chain((0..3).map(|k| (6 + 6 * j + k, along[k])))
-                .collect();
+            let row: Vec<_> =
+                (0..3).map(|k| (6 + 6 * i + k, -along[k])).chain((0..3).map(|k| (6 + 6 * j + k, along[k]))).collect();
             equations.add(residual, &row);
         }
     }

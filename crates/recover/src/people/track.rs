@@ -1,7 +1,7 @@
 //! A sequence: each frame from the one before, those that are lost anew, and back again.
 
 use super::fit::{FrameFit, PersonFit};
-use super::matching::Observation;
+use cager_registration::Observation;
 
 /// A frame of a sequence.
 #[derive(Clone, Debug)]
@@ -23,7 +23,12 @@ const WINDOW: usize = 31;
 
 /// Fits a sequence forwards and, where `back` says so, backwards from its end, keeping the better fit of each frame. `done` is told each frame of
 /// the first pass.
-pub fn track(fit: &PersonFit<'_>, observations: &[Observation], back: bool, mut done: impl FnMut(usize, &TrackedFrame)) -> Vec<TrackedFrame> {
+pub fn track(
+    fit: &PersonFit<'_>,
+    observations: &[Observation],
+    back: bool,
+    mut done: impl FnMut(usize, &TrackedFrame),
+) -> Vec<TrackedFrame> {
     let mut frames: Vec<TrackedFrame> = Vec::with_capacity(observations.len());
     for (number, observation) in observations.iter().enumerate() {
         let last = frames.last().filter(|frame| !frame.lost).map(|frame| &frame.fit);

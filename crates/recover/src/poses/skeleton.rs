@@ -94,9 +94,8 @@ impl SkeletonPoses {
     pub fn pose(&self, joints: &[JointPose]) -> Vec<f64> {
         let world = |bone: usize| matrix(&joints[self.joints[bone].0]) * self.alignments[bone];
         let pelvis = world(PELVIS).transpose();
-        let turns: Vec<DMat3> = (0..self.joints.len())
-            .map(|bone| self.to_rig * pelvis * world(bone) * self.to_rig.transpose())
-            .collect();
+        let turns: Vec<DMat3> =
+            (0..self.joints.len()).map(|bone| self.to_rig * pelvis * world(bone) * self.to_rig.transpose()).collect();
         let mut position = [DVec3::ZERO; QUADS];
         let mut rotation = [DMat3::IDENTITY; QUADS];
         position[0] = self.rest[0];

@@ -3,8 +3,8 @@
 //! A pose `y` has six numbers for each quad, in the pelvis frame of the rest pose: the position of its joint and its rotation vector `w`. With the
 //! placement Γ of the pelvis, rotation `G` and translation `t`, a corner with offset `u` from its joint is at `v = G (p + exp(w) u) + t`.
 
-use super::topology::{CAGE_VERTICES, QUADS, owner};
 use super::Rig;
+use super::topology::{CAGE_VERTICES, QUADS, owner};
 use crate::rotation::{exp, right_jacobian, skew};
 use cager_geometry::mesh::Point;
 use glam::{DMat3, DVec3};

@@ -1,7 +1,7 @@
 //! Whether a template lies inside the cage of a rig, and the correction of a rig of which parts stick out.
 
-use super::topology::{CAGE_VERTICES, triangles};
 use super::Rig;
+use super::topology::{CAGE_VERTICES, triangles};
 use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::spatial::{Surface, outside};
 use cager_geometry::vector::{add, cross, dot, norm, sub};

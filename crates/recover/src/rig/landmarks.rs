@@ -115,7 +115,8 @@ impl Landmarks {
         let all = between.filter_map(|level| level.trunk(self.middle)).reduce(Extent::and);
         let nearest = || {
             let near = self.levels.iter().filter(|level| level.trunk(self.middle).is_some());
-            near.min_by(|a, b| (a.y - from).abs().total_cmp(&(b.y - from).abs())).and_then(|level| level.trunk(self.middle))
+            near.min_by(|a, b| (a.y - from).abs().total_cmp(&(b.y - from).abs()))
+                .and_then(|level| level.trunk(self.middle))
         };
         all.or_else(nearest).unwrap_or(Extent { low: DVec3::ZERO, high: DVec3::ZERO })
     }
@@ -136,7 +137,9 @@ impl Landmarks {
         let beside = DVec3::new(chest.center().x + sign * (half_width + 0.01 * height), armpit, chest.center().z);
         let ring = |through: DVec3, normal: DVec3| {
             let parts = body.section(through, normal).into_iter().filter(|part| part.len() > 4);
-            parts.max_by(|a, b| Extent::of(a.iter().copied()).center().y.total_cmp(&Extent::of(b.iter().copied()).center().y))
+            parts.max_by(|a, b| {
+                Extent::of(a.iter().copied()).center().y.total_cmp(&Extent::of(b.iter().copied()).center().y)
+            })
         };
         let upright = ring(beside, DVec3::X * sign).ok_or(none.clone())?;
         let shoulder_center = Extent::of(upright.iter().copied()).center();
@@ -144,7 +147,8 @@ impl Landmarks {
         // Positions along the arm, from the tip: the middle of what is at the same distance along the surface.
         let width = 0.012 * height;
         let at = |d: f64| -> Vec<DVec3> {
-            let near = (0..body.points.len()).filter(|&v| (distance[v] - d).abs() < width && out(body.points[v]) > 0.8 * half_width);
+            let near = (0..body.points.len())
+                .filter(|&v| (distance[v] - d).abs() < width && out(body.points[v]) > 0.8 * half_width);
             near.map(|v| body.points[v]).collect()
         };
         let center = |d: f64| {
@@ -172,9 +176,8 @@ impl Landmarks {
             shoulder_center.z,
         );
         let length = last_d + last_c.distance(joint);
-        let along = |d: f64| {
-            path.iter().min_by(|a, b| (a.0 - d).abs().total_cmp(&(b.0 - d).abs())).map_or(joint, |&(_, c)| c)
-        };
+        let along =
+            |d: f64| path.iter().min_by(|a, b| (a.0 - d).abs().total_cmp(&(b.0 - d).abs())).map_or(joint, |&(_, c)| c);
         let girth = |d: f64| {
             let (c, around) = (along(d), at(d));
             around.iter().map(|p| p.distance(c)).sum::<f64>() / around.len().max(1) as f64
@@ -201,11 +204,14 @@ impl Landmarks {
             let inside = levels.iter().filter(|level| level.y >= from && level.y <= to);
             inside.filter_map(|level| level.leg(middle, sign)).reduce(Extent::and)
         };
-        let at = |y: f64| between(y - 0.012 * height, y + 0.012 * height).unwrap_or(Extent { low: DVec3::Y * y, high: DVec3::Y * y });
+        let at = |y: f64| {
+            between(y - 0.012 * height, y + 0.012 * height).unwrap_or(Extent { low: DVec3::Y * y, high: DVec3::Y * y })
+        };
         let ankle = bottom + 0.054 * height;
         let hip = crotch + 0.036 * height;
         let knee = 0.5 * (ankle + hip);
-        let thigh = between(crotch - 0.09 * height, crotch - 0.01 * height).unwrap_or_else(|| at(crotch - 0.03 * height));
+        let thigh =
+            between(crotch - 0.09 * height, crotch - 0.01 * height).unwrap_or_else(|| at(crotch - 0.03 * height));
         let around_knee = between(knee - 0.05 * height, knee + 0.05 * height).unwrap_or_else(|| at(knee));
         let shin = between(bottom + 0.09 * height, bottom + 0.12 * height).unwrap_or_else(|| at(ankle));
         let low = body.points.iter().filter(|p| p.y < bottom + 0.045 * height && (p.x - middle) * sign > 0.0);

@@ -14,7 +14,7 @@ pub use enclosure::{Enclosure, enclose};
 pub use error::RigError;
 pub use placement::{PlacedRig, PlacementOptions, place};
 pub(crate) use topology::BONES;
-pub use topology::{CAGE_FACES, CAGE_VERTICES, QUADS, QUAD_NAMES, owner, triangles};
+pub use topology::{CAGE_FACES, CAGE_VERTICES, QUAD_NAMES, QUADS, owner, triangles};
 
 use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::vector::cross;

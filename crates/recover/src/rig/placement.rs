@@ -75,7 +75,8 @@ fn axes(template: &TriMesh, options: &PlacementOptions) -> Result<DMat3, RigErro
             let h = (p.dot(up) - low) / (high - low);
             h >= from && h <= to
         });
-        let (low, high) = inside.map(|p| p.dot(ahead)).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        let (low, high) =
+            inside.map(|p| p.dot(ahead)).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
         0.5 * (low + high)
     };
     let forward = if middle(0.0, 0.03) - middle(0.06, 0.12) >= 0.0 { ahead } else { -ahead };
@@ -114,7 +115,8 @@ fn first_rig(marks: &Landmarks) -> Rig {
     quads[0] = Quad { joint: middle(trunk(0.30), pelvis), corners: level(trunk(0.21), pelvis) };
     quads[1] = Quad { joint: middle(trunk(0.58), waist), corners: level(trunk(0.60), waist) };
     quads[2] = Quad { joint: middle(trunk(0.88), chest), corners: level(trunk(0.90), chest) };
-    quads[3] = Quad { joint: middle(marks.neck - 0.015 * h, neck), corners: level(marks.neck + 0.005 * h, neck.and(head)) };
+    quads[3] =
+        Quad { joint: middle(marks.neck - 0.015 * h, neck), corners: level(marks.neck + 0.005 * h, neck.and(head)) };
     quads[4] = Quad { joint: middle(marks.top - 0.012 * h, head), corners: level(marks.top + 0.02 * h, head) };
     for (side, sign) in [(0, 1.0), (TO_RIGHT, -1.0)] {
         let half = usize::from(side > 0);

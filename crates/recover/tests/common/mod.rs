@@ -1,6 +1,8 @@
 //! Captures for tests.
 #![allow(dead_code, unreachable_pub)]
 
+pub mod observe;
+
 use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::topology::UnionFind;
 use std::path::{Path, PathBuf};
@@ -49,7 +51,8 @@ pub fn capture(name: &str, up: usize) -> Capture {
     let at = |f: usize, v: usize| [0, 1, 2].map(|k| f64::from(values[(f * shape[1] + v) * 3 + k]));
     let frames = (0..shape[0]).map(|f| kept.iter().map(|&v| at(f, v)).collect()).collect();
     let heights: Vec<f64> = vertices.iter().map(|p| p[up]).collect();
-    let height = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max) - heights.iter().copied().fold(f64::INFINITY, f64::min);
+    let height = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+        - heights.iter().copied().fold(f64::INFINITY, f64::min);
     Capture { rest: TriMesh { vertices, triangles }, frames, height }
 }
 
