@@ -10,6 +10,8 @@ mod model;
 mod options;
 mod search;
 mod stages;
+#[cfg(test)]
+mod tests;
 mod track;
 
 pub use cager_registration::Observation;

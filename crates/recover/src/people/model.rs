@@ -177,18 +177,15 @@ impl SampleDerivative<'_> {
     pub(super) fn row(&self, sample: usize, direction: DVec3, out: &mut [f64]) {
         let column = self.model.samples.col_as_slice(sample);
         let (phi, psi) = column.split_at(CAGE_VERTICES);
-        for (out, &weight) in out.chunks_exact_mut(3).zip(phi) {
-            let value = direction * weight;
-            (out[0], out[1], out[2]) = (value.x, value.y, value.z);
-        }
+        let mut by = [DVec3::ZERO; CAGE_VERTICES];
+        by.iter_mut().zip(phi).for_each(|(by, &weight)| *by = direction * weight);
         for (([a, b, c], back), &weight) in self.faces.iter().zip(psi) {
             let along = direction * weight;
             let (by_b, by_c) = (back[0] * along, back[1] * along);
-            for k in 0..3 {
-                out[3 * b + k] += by_b[k];
-                out[3 * c + k] += by_c[k];
-                out[3 * a + k] -= by_b[k] + by_c[k];
-            }
+            by[*b] += by_b;
+            by[*c] += by_c;
+            by[*a] -= by_b + by_c;
         }
+        out.chunks_exact_mut(3).zip(&by).for_each(|(out, by)| out.copy_from_slice(&by.to_array()));
     }
 }

@@ -57,7 +57,7 @@ pub struct FitOptions {
     pub vertices: f64,
     /// How tightly bones keep their lengths; one allows 0.4 %.
     pub bones: f64,
-    /// Share of the last frame's offset from the manifold that the next one begins with.
+    /// Share of the last fit's offset from the manifold that the next one keeps: the manifold is shifted by it.
     pub carried: f64,
     /// Rounds of Gauss–Newton in a frame that follows another: latent numbers, quads, vertices.
     pub rounds: [usize; 3],
@@ -72,18 +72,18 @@ impl Default for FitOptions {
         Self {
             method: Method::Robust,
             system: SystemKind::Green,
-            samples: 1500,
-            observed: 1000,
+            samples: 2500,
+            observed: 1500,
             deviation: 0.005,
             reach: [8.0, 4.0],
             prior: 0.3,
             quads: 0.1,
             vertices: 0.005,
             bones: 0.3,
-            carried: 0.7,
+            carried: 0.9,
             rounds: [8, 8, 5],
             first_rounds: [25, 15, 6],
-            candidates: 6,
+            candidates: 8,
         }
     }
 }

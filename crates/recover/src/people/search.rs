@@ -15,11 +15,9 @@ const HEADINGS: usize = 8;
 const EXAMPLES: usize = 96;
 /// Every so manieth sample and chosen point is looked at.
 const THIN: usize = 5;
-/// Rounds of each candidate.
-const ROUNDS: usize = 8;
 
-/// The placement and latent numbers of the best start.
-pub(super) fn search(fit: &PersonFit<'_>, observed: &Observed<'_>) -> (Placement, Vec<f64>) {
+/// Placements and latent numbers of the best starts, best first.
+pub(super) fn search(fit: &PersonFit<'_>, observed: &Observed<'_>) -> Vec<(Placement, Vec<f64>)> {
     let manifold = fit.manifold;
     let tried = manifold.examples().min(EXAMPLES);
     let examples: Vec<usize> = (0..tried).map(|k| k * manifold.examples() / tried).collect();
@@ -28,7 +26,7 @@ pub(super) fn search(fit: &PersonFit<'_>, observed: &Observed<'_>) -> (Placement
     let center = DVec3::from(mean(points));
     let seen: Vec<usize> = observed.chosen.iter().copied().step_by(THIN).collect();
     let cap = 0.1 * fit.model.height();
-    let mut starts: Vec<(f64, Placement, usize)> = examples
+    let mut starts: Vec<(f64, Placement, usize, usize)> = examples
         .par_iter()
         .flat_map_iter(|&example| {
             let vertices =
@@ -58,22 +56,21 @@ pub(super) fn search(fit: &PersonFit<'_>, observed: &Observed<'_>) -> (Placement
                         turned.distance(at[found]).min(cap)
                     });
                     let cost = forth.sum::<f64>() / at.len() as f64 + back.sum::<f64>() / seen.len() as f64;
-                    (cost, placement, example)
+                    (cost, placement, heading, example)
                 })
                 .collect::<Vec<_>>()
         })
         .collect();
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-    starts.truncate(fit.options.candidates.max(1));
-    let mut best: Option<(f64, Placement, Vec<f64>)> = None;
-    for (_, placement, example) in starts {
-        let mut stage = fit.latent_stage(placement, manifold.latent(example).to_vec());
-        fit.run(&mut stage, observed, ROUNDS);
-        let vertices = deform(fit.model.rig(), &manifold.pose(&stage.latent), &stage.placement).vertices;
-        let score = fit.score(observed, &vertices);
-        if best.as_ref().is_none_or(|best| score < best.0) {
-            best = Some((score, stage.placement, stage.latent));
+    // Several of each heading, since the nearest of all may face the wrong way.
+    let mut taken = [0; HEADINGS];
+    let each = fit.options.candidates.div_ceil(2).max(1);
+    let mut chosen = Vec::new();
+    for (_, placement, heading, example) in starts {
+        if taken[heading] < each && chosen.len() < fit.options.candidates.max(1) {
+            taken[heading] += 1;
+            chosen.push((placement, manifold.latent(example).to_vec()));
         }
     }
-    best.map(|(_, placement, latent)| (placement, latent)).unwrap_or_default()
+    chosen
 }

@@ -5,14 +5,15 @@ use super::model::CAGE_UNKNOWNS;
 use super::options::FitOptions;
 use crate::manifold::Manifold;
 use crate::rig::{BONES, CAGE_VERTICES, Deformed, Placement, QUAD_UNKNOWNS, Rig, deform, triangles};
+use cager_geometry::linalg::{multiply, zeros};
 use cager_geometry::mesh::Point;
+use faer::Mat;
 use glam::DVec3;
+use rayon::prelude::*;
 use std::collections::BTreeSet;
 
 /// Unknowns of a fit.
 pub(super) trait Stage {
-    /// How many there are.
-    fn unknowns(&self) -> usize;
     /// The cage under them, for the derivatives.
     fn linearized(&self) -> Linearized;
     /// Adds what holds them back.
@@ -30,38 +31,46 @@ pub(super) struct Linearized {
 enum By {
     Vertices,
     Quads(Deformed),
-    Latent(Deformed, Vec<Vec<f64>>),
-    Placement(Deformed),
-    LatentAlone(Deformed, Vec<Vec<f64>>),
+    /// Through the derivatives of placement and pose by the unknowns: unknowns × (6 + 126).
+    Through(Deformed, Mat<f64>),
 }
 
 impl Linearized {
-    /// Takes a row of derivatives by the vertices to the unknowns; `scratch` has 6 + 126 numbers.
-    pub(super) fn pull(&self, row: &[f64], scratch: &mut [f64], out: &mut [f64]) {
-        let by_latent = |basis: &[Vec<f64>], scratch: &[f64], out: &mut [f64]| {
-            for (out, vector) in out.iter_mut().zip(basis) {
-                *out = vector.iter().zip(&scratch[6..]).map(|(a, b)| a * b).sum();
-            }
-        };
+    /// Numbers of a row before [`Self::through`].
+    pub(super) fn width(&self) -> usize {
+        match self.by {
+            By::Vertices => CAGE_UNKNOWNS,
+            By::Quads(_) | By::Through(..) => 6 + QUAD_UNKNOWNS,
+        }
+    }
+
+    /// Takes a row of derivatives by the vertices to one by placement and pose, or leaves it as it is.
+    pub(super) fn pull(&self, row: &[f64], out: &mut [f64]) {
         match &self.by {
             By::Vertices => out.copy_from_slice(row),
-            By::Quads(deformed) => deformed.pull(row, out),
-            By::Latent(deformed, basis) => {
-                deformed.pull(row, scratch);
-                out[..6].copy_from_slice(&scratch[..6]);
-                by_latent(basis, scratch, &mut out[6..]);
+            By::Quads(deformed) | By::Through(deformed, _) => deformed.pull(row, out),
+        }
+    }
+
+    /// Takes such rows, one column each, to derivatives by the unknowns.
+    pub(super) fn through(&self, rows: Mat<f64>) -> Mat<f64> {
+        match &self.by {
+            By::Through(_, basis) => {
+                let mut out = zeros(basis.nrows(), rows.ncols());
+                let blocks = out.as_mut().par_col_chunks_mut(BLOCK).enumerate();
+                blocks.for_each(|(k, block)| {
+                    let count = block.ncols();
+                    multiply(block, basis.as_ref(), rows.as_ref().subcols(k * BLOCK, count));
+                });
+                out
             }
-            By::Placement(deformed) => {
-                deformed.pull(row, scratch);
-                out.copy_from_slice(&scratch[..6]);
-            }
-            By::LatentAlone(deformed, basis) => {
-                deformed.pull(row, scratch);
-                by_latent(basis, scratch, out);
-            }
+            _ => rows,
         }
     }
 }
+
+/// Columns of a product that one task computes.
+const BLOCK: usize = 256;
 
 /// Which of placement and latent numbers are unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,28 +86,35 @@ pub(super) struct LatentStage<'a> {
     pub(super) manifold: &'a Manifold,
     pub(super) placement: Placement,
     pub(super) latent: Vec<f64>,
+    /// What poses are off the manifold by: it is shifted to pass through the last fit.
+    pub(super) offset: Vec<f64>,
     pub(super) weight: f64,
     pub(super) free: Free,
 }
 
-impl Stage for LatentStage<'_> {
-    fn unknowns(&self) -> usize {
-        match self.free {
-            Free::Both => 6 + self.latent.len(),
-            Free::Placement => 6,
-            Free::Latent => self.latent.len(),
-        }
+impl LatentStage<'_> {
+    /// The pose under the present latent numbers.
+    pub(super) fn pose(&self) -> Vec<f64> {
+        self.manifold.pose(&self.latent).iter().zip(&self.offset).map(|(y, d)| y + d).collect()
     }
+}
 
+impl Stage for LatentStage<'_> {
     fn linearized(&self) -> Linearized {
-        let deformed = deform(self.rig, &self.manifold.pose(&self.latent), &self.placement);
+        let deformed = deform(self.rig, &self.pose(), &self.placement);
         let vertices = deformed.vertices.clone();
-        let basis = || self.manifold.jacobian(&self.latent);
-        let by = match self.free {
-            Free::Both => By::Latent(deformed, basis()),
-            Free::Placement => By::Placement(deformed),
-            Free::Latent => By::LatentAlone(deformed, basis()),
+        let basis = self.manifold.jacobian(&self.latent);
+        let (places, latents) = match self.free {
+            Free::Both => (6, basis.len()),
+            Free::Placement => (6, 0),
+            Free::Latent => (0, basis.len()),
         };
+        let entry = |i: usize, j: usize| match (i.checked_sub(places), j.checked_sub(6)) {
+            (Some(k), Some(y)) => basis[k][y],
+            (None, None) if i == j => 1.0,
+            _ => 0.0,
+        };
+        let by = By::Through(deformed, Mat::from_fn(places + latents, 6 + QUAD_UNKNOWNS, entry));
         Linearized { vertices, by }
     }
 
@@ -157,10 +173,6 @@ impl<'a> QuadStage<'a> {
 }
 
 impl Stage for QuadStage<'_> {
-    fn unknowns(&self) -> usize {
-        6 + QUAD_UNKNOWNS
-    }
-
     fn linearized(&self) -> Linearized {
         let deformed = deform(self.rig, &self.pose, &self.placement);
         Linearized { vertices: deformed.vertices.clone(), by: By::Quads(deformed) }
@@ -211,10 +223,6 @@ impl VertexStage {
 }
 
 impl Stage for VertexStage {
-    fn unknowns(&self) -> usize {
-        CAGE_UNKNOWNS
-    }
-
     fn linearized(&self) -> Linearized {
         Linearized { vertices: self.vertices.clone(), by: By::Vertices }
     }

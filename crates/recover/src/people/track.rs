@@ -14,12 +14,15 @@ pub struct TrackedFrame {
     pub searched: bool,
 }
 
-/// A score this many times the median of the frames before is looked into.
-const SUSPECT: f64 = 1.5;
-/// A frame is lost above this many times the median.
-const LOST: f64 = 2.5;
-/// Frames that the median is of.
+/// A frame whose score is this many times the usual one of the frames before is searched for anew.
+const SUSPECT: f64 = 1.15;
+/// A frame is lost above this many times the usual score.
+const LOST: f64 = 2.0;
+/// Frames that the usual score is of.
 const WINDOW: usize = 31;
+
+/// On the way back, frames whose score is below this many times that of the next one are left as they are.
+const AGREED: f64 = 0.9;
 
 /// Fits a sequence forwards and, where `back` says so, backwards from its end, keeping the better fit of each frame. `done` is told each frame of
 /// the first pass.
@@ -32,7 +35,7 @@ pub fn track(
     let mut frames: Vec<TrackedFrame> = Vec::with_capacity(observations.len());
     for (number, observation) in observations.iter().enumerate() {
         let last = frames.last().filter(|frame| !frame.lost).map(|frame| &frame.fit);
-        let usual = median(frames.iter().rev().take(WINDOW).filter(|frame| !frame.lost).map(|frame| frame.fit.score));
+        let usual = usual_of(frames.iter().rev().take(WINDOW).filter(|frame| !frame.lost).map(|frame| frame.fit.score));
         let mut frame = TrackedFrame { fit: fit.fit(observation, last), lost: false, searched: last.is_none() };
         if !frame.searched && usual.is_some_and(|usual| frame.fit.score > SUSPECT * usual) {
             let anew = fit.fit(observation, None);
@@ -45,10 +48,13 @@ pub fn track(
         frames.push(frame);
     }
     if back {
-        let usual = median(frames.iter().map(|frame| frame.fit.score));
+        let usual = usual_of(frames.iter().map(|frame| frame.fit.score));
         for number in (0..frames.len().saturating_sub(1)).rev() {
             let from = &frames[number + 1];
             if from.lost {
+                continue;
+            }
+            if frames[number].fit.score < AGREED * from.fit.score {
                 continue;
             }
             let again = fit.fit(&observations[number], Some(&from.fit));
@@ -61,8 +67,9 @@ pub fn track(
     frames
 }
 
-fn median(scores: impl Iterator<Item = f64>) -> Option<f64> {
+/// The lower quartile: frames that are off raise it least.
+fn usual_of(scores: impl Iterator<Item = f64>) -> Option<f64> {
     let mut scores: Vec<f64> = scores.collect();
     scores.sort_unstable_by(f64::total_cmp);
-    scores.get(scores.len() / 2).copied()
+    scores.get(scores.len() / 4).copied()
 }
