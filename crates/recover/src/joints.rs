@@ -156,3 +156,41 @@ impl CagedJoints {
         Skeleton { joints: (0..rest.len()).map(joint).collect() }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::people::tests::mannequin;
+    use cager_core::coordinates::Green;
+    use cager_formats::biovision::read_bvh_bytes;
+    use std::path::Path;
+
+    #[test]
+    fn joints_leave_as_bvh_exactly_where_they_are() {
+        let rig = mannequin();
+        let cage = Cage::new(rig.cage()).unwrap();
+        let joints = CagedJoints::new(MarkedJoints::of_rig(&rig), &cage, &Green::Consistent).unwrap();
+        let bent = |p: &Point| [p[0] + 0.1 * p[1] * p[1], p[1] - 0.3 * p[2], p[2] + 0.2 * p[0]];
+        let frames: Vec<Vec<Point>> = [cage.vertices().to_vec(), cage.vertices().iter().map(bent).collect()]
+            .iter()
+            .map(|vertices| joints.positions(vertices))
+            .collect();
+        for (found, marked) in frames[0].iter().zip(&rig.quads) {
+            assert!((0..3).all(|k| (found[k] - marked.joint[k]).abs() < 1e-9), "{found:?} {marked:?}");
+        }
+        let clip = read_bvh_bytes(Path::new("joints.bvh"), &joints.bvh(&frames, 0.04)).unwrap();
+        for (number, frame) in frames.iter().enumerate() {
+            // Files list joints depth first.
+            let poses = clip.skeleton.pose(clip.motion.frame(number));
+            for (name, p) in joints.joints.names.iter().zip(frame) {
+                let found = poses[clip.skeleton.joint(name).unwrap()].position;
+                assert!((0..3).all(|k| (found[k] - p[k]).abs() < 1e-9), "{name}: {found:?} {p:?}");
+            }
+        }
+        let csv = joints.csv(&frames);
+        assert_eq!((csv.lines().count(), csv.lines().nth(1).unwrap().starts_with("0,pelvis,")), (2 * 21 + 1, true));
+        let mut wrong = MarkedJoints::of_rig(&rig);
+        wrong.parents[3] = Some(7);
+        assert!(matches!(CagedJoints::new(wrong, &cage, &Green::Consistent), Err(JointsError::Order(3))));
+    }
+}

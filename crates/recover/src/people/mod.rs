@@ -11,7 +11,7 @@ mod options;
 mod search;
 mod stages;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod track;
 
 pub use cager_registration::Observation;

@@ -78,10 +78,10 @@ impl Default for FitOptions {
             reach: [8.0, 4.0],
             prior: 0.3,
             quads: 0.1,
-            vertices: 0.005,
+            vertices: 0.003,
             bones: 0.3,
-            carried: 0.9,
-            rounds: [8, 8, 5],
+            carried: 0.7,
+            rounds: [6, 7, 4],
             first_rounds: [25, 15, 6],
             candidates: 8,
         }

@@ -14,7 +14,7 @@ pub(crate) fn mannequin() -> Rig {
     let level = |y: f64, x: f64, z: f64| [[x, y, z], [-x, y, z], [-x, y, -z], [x, y, -z]];
     let trunk = [(0.9, 2.0, 1.4), (2.3, 1.7, 1.2), (3.9, 1.8, 1.3), (6.2, 1.1, 1.2), (8.7, 1.1, 1.3)];
     let mut quads: Vec<Quad> =
-        trunk.iter().map(|&(y, x, z)| Quad { joint: [0.0, y, 0.1], corners: level(y, x, z) }).collect();
+        trunk.iter().map(|&(y, x, z)| Quad { joint: [0.0, y - 0.2, 0.1], corners: level(y, x, z) }).collect();
     for s in [1.0, -1.0] {
         for x in [1.9, 3.8, 6.1, 8.2] {
             let corners = [[x * s, 4.5, 0.6], [x * s, 4.5, -0.6], [x * s, 5.7, -0.6], [x * s, 5.7, 0.6]];
@@ -151,5 +151,67 @@ fn derivatives_of_manifolds_and_their_priors_equal_central_differences() {
                 near(row[k], above[r], below[r]);
             }
         }
+    }
+}
+
+#[path = "../../tests/common/mod.rs"]
+mod common;
+
+/// What a rig can do at best: its quads and its vertices fitted to known correspondences.
+#[test]
+fn a_walk_is_followed_closely_where_correspondences_are_known() {
+    if !common::there("makehuman-cmu-walk/rest.obj") {
+        return;
+    }
+    let walk = common::capture("makehuman-cmu-walk", 1);
+    let rig = crate::rig::place(&walk.rest, &crate::rig::PlacementOptions::default()).unwrap().rig;
+    let samples = cager_registration::sample_surface(&walk.rest.vertices, &walk.rest.triangles, 1500, 0);
+    let examples = Examples::new(&rig, &poses(&rig, 24)).unwrap();
+    let manifold = Manifold::learn(&examples, Kind::Pca, 4).unwrap();
+    let mut means = [0.0; 2];
+    let frames = [0, 12, 24, 36, 48, 60, 72];
+    for (which, system) in [SystemKind::Green, SystemKind::MeanValue].into_iter().enumerate() {
+        let model = PersonModel::new(&walk.rest, &rig, system, 1500).unwrap();
+        let options = FitOptions { system, quads: 1e-4, bones: 1e-4, vertices: 1e-5, ..Default::default() };
+        let fit = PersonFit { model: &model, manifold: &manifold, options };
+        for frame in frames {
+            let truth: Vec<Point> = samples.iter().map(|s| s.at(&walk.frames[frame], &walk.rest.triangles)).collect();
+            let rest = rig.rest_pose();
+            let mut quads = QuadStage::new(&rig, model.height(), &options, Placement::default(), [rest.clone(), rest]);
+            known(&fit, &mut quads, &truth, 25);
+            let mut vertices = VertexStage::new(model.height(), &options, quads.linearized().vertices);
+            if which == 1 {
+                known(&fit, &mut vertices, &truth, 40);
+            }
+            let cage = if which == 1 { vertices.linearized().vertices } else { quads.linearized().vertices };
+            let found = model.deformed(&cage);
+            let sum: f64 =
+                found.iter().zip(&walk.frames[frame]).map(|(a, b)| cager_geometry::vector::distance(*a, *b)).sum();
+            means[which] += 100.0 * sum / found.len() as f64 / walk.height / frames.len() as f64;
+        }
+    }
+    eprintln!(
+        "floor with known correspondences: quads {:.3} %, free vertices {:.3} % of the height",
+        means[0], means[1]
+    );
+    assert!(means[0] <= 0.40 && means[1] <= 0.30, "{means:?}");
+}
+
+fn known(fit: &PersonFit<'_>, stage: &mut dyn Stage, truth: &[Point], rounds: usize) {
+    let weight = 1e6 / truth.len() as f64;
+    for _ in 0..rounds {
+        let at = stage.linearized();
+        let sampled = fit.model.sampled(&at.vertices);
+        let mut matches = Vec::new();
+        for (sample, (p, q)) in sampled.points.iter().zip(truth).enumerate() {
+            for (k, normal) in [DVec3::X, DVec3::Y, DVec3::Z].into_iter().enumerate() {
+                matches.push(Match { sample, normal, residual: p[k] - q[k], distance: 0.0, weight });
+            }
+        }
+        let derivatives = fit.derivatives(&at, &matches);
+        let residuals: Vec<f64> = matches.iter().map(|m| m.residual * weight.sqrt()).collect();
+        let mut equations = super::equations::NormalEquations::new(&derivatives, &residuals);
+        stage.hold(&mut equations);
+        stage.step(&equations.step().unwrap());
     }
 }

@@ -1,8 +1,6 @@
 //! Captures for tests.
 #![allow(dead_code, unreachable_pub)]
 
-pub mod observe;
-
 use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::topology::UnionFind;
 use std::path::{Path, PathBuf};

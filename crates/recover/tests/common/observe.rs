@@ -8,7 +8,7 @@ use cager_recover::poses::{Naming, SkeletonPoses};
 use cager_recover::rig::Rig;
 use std::ops::Range;
 
-use super::{Capture, data};
+use crate::common::{Capture, data};
 
 /// Points at random on the surface of a frame, with noise as a fraction of the height.
 pub fn seen(capture: &Capture, frame: usize, count: usize, noise: f64) -> Observation {
