@@ -6,6 +6,7 @@ use super::coding_args::{ErrorBound, Quality, TargetSize, Unit};
 use super::names;
 use super::outputs::OutputArgs;
 use super::recover_args::RecoverArgs;
+use super::rig::{ManifoldArgs, RigArgs};
 use super::transfer_args::{EditArgs, TransferArgs};
 use crate::config::{ServeFlags, bytes};
 use crate::decode::Layer;
@@ -56,6 +57,8 @@ pub(crate) enum Command {
     Encode(Box<EncodeArgs>),
     Decode(DecodeArgs),
     Recover(Box<RecoverArgs>),
+    Rig(RigArgs),
+    Manifold(ManifoldArgs),
     Edit(EditArgs),
     Inspect(InspectArgs),
     Cage(Box<CageArgs>),

@@ -27,6 +27,7 @@ mod outputs;
 mod progress;
 mod recover;
 mod recover_args;
+mod rig;
 pub(crate) mod serve;
 mod solver_options;
 mod transfer_args;
@@ -53,6 +54,8 @@ pub fn run() -> ExitCode {
         Command::Encode(args) => encode::run(&args),
         Command::Decode(args) => decode::run(&args),
         Command::Recover(args) => recover::run(&args),
+        Command::Rig(args) => rig::run(&args),
+        Command::Manifold(args) => rig::learn(&args),
         Command::Edit(args) => edit::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Cage(args) => cage::run(&args),

@@ -50,7 +50,7 @@ pub struct Deformed {
     rotation: DMat3,
     /// Of each vertex, its position relative to the pelvis frame's origin, turned: `G (p + exp(w) u)`.
     arms: Vec<DVec3>,
-    /// Of each vertex, its derivative by the rotation vector of its quad.
+    /// Of each vertex, its derivative by the rotation vector of its quad, transposed.
     by_rotation: Vec<DMat3>,
 }
 
@@ -82,7 +82,7 @@ pub fn deform(rig: &Rig, pose: &[f64], placement: &Placement) -> Deformed {
         let arm = g * (*position + *turn * offset);
         deformed.vertices.push((arm + placement.translation).to_array());
         deformed.arms.push(arm);
-        deformed.by_rotation.push(-(g * *turn * skew(offset) * *jacobian));
+        deformed.by_rotation.push(-(g * *turn * skew(offset) * *jacobian).transpose());
     }
     deformed
 }
@@ -91,21 +91,23 @@ impl Deformed {
     /// Derivatives of `Σ row · v` over the vertices, by the placement (turn, then translation) and by the pose: 6 + [`QUAD_UNKNOWNS`] numbers from
     /// 3 × 86.
     pub fn pull(&self, row: &[f64], out: &mut [f64]) {
-        out.fill(0.0);
         let (place, pose) = out.split_at_mut(6);
         let back = self.rotation.transpose();
-        for (vertex, a) in row.chunks_exact(3).enumerate() {
-            let a = DVec3::from_slice(a);
-            let quad = &mut pose[6 * owner(vertex)..][..6];
-            let by_turn = self.arms[vertex].cross(a);
-            let by_position = back * a;
-            let by_rotation = self.by_rotation[vertex].transpose() * a;
-            for k in 0..3 {
-                place[k] += by_turn[k];
-                place[3 + k] += a[k];
-                quad[k] += by_position[k];
-                quad[3 + k] += by_rotation[k];
-            }
+        let (mut turn, mut shift) = (DVec3::ZERO, DVec3::ZERO);
+        let mut by_position = [DVec3::ZERO; QUADS];
+        let mut by_rotation = [DVec3::ZERO; QUADS];
+        for ((vertex, a), (arm, by)) in row.chunks_exact(3).enumerate().zip(self.arms.iter().zip(&self.by_rotation)) {
+            let (a, quad) = (DVec3::from_slice(a), owner(vertex));
+            turn += arm.cross(a);
+            shift += a;
+            by_position[quad] += a;
+            by_rotation[quad] += *by * a;
+        }
+        place[..3].copy_from_slice(&turn.to_array());
+        place[3..].copy_from_slice(&shift.to_array());
+        for (out, (position, rotation)) in pose.chunks_exact_mut(6).zip(by_position.iter().zip(&by_rotation)) {
+            out[..3].copy_from_slice(&(back * *position).to_array());
+            out[3..].copy_from_slice(&rotation.to_array());
         }
     }
 }

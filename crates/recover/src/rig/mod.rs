@@ -13,6 +13,7 @@ pub use deformation::{Deformed, Placement, QUAD_UNKNOWNS, deform};
 pub use enclosure::{Enclosure, enclose};
 pub use error::RigError;
 pub use placement::{PlacedRig, PlacementOptions, place};
+pub(crate) use topology::BONES;
 pub use topology::{CAGE_FACES, CAGE_VERTICES, QUAD_NAMES, QUADS, owner, triangles};
 
 use cager_geometry::mesh::{Point, TriMesh};

@@ -30,7 +30,7 @@ pub struct Capture {
 
 pub fn capture(name: &str, up: usize) -> Capture {
     let folder = data().join(name);
-    let rest = TriMesh::from(&cager_formats::read_model(folder.join("rest.obj")).unwrap());
+    let rest = TriMesh::from(&cager_formats::read_model(&folder.join("rest.obj")).unwrap());
     let mut parts = UnionFind::new(rest.vertices.len());
     for &[a, b, c] in &rest.triangles {
         parts.join(a, b);

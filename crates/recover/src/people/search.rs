@@ -1,0 +1,76 @@
+//! Where to begin without a frame before: every example of the manifold under eight headings about the up axis.
+
+use super::fit::{Observed, PersonFit};
+use crate::rig::{Placement, deform};
+use cager_geometry::mesh::Point;
+use cager_geometry::vector::mean;
+use cager_registration::{Observation, OrientedPoints};
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+
+/// Headings that are tried.
+const HEADINGS: usize = 8;
+/// Examples that are tried at the most.
+const EXAMPLES: usize = 96;
+/// Every so manieth sample and chosen point is looked at.
+const THIN: usize = 5;
+
+/// Placements and latent numbers of the best starts, best first.
+pub(super) fn search(fit: &PersonFit<'_>, observed: &Observed<'_>) -> Vec<(Placement, Vec<f64>)> {
+    let manifold = fit.manifold;
+    let tried = manifold.examples().min(EXAMPLES);
+    let examples: Vec<usize> = (0..tried).map(|k| k * manifold.examples() / tried).collect();
+    let up = DVec3::from(fit.model.rig().up);
+    let Observation { points, normals } = observed.observation;
+    let center = DVec3::from(mean(points));
+    let seen: Vec<usize> = observed.chosen.iter().copied().step_by(THIN).collect();
+    let cap = 0.1 * fit.model.height();
+    let mut starts: Vec<(f64, Placement, usize, usize)> = examples
+        .par_iter()
+        .flat_map_iter(|&example| {
+            let vertices =
+                deform(fit.model.rig(), &manifold.pose(manifold.latent(example)), &Placement::default()).vertices;
+            let sampled = fit.model.sampled(&vertices);
+            let own = DVec3::from(mean(&sampled.points));
+            let thin = |all: &[Point]| -> Vec<DVec3> { all.iter().step_by(THIN).map(|&p| p.into()).collect() };
+            let (at, facing) = (thin(&sampled.points), thin(&sampled.normals));
+            let tree = OrientedPoints::new(
+                &at.iter().map(|p| p.to_array()).collect::<Vec<_>>(),
+                &facing.iter().map(|n| n.to_array()).collect::<Vec<_>>(),
+                0.02 * fit.model.diagonal(),
+            );
+            (0..HEADINGS)
+                .map(|heading| {
+                    let rotation = DMat3::from_axis_angle(up, TAU * heading as f64 / HEADINGS as f64);
+                    let placement = Placement { rotation, translation: center - rotation * own };
+                    let forth = at.iter().zip(&facing).map(|(&p, &n)| {
+                        let p = placement.at(p);
+                        let found = observed.tree.nearest(p.to_array(), (rotation * n).to_array()).0;
+                        p.distance(points[found].into()).min(cap)
+                    });
+                    let back = seen.iter().map(|&s| {
+                        let turned = rotation.transpose() * (DVec3::from(points[s]) - placement.translation);
+                        let normal = rotation.transpose() * DVec3::from(normals[s]);
+                        let found = tree.nearest(turned.to_array(), normal.to_array()).0;
+                        turned.distance(at[found]).min(cap)
+                    });
+                    let cost = forth.sum::<f64>() / at.len() as f64 + back.sum::<f64>() / seen.len() as f64;
+                    (cost, placement, heading, example)
+                })
+                .collect::<Vec<_>>()
+        })
+        .collect();
+    starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // Several of each heading, since the nearest of all may face the wrong way.
+    let mut taken = [0; HEADINGS];
+    let each = fit.options.candidates.div_ceil(2).max(1);
+    let mut chosen = Vec::new();
+    for (_, placement, heading, example) in starts {
+        if taken[heading] < each && chosen.len() < fit.options.candidates.max(1) {
+            taken[heading] += 1;
+            chosen.push((placement, manifold.latent(example).to_vec()));
+        }
+    }
+    chosen
+}

@@ -1,0 +1,161 @@
+//! People recovered from observed surfaces, against vertex-exact truth; figures in percent of the height.
+
+mod common;
+#[path = "common/observe.rs"]
+mod observe;
+
+use cager_core::cage::Cage;
+use cager_geometry::linalg::svd::svd;
+use cager_geometry::mesh::Point;
+use cager_geometry::vector::{add, distance, mean, sub};
+use cager_recover::joints::{CagedJoints, MarkedJoints};
+use cager_recover::manifold::{Examples, Kind, Manifold};
+use cager_recover::people::{FitOptions, Method, PersonFit, PersonModel, track};
+use cager_recover::rig::{PlacementOptions, Rig, place};
+use common::{Capture, capture, data, npy, there};
+use faer::Mat;
+use observe::{errors, poses, seen};
+use std::time::Instant;
+
+fn rig_of(capture: &Capture, up: Point) -> Rig {
+    place(&capture.rest, &PlacementOptions { up, ..Default::default() }).unwrap().rig
+}
+
+fn learned(rig: &Rig, poses: &[Vec<f64>], kind: Kind, dims: usize) -> Manifold {
+    Manifold::learn(&Examples::new(rig, poses).unwrap(), kind, dims).unwrap()
+}
+
+/// Mean error of vertices, of the worst frame, and the cages.
+fn recovered(
+    what: &str,
+    fit: &PersonFit<'_>,
+    truth: &Capture,
+    frames: &[usize],
+    noise: f64,
+) -> (f64, f64, Vec<Vec<Point>>) {
+    let seen: Vec<_> = frames.iter().map(|&f| seen(truth, f, 15_000, noise)).collect();
+    let start = Instant::now();
+    let tracked = track(fit, &seen, false, |_, _| {});
+    let each = start.elapsed().as_millis() / frames.len() as u128;
+    let all: Vec<f64> = tracked
+        .iter()
+        .zip(frames)
+        .map(|(frame, &f)| errors(&fit.model.deformed(&frame.fit.vertices), &truth.frames[f], truth.height)[0])
+        .collect();
+    let (sum, worst) = all.iter().fold((0.0, 0.0_f64), |(sum, worst), &e| (sum + e, worst.max(e)));
+    let mean = sum / all.len() as f64;
+    let lost = tracked.iter().filter(|frame| frame.lost).count();
+    eprintln!("{what}: vertices {mean:.3} %, worst frame {worst:.2} %, {lost} lost, {each} ms a frame, start included");
+    (mean, worst, tracked.into_iter().map(|frame| frame.fit.vertices).collect())
+}
+
+#[test]
+fn a_walk_is_recovered_by_the_poses_of_its_first_cycle_and_not_by_the_printed_recipe() {
+    if !there("makehuman-cmu-walk/rest.obj") {
+        return;
+    }
+    let walk = capture("makehuman-cmu-walk", 1);
+    let rig = rig_of(&walk, [0.0, 1.0, 0.0]);
+    let own = poses(&rig, "02_02", 5..155, 2);
+    let options = FitOptions::default();
+    let model = PersonModel::new(&walk.rest, &rig, options.system, options.samples).unwrap();
+    let frames: Vec<usize> = (37..73).step_by(3).collect();
+    let manifold = learned(&rig, &own, Kind::Pca, 10);
+    let fit = PersonFit { model: &model, manifold: &manifold, options };
+    let (robust, ..) = recovered("robust, PCA 10, own first cycle", &fit, &walk, &frames, 0.0);
+    assert!(robust < 0.65, "{robust}");
+    let start = Instant::now();
+    let manifold = learned(&rig, &own, Kind::Gplvm, 10);
+    eprintln!("GPLVM of {} poses learned in {:.2} s", own.len(), start.elapsed().as_secs_f64());
+    let fit = PersonFit { model: &model, manifold: &manifold, options };
+    let (robust, ..) = recovered("robust, GPLVM 10, own first cycle", &fit, &walk, &frames, 0.0);
+    assert!(robust < 0.75, "{robust}");
+    let fit = PersonFit { options: FitOptions { method: Method::Paper, ..options }, ..fit };
+    let (paper, ..) = recovered("paper, GPLVM 10, own first cycle", &fit, &walk, &frames, 0.0);
+    assert!(paper > 1.5 * robust, "{paper}");
+}
+
+#[test]
+fn a_man_is_recovered_with_joints_by_the_poses_of_another_person() {
+    if !there("anny-man-02_02/rest.obj") {
+        return;
+    }
+    let man = capture("anny-man-02_02", 2);
+    let rig = rig_of(&man, [0.0, 0.0, 1.0]);
+    let other = poses(&rig, "131_01", 0..994, 8);
+    let manifold = learned(&rig, &other, Kind::Pca, 20);
+    let options = FitOptions::default();
+    let model = PersonModel::new(&man.rest, &rig, options.system, options.samples).unwrap();
+    let frames: Vec<usize> = (0..60).step_by(3).collect();
+    let fit = PersonFit { model: &model, manifold: &manifold, options };
+    let (mean, _, cages) =
+        recovered("anny man, PCA 20 of another person's dance, noise 0.5 %", &fit, &man, &frames, 0.005);
+    let (shape, values) = npy(&data().join("anny-man-02_02/joints.npy"));
+    let truth = |f: usize, j: usize| [0, 1, 2].map(|k| f64::from(values[(f * shape[1] + j) * 3 + k]));
+    // Heads of the limbs' bones: hips, knees, ankles, shoulders, elbows, wrists.
+    let marked = [2, 3, 4, 27, 28, 29, 10, 11, 12, 20, 21, 22];
+    let positions: Vec<Point> = marked.iter().map(|&j| at_rest(&man, &frames, |f| truth(f, j))).collect();
+    let parents = (0..marked.len()).map(|k| (k > 0).then_some(0)).collect();
+    let names = marked.iter().map(|j| format!("joint {j}")).collect();
+    let joints = CagedJoints::new(
+        MarkedJoints { names, parents, positions },
+        &Cage::new(rig.cage()).unwrap(),
+        options.system.system(),
+    )
+    .unwrap();
+    let mut sum = 0.0;
+    for (cage, &f) in cages.iter().zip(&frames) {
+        let found = joints.positions(cage);
+        sum += marked.iter().zip(&found).map(|(&j, p)| distance(*p, truth(f, j))).sum::<f64>();
+    }
+    let joint_error = 100.0 * sum / (frames.len() * marked.len()) as f64 / man.height;
+    eprintln!("joints {joint_error:.3} %");
+    assert!(mean < 1.2 && joint_error < 1.2, "{mean} {joint_error}");
+}
+
+#[test]
+fn a_woman_is_recovered_with_the_template_of_a_man() {
+    if !there("anny-heavywoman-02_02/rest.obj") {
+        return;
+    }
+    let (man, woman) = (capture("anny-man-02_02", 2), capture("anny-heavywoman-02_02", 2));
+    let rig = rig_of(&man, [0.0, 0.0, 1.0]);
+    let manifold = learned(&rig, &poses(&rig, "02_02", 8..244, 3), Kind::Pca, 10);
+    let options = FitOptions::default();
+    let model = PersonModel::new(&man.rest, &rig, options.system, options.samples).unwrap();
+    let frames: Vec<usize> = (0..60).step_by(5).collect();
+    let fit = PersonFit { model: &model, manifold: &manifold, options };
+    let (mean, ..) = recovered("heavy woman by the man's template, PCA 10 of the clip", &fit, &woman, &frames, 0.0);
+    assert!(mean < 2.5, "{mean}");
+}
+
+/// A joint in the rest pose: taken back by the rigid motions of the vertices around it.
+fn at_rest(capture: &Capture, frames: &[usize], joint: impl Fn(usize) -> Point) -> Point {
+    let mut order: Vec<usize> = (0..capture.rest.vertices.len()).collect();
+    let first = joint(frames[0]);
+    order.sort_by(|&a, &b| {
+        distance(capture.frames[frames[0]][a], first).total_cmp(&distance(capture.frames[frames[0]][b], first))
+    });
+    let rest: Vec<Point> = order[..150].iter().map(|&v| capture.rest.vertices[v]).collect();
+    let all: Vec<Point> = frames
+        .iter()
+        .map(|&f| {
+            let now: Vec<Point> = order[..150].iter().map(|&v| capture.frames[f][v]).collect();
+            let (from, to) = (mean(&now), mean(&rest));
+            let moment = Mat::from_fn(3, 3, |i, j| {
+                rest.iter().zip(&now).map(|(r, n)| (r[i] - to[i]) * (n[j] - from[j])).sum::<f64>()
+            });
+            let found = svd(moment.as_ref()).unwrap();
+            let sign = (found.u.determinant() * found.v.determinant()).signum();
+            let d = [1.0, 1.0, sign];
+            let p = sub(joint(f), from);
+            let turned = [0, 1, 2].map(|i| {
+                (0..3)
+                    .map(|j| (0..3).map(|k| found.u[(i, k)] * d[k] * found.v[(j, k)]).sum::<f64>() * p[j])
+                    .sum::<f64>()
+            });
+            add(turned, to)
+        })
+        .collect();
+    mean(&all)
+}

@@ -1,0 +1,178 @@
+//! `cager rig` and `cager manifold`: what `cager recover` needs to follow people.
+
+use super::outputs::{OutputArgs, Outputs};
+use super::{grouped, human_bytes, progress, read_model, tell, warn};
+use crate::mismatch::Up;
+use anyhow::{Context, Result, bail};
+use cager_formats::biovision::{Clip, read_bvh};
+use cager_formats::{AtomicFile, Target};
+use cager_geometry::mesh::{Point, TriMesh};
+use cager_recover::manifold::{Examples, Kind, Manifold};
+use cager_recover::poses::{Naming, SkeletonPoses};
+use cager_recover::rig::{CAGE_FACES, CAGE_VERTICES, PlacementOptions, Rig, place};
+use clap::{Args, ValueEnum};
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Place a rig of oriented quads in a person: the cage that `recover --rig` poses.
+///
+/// The person should stand upright in a T- or A-pose. The rig is a JSON file that may be corrected by hand: 21 quads with the joints that they turn about.
+/// Example: cager rig body.obj -o rig.json
+#[derive(Args, Debug)]
+pub(crate) struct RigArgs {
+    /// Mesh of a person: .obj .ply .off .stl .glb, with faces.
+    #[arg(value_name = "TEMPLATE")]
+    template: PathBuf,
+
+    /// File to write, or - for standard output; it appears whole or not at all.
+    #[arg(short, long, value_name = "RIG.json")]
+    output: PathBuf,
+
+    #[command(flatten)]
+    outputs: OutputArgs,
+
+    /// Axis that points up.
+    #[arg(long = "up", id = "rig_up", value_name = "AXIS", value_parser = super::checks::up, default_value = "y")]
+    up: Up,
+
+    /// Axis that the person looks along: x, -x, y, -y, z or -z [default: as the feet tell].
+    #[arg(long, value_name = "AXIS", value_parser = axis, allow_hyphen_values = true, hide_default_value = true)]
+    forward: Option<Point>,
+
+    /// Distance between the person and the cage, where there is room, as a fraction of the height.
+    #[arg(long, value_name = "F", default_value_t = 0.003)]
+    margin: f64,
+}
+
+/// Learn which poses are usual from motion capture: the manifold of `recover --manifold`.
+///
+/// Clips are BVH files whose joints are named as CMU's or Mixamo's, or by --names. Example: cager manifold walk.bvh --rig rig.json -o walk.manifold.json
+#[derive(Args, Debug)]
+pub(crate) struct ManifoldArgs {
+    /// Motion capture: .bvh files.
+    #[arg(value_name = "BVH", required = true)]
+    clips: Vec<PathBuf>,
+
+    /// Rig whose poses are learned, as `cager rig` writes it.
+    #[arg(long, value_name = "RIG.json")]
+    rig: PathBuf,
+
+    /// File to write, or - for standard output; it appears whole or not at all.
+    #[arg(short, long, value_name = "MANIFOLD.json")]
+    output: PathBuf,
+
+    #[command(flatten)]
+    outputs: OutputArgs,
+
+    /// Dimensions of the manifold.
+    #[arg(long, value_name = "D", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=100))]
+    dims: u16,
+
+    /// pca: linear; gplvm: curved, slower to learn.
+    #[arg(long, value_enum, value_name = "KIND", default_value = "pca")]
+    kind: ManifoldKind,
+
+    /// Poses that are learned from, spread evenly over each clip, in all.
+    #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(2..=2000))]
+    poses: u32,
+
+    /// Names of the joints that the rig's bones follow, as JSON: an object of {"joint": …, "end": …} by bone.
+    #[arg(long, value_name = "NAMES.json")]
+    names: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum ManifoldKind {
+    Pca,
+    Gplvm,
+}
+
+fn axis(text: &str) -> Result<Point, String> {
+    let (sign, name) = text.strip_prefix('-').map_or((1.0, text), |name| (-1.0, name));
+    let place = ["x", "y", "z"].iter().position(|axis| *axis == name);
+    place
+        .map(|place| std::array::from_fn(|k| if k == place { sign } else { 0.0 }))
+        .ok_or_else(|| "give x, -x, y, -y, z or -z".to_owned())
+}
+
+pub(super) fn run(args: &RigArgs) -> Result<()> {
+    let mut outputs = Outputs::new(args.outputs, [&args.template])?;
+    let output = outputs.text(&args.output)?;
+    let template = read_model(&args.template)?;
+    let up = if args.up == Up::Z { [0.0, 0.0, 1.0] } else { [0.0, 1.0, 0.0] };
+    let options = PlacementOptions { up, forward: args.forward, margin: args.margin };
+    let placed = place(&TriMesh::from(&template), &options).with_context(|| args.template.display().to_string())?;
+    let outside = placed.enclosure.outside.len();
+    if outside > 0 {
+        warn(&[format!(
+            "{}: {} of {} points lie outside of the rig's cage, by up to {:.2} % of the height; move the quads there outwards in the file, or go on",
+            args.template.display(),
+            grouped(outside),
+            grouped(template.points.len()),
+            100.0 * placed.enclosure.farthest
+        )]);
+    }
+    let text = placed.rig.to_json();
+    write(&output, args.outputs, text.as_bytes(), &format!("{CAGE_VERTICES} vertices and {CAGE_FACES} triangles in 21 quads"))
+}
+
+pub(super) fn learn(args: &ManifoldArgs) -> Result<()> {
+    let inputs = args.clips.iter().chain([&args.rig]).chain(&args.names);
+    let mut outputs = Outputs::new(args.outputs, inputs)?;
+    let output = outputs.text(&args.output)?;
+    let rig = read_rig(&args.rig)?;
+    let naming = args.names.as_ref().map(|path| named(path, Naming::from_json(&read(path)?))).transpose()?;
+    let share = (args.poses as usize).div_ceil(args.clips.len());
+    let mut poses = Vec::new();
+    for path in &args.clips {
+        poses.extend(poses_of(path, &rig, naming.as_ref(), share)?);
+    }
+    let clock = progress::ticking("learning");
+    let kind = if args.kind == ManifoldKind::Pca { Kind::Pca } else { Kind::Gplvm };
+    let learned = Examples::new(&rig, &poses).and_then(|examples| Manifold::learn(&examples, kind, args.dims.into()));
+    clock.finish_and_clear();
+    let text = learned.context("--dims, --poses or the clips")?.to_json();
+    let what = format!("a manifold of {} dimensions from {} poses", args.dims, grouped(poses.len()));
+    write(&output, args.outputs, text.as_bytes(), &what)
+}
+
+/// Poses of a clip, spread evenly.
+fn poses_of(path: &Path, rig: &Rig, naming: Option<&Naming>, most: usize) -> Result<Vec<Vec<f64>>> {
+    let Clip { skeleton, motion } = read_bvh(path)?;
+    let naming = naming.map_or_else(|| named(path, Naming::of(&skeleton)), |naming| Ok(naming.clone()))?;
+    let skeleton_poses = named(path, SkeletonPoses::new(&skeleton, &naming, rig))?;
+    let frames = motion.frames();
+    let count = most.min(frames);
+    let frame = |k: usize| k * (frames - 1) / (count - 1).max(1);
+    Ok((0..count).map(|k| skeleton_poses.pose(&skeleton.pose(motion.frame(frame(k))))).collect())
+}
+
+pub(super) fn read_rig(path: &Path) -> Result<Rig> {
+    named(path, Rig::from_json(&read(path)?))
+}
+
+pub(super) fn read_manifold(path: &Path) -> Result<Manifold> {
+    named(path, Manifold::from_json(&read(path)?))
+}
+
+fn read(path: &Path) -> Result<Vec<u8>> {
+    fs::read(path).with_context(|| path.display().to_string())
+}
+
+fn named<T, E: std::error::Error + Send + Sync + 'static>(path: &Path, result: Result<T, E>) -> Result<T> {
+    result.with_context(|| path.display().to_string())
+}
+
+fn write(output: &Target, args: OutputArgs, bytes: &[u8], what: &str) -> Result<()> {
+    if args.dry_run {
+        return super::dry_run::tell_dry_run(output, what, &[]);
+    }
+    if bytes.is_empty() {
+        bail!("{}: nothing to write", output.path().display());
+    }
+    let mut file = AtomicFile::create(output)?;
+    file.write_all(bytes)?;
+    file.commit()?;
+    tell(&format!("{}: {what}, {}\n", output.path().display(), human_bytes(bytes.len() as u64)))
+}
