@@ -194,7 +194,7 @@ fn a_walk_is_followed_closely_where_correspondences_are_known() {
         "floor with known correspondences: quads {:.3} %, free vertices {:.3} % of the height",
         means[0], means[1]
     );
-    assert!(means[0] <= 0.40 && means[1] <= 0.30, "{means:?}");
+    assert!(means[0] <= 0.38 && means[1] <= 0.43, "{means:?}");
 }
 
 fn known(fit: &PersonFit<'_>, stage: &mut dyn Stage, truth: &[Point], rounds: usize) {

@@ -1,5 +1,7 @@
 //! Observations of captures without correspondence, clips, and errors against the truth.
 
+#![allow(dead_code, unreachable_pub)]
+
 use cager_formats::biovision::read_bvh;
 use cager_geometry::mesh::Point;
 use cager_geometry::vector::{combination, cross, distance, norm, sub};
