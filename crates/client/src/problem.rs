@@ -8,10 +8,10 @@ use reqwest::{Response, StatusCode};
 use std::time::{Duration, SystemTime};
 
 /// Bytes read from the body of an error response.
-const PROBLEM_BYTES: usize = 64 << 10;
+const MAX_PROBLEM_BYTES: usize = 64 << 10;
 
 /// Characters shown of a body that is not a problem.
-const SHOWN_CHARS: usize = 200;
+const MAX_SHOWN_CHARS: usize = 200;
 
 /// Longest wait for the body of an error response; after that only its status is reported.
 const BODY_TIMEOUT: Duration = Duration::from_secs(5);
@@ -49,9 +49,9 @@ async fn read_problem(mut response: Response) -> Problem {
     let mut body = Vec::new();
     let read = async {
         while let Ok(Some(chunk)) = response.chunk().await {
-            let room = PROBLEM_BYTES - body.len();
+            let room = MAX_PROBLEM_BYTES - body.len();
             body.extend_from_slice(&chunk[..chunk.len().min(room)]);
-            if body.len() == PROBLEM_BYTES {
+            if body.len() == MAX_PROBLEM_BYTES {
                 break;
             }
         }
@@ -111,7 +111,7 @@ fn visible_text(page: &str) -> String {
         }
     }
     let line = printable(&text.split_whitespace().collect::<Vec<_>>().join(" "));
-    match line.char_indices().nth(SHOWN_CHARS) {
+    match line.char_indices().nth(MAX_SHOWN_CHARS) {
         Some((end, _)) => format!("{}…", &line[..end]),
         None => line,
     }

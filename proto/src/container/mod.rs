@@ -24,17 +24,17 @@ pub const MAGIC: [u8; 8] = *b"\x89CGR\r\n\x1a\n";
 /// Version of the layout.
 pub const VERSION: u16 = 1;
 /// Largest encoded [`Header`], in bytes.
-pub(crate) const HEADER_LIMIT: usize = 64 << 10;
+pub(crate) const MAX_HEADER_BYTES: usize = 64 << 10;
 /// Frames of one chunk: what reading one frame decompresses.
 pub const CHUNK_FRAMES: usize = 16;
 
 /// Frames of a coded group, at the most: longer ones take fewer bytes, and reading one frame decodes its group.
-const GROUP_FRAMES: usize = 256;
+const MAX_GROUP_FRAMES: usize = 256;
 
 /// Frames of a coded group of so many points and rows a frame, so that readers can decode it in little memory.
 pub fn group_frames(points: usize, rows: usize) -> usize {
     let fitting = (cager_codec::MAX_POSITIONS / points.max(1)).min((2 << 20) / (12 * rows.max(1)));
-    fitting.clamp(1, GROUP_FRAMES)
+    fitting.clamp(1, MAX_GROUP_FRAMES)
 }
 
 /// What a decoder must know. Stored as bincode of fixed-width integers, see [`crate::wire`], but for the origin.
