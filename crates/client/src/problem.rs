@@ -3,7 +3,7 @@
 use crate::backoff::retry_after;
 use crate::error::{ClientError, Failure};
 use cager_proto::messages::Problem;
-use reqwest::header::{CONTENT_TYPE, LOCATION, RETRY_AFTER};
+use reqwest::header::{CONTENT_TYPE, HeaderName, LOCATION, RETRY_AFTER};
 use reqwest::{Response, StatusCode};
 use std::time::{Duration, SystemTime};
 
@@ -44,8 +44,8 @@ pub(crate) fn classify(problem: Problem, retry_after: Option<Duration>) -> Failu
 
 async fn read_problem(mut response: Response) -> Problem {
     let status = response.status();
-    let is_json = header(&response, CONTENT_TYPE.as_str()).is_some_and(|kind| kind.contains("json"));
-    let place = header(&response, LOCATION.as_str());
+    let is_json = header(&response, &CONTENT_TYPE).is_some_and(|kind| kind.to_ascii_lowercase().contains("json"));
+    let place = header(&response, &LOCATION).map(str::to_owned);
     let mut body = Vec::new();
     let read = async {
         while let Ok(Some(chunk)) = response.chunk().await {
@@ -61,8 +61,8 @@ async fn read_problem(mut response: Response) -> Problem {
     parse(status, is_json, place.as_deref(), &body)
 }
 
-fn header(response: &Response, name: &str) -> Option<String> {
-    Some(response.headers().get(name)?.to_str().ok()?.to_ascii_lowercase())
+fn header<'a>(response: &'a Response, name: &HeaderName) -> Option<&'a str> {
+    response.headers().get(name)?.to_str().ok()
 }
 
 /// Parses a problem, or makes one from the page of a proxy or another server.
@@ -150,10 +150,19 @@ mod tests {
         assert!(problem.detail.contains("503") && problem.detail.contains("without saying why"));
     }
 
-    #[test]
-    fn a_redirect_names_its_target() {
-        let problem = parse(StatusCode::PERMANENT_REDIRECT, false, Some("https://cager.example/"), b"moved");
-        assert!(problem.detail.contains("https://cager.example/"));
+    #[tokio::test]
+    async fn a_redirect_names_its_target_as_it_is_written() {
+        let response = http::Response::builder().status(308).header(LOCATION, "https://cager.example/Studio/A");
+        let problem = read_problem(response.body("moved").expect("a response").into()).await;
+        assert!(problem.detail.contains("https://cager.example/Studio/A"), "{}", problem.detail);
+    }
+
+    #[tokio::test]
+    async fn the_kind_of_a_body_may_be_written_in_any_case() {
+        let response = http::Response::builder().status(422).header(CONTENT_TYPE, "Application/Problem+JSON");
+        let body = r#"{"type":"about:blank","title":"t","status":422,"detail":"face 3 is open"}"#;
+        let problem = read_problem(response.body(body).expect("a response").into()).await;
+        assert_eq!(problem.detail, "face 3 is open");
     }
 
     #[test]

@@ -72,7 +72,7 @@ pub struct Header {
 }
 
 impl Header {
-    /// Bytes of the f32 positions of so many frames and of one connectivity: what a container is smaller than.
+    /// Bytes of a capture of so many frames in single precision with one connectivity: what the bytes of a container are compared with.
     pub fn capture_bytes(&self, frames: usize) -> u64 {
         let positions = self.points.saturating_mul(12).saturating_mul(frames as u64);
         self.rest_corners.saturating_mul(4).saturating_add(positions)
@@ -84,7 +84,7 @@ pub fn counted_from_zero(numbers: &[f64]) -> bool {
     numbers.iter().enumerate().all(|(frame, &number)| number == frame as f64)
 }
 
-/// Numbers of frames are finite and ascend.
+/// Whether all are finite and ascend, as numbers of frames must.
 pub(crate) fn are_frame_numbers(numbers: &[f64]) -> bool {
     numbers.iter().all(|x| x.is_finite()) && numbers.windows(2).all(|pair| pair[0] < pair[1])
 }

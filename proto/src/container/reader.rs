@@ -456,7 +456,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         } else {
             raw.chunks_exact(24).map(|b| [0, 8, 16].map(|k| f64::from_bits(u64_at(b, k)))).collect()
         };
-        finite(points, entry.offset)
+        check_finite(points, entry.offset)
     }
 
     fn indices(&mut self, tag: [u8; 4]) -> Result<(u64, Vec<u32>), Error> {
@@ -467,7 +467,7 @@ impl<R: Read + Seek> ContainerReader<R> {
 }
 
 /// Refuses positions that are not finite, of the section there.
-pub(super) fn finite(points: Vec<Point>, offset: u64) -> Result<Vec<Point>, Error> {
+pub(super) fn check_finite(points: Vec<Point>, offset: u64) -> Result<Vec<Point>, Error> {
     match points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
         Some(k) => Err(Error::corrupt(offset, format!("position {k} is not finite"))),
         None => Ok(points),
