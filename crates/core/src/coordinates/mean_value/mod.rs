@@ -78,7 +78,8 @@ struct Scratch<const EDGE: usize> {
     directions: Vec<[Lanes; 3]>,
     /// Reciprocal distances to each cage vertex.
     nearness: Vec<Lanes>,
-    /// Terms of each edge; of the coordinates themselves, half the mean-vector term `½ θ n`, and the factor that turns it into `u_a × u_b`.
+    /// Terms of each edge; of [`FORWARD`] ones three are half the mean-vector term `½ θ n`, and the fourth is the factor that turns it into
+    /// `u_a × u_b`.
     edges: Vec<[Lanes; EDGE]>,
     /// Unnormalised weights.
     weights: Vec<Lanes>,
@@ -132,7 +133,7 @@ fn task_coordinates(
     outsiders
 }
 
-/// Writes the coordinates of the points of a lane group, as many as there are rows.
+/// Writes the coordinates of a lane group's points, one for each row.
 fn store(mut rows: MatMut<'_, f64>, weights: &[Lanes], scale: Lanes) {
     for (j, &weight) in weights.iter().enumerate() {
         let values = (weight * scale).0;
@@ -167,8 +168,8 @@ fn set_row(rows: &mut MatMut<'_, f64>, row: usize, entries: &[(usize, f64)]) {
     }
 }
 
-/// Computes the weights of one lane's point anew, integrated for faces whose rounding matters, where all weights add up to about
-/// `total`; returns their sum.
+/// Computes the weights of lane l's point again, integrated for faces whose rounding matters; `total` is about the sum of all weights. Returns
+/// that sum.
 #[cold]
 fn accurate_weights(cage: &Cage, scratch: &mut Scratch<FORWARD>, x: Point, l: usize, total: f64) -> f64 {
     for weight in &mut scratch.weights {
@@ -287,7 +288,7 @@ fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch<FORWA
     Sums { total, on, inaccurate }
 }
 
-// Kept out of the loops: the compiler would otherwise split the lanes as these few entries ask for, and the roots with them.
+// Kept out of the loops: inlined, what they do lane by lane would keep the compiler from vectorising the loops, roots included.
 
 #[cold]
 #[inline(never)]
