@@ -7,7 +7,7 @@ use anyhow::Context;
 use cager_codec::{AdjacentGroups, CageBasis, decode_cages, encode_cages};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Coordinates, Green, Harmonic, MeanValue, Refinement};
-use cager_core::inversion::{BATCH, PrepareContext, Rows, Solver, SolverOptions};
+use cager_core::inversion::{BATCH, PrepareContext, Rows, Solver, SolverOptions, Step};
 use cager_core::maxvol::{self, maxvol};
 use cager_demo::{Capture, Options};
 use cager_formats::{FrameOptions, create_frames, write_model};
@@ -143,8 +143,8 @@ fn figures(folder: &Path) -> anyhow::Result<Value> {
         "frames": frames.len(),
         "coded_cages_bytes": coded.iter().map(Vec::len).sum::<usize>(),
         "threads": rayon::current_num_threads(),
-        "log_volume": handles.log_volume,
-        "swaps": handles.swaps,
+        "log_volume": handles.volume.log_volume,
+        "swaps": handles.volume.swaps,
         "solver_bytes": solver.size_bytes(),
         "coordinates": coordinates,
         "seconds": {
@@ -207,15 +207,15 @@ fn growth(points: usize, cage_vertices: usize) -> anyhow::Result<Value> {
     let (capture, cage) = capture(points, cage_vertices)?;
     let clock = Instant::now();
     let begun = RefCell::new(Vec::new());
-    let next = |step| {
+    let before_step = |step| {
         begun.borrow_mut().push((step, clock.elapsed().as_secs_f64()));
         ControlFlow::Continue(())
     };
-    let context = PrepareContext { next: &next, ..PrepareContext::default() };
+    let context = PrepareContext { before_step: &before_step, ..PrepareContext::default() };
     let solver = Solver::prepare_with(&MeanValue, &cage, &capture.rest.points, SolverOptions::PAPER, &context)?;
     let seconds = clock.elapsed().as_secs_f64();
     let begin = |step| begun.borrow().iter().find(|(name, _)| *name == step).map_or(seconds, |(_, begin)| *begin);
-    let [coordinates, handles, rest] = ["coordinates", "handles", "singular values"].map(begin);
+    let [coordinates, handles, rest] = [Step::Coordinates, Step::Handles, Step::SingularValues].map(begin);
     Ok(json!({
         "points": capture.rest.points.len(),
         "cage_vertices": cage.vertices().len(),

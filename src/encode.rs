@@ -11,7 +11,7 @@ use crate::speed::StepClock;
 use batches::{Batch, BatchPlan, SolvedBatch, read_batches, solve};
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_core::inversion::{Analysis, PrepareContext, PrepareError, Solver, SolverOptions};
+use cager_core::inversion::{Analysis, PrepareContext, PrepareError, Solver, SolverOptions, Step};
 use cager_formats::{Action, AtomicFile, FrameReader, Target};
 use cager_geometry::linalg::SparseMatrix;
 use cager_geometry::mesh::{Model, Point, diagonal};
@@ -327,14 +327,19 @@ fn prepare(
     let passes = if job.choose.is_some() { usize::MAX } else { batches };
     let stores_coordinates = job.memory.keeps(points.len(), job.system.values(job.cage).columns(), passes);
     let clock = StepClock::default();
-    let next = |step| {
+    let before_step = |step: Step| {
         clock.begin(step);
-        tell(step);
+        tell(step.name());
         ControlFlow::Continue(())
     };
     let memory = free_bytes();
-    let context =
-        PrepareContext { matrix: job.matrix, stores_coordinates, memory, next: &next, ..PrepareContext::default() };
+    let context = PrepareContext {
+        matrix: job.matrix,
+        stores_coordinates,
+        memory,
+        before_step: &before_step,
+        ..PrepareContext::default()
+    };
     let chosen_by = job.choose.as_ref().filter(|choose| !choose.samples.is_empty());
     let Some(ChooseSpectrum { samples, bound }) = chosen_by else {
         let solver = Solver::prepare_with(job.system, job.cage, points, options, &context)?;

@@ -4,9 +4,9 @@ use cager_geometry::mesh::{Point, bounds};
 
 /// How many diagonals of the rest pose the middle point of a capture's first frame may lie from it: later frames travel, the first one
 /// begins where the rest pose is.
-const MOST_AT_FIRST: f64 = 100.0;
+const MAX_AT_FIRST: f64 = 100.0;
 /// The same for any point of any frame: farther ones are no positions.
-const MOST: f64 = 1e5;
+const MAX_DIAGONALS: f64 = 1e5;
 
 /// Where the points of a capture's frames may lie.
 #[derive(Clone, Copy, Debug)]
@@ -33,14 +33,14 @@ impl Reach {
         let squared = |p: Point| p.iter().zip(self.centre).map(|(x, c)| (x - c).powi(2)).sum::<f64>();
         let in_diagonals = |squared: f64| squared.sqrt() / self.diagonal;
         let farthest = points.clone().map(squared).fold(0.0, f64::max);
-        let far = if in_diagonals(farthest) > MOST {
+        let far = if in_diagonals(farthest) > MAX_DIAGONALS {
             let row = points.clone().position(|p| squared(p) == farthest).unwrap_or(0);
             format!("{what} {row} lies {} diagonals of the rest pose away from it", shown(in_diagonals(farthest)))
-        } else if is_first && in_diagonals(farthest) > MOST_AT_FIRST {
+        } else if is_first && in_diagonals(farthest) > MAX_AT_FIRST {
             let mut all: Vec<f64> = points.map(squared).collect();
             let middle = all.len() / 2;
             let (_, median, _) = all.select_nth_unstable_by(middle, f64::total_cmp);
-            let diagonals = Some(in_diagonals(*median)).filter(|&diagonals| diagonals > MOST_AT_FIRST)?;
+            let diagonals = Some(in_diagonals(*median)).filter(|&diagonals| diagonals > MAX_AT_FIRST)?;
             format!("its first frame lies {} diagonals of the rest pose away from it", shown(diagonals))
         } else {
             return None;

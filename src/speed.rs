@@ -2,6 +2,7 @@
 
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
+use cager_core::inversion::Step;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use std::cell::RefCell;
@@ -9,18 +10,18 @@ use std::time::Instant;
 
 /// When the steps of a preparation began.
 #[derive(Default)]
-pub(crate) struct StepClock(RefCell<Vec<(&'static str, Instant)>>);
+pub(crate) struct StepClock(RefCell<Vec<(Step, Instant)>>);
 
 impl StepClock {
-    pub(crate) fn begin(&self, step: &'static str) {
+    pub(crate) fn begin(&self, step: Step) {
         self.0.borrow_mut().push((step, Instant::now()));
     }
 
     /// Seconds for the coordinates, for the handles, and for all that came after these up to now.
     pub(crate) fn seconds(&self) -> [f64; 3] {
         let (now, begun) = (Instant::now(), self.0.borrow());
-        let begin = |step| begun.iter().find(|(name, _)| *name == step).map_or(now, |(_, begin)| *begin);
-        let [coordinates, handles, rest] = ["coordinates", "handles", "singular values"].map(begin);
+        let begin = |step| begun.iter().find(|(one, _)| *one == step).map_or(now, |(_, begin)| *begin);
+        let [coordinates, handles, rest] = [Step::Coordinates, Step::Handles, Step::SingularValues].map(begin);
         [handles - coordinates, rest - handles, now - rest].map(|time| time.as_secs_f64())
     }
 }
@@ -55,7 +56,24 @@ pub(crate) fn seconds_to_prepare(system: &dyn CoordinateSystem, cage: &Cage, poi
 mod tests {
     use super::*;
     use cager_core::coordinates::MeanValue;
+    use cager_core::inversion::{PrepareContext, Solver, SolverOptions};
     use cager_demo::{Capture, Options};
+    use std::ops::ControlFlow;
+
+    #[test]
+    fn each_step_of_a_preparation_takes_time() {
+        let Capture { rest, cage, .. } = Capture::new(&Options { points: 400, frames: 2, cage_vertices: 42 });
+        let cage = Cage::new(cage).expect("a cage");
+        let clock = StepClock::default();
+        let before_step = |step| {
+            clock.begin(step);
+            ControlFlow::Continue(())
+        };
+        let context = PrepareContext { before_step: &before_step, ..PrepareContext::default() };
+        Solver::prepare_with(&MeanValue, &cage, &rest.points, SolverOptions::PAPER, &context).expect("a solver");
+        let seconds = clock.seconds();
+        assert!(seconds.iter().all(|&time| time > 0.0), "{seconds:?}");
+    }
 
     #[test]
     fn larger_models_and_cages_take_longer() {

@@ -81,7 +81,7 @@ pub struct SessionOptions {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(exclusive_minimum = 0, exclusive_maximum = 1))]
     pub max_error: Option<f64>,
-    /// The same with the root mean square error of the points, averaged over the frames.
+    /// As `max_error`, but for the root mean square error of a frame's points, averaged over the frames.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(exclusive_minimum = 0, exclusive_maximum = 1))]
     pub mean_error: Option<f64>,

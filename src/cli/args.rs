@@ -398,9 +398,9 @@ pub(crate) struct ManArgs {
 }
 
 fn memory(text: &str) -> Result<Memory, String> {
-    const LEAST: u64 = 100_000_000;
+    const MIN_BYTES: u64 = 100_000_000;
     match bytes(text) {
-        Some(size) if size >= LEAST => Ok(Memory::at_most(size)),
+        Some(size) if size >= MIN_BYTES => Ok(Memory::at_most(size)),
         Some(_) => Err("give at least 100MB".to_owned()),
         None => Err("give a size such as 800MB or 2GiB".to_owned()),
     }

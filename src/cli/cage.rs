@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// Farthest that a cage may be asked to keep from the points, as a fraction of the diagonal.
-const MOST_CLEARANCE: f64 = 0.5;
+const MAX_CLEARANCE: f64 = 0.5;
 /// Points of the model that its page draws at the most, about.
 const SHOWN_POINTS: usize = 40_000;
 
@@ -60,9 +60,9 @@ pub(super) fn run(args: &CageArgs) -> Result<()> {
         return super::diagnosis::run(args, &targets, rest);
     }
     if let Some(clearance) = args.clearance
-        && !(0.0..=MOST_CLEARANCE).contains(&clearance)
+        && !(0.0..=MAX_CLEARANCE).contains(&clearance)
     {
-        bail!("--clearance: is {clearance}; give a fraction of the rest pose's diagonal from 0 to {MOST_CLEARANCE}");
+        bail!("--clearance: is {clearance}; give a fraction of the rest pose's diagonal from 0 to {MAX_CLEARANCE}");
     }
     let Some(output) = &targets.output else { bail!("-o: say which file to write") };
     if args.outputs.dry_run {

@@ -8,7 +8,7 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpStream};
 use std::time::{Duration, Instant};
 
 /// Longer answers are cut.
-const MOST_BYTES: usize = 1 << 16;
+const MAX_ANSWER_BYTES: usize = 1 << 16;
 /// First byte of a TLS alert, with which a service with TLS answers plain HTTP.
 const TLS_ALERT: u8 = 0x15;
 
@@ -62,7 +62,7 @@ fn ask(address: SocketAddr, path: &str, end: Instant) -> std::io::Result<Vec<u8>
     stream.set_write_timeout(Some(left()?))?;
     stream.write_all(format!("GET {path} HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n").as_bytes())?;
     let (mut answer, mut piece) = (Vec::new(), [0; 4096]);
-    while answer.len() < MOST_BYTES {
+    while answer.len() < MAX_ANSWER_BYTES {
         stream.set_read_timeout(Some(left()?))?;
         match stream.read(&mut piece) {
             Ok(0) => break,

@@ -3,13 +3,14 @@
 use super::coding_args::goal;
 use super::dry_run::tell_dry_run;
 use super::outputs::Outputs;
-use super::recover_args::{Align, RecoverArgs};
+use super::recover_args::{Align, PersonMethod, RecoverArgs};
+use super::rig::{read_manifold, read_rig};
 use super::solver_options::read_cage;
 use super::{design, grouped, human_bytes, progress, read_model, tell, warn};
 use crate::coding::InversionChoices;
 use crate::encode::{self, EncodeProgress, Encoded, Job};
 use crate::memory::Memory;
-use crate::recover::{RecoverJob, RecoverOptions, RecoverProgress, Recovered, RecoveryReport, recover};
+use crate::recover::{Person, RecoverJob, RecoverOptions, RecoverProgress, Recovered, RecoveryReport, recover};
 use anyhow::{Context, Result, bail};
 use cager_cages::{EncloseOptions, enclose};
 use cager_core::cage::Cage;
@@ -17,29 +18,76 @@ use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::regularize::Regularizer;
 use cager_formats::{AtomicFile, MeshSequence, ScratchDir, Target, commit_together, mesh_sequence};
 use cager_geometry::mesh::Model;
+use cager_recover::manifold::Manifold;
+use cager_recover::people::{FitOptions, Method};
+use cager_recover::rig::Rig;
 use std::io::Write;
 use std::path::Path;
 
 pub(super) fn run(args: &RecoverArgs) -> Result<()> {
-    let inputs = [&args.template, &args.frames].into_iter().chain(&args.cage);
-    let mut outputs = Outputs::new(args.outputs, inputs)?;
+    let files = [&args.template, &args.frames].into_iter().chain(&args.cage).chain(&args.rig).chain(&args.manifold);
+    let mut outputs = Outputs::new(args.outputs, files)?;
     let output = outputs.binary(&args.output, "dance.cager")?;
     let report = args.report.as_ref().map(|path| outputs.text(path)).transpose()?;
+    let joints = args.joints.as_ref().map(|path| joints_target(&mut outputs, path)).transpose()?;
     let template = read_model(&args.template)?;
     if template.faces.is_empty() {
         bail!("{}: has no faces, and a template is a mesh; give one with faces", args.template.display());
     }
     goal(&args.coding, true, &template, 1)?;
     let files = frames(args)?;
+    let person = person(args)?;
     if args.outputs.dry_run {
         let what = format!("{} frames of {} points", grouped(files.files.len()), grouped(template.points.len()));
-        return tell_dry_run(&output, &what, &[report]);
+        return tell_dry_run(&output, &what, &[report, joints.map(|(target, _)| target)]);
     }
-    let cage = cage(args, &template)?;
+    let cage = match &person {
+        Some((rig, _)) => Cage::new(rig.cage()).context("--rig")?,
+        None => cage(args, &template)?,
+    };
     let report = report.map(AtomicFile::create).transpose()?;
+    let joints =
+        joints.map(|(target, kind)| Ok::<_, anyhow::Error>((AtomicFile::create(target)?, kind))).transpose()?;
     let scratch = ScratchDir::create(scratch_folder(&output))?;
-    let recovered = followed(args, template, cage, &files, scratch.path())?;
-    write(args, &output, recovered, report)
+    let options = person_options(args.method);
+    let known = person.as_ref().map(|(rig, manifold)| Person { rig, manifold, options });
+    let recovered = followed(args, template, cage, known, &files, scratch.path())?;
+    let system = if person.is_some() { options.system.system() } else { &MeanValue };
+    write(args, &output, system, recovered, report, joints)
+}
+
+/// What is known of a person.
+fn person(args: &RecoverArgs) -> Result<Option<(Rig, Manifold)>> {
+    let (Some(rig), Some(manifold)) = (&args.rig, &args.manifold) else { return Ok(None) };
+    if args.align == Align::Auto || args.scale == Align::Auto || args.up.is_some() {
+        bail!("--rig: finds the person wherever it is; leave out --align, --scale and --up");
+    }
+    Ok(Some((read_rig(rig)?, read_manifold(manifold)?)))
+}
+
+fn person_options(method: PersonMethod) -> FitOptions {
+    let method = match method {
+        PersonMethod::Robust => Method::Robust,
+        PersonMethod::Paper => Method::Paper,
+    };
+    FitOptions { method, ..FitOptions::default() }
+}
+
+/// How joints are written.
+#[derive(Clone, Copy)]
+enum JointsKind {
+    Csv,
+    Bvh,
+}
+
+fn joints_target(outputs: &mut Outputs, path: &Path) -> Result<(Target, JointsKind)> {
+    let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
+    let kind = match extension.as_deref() {
+        Some("csv") => JointsKind::Csv,
+        Some("bvh") => JointsKind::Bvh,
+        _ => bail!("{}: joints are written as .csv or .bvh; name a file that ends so", path.display()),
+    };
+    Ok((outputs.text(path)?, kind))
 }
 
 /// The files of the frames; the template and the cage are none unless they are called like these.
@@ -79,12 +127,14 @@ fn followed(
     args: &RecoverArgs,
     template: Model,
     cage: Cage,
+    person: Option<Person<'_>>,
     files: &MeshSequence,
     scratch: &Path,
 ) -> Result<Recovered> {
     let job = RecoverJob {
         template,
         cage,
+        person,
         files,
         frame_rate: args.timing.fps,
         first_number: 0.0,
@@ -111,10 +161,19 @@ fn followed(
     Ok(recovered?)
 }
 
+/// Frames per second of joints where --fps does not tell.
+const DEFAULT_RATE: f64 = 30.0;
+
 /// Encodes what was recovered.
-fn write(args: &RecoverArgs, output: &Target, recovered: Recovered, report_file: Option<AtomicFile>) -> Result<()> {
-    let Recovered { rest, cage, mut frames, report, warnings } = recovered;
-    let system: &dyn CoordinateSystem = &MeanValue;
+fn write(
+    args: &RecoverArgs,
+    output: &Target,
+    system: &'static dyn CoordinateSystem,
+    recovered: Recovered,
+    report_file: Option<AtomicFile>,
+    joints_file: Option<(AtomicFile, JointsKind)>,
+) -> Result<()> {
+    let Recovered { rest, cage, mut frames, report, joints, warnings } = recovered;
     let count = report.frames.len();
     let goal = goal(&args.coding, true, &rest, count)?;
     let choices = InversionChoices {
@@ -147,7 +206,15 @@ fn write(args: &RecoverArgs, output: &Target, recovered: Recovered, report_file:
     bar.finish();
     let Encoded { report: encoded, container } = result?;
     let report_file = report_file.map(|file| write_report(file, &report)).transpose()?;
-    commit_together(report_file.into_iter().chain([container]).collect())?;
+    let joints_file = joints_file.zip(joints).map(|((mut file, kind), joints)| {
+        match kind {
+            JointsKind::Csv => file.write_all(joints.csv().as_bytes()),
+            JointsKind::Bvh => file.write_all(&joints.bvh(args.timing.fps.unwrap_or(DEFAULT_RATE))),
+        }
+        .map(|()| file)
+    });
+    let joints_file = joints_file.transpose()?;
+    commit_together(report_file.into_iter().chain(joints_file).chain([container]).collect())?;
     warn(&warnings);
     warn(&encoded.warnings);
     tell(&summary(&report, &encoded, output.path()))
@@ -161,7 +228,8 @@ fn write_report(mut file: AtomicFile, report: &RecoveryReport) -> Result<AtomicF
 }
 
 fn summary(report: &RecoveryReport, encoded: &cager_proto::report::Report, output: &Path) -> String {
-    let percent = |share: Option<f64>| share.map_or("unknown".to_owned(), |share| format!("{:.3} %", 100.0 * share));
+    let percent =
+        |share: Option<f64>| share.map_or("not measured".to_owned(), |share| format!("{:.3} %", 100.0 * share));
     let count = |outcome: &str| report.frames.iter().filter(|frame| frame.outcome == outcome).count();
     let placed = report.placement.map_or_else(String::new, |placed| {
         format!(

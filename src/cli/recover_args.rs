@@ -24,8 +24,24 @@ pub(crate) struct RecoverArgs {
     pub(super) frames: PathBuf,
 
     /// Closed cage around the template [default: one of 350 vertices is made].
-    #[arg(long, value_name = "CAGE", hide_default_value = true)]
+    #[arg(long, value_name = "CAGE", hide_default_value = true, conflicts_with = "rig")]
     pub(super) cage: Option<PathBuf>,
+
+    /// Follow a person by this rig, as `cager rig` writes it for the template: for noisy, partial or fast surfaces.
+    #[arg(long, value_name = "RIG.json", requires = "manifold")]
+    pub(super) rig: Option<PathBuf>,
+
+    /// Poses that are usual, as `cager manifold` writes them.
+    #[arg(long, value_name = "MANIFOLD.json", requires = "rig")]
+    pub(super) manifold: Option<PathBuf>,
+
+    /// With --rig, paper: as Duveau et al. 2012 print it, for comparison.
+    #[arg(long, value_enum, value_name = "METHOD", requires = "rig", default_value = "robust")]
+    pub(super) method: PersonMethod,
+
+    /// With --rig, write where its joints are in every frame: .csv or .bvh.
+    #[arg(long, value_name = "JOINTS", requires = "rig")]
+    pub(super) joints: Option<PathBuf>,
 
     /// File to write, or - for standard output; it appears whole or not at all.
     #[arg(short, long, value_name = "OUT.cager")]
@@ -74,4 +90,11 @@ pub(crate) struct RecoverArgs {
 pub(super) enum Align {
     None,
     Auto,
+}
+
+/// How a person is followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum PersonMethod {
+    Robust,
+    Paper,
 }

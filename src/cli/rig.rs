@@ -114,7 +114,12 @@ pub(super) fn run(args: &RigArgs) -> Result<()> {
         )]);
     }
     let text = placed.rig.to_json();
-    write(&output, args.outputs, text.as_bytes(), &format!("{CAGE_VERTICES} vertices and {CAGE_FACES} triangles in 21 quads"))
+    write(
+        &output,
+        args.outputs,
+        text.as_bytes(),
+        &format!("{CAGE_VERTICES} vertices and {CAGE_FACES} triangles in 21 quads"),
+    )
 }
 
 pub(super) fn learn(args: &ManifoldArgs) -> Result<()> {

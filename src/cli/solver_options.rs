@@ -97,7 +97,7 @@ pub(super) fn matrix(args: &SolverArgs) -> Result<Option<SparseMatrix>> {
 pub(super) fn spectrum_bound(args: &SolverArgs) -> Result<f64> {
     const USUAL: f64 = 0.05;
     // Errors a hundred times as large make no useful encoding.
-    const MOST: f64 = 100.0;
+    const MAX_BOUND: f64 = 100.0;
     match args.spectrum_bound {
         Some(_) if args.spectrum != Some(SpectrumArg::Auto) => {
             bail!("--spectrum-bound: only --spectrum auto looks at it; leave it out or choose automatically")
@@ -105,8 +105,8 @@ pub(super) fn spectrum_bound(args: &SolverArgs) -> Result<f64> {
         Some(bound) if !(bound.is_finite() && bound >= 0.0) => {
             bail!("--spectrum-bound: is {bound}; give a finite fraction of at least 0")
         }
-        Some(bound) if bound > MOST => {
-            bail!("--spectrum-bound: is {bound:e}; give a fraction of at most {MOST}, such as 0.05 for 5 %")
+        Some(bound) if bound > MAX_BOUND => {
+            bail!("--spectrum-bound: is {bound:e}; give a fraction of at most {MAX_BOUND}, such as 0.05 for 5 %")
         }
         bound => Ok(bound.unwrap_or(USUAL)),
     }

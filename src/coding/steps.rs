@@ -18,7 +18,7 @@ const USUAL_STEP: f64 = 1.8;
 /// Figures so near to what is allowed are good enough, and so are steps so near to each other.
 const NEAR: f64 = 1.02;
 /// Most steps that are tried for a group.
-const MOST_TRIALS: usize = 20;
+const MAX_TRIALS: usize = 20;
 
 /// Of so many frames those that steps are chosen by: a run in either half, since a capture may begin more calmly than it goes on.
 fn trial_frames(count: usize) -> [Range<usize>; 2] {
@@ -108,7 +108,7 @@ impl GroupCoder {
         let mut best: Option<(f64, f64, T)> = None;
         let mut refused: Option<f64> = None;
         let mut before: Option<(f64, f64)> = None;
-        for _ in 0..MOST_TRIALS {
+        for _ in 0..MAX_TRIALS {
             let figure = match tried(self, step, ratio) {
                 Ok((found, figure)) => {
                     let is_fine = figure <= 1.0;

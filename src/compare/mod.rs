@@ -94,11 +94,11 @@ pub(crate) fn compare(job: &Job<'_>, progress: &mut Progress<'_>) -> Result<(Fig
         };
         tell(&format!("{name}: coordinates"), 0.0);
         let clock = StepClock::default();
-        let next = |step| {
+        let before_step = |step| {
             clock.begin(step);
             ControlFlow::Continue(())
         };
-        let context = PrepareContext { next: &next, ..PrepareContext::default() };
+        let context = PrepareContext { before_step: &before_step, ..PrepareContext::default() };
         let analysis = match Analysis::new(system, job.cage, &job.rest.points, &context) {
             Ok(analysis) => analysis,
             Err(error) => {

@@ -159,11 +159,13 @@ async fn check_host_and_origin(
 
 /// Whether to compress a response: text of 1 KiB or more. Binary numbers compress badly and are requested by range.
 fn is_worth_compressing(_: StatusCode, _: Version, headers: &HeaderMap, _: &Extensions) -> bool {
-    const LEAST: u64 = 1024;
+    const MIN_BYTES: u64 = 1024;
     let text = |name| headers.get(name).and_then(|value: &HeaderValue| value.to_str().ok());
     let media_type = text(header::CONTENT_TYPE).and_then(|value| value.split(';').next()).unwrap_or_default();
     matches!(media_type, "application/json" | "text/html" | "text/javascript" | "text/css" | "image/svg+xml")
-        && text(header::CONTENT_LENGTH).and_then(|length| length.parse().ok()).is_none_or(|length: u64| length >= LEAST)
+        && text(header::CONTENT_LENGTH)
+            .and_then(|length| length.parse().ok())
+            .is_none_or(|length: u64| length >= MIN_BYTES)
 }
 
 /// Takes a request permit until the response is complete; a large response keeps it until it is sent.

@@ -36,7 +36,7 @@ pub(crate) struct Prepared {
     pub(crate) warnings: Vec<String>,
 }
 
-/// Prepares the solver, and gives the seconds of [`StepClock`] too. `wanted` is called before each step; returns `None` once it is false.
+/// The prepared solver and the seconds of [`StepClock::seconds`]. `wanted` is called before each step; `None` once it is false.
 ///
 /// # Errors
 /// `INVALID_GEOMETRY`, `INVALID_OPTIONS`.
@@ -50,18 +50,21 @@ pub(crate) fn prepare(
     let options = choices.inversion.options(unknowns);
     check_memory(geometry, choices, options, max_bytes)?;
     let clock = StepClock::default();
-    let next = |step| {
+    let before_step = |step| {
         clock.begin(step);
         if wanted() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     };
     let context = PrepareContext {
         matrix: geometry.matrix.as_ref(),
         memory: max_bytes,
-        next: &next,
+        before_step: &before_step,
         ..PrepareContext::default()
     };
     match Solver::prepare_with(choices.system, &geometry.cage, &geometry.rest.points, options, &context) {
-        Ok(solver) => Ok(Some((with_solver(solver, &geometry.cage, options), clock.seconds()))),
+        Ok(solver) => {
+            let seconds = clock.seconds();
+            Ok(Some((with_solver(solver, &geometry.cage, options), seconds)))
+        }
         Err(PrepareError::Stopped) => Ok(None),
         Err(error) => Err(refused(&error)),
     }

@@ -1,34 +1,34 @@
 //! One animation of a template from surfaces that have no correspondence: files in, frames out that can be encoded as any capture.
 
+mod any_subject;
+mod finish;
+mod people;
 mod placement;
 mod positions;
 mod report;
 mod surfaces;
 
+pub use people::{Joints, Person};
 pub use placement::Placement;
 pub use positions::RecoveredFrames;
 pub use report::{FrameReport, RecoveryReport};
 pub use surfaces::Distances;
 
 use crate::mismatch::Up;
+use any_subject::Recovering;
 use cager_core::cage::{Cage, CageError};
 use cager_core::coordinates::{CoordinateSystem, CoordinatesError, MeanValue};
 use cager_formats::MeshSequence;
-use cager_geometry::linalg::tall_product;
-use cager_geometry::mesh::{Model, Point, TriMesh};
-use cager_recover::offsets::OffsetSolver;
-use cager_recover::track::{SecondPass, TrackedFrame, Tracker, smoothed};
-use cager_registration::{
-    ObservationError, RegistrationError, SurfacePoint, Template, TemplateOptions, outward, sample_surface,
-};
-use faer::Mat;
-use placement::{area, check_start};
+use cager_geometry::mesh::{Model, TriMesh};
+use cager_recover::joints::JointsError;
+use cager_recover::people::ModelError;
+use cager_registration::{ObservationError, RegistrationError, outward};
+use finish::Finisher;
 use report::Seconds;
-use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::sync_channel;
 use std::time::Instant;
-use surfaces::{Followed, SurfaceFiles, distances};
+use surfaces::{Followed, SurfaceFiles};
 
 /// Why a recovery stopped; nothing was written.
 #[derive(Debug, thiserror::Error)]
@@ -57,6 +57,12 @@ pub enum RecoverError {
     /// The template cannot be laid onto anything.
     #[error(transparent)]
     Template(#[from] RegistrationError),
+    /// The template cannot be followed by its rig.
+    #[error(transparent)]
+    Person(#[from] ModelError),
+    /// The joints have no place in the cage.
+    #[error(transparent)]
+    Joints(#[from] JointsError),
     /// The cage cannot be used.
     #[error("the cage: {0}")]
     Cage(#[from] CageError),
@@ -104,6 +110,8 @@ pub struct RecoverJob<'a> {
     pub template: Model,
     /// Its cage.
     pub cage: Cage,
+    /// What is known of it, where it is a person: the cage is then the rig's.
+    pub person: Option<Person<'a>>,
     /// The frames.
     pub files: &'a MeshSequence,
     /// Frames per second, where known.
@@ -135,6 +143,8 @@ pub struct Recovered {
     pub frames: RecoveredFrames,
     /// How it went.
     pub report: RecoveryReport,
+    /// Joints of a person in every frame.
+    pub joints: Option<Joints>,
     /// What the user should know.
     pub warnings: Vec<String>,
 }
@@ -145,7 +155,7 @@ pub struct Recovered {
 /// See [`RecoverError`].
 pub fn recover(job: RecoverJob<'_>, progress: &dyn Fn(RecoverProgress)) -> Result<Recovered, RecoverError> {
     let clock = Instant::now();
-    let RecoverJob { mut template, cage, files, frame_rate, first_number, options, scratch } = job;
+    let RecoverJob { mut template, cage, person, files, frame_rate, first_number, options, scratch } = job;
     let frames = files.files.len();
     let numbers = files.numbers.clone().unwrap_or_else(|| (0..frames).map(|k| first_number + k as f64).collect());
     let diagonal = |model: &Model| cager_geometry::mesh::diagonal(&model.points);
@@ -156,46 +166,44 @@ pub fn recover(job: RecoverJob<'_>, progress: &dyn Fn(RecoverProgress)) -> Resul
     let placement = Placement::find(&mut template, &mut cage, &seen.observation, &options);
     surfaces.diagonal = diagonal(&template);
     let cage = Cage::new(cage)?;
-    let coordinates = MeanValue.coordinates(&cage, &template.points, None)?;
     let mut rest = TriMesh::from(&template);
     rest.triangles = outward(&rest.vertices, &rest.triangles);
-    let prepared = Template::new(&rest, &cage, coordinates.phi.as_ref(), &TemplateOptions::default())?;
-    let model = Recovering { rest: &rest, phi: &coordinates.phi, template: &prepared, diagonal: surfaces.diagonal };
-    if placement.is_none() && !options.force {
-        let target = cager_registration::Target::new(&seen.observation, surfaces.diagonal);
-        let area_of = |cage: &[Point]| area(&model.positions(cage), &rest.triangles);
-        check_start(&template, &cage, &prepared, area_of, (&files.files[first], &seen.observation, &target))?;
-    }
-    drop(seen);
-    let mut seconds = Seconds { prepare: clock.elapsed().as_secs_f64(), ..Seconds::default() };
-
-    let clock = Instant::now();
-    let mut tracker = Tracker::new(&prepared, cage.vertices().to_vec());
-    let mut tracked: Vec<TrackedFrame> = Vec::with_capacity(frames);
-    each(&surfaces, (0..frames).collect(), options.force, |_, seen| {
-        tracked.push(match seen {
-            Some(seen) => tracker.follow(&seen.target),
-            None => tracker.skip(),
-        });
-        progress(RecoverProgress::Followed(tracked.len()));
-        Ok(())
-    })?;
-    seconds.follow = clock.elapsed().as_secs_f64();
-
-    let clock = Instant::now();
-    let mut written = RecoveredFrames::create(scratch, rest.vertices.len(), numbers.clone(), frame_rate)?;
-    let reports = model.refine(&surfaces, &mut tracked, &mut written, &options, progress)?;
-    written.rewind()?;
-    seconds.refine = clock.elapsed().as_secs_f64();
-
+    let written = RecoveredFrames::create(scratch, rest.vertices.len(), numbers.clone(), frame_rate)?;
+    let mut finisher = Finisher::new(&rest, surfaces.diagonal, options.offsets, written);
+    let mut seconds = Seconds::default();
+    let (mut joints, mut warnings) = (None, Vec::new());
+    let reports = if let Some(person) = person {
+        seconds.prepare = clock.elapsed().as_secs_f64();
+        let clock = Instant::now();
+        let found = person.follow(&rest, &surfaces, &mut finisher, options.force, progress)?;
+        seconds.follow = clock.elapsed().as_secs_f64();
+        joints = Some(found.joints);
+        found.reports
+    } else {
+        let coordinates = MeanValue.coordinates(&cage, &template.points, None)?;
+        if !coordinates.outside.is_empty() {
+            let outside = coordinates.outside.len();
+            warnings.push(format!("{outside} points of the template lie outside of the cage, and follow it less well"));
+        }
+        let model = Recovering::new(&rest, &cage, &coordinates.phi)?;
+        if placement.is_none() && !options.force {
+            model.check_start(&template, &rest, &cage, (&files.files[first], &seen))?;
+        }
+        drop(seen);
+        seconds.prepare = clock.elapsed().as_secs_f64();
+        let clock = Instant::now();
+        let mut tracked = model.follow(&surfaces, &cage, options.force, progress)?;
+        seconds.follow = clock.elapsed().as_secs_f64();
+        let clock = Instant::now();
+        let reports = model.refine(&surfaces, &mut tracked, &mut finisher, options.force, progress)?;
+        seconds.refine = clock.elapsed().as_secs_f64();
+        reports
+    };
     let report = RecoveryReport::new(&rest, &cage, surfaces.diagonal, placement, reports, &numbers, files, seconds);
-    let mut warnings = report.warnings();
+    warnings.extend(report.warnings());
     warnings.extend(placement.and_then(|placement| placement.warning()));
-    if !coordinates.outside.is_empty() {
-        let outside = coordinates.outside.len();
-        warnings.push(format!("{outside} points of the template lie outside of the cage, and follow it less well"));
-    }
-    Ok(Recovered { rest: template, cage, frames: written, report, warnings })
+    let frames = finisher.into_frames()?;
+    Ok(Recovered { rest: template, cage, frames, report, joints, warnings })
 }
 
 /// The first frame that holds a surface.
@@ -240,88 +248,4 @@ fn each(
         }
         Ok(())
     })
-}
-
-/// A template that is followed.
-struct Recovering<'a> {
-    rest: &'a TriMesh,
-    phi: &'a Mat<f64>,
-    template: &'a Template,
-    diagonal: f64,
-}
-
-/// Points of the template that are measured to the surfaces.
-const MEASURED: usize = 3000;
-
-impl Recovering<'_> {
-    /// Where the template's points are in a cage.
-    fn positions(&self, cage: &[Point]) -> Vec<Point> {
-        let cage = Mat::from_fn(cage.len(), 3, |i, k| cage[i][k]);
-        let found = tall_product(self.phi.as_ref(), cage.as_ref());
-        (0..found.nrows()).map(|i| std::array::from_fn(|k| found[(i, k)])).collect()
-    }
-
-    /// The second pass, from the last frame: frames that lay badly from the frame after them, smoothed between their neighbours, measured and written.
-    fn refine(
-        &self,
-        surfaces: &SurfaceFiles<'_>,
-        tracked: &mut [TrackedFrame],
-        written: &mut RecoveredFrames,
-        options: &RecoverOptions,
-        progress: &dyn Fn(RecoverProgress),
-    ) -> Result<Vec<FrameReport>, RecoverError> {
-        let pass = SecondPass::new(self.template, tracked);
-        let offsets =
-            options.offsets.then(|| OffsetSolver::new(self.rest, self.diagonal));
-        let samples = sample_surface(&self.rest.vertices, &self.rest.triangles, MEASURED, 1);
-        let mut reports: VecDeque<FrameReport> = VecDeque::with_capacity(tracked.len());
-        let mut finish = |frame: usize, seen: Option<&Followed>, tracked: &[TrackedFrame]| {
-            let mut positions = self.positions(&tracked[frame].cage);
-            if let (Some(offsets), Some(seen)) = (&offsets, seen) {
-                positions = offsets.offset(&positions, &seen.target);
-            }
-            reports.push_front(self.measure(&tracked[frame], positions.clone(), &samples, seen));
-            written.write(frame, &positions)?;
-            progress(RecoverProgress::Refined(reports.len()));
-            Ok::<_, RecoverError>(())
-        };
-        // The frame after the one that is looked at, which waits for its other neighbour.
-        let mut waiting: Option<(usize, Option<Followed>)> = None;
-        each(surfaces, (0..tracked.len()).rev().collect(), options.force, |frame, seen| {
-            if let Some(seen) = seen.as_ref().filter(|_| pass.wants(&tracked[frame])) {
-                let (at, after) = tracked[frame..].split_at_mut(1);
-                let after: Vec<&[Point]> = after.iter().take(2).map(|frame| &frame.cage[..]).collect();
-                pass.refit(&seen.target, &mut at[0], &after);
-            }
-            if let Some((later, at)) = waiting.replace((frame, seen)) {
-                if let (Some(at), Some(beyond)) = (&at, tracked.get(later + 1)) {
-                    let beside = [&tracked[frame].cage[..], &beyond.cage[..]];
-                    let cage = smoothed(self.template, &at.target, &tracked[later].cage, beside);
-                    tracked[later].cage = cage;
-                }
-                finish(later, at.as_ref(), tracked)?;
-            }
-            Ok(())
-        })?;
-        if let Some((frame, seen)) = waiting {
-            finish(frame, seen.as_ref(), tracked)?;
-        }
-        Ok(reports.into())
-    }
-
-    fn measure(
-        &self,
-        frame: &TrackedFrame,
-        positions: Vec<Point>,
-        samples: &[SurfacePoint],
-        seen: Option<&Followed>,
-    ) -> FrameReport {
-        let mesh = TriMesh { vertices: positions, triangles: self.rest.triangles.clone() };
-        let points: Vec<Point> = samples.iter().map(|sample| sample.at(&mesh.vertices, &mesh.triangles)).collect();
-        let (to_surface, from_surface) =
-            seen.map_or((None, None), |seen| distances(&mesh, &points, seen, self.diagonal));
-        let turned = seen.is_some_and(|seen| seen.notes.turned);
-        let estimated_normals = seen.is_some_and(|seen| seen.notes.estimated_normals);
-        FrameReport::new(frame, to_surface, from_surface, turned, estimated_normals)
-    }
 }

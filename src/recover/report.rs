@@ -6,6 +6,7 @@ use cager_core::cage::Cage;
 use cager_formats::MeshSequence;
 use cager_geometry::mesh::TriMesh;
 use cager_recover::track::{Outcome, TrackedFrame};
+use cager_registration::ObservationNotes;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -64,22 +65,56 @@ pub struct Seconds {
     pub refine: f64,
 }
 
-impl FrameReport {
-    pub(super) fn new(
-        frame: &TrackedFrame,
-        to_surface: Option<Distances>,
-        from_surface: Option<Distances>,
-        turned: bool,
-        estimated_normals: bool,
-    ) -> Self {
+/// How a frame's cage was found, and how well it lies.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct How {
+    outcome: &'static str,
+    score: f64,
+}
+
+impl How {
+    /// There was nothing to follow.
+    pub(super) const NO_SURFACE: Self = Self { outcome: "no_surface", score: f64::INFINITY };
+
+    /// Of any subject.
+    pub(super) fn of(frame: &TrackedFrame) -> Self {
         let outcome = match frame.outcome {
             Outcome::Followed => "followed",
             Outcome::SearchedWider => "wider_search",
             Outcome::Lost => "lost",
             Outcome::NoSurface => "no_surface",
         };
-        let score = Some(frame.score).filter(|score| score.is_finite());
-        Self { number: 0.0, file: PathBuf::new(), outcome, score, to_surface, from_surface, turned, estimated_normals }
+        Self { outcome, score: frame.score }
+    }
+
+    /// Of a person.
+    pub(super) fn of_person(frame: &cager_recover::people::TrackedFrame) -> Self {
+        let outcome = match (frame.lost, frame.searched) {
+            (true, _) => "lost",
+            (false, true) => "wider_search",
+            (false, false) => "followed",
+        };
+        Self { outcome, score: frame.fit.score }
+    }
+}
+
+impl FrameReport {
+    pub(super) fn new(
+        how: How,
+        to_surface: Option<Distances>,
+        from_surface: Option<Distances>,
+        notes: Option<ObservationNotes>,
+    ) -> Self {
+        Self {
+            number: 0.0,
+            file: PathBuf::new(),
+            outcome: how.outcome,
+            score: Some(how.score).filter(|score| score.is_finite()),
+            to_surface,
+            from_surface,
+            turned: notes.is_some_and(|notes| notes.turned),
+            estimated_normals: notes.is_some_and(|notes| notes.estimated_normals),
+        }
     }
 }
 

@@ -8,7 +8,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 /// Most bytes of a group's file.
-const MOST_GROUP_BYTES: usize = 1 << 30;
+const MAX_GROUP_BYTES: usize = 1 << 30;
 /// Bytes of the digest that a group's file ends with.
 const DIGEST: usize = 32;
 
@@ -73,7 +73,7 @@ impl Store {
     /// the completion that it was coded for.
     pub fn put_group<T: Serialize>(&self, id: &str, first: u32, last: bool, group: &T) -> Result<u64, StoreError> {
         let path = self.part(id, if last { LAST } else { GROUP }, first)?;
-        let encoded = wire::encode::<_, MOST_GROUP_BYTES>(group);
+        let encoded = wire::encode::<_, MAX_GROUP_BYTES>(group);
         let mut bytes = encoded.map_err(|e| StoreError::of(&path, "write", io::Error::other(e)))?;
         let digest = blake3::hash(&bytes);
         bytes.extend_from_slice(digest.as_bytes());
@@ -94,13 +94,13 @@ impl Store {
     }
 
     fn read_group<T: DeserializeOwned>(&self, path: &Path) -> Result<Option<(T, u64)>, StoreError> {
-        let Some(file) = self.files().read(path, (MOST_GROUP_BYTES + DIGEST) as u64)? else { return Ok(None) };
+        let Some(file) = self.files().read(path, (MAX_GROUP_BYTES + DIGEST) as u64)? else { return Ok(None) };
         let damaged = |what: String| StoreError::damaged(path, what);
         let (bytes, _) = file
             .split_last_chunk::<DIGEST>()
             .filter(|(bytes, digest)| blake3::hash(bytes) == **digest)
             .ok_or_else(|| damaged("its content does not match its checksum".to_owned()))?;
-        let group = wire::decode::<_, MOST_GROUP_BYTES>(bytes).map_err(|error| damaged(error.to_string()))?;
+        let group = wire::decode::<_, MAX_GROUP_BYTES>(bytes).map_err(|error| damaged(error.to_string()))?;
         Ok(Some((group, file.len() as u64)))
     }
 

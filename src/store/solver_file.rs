@@ -24,7 +24,7 @@ const HEADER_BYTES: u64 = 1 << 16;
 const CHECKSUM: &str = "crc32c";
 
 /// Most bytes of [`Facts`].
-const MOST_FACTS: usize = 1 << 30;
+const MAX_FACTS_BYTES: usize = 1 << 30;
 
 /// What a solver is made of beside matrices.
 #[derive(Deserialize, Serialize)]
@@ -87,7 +87,7 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
         nearness,
         preparation: solver.preparation().clone(),
     };
-    let facts = wire::encode::<_, MOST_FACTS>(&facts).map_err(io::Error::other)?;
+    let facts = wire::encode::<_, MAX_FACTS_BYTES>(&facts).map_err(io::Error::other)?;
     let mut arrays = vec![Array::new("facts", column(&facts))];
     arrays.extend(matrices);
 
@@ -166,7 +166,7 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Option<S
         return Err(damage("its content does not match its checksum"));
     }
     let no_fit = || damage("its parts do not fit together");
-    let facts = wire::decode::<_, MOST_FACTS>(&facts).map_err(|_| no_fit())?;
+    let facts = wire::decode::<_, MAX_FACTS_BYTES>(&facts).map_err(|_| no_fit())?;
     let Facts { positions, reads_all, diagonal, handles, first, tied, nearness, preparation } = facts;
     let positions = positions as usize;
     let target = match (constant, previous, first) {
@@ -358,7 +358,7 @@ mod tests {
         let nearness = Some(Near { faces: vec![[29, 30, 31]], margin: 32.0 });
         let facts =
             Facts { positions: 27, reads_all: true, diagonal: 28.0, handles, first, tied, nearness, preparation };
-        let bytes = wire::encode::<_, MOST_FACTS>(&facts).expect("bytes");
+        let bytes = wire::encode::<_, MAX_FACTS_BYTES>(&facts).expect("bytes");
         assert_eq!(crc32c::crc32c(&bytes), 4_213_871_190, "files of this version read otherwise: raise it");
     }
 }

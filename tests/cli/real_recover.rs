@@ -63,7 +63,10 @@ fn the_dancer_the_walk_and_the_horse_are_recovered_within_their_bounds() {
         ("horse-gallop", 48, 1, 0.0065, 0.014),
     ] {
         let (errors, jitter) = recovered(&data().join(name), frames, step);
-        assert!(mean(&errors) <= bound && errors.iter().all(|&error| error <= worst), "{name} every {step}: {errors:?}");
+        assert!(
+            mean(&errors) <= bound && errors.iter().all(|&error| error <= worst),
+            "{name} every {step}: {errors:?}"
+        );
         assert!(step > 1 || name != "samba" || jitter <= 0.003, "{name}: {jitter}");
     }
 }

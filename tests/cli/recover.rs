@@ -1,7 +1,7 @@
 //! One animation from surfaces that share nothing: `recover`.
 
 use crate::refused::refused;
-use crate::support::{Dir, measure, mean, polygons, read_frames};
+use crate::support::{Dir, mean, measure, polygons, read_frames};
 use cager_demo::{Capture, Options};
 use cager_geometry::mesh::{Model, Point, TriMesh};
 use cager_geometry::vector::{add, centroid};
@@ -169,8 +169,14 @@ fn frames_without_a_surface_are_refused_by_name_and_passed_over_by_force() {
     for (text, words) in [
         (ply(&line, false), ["scan_2.ply", "frame 2", "one line only"]),
         (ply(&line, true), ["scan_2.ply", "frame 2", "no normal at vertex 0"]),
-        (ply(&Observation { points: vec![[0.0; 3]; 3], normals: vec![[0.0; 3]; 3] }, false), ["scan_2.ply", "3 points", "at least"]),
-        (ply(&dance.seen(2, 100), true).replacen("\n0.", "\nnan ", 1).replacen("\n-0.", "\nnan ", 1), ["scan_2.ply", "NaN", "repair"]),
+        (
+            ply(&Observation { points: vec![[0.0; 3]; 3], normals: vec![[0.0; 3]; 3] }, false),
+            ["scan_2.ply", "3 points", "at least"],
+        ),
+        (
+            ply(&dance.seen(2, 100), true).replacen("\n0.", "\nnan ", 1).replacen("\n-0.", "\nnan ", 1),
+            ["scan_2.ply", "NaN", "repair"],
+        ),
     ] {
         dir.write("scan_2.ply", text);
         refused(&dir, RECOVER, &words);

@@ -295,7 +295,7 @@ pub(crate) fn split(model: &Model) -> (Model, Vec<usize>) {
     }
     let points = from.iter().map(|&v| model.points[v]).collect();
     let colors = from.iter().filter_map(|&v| model.colors.get(v).copied()).collect();
-    (Model { points, faces: polygons(faces), colors }, from)
+    (Model { points, faces: polygons(faces), colors, ..Model::default() }, from)
 }
 
 pub(crate) fn npy_f64(frames: &[Vec<f64>]) -> Vec<u8> {

@@ -7,7 +7,7 @@ use std::time::{Duration, SystemTime};
 const FIRST: Duration = Duration::from_millis(100);
 
 /// Upper bound of a pause requested by the service.
-const LONGEST_RETRY_AFTER: Duration = Duration::from_secs(600);
+const MAX_RETRY_AFTER: Duration = Duration::from_secs(600);
 
 /// Retry state of one call: counts failures without progress.
 #[derive(Debug)]
@@ -54,7 +54,7 @@ impl Backoff {
         let own = self.next_wait();
         Ok(match retry_after {
             // A little later than asked for, and not all clients at once.
-            Some(asked) => own.max(asked.min(LONGEST_RETRY_AFTER).mul_f64(1.0 + 0.1 * fastrand::f64())),
+            Some(asked) => own.max(asked.min(MAX_RETRY_AFTER).mul_f64(1.0 + 0.1 * fastrand::f64())),
             None => own,
         })
     }
@@ -142,8 +142,8 @@ mod tests {
             let mut backoff = Backoff::new(1, Duration::from_secs(1));
             let error = ClientError::Protocol(String::new());
             let wait = backoff.failed(Failure::Transient { error, retry_after: Some(asked) }).expect("one more");
-            prop_assert!(wait >= asked.min(LONGEST_RETRY_AFTER));
-            prop_assert!(wait <= LONGEST_RETRY_AFTER.mul_f64(1.1));
+            prop_assert!(wait >= asked.min(MAX_RETRY_AFTER));
+            prop_assert!(wait <= MAX_RETRY_AFTER.mul_f64(1.1));
         }
     }
 }

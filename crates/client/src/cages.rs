@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 
 /// Polling intervals of [`Client::wait_cage`].
 const FIRST_PAUSE: Duration = Duration::from_millis(50);
-const LONGEST_PAUSE: Duration = Duration::from_secs(2);
+const MAX_PAUSE: Duration = Duration::from_secs(2);
 
 /// What a cage is designed from.
 #[derive(Clone, Debug, PartialEq)]
@@ -131,7 +131,7 @@ impl Client {
                 return Err(ClientError::NotDesigned { id: id.to_owned(), waited });
             }
             tokio::time::sleep(pause.min(limit - waited)).await;
-            pause = pause.mul_f64(1.25).min(LONGEST_PAUSE);
+            pause = pause.mul_f64(1.25).min(MAX_PAUSE);
         }
     }
 

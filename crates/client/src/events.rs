@@ -18,7 +18,7 @@ use std::time::Duration;
 const RECONNECT: Duration = Duration::from_secs(1);
 
 /// Longest pause that a stream may ask for.
-const LONGEST_RECONNECT: Duration = Duration::from_secs(60);
+const MAX_RECONNECT: Duration = Duration::from_secs(60);
 
 impl Client {
     /// Progress of a session as it happens, until it is complete or has failed; that is the last item. A broken connection is
@@ -111,7 +111,7 @@ impl<T: DeserializeOwned + Send + 'static> Events<T> {
         if let Some(id) = parser.last_id() {
             self.last_id = Some(id.to_owned());
         }
-        self.pause = parser.retry().map_or(self.pause, |asked| asked.min(LONGEST_RECONNECT));
+        self.pause = parser.retry().map_or(self.pause, |asked| asked.min(MAX_RECONNECT));
         for event in events {
             match serde_json::from_str(&event.data) {
                 Ok(progress) => self.waiting.push_back(progress),

@@ -12,9 +12,9 @@ use std::ops::Range;
 /// How much of a frame is decoded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Layer {
-    /// What its cage says alone.
+    /// The positions that its cage gives.
     Cages,
-    /// With the residual, where there is one.
+    /// Those with the residual added, where there is one.
     #[default]
     All,
 }
@@ -23,8 +23,7 @@ impl Client {
     /// Positions of a session's own frames, n × 3 values each, decoded by the service.
     ///
     /// # Errors
-    /// [`ClientError::Refused`] with status 409 where not all of them are coded yet, or solved where frames are not coded, and those of the
-    /// connection.
+    /// [`ClientError::Refused`] with status 409 where some are not coded yet, or not solved in a session that codes none; and those of the connection.
     pub async fn decode_frames(&self, id: &str, frames: Range<u32>, layer: Layer) -> Result<Vec<f32>, ClientError> {
         let count = frames.end.saturating_sub(frames.start);
         if count == 0 {
@@ -94,7 +93,7 @@ impl Client {
             SessionState::Completed => match self.container_length(id).await? {
                 length if length == *written => Ok(()),
                 _ => Err(Failure::protocol(
-                    "frames that had come already were left out in the end; download the container",
+                    "frames that were received already are not in the completed container; download it",
                 )),
             },
             SessionState::Failed => Err(ClientError::Failed(Box::new(reason(session))).into()),

@@ -3,15 +3,15 @@
 use crate::backoff::retry_after;
 use crate::error::{ClientError, Failure};
 use cager_proto::messages::Problem;
-use reqwest::header::{CONTENT_TYPE, LOCATION, RETRY_AFTER};
+use reqwest::header::{CONTENT_TYPE, HeaderName, LOCATION, RETRY_AFTER};
 use reqwest::{Response, StatusCode};
 use std::time::{Duration, SystemTime};
 
 /// Bytes read from the body of an error response.
-const PROBLEM_BYTES: usize = 64 << 10;
+const MAX_PROBLEM_BYTES: usize = 64 << 10;
 
 /// Characters shown of a body that is not a problem.
-const SHOWN_CHARS: usize = 200;
+const MAX_SHOWN_CHARS: usize = 200;
 
 /// Longest wait for the body of an error response; after that only its status is reported.
 const BODY_TIMEOUT: Duration = Duration::from_secs(5);
@@ -44,14 +44,14 @@ pub(crate) fn classify(problem: Problem, retry_after: Option<Duration>) -> Failu
 
 async fn read_problem(mut response: Response) -> Problem {
     let status = response.status();
-    let is_json = header(&response, CONTENT_TYPE.as_str()).is_some_and(|kind| kind.contains("json"));
-    let place = header(&response, LOCATION.as_str());
+    let is_json = header(&response, &CONTENT_TYPE).is_some_and(|kind| kind.to_ascii_lowercase().contains("json"));
+    let place = header(&response, &LOCATION).map(str::to_owned);
     let mut body = Vec::new();
     let read = async {
         while let Ok(Some(chunk)) = response.chunk().await {
-            let room = PROBLEM_BYTES - body.len();
+            let room = MAX_PROBLEM_BYTES - body.len();
             body.extend_from_slice(&chunk[..chunk.len().min(room)]);
-            if body.len() == PROBLEM_BYTES {
+            if body.len() == MAX_PROBLEM_BYTES {
                 break;
             }
         }
@@ -61,8 +61,8 @@ async fn read_problem(mut response: Response) -> Problem {
     parse(status, is_json, place.as_deref(), &body)
 }
 
-fn header(response: &Response, name: &str) -> Option<String> {
-    Some(response.headers().get(name)?.to_str().ok()?.to_ascii_lowercase())
+fn header<'a>(response: &'a Response, name: &HeaderName) -> Option<&'a str> {
+    response.headers().get(name)?.to_str().ok()
 }
 
 /// Parses a problem, or makes one from the page of a proxy or another server.
@@ -111,7 +111,7 @@ fn visible_text(page: &str) -> String {
         }
     }
     let line = printable(&text.split_whitespace().collect::<Vec<_>>().join(" "));
-    match line.char_indices().nth(SHOWN_CHARS) {
+    match line.char_indices().nth(MAX_SHOWN_CHARS) {
         Some((end, _)) => format!("{}…", &line[..end]),
         None => line,
     }
@@ -150,10 +150,19 @@ mod tests {
         assert!(problem.detail.contains("503") && problem.detail.contains("without saying why"));
     }
 
-    #[test]
-    fn a_redirect_names_its_target() {
-        let problem = parse(StatusCode::PERMANENT_REDIRECT, false, Some("https://cager.example/"), b"moved");
-        assert!(problem.detail.contains("https://cager.example/"));
+    #[tokio::test]
+    async fn a_redirect_names_its_target_as_it_is_written() {
+        let response = http::Response::builder().status(308).header(LOCATION, "https://cager.example/Studio/A");
+        let problem = read_problem(response.body("moved").expect("a response").into()).await;
+        assert!(problem.detail.contains("https://cager.example/Studio/A"), "{}", problem.detail);
+    }
+
+    #[tokio::test]
+    async fn the_kind_of_a_body_may_be_written_in_any_case() {
+        let response = http::Response::builder().status(422).header(CONTENT_TYPE, "Application/Problem+JSON");
+        let body = r#"{"type":"about:blank","title":"t","status":422,"detail":"face 3 is open"}"#;
+        let problem = read_problem(response.body(body).expect("a response").into()).await;
+        assert_eq!(problem.detail, "face 3 is open");
     }
 
     #[test]

@@ -16,10 +16,10 @@ pub struct CageFrame {
     pub values: Vec<f32>,
 }
 
-/// Incremental parser of a stream of cage records. Buffers at most one record and one chunk.
+/// Parses a stream of cage records as it comes. Holds at most one record and one chunk.
 #[derive(Debug)]
 pub(crate) struct CageRecords {
-    /// Unknowns per frame, m: a record of another size is none of this session's.
+    /// Unknowns per frame, m: records of another size belong to no frame of this session.
     rows: u32,
     buffer: BytesMut,
 }

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 /// Polling intervals of [`Client::wait_ready`].
 const FIRST_PAUSE: Duration = Duration::from_millis(20);
-const LONGEST_PAUSE: Duration = Duration::from_secs(2);
+const MAX_PAUSE: Duration = Duration::from_secs(2);
 
 impl Client {
     /// A session as it is now.
@@ -79,7 +79,7 @@ impl Client {
                 return Err(ClientError::NotReady { id: id.to_owned(), waited });
             }
             tokio::time::sleep(pause.min(limit - waited)).await;
-            pause = pause.mul_f64(1.25).min(LONGEST_PAUSE);
+            pause = pause.mul_f64(1.25).min(MAX_PAUSE);
         }
     }
 

@@ -1,7 +1,7 @@
 //! Cages of a group of frames: `Y = E A` in the coordinates of [`CageBasis`], A in whole steps.
 
 use crate::basis::CageBasis;
-use crate::entropy::{Coder, Decoder, Encoder, Integers, MAX_SIZE, SIZES, size_class};
+use crate::entropy::{Coder, Decoder, Encoder, Integers, MAX_CONTEXT_SIZE, MAX_SIZE, SIZES, size_class};
 use crate::error::{Error, Result};
 use crate::trajectories::{PULSE_FRAMES, Trajectories, fit};
 use crate::{MAX_FRAMES, trajectories};
@@ -126,7 +126,8 @@ fn code_values(coder: &mut impl Coder, rows: usize, count: usize, given: &[i32])
     let mut found: Vec<i32> = Vec::with_capacity(width * count);
     for at in 0..width * count {
         let (k, value) = (at / width, at % width);
-        let size = |known: bool, back: usize| if known { found[at - back].unsigned_abs().min(1 << 20) } else { 0 };
+        let size =
+            |known: bool, back: usize| if known { found[at - back].unsigned_abs().min(MAX_CONTEXT_SIZE) } else { 0 };
         let around = 8 * size(value >= 3, 3)
             + 4 * size(value >= 6, 6)
             + 8 * size(k >= 1, width)

@@ -2,7 +2,7 @@
 //! around it are. Vertices may be coded in two parts, coarse and fine, each by a range coder of its own, so that two threads code them: the fine part of a component
 //! while the coarse part of a later one is under way.
 
-use crate::entropy::{BinaryModel, Coder, Integers, MAX_SIZE, SIZES, size_class};
+use crate::entropy::{BinaryModel, Coder, Integers, MAX_CONTEXT_SIZE, MAX_RESIDUAL_SIZE, MAX_SIZE, SIZES, size_class};
 use crate::hierarchy::Hierarchy;
 use std::ops::Range;
 use std::sync::LazyLock;
@@ -85,12 +85,12 @@ impl<M: Models> Part<M> {
             let target = target.get(place);
             let mut beside = 0;
             for k in 0..3 {
-                let around = around[k].min(1 << 20) as u32;
+                let around = around[k].min(MAX_CONTEXT_SIZE.into()) as u32;
                 let context = size_class(around + 6 * before[k] + beside);
                 let value = target.map_or(0, |target| rounded(target[k] - expected[k]));
                 let value = models.code(coder, SIZES * k + context, value);
                 found[place][k] = expected[k] + PARTS * i64::from(value);
-                let size = value.unsigned_abs().min(1 << 16);
+                let size = value.unsigned_abs().min(MAX_RESIDUAL_SIZE);
                 sizes[place][k] = size;
                 beside = beside / 2 + 5 * size;
             }

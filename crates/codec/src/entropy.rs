@@ -213,6 +213,10 @@ struct Context {
 pub(crate) const UNARY: u32 = 14;
 /// Largest size of a number.
 pub(crate) const MAX_SIZE: u32 = 1 << 28;
+/// Sizes around a number count up to this for its context.
+pub(crate) const MAX_CONTEXT_SIZE: u32 = 1 << 20;
+/// Sizes of residuals are kept up to this.
+pub(crate) const MAX_RESIDUAL_SIZE: u32 = 1 << 16;
 
 impl Integers {
     pub(crate) fn new(contexts: usize) -> Self {

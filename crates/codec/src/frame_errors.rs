@@ -1,6 +1,6 @@
 //! The errors of frames, each to twelve binary digits, as differences to those of the frame before.
 
-use crate::entropy::{Coder, Decoder, Encoder, Integers, SIZES, size_class};
+use crate::entropy::{Coder, Decoder, Encoder, Integers, MAX_CONTEXT_SIZE, SIZES, size_class};
 use crate::error::{Error, Result};
 
 /// Digits of a single-precision number that are left out.
@@ -41,7 +41,7 @@ fn code(coder: &mut impl Coder, frames: usize, given: &[[f32; 2]]) -> Option<Vec
             let number = given.get(frame).map_or(0, |errors| (rounded_error(errors[k]).to_bits() >> LEFT_OUT) as i32);
             let difference = models[k].code(coder, size_class(around[k]), number - before[k]);
             before[k] = before[k].saturating_add(difference);
-            around[k] = (around[k] + difference.unsigned_abs().min(1 << 20)) / 2;
+            around[k] = (around[k] + difference.unsigned_abs().min(MAX_CONTEXT_SIZE)) / 2;
         }
         if coder.is_damaged() || before.iter().any(|number| !(0..1 << (u32::BITS - LEFT_OUT)).contains(number)) {
             return None;

@@ -1,6 +1,8 @@
 //! Positions of a mesh at rest, on a grid.
 
-use crate::entropy::{Coder, Decoder, Encoder, Integers, MAX_SIZE, SIZES, size_class};
+use crate::entropy::{
+    Coder, Decoder, Encoder, Integers, MAX_CONTEXT_SIZE, MAX_RESIDUAL_SIZE, MAX_SIZE, SIZES, size_class,
+};
 use crate::error::{Error, Result};
 use crate::parallelograms::Predictions;
 use crate::prediction_weights::{PredictionWeights, WEIGHTS_BYTES};
@@ -97,12 +99,12 @@ fn code(
         for k in 0..3 {
             let of = |w: &u32| residuals[*w as usize].map_or(0, |sizes| u64::from(sizes[k]));
             let around = 6 * known.iter().map(of).sum::<u64>() / known.len().max(1) as u64;
-            let around = around.min(1 << 20) as u32 + 5 * (before / 8) + 5 * coded_so_far;
-            let context = SIZES * triples.len().min(2) + size_class(around.min(1 << 20));
+            let around = around.min(MAX_CONTEXT_SIZE.into()) as u32 + 5 * (before / 8) + 5 * coded_so_far;
+            let context = SIZES * triples.len().min(2) + size_class(around.min(MAX_CONTEXT_SIZE));
             let value = given.get(vertex).map_or(0, |steps| steps[k] - expected[k]);
             let value = models.code(coder, context, value);
             found[vertex][k] = value.saturating_add(expected[k]);
-            sizes[k] = value.unsigned_abs().min(1 << 16);
+            sizes[k] = value.unsigned_abs().min(MAX_RESIDUAL_SIZE);
             coded_so_far += sizes[k];
         }
         before = (before + 8 * coded_so_far / 3) / 2;

@@ -40,7 +40,7 @@ impl CodedMesh {
     }
 
     fn grid(mesh: &Model, step: f64) -> Result<Grid> {
-        Grid::new(&mesh.points, step).ok_or(Error::Damaged("positions too far apart for this step"))
+        Grid::new(&mesh.points, step).ok_or(Error::Unsuitable("positions too far apart for this step"))
     }
 
     fn of(mesh: &Model, grid: Grid, ordered: Polygons, faces: Vec<u8>, positions: Vec<u8>) -> Self {

@@ -1,24 +1,24 @@
 //! Motion of a group of frames as few trajectories, each shared by all points: `M ≈ E A`, with M frames × values, E frames × components of
 //! nearly orthonormal columns, the eigenvectors of `M Mᵀ` (Karhunen–Loève transform in time), and A what each value takes of them.
 
-use crate::entropy::{Coder, Integers, SIZES, size_class};
+use crate::entropy::{Coder, Integers, MAX_CONTEXT_SIZE, SIZES, size_class};
 use cager_geometry::linalg;
 use faer::{Mat, MatRef};
 
 /// Components whose energy per value is below this fraction of that of rounding to whole steps are left out.
-const WORTH: f64 = 0.3 / 12.0;
-/// Added to the size of an entry of E before it is rounded down: small ones cost more than they are worth.
+const MIN_ENERGY: f64 = 0.3 / 12.0;
+/// Added to a size before rounding down: below 0.5, since small entries cost more than they gain.
 const ROUND_UP: f64 = 0.35;
 /// Largest number of binary digits of an entry of E.
 const MAX_DIGITS: u32 = 26;
 
 /// Fewest rows of one part of a sum over all of them, and most parts.
-const BLOCK_ROWS: usize = 2048;
+const MIN_BLOCK_ROWS: usize = 2048;
 const MAX_BLOCKS: usize = 16;
 
 /// `Mᵀ M` of motion with many rows.
 pub(crate) fn gram(motion: MatRef<'_, f64>) -> Mat<f64> {
-    linalg::mirrored(linalg::gram(motion, motion.nrows().div_ceil(MAX_BLOCKS).max(BLOCK_ROWS)))
+    linalg::mirrored(linalg::gram(motion, motion.nrows().div_ceil(MAX_BLOCKS).max(MIN_BLOCK_ROWS)))
 }
 
 /// Frames over which a pulse beside another group falls to 0.
@@ -40,7 +40,7 @@ impl Trajectories {
     pub(crate) fn choose(gram: MatRef<'_, f64>, width: usize, step: f64, most: usize) -> Option<Self> {
         let frames = gram.nrows();
         let (energies, vectors) = linalg::eigen(gram)?;
-        let least = WORTH * width as f64 * step * step;
+        let least = MIN_ENERGY * width as f64 * step * step;
         let count = energies.iter().take_while(|&&energy| energy > least).count().min(most);
         let waves = linalg::product(cosines(frames).as_ref(), vectors.subcols(0, count));
         // An entry's error times the component's length is an error of the values: coded to the same step.
@@ -92,7 +92,9 @@ impl Trajectories {
             let (mut last, mut last_but_one) = (0, 0);
             for t in 0..frames {
                 let above = if k > 0 { found.waves[(k - 1) * frames + t].unsigned_abs() } else { 0 };
-                let size = last.min(1 << 20) * 8 + last_but_one.min(1 << 20) * 4 + above.min(1 << 20) * 4;
+                let [last_size, size_before, above] =
+                    [last, last_but_one, above].map(|size: u32| size.min(MAX_CONTEXT_SIZE));
+                let size = 8 * last_size + 4 * size_before + 4 * above;
                 let value = self.waves.get(k * frames + t).copied().unwrap_or(0);
                 let value = models.code(coder, size_class(size), value);
                 found.waves.push(value);

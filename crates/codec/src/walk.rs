@@ -8,15 +8,15 @@ use crate::open_edges::{NEWEST, OpenEdges};
 const MAX_FACES: u32 = 8;
 /// Pairs of such numbers.
 const PAIRS: usize = (MAX_FACES as usize + 1).pow(2);
-/// Open edges of a vertex that are sorted anew with it, in either direction: ordinary meshes have no more.
-const MAX_NEARER: usize = 4;
-/// Vertices that a corner is looked for among, those that open edges lead to.
+/// Open edges of a vertex that are queued anew when it has fewer faces to come, in either direction: ordinary meshes have no more.
+const MAX_REQUEUED: usize = 4;
+/// Candidates for the next corner: vertices at the far end of open edges.
 const MAX_NEAR: usize = 8;
 
 /// The turn of vertices that were not met yet.
 const UNVISITED: u32 = u32::MAX;
 
-/// What vertices are called.
+/// How vertices are numbered.
 pub(crate) enum VertexLabels {
     /// What the faces call them that are encoded; the faces at each.
     Given(Vec<u32>),
@@ -33,7 +33,7 @@ pub(crate) struct Walk {
     met: Vec<u32>,
     pub(crate) turns: Vec<u32>,
     /// Faces that each vertex still is a corner of.
-    faces: Vec<u32>,
+    faces_to_come: Vec<u32>,
     /// The last face, counted from 1, that each vertex is a corner of, and the face that is coded.
     of_face: Vec<u32>,
     face: u32,
@@ -59,7 +59,7 @@ impl Walk {
             arriving: std::iter::repeat_with(OpenEdges::default).take(points).collect(),
             met: Vec::new(),
             turns: vec![UNVISITED; points],
-            faces: vec![0; points],
+            faces_to_come: vec![0; points],
             of_face: vec![0; points],
             face: 0,
             gates: Gates::default(),
@@ -88,23 +88,23 @@ impl Walk {
 
     /// Fewest faces that are to come at an end of an edge.
     fn to_come(&self, (a, b): (u32, u32)) -> u32 {
-        self.faces[a as usize].min(self.faces[b as usize])
+        self.faces_to_come[a as usize].min(self.faces_to_come[b as usize])
     }
 
     /// Sorts the open edges of a vertex anew where none of their ends has fewer faces to come.
     fn requeue_open_edges(&mut self, v: u32) {
-        let faces = self.faces[v as usize];
+        let faces = self.faces_to_come[v as usize];
         if faces >= MAX_TO_COME {
             return;
         }
         let mut scratch = [0; NEWEST];
         for &x in last_few(self.leaving[v as usize].newest(&mut scratch)) {
-            if self.faces[x as usize] >= faces {
+            if self.faces_to_come[x as usize] >= faces {
                 self.gates.push((v, x), faces);
             }
         }
         for &x in last_few(self.arriving[v as usize].newest(&mut scratch)) {
-            if self.faces[x as usize] >= faces {
+            if self.faces_to_come[x as usize] >= faces {
                 self.gates.push((x, v), faces);
             }
         }
@@ -112,7 +112,7 @@ impl Walk {
 
     /// Codes whether a face follows across a gate.
     pub(crate) fn code_across(&mut self, coder: &mut impl Coder, (a, b): (u32, u32), follows: bool) -> bool {
-        let to_come = |v: u32| self.faces[v as usize].min(2) as usize;
+        let to_come = |v: u32| self.faces_to_come[v as usize].min(2) as usize;
         coder.bit(&mut self.across[3 * to_come(a) + to_come(b)], follows)
     }
 
@@ -155,9 +155,9 @@ impl Walk {
                 self.arriving[to as usize].push(from);
                 opened.push((from, to));
             }
-            let faces = self.faces[from as usize];
+            let faces = self.faces_to_come[from as usize];
             if faces > 0 {
-                self.faces[from as usize] = faces - 1;
+                self.faces_to_come[from as usize] = faces - 1;
                 nearer.push(from);
             }
         }
@@ -171,7 +171,7 @@ impl Walk {
     /// Codes the vertex after those of `face`; `closes` says that an edge leads from it back to the gate.
     fn corner(&mut self, coder: &mut impl Coder, face: &[u32], closes: bool, given: u32) -> u32 {
         let (Some(&previous), Some(&first)) = (face.last(), face.first()) else {
-            return self.any(coder, given);
+            return self.first_corner(coder, given);
         };
         // Vertices that an open edge leads from to the last corner, or to from the first one.
         let mut near: Vec<u32> = Vec::with_capacity(4);
@@ -198,7 +198,7 @@ impl Walk {
             }
         }
         near.truncate(MAX_NEAR);
-        let faces = |v: u32| self.faces[v as usize].min(MAX_FACES);
+        let faces = |v: u32| self.faces_to_come[v as usize].min(MAX_FACES);
         let pair = ((MAX_FACES + 1) * faces(previous) + faces(first)) as usize;
         let ends = usize::from(faces(previous) == 1) + 2 * usize::from(faces(first) == 1);
         let new = self.is_unvisited(given);
@@ -215,7 +215,7 @@ impl Walk {
     }
 
     /// A corner of the first face of a part.
-    fn any(&mut self, coder: &mut impl Coder, given: u32) -> u32 {
+    fn first_corner(&mut self, coder: &mut impl Coder, given: u32) -> u32 {
         let new = self.is_unvisited(given);
         if coder.bit(&mut self.first_time[0], new) {
             self.new_vertex(coder, given)
@@ -238,7 +238,7 @@ impl Walk {
         if let Some(place) = self.turns.get_mut(vertex as usize) {
             *place = turn;
             // Of the first face of all it is a corner now.
-            self.faces[vertex as usize] = self.face_counts.natural(coder, 0, faces - 1).saturating_add(1);
+            self.faces_to_come[vertex as usize] = self.face_counts.natural(coder, 0, faces - 1).saturating_add(1);
             self.met.push(vertex);
         }
         vertex
@@ -259,5 +259,5 @@ impl Walk {
 }
 
 fn last_few(ends: &[u32]) -> &[u32] {
-    &ends[ends.len().saturating_sub(MAX_NEARER)..]
+    &ends[ends.len().saturating_sub(MAX_REQUEUED)..]
 }

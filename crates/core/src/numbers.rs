@@ -1,8 +1,8 @@
-//! Numbers in what is stored.
+//! Numbers of reports that may be none.
 
 use serde::{Deserialize, Deserializer};
 
-/// Reads a number that is not finite: JSON has none, and `null` stands for it.
+/// Reads a number that may be none: JSON writes `null` for NaN and infinities. A capture that stands still has such figures, and its file must open.
 ///
 /// # Errors
 /// Those of the deserializer.

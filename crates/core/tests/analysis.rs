@@ -188,9 +188,9 @@ fn swaps_lead_from_the_start_to_the_handles_and_their_volume() {
             rows[swap.position as usize] = swap.row;
             volume += swap.growth.ln();
         }
-        assert_eq!((rows, found.trace.len()), (found.rows.clone(), found.swaps));
-        assert!((volume - found.log_volume).abs() < 1e-4, "{volume} {}", found.log_volume);
-        assert!(found.max_entry <= 1.0 + TOLERANCE);
+        assert_eq!((rows, found.trace.len()), (found.rows.clone(), found.volume.swaps));
+        assert!((volume - found.volume.log_volume).abs() < 1e-4, "{volume} {}", found.volume.log_volume);
+        assert!(found.volume.max_entry <= 1.0 + TOLERANCE);
     }
     assert!(maxvol_from(a.as_ref(), vec![7; 25], TOLERANCE).is_err());
     // All but dependent: the second row is the first but for 1e-7.

@@ -1,70 +1,22 @@
 //! Whatever bytes come, readers answer with an error or a value: no panic, and no more memory than the bytes justify.
 
-#![allow(unsafe_code)]
-
+#[path = "../../../proto/tests/support/memory.rs"]
+mod memory;
 mod support;
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 use std::path::Path;
 
 use cager_formats::{CacheFormat, MeshFormat, open_frames_bytes, read_model_bytes};
+use memory::peak_of;
 use proptest::prelude::*;
 use support::*;
-
-thread_local! {
-    static LIVE: Cell<usize> = const { Cell::new(0) };
-    static PEAK: Cell<usize> = const { Cell::new(0) };
-}
-
-/// Counts the bytes that each thread holds.
-struct Counting;
-
-impl Counting {
-    fn add(size: usize) {
-        // A thread that is ending has no counters any more.
-        let _ = LIVE.try_with(|live| {
-            live.set(live.get().saturating_add(size));
-            let _ = PEAK.try_with(|peak| peak.set(peak.get().max(live.get())));
-        });
-    }
-
-    fn subtract(size: usize) {
-        let _ = LIVE.try_with(|live| live.set(live.get().saturating_sub(size)));
-    }
-}
-
-// SAFETY: all calls go to the system's allocator as they come.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        Self::add(layout.size());
-        // SAFETY: the caller's promises are those that `System` asks for.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        Self::subtract(layout.size());
-        // SAFETY: as above.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 /// For blocks and tables that do not depend on the input.
 const FIXED: usize = 1 << 20;
 const PER_BYTE: usize = 64;
 
-fn measured<T>(read: impl FnOnce() -> T) -> (T, usize) {
-    let before = LIVE.get();
-    PEAK.set(before);
-    let value = read();
-    (value, PEAK.get().saturating_sub(before))
-}
-
 fn guarded<T>(name: &str, bytes: &[u8], read: impl FnOnce() -> T) -> T {
-    let (value, used) = measured(read);
+    let (value, used) = peak_of(read);
     let most = FIXED + PER_BYTE * bytes.len();
     assert!(used <= most, "{name}: {used} bytes of memory for {} bytes of file", bytes.len());
     value
@@ -221,7 +173,7 @@ fn json_of_empty_objects_takes_no_more_memory_than_their_greatest_number_does() 
     for key in ["nodes", "materials", "images"] {
         let json = glb_json(&format!(r#","{key}":[{}{{}}]"#, "{},".repeat(99_000)));
         let bytes = glb_file(&json, &glb_data());
-        let (_, used) = measured(|| read("a.glb", &bytes));
+        let (_, used) = peak_of(|| read("a.glb", &bytes));
         assert!(used < 200 << 20, "{used} bytes of memory for {key}");
     }
 }

@@ -79,6 +79,11 @@ impl Target {
         }
     }
 
+    /// The observation.
+    pub fn observation(&self) -> Observation {
+        Observation { points: plain(&self.points), normals: plain(&self.normals) }
+    }
+
     /// The observed points.
     pub fn points(&self) -> &[DVec3] {
         &self.points

@@ -54,7 +54,7 @@ fn seeds() -> Vec<Vec<u8>> {
     let mut faces = Polygons::new();
     faces.push(&[0, 1, 2, 3]);
     let points = cage.vertices.iter().map(|p| p.map(|x| 0.1 + x / 3.0)).collect();
-    let rest = Model { points, faces, colors: vec![[200, 0, 7]; 4] };
+    let rest = Model { points, faces, colors: vec![[200, 0, 7]; 4], ..Model::default() };
     let header = Header {
         coordinates_definition: 3,
         coordinates: "mvc".to_owned(),

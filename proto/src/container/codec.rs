@@ -8,7 +8,7 @@ use std::io::Read;
 pub(crate) const RAW: u8 = 0;
 /// Byte planes of the elements, then zstd.
 pub(crate) const PLANES: u8 = 1;
-/// Elements are 32-bit words; each less the word one stride before it, zigzag, byte planes, zstd.
+/// Differences of 32-bit words one stride apart, zigzag-coded, then byte planes and zstd.
 pub(crate) const DIFFERENCE: u8 = 2;
 /// Whole numbers of the `cager-codec` crate: cages of a group of frames, or what they leave of the positions.
 pub(crate) const CODED: u8 = 3;
@@ -20,7 +20,7 @@ pub(crate) fn is_coded(codec: u8) -> bool {
     [CODED, CODED_STATIC].contains(&codec)
 }
 
-const LEVEL: i32 = 3;
+const ZSTD_LEVEL: i32 = 3;
 /// zstd's window at this level is 2 MiB; a file that asks for much more is not ours.
 const MAX_WINDOW_LOG: u32 = 24;
 
@@ -31,7 +31,7 @@ pub(crate) fn encode(codec: u8, raw: &[u8], width: usize, stride: usize) -> Resu
         DIFFERENCE => split_planes(&differences(raw, stride), 4),
         _ => split_planes(raw, width),
     };
-    let packed = zstd::bulk::compress(&planes, LEVEL)?;
+    let packed = zstd::bulk::compress(&planes, ZSTD_LEVEL)?;
     Ok(if packed.len() < raw.len() { (codec, packed) } else { (RAW, raw.to_vec()) })
 }
 

@@ -1,7 +1,7 @@
 //! Sections of whole numbers: meshes, groups of cages and what is added to their positions, by the `cager-codec` crate.
 
 use super::codec::{CODED, CODED_STATIC};
-use super::reader::{ContainerReader, finite};
+use super::reader::{ContainerReader, check_finite};
 use super::section::{Entry, SectionHeader};
 use super::{Error, tag};
 use cager_codec::{
@@ -43,7 +43,7 @@ impl CodedSection {
 
     pub(super) fn positions(&self, faces: &Polygons, count: usize) -> Result<Vec<Point>, Error> {
         let points = decode_positions(&self.payload, faces, count).map_err(|e| self.damaged(&e))?;
-        finite(points, self.offset)
+        check_finite(points, self.offset)
     }
 
     pub(super) fn errors(&self, frames: usize) -> Result<Vec<[f32; 2]>, Error> {

@@ -30,7 +30,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         let mut next = PRELUDE_BYTES as u64;
         for line in contents.chunks_exact(ENTRY_BYTES) {
             let at = u64_at(line, 0);
-            let header = SectionHeader::of_entry(&line[8..]);
+            let header = SectionHeader::without_checksum(&line[8..]);
             // Sections follow each other without gaps, so that no byte of the file goes unchecked.
             if at != next {
                 return Err(Error::corrupt(offset, "the table of contents leaves a gap"));

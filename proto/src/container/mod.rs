@@ -24,17 +24,17 @@ pub const MAGIC: [u8; 8] = *b"\x89CGR\r\n\x1a\n";
 /// Version of the layout.
 pub const VERSION: u16 = 1;
 /// Largest encoded [`Header`], in bytes.
-pub(crate) const HEADER_LIMIT: usize = 64 << 10;
+pub(crate) const MAX_HEADER_BYTES: usize = 64 << 10;
 /// Frames of one chunk: what reading one frame decompresses.
 pub const CHUNK_FRAMES: usize = 16;
 
 /// Frames of a coded group, at the most: longer ones take fewer bytes, and reading one frame decodes its group.
-const GROUP_FRAMES: usize = 256;
+const MAX_GROUP_FRAMES: usize = 256;
 
 /// Frames of a coded group of so many points and rows a frame, so that readers can decode it in little memory.
 pub fn group_frames(points: usize, rows: usize) -> usize {
     let fitting = (cager_codec::MAX_POSITIONS / points.max(1)).min((2 << 20) / (12 * rows.max(1)));
-    fitting.clamp(1, GROUP_FRAMES)
+    fitting.clamp(1, MAX_GROUP_FRAMES)
 }
 
 /// What a decoder must know. Stored as bincode of fixed-width integers, see [`crate::wire`], but for the origin.
@@ -72,7 +72,7 @@ pub struct Header {
 }
 
 impl Header {
-    /// Bytes of the f32 positions of so many frames and of one connectivity: what a container is smaller than.
+    /// Bytes of a capture of so many frames in single precision with one connectivity: what the bytes of a container are compared with.
     pub fn capture_bytes(&self, frames: usize) -> u64 {
         let positions = self.points.saturating_mul(12).saturating_mul(frames as u64);
         self.rest_corners.saturating_mul(4).saturating_add(positions)
@@ -84,7 +84,7 @@ pub fn counted_from_zero(numbers: &[f64]) -> bool {
     numbers.iter().enumerate().all(|(frame, &number)| number == frame as f64)
 }
 
-/// Numbers of frames are finite and ascend.
+/// Whether all are finite and ascend, as numbers of frames must.
 pub(crate) fn are_frame_numbers(numbers: &[f64]) -> bool {
     numbers.iter().all(|x| x.is_finite()) && numbers.windows(2).all(|pair| pair[0] < pair[1])
 }

@@ -3,7 +3,7 @@
 use super::codec::{self, CODED};
 use super::groups::Groups;
 use super::section::{self, Entry, FOOTER_BYTES, HEADER_BYTES, PRELUDE_BYTES, SectionHeader};
-use super::{Error, HEADER_LIMIT, Header, counted_from_zero, tag};
+use super::{Error, Header, MAX_HEADER_BYTES, counted_from_zero, tag};
 use crate::le::{self, f32_at, u64_at};
 use crate::report::{FrameError, Report, WorstError};
 use crate::wire;
@@ -353,7 +353,7 @@ impl<R: Read + Seek> ContainerReader<R> {
             return Err(Error::corrupt(entry.offset, "the header is compressed"));
         }
         let raw = self.raw(entry)?;
-        self.header = wire::decode::<_, HEADER_LIMIT>(&raw)
+        self.header = wire::decode::<_, MAX_HEADER_BYTES>(&raw)
             .map_err(|e| Error::corrupt(entry.offset, format!("the header cannot be read ({e})")))?;
         let h = &self.header;
         if h.frame_rate.is_some_and(|fps| !(fps.is_finite() && fps > 0.0)) {
@@ -456,7 +456,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         } else {
             raw.chunks_exact(24).map(|b| [0, 8, 16].map(|k| f64::from_bits(u64_at(b, k)))).collect()
         };
-        finite(points, entry.offset)
+        check_finite(points, entry.offset)
     }
 
     fn indices(&mut self, tag: [u8; 4]) -> Result<(u64, Vec<u32>), Error> {
@@ -467,7 +467,7 @@ impl<R: Read + Seek> ContainerReader<R> {
 }
 
 /// Refuses positions that are not finite, of the section there.
-pub(super) fn finite(points: Vec<Point>, offset: u64) -> Result<Vec<Point>, Error> {
+pub(super) fn check_finite(points: Vec<Point>, offset: u64) -> Result<Vec<Point>, Error> {
     match points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
         Some(k) => Err(Error::corrupt(offset, format!("position {k} is not finite"))),
         None => Ok(points),

@@ -2,7 +2,7 @@
 
 use crate::le::{u32_at, u64_at};
 
-use super::{Error, HEADER_LIMIT, MAGIC, VERSION, codec, tag};
+use super::{Error, MAGIC, MAX_HEADER_BYTES, VERSION, codec, tag};
 
 pub(crate) const PRELUDE_BYTES: usize = 16;
 pub(crate) const HEADER_BYTES: usize = 40;
@@ -47,11 +47,11 @@ impl SectionHeader {
         if b[6..8] != [0, 0] {
             return Err(Error::corrupt(offset + 6, "reserved bytes are not zero"));
         }
-        Ok(Self { payload_crc: u32_at(b, 32), ..Self::of_entry(b) })
+        Ok(Self { payload_crc: u32_at(b, 32), ..Self::without_checksum(b) })
     }
 
-    /// The fields before the checksums, as the table of contents repeats them.
-    pub(crate) fn of_entry(b: &[u8]) -> Self {
+    /// All fields but the checksum of the payload, which is 0: the table of contents repeats these.
+    pub(crate) fn without_checksum(b: &[u8]) -> Self {
         Self {
             tag: [b[0], b[1], b[2], b[3]],
             codec: b[4],
@@ -68,8 +68,8 @@ impl SectionHeader {
     /// `docs/FORMAT.md`.
     pub(crate) fn most_raw_bytes(tag: [u8; 4], codec: u8, file_bytes: u64) -> u64 {
         let (times, more) = match tag {
-            tag::HEADER => return HEADER_LIMIT as u64,
-            // Decoding whole numbers takes several times what they become.
+            tag::HEADER => return MAX_HEADER_BYTES as u64,
+            // Decoding whole numbers takes several times the memory of the result.
             _ if codec::is_coded(codec) => (16, 2 << 20),
             // Two bytes of JSON may become an empty text of 24 bytes.
             tag::REPORT => (16, 4 << 20),
@@ -107,7 +107,7 @@ pub(crate) fn check_prelude(b: &[u8; PRELUDE_BYTES]) -> Result<(), Error> {
     }
 }
 
-/// The last bytes: where the table of contents is, and how long the file should be.
+/// The last bytes of a file: where its table of contents is, and its length.
 pub(crate) fn footer(contents_offset: u64, file_bytes: u64) -> [u8; FOOTER_BYTES] {
     let mut out = [0; FOOTER_BYTES];
     out[0..8].copy_from_slice(&contents_offset.to_le_bytes());

@@ -3,7 +3,7 @@
 use super::codec::{self, CODED, CODED_STATIC, DIFFERENCE, PLANES, RAW};
 use super::reader::ContainerReader;
 use super::section::{self, HEADER_BYTES, SectionHeader};
-use super::{CHUNK_FRAMES, Error, HEADER_LIMIT, Header, counted_from_zero, tag};
+use super::{CHUNK_FRAMES, Error, Header, MAX_HEADER_BYTES, counted_from_zero, tag};
 use crate::report::Report;
 use crate::wire;
 use cager_codec::{CodedMesh, encode_errors};
@@ -73,7 +73,8 @@ impl<W: Write> ContainerWriter<W> {
         check(&header, rest, cage)?;
         let mut writer = Self::empty(out, header);
         writer.put(&section::prelude())?;
-        let encoded = wire::encode::<_, HEADER_LIMIT>(&writer.header).map_err(|e| Error::TooLarge(e.to_string()))?;
+        let encoded =
+            wire::encode::<_, MAX_HEADER_BYTES>(&writer.header).map_err(|e| Error::TooLarge(e.to_string()))?;
         writer.section(tag::HEADER, RAW, 1, 0, &encoded)?;
         writer.write_origin()?;
         writer.positions(tag::REST_POINTS, &rest.points, coded_rest)?;

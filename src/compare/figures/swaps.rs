@@ -10,7 +10,7 @@ use serde::Serialize;
 /// Condition numbers are computed after at most this many swaps, evenly spaced.
 const CONDITIONS: usize = 24;
 /// From more coordinates than this, the search with a random start takes evenly spaced points: it needs many swaps.
-const MOST_ENTRIES: usize = 6_000_000;
+const MAX_ENTRIES: usize = 6_000_000;
 /// Points drawn for a random start, as multiples of the unknowns: among few there may be no independent ones, and all of them
 /// would be no draw.
 const DRAWN: [usize; 7] = [2, 3, 4, 5, 6, 8, 16];
@@ -54,7 +54,7 @@ fn from_random(analysis: &Analysis) -> Option<SwapTrace> {
     if analysis.preparation().rank < m {
         return None;
     }
-    let step = n.div_ceil((MOST_ENTRIES / m).max(4 * m));
+    let step = n.div_ceil((MAX_ENTRIES / m).max(4 * m));
     let rows: Vec<u32> = (0..n as u32).step_by(step).collect();
     if rows.len() < m {
         return None;

@@ -3,7 +3,7 @@
 import type { CageBasis } from './basis';
 import { multiply } from './dense';
 import { CodedDataError } from './error';
-import { IntegerModels, SIZE_CLASSES, sizeClass } from './integers';
+import { IntegerModels, MAX_CONTEXT_SIZE, SIZE_CLASSES, sizeClass } from './integers';
 import { RangeDecoder } from './rangeDecoder';
 import { decodeTrajectories } from './trajectories';
 
@@ -13,7 +13,6 @@ export const MAX_FRAMES = 1024;
 export const MAX_ROWS = 4096;
 /** Whether the basis is rotated (u8), the step (f64) and the number of components (u16). */
 const HEAD_BYTES = 11;
-const MAX_SIZE = 1 << 20;
 
 /** What a group of cages holds: `E·A` in whole steps of a basis. */
 export interface CageNumbers {
@@ -110,7 +109,7 @@ function decodeNumbers(decoder: RangeDecoder, components: number, width: number)
       }
       const number = models.signed(decoder, SIZE_CLASSES * axis + sizeClass(around));
       found[k * width + value] = number;
-      sizes[at] = Math.min(Math.abs(number), MAX_SIZE);
+      sizes[at] = Math.min(Math.abs(number), MAX_CONTEXT_SIZE);
     }
     [sizes, before, twoBefore] = [twoBefore, sizes, before];
   }

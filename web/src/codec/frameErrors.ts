@@ -2,12 +2,11 @@
 
 import type { FrameErrors } from '../capture';
 import { CodedDataError } from './error';
-import { IntegerModels, SIZE_CLASSES, sizeClass } from './integers';
+import { IntegerModels, MAX_CONTEXT_SIZE, SIZE_CLASSES, sizeClass } from './integers';
 import { RangeDecoder } from './rangeDecoder';
 
 /** Binary digits of a single-precision number that are left out. */
 const LEFT_OUT = 12;
-const MAX_SIZE = 1 << 20;
 /** What the numbers that are left are below. */
 const NUMBERS = 2 ** (32 - LEFT_OUT);
 
@@ -42,7 +41,7 @@ class ErrorSeries {
   read(decoder: RangeDecoder, frame: number): void {
     const difference = this.models.signed(decoder, sizeClass(this.around));
     this.before += difference;
-    this.around = (this.around + Math.min(Math.abs(difference), MAX_SIZE)) >> 1;
+    this.around = (this.around + Math.min(Math.abs(difference), MAX_CONTEXT_SIZE)) >> 1;
     this.words[frame] = this.before << LEFT_OUT;
     if (this.before < 0 || this.before >= NUMBERS || this.errors[frame] < 0) {
       throw new CodedDataError('an error of a frame is negative or out of range');

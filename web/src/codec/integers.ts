@@ -7,7 +7,11 @@ const UNARY = 14;
 /** Models of one context: whether the number is 0, its sign, and the unary digits of its size. */
 const PER_CONTEXT = 2 + UNARY;
 /** Largest size of a signed number. */
-export const MAX_VALUE = 2 ** 28;
+export const MAX_SIZE = 2 ** 28;
+/** Sizes around a number count up to this for its context. */
+export const MAX_CONTEXT_SIZE = 2 ** 20;
+/** Sizes of residuals are kept up to this. */
+export const MAX_RESIDUAL_SIZE = 2 ** 16;
 /** Number of classes of {@link sizeClass}. */
 export const SIZE_CLASSES = 16;
 
@@ -43,7 +47,7 @@ export class IntegerModels {
       size++;
     }
     if (size > UNARY) {
-      size = Math.min(UNARY + this.largeSize(decoder), MAX_VALUE);
+      size = Math.min(UNARY + this.largeSize(decoder), MAX_SIZE);
     }
     return negative ? -size : size;
   }

@@ -1,7 +1,7 @@
 /** Positions of a mesh at rest on a grid, predicted along its faces; docs/FORMAT.md, "Positions". */
 
 import { CodedDataError } from './error';
-import { IntegerModels, MAX_VALUE, SIZE_CLASSES, sizeClass } from './integers';
+import { IntegerModels, MAX_RESIDUAL_SIZE, MAX_SIZE, SIZE_CLASSES, sizeClass } from './integers';
 import { parallelogramPredictions, type Predictions } from './parallelograms';
 import type { Polygons } from './polygons';
 import { PredictionWeights, WEIGHTS_BYTES } from './predictionWeights';
@@ -11,8 +11,6 @@ import { StepPredictor } from './stepPredictor';
 /** Origin (three f64) and step (f64) of the grid. */
 const GRID_BYTES = 32;
 const HEAD_BYTES = GRID_BYTES + WEIGHTS_BYTES;
-/** Sizes of numbers count up to this. */
-const MAX_SIZE = 1 << 16;
 
 /**
  * Decodes the positions of so many points, x y z each, that the encoder wrote for the same faces in the same order. Damaged bytes may give positions that are
@@ -66,11 +64,11 @@ function readSteps(
       } else if (near[place] !== vertex) {
         expected = found[3 * near[place] + k];
       }
-      expected = Math.max(-MAX_VALUE, Math.min(MAX_VALUE, expected));
+      expected = Math.max(-MAX_SIZE, Math.min(MAX_SIZE, expected));
       const context = SIZE_CLASSES * Math.min(count, 2) + sizeClass(predictor.around(k, sum));
       const value = models.signed(decoder, context);
       found[3 * vertex + k] = value + expected;
-      sizes[k] = Math.min(Math.abs(value), MAX_SIZE);
+      sizes[k] = Math.min(Math.abs(value), MAX_RESIDUAL_SIZE);
       sum += sizes[k];
     }
     predictor.end(sizes, sum);

@@ -5,7 +5,7 @@ import { MAX_FRAMES } from './cages';
 import { decodeCorrections } from './corrections';
 import { CodedDataError } from './error';
 import type { Hierarchy } from './hierarchy';
-import { IntegerModels, SIZE_CLASSES, sizeClass } from './integers';
+import { IntegerModels, MAX_RESIDUAL_SIZE, SIZE_CLASSES, sizeClass } from './integers';
 import { BinaryModels, RangeDecoder } from './rangeDecoder';
 import { decodeTrajectories } from './trajectories';
 
@@ -98,7 +98,7 @@ class Part {
         const context = SIZE_CLASSES * axis + sizeClass(around + 6 * before[at] + beside);
         const value = models.signed(this.decoder, context);
         found[at] = expected + PARTS * value;
-        const size = Math.min(Math.abs(value), 1 << 16);
+        const size = Math.min(Math.abs(value), MAX_RESIDUAL_SIZE);
         sizes[at] = size;
         beside = (beside >> 1) + 5 * size;
       }

@@ -1,12 +1,11 @@
 /** Trajectories that the frames of a group share, E in `M ≈ E·A`; docs/FORMAT.md, "Trajectories". */
 
-import { IntegerModels, SIZE_CLASSES, sizeClass } from './integers';
+import { IntegerModels, MAX_CONTEXT_SIZE, SIZE_CLASSES, sizeClass } from './integers';
 import { multiply } from './dense';
 import type { RangeDecoder } from './rangeDecoder';
 
 /** Largest number of binary digits of an entry. */
 const MAX_DIGITS = 26;
-const MAX_SIZE = 1 << 20;
 
 /** Reads E, frames × components, row by row. */
 export function decodeTrajectories(decoder: RangeDecoder, frames: number, components: number): Float64Array {
@@ -25,7 +24,7 @@ export function decodeTrajectories(decoder: RangeDecoder, frames: number, compon
       const value = models.signed(decoder, sizeClass(8 * last + 4 * lastButOne + 4 * above[t]));
       waves[t * components + component] = value * unit;
       lastButOne = last;
-      last = Math.min(Math.abs(value), MAX_SIZE);
+      last = Math.min(Math.abs(value), MAX_CONTEXT_SIZE);
       above[t] = last;
     }
   }

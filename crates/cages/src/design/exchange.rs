@@ -30,11 +30,11 @@ pub(super) fn exchange(
 ) -> Remeshing {
     let mesh = cage.mesh();
     let m = mesh.vertices.len();
-    let most = ((share * m as f64) as usize).max(1);
-    let (grow, shrink) = (goal.saturating_sub(m), m.saturating_sub(goal));
-    let neighbours = OneRings::new(mesh);
-    let gains = gains(cage, points, phi, fit);
-    let costs = costs(mesh, &neighbours, fit);
+    let max_count = ((share * m as f64) as usize).max(1);
+    let (missing, surplus) = (goal.saturating_sub(m), m.saturating_sub(goal));
+    let rings = OneRings::new(mesh);
+    let gains = split_gains(cage, points, phi, fit);
+    let costs = removal_costs(mesh, &rings, fit);
     let mut touched = vec![false; m];
 
     let mut edges: Vec<usize> = (0..gains.len()).collect();
@@ -42,7 +42,7 @@ pub(super) fn exchange(
     let mut splits: Vec<usize> = Vec::new();
     for e in edges {
         let ends = cage.edges()[e].vertices;
-        if splits.len() == most.max(grow.min(m / 4)) {
+        if splits.len() == max_count.max(missing.min(m / 4)) {
             break;
         }
         if !ends.iter().any(|&v| touched[v as usize]) {
@@ -57,19 +57,17 @@ pub(super) fn exchange(
     let mut merged: Vec<(u32, u32)> = Vec::new();
     for v in order {
         // The split that this removal makes room for.
-        let pays_for = splits.get((grow + merged.len()).saturating_sub(shrink));
-        let pays = merged.len() < shrink || pays_for.is_some_and(|&e| gains[e] > costs[v]);
-        if merged.len() >= most.max(shrink.min(m / 4)) || !pays {
+        let split = splits.get((missing + merged.len()).saturating_sub(surplus));
+        let is_worth_it = merged.len() < surplus || split.is_some_and(|&e| gains[e] > costs[v]);
+        if merged.len() >= max_count.max(surplus.min(m / 4)) || !is_worth_it {
             break;
         }
-        let ring = neighbours.of(v);
+        let ring = rings.of(v);
         if touched[v] || ring.iter().any(|&w| touched[w as usize]) {
             continue;
         }
         let allowed = |c: &Collapse| obstacles.allow(&current, &c.old, &c.new);
-        if let Some(Collapse { into, old, new, .. }) =
-            topology::collapses(mesh, &neighbours, v).into_iter().find(allowed)
-        {
+        if let Some(Collapse { into, old, new, .. }) = topology::collapses(mesh, &rings, v).into_iter().find(allowed) {
             current.triangles.retain(|t| !old.contains(t));
             current.triangles.extend(new);
             touched[v] = true;
@@ -77,7 +75,7 @@ pub(super) fn exchange(
             merged.push((v as u32, into));
         }
     }
-    splits.truncate((grow + merged.len()).saturating_sub(shrink));
+    splits.truncate((missing + merged.len()).saturating_sub(surplus));
     let mut mesh = mesh.clone();
     for e in splits {
         topology::split(&mut mesh, cage.edges()[e].vertices);
@@ -91,7 +89,7 @@ pub(super) fn exchange(
 /// Splitting an edge leaves the surface as it is and adds one function `b` to those that the cage has, so the error falls by
 /// `‖bᵀ R‖²/‖b − Π b‖²`, with `R` the residual and `Π` the projection on the columns of `Φ`. All edges' functions come from one
 /// subdivision of the whole cage, whose functions have a somewhat smaller support.
-fn gains(cage: &Cage, points: &[Point], phi: &Mat<f64>, fit: &Fit) -> Vec<f64> {
+fn split_gains(cage: &Cage, points: &[Point], phi: &Mat<f64>, fit: &Fit) -> Vec<f64> {
     let m = cage.vertices().len();
     let Ok(fine) = Cage::new(topology::subdivided(cage)) else { return vec![0.0; cage.edges().len()] };
     let columns = MeanValue.smooth_coordinates(&fine, points);
@@ -111,12 +109,12 @@ fn gains(cage: &Cage, points: &[Point], phi: &Mat<f64>, fit: &Fit) -> Vec<f64> {
 
 /// For every vertex, by how much `‖X − Φ C‖²` would rise if it followed its neighbours: with `a` the row that says so, `a C = 0`, the
 /// least-squares fit under that constraint is worse by `‖a C‖²/(a (ΦᵀΦ)⁻¹ aᵀ)`.
-fn costs(mesh: &TriMesh, neighbours: &OneRings<'_>, fit: &Fit) -> Vec<f64> {
+fn removal_costs(mesh: &TriMesh, neighbours: &OneRings<'_>, fit: &Fit) -> Vec<f64> {
     let m = mesh.vertices.len();
     let mut inverse = Mat::<f64>::identity(m, m);
     solve_cholesky(fit.factor.as_ref(), &mut inverse);
     let costs = (0..m).map(|v| {
-        let weights = following(mesh, v, &neighbours.of(v));
+        let weights = neighbour_weights(mesh, v, &neighbours.of(v));
         let row: Vec<(usize, f64)> = std::iter::once((v, 1.0)).chain(weights.iter().map(|&(k, w)| (k, -w))).collect();
         let spread: f64 =
             row.iter().map(|&(i, x)| row.iter().map(|&(j, y)| x * y * inverse[(i, j)]).sum::<f64>()).sum();
@@ -128,7 +126,7 @@ fn costs(mesh: &TriMesh, neighbours: &OneRings<'_>, fit: &Fit) -> Vec<f64> {
 }
 
 /// Weights of the neighbours that sum to one and reproduce a vertex's place as well as they can.
-fn following(mesh: &TriMesh, v: usize, ring: &[u32]) -> Vec<(usize, f64)> {
+fn neighbour_weights(mesh: &TriMesh, v: usize, ring: &[u32]) -> Vec<(usize, f64)> {
     let at = |i: usize| DVec3::from_array(mesh.vertices[i]);
     let k = ring.len();
     let offsets: Vec<DVec3> = ring.iter().map(|&r| at(r as usize) - at(v)).collect();

@@ -11,13 +11,16 @@ use std::ops::ControlFlow;
 
 /// Vertices to begin with.
 const FIRST_VERTICES: usize = 100;
-/// Steps with each number of vertices, and how many numbers are tried.
+/// Steps with each number of vertices.
 const STEPS: usize = 80;
-const ROUNDS: usize = 8;
-/// A cage whose error is within this of the goal is small enough.
-const CLOSE: f64 = 0.93;
+/// How many numbers of vertices are tried.
+const MAX_ROUNDS: usize = 8;
+/// A cage whose error is at least this fraction of the goal is small enough.
+const MIN_SHARE_OF_GOAL: f64 = 0.93;
+/// What is aimed at next, as a fraction of the goal.
+const AIM: f64 = 0.97;
 /// Frames that the encoder's error is measured on.
-const FRAMES: usize = 24;
+const MAX_MEASURED_FRAMES: usize = 24;
 
 /// Vertices to begin with around so many points.
 pub(super) fn first_vertices(points: usize) -> usize {
@@ -39,8 +42,8 @@ impl Run<'_> {
         let mut smallest: Option<Best> = None;
         let mut lowest: Option<(f64, Best)> = None;
         let mut ended = ControlFlow::Continue(());
-        for round in 0..ROUNDS {
-            let fraction = [round as f64 / ROUNDS as f64, (round + 1) as f64 / ROUNDS as f64];
+        for round in 0..MAX_ROUNDS {
+            let fraction = [round as f64 / MAX_ROUNDS as f64, (round + 1) as f64 / MAX_ROUNDS as f64];
             // Results with another number of vertices do not count.
             let evaluation = Evaluation { training_error: f64::INFINITY, validation_error: f64::INFINITY };
             self.best = Best { mesh: descent.cage.mesh().clone(), evaluation };
@@ -59,11 +62,11 @@ impl Run<'_> {
             if found <= error && is_smaller {
                 smallest = Some(best);
             }
-            if ended.is_break() || (found <= error && found >= CLOSE * error) {
+            if ended.is_break() || (found <= error && found >= MIN_SHARE_OF_GOAL * error) {
                 break;
             }
             // The error falls about as the number of vertices rises.
-            let aimed = (goal as f64 * (found / (0.97 * error))).ceil() as usize;
+            let aimed = (goal as f64 * (found / (AIM * error))).ceil() as usize;
             let next = aimed.clamp(goal / 2, goal * 2).clamp(4, most);
             if next == goal {
                 break;
@@ -91,11 +94,11 @@ impl Run<'_> {
         let Ok(cage) = Cage::new(best.mesh.clone()) else { return f64::INFINITY };
         let options = SolverOptions::for_unknowns(cage.vertices().len());
         let Ok(solver) = Solver::prepare(&MeanValue, &cage, &self.rest.points, options) else { return f64::INFINITY };
-        assert!(!solver.follows_previous(), "every cage depends on the one before");
+        assert!(!solver.follows_previous(), "a solver whose cages do not depend on the frame before");
         let held_back: Vec<&[f64]> =
             frames.iter().skip(usize::from(frames.len() > 1)).step_by(2).map(Vec::as_slice).collect();
         let mut errors = Vec::new();
-        for frames in evenly(&held_back, FRAMES).chunks(BATCH) {
+        for frames in evenly(&held_back, MAX_MEASURED_FRAMES).chunks(BATCH) {
             let inverted = solver.invert(Rows::All, None, frames);
             let views: Vec<&[f32]> = inverted.iter().map(|inverted| inverted.cage.as_slice()).collect();
             errors.extend(solver.decoder().measure(&views, frames));

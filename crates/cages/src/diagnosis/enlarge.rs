@@ -6,12 +6,19 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 /// Maximum displacement of a vertex, as a fraction of the diagonal.
-const FARTHEST: f64 = 0.06;
+const MAX_MOVE: f64 = 0.06;
 
 /// Points end up this far inside, as a fraction of the diagonal.
 const MARGIN: f64 = 5e-4;
 
-const ROUNDS: usize = 60;
+/// Largest displacement of a vertex in a round, as a fraction of the diagonal.
+const MAX_STEP: f64 = 0.01;
+
+const MAX_ROUNDS: usize = 60;
+
+/// Attempts of a round: in each, vertices of faces that would newly cut another go so much less far.
+const MAX_ATTEMPTS: usize = 6;
+const SHORTER: f64 = 0.3;
 
 /// Vertices moved outwards along their normals until all points are inside, if that takes little and cuts no faces that were apart.
 pub(super) fn enlarged(cage: &TriMesh, model: &Model) -> Option<Vec<DVec3>> {
@@ -19,7 +26,7 @@ pub(super) fn enlarged(cage: &TriMesh, model: &Model) -> Option<Vec<DVec3>> {
     let start: Vec<DVec3> = cage.vertices.iter().map(|&p| p.into()).collect();
     let allowed = self_intersections(cage);
     let mut positions = start.clone();
-    for _ in 0..ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let surface = Surface::new(positions.clone(), cage.triangles.clone());
         let pushes = pushes(&surface, model, MARGIN * extent);
         if pushes.is_empty() {
@@ -28,7 +35,7 @@ pub(super) fn enlarged(cage: &TriMesh, model: &Model) -> Option<Vec<DVec3>> {
         let normals = normals(&surface);
         let mut step = vec![0.0_f64; positions.len()];
         for (vertex, push) in pushes {
-            step[vertex as usize] = step[vertex as usize].max(push.min(0.01 * extent));
+            step[vertex as usize] = step[vertex as usize].max(push.min(MAX_STEP * extent));
         }
         if !advance(&mut positions, &start, &normals, step, &allowed, cage, extent) {
             return None;
@@ -47,19 +54,19 @@ fn advance(
     cage: &TriMesh,
     extent: f64,
 ) -> bool {
-    for _ in 0..6 {
+    for _ in 0..MAX_ATTEMPTS {
         let moved: Vec<DVec3> = (0..positions.len()).map(|v| positions[v] + step[v] * normals[v]).collect();
         let vertices = moved.iter().map(DVec3::to_array).collect();
         let cuts = self_intersections(&TriMesh { vertices, triangles: cage.triangles.clone() });
         let new: Vec<u32> = cuts.into_iter().filter(|c| allowed.binary_search(c).is_err()).flatten().collect();
         if new.is_empty() {
-            let far = (0..moved.len()).any(|v| moved[v].distance(start[v]) > FARTHEST * extent);
+            let far = (0..moved.len()).any(|v| moved[v].distance(start[v]) > MAX_MOVE * extent);
             let any = step.iter().any(|&s| s > 0.0);
             positions.copy_from_slice(&moved);
             return any && !far;
         }
         for v in new.into_iter().flat_map(|f| cage.triangles[f as usize]) {
-            step[v as usize] *= 0.3;
+            step[v as usize] *= SHORTER;
         }
     }
     false

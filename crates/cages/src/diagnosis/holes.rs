@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 /// Longest border loop that is filled; longer ones are left to the user.
-pub(super) const LONGEST: usize = 40;
+pub(super) const MAX_HOLE_EDGES: usize = 40;
 
 /// Faces that fill a border loop, given in their direction: one polygon where it has at most four corners, otherwise triangles.
 pub(super) fn fill(border: &[u32], position: impl Fn(u32) -> DVec3) -> Vec<Vec<u32>> {

@@ -10,18 +10,18 @@ use faer::{Mat, MatRef};
 const IDLE: f64 = 1e-4;
 
 /// Maximum number of coordinates evaluated; points are subsampled accordingly.
-const ENTRIES: usize = 20_000_000;
+const MAX_ENTRIES: usize = 20_000_000;
 
 /// Cages with more vertices are not analysed: it would take minutes.
-const MAX_VERTICES: usize = 2_000;
+const MAX_ANALYSED_VERTICES: usize = 2_000;
 
 /// Vertices that move no point, and the condition number of the mean value coordinates; neither of a cage of thousands of vertices.
 pub(super) fn influence(mesh: &TriMesh, model: &Model) -> (Vec<u32>, Option<f64>) {
     let Ok(cage) = Cage::new(mesh.clone()) else { return (Vec::new(), None) };
-    if mesh.vertices.len() > MAX_VERTICES {
+    if mesh.vertices.len() > MAX_ANALYSED_VERTICES {
         return (Vec::new(), None);
     }
-    let stride = (model.points.len() * mesh.vertices.len()).div_ceil(ENTRIES).max(1);
+    let stride = (model.points.len() * mesh.vertices.len()).div_ceil(MAX_ENTRIES).max(1);
     let points: Vec<Point> = model.points.iter().step_by(stride).copied().collect();
     let Ok(coordinates) = MeanValue.coordinates(&cage, &points, None) else { return (Vec::new(), None) };
     let phi = &coordinates.phi;

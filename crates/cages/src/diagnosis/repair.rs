@@ -2,7 +2,7 @@
 
 use super::enlarge::enlarged;
 use super::findings::{Findings, check};
-use super::holes::{LONGEST, fill};
+use super::holes::{MAX_HOLE_EDGES, fill};
 use super::weld::same_place;
 use cager_geometry::mesh::{Model, Polygons, TriMesh, diagonal};
 use cager_geometry::spatial::{Nesting, part_volumes};
@@ -63,7 +63,7 @@ impl Repairing {
         let sound = |v: &u32| points.get(*v as usize).is_some_and(|p| p.is_finite());
         self.faces.retain(|face| face.iter().all(sound));
         self.changed(before - self.faces.len(), |n| {
-            format!("removed {} without finite corners", counted(n, "face", "faces"))
+            format!("removed {} with missing or non-finite corners", counted(n, "face", "faces"))
         });
     }
 
@@ -151,7 +151,7 @@ impl Repairing {
 
     fn fill_holes(&mut self) {
         let loops = border_loops(&edges(&self.faces));
-        let small: Vec<&Vec<u32>> = loops.iter().filter(|l| l.len() <= LONGEST).collect();
+        let small: Vec<&Vec<u32>> = loops.iter().filter(|l| l.len() <= MAX_HOLE_EDGES).collect();
         for border in &small {
             let new = fill(border, |v| self.points[v as usize]);
             self.faces.extend(new);

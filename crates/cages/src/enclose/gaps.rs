@@ -8,15 +8,15 @@ use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 
 /// Balls up to so many times the largest offset are looked for in gaps.
-const LARGEST_BALL: f64 = 1.15;
+const MAX_BALL: f64 = 1.15;
 
 /// A ball in a gap touches the surface on both sides: at the least, the cosine between its touching points lies below this.
 const OPPOSITE: f64 = -0.6;
 
 /// A surface of an area that would take more samples than this has too many narrow gaps, which stay closed.
 const MAX_SAMPLES: usize = 100_000;
-/// Samples that are looked at, at the most: a cube of a smooth surface has one for each of some directions, and ordinary models have less than half as many.
-const MAX_LOOKED_AT: usize = 90_000;
+/// Samples that are examined, at the most: a cube of a smooth surface has one for each of some directions, and ordinary models have less than half as many.
+const MAX_EXAMINED_SAMPLES: usize = 90_000;
 /// Places tried beyond one a face. Slivers as long as the model have many more than samples.
 const MAX_TRIES: usize = 2_000_000;
 
@@ -29,7 +29,7 @@ pub(super) fn balls_in_gaps(source: &NormalizedModel, largest: f64) -> Option<Ve
     let winding = GeneralizedWinding::new(&source.surface);
     let touching = |&(point, normal): &(DVec3, DVec3)| {
         let ball = |outwards: DVec3| {
-            let ball = ball_between(&source.surface, point, outwards, LARGEST_BALL * largest)?;
+            let ball = ball_between(&source.surface, point, outwards, MAX_BALL * largest)?;
             (winding.at(ball.center).abs() < 0.25).then_some(ball)
         };
         [ball(normal), ball(-normal)]
@@ -58,7 +58,7 @@ fn samples(surface: &Surface, spacing: f64) -> Option<Vec<(DVec3, DVec3)>> {
         let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
         let n = ((longest / spacing).ceil() as u32).clamp(1, 100);
         tries += n as usize * (n as usize + 1) / 2 - 1;
-        if samples.len() > MAX_LOOKED_AT || tries > MAX_TRIES {
+        if samples.len() > MAX_EXAMINED_SAMPLES || tries > MAX_TRIES {
             return None;
         }
         for i in 0..n {

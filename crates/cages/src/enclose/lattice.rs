@@ -9,7 +9,7 @@ use std::collections::{HashMap, HashSet};
 pub(super) const LEVELS: u32 = 3;
 
 /// Side of the largest cubes in the unit of integer coordinates, half the side of the smallest.
-const LARGEST: u32 = 2 << LEVELS;
+const MAX_SIDE: u32 = 2 << LEVELS;
 
 /// Corners of a cube's face, along the two axes after the face's.
 const FACE: [[u32; 2]; 4] = [[0, 0], [1, 0], [1, 1], [0, 1]];
@@ -69,7 +69,7 @@ struct Cube {
 
 impl Cube {
     fn side(self) -> u32 {
-        LARGEST >> self.level
+        MAX_SIDE >> self.level
     }
 
     fn low(self) -> Place {
@@ -122,7 +122,7 @@ impl Octree {
     pub(super) fn uniform(bounds: &Aabb, spacing: f64) -> Self {
         let cells = (bounds.size() / spacing).ceil().max(DVec3::splat(2.0)).to_array().map(|c| c as u32);
         let origin = bounds.center() - 0.5 * spacing * DVec3::from_array(cells.map(f64::from));
-        Self { origin, unit: spacing / f64::from(LARGEST), cells, halved: HashSet::new() }
+        Self { origin, unit: spacing / f64::from(MAX_SIDE), cells, halved: HashSet::new() }
     }
 
     /// Halves all cubes that are too large, by their centre and side; false where it gave up because more than `most` were.

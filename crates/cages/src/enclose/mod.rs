@@ -47,7 +47,7 @@ pub fn enclose_watched(
     options: &EncloseOptions,
     watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Result<TriMesh, EncloseError> {
-    let clearance = options.clearance.filter(|c| c.is_finite()).unwrap_or(0.0).clamp(0.0, LARGEST_CLEARANCE);
+    let clearance = options.clearance.filter(|c| c.is_finite()).unwrap_or(0.0).clamp(0.0, MAX_CLEARANCE);
     let mut offset = first_offset(options.vertices).max(2.0 * clearance);
     let source = NormalizedModel::new(model, offset)?;
     if options.vertices < MIN_VERTICES {
@@ -56,7 +56,7 @@ pub fn enclose_watched(
     let mut least = usize::MAX;
     // Surfaces that are known already, the next to be tried last, from when on its narrow gaps have proved to be too many.
     let mut known: Option<Vec<Start>> = None;
-    while offset < LARGEST_OFFSET.max(4.0 * clearance) {
+    while offset < MAX_OFFSET.max(4.0 * clearance) {
         if watch().is_break() {
             return Err(EncloseError::Stopped);
         }
@@ -150,10 +150,10 @@ const MIN_VERTICES: usize = 4;
 const VERTICES_PER_PART: usize = 6;
 
 /// Largest offset tried, as a fraction of the diagonal.
-const LARGEST_OFFSET: f64 = 1.0;
+const MAX_OFFSET: f64 = 1.0;
 
 /// Larger clearances are taken as this, a fraction of the diagonal.
-const LARGEST_CLEARANCE: f64 = 10.0;
+const MAX_CLEARANCE: f64 = 10.0;
 
 /// Clearance kept where none is asked for, as a fraction of the offset.
 const DEFAULT_CLEARANCE: f64 = 0.2;

@@ -98,7 +98,7 @@ impl<'a> Simplifier<'a> {
         self.vertices
     }
 
-    /// Collapses edges until at most `target` vertices are left. Says whether it came that far, which it does not where it was stopped.
+    /// Collapses edges until at most `target` vertices are left; false where it ends before, stopped or as hardly any can be collapsed.
     pub(super) fn simplify(&mut self, target: usize, watch: &mut dyn FnMut() -> ControlFlow<()>) -> bool {
         while self.vertices > target {
             let before = self.vertices;

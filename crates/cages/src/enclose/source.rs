@@ -79,7 +79,10 @@ pub(crate) fn check_finite(points: &[Point]) -> Result<(), EncloseError> {
     }
 }
 
-/// Corners and diagonal of the bounding box of points that a cage can be around.
+/// Low corner, high corner and diagonal of the bounding box of these points.
+///
+/// # Errors
+/// No points, or points that all lie in about the same place.
 pub(crate) fn extent(points: &[Point]) -> Result<(DVec3, DVec3, f64), EncloseError> {
     if points.is_empty() {
         return Err(EncloseError::Empty);

@@ -40,8 +40,8 @@ pub(super) async fn with_idle_timeout<T>(
             }
             if sent.bytes.load(Ordering::Relaxed) == before && !sent.starved.load(Ordering::Relaxed) {
                 client.disable_live();
-                return Err(client
-                    .broken(format!("nothing moved for {limit:.0?}; results come after each request from here on")));
+                let what = format!("no data moved for {:.0} s, as behind some proxies", limit.as_secs_f64());
+                return Err(client.broken(format!("{what}; results come after each request from here on")));
             }
         }
     };

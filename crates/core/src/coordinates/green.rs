@@ -11,7 +11,7 @@
 use super::layer::{self, FaceBasis, Layers, Scratch};
 use super::{
     CageValues, CoordinateSystem, Coordinates, CoordinatesError, DependentNormals, ElementPlan, PointwiseCoordinates,
-    by_tasks, refuse_plan,
+    pointwise_coordinates, refuse_plan,
 };
 use crate::cage::Cage;
 use crate::simd::{LANES, Lanes};
@@ -72,7 +72,7 @@ impl CoordinateSystem for Green {
 fn coordinates(cage: &Cage, points: &[Point]) -> Coordinates {
     let layers = Layers::new(cage);
     let length = normal_length(&layers);
-    by_tasks(
+    pointwise_coordinates(
         points.len(),
         cage.vertices().len() + cage.faces().len(),
         || layers.scratch(),

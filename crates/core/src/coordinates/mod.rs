@@ -38,16 +38,16 @@ pub struct Coordinates {
 /// moves a decoded point by more than 1e-7 of the diagonal; those before it then remain supported. 1 and 2 were never released.
 pub const DEFINITION: u32 = 3;
 
-/// How a numerical solution was refined.
+/// How a numerical solution was refined. Stored in reports: the names of fields are part of the format.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Refinement {
     /// Boundary elements of the last solution.
     pub elements: usize,
     /// Solutions after the first.
     pub refinements: usize,
-    /// An estimate of how far a coordinate of a point is from the limit, the largest of: what the highest degrees of the elements change of
-    /// one; what one was corrected by to make linear functions exact; and the residual that the iteration left of the equations on the
-    /// cage, those of unknowns that it left out and of damped ones as well.
+    /// An estimate of how far a coordinate of a point is from the limit, at most 1e-3 but where a warning says otherwise: the largest of what the
+    /// highest degrees of the elements change of one, what one was corrected by to make linear functions exact, and the residual that the iteration
+    /// left of the equations on the cage, those of unknowns that it left out and of damped ones as well.
     #[serde(deserialize_with = "crate::numbers::number_or_null")]
     pub change: f64,
 }
@@ -56,7 +56,7 @@ impl Refinement {
     /// Refining ends when it changes no coordinate of a point by more than this.
     pub const TOLERANCE: f64 = 1e-3;
 
-    /// Whether refining ended so.
+    /// Whether [`Self::TOLERANCE`] was reached.
     pub fn reached(&self) -> bool {
         self.change <= Self::TOLERANCE
     }
@@ -107,11 +107,11 @@ pub trait CoordinateSystem: Sync {
     /// The values of a cage.
     fn values(&self, cage: &Cage) -> CageValues;
 
-    /// `Φ` for these points. Rows sum to one; runs on the current rayon pool; the result does not depend on it. By a plan, a numerical solution is
+    /// `Φ` for these points. Rows sum to one; runs on the current rayon pool; the result does not depend on it. With a plan, a numerical solution is
     /// found on the elements of an earlier one instead of elements chosen for these points; with the earlier points the bits are the same.
     ///
     /// # Errors
-    /// A cage or points for which the system is not defined; a plan that is not of this cage or of no such system.
+    /// A cage or points for which the system is not defined; a plan made for another cage or another system.
     fn coordinates(
         &self,
         cage: &Cage,
@@ -144,7 +144,7 @@ const TASK_POINTS: usize = 8 * LANES;
 
 /// Coordinates whose rows depend on their own points alone, task by task: `work` fills the rows from that of the given point on, and returns the points of
 /// them that lie outside.
-fn by_tasks<S>(
+fn pointwise_coordinates<S>(
     points: usize,
     columns: usize,
     scratch: impl Fn() -> S + Send + Sync,

@@ -14,7 +14,7 @@ use cager_geometry::linalg;
 use cager_geometry::mesh::Point;
 use error::{Sums, block_sums};
 use faer::{Mat, MatRef};
-use phi::{BLOCK_ROWS, Phi, padded, single};
+use phi::{BLOCK_ROWS, Phi, padded, to_padded_single};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -33,7 +33,7 @@ pub struct Decoder {
 impl Decoder {
     /// Takes coordinates n × m whose first `positions` columns multiply vertices.
     pub fn new(phi: MatRef<'_, f64>, positions: usize) -> Self {
-        let (points, phi) = (phi.nrows(), Phi::Stored(Arc::new(single(phi))));
+        let (points, phi) = (phi.nrows(), Phi::Stored(Arc::new(to_padded_single(phi))));
         Self { phi, points, positions, normals: None }
     }
 

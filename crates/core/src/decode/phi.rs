@@ -55,7 +55,7 @@ impl Phi {
             Self::Recomputed(computed) => {
                 let Recomputed { pointwise, cage, points, columns } = &**computed;
                 for_each_chunk(*pointwise, cage, points, *columns, |first, part| {
-                    work(first, single(part.phi.as_ref()).as_ref());
+                    work(first, to_padded_single(part.phi.as_ref()).as_ref());
                 });
             }
         }
@@ -66,7 +66,9 @@ impl Phi {
             Self::Stored(phi) => linalg::rows_of((**phi).as_ref(), rows),
             Self::Recomputed(computed) => {
                 let points: Vec<Point> = rows.iter().map(|&i| computed.points[i as usize]).collect();
-                single((computed.pointwise)(&computed.cage, &points).phi.as_ref()).subrows(0, rows.len()).to_owned()
+                to_padded_single((computed.pointwise)(&computed.cage, &points).phi.as_ref())
+                    .subrows(0, rows.len())
+                    .to_owned()
             }
         }
     }
@@ -91,6 +93,6 @@ pub(super) fn padded(points: usize, columns: usize) -> Mat<f32> {
 }
 
 /// Converts to single precision, padded with zero rows to a whole tile.
-pub(super) fn single(phi: MatRef<'_, f64>) -> Mat<f32> {
+pub(super) fn to_padded_single(phi: MatRef<'_, f64>) -> Mat<f32> {
     linalg::to_single(phi, phi.nrows().next_multiple_of(linalg::TILE_ROWS))
 }

@@ -5,11 +5,11 @@ use super::analysed_coordinates::{AnalysisCoordinates, coordinates};
 use super::checks::{check, reject_far_points};
 use super::options::drop_zero_weight_regularizer;
 use super::spectra::{RequiredDecompositions, Spectra};
-use super::{PreparationReport, PrepareContext, PrepareError, SolverOptions};
+use super::{PreparationReport, PrepareContext, PrepareError, SolverOptions, Step};
 use crate::cage::Cage;
 use crate::coordinates::CoordinateSystem;
 use crate::decode::Decoder;
-use crate::maxvol::{MaxVol, RANK_TOLERANCE, Volume};
+use crate::maxvol::{MaxVol, RANK_TOLERANCE};
 use crate::row_basis::{RowBasis, deficient_basis, row_basis};
 use cager_geometry::linalg;
 use cager_geometry::linalg::svd;
@@ -98,7 +98,7 @@ impl Analysis {
         let (m, diagonal) = (system.values(cage).unknowns(), diagonal(points));
         check(points, m, options, context.memory)?;
         reject_far_points(cage, points)?;
-        context.next("coordinates")?;
+        context.begin(Step::Coordinates)?;
         let AnalysisCoordinates {
             phi,
             sample,
@@ -109,27 +109,26 @@ impl Analysis {
             refinement,
             plan,
         } = coordinates(system, cage, points, required, context)?;
-        context.next("handles")?;
+        context.begin(Step::Handles)?;
         let no_handles = PrepareError::NoSolution { what: "choice of handles" };
         let mut basis = row_basis(phi.as_ref()).ok_or(no_handles.clone())?;
+
+        context.begin(Step::SingularValues)?;
         // Built only now, since memory use peaks in maxvol.
         let decoder = decoder.unwrap_or_else(|| Decoder::new(phi.as_ref(), cage.vertices().len()));
-
-        context.next("singular values")?;
         let mut spectra = Spectra::of(phi.as_ref(), &basis, required)?;
         if basis.rank == m && spectra.full_ends[2] <= RANK_TOLERANCE * spectra.full_ends[0] {
             basis = deficient_basis(phi.as_ref()).ok_or(no_handles)?;
             spectra = Spectra::of(phi.as_ref(), &basis, required)?;
         }
         let rank = basis.rank;
-        let MaxVol { swaps, log_volume, max_entry, .. } = basis.handles;
         let preparation = PreparationReport {
             rank,
             affine_reproduction_error: error / diagonal,
             condition_full: spectra.full_ends[0] / spectra.full_ends[1],
             condition_handles: spectra.handles_ends.map_or(f64::NAN, |[first, last]| first / last),
             singular_values: Vec::new(),
-            maxvol: Volume { swaps, log_volume, max_entry },
+            maxvol: basis.handles.volume,
             outside,
             outside_distance,
             refinement,

@@ -33,6 +33,31 @@ pub struct PreparationReport {
     pub plan: Option<ElementPlan>,
 }
 
+/// A step of the preparation; they begin in this order.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub enum Step {
+    /// `Φ`.
+    Coordinates,
+    /// Which rows of it are read.
+    Handles,
+    /// The spectrum of those rows, after the decoder where the first step left none.
+    SingularValues,
+    /// The regularisation, and what turns frames into cages; not of an [`Analysis`](super::Analysis).
+    Operator,
+}
+
+impl Step {
+    /// What people who wait are told.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Coordinates => "coordinates",
+            Self::Handles => "handles",
+            Self::SingularValues => "singular values",
+            Self::Operator => "operator",
+        }
+    }
+}
+
 /// How to prepare a solver, apart from its options.
 #[derive(Clone, Copy)]
 pub struct PrepareContext<'a> {
@@ -45,8 +70,8 @@ pub struct PrepareContext<'a> {
     pub analysed_entries: usize,
     /// Most bytes that the coordinates, or the covariance of handles, may take; what needs more is refused before any of it is taken.
     pub memory: u64,
-    /// Called with the name of each step before it begins; `Break` ends the preparation with [`PrepareError::Stopped`].
-    pub next: &'a dyn Fn(&'static str) -> ControlFlow<()>,
+    /// Called before each step begins; `Break` ends the preparation with [`PrepareError::Stopped`].
+    pub before_step: &'a dyn Fn(Step) -> ControlFlow<()>,
 }
 
 impl Default for PrepareContext<'_> {
@@ -56,14 +81,14 @@ impl Default for PrepareContext<'_> {
             stores_coordinates: true,
             analysed_entries: 1 << 25,
             memory: 16 << 30,
-            next: &|_| ControlFlow::Continue(()),
+            before_step: &|_| ControlFlow::Continue(()),
         }
     }
 }
 
 impl PrepareContext<'_> {
-    pub(super) fn next(&self, step: &'static str) -> Result<(), PrepareError> {
-        match (self.next)(step) {
+    pub(super) fn begin(&self, step: Step) -> Result<(), PrepareError> {
+        match (self.before_step)(step) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(PrepareError::Stopped),
         }

@@ -3,7 +3,7 @@
 use super::checks::check_options;
 use super::consistent::Consistent;
 use super::error::failed;
-use super::nearness::{Nearness, NearnessParts, farthest};
+use super::nearness::{Nearness, NearnessParts, max_distance};
 use super::operator::{Decomposition, Directions, padded_to_tiles};
 use super::options::drop_zero_weight_regularizer;
 use super::target::RegularizationTarget;
@@ -113,7 +113,7 @@ impl<'a> HandleSystem<'a> {
             factor: self.scaled_factor(),
             rest: Mat::from_fn(analysis.rest.len(), 3, |i, k| analysis.rest[i][k]),
             faces: analysis.cage.mesh().triangles.clone(),
-            margin: farthest(&rest, analysis.cage.vertices()),
+            margin: max_distance(&rest, analysis.cage.vertices()),
         })
     }
 

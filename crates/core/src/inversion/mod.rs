@@ -25,7 +25,7 @@ pub use crate::handles::Handles;
 pub use analysis::Analysis;
 pub use checks::{check_options, coordinates_bytes, reject_far_points};
 pub use consistent::{Convergence, Outcome};
-pub use context::{PreparationReport, PrepareContext};
+pub use context::{PreparationReport, PrepareContext, Step};
 pub use error::PrepareError;
 pub use factored::{FactoredInversion, ProjectedFrames};
 pub use handle_system::HandleSystem;

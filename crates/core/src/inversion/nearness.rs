@@ -74,7 +74,7 @@ impl Nearness {
     pub(super) fn keep(&self, cage: &mut [Point], frame: &Aabb, diagonal: f64) -> bool {
         let unit = diagonal.max(frame.size().length());
         let vertices = self.cage.vertices().len();
-        let beyond = |cage: &[Point]| (farthest(frame, &cage[..vertices]) - self.data.margin) / unit;
+        let beyond = |cage: &[Point]| (max_distance(frame, &cage[..vertices]) - self.data.margin) / unit;
         let share = ((beyond(cage) - NEAR) / (FAR - NEAR)).min(1.0);
         let is_far = share > 0.0;
         if is_far {
@@ -131,7 +131,7 @@ impl Nearness {
     }
 }
 
-/// Distance of the farthest of some places from a box.
-pub(super) fn farthest(from: &Aabb, places: &[Point]) -> f64 {
+/// Largest distance of a point from a box.
+pub(super) fn max_distance(from: &Aabb, places: &[Point]) -> f64 {
     places.iter().map(|&p| from.distance2(p.into())).fold(0.0, f64::max).sqrt()
 }

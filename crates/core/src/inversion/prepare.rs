@@ -1,7 +1,7 @@
 //! Preparation of a solver: coordinates, handles, spectrum and operator.
 
 use super::checks::{check, reject_far_points};
-use super::{Analysis, PrepareContext, PrepareError, Solver, SolverOptions};
+use super::{Analysis, PrepareContext, PrepareError, Solver, SolverOptions, Step};
 use crate::cage::Cage;
 use crate::coordinates::CoordinateSystem;
 use cager_geometry::mesh::Point;
@@ -50,7 +50,7 @@ impl Solver {
         // A matrix that does not fit the cage is refused before anything is computed.
         options.regularizer.delta(context.matrix, cage, system.values(cage).unknowns())?;
         let analysis = Analysis::for_solver(system, cage, points, options, context)?;
-        context.next("operator")?;
+        context.begin(Step::Operator)?;
         analysis.handle_system(options.handles)?.solver(options, context.matrix)
     }
 }

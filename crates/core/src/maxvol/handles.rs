@@ -26,11 +26,11 @@ pub struct Swap {
     pub growth: f64,
 }
 
-/// How a search went.
+/// How a search went. Stored in reports: the names of fields are part of the format.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
 #[serde(default)]
 pub struct Volume {
-    /// Swaps after the start by pivoted LU.
+    /// Swaps after the start.
     pub swaps: usize,
     /// `ln |det Φ□|`.
     #[serde(deserialize_with = "crate::numbers::number_or_null")]
@@ -47,16 +47,12 @@ pub struct MaxVol {
     pub rows: Vec<u32>,
     /// Rows the search started from: those of pivoted LU, or what was given.
     pub start: Vec<u32>,
-    /// Number of swaps after the start.
-    pub swaps: usize,
-    /// These swaps, in order.
+    /// How the search went; `max_entry` is from a fresh factorisation, or, where a tolerance of one allows it, in single precision.
+    pub volume: Volume,
+    /// The swaps, in order.
     pub trace: Vec<Swap>,
-    /// `ln |det Φ□|` of the picked rows.
-    pub log_volume: f64,
-    /// The same for the rows the search started from.
+    /// `ln |det Φ□|` of the rows the search started from.
     pub start_log_volume: f64,
-    /// Largest `|B_ij|` over all rows after the last swap: from a fresh factorisation, or, where a tolerance of one allows it, in single precision.
-    pub max_entry: f64,
     /// `Bᵀ B`, m × m, symmetric; `None` where the swaps were confirmed in single precision.
     pub(crate) gram: Option<Mat<f64>>,
     /// `Φ□⁻¹`, m × m.

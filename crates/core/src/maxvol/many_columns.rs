@@ -1,7 +1,7 @@
 //! Maximum volume with many columns, to a loose tolerance. The LU factorisation that picks the first rows gives all of `B = Φ Φ□⁻¹` for half a product, and
 //! a round of k swaps changes it by a product of rank k; both in single precision, which is enough for a tolerance of one.
 
-use super::handles::{MAX_PASSES, MaxVol, SINGLE_IS_SAFE, Swap};
+use super::handles::{MAX_PASSES, MaxVol, SINGLE_IS_SAFE, Swap, Volume};
 use super::swaps::CandidateRows;
 use cager_geometry::linalg;
 use cager_geometry::linalg::zeros;
@@ -43,19 +43,8 @@ pub(super) fn search(phi: MatRef<'_, f64>, tolerance: f64) -> Option<MaxVol> {
             let rows: Vec<u32> = picked.iter().map(|&at| order[at as usize]).collect();
             let (inverse, log_volume) = linalg::inverse(linalg::rows_of(phi, &rows).as_ref());
             let start_log_volume = log_volume - trace.iter().map(|swap| swap.growth.ln()).sum::<f64>();
-            let swaps = trace.len();
-            let max_entry = f64::from(max_entry);
-            return Some(MaxVol {
-                rows,
-                start,
-                swaps,
-                trace,
-                log_volume,
-                start_log_volume,
-                max_entry,
-                gram: None,
-                inverse,
-            });
+            let volume = Volume { swaps: trace.len(), log_volume, max_entry: f64::from(max_entry) };
+            return Some(MaxVol { rows, start, volume, trace, start_log_volume, gram: None, inverse });
         }
     }
     None
@@ -124,17 +113,20 @@ mod tests {
             pool.install(|| search(phi.as_ref(), LOOSE_TOLERANCE).unwrap())
         });
         assert_eq!((&found.rows, &found.trace), (&alone.rows, &alone.trace));
-        assert_eq!(found.max_entry.to_bits(), alone.max_entry.to_bits());
+        assert_eq!(found.volume.max_entry.to_bits(), alone.volume.max_entry.to_bits());
         let expected = general(phi.as_ref(), start_rows(phi.as_ref()).unwrap(), LOOSE_TOLERANCE);
         assert_eq!(found.start, expected.start);
         assert!(
-            (found.log_volume - expected.log_volume).abs() < 1e-3 * expected.log_volume.abs(),
+            (found.volume.log_volume - expected.volume.log_volume).abs() < 1e-3 * expected.volume.log_volume.abs(),
             "{}",
-            found.log_volume
+            found.volume.log_volume
         );
         let b = linalg::product(phi.as_ref(), found.inverse.as_ref());
         let largest = b.norm_max();
-        assert!((found.max_entry - largest).abs() < 1e-3 * largest && largest <= 1.0 + LOOSE_TOLERANCE, "{largest}");
-        assert!(found.swaps > 0 && (found.start_log_volume - expected.start_log_volume).abs() < 1e-3);
+        assert!(
+            (found.volume.max_entry - largest).abs() < 1e-3 * largest && largest <= 1.0 + LOOSE_TOLERANCE,
+            "{largest}"
+        );
+        assert!(found.volume.swaps > 0 && (found.start_log_volume - expected.start_log_volume).abs() < 1e-3);
     }
 }

@@ -73,8 +73,8 @@ fn search(phi: MatRef<'_, f64>, start: Vec<u32>, tolerance: f64) -> MaxVol {
     let (mut inverse, mut log_volume) = linalg::inverse(linalg::rows_of(phi, &rows).as_ref());
     let start_log_volume = log_volume;
     let found = |rows, trace: Vec<Swap>, log_volume, max_entry, gram, inverse| {
-        let swaps = trace.len();
-        MaxVol { rows, start, swaps, trace, log_volume, start_log_volume, max_entry, gram: Some(gram), inverse }
+        let volume = Volume { swaps: trace.len(), log_volume, max_entry };
+        MaxVol { rows, start, volume, trace, start_log_volume, gram: Some(gram), inverse }
     };
     let mut row_max = row_maxima(phi, inverse.as_ref());
     for pass in 0..MAX_PASSES {

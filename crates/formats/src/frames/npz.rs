@@ -21,7 +21,7 @@ const RATES: [&str; 6] = ["fps", "framerate", "frame_rate", "frames_per_second",
 const MAX_ARRAYS: usize = 4096;
 
 /// Deflate packs no more bytes than these into one; what announces more is no archive.
-const MAX_DEFLATED: u64 = 1032;
+const MAX_DEFLATE_RATIO: u64 = 1032;
 
 /// Opens the one array of an archive that can be frames of so many points, as it is packed.
 pub(super) fn open<'a>(
@@ -175,7 +175,7 @@ impl Arrays {
                 }
             };
             let packed = file.compressed_size();
-            let most = if deflated { packed.saturating_mul(MAX_DEFLATED) } else { packed };
+            let most = if deflated { packed.saturating_mul(MAX_DEFLATE_RATIO) } else { packed };
             let start = file.data_start().filter(|start| start.checked_add(packed).is_some_and(|end| end <= length));
             let Some(start) = start.filter(|_| file.size() <= most) else {
                 let what = format!(

@@ -8,7 +8,7 @@ use crate::error::Fault;
 const MAGIC: &[u8; 12] = b"POINTCACHE2\0";
 const HEADER: usize = 32;
 /// Frame numbers beyond are no numbers of frames.
-const MAX_TIME: f64 = 1e9;
+const MAX_FRAME_NUMBER: f64 = 1e9;
 
 pub(super) fn layout(head: &[u8]) -> Result<Layout, Fault> {
     let Some(fields) = head.strip_prefix(MAGIC) else {
@@ -27,7 +27,9 @@ pub(super) fn layout(head: &[u8]) -> Result<Layout, Fault> {
     let real = |k: usize| fields.as_chunks().0.get(k).map(|bytes| f64::from(f32::from_le_bytes(*bytes)));
     // Some programs leave both at zero.
     let (first, step) = match (real(2), real(3)) {
-        (Some(first), Some(step)) if first.abs() < MAX_TIME && step > 0.0 && step < MAX_TIME => (first, step),
+        (Some(first), Some(step)) if first.abs() < MAX_FRAME_NUMBER && step > 0.0 && step < MAX_FRAME_NUMBER => {
+            (first, step)
+        }
         _ => (0.0, 1.0),
     };
     let mut layout = Layout::new(points, frames, HEADER as u64, Scalar::F32Little);

@@ -12,8 +12,9 @@ pub(super) const BLOCK_COLUMNS: usize = 192;
 pub(super) const PARALLEL_THRESHOLD: usize = 1 << 26;
 /// Rows that one task computes of the product of a matrix with many rows.
 pub const BLOCK_ROWS: usize = 1024;
-/// Parts of a sum that are computed at the same time, at the least and at the most, and the entries of those beyond the least.
+/// Parts of a sum that are computed at the same time, at the least and at the most.
 const PARTS_AT_ONCE: [usize; 2] = [4, 16];
+/// Entries of all those parts, beyond which only the least number is computed at the same time.
 const MAX_PART_ENTRIES: usize = 1 << 24;
 
 /// Rows of products whose results must not depend on the width are padded to a multiple of this: at the edges of small matrices the kernels sum in

@@ -15,9 +15,13 @@ impl Aabb {
     /// The box that holds nothing.
     pub const EMPTY: Self = Self { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
 
-    /// The least box around some points.
+    /// The least box around some points; coordinates that are NaN count for nothing.
     pub fn around(points: impl IntoIterator<Item = DVec3>) -> Self {
-        points.into_iter().fold(Self::EMPTY, |b, p| Self { low: b.low.min(p), high: b.high.max(p) })
+        // `DVec3::min` may give the NaN, and the box of all before it would be lost.
+        let each = |f: fn(f64, f64) -> f64, a: DVec3, b: DVec3| DVec3::new(f(a.x, b.x), f(a.y, b.y), f(a.z, b.z));
+        points
+            .into_iter()
+            .fold(Self::EMPTY, |b, p| Self { low: each(f64::min, b.low, p), high: each(f64::max, b.high, p) })
     }
 
     /// The least box around both.
@@ -50,5 +54,19 @@ impl Aabb {
     /// Extent along each axis.
     pub fn size(&self) -> DVec3 {
         self.high - self.low
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn coordinates_that_are_no_numbers_do_not_lose_the_box() {
+        let points = [DVec3::ZERO, DVec3::new(f64::NAN, 2.0, -1.0), DVec3::ONE];
+        for shift in 0..3 {
+            let turned = (0..3).map(|k| points[(k + shift) % 3]);
+            assert_eq!(Aabb::around(turned), Aabb { low: DVec3::new(0.0, 0.0, -1.0), high: DVec3::new(1.0, 2.0, 1.0) });
+        }
     }
 }

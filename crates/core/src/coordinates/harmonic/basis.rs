@@ -12,13 +12,13 @@ pub(super) const fn functions(degree: usize) -> usize {
     (degree + 1) * (degree + 2) / 2
 }
 
-/// Place of the monomial `αᵃ βᵇ` among all, by degree.
+/// Index of the monomial `αᵃ βᵇ` among all, by degree.
 pub(super) const fn place(a: usize, b: usize) -> usize {
     let degree = a + b;
     degree * (degree + 1) / 2 + b
 }
 
-/// Polynomials in `α, β`, the second and third barycentric coordinate, the mean of whose squares is one.
+/// Orthonormal polynomials in `α, β`, the second and third barycentric coordinate: the mean of each one's square over the triangle is one.
 pub(super) struct Basis {
     /// Row k: the coefficients of polynomial k over the monomials, of which it has the first k + 1.
     pub(super) coefficients: [[f64; MAX_FUNCTIONS]; MAX_FUNCTIONS],

@@ -115,7 +115,7 @@ const MAX_ASPECT: [(f64, usize); 3] = [(4.0, 6), (8.0, 5), (14.0, 4)];
 /// however their vertices are ordered.
 const TIE: f64 = 1.0 + 1e-9;
 /// No elements are divided for the sake of their shape once there are so many.
-pub(super) const MANY: usize = 1200;
+pub(super) const MAX_ELEMENTS_FOR_SHAPE: usize = 1200;
 
 /// The faces of a cage, in their order, divided where points are near.
 pub(super) fn elements(faces: &[[Point; 3]], points: &[Point]) -> Vec<Element> {
@@ -128,7 +128,7 @@ pub(super) fn elements(faces: &[[Point; 3]], points: &[Point]) -> Vec<Element> {
         if waiting == 0 {
             return elements;
         }
-        let divide = elements.len() + waiting <= MANY;
+        let divide = elements.len() + waiting <= MAX_ELEMENTS_FOR_SHAPE;
         let judge = |mut element: Element| {
             if element.degree > 0 {
                 return vec![element];

@@ -1,8 +1,7 @@
 //! Rows of `Φ` from the densities.
 //!
-//! Very near the surface the densities' finite degree shows. There the values on the surface help, which are the hat functions: what the
-//! densities give wrong at the nearest place is taken off, as far as that error reaches into the cage. So values are exact on
-//! the surface and continuous near it.
+//! Very near the surface the densities' finite degree shows. There the values on the surface help, which are the hat functions: the error at the
+//! nearest place on the surface is subtracted, as far as it reaches into the cage, so that values are exact on the surface and continuous near it.
 
 use super::affine::AffineFit;
 use super::basis::{MAX_FUNCTIONS, functions};
@@ -20,11 +19,12 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
+/// Points that one parallel task computes: some lane groups, which share one product with the low densities.
 const TASK_POINTS: usize = 16 * LANES;
 /// High unknowns count up to this many radii from their element's centre.
 const HIGH_RANGE: f64 = 4.0;
-/// Elements with at least this part of the largest share of a change are marked.
-const MAIN: f64 = 0.3;
+/// Elements with at least this fraction of the largest share of a change are marked.
+const MIN_MARKED_SHARE: f64 = 0.3;
 
 /// Densities on the surface, from which coordinates are evaluated.
 pub(super) struct Solution<'a> {
@@ -210,7 +210,7 @@ fn evaluate_group(solution: &Solution<'_>, group: &Group, start: usize, scratch:
     }
 }
 
-/// A part of a value, which need not be finite where the part is nothing, as on edges.
+/// A value times a factor; zero where the factor is, even if the value is not finite, as on edges.
 #[inline(always)]
 fn weigh(value: Lanes, by: Lanes) -> Lanes {
     value.zip(by, |value, by| if by == 0.0 { 0.0 } else { value * by })
@@ -275,5 +275,5 @@ fn mark(solution: &Solution<'_>, group: &Group, l: usize, vertex: u32, marked: &
         shares.push((share.abs(), e as u32));
     }
     let largest = shares.iter().map(|s| s.0).fold(0.0, f64::max);
-    marked.extend(shares.iter().filter(|s| s.0 >= MAIN * largest * (1.0 - 1e-6)).map(|s| s.1));
+    marked.extend(shares.iter().filter(|s| s.0 >= MIN_MARKED_SHARE * largest * (1.0 - 1e-6)).map(|s| s.1));
 }

@@ -1,10 +1,10 @@
 //! How much memory boundary elements take.
 
 use super::basis::{MAX_FUNCTIONS, functions};
-use super::elements::{Element, MANY, Unknowns};
+use super::elements::{Element, MAX_ELEMENTS_FOR_SHAPE, Unknowns};
 use super::galerkin::is_near;
-use super::limits::{ELEMENTS, LOW_DEGREES};
-use super::patch::PATCH;
+use super::limits::{LOW_DEGREES, MAX_ELEMENTS};
+use super::patch::MAX_PATCH_UNKNOWNS;
 use cager_geometry::mesh::Point;
 use rayon::prelude::*;
 
@@ -18,11 +18,11 @@ pub(super) fn needed(unknowns: &Unknowns, vertices: usize) -> u64 {
     bytes(unknowns.low_count(), unknowns.high_count(), vertices, near)
 }
 
-/// The same for the most elements, of the highest degree, that refining these faces may end with. Elements have about as many near ones as
+/// Upper bound of [`needed`]: for the most elements, of the highest degree, that refining these faces may end with. Elements have about as many near ones as
 /// the faces.
-pub(super) fn at_most(faces: &[[Point; 3]], vertices: usize) -> u64 {
+pub(super) fn upper_bound(faces: &[[Point; 3]], vertices: usize) -> u64 {
     let whole: Vec<Element> = faces.iter().enumerate().map(|(f, &corners)| Element::face(f, corners)).collect();
-    let elements = ELEMENTS.max(2 * faces.len().max(MANY)).min(LOW_DEGREES[2].0);
+    let elements = MAX_ELEMENTS.max(2 * faces.len().max(MAX_ELEMENTS_FOR_SHAPE)).min(LOW_DEGREES[2].0);
     let low = LOW_DEGREES.iter().map(|&(most, degree)| elements.min(most) * functions(degree)).max().unwrap_or(0);
     let pairs = (near_pairs(&whole, |_, _| 1) * elements as u64).div_ceil(faces.len().max(1) as u64);
     bytes(low, elements * MAX_FUNCTIONS, vertices, pairs * (MAX_FUNCTIONS * MAX_FUNCTIONS) as u64)
@@ -31,7 +31,7 @@ pub(super) fn at_most(faces: &[[Point; 3]], vertices: usize) -> u64 {
 /// The dense equations in double and in single precision, right-hand sides and densities, entries of near pairs, and a patch per thread.
 fn bytes(low: usize, high: usize, vertices: usize, near: u64) -> u64 {
     let [low, high, vertices] = [low, high, vertices].map(|count| count as u64);
-    let patches = rayon::current_num_threads() as u64 * (PATCH * PATCH) as u64;
+    let patches = rayon::current_num_threads() as u64 * (MAX_PATCH_UNKNOWNS * MAX_PATCH_UNKNOWNS) as u64;
     12 * low * low + 8 * (vertices * (3 * low + 2 * high) + near + patches)
 }
 

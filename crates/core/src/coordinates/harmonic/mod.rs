@@ -38,7 +38,7 @@ use cager_geometry::mesh::Point;
 use elements::Unknowns;
 use evaluate::{Evaluated, Solution};
 use faer::Mat;
-use limits::{ELEMENTS, LOW_DEGREES};
+use limits::{LOW_DEGREES, MAX_ELEMENTS};
 pub use plan::ElementPlan;
 use solve::SolveRecord;
 use surface::{ClosestPoint, Side, Surface};
@@ -67,7 +67,7 @@ impl CoordinateSystem for Harmonic {
         let faces: Vec<[Point; 3]> = cage.mesh().triangles.iter().map(corners).collect();
         let vertices = cage.vertices().len();
         match plan.map(|plan| plan.read(&faces, vertices)) {
-            None => memory::at_most(&faces, vertices),
+            None => memory::upper_bound(&faces, vertices),
             Some(Ok((unknowns, _))) => memory::needed(&unknowns, vertices),
             Some(Err(_)) => 0,
         }
@@ -151,7 +151,7 @@ fn refine(problem: &Problem<'_>) -> Result<Coordinates, CoordinatesError> {
     let mut degree = low_degree(elements.len()).ok_or_else(|| {
         not_computed(format!("it would take {} boundary elements, more than {}", elements.len(), LOW_DEGREES[2].0))
     })?;
-    let most = ELEMENTS.max(2 * elements.len());
+    let most = MAX_ELEMENTS.max(2 * elements.len());
     let mut refinements = 0;
     loop {
         let unknowns = Unknowns::new(&elements, degree);

@@ -8,14 +8,14 @@ use faer::linalg::triangular_solve;
 use faer::{Mat, MatMut, MatRef, Par};
 
 /// Unknowns of a patch at most.
-pub(super) const PATCH: usize = 1600;
-/// Where the entries of thin elements are not exact enough to be definite, diagonals grow by these parts, one after the other.
+pub(super) const MAX_PATCH_UNKNOWNS: usize = 1600;
+/// Where the entries of thin elements are not exact enough to be definite, diagonals grow by these fractions, one after the other.
 pub(super) const DAMPING: [f64; 5] = [0.0, 1e-4, 1e-3, 1e-2, 1e-1];
 
-/// Makes the diagonal larger by a part of it.
-pub(super) fn damp(mut a: MatMut<'_, f64>, part: f64) {
+/// Makes the diagonal larger by a fraction of it.
+pub(super) fn damp(mut a: MatMut<'_, f64>, fraction: f64) {
     for k in 0..a.nrows() {
-        a[(k, k)] *= 1.0 + part;
+        a[(k, k)] *= 1.0 + fraction;
     }
 }
 
@@ -58,7 +58,7 @@ pub(super) fn choose(unknowns: &Unknowns, candidates: &[Vec<u32>], residuals: &[
         let mut count = 0;
         let fits = |&(_, e): &(f64, u32)| {
             count += functions(unknowns.elements[e as usize].degree);
-            count <= PATCH
+            count <= MAX_PATCH_UNKNOWNS
         };
         let mut elements: Vec<u32> = sizes.into_iter().take_while(fits).map(|size| size.1).collect();
         elements.sort_unstable();
@@ -118,11 +118,11 @@ pub(super) fn solve(
 ) -> Option<Step> {
     let low = equations.unknowns.low;
     let layout = Layout::new(patch, equations.unknowns);
-    let definite = |part: f64| {
+    let definite = |fraction: f64| {
         let mut matrix = zeroed(memory, layout.count, layout.count);
         fill_low(matrix.as_mut(), equations, patch);
         fill_near(matrix.as_mut(), equations, patch, &layout);
-        damp(matrix.as_mut(), part);
+        damp(matrix.as_mut(), fraction);
         cholesky_in_place(matrix, Par::Seq).is_some()
     };
     let damping = least_damping(patch.damping, definite)?;

@@ -4,7 +4,7 @@
 use super::basis::{MAX_DEGREE, functions};
 use super::elements::{Element, LATER, QUARTERS, Unknowns};
 use super::limits::{LOW_DEGREES, MIN_DEGREE};
-use super::patch::{DAMPING, PATCH};
+use super::patch::{DAMPING, MAX_PATCH_UNKNOWNS};
 use super::solve::{MAX_ITERATIONS, SolveRecord};
 use cager_geometry::mesh::Point;
 use serde::{Deserialize, Serialize};
@@ -83,7 +83,7 @@ impl ElementPlan {
             let (mut patch, mut size) = (Vec::new(), 0);
             for e in (0..count).filter(|e| is_set(v * count + e)) {
                 size += functions(unknowns.elements[e].degree);
-                if size > PATCH {
+                if size > MAX_PATCH_UNKNOWNS {
                     return Err("it solves for too many unknowns around a vertex");
                 }
                 patch.push(e as u32);

@@ -10,12 +10,12 @@ use super::triangle::Triangle;
 use crate::coordinates::layer::INVERSE_4PI;
 use crate::simd::{LANES, Lanes, dot, multiversion};
 
-/// Farther from the centre than so many radii, a triangle's potentials are taken by quadrature,
-const FAR: f64 = 6.0;
-/// and here with fewer points and degrees.
-const FARTHER: f64 = 20.0;
+/// From so many radii from the centre on, a triangle's potentials are taken by quadrature.
+const QUADRATURE_FROM: f64 = 6.0;
+/// From so many on, with fewer points and degrees.
+const COARSE_FROM: f64 = 20.0;
 /// Degree of the densities that count there.
-const FARTHER_DEGREE: usize = 2;
+const COARSE_DEGREE: usize = 2;
 
 multiversion! {
     /// Potentials at one lane group of the polynomials up to a degree on a triangle; as many entries of `out` are written.
@@ -35,7 +35,7 @@ fn potentials_generic(
     let r = [x[0] - Lanes::splat(c[0]), x[1] - Lanes::splat(c[1]), x[2] - Lanes::splat(c[2])];
     let distance2 = dot(&r, &r);
     let at = |radii: f64| (radii * triangle.radius) * (radii * triangle.radius);
-    let (far, farther) = (at(FAR), at(FARTHER));
+    let (far, farther) = (at(QUADRATURE_FROM), at(COARSE_FROM));
     let count = functions(degree);
     let (mut near_any, mut far_any, mut farther_any) = (false, false, false);
     for l in 0..LANES {
@@ -53,7 +53,7 @@ fn potentials_generic(
     }
     let mut part = [Lanes::ZERO; MAX_FUNCTIONS];
     if farther_any {
-        let low = degree.min(FARTHER_DEGREE);
+        let low = degree.min(COARSE_DEGREE);
         quadrature(triangle, &tables.coarse, low, x, &mut part);
         let keep = distance2.map(|d| if d > farther { 1.0 } else { 0.0 });
         for k in 0..functions(low) {

@@ -36,7 +36,7 @@ pub(super) struct Densities {
 }
 
 /// A matrix in single precision, from the row on that belongs to each column; zeros above.
-fn single_from(a: MatRef<'_, f64>, first: impl Fn(usize) -> usize + Sync) -> Mat<f32> {
+fn lower_in_single(a: MatRef<'_, f64>, first: impl Fn(usize) -> usize + Sync) -> Mat<f32> {
     let mut out = linalg::zeros::<f32>(a.nrows(), a.ncols());
     out.as_mut().par_col_iter_mut().zip(a.par_col_iter()).enumerate().for_each(|(j, (out, a))| {
         let first = first(j);
@@ -93,7 +93,7 @@ pub(super) fn solve(
 ) -> Option<Solved> {
     // The factor takes the place of the matrix, of which the patches need entries between elements that are not near, those on and
     // below the diagonal.
-    let far = single_from(operator.low.as_ref(), |j| j - j % unknowns.low);
+    let far = lower_in_single(operator.low.as_ref(), |j| j - j % unknowns.low);
     let low_system = LowSystem::new(operator.low, &far, given.map(|record| record.damping))?;
     let equations = Equations { near: &operator.near, far: &far, b, unknowns };
     let mut low = low_system.solve(b.low.clone());
@@ -150,10 +150,10 @@ struct LowSystem {
 impl LowSystem {
     /// Factors the lower triangle of a matrix; `far` is the same in single precision.
     fn new(mut matrix: Mat<f64>, far: &Mat<f32>, given: Option<u8>) -> Option<Self> {
-        let definite = |part: f64| {
-            if part > 0.0 {
+        let definite = |fraction: f64| {
+            if fraction > 0.0 {
                 restore(matrix.as_mut(), far);
-                damp(matrix.as_mut(), part);
+                damp(matrix.as_mut(), fraction);
             }
             linalg::cholesky_in_place(matrix.as_mut(), Par::rayon(0)).is_some()
         };
@@ -250,7 +250,7 @@ impl Equations<'_> {
         patch::choose(self.unknowns, candidates, &self.residuals(low, &high, candidates), low.ncols())
     }
 
-    /// The largest residual, see [`Solved::residual`]; the low unknowns were solved for with diagonals larger by the part `damping`.
+    /// The largest residual, see [`Solved::residual`]; the low unknowns were solved for with diagonals larger by the fraction `damping`.
     fn largest_residual(&self, low: MatRef<'_, f64>, high: &[High], candidates: &[Vec<u32>], damping: f64) -> f64 {
         let l = self.unknowns.low;
         let residuals = self.residuals(low, high, candidates);

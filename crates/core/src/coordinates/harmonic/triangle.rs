@@ -3,7 +3,7 @@
 use cager_geometry::mesh::Point;
 use cager_geometry::vector;
 
-/// A triangle with a polynomial density.
+/// A triangle that carries a polynomial density, whose barycentric coordinates 1 − α − β, α and β belong to its corners in order.
 #[derive(Clone, Debug)]
 pub(super) struct Triangle {
     pub(super) corners: [Point; 3],
@@ -41,7 +41,7 @@ impl Triangle {
         Self { corners, centre, radius, area: 0.5 * double_area, normal, gradients, along, outward, lengths }
     }
 
-    /// The point with these barycentric coordinates.
+    /// The point with α and β as second and third barycentric coordinate.
     pub(super) fn point(&self, alpha: f64, beta: f64) -> Point {
         let [a, b, c] = self.corners;
         [0, 1, 2].map(|k| a[k] + alpha * (b[k] - a[k]) + beta * (c[k] - a[k]))

@@ -5,7 +5,7 @@
 //! `det = u_0·g_0` and `m = ½ Σ θ_e n_e`; all of it is smooth away from the cage's faces. A face that a point sees edge-on has
 //! weights of zero, their limit beside the face.
 
-use super::{MeanValue, store};
+use super::{GRADIENT, MeanValue, store};
 use crate::cage::{Cage, Edge, Face};
 use crate::simd::{LANES, Lanes, angle, cross, dot, gather, multiversion};
 use cager_geometry::linalg::zeros;
@@ -87,7 +87,7 @@ impl MeanValue {
 
 /// Values of the forward pass: unit vectors `u`, reciprocal distances `1/d` and unnormalised weights `W`. Per edge: `c = u_a × u_b`; `f = θ/(2 sin θ)`, so
 /// that the mean-vector term is `f c`; and `(df/ds)/s`.
-type Scratch = super::Scratch<5>;
+type Scratch = super::Scratch<GRADIENT>;
 
 /// Accumulators of the backward pass.
 struct Adjoint {
@@ -176,7 +176,7 @@ fn forward_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> Lanes {
 }
 
 #[inline(always)]
-fn edge_term(edge: &Edge, directions: &[[Lanes; 3]], out: &mut [Lanes; 5]) {
+fn edge_term(edge: &Edge, directions: &[[Lanes; 3]], out: &mut [Lanes; GRADIENT]) {
     let [a, b] = edge.vertices.map(|v| &directions[v as usize]);
     let c = cross(a, b);
     let s = dot(&c, &c).sqrt();
@@ -208,7 +208,7 @@ struct FaceTerms {
 
 impl FaceTerms {
     #[inline(always)]
-    fn new(face: &Face, directions: &[[Lanes; 3]], edges: &[[Lanes; 5]]) -> Self {
+    fn new(face: &Face, directions: &[[Lanes; 3]], edges: &[[Lanes; GRADIENT]]) -> Self {
         let [e0, e1, e2] = face.edges.map(|e| &edges[e as usize]);
         let [s0, s1, s2] = face.signs;
         let g0 = [e0[0] * s0, e0[1] * s0, e0[2] * s0];

@@ -17,9 +17,9 @@ const GAUSS: [[f64; 2]; 8] = [
     [0.980_144_928_248_768_1, 0.050_614_268_145_188_13],
 ];
 /// Pieces are halved until their longest side is at most this fraction of their distance: the rule is then exact to rounding.
-const SIDE_OVER_DISTANCE: f64 = 0.35;
+const MAX_SIDE_OVER_DISTANCE: f64 = 0.35;
 /// Halvings at most; a longest side is halved by every second one.
-const DEPTH: u32 = 120;
+const MAX_HALVINGS: u32 = 120;
 
 /// Weights of the corners of a face for the point `x`.
 pub(super) fn face_weights(corners: [Point; 3], x: Point) -> [f64; 3] {
@@ -30,7 +30,7 @@ pub(super) fn face_weights(corners: [Point; 3], x: Point) -> [f64; 3] {
     let normal = cross(sides[(longest + 1) % 3], sides[(longest + 2) % 3]);
     let seen = corners.map(|corner| sub(corner, x));
     let mut sums = [0.0; 3];
-    integrate(seen, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], 1.0, DEPTH, &mut sums);
+    integrate(seen, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], 1.0, MAX_HALVINGS, &mut sums);
     sums.map(|sum| sum * dot(seen[longest], normal))
 }
 
@@ -38,13 +38,13 @@ fn longest(sides: &[Point; 3]) -> usize {
     (0..3).fold(0, |best, i| if dot(sides[i], sides[i]) > dot(sides[best], sides[best]) { i } else { best })
 }
 
-/// Adds `∫ λ_i / |r|⁴ dA` over a piece, by its corners and their barycentric coordinates; `share` is its part of the face's area, which
-/// counts as one half.
+/// Adds `∫ λ_i / |r|⁴ dA` over a piece, given by its corners and their barycentric coordinates, in the unit in which the face's area is one half.
+/// `share` is the piece's fraction of that area.
 fn integrate(corners: [Point; 3], barycentric: [Point; 3], share: f64, depth: u32, sums: &mut Point) {
     let [a, b, c] = corners;
     let sides = [sub(c, b), sub(a, c), sub(b, a)];
     let top = longest(&sides);
-    let reach2 = distance2_to_triangle(corners, [0.0; 3]) * (SIDE_OVER_DISTANCE * SIDE_OVER_DISTANCE);
+    let reach2 = distance2_to_triangle(corners, [0.0; 3]) * (MAX_SIDE_OVER_DISTANCE * MAX_SIDE_OVER_DISTANCE);
     if depth > 0 && dot(sides[top], sides[top]) > reach2 {
         let (i, j) = ((top + 1) % 3, (top + 2) % 3);
         let middles = (middle(corners[i], corners[j]), middle(barycentric[i], barycentric[j]));

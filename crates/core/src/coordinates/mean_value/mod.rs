@@ -11,8 +11,8 @@ mod gradient;
 mod integral;
 
 use super::{
-    CageValues, CoordinateSystem, Coordinates, CoordinatesError, ElementPlan, PointwiseCoordinates, by_tasks,
-    refuse_plan,
+    CageValues, CoordinateSystem, Coordinates, CoordinatesError, ElementPlan, PointwiseCoordinates,
+    pointwise_coordinates, refuse_plan,
 };
 use crate::cage::{Cage, Edge, Face};
 use crate::simd::{LANES, Lanes, angle, cross, dot, gather, multiversion};
@@ -60,7 +60,7 @@ impl CoordinateSystem for MeanValue {
 }
 
 fn coordinates(cage: &Cage, points: &[Point]) -> Coordinates {
-    by_tasks(
+    pointwise_coordinates(
         points.len(),
         cage.vertices().len(),
         || Scratch::new(cage),
@@ -68,13 +68,18 @@ fn coordinates(cage: &Cage, points: &[Point]) -> Coordinates {
     )
 }
 
+/// Terms of an edge in the [`Scratch`] of the coordinates, and of their gradient.
+const FORWARD: usize = 4;
+const GRADIENT: usize = 5;
+
 /// Working memory of one task; every entry holds one lane group.
 struct Scratch<const EDGE: usize> {
     /// Unit vectors from the points to each cage vertex.
     directions: Vec<[Lanes; 3]>,
     /// Reciprocal distances to each cage vertex.
     nearness: Vec<Lanes>,
-    /// Terms of each edge; of the coordinates themselves, half the mean-vector term `½ θ n`, and the factor that turns it into `u_a × u_b`.
+    /// Terms of each edge; of [`FORWARD`] ones three are half the mean-vector term `½ θ n`, and the fourth is the factor that turns it into
+    /// `u_a × u_b`.
     edges: Vec<[Lanes; EDGE]>,
     /// Unnormalised weights.
     weights: Vec<Lanes>,
@@ -98,7 +103,7 @@ fn task_coordinates(
     points: &[Point],
     first: usize,
     mut rows: MatMut<'_, f64>,
-    scratch: &mut Scratch<4>,
+    scratch: &mut Scratch<FORWARD>,
 ) -> Vec<u32> {
     let mut outsiders = Vec::new();
     let count = rows.nrows();
@@ -128,7 +133,7 @@ fn task_coordinates(
     outsiders
 }
 
-/// Writes the coordinates of the points of a lane group, as many as there are rows.
+/// Writes the coordinates of a lane group's points, one for each row.
 fn store(mut rows: MatMut<'_, f64>, weights: &[Lanes], scale: Lanes) {
     for (j, &weight) in weights.iter().enumerate() {
         let values = (weight * scale).0;
@@ -163,10 +168,10 @@ fn set_row(rows: &mut MatMut<'_, f64>, row: usize, entries: &[(usize, f64)]) {
     }
 }
 
-/// Computes the weights of one lane's point anew, integrated for faces whose rounding matters, where all weights add up to about
-/// `total`; returns their sum.
+/// Computes the weights of lane l's point again, integrated for faces whose rounding matters; `total` is about the sum of all weights. Returns
+/// that sum.
 #[cold]
-fn accurate_weights(cage: &Cage, scratch: &mut Scratch<4>, x: Point, l: usize, total: f64) -> f64 {
+fn accurate_weights(cage: &Cage, scratch: &mut Scratch<FORWARD>, x: Point, l: usize, total: f64) -> f64 {
     for weight in &mut scratch.weights {
         weight.0[l] = 0.0;
     }
@@ -181,7 +186,7 @@ fn accurate_weights(cage: &Cage, scratch: &mut Scratch<4>, x: Point, l: usize, t
 }
 
 /// Weights of one face times the distances of its corners.
-fn face_weights(cage: &Cage, scratch: &Scratch<4>, face: &Face, x: Point, l: usize, total: f64) -> [f64; 3] {
+fn face_weights(cage: &Cage, scratch: &Scratch<FORWARD>, face: &Face, x: Point, l: usize, total: f64) -> [f64; 3] {
     let vertices = face.vertices.map(|v| v as usize);
     let edges = face.edges.map(|e| scratch.edges[e as usize].map(|c| c.0[l]));
     let g = [0, 1, 2].map(|i| [0, 1, 2].map(|k| face.signs[i] * edges[i][k]));
@@ -209,11 +214,11 @@ fn is_inaccurate(loss2: f64, nearest: f64, total: f64) -> bool {
 
 multiversion! {
     /// Unnormalised weights of one lane group, left in the scratch; returns their sums.
-    fn group_weights(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch<4>) -> Sums = group_weights_generic;
+    fn group_weights(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch<FORWARD>) -> Sums = group_weights_generic;
 }
 
 #[inline(always)]
-fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch<4>) -> Sums {
+fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch<FORWARD>) -> Sums {
     let mut on = [On::Nothing; LANES];
     let near_vertex = VERTEX_TOLERANCE * cage.diagonal();
     for (j, v) in cage.vertices().iter().enumerate() {
@@ -283,7 +288,7 @@ fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch<4>) -
     Sums { total, on, inaccurate }
 }
 
-// Kept out of the loops: the compiler would otherwise split the lanes as these few entries ask for, and the roots with them.
+// Kept out of the loops: inlined, what they do lane by lane would keep the compiler from vectorising the loops, roots included.
 
 #[cold]
 #[inline(never)]

@@ -105,7 +105,7 @@ impl Buffers<'_> {
                 found.bytes.chunks(found.stride).take(count).map(&convert).collect()
             }
             // Zeros, but for what a sparse accessor has.
-            None => (0..count.ok_or_else(too_large)?).map(|_| convert(&[0; MAX_BYTES][..size])).collect(),
+            None => (0..count.ok_or_else(too_large)?).map(|_| convert(&[0; MAX_ELEMENT_BYTES][..size])).collect(),
         };
         if let Some(sparse) = &accessor.sparse {
             let replaced = self.sparse_indices(sparse, most, place)?;
@@ -158,7 +158,7 @@ impl Buffers<'_> {
 }
 
 /// The largest element: sixteen numbers of four bytes.
-const MAX_BYTES: usize = 64;
+const MAX_ELEMENT_BYTES: usize = 64;
 
 /// Where the elements of an accessor are; the last one ends the bytes.
 struct Elements<'a> {

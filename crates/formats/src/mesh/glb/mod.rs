@@ -39,7 +39,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Model, Fault> {
         skins: Skins::new(),
         model: Model::default(),
         colors: Colors::default(),
-        most: MAX_FREE + MAX_PER_BYTE * bytes.len(),
+        most: MAX_ITEMS_OF_ANY_FILE + MAX_ITEMS_PER_BYTE * bytes.len(),
         unpacked: 0,
     };
     for placement in &scene.placements {
@@ -51,9 +51,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Model, Fault> {
 }
 
 /// Points, corners and primitives that any file may have.
-const MAX_FREE: usize = 1 << 16;
+const MAX_ITEMS_OF_ANY_FILE: usize = 1 << 16;
 /// Those beyond, for each byte of the file: enough for seven copies of a mesh and more.
-const MAX_PER_BYTE: usize = 2;
+const MAX_ITEMS_PER_BYTE: usize = 2;
 
 struct Builder<'a> {
     root: &'a Root,

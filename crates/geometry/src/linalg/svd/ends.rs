@@ -5,7 +5,7 @@ use crate::linalg;
 use faer::{Mat, MatRef};
 
 /// Steps that the method takes at the most.
-const STEPS: usize = 240;
+const MAX_STEPS: usize = 240;
 /// It ends when as many steps change the value by less than this fraction.
 const SETTLED: f64 = 1e-11;
 const UNCHANGED: usize = 4;
@@ -41,7 +41,7 @@ pub fn first_value(factors: &[MatRef<'_, f64>]) -> f64 {
 
 /// Largest eigenvalue of a symmetric positive operator on vectors of length m, given as columns.
 fn largest(m: usize, apply: impl Fn(MatRef<'_, f64>) -> Mat<f64>) -> f64 {
-    let steps = STEPS.min(m);
+    let steps = MAX_STEPS.min(m);
     let mut basis = Mat::<f64>::zeros(m, steps + 1);
     let mut random = fastrand::Rng::with_seed(0);
     basis.col_mut(0).iter_mut().for_each(|x| *x = random.f64() - 0.5);
@@ -107,6 +107,13 @@ fn largest_of_tridiagonal(diagonal: &[f64], off_diagonal: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::linalg::svd::singular_values;
+
+    #[test]
+    fn the_iterations_begin_with_the_same_vectors_for_ever() {
+        let mut random = fastrand::Rng::with_seed(0);
+        let values = [11_116_517_241_604_665_558, 91_298_403_691_422_709, 1_747_996_488_805_885_078];
+        assert_eq!(values.map(|_| random.u64(..)), values);
+    }
 
     #[test]
     fn the_ends_are_those_of_the_decomposition() {

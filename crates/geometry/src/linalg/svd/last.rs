@@ -9,7 +9,7 @@ use faer::{Mat, MatRef};
 /// Vectors of a block beyond the wanted ones: the farther the values left out, the fewer steps.
 const MARGIN: usize = 12;
 /// Blocks that the space has at the most.
-const BLOCKS: usize = 16;
+const MAX_BLOCKS: usize = 16;
 /// Change in a step, over the largest value of the inverse, below which the values count as found.
 const SETTLED: f64 = 1e-13;
 /// Directions of a new block shorter than this fraction of its longest lie in the space already.
@@ -56,7 +56,7 @@ pub fn last_directions(inverse: MatRef<'_, f64>, first: f64, count: usize) -> Op
     let mut block = Mat::from_fn(m, width, |_, _| random.f64() - 0.5);
     let (mut space, mut images) = (Mat::<f64>::zeros(m, 0), Mat::<f64>::zeros(m, 0));
     let mut known: Vec<f64> = Vec::new();
-    for _ in 0..BLOCKS {
+    for _ in 0..MAX_BLOCKS {
         // Twice is enough (Kahan and Parlett).
         for _ in 0..2 {
             block -= linalg::tall_product(space.as_ref(), linalg::product(space.transpose(), block.as_ref()).as_ref());

@@ -1,0 +1,109 @@
+//! Any subject: a template followed by its cage alone.
+
+use super::finish::Finisher;
+use super::placement::{area, check_start};
+use super::report::{FrameReport, How};
+use super::surfaces::{Followed, Seen, SurfaceFiles};
+use super::{RecoverError, RecoverProgress, each};
+use cager_core::cage::Cage;
+use cager_geometry::linalg::tall_product;
+use cager_geometry::mesh::{Model, Point, TriMesh};
+use cager_recover::track::{SecondPass, TrackedFrame, Tracker, smoothed};
+use cager_registration::{Target, Template, TemplateOptions};
+use faer::Mat;
+use std::collections::VecDeque;
+
+/// A template that is followed.
+pub(super) struct Recovering<'a> {
+    phi: &'a Mat<f64>,
+    template: Template,
+}
+
+impl<'a> Recovering<'a> {
+    /// A template in its cage.
+    pub(super) fn new(rest: &TriMesh, cage: &Cage, phi: &'a Mat<f64>) -> Result<Self, RecoverError> {
+        Ok(Self { phi, template: Template::new(rest, cage, phi.as_ref(), &TemplateOptions::default())? })
+    }
+
+    /// Refuses a template that seems turned or of another size.
+    pub(super) fn check_start(
+        &self,
+        model: &Model,
+        rest: &TriMesh,
+        cage: &Cage,
+        first: (&std::path::Path, &Seen),
+    ) -> Result<(), RecoverError> {
+        let target = Target::new(&first.1.observation, self.template.diagonal());
+        let area_of = |cage: &[Point]| area(&self.positions(cage), &rest.triangles);
+        check_start(model, cage, &self.template, area_of, (first.0, &first.1.observation, &target))
+    }
+
+    /// The first pass, from the first frame.
+    pub(super) fn follow(
+        &self,
+        surfaces: &SurfaceFiles<'_>,
+        cage: &Cage,
+        force: bool,
+        progress: &dyn Fn(RecoverProgress),
+    ) -> Result<Vec<TrackedFrame>, RecoverError> {
+        let mut tracker = Tracker::new(&self.template, cage.vertices().to_vec());
+        let mut tracked = Vec::with_capacity(surfaces.files.len());
+        each(surfaces, (0..surfaces.files.len()).collect(), force, |_, seen| {
+            tracked.push(match seen {
+                Some(seen) => tracker.follow(&seen.target),
+                None => tracker.skip(),
+            });
+            progress(RecoverProgress::Followed(tracked.len()));
+            Ok(())
+        })?;
+        Ok(tracked)
+    }
+
+    /// Where the template's points are in a cage.
+    fn positions(&self, cage: &[Point]) -> Vec<Point> {
+        let cage = Mat::from_fn(cage.len(), 3, |i, k| cage[i][k]);
+        let found = tall_product(self.phi.as_ref(), cage.as_ref());
+        (0..found.nrows()).map(|i| std::array::from_fn(|k| found[(i, k)])).collect()
+    }
+
+    /// The second pass, from the last frame: frames that lay badly from the frame after them, smoothed between their neighbours, measured and written.
+    pub(super) fn refine(
+        &self,
+        surfaces: &SurfaceFiles<'_>,
+        tracked: &mut [TrackedFrame],
+        finisher: &mut Finisher<'_>,
+        force: bool,
+        progress: &dyn Fn(RecoverProgress),
+    ) -> Result<Vec<FrameReport>, RecoverError> {
+        let pass = SecondPass::new(&self.template, tracked);
+        let mut reports: VecDeque<FrameReport> = VecDeque::with_capacity(tracked.len());
+        let mut finish = |frame: usize, seen: Option<&Followed>, tracked: &[TrackedFrame]| {
+            let positions = self.positions(&tracked[frame].cage);
+            reports.push_front(finisher.finish(frame, positions, How::of(&tracked[frame]), seen)?);
+            progress(RecoverProgress::Refined(reports.len()));
+            Ok::<_, RecoverError>(())
+        };
+        // The frame after the one that is looked at, which waits for its other neighbour.
+        let mut waiting: Option<(usize, Option<Followed>)> = None;
+        each(surfaces, (0..tracked.len()).rev().collect(), force, |frame, seen| {
+            if let Some(seen) = seen.as_ref().filter(|_| pass.wants(&tracked[frame])) {
+                let (at, after) = tracked[frame..].split_at_mut(1);
+                let after: Vec<&[Point]> = after.iter().take(2).map(|frame| &frame.cage[..]).collect();
+                pass.refit(&seen.target, &mut at[0], &after);
+            }
+            if let Some((later, at)) = waiting.replace((frame, seen)) {
+                if let (Some(at), Some(beyond)) = (&at, tracked.get(later + 1)) {
+                    let beside = [&tracked[frame].cage[..], &beyond.cage[..]];
+                    let cage = smoothed(&self.template, &at.target, &tracked[later].cage, beside);
+                    tracked[later].cage = cage;
+                }
+                finish(later, at.as_ref(), tracked)?;
+            }
+            Ok(())
+        })?;
+        if let Some((frame, seen)) = waiting {
+            finish(frame, seen.as_ref(), tracked)?;
+        }
+        Ok(reports.into())
+    }
+}

@@ -1,0 +1,54 @@
+//! Frames whose cages are known: vertices that leave their cage, distances, positions written.
+
+use super::RecoverError;
+use super::positions::RecoveredFrames;
+use super::report::{FrameReport, How};
+use super::surfaces::{Followed, distances};
+use cager_geometry::mesh::{Point, TriMesh};
+use cager_recover::offsets::OffsetSolver;
+use cager_registration::{SurfacePoint, sample_surface};
+
+/// What is done with every frame in the end.
+pub(super) struct Finisher<'a> {
+    rest: &'a TriMesh,
+    diagonal: f64,
+    offsets: Option<OffsetSolver>,
+    samples: Vec<SurfacePoint>,
+    written: RecoveredFrames,
+}
+
+/// Points of the template that are measured to the surfaces.
+const MEASURED: usize = 3000;
+
+impl<'a> Finisher<'a> {
+    /// For a template at rest; with offsets where vertices may leave the cage.
+    pub(super) fn new(rest: &'a TriMesh, diagonal: f64, offsets: bool, written: RecoveredFrames) -> Self {
+        let samples = sample_surface(&rest.vertices, &rest.triangles, MEASURED, 1);
+        Self { rest, diagonal, offsets: offsets.then(|| OffsetSolver::new(rest, diagonal)), samples, written }
+    }
+
+    /// Writes a frame from where its cage has the template's points.
+    pub(super) fn finish(
+        &mut self,
+        frame: usize,
+        mut positions: Vec<Point>,
+        how: How,
+        seen: Option<&Followed>,
+    ) -> Result<FrameReport, RecoverError> {
+        if let (Some(offsets), Some(seen)) = (&self.offsets, seen) {
+            positions = offsets.offset(&positions, &seen.target);
+        }
+        self.written.write(frame, &positions)?;
+        let mesh = TriMesh { vertices: positions, triangles: self.rest.triangles.clone() };
+        let points: Vec<Point> = self.samples.iter().map(|sample| sample.at(&mesh.vertices, &mesh.triangles)).collect();
+        let (to_surface, from_surface) =
+            seen.map_or((None, None), |seen| distances(&mesh, &points, seen, self.diagonal));
+        Ok(FrameReport::new(how, to_surface, from_surface, seen.map(|seen| seen.notes)))
+    }
+
+    /// All frames, ready to be read.
+    pub(super) fn into_frames(mut self) -> Result<RecoveredFrames, RecoverError> {
+        self.written.rewind()?;
+        Ok(self.written)
+    }
+}
