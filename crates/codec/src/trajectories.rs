@@ -92,13 +92,11 @@ impl Trajectories {
             let (mut last, mut last_but_one) = (0, 0);
             for t in 0..frames {
                 let above = if k > 0 { found.waves[(k - 1) * frames + t].unsigned_abs() } else { 0 };
-                let [last_size, size_before, above] =
-                    [last, last_but_one, above].map(|size: u32| size.min(MAX_CONTEXT_SIZE));
-                let size = 8 * last_size + 4 * size_before + 4 * above;
+                let size = 8 * last + 4 * last_but_one + 4 * above.min(MAX_CONTEXT_SIZE);
                 let value = self.waves.get(k * frames + t).copied().unwrap_or(0);
                 let value = models.code(coder, size_class(size), value);
                 found.waves.push(value);
-                (last_but_one, last) = (last, value.unsigned_abs());
+                (last_but_one, last) = (last, value.unsigned_abs().min(MAX_CONTEXT_SIZE));
             }
         }
         found

@@ -7,15 +7,11 @@ use rayon::prelude::*;
 
 /// Maximum displacement of a vertex, as a fraction of the diagonal.
 const MAX_MOVE: f64 = 0.06;
-
 /// Points end up this far inside, as a fraction of the diagonal.
 const MARGIN: f64 = 5e-4;
-
 /// Largest displacement of a vertex in a round, as a fraction of the diagonal.
 const MAX_STEP: f64 = 0.01;
-
 const MAX_ROUNDS: usize = 60;
-
 /// Attempts of a round: in each, vertices of faces that would newly cut another go so much less far.
 const MAX_ATTEMPTS: usize = 6;
 const SHORTER: f64 = 0.3;

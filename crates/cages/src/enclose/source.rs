@@ -79,10 +79,7 @@ pub(crate) fn check_finite(points: &[Point]) -> Result<(), EncloseError> {
     }
 }
 
-/// Low corner, high corner and diagonal of the bounding box of these points.
-///
-/// # Errors
-/// No points, or points that all lie in about the same place.
+/// Low and high corner and diagonal of the bounding box; refuses no points, and points in one place.
 pub(crate) fn extent(points: &[Point]) -> Result<(DVec3, DVec3, f64), EncloseError> {
     if points.is_empty() {
         return Err(EncloseError::Empty);
