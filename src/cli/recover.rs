@@ -10,14 +10,16 @@ use super::{design, grouped, human_bytes, progress, read_model, tell, warn};
 use crate::coding::InversionChoices;
 use crate::encode::{self, EncodeProgress, Encoded, Job};
 use crate::memory::Memory;
+use crate::origin::{move_to, own_origin};
 use crate::recover::{Person, RecoverJob, RecoverOptions, RecoverProgress, Recovered, RecoveryReport, recover};
 use anyhow::{Context, Result, bail};
 use cager_cages::{EncloseOptions, enclose};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
+use cager_core::inversion::Handles;
 use cager_core::regularize::Regularizer;
 use cager_formats::{AtomicFile, MeshSequence, ScratchDir, Target, commit_together, mesh_sequence};
-use cager_geometry::mesh::Model;
+use cager_geometry::mesh::{Model, Point};
 use cager_recover::manifold::Manifold;
 use cager_recover::people::{FitOptions, Method};
 use cager_recover::rig::Rig;
@@ -30,11 +32,19 @@ pub(super) fn run(args: &RecoverArgs) -> Result<()> {
     let output = outputs.binary(&args.output, "dance.cager")?;
     let report = args.report.as_ref().map(|path| outputs.text(path)).transpose()?;
     let joints = args.joints.as_ref().map(|path| joints_target(&mut outputs, path)).transpose()?;
-    let template = read_model(&args.template)?;
+    let mut template = read_model(&args.template)?;
     if template.faces.is_empty() {
         bail!("{}: has no faces, and a template is a mesh; give one with faces", args.template.display());
     }
     goal(&args.coding, true, &template, 1)?;
+    let origin = own_origin(&template.points);
+    if origin.is_some() && args.rig.is_some() {
+        bail!(
+            "{}: lies far away from the origin, where rigs are not exact; move it and the frames there",
+            args.template.display()
+        );
+    }
+    move_to(origin, &mut template.points);
     let files = frames(args)?;
     let person = person(args)?;
     if args.outputs.dry_run {
@@ -43,7 +53,7 @@ pub(super) fn run(args: &RecoverArgs) -> Result<()> {
     }
     let cage = match &person {
         Some((rig, _)) => Cage::new(rig.cage()).context("--rig")?,
-        None => cage(args, &template)?,
+        None => cage(args, &template, origin)?,
     };
     let report = report.map(AtomicFile::create).transpose()?;
     let joints =
@@ -51,9 +61,9 @@ pub(super) fn run(args: &RecoverArgs) -> Result<()> {
     let scratch = ScratchDir::create(scratch_folder(&output))?;
     let options = person_options(args.method);
     let known = person.as_ref().map(|(rig, manifold)| Person { rig, manifold, options });
-    let recovered = followed(args, template, cage, known, &files, scratch.path())?;
+    let recovered = followed(args, (template, cage, origin), known, &files, scratch.path())?;
     let system = if person.is_some() { options.system.system() } else { &MeanValue };
-    write(args, &output, system, recovered, report, joints)
+    write(args, &output, (system, origin), recovered, report, joints)
 }
 
 /// What is known of a person.
@@ -102,9 +112,9 @@ fn frames(args: &RecoverArgs) -> Result<MeshSequence> {
 }
 
 /// The cage that is given, or one around the template.
-fn cage(args: &RecoverArgs, template: &Model) -> Result<Cage> {
+fn cage(args: &RecoverArgs, template: &Model, origin: Option<Point>) -> Result<Cage> {
     if let Some(path) = &args.cage {
-        return read_cage(path, false, None);
+        return read_cage(path, false, origin);
     }
     let bar = progress::ticking("making a cage");
     let options = EncloseOptions { vertices: design::default_vertices(template.points.len()), ..Default::default() };
@@ -125,8 +135,7 @@ fn scratch_folder(output: &Target) -> &Path {
 
 fn followed(
     args: &RecoverArgs,
-    template: Model,
-    cage: Cage,
+    (template, cage, origin): (Model, Cage, Option<Point>),
     person: Option<Person<'_>>,
     files: &MeshSequence,
     scratch: &Path,
@@ -137,7 +146,7 @@ fn followed(
         person,
         files,
         frame_rate: args.timing.fps,
-        first_number: 0.0,
+        origin,
         options: RecoverOptions {
             align: args.align == Align::Auto,
             scale: args.scale == Align::Auto,
@@ -168,7 +177,7 @@ const DEFAULT_RATE: f64 = 30.0;
 fn write(
     args: &RecoverArgs,
     output: &Target,
-    system: &'static dyn CoordinateSystem,
+    (system, origin): (&'static dyn CoordinateSystem, Option<Point>),
     recovered: Recovered,
     report_file: Option<AtomicFile>,
     joints_file: Option<(AtomicFile, JointsKind)>,
@@ -176,11 +185,13 @@ fn write(
     let Recovered { rest, cage, mut frames, report, joints, warnings } = recovered;
     let count = report.frames.len();
     let goal = goal(&args.coding, true, &rest, count)?;
+    // Where points stay in their cages, all of them tell these exactly.
+    let exact = goal.is_none() && !args.offsets;
     let choices = InversionChoices {
         system,
-        handles: None,
+        handles: exact.then_some(Handles::All),
         regularizer: Regularizer::default(),
-        spectrum: None,
+        spectrum: exact.then_some(0),
         lambda: None,
         is_coded: goal.is_some(),
     };
@@ -196,7 +207,7 @@ fn write(
         choose: None,
         memory: Memory::half_of_free(),
         goal,
-        origin: None,
+        origin,
         exact_rest: args.coding.exact_rest,
     };
     let result = encode::encode(job, &|told| match told {

@@ -86,7 +86,7 @@ impl<'a> Recovering<'a> {
         // The frame after the one that is looked at, which waits for its other neighbour.
         let mut waiting: Option<(usize, Option<Followed>)> = None;
         each(surfaces, (0..tracked.len()).rev().collect(), force, |frame, seen| {
-            if let Some(seen) = seen.as_ref().filter(|_| pass.wants(&tracked[frame])) {
+            if let Some(seen) = seen.as_ref().filter(|_| pass.wants(frame)) {
                 let (at, after) = tracked[frame..].split_at_mut(1);
                 let after: Vec<&[Point]> = after.iter().take(2).map(|frame| &frame.cage[..]).collect();
                 pass.refit(&seen.target, &mut at[0], &after);

@@ -19,7 +19,7 @@ use any_subject::Recovering;
 use cager_core::cage::{Cage, CageError};
 use cager_core::coordinates::{CoordinateSystem, CoordinatesError, MeanValue};
 use cager_formats::MeshSequence;
-use cager_geometry::mesh::{Model, TriMesh};
+use cager_geometry::mesh::{Model, Point, TriMesh};
 use cager_recover::joints::JointsError;
 use cager_recover::people::ModelError;
 use cager_registration::{ObservationError, RegistrationError, outward};
@@ -116,8 +116,8 @@ pub struct RecoverJob<'a> {
     pub files: &'a MeshSequence,
     /// Frames per second, where known.
     pub frame_rate: Option<f64>,
-    /// Number of the first frame, where it is not in the names of the files.
-    pub first_number: f64,
+    /// Subtracted from the frames, as it was from the template and its cage.
+    pub origin: Option<Point>,
     /// What it may do.
     pub options: RecoverOptions,
     /// A folder for frames on their way; nothing stays there that is not removed with it.
@@ -155,11 +155,12 @@ pub struct Recovered {
 /// See [`RecoverError`].
 pub fn recover(job: RecoverJob<'_>, progress: &dyn Fn(RecoverProgress)) -> Result<Recovered, RecoverError> {
     let clock = Instant::now();
-    let RecoverJob { mut template, cage, person, files, frame_rate, first_number, options, scratch } = job;
+    let RecoverJob { mut template, cage, person, files, frame_rate, origin, options, scratch } = job;
     let frames = files.files.len();
-    let numbers = files.numbers.clone().unwrap_or_else(|| (0..frames).map(|k| first_number + k as f64).collect());
+    let numbers = files.numbers.clone().unwrap_or_else(|| (0..frames).map(|k| k as f64).collect());
     let diagonal = |model: &Model| cager_geometry::mesh::diagonal(&model.points);
-    let mut surfaces = SurfaceFiles { files: &files.files, points: options.points, diagonal: diagonal(&template) };
+    let mut surfaces =
+        SurfaceFiles { files: &files.files, points: options.points, diagonal: diagonal(&template), origin };
     let first = first_surface(&surfaces, options.force)?;
     let mut cage = cage.mesh().clone();
     let seen = surfaces.read(first)?;
@@ -172,7 +173,7 @@ pub fn recover(job: RecoverJob<'_>, progress: &dyn Fn(RecoverProgress)) -> Resul
     let mut finisher = Finisher::new(&rest, surfaces.diagonal, options.offsets, written);
     let mut seconds = Seconds::default();
     let (mut joints, mut warnings) = (None, Vec::new());
-    let reports = if let Some(person) = person {
+    let mut reports = if let Some(person) = person {
         seconds.prepare = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         let found = person.follow(&rest, &surfaces, &mut finisher, options.force, progress)?;
@@ -199,7 +200,10 @@ pub fn recover(job: RecoverJob<'_>, progress: &dyn Fn(RecoverProgress)) -> Resul
         seconds.refine = clock.elapsed().as_secs_f64();
         reports
     };
-    let report = RecoveryReport::new(&rest, &cage, surfaces.diagonal, placement, reports, &numbers, files, seconds);
+    for ((report, &number), file) in reports.iter_mut().zip(&numbers).zip(&files.files) {
+        (report.number, report.file) = (number, file.clone());
+    }
+    let report = RecoveryReport::new((&rest, &cage), surfaces.diagonal, placement, reports, seconds);
     warnings.extend(report.warnings());
     warnings.extend(placement.and_then(|placement| placement.warning()));
     let frames = finisher.into_frames()?;

@@ -65,6 +65,10 @@ impl Person<'_> {
             }
             Ok(())
         })?;
+        if numbers.is_empty() {
+            let first = "its file was there when it was looked at first".to_owned();
+            return Err(RecoverError::NoSurface { frames: surfaces.files.len(), first });
+        }
         let tracked = track(&fit, &observations, true, |done, _| progress(RecoverProgress::Followed(done + 1)));
         drop(observations);
         let caged = CagedJoints::new(MarkedJoints::of_rig(self.rig), model.cage(), self.options.system.system())?;

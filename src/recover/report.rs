@@ -3,7 +3,6 @@
 use super::placement::Placement;
 use super::surfaces::Distances;
 use cager_core::cage::Cage;
-use cager_formats::MeshSequence;
 use cager_geometry::mesh::TriMesh;
 use cager_recover::track::{Outcome, TrackedFrame};
 use cager_registration::ObservationNotes;
@@ -119,20 +118,13 @@ impl FrameReport {
 }
 
 impl RecoveryReport {
-    #[allow(clippy::too_many_arguments)]
     pub(super) fn new(
-        rest: &TriMesh,
-        cage: &Cage,
+        (rest, cage): (&TriMesh, &Cage),
         diagonal: f64,
         placement: Option<Placement>,
-        mut frames: Vec<FrameReport>,
-        numbers: &[f64],
-        files: &MeshSequence,
+        frames: Vec<FrameReport>,
         seconds: Seconds,
     ) -> Self {
-        for ((frame, &number), file) in frames.iter_mut().zip(numbers).zip(&files.files) {
-            (frame.number, frame.file) = (number, file.clone());
-        }
         let mean = |of: fn(&FrameReport) -> Option<Distances>| {
             let found: Vec<f64> = frames.iter().filter_map(of).map(|distances| distances.mean).collect();
             (!found.is_empty()).then(|| found.iter().sum::<f64>() / found.len() as f64)

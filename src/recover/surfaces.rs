@@ -1,6 +1,7 @@
 //! Observed surfaces from files, made ready to be followed.
 
 use super::RecoverError;
+use crate::origin::move_to;
 use cager_formats::read_model;
 use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::spatial::Surface;
@@ -14,6 +15,8 @@ pub(super) struct SurfaceFiles<'a> {
     pub(super) points: usize,
     /// The template's diagonal.
     pub(super) diagonal: f64,
+    /// Subtracted from all points.
+    pub(super) origin: Option<Point>,
 }
 
 /// A surface as it was read.
@@ -35,7 +38,8 @@ impl SurfaceFiles<'_> {
     /// Reads a frame. The points that are drawn of it depend on its number alone.
     pub(super) fn read(&self, frame: usize) -> Result<Seen, RecoverError> {
         let path = &self.files[frame];
-        let model = read_model(path)?;
+        let mut model = read_model(path)?;
+        move_to(self.origin, &mut model.points);
         let options = ObservationOptions { points: self.points, seed: 1000 + frame as u64 };
         let found = if model.faces.is_empty() {
             Observation::of_cloud(&model.points, &model.normals, &options)

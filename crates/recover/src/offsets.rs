@@ -94,7 +94,7 @@ impl OffsetSolver {
                 term(n, surface.normals()[j], p - surface.points()[j], 1.0)
             })
             .unzip();
-        let plain = |points: &[DVec3]| points.iter().map(|p| p.to_array()).collect::<Vec<Point>>();
+        let plain = |points: &[DVec3]| points.iter().map(DVec3::to_array).collect::<Vec<Point>>();
         let tree = OrientedPoints::new(&plain(vertices), &plain(&normals), surface.normal_length());
         let share = vertices.len() as f64 / surface.points().len() as f64;
         let back: Vec<(usize, (DMat3, DVec3))> = surface

@@ -32,14 +32,18 @@ pub struct Tracker<'t> {
     template: &'t Template,
     last: Vec<Point>,
     before: Vec<Point>,
-    /// Scores of the frames so far, ascending.
+    /// Scores of the frames so far, in their order.
     scores: Vec<f64>,
 }
 
-/// A frame that scores above so many times the median is looked for further around.
+/// Frames before that say what scores are usual just now: they change with the pose.
+const RECENT: usize = 9;
+/// A frame that scores above so many times the median of the recent ones is looked for further around.
 const SEARCHED_FROM: f64 = 1.06;
-/// A frame that scores above so many times the median is lost.
-const LOST_FROM: f64 = 1.5;
+/// So is one that scores above so many times the median of all.
+const SEARCHED_FROM_ALL: f64 = 1.3;
+/// A frame that scores above so many times the median of all is lost.
+const LOST_FROM: f64 = 1.6;
 
 impl<'t> Tracker<'t> {
     /// From the cage of the rest pose, laid where the first frame is.
@@ -51,25 +55,29 @@ impl<'t> Tracker<'t> {
     pub fn follow(&mut self, surface: &Target) -> TrackedFrame {
         let template = self.template;
         let ahead = extrapolated(&self.last, &self.before);
-        let starts = [&self.last, &ahead];
+        let mut starts = [&self.last, &ahead];
         let near = starts.map(|start| template.score(surface, start));
-        let start = starts[usize::from(near[1] < near[0])];
-        let mut best = Scored::fit(template, surface, start, &FitOptions::NEAR);
+        if near[1] < near[0] {
+            starts.reverse();
+        }
+        let mut best = Scored::fit(template, surface, starts[0], &FitOptions::NEAR);
         let mut outcome = Outcome::Followed;
-        let usual = self.usual_score();
-        if best.score > SEARCHED_FROM * usual.unwrap_or(f64::INFINITY) {
-            for start in starts {
-                let again = Scored::fit(template, surface, start, &FitOptions::FAR);
-                if again.score < best.score {
-                    (best, outcome) = (again, Outcome::SearchedWider);
-                }
+        let recent = median(&self.scores[self.scores.len().saturating_sub(RECENT)..]);
+        let usual = median(&self.scores);
+        let most = (SEARCHED_FROM * recent).min(SEARCHED_FROM_ALL * usual);
+        for start in starts {
+            if best.score <= most {
+                break;
+            }
+            let again = Scored::fit(template, surface, start, &FitOptions::FAR);
+            if again.score < best.score {
+                (best, outcome) = (again, Outcome::SearchedWider);
             }
         }
-        if best.score > LOST_FROM * usual.unwrap_or(f64::INFINITY) {
+        if best.score > LOST_FROM * usual {
             outcome = Outcome::Lost;
         }
-        let at = self.scores.partition_point(|&score| score < best.score);
-        self.scores.insert(at, best.score);
+        self.scores.push(best.score);
         self.before = std::mem::replace(&mut self.last, best.cage.clone());
         TrackedFrame { cage: best.cage, score: best.score, outcome }
     }
@@ -79,11 +87,13 @@ impl<'t> Tracker<'t> {
         self.before.clone_from(&self.last);
         TrackedFrame { cage: self.last.clone(), score: f64::INFINITY, outcome: Outcome::NoSurface }
     }
+}
 
-    /// The median of the scores so far.
-    fn usual_score(&self) -> Option<f64> {
-        self.scores.get(self.scores.len() / 2).copied()
-    }
+/// The median of some scores; infinite without any.
+fn median(scores: &[f64]) -> f64 {
+    let mut scores: Vec<f64> = scores.iter().copied().filter(|score| score.is_finite()).collect();
+    scores.sort_by(f64::total_cmp);
+    scores.get(scores.len() / 2).copied().unwrap_or(f64::INFINITY)
 }
 
 /// A cage and how well it lies.
@@ -108,23 +118,26 @@ fn extrapolated(last: &[Point], before: &[Point]) -> Vec<Point> {
 /// that lies better, and is smoothed between its neighbours.
 pub struct SecondPass<'t> {
     template: &'t Template,
+    /// Of the first pass.
+    scores: Vec<f64>,
     usual: f64,
 }
 
-/// A frame of the first pass that scores above so many times the median is fitted again from the frame after it.
+/// A frame of the first pass that scores above so many times the median of those around it is fitted again from the frame after it.
 const REFITTED_FROM: f64 = 1.03;
 
 impl<'t> SecondPass<'t> {
     /// Over these frames.
     pub fn new(template: &'t Template, frames: &[TrackedFrame]) -> Self {
-        let mut scores: Vec<f64> = frames.iter().map(|frame| frame.score).filter(|score| score.is_finite()).collect();
-        scores.sort_by(f64::total_cmp);
-        Self { template, usual: scores.get(scores.len() / 2).copied().unwrap_or(f64::INFINITY) }
+        let scores: Vec<f64> = frames.iter().map(|frame| frame.score).collect();
+        Self { template, usual: median(&scores), scores }
     }
 
     /// Whether a frame is fitted again.
-    pub fn wants(&self, frame: &TrackedFrame) -> bool {
-        frame.score.is_finite() && frame.score > REFITTED_FROM * self.usual
+    pub fn wants(&self, frame: usize) -> bool {
+        let around = frame.saturating_sub(RECENT / 2)..(frame + RECENT / 2 + 1).min(self.scores.len());
+        let score = self.scores[frame];
+        score.is_finite() && score > (REFITTED_FROM * median(&self.scores[around])).min(SEARCHED_FROM_ALL * self.usual)
     }
 
     /// Fits a frame again from the cages of the one or two frames after it, nearest first, if that lies better.
@@ -132,13 +145,16 @@ impl<'t> SecondPass<'t> {
         let Some(&next) = after.first() else { return };
         let mut starts = vec![next.to_vec()];
         starts.extend(after.get(1).map(|beyond| extrapolated(next, beyond)));
-        for start in starts {
-            for options in [FitOptions::NEAR, FitOptions::FAR] {
-                let again = Scored::fit(self.template, surface, &start, &options);
+        for options in [FitOptions::NEAR, FitOptions::FAR] {
+            for start in &starts {
+                let again = Scored::fit(self.template, surface, start, &options);
                 if again.score < frame.score {
                     (frame.cage, frame.score) = (again.cage, again.score);
                     frame.outcome = Outcome::SearchedWider;
                 }
+            }
+            if frame.score <= SEARCHED_FROM_ALL * self.usual {
+                break;
             }
         }
         if frame.score > LOST_FROM * self.usual {

@@ -14,6 +14,7 @@ const PEOPLE: [(&str, usize, Point); 3] = [
 ];
 
 #[test]
+#[ignore = "needs the captures: make captures"]
 fn a_rig_is_placed_in_people_of_any_size_and_encloses_them() {
     for (name, axis, up) in PEOPLE {
         if !there(&format!("{name}/rest.obj")) {
@@ -33,9 +34,6 @@ fn a_rig_is_placed_in_people_of_any_size_and_encloses_them() {
                 100.0 * enclosure.moved,
                 rig.forward
             );
-            if let Some(folder) = std::env::var_os("RIG_OUT").filter(|_| scale == 1.0) {
-                std::fs::write(std::path::Path::new(&folder).join(format!("{name}.json")), rig.to_json()).unwrap();
-            }
             let cage = Cage::new(rig.cage()).unwrap();
             assert_eq!((cage.vertices().len(), cage.faces().len()), (86, 168));
             assert!(enclosure.outside.is_empty(), "{name}: {enclosure:?}");

@@ -226,7 +226,7 @@ impl Pair {
 }
 
 fn tree(points: &[DVec3], normals: &[DVec3], spread: f64) -> OrientedPoints {
-    let plain = |points: &[DVec3]| points.iter().map(|p| p.to_array()).collect::<Vec<_>>();
+    let plain = |points: &[DVec3]| points.iter().map(DVec3::to_array).collect::<Vec<_>>();
     OrientedPoints::new(&plain(points), &plain(normals), NORMAL_LENGTH * spread)
 }
 

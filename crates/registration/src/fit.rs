@@ -257,8 +257,8 @@ impl Template {
         x
     }
 
-    /// How well the template lies on a surface in a cage: the mean, both ways, of the distance from the plane of the nearest point and of the difference of
-    /// normals together, as a share of the diagonal; far ones count as [`MAX_SCORED`].
+    /// How well the template lies on a surface in a cage: the root mean square, both ways, of the distance from the plane of the nearest point and of the difference of
+    /// normals together, as a share of the diagonal; distances beyond 5 % count as 5 %.
     pub fn score(&self, target: &Target, cage: &[Point]) -> f64 {
         let (positions, normals) = self.samples_in(matrix(&vectors(cage)).as_ref());
         let samples = OrientedPoints::new(&plain(&positions), &plain(&normals), target.normal_length);

@@ -194,5 +194,5 @@ pub(crate) fn pose(sample: &Sample, corners: &[DVec3]) -> (DVec3, DVec3) {
 
 /// As plain points.
 pub(crate) fn plain(points: &[DVec3]) -> Vec<Point> {
-    points.iter().map(|p| p.to_array()).collect()
+    points.iter().map(DVec3::to_array).collect()
 }

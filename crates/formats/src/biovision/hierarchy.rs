@@ -101,6 +101,11 @@ fn begin(
         return Err(Fault::damaged(format!("line {line}: the joint has no name; export the motion again")));
     }
     let shown = quoted(name.as_bytes());
+    if name.contains(['{', '}']) {
+        return Err(Fault::damaged(format!(
+            "line {line}: joint {shown} has a brace in its name; export the motion again"
+        )));
+    }
     if let Some(&first) = names.get(&name) {
         let above = open.iter().any(|open| matches!(open, Open::Joint(joint) if *joint == first));
         let what = if above { "below itself: the tree would be cyclic" } else { "twice" };

@@ -36,8 +36,8 @@ pub(super) fn search(fit: &PersonFit<'_>, observed: &Observed<'_>) -> Vec<(Place
             let thin = |all: &[Point]| -> Vec<DVec3> { all.iter().step_by(THIN).map(|&p| p.into()).collect() };
             let (at, facing) = (thin(&sampled.points), thin(&sampled.normals));
             let tree = OrientedPoints::new(
-                &at.iter().map(|p| p.to_array()).collect::<Vec<_>>(),
-                &facing.iter().map(|n| n.to_array()).collect::<Vec<_>>(),
+                &at.iter().map(DVec3::to_array).collect::<Vec<_>>(),
+                &facing.iter().map(DVec3::to_array).collect::<Vec<_>>(),
                 0.02 * fit.model.diagonal(),
             );
             (0..HEADINGS)

@@ -166,7 +166,7 @@ mod tests {
         let faces = triangles();
         assert_eq!((faces.len(), CAGE_VERTICES), (168, 86));
         assert!(edges(faces).values().all(|users| users.len() == 2 && users[0].1 != users[1].1));
-        let mut used = vec![false; CAGE_VERTICES];
+        let mut used = [false; CAGE_VERTICES];
         faces.as_flattened().iter().for_each(|&v| used[v as usize] = true);
         assert!(used.iter().all(|&used| used));
         assert_eq!(CAGE_VERTICES + faces.len(), edges(faces).len() + 2, "Euler");

@@ -5,9 +5,9 @@ use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::topology::UnionFind;
 use std::path::{Path, PathBuf};
 
-/// The folder with captures, `CAGER_DATA` or `shared/data` beside the repository.
+/// The folder with captures, `CAGER_CAPTURES` or `shared/data` beside the repository.
 pub fn data() -> PathBuf {
-    std::env::var_os("CAGER_DATA")
+    std::env::var_os("CAGER_CAPTURES")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"), PathBuf::from)
 }
 
