@@ -1,6 +1,6 @@
 //! A surface as it was seen once: points of it with outward normals, from a mesh or from a cloud, checked.
 
-use cager_geometry::vector::{Point, cross, dot, mean, sub};
+use cager_geometry::vector::{Point, dot, mean, sub};
 use glam::DVec3;
 
 use crate::normals::estimated_normals;
@@ -157,10 +157,4 @@ fn check_points(points: &[Point]) -> Result<(), ObservationError> {
 fn points_inwards(points: &[Point], normals: &[Point]) -> bool {
     let center = mean(points);
     points.iter().zip(normals).map(|(&p, &n)| dot(sub(p, center), n)).sum::<f64>() < 0.0
-}
-
-/// Six times the volume that triangles enclose, as seen from `center`; of open surfaces, with cones from there over the borders.
-pub(crate) fn volume6(vertices: &[Point], triangles: &[[u32; 3]], center: Point) -> f64 {
-    let from = |v: u32| sub(vertices[v as usize], center);
-    triangles.iter().map(|&[a, b, c]| dot(from(a), cross(from(b), from(c)))).sum()
 }

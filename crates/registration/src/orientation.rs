@@ -2,9 +2,7 @@
 
 use std::collections::HashMap;
 
-use cager_geometry::vector::{Point, mean};
-
-use crate::observation::volume6;
+use cager_geometry::vector::{Point, cross, dot, mean, sub};
 
 /// Triangles that face outwards, as far as that can be told.
 pub(crate) struct Oriented {
@@ -108,6 +106,12 @@ fn turn_parts(vertices: &[Point], triangles: &mut [[u32; 3]], links: &[Link]) ->
         }
     }
     turned
+}
+
+/// Six times the volume that triangles enclose, as seen from `center`; of open surfaces, with cones from there over the borders.
+fn volume6(vertices: &[Point], triangles: &[[u32; 3]], center: Point) -> f64 {
+    let from = |v: u32| sub(vertices[v as usize], center);
+    triangles.iter().map(|&[a, b, c]| dot(from(a), cross(from(b), from(c)))).sum()
 }
 
 #[cfg(test)]

@@ -42,7 +42,7 @@ pub enum Step {
     Handles,
     /// The spectrum of those rows, after the decoder where the first step left none.
     SingularValues,
-    /// The regularisation, and what turns frames into cages; not of an [`Analysis`](super::Analysis).
+    /// The regularisation, and what turns frames into cages; not of an analysis.
     Operator,
 }
 

@@ -1,6 +1,7 @@
 //! The part of a BVH file that begins with `HIERARCHY`: the tree of joints.
 
-use super::{Channel, Joint, Skeleton, Words};
+use super::skeleton::{Channel, Joint, Skeleton};
+use super::words::Words;
 use crate::error::Fault;
 use crate::text::{no_number, number, quoted};
 use cager_geometry::mesh::Point;

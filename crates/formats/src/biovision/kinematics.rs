@@ -1,6 +1,6 @@
 //! Forward kinematics: where the joints of a skeleton are.
 
-use super::{Channel, Skeleton};
+use super::skeleton::{Channel, Skeleton};
 use cager_geometry::mesh::Point;
 use cager_geometry::vector::add;
 

@@ -1,7 +1,8 @@
 //! The part of a BVH file behind `MOTION`: one line of values for each frame.
 
 use super::hierarchy::finite;
-use super::{Motion, Words};
+use super::skeleton::Motion;
+use super::words::Words;
 use crate::error::Fault;
 use crate::text::{integer, quoted, words};
 

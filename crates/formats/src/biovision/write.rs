@@ -1,6 +1,6 @@
 //! Writing BVH files.
 
-use super::{Channel, Motion, Skeleton};
+use super::skeleton::{Channel, Motion, Skeleton};
 use crate::atomic::AtomicFile;
 use crate::error::Error;
 use std::fmt::Write as _;

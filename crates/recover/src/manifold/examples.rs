@@ -1,6 +1,6 @@
 //! The poses that a manifold is learned from.
 
-use super::ManifoldError;
+use super::error::ManifoldError;
 use crate::rig::{QUAD_UNKNOWNS, Rig};
 use cager_geometry::linalg::zeros;
 use cager_geometry::vector::dot;

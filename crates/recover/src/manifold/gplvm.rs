@@ -5,7 +5,8 @@
 //! `D/2 log |K| + ½ tr(K⁻¹ Y Yᵀ) + ½ ‖X‖²` with `K = α exp(−γ/2 ‖x − x'‖²) + δ/β`, by L-BFGS from the principal components.
 
 use super::descent::minimize;
-use super::{Examples, ManifoldError, Pca, PoseWeights};
+use super::error::ManifoldError;
+use super::{Examples, Pca, PoseWeights};
 
 use crate::rig::QUAD_UNKNOWNS;
 use cager_geometry::linalg::{cholesky, product, solve_cholesky, zeros};

@@ -3,12 +3,14 @@
 //! What each number counts is said by [`PoseWeights`].
 
 mod descent;
+mod error;
 mod examples;
 mod gplvm;
 mod model;
 mod pca;
 
+pub use error::ManifoldError;
 pub use examples::{Examples, PoseWeights};
 pub use gplvm::{Gplvm, GplvmOptions};
-pub use model::{Kind, Manifold, ManifoldError, Prior};
+pub use model::{Kind, Manifold, Prior};
 pub use pca::Pca;

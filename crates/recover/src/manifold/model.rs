@@ -1,5 +1,6 @@
 //! A learned manifold of either kind: poses, derivatives, prior and files.
 
+use super::error::ManifoldError;
 use super::{Examples, Gplvm, GplvmOptions, Pca};
 use serde::{Deserialize, Serialize};
 
@@ -12,31 +13,6 @@ pub enum Kind {
     Pca,
     /// A Gaussian process latent variable model with back-constraints.
     Gplvm,
-}
-
-/// Why a manifold cannot be learned or read.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ManifoldError {
-    /// Fewer than two poses.
-    #[error("has {poses} poses, and two are the least; give longer clips")]
-    TooFewPoses {
-        /// Poses there are.
-        poses: usize,
-    },
-    /// As many latent numbers as poses.
-    #[error("{dims} dimensions cannot be learned from {poses} poses; ask for fewer, or give more clips")]
-    TooManyDims {
-        /// Latent numbers asked for.
-        dims: usize,
-        /// Poses, of which some may be equal.
-        poses: usize,
-    },
-    /// A number that is NaN or infinite.
-    #[error("has a number that is NaN or infinite")]
-    NotFinite,
-    /// The file is no JSON, or not of this form.
-    #[error("is no manifold of poses ({0}); write it with `cager manifold`")]
-    Syntax(String),
 }
 
 /// A manifold of poses.

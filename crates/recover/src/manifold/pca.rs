@@ -1,6 +1,7 @@
 //! Principal components of poses: the linear manifold `y = mean + B x`, with unit variance of each latent number over the examples.
 
-use super::{Examples, ManifoldError};
+use super::Examples;
+use super::error::ManifoldError;
 use crate::rig::QUAD_UNKNOWNS;
 use cager_geometry::linalg::svd::svd;
 use serde::{Deserialize, Serialize};

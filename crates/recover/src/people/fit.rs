@@ -2,6 +2,7 @@
 
 use super::equations::NormalEquations;
 use super::model::{CAGE_UNKNOWNS, PersonModel, Sampled};
+use super::observed::Observed;
 use super::options::{FitOptions, Method};
 use super::search::search;
 use super::stages::{Free, LatentStage, Linearized, QuadStage, Stage, VertexStage};
@@ -54,14 +55,6 @@ pub struct PersonFit<'a> {
     pub options: FitOptions,
 }
 
-/// An observation, ready to be matched.
-pub(super) struct Observed<'a> {
-    pub(super) observation: &'a Observation,
-    pub(super) tree: OrientedPoints,
-    /// Those of its points that are matched with the template.
-    pub(super) chosen: Vec<usize>,
-}
-
 /// Which sample belongs to which observed point.
 #[derive(Default)]
 struct Pairs {
@@ -91,7 +84,7 @@ impl<'a> PersonFit<'a> {
             stage.offset = self.offset(&stage, &fit.pose);
             return self.finish(&observed, stage, self.options.rounds);
         }
-        let starts = search(self, &observed);
+        let starts = search(self.model, self.manifold, self.options.candidates, &observed);
         let fits = starts.into_iter().map(|(placement, latent)| self.fit_from(&observed, placement, latent));
         // The examples of a manifold are never none, so there is a start.
         fits.reduce(|best, fit| if fit.score < best.score { fit } else { best }).unwrap_or_else(|| {

@@ -7,6 +7,7 @@
 mod equations;
 mod fit;
 mod model;
+mod observed;
 mod options;
 mod search;
 mod stages;

@@ -1,6 +1,8 @@
 //! Where to begin without a frame before: every example of the manifold under eight headings about the up axis.
 
-use super::fit::{Observed, PersonFit};
+use super::model::PersonModel;
+use super::observed::Observed;
+use crate::manifold::Manifold;
 use crate::rig::{Placement, deform};
 use cager_geometry::mesh::Point;
 use cager_geometry::vector::mean;
@@ -17,28 +19,32 @@ const EXAMPLES: usize = 96;
 const THIN: usize = 5;
 
 /// Placements and latent numbers of the best starts, best first.
-pub(super) fn search(fit: &PersonFit<'_>, observed: &Observed<'_>) -> Vec<(Placement, Vec<f64>)> {
-    let manifold = fit.manifold;
+pub(super) fn search(
+    model: &PersonModel,
+    manifold: &Manifold,
+    candidates: usize,
+    observed: &Observed<'_>,
+) -> Vec<(Placement, Vec<f64>)> {
     let tried = manifold.examples().min(EXAMPLES);
     let examples: Vec<usize> = (0..tried).map(|k| k * manifold.examples() / tried).collect();
-    let up = DVec3::from(fit.model.rig().up);
+    let up = DVec3::from(model.rig().up);
     let Observation { points, normals } = observed.observation;
     let center = DVec3::from(mean(points));
     let seen: Vec<usize> = observed.chosen.iter().copied().step_by(THIN).collect();
-    let cap = 0.1 * fit.model.height();
+    let cap = 0.1 * model.height();
     let mut starts: Vec<(f64, Placement, usize, usize)> = examples
         .par_iter()
         .flat_map_iter(|&example| {
             let vertices =
-                deform(fit.model.rig(), &manifold.pose(manifold.latent(example)), &Placement::default()).vertices;
-            let sampled = fit.model.sampled(&vertices);
+                deform(model.rig(), &manifold.pose(manifold.latent(example)), &Placement::default()).vertices;
+            let sampled = model.sampled(&vertices);
             let own = DVec3::from(mean(&sampled.points));
             let thin = |all: &[Point]| -> Vec<DVec3> { all.iter().step_by(THIN).map(|&p| p.into()).collect() };
             let (at, facing) = (thin(&sampled.points), thin(&sampled.normals));
             let tree = OrientedPoints::new(
                 &at.iter().map(DVec3::to_array).collect::<Vec<_>>(),
                 &facing.iter().map(DVec3::to_array).collect::<Vec<_>>(),
-                0.02 * fit.model.diagonal(),
+                0.02 * model.diagonal(),
             );
             (0..HEADINGS)
                 .map(|heading| {
@@ -64,10 +70,10 @@ pub(super) fn search(fit: &PersonFit<'_>, observed: &Observed<'_>) -> Vec<(Place
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
     // Several of each heading, since the nearest of all may face the wrong way.
     let mut taken = [0; HEADINGS];
-    let each = fit.options.candidates.div_ceil(2).max(1);
+    let each = candidates.div_ceil(2).max(1);
     let mut chosen = Vec::new();
     for (_, placement, heading, example) in starts {
-        if taken[heading] < each && chosen.len() < fit.options.candidates.max(1) {
+        if taken[heading] < each && chosen.len() < candidates.max(1) {
             taken[heading] += 1;
             chosen.push((placement, manifold.latent(example).to_vec()));
         }

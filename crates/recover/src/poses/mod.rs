@@ -1,7 +1,9 @@
 //! Poses of a rig from motion-capture clips: the quads are taken along by the bones of a skeleton (Duveau et al. 2012, §6.2).
 
+mod error;
 mod names;
 mod skeleton;
 
+pub use error::PoseError;
 pub use names::{BONES, BoneNames, Naming};
-pub use skeleton::{PoseError, SkeletonPoses};
+pub use skeleton::SkeletonPoses;

@@ -1,6 +1,6 @@
 //! Which joints of a skeleton are which bones of a person, by the names that exporters give them.
 
-use super::PoseError;
+use super::error::PoseError;
 use cager_formats::biovision::Skeleton;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
