@@ -72,7 +72,9 @@ fn person(args: &RecoverArgs) -> Result<Option<(Rig, Manifold)>> {
     if args.align == Align::Auto || args.scale == Align::Auto || args.up.is_some() {
         bail!("--rig: finds the person wherever it is; leave out --align, --scale and --up");
     }
-    Ok(Some((read_rig(rig)?, read_manifold(manifold)?)))
+    let rig = read_rig(rig)?;
+    let manifold = read_manifold(manifold, &rig)?;
+    Ok(Some((rig, manifold)))
 }
 
 fn person_options(method: PersonMethod) -> FitOptions {
@@ -185,6 +187,11 @@ fn write(
     let Recovered { rest, cage, mut frames, report, joints, warnings } = recovered;
     let count = report.frames.len();
     let goal = goal(&args.coding, true, &rest, count)?;
+    if args.offsets && goal.is_none() {
+        warn(&[
+            "--offsets: cages alone are stored, without what leaves them; add --max-error to store that too".to_owned()
+        ]);
+    }
     // Where points stay in their cages, all of them tell these exactly.
     let exact = goal.is_none() && !args.offsets;
     let choices = InversionChoices {
@@ -217,9 +224,10 @@ fn write(
     bar.finish();
     let Encoded { report: encoded, container } = result?;
     let report_file = report_file.map(|file| write_report(file, &report)).transpose()?;
+    let numbers: Vec<f64> = report.frames.iter().map(|frame| frame.number).collect();
     let joints_file = joints_file.zip(joints).map(|((mut file, kind), joints)| {
         match kind {
-            JointsKind::Csv => file.write_all(joints.csv().as_bytes()),
+            JointsKind::Csv => file.write_all(joints.csv(&numbers).as_bytes()),
             JointsKind::Bvh => file.write_all(&joints.bvh(args.timing.fps.unwrap_or(DEFAULT_RATE))),
         }
         .map(|()| file)
@@ -243,10 +251,7 @@ fn summary(report: &RecoveryReport, encoded: &cager_proto::report::Report, outpu
         |share: Option<f64>| share.map_or("not measured".to_owned(), |share| format!("{:.3} %", 100.0 * share));
     let count = |outcome: &str| report.frames.iter().filter(|frame| frame.outcome == outcome).count();
     let placed = report.placement.map_or_else(String::new, |placed| {
-        format!(
-            "  placed  turned by {:.1} degrees, scaled by {:.4}; the runner-up lies {:.2} times as far\n",
-            placed.degrees, placed.scale, placed.runner_up
-        )
+        format!("  placed  turned by {:.1} degrees, scaled by {:.4}\n", placed.degrees, placed.scale)
     });
     let s = report.seconds;
     format!(

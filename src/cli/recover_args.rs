@@ -39,7 +39,7 @@ pub(crate) struct RecoverArgs {
     #[arg(long, value_enum, value_name = "METHOD", requires = "rig", default_value = "robust")]
     pub(super) method: PersonMethod,
 
-    /// With --rig, write where its joints are in every frame: .csv or .bvh.
+    /// With --rig, write where its joints are in every frame: .csv or .bvh, at 30 frames per second without --fps.
     #[arg(long, value_name = "JOINTS", requires = "rig")]
     pub(super) joints: Option<PathBuf>,
 

@@ -7,6 +7,7 @@ use anyhow::{Context, Result, bail};
 use cager_formats::biovision::{Clip, read_bvh};
 use cager_formats::{AtomicFile, Target};
 use cager_geometry::mesh::{Point, TriMesh};
+use cager_geometry::vector::{distance, norm};
 use cager_recover::manifold::{Examples, Kind, Manifold};
 use cager_recover::poses::{Naming, SkeletonPoses};
 use cager_recover::rig::{CAGE_FACES, CAGE_VERTICES, PlacementOptions, Rig, place};
@@ -41,7 +42,7 @@ pub(crate) struct RigArgs {
     forward: Option<Point>,
 
     /// Distance between the person and the cage, where there is room, as a fraction of the height.
-    #[arg(long, value_name = "F", default_value_t = 0.003)]
+    #[arg(long, value_name = "F", default_value_t = 0.003, value_parser = margin, allow_negative_numbers = true)]
     margin: f64,
 }
 
@@ -94,6 +95,11 @@ fn axis(text: &str) -> Result<Point, String> {
     place
         .map(|place| std::array::from_fn(|k| if k == place { sign } else { 0.0 }))
         .ok_or_else(|| "give x, -x, y, -y, z or -z".to_owned())
+}
+
+fn margin(text: &str) -> Result<f64, String> {
+    let found = text.parse().ok().filter(|margin: &f64| (0.0..=0.1).contains(margin));
+    found.ok_or_else(|| "give a fraction from 0 to 0.1".to_owned())
 }
 
 pub(super) fn run(args: &RigArgs) -> Result<()> {
@@ -157,8 +163,16 @@ pub(super) fn read_rig(path: &Path) -> Result<Rig> {
     named(path, Rig::from_json(&read(path)?))
 }
 
-pub(super) fn read_manifold(path: &Path) -> Result<Manifold> {
-    named(path, Manifold::from_json(&read(path)?))
+/// A manifold that was learned for this rig: where the waist is in the pelvis's frame is the same in every pose.
+pub(super) fn read_manifold(path: &Path, rig: &Rig) -> Result<Manifold> {
+    let manifold = named(path, Manifold::from_json(&read(path)?))?;
+    let (pose, rest) = (manifold.pose(&vec![0.0; manifold.dims()]), rig.rest_pose());
+    let waist = |pose: &[f64]| [6, 7, 8].map(|k| pose[k] - pose[k - 6]);
+    let (found, own) = (waist(&pose), waist(&rest));
+    if distance(found, own).is_nan() || distance(found, own) > 0.01 * norm(own) {
+        bail!("{}: was learned for another rig; run `cager manifold` with this one", path.display());
+    }
+    Ok(manifold)
 }
 
 fn read(path: &Path) -> Result<Vec<u8>> {

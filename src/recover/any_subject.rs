@@ -91,6 +91,7 @@ impl<'a> Recovering<'a> {
                 let after: Vec<&[Point]> = after.iter().take(2).map(|frame| &frame.cage[..]).collect();
                 pass.refit(&seen.target, &mut at[0], &after);
             }
+            pass.judge(&mut tracked[frame]);
             if let Some((later, at)) = waiting.replace((frame, seen)) {
                 if let (Some(at), Some(beyond)) = (&at, tracked.get(later + 1)) {
                     let beside = [&tracked[frame].cage[..], &beyond.cage[..]];

@@ -164,7 +164,7 @@ pub fn recover(job: RecoverJob<'_>, progress: &dyn Fn(RecoverProgress)) -> Resul
     let first = first_surface(&surfaces, options.force)?;
     let mut cage = cage.mesh().clone();
     let seen = surfaces.read(first)?;
-    let placement = Placement::find(&mut template, &mut cage, &seen.observation, &options);
+    let placement = Placement::find(&mut template, &mut cage, &seen.observation, &options)?;
     surfaces.diagonal = diagonal(&template);
     let cage = Cage::new(cage)?;
     let mut rest = TriMesh::from(&template);
@@ -216,7 +216,7 @@ fn first_surface(surfaces: &SurfaceFiles<'_>, force: bool) -> Result<usize, Reco
     for frame in 0..surfaces.files.len() {
         match surfaces.read(frame) {
             Ok(_) => return Ok(frame),
-            Err(error) if !force => return Err(error),
+            Err(error) if !force || !matches!(error, RecoverError::Surface { .. }) => return Err(error),
             Err(error) => {
                 first_error.get_or_insert(error);
             }
@@ -246,7 +246,7 @@ fn each(
         for (frame, seen) in read {
             match seen {
                 Ok(seen) => work(frame, Some(seen))?,
-                Err(_) if force => work(frame, None)?,
+                Err(RecoverError::Surface { .. }) if force => work(frame, None)?,
                 Err(error) => return Err(error),
             }
         }

@@ -28,9 +28,9 @@ pub struct Joints {
 }
 
 impl Joints {
-    /// A table, `frame,joint,x,y,z`.
-    pub fn csv(&self) -> String {
-        self.caged.csv(&self.frames)
+    /// A table, `frame,joint,x,y,z`, by the numbers of the frames.
+    pub fn csv(&self, numbers: &[f64]) -> String {
+        self.caged.csv(numbers, &self.frames)
     }
 
     /// A BVH file of so many frames per second.

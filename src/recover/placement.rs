@@ -6,7 +6,7 @@ use cager_core::cage::Cage;
 use cager_geometry::mesh::{Model, Point, TriMesh};
 use cager_geometry::vector::{cross, norm, sub};
 use cager_registration::{
-    AlignOptions, Alignment, FitOptions, Observation, ObservationOptions, Target, Template, align,
+    AlignOptions, Alignment, FitOptions, Observation, ObservationOptions, RegistrationError, Target, Template, align,
 };
 use std::path::Path;
 
@@ -41,19 +41,20 @@ impl Placement {
         cage: &mut TriMesh,
         surface: &Observation,
         options: &RecoverOptions,
-    ) -> Option<Self> {
+    ) -> Result<Option<Self>, RecoverError> {
         if let Some(up) = options.up {
             let turn = |p: &mut Point| *p = turned(*p, up);
             template.points.iter_mut().chain(&mut cage.vertices).for_each(turn);
         }
         if !options.align && !options.scale {
-            return None;
+            return Ok(None);
         }
         let up = options.up.map(|up| if up == Up::Z { [0.0, 0.0, 1.0] } else { [0.0, 1.0, 0.0] });
-        let found = align(&seen(template)?, surface, &AlignOptions { up, scale: options.scale });
+        let own = seen(template).ok_or(RegistrationError::NoSurface)?;
+        let found = align(&own, surface, &AlignOptions { up, scale: options.scale });
         template.points.iter_mut().chain(&mut cage.vertices).for_each(|p| *p = found.apply(*p));
         let Alignment { scale, translation, score, runner_up, .. } = found;
-        Some(Self { degrees: found.degrees(), scale, translation, score, runner_up })
+        Ok(Some(Self { degrees: found.degrees(), scale, translation, score, runner_up }))
     }
 
     /// What the user should know.

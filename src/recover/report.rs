@@ -22,7 +22,7 @@ pub struct RecoveryReport {
     pub placement: Option<Placement>,
     /// Frames in which part of the template may be somewhere else, by their numbers.
     pub lost: Vec<f64>,
-    /// From the template to the surfaces, on average over the frames.
+    /// From the template to the surfaces, on average over the frames that are not lost.
     pub to_surface: Option<f64>,
     /// And back.
     pub from_surface: Option<f64>,
@@ -126,7 +126,12 @@ impl RecoveryReport {
         seconds: Seconds,
     ) -> Self {
         let mean = |of: fn(&FrameReport) -> Option<Distances>| {
-            let found: Vec<f64> = frames.iter().filter_map(of).map(|distances| distances.mean).collect();
+            let found: Vec<f64> = frames
+                .iter()
+                .filter(|frame| frame.outcome != "lost")
+                .filter_map(of)
+                .map(|distances| distances.mean)
+                .collect();
             (!found.is_empty()).then(|| found.iter().sum::<f64>() / found.len() as f64)
         };
         Self {

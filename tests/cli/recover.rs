@@ -181,6 +181,13 @@ fn frames_without_a_surface_are_refused_by_name_and_passed_over_by_force() {
         dir.write("scan_2.ply", text);
         refused(&dir, RECOVER, &words);
     }
+    let place = Observation { points: vec![[1.0, 2.0, 3.0]; 50], normals: vec![[0.0, 1.0, 0.0]; 50] };
+    let huge = dance.seen(2, 200);
+    let huge = Observation { points: huge.points.iter().map(|p| p.map(|x| 1e160 * x)).collect(), ..huge };
+    for (cloud, word) in [(place, "one line only"), (huge, "scale it")] {
+        dir.write("scan_2.ply", ply(&cloud, true));
+        refused(&dir, RECOVER, &["scan_2.ply", word]);
+    }
     dir.write("scan_2.ply", ply(&line, false));
     let said = dir.cager(&format!("{RECOVER} --force")).succeeds();
     assert!(said.stderr.contains("stays as it was, in frames: 2\n"), "{}", said.stderr);

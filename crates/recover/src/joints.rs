@@ -97,9 +97,9 @@ impl CagedJoints {
     }
 
     /// A table of the paths: `frame,joint,x,y,z`, one line for each joint of each frame.
-    pub fn csv(&self, frames: &[Vec<Point>]) -> String {
+    pub fn csv(&self, numbers: &[f64], frames: &[Vec<Point>]) -> String {
         let mut text = String::from("frame,joint,x,y,z\n");
-        for (number, frame) in frames.iter().enumerate() {
+        for (number, frame) in numbers.iter().zip(frames) {
             for (name, [x, y, z]) in self.joints.names.iter().zip(frame) {
                 let quoted = name.contains([',', '"', '\n']).then(|| format!("\"{}\"", name.replace('"', "\"\"")));
                 let _ = writeln!(text, "{number},{},{x},{y},{z}", quoted.as_deref().unwrap_or(name));
@@ -187,7 +187,7 @@ mod tests {
                 assert!((0..3).all(|k| (found[k] - p[k]).abs() < 1e-9), "{name}: {found:?} {p:?}");
             }
         }
-        let csv = joints.csv(&frames);
+        let csv = joints.csv(&(0..frames.len()).map(|k| k as f64).collect::<Vec<_>>(), &frames);
         assert_eq!((csv.lines().count(), csv.lines().nth(1).unwrap().starts_with("0,pelvis,")), (2 * 21 + 1, true));
         let mut wrong = MarkedJoints::of_rig(&rig);
         wrong.parents[3] = Some(7);

@@ -44,6 +44,8 @@ const SEARCHED_FROM: f64 = 1.06;
 const SEARCHED_FROM_ALL: f64 = 1.3;
 /// A frame that scores above so many times the median of all is lost.
 const LOST_FROM: f64 = 1.6;
+/// Frames before that it takes to say so: a template that is the first frame lies there better than it can elsewhere.
+const MIN_JUDGED: usize = 3;
 
 impl<'t> Tracker<'t> {
     /// From the cage of the rest pose, laid where the first frame is.
@@ -66,7 +68,8 @@ impl<'t> Tracker<'t> {
         let usual = median(&self.scores);
         let most = (SEARCHED_FROM * recent).min(SEARCHED_FROM_ALL * usual);
         for start in starts {
-            if best.score <= most {
+            // Of the first frame nothing says how well it should lie.
+            if best.score <= most && !self.scores.is_empty() {
                 break;
             }
             let again = Scored::fit(template, surface, start, &FitOptions::FAR);
@@ -74,7 +77,7 @@ impl<'t> Tracker<'t> {
                 (best, outcome) = (again, Outcome::SearchedWider);
             }
         }
-        if best.score > LOST_FROM * usual {
+        if self.scores.len() >= MIN_JUDGED && best.score > LOST_FROM * usual {
             outcome = Outcome::Lost;
         }
         self.scores.push(best.score);
@@ -105,7 +108,12 @@ struct Scored {
 impl Scored {
     fn fit(template: &Template, surface: &Target, start: &[Point], options: &FitOptions) -> Self {
         let cage = template.fit(surface, start, options);
-        Self { score: template.score(surface, &cage), cage }
+        let score = template.score(surface, &cage);
+        if score.is_finite() && cage.as_flattened().iter().all(|x| x.is_finite()) {
+            Self { cage, score }
+        } else {
+            Self { cage: start.to_vec(), score: f64::INFINITY }
+        }
     }
 }
 
@@ -157,8 +165,16 @@ impl<'t> SecondPass<'t> {
                 break;
             }
         }
-        if frame.score > LOST_FROM * self.usual {
-            frame.outcome = Outcome::Lost;
+    }
+
+    /// Whether a frame is lost, in the end.
+    pub fn judge(&self, frame: &mut TrackedFrame) {
+        let lost = self.scores.len() > MIN_JUDGED && frame.score > LOST_FROM * self.usual;
+        match (lost, frame.outcome) {
+            (_, Outcome::NoSurface) => {}
+            (true, _) => frame.outcome = Outcome::Lost,
+            (false, Outcome::Lost) => frame.outcome = Outcome::SearchedWider,
+            (false, _) => {}
         }
     }
 }

@@ -46,7 +46,8 @@ impl<const D: usize> NearestPoints<D> {
     /// The number of the point nearest to `query`, and the squared distance.
     pub fn nearest(&self, query: [f64; D]) -> (usize, f64) {
         let found = self.0.knn(1, &node(query));
-        (found[0].index as usize, found[0].dist2.into_inner())
+        // None is found where squares of distances overflow.
+        found.first().map_or((0, f64::INFINITY), |found| (found.index as usize, found.dist2.into_inner()))
     }
 
     /// The numbers of the `count` points nearest to `query`, nearest first.

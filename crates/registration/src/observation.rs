@@ -1,5 +1,7 @@
 //! A surface as it was seen once: points of it with outward normals, from a mesh or from a cloud, checked.
 
+use cager_geometry::linalg::symmetric_eigen;
+use cager_geometry::mesh::diagonal;
 use cager_geometry::vector::{Point, dot, mean, sub};
 use glam::DVec3;
 
@@ -45,7 +47,7 @@ pub struct ObservationNotes {
 }
 
 /// Why a surface cannot be an observation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ObservationError {
     /// Fewer points than a surface has.
     #[error("has {points} points; a surface needs at least {MIN_POINTS}")]
@@ -58,6 +60,12 @@ pub enum ObservationError {
     NotFinite {
         /// The first such point.
         vertex: usize,
+    },
+    /// Coordinates that cannot be calculated with, or points that all but coincide.
+    #[error("reaches {extent:e} units; scale it to something between 1e-20 and 1e20")]
+    Extreme {
+        /// The largest coordinate, or the extent.
+        extent: f64,
     },
     /// All faces are points or lines, or none is left.
     #[error("has faces, but none of them has an area; export the mesh again")]
@@ -75,6 +83,8 @@ pub enum ObservationError {
 
 /// The least number of points of an observation.
 const MIN_POINTS: usize = 10;
+/// Coordinates beyond, or extents below one over it, are no length of anything.
+const MAX_EXTENT: f64 = 1e20;
 
 impl Observation {
     /// Points drawn of a triangle mesh, even by area. Faces that run against their neighbours are turned, and all of them where they face inwards;
@@ -133,6 +143,9 @@ impl Observation {
             kept.iter().map(unit).collect::<Result<_, _>>()?
         };
         let points: Vec<Point> = kept.iter().map(|&k| points[k as usize]).collect();
+        if on_a_line(&points) {
+            return Err(ObservationError::Line);
+        }
         let turned = points_inwards(&points, &kept_normals);
         if turned {
             kept_normals.iter_mut().for_each(|n| *n = n.map(|x| -x));
@@ -147,10 +160,30 @@ fn check_points(points: &[Point]) -> Result<(), ObservationError> {
     if points.len() < MIN_POINTS {
         return Err(ObservationError::TooFewPoints { points: points.len() });
     }
-    match points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
-        Some(vertex) => Err(ObservationError::NotFinite { vertex }),
-        None => Ok(()),
+    if let Some(vertex) = points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+        return Err(ObservationError::NotFinite { vertex });
     }
+    let largest = points.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let extent = diagonal(points);
+    if largest > MAX_EXTENT {
+        Err(ObservationError::Extreme { extent: largest })
+    } else if extent > 0.0 && extent < 1.0 / MAX_EXTENT {
+        Err(ObservationError::Extreme { extent })
+    } else {
+        Ok(())
+    }
+}
+
+/// Whether points lie on a line, or in one place.
+fn on_a_line(points: &[Point]) -> bool {
+    let center = mean(points);
+    let mut covariance = [[0.0; 3]; 3];
+    for &p in points {
+        let d = sub(p, center);
+        (0..3).for_each(|i| (0..3).for_each(|j| covariance[i][j] += d[i] * d[j]));
+    }
+    let (values, _) = symmetric_eigen(covariance);
+    values[1] <= 1e-12 * values[0]
 }
 
 /// Whether normals point inwards: `Σ (p − centre) · n` of points spread over a closed surface has the sign of the volume, three times which it estimates.

@@ -18,6 +18,8 @@ struct Compressed {
     entries: Vec<(u32, f32)>,
 }
 
+/// Rows whose larger entries sum to less are kept whole.
+const MIN_KEPT: f64 = 0.5;
 /// Products with fewer entries are computed by one thread.
 const MIN_PARALLEL_ENTRIES: usize = 20_000;
 
@@ -28,9 +30,12 @@ impl SparseRows {
         let mut columns: Vec<Vec<(u32, f32)>> = vec![Vec::new(); matrix.ncols()];
         for i in 0..matrix.nrows() {
             let row = matrix.row(i);
-            let kept: Vec<(u32, f64)> =
-                (0..matrix.ncols()).map(|j| (j as u32, row[j])).filter(|(_, x)| x.abs() > threshold).collect();
-            let sum: f64 = kept.iter().map(|(_, x)| x).sum();
+            let all = || (0..matrix.ncols()).map(|j| (j as u32, row[j]));
+            let mut kept: Vec<(u32, f64)> = all().filter(|(_, x)| x.abs() > threshold).collect();
+            let mut sum: f64 = kept.iter().map(|(_, x)| x).sum();
+            if sum < MIN_KEPT {
+                (kept, sum) = (all().collect(), 1.0);
+            }
             rows.push(kept.iter().map(|&(j, x)| (j, (x / sum) as f32)).collect());
             rows[i].iter().for_each(|&(j, x)| columns[j as usize].push((i as u32, x)));
         }

@@ -18,6 +18,8 @@ pub struct TrackedFrame {
 const SUSPECT: f64 = 1.15;
 /// A frame is lost above this many times the usual score.
 const LOST: f64 = 2.0;
+/// No frame is found above this score, a share of the height.
+const MAX_SCORE: f64 = 0.03;
 /// Frames that the usual score is of.
 const WINDOW: usize = 31;
 
@@ -43,7 +45,7 @@ pub fn track(
                 frame = TrackedFrame { fit: anew, lost: false, searched: true };
             }
         }
-        frame.lost = usual.is_some_and(|usual| frame.fit.score > LOST * usual);
+        frame.lost = frame.fit.score > MAX_SCORE || usual.is_some_and(|usual| frame.fit.score > LOST * usual);
         done(number, &frame);
         frames.push(frame);
     }
@@ -61,7 +63,8 @@ pub fn track(
             if again.score < frames[number].fit.score {
                 frames[number].fit = again;
             }
-            frames[number].lost = usual.is_some_and(|usual| frames[number].fit.score > LOST * usual);
+            let score = frames[number].fit.score;
+            frames[number].lost = score > MAX_SCORE || usual.is_some_and(|usual| score > LOST * usual);
         }
     }
     frames
