@@ -34,8 +34,8 @@ pub(crate) fn estimated_normals(points: &[Point], kept: &[u32]) -> Option<Vec<Po
     Some(normals)
 }
 
-/// The normal of the plane through some points; zero where they lie on a line.
-fn plane_normal(points: &[Point]) -> Point {
+/// The normal of the plane through some points; zero where they lie on a line or in one place.
+pub(crate) fn plane_normal(points: &[Point]) -> Point {
     let center = mean(points);
     let mut covariance = [[0.0; 3]; 3];
     for &p in points {

@@ -1,11 +1,10 @@
 //! A surface as it was seen once: points of it with outward normals, from a mesh or from a cloud, checked.
 
-use cager_geometry::linalg::symmetric_eigen;
 use cager_geometry::mesh::diagonal;
 use cager_geometry::vector::{Point, dot, mean, sub};
 use glam::DVec3;
 
-use crate::normals::estimated_normals;
+use crate::normals::{estimated_normals, plane_normal};
 use crate::orientation::{Oriented, oriented};
 use crate::sampling::{area_normal, sample_surface};
 
@@ -143,7 +142,7 @@ impl Observation {
             kept.iter().map(unit).collect::<Result<_, _>>()?
         };
         let points: Vec<Point> = kept.iter().map(|&k| points[k as usize]).collect();
-        if on_a_line(&points) {
+        if plane_normal(&points) == [0.0; 3] {
             return Err(ObservationError::Line);
         }
         let turned = points_inwards(&points, &kept_normals);
@@ -172,18 +171,6 @@ fn check_points(points: &[Point]) -> Result<(), ObservationError> {
     } else {
         Ok(())
     }
-}
-
-/// Whether points lie on a line, or in one place.
-fn on_a_line(points: &[Point]) -> bool {
-    let center = mean(points);
-    let mut covariance = [[0.0; 3]; 3];
-    for &p in points {
-        let d = sub(p, center);
-        (0..3).for_each(|i| (0..3).for_each(|j| covariance[i][j] += d[i] * d[j]));
-    }
-    let (values, _) = symmetric_eigen(covariance);
-    values[1] <= 1e-12 * values[0]
 }
 
 /// Whether normals point inwards: `Σ (p − centre) · n` of points spread over a closed surface has the sign of the volume, three times which it estimates.
