@@ -127,6 +127,8 @@ settings! {
     max_design_queue: usize = 16, Kind::Number { least: 0, most: 1_000_000 };
     /// Seconds that a design may take; then the best cage so far is the result.
     max_design_seconds: u64 = 120, Kind::Number { least: 1, most: DAY };
+    /// Recoveries that follow frames at the same time.
+    max_recoveries: usize = 1, Kind::Number { least: 1, most: 4096 };
     /// Memory that the frames of one design may take, in bytes: so many of those that were sent are looked at.
     max_design_bytes: u64 = 512 * MIB, Kind::Bytes { least: MIB, most: 1 << 50 };
     /// Bytes of the frames that a cage is designed from.

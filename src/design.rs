@@ -9,6 +9,11 @@ use cager_proto::report::{DesignReport, StageReport};
 /// Frames of a capture that a design looks at, at most: every second one to design by, the others to judge by.
 pub const FRAMES: usize = 160;
 
+/// Vertices of a cage where no number is given: fewer for a model whose points could not determine so many.
+pub(crate) fn default_vertices(points: usize) -> usize {
+    350.min(points / 2).max(4)
+}
+
 /// Evenly spaced frames of a capture, or of a range of it, to design a cage from.
 ///
 /// # Errors

@@ -42,12 +42,14 @@ kinds! {
     REQUEST_TIMEOUT REQUEST_TIMEOUT "request-timeout" "The request stopped arriving";
     FRAME_CONFLICT CONFLICT "frame-conflict" "The frame was posted before with other content";
     FRAMES_MISSING CONFLICT "frames-missing" "Frames are missing";
-    NOT_COMPLETED CONFLICT "not-completed" "The session is not completed yet";
+    NOT_COMPLETED CONFLICT "not-completed" "The session or job is not completed yet";
     SESSION_COMPLETED CONFLICT "session-completed" "The session is completed and does not change any more";
     SESSION_FAILED CONFLICT "session-failed" "The session failed and cannot be used";
     NOT_READY CONFLICT "not-ready" "The session is still being prepared";
     CAGE_NOT_READY CONFLICT "cage-not-ready" "The cage is still being designed";
     CAGE_FAILED CONFLICT "cage-failed" "No cage could be designed";
+    RECOVERY_COMPLETED CONFLICT "recovery-completed" "The recovery takes no frames any more";
+    RECOVERY_FAILED CONFLICT "recovery-failed" "The recovery failed and cannot be used";
     KEY_IN_USE CONFLICT "idempotency-key-in-use" "A request with this idempotency key is still being worked on";
     SESSION_DELETED GONE "session-deleted" "The session was deleted";
     TOO_LARGE PAYLOAD_TOO_LARGE "too-large" "The body is larger than allowed";

@@ -2,12 +2,13 @@
 
 use crate::admission::{Budget, Held};
 use crate::auth::{Access, Tenant};
-use crate::cage_job::registry::CageJobs;
-use crate::cage_job::{DesignPool, Designer, local_designer};
+use crate::cage_job::{CageDesign, DesignPool, Designer, local_designer};
 use crate::config::ServeConfig;
 use crate::engine::{Engine, threads};
+use crate::jobs::Jobs;
 use crate::preparation::{CageMaker, Solvers};
 use crate::problem::{self, ApiError};
+use crate::recovery::Recovery;
 use crate::session::commit::Committer;
 use crate::session::registry::Registry;
 use crate::store::{ContentKey, Disk, Store, StoreError};
@@ -46,9 +47,12 @@ pub struct Service {
     pub(crate) committer: Committer,
     pub(crate) webhooks: Arc<Webhooks>,
     pub(crate) registry: Arc<Registry>,
-    pub(crate) cage_jobs: CageJobs,
+    pub(crate) cage_jobs: Jobs<CageDesign>,
+    pub(crate) recoveries: Jobs<Recovery>,
     pub(crate) unread: UnreadableFiles,
     pub(crate) designs: DesignPool,
+    /// Recoveries that follow frames or are finished.
+    pub(crate) recovering: Arc<Budget>,
     pub(crate) cage_maker: CageMaker,
     /// Uploaded files being parsed, which keeps a processor busy.
     pub(crate) reading: Arc<Budget>,
@@ -113,7 +117,7 @@ pub enum StartError {
 }
 
 impl Service {
-    /// Opens the data folder and resumes its sessions and cage jobs. Call within a tokio runtime.
+    /// Opens the data folder and resumes its sessions and jobs. Call within a tokio runtime.
     ///
     /// # Errors
     /// See [`StartError`].
@@ -159,9 +163,11 @@ impl Service {
             engine,
             committer: Committer::start(COMMIT_THREADS).map_err(StartError::Threads)?,
             registry: Arc::default(),
-            cage_jobs: CageJobs::default(),
+            cage_jobs: Jobs::default(),
+            recoveries: Jobs::default(),
             unread,
             designs: DesignPool::new(&config, designer).map_err(StartError::Threads)?,
+            recovering: config.budget(config.max_recoveries as u64),
             cage_maker: CageMaker::new(config.budget(config.max_preparing as u64), solvers.pool()),
             solvers,
             reading: config.budget(MAX_CONCURRENT_PARSING),
@@ -188,13 +194,18 @@ impl Service {
         }
         let cage_jobs = opened.cage_jobs.len();
         for meta in opened.cage_jobs {
-            service.resume_and_track_cage_job(meta);
+            service.resume_and_track_job::<CageDesign>(meta);
+        }
+        let recoveries = opened.recoveries.len();
+        for meta in opened.recoveries {
+            service.resume_and_track_job::<Recovery>(meta);
         }
         service.orphans().iter().for_each(|key| service.forget_orphan(key));
         service.resumed.store(true, Ordering::Release);
         tracing::info!(
             sessions = count,
             cage_jobs,
+            recoveries,
             quarantined = opened.quarantined.len(),
             unread = service.unread.summary(),
             "sessions resumed"

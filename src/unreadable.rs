@@ -1,8 +1,11 @@
-//! Sessions and cage jobs whose files could not be read: they stay in place and are retried until they can be read.
+//! Sessions and jobs whose files could not be read: they stay in place and are retried until they can be read.
 
+use crate::cage_job::CageDesign;
+use crate::jobs::{Work, kind_of};
 use crate::problem::{self, ApiError};
+use crate::recovery::Recovery;
 use crate::service::Service;
-use crate::store::{CageJobMeta, Kind, SessionMeta, StoreError};
+use crate::store::{FolderMeta as _, JobMeta as _, Kind, SessionMeta, StoreError};
 use crate::sync::lock;
 use crate::tasks::blocking;
 use std::collections::BTreeMap;
@@ -11,7 +14,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Instant;
 use tokio::sync::MutexGuard;
 
-/// All unreadable sessions and cage jobs.
+/// All unreadable sessions and jobs.
 #[derive(Default)]
 pub(crate) struct UnreadableFiles {
     known: Mutex<BTreeMap<(Kind, String), UnreadableEntry>>,
@@ -21,7 +24,7 @@ pub(crate) struct UnreadableFiles {
     orphans_kept: AtomicBool,
 }
 
-/// An unreadable session or cage job.
+/// An unreadable session or job.
 #[derive(Clone)]
 struct UnreadableEntry {
     /// Its tenant, if known.
@@ -78,10 +81,11 @@ impl UnreadableFiles {
 
     /// A summary for operators; `None` if everything could be read.
     pub(crate) fn summary(&self) -> Option<String> {
-        let [sessions, jobs] = [Kind::Session, Kind::CageJob].map(|kind| self.count(kind));
-        (sessions + jobs > 0).then(|| {
+        let [sessions, designs, recoveries] =
+            [Kind::Session, Kind::CageJob, Kind::Recovery].map(|kind| self.count(kind));
+        (sessions + designs + recoveries > 0).then(|| {
             format!(
-                "{sessions} sessions and {jobs} cage designs cannot be read and are left where they are; the log has their paths, and they are served when they can be read"
+                "{sessions} sessions, {designs} cage designs and {recoveries} recoveries cannot be read and are left where they are; the log has their paths, and they are served when they can be read"
             )
         })
     }
@@ -103,10 +107,14 @@ impl Service {
         self.track_outcome(Kind::Session, &id, &tenant, self.resume(meta));
     }
 
-    /// Resumes a cage job found on disk and updates the list.
-    pub(crate) fn resume_and_track_cage_job(self: &Arc<Self>, meta: CageJobMeta) {
-        let (id, tenant) = (meta.id.clone(), meta.tenant.clone());
-        self.track_outcome(Kind::CageJob, &id, &tenant, self.resume_cage_job(meta));
+    /// Resumes a job found on disk and updates the list.
+    pub(crate) fn resume_and_track_job<W: Work>(self: &Arc<Self>, meta: W::Meta) {
+        let (id, tenant) = (meta.id().to_owned(), meta.tenant().to_owned());
+        self.track_outcome(kind_of::<W>(), &id, &tenant, self.resume_job::<W>(meta));
+    }
+
+    fn reload_job<W: Work>(self: &Arc<Self>, id: &str) -> Result<Option<()>, StoreError> {
+        Ok(self.store.reload_meta(id)?.map(|meta| self.resume_and_track_job::<W>(meta)))
     }
 
     fn track_outcome(&self, kind: Kind, id: &str, tenant: &str, outcome: Result<(), StoreError>) {
@@ -174,9 +182,8 @@ impl Service {
                 Kind::Session => {
                     service.store.reload_meta(&id).map(|meta| meta.map(|meta| service.resume_and_track_session(meta)))
                 }
-                Kind::CageJob => {
-                    service.store.reload_meta(&id).map(|meta| meta.map(|meta| service.resume_and_track_cage_job(meta)))
-                }
+                Kind::CageJob => service.reload_job::<CageDesign>(&id),
+                Kind::Recovery => service.reload_job::<Recovery>(&id),
             };
             if matches!(found, Ok(None)) {
                 service.unread.forget(kind, &id);

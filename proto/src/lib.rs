@@ -4,6 +4,7 @@
 //! * [`container`]: the `.cager` file: a rest pose, its cage and one solved cage per frame, with random access.
 //! * [`messages`]: the JSON bodies of the service.
 //! * [`record`]: the frame record, `application/vnd.cager.frames`: one frame with its number and its error.
+//! * [`recovery_messages`]: the JSON bodies of recoveries.
 //! * [`report`]: what is told of an encoding, in `report.json` and in a container.
 //! * [`wire`]: small structured values to and from bytes; the one module that knows bincode.
 //!
@@ -15,5 +16,6 @@ pub mod container;
 mod le;
 pub mod messages;
 pub mod record;
+pub mod recovery_messages;
 pub mod report;
 pub mod wire;

@@ -1,22 +1,21 @@
 //! Creating, resuming and deleting cage jobs.
 
-use super::{CageJob, Finished, Outcome, Phase, options, samples};
+use super::{CageJob, Finished, options, samples};
 use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::config::ServeConfig;
 use crate::far_frames::Reach;
 use crate::idempotency::{extension, made_before, once, request};
+use crate::jobs::{Outcome, Phase};
 use crate::preparation::{check_extent, read_part};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::registry::Reserved;
-use crate::store::{CageJobMeta, ContentKey, Idempotency, Kind, Spool, StoreError, StoredPart};
+use crate::store::{CageJobMeta, ContentKey, Idempotency, Spool, Store, StoredPart};
 use crate::tasks::{blocking, to_the_end};
-use crate::unreadable;
 use cager_geometry::mesh::diagonal;
 use cager_proto::cage_messages::CageOptions;
 use std::sync::Arc;
-use std::sync::atomic::Ordering::Relaxed;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// A request to design a cage.
@@ -124,7 +123,7 @@ impl Service {
         let bytes = meta.rest.bytes + meta.frames.bytes;
         let (store, kept) = (self.store.clone(), meta.clone());
         blocking(move || store.create_cage_job(&kept, &rest, frames)).await??;
-        let job = Arc::new(CageJob::new(meta, Phase::Queued, bytes));
+        let job = Arc::new(CageJob::new(meta, Phase::Waiting, bytes));
         self.cage_jobs.insert(Arc::clone(&job));
         drop(reserved);
         tokio::spawn(Arc::clone(self).run_cage_job(Arc::clone(&job)));
@@ -147,62 +146,11 @@ impl Service {
         Some(job)
     }
 
-    /// Resumes a job found on disk; one without outcome is designed from the start. If its outcome cannot be read, it is registered as
-    /// failed so that it can be deleted, and resumed when this is called again.
-    ///
-    /// # Errors
-    /// I/O errors of its files.
-    pub(crate) fn resume_cage_job(self: &Arc<Self>, meta: CageJobMeta) -> Result<(), StoreError> {
-        let id = meta.id.clone();
-        let (phase, error) = match self.store.cage_job_outcome(&id) {
-            Ok(Some(Outcome::Completed(found))) => (Phase::Completed(found), None),
-            Ok(Some(Outcome::Failed(problem))) => (Phase::Failed(problem), None),
-            Ok(None) => (Phase::Queued, None),
-            Err(error @ StoreError::Damaged { .. }) => {
-                tracing::warn!(job = %id, %error, "the outcome of a cage job is damaged, so the cage is designed again");
-                (Phase::Queued, None)
-            }
-            Err(error) => (Phase::Failed(unreadable::problem(Kind::CageJob).problem), Some(error)),
-        };
-        let unfinished = matches!(phase, Phase::Queued);
-        if !unfinished && error.is_none() {
-            self.store.forget_cage_job_input(&id);
-        }
-        // Rather too much than nothing where it cannot be counted.
-        let bytes = self.store.bytes(Kind::CageJob, &id).unwrap_or(meta.rest.bytes + meta.frames.bytes);
-        let job = Arc::new(CageJob::new(meta, phase, bytes));
-        self.cage_jobs.insert(Arc::clone(&job));
-        if unfinished {
-            tokio::spawn(Arc::clone(self).run_cage_job(job));
-        }
-        error.map_or(Ok(()), Err)
-    }
-
-    /// Stores the outcome of a job, then notifies its followers.
-    pub(super) async fn finish_cage_job(&self, job: &Arc<CageJob>, outcome: Outcome, cage: Option<Vec<u8>>) {
-        let (store, id, kept) = (self.store.clone(), job.meta.id.clone(), outcome.clone());
-        let stored = blocking(move || {
-            let stored = store.finish_cage_job(&id, &kept, cage.as_deref());
-            stored.map(|()| store.bytes(Kind::CageJob, &id).ok())
-        });
-        match stored.await {
-            _ if job.deleted().is_cancelled() => return,
-            Ok(Ok(Some(bytes))) => job.bytes.store(bytes, Relaxed),
-            Ok(Ok(None)) => {}
-            Ok(Err(error)) => {
-                tracing::warn!(job = %job.meta.id, %error, "the outcome of a cage job could not be kept; a restart designs it again");
-                if matches!(outcome, Outcome::Completed(_)) {
-                    return job.set_phase(Phase::Failed(ApiError::from(error).problem));
-                }
-            }
-            Err(error) => return job.set_phase(Phase::Failed(error.problem)),
-        }
-        let (phase, result) = match outcome {
-            Outcome::Completed(found) => (Phase::Completed(found), "completed"),
-            Outcome::Failed(problem) => (Phase::Failed(problem), "failed"),
-        };
-        metrics::counter!("cager_designs_total", "result" => result).increment(1);
-        job.set_phase(phase);
+    /// Stores the outcome of a job and its cage, if any.
+    pub(super) async fn finish_cage_job(&self, job: &Arc<CageJob>, outcome: Outcome<Finished>, cage: Option<Vec<u8>>) {
+        let id = job.meta.id.clone();
+        let write = move |store: &Store, outcome: &_| store.finish_cage_job(&id, outcome, cage.as_deref());
+        self.finish_job(job, outcome, write).await;
     }
 
     /// Copies the outcome of a job of the same input; false if it cannot be read.
@@ -216,25 +164,6 @@ impl Service {
         let Ok(Ok(cage)) = blocking(move || duplicate.completed_cage(&store)).await else { return false };
         self.finish_cage_job(job, Outcome::Completed(found), Some(cage.to_vec())).await;
         true
-    }
-
-    /// Deletes a job and stops its design. Runs to the end even if the client disconnects.
-    ///
-    /// # Errors
-    /// Storage errors.
-    pub(crate) async fn delete_cage_job(self: &Arc<Self>, job: &Arc<CageJob>) -> Result<(), ApiError> {
-        let (service, job) = (Arc::clone(self), Arc::clone(job));
-        to_the_end(async move {
-            let (store, id) = (service.store.clone(), job.meta.id.clone());
-            let _unread = service.unread.hold(Kind::CageJob, &id).await;
-            blocking(move || store.delete(Kind::CageJob, &id)).await??;
-            service.unread.forget(Kind::CageJob, &job.meta.id);
-            service.cage_jobs.remove(&job.meta.id);
-            job.deleted.cancel();
-            job.touch();
-            Ok(())
-        })
-        .await
     }
 }
 

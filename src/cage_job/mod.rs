@@ -2,43 +2,66 @@
 //! completed or failed; its input is stored until it has ended, so that a restart can begin it again.
 
 pub(crate) mod create;
+mod duplicates;
 mod options;
-pub(crate) mod registry;
 mod run;
 mod samples;
 
 pub use run::Designer;
 pub(crate) use run::{DesignPool, local_designer};
 
+use crate::jobs::{Job, Jobs, Phase, Work};
 use crate::problem::{self, ApiError};
-use crate::store::{CageJobMeta, Kind, Store, StoreError};
-use crate::sync::lock;
+use crate::service::Service;
+use crate::store::{CageJobMeta, Store};
 use bytes::Bytes;
 use cager_cages::Progress as DesignProgress;
 use cager_geometry::mesh::TriMesh;
 use cager_proto::cage_messages::{CageError, CageJob as View, CageProgress, CageStage, CageState};
-use cager_proto::messages::Problem;
 use serde::{Deserialize, Serialize};
-use std::sync::Mutex;
-use std::sync::atomic::AtomicU64;
+use std::sync::Arc;
 use std::time::Instant;
-use tokio::sync::watch;
-use tokio_util::sync::CancellationToken;
+
+/// Cages designed by example.
+pub struct CageDesign;
 
 /// A cage job in memory.
-pub(crate) struct CageJob {
-    pub(crate) meta: CageJobMeta,
-    status: Mutex<Status>,
-    /// Bytes of its files.
-    pub(crate) bytes: AtomicU64,
-    version: watch::Sender<u64>,
-    deleted: CancellationToken,
+pub(crate) type CageJob = Job<CageDesign>;
+
+impl Work for CageDesign {
+    type Meta = CageJobMeta;
+    type Finished = Finished;
+    type Progress = Progress;
+
+    const NAME: &'static str = "cage design";
+    const LIST: &'static str = "/v1/cages";
+    const ENDED: &'static str = "cager_designs_total";
+    const FAILED: problem::Kind = problem::CAGE_FAILED;
+
+    fn jobs(service: &Service) -> &Jobs<Self> {
+        &service.cage_jobs
+    }
+
+    fn begin(service: Arc<Service>, job: Arc<CageJob>) {
+        tokio::spawn(service.run_cage_job(job));
+    }
+
+    fn forget_input(store: &Store, id: &str) {
+        store.forget_cage_job_input(id);
+    }
+
+    fn enter(progress: &mut Progress, phase: &Phase<Finished>) {
+        progress.stage = None;
+        progress.began = matches!(phase, Phase::Running).then(Instant::now);
+        if !matches!(phase, Phase::Running) {
+            progress.best = None;
+        }
+    }
 }
 
-/// State and progress of a job.
+/// Progress of a design.
 #[derive(Default)]
-struct Status {
-    phase: Phase,
+pub(crate) struct Progress {
     stage: Option<&'static str>,
     fraction: f64,
     /// Error on the held-back frames.
@@ -47,15 +70,6 @@ struct Status {
     sampled: u32,
     best: Option<Best>,
     began: Option<Instant>,
-}
-
-#[derive(Clone, Default)]
-enum Phase {
-    #[default]
-    Queued,
-    Running,
-    Completed(Box<Finished>),
-    Failed(Box<Problem>),
 }
 
 /// The best cage so far of a running design.
@@ -75,17 +89,9 @@ impl Best {
     }
 }
 
-/// The stored outcome of a job.
-#[derive(Clone, Debug, Deserialize, Serialize)]
-#[serde(rename_all = "snake_case")]
-enum Outcome {
-    Completed(Box<Finished>),
-    Failed(Box<Problem>),
-}
-
 /// Results of a completed job, without the cage itself.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-struct Finished {
+pub(crate) struct Finished {
     vertices: u32,
     faces: u32,
     sampled: u32,
@@ -107,67 +113,24 @@ pub(crate) enum Cage {
 }
 
 impl CageJob {
-    fn new(meta: CageJobMeta, phase: Phase, bytes: u64) -> Self {
-        Self {
-            meta,
-            status: Mutex::new(Status { phase, ..Status::default() }),
-            bytes: AtomicU64::new(bytes),
-            version: watch::Sender::new(0),
-            deleted: CancellationToken::new(),
-        }
-    }
-
-    /// A counter that changes with every change of the job.
-    pub(crate) fn changes(&self) -> watch::Receiver<u64> {
-        self.version.subscribe()
-    }
-
-    /// Cancelled when the job is deleted.
-    pub(crate) fn deleted(&self) -> &CancellationToken {
-        &self.deleted
-    }
-
-    fn touch(&self) {
-        self.version.send_modify(|version| *version += 1);
-    }
-
-    fn set_phase(&self, phase: Phase) {
-        {
-            let mut status = lock(&self.status);
-            status.stage = None;
-            status.began = matches!(phase, Phase::Running).then(Instant::now);
-            if !matches!(phase, Phase::Running) {
-                status.best = None;
-            }
-            status.phase = phase;
-        }
-        self.touch();
-    }
-
-    fn phase(&self) -> Phase {
-        lock(&self.status).phase.clone()
-    }
-
     /// State of the job.
     pub(crate) fn state(&self) -> CageState {
-        state_of(&lock(&self.status).phase)
+        state_of(&self.status().phase)
     }
 
     fn set_sampled(&self, sampled: usize) {
-        lock(&self.status).sampled = sampled as u32;
+        self.status().progress.sampled = sampled as u32;
     }
 
     /// Takes over the progress that a design reports.
-    fn progressed(&self, told: &DesignProgress<'_>) {
+    fn designed(&self, told: &DesignProgress<'_>) {
         let better = told.better.map(Best::new);
-        {
-            let mut status = lock(&self.status);
-            status.stage = Some(told.stage);
-            status.fraction = told.fraction.clamp(0.0, 1.0);
-            status.error = told.error.filter(|error| error.is_finite());
-            status.best = better.or(status.best.take());
-        }
-        self.touch();
+        self.progressed(|progress| {
+            progress.stage = Some(told.stage);
+            progress.fraction = told.fraction.clamp(0.0, 1.0);
+            progress.error = told.error.filter(|error| error.is_finite());
+            progress.best = better.or(progress.best.take());
+        });
     }
 
     /// State and progress, for server-sent events.
@@ -184,7 +147,8 @@ impl CageJob {
 
     /// The job as returned by the API.
     pub(crate) fn view(&self) -> View {
-        let status = lock(&self.status);
+        let status = self.status();
+        let progress = &status.progress;
         let mut view = View {
             id: self.meta.id.clone(),
             name: self.meta.options.name.clone(),
@@ -192,20 +156,20 @@ impl CageJob {
             created: self.meta.created_ms as f64 / 1e3,
             points: self.meta.points,
             frames: self.meta.frame_count,
-            sampled_frames: status.sampled,
-            vertices: status.best.as_ref().map(|best| best.vertices),
-            faces: status.best.as_ref().map(|best| best.faces),
-            stage: status.stage.map(str::to_owned),
-            fraction: status.fraction,
-            error: CageError { designed: None, held_back: status.error },
+            sampled_frames: progress.sampled,
+            vertices: progress.best.as_ref().map(|best| best.vertices),
+            faces: progress.best.as_ref().map(|best| best.faces),
+            stage: progress.stage.map(str::to_owned),
+            fraction: progress.fraction,
+            error: CageError { designed: None, held_back: progress.error },
             stages: Vec::new(),
-            seconds: status.began.map_or(0.0, |began| began.elapsed().as_secs_f64()),
+            seconds: progress.began.map_or(0.0, |began| began.elapsed().as_secs_f64()),
             timed_out: false,
             warnings: Vec::new(),
             problem: None,
         };
         match &status.phase {
-            Phase::Queued | Phase::Running => {}
+            Phase::Waiting | Phase::Running => {}
             Phase::Completed(found) => {
                 view.sampled_frames = found.sampled;
                 (view.vertices, view.faces) = (Some(found.vertices), Some(found.faces));
@@ -236,7 +200,7 @@ impl CageJob {
     /// # Errors
     /// `CAGE_NOT_READY`, `CAGE_FAILED`; damage, after which the job has failed and is in quarantine.
     pub(crate) fn cage(&self, store: &Store) -> Result<Cage, ApiError> {
-        let best = lock(&self.status).best.clone();
+        let best = self.status().progress.best.clone();
         match self.phase() {
             Phase::Completed(found) => {
                 let obj = store.cage_job_cage(&self.meta.id, found.cage_bytes, &found.cage_digest);
@@ -244,31 +208,10 @@ impl CageJob {
                 Ok(Cage::Final { obj: obj.into(), digest: found.cage_digest })
             }
             Phase::Failed(problem) => Err(ApiError::new(problem::CAGE_FAILED, problem.detail)),
-            Phase::Queued | Phase::Running => best
+            Phase::Waiting | Phase::Running => best
                 .map(|Best { obj, digest, .. }| Cage::SoFar { obj, digest })
                 .ok_or_else(|| not_ready("there is no cage yet; wait for the first one of the design")),
         }
-    }
-
-    /// The response for a storage error; damage fails the job and quarantines it.
-    fn fail_if_damaged(&self, store: &Store, error: StoreError) -> ApiError {
-        if self.deleted.is_cancelled() {
-            return ApiError::new(problem::NOT_FOUND, "the cage design was deleted");
-        }
-        let StoreError::Damaged { what, .. } = &error else {
-            return error.into();
-        };
-        let failed = ApiError::new(
-            problem::CAGE_FAILED,
-            "stored data of this design is damaged and was moved to quarantine; request the design again",
-        );
-        tracing::error!(job = %self.meta.id, %error, "a cage job is damaged and put in quarantine");
-        metrics::counter!("cager_quarantined_total").increment(1);
-        if let Err(error) = store.quarantine(Kind::CageJob, &self.meta.id, what) {
-            tracing::error!(job = %self.meta.id, %error, "it could not be moved");
-        }
-        self.set_phase(Phase::Failed(failed.problem.clone()));
-        failed
     }
 }
 
@@ -276,9 +219,9 @@ fn not_ready(detail: &str) -> ApiError {
     ApiError::new(problem::CAGE_NOT_READY, detail).retry_after(2)
 }
 
-fn state_of(phase: &Phase) -> CageState {
+fn state_of(phase: &Phase<Finished>) -> CageState {
     match phase {
-        Phase::Queued => CageState::Queued,
+        Phase::Waiting => CageState::Queued,
         Phase::Running => CageState::Running,
         Phase::Completed(_) => CageState::Completed,
         Phase::Failed(_) => CageState::Failed,

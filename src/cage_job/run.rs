@@ -1,13 +1,14 @@
 //! Running designs: a limited number at a time, tenants in turn, on threads of the lowest priority.
 
-use super::{Best, CageJob, Finished, Outcome, Phase, options, samples};
+use super::{Best, CageJob, Finished, options, samples};
 use crate::admission::{Budget, Held};
 use crate::config::ServeConfig;
 use crate::engine::threads;
+use crate::jobs::{MAX_ATTEMPTS, Outcome, Phase};
 use crate::preparation::read_part;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::StoreError;
+use crate::store::{Kind, StoreError};
 use crate::tasks::blocking;
 use cager_cages::{Design, DesignError, DesignOptions, Progress, design};
 use cager_geometry::mesh::Model;
@@ -19,9 +20,6 @@ use std::time::{Duration, Instant};
 
 /// How long after its time limit a design is stopped.
 const GRACE: Duration = Duration::from_secs(5);
-
-/// Number of attempts after which a design is given up, since it may be what crashes the process.
-const MAX_ATTEMPTS: u32 = 5;
 
 /// Function that designs cages; tests replace it.
 pub type Designer = dyn Fn(
@@ -57,6 +55,11 @@ impl DesignPool {
         Ok(Self { places: config.budget(config.max_designs as u64), pool, designer, bytes: AtomicU64::new(0) })
     }
 
+    /// Its threads, for all work that is as little urgent.
+    pub(crate) fn threads(&self) -> &rayon::ThreadPool {
+        &self.pool
+    }
+
     /// Memory of the frames of running designs, in bytes.
     pub(crate) fn bytes(&self) -> u64 {
         self.bytes.load(Relaxed)
@@ -88,7 +91,7 @@ impl Service {
         match ended {
             // An orderly stop does not count as an attempt.
             RunOutcome::Stopped => {
-                if let Err(error) = self.store.uncount_cage_job_attempt(&job.meta.id) {
+                if let Err(error) = self.store.uncount_attempt(Kind::CageJob, &job.meta.id) {
                     tracing::debug!(job = %job.meta.id, %error, "the count of its beginnings stays");
                 }
             }
@@ -116,7 +119,7 @@ impl Service {
                 Phase::Completed(found) if self.copy_outcome(job, &duplicate, found.clone()).await => return None,
                 // Its cage could not be read, and it has failed by now.
                 Phase::Completed(_) | Phase::Failed(_) => unreadable = true,
-                Phase::Queued | Phase::Running => {
+                Phase::Waiting | Phase::Running => {
                     tokio::select! {
                         _ = changes.changed() => {}
                         () = duplicate.deleted().cancelled() => {}
@@ -152,7 +155,7 @@ impl Service {
     fn design_with(&self, job: &Arc<CageJob>, clock: Instant) -> Result<(Finished, Vec<u8>), ApiError> {
         let meta = &job.meta;
         let damaged = |error: StoreError| job.fail_if_damaged(&self.store, error);
-        if self.store.count_cage_job_attempt(&meta.id).map_err(damaged)? > MAX_ATTEMPTS {
+        if self.store.count_attempt(Kind::CageJob, &meta.id).map_err(damaged)? > MAX_ATTEMPTS {
             let detail = format!(
                 "the service ended {MAX_ATTEMPTS} times while this cage was designed, so it is given up; try a lighter model, or fewer frames"
             );
@@ -172,7 +175,7 @@ impl Service {
 
         let latest = clock + options.time_limit.unwrap_or_default() + GRACE;
         let mut watch = |told: Progress<'_>| {
-            job.progressed(&told);
+            job.designed(&told);
             let over = Instant::now() > latest || job.deleted().is_cancelled() || self.stopping().is_cancelled();
             if over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };

@@ -2,10 +2,11 @@
 
 use super::cage_args::{CageArgs, GeneralArg};
 use super::checks::{check_capture, checked_files, warn_of_departures};
-use super::design::{self, default_vertices};
+use super::design;
 use super::dry_run::{read_files, tell_dry_run};
 use super::outputs::Outputs;
 use super::{grouped, progress, read_model, tell, warn};
+use crate::design::default_vertices;
 use crate::design::{read_frames, report as design_report};
 use crate::frames::CaptureFiles;
 use crate::report_page::{Contents, Kind, NO_PAGE, ReportPage, ShownCage, ShownMesh};

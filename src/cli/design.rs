@@ -1,17 +1,13 @@
 //! Cage design with a progress bar, for `cager cage` and `cager encode`.
 
 use super::progress;
+use crate::design::default_vertices;
 use anyhow::{Result, bail};
 use cager_cages::{Design, DesignError, DesignOptions, Goal, Progress};
 use cager_core::cage::CageError;
 use cager_geometry::mesh::{Model, TriMesh};
 use std::ops::ControlFlow;
 use std::path::Path;
-
-/// Vertices of a cage where no number is given: fewer for a model whose points could not determine so many.
-pub(super) fn default_vertices(points: usize) -> usize {
-    350.min(points / 2).max(4)
-}
 
 /// What the number of vertices of a cage around so many points follows from.
 pub(super) fn goal(vertices: Option<u32>, mean_error: Option<f64>, points: usize) -> Result<Goal> {

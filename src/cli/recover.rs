@@ -3,21 +3,19 @@
 use super::coding_args::goal;
 use super::dry_run::tell_dry_run;
 use super::outputs::Outputs;
-use super::recover_args::{Align, PersonMethod, RecoverArgs};
+use super::recover_args::{Align, JointsKind, PersonMethod, RecoverArgs};
 use super::rig::{read_manifold, read_rig};
 use super::solver_options::read_cage;
-use super::{design, grouped, human_bytes, progress, read_model, tell, warn};
-use crate::coding::InversionChoices;
-use crate::encode::{self, EncodeProgress, Encoded, Job};
-use crate::memory::Memory;
+use super::{grouped, human_bytes, progress, read_model, tell, warn};
+use crate::encode::{EncodeProgress, Encoded};
 use crate::origin::{move_to, own_origin};
-use crate::recover::{Person, RecoverJob, RecoverOptions, RecoverProgress, Recovered, RecoveryReport, recover};
+use crate::recover::{
+    Encoding, JOINTS_RATE, Person, RecoverJob, RecoverOptions, RecoverProgress, Recovered, RecoveryReport, cage_around,
+    recover,
+};
 use anyhow::{Context, Result, bail};
-use cager_cages::{EncloseOptions, enclose};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
-use cager_core::inversion::Handles;
-use cager_core::regularize::Regularizer;
 use cager_formats::{AtomicFile, MeshSequence, ScratchDir, Target, commit_together, mesh_sequence};
 use cager_geometry::mesh::{Model, Point};
 use cager_recover::manifold::Manifold;
@@ -25,6 +23,7 @@ use cager_recover::people::{FitOptions, Method};
 use cager_recover::rig::Rig;
 use std::io::Write;
 use std::path::Path;
+use std::sync::OnceLock;
 
 pub(super) fn run(args: &RecoverArgs) -> Result<()> {
     let files = [&args.template, &args.frames].into_iter().chain(&args.cage).chain(&args.rig).chain(&args.manifold);
@@ -85,13 +84,6 @@ fn person_options(method: PersonMethod) -> FitOptions {
     FitOptions { method, ..FitOptions::default() }
 }
 
-/// How joints are written.
-#[derive(Clone, Copy)]
-enum JointsKind {
-    Csv,
-    Bvh,
-}
-
 fn joints_target(outputs: &mut Outputs, path: &Path) -> Result<(Target, JointsKind)> {
     let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
     let kind = match extension.as_deref() {
@@ -119,8 +111,7 @@ fn cage(args: &RecoverArgs, template: &Model, origin: Option<Point>) -> Result<C
         return read_cage(path, false, origin);
     }
     let bar = progress::ticking("making a cage");
-    let options = EncloseOptions { vertices: design::default_vertices(template.points.len()), ..Default::default() };
-    let made = enclose(template, &options);
+    let made = cage_around(template);
     bar.finish_and_clear();
     let named = || args.template.display().to_string();
     Cage::new(made.with_context(named)?).with_context(named)
@@ -146,7 +137,8 @@ fn followed(
         template,
         cage,
         person,
-        files,
+        source: files,
+        pool: None,
         frame_rate: args.timing.fps,
         origin,
         options: RecoverOptions {
@@ -159,9 +151,9 @@ fn followed(
         },
         scratch,
     };
-    let (there, back) = (progress::frames("following", files.files.len()), std::cell::OnceCell::new());
+    let (there, back) = (progress::frames("following", files.files.len()), OnceLock::new());
     let recovered = recover(job, &|told| match told {
-        RecoverProgress::Followed(done) => there.set_position(done as u64),
+        RecoverProgress::Followed(found) => there.set_position(found.frame as u64 + 1),
         RecoverProgress::Refined(done) => {
             there.finish_and_clear();
             back.get_or_init(|| progress::frames("refining", files.files.len())).set_position(done as u64);
@@ -172,9 +164,6 @@ fn followed(
     Ok(recovered?)
 }
 
-/// Frames per second of joints where --fps does not tell.
-const DEFAULT_RATE: f64 = 30.0;
-
 /// Encodes what was recovered.
 fn write(
     args: &RecoverArgs,
@@ -184,7 +173,7 @@ fn write(
     report_file: Option<AtomicFile>,
     joints_file: Option<(AtomicFile, JointsKind)>,
 ) -> Result<()> {
-    let Recovered { rest, cage, mut frames, report, joints, warnings } = recovered;
+    let Recovered { rest, cage, mut frames, report, joints, warnings, .. } = recovered;
     let count = report.frames.len();
     let goal = goal(&args.coding, true, &rest, count)?;
     if args.offsets && goal.is_none() {
@@ -192,43 +181,25 @@ fn write(
             "--offsets: cages alone are stored, without what leaves them; add --max-error to store that too".to_owned()
         ]);
     }
-    // Where points stay in their cages, all of them tell these exactly.
-    let exact = goal.is_none() && !args.offsets;
-    let choices = InversionChoices {
-        system,
-        handles: exact.then_some(Handles::All),
-        regularizer: Regularizer::default(),
-        spectrum: exact.then_some(0),
-        lambda: None,
-        is_coded: goal.is_some(),
-    };
     let bar = progress::PreparationBar::new("encoding", count);
-    let job = Job {
-        rest: &rest,
-        cage: &cage,
-        frames: &mut frames,
-        output,
-        system,
-        options: choices.options(system.values(&cage).unknowns()),
-        matrix: None,
-        choose: None,
-        memory: Memory::half_of_free(),
-        goal,
-        origin,
-        exact_rest: args.coding.exact_rest,
-    };
-    let result = encode::encode(job, &|told| match told {
+    let (offsets, exact_rest) = (args.offsets, args.coding.exact_rest);
+    let encoding = Encoding { output, system, goal, offsets, origin, exact_rest };
+    let result = encoding.write((&rest, &cage), &mut frames, &|told| match told {
         EncodeProgress::Preparing(step) => bar.preparing(step),
         EncodeProgress::Frames(done) => bar.done(done),
     });
     bar.finish();
     let Encoded { report: encoded, container } = result?;
-    let report_file = report_file.map(|file| write_report(file, &report)).transpose()?;
+    let report_file = report_file.map(|mut file| {
+        file.write_all(&report.json()?)?;
+        Ok::<_, anyhow::Error>(file)
+    });
+    let report_file = report_file.transpose()?;
     let numbers: Vec<f64> = report.frames.iter().map(|frame| frame.number).collect();
     let joints_file = joints_file.zip(joints).map(|((mut file, kind), joints)| {
         match kind {
             JointsKind::Csv => file.write_all(joints.csv(&numbers).as_bytes()),
-            JointsKind::Bvh => file.write_all(&joints.bvh(args.timing.fps.unwrap_or(DEFAULT_RATE))),
+            JointsKind::Bvh => file.write_all(&joints.bvh(args.timing.fps.unwrap_or(JOINTS_RATE))),
         }
         .map(|()| file)
     });
@@ -237,13 +208,6 @@ fn write(
     warn(&warnings);
     warn(&encoded.warnings);
     tell(&summary(&report, &encoded, output.path()))
-}
-
-fn write_report(mut file: AtomicFile, report: &RecoveryReport) -> Result<AtomicFile> {
-    let mut text = serde_json::to_vec_pretty(report)?;
-    text.push(b'\n');
-    file.write_all(&text)?;
-    Ok(file)
 }
 
 fn summary(report: &RecoveryReport, encoded: &cager_proto::report::Report, output: &Path) -> String {

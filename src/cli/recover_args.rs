@@ -98,3 +98,10 @@ pub(super) enum PersonMethod {
     Robust,
     Paper,
 }
+
+/// How joints are written.
+#[derive(Clone, Copy)]
+pub(super) enum JointsKind {
+    Csv,
+    Bvh,
+}

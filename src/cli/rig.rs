@@ -3,11 +3,11 @@
 use super::outputs::{OutputArgs, Outputs};
 use super::{grouped, human_bytes, progress, read_model, tell, warn};
 use crate::mismatch::Up;
+use crate::recover::{manifold_of, rig_of};
 use anyhow::{Context, Result, bail};
 use cager_formats::biovision::{Clip, read_bvh};
 use cager_formats::{AtomicFile, Target};
 use cager_geometry::mesh::{Point, TriMesh};
-use cager_geometry::vector::{distance, norm};
 use cager_recover::manifold::{Examples, Kind, Manifold};
 use cager_recover::poses::{Naming, SkeletonPoses};
 use cager_recover::rig::{CAGE_FACES, CAGE_VERTICES, PlacementOptions, Rig, place};
@@ -160,19 +160,15 @@ fn poses_of(path: &Path, rig: &Rig, naming: Option<&Naming>, most: usize) -> Res
 }
 
 pub(super) fn read_rig(path: &Path) -> Result<Rig> {
-    named(path, Rig::from_json(&read(path)?))
+    of_file(path, rig_of(&read(path)?))
 }
 
-/// A manifold that was learned for this rig: where the waist is in the pelvis's frame is the same in every pose.
 pub(super) fn read_manifold(path: &Path, rig: &Rig) -> Result<Manifold> {
-    let manifold = named(path, Manifold::from_json(&read(path)?))?;
-    let (pose, rest) = (manifold.pose(&vec![0.0; manifold.dims()]), rig.rest_pose());
-    let waist = |pose: &[f64]| [6, 7, 8].map(|k| pose[k] - pose[k - 6]);
-    let (found, own) = (waist(&pose), waist(&rest));
-    if distance(found, own).is_nan() || distance(found, own) > 0.01 * norm(own) {
-        bail!("{}: was learned for another rig; run `cager manifold` with this one", path.display());
-    }
-    Ok(manifold)
+    of_file(path, manifold_of(&read(path)?, rig))
+}
+
+fn of_file<T>(path: &Path, result: Result<T, String>) -> Result<T> {
+    result.map_err(|what| anyhow::anyhow!("{}: {what}", path.display()))
 }
 
 fn read(path: &Path) -> Result<Vec<u8>> {

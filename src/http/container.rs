@@ -21,8 +21,7 @@ use http::header::{CACHE_CONTROL, CONTENT_DISPOSITION, CONTENT_TYPE};
 use http::{HeaderMap, HeaderValue};
 use serde::Deserialize;
 use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom, Write};
-use std::ops::Range;
+use std::io::{self, Write};
 use std::sync::{Arc, Mutex};
 
 const MEDIA_TYPE: &str = "application/vnd.cager";
@@ -78,22 +77,11 @@ async fn whole(
 ) -> Result<Response, ApiError> {
     let path = service.store.container_path(&session.meta.id);
     let opened = blocking(move || File::open(&path).map_err(|error| StoreError::of(&path, "open", error))).await?;
-    let file = Mutex::new(opened.map_err(|error| session.storage_error(error))?);
-    let read = move |range: Range<u64>| -> io::Result<Bytes> {
-        let mut file = lock(&file);
-        let mut bytes = vec![0; (range.end - range.start) as usize];
-        file.seek(SeekFrom::Start(range.start))?;
-        file.read_exact(&mut bytes)?;
-        Ok(bytes.into())
-    };
-    let container = Immutable {
-        length: completion.container_bytes,
-        etag: completion.container_digest,
-        media_type: MEDIA_TYPE,
-        public: !service.access.is_guarded(),
-        room: service.download_memory.nothing(&tenant.name),
-        read: Arc::new(read),
-    };
+    let file = opened.map_err(|error| session.storage_error(error))?;
+    let Completion { container_bytes, container_digest, .. } = completion;
+    let room = service.download_memory.nothing(&tenant.name);
+    let public = !service.access.is_guarded();
+    let container = Immutable::of_file(file, container_bytes, container_digest, MEDIA_TYPE, room, public);
     Ok(container.respond(headers))
 }
 

@@ -37,7 +37,7 @@ pub(crate) async fn get(
 ) -> Result<Response, ApiError> {
     let place = service.stream(&tenant)?;
     let (changes, deleted) = (session.changes(), session.deleted().clone());
-    let look = move || {
+    let look = move |_: Option<&str>| {
         let progress = session.progress();
         ProgressEvent {
             id: id_of(&progress),

@@ -1,9 +1,9 @@
-//! Extractors: the tenant, the tenant's session or cage job, validated queries and bodies.
+//! Extractors: the tenant, the tenant's session or job, validated queries and bodies.
 
 use super::guarded::revocable;
 use super::listen::ConnectionHandle;
 use crate::auth::{Denied, Grant, Scope, Tenant};
-use crate::cage_job::CageJob;
+use crate::jobs::{Job, Work, kind_of};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::Session;
@@ -92,15 +92,15 @@ impl TenantResource for Session {
     }
 }
 
-impl TenantResource for CageJob {
-    const KIND: Kind = Kind::CageJob;
+impl<W: Work> TenantResource for Job<W> {
+    const KIND: Kind = kind_of::<W>();
 
     fn find(service: &Service, tenant: &str, id: &str) -> Result<Arc<Self>, ApiError> {
-        service.cage_jobs.find(tenant, id)
+        W::jobs(service).find(tenant, id)
     }
 }
 
-/// The tenant's session or cage job named in the path, whether or not its files can be read. Rejects with 404 if it does not exist or
+/// The tenant's session or job named in the path, whether or not its files can be read. Rejects with 404 if it does not exist or
 /// belongs to another tenant, and with 503 if its owner cannot be read.
 pub(crate) struct Requested<T>(pub(crate) Arc<T>);
 
@@ -139,19 +139,19 @@ impl FromRequestParts<Arc<Service>> for RequestedSession {
     }
 }
 
-/// The tenant's cage job named in the path. Rejects as [`Requested`], and with 503 if its files cannot be read.
-pub(crate) struct RequestedCageJob {
+/// The tenant's job named in the path. Rejects as [`Requested`], and with 503 if its files cannot be read.
+pub(crate) struct RequestedJob<W: Work> {
     pub(crate) tenant: Arc<Tenant>,
-    pub(crate) job: Arc<CageJob>,
+    pub(crate) job: Arc<Job<W>>,
 }
 
-impl FromRequestParts<Arc<Service>> for RequestedCageJob {
+impl<W: Work> FromRequestParts<Arc<Service>> for RequestedJob<W> {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, service: &Arc<Service>) -> Result<Self, ApiError> {
         let Caller(tenant) = Caller::from_request_parts(parts, service).await?;
-        let Requested(job) = Requested::<CageJob>::from_request_parts(parts, service).await?;
-        service.retry_unreadable(Kind::CageJob, &tenant.name, &job.meta.id).await?;
+        let Requested(job) = Requested::<Job<W>>::from_request_parts(parts, service).await?;
+        service.retry_unreadable(kind_of::<W>(), &tenant.name, job.id()).await?;
         Ok(Self { tenant, job })
     }
 }

@@ -21,7 +21,7 @@ struct MeterState {
     received: u64,
     began: Instant,
     /// Subject of the error message for a body that is too large.
-    what: &'static str,
+    what: String,
     /// The error that ended the body.
     refused: Option<ApiError>,
     done: bool,
@@ -33,13 +33,13 @@ impl Metered {
         service: &Arc<Service>,
         tenant: &Tenant,
         request: Request,
-        what: &'static str,
+        what: impl Into<String>,
     ) -> (Self, Request) {
         let counted = MeterState {
             room: service.upload_memory.nothing(&tenant.name),
             received: 0,
             began: Instant::now(),
-            what,
+            what: what.into(),
             refused: None,
             done: false,
         };

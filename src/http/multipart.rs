@@ -1,4 +1,4 @@
-//! Parses the multipart body that creates a session.
+//! Parses multipart bodies: the files that a session or a recovery is made from.
 
 use super::extract::{content_type, idempotency_key};
 use super::frames::{SLOWEST_BYTES_PER_SECOND, body_error};
@@ -16,6 +16,7 @@ use axum::extract::{FromRequest, Multipart, Request};
 use cager_proto::messages::SessionOptions;
 use futures_util::{StreamExt as _, stream};
 use serde::de::DeserializeOwned;
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -63,15 +64,51 @@ pub(super) fn check_form_header(
     Ok(FormHeader { idempotency_key: idempotency_key(headers)?, patience })
 }
 
-/// Reads all parts.
+/// Files of a form by the names of their parts, and its options.
+pub(super) struct Files<T> {
+    pub(super) files: HashMap<&'static str, NamedFile>,
+    pub(super) options: T,
+    /// Permit for their memory.
+    pub(super) room: Held,
+}
+
+impl<T> Files<T> {
+    /// The file of a part that has to be there.
+    ///
+    /// # Errors
+    /// It is not there.
+    pub(super) fn take(&mut self, part: &str, what: &str) -> Result<NamedFile, ApiError> {
+        let missing = || bad(format!("part {part} is missing; send {what} as a file"));
+        self.files.remove(part).ok_or_else(missing)
+    }
+}
+
+/// Reads the parts that make a session.
 ///
 /// # Errors
 /// Parts that are missing, twice there, unknown or too large; no room.
 pub(crate) async fn read(service: &Arc<Service>, tenant: &Tenant, request: Request) -> Result<Parts, ApiError> {
-    let (metered, request) = Metered::new(service, tenant, request, "rest pose and cage have");
+    let mut form = read_files(service, tenant, request, &["rest", "cage", MATRIX], "rest pose and cage").await?;
+    let rest = form.take("rest", "the rest pose")?;
+    let uploaded = Uploaded { rest, cage: form.files.remove("cage"), matrix: form.files.remove(MATRIX) };
+    Ok(Parts { uploaded, options: form.options, room: form.room })
+}
+
+/// Reads files into memory, and options; `what` are all the files together.
+///
+/// # Errors
+/// Parts that are twice there, unknown or too large; no room.
+pub(super) async fn read_files<T: DeserializeOwned + Default>(
+    service: &Arc<Service>,
+    tenant: &Tenant,
+    request: Request,
+    parts: &[&'static str],
+    what: &str,
+) -> Result<Files<T>, ApiError> {
+    let (metered, request) = Metered::new(service, tenant, request, format!("{what} have"));
     let body = form(request).await?;
-    let ((uploaded, options), room) = metered.finish(read_parts(service, body).await)?;
-    Ok(Parts { uploaded, options, room })
+    let ((files, options), room) = metered.finish(read_parts(service, body, parts, what).await)?;
+    Ok(Files { files, options, room })
 }
 
 /// The form in a request's body.
@@ -93,39 +130,41 @@ pub(super) async fn form(request: Request) -> Result<Multipart, ApiError> {
         .map_err(|error| bad(format!("the multipart body cannot be read: {}", error.body_text())))
 }
 
-async fn read_parts(service: &Service, mut body: Multipart) -> Result<(Uploaded, SessionOptions), ApiError> {
-    let (mut rest, mut cage, mut matrix, mut options) = (None, None, None, None);
+async fn read_parts<T: DeserializeOwned + Default>(
+    service: &Service,
+    mut body: Multipart,
+    parts: &[&'static str],
+    what: &str,
+) -> Result<(HashMap<&'static str, NamedFile>, T), ApiError> {
+    let (mut files, mut options) = (HashMap::new(), None);
     let mut left = service.config.max_rest_bytes;
     while let Some(field) = body.next_field().await.map_err(|e| broken(&e))? {
         let part = field.name().unwrap_or_default().to_owned();
         let twice = || bad(format!("part {part:?} is there twice; send it once"));
-        match part.as_str() {
-            "rest" | "cage" | MATRIX => {
-                let place = match part.as_str() {
-                    "rest" => &mut rest,
-                    "cage" => &mut cage,
-                    _ => &mut matrix,
-                };
-                if place.is_some() {
-                    return Err(twice());
-                }
-                *place = Some(read_file(service, &part, field, &mut left).await?);
+        if part == "options" {
+            if options.is_some() {
+                return Err(twice());
             }
-            "options" => {
-                if options.is_some() {
-                    return Err(twice());
-                }
-                options = Some(read_options(field).await?);
+            options = Some(read_options(field).await?);
+        } else if let Some(known) = parts.iter().find(|known| **known == part) {
+            if files.contains_key(known) {
+                return Err(twice());
             }
-            _ => return Err(bad(format!("part {part:?} is unknown; send rest, cage, regularizer_matrix and options"))),
+            files.insert(*known, read_file(service, &part, field, &mut left, what).await?);
+        } else {
+            return Err(bad(format!("part {part:?} is unknown; send {} and options", parts.join(", "))));
         }
     }
-    let rest = rest.ok_or_else(|| bad("part rest is missing; send the rest pose as a file".to_owned()))?;
-    let uploaded = Uploaded { rest, cage, matrix };
-    Ok((uploaded, options.unwrap_or_default()))
+    Ok((files, options.unwrap_or_default()))
 }
 
-async fn read_file(service: &Service, part: &str, mut field: Field<'_>, left: &mut u64) -> Result<NamedFile, ApiError> {
+async fn read_file(
+    service: &Service,
+    part: &str,
+    mut field: Field<'_>,
+    left: &mut u64,
+    what: &str,
+) -> Result<NamedFile, ApiError> {
     let name = file_name(&field);
     // There is one format of matrices, so that their names say nothing.
     let name = if part == MATRIX && name.is_empty() { format!("{MATRIX}.mtx") } else { name };
@@ -138,7 +177,7 @@ async fn read_file(service: &Service, part: &str, mut field: Field<'_>, left: &m
         *left = left.checked_sub(chunk.len() as u64).ok_or_else(|| {
             service.rejected("body_too_large");
             let limit = service.config.max_rest_bytes;
-            let detail = format!("rest pose and cage are larger than {limit} bytes together; send a lighter model");
+            let detail = format!("{what} are larger than {limit} bytes together; send a lighter model");
             ApiError::new(problem::TOO_LARGE, detail).limit(limit)
         })?;
         bytes.extend_from_slice(&chunk);

@@ -10,6 +10,7 @@ use cager_proto::cage_messages::{CageJob, CageJobList, CageOptions, CageProgress
 use cager_proto::messages::{
     CageSource, FrameErrors, FrameResult, Problem, RestCage, Session, SessionList, SessionOptions,
 };
+use cager_proto::recovery_messages::{Recovery, RecoveryList, RecoveryOptions, RecoveryProgress};
 use http::header;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -39,6 +40,45 @@ pub(crate) struct Id {
 pub(crate) struct CageId {
     /// Id of the cage design.
     id: String,
+}
+
+/// The path parameter of a recovery.
+#[derive(IntoParams)]
+#[into_params(parameter_in = Path)]
+#[allow(dead_code, reason = "it only describes")]
+pub(crate) struct RecoveryId {
+    /// Id of the recovery.
+    id: String,
+}
+
+/// The parts of a request for a recovery.
+#[derive(ToSchema)]
+#[allow(dead_code, reason = "it only describes")]
+pub(crate) struct NewRecoveryForm {
+    /// Mesh that is to move, with faces, a file whose name ends in .obj, .ply, .off, .stl or .glb.
+    #[schema(value_type = String, format = Binary)]
+    template: Vec<u8>,
+    /// Closed cage around it, a file of one of the same formats; one is made where it is left out.
+    #[schema(value_type = String, format = Binary, required = false)]
+    cage: Vec<u8>,
+    /// Rig of a person, as `cager rig` writes it, in place of a cage.
+    #[schema(value_type = String, format = Binary, required = false)]
+    rig: Vec<u8>,
+    /// Poses that are usual, as `cager manifold` writes them, with a rig.
+    #[schema(value_type = String, format = Binary, required = false)]
+    manifold: Vec<u8>,
+    /// Choices.
+    #[schema(required = false)]
+    options: RecoveryOptions,
+}
+
+/// Frames of a recovery.
+#[derive(ToSchema)]
+#[allow(dead_code, reason = "it only describes")]
+pub(crate) struct SurfacesForm {
+    /// Meshes or point clouds, each a part of its own, files whose names end in .obj, .ply, .off, .stl or .glb.
+    #[schema(value_type = Vec<String>, format = Binary)]
+    frame: Vec<Vec<u8>>,
 }
 
 /// The parts of a request for a cage design.
@@ -96,13 +136,14 @@ pub(crate) struct NewSessionForm {
         description = "Turns animated mesh captures into cages: make a session from a rest pose and its cage, post frames, follow or download the cages.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0"),
     ),
-    components(schemas(CageJob, CageJobList, CageOptions, CageProgress, CageSource, Event, FrameErrors, FrameResult, Problem, RestCage, RowsQuery, Session, SessionList, SessionOptions)),
+    components(schemas(CageJob, CageJobList, CageOptions, CageProgress, CageSource, Event, FrameErrors, FrameResult, Problem, Recovery, RecoveryList, RecoveryOptions, RecoveryProgress, RestCage, RowsQuery, Session, SessionList, SessionOptions)),
     security(("token" = [])),
     tags(
         (name = "sessions", description = "Sessions and their progress"),
         (name = "frames", description = "Frames of a capture"),
         (name = "results", description = "What comes out"),
         (name = "cages", description = "Cages designed from a motion"),
+        (name = "recoveries", description = "Animations recovered from surfaces without correspondence"),
         (name = "operation", description = "For operators"),
     ),
     modifiers(&Token),
@@ -169,7 +210,7 @@ pub(crate) fn finished(mut document: utoipa::openapi::OpenApi) -> Value {
     let mut document = serde_json::to_value(&document).unwrap_or_default();
     fix_u32_ranges(&mut document);
     let schemas = &mut document["components"]["schemas"];
-    for form in ["NewSessionForm", "NewCageForm", "OtherModelForm"] {
+    for form in ["NewSessionForm", "NewCageForm", "NewRecoveryForm", "OtherModelForm", "SurfacesForm"] {
         schemas[form]["additionalProperties"] = false.into();
     }
     document
@@ -245,6 +286,8 @@ fn describe_content(media_type: &str, content: &mut RefOr<Content>) {
     if media_type == "multipart/form-data" {
         let files: &[_] = match form(content) {
             "OtherModelForm" => &[("model", "obj")],
+            "SurfacesForm" => &[("frame", "ply")],
+            "NewRecoveryForm" => &[("template", "obj"), ("cage", "obj"), ("rig", "json"), ("manifold", "json")],
             "NewCageForm" => &[("rest", "obj"), ("frames", "npy")],
             _ => &[("rest", "obj"), ("cage", "obj")],
         };
@@ -257,7 +300,7 @@ fn describe_content(media_type: &str, content: &mut RefOr<Content>) {
             let part_headers = EncodingBuilder::new().header("Content-Disposition", name.build());
             content.encoding.insert((*part).to_owned(), part_headers.build());
         }
-        if form(content) != "OtherModelForm" {
+        if !matches!(form(content), "OtherModelForm" | "SurfacesForm") {
             let options = EncodingBuilder::new().content_type(Some("application/json".to_owned()));
             content.encoding.insert("options".to_owned(), options.build());
         }

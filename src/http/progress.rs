@@ -22,8 +22,8 @@ pub(super) struct ProgressSource {
     /// Notifies of changes.
     pub(super) changes: watch::Receiver<u64>,
     pub(super) deleted: CancellationToken,
-    /// The current state.
-    pub(super) look: Box<dyn Fn() -> ProgressEvent + Send + Sync>,
+    /// The current state, for who was told the event with this id last.
+    pub(super) look: Box<dyn Fn(Option<&str>) -> ProgressEvent + Send + Sync>,
 }
 
 /// An event.
@@ -48,12 +48,12 @@ pub(super) fn stream(service: Arc<Service>, place: Held, headers: &HeaderMap, fo
                 if followed.deleted.is_cancelled() {
                     return Some((Ok(Bytes::from_static(b"event: deleted\ndata: {}\n\n")), None));
                 }
-                let ProgressEvent { id, last, .. } = (followed.look)();
+                let ProgressEvent { id, last, .. } = (followed.look)(heard.as_deref());
                 if heard.as_deref() != Some(id.as_str()) {
                     if heard.is_some() {
                         tokio::time::sleep(MIN_EVENT_INTERVAL).await;
                     }
-                    let ProgressEvent { id, data, .. } = (followed.look)();
+                    let ProgressEvent { id, data, last } = (followed.look)(heard.as_deref());
                     let event = format!("event: progress\nid: {id}\ndata: {data}\n\n");
                     let rest = (!last).then_some((Some(id), followed, place));
                     return Some((Ok::<_, io::Error>(Bytes::from(event)), rest));

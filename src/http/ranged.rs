@@ -2,13 +2,15 @@
 
 use crate::admission::Held;
 use crate::problem::{self, ApiError};
+use crate::sync::lock;
 use axum::body::Body;
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
 use http::{HeaderMap, HeaderValue, StatusCode, header};
-use std::io;
+use std::fs::File;
+use std::io::{self, Read as _, Seek as _, SeekFrom};
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 /// Bytes read and sent at a time.
 const PIECE: u64 = 512 << 10;
@@ -28,6 +30,26 @@ pub(crate) struct Immutable {
 }
 
 impl Immutable {
+    /// A file of this length, whose digest is its tag.
+    pub(crate) fn of_file(
+        file: File,
+        length: u64,
+        digest: String,
+        media_type: &'static str,
+        room: Held,
+        public: bool,
+    ) -> Self {
+        let file = Mutex::new(file);
+        let read = move |range: Range<u64>| {
+            let mut file = lock(&file);
+            let mut bytes = vec![0; (range.end - range.start) as usize];
+            file.seek(SeekFrom::Start(range.start))?;
+            file.read_exact(&mut bytes)?;
+            Ok(bytes.into())
+        };
+        Self { length, etag: digest, media_type, public, room, read: Arc::new(read) }
+    }
+
     /// The response to a request with these headers; 416 for a range outside the content, 429 or 503 without memory.
     pub(crate) fn respond(mut self, headers: &HeaderMap) -> Response {
         let etag = format!("\"{}\"", self.etag);

@@ -6,7 +6,7 @@ use super::guarded::with_permit;
 use super::respond::PROBLEM_JSON;
 use super::{
     cage, cage_jobs, cages, container, coordinates, decode, errors, events, extract, frames, health, openapi, origin,
-    page, sent, sessions,
+    page, recoveries, sent, sessions,
 };
 use crate::problem::{self, ApiError, Kind};
 use crate::service::Service;
@@ -46,6 +46,15 @@ fn quick() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(cage_jobs::jobs::get, cage_jobs::jobs::delete))
         .routes(routes!(cage_jobs::events::get))
         .routes(routes!(cage_jobs::cage_obj::get))
+        .routes(routes!(recoveries::jobs::list))
+        .routes(routes!(recoveries::jobs::get, recoveries::jobs::delete))
+        .routes(routes!(recoveries::jobs::complete))
+        .routes(routes!(recoveries::events::get))
+        .routes(routes!(recoveries::cages::get))
+        .routes(routes!(recoveries::results::container))
+        .routes(routes!(recoveries::results::report))
+        .routes(routes!(recoveries::results::joints_csv))
+        .routes(routes!(recoveries::results::joints_bvh))
 }
 
 /// Routes that take as long as their work.
@@ -60,6 +69,8 @@ fn streaming() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(frames::post))
         .routes(routes!(decode::post))
         .routes(routes!(cage_jobs::create::create))
+        .routes(routes!(recoveries::create::create))
+        .routes(routes!(recoveries::frames::post))
 }
 
 /// Routes without authentication and limits, for probes.

@@ -5,6 +5,8 @@ use super::frames::too_slow;
 use super::multipart::FormHeader;
 use super::respond::JsonResult;
 use super::{multipart, openapi};
+use crate::auth::Tenant;
+use crate::jobs::{Job, Jobs, Work};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::create::NewSession;
@@ -53,6 +55,17 @@ pub(crate) async fn create(
 pub(crate) struct PageQuery {
     /// The `next` of the page before.
     pub(super) after: Option<String>,
+}
+
+impl PageQuery {
+    /// A page of a tenant's jobs, and where the next one begins.
+    pub(super) fn page<W: Work>(&self, jobs: &Jobs<W>, tenant: &Tenant) -> (Vec<Arc<Job<W>>>, Option<String>) {
+        let mut page = jobs.page(&tenant.name, self.after.as_deref(), PAGE + 1);
+        let more = page.len() > PAGE;
+        page.truncate(PAGE);
+        let next = page.last().filter(|_| more).map(|job| job.id().to_owned());
+        (page, next)
+    }
 }
 
 /// Lists the tenant's sessions, newest first, a hundred at a time; of missing frames the first ranges.

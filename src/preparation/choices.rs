@@ -75,7 +75,10 @@ impl Choices {
 }
 
 /// What the container is to meet.
-fn goal(options: &SessionOptions) -> Result<Option<Goal>, ApiError> {
+///
+/// # Errors
+/// Options that contradict each other or are out of range.
+pub(crate) fn goal(options: &SessionOptions) -> Result<Option<Goal>, ApiError> {
     let refuse = |detail: String| Err(ApiError::new(problem::INVALID_OPTIONS, detail));
     let SessionOptions { max_error, mean_error, target_size, quality, frames, .. } = options;
     let names = [

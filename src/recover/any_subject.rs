@@ -3,8 +3,8 @@
 use super::finish::Finisher;
 use super::placement::{area, check_start};
 use super::report::{FrameReport, How};
-use super::surfaces::{Followed, Seen, SurfaceFiles};
-use super::{RecoverError, RecoverProgress, each};
+use super::surfaces::{Followed, Seen, Surfaces};
+use super::{Finished, RecoverError, RecoverProgress, Watch};
 use cager_core::cage::Cage;
 use cager_geometry::linalg::tall_product;
 use cager_geometry::mesh::{Model, Point, TriMesh};
@@ -41,19 +41,19 @@ impl<'a> Recovering<'a> {
     /// The first pass, from the first frame.
     pub(super) fn follow(
         &self,
-        surfaces: &SurfaceFiles<'_>,
+        surfaces: &Surfaces<'_>,
         cage: &Cage,
-        force: bool,
-        progress: &dyn Fn(RecoverProgress),
+        watch: &Watch<'_>,
     ) -> Result<Vec<TrackedFrame>, RecoverError> {
         let mut tracker = Tracker::new(&self.template, cage.vertices().to_vec());
-        let mut tracked = Vec::with_capacity(surfaces.files.len());
-        each(surfaces, (0..surfaces.files.len()).collect(), force, |_, seen| {
-            tracked.push(match seen {
+        let mut tracked = Vec::new();
+        surfaces.each(surfaces.arriving(), |frame, seen| {
+            let found = match seen {
                 Some(seen) => tracker.follow(&seen.target),
                 None => tracker.skip(),
-            });
-            progress(RecoverProgress::Followed(tracked.len()));
+            };
+            watch(How::of(&found).first_look(frame, &found.cage));
+            tracked.push(found);
             Ok(())
         })?;
         Ok(tracked)
@@ -69,23 +69,22 @@ impl<'a> Recovering<'a> {
     /// The second pass, from the last frame: frames that lay badly from the frame after them, smoothed between their neighbours, measured and written.
     pub(super) fn refine(
         &self,
-        surfaces: &SurfaceFiles<'_>,
-        tracked: &mut [TrackedFrame],
-        finisher: &mut Finisher<'_>,
-        force: bool,
-        progress: &dyn Fn(RecoverProgress),
-    ) -> Result<Vec<FrameReport>, RecoverError> {
-        let pass = SecondPass::new(&self.template, tracked);
+        surfaces: &Surfaces<'_>,
+        mut tracked: Vec<TrackedFrame>,
+        mut finisher: Finisher<'_>,
+        watch: &Watch<'_>,
+    ) -> Result<Finished, RecoverError> {
+        let pass = SecondPass::new(&self.template, &tracked);
         let mut reports: VecDeque<FrameReport> = VecDeque::with_capacity(tracked.len());
         let mut finish = |frame: usize, seen: Option<&Followed>, tracked: &[TrackedFrame]| {
             let positions = self.positions(&tracked[frame].cage);
             reports.push_front(finisher.finish(frame, positions, How::of(&tracked[frame]), seen)?);
-            progress(RecoverProgress::Refined(reports.len()));
+            watch(RecoverProgress::Refined(reports.len()));
             Ok::<_, RecoverError>(())
         };
         // The frame after the one that is looked at, which waits for its other neighbour.
         let mut waiting: Option<(usize, Option<Followed>)> = None;
-        each(surfaces, (0..tracked.len()).rev().collect(), force, |frame, seen| {
+        surfaces.each((0..tracked.len()).rev().map(Ok), |frame, seen| {
             if let Some(seen) = seen.as_ref().filter(|_| pass.wants(frame)) {
                 let (at, after) = tracked[frame..].split_at_mut(1);
                 let after: Vec<&[Point]> = after.iter().take(2).map(|frame| &frame.cage[..]).collect();
@@ -98,13 +97,14 @@ impl<'a> Recovering<'a> {
                     let cage = smoothed(&self.template, &at.target, &tracked[later].cage, beside);
                     tracked[later].cage = cage;
                 }
-                finish(later, at.as_ref(), tracked)?;
+                finish(later, at.as_ref(), &tracked)?;
             }
             Ok(())
         })?;
         if let Some((frame, seen)) = waiting {
-            finish(frame, seen.as_ref(), tracked)?;
+            surfaces.on_pool(|| finish(frame, seen.as_ref(), &tracked))?;
         }
-        Ok(reports.into())
+        let cages = tracked.into_iter().map(|frame| frame.cage).collect();
+        Ok(Finished { reports: reports.into(), cages, joints: None, frames: finisher.into_frames()? })
     }
 }

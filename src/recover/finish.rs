@@ -1,9 +1,12 @@
 //! Frames whose cages are known: vertices that leave their cage, distances, positions written.
 
 use super::RecoverError;
+use super::distances::distances;
 use super::positions::RecoveredFrames;
 use super::report::{FrameReport, How};
-use super::surfaces::{Followed, distances};
+use super::source::SurfaceSource;
+use super::surfaces::Followed;
+use cager_formats::FrameReader;
 use cager_geometry::mesh::{Point, TriMesh};
 use cager_recover::offsets::OffsetSolver;
 use cager_registration::{SurfacePoint, sample_surface};
@@ -11,6 +14,7 @@ use cager_registration::{SurfacePoint, sample_surface};
 /// What is done with every frame in the end.
 pub(super) struct Finisher<'a> {
     rest: &'a TriMesh,
+    source: &'a dyn SurfaceSource,
     diagonal: f64,
     offsets: Option<OffsetSolver>,
     samples: Vec<SurfacePoint>,
@@ -22,9 +26,15 @@ const MEASURED: usize = 3000;
 
 impl<'a> Finisher<'a> {
     /// For a template at rest; with offsets where vertices may leave the cage.
-    pub(super) fn new(rest: &'a TriMesh, diagonal: f64, offsets: bool, written: RecoveredFrames) -> Self {
+    pub(super) fn new(
+        rest: &'a TriMesh,
+        source: &'a dyn SurfaceSource,
+        diagonal: f64,
+        offsets: bool,
+        written: RecoveredFrames,
+    ) -> Self {
         let samples = sample_surface(&rest.vertices, &rest.triangles, MEASURED, 1);
-        Self { rest, diagonal, offsets: offsets.then(|| OffsetSolver::new(rest, diagonal)), samples, written }
+        Self { rest, source, diagonal, offsets: offsets.then(|| OffsetSolver::new(rest, diagonal)), samples, written }
     }
 
     /// Writes a frame from where its cage has the template's points.
@@ -41,9 +51,9 @@ impl<'a> Finisher<'a> {
         self.written.write(frame, &positions)?;
         let mesh = TriMesh { vertices: positions, triangles: self.rest.triangles.clone() };
         let points: Vec<Point> = self.samples.iter().map(|sample| sample.at(&mesh.vertices, &mesh.triangles)).collect();
-        let (to_surface, from_surface) =
-            seen.map_or((None, None), |seen| distances(&mesh, &points, seen, self.diagonal));
-        Ok(FrameReport::new(how, to_surface, from_surface, seen.map(|seen| seen.notes)))
+        let distances = seen.map_or((None, None), |seen| distances(&mesh, &points, seen, self.diagonal));
+        let named = (self.written.number(frame), self.source.file(frame));
+        Ok(FrameReport::new(named, how, distances, seen.map(|seen| seen.notes)))
     }
 
     /// All frames, ready to be read.

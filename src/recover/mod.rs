@@ -1,24 +1,32 @@
 //! One animation of a template from surfaces that have no correspondence: files in, frames out that can be encoded as any capture.
 
 mod any_subject;
+mod distances;
+mod encoding;
 mod finish;
 mod people;
 mod placement;
 mod positions;
 mod report;
+mod source;
 mod surfaces;
 
+pub use distances::Distances;
+pub(crate) use encoding::Encoding;
+pub(crate) use people::{JOINTS_RATE, manifold_of, rig_of};
 pub use people::{Joints, Person};
 pub use placement::Placement;
 pub use positions::RecoveredFrames;
 pub use report::{FrameReport, RecoveryReport};
-pub use surfaces::Distances;
+pub use source::{Arrival, SurfaceSource};
+pub(crate) use surfaces::observed;
 
+use crate::design::default_vertices;
 use crate::mismatch::Up;
 use any_subject::Recovering;
+use cager_cages::{EncloseError, EncloseOptions, enclose};
 use cager_core::cage::{Cage, CageError};
 use cager_core::coordinates::{CoordinateSystem, CoordinatesError, MeanValue};
-use cager_formats::MeshSequence;
 use cager_geometry::mesh::{Model, Point, TriMesh};
 use cager_recover::joints::JointsError;
 use cager_recover::people::ModelError;
@@ -26,9 +34,8 @@ use cager_registration::{ObservationError, RegistrationError, outward};
 use finish::Finisher;
 use report::Seconds;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::sync_channel;
 use std::time::Instant;
-use surfaces::{Followed, SurfaceFiles};
+use surfaces::Surfaces;
 
 /// Why a recovery stopped; nothing was written.
 #[derive(Debug, thiserror::Error)]
@@ -36,6 +43,12 @@ pub enum RecoverError {
     /// A file cannot be read, or the scratch file not be written.
     #[error(transparent)]
     Formats(#[from] cager_formats::Error),
+    /// It was told to stop.
+    #[error("the recovery was stopped")]
+    Stopped,
+    /// A stored file cannot be read.
+    #[error("{0}")]
+    Stored(String),
     /// A file holds no surface that can be followed.
     #[error("{}: frame {frame}: {cause}; or go on without such frames with --force", .path.display())]
     Surface {
@@ -113,7 +126,9 @@ pub struct RecoverJob<'a> {
     /// What is known of it, where it is a person: the cage is then the rig's.
     pub person: Option<Person<'a>>,
     /// The frames.
-    pub files: &'a MeshSequence,
+    pub source: &'a dyn SurfaceSource,
+    /// Threads that read and fit; the usual ones without.
+    pub pool: Option<&'a rayon::ThreadPool>,
     /// Frames per second, where known.
     pub frame_rate: Option<f64>,
     /// Subtracted from the frames, as it was from the template and its cage.
@@ -124,14 +139,30 @@ pub struct RecoverJob<'a> {
     pub scratch: &'a Path,
 }
 
+/// A frame of the first pass.
+#[derive(Clone, Copy, Debug)]
+pub struct FirstLook<'a> {
+    /// Its place, from 0.
+    pub frame: usize,
+    /// Vertices of the cage.
+    pub cage: &'a [Point],
+    /// How well the template lies on the surface, as in a [`FrameReport`].
+    pub score: Option<f64>,
+    /// How it was found, as in a [`FrameReport`].
+    pub outcome: &'static str,
+}
+
 /// How far a recovery is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RecoverProgress {
-    /// So many frames were followed from the first.
-    Followed(usize),
+#[derive(Clone, Copy, Debug)]
+pub enum RecoverProgress<'a> {
+    /// A frame was followed; they come in their order.
+    Followed(FirstLook<'a>),
     /// So many were looked at again from the last.
     Refined(usize),
 }
+
+/// Who is told how far a recovery is.
+pub type Watch<'a> = dyn Fn(RecoverProgress<'_>) + Sync + 'a;
 
 /// A recovered animation.
 pub struct Recovered {
@@ -141,6 +172,8 @@ pub struct Recovered {
     pub cage: Cage,
     /// Its points in every frame.
     pub frames: RecoveredFrames,
+    /// Its cage in every frame.
+    pub cages: Vec<Vec<Point>>,
     /// How it went.
     pub report: RecoveryReport,
     /// Joints of a person in every frame.
@@ -149,107 +182,78 @@ pub struct Recovered {
     pub warnings: Vec<String>,
 }
 
+/// A cage for a template that comes without.
+///
+/// # Errors
+/// No cage can be made around it.
+pub(crate) fn cage_around(template: &Model) -> Result<TriMesh, EncloseError> {
+    enclose(template, &EncloseOptions { vertices: default_vertices(template.points.len()), ..Default::default() })
+}
+
+/// Frames of which all is known.
+struct Finished {
+    reports: Vec<FrameReport>,
+    cages: Vec<Vec<Point>>,
+    joints: Option<Joints>,
+    frames: RecoveredFrames,
+}
+
 /// Follows a template through surfaces.
 ///
 /// # Errors
 /// See [`RecoverError`].
-pub fn recover(job: RecoverJob<'_>, progress: &dyn Fn(RecoverProgress)) -> Result<Recovered, RecoverError> {
+pub fn recover(job: RecoverJob<'_>, watch: &Watch<'_>) -> Result<Recovered, RecoverError> {
     let clock = Instant::now();
-    let RecoverJob { mut template, cage, person, files, frame_rate, origin, options, scratch } = job;
-    let frames = files.files.len();
-    let numbers = files.numbers.clone().unwrap_or_else(|| (0..frames).map(|k| k as f64).collect());
+    let RecoverJob { mut template, cage, person, source, pool, frame_rate, origin, options, scratch } = job;
     let diagonal = |model: &Model| cager_geometry::mesh::diagonal(&model.points);
-    let mut surfaces =
-        SurfaceFiles { files: &files.files, points: options.points, diagonal: diagonal(&template), origin };
-    let first = first_surface(&surfaces, options.force)?;
+    let RecoverOptions { points, force, .. } = options;
+    let mut surfaces = Surfaces { source, pool, points, diagonal: diagonal(&template), origin, force };
+    let (first, seen) = surfaces.first()?;
     let mut cage = cage.mesh().clone();
-    let seen = surfaces.read(first)?;
-    let placement = Placement::find(&mut template, &mut cage, &seen.observation, &options)?;
+    let placement = surfaces.on_pool(|| Placement::find(&mut template, &mut cage, &seen.observation, &options))?;
     surfaces.diagonal = diagonal(&template);
     let cage = Cage::new(cage)?;
     let mut rest = TriMesh::from(&template);
     rest.triangles = outward(&rest.vertices, &rest.triangles);
-    let written = RecoveredFrames::create(scratch, rest.vertices.len(), numbers.clone(), frame_rate)?;
-    let mut finisher = Finisher::new(&rest, surfaces.diagonal, options.offsets, written);
+    let finisher = |frames: usize| {
+        let numbers = source.numbers(frames).unwrap_or_else(|| (0..frames).map(|k| k as f64).collect());
+        let written = RecoveredFrames::create(scratch, rest.vertices.len(), numbers, frame_rate)?;
+        Ok(Finisher::new(&rest, source, surfaces.diagonal, options.offsets, written))
+    };
     let mut seconds = Seconds::default();
-    let (mut joints, mut warnings) = (None, Vec::new());
-    let mut reports = if let Some(person) = person {
+    let mut warnings = Vec::new();
+    let Finished { reports, cages, joints, frames } = if let Some(person) = person {
         seconds.prepare = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
-        let found = person.follow(&rest, &surfaces, &mut finisher, options.force, progress)?;
+        let found = person.follow(&rest, &surfaces, &finisher, watch)?;
         seconds.follow = clock.elapsed().as_secs_f64();
-        joints = Some(found.joints);
-        found.reports
+        found
     } else {
-        let coordinates = MeanValue.coordinates(&cage, &template.points, None)?;
+        let coordinates = surfaces.on_pool(|| MeanValue.coordinates(&cage, &template.points, None))?;
         if !coordinates.outside.is_empty() {
             let outside = coordinates.outside.len();
             warnings.push(format!("{outside} points of the template lie outside of the cage, and follow it less well"));
         }
-        let model = Recovering::new(&rest, &cage, &coordinates.phi)?;
-        if placement.is_none() && !options.force {
-            model.check_start(&template, &rest, &cage, (&files.files[first], &seen))?;
-        }
+        let model = surfaces.on_pool(|| {
+            let model = Recovering::new(&rest, &cage, &coordinates.phi)?;
+            if placement.is_none() && !force {
+                model.check_start(&template, &rest, &cage, (&source.file(first), &seen))?;
+            }
+            Ok::<_, RecoverError>(model)
+        })?;
         drop(seen);
         seconds.prepare = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
-        let mut tracked = model.follow(&surfaces, &cage, options.force, progress)?;
+        let tracked = model.follow(&surfaces, &cage, watch)?;
         seconds.follow = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
-        let reports = model.refine(&surfaces, &mut tracked, &mut finisher, options.force, progress)?;
+        let finisher = finisher(tracked.len())?;
+        let found = model.refine(&surfaces, tracked, finisher, watch)?;
         seconds.refine = clock.elapsed().as_secs_f64();
-        reports
+        found
     };
-    for ((report, &number), file) in reports.iter_mut().zip(&numbers).zip(&files.files) {
-        (report.number, report.file) = (number, file.clone());
-    }
     let report = RecoveryReport::new((&rest, &cage), surfaces.diagonal, placement, reports, seconds);
     warnings.extend(report.warnings());
     warnings.extend(placement.and_then(|placement| placement.warning()));
-    let frames = finisher.into_frames()?;
-    Ok(Recovered { rest: template, cage, frames, report, joints, warnings })
-}
-
-/// The first frame that holds a surface.
-fn first_surface(surfaces: &SurfaceFiles<'_>, force: bool) -> Result<usize, RecoverError> {
-    let mut first_error = None;
-    for frame in 0..surfaces.files.len() {
-        match surfaces.read(frame) {
-            Ok(_) => return Ok(frame),
-            Err(error) if !force || !matches!(error, RecoverError::Surface { .. }) => return Err(error),
-            Err(error) => {
-                first_error.get_or_insert(error);
-            }
-        }
-    }
-    let first = first_error.map_or_else(String::new, |error| error.to_string());
-    Err(RecoverError::NoSurface { frames: surfaces.files.len(), first })
-}
-
-/// Calls `work` with frames in an order, each read while the one before is worked on; with nothing for those that hold no surface, where that is allowed.
-fn each(
-    surfaces: &SurfaceFiles<'_>,
-    order: Vec<usize>,
-    force: bool,
-    mut work: impl FnMut(usize, Option<Followed>) -> Result<(), RecoverError>,
-) -> Result<(), RecoverError> {
-    std::thread::scope(|scope| {
-        let (send, read) = sync_channel(1);
-        scope.spawn(move || {
-            for frame in order {
-                // Nobody waits where the work failed.
-                if send.send((frame, surfaces.follow(frame))).is_err() {
-                    break;
-                }
-            }
-        });
-        for (frame, seen) in read {
-            match seen {
-                Ok(seen) => work(frame, Some(seen))?,
-                Err(RecoverError::Surface { .. }) if force => work(frame, None)?,
-                Err(error) => return Err(error),
-            }
-        }
-        Ok(())
-    })
+    Ok(Recovered { rest: template, cage, frames, cages, report, joints, warnings })
 }

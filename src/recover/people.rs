@@ -1,15 +1,15 @@
 //! People: a template followed by its rig and the manifold of usual poses.
 
 use super::finish::Finisher;
-use super::report::{FrameReport, How};
-use super::surfaces::{Followed, SurfaceFiles};
-use super::{RecoverError, RecoverProgress, each};
+use super::report::How;
+use super::surfaces::Surfaces;
+use super::{Finished, RecoverError, RecoverProgress, Watch};
 use cager_geometry::mesh::{Point, TriMesh};
+use cager_geometry::vector::{distance, norm};
 use cager_recover::joints::{CagedJoints, MarkedJoints};
 use cager_recover::manifold::Manifold;
-use cager_recover::people::{FitOptions, PersonFit, PersonModel, track};
+use cager_recover::people::{FitOptions, PersonFit, PersonModel, PersonTracker};
 use cager_recover::rig::Rig;
-use cager_registration::Observation;
 
 /// What is known of a person.
 pub struct Person<'a> {
@@ -20,6 +20,9 @@ pub struct Person<'a> {
     /// How it is fitted.
     pub options: FitOptions,
 }
+
+/// Frames per second of joints where nobody tells.
+pub(crate) const JOINTS_RATE: f64 = 30.0;
 
 /// Joints in every frame.
 pub struct Joints {
@@ -39,50 +42,82 @@ impl Joints {
     }
 }
 
-/// A person that was followed.
-pub(super) struct FollowedPerson {
-    pub(super) reports: Vec<FrameReport>,
-    pub(super) joints: Joints,
+/// What fits a person.
+///
+/// # Errors
+/// It is no rig.
+pub(crate) fn rig_of(bytes: &[u8]) -> Result<Rig, String> {
+    Rig::from_json(bytes).map_err(|error| error.to_string())
+}
+
+/// A manifold that was learned for this rig: where the waist is in the pelvis's frame is the same in every pose.
+///
+/// # Errors
+/// It is no manifold, or one of another rig.
+pub(crate) fn manifold_of(bytes: &[u8], rig: &Rig) -> Result<Manifold, String> {
+    let manifold = Manifold::from_json(bytes).map_err(|error| error.to_string())?;
+    let (pose, rest) = (manifold.pose(&vec![0.0; manifold.dims()]), rig.rest_pose());
+    let waist = |pose: &[f64]| [6, 7, 8].map(|k| pose[k] - pose[k - 6]);
+    let (found, own) = (waist(&pose), waist(&rest));
+    if distance(found, own).is_nan() || distance(found, own) > 0.01 * norm(own) {
+        return Err("was learned for another rig; run `cager manifold` with this one".to_owned());
+    }
+    Ok(manifold)
 }
 
 impl Person<'_> {
-    /// Forwards and backwards through all frames. The points that are looked at of all of them are held in memory.
-    pub(super) fn follow(
+    /// Forwards and backwards through all frames.
+    pub(super) fn follow<'f>(
         &self,
         rest: &TriMesh,
-        surfaces: &SurfaceFiles<'_>,
-        finisher: &mut Finisher<'_>,
-        force: bool,
-        progress: &dyn Fn(RecoverProgress),
-    ) -> Result<FollowedPerson, RecoverError> {
-        let model = PersonModel::new(rest, self.rig, self.options.system, self.options.samples)?;
+        surfaces: &Surfaces<'_>,
+        finisher: &dyn Fn(usize) -> Result<Finisher<'f>, RecoverError>,
+        watch: &Watch<'_>,
+    ) -> Result<Finished, RecoverError> {
+        let model = surfaces.on_pool(|| PersonModel::new(rest, self.rig, self.options.system, self.options.samples))?;
         let fit = PersonFit { model: &model, manifold: self.manifold, options: self.options };
-        let (mut observations, mut numbers): (Vec<Observation>, Vec<usize>) = (Vec::new(), Vec::new());
-        each(surfaces, (0..surfaces.files.len()).collect(), force, |frame, seen| {
-            if let Some(Followed { target, .. }) = seen {
-                observations.push(target.observation());
-                numbers.push(frame);
-            }
+        let (mut tracker, mut numbers, mut frames) = (PersonTracker::new(&fit), Vec::new(), 0);
+        surfaces.each(surfaces.arriving(), |frame, seen| {
+            frames += 1;
+            // A frame without a surface stays as the one before it; before the first that has one, nothing is known.
+            let how = match seen {
+                Some(seen) => {
+                    numbers.push(frame);
+                    How::of_person(tracker.follow(&seen.target.observation()))
+                }
+                None => How::NO_SURFACE,
+            };
+            let cage = tracker.frames().last().map_or(model.cage().vertices(), |frame| &frame.fit.vertices);
+            watch(how.first_look(frame, cage));
             Ok(())
         })?;
         if numbers.is_empty() {
             let first = "its file was there when it was looked at first".to_owned();
-            return Err(RecoverError::NoSurface { frames: surfaces.files.len(), first });
+            return Err(RecoverError::NoSurface { frames, first });
         }
-        let tracked = track(&fit, &observations, true, |done, _| progress(RecoverProgress::Followed(done + 1)));
-        drop(observations);
+        let mut back = tracker.back();
+        surfaces.each((0..frames).rev().map(Ok), |frame, seen| {
+            if let (Some(seen), Ok(at)) = (seen, numbers.binary_search(&frame)) {
+                back.refit(at, || seen.target.observation());
+            }
+            Ok(())
+        })?;
+        let tracked = back.into_frames();
+        let mut finisher = finisher(frames)?;
         let caged = CagedJoints::new(MarkedJoints::of_rig(self.rig), model.cage(), self.options.system.system())?;
-        let (mut reports, mut joints) = (Vec::new(), Vec::new());
-        each(surfaces, (0..surfaces.files.len()).collect(), force, |frame, seen| {
+        let (mut reports, mut joints, mut cages) = (Vec::new(), Vec::new(), Vec::new());
+        surfaces.each((0..frames).map(Ok), |frame, seen| {
             // A frame without a surface stays as the one before it, or is as the first that has one.
             let at = numbers.partition_point(|&number| number <= frame).saturating_sub(1);
             let vertices = &tracked[at].fit.vertices;
             let how = if seen.is_some() { How::of_person(&tracked[at]) } else { How::NO_SURFACE };
             reports.push(finisher.finish(frame, model.deformed(vertices), how, seen.as_ref())?);
             joints.push(caged.positions(vertices));
-            progress(RecoverProgress::Refined(reports.len()));
+            cages.push(vertices.clone());
+            watch(RecoverProgress::Refined(reports.len()));
             Ok(())
         })?;
-        Ok(FollowedPerson { reports, joints: Joints { caged, frames: joints } })
+        let joints = Some(Joints { caged, frames: joints });
+        Ok(Finished { reports, cages, joints, frames: finisher.into_frames()? })
     }
 }

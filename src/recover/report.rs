@@ -1,9 +1,10 @@
 //! What is told of a recovery.
 
+use super::distances::Distances;
 use super::placement::Placement;
-use super::surfaces::Distances;
+use super::{FirstLook, RecoverProgress};
 use cager_core::cage::Cage;
-use cager_geometry::mesh::TriMesh;
+use cager_geometry::mesh::{Point, TriMesh};
 use cager_recover::track::{Outcome, TrackedFrame};
 use cager_registration::ObservationNotes;
 use serde::Serialize;
@@ -75,6 +76,16 @@ impl How {
     /// There was nothing to follow.
     pub(super) const NO_SURFACE: Self = Self { outcome: "no_surface", score: f64::INFINITY };
 
+    /// A frame of the first pass with this cage.
+    pub(super) fn first_look(self, frame: usize, cage: &[Point]) -> RecoverProgress<'_> {
+        RecoverProgress::Followed(FirstLook { frame, cage, score: self.score(), outcome: self.outcome })
+    }
+
+    /// None without a surface.
+    pub(super) fn score(self) -> Option<f64> {
+        Some(self.score).filter(|score| score.is_finite())
+    }
+
     /// Of any subject.
     pub(super) fn of(frame: &TrackedFrame) -> Self {
         let outcome = match frame.outcome {
@@ -99,16 +110,16 @@ impl How {
 
 impl FrameReport {
     pub(super) fn new(
+        (number, file): (f64, PathBuf),
         how: How,
-        to_surface: Option<Distances>,
-        from_surface: Option<Distances>,
+        (to_surface, from_surface): (Option<Distances>, Option<Distances>),
         notes: Option<ObservationNotes>,
     ) -> Self {
         Self {
-            number: 0.0,
-            file: PathBuf::new(),
+            number,
+            file,
             outcome: how.outcome,
-            score: Some(how.score).filter(|score| score.is_finite()),
+            score: how.score(),
             to_surface,
             from_surface,
             turned: notes.is_some_and(|notes| notes.turned),
@@ -145,6 +156,16 @@ impl RecoveryReport {
             frames,
             seconds,
         }
+    }
+
+    /// As a file.
+    ///
+    /// # Errors
+    /// It cannot be written as JSON.
+    pub(crate) fn json(&self) -> serde_json::Result<Vec<u8>> {
+        let mut text = serde_json::to_vec_pretty(self)?;
+        text.push(b'\n');
+        Ok(text)
     }
 
     /// What the user should know.

@@ -1,22 +1,27 @@
-//! Observed surfaces from files, made ready to be followed.
+//! Observed surfaces, made ready to be followed.
 
 use super::RecoverError;
+use super::source::{Arrival, SurfaceSource};
 use crate::origin::move_to;
-use cager_formats::read_model;
-use cager_geometry::mesh::{Point, TriMesh};
+use cager_geometry::mesh::{Model, Point, TriMesh};
 use cager_geometry::spatial::Surface;
-use cager_registration::{Observation, ObservationNotes, ObservationOptions, Target};
-use std::path::PathBuf;
+use cager_registration::{Observation, ObservationError, ObservationNotes, ObservationOptions, Target};
+use std::sync::mpsc::sync_channel;
 
-/// The files of a recovery, each a surface of its own.
-pub(super) struct SurfaceFiles<'a> {
-    pub(super) files: &'a [PathBuf],
+/// The surfaces of a recovery, as they are read.
+#[derive(Clone, Copy)]
+pub(super) struct Surfaces<'a> {
+    pub(super) source: &'a dyn SurfaceSource,
+    /// Where reading and fitting is done; on the usual threads without.
+    pub(super) pool: Option<&'a rayon::ThreadPool>,
     /// Points that are looked at of each.
     pub(super) points: usize,
     /// The template's diagonal.
     pub(super) diagonal: f64,
     /// Subtracted from all points.
     pub(super) origin: Option<Point>,
+    /// Whether frames without a surface are passed over.
+    pub(super) force: bool,
 }
 
 /// A surface as it was read.
@@ -34,75 +39,106 @@ pub(super) struct Followed {
     pub(super) surface: Option<Surface>,
 }
 
-impl SurfaceFiles<'_> {
-    /// Reads a frame. The points that are drawn of it depend on its number alone.
-    pub(super) fn read(&self, frame: usize) -> Result<Seen, RecoverError> {
-        let path = &self.files[frame];
-        let mut model = read_model(path)?;
+/// What is looked at of a frame. The points that are drawn of it depend on its number alone.
+///
+/// # Errors
+/// There is no surface in it.
+pub(crate) fn observed(
+    model: &Model,
+    frame: usize,
+    points: usize,
+) -> Result<(Observation, ObservationNotes), ObservationError> {
+    let options = ObservationOptions { points, seed: 1000 + frame as u64 };
+    if model.faces.is_empty() {
+        Observation::of_cloud(&model.points, &model.normals, &options)
+    } else {
+        Observation::of_mesh(&model.points, &model.faces.triangulated(), &options)
+    }
+}
+
+impl<'a> Surfaces<'a> {
+    /// Does work on the threads that are for it.
+    pub(super) fn on_pool<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
+        match self.pool {
+            Some(pool) => pool.install(work),
+            None => work(),
+        }
+    }
+
+    /// Frames from the first on, each when it is there.
+    pub(super) fn arriving(&self) -> impl Iterator<Item = Result<usize, RecoverError>> + Send + use<'a> {
+        let source = self.source;
+        (0..).map_while(move |frame| match source.wait_for(frame) {
+            Arrival::There => Some(Ok(frame)),
+            Arrival::End => None,
+            Arrival::Stopped => Some(Err(RecoverError::Stopped)),
+        })
+    }
+
+    /// Reads a frame.
+    fn read(&self, frame: usize) -> Result<Seen, RecoverError> {
+        let mut model = self.source.read(frame)?;
         move_to(self.origin, &mut model.points);
-        let options = ObservationOptions { points: self.points, seed: 1000 + frame as u64 };
-        let found = if model.faces.is_empty() {
-            Observation::of_cloud(&model.points, &model.normals, &options)
-        } else {
-            Observation::of_mesh(&model.points, &model.faces.triangulated(), &options)
-        };
-        let (observation, notes) = found.map_err(|cause| RecoverError::Surface { path: path.clone(), frame, cause })?;
+        let found = observed(&model, frame, self.points);
+        let path = || self.source.file(frame);
+        let (observation, notes) = found.map_err(|cause| RecoverError::Surface { path: path(), frame, cause })?;
         let surface = (!model.faces.is_empty()).then(|| Surface::from(&TriMesh::from(&model)));
         Ok(Seen { observation, notes, surface })
     }
 
-    /// Reads a frame for a template.
-    pub(super) fn follow(&self, frame: usize) -> Result<Followed, RecoverError> {
-        let Seen { observation, notes, surface } = self.read(frame)?;
-        Ok(Followed { target: Target::new(&observation, self.diagonal), notes, surface })
+    /// Reads a frame for a template; nothing of one that has no surface, where that is allowed.
+    fn follow(&self, frame: usize) -> Result<Option<Followed>, RecoverError> {
+        match self.read(frame) {
+            Ok(Seen { observation, notes, surface }) => {
+                Ok(Some(Followed { target: Target::new(&observation, self.diagonal), notes, surface }))
+            }
+            Err(RecoverError::Surface { .. }) if self.force => Ok(None),
+            Err(error) => Err(error),
+        }
     }
-}
 
-/// Distances between a template and an observed surface, as shares of the diagonal.
-#[derive(Clone, Copy, Debug, serde::Serialize)]
-pub struct Distances {
-    /// From points of one to the other, on average.
-    pub mean: f64,
-    /// Root of the mean square.
-    pub rms: f64,
-    /// Ninety-five of a hundred are nearer.
-    pub percentile_95: f64,
-    /// The largest.
-    pub largest: f64,
-}
+    /// The first frame that holds a surface, when it is there.
+    pub(super) fn first(&self) -> Result<(usize, Seen), RecoverError> {
+        let (mut frames, mut first_error) = (0, None);
+        for frame in self.arriving() {
+            let frame = frame?;
+            frames = frame + 1;
+            match self.on_pool(|| self.read(frame)) {
+                Ok(seen) => return Ok((frame, seen)),
+                Err(error) if !self.force || !matches!(error, RecoverError::Surface { .. }) => return Err(error),
+                Err(error) => {
+                    first_error.get_or_insert(error);
+                }
+            }
+        }
+        let first = first_error.map_or_else(String::new, |error| error.to_string());
+        Err(RecoverError::NoSurface { frames, first })
+    }
 
-impl Distances {
-    /// None without points.
-    pub(super) fn new(mut distances: Vec<f64>, diagonal: f64) -> Option<Self> {
-        distances.sort_by(f64::total_cmp);
-        let count = distances.len();
-        let mean = |of: fn(f64) -> f64| distances.iter().map(|&d| of(d / diagonal)).sum::<f64>() / count as f64;
-        Some(Self {
-            mean: mean(|d| d),
-            rms: mean(|d| d * d).sqrt(),
-            percentile_95: distances.get(count * 95 / 100)? / diagonal,
-            largest: distances.last()? / diagonal,
+    /// Calls `work` with frames in an order, each read while the one before is worked on; with nothing for those that hold no surface, where that is
+    /// allowed.
+    pub(super) fn each(
+        &self,
+        order: impl Iterator<Item = Result<usize, RecoverError>> + Send,
+        mut work: impl FnMut(usize, Option<Followed>) -> Result<(), RecoverError> + Send,
+    ) -> Result<(), RecoverError> {
+        std::thread::scope(|scope| {
+            let (send, read) = sync_channel(1);
+            scope.spawn(move || {
+                for frame in order {
+                    let read = frame.and_then(|frame| Ok((frame, self.on_pool(|| self.follow(frame))?)));
+                    let failed = read.is_err();
+                    // Nobody waits where the work failed.
+                    if send.send(read).is_err() || failed {
+                        break;
+                    }
+                }
+            });
+            for read in read {
+                let (frame, seen) = read?;
+                self.on_pool(|| work(frame, seen))?;
+            }
+            Ok(())
         })
     }
-}
-
-/// Observed points that are measured to the template, at the most.
-const MAX_MEASURED: usize = 5000;
-
-/// Distances from the template to the observed surface, which a cloud has none, and back.
-pub(super) fn distances(
-    template: &TriMesh,
-    samples: &[Point],
-    seen: &Followed,
-    diagonal: f64,
-) -> (Option<Distances>, Option<Distances>) {
-    use rayon::prelude::*;
-    let to = |surface: &Surface, points: &[glam::DVec3]| -> Vec<f64> {
-        points.par_iter().with_min_len(64).map(|&p| surface.nearest(p).map_or(f64::NAN, |n| n.distance)).collect()
-    };
-    let samples: Vec<glam::DVec3> = samples.iter().map(|&p| p.into()).collect();
-    let there = seen.surface.as_ref().and_then(|surface| Distances::new(to(surface, &samples), diagonal));
-    let every = seen.target.points().len().div_ceil(MAX_MEASURED).max(1);
-    let observed: Vec<glam::DVec3> = seen.target.points().iter().copied().step_by(every).collect();
-    (there, Distances::new(to(&Surface::from(template), &observed), diagonal))
 }

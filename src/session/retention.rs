@@ -1,9 +1,13 @@
-//! Storage quotas of tenants and deletion of expired sessions and cage jobs.
+//! Storage quotas of tenants and deletion of expired sessions and jobs.
 
 use super::registry::Reserved;
 use crate::auth::Tenant;
+use crate::cage_job::CageDesign;
+use crate::jobs::{Jobs, Work};
 use crate::problem::{self, ApiError};
+use crate::recovery::Recovery;
 use crate::service::Service;
+use crate::store::JobMeta as _;
 use crate::tasks::blocking;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -13,7 +17,7 @@ use tokio_util::sync::CancellationToken;
 const SWEEP_INTERVAL: Duration = Duration::from_secs(20);
 
 impl Service {
-    /// For every tenant that stores anything: number of sessions, and bytes of sessions and cage jobs.
+    /// For every tenant that stores anything: number of sessions, and bytes of sessions and jobs.
     pub(crate) fn usage(&self) -> Vec<(String, usize, u64)> {
         let mut usage = std::collections::BTreeMap::<String, (usize, u64)>::new();
         for session in self.registry.all() {
@@ -21,23 +25,27 @@ impl Service {
             entry.0 += 1;
             entry.1 += session.bytes.load(Relaxed);
         }
-        for job in self.cage_jobs.all() {
-            usage.entry(job.meta.tenant.clone()).or_default().1 += job.bytes.load(Relaxed);
+        fn taken<W: Work>(jobs: &Jobs<W>) -> impl Iterator<Item = (String, u64)> {
+            jobs.all().into_iter().map(|job| (job.meta.tenant().to_owned(), job.bytes.load(Relaxed)))
+        }
+        for (tenant, bytes) in taken(&self.cage_jobs).chain(taken(&self.recoveries)) {
+            usage.entry(tenant).or_default().1 += bytes;
         }
         usage.into_iter().map(|(tenant, (sessions, bytes))| (tenant, sessions, bytes)).collect()
     }
 
-    /// Reserves quota for one more session or cage job of `bytes` bytes.
+    /// Reserves quota for one more session or job of `bytes` bytes.
     ///
     /// # Errors
     /// A quota that is used up.
     pub(crate) fn reserve(&self, tenant: &Tenant, bytes: u64) -> Result<Reserved, ApiError> {
         self.registry.reserve(&tenant.name, bytes, |usage| {
-            let (count, used) = self.with_cage_jobs(tenant, usage);
+            let (count, used) = self.with_jobs(tenant, usage);
             if count >= tenant.limits.max_sessions {
                 self.rejected("tenant_sessions");
-                let detail =
-                    format!("you have {count} sessions and cage designs; delete one that is not needed any more");
+                let detail = format!(
+                    "you have {count} sessions, cage designs and recoveries; delete one that is not needed any more"
+                );
                 return Err(ApiError::new(problem::TOO_MANY_SESSIONS, detail).limit(tenant.limits.max_sessions));
             }
             self.bytes_allowed(tenant, used, bytes)
@@ -49,7 +57,7 @@ impl Service {
     /// # Errors
     /// As [`Self::reserve`].
     pub(crate) fn reserve_more(&self, tenant: &Tenant, room: &mut Reserved, bytes: u64) -> Result<(), ApiError> {
-        room.extend(bytes, |usage| self.bytes_allowed(tenant, self.with_cage_jobs(tenant, usage).1, bytes))
+        room.extend(bytes, |usage| self.bytes_allowed(tenant, self.with_jobs(tenant, usage).1, bytes))
     }
 
     /// Reserves quota for the next frames of an upload, `bytes` bytes each: for `most` of them, or for an eighth of those that there is room
@@ -59,16 +67,16 @@ impl Service {
     /// There is no room for one.
     pub(crate) fn reserve_frames(&self, tenant: &Tenant, bytes: u64, most: u64) -> Result<Reserved, ApiError> {
         self.registry.reserve_with(&tenant.name, 0, |usage| {
-            let (_, used) = self.with_cage_jobs(tenant, usage);
+            let (_, used) = self.with_jobs(tenant, usage);
             self.bytes_allowed(tenant, used, bytes)?;
             let room = (tenant.limits.max_bytes - used) / bytes.max(1);
             Ok(bytes * (room / 8).clamp(1, most))
         })
     }
 
-    fn with_cage_jobs(&self, tenant: &Tenant, (count, used): (u64, u64)) -> (u64, u64) {
-        let (jobs, theirs) = self.cage_jobs.usage_of(&tenant.name);
-        (count + jobs, used + theirs)
+    fn with_jobs(&self, tenant: &Tenant, (count, used): (u64, u64)) -> (u64, u64) {
+        let jobs = [self.cage_jobs.usage_of(&tenant.name), self.recoveries.usage_of(&tenant.name)];
+        jobs.into_iter().fold((count, used), |(count, used), (jobs, theirs)| (count + jobs, used + theirs))
     }
 
     /// Checks whether a tenant may store `bytes` more bytes.
@@ -77,7 +85,7 @@ impl Service {
     /// A quota that is used up.
     pub(crate) fn check_bytes(&self, tenant: &Tenant, bytes: u64) -> Result<(), ApiError> {
         let usage = self.registry.usage_of(&tenant.name);
-        self.bytes_allowed(tenant, self.with_cage_jobs(tenant, usage).1, bytes)
+        self.bytes_allowed(tenant, self.with_jobs(tenant, usage).1, bytes)
     }
 
     fn bytes_allowed(&self, tenant: &Tenant, used: u64, bytes: u64) -> Result<(), ApiError> {
@@ -86,7 +94,7 @@ impl Service {
         }
         self.rejected("tenant_bytes");
         let detail = format!(
-            "your sessions and cage designs take {used} of {} bytes, and this needs {bytes} more; delete those that are not needed any more",
+            "your sessions, cage designs and recoveries take {used} of {} bytes, and this needs {bytes} more; delete those that are not needed any more",
             tenant.limits.max_bytes
         );
         Err(ApiError::new(problem::QUOTA_EXCEEDED, detail).limit(tenant.limits.max_bytes))
@@ -114,14 +122,8 @@ impl Service {
             let most_s = self.access.tenant(tenant).limits.max_age_s;
             most_s > 0 && now.saturating_sub(created_ms) / 1000 >= most_s
         };
-        for job in self.cage_jobs.all() {
-            if expired(&job.meta.tenant, job.meta.created_ms) {
-                tracing::info!(job = %job.meta.id, "deleted, because its time is over");
-                if let Err(error) = self.delete_cage_job(&job).await {
-                    tracing::warn!(job = %job.meta.id, detail = %error.problem.detail, "could not be deleted");
-                }
-            }
-        }
+        self.delete_jobs::<CageDesign>(&expired).await;
+        self.delete_jobs::<Recovery>(&expired).await;
         for session in self.registry.all() {
             if expired(&session.meta.tenant, session.meta.created_ms) {
                 tracing::info!(session = %session.meta.id, "deleted, because its time is over");
@@ -133,6 +135,18 @@ impl Service {
                 let retried = Arc::clone(&session);
                 let _ = blocking(move || retried.retry_failed_writes()).await;
                 session.close_files_if_idle();
+            }
+        }
+    }
+
+    /// Deletes the jobs of a kind that have expired.
+    async fn delete_jobs<W: Work>(self: &Arc<Self>, expired: &(dyn Fn(&str, u64) -> bool + Sync)) {
+        for job in W::jobs(self).all() {
+            if expired(job.meta.tenant(), job.meta.created_ms()) {
+                tracing::info!(job = job.id(), "deleted, because its time is over");
+                if let Err(error) = self.delete_job(&job).await {
+                    tracing::warn!(job = job.id(), detail = %error.problem.detail, "could not be deleted");
+                }
             }
         }
     }

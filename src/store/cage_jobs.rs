@@ -1,9 +1,9 @@
 //! Cage jobs: the input of a cage design, and the designed cage.
 
+use super::jobs::{ATTEMPTS, JobMeta, OUTCOME, outcome_of};
 use super::scan::{FolderMeta, Kind};
 use super::{ContentKey, Idempotency, Spool, Store, StoreError, StoredFile, StoredPart, meta};
 use cager_proto::cage_messages::CageOptions;
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 /// Metadata of a cage job, fixed at its creation.
@@ -40,9 +40,25 @@ impl FolderMeta for CageJobMeta {
     }
 }
 
+impl JobMeta for CageJobMeta {
+    fn tenant(&self) -> &str {
+        &self.tenant
+    }
+
+    fn created_ms(&self) -> u64 {
+        self.created_ms
+    }
+
+    fn idempotency(&self) -> Option<&Idempotency> {
+        self.idempotency.as_ref()
+    }
+
+    fn sent_bytes(&self) -> u64 {
+        self.rest.bytes + self.frames.bytes
+    }
+}
+
 const META: &str = "job.json";
-const OUTCOME: &str = "outcome.json";
-const ATTEMPTS: &str = "attempts.json";
 const REST: &str = "rest";
 const FRAMES: &str = "frames";
 const CAGE: &str = "cage.obj";
@@ -70,7 +86,7 @@ impl Store {
     ) -> Result<(), StoreError> {
         let (files, place) = (self.files(), self.folder(Kind::CageJob, &meta.id)?);
         let bytes = meta::wrap(&place.join(META), "cage job", meta)?;
-        let outcome = meta::wrap(&place.join(OUTCOME), "cage outcome", outcome)?;
+        let outcome = meta::wrap(&place.join(OUTCOME), outcome_of(Kind::CageJob), outcome)?;
         files.publish_folder(&place, |staging| {
             files.write_new(&staging.join(META), &bytes)?;
             files.write_new(&staging.join(CAGE), cage)?;
@@ -101,27 +117,6 @@ impl Store {
         Ok(file)
     }
 
-    /// Durably increments the number of attempts and returns it, so that a design that crashes the process is not retried at every start.
-    pub fn count_cage_job_attempt(&self, id: &str) -> Result<u32, StoreError> {
-        self.set_cage_job_attempts(id, |before| before + 1)
-    }
-
-    /// Decrements the number of attempts after an orderly stop.
-    ///
-    /// # Errors
-    /// Not found where the job was deleted.
-    pub fn uncount_cage_job_attempt(&self, id: &str) -> Result<(), StoreError> {
-        self.set_cage_job_attempts(id, |before| before.saturating_sub(1)).map(|_| ())
-    }
-
-    fn set_cage_job_attempts(&self, id: &str, change: impl FnOnce(u32) -> u32) -> Result<u32, StoreError> {
-        let path = self.folder(Kind::CageJob, id)?.join(ATTEMPTS);
-        // An unreadable counter restarts at 0.
-        let attempts = change(meta::read(self.files(), &path, "attempts").ok().flatten().unwrap_or(0));
-        self.files().replace(&path, &meta::wrap(&path, "attempts", &attempts)?)?;
-        Ok(attempts)
-    }
-
     /// Stores the outcome of a job and its cage, if any, and removes its input; durable on `Ok`.
     ///
     /// # Errors
@@ -131,18 +126,9 @@ impl Store {
         if let Some(cage) = cage {
             files.replace(&folder.join(CAGE), cage)?;
         }
-        let path = folder.join(OUTCOME);
-        files.replace(&path, &meta::wrap(&path, "cage outcome", outcome)?)?;
+        self.set_job_outcome(Kind::CageJob, id, outcome)?;
         self.forget_cage_job_input(id);
         Ok(())
-    }
-
-    /// The outcome of a job; `None` if it is not finished.
-    ///
-    /// # Errors
-    /// [`StoreError::Damaged`].
-    pub fn cage_job_outcome<T: DeserializeOwned>(&self, id: &str) -> Result<Option<T>, StoreError> {
-        meta::read(self.files(), &self.folder(Kind::CageJob, id)?.join(OUTCOME), "cage outcome")
     }
 
     /// The cage of a completed job, an OBJ file of this length and digest.
@@ -155,11 +141,7 @@ impl Store {
 
     /// Removes the input of a finished job, best effort: files that remain are removed at the next start.
     pub fn forget_cage_job_input(&self, id: &str) {
-        for name in [REST, FRAMES, ATTEMPTS] {
-            if let Err(error) = self.folder(Kind::CageJob, id).and_then(|f| self.files().remove_file(&f.join(name))) {
-                tracing::warn!(job = id, %error, "the input of a finished cage job still takes space");
-            }
-        }
+        self.forget_files(Kind::CageJob, id, [REST, FRAMES, ATTEMPTS]);
     }
 
     fn cage_job_part(&self, id: &str, name: &str, bytes: u64, digest: &str) -> Result<Vec<u8>, StoreError> {

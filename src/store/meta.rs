@@ -48,7 +48,7 @@ fn newer_format(file: &[u8]) -> Option<u32> {
     (found.format > 1).then_some(found.format)
 }
 
-fn unwrap<T: DeserializeOwned>(file: &[u8], kind: &str) -> Result<T, String> {
+pub(super) fn unwrap<T: DeserializeOwned>(file: &[u8], kind: &str) -> Result<T, String> {
     let start = head(kind, b"").len();
     let body = file.len().checked_sub(TAIL.len()).and_then(|end| file.get(start..end));
     let body = body.ok_or_else(|| format!("{} bytes are too few", file.len()))?;

@@ -7,6 +7,8 @@
 //! sessions/<id>/   session.json  frames.log  capture.cager  complete.json  outcome.json  announce.json
 //!                  frames-<first>  group-<first>  last-<first>
 //! cages/<id>/      job.json  rest  frames  attempts.json  cage.obj  outcome.json
+//! recoveries/<id>/ recovery.json  template  cage  rig  manifold  frame-<k>  attempts.json  complete.json
+//!                  capture.cager  cages  report.json  joints.csv  joints.bvh  outcome.json
 //! contents/<key>/  content.json  rest  cage  matrix
 //! prepared/<key>.solver
 //! tmp/             being written; emptied at start       trash/       being removed; emptied at start
@@ -14,7 +16,7 @@
 //! ```
 //!
 //! Files and folders are written in `tmp/`, synced and renamed into place; folders are moved to `trash/` before they are removed. So
-//! everything in `sessions`, `cages`, `contents` and `prepared` is complete. Only the frame log grows in place, whose recovery [`log`]
+//! everything in `sessions`, `cages`, `recoveries`, `contents` and `prepared` is complete. Only the frame log grows in place, whose recovery [`log`]
 //! describes, and frames that wait to be coded, whose digests it has.
 
 use crate::store::files::Files;
@@ -33,10 +35,12 @@ mod error;
 mod faults;
 mod files;
 mod groups;
+mod jobs;
 pub mod log;
 mod meta;
 mod names;
 mod prepared;
+mod recoveries;
 mod scan;
 mod sessions;
 mod solver_file;
@@ -49,8 +53,11 @@ pub use cage_jobs::CageJobMeta;
 pub use content::{Content, NamedFile, StoredPart};
 pub use disk::{Disk, LocalDisk};
 pub use error::StoreError;
+pub(crate) use jobs::JobMeta;
 pub use log::{FrameLog, LogEntry, LogReader, LogRecord};
 pub use names::{ContentKey, is_session_id};
+pub use recoveries::{RecoveryMeta, RecoveryParts, Workshop};
+pub(crate) use scan::FolderMeta;
 pub use scan::{Kind, Unreadable};
 pub use sessions::{Completion, Container, Idempotency, SessionBytes, SessionMeta};
 pub use spool::{Spool, StoredFile};
@@ -87,9 +94,11 @@ pub struct Opened {
     pub sessions: Vec<SessionMeta>,
     /// Its cage jobs, oldest first.
     pub cage_jobs: Vec<CageJobMeta>,
-    /// Sessions and cage jobs that were damaged and moved to quarantine.
+    /// Its recoveries, oldest first.
+    pub recoveries: Vec<RecoveryMeta>,
+    /// Sessions and jobs that were damaged and moved to quarantine.
     pub quarantined: Vec<Quarantined>,
-    /// Sessions and cage jobs that could not be read and were left in place.
+    /// Sessions and jobs that could not be read and were left in place.
     pub unread: Vec<Unreadable>,
 }
 
@@ -116,13 +125,17 @@ impl Store {
         let lock = disk.lock(&lock_path).map_err(|e| StoreError::of(&lock_path, "lock", e))?;
         let lock = lock.ok_or_else(|| StoreError::Locked { path: root.to_owned() })?;
         let files = Files::new(root, disk);
-        let kept = [&files.trash, &files.sessions, &files.cages, &files.contents, &files.prepared];
+        let kept = [&files.trash, &files.sessions, &files.cages, &files.recoveries, &files.contents, &files.prepared];
         for folder in kept.into_iter().chain([&files.quarantine, &files.tmp]) {
             make_folder(&*files.disk, folder)?;
         }
         // They may be so on purpose: whoever made them decides.
         let is_open = |folder: &Path| disk::is_open_to_all(folder).unwrap_or(false);
-        if is_open(root) && [&files.sessions, &files.contents, &files.cages].into_iter().any(|folder| is_open(folder)) {
+        if is_open(root)
+            && [&files.sessions, &files.contents, &files.cages, &files.recoveries]
+                .into_iter()
+                .any(|folder| is_open(folder))
+        {
             let folder = root.display();
             tracing::warn!(
                 "every user of this machine may look into the data folder {folder}; close it: chmod -R o= {folder}"
@@ -139,15 +152,12 @@ impl Store {
             }
         }
         let scan::FolderScan { metas: mut sessions, mut quarantined, mut unread } = scan::find::<SessionMeta>(&files)?;
-        let scan::FolderScan { metas: mut cage_jobs, quarantined: damaged, unread: more } =
-            scan::find::<CageJobMeta>(&files)?;
-        quarantined.extend(damaged);
-        unread.extend(more);
         sessions.sort_by(|a, b| (a.created_ms, &a.id).cmp(&(b.created_ms, &b.id)));
-        cage_jobs.sort_by(|a, b| (a.created_ms, &a.id).cmp(&(b.created_ms, &b.id)));
+        let cage_jobs = jobs::find(&files, &mut quarantined, &mut unread)?;
+        let recoveries = jobs::find(&files, &mut quarantined, &mut unread)?;
         quarantined.sort_by(|a, b| a.name.cmp(&b.name));
         let inner = Inner { files, lock: Arc::new(lock), logs: Arc::default() };
-        Ok(Opened { store: Self { inner: Arc::new(inner) }, sessions, cage_jobs, quarantined, unread })
+        Ok(Opened { store: Self { inner: Arc::new(inner) }, sessions, cage_jobs, recoveries, quarantined, unread })
     }
 
     fn files(&self) -> &Files {

@@ -1,4 +1,4 @@
-//! Scanning the store for sessions and cage jobs.
+//! Scanning the store for sessions and jobs.
 
 use super::files::Files;
 use super::names::check_id;
@@ -13,6 +13,8 @@ pub enum Kind {
     Session,
     /// A cage job.
     CageJob,
+    /// A recovery.
+    Recovery,
 }
 
 impl Kind {
@@ -21,6 +23,7 @@ impl Kind {
         match self {
             Self::Session => "session",
             Self::CageJob => "cage job",
+            Self::Recovery => "recovery",
         }
     }
 
@@ -29,6 +32,7 @@ impl Kind {
         match self {
             Self::Session => &files.sessions,
             Self::CageJob => &files.cages,
+            Self::Recovery => &files.recoveries,
         }
     }
 }
@@ -36,7 +40,7 @@ impl Kind {
 /// A folder that could not be read and was left in place.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unreadable {
-    /// Session or cage job.
+    /// Session or job.
     pub kind: Kind,
     /// Name of its folder.
     pub name: String,

@@ -56,12 +56,13 @@ pub(crate) fn observe(service: &Service) {
     metrics::gauge!("cager_streams").set(service.open_streams() as f64);
     metrics::gauge!("cager_preparing").set(service.solvers.in_flight() as f64);
     metrics::gauge!("cager_designing").set(service.cage_jobs.unfinished() as f64);
+    metrics::gauge!("cager_recovering").set(service.recoveries.unfinished() as f64);
     metrics::gauge!("cager_memory_bytes", "use" => "designs").set(service.designs.bytes() as f64);
     metrics::gauge!("cager_memory_bytes", "use" => "frames").set(service.frame_memory.used() as f64);
     metrics::gauge!("cager_memory_bytes", "use" => "downloads").set(service.download_memory.used() as f64);
     metrics::gauge!("cager_disk_bytes", "use" => "spool").set(service.spool_space.used() as f64);
     metrics::gauge!("cager_memory_bytes", "use" => "uploads").set(service.upload_memory.used() as f64);
-    for (kind, what) in [(Kind::Session, "sessions"), (Kind::CageJob, "cages")] {
+    for (kind, what) in [(Kind::Session, "sessions"), (Kind::CageJob, "cages"), (Kind::Recovery, "recoveries")] {
         metrics::gauge!("cager_unread", "what" => what).set(service.unread.count(kind) as f64);
     }
     metrics::gauge!("cager_disk_free_bytes").set(service.store.free_bytes() as f64);
@@ -84,8 +85,8 @@ fn describe() {
     describe_counter!("cager_log_bytes_total", Unit::Bytes, "Bytes written to frame logs");
     describe_counter!("cager_sessions_created_total", "Sessions made, by tenant");
     describe_counter!("cager_sessions_expired_total", "Sessions deleted because of their age");
-    describe_counter!("cager_quarantined_total", "Damaged sessions, cage designs and files moved to quarantine");
-    describe_gauge!("cager_unread", "Sessions and cage designs whose files cannot be read, left where they are");
+    describe_counter!("cager_quarantined_total", "Damaged sessions, jobs and files moved to quarantine");
+    describe_gauge!("cager_unread", "Sessions and jobs whose files cannot be read, left where they are");
     describe_gauge!("cager_build_info", "Always 1; version and commit of the program");
     describe_counter!("cager_webhooks_total", "Messages to webhooks, by result: delivered, given_up, gone");
     describe_counter!("cager_rejections_total", "Requests turned away, by reason");
@@ -114,12 +115,15 @@ fn describe() {
         "cager_designs_total",
         "Cage designs that ended, by result: completed, failed, or known from an earlier one"
     );
+    describe_gauge!("cager_recovering", "Recoveries that are not over");
+    describe_counter!("cager_recoveries_total", "Recoveries that ended, by result: completed or failed");
+    describe_counter!("cager_recovered_frames_total", "Frames of recoveries that were followed, by tenant");
     describe_histogram!("cager_design_seconds", Unit::Seconds, "Designing a cage");
     describe_gauge!("cager_memory_bytes", Unit::Bytes, "Memory of frames, uploads, downloads and designs in progress");
     describe_gauge!("cager_disk_free_bytes", Unit::Bytes, "Free space of the data folder's file system");
     describe_gauge!("cager_uptime_seconds", Unit::Seconds, "Time since the service started");
     describe_gauge!("cager_sessions", "Sessions, by tenant");
-    describe_gauge!("cager_stored_bytes", Unit::Bytes, "Disk space of sessions and cage designs, by tenant");
+    describe_gauge!("cager_stored_bytes", Unit::Bytes, "Disk space of sessions and jobs, by tenant");
     describe_counter!("cager_coded_frames_total", "Frames coded in groups, by tenant");
     describe_histogram!("cager_queue_seconds", Unit::Seconds, "Wait of a batch's oldest frame");
     describe_histogram!("cager_solve_seconds", Unit::Seconds, "Inverting and measuring a batch of up to 16 frames");

@@ -17,8 +17,8 @@ pub use atomic::{AtomicDir, AtomicFile, ScratchDir, Target, commit_together, rem
 pub use error::{Action, Error};
 pub use frames::{
     CacheFormat, FrameOptions, FrameRange, FrameReader, FrameSelection, FrameWriter, MeshSequence, create_frames,
-    frame_files, frames_path, mesh_sequence, missing_frames, open_frames, open_frames_bytes, open_frames_in,
-    open_selected_frames,
+    frame_files, frame_numbers, frames_path, mesh_sequence, missing_frames, open_frames, open_frames_bytes,
+    open_frames_in, open_selected_frames,
 };
 pub use matrix::{read_matrix, read_matrix_bytes};
 pub use mesh::{MeshFormat, model_bytes, obj_bytes, read_model, read_model_bytes, read_model_with_note, write_model};

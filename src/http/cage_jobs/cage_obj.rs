@@ -1,7 +1,7 @@
 //! `GET /v1/cages/{id}/cage.obj`: the best cage so far, and in the end the result.
 
-use crate::cage_job::Cage;
-use crate::http::extract::RequestedCageJob;
+use crate::cage_job::{Cage, CageDesign};
+use crate::http::extract::RequestedJob;
 use crate::http::openapi;
 use crate::http::ranged::Immutable;
 use crate::problem::ApiError;
@@ -25,7 +25,7 @@ use std::sync::Arc;
 )]
 pub(crate) async fn get(
     State(service): State<Arc<Service>>,
-    RequestedCageJob { job, tenant }: RequestedCageJob,
+    RequestedJob { job, tenant }: RequestedJob<CageDesign>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let store = service.store.clone();

@@ -1,7 +1,8 @@
 //! `GET /v1/cages/{id}/events`: progress of a design as server-sent events.
 
+use crate::cage_job::CageDesign;
 use crate::http::events::Event;
-use crate::http::extract::RequestedCageJob;
+use crate::http::extract::RequestedJob;
 use crate::http::openapi;
 use crate::http::progress::{self, ProgressEvent, ProgressSource};
 use crate::problem::ApiError;
@@ -21,12 +22,12 @@ use std::sync::Arc;
 )]
 pub(crate) async fn get(
     State(service): State<Arc<Service>>,
-    RequestedCageJob { job, tenant }: RequestedCageJob,
+    RequestedJob { job, tenant }: RequestedJob<CageDesign>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let place = service.stream(&tenant)?;
     let (changes, deleted) = (job.changes(), job.deleted().clone());
-    let look = move || {
+    let look = move |_: Option<&str>| {
         let progress = job.progress();
         let data = serde_json::to_string(&progress).unwrap_or_default();
         let id = blake3::hash(data.as_bytes()).to_hex()[..16].to_owned();

@@ -1,13 +1,14 @@
 //! Listing, looking at and deleting cage designs.
 
-use crate::http::extract::{Caller, Query, Requested, RequestedCageJob};
+use crate::cage_job::{CageDesign, CageJob};
+use crate::http::extract::{Caller, Query, Requested, RequestedJob};
 use crate::http::openapi;
-use crate::http::sessions::{PAGE, PageQuery};
+use crate::http::sessions::PageQuery;
 use crate::problem::ApiError;
 use crate::service::Service;
 use axum::Json;
 use axum::extract::State;
-use cager_proto::cage_messages::{CageJob, CageJobList};
+use cager_proto::cage_messages::{CageJob as View, CageJobList};
 use http::StatusCode;
 use std::sync::Arc;
 
@@ -18,16 +19,13 @@ pub(crate) async fn list(
     Caller(tenant): Caller,
     Query(query): Query<PageQuery>,
 ) -> Json<CageJobList> {
-    let mut page = service.cage_jobs.page(&tenant.name, query.after.as_deref(), PAGE + 1);
-    let more = page.len() > PAGE;
-    page.truncate(PAGE);
-    let next = page.last().filter(|_| more).map(|job| job.meta.id.clone());
+    let (page, next) = query.page(&service.cage_jobs, &tenant);
     Json(CageJobList { cages: page.iter().map(|job| job.view()).collect(), next })
 }
 
 /// A cage design.
-#[utoipa::path(get, path = "/v1/cages/{id}", operation_id = "get_cage_design", tag = "cages", params(openapi::CageId), responses((status = 200, description = "The design", body = CageJob)))]
-pub(crate) async fn get(RequestedCageJob { job, .. }: RequestedCageJob) -> Json<CageJob> {
+#[utoipa::path(get, path = "/v1/cages/{id}", operation_id = "get_cage_design", tag = "cages", params(openapi::CageId), responses((status = 200, description = "The design", body = View)))]
+pub(crate) async fn get(RequestedJob { job, .. }: RequestedJob<CageDesign>) -> Json<View> {
     Json(job.view())
 }
 
@@ -35,8 +33,8 @@ pub(crate) async fn get(RequestedCageJob { job, .. }: RequestedCageJob) -> Json<
 #[utoipa::path(delete, path = "/v1/cages/{id}", operation_id = "delete_cage_design", tag = "cages", params(openapi::CageId), responses((status = 204, description = "It is gone")))]
 pub(crate) async fn delete(
     State(service): State<Arc<Service>>,
-    Requested(job): Requested<crate::cage_job::CageJob>,
+    Requested(job): Requested<CageJob>,
 ) -> Result<StatusCode, ApiError> {
-    service.delete_cage_job(&job).await?;
+    service.delete_job(&job).await?;
     Ok(StatusCode::NO_CONTENT)
 }

@@ -3,21 +3,18 @@
 use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::cage_job::create::{NewCageJob, check_options};
-use crate::config::MULTIPART_OVERHEAD_BYTES;
 use crate::http::multipart::{NAME_CHARACTERS, bad, broken, file_name, form, read_options};
+use crate::http::paced::Paced;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::registry::Reserved;
 use crate::store::Spool;
-use crate::sync::lock;
 use crate::tasks::blocking;
-use axum::body::Body;
 use axum::extract::multipart::Field;
 use axum::extract::{Multipart, Request};
-use bytes::{Bytes, BytesMut};
+use bytes::BytesMut;
 use cager_proto::cage_messages::CageOptions;
-use futures_util::StreamExt as _;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 /// Bytes of frames written to disk at a time; quota is reserved in the same steps.
 const SPOOL_CHUNK_BYTES: usize = 1 << 20;
@@ -32,33 +29,23 @@ pub(in crate::http) async fn read(
     request: Request,
     idempotency_key: Option<String>,
 ) -> Result<NewCageJob, ApiError> {
-    let pace = Arc::new(Mutex::new(ParserBacklog::default()));
-    let counted = Arc::clone(&pace);
-    let count = move |piece: Result<Bytes, axum::Error>| {
-        let piece = piece?;
-        let mut pace = lock(&counted);
-        pace.unused += piece.len() as u64;
-        pace.stuck |= pace.unused > 2 * MULTIPART_OVERHEAD_BYTES;
-        if pace.stuck { Err(axum::Error::new("it has no parts")) } else { Ok(piece) }
-    };
-    let request = request.map(|body| Body::from_stream(body.into_data_stream().map(count)));
+    let (pace, request) = Paced::new(request);
     let body = form(request).await?;
     let receiver = Receiver {
         service,
         tenant,
-        pace: Arc::clone(&pace),
+        pace: pace.clone(),
         room: service.upload_memory.nothing(&tenant.name),
         reserved: service.reserve(tenant, 0)?,
     };
     let read = receiver.read(body, idempotency_key).await;
-    let stuck = lock(&pace).stuck;
-    if stuck { Err(bad("the multipart body has no parts; check its boundary".to_owned())) } else { read }
+    pace.finish(read)
 }
 
 struct Receiver<'a> {
     service: &'a Arc<Service>,
     tenant: &'a Arc<Tenant>,
-    pace: Arc<Mutex<ParserBacklog>>,
+    pace: Paced,
     room: Held,
     reserved: Reserved,
 }
@@ -105,7 +92,7 @@ impl Receiver<'_> {
         }
         let limit = self.service.config.max_rest_bytes;
         let mut bytes = Vec::new();
-        while let Some(chunk) = self.chunk(&mut field).await? {
+        while let Some(chunk) = self.pace.chunk(&mut field).await? {
             if (bytes.len() + chunk.len()) as u64 > limit {
                 return Err(
                     self.too_large(&format!("the rest pose is larger than {limit} bytes; send a lighter model"), limit)
@@ -127,7 +114,7 @@ impl Receiver<'_> {
         let mut spool = blocking(move || store.spool()).await??;
         let mut waiting = BytesMut::new();
         loop {
-            let chunk = self.chunk(&mut field).await?;
+            let chunk = self.pace.chunk(&mut field).await?;
             let ended = chunk.is_none();
             waiting.extend_from_slice(&chunk.unwrap_or_default());
             if waiting.len() < SPOOL_CHUNK_BYTES && !ended {
@@ -154,26 +141,8 @@ impl Receiver<'_> {
         }
     }
 
-    async fn chunk(&self, field: &mut Field<'_>) -> Result<Option<Bytes>, ApiError> {
-        let chunk = field.chunk().await.map_err(|e| broken(&e))?;
-        if let Some(chunk) = &chunk {
-            let mut pace = lock(&self.pace);
-            pace.unused = pace.unused.saturating_sub(chunk.len() as u64);
-        }
-        Ok(chunk)
-    }
-
     fn too_large(&self, detail: &str, limit: u64) -> ApiError {
         self.service.rejected("body_too_large");
         ApiError::new(problem::TOO_LARGE, detail).limit(limit)
     }
-}
-
-/// Progress of the multipart parser relative to the body.
-#[derive(Default)]
-struct ParserBacklog {
-    /// Bytes received that belong to no part yet; the parser buffers them.
-    unused: u64,
-    /// Whether that limit was exceeded.
-    stuck: bool,
 }

@@ -55,7 +55,7 @@ fn live(given: &Given, told: &mut Told) -> Result<(), StoreError> {
         twice(|| create(&store, id))?;
         told.created.push(id);
     }
-    twice(|| store.count_cage_job_attempt("a"))?;
+    twice(|| store.count_attempt(Kind::CageJob, "a"))?;
     twice(|| store.finish_cage_job("a", &OUTCOME, Some(CAGE)))?;
     told.finished = true;
     twice(|| store.delete(Kind::CageJob, "b"))?;
@@ -74,7 +74,8 @@ fn look(given: &Given, told: &Told, what: &str) {
     assert!(!told.created.contains(&"a") || there("a"), "{what}: a job is lost");
     assert!(!(told.deleted && there("b")), "{what}: a deleted job came back");
     for id in ["a", "b"].into_iter().filter(|id| there(id)) {
-        let outcome: Option<String> = store.cage_job_outcome(id).unwrap_or_else(|error| panic!("{what}: {error}"));
+        let outcome: Option<String> =
+            store.job_outcome(Kind::CageJob, id).unwrap_or_else(|error| panic!("{what}: {error}"));
         assert!(outcome.is_some() || !(told.finished && id == "a"), "{what}: an outcome is lost");
         match outcome {
             Some(outcome) => {
@@ -107,7 +108,10 @@ fn a_job_keeps_its_input_until_it_is_over_and_its_cage_from_then_on() {
     let store = given.open().store;
     create(&store, "a").unwrap();
     assert!(store.bytes(Kind::CageJob, "a").expect("a job") > 8000);
-    assert_eq!([store.count_cage_job_attempt("a").unwrap(), store.count_cage_job_attempt("a").unwrap()], [1, 2]);
+    assert_eq!(
+        [store.count_attempt(Kind::CageJob, "a").unwrap(), store.count_attempt(Kind::CageJob, "a").unwrap()],
+        [1, 2]
+    );
     store.finish_cage_job("a", &OUTCOME, Some(CAGE)).unwrap();
     assert!(store.bytes(Kind::CageJob, "a").expect("a job") < 2000);
     assert!(matches!(store.cage_job_rest(&meta("a")), Err(StoreError::Damaged { .. })));

@@ -1,2 +1,3 @@
 mod cages;
+mod recoveries;
 mod sessions;

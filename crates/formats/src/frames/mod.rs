@@ -35,7 +35,8 @@ pub use numbers::missing_frames;
 pub use range::FrameRange;
 pub use selection::FrameSelection;
 pub use source::{
-    MeshSequence, frame_files, mesh_sequence, open_frames, open_frames_bytes, open_frames_in, open_selected_frames,
+    MeshSequence, frame_files, frame_numbers, mesh_sequence, open_frames, open_frames_bytes, open_frames_in,
+    open_selected_frames,
 };
 pub use write::{FrameOptions, FrameWriter, create_frames, frames_path};
 

@@ -95,6 +95,12 @@ pub fn mesh_sequence(source: impl AsRef<Path>, no_frames: &[PathBuf]) -> Result<
     Ok(MeshSequence { files, numbers, notes })
 }
 
+/// The numbers that the names of files in this order tell; none where they tell none, or another order.
+pub fn frame_numbers(files: &[PathBuf]) -> Option<Vec<f64>> {
+    let sequence = Sequence::of(files.to_vec()).ok()?;
+    sequence.numbers.filter(|_| sequence.files == files)
+}
+
 /// Opens the frames in the bytes of a cache file; `name` is the path in error messages.
 ///
 /// # Errors

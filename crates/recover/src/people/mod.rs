@@ -19,4 +19,4 @@ pub use cager_registration::Observation;
 pub use fit::{FrameFit, PersonFit};
 pub use model::{ModelError, PersonModel};
 pub use options::{FitOptions, Method, SystemKind};
-pub use track::{TrackedFrame, track};
+pub use track::{PersonTracker, TrackedFrame, WayBack, track};

@@ -26,16 +26,26 @@ const WINDOW: usize = 31;
 /// On the way back, frames whose score is below this many times that of the next one are left as they are.
 const AGREED: f64 = 0.9;
 
-/// Fits a sequence forwards and, where `back` says so, backwards from its end, keeping the better fit of each frame. `done` is told each frame of
-/// the first pass.
-pub fn track(
-    fit: &PersonFit<'_>,
-    observations: &[Observation],
-    back: bool,
-    mut done: impl FnMut(usize, &TrackedFrame),
-) -> Vec<TrackedFrame> {
-    let mut frames: Vec<TrackedFrame> = Vec::with_capacity(observations.len());
-    for (number, observation) in observations.iter().enumerate() {
+/// Fits a sequence forwards, frame by frame as they come.
+pub struct PersonTracker<'f, 'a> {
+    fit: &'f PersonFit<'a>,
+    frames: Vec<TrackedFrame>,
+}
+
+impl<'f, 'a> PersonTracker<'f, 'a> {
+    /// Before the first frame.
+    pub fn new(fit: &'f PersonFit<'a>) -> Self {
+        Self { fit, frames: Vec::new() }
+    }
+
+    /// The frames so far.
+    pub fn frames(&self) -> &[TrackedFrame] {
+        &self.frames
+    }
+
+    /// Fits the next frame.
+    pub fn follow(&mut self, observation: &Observation) -> &TrackedFrame {
+        let (fit, frames) = (self.fit, &mut self.frames);
         let last = frames.last().filter(|frame| !frame.lost).map(|frame| &frame.fit);
         let usual = usual_of(frames.iter().rev().take(WINDOW).filter(|frame| !frame.lost).map(|frame| frame.fit.score));
         let mut frame = TrackedFrame { fit: fit.fit(observation, last), lost: false, searched: last.is_none() };
@@ -46,28 +56,62 @@ pub fn track(
             }
         }
         frame.lost = frame.fit.score > MAX_SCORE || usual.is_some_and(|usual| frame.fit.score > LOST * usual);
-        done(number, &frame);
         frames.push(frame);
+        &frames[frames.len() - 1]
     }
-    if back {
-        let usual = usual_of(frames.iter().map(|frame| frame.fit.score));
-        for number in (0..frames.len().saturating_sub(1)).rev() {
-            let from = &frames[number + 1];
-            if from.lost {
-                continue;
-            }
-            if frames[number].fit.score < AGREED * from.fit.score {
-                continue;
-            }
-            let again = fit.fit(&observations[number], Some(&from.fit));
-            if again.score < frames[number].fit.score {
-                frames[number].fit = again;
-            }
-            let score = frames[number].fit.score;
-            frames[number].lost = score > MAX_SCORE || usual.is_some_and(|usual| score > LOST * usual);
+
+    /// The way back, from the last frame.
+    pub fn back(self) -> WayBack<'f, 'a> {
+        let usual = usual_of(self.frames.iter().map(|frame| frame.fit.score));
+        WayBack { fit: self.fit, frames: self.frames, usual }
+    }
+}
+
+/// Fits a sequence backwards after [`PersonTracker`], keeping the better fit of each frame.
+pub struct WayBack<'f, 'a> {
+    fit: &'f PersonFit<'a>,
+    frames: Vec<TrackedFrame>,
+    usual: Option<f64>,
+}
+
+impl WayBack<'_, '_> {
+    /// Fits a frame from the one after it, unless it lies well already; to be called from the last frame to the first.
+    pub fn refit(&mut self, number: usize, observation: impl FnOnce() -> Observation) {
+        let (before, from) = self.frames.split_at_mut(number + 1);
+        let (Some(frame), Some(from)) = (before.last_mut(), from.first()) else { return };
+        if from.lost || frame.fit.score < AGREED * from.fit.score {
+            return;
         }
+        let again = self.fit.fit(&observation(), Some(&from.fit));
+        if again.score < frame.fit.score {
+            frame.fit = again;
+        }
+        let score = frame.fit.score;
+        frame.lost = score > MAX_SCORE || self.usual.is_some_and(|usual| score > LOST * usual);
     }
-    frames
+
+    /// All frames.
+    pub fn into_frames(self) -> Vec<TrackedFrame> {
+        self.frames
+    }
+}
+
+/// Fits a sequence forwards and, where `back` says so, backwards from its end. `done` is told each frame of the first pass.
+pub fn track(
+    fit: &PersonFit<'_>,
+    observations: &[Observation],
+    back: bool,
+    mut done: impl FnMut(usize, &TrackedFrame),
+) -> Vec<TrackedFrame> {
+    let mut tracker = PersonTracker::new(fit);
+    for (number, observation) in observations.iter().enumerate() {
+        done(number, tracker.follow(observation));
+    }
+    let mut way_back = tracker.back();
+    for number in (0..if back { observations.len() } else { 0 }).rev() {
+        way_back.refit(number, || observations[number].clone());
+    }
+    way_back.into_frames()
 }
 
 /// The lower quartile: frames that are off raise it least.

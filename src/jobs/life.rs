@@ -1,0 +1,107 @@
+//! Jobs found on disk, ended and deleted.
+
+use super::{Job, Outcome, Phase, Work, kind_of};
+use crate::problem::ApiError;
+use crate::service::Service;
+use crate::store::{FolderMeta as _, JobMeta as _, Store, StoreError};
+use crate::tasks::{blocking, to_the_end};
+use crate::unreadable;
+use std::sync::Arc;
+use std::sync::atomic::Ordering::{Relaxed, SeqCst};
+
+impl Service {
+    /// Resumes a job found on disk; one without outcome is begun again. If its outcome cannot be read, it is registered as failed so that it
+    /// can be deleted, and resumed when this is called again.
+    ///
+    /// # Errors
+    /// I/O errors of its files.
+    pub(crate) fn resume_job<W: Work>(self: &Arc<Self>, meta: W::Meta) -> Result<(), StoreError> {
+        let (id, kind) = (meta.id().to_owned(), kind_of::<W>());
+        let (phase, error) = match self.store.job_outcome(kind, &id) {
+            Ok(Some(Outcome::Completed(found))) => (Phase::Completed(found), None),
+            Ok(Some(Outcome::Failed(problem))) => (Phase::Failed(problem), None),
+            Ok(None) => (Phase::Waiting, None),
+            Err(error @ StoreError::Damaged { .. }) => {
+                tracing::warn!(job = %id, %error, "the outcome of a job is damaged, so it is begun again");
+                (Phase::Waiting, None)
+            }
+            Err(error) => (Phase::Failed(unreadable::problem(kind).problem), Some(error)),
+        };
+        let unfinished = matches!(phase, Phase::Waiting);
+        if !unfinished && error.is_none() {
+            W::forget_input(&self.store, &id);
+        }
+        // Rather too much than nothing where it cannot be counted.
+        let bytes = self.store.bytes(kind, &id).unwrap_or_else(|_| meta.sent_bytes());
+        let job = Arc::new(Job::<W>::new(meta, phase, bytes));
+        let loaded = if unfinished { W::load(&self.store, &job) } else { Ok(()) };
+        let error = loaded.err().map_or(error, |found| {
+            let is_damage = matches!(found, StoreError::Damaged { .. });
+            if is_damage {
+                job.fail_if_damaged(&self.store, found);
+                return None;
+            }
+            job.set_phase(Phase::Failed(unreadable::problem(kind).problem));
+            Some(found)
+        });
+        W::jobs(self).insert(Arc::clone(&job));
+        if !job.status().phase.is_final() {
+            W::begin(Arc::clone(self), job);
+        }
+        error.map_or(Ok(()), Err)
+    }
+
+    /// Stores the outcome of a job by `write`, then notifies its followers.
+    pub(crate) async fn finish_job<W: Work>(
+        &self,
+        job: &Arc<Job<W>>,
+        outcome: Outcome<W::Finished>,
+        write: impl FnOnce(&Store, &Outcome<W::Finished>) -> Result<(), StoreError> + Send + 'static,
+    ) {
+        let (store, id, kept) = (self.store.clone(), job.id().to_owned(), outcome.clone());
+        let stored = blocking(move || write(&store, &kept).map(|()| store.bytes(kind_of::<W>(), &id).ok()));
+        match stored.await {
+            _ if job.is_going() => return,
+            Ok(Ok(Some(bytes))) => job.bytes.store(bytes, Relaxed),
+            Ok(Ok(None)) => {}
+            Ok(Err(error)) => {
+                tracing::warn!(job = job.id(), %error, "the outcome of a job could not be kept; a restart begins it again");
+                if matches!(outcome, Outcome::Completed(_)) {
+                    return job.set_phase(Phase::Failed(ApiError::from(error).problem));
+                }
+            }
+            Err(error) => return job.set_phase(Phase::Failed(error.problem)),
+        }
+        let (phase, result) = match outcome {
+            Outcome::Completed(found) => (Phase::Completed(found), "completed"),
+            Outcome::Failed(problem) => (Phase::Failed(problem), "failed"),
+        };
+        metrics::counter!(W::ENDED, "result" => result).increment(1);
+        job.set_phase(phase);
+    }
+
+    /// Deletes a job and stops its work. Runs to the end even if the client disconnects.
+    ///
+    /// # Errors
+    /// Storage errors.
+    pub(crate) async fn delete_job<W: Work>(self: &Arc<Self>, job: &Arc<Job<W>>) -> Result<(), ApiError> {
+        let (service, job) = (Arc::clone(self), Arc::clone(job));
+        to_the_end(async move {
+            let (store, id, kind) = (service.store.clone(), job.id().to_owned(), kind_of::<W>());
+            let _unread = service.unread.hold(kind, &id).await;
+            job.deleting.store(true, SeqCst);
+            let deleted = blocking(move || store.delete(kind, &id)).await.and_then(|deleted| Ok(deleted?));
+            if deleted.is_err() {
+                job.deleting.store(false, SeqCst);
+                job.touch();
+            }
+            deleted?;
+            service.unread.forget(kind, job.id());
+            W::jobs(&service).remove(job.id());
+            job.deleted().cancel();
+            job.touch();
+            Ok(())
+        })
+        .await
+    }
+}

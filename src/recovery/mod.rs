@@ -1,0 +1,148 @@
+//! Recoveries, independent of HTTP: a template followed through surfaces as they are sent, in the background. Frames are on disk as they were sent
+//! before they are acknowledged; what follows them is `cager recover` itself, which reads them again whenever it needs them. So a restart begins
+//! with the first frame and comes to the same results.
+
+mod choices;
+mod create;
+mod finish;
+mod frames;
+mod run;
+mod source;
+mod view;
+
+pub(crate) use create::NewRecovery;
+
+use crate::jobs::{Job, Jobs, Phase, Work};
+use crate::problem::{self, ApiError};
+use crate::service::Service;
+use crate::store::{RecoveryMeta, Store, StoreError, StoredPart};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Animations recovered from surfaces.
+pub(crate) struct Recovery;
+
+/// A recovery in memory.
+pub(crate) type RecoveryJob = Job<Recovery>;
+
+impl Work for Recovery {
+    type Meta = RecoveryMeta;
+    type Finished = Finished;
+    type Progress = Progress;
+
+    const NAME: &'static str = "recovery";
+    const LIST: &'static str = "/v1/recoveries";
+    const ENDED: &'static str = "cager_recoveries_total";
+    const FAILED: problem::Kind = problem::RECOVERY_FAILED;
+
+    fn jobs(service: &Service) -> &Jobs<Self> {
+        &service.recoveries
+    }
+
+    fn load(store: &Store, job: &RecoveryJob) -> Result<(), StoreError> {
+        let (frames, declared) = (store.recovery_frames(job.id())?, store.declared_recovery(job.id())?);
+        job.progressed(|progress| {
+            progress.declared = declared;
+            progress.frames = frames.into_iter().collect();
+            progress.count();
+        });
+        Ok(())
+    }
+
+    fn begin(service: Arc<Service>, job: Arc<RecoveryJob>) {
+        tokio::spawn(service.run_recovery(job));
+    }
+
+    fn forget_input(store: &Store, id: &str) {
+        store.forget_recovery_input(id);
+    }
+
+    fn enter(progress: &mut Progress, phase: &Phase<Finished>) {
+        if phase.is_final() {
+            *progress = Progress { refined: progress.refined, ..Progress::default() };
+        }
+    }
+}
+
+/// What is known of a recovery that is not over.
+#[derive(Default)]
+pub(crate) struct Progress {
+    /// Frames that are on disk.
+    frames: BTreeMap<u32, StoredPart>,
+    /// How many are there from the first on without a gap.
+    arrived: u32,
+    /// How many there are in all, once it was said.
+    declared: Option<u32>,
+    /// What the first pass found, from the first frame on.
+    followed: Vec<FollowedCage>,
+    refined: u32,
+    /// Held while a frame is stored or their number is noted.
+    storing: Arc<tokio::sync::Mutex<()>>,
+}
+
+impl Progress {
+    /// Notes how many frames have arrived without a gap.
+    fn count(&mut self) {
+        while self.frames.contains_key(&self.arrived) {
+            self.arrived += 1;
+        }
+    }
+
+    /// Whether there is something to do now.
+    fn has_work(&self) -> bool {
+        self.arrived as usize > self.followed.len() || self.declared.is_some()
+    }
+}
+
+/// A frame as the first pass found it.
+struct FollowedCage {
+    cage: Vec<[f32; 3]>,
+    score: Option<f64>,
+    outcome: &'static str,
+}
+
+/// Results of a completed recovery, without its files.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+pub(crate) struct Finished {
+    pub(crate) frames: u32,
+    pub(crate) lost: u32,
+    pub(crate) cage_vertices: u32,
+    pub(crate) warnings: Vec<String>,
+    /// The results.
+    pub(crate) files: Vec<StoredPart>,
+}
+
+impl RecoveryJob {
+    /// The results of a completed recovery.
+    ///
+    /// # Errors
+    /// It is not completed.
+    pub(crate) fn finished(&self) -> Result<Box<Finished>, ApiError> {
+        match self.phase() {
+            Phase::Completed(finished) => Ok(finished),
+            Phase::Failed(problem) => Err(ApiError::new(problem::RECOVERY_FAILED, problem.detail)),
+            Phase::Waiting | Phase::Running => {
+                let detail = "results are written when the recovery is completed; post {\"frames\": F} to complete, and wait until its state is completed";
+                Err(ApiError::new(problem::NOT_COMPLETED, detail).retry_after(2))
+            }
+        }
+    }
+}
+
+/// A recovery that takes no frames any more, or is gone.
+fn closed(job: &RecoveryJob) -> Option<ApiError> {
+    if job.is_going() {
+        return Some(ApiError::new(problem::NOT_FOUND, "the recovery was deleted"));
+    }
+    match job.phase() {
+        Phase::Completed(finished) => {
+            let detail = format!("the recovery is completed with {} frames and takes no more", finished.frames);
+            Some(ApiError::new(problem::RECOVERY_COMPLETED, detail))
+        }
+        Phase::Failed(problem) => {
+            Some(ApiError::new(problem::RECOVERY_FAILED, format!("the recovery failed: {}", problem.detail)))
+        }
+        Phase::Waiting | Phase::Running => None,
+    }
+}

@@ -1,0 +1,131 @@
+//! Recoveries as the service tells of them.
+
+use super::{Progress, RecoveryJob};
+use crate::jobs::Phase;
+use crate::store::StoreError;
+use cager_proto::recovery_messages::{
+    FollowedFrame, Recovery as View, RecoveryFrames, RecoveryProgress, RecoveryState,
+};
+use std::fs::File;
+use std::io::{Read as _, Seek as _, SeekFrom};
+
+/// Missing ranges in a view, at most.
+const RANGES: usize = 100;
+/// Frames in an event, at most.
+const TOLD: usize = 1000;
+/// The file of all cages of a completed recovery.
+pub(super) const CAGES: &str = "cages";
+
+impl RecoveryJob {
+    /// The recovery as returned by the API.
+    pub(crate) fn view(&self) -> View {
+        let status = self.status();
+        let progress = &status.progress;
+        let mut view = View {
+            id: self.meta.id.clone(),
+            name: self.meta.options.name.clone(),
+            state: state_of(&status.phase, progress),
+            created: self.meta.created_ms as f64 / 1e3,
+            points: self.meta.points,
+            cage_vertices: progress.followed.first().map(|first| first.cage.len() as u32),
+            origin: self.meta.origin,
+            joints: self.meta.parts.rig.is_some(),
+            frames: RecoveryFrames {
+                received: progress.frames.len() as u32,
+                followed: progress.followed.len() as u32,
+                refined: progress.refined,
+                lost: progress.followed.iter().filter(|frame| frame.outcome == "lost").count() as u32,
+                declared: progress.declared,
+                missing: missing(progress, None),
+            },
+            container_bytes: None,
+            warnings: Vec::new(),
+            problem: None,
+        };
+        match &status.phase {
+            Phase::Waiting | Phase::Running => {}
+            Phase::Completed(found) => {
+                view.cage_vertices = Some(found.cage_vertices);
+                let [received, followed, refined] = [found.frames; 3];
+                let declared = Some(received);
+                view.frames =
+                    RecoveryFrames { received, followed, refined, lost: found.lost, declared, missing: Vec::new() };
+                view.container_bytes = found.files.iter().find(|f| f.name == "capture.cager").map(|f| f.bytes);
+                view.warnings = found.warnings.clone();
+            }
+            Phase::Failed(problem) => view.problem = Some((**problem).clone()),
+        }
+        view
+    }
+
+    /// State and progress for server-sent events, with the frames from `told` on.
+    pub(crate) fn progress_from(&self, told: u32) -> RecoveryProgress {
+        let View { state, frames: RecoveryFrames { received, followed, refined, .. }, .. } = self.view();
+        let status = self.status();
+        let new = status.progress.followed.iter().enumerate().skip(told as usize).take(TOLD);
+        let frames = new.map(|(frame, found)| FollowedFrame {
+            frame: frame as u32,
+            score: found.score,
+            outcome: found.outcome.to_owned(),
+        });
+        RecoveryProgress { state, received, followed, refined, frames: frames.collect() }
+    }
+
+    /// Cages from frame `first` on, at most `most`, m × 12 bytes each, and the number of frames, once that is known: of the first pass, and of the
+    /// whole when the recovery is completed. Blocks.
+    ///
+    /// # Errors
+    /// The file of all cages cannot be read.
+    pub(crate) fn cages(
+        &self,
+        store: &crate::store::Store,
+        first: u32,
+        most: u32,
+    ) -> Result<(Vec<u8>, Option<u32>), StoreError> {
+        let finished = {
+            let status = self.status();
+            let progress = &status.progress;
+            let Phase::Completed(finished) = &status.phase else {
+                let found = progress.followed.iter().skip(first as usize).take(most as usize);
+                let bytes = found.flat_map(|found| found.cage.as_flattened()).flat_map(|x| x.to_le_bytes());
+                return Ok((bytes.collect(), progress.declared));
+            };
+            finished.clone()
+        };
+        let path = store.recovery_file(&self.meta.id, CAGES)?;
+        let stride = 12 * u64::from(finished.cage_vertices);
+        let count = most.min(finished.frames.saturating_sub(first));
+        let mut bytes = vec![0; (stride * u64::from(count)) as usize];
+        let mut read = || {
+            let mut file = File::open(&path)?;
+            file.seek(SeekFrom::Start(stride * u64::from(first)))?;
+            file.read_exact(&mut bytes)
+        };
+        read().map_err(|error| StoreError::of(&path, "read", error))?;
+        Ok((bytes, Some(finished.frames)))
+    }
+}
+
+fn state_of(phase: &Phase<super::Finished>, progress: &Progress) -> RecoveryState {
+    match phase {
+        Phase::Completed(_) => RecoveryState::Completed,
+        Phase::Failed(_) => RecoveryState::Failed,
+        _ if progress.declared.is_some() => RecoveryState::Finishing,
+        _ if progress.has_work() => RecoveryState::Following,
+        _ => RecoveryState::Ready,
+    }
+}
+
+/// Ranges of frames that are missing below the highest, or below `end`; the first ones.
+pub(super) fn missing(progress: &Progress, end: Option<u32>) -> Vec<[u32; 2]> {
+    let mut ranges = Vec::new();
+    let mut next = progress.arrived;
+    let there = progress.frames.range(next..).map(|(&frame, _)| frame);
+    for frame in there.chain(end) {
+        if frame > next && ranges.len() < RANGES {
+            ranges.push([next, frame]);
+        }
+        next = next.max(frame.saturating_add(1));
+    }
+    ranges
+}

@@ -1,0 +1,59 @@
+//! Recoveries are repeated, listed, deleted and counted as sessions are.
+
+use super::{FRAMES, create, created, post, scans, until};
+use crate::support::TestApp;
+use cager_proto::recovery_messages::{Recovery, RecoveryList};
+use serde_json::json;
+
+const ANNA: &str = "anna-has-a-long-secret";
+const BERT: &str = "bert-has-a-long-secret";
+
+#[tokio::test]
+async fn the_same_request_again_gives_the_same_recovery() {
+    let app = TestApp::start();
+    let options = json!({"points": 800});
+    let first: Recovery = create(&app, scans().form(&options), Some("k")).await.is(202);
+    let again = create(&app, scans().form(&options), Some("k")).await.expect(202);
+    assert_eq!(again.header("location"), format!("/v1/recoveries/{}", first.id));
+    assert_eq!(again.json::<Recovery>().id, first.id);
+    create(&app, scans().form(&json!({"points": 900})), Some("k")).await.problem(422, "idempotency-key-reused");
+    let other: Recovery = create(&app, scans().form(&options), None).await.is(202);
+    let list: RecoveryList = app.get("/v1/recoveries").await.is(200);
+    assert_eq!(list.recoveries.iter().map(|job| &job.id).collect::<Vec<_>>(), [&other.id, &first.id]);
+    app.delete(&format!("/v1/recoveries/{}", first.id)).await.expect(204);
+    let anew: Recovery = create(&app, scans().form(&options), Some("k")).await.is(202);
+    assert_ne!(anew.id, first.id);
+}
+
+#[tokio::test]
+async fn a_recovery_that_is_deleted_while_it_runs_is_gone_and_its_followers_hear_of_it() {
+    let app = TestApp::start();
+    let job = created(&app, &json!({"points": 800})).await;
+    let path = format!("/v1/recoveries/{}", job.id);
+    let events = {
+        let (api, path) = (app.stranger(), format!("{path}/events"));
+        tokio::spawn(async move { api.get(&path).await.expect(200).text() })
+    };
+    post(&app, &job.id, 0, scans().parts(0..FRAMES)).await.expect(200);
+    until(&app, &job.id, |recovery| recovery.frames.followed >= 1).await;
+    app.delete(&path).await.expect(204);
+    assert!(events.await.expect("a stream").ends_with("event: deleted\ndata: {}\n\n"));
+    app.get(&path).await.problem(404, "not-found");
+    post(&app, &job.id, 0, scans().parts(0..1)).await.problem(404, "not-found");
+    assert!(!app.data().join("recoveries").join(&job.id).exists());
+    assert_eq!(app.metric("cager_recovering").await, 0.0);
+}
+
+#[tokio::test]
+async fn tenants_have_recoveries_and_quotas_of_their_own() {
+    let app =
+        TestApp::guarded_with(&[("anna", ANNA, ""), ("bert", BERT, "max_sessions = 1\nmax_bytes = 100000\n")], &[]);
+    let (anna, bert) = (app.caller(Some(ANNA)), app.caller(Some(BERT)));
+    let job = created(&anna, &json!({})).await;
+    bert.get(&format!("/v1/recoveries/{}", job.id)).await.problem(404, "not-found");
+    post(&bert, &job.id, 0, scans().parts(0..1)).await.problem(404, "not-found");
+    let own = created(&bert, &json!({})).await;
+    create(&bert, scans().form(&json!({})), None).await.problem(429, "too-many-sessions");
+    post(&bert, &own.id, 0, scans().parts(0..FRAMES)).await.problem(507, "quota-exceeded");
+    post(&anna, &job.id, 0, scans().parts(0..FRAMES)).await.expect(200);
+}

@@ -1,0 +1,65 @@
+//! Recoveries and restarts.
+
+use super::{FRAMES, complete, completed, container, created, post, recovery, scans, until};
+use crate::support::TestApp;
+use cager_proto::recovery_messages::RecoveryState;
+use serde_json::json;
+
+#[tokio::test]
+async fn a_killed_service_keeps_every_frame_it_acknowledged_and_makes_the_same_file() {
+    let mut app = TestApp::start();
+    let scans = scans();
+    let job = created(&app, &json!({"points": 800})).await;
+    post(&app, &job.id, 0, scans.parts(0..2)).await.expect(200);
+    until(&app, &job.id, |recovery| recovery.frames.followed >= 1).await;
+    app.kill();
+    let mut app = app.again();
+    let found = recovery(&app, &job.id).await;
+    assert_eq!((found.frames.received, found.created), (2, job.created));
+    post(&app, &job.id, 1, scans.parts(0..1)).await.problem(409, "frame-conflict");
+    post(&app, &job.id, 1, scans.parts(1..FRAMES)).await.expect(200);
+    complete(&app, &job.id, FRAMES).await.expect(202);
+    // In the midst of it.
+    app.kill();
+    let mut app = app.again();
+    assert_eq!(recovery(&app, &job.id).await.frames.declared, Some(FRAMES));
+    let done = completed(&app, &job.id).await;
+    let made = container(&app, &job.id).await;
+    assert!(made == scans.recovered("--points 800"), "another file than that of the command line");
+    let cages = app.get(&format!("/v1/recoveries/{}/cages?first=1&count=2", job.id)).await.expect(200).body;
+    // What is completed stays as it is.
+    app.kill();
+    let app = app.again();
+    assert_eq!(recovery(&app, &job.id).await, done);
+    assert_eq!(container(&app, &job.id).await, made);
+    let again = app.get(&format!("/v1/recoveries/{}/cages?first=1&count=2", job.id)).await.expect(200).body;
+    assert_eq!(again, cages);
+}
+
+#[tokio::test]
+async fn a_damaged_frame_fails_the_recovery_and_goes_to_quarantine() {
+    let mut app = TestApp::start();
+    let job = created(&app, &json!({"points": 800})).await;
+    post(&app, &job.id, 0, scans().parts(0..1)).await.expect(200);
+    app.kill();
+    let path = app.data().join("recoveries").join(&job.id).join("frame-0");
+    let mut bytes = std::fs::read(&path).expect("a frame");
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(&path, bytes).expect("a frame");
+    let app = app.again();
+    let failed = {
+        let clock = std::time::Instant::now();
+        loop {
+            let found = recovery(&app, &job.id).await;
+            if found.state == RecoveryState::Failed {
+                break found;
+            }
+            assert!(clock.elapsed() < super::PATIENCE, "{found:?}");
+            tokio::time::sleep(std::time::Duration::from_millis(20)).await;
+        }
+    };
+    assert!(failed.problem.is_some_and(|problem| problem.detail.contains("quarantine")));
+    assert!(!path.exists());
+    post(&app, &job.id, 1, scans().parts(1..2)).await.problem(409, "recovery-failed");
+}

@@ -1,0 +1,92 @@
+//! From a template and frames to an animation.
+
+use super::{FRAMES, complete, completed, container, created, post, recovery, scans, until};
+use crate::support::TestApp;
+use cager_proto::recovery_messages::{FollowedFrame, PostedFrames, RecoveryProgress, RecoveryState};
+use serde_json::{Value, json};
+
+/// The data of all events in a whole stream.
+fn progress(text: &str) -> Vec<RecoveryProgress> {
+    let data = text.lines().filter_map(|line| line.strip_prefix("data: "));
+    data.map(|data| serde_json::from_str(data).expect("a progress")).collect()
+}
+
+#[tokio::test]
+async fn what_is_recovered_is_byte_for_byte_what_the_command_line_recovers() {
+    let app = TestApp::start();
+    let scans = scans();
+    let job = created(&app, &json!({"name": "dance", "points": 800, "frame_rate": 25.0})).await;
+    assert_eq!((job.state, job.frames.received, job.joints), (RecoveryState::Ready, 0, false));
+    let events = {
+        let path = format!("/v1/recoveries/{}/events", job.id);
+        let api = app.stranger();
+        tokio::spawn(async move { api.get(&path).await.expect(200).text() })
+    };
+    let following = {
+        let path = format!("/v1/recoveries/{}/cages?follow=true", job.id);
+        let api = app.stranger();
+        tokio::spawn(async move { api.get(&path).await.expect(200).body })
+    };
+    // Out of order, with a gap that is filled later.
+    let posted: PostedFrames = post(&app, &job.id, 1, scans.parts(1..3)).await.is(200);
+    assert_eq!(posted.frames.iter().map(|frame| frame.frame).collect::<Vec<_>>(), [1, 2]);
+    assert_eq!((posted.frames[0].file.as_str(), posted.received), ("scan_6.ply", 2));
+    assert_eq!(recovery(&app, &job.id).await.frames.missing, [[0, 1]]);
+    complete(&app, &job.id, FRAMES).await.problem(409, "frames-missing");
+    post(&app, &job.id, 0, scans.parts(0..1)).await.expect(200);
+    let found = until(&app, &job.id, |recovery| recovery.frames.followed == 3).await;
+    assert_eq!(found.state, RecoveryState::Ready);
+    app.get(&format!("/v1/recoveries/{}/capture.cager", job.id)).await.problem(409, "not-completed");
+    app.get(&format!("/v1/recoveries/{}/cages?first=2&count=2", job.id)).await.problem(409, "frames-missing");
+    let live = app.get(&format!("/v1/recoveries/{}/cages?first=1", job.id)).await.expect(200).body;
+    assert_eq!(live.len() as u32, 2 * 12 * found.cage_vertices.expect("a cage"));
+    // The same again is known; other bytes are refused, and change nothing.
+    post(&app, &job.id, 0, scans.parts(0..3)).await.expect(200);
+    let refused = post(&app, &job.id, 2, scans.parts(0..1)).await.problem(409, "frame-conflict");
+    assert_eq!(refused.frame, Some(2));
+    post(&app, &job.id, 3, scans.parts(3..4)).await.expect(200);
+    complete(&app, &job.id, 2).await.problem(409, "frame-conflict");
+    complete(&app, &job.id, FRAMES).await.expect(202);
+    let done = completed(&app, &job.id).await;
+    assert_eq!((done.frames.followed, done.frames.refined, done.frames.missing.len()), (FRAMES, FRAMES, 0));
+
+    let made = container(&app, &job.id).await;
+    assert_eq!(done.container_bytes, Some(made.len() as u64));
+    assert!(made == scans.recovered("--points 800 --fps 25"), "another file than that of the command line");
+    let report: Value = app.get(&format!("/v1/recoveries/{}/report", job.id)).await.is(200);
+    assert_eq!(report["frames"].as_array().map(Vec::len), Some(FRAMES as usize));
+    assert_eq!((&report["frames"][0]["file"], &report["frames"][0]["number"]), (&json!("scan_5.ply"), &json!(5.0)));
+    app.get(&format!("/v1/recoveries/{}/joints.bvh", job.id)).await.problem(404, "not-found");
+    let stride = 12 * done.cage_vertices.expect("a cage") as usize;
+    let cages = app.get(&format!("/v1/recoveries/{}/cages", job.id)).await.expect(200).body;
+    assert_eq!(cages.len(), FRAMES as usize * stride);
+    assert_eq!(following.await.expect("a stream").len(), FRAMES as usize * stride);
+    let told = progress(&events.await.expect("a stream"));
+    let frames: Vec<&FollowedFrame> = told.iter().flat_map(|progress| &progress.frames).collect();
+    assert!(frames.iter().enumerate().all(|(k, frame)| frame.frame == k as u32), "{frames:?}");
+    assert!(frames.iter().all(|frame| frame.score.is_some_and(|score| score < 0.1)), "{frames:?}");
+    assert_eq!(told.last().map(|progress| progress.state), Some(RecoveryState::Completed));
+
+    // It is over, and keeps what it made and nothing else.
+    complete(&app, &job.id, FRAMES).await.expect(202);
+    complete(&app, &job.id, 3).await.problem(409, "recovery-completed");
+    post(&app, &job.id, 0, scans.parts(0..1)).await.problem(409, "recovery-completed");
+    let folder = app.data().join("recoveries").join(&job.id);
+    let names = std::fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("a file").file_name());
+    let mut names: Vec<String> = names.map(|name| name.to_string_lossy().into_owned()).collect();
+    names.sort();
+    assert_eq!(names, ["cages", "capture.cager", "outcome.json", "recovery.json", "report.json"]);
+    assert_eq!(app.metric("cager_recoveries_total{result=\"completed\"}").await, 1.0);
+    assert_eq!(app.metric("cager_recovering").await, 0.0);
+}
+
+#[tokio::test]
+async fn offsets_and_a_guaranteed_error_are_those_of_the_command_line() {
+    let app = TestApp::start();
+    let job = created(&app, &json!({"points": 800, "offsets": true, "max_error": 1e-3, "start": 7.0})).await;
+    post(&app, &job.id, 0, scans().parts(0..FRAMES)).await.expect(200);
+    complete(&app, &job.id, FRAMES).await.expect(202);
+    completed(&app, &job.id).await;
+    let expected = scans().recovered("--points 800 --offsets --max-error 1e-3 --start 7");
+    assert!(container(&app, &job.id).await == expected, "another file than that of the command line");
+}
