@@ -4,11 +4,13 @@
 mod cage;
 mod error;
 mod frames;
+mod recover;
 mod same;
 
 pub use cage::RemoteCage;
 pub use error::{Difference, RemoteError};
 pub use frames::FileFrames;
+pub use recover::{RemoteRecovery, RemoteRecoveryProgress, recover_remotely};
 
 use crate::design;
 use crate::encode::Encoded;

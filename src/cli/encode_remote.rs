@@ -171,7 +171,7 @@ fn with_origin(encoded: Encoded, origin: Point, output: &Target) -> Result<Encod
 }
 
 /// What the container is to meet, as a session is asked for it.
-fn coding_options(goal: Option<Goal>, exact_rest: bool) -> SessionOptions {
+pub(super) fn coding_options(goal: Option<Goal>, exact_rest: bool) -> SessionOptions {
     let options = SessionOptions { exact_rest, ..SessionOptions::default() };
     match goal {
         None => SessionOptions::default(),

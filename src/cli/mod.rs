@@ -27,6 +27,7 @@ mod outputs;
 mod progress;
 mod recover;
 mod recover_args;
+mod recover_remote;
 mod rig;
 pub(crate) mod serve;
 mod solver_options;

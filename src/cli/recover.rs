@@ -6,7 +6,7 @@ use super::outputs::Outputs;
 use super::recover_args::{Align, JointsKind, PersonMethod, RecoverArgs};
 use super::rig::{read_manifold, read_rig};
 use super::solver_options::read_cage;
-use super::{grouped, human_bytes, progress, read_model, tell, warn};
+use super::{grouped, human_bytes, progress, read_model, recover_remote, tell, warn};
 use crate::encode::{EncodeProgress, Encoded};
 use crate::origin::{move_to, own_origin};
 use crate::recover::{
@@ -45,6 +45,9 @@ pub(super) fn run(args: &RecoverArgs) -> Result<()> {
     }
     move_to(origin, &mut template.points);
     let files = frames(args)?;
+    if let Some(address) = args.server.as_deref().filter(|_| !args.outputs.dry_run) {
+        return recover_remote::run(args, address, &template, &files, &output, report, joints);
+    }
     let person = person(args)?;
     if args.outputs.dry_run {
         let what = format!("{} frames of {} points", grouped(files.files.len()), grouped(template.points.len()));

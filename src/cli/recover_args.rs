@@ -80,6 +80,14 @@ pub(crate) struct RecoverArgs {
     #[arg(long, value_name = "REPORT.json")]
     pub(super) report: Option<PathBuf>,
 
+    /// Have a service compute: its address, such as http://127.0.0.1:8080. The same command goes on where the connection broke.
+    #[arg(long, value_name = "URL")]
+    pub(super) server: Option<String>,
+
+    /// Token to show to the service [default: the environment's CAGER_TOKEN, which other users of this machine do not see].
+    #[arg(long, value_name = "T", requires = "server", hide_default_value = true)]
+    pub(super) token: Option<String>,
+
     /// Go on past files that hold no surface, and where the template seems turned or of another size.
     #[arg(long)]
     pub(super) force: bool,
@@ -104,4 +112,14 @@ pub(super) enum PersonMethod {
 pub(super) enum JointsKind {
     Csv,
     Bvh,
+}
+
+impl JointsKind {
+    /// Their name among a service's results.
+    pub(super) fn result(self) -> &'static str {
+        match self {
+            Self::Csv => "joints.csv",
+            Self::Bvh => "joints.bvh",
+        }
+    }
 }

@@ -59,6 +59,9 @@ pub enum RemoteError {
         /// Why it broke off.
         cause: Box<Self>,
     },
+    /// The service could not recover anything.
+    #[error("{0}")]
+    Recovery(String),
     /// The network runtime cannot be started.
     #[error("the network cannot be used ({0}); free some memory or files and try again")]
     Runtime(io::Error),

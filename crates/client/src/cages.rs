@@ -153,9 +153,14 @@ impl Client {
     /// # Errors
     /// [`ClientError::Refused`] with status 404 for an unknown id, and those of the connection.
     pub async fn delete_cage(&self, id: &str) -> Result<(), ClientError> {
+        self.delete_job("cages", id).await
+    }
+
+    /// Deletes a job, once, over as many connections as it takes.
+    pub(crate) async fn delete_job(&self, resource: &str, id: &str) -> Result<(), ClientError> {
         let asked = AtomicBool::new(false);
         self.retrying(|| async {
-            let request = self.request(Method::DELETE, &["v1", "cages", id], &[]).await?;
+            let request = self.request(Method::DELETE, &["v1", resource, id], &[]).await?;
             let again = asked.swap(true, Ordering::Relaxed);
             match self.send(request).await {
                 // An earlier attempt deleted it, and its answer was lost.

@@ -16,11 +16,16 @@ impl Client {
     /// [`ClientError::Refused`] with status 409 where the session is not complete, [`ClientError::Output`] where `out` cannot
     /// be written, and those of the connection. `out` may then hold a part of the container.
     pub async fn download(&self, id: &str, out: &mut (impl Write + Send)) -> Result<u64, ClientError> {
+        self.download_file(&["v1", "sessions", id, "capture.cager"], out).await
+    }
+
+    /// Writes a file that never changes.
+    pub(crate) async fn download_file(&self, path: &[&str], out: &mut (impl Write + Send)) -> Result<u64, ClientError> {
         let mut progress = Written::default();
         let mut backoff = self.backoff();
         loop {
             let before = progress.bytes;
-            let Err(failure) = self.download_on(id, out, &mut progress).await else { break };
+            let Err(failure) = self.download_on(path, out, &mut progress).await else { break };
             if progress.bytes > before {
                 backoff.progress();
             }
@@ -40,8 +45,13 @@ impl Client {
     }
 
     /// Goes on with a download on one connection, to its end.
-    async fn download_on(&self, id: &str, out: &mut (impl Write + Send), written: &mut Written) -> Result<(), Failure> {
-        let mut request = self.request(Method::GET, &["v1", "sessions", id, "capture.cager"], &[]).await?;
+    async fn download_on(
+        &self,
+        path: &[&str],
+        out: &mut (impl Write + Send),
+        written: &mut Written,
+    ) -> Result<(), Failure> {
+        let mut request = self.request(Method::GET, path, &[]).await?;
         if written.bytes > 0 {
             // Without a name for the version there is no telling whether the rest belongs to what is there.
             let Some(etag) = &written.etag else {

@@ -15,6 +15,7 @@ use tempfile::TempDir;
 mod cage_jobs;
 mod faults;
 mod prepared;
+mod recoveries;
 mod sessions;
 
 pub(crate) const EIO: i32 = 5;

@@ -2,7 +2,7 @@
 
 use super::{FRAMES, complete, completed, container, created, post, recovery, scans, until};
 use crate::support::TestApp;
-use cager_proto::recovery_messages::{FollowedFrame, PostedFrames, RecoveryProgress, RecoveryState};
+use cager_proto::recovery_messages::{FollowedFrame, PostedFrames, RecoveryList, RecoveryProgress, RecoveryState};
 use serde_json::{Value, json};
 
 /// The data of all events in a whole stream.
@@ -89,4 +89,13 @@ async fn offsets_and_a_guaranteed_error_are_those_of_the_command_line() {
     completed(&app, &job.id).await;
     let expected = scans().recovered("--points 800 --offsets --max-error 1e-3 --start 7");
     assert!(container(&app, &job.id).await == expected, "another file than that of the command line");
+}
+
+#[tokio::test]
+async fn the_command_line_has_a_service_recover_the_same_file_and_leaves_nothing_there() {
+    let app = TestApp::start();
+    let made = scans().recovered(&format!("--points 800 --fps 25 --server http://{}", app.address));
+    assert!(made == scans().recovered("--points 800 --fps 25"), "another file than without a service");
+    let list: RecoveryList = app.get("/v1/recoveries").await.is(200);
+    assert!(list.recoveries.is_empty(), "{list:?}");
 }

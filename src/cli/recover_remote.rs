@@ -1,0 +1,94 @@
+//! `cager recover --server`.
+
+use super::coding_args::goal;
+use super::encode_remote::coding_options;
+use super::recover_args::{Align, JointsKind, PersonMethod, RecoverArgs};
+use super::{grouped, human_bytes, plain, progress, tell, warn};
+use crate::mismatch::Up;
+use crate::remote::{RemoteRecovery, RemoteRecoveryProgress, mesh_file, recover_remotely};
+use anyhow::Result;
+use cager_client::NewRecovery;
+use cager_client::messages::SessionOptions;
+use cager_client::recovery_messages::{Placing, RecoveryOptions, RecoveryState};
+use cager_formats::{AtomicFile, MeshSequence, Target, commit_together};
+use cager_geometry::mesh::Model;
+
+/// Has a service recover what the arguments say.
+pub(super) fn run(
+    args: &RecoverArgs,
+    address: &str,
+    template: &Model,
+    files: &MeshSequence,
+    output: &Target,
+    report: Option<Target>,
+    joints: Option<(Target, JointsKind)>,
+) -> Result<()> {
+    let mut container = AtomicFile::create(output)?;
+    let mut report = report.map(AtomicFile::create).transpose()?;
+    let mut joints = joints
+        .map(|(target, kind)| Ok::<_, anyhow::Error>((kind.result(), AtomicFile::create(target)?)))
+        .transpose()?;
+    let file = |path: &Option<_>| path.as_deref().map(mesh_file).transpose();
+    let person = file(&args.rig)?.zip(file(&args.manifold)?).map(|(rig, manifold)| [rig, manifold]);
+    let options = options(args, template, files.files.len(), person.is_some())?;
+    let new = NewRecovery { cage: file(&args.cage)?, person, options, ..NewRecovery::new(mesh_file(&args.template)?) };
+    let mut outputs = vec![("capture.cager", &mut container)];
+    outputs.extend(report.as_mut().map(|file| ("report", file)));
+    outputs.extend(joints.as_mut().map(|(name, file)| (*name, file)));
+    let token = args.token.clone().or_else(|| std::env::var("CAGER_TOKEN").ok()).filter(|token| !token.is_empty());
+    let job = RemoteRecovery { address, token: token.as_deref(), new, files: &files.files, outputs };
+    let bar = progress::frames("sending", files.files.len());
+    let result = recover_remotely(job, &mut |told| match told {
+        RemoteRecoveryProgress::Sent(sent) => bar.set_position(sent as u64),
+        RemoteRecoveryProgress::Told(told) => {
+            bar.set_message(if told.refined > 0 { "refining" } else { "following" });
+            let done = if told.refined > 0 { told.refined } else { told.followed };
+            bar.set_position(if told.state == RecoveryState::Completed { 0 } else { u64::from(done) });
+        }
+    });
+    bar.finish_and_clear();
+    let done = result?;
+    let bytes = container.complete()?;
+    commit_together(report.into_iter().chain(joints.map(|(_, file)| file)).chain([container]).collect())?;
+    warn(&done.warnings);
+    tell(&format!(
+        "{}: {} frames of {} points as cages of {} vertices\n  frames  {} lost\n  size    {}\n  service {}\n",
+        output.path().display(),
+        grouped(done.frames.received as usize),
+        grouped(done.points as usize),
+        grouped(done.cage_vertices.unwrap_or(0) as usize),
+        grouped(done.frames.lost as usize),
+        human_bytes(bytes),
+        plain(address),
+    ))
+}
+
+fn options(args: &RecoverArgs, template: &Model, frames: usize, has_rig: bool) -> Result<RecoveryOptions> {
+    let goal = goal(&args.coding, true, template, frames)?;
+    let SessionOptions { max_error, mean_error, target_size, quality, exact_rest, .. } =
+        coding_options(goal, args.coding.exact_rest);
+    let placing = |align| (align == Align::Auto).then_some(Placing::Auto);
+    let method = match args.method {
+        PersonMethod::Robust => "robust",
+        PersonMethod::Paper => "paper",
+    };
+    let name = args.output.file_stem().filter(|&name| name != "-");
+    Ok(RecoveryOptions {
+        name: name.map(|name| name.to_string_lossy().chars().take(200).collect()),
+        align: placing(args.align),
+        scale: placing(args.scale),
+        up: args.up.map(|up| if up == Up::Z { "z" } else { "y" }.to_owned()),
+        offsets: args.offsets,
+        force: args.force,
+        points: Some(args.points),
+        method: has_rig.then(|| method.to_owned()),
+        frame_rate: args.timing.fps,
+        start: args.timing.start,
+        frames: u32::try_from(frames).ok(),
+        max_error,
+        mean_error,
+        target_size,
+        quality,
+        exact_rest,
+    })
+}
