@@ -205,6 +205,9 @@ pub struct FollowedFrame {
     pub frame: u32,
     /// How well the template lies on the surface, a fraction of its size; null without a surface.
     pub score: Option<f64>,
+    /// Where the joints of a person are, in the order of `joints.csv`; none of any other subject.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub joints: Vec<[f64; 3]>,
     /// `followed` from the frame before, by a `wider_search`, `lost`, or `no_surface`.
     pub outcome: String,
 }

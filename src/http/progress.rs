@@ -17,13 +17,15 @@ const MIN_EVENT_INTERVAL: Duration = Duration::from_millis(100);
 /// Interval of comments that keep proxies from closing an idle connection.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 
+/// The current state, for who was told the event with this id last.
+pub(super) type Look = Box<dyn Fn(Option<&str>) -> ProgressEvent + Send + Sync>;
+
 /// The source of progress events.
 pub(super) struct ProgressSource {
     /// Notifies of changes.
     pub(super) changes: watch::Receiver<u64>,
     pub(super) deleted: CancellationToken,
-    /// The current state, for who was told the event with this id last.
-    pub(super) look: Box<dyn Fn(Option<&str>) -> ProgressEvent + Send + Sync>,
+    pub(super) look: Look,
 }
 
 /// An event.

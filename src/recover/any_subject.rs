@@ -47,12 +47,12 @@ impl<'a> Recovering<'a> {
     ) -> Result<Vec<TrackedFrame>, RecoverError> {
         let mut tracker = Tracker::new(&self.template, cage.vertices().to_vec());
         let mut tracked = Vec::new();
-        surfaces.each(surfaces.arriving(), |frame, seen| {
+        surfaces.each(0.., |frame, seen| {
             let found = match seen {
                 Some(seen) => tracker.follow(&seen.target),
                 None => tracker.skip(),
             };
-            watch(How::of(&found).first_look(frame, &found.cage));
+            watch(How::of(&found).first_look(frame, &found.cage, &[]));
             tracked.push(found);
             Ok(())
         })?;
@@ -84,7 +84,7 @@ impl<'a> Recovering<'a> {
         };
         // The frame after the one that is looked at, which waits for its other neighbour.
         let mut waiting: Option<(usize, Option<Followed>)> = None;
-        surfaces.each((0..tracked.len()).rev().map(Ok), |frame, seen| {
+        surfaces.each((0..tracked.len()).rev(), |frame, seen| {
             if let Some(seen) = seen.as_ref().filter(|_| pass.wants(frame)) {
                 let (at, after) = tracked[frame..].split_at_mut(1);
                 let after: Vec<&[Point]> = after.iter().take(2).map(|frame| &frame.cage[..]).collect();

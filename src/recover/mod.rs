@@ -146,6 +146,8 @@ pub struct FirstLook<'a> {
     pub frame: usize,
     /// Vertices of the cage.
     pub cage: &'a [Point],
+    /// Joints of a person; none of any other subject.
+    pub joints: &'a [Point],
     /// How well the template lies on the surface, as in a [`FrameReport`].
     pub score: Option<f64>,
     /// How it was found, as in a [`FrameReport`].

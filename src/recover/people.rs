@@ -76,8 +76,9 @@ impl Person<'_> {
     ) -> Result<Finished, RecoverError> {
         let model = surfaces.on_pool(|| PersonModel::new(rest, self.rig, self.options.system, self.options.samples))?;
         let fit = PersonFit { model: &model, manifold: self.manifold, options: self.options };
+        let caged = CagedJoints::new(MarkedJoints::of_rig(self.rig), model.cage(), self.options.system.system())?;
         let (mut tracker, mut numbers, mut frames) = (PersonTracker::new(&fit), Vec::new(), 0);
-        surfaces.each(surfaces.arriving(), |frame, seen| {
+        surfaces.each(0.., |frame, seen| {
             frames += 1;
             // A frame without a surface stays as the one before it; before the first that has one, nothing is known.
             let how = match seen {
@@ -88,7 +89,7 @@ impl Person<'_> {
                 None => How::NO_SURFACE,
             };
             let cage = tracker.frames().last().map_or(model.cage().vertices(), |frame| &frame.fit.vertices);
-            watch(how.first_look(frame, cage));
+            watch(how.first_look(frame, cage, &caged.positions(cage)));
             Ok(())
         })?;
         if numbers.is_empty() {
@@ -96,7 +97,7 @@ impl Person<'_> {
             return Err(RecoverError::NoSurface { frames, first });
         }
         let mut back = tracker.back();
-        surfaces.each((0..frames).rev().map(Ok), |frame, seen| {
+        surfaces.each((0..frames).rev(), |frame, seen| {
             if let (Some(seen), Ok(at)) = (seen, numbers.binary_search(&frame)) {
                 back.refit(at, || seen.target.observation());
             }
@@ -104,9 +105,8 @@ impl Person<'_> {
         })?;
         let tracked = back.into_frames();
         let mut finisher = finisher(frames)?;
-        let caged = CagedJoints::new(MarkedJoints::of_rig(self.rig), model.cage(), self.options.system.system())?;
         let (mut reports, mut joints, mut cages) = (Vec::new(), Vec::new(), Vec::new());
-        surfaces.each((0..frames).map(Ok), |frame, seen| {
+        surfaces.each(0..frames, |frame, seen| {
             // A frame without a surface stays as the one before it, or is as the first that has one.
             let at = numbers.partition_point(|&number| number <= frame).saturating_sub(1);
             let vertices = &tracked[at].fit.vertices;

@@ -76,9 +76,9 @@ impl How {
     /// There was nothing to follow.
     pub(super) const NO_SURFACE: Self = Self { outcome: "no_surface", score: f64::INFINITY };
 
-    /// A frame of the first pass with this cage.
-    pub(super) fn first_look(self, frame: usize, cage: &[Point]) -> RecoverProgress<'_> {
-        RecoverProgress::Followed(FirstLook { frame, cage, score: self.score(), outcome: self.outcome })
+    /// A frame of the first pass with this cage and these joints.
+    pub(super) fn first_look<'a>(self, frame: usize, cage: &'a [Point], joints: &'a [Point]) -> RecoverProgress<'a> {
+        RecoverProgress::Followed(FirstLook { frame, cage, joints, score: self.score(), outcome: self.outcome })
     }
 
     /// None without a surface.

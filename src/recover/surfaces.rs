@@ -56,23 +56,13 @@ pub(crate) fn observed(
     }
 }
 
-impl<'a> Surfaces<'a> {
+impl Surfaces<'_> {
     /// Does work on the threads that are for it.
     pub(super) fn on_pool<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
         match self.pool {
             Some(pool) => pool.install(work),
             None => work(),
         }
-    }
-
-    /// Frames from the first on, each when it is there.
-    pub(super) fn arriving(&self) -> impl Iterator<Item = Result<usize, RecoverError>> + Send + use<'a> {
-        let source = self.source;
-        (0..).map_while(move |frame| match source.wait_for(frame) {
-            Arrival::There => Some(Ok(frame)),
-            Arrival::End => None,
-            Arrival::Stopped => Some(Err(RecoverError::Stopped)),
-        })
     }
 
     /// Reads a frame.
@@ -100,9 +90,12 @@ impl<'a> Surfaces<'a> {
     /// The first frame that holds a surface, when it is there.
     pub(super) fn first(&self) -> Result<(usize, Seen), RecoverError> {
         let (mut frames, mut first_error) = (0, None);
-        for frame in self.arriving() {
-            let frame = frame?;
-            frames = frame + 1;
+        for frame in 0.. {
+            match self.source.wait_for(frame) {
+                Arrival::There => frames = frame + 1,
+                Arrival::End => break,
+                Arrival::Stopped => return Err(RecoverError::Stopped),
+            }
             match self.on_pool(|| self.read(frame)) {
                 Ok(seen) => return Ok((frame, seen)),
                 Err(error) if !self.force || !matches!(error, RecoverError::Surface { .. }) => return Err(error),
@@ -115,21 +108,25 @@ impl<'a> Surfaces<'a> {
         Err(RecoverError::NoSurface { frames, first })
     }
 
-    /// Calls `work` with frames in an order, each read while the one before is worked on; with nothing for those that hold no surface, where that is
-    /// allowed.
+    /// Calls `work` with frames in an order, to the last that there is, each read while the one before is worked on; with nothing for those that hold no
+    /// surface, where that is allowed.
     pub(super) fn each(
         &self,
-        order: impl Iterator<Item = Result<usize, RecoverError>> + Send,
+        order: impl Iterator<Item = usize> + Send,
         mut work: impl FnMut(usize, Option<Followed>) -> Result<(), RecoverError> + Send,
     ) -> Result<(), RecoverError> {
         std::thread::scope(|scope| {
             let (send, read) = sync_channel(1);
             scope.spawn(move || {
                 for frame in order {
-                    let read = frame.and_then(|frame| Ok((frame, self.on_pool(|| self.follow(frame))?)));
+                    let read = match self.source.wait_for(frame) {
+                        Arrival::There => self.on_pool(|| self.follow(frame)),
+                        Arrival::End => break,
+                        Arrival::Stopped => Err(RecoverError::Stopped),
+                    };
                     let failed = read.is_err();
                     // Nobody waits where the work failed.
-                    if send.send(read).is_err() || failed {
+                    if send.send(read.map(|seen| (frame, seen))).is_err() || failed {
                         break;
                     }
                 }

@@ -98,6 +98,7 @@ impl Progress {
 /// A frame as the first pass found it.
 struct FollowedCage {
     cage: Vec<[f32; 3]>,
+    joints: Vec<[f64; 3]>,
     score: Option<f64>,
     outcome: &'static str,
 }

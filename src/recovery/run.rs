@@ -47,7 +47,7 @@ impl Service {
                 () = self.stopping().cancelled() => return,
             };
             let (service, running) = (Arc::clone(&self), Arc::clone(&job));
-            match blocking(move || service.recover(running, place)).await.unwrap_or_else(Ended::Failed) {
+            match blocking(move || service.recover(&running, place)).await.unwrap_or_else(Ended::Failed) {
                 // It does not count as an attempt.
                 Ended::Paused => {
                     let (store, id) = (self.store.clone(), job.meta.id.clone());
@@ -81,9 +81,9 @@ impl Service {
     }
 
     /// Follows frames until there are none for a while, or to the end. Blocks.
-    fn recover(self: Arc<Self>, job: Arc<RecoveryJob>, place: Held) -> Ended {
-        let source = StoredSurfaces::new(Arc::clone(&self), Arc::clone(&job), place);
-        match self.recover_from(&job, &source) {
+    fn recover(self: Arc<Self>, job: &Arc<RecoveryJob>, place: Held) -> Ended {
+        let source = StoredSurfaces::new(Arc::clone(&self), Arc::clone(job), place);
+        match self.recover_from(job, &source) {
             _ if source.is_stopped() => Ended::Paused,
             Ok(Some((finished, workshop))) => Ended::Completed(Box::new(finished), workshop),
             Ok(None) => Ended::Paused,
@@ -155,11 +155,11 @@ impl RecoveryJob {
     /// Takes over what a run tells. A run begins with the first frame, and finds what the one before found.
     fn told(&self, told: RecoverProgress<'_>) {
         self.progressed(|progress| match told {
-            RecoverProgress::Followed(FirstLook { frame, cage, score, outcome })
+            RecoverProgress::Followed(FirstLook { frame, cage, joints, score, outcome })
                 if frame == progress.followed.len() =>
             {
                 let cage = cage.iter().map(|point| point.map(|x| x as f32)).collect();
-                progress.followed.push(FollowedCage { cage, score, outcome });
+                progress.followed.push(FollowedCage { cage, joints: joints.to_vec(), score, outcome });
                 metrics::counter!("cager_recovered_frames_total", "tenant" => self.meta.tenant.clone()).increment(1);
             }
             RecoverProgress::Followed(_) => {}

@@ -11,19 +11,21 @@ use cager_formats::{MeshFormat, frame_numbers, read_model_bytes};
 use cager_geometry::mesh::Model;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio::runtime::Handle;
 
 /// How long a recovery waits for its next frame before it gives its memory back; the next frame then has it begin anew.
 const PATIENCE: Duration = Duration::from_secs(60);
+/// How long it works while others wait for their turn.
+const TURN: Duration = Duration::from_secs(5);
 
 /// The stored frames of a recovery.
 pub(super) struct StoredSurfaces {
     service: Arc<Service>,
     job: Arc<RecoveryJob>,
     runtime: Handle,
-    /// The place among those that work, given back while there is nothing to do.
-    place: Mutex<Option<Held>>,
+    /// The place among those that work, and since when; given back while there is nothing to do.
+    place: Mutex<Option<(Held, Instant)>>,
     /// Why a stored frame could not be read.
     pub(super) failure: Mutex<Option<ApiError>>,
 }
@@ -31,7 +33,7 @@ pub(super) struct StoredSurfaces {
 impl StoredSurfaces {
     /// With a place for the work. Call within a tokio runtime.
     pub(super) fn new(service: Arc<Service>, job: Arc<RecoveryJob>, place: Held) -> Self {
-        let (place, failure) = (Mutex::new(Some(place)), Mutex::default());
+        let (place, failure) = (Mutex::new(Some((place, Instant::now()))), Mutex::default());
         Self { service, job, runtime: Handle::current(), place, failure }
     }
 
@@ -44,13 +46,16 @@ impl StoredSurfaces {
         self.job.status().progress.frames.get(&u32::try_from(frame).ok()?).cloned()
     }
 
-    /// Waits for a place to work at.
+    /// Waits for a place to work at; after a while it is the turn of others who wait.
     async fn take_place(&self) -> Arrival {
-        if lock(&self.place).is_some() {
+        if lock(&self.place).as_ref().is_some_and(|(_, since)| since.elapsed() < TURN) {
             return Arrival::There;
         }
+        drop(lock(&self.place).take());
         tokio::select! {
-            place = self.service.recovering.take(&self.job.meta.tenant, 1) => *lock(&self.place) = Some(place),
+            place = self.service.recovering.take(&self.job.meta.tenant, 1) => {
+                *lock(&self.place) = Some((place, Instant::now()));
+            }
             () = self.job.deleted().cancelled() => return Arrival::Stopped,
             () = self.service.stopping().cancelled() => return Arrival::Stopped,
         }

@@ -66,6 +66,7 @@ impl RecoveryJob {
         let frames = new.map(|(frame, found)| FollowedFrame {
             frame: frame as u32,
             score: found.score,
+            joints: found.joints.clone(),
             outcome: found.outcome.to_owned(),
         });
         RecoveryProgress { state, received, followed, refined, frames: frames.collect() }

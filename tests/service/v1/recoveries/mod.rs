@@ -1,6 +1,7 @@
 //! `/v1/recoveries`: a template followed through surfaces that are sent one by one.
 
 mod life;
+mod person;
 mod refused;
 mod restart;
 mod whole;
