@@ -81,7 +81,7 @@ async fn whole(
     let Completion { container_bytes, container_digest, .. } = completion;
     let room = service.download_memory.nothing(&tenant.name);
     let public = !service.access.is_guarded();
-    let container = Immutable::of_file(file, container_bytes, container_digest, MEDIA_TYPE, room, public);
+    let container = Immutable::of_file(file, 0..container_bytes, container_digest, MEDIA_TYPE, room, public);
     Ok(container.respond(headers))
 }
 

@@ -30,24 +30,24 @@ pub(crate) struct Immutable {
 }
 
 impl Immutable {
-    /// A file of this length, whose digest is its tag.
+    /// These bytes of a file.
     pub(crate) fn of_file(
         file: File,
-        length: u64,
-        digest: String,
+        bytes: Range<u64>,
+        etag: String,
         media_type: &'static str,
         room: Held,
         public: bool,
     ) -> Self {
-        let file = Mutex::new(file);
+        let (file, begin, length) = (Mutex::new(file), bytes.start, bytes.end - bytes.start);
         let read = move |range: Range<u64>| {
             let mut file = lock(&file);
             let mut bytes = vec![0; (range.end - range.start) as usize];
-            file.seek(SeekFrom::Start(range.start))?;
+            file.seek(SeekFrom::Start(begin + range.start))?;
             file.read_exact(&mut bytes)?;
             Ok(bytes.into())
         };
-        Self { length, etag: digest, media_type, public, room, read: Arc::new(read) }
+        Self { length, etag, media_type, public, room, read: Arc::new(read) }
     }
 
     /// The response to a request with these headers; 416 for a range outside the content, 429 or 503 without memory.

@@ -1,5 +1,6 @@
 //! `GET /v1/recoveries/{id}/cages`: cages as frames are followed, and in the end those of the whole.
 
+use super::results::file;
 use crate::admission::Held;
 use crate::http::extract::{Query, RequestedJob};
 use crate::http::openapi;
@@ -12,11 +13,12 @@ use axum::body::Body;
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
-use http::header;
+use http::{HeaderMap, header};
 use serde::Deserialize;
 use std::io;
 use std::sync::Arc;
 
+const OCTETS: &str = "application/octet-stream";
 /// Frames read and sent at a time.
 const PIECE_FRAMES: u32 = 64;
 
@@ -35,15 +37,21 @@ pub(crate) struct CagesQuery {
     follow: bool,
 }
 
-/// Cages: m × 3 little-endian f32 each, `cage_vertices` of the recovery. As frames come those of the first pass; of a completed recovery the final ones.
+/// Cages: m × 3 little-endian f32 each, `cage_vertices` of the recovery. As frames come those of the first pass; of a completed recovery the final ones,
+/// which never change: they have an `ETag` and take `Range`.
 #[utoipa::path(
-    get, path = "/v1/recoveries/{id}/cages", operation_id = "get_recovered_cages", tag = "recoveries", params(openapi::RecoveryId, CagesQuery),
-    responses((status = 200, description = "The cages", content_type = "application/octet-stream", body = Vec<u8>)),
+    get, path = "/v1/recoveries/{id}/cages", operation_id = "get_recovered_cages", tag = "recoveries", params(openapi::RecoveryId, CagesQuery, openapi::Conditions),
+    responses(
+        (status = 200, description = "The cages", content_type = "application/octet-stream", body = Vec<u8>),
+        (status = 206, description = "The range asked for", content_type = "application/octet-stream", body = Vec<u8>),
+        (status = 304, description = "The client's copy is current"),
+    ),
 )]
 pub(crate) async fn get(
     State(service): State<Arc<Service>>,
     RequestedJob { job, tenant }: RequestedJob<Recovery>,
     Query(CagesQuery { first, count, follow }): Query<CagesQuery>,
+    headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     if let Phase::Failed(problem) = job.phase() {
         return Err(ApiError::new(problem::RECOVERY_FAILED, problem.detail));
@@ -54,6 +62,14 @@ pub(crate) async fn get(
         let detail =
             format!("{there} of the {count} frames from {first} on are followed; request fewer, or use follow=true");
         return Err(ApiError::new(problem::FRAMES_MISSING, detail));
+    }
+    if let Ok(finished) = job.finished()
+        && !follow
+    {
+        let stride = 12 * u64::from(finished.cage_vertices);
+        let begin = stride * u64::from(first);
+        let bytes = begin..begin + stride * u64::from(count.unwrap_or(there));
+        return file(&service, &tenant, &job, Some(bytes), ("cages", OCTETS), &headers).await;
     }
     let end = match (count, follow) {
         (Some(count), _) => Some(first.saturating_add(count)),
@@ -69,7 +85,7 @@ pub(crate) async fn get(
             Err(error) => Some((Err(error), None)),
         }
     });
-    let headers = [(header::CONTENT_TYPE, "application/octet-stream"), (header::CACHE_CONTROL, "no-store")];
+    let headers = [(header::CONTENT_TYPE, OCTETS), (header::CACHE_CONTROL, "no-store")];
     Ok((headers, Body::from_stream(stream)).into_response())
 }
 

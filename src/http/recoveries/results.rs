@@ -14,6 +14,7 @@ use axum::response::Response;
 use http::header::CONTENT_DISPOSITION;
 use http::{HeaderMap, HeaderValue};
 use std::fs::File;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// The container of a completed recovery, byte for byte what `cager recover` writes for the same files and options.
@@ -31,7 +32,7 @@ pub(crate) async fn container(
     RequestedJob { job, tenant }: RequestedJob<Recovery>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    file(&service, &tenant, &job, ("capture.cager", "application/vnd.cager"), &headers).await
+    file(&service, &tenant, &job, None, ("capture.cager", "application/vnd.cager"), &headers).await
 }
 
 /// How each frame was found and how far it lies from its surface, as `cager recover --report` writes it.
@@ -49,7 +50,7 @@ pub(crate) async fn report(
     RequestedJob { job, tenant }: RequestedJob<Recovery>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    file(&service, &tenant, &job, ("report.json", "application/json"), &headers).await
+    file(&service, &tenant, &job, None, ("report.json", "application/json"), &headers).await
 }
 
 /// Where the rig's joints are in every frame, `frame,joint,x,y,z`.
@@ -67,7 +68,7 @@ pub(crate) async fn joints_csv(
     RequestedJob { job, tenant }: RequestedJob<Recovery>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    file(&service, &tenant, &job, ("joints.csv", "text/csv"), &headers).await
+    file(&service, &tenant, &job, None, ("joints.csv", "text/csv"), &headers).await
 }
 
 /// The rig's joints in every frame as a skeleton in motion.
@@ -85,13 +86,15 @@ pub(crate) async fn joints_bvh(
     RequestedJob { job, tenant }: RequestedJob<Recovery>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    file(&service, &tenant, &job, ("joints.bvh", "text/plain"), &headers).await
+    file(&service, &tenant, &job, None, ("joints.bvh", "text/plain"), &headers).await
 }
 
-async fn file(
+/// A result, or these bytes of it.
+pub(super) async fn file(
     service: &Service,
     tenant: &Tenant,
     job: &Arc<RecoveryJob>,
+    bytes: Option<Range<u64>>,
     (name, media_type): (&'static str, &'static str),
     headers: &HeaderMap,
 ) -> Result<Response, ApiError> {
@@ -104,7 +107,10 @@ async fn file(
     let opened = blocking(move || File::open(&path).map_err(|error| StoreError::of(&path, "open", error))).await?;
     let opened = opened.map_err(|error| job.fail_if_damaged(&service.store, error))?;
     let room = service.download_memory.nothing(&tenant.name);
-    let file = Immutable::of_file(opened, part.bytes, part.blake3, media_type, room, !service.access.is_guarded());
+    let etag =
+        bytes.as_ref().map_or(part.blake3.clone(), |range| format!("{}-{}-{}", part.blake3, range.start, range.end));
+    let bytes = bytes.unwrap_or(0..part.bytes);
+    let file = Immutable::of_file(opened, bytes, etag, media_type, room, !service.access.is_guarded());
     let mut response = file.respond(headers);
     let disposition = HeaderValue::from_str(&format!("attachment; filename=\"{name}\""));
     response.headers_mut().extend(disposition.ok().map(|value| (CONTENT_DISPOSITION, value)));

@@ -60,6 +60,9 @@ async fn what_is_recovered_is_byte_for_byte_what_the_command_line_recovers() {
     let stride = 12 * done.cage_vertices.expect("a cage") as usize;
     let cages = app.get(&format!("/v1/recoveries/{}/cages", job.id)).await.expect(200).body;
     assert_eq!(cages.len(), FRAMES as usize * stride);
+    let path = format!("/v1/recoveries/{}/cages?first=1", job.id);
+    let part = app.get_with(&path, &[("range", "bytes=12-35")]).await.expect(206);
+    assert!(part.body == cages[stride + 12..stride + 36] && !part.header("etag").is_empty());
     assert_eq!(following.await.expect("a stream").len(), FRAMES as usize * stride);
     let told = progress(&events.await.expect("a stream"));
     let frames: Vec<&FollowedFrame> = told.iter().flat_map(|progress| &progress.frames).collect();
