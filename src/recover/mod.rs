@@ -24,7 +24,7 @@ pub(crate) use surfaces::observed;
 use crate::design::default_vertices;
 use crate::mismatch::Up;
 use any_subject::Recovering;
-use cager_cages::{EncloseError, EncloseOptions, enclose};
+use cager_cages::{EncloseError, enclose_apart};
 use cager_core::cage::{Cage, CageError};
 use cager_core::coordinates::{CoordinateSystem, CoordinatesError, MeanValue};
 use cager_geometry::mesh::{Model, Point, TriMesh};
@@ -189,7 +189,7 @@ pub struct Recovered {
 /// # Errors
 /// No cage can be made around it.
 pub(crate) fn cage_around(template: &Model) -> Result<TriMesh, EncloseError> {
-    enclose(template, &EncloseOptions { vertices: default_vertices(template.points.len()), ..Default::default() })
+    enclose_apart(template, default_vertices(template.points.len()))
 }
 
 /// Frames of which all is known.

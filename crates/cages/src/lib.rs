@@ -4,7 +4,9 @@ mod bounding_shape;
 mod design;
 pub mod diagnosis;
 mod enclose;
+mod enclose_apart;
 
 pub use bounding_shape::{BoundingShape, bounding_shape};
 pub use design::{Design, DesignError, DesignOptions, Goal, MAX_VERTICES, Progress, Stage, Style, design};
 pub use enclose::{EncloseError, EncloseOptions, enclose, enclose_watched};
+pub use enclose_apart::enclose_apart;

@@ -34,6 +34,15 @@ const TOLERANCE: f64 = 1e-5;
 struct Pulls {
     hessians: Vec<DMat3>,
     pulls: Vec<DVec3>,
+    matches: Matches,
+}
+
+/// What matched in an iteration, which is near what matches in the next one.
+struct Matches {
+    /// The observed point of each vertex.
+    there: Vec<u32>,
+    /// The vertex of each observed point.
+    back: Vec<u32>,
 }
 
 impl OffsetSolver {
@@ -51,11 +60,13 @@ impl OffsetSolver {
     pub fn offset(&self, positions: &[Point], surface: &Target) -> Vec<Point> {
         let base: Vec<DVec3> = positions.iter().map(|&p| DVec3::from(p)).collect();
         let mut offsets = vec![DVec3::ZERO; base.len()];
+        let mut known = None;
         for iteration in 0..ITERATIONS {
             let t = iteration as f64 / (ITERATIONS - 1) as f64;
             let reach = REACH[0] * (REACH[1] / REACH[0]).powf(t) * self.diagonal;
             let moved: Vec<DVec3> = base.iter().zip(&offsets).map(|(&p, &d)| p + d).collect();
-            let Pulls { hessians, mut pulls } = self.pulls(&moved, surface, reach);
+            let Pulls { hessians, mut pulls, matches } = self.pulls(&moved, surface, reach, known.as_ref());
+            known = Some(matches);
             let held = self.smoothness_times(&offsets);
             pulls.iter_mut().zip(held).for_each(|(pull, held)| *pull -= held);
             let change = self.solve(&hessians, pulls);
@@ -75,7 +86,7 @@ impl OffsetSolver {
     }
 
     /// Matches of every vertex with the surface, and of every point of the surface with a vertex.
-    fn pulls(&self, vertices: &[DVec3], surface: &Target, reach: f64) -> Pulls {
+    fn pulls(&self, vertices: &[DVec3], surface: &Target, reach: f64, known: Option<&Matches>) -> Pulls {
         let normals = self.normals(vertices);
         let term = |own: DVec3, other: DVec3, offset: DVec3, share: f64| {
             let cosine = own.dot(other);
@@ -85,33 +96,42 @@ impl OffsetSolver {
             let hessian = DMat3::from_cols(weighted * other.x, weighted * other.y, weighted * other.z);
             (hessian, -offset.dot(other) * weighted)
         };
-        let (mut hessians, mut pulls): (Vec<DMat3>, Vec<DVec3>) = vertices
+        let there: Vec<u32> = vertices
             .par_iter()
             .zip(&normals)
+            .enumerate()
             .with_min_len(64)
-            .map(|(&p, &n)| {
-                let j = surface.nearest(p, n);
-                term(n, surface.normals()[j], p - surface.points()[j], 1.0)
+            .map(|(i, (&p, &n))| match known {
+                Some(known) => surface.nearest_from(p, n, known.there[i] as usize) as u32,
+                None => surface.nearest(p, n) as u32,
             })
-            .unzip();
+            .collect();
+        let of_vertex = |(i, &j): (usize, &u32)| {
+            let j = j as usize;
+            term(normals[i], surface.normals()[j], vertices[i] - surface.points()[j], 1.0)
+        };
+        let (mut hessians, mut pulls): (Vec<DMat3>, Vec<DVec3>) = there.iter().enumerate().map(of_vertex).unzip();
         let plain = |points: &[DVec3]| points.iter().map(DVec3::to_array).collect::<Vec<Point>>();
         let tree = OrientedPoints::new(&plain(vertices), &plain(&normals), surface.normal_length());
         let share = vertices.len() as f64 / surface.points().len() as f64;
-        let back: Vec<(usize, (DMat3, DVec3))> = surface
+        let back: Vec<u32> = surface
             .points()
             .par_iter()
             .zip(surface.normals())
+            .enumerate()
             .with_min_len(64)
-            .map(|(&q, &n)| {
-                let (i, _) = tree.nearest(q.to_array(), n.to_array());
-                (i, term(normals[i], n, vertices[i] - q, share))
+            .map(|(k, (q, n))| match known {
+                Some(known) => tree.nearest_from(q.to_array(), n.to_array(), known.back[k] as usize).0 as u32,
+                None => tree.nearest(q.to_array(), n.to_array()).0 as u32,
             })
             .collect();
-        for (i, (hessian, pull)) in back {
+        for (&i, (&q, &n)) in back.iter().zip(surface.points().iter().zip(surface.normals())) {
+            let i = i as usize;
+            let (hessian, pull) = term(normals[i], n, vertices[i] - q, share);
             hessians[i] += hessian;
             pulls[i] += pull;
         }
-        Pulls { hessians, pulls }
+        Pulls { hessians, pulls, matches: Matches { there, back } }
     }
 
     /// What smoothness and size have against offsets: their gradient.

@@ -1,6 +1,6 @@
 //! A template followed through surfaces without correspondence, by its cage alone: any subject.
 
-use cager_geometry::vector::{Point, along, dot, middle, sub};
+use cager_geometry::vector::{Point, along, dot, middle, norm, sub};
 use cager_registration::{FitOptions, Target, Template};
 
 /// How a frame's cage was found.
@@ -34,6 +34,8 @@ pub struct Tracker<'t> {
     before: Vec<Point>,
     /// Scores of the frames so far, in their order.
     scores: Vec<f64>,
+    /// The last frame that was looked for further around.
+    searched: Option<usize>,
 }
 
 /// Frames before that say what scores are usual just now: they change with the pose.
@@ -42,6 +44,10 @@ const RECENT: usize = 9;
 const SEARCHED_FROM: f64 = 1.06;
 /// So is one that scores above so many times the median of all.
 const SEARCHED_FROM_ALL: f64 = 1.3;
+/// The surface moves little where the two starts are nearer to each other than this share of the diagonal: to a search that sees much further they are one.
+const ALIKE: f64 = 0.02;
+/// For so many frames.
+const SEARCHED_FOR: usize = 3;
 /// A frame that scores above so many times the median of all is lost.
 const LOST_FROM: f64 = 1.6;
 /// Frames before that it takes to say so: a template that is the first frame lies there better than it can elsewhere.
@@ -50,7 +56,7 @@ const MIN_JUDGED: usize = 3;
 impl<'t> Tracker<'t> {
     /// From the cage of the rest pose, laid where the first frame is.
     pub fn new(template: &'t Template, start: Vec<Point>) -> Self {
-        Self { template, before: start.clone(), last: start, scores: Vec::new() }
+        Self { template, before: start.clone(), last: start, scores: Vec::new(), searched: None }
     }
 
     /// The next frame's cage.
@@ -64,14 +70,15 @@ impl<'t> Tracker<'t> {
         }
         let mut best = Scored::fit(template, surface, starts[0], &FitOptions::NEAR);
         let mut outcome = Outcome::Followed;
-        let recent = median(&self.scores[self.scores.len().saturating_sub(RECENT)..]);
-        let usual = median(&self.scores);
-        let most = (SEARCHED_FROM * recent).min(SEARCHED_FROM_ALL * usual);
-        for start in starts {
+        let usual = median(judging(&self.scores));
+        let alike = farthest_apart(starts) < ALIKE * template.diagonal();
+        let most = (SEARCHED_FROM * self.level(alike)).min(SEARCHED_FROM_ALL * usual);
+        for start in &starts[..if alike { 1 } else { 2 }] {
             // Of the first frame nothing says how well it should lie.
             if best.score <= most && !self.scores.is_empty() {
                 break;
             }
+            self.searched = Some(self.scores.len());
             let again = Scored::fit(template, surface, start, &FitOptions::FAR);
             if again.score < best.score {
                 (best, outcome) = (again, Outcome::SearchedWider);
@@ -85,11 +92,29 @@ impl<'t> Tracker<'t> {
         TrackedFrame { cage: best.cage, score: best.score, outcome }
     }
 
+    /// The score that is usual just now. What a search further around a frame shortly before has left is as good as it gets where the surface moves little.
+    fn level(&self, slow: bool) -> f64 {
+        let scores = judging(&self.scores);
+        let recent = median(&scores[scores.len().saturating_sub(RECENT)..]);
+        let searched = self.searched.filter(|&frame| slow && frame + SEARCHED_FOR >= self.scores.len());
+        searched.map_or(recent, |frame| recent.max(self.scores[frame]))
+    }
+
     /// A frame without a surface.
     pub fn skip(&mut self) -> TrackedFrame {
         self.before.clone_from(&self.last);
         TrackedFrame { cage: self.last.clone(), score: f64::INFINITY, outcome: Outcome::NoSurface }
     }
+}
+
+/// Scores but the first where there are enough others: a template that is the first frame lies there better than it can elsewhere.
+fn judging(scores: &[f64]) -> &[f64] {
+    if scores.len() > MIN_JUDGED { &scores[1..] } else { scores }
+}
+
+/// How far two cages are apart where they are farthest.
+fn farthest_apart([a, b]: [&Vec<Point>; 2]) -> f64 {
+    a.iter().zip(b).map(|(&a, &b)| norm(sub(a, b))).fold(0.0, f64::max)
 }
 
 /// The median of some scores; infinite without any.

@@ -1,15 +1,15 @@
 //! A template's cage fitted to a surface without correspondence: matches both ways, point to plane, as rigid as possible.
 
-use cager_geometry::linalg::{cholesky, solve_cholesky, tall_product, transposed_product};
+use cager_geometry::linalg::{cholesky, solve_cholesky, transposed_product};
 use cager_geometry::vector::Point;
 use faer::{Mat, MatRef};
 use glam::{DMat3, DVec3, Mat3A, Vec3A};
 use rayon::prelude::*;
 
 use crate::matching::{OrientedPoints, match_weight};
-use crate::observation::Observation;
 use crate::sparse_rows::{matrix, points, single, vectors};
-use crate::template::{Template, plain, pose};
+use crate::target::Target;
+use crate::template::{Template, plain};
 
 /// How a fit goes from stiff and far-seeing to loose and exact: `[first, last]` of each iteration's values, in between in proportion.
 #[derive(Clone, Copy, Debug)]
@@ -42,68 +42,13 @@ impl FitOptions {
     pub const FAR: Self = Self { iterations: 16, rigidity: [1e-2, 1e-5], reach: [0.1, 0.006], ..Self::NEAR };
 }
 
-/// A surface made ready to be matched.
-pub struct Target {
-    points: Vec<DVec3>,
-    normals: Vec<DVec3>,
-    tree: OrientedPoints,
-    normal_length: f64,
-}
-
-/// What a normal counts in matches, as a share of the diagonal.
-const NORMAL_LENGTH: f64 = 0.02;
 /// Holds what nothing else determines.
 const START_WEIGHT: f64 = 1e-4;
 /// A fit ends early once the samples move by less than this share of the diagonal.
 const MIN_MOVE: f64 = 1e-4;
 /// Of the residual of conjugate gradients, squared.
 const TOLERANCE: f64 = 1e-4;
-/// Distances count no more than this in a score, as a share of the diagonal.
-const MAX_SCORED: f64 = 0.05;
-/// Of the observed points, every so manieth is scored.
-const SCORED_EVERY: usize = 5;
 const BLOCK_ROWS: usize = 512;
-
-impl Target {
-    /// An observation for a template of this diagonal.
-    ///
-    /// # Panics
-    /// Where it has no points.
-    pub fn new(observation: &Observation, diagonal: f64) -> Self {
-        let normal_length = NORMAL_LENGTH * diagonal;
-        Self {
-            points: vectors(&observation.points),
-            normals: vectors(&observation.normals),
-            tree: OrientedPoints::new(&observation.points, &observation.normals, normal_length),
-            normal_length,
-        }
-    }
-
-    /// The observation.
-    pub fn observation(&self) -> Observation {
-        Observation { points: plain(&self.points), normals: plain(&self.normals) }
-    }
-
-    /// The observed points.
-    pub fn points(&self) -> &[DVec3] {
-        &self.points
-    }
-
-    /// Their unit normals.
-    pub fn normals(&self) -> &[DVec3] {
-        &self.normals
-    }
-
-    /// The observed point that a point with this unit normal matches.
-    pub fn nearest(&self, point: DVec3, normal: DVec3) -> usize {
-        self.tree.nearest(point.to_array(), normal.to_array()).0
-    }
-
-    /// What a normal counts in matches, in the unit of the points.
-    pub fn normal_length(&self) -> f64 {
-        self.normal_length
-    }
-}
 
 /// Weighted squared distances along normals, by sample: `½ xᵢᵀ Bᵢ xᵢ − bᵢᵀ xᵢ` of a sample's displacement.
 struct Distances {
@@ -112,13 +57,32 @@ struct Distances {
     single_hessians: Vec<Mat3A>,
 }
 
-impl Template {
-    /// Samples in a cage: positions and unit normals.
-    fn samples_in(&self, cage: MatRef<'_, f64>) -> (Vec<DVec3>, Vec<DVec3>) {
-        let corners = points(tall_product(self.corner_coordinates.as_ref(), cage).as_ref());
-        self.samples.iter().map(|sample| pose(sample, &corners)).unzip()
-    }
+/// Matches of the iteration before, which are near those of the next one.
+struct KnownMatches {
+    /// The observed point of each sample.
+    there: Vec<Option<u32>>,
+    /// The sample of each observed point.
+    back: Vec<Option<u32>>,
+}
 
+impl KnownMatches {
+    fn none(samples: usize, points: usize) -> Self {
+        Self { there: vec![None; samples], back: vec![None; points] }
+    }
+}
+
+/// The nearest of some points, from the one that was it before; it is remembered.
+fn found(tree: &OrientedPoints, point: DVec3, normal: DVec3, known: &mut Option<u32>) -> usize {
+    let (point, normal) = (point.to_array(), normal.to_array());
+    let (found, _) = match *known {
+        Some(known) => tree.nearest_from(point, normal, known as usize),
+        None => tree.nearest(point, normal),
+    };
+    *known = Some(found as u32);
+    found
+}
+
+impl Template {
     /// The cage that lays the template onto a surface, from a cage near it. Runs on the current rayon pool; the result does not depend on it.
     pub fn fit(&self, target: &Target, start: &[Point], options: &FitOptions) -> Vec<Point> {
         self.fit_beside(target, start, start, options)
@@ -136,11 +100,12 @@ impl Template {
         let mut cage = matrix(&vectors(start));
         let m = cage.nrows();
         let hold = options.hold / (self.diagonal * self.diagonal * m as f64);
+        let mut known = KnownMatches::none(self.samples.len(), target.points.len());
         for iteration in 0..options.iterations {
             let t = iteration as f64 / (options.iterations - 1).max(1) as f64;
             let between = |[first, last]: [f64; 2]| first * (last / first).powf(t);
             let (rigidity, reach) = (between(options.rigidity), between(options.reach) * self.diagonal);
-            let distances = self.distances(target, cage.as_ref(), reach, options.matched_back, iteration);
+            let distances = self.distances(target, cage.as_ref(), reach, (options.matched_back, iteration), &mut known);
             let mut pull = transposed_product(self.coordinates.as_ref(), matrix(&distances.pulls).as_ref(), BLOCK_ROWS);
             pull += faer::Scale(rigidity) * self.rigidity.pull(&self.rigidity.positions(cage.as_ref()));
             pull += faer::Scale(hold) * (&reference - &cage);
@@ -157,7 +122,14 @@ impl Template {
     }
 
     /// Matches of every sample with the surface, and of a part of the surface with the samples.
-    fn distances(&self, target: &Target, cage: MatRef<'_, f64>, reach: f64, most: usize, turn: usize) -> Distances {
+    fn distances(
+        &self,
+        target: &Target,
+        cage: MatRef<'_, f64>,
+        reach: f64,
+        (most, turn): (usize, usize),
+        known: &mut KnownMatches,
+    ) -> Distances {
         let (positions, normals) = self.samples_in(cage);
         let unit = 1.0 / (self.diagonal * self.diagonal);
         let share = unit / positions.len() as f64;
@@ -169,9 +141,10 @@ impl Template {
         let (mut hessians, mut pulls): (Vec<DMat3>, Vec<DVec3>) = positions
             .par_iter()
             .zip(&normals)
+            .zip(&mut known.there)
             .with_min_len(64)
-            .map(|(&p, &n)| {
-                let (j, _) = target.tree.nearest(p.to_array(), n.to_array());
+            .map(|((&p, &n), known)| {
+                let j = found(&target.tree, p, n, known);
                 let (offset, normal) = (p - target.points[j], target.normals[j]);
                 term(normal, share * match_weight(n.dot(normal), offset, reach), offset)
             })
@@ -184,12 +157,13 @@ impl Template {
             .par_iter()
             .with_min_len(64)
             .map(|&k| {
-                let (point, normal) = (target.points[k], target.normals[k]);
-                let (i, _) = samples.nearest(point.to_array(), normal.to_array());
+                let (point, normal, mut match_of) = (target.points[k], target.normals[k], known.back[k]);
+                let i = found(&samples, point, normal, &mut match_of);
                 let offset = positions[i] - point;
                 (i, term(normal, share * match_weight(normals[i].dot(normal), offset, reach), offset))
             })
             .collect();
+        back.iter().zip(&terms).for_each(|(&k, (i, _))| known.back[k] = Some(*i as u32));
         for (i, (hessian, pull)) in terms {
             hessians[i] += hessian;
             pulls[i] += pull;
@@ -255,40 +229,6 @@ impl Template {
             size = next;
         }
         x
-    }
-
-    /// How well the template lies on a surface in a cage: the root mean square, both ways, of the distance from the plane of the nearest point and of the difference of
-    /// normals together, as a share of the diagonal; distances beyond 5 % count as 5 %.
-    pub fn score(&self, target: &Target, cage: &[Point]) -> f64 {
-        let (positions, normals) = self.samples_in(matrix(&vectors(cage)).as_ref());
-        let samples = OrientedPoints::new(&plain(&positions), &plain(&normals), target.normal_length);
-        let scored = |offset: DVec3, own: DVec3, other: DVec3, d2: f64| {
-            let far = d2.sqrt() / self.diagonal;
-            let plane = offset.dot(other) / self.diagonal;
-            let turn = NORMAL_LENGTH * (own - other).length();
-            if far > MAX_SCORED { MAX_SCORED } else { (plane * plane + turn * turn).sqrt().min(MAX_SCORED) }
-        };
-        let there: Vec<f64> = positions
-            .par_iter()
-            .zip(&normals)
-            .with_min_len(64)
-            .map(|(&p, &n)| {
-                let (j, d2) = target.tree.nearest(p.to_array(), n.to_array());
-                scored(p - target.points[j], n, target.normals[j], d2)
-            })
-            .collect();
-        let back: Vec<f64> = (0..target.points.len())
-            .into_par_iter()
-            .step_by(SCORED_EVERY)
-            .with_min_len(64)
-            .map(|k| {
-                let (point, normal) = (target.points[k], target.normals[k]);
-                let (i, d2) = samples.nearest(point.to_array(), normal.to_array());
-                scored(point - positions[i], normal, normals[i], d2)
-            })
-            .collect();
-        let mean = |distances: &[f64]| (distances.iter().map(|d| d * d).sum::<f64>() / distances.len() as f64).sqrt();
-        mean(&there) + mean(&back)
     }
 }
 

@@ -26,6 +26,11 @@ impl OrientedPoints {
     pub fn nearest(&self, point: Point, normal: Point) -> (usize, f64) {
         self.tree.nearest(join(point, normal, self.normal_length))
     }
+
+    /// [`Self::nearest`], where the number of a point is known that is near already: nothing is looked for beyond it.
+    pub fn nearest_from(&self, point: Point, normal: Point, known: usize) -> (usize, f64) {
+        self.tree.nearest_from(join(point, normal, self.normal_length), known)
+    }
 }
 
 /// A point with its normal in six dimensions.

@@ -1,6 +1,6 @@
 //! Nearest points in a few dimensions, by a k-d tree.
 
-use nabo::{KDTree, NotNan, Point};
+use nabo::{CandidateContainer, KDTree, NotNan, Parameters, Point};
 
 /// A point in `D` dimensions as the tree wants it.
 #[derive(Clone, Copy)]
@@ -30,7 +30,13 @@ fn node<const D: usize>(point: [f64; D]) -> Node<D> {
 }
 
 /// A tree over points in `D` dimensions. Coordinates that are NaN count as 0.
-pub struct NearestPoints<const D: usize>(KDTree<f64, Node<D>>);
+pub struct NearestPoints<const D: usize> {
+    tree: KDTree<f64, Node<D>>,
+    points: Vec<Node<D>>,
+}
+
+/// What is looked for beyond a known distance, since both are rounded.
+const MARGIN: f64 = 1.0 + 1e-9;
 
 impl<const D: usize> NearestPoints<D> {
     /// A tree over some points.
@@ -40,19 +46,35 @@ impl<const D: usize> NearestPoints<D> {
     pub fn new(points: impl IntoIterator<Item = [f64; D]>) -> Self {
         let nodes: Vec<Node<D>> = points.into_iter().map(node).collect();
         assert!(!nodes.is_empty(), "a tree needs a point");
-        Self(KDTree::new(&nodes))
+        Self { tree: KDTree::new(&nodes), points: nodes }
     }
 
     /// The number of the point nearest to `query`, and the squared distance.
     pub fn nearest(&self, query: [f64; D]) -> (usize, f64) {
-        let found = self.0.knn(1, &node(query));
+        let found = self.tree.knn(1, &node(query));
         // None is found where squares of distances overflow.
         found.first().map_or((0, f64::INFINITY), |found| (found.index as usize, found.dist2.into_inner()))
     }
 
+    /// [`Self::nearest`], where the number of a point is known that is near already: nothing is looked for beyond it.
+    pub fn nearest_from(&self, query: [f64; D], known: usize) -> (usize, f64) {
+        let query = node(query);
+        let squares = query.0.iter().zip(&self.points[known].0).map(|(a, b)| (a.into_inner() - b.into_inner()).powi(2));
+        let known_d2: f64 = squares.sum();
+        let within = Parameters {
+            epsilon: 0.0,
+            max_radius: known_d2.sqrt() * MARGIN,
+            allow_self_match: true,
+            sort_results: false,
+        };
+        let found = self.tree.knn_advanced(1, &query, CandidateContainer::Linear, &within, None);
+        let found = found.first().map(|found| (found.index as usize, found.dist2.into_inner()));
+        found.filter(|(_, d2)| *d2 < known_d2).unwrap_or((known, known_d2))
+    }
+
     /// The numbers of the `count` points nearest to `query`, nearest first.
     pub fn several(&self, count: u32, query: [f64; D]) -> Vec<usize> {
-        self.0.knn(count, &node(query)).iter().map(|found| found.index as usize).collect()
+        self.tree.knn(count, &node(query)).iter().map(|found| found.index as usize).collect()
     }
 }
 
@@ -72,6 +94,10 @@ mod tests {
             let least = points.iter().map(|&p| distance2(p, query)).fold(f64::INFINITY, f64::min);
             let (found, d2) = tree.nearest(query);
             assert!((d2 - least).abs() < 1e-12 && (distance2(points[found], query) - least).abs() < 1e-12);
+            for known in [found, random.usize(..points.len())] {
+                let (again, d2) = tree.nearest_from(query, known);
+                assert!((d2 - least).abs() < 1e-12 && (distance2(points[again], query) - least).abs() < 1e-12);
+            }
         }
     }
 

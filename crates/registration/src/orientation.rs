@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use cager_geometry::vector::{Point, cross, dot, mean, sub};
+use rayon::prelude::*;
 
 /// Triangles that face outwards, as far as that can be told.
 pub(crate) struct Oriented {
@@ -55,7 +56,7 @@ fn links(triangles: &[[u32; 3]]) -> Vec<Link> {
         let real = [[a, b], [b, c], [c, a]].into_iter().filter(|[u, v]| u != v);
         sides.extend(real.map(|[u, v]| ([u.min(v), u.max(v)], face as u32, u < v)));
     }
-    sides.sort_unstable();
+    sides.par_sort_unstable();
     sides
         .chunk_by(|a, b| a.0 == b.0)
         .filter_map(|at| match at {

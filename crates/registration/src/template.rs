@@ -7,11 +7,12 @@ use cager_geometry::vector::Point;
 use faer::{Mat, MatRef};
 use glam::DVec3;
 
+use crate::dense_rows::DenseRows;
 use crate::matching::join;
 use crate::orientation::welded;
 use crate::rigidity::{Rigidity, node_edges};
 use crate::sampling::{SurfacePoint, area_normal, farthest, sample_surface};
-use crate::sparse_rows::{SparseRows, vectors};
+use crate::sparse_rows::{SparseRows, points, vectors};
 
 /// How closely a template is looked at.
 #[derive(Clone, Copy, Debug)]
@@ -60,7 +61,7 @@ pub struct Template {
     pub(crate) diagonal: f64,
     pub(crate) samples: Vec<Sample>,
     /// Coordinates of the corners of the samples' triangles.
-    pub(crate) corner_coordinates: Mat<f64>,
+    pub(crate) corner_coordinates: DenseRows,
     /// Coordinates of the samples, s × m.
     pub(crate) coordinates: Mat<f64>,
     pub(crate) sparse: SparseRows,
@@ -134,13 +135,19 @@ impl Template {
         Ok(Self {
             diagonal,
             samples,
-            corner_coordinates,
+            corner_coordinates: DenseRows::new(corner_coordinates.as_ref()),
             sparse: SparseRows::new(coordinates.as_ref(), SPARSE_THRESHOLD),
             coordinates,
             gram: scaled,
             rigidity_hessian: rigidity.hessian(),
             rigidity,
         })
+    }
+
+    /// Samples in a cage: positions and unit normals.
+    pub(crate) fn samples_in(&self, cage: MatRef<'_, f64>) -> (Vec<DVec3>, Vec<DVec3>) {
+        let corners = self.corner_coordinates.times(&points(cage));
+        self.samples.iter().map(|sample| pose(sample, &corners)).unzip()
     }
 
     /// Length of the rest pose's diagonal.
